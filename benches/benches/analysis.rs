@@ -6,22 +6,22 @@ use skinrig_analysis::calibrate::{calibrate, choose};
 use skinrig_analysis::clock::{PressSpan, align_by_rates, fit_rates};
 use skinrig_analysis::dbscan::Dbscan;
 use skinrig_analysis::grid::PixelGrid;
-use skinrig_analysis::kept::Keep;
 use skinrig_analysis::metrics::{Exclusions, metrics};
+use skinrig_analysis::press_events::Retention;
 use skinrig_analysis::rates::RateHistogram;
 use skinrig_analysis::sets::{CalibrationSet, ScoreSet};
 use skinrig_analysis::triangulate::locate;
-use skinrig_analysis::{analyze_and_keep, reduction};
+use skinrig_analysis::{analyze_with_events, reduction};
 use skinrig_bench::files::{Files, Memory};
 use skinrig_bench::memory::{peak_mb, reset_peak};
 use skinrig_bench::{Table, recording};
 use skinrig_model::{CalibrationModel, PressRole, SkinOutline, StereoGeometry};
 
-/// Events of a dense press: those of one period in a real-rate recording.
+/// Events of a dense press: one period of a recording at a realistic rate.
 const PRESS_EVENTS: usize = 20_000;
 
 fn main() {
-    // Before anything else has needed memory.
+    // Before anything else allocates memory.
     memory();
     clustering();
     sizes();
@@ -70,7 +70,7 @@ fn cluster(dbscan: &mut Dbscan, grid: &mut PixelGrid, events: &[(u16, u16)]) {
 /// Presses of a thousand to ten million events.
 const SIZES: [usize; 5] = [1_000, 10_000, 100_000, 1_000_000, 10_000_000];
 
-/// Resident memory while presses of growing size are counted as they come, and clustered.
+/// Resident memory while presses of growing size are counted and clustered.
 fn memory() {
     let mut pixels = vec![(0, 0); 8192];
     println!("\nDBSCAN of one press by its size: peak resident memory of the process");
@@ -188,12 +188,12 @@ fn whole() {
     println!("{}", table.run(3));
 }
 
-/// Presses of the published calibration.
+/// Presses in the published calibration.
 const CALIBRATED: usize = 250;
-/// Seeds of the multi-start that have to agree.
+/// Seeds of the multi-start that must agree.
 const SEEDS: u64 = 10;
 
-/// The calibration of 250 presses: every seed of the multi-start has to end in the same optimum.
+/// Calibration of 250 presses: every seed of the multi-start must reach the same optimum.
 fn calibrations() {
     let mut input = recording::input();
     input.settings.study_presses = 0;
@@ -248,14 +248,14 @@ fn calibrations() {
     println!("{}", table.run(5));
 }
 
-/// The study of data reduction on all presses, in windows that hold about 18,000 events of each camera.
+/// Data-reduction study on all presses, in windows of about 18,000 events per camera.
 fn reductions() {
     let mut input = recording::input();
     let settings = &mut input.settings;
     settings.calibration = CalibrationModel::None;
     settings.window_before_ms = 100.0;
     settings.window_after_ms = 1500.0;
-    // The studies that the analysis itself does are kept small.
+    // Keep the studies of the analysis itself small.
     (settings.reduction.seeds, settings.reduction.max_power) = (1, 1);
     for planned in &mut input.planned {
         if planned.role == PressRole::Calibrate {
@@ -264,7 +264,7 @@ fn reductions() {
     }
     let source = Memory(recording::events(&input));
     let (mut done, kept) =
-        analyze_and_keep(&input, &source, Keep::Scored).expect("a good recording");
+        analyze_with_events(&input, &source, Retention::Scored).expect("a good recording");
     drop(source);
     (
         done.settings.reduction.seeds,

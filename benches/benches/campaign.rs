@@ -1,7 +1,7 @@
-//! A whole campaign: simulate and record, verify, analyse; seconds and memory of each, and how they grow with the events.
+//! A whole campaign: simulate and record, verify, analyse; time and memory of each stage, and their growth with the events.
 //!
-//! `SKINRIG_BENCH_REPETITIONS` says how many of the published ten repetitions are run, one campaign for each number;
-//! `1,3,10` when absent.
+//! `SKINRIG_BENCH_REPETITIONS` selects how many of the published ten repetitions run, one campaign per number; default
+//! `1,3,10`.
 #![expect(clippy::print_stdout, reason = "a bench prints its table")]
 
 use std::ffi::OsString;
@@ -19,17 +19,17 @@ const PROTOCOL: &str = concat!(
     "/../protocols/paper-meander.yaml"
 );
 
-/// One part of the pipeline.
+/// A stage of the pipeline.
 struct Stage {
     what: &'static str,
     seconds: f64,
-    /// Largest resident memory during the part; `None` where the system does not say.
+    /// Peak resident memory of the stage; `None` if the system does not report it.
     peak_mb: Option<f64>,
-    /// Bytes that the process asked the system for during the part; `None` where the system does not say.
+    /// Bytes read by the process during the stage; `None` if the system does not report it.
     read: Option<u64>,
 }
 
-/// What one campaign took to be analysed.
+/// Results of one campaign.
 struct Campaign {
     events: u64,
     bytes: u64,
@@ -55,11 +55,11 @@ fn skinrig(arguments: &[OsString]) {
     assert_eq!(skinrig::main_with(all), Exit::Ok, "{arguments:?}");
 }
 
-/// The protocol's overrides for this many repetitions.
+/// Protocol overrides for this many repetitions.
 fn overrides(repetitions: u32) -> Vec<String> {
     let mut values = vec![format!("repetitions.count={repetitions}")];
     if repetitions == 1 {
-        // There is none to calibrate with besides the scored one.
+        // A single repetition is scored, so none calibrates.
         values.push("evaluation.calibrate=[]".into());
         values.push("evaluation.score=[1]".into());
         values.push("analysis.calibration=none".into());
@@ -77,7 +77,7 @@ fn session_in(folder: &Path) -> PathBuf {
         .expect("a session")
 }
 
-/// Writes the bytes of `source` to a new file and makes them durable; seconds without the reading.
+/// Writes the bytes of `source` to a new file durably; seconds without the reading.
 fn plain_write(source: &Path, target: &Path) -> f64 {
     let mut from = File::open(source).expect("the session");
     let mut to = File::create(target).expect("a new file");
@@ -105,7 +105,7 @@ fn main() {
     growth(&campaigns);
 }
 
-/// How the analysis grows with the events.
+/// Growth of the analysis with the events.
 fn growth(campaigns: &[Campaign]) {
     println!("\nanalyse and report, by the events of a session");
     for (i, c) in campaigns.iter().enumerate() {
@@ -117,8 +117,8 @@ fn growth(campaigns: &[Campaign]) {
         let times_read =
             |read: u64| format!("  {:.2} x the session read", read as f64 / c.bytes as f64);
         let read = c.analysing.read.map_or(String::new(), times_read);
-        // From the campaign before to this one: what each further event costs, and the power of the events that time
-        // goes with, 1 when it is proportional.
+        // Relative to the previous campaign: cost of each further event, and exponent of time over events, 1 if
+        // proportional.
         let grown = i
             .checked_sub(1)
             .and_then(|before| campaigns.get(before))
@@ -137,7 +137,7 @@ fn growth(campaigns: &[Campaign]) {
     }
 }
 
-/// One campaign of so many repetitions.
+/// Runs a campaign with this many repetitions.
 fn campaign(repetitions: u32) -> Campaign {
     let overrides = overrides(repetitions);
     let checked = skinrig::check::load(Path::new(PROTOCOL), &overrides)

@@ -1,6 +1,6 @@
-//! The analysis beside Python: scikit-learn, the C++ `dbscan` package, numpy and scipy, and the choices of the public
-//! analysis code. The scripts in `benches/compare` do the other side, on the same files, in the same run, and say
-//! whether they found the same.
+//! The analysis compared with Python: scikit-learn, the C++ `dbscan` package, numpy and scipy, and the choices of the public
+//! analysis code. The scripts in `benches/compare` do the same work on the same files in the same run; the results must be
+//! equal.
 #![expect(clippy::print_stdout, reason = "a bench prints its table")]
 
 use std::cell::RefCell;
@@ -10,10 +10,10 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 use skinrig_analysis::dbscan::{Dbscan, NOISE};
 use skinrig_analysis::grid::PixelGrid;
-use skinrig_analysis::kept::Keep;
 use skinrig_analysis::latency;
+use skinrig_analysis::press_events::Retention;
 use skinrig_analysis::segment::windows;
-use skinrig_analysis::{Analysis, SessionInput, analyze, analyze_and_keep};
+use skinrig_analysis::{Analysis, SessionInput, analyze, analyze_with_events};
 use skinrig_bench::files::Files;
 use skinrig_bench::python::Python;
 use skinrig_bench::{Table, recording};
@@ -22,12 +22,12 @@ use skinrig_model::{AnalysisSettings, CalibrationModel, CentroidRule, PressRole,
 const ROWS: (u16, u16) = (185, 360);
 const EPS_PX: f64 = 10.0;
 const MIN_SAMPLES: u32 = 10;
-/// Events of a dense press: those of one period in a real-rate recording.
+/// Events of a dense press: one period of a recording at a realistic rate.
 const PRESS_EVENTS: usize = 20_000;
 
 fn main() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    // By hand: `SKINRIG_BENCH_INPUTS=FOLDER` keeps the inputs for the scripts.
+    // For manual use: `SKINRIG_BENCH_INPUTS=FOLDER` keeps the inputs of the scripts.
     let kept = std::env::var_os("SKINRIG_BENCH_INPUTS").map(PathBuf::from);
     let folder = kept.as_deref().unwrap_or(folder.path());
     fs::create_dir_all(folder).expect("a folder");
@@ -59,7 +59,7 @@ fn start(script: &str, folder: &Path) -> Option<RefCell<Python>> {
     python.map(RefCell::new)
 }
 
-/// Wall seconds of the whole, of which the task may have done a share; panics unless both sides found the same.
+/// Wall-clock seconds of a task; panics unless both sides found the same.
 fn seconds(python: &RefCell<Python>, task: &str) -> f64 {
     let answer = python.borrow_mut().ask(task).expect("an answer");
     assert_eq!(answer["agrees"], true, "{task}: {answer}");
@@ -108,7 +108,7 @@ fn cluster(dbscan: &mut Dbscan, grid: &mut PixelGrid, events: &[(u16, u16)]) {
     std::hint::black_box(dbscan.run(grid).len());
 }
 
-/// The events, and per event 0 for noise, 1 for border, 2 for core.
+/// Writes the events, and per event 0 for noise, 1 for border, 2 for core.
 fn write_press(folder: &Path, events: &[(u16, u16)], dbscan: &Dbscan) {
     let mut classes = vec![0u8; 640 * 480];
     for (pixel, label) in dbscan.labels() {
@@ -129,7 +129,7 @@ fn write_press(folder: &Path, events: &[(u16, u16)], dbscan: &Dbscan) {
     write(folder, "press.json", settings.to_string().as_bytes());
 }
 
-/// One repetition in the way of the public code: windows of a whole period, all clusters, all eight parameters.
+/// One repetition as in the public code: windows of a whole period, all clusters, all eight parameters.
 fn repetition(folder: &Path) {
     let [mut input, mut unmarked] = [recording::marked_input(), recording::input()];
     let beside_ms = 1e3 * (recording::PERIOD_S - recording::TOUCH_S) / 2.0;
@@ -198,7 +198,7 @@ fn repetition(folder: &Path) {
     println!("{}", table.run(15));
 }
 
-/// The detection latency of all presses of the repetition that [`repetition`] left in the folder.
+/// Detection latency of all presses of the repetition that [`repetition`] left in the folder.
 fn studies(folder: &Path) {
     let mut input = recording::input();
     input.settings.calibration = CalibrationModel::None;
@@ -207,8 +207,8 @@ fn studies(folder: &Path) {
             planned.role = PressRole::Score;
         }
     }
-    let (done, kept) =
-        analyze_and_keep(&input, &Files::at(folder), Keep::Scored).expect("a good recording");
+    let (done, kept) = analyze_with_events(&input, &Files::at(folder), Retention::Scored)
+        .expect("a good recording");
     let presses = f64::from(recording::PRESSES);
     let thresholds = f64::from(input.settings.latency.thresholds.count);
     let method = format!(
@@ -230,7 +230,7 @@ fn studies(folder: &Path) {
     println!("{}", table.run(3));
 }
 
-/// What the other side is given, and what it has to find.
+/// Input for the baseline, and the expected result.
 fn known(input: &SessionInput, done: &Analysis) -> Value {
     let presses = || {
         let rows = done.presses.iter().enumerate();

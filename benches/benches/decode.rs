@@ -1,4 +1,4 @@
-//! Event decoding and encoding on one core, beside a straightforward decoder and a memory copy.
+//! Event decoding and encoding on one core, compared with a straightforward decoder and a memory copy.
 #![expect(clippy::print_stdout, reason = "a bench prints its table")]
 
 use std::hint::black_box;
@@ -65,7 +65,7 @@ fn evt3(rows: usize, per_row: usize, vectors: bool) -> (Vec<u8>, usize) {
     (words.iter().flat_map(|w| w.to_le_bytes()).collect(), events)
 }
 
-/// The decoder that one writes first: a match per word, a push per event.
+/// A straightforward decoder: a match per word, a push per event.
 fn plain_evt2(bytes: &[u8], mut each: impl FnMut(CdEvent)) {
     let (mut base, mut previous, mut epoch) = (0, None, 0);
     for word in bytes.chunks_exact(4) {
@@ -90,7 +90,7 @@ fn plain_evt2(bytes: &[u8], mut each: impl FnMut(CdEvent)) {
     }
 }
 
-/// The same for EVT3, word by word and bit by bit.
+/// Same for EVT3, word by word and bit by bit.
 fn plain_evt3(bytes: &[u8], mut each: impl FnMut(CdEvent)) {
     let (mut high, mut low, mut epoch, mut started) = (0_u64, 0_u64, 0_u64, false);
     let (mut y, mut x, mut polarity) = (0, 0, Polarity::Off);
@@ -137,7 +137,7 @@ fn plain_evt3(bytes: &[u8], mut each: impl FnMut(CdEvent)) {
     }
 }
 
-/// Uses an event so that no decoder can leave parts of it out.
+/// Uses all parts of an event, so that no decoder can skip any.
 fn digest(sum: u64, e: &CdEvent) -> u64 {
     sum.wrapping_add(e.t_us)
         .wrapping_add(u64::from(e.x) ^ u64::from(e.y) << 16)
@@ -217,7 +217,7 @@ fn decode_table(title: &str, format: StreamFormat, bytes: &[u8], events: usize) 
     println!("{}", table.run(7));
 }
 
-/// What most of a recording is: a camera that sees little or nothing, so that time base words are the bulk.
+/// Typical recording: an idle camera, mostly TIME_HIGH words.
 fn idle_table() {
     for (title, per_time_high, events) in [
         (

@@ -1,4 +1,4 @@
-//! Reading events from a bimvee container, beside a plain read of the file and h5py, on the same file.
+//! Reads events from a bimvee container, compared with a plain read of the file and h5py, on the same file.
 #![expect(clippy::print_stdout, reason = "a bench prints its table")]
 
 use std::fs::File;
@@ -16,8 +16,7 @@ use skinrig_model::{CdEvent, Polarity};
 
 const EVENTS: usize = 7_000_000;
 
-/// Reads as a Python user would: four arrays in memory. One read per line of input, a path; answers with its
-/// seconds.
+/// Reads like a Python user: four arrays in memory. One read per input line (a path); the answer is its duration in seconds.
 const H5PY: &str = r#"
 import sys, time, h5py
 print(h5py.__version__, flush=True)
@@ -31,7 +30,7 @@ for line in sys.stdin:
     print('{"seconds": %r, "rows": %d}' % (seconds, len(arrays[0])), flush=True)
 "#;
 
-/// The layout of the published files: contiguous columns, as h5py writes them.
+/// Layout of the published files: contiguous columns, as h5py writes them.
 const CONTIGUOUS: &str = r#"
 import sys, h5py
 with h5py.File(sys.argv[1]) as a, h5py.File(sys.argv[2], "w") as b:
@@ -40,7 +39,7 @@ with h5py.File(sys.argv[1]) as a, h5py.File(sys.argv[2], "w") as b:
         b['data/"%s"' % k] = v.astype("i8") if k in "xy" else v
 "#;
 
-/// Reads the file and returns the seconds that it took, as Python measured them.
+/// Reads the file and returns the duration in seconds, as measured by Python.
 fn read(h5py: &mut Python, path: &Path) -> f64 {
     let answer = h5py.ask(&path.display().to_string()).expect("an answer");
     assert_eq!(answer["rows"].as_u64(), Some(EVENTS as u64));

@@ -1,4 +1,4 @@
-//! How fast camera bytes reach the session file, beside a plain file.
+//! Throughput from camera bytes to the session file, compared with a plain file.
 #![expect(clippy::print_stdout, reason = "a bench prints its table")]
 
 use std::error::Error;
@@ -51,7 +51,7 @@ fn session(path: &Path, chunk: &[u8]) -> Result<(), Box<dyn Error>> {
             triggers: vec![],
         }))?;
     }
-    // Returns when everything before it is on the disk.
+    // Returns when all previous records are on the disk.
     let attempt = AttemptId {
         press: PressId::from_index(0),
         number: 1,

@@ -1,6 +1,6 @@
-//! How fast two cameras may send until something on the way to the session file loses an event, beside a plain file.
+//! Highest event rate of two cameras without losses on the way to the session file, compared with a plain file.
 //!
-//! The cameras are emulated and stream in real time from this process; a second process has the driver, libusb and the
+//! The cameras are emulated and stream in real time from this process; a second process runs the driver, libusb and the
 //! recorder, as in production. `SKINRIG_BENCH_SECONDS` sets the length of a trial (default 5).
 #![expect(clippy::print_stdout, reason = "a bench prints its table")]
 
@@ -34,20 +34,20 @@ mod linux {
     use skinrig_model::{AttemptId, CameraId, HostTime, PressId, Record};
     use skinrig_recorder::SessionWriter;
 
-    /// Names the job of the recording process.
+    /// Environment variable with the job of the recording process.
     pub const JOB: &str = "SKINRIG_BENCH_JOB";
 
     const SERIALS: [&str; 2] = ["00001621", "00001622"];
-    /// The sensor's maximum, and where the search ends, Mev/s per camera.
+    /// Maximum rate of the sensor, and end of the search, Mev/s per camera.
     const HIGHEST: f64 = 50.0;
-    /// The search ends when it knows the rate this well, Mev/s per camera.
+    /// Resolution of the search, Mev/s per camera.
     const STEP: f64 = 1.0;
     const BYTES_PER_EVENT: f64 = 4.0;
-    /// Small against what a trial sends, so that a rate that cannot be kept up shows as loss.
+    /// Small compared with a trial, so that an excessive rate shows as loss.
     const BACKLOG: usize = 32 << 20;
     const SEGMENT_MB: u64 = 1024;
 
-    /// Where the bytes go.
+    /// Destination of the bytes.
     #[derive(Clone, Copy, PartialEq, Eq)]
     enum Sink {
         Nowhere,
@@ -63,12 +63,12 @@ mod linux {
         }
     }
 
-    /// A rate, Mev/s per camera, and the trial at it.
+    /// A rate, Mev/s per camera, and its trial.
     type Found = Option<(f64, Trial)>;
 
-    /// What came of a trial.
+    /// Result of a trial.
     struct Trial {
-        /// Bytes that were to arrive, and those that did not: at the camera, and on the host.
+        /// Bytes sent, and bytes lost: at the camera, and on the host.
         made: u64,
         dropped: u64,
         lost: u64,
@@ -159,7 +159,7 @@ mod linux {
         while high - low > STEP || loses.is_none() {
             let mut tried = trial(folder, sink, rate, Pacing::RealTime, seconds)?;
             if !tried.is_loss_free() {
-                // Once may be a hiccup of the machine.
+                // A single loss may be a hiccup of the machine.
                 tried = trial(folder, sink, rate, Pacing::RealTime, seconds)?;
             }
             if tried.is_loss_free() {
@@ -209,7 +209,7 @@ mod linux {
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()?;
-        // Those that serve the cameras end with the process, so they are looked at meanwhile.
+        // Threads that serve the cameras end with the process, so measure them while it runs.
         let mut spent = BTreeMap::new();
         while child.try_wait()?.is_none() {
             for (name, seconds) in threads("emulator")? {
@@ -270,7 +270,7 @@ mod linux {
             camera.configure(&CameraSettings::default())?;
             cameras.push(camera);
         }
-        // Together: the first must not stream while the second takes its half second.
+        // Together: the first must not stream during the second's half-second start.
         std::thread::scope(|scope| {
             let starting: Vec<_> = cameras
                 .iter_mut()
@@ -287,7 +287,7 @@ mod linux {
         while !stopping {
             stopping = begun.elapsed() >= span;
             if stopping {
-                // The threads of the stream end with it.
+                // The stream's threads end with it.
                 spent = threads("host")?;
             }
             for camera in &mut cameras {
@@ -298,7 +298,7 @@ mod linux {
                 }
             }
             if chunks.is_empty() {
-                // As long as the controller's step.
+                // Same as the controller's step.
                 std::thread::sleep(Duration::from_millis(1));
             }
             for chunk in chunks.drain(..) {
@@ -309,7 +309,7 @@ mod linux {
             }
         }
         if let Some(writer) = &mut writer {
-            // Returns when everything before it is on the disk.
+            // Returns when all previous records are on the disk.
             let (press, number) = (PressId::from_index(0), 1);
             writer.accept(Record::Intent {
                 attempt: AttemptId { press, number },
@@ -322,9 +322,9 @@ mod linux {
         Ok(())
     }
 
-    /// CPU seconds that the threads of this process have used, those of one name together.
+    /// CPU seconds used by the threads of this process, summed by name.
     fn threads(process: &str) -> Result<BTreeMap<String, f64>, Box<dyn Error>> {
-        /// Of all Linux systems in use.
+        /// Clock ticks on all common Linux systems.
         const TICKS_PER_S: f64 = 100.0;
         let mut spent = BTreeMap::new();
         for entry in std::fs::read_dir("/proc/self/task")? {

@@ -1,4 +1,4 @@
-//! How fast each simulation level runs, against real time.
+//! Speed of each simulation level relative to real time.
 #![expect(clippy::print_stdout, reason = "a bench prints its table")]
 
 use std::path::Path;
@@ -12,7 +12,7 @@ const PROTOCOL: &str = concat!(
     "/../protocols/paper-meander.yaml"
 );
 
-/// Takes every record and keeps what it weighs.
+/// Accepts every record and adds up its size.
 #[derive(Default)]
 struct Scales {
     events: u64,
@@ -34,7 +34,7 @@ impl RecordSink for Scales {
     }
 }
 
-/// Runs `presses` presses of the published experiment; returns what came and the simulated seconds.
+/// Runs `presses` presses of the published experiment; returns the totals and the simulated seconds.
 fn simulate(level: SimLevel, presses: u32) -> (Scales, f64) {
     let overrides = [
         format!("path.meander.count={presses}"),

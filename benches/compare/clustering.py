@@ -1,4 +1,4 @@
-"""Clusters the events of one press in five ways; core and noise must be what the bench found."""
+"""Clusters the events of one press in five ways; core and noise must equal the benchmark's."""
 
 import json
 

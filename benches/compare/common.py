@@ -1,4 +1,4 @@
-"""How a comparison is run: by hand, every task a few times, or task by task as the bench asks for it."""
+"""Runs the tasks of a comparison: by hand, each a few times, or one at a time on request of the benchmark."""
 
 import importlib.metadata
 import json
@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def measured(task, folder):
-    """Runs a task once: its result with wall and CPU seconds. What a task checks afterwards is not timed.
+    """Runs a task once: its result with wall and CPU seconds. Later checks of the task are not timed.
 
     A task is a function of the folder that returns (work, check): `work` is timed, `check(result)` gives what
     is reported of the result.
@@ -17,7 +17,7 @@ def measured(task, folder):
     wall, cpu = time.perf_counter(), time.process_time()
     result = work()
     cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
-    # A task whose work runs in other processes, or which does a part of the whole, says so itself.
+    # A task that uses other processes, or does only a fraction of the work, reports this itself.
     return {"seconds": wall, "cpu_seconds": cpu, **check(result)}
 
 

@@ -1,4 +1,4 @@
-"""DBSCAN's core and noise from pixel counts, in numpy: sums over discs from sums along rows, or by Fourier transform."""
+"""DBSCAN's core and noise from pixel counts, in numpy: sums over discs, by row sums or Fourier transform."""
 
 from functools import lru_cache
 
@@ -15,10 +15,10 @@ def disc_halves(eps):
 
 
 def disc_sums(counts, halves):
-    """For each pixel, the sum of `counts` (rows x columns) over the disc about it."""
+    """For each pixel, the sum of `counts` (rows x columns) over the disc around it."""
     rows, width = counts.shape
     reach = len(halves) - 1
-    # sums[:, reach + 1 + x] is the sum of the columns up to x, with room on both sides.
+    # sums[:, reach + 1 + x] is the sum of the columns up to x, with padding on both sides.
     sums = np.zeros((rows, width + 2 * reach + 1), np.int32)
     np.cumsum(counts, axis=1, out=sums[:, reach + 1 : reach + 1 + width])
     sums[:, reach + 1 + width :] = sums[:, reach + width : reach + width + 1]
@@ -35,7 +35,7 @@ def disc_sums(counts, halves):
 
 @lru_cache
 def disc_transform(halves, shape):
-    """The Fourier transform of the disc, made once."""
+    """The Fourier transform of the disc, computed once."""
     reach = len(halves) - 1
     disc = np.zeros((2 * reach + 1, 2 * reach + 1))
     for dy, half in enumerate(halves):
@@ -44,7 +44,7 @@ def disc_transform(halves, shape):
 
 
 def disc_sums_fft(counts, halves):
-    """The same by convolution with the disc; sums are whole numbers, so that rounding undoes the transform's error."""
+    """The same by convolution with the disc; sums are integers, so rounding removes the transform's error."""
     reach = len(halves) - 1
     shape = tuple(next_fast_len(n + 2 * reach, real=True) for n in counts.shape)
     sums = irfft2(rfft2(counts, shape) * disc_transform(tuple(halves), shape), shape)

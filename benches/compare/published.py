@@ -1,8 +1,7 @@
-"""The choices of the public analysis code, written anew from what is known of it: per press DBSCAN of all events in the
-three seconds about it, a CUSUM detector step by step in Python, one factor of data reduction.
+"""The choices of the public analysis code, reimplemented: per press, DBSCAN of all events in the
+three seconds around it, a CUSUM detector step by step in Python, one factor of data reduction.
 
-The whole takes an hour, so each task does a part that is spread evenly over the presses and says what share of the
-whole it was.
+All of it takes an hour, so each task does a fraction, spread evenly over the presses, and reports the fraction.
 """
 
 import json
@@ -45,7 +44,7 @@ def centroids(sets, eps, min_samples):
 
 
 def clustering(folder):
-    """The centroids of all presses; nothing else of the repetition."""
+    """The centroids of all presses; no other part of a repetition."""
     s, n, sets = presses(folder, SETS)
 
     def check(found):
@@ -56,7 +55,7 @@ def clustering(folder):
 
 
 def reduction(folder):
-    """One factor and one seed: exactly max(1, n // k) events of each press, every event a cluster."""
+    """One factor and one seed: exactly max(1, n // k) events of each press; each event is a cluster."""
     factor = 4
     s, n, sets = presses(folder, SETS)
     random = np.random.default_rng(0)

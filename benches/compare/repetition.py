@@ -1,8 +1,8 @@
-"""One repetition from HDF5 to the error in mm, as well as Python packages allow: h5py, pixel counts in numpy,
+"""One repetition from HDF5 to the error in mm, as fast as Python packages allow: h5py, pixel counts in numpy,
 least squares in scipy, one process per camera.
 
-The press windows are given (the bench aligns the clocks first; nothing here has to). Calibration on every other press,
-error on the rest.
+The press windows are given (the benchmark has aligned the clocks). Calibration on every other press, error on the
+rest.
 """
 
 import json
@@ -21,7 +21,7 @@ SPREAD = np.array([8.0, 8.0, 8.0, 8.0, 4.0, 4.0, 0.4, 0.4])
 
 
 def columns(path, windows, rows, eps, min_samples, sums):
-    """Mean column of the events that are not noise, per window, and the CPU seconds that this took."""
+    """Mean column of the events that are not noise, per window, and the CPU seconds this took."""
     cpu = time.process_time()
     with h5py.File(path) as file:
         ts, x, y = (file["data"][f'"{k}"'][:] for k in ("ts", "x", "y"))
@@ -51,7 +51,7 @@ def directions(parameters, camera, u):
 
 
 def locate(parameters, u):
-    """Where the rays of all presses meet, 2 x n."""
+    """Intersections of the rays of all presses, 2 x n."""
     one, two = (directions(parameters, k, u[k]) for k in (0, 1))
     between = parameters[2:4] - parameters[:2]
     sine = one[0] * two[1] - one[1] * two[0]
@@ -60,7 +60,7 @@ def locate(parameters, u):
 
 
 def calibrate(start, u, truth, seed=1):
-    """The best of several starts."""
+    """The best fit of several starting points."""
     random = np.random.default_rng(seed)
     starts = [start] + [start + SPREAD * random.uniform(-1, 1, 8) for _ in range(STARTS - 1)]
     residuals = lambda p: (locate(p, u) - truth).ravel()
@@ -73,7 +73,7 @@ def rmse(errors):
 
 
 def whole(folder, submit=None, sums=disc_sums):
-    """With a process per camera, or else both cameras in this one."""
+    """With one process per camera, or both cameras in this process."""
     s = json.loads((folder / "repetition.json").read_text())
     truth, calibrates = np.array(s["truth"]).T, np.array(s["calibrates"])
 
@@ -101,7 +101,7 @@ def whole(folder, submit=None, sums=disc_sums):
         u, rmse_mm, cpu = result
         expected = np.array(s["columns"], float)
         same = (np.abs(u - expected) <= 1e-9) | (np.isnan(u) & np.isnan(expected))
-        # The bench bounds the pull of outliers, least squares here does not.
+        # The benchmark limits the influence of outliers; this least-squares fit does not.
         close = abs(rmse_mm - s["rmse_mm"]) <= 0.02 * s["rmse_mm"]
         return {"agrees": bool(same.all() and close), "rmse_mm": rmse_mm, "cpu_seconds": cpu}
 
@@ -110,7 +110,7 @@ def whole(folder, submit=None, sums=disc_sums):
 
 if __name__ == "__main__":
     with ProcessPoolExecutor(2) as pool:
-        # The processes are there before anything is timed.
+        # The processes start before the timing.
         list(pool.map(abs, [1, 2]))
         tasks = {
             "two_processes": lambda folder: whole(folder, pool.submit),

@@ -1,4 +1,4 @@
-//! A recording as files in the published layout, and as a source of events for the analysis.
+//! A recording as files in the published layout, and as an event source for the analysis.
 
 use std::path::{Path, PathBuf};
 
@@ -26,7 +26,7 @@ impl Files {
         Ok(files)
     }
 
-    /// Files that are there.
+    /// Uses existing files.
     #[must_use]
     pub fn at(folder: &Path) -> Self {
         Self(folder.into())

@@ -1,11 +1,11 @@
-//! A small harness: times pieces of work that belong together and prints them as one table.
+//! A small harness: times related pieces of work and prints them as one table.
 //!
-//! A number alone says more about the machine than about the code. So every table holds, from the same run,
-//! the baseline that the code is compared with, and each row says how it was measured. The rounds of all rows
-//! are interleaved, so that a slow moment of the machine hits all of them, and every second round runs backwards,
-//! so that none always follows the same neighbour; the best round counts.
+//! A number alone describes the machine rather than the code. So every table contains a baseline from the same run, and each
+//! row states how it was measured. The rounds of all rows are interleaved, so that a slow moment of the machine affects all
+//! of them, and every second round runs backwards, so that no row always follows the same neighbour; the best round counts.
 //!
-//! [`recording`] makes the data, [`files`] and [`session`] store it, [`python`] runs the other side, [`memory`] reads the peak.
+//! [`recording`] creates the data, [`files`] and [`session`] store it, [`python`] runs the Python programs, [`memory`]
+//! reads the peak.
 
 pub mod files;
 pub mod memory;
@@ -16,15 +16,15 @@ pub mod session;
 use std::fmt::Write as _;
 use std::time::Instant;
 
-/// One thing to measure.
+/// A row to measure.
 struct Row<'a> {
     what: String,
     work: Box<dyn FnMut() -> f64 + 'a>,
     units: f64,
     is_baseline: bool,
-    /// The rows are set beside this one.
+    /// The other rows are compared with this one.
     is_ours: bool,
-    /// Of each round but the first.
+    /// Seconds of each round, without the warm-up.
     seconds: Vec<f64>,
 }
 
@@ -33,7 +33,7 @@ impl Row<'_> {
         self.seconds.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// How many times longer this took than `other`: the median over the rounds.
+    /// Factor by which this took longer than `other`: the median over the rounds.
     fn times(&self, other: &Self) -> f64 {
         let rounds = self.seconds.iter().zip(&other.seconds);
         let mut ratios: Vec<f64> = rounds.map(|(a, b)| a / b).collect();
@@ -47,7 +47,7 @@ impl Row<'_> {
     }
 }
 
-/// A table of things that do the same work in different ways.
+/// A table of alternative implementations of the same work.
 pub struct Table<'a> {
     title: String,
     unit: &'static str,
@@ -56,7 +56,7 @@ pub struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    /// An empty table. `unit` names what is counted per second ("Mev"), `method` says how.
+    /// An empty table. `unit` names what is counted per second ("Mev"), `method` describes the measurement.
     #[must_use]
     pub fn new(title: &str, unit: &'static str, method: &str) -> Self {
         Self {
@@ -67,13 +67,13 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Adds a row whose `work` handles `units` (in the table's unit) in one call.
+    /// Adds a row whose `work` processes `units` (in the table's unit) per call.
     pub fn row(&mut self, what: &str, units: f64, work: impl FnMut() + 'a) -> &mut Self {
         self.push(what, units, false, timed(work))
     }
 
-    /// Adds the row that all others are set beside: for each of them the table says how many times longer it took, round
-    /// by round, in the median.
+    /// Adds the row that all others are compared with: for each of them the table states the factor by which it took longer,
+    /// as a median over the rounds.
     pub fn ours(&mut self, what: &str, units: f64, work: impl FnMut() + 'a) -> &mut Self {
         self.push(what, units, false, timed(work));
         if let Some(row) = self.rows.last_mut() {
@@ -82,17 +82,17 @@ impl<'a> Table<'a> {
         self
     }
 
-    /// Adds a row whose `work` says itself how many seconds it took: another process, or something that is known.
+    /// Adds a row whose `work` returns its own duration in seconds: another process, or a known value.
     pub fn told(&mut self, what: &str, units: f64, work: impl FnMut() -> f64 + 'a) -> &mut Self {
         self.push(what, units, false, work)
     }
 
-    /// Adds the row that the ratios refer to.
+    /// Adds the baseline of the ratios.
     pub fn baseline(&mut self, what: &str, units: f64, work: impl FnMut() + 'a) -> &mut Self {
         self.push(what, units, true, timed(work))
     }
 
-    /// Adds the row that the ratios refer to, whose `work` says itself how many seconds it took.
+    /// Adds the baseline of the ratios, whose `work` returns its own duration in seconds.
     pub fn baseline_told(
         &mut self,
         what: &str,
@@ -211,7 +211,7 @@ mod tests {
     #[test]
     fn the_others_are_set_beside_ours_round_by_round() {
         let mut table = Table::new("race", "op", "told");
-        // The first round warms up.
+        // The first round is the warm-up.
         let mut told = [9.0, 1.0, 8.0, 3.0].into_iter();
         table.told("theirs", 1.0, move || told.next().unwrap());
         table.ours("ours", 1.0, || ());

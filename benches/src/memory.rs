@@ -1,11 +1,11 @@
-//! The largest resident memory of this process and the bytes that it read, where the system tells them.
+//! Peak resident memory of this process and bytes that it read, where the system reports them.
 
-/// Forgets the largest resident memory so far, where the system can.
+/// Resets the peak resident memory, where the system can.
 pub fn reset_peak() {
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 
-/// Largest resident memory since the start or the last reset, MB; `None` where the system does not say.
+/// Peak resident memory since the start or the last reset, MB; `None` if the system does not report it.
 #[must_use]
 pub fn peak_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
@@ -14,7 +14,7 @@ pub fn peak_mb() -> Option<f64> {
     Some(kib * 1024.0 / 1e6)
 }
 
-/// Bytes that this process has asked the system to read since it began; `None` where the system does not say.
+/// Bytes read by this process since its start; `None` if the system does not report it.
 #[must_use]
 pub fn bytes_read() -> Option<u64> {
     let counters = std::fs::read_to_string("/proc/self/io").ok()?;

@@ -1,4 +1,4 @@
-//! A Python program that measures the other side when it is told to, and waits in between.
+//! A Python program that runs one task per request and waits in between.
 
 use std::ffi::OsStr;
 use std::io::{BufRead as _, BufReader, Write as _};

@@ -1,8 +1,10 @@
-//! The arm in the hands of a check: held against the rig file, moved under the guard of runs, retracted and braked in the end.
+//! Arm control for checks: limits from the rig file, motion under the same guard as in runs, always retracted and braked at the end.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use skinrig_controller::{ControlHandle, ControllerError, ControllerSettings, Jog, Moved, Touched};
+use skinrig_controller::{
+    ControlHandle, ControllerError, ControllerSettings, Jog, MoveOutcome, TouchOutcome,
+};
 use skinrig_device::{Clock, DeviceError, Indenter, MotionLimits, RobotSample};
 use skinrig_model::{HostDuration, HostTime, Point2, Point3, PoseSample, Robot, Setting, Skin};
 use skinrig_nightly::{Evidence, EvidenceKind};
@@ -10,21 +12,21 @@ use skinrig_protocol::plan::{OnTrip, RunLimits};
 use skinrig_protocol::rig::RigFile;
 use skinrig_protocol::{Surface, TouchSearch};
 
-use crate::bench::{Bench, Trouble};
-use crate::cause;
+use crate::bench::{Bench, Problem};
 use crate::findings::Findings;
-use crate::room::{CLEARANCE_MM, Room};
+use crate::run_evidence;
+use crate::test_volume::{CLEARANCE_MM, TestVolume};
 
-/// How close to its target a move ends, mm: near enough to measure where exactly.
-const ARRIVED_MM: f64 = 0.5;
-/// For so long.
-const ARRIVED_FOR: HostDuration = HostDuration::from_millis(50);
-/// Ways up from an unknown place and down to the skin, mm/s.
+/// Position tolerance at the end of a move, mm. Small enough, because checks measure the exact position themselves.
+const TOLERANCE_MM: f64 = 0.5;
+/// Time within the tolerance that ends a move.
+const SETTLE_TIME: HostDuration = HostDuration::from_millis(50);
+/// Speed of the rise from an unknown position and of the descent to the skin, mm/s.
 const SLOW_MM_S: f64 = 10.0;
-/// A braked robot tells where it is within this time.
-const FRESH: HostDuration = HostDuration::from_millis(100);
-/// How the surface is touched when the rig file does not say: as `skinrig jog` does.
-const SEARCH: TouchSearch = TouchSearch {
+/// A braked robot reports its position within this time.
+const POSITION_TIMEOUT: HostDuration = HostDuration::from_millis(100);
+/// Touch search when the rig file has none: the same as in `skinrig jog`.
+const DEFAULT_SEARCH: TouchSearch = TouchSearch {
     threshold_n: 0.2,
     samples: 5,
     speed_mm_s: 2.0,
@@ -32,7 +34,7 @@ const SEARCH: TouchSearch = TouchSearch {
     tare: HostDuration::from_millis(300),
 };
 
-/// How low a check goes.
+/// Lowest region that a check needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reach {
     /// Never below clearance height.
@@ -41,22 +43,22 @@ pub enum Reach {
     Skin,
 }
 
-/// An armed robot above clearance height, or at it.
+/// An armed robot at clearance height or above.
 pub struct Arm<'a> {
     jog: Jog<'a>,
     stop: &'a dyn Fn() -> bool,
-    /// Where it may go.
-    pub room: &'a Room,
-    /// How it touches the surface.
+    /// Where the arm may go.
+    pub volume: &'a TestVolume,
+    /// How it searches for the surface.
     pub search: TouchSearch,
-    own: MotionLimits,
+    robot_limits: MotionLimits,
 }
 
-/// What a check does with the arm.
-type Work<'w> = &'w mut dyn FnMut(&mut Arm<'_>, &mut Findings) -> Result<(), Trouble>;
+/// The measurement that a check makes with the arm.
+type Work<'w> = &'w mut dyn FnMut(&mut Arm<'_>, &mut Findings) -> Result<(), Problem>;
 
-/// Arms the robot, takes it to clearance height where it lies below, lets `work` have it, and retracts and brakes it, whatever
-/// came of that. What `work` did not measure of `metrics` is unmeasured.
+/// Arms the robot, raises it to clearance height if needed, runs `work`, then retracts and brakes the robot even after an error.
+/// Each of `metrics` that `work` did not measure becomes unmeasured.
 pub(crate) fn with_arm(
     bench: &mut dyn Bench,
     reach: Reach,
@@ -67,14 +69,14 @@ pub(crate) fn with_arm(
     let rig = bench.rig();
     let search = match rig.surface {
         Some(Surface::Touch(search)) => search,
-        _ => SEARCH,
+        _ => DEFAULT_SEARCH,
     };
-    let answer = match Room::of(rig, today()) {
-        Ok(room) => borrow(bench, reach, (&room, search), found, work),
-        Err(why) => Err(why),
+    let result = match TestVolume::from_rig(rig, today()) {
+        Ok(volume) => with_robot(bench, reach, (&volume, search), found, work),
+        Err(problem) => Err(problem),
     };
-    if let Err(why) = answer {
-        found.evidence.push(*why);
+    if let Err(problem) = result {
+        found.evidence.push(*problem);
     }
     for metric in metrics {
         if !found.values.iter().any(|v| v.metric == *metric) {
@@ -89,69 +91,71 @@ fn today() -> i64 {
     i64::try_from(seconds / 86_400).unwrap_or(i64::MAX)
 }
 
-/// The robot of the bench, as long as the work takes.
-fn borrow(
+/// Runs `work` with the bench's robot.
+fn with_robot(
     bench: &mut dyn Bench,
     reach: Reach,
-    (room, search): (&Room, TouchSearch),
+    (volume, search): (&TestVolume, TouchSearch),
     found: &mut Findings,
     work: Work<'_>,
-) -> Result<(), Trouble> {
-    let (patience, control, stop) = (bench.patience(), bench.control(), bench.stopping());
+) -> Result<(), Problem> {
+    let (timing_slack, control, stop) =
+        (bench.timing_slack(), bench.control(), bench.stop_signal());
     let devices = bench.devices();
-    let robot = devices.robot.as_mut().map_err(|why| why.clone())?;
-    let setup = Setup::new(room, reach, patience, &**robot, control);
-    let hand = Hand {
+    let robot = devices.robot.as_mut().map_err(|problem| problem.clone())?;
+    let setup = ArmSetup::new(volume, reach, timing_slack, &**robot, control);
+    let context = ArmContext {
         search,
         stop: &*stop,
     };
-    let answer = arm_and_work(
+    let result = arm_and_work(
         &mut **robot,
         &mut *devices.clock,
         &setup,
-        &hand,
+        &context,
         found,
         work,
     );
-    if answer
+    if result
         .as_ref()
         .is_err_and(|e| e.kind == EvidenceKind::DeviceLost)
     {
-        bench.close(); // only opening it again helps
+        bench.close(); // a lost device must be reopened
     }
-    answer
+    result
 }
 
 /// How a check arms the robot.
-struct Setup<'a> {
-    room: &'a Room,
+struct ArmSetup<'a> {
+    volume: &'a TestVolume,
     run: RunLimits,
-    own: MotionLimits,
+    robot_limits: MotionLimits,
     control: ControlHandle,
     settings: ControllerSettings,
 }
 
-/// What else a check brings along.
-struct Hand<'a> {
+/// Touch search and stop signal of a check.
+struct ArmContext<'a> {
     search: TouchSearch,
     stop: &'a dyn Fn() -> bool,
 }
 
-impl<'a> Setup<'a> {
+impl<'a> ArmSetup<'a> {
     fn new(
-        room: &'a Room,
+        volume: &'a TestVolume,
         reach: Reach,
-        patience: HostDuration,
+        timing_slack: HostDuration,
         robot: &dyn Indenter,
         control: ControlHandle,
     ) -> Self {
-        let (run, own) = limits(room, reach, robot.capabilities().max_acceleration_mm_s2);
+        let (run, robot_limits) =
+            limits(volume, reach, robot.capabilities().max_acceleration_mm_s2);
         Self {
-            room,
+            volume,
             run,
-            own,
+            robot_limits,
             control,
-            settings: settings(patience),
+            settings: settings(timing_slack),
         }
     }
 
@@ -159,95 +163,101 @@ impl<'a> Setup<'a> {
         &self,
         robot: &'r mut dyn Indenter,
         clock: &'r mut dyn Clock,
-    ) -> Result<Jog<'r>, Trouble> {
+    ) -> Result<Jog<'r>, Problem> {
         let started = Jog::on_skin(
             Box::new(robot),
             Box::new(clock),
-            self.room.robot_from_skin,
+            self.volume.robot_from_skin,
             self.run,
-            &self.own,
+            &self.robot_limits,
             &self.control,
             self.settings,
         );
-        started.map(|(jog, _)| jog).map_err(of)
+        started.map(|(jog, _)| jog).map_err(from_controller)
     }
 
-    /// Up to clearance height where the tip lies below.
-    fn rise(&self, jog: &mut Jog<'_>) -> Result<(), Trouble> {
-        let at = jog.look().map_err(of)?.measured;
+    /// Rises to clearance height if the tip is below it.
+    fn rise(&self, jog: &mut Jog<'_>) -> Result<(), Problem> {
+        let at = jog.look().map_err(from_controller)?.measured;
         if at.z_mm >= CLEARANCE_MM {
             return Ok(());
         }
         let speed = SLOW_MM_S.min(self.run.max_speed_mm_s);
-        let up = at.plane().at_height(CLEARANCE_MM + 2.0 * ARRIVED_MM);
-        jog.go(up, speed, &|| false).map(drop).map_err(of)
+        let up = at.plane().at_height(CLEARANCE_MM + 2.0 * TOLERANCE_MM);
+        jog.go(up, speed, &|| false)
+            .map(drop)
+            .map_err(from_controller)
     }
 }
 
 fn arm_and_work(
     robot: &mut dyn Indenter,
     clock: &mut dyn Clock,
-    setup: &Setup<'_>,
-    hand: &Hand<'_>,
+    setup: &ArmSetup<'_>,
+    context: &ArmContext<'_>,
     found: &mut Findings,
     work: Work<'_>,
-) -> Result<(), Trouble> {
-    // Braked, the arm sinks: it may rest on the skin. The force at rest is taken when it is armed, and belongs to free air.
-    if may_be_low(robot, clock, setup.room) {
-        leave(robot, clock, setup)?;
+) -> Result<(), Problem> {
+    // A braked arm sinks and may rest on the skin. Arming measures the force at rest, which must happen in free air.
+    if may_be_low(robot, clock, setup.volume) {
+        retract(robot, clock, setup)?;
     }
     let mut jog = setup.start(&mut *robot, &mut *clock)?;
     setup.rise(&mut jog)?;
     let mut arm = Arm {
         jog,
-        stop: hand.stop,
-        room: setup.room,
-        search: hand.search,
-        own: setup.own,
+        stop: context.stop,
+        volume: setup.volume,
+        search: context.search,
+        robot_limits: setup.robot_limits,
     };
-    let answer = work(&mut arm, found);
+    let result = work(&mut arm, found);
     let ended = arm.jog.finish();
     drop(arm);
-    let Err(e) = ended else { return answer };
-    // Broken off below: once more from where it lies. What the robot says then is told beside the first reason.
+    let Err(e) = ended else { return result };
+    // The motion ended below clearance: retract once more from there. Report a second error next to the first.
     if !matches!(e, ControllerError::Device(DeviceError::Lost { .. }))
-        && let Err(again) = leave(robot, clock, setup)
+        && let Err(second) = retract(robot, clock, setup)
     {
-        found.evidence.push(*again);
+        found.evidence.push(*second);
     }
-    answer.and(Err(of(e)))
+    result.and(Err(from_controller(e)))
 }
 
-/// Whether the tip lies below clearance height, or nobody knows. What the braked robot told while nobody listened is of no
-/// interest, nor that some of it found no room.
-fn may_be_low(robot: &mut dyn Indenter, clock: &mut dyn Clock, room: &Room) -> bool {
+/// Whether the tip is below clearance height or its height is unknown. Discards old samples first, and ignores an overflow of the
+/// queue.
+fn may_be_low(robot: &mut dyn Indenter, clock: &mut dyn Clock, volume: &TestVolume) -> bool {
     let mut samples = Vec::new();
     let _ = robot.poll(&mut samples);
     samples.clear();
-    clock.wait_until(clock.now() + FRESH);
-    // What is wrong with the robot is told when it is armed.
+    clock.wait_until(clock.now() + POSITION_TIMEOUT);
+    // Arming reports any fault of the robot.
     let _ = robot.poll(&mut samples);
-    let skin_from_robot = room.robot_from_skin.inverse();
+    let skin_from_robot = volume.robot_from_skin.inverse();
     let height_mm = |s: &RobotSample| skin_from_robot.apply(s.measured).z_mm;
     samples.last().is_none_or(|s| height_mm(s) < CLEARANCE_MM)
 }
 
-/// Up from the skin, and braked again.
-fn leave(
+/// Rises from the skin and brakes again.
+fn retract(
     robot: &mut dyn Indenter,
     clock: &mut dyn Clock,
-    setup: &Setup<'_>,
-) -> Result<(), Trouble> {
+    setup: &ArmSetup<'_>,
+) -> Result<(), Problem> {
     let mut jog = setup.start(robot, clock)?;
     setup.rise(&mut jog)?;
-    jog.finish().map(drop).map_err(of)
+    jog.finish().map(drop).map_err(from_controller)
 }
 
-/// What the guard holds the arm to, skin frame, and what the robot itself is told.
-fn limits(room: &Room, reach: Reach, max_acceleration_mm_s2: f64) -> (RunLimits, MotionLimits) {
-    let l = &room.limits;
-    let (mut least, mut most) = room.around();
-    most[2] = room.top_mm();
+/// Limits of the guard in the skin frame, and of the robot itself.
+fn limits(
+    volume: &TestVolume,
+    reach: Reach,
+    max_acceleration_mm_s2: f64,
+) -> (RunLimits, MotionLimits) {
+    let l = &volume.limits;
+    let (mut least, mut most) = volume.workspace_bounds();
+    most[2] = volume.top_mm();
     let max_depth_mm = match reach {
         Reach::Air => f64::MIN_POSITIVE,
         Reach::Skin => l.max_depth_mm,
@@ -263,53 +273,57 @@ fn limits(room: &Room, reach: Reach, max_acceleration_mm_s2: f64) -> (RunLimits,
         max_depth_mm,
         max_speed_mm_s: l.max_speed_mm_s,
         max_force_n: l.max_force_n,
-        position_tolerance_mm: ARRIVED_MM,
-        settle_time: ARRIVED_FOR,
+        position_tolerance_mm: TOLERANCE_MM,
+        settle_time: SETTLE_TIME,
         max_acceleration_mm_s2: None,
         on_trip: OnTrip::Retract,
     };
-    let own = MotionLimits {
+    let robot_limits = MotionLimits {
         min_mm: l.workspace.min_mm,
         max_mm: l.workspace.max_mm,
         max_speed_mm_s: l.max_speed_mm_s,
         max_acceleration_mm_s2,
         max_force_n: l.max_force_n,
     };
-    (run, own)
+    (run, robot_limits)
 }
 
-/// How patient the guard is with stand-ins that may be so late.
-fn settings(patience: HostDuration) -> ControllerSettings {
+/// Controller settings that tolerate emulated devices being late by `timing_slack`.
+fn settings(timing_slack: HostDuration) -> ControllerSettings {
     let usual = ControllerSettings::default();
     ControllerSettings {
-        late_after: usual.late_after.max(patience),
-        stale_after: usual.stale_after.max(HostDuration(patience.0 / 5)),
-        // An arm that was held up catches up in bursts.
-        speed_over: usual.speed_over.max(HostDuration(patience.0 / 25)),
+        late_after: usual.late_after.max(timing_slack),
+        stale_after: usual.stale_after.max(HostDuration(timing_slack.0 / 5)),
+        // After a delay the arm's samples arrive in bursts.
+        speed_over: usual.speed_over.max(HostDuration(timing_slack.0 / 25)),
         ..usual
     }
 }
 
 impl Arm<'_> {
-    /// To `target`, and waits until it is there.
+    /// Moves to `target` and waits for arrival.
     ///
     /// # Errors
-    /// What kept it from there.
-    pub fn go(&mut self, target: Point3<Skin>, speed_mm_s: f64) -> Result<PoseSample, Trouble> {
-        let speed = speed_mm_s.min(self.room.limits.max_speed_mm_s);
-        match self.jog.go(target, speed, self.stop).map_err(of)? {
-            Moved::Arrived(at) => Ok(at),
-            Moved::Stopped(_) => Err(stopped()),
+    /// [`Problem`] when the arm does not arrive, or when the suite must stop.
+    pub fn go(&mut self, target: Point3<Skin>, speed_mm_s: f64) -> Result<PoseSample, Problem> {
+        let speed = speed_mm_s.min(self.volume.limits.max_speed_mm_s);
+        match self
+            .jog
+            .go(target, speed, self.stop)
+            .map_err(from_controller)?
+        {
+            MoveOutcome::Arrived(at) => Ok(at),
+            MoveOutcome::Stopped(_) => Err(suite_stopped()),
         }
     }
 
-    /// Slowly down to the height of the band in which the surface is looked for.
+    /// Descends slowly to the top of the band of the touch search.
     ///
     /// # Errors
-    /// What kept it from there.
-    pub fn above(&mut self, at: Point2) -> Result<PoseSample, Trouble> {
+    /// As [`go`](Self::go).
+    pub fn go_above(&mut self, at: Point2) -> Result<PoseSample, Problem> {
         let high_mm = 2.0 * CLEARANCE_MM;
-        let here = self.look()?.measured;
+        let here = self.pose()?.measured;
         if here.z_mm < high_mm {
             self.go(here.plane().at_height(high_mm), 2.0 * SLOW_MM_S)?;
         }
@@ -317,42 +331,42 @@ impl Arm<'_> {
         self.go(at.at_height(self.search.band_mm), SLOW_MM_S)
     }
 
-    /// Sets off to `target`, and gives when.
+    /// Starts a move to `target` and returns its start time.
     ///
     /// # Errors
-    /// What the guard or the robot says.
-    pub fn send(&mut self, target: Point3<Skin>, speed_mm_s: f64) -> Result<HostTime, Trouble> {
-        let speed = speed_mm_s.min(self.room.limits.max_speed_mm_s);
-        self.jog.send(target, speed).map_err(of)
+    /// [`Problem`] from the guard or the robot.
+    pub fn send(&mut self, target: Point3<Skin>, speed_mm_s: f64) -> Result<HostTime, Problem> {
+        let speed = speed_mm_s.min(self.volume.limits.max_speed_mm_s);
+        self.jog.send(target, speed).map_err(from_controller)
     }
 
-    /// Every sample of so long a time, up to the first of which `enough` is true.
+    /// Collects samples for `span`, or until `enough` is true for one.
     ///
     /// # Errors
-    /// What the watch over the arm says; the samples before are in `seen`.
+    /// [`Problem`] from the watchdog or the robot. `seen` keeps the samples up to then.
     pub fn watch(
         &mut self,
         span: HostDuration,
         seen: &mut Vec<PoseSample>,
         mut enough: impl FnMut(&PoseSample) -> bool,
-    ) -> Result<(), Trouble> {
+    ) -> Result<(), Problem> {
         let stop = self.stop;
         let watched = self.jog.watch(span, seen, |s| enough(s) || stop());
-        watched.map_err(of)?;
-        if stop() { Err(stopped()) } else { Ok(()) }
+        watched.map_err(from_controller)?;
+        if stop() { Err(suite_stopped()) } else { Ok(()) }
     }
 
-    /// Finds the surface below, within the band around the frame's, and gives its height, mm; the tip ends above it.
+    /// Searches for the surface within the band around the frame's surface. Returns its height, mm; the tip ends above it.
     ///
     /// # Errors
-    /// When there is none, and what else the way down says.
-    pub fn touch(&mut self) -> Result<f64, Trouble> {
+    /// [`Problem`] when there is no surface in the band, or the descent fails.
+    pub fn touch(&mut self) -> Result<f64, Problem> {
         let search = self.search;
         let way_mm = 2.0 * search.band_mm;
-        match self.jog.touch(search, way_mm, self.stop).map_err(of)? {
-            Touched::At(at) => Ok(at.measured.z_mm),
-            Touched::Stopped(_) => Err(stopped()),
-            Touched::Nothing(at) => Err(Box::new(
+        match self.jog.touch(search, way_mm, self.stop).map_err(from_controller)? {
+            TouchOutcome::At(at) => Ok(at.measured.z_mm),
+            TouchOutcome::Stopped(_) => Err(suite_stopped()),
+            TouchOutcome::NotFound(at) => Err(Box::new(
                 Evidence::new(
                     EvidenceKind::State,
                     "robot",
@@ -361,87 +375,100 @@ impl Arm<'_> {
                         search.band_mm, at.measured.z_mm
                     ),
                 )
-                .next("look whether the skin is mounted, then touch it off again with `skinrig jog`"),
+                .next("check that the skin is mounted, then touch it off second with `skinrig jog`"),
             )),
         }
     }
 
-    /// Lets the robot exert this much force at most; `None`: what the rig file says.
+    /// Limits the robot's force; `None` restores the limit of the rig file.
     ///
     /// # Errors
-    /// What the robot answers, and a limit that reads back with another value.
-    pub fn limit_force(&mut self, force_n: Option<f64>) -> Result<Vec<Setting>, Trouble> {
-        let own = MotionLimits {
-            max_force_n: force_n.unwrap_or(self.own.max_force_n),
-            ..self.own
+    /// [`Problem`] from the robot, also when the limit reads back with another value.
+    pub fn limit_force(&mut self, force_n: Option<f64>) -> Result<Vec<Setting>, Problem> {
+        let robot_limits = MotionLimits {
+            max_force_n: force_n.unwrap_or(self.robot_limits.max_force_n),
+            ..self.robot_limits
         };
-        self.jog.limit(&own).map_err(of)
+        self.jog.limit(&robot_limits).map_err(from_controller)
     }
 
-    /// Where the tip is.
+    /// The latest pose of the tip.
     ///
     /// # Errors
     /// As [`watch`](Self::watch).
-    pub fn look(&mut self) -> Result<PoseSample, Trouble> {
-        self.jog.look().map_err(of)
+    pub fn pose(&mut self) -> Result<PoseSample, Problem> {
+        self.jog.look().map_err(from_controller)
     }
 
-    /// Brings it to rest where it is, with live motors. Gives when that was ordered.
+    /// Stops the arm where it is, with live motors. Returns the time of the command.
     ///
     /// # Errors
-    /// What the robot answers.
-    pub fn hold(&mut self) -> Result<HostTime, Trouble> {
-        self.jog.hold().map_err(of)
+    /// [`Problem`] from the robot.
+    pub fn hold(&mut self) -> Result<HostTime, Problem> {
+        self.jog.hold().map_err(from_controller)
     }
 
-    /// Motors off, wherever it is; it is not armed again. Gives when that was ordered.
+    /// Switches the motors off; the arm cannot be armed again. Returns the time of the command.
     ///
     /// # Errors
-    /// What the robot answers.
-    pub fn halt(&mut self) -> Result<HostTime, Trouble> {
-        self.jog.halt().map_err(of)
+    /// [`Problem`] from the robot.
+    pub fn halt(&mut self) -> Result<HostTime, Problem> {
+        self.jog.halt().map_err(from_controller)
     }
 }
 
-/// Takes the arm into free air, says through `held` where it is, and holds it there until `stop`; then it is retracted and braked.
+/// Moves the arm into free air, reports its position through `held`, holds it until `stop`, then retracts and brakes it.
 ///
 /// # Errors
-/// What kept it from that.
+/// [`Problem`] from the motion.
 pub fn hold_in_air(
     robot: &mut dyn Indenter,
     clock: &mut dyn Clock,
     rig: &RigFile,
-    patience: HostDuration,
+    timing_slack: HostDuration,
     stop: &dyn Fn() -> bool,
     held: &mut dyn FnMut(Point3<Robot>),
-) -> Result<(), Trouble> {
-    let room = Room::of(rig, today())?;
-    let setup = Setup::new(&room, Reach::Air, patience, &*robot, ControlHandle::new());
-    let hand = Hand {
-        search: SEARCH,
+) -> Result<(), Problem> {
+    let volume = TestVolume::from_rig(rig, today())?;
+    let setup = ArmSetup::new(
+        &volume,
+        Reach::Air,
+        timing_slack,
+        &*robot,
+        ControlHandle::new(),
+    );
+    let context = ArmContext {
+        search: DEFAULT_SEARCH,
         stop,
     };
-    let mut nothing = Findings::default();
-    arm_and_work(robot, clock, &setup, &hand, &mut nothing, &mut |arm, _| {
-        let [middle, ..] = arm.room.air();
-        let at = arm.go(middle, SLOW_MM_S)?;
-        held(arm.room.robot_from_skin.apply(at.measured));
-        while !stop() {
-            // Of no interest here; what is wrong ends it.
-            arm.look()?;
-        }
-        Ok(())
-    })
+    let mut ignored = Findings::default();
+    arm_and_work(
+        robot,
+        clock,
+        &setup,
+        &context,
+        &mut ignored,
+        &mut |arm, _| {
+            let [middle, ..] = arm.volume.air_points();
+            let at = arm.go(middle, SLOW_MM_S)?;
+            held(arm.volume.robot_from_skin.apply(at.measured));
+            while !stop() {
+                // The pose does not matter here; an error ends the loop.
+                arm.pose()?;
+            }
+            Ok(())
+        },
+    )
 }
 
-/// The evidence that an error of the guard is.
-pub(crate) fn of(e: ControllerError) -> Trouble {
-    let rows = cause::of(&e).into_iter();
+/// Evidence from a controller error.
+pub(crate) fn from_controller(e: ControllerError) -> Problem {
+    let rows = run_evidence::from_error(&e).into_iter();
     let software = || Evidence::new(EvidenceKind::Software, "robot", e.to_string());
     Box::new(rows.last().unwrap_or_else(software))
 }
 
-fn stopped() -> Trouble {
-    let what = "broken off: everything is to end";
+fn suite_stopped() -> Problem {
+    let what = "stopped: the suite must end";
     Box::new(Evidence::new(EvidenceKind::Stopped, "robot", what))
 }

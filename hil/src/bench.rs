@@ -1,4 +1,4 @@
-//! What a suite needs of a bench; the command line puts drivers behind it.
+//! Interface between a suite and its bench; the command line implements it with real drivers.
 
 use std::path::Path;
 
@@ -12,13 +12,13 @@ use skinrig_protocol::suite::Light;
 
 use crate::findings::Findings;
 
-/// Why something could not be had or done: boxed, for it is rare and large.
-pub type Trouble = Box<Evidence>;
+/// Evidence that explains why an operation failed. Boxed because it is large and rare.
+pub type Problem = Box<Evidence>;
 
-/// A device that was opened, or why it could not be.
-pub type Slot<T> = Result<Box<T>, Trouble>;
+/// An open device, or why it could not be opened.
+pub type Slot<T> = Result<Box<T>, Problem>;
 
-/// The devices of a bench, each opened by itself: one that is missing keeps no other from being checked.
+/// The devices of a bench. Each is opened separately, so that a missing one does not prevent checks of the others.
 pub struct Devices {
     /// The robot, braked.
     pub robot: Slot<dyn Indenter>,
@@ -26,11 +26,11 @@ pub struct Devices {
     pub cameras: [Slot<dyn EventCamera>; 2],
     /// The trigger box, armed; `None`: the rig file has none.
     pub trigger_box: Option<Slot<dyn TriggerBox>>,
-    /// The clock that all of them share.
+    /// Clock shared by all devices.
     pub clock: Box<dyn Clock>,
 }
 
-/// What a golden campaign gave: the session, and its numbers in the units of the suite's metrics.
+/// Result of a golden campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GoldenRun {
     /// The session and its report, relative to the night's folder.
@@ -39,88 +39,87 @@ pub struct GoldenRun {
     pub skin: Option<String>,
     /// Version of the analysis.
     pub analysis_version: u32,
-    /// What was measured, and what else was seen: losses, faults, findings of the audit.
+    /// Measurements in the units of the suite's metrics, and evidence: losses, faults, audit findings.
     pub findings: Findings,
 }
 
-/// What the drill of a watchdog gave.
+/// Result of a watchdog drill.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Drilled {
-    /// From the kill until the motors were known to be off, s; `None`: they never were.
+pub struct DrillResult {
+    /// Time from the kill until the motors were known to be off, s; `None`: they stayed live.
     pub braked_within_s: Option<f64>,
-    /// How far the tip was from where it had been held, mm.
+    /// Distance of the tip from the position it held, mm.
     pub drop_mm: f64,
-    /// What the robot says of why its motors went off.
+    /// Reason that the robot reports for switching its motors off.
     pub note: Option<String>,
 }
 
-/// A bench.
+/// A bench on which a suite runs.
 pub trait Bench {
     /// The rig file.
     fn rig(&self) -> &RigFile;
 
-    /// Opens every device that is not open, and hands them out.
+    /// Opens every closed device and returns all of them.
     fn devices(&mut self) -> &mut Devices;
 
-    /// Lets go of every device: robot braked, cameras stopped. Nothing happens when none is open.
+    /// Closes every device: robot braked, cameras stopped. Does nothing when none is open.
     fn close(&mut self);
 
-    /// The settings that a run would write to this camera.
+    /// The settings that a run would write to `camera`.
     ///
     /// # Errors
-    /// [`Trouble`] when a bias file cannot be read.
-    fn camera_settings(&self, camera: CameraId) -> Result<CameraSettings, Trouble>;
+    /// [`Problem`] when a bias file cannot be read.
+    fn camera_settings(&self, camera: CameraId) -> Result<CameraSettings, Problem>;
 
-    /// Switches the lamps. `Ok(false)`: this bench cannot.
+    /// Switches the lamps. `Ok(false)`: this bench has no switchable lamps.
     ///
     /// # Errors
-    /// [`Trouble`] when the program failed.
-    fn light(&mut self, light: Light) -> Result<bool, Trouble>;
+    /// [`Problem`] when the lamp program fails.
+    fn set_light(&mut self, light: Light) -> Result<bool, Problem>;
 
-    /// Whether the drill is permitted here.
+    /// Whether the rig file permits `drill`.
     fn permits(&self, drill: Drill) -> bool;
 
-    /// Closes every device and lets another process hold the arm in free air, which is then killed.
+    /// Closes every device, starts another process that holds the arm in free air, and kills that process.
     ///
     /// # Errors
-    /// [`Trouble`] when it could not be done.
-    fn watchdog_drill(&mut self) -> Result<Drilled, Trouble>;
+    /// [`Problem`] when the drill could not be carried out.
+    fn watchdog_drill(&mut self) -> Result<DrillResult, Problem>;
 
     /// Closes every device, runs the golden campaign through controller and recorder, and analyses it.
     ///
     /// # Errors
-    /// [`Trouble`] when there is no session to speak of.
-    fn golden(&mut self, protocol: &Path) -> Result<GoldenRun, Trouble>;
+    /// [`Problem`] when there is no usable session.
+    fn run_golden(&mut self, protocol: &Path) -> Result<GoldenRun, Problem>;
 
-    /// Where sessions go: the folder whose disk is checked.
+    /// Folder for sessions; its disk is the one that is checked.
     fn folder(&self) -> &Path;
 
-    /// The firmware of every device that was open so far: `robot`, `camera1`, ..., and its version.
+    /// Firmware of every device opened so far: name in results and version.
     fn firmware(&self) -> Vec<(String, String)> {
         Vec::new()
     }
 
-    /// Whether everything is to end soon: ctrl-C, or the system's polite end. Checks look at it while they wait or move, and
-    /// come back with what they have; the runner says why.
-    fn stop_asked(&self) -> bool {
+    /// Whether the suite must end soon, after ctrl-C or SIGTERM. Checks poll this while they wait or move, and return what they have.
+    fn stop_requested(&self) -> bool {
         false
     }
 
-    /// As [`stop_asked`](Self::stop_asked), for whoever has devices of the bench in hand.
-    fn stopping(&self) -> Box<dyn Fn() -> bool> {
+    /// [`stop_requested`](Self::stop_requested) as a function, for callers that borrow the bench's devices.
+    fn stop_signal(&self) -> Box<dyn Fn() -> bool> {
         Box::new(|| false)
     }
 
-    /// The operator's hand on the arm: a halt switches the motors off at once, wherever it is.
+    /// The operator's control over the arm: a halt switches the motors off at once.
     fn control(&self) -> ControlHandle {
         ControlHandle::new()
     }
 
-    /// Whether somebody else took the bench: everything ends, and the night says so.
+    /// Whether another program took the lease. The suite then ends and records it.
     fn lease_is_lost(&self) -> bool {
         false
     }
 
-    /// How late stand-ins that share this computer's processors may be; zero on a bench of hardware.
-    fn patience(&self) -> HostDuration;
+    /// Extra delay to tolerate from emulated devices that share this computer's processors; zero on real hardware.
+    fn timing_slack(&self) -> HostDuration;
 }

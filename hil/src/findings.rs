@@ -1,42 +1,42 @@
-//! What a check found: values by device and metric, and evidence.
+//! Findings of a check: measured values by device and metric, and evidence.
 
 use skinrig_nightly::{Evidence, EvidenceKind, Golden};
 
-/// A value that was measured.
+/// A measured value, or a metric that could not be measured.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Value {
-    /// Of which device: `robot`, `camera1`, `camera2`, `trigger box`, `computer`, `skin`.
+    /// Device: `robot`, `camera1`, `camera2`, `trigger box`, `computer` or `skin`.
     pub subject: String,
-    /// As in the suite.
+    /// Metric name as in the suite.
     pub metric: &'static str,
-    /// In the metric's unit. `None`: it could not be measured.
+    /// In the metric's unit. `None`: not measured.
     pub value: Option<f64>,
     /// 95 % interval.
     pub interval: Option<[f64; 2]>,
-    /// Samples behind it.
+    /// Number of samples behind the value.
     pub n: Option<u64>,
-    /// How many it needs; with fewer it is inconclusive.
+    /// Minimum number of samples; with fewer the value is inconclusive.
     pub needs: u64,
-    /// Anything to add.
+    /// Remark for the reader.
     pub note: Option<String>,
 }
 
-/// What a check found.
+/// Findings of one attempt at a check.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Findings {
-    /// In the order in which they were found.
+    /// In the order of measurement.
     pub values: Vec<Value>,
-    /// Likewise.
+    /// In the order of observation.
     pub evidence: Vec<Evidence>,
-    /// The check cannot be made on this bench, and why: it is SKIPPED.
-    pub not_here: Option<String>,
-    /// What a golden campaign leaves in the night besides its numbers.
-    pub golden: Option<GoldenKept>,
+    /// Why the check cannot run on this bench; it is then SKIPPED.
+    pub not_applicable: Option<String>,
+    /// Session of the golden campaign, if the check ran one.
+    pub golden: Option<GoldenRecord>,
 }
 
-/// What a golden campaign leaves in the night besides its numbers.
+/// What the night keeps of a golden campaign besides its metrics.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct GoldenKept {
+pub struct GoldenRecord {
     /// The session and its report, relative to the night's folder.
     pub files: Golden,
     /// Name of the skin, from the protocol.
@@ -46,26 +46,26 @@ pub struct GoldenKept {
 }
 
 impl Findings {
-    /// A value of `metric` on `subject`.
+    /// Adds a value of `metric` on `subject`.
     pub fn value(&mut self, subject: &str, metric: &'static str, value: f64) -> &mut Value {
         self.push(subject, metric, Some(value))
     }
 
-    /// `metric` could not be measured on `subject`.
+    /// Records that `metric` could not be measured on `subject`.
     pub fn unmeasured(&mut self, subject: &str, metric: &'static str) -> &mut Value {
         self.push(subject, metric, None)
     }
 
-    /// A trouble, with the metrics that it kept from being measured on `subject`.
-    pub fn trouble(&mut self, trouble: Evidence, subject: &str, metrics: &[&'static str]) {
-        self.evidence.push(trouble);
+    /// Adds `evidence` and marks `metrics` of `subject` as unmeasured.
+    pub fn failed(&mut self, evidence: Evidence, subject: &str, metrics: &[&'static str]) {
+        self.evidence.push(evidence);
         for metric in metrics {
             self.unmeasured(subject, metric);
         }
     }
 
-    /// Something that was seen.
-    pub fn saw(&mut self, kind: EvidenceKind, subject: &str, what: impl Into<String>) {
+    /// Adds evidence.
+    pub fn add_evidence(&mut self, kind: EvidenceKind, subject: &str, what: impl Into<String>) {
         self.evidence.push(Evidence::new(kind, subject, what));
     }
 
@@ -85,15 +85,15 @@ impl Findings {
 }
 
 impl Value {
-    /// From so many samples, of which `needs` are enough.
-    pub fn of(&mut self, n: usize, needs: u64) -> &mut Self {
+    /// Sets the number of samples, and how many are needed.
+    pub fn with_samples(&mut self, n: usize, needs: u64) -> &mut Self {
         self.n = Some(n as u64);
         self.needs = needs;
         self
     }
 
-    /// With a remark.
-    pub fn noting(&mut self, note: impl Into<String>) -> &mut Self {
+    /// Attaches a remark.
+    pub fn with_note(&mut self, note: impl Into<String>) -> &mut Self {
         self.note = Some(note.into());
         self
     }

@@ -1,20 +1,20 @@
-//! The nightly suite on a bench: what is measured on each device, in which order, and for how long.
+//! Runs the nightly suite on a bench: the checks, their order and repeats, the lease of the bench and the history of nights.
 //!
-//! A check ([`checks::make`]) asks a [`Bench`] for devices, which it knows by their traits alone, and fills a [`Findings`]: values, and
-//! evidence of whatever kept it from measuring. It never judges: limits, verdicts and causes are `skinrig-nightly`'s.
+//! A check ([`checks::run`]) gets its devices from a [`Bench`], uses them through their traits, and fills a [`Findings`] with measured
+//! values and with evidence of what prevented a measurement. `skinrig-nightly` judges the findings: limits, verdicts and causes.
 
 pub mod arm;
 pub mod bench;
-pub mod cause;
 pub mod checks;
+pub mod device_evidence;
 pub mod findings;
 pub mod history;
 pub mod lease;
-pub mod room;
+pub mod run_evidence;
 pub mod runner;
 mod streams;
-pub mod trouble;
+pub mod test_volume;
 
-pub use bench::{Bench, Devices, Drilled, GoldenRun, Slot, Trouble};
-pub use findings::{Findings, GoldenKept};
-pub use runner::{Onlooker, Tonight};
+pub use bench::{Bench, Devices, DrillResult, GoldenRun, Problem, Slot};
+pub use findings::{Findings, GoldenRecord};
+pub use runner::{NightObserver, SuiteRunner};

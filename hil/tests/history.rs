@@ -1,9 +1,9 @@
-//! The history file: nights go in once, come out as they were, and only a sound history is written to.
+//! The history file: nights are added once, read back unchanged, and only into an intact history.
 #![expect(clippy::unwrap_used, reason = "a test that fails must say so")]
 
 use std::path::Path;
 
-use skinrig_hil::history::{Appended, Filter, HistoryError, accept, append, lines, load};
+use skinrig_hil::history::{AppendOutcome, Filter, HistoryError, accept, append, load, suites};
 use skinrig_model::Limit;
 use skinrig_nightly::night::{Attempt, CheckResult, Measurement, NIGHT_VERSION, Part};
 use skinrig_nightly::trend::{Acceptance, History};
@@ -19,7 +19,7 @@ fn measured(metric: &str, value: Option<f64>) -> Measurement {
         n: Some(40),
         needs: 10,
         limit: Some(limit),
-        verdict: Verdict::on(value, Some(40), 10, Some(&limit)),
+        verdict: Verdict::of_measurement(value, Some(40), 10, Some(&limit)),
         note: None,
     }
 }
@@ -41,7 +41,7 @@ fn attempt(value: Option<f64>) -> Attempt {
     }
 }
 
-/// Night number `day`, in which the golden check was made once per value.
+/// Night number `day` with one attempt at the golden check per value.
 fn night(day: u32, rig: &str, values: &[Option<f64>]) -> Night {
     let check = CheckResult {
         name: "golden".to_owned(),
@@ -91,7 +91,7 @@ fn night(day: u32, rig: &str, values: &[Option<f64>]) -> Night {
 }
 
 #[test]
-fn nights_come_out_as_they_went_in_whatever_the_order_and_only_once() {
+fn nights_are_read_back_unchanged_in_any_order_and_added_only_once() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("history.sqlite");
     let nights = [
@@ -103,8 +103,11 @@ fn nights_come_out_as_they_went_in_whatever_the_order_and_only_once() {
     for night in [&nights[1], &other, &nights[2], &nights[0]] {
         let own = folder.path().join(&night.id);
         std::fs::create_dir_all(&own).unwrap();
-        assert_eq!(append(&path, night, &own).unwrap(), Appended::New);
-        assert_eq!(append(&path, night, &own).unwrap(), Appended::Known);
+        assert_eq!(append(&path, night, &own).unwrap(), AppendOutcome::Added);
+        assert_eq!(
+            append(&path, night, &own).unwrap(),
+            AppendOutcome::AlreadyPresent
+        );
     }
     let mut expected = History::default();
     for night in &nights {
@@ -121,7 +124,7 @@ fn nights_come_out_as_they_went_in_whatever_the_order_and_only_once() {
         (located.points[0].value, located.points[0].attempts),
         (Some(0.1 + 0.2), 3)
     );
-    let all = lines(&path).unwrap();
+    let all = suites(&path).unwrap();
     let named: Vec<_> = all.iter().map(|l| (l.rig.as_str(), l.nights)).collect();
     assert_eq!(named, [("b1", 3), ("b2", 1)]);
 
@@ -130,9 +133,9 @@ fn nights_come_out_as_they_went_in_whatever_the_order_and_only_once() {
     let mut cut_off = night(9, "b1", &[]);
     cut_off.finished = false;
     let e = append(&path, &cut_off, folder.path()).unwrap_err();
-    assert!(matches!(e, HistoryError::NoNight { .. }), "{e}");
+    assert!(matches!(e, HistoryError::InvalidNight { .. }), "{e}");
     let e = append(&path, &forged, folder.path()).unwrap_err();
-    assert!(matches!(e, HistoryError::OtherNight { .. }), "{e}");
+    assert!(matches!(e, HistoryError::ConflictingNight { .. }), "{e}");
     assert_eq!(load(&path, &one).unwrap(), expected);
 }
 
@@ -150,16 +153,16 @@ fn two_programs_add_to_one_history_at_once() {
             });
         }
     });
-    let all = lines(&path).unwrap();
+    let all = suites(&path).unwrap();
     assert_eq!(all.iter().map(|l| l.nights).collect::<Vec<_>>(), [5; 4]);
 }
 
 #[test]
-fn what_was_accepted_is_kept_and_must_be_there() {
+fn acceptances_are_stored_and_must_name_existing_nights_and_series() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("history.sqlite");
     append(&path, &night(1, "b1", &[Some(97.0)]), folder.path()).unwrap();
-    let said = Acceptance {
+    let acceptance = Acceptance {
         series: Some("golden/skin/located".to_owned()),
         night: "2026-11-01T02-00-00Z-nightly".to_owned(),
         reason: "another skin".to_owned(),
@@ -167,23 +170,23 @@ fn what_was_accepted_is_kept_and_must_be_there() {
         at: "2026-11-02T08:00:00Z".to_owned(),
     };
     let history = load(&path, &Filter::default()).unwrap();
-    accept(&path, &history, &said).unwrap();
+    accept(&path, &history, &acceptance).unwrap();
     let unknown = Acceptance {
         night: "2026-11-09T02-00-00Z-nightly".to_owned(),
-        ..said.clone()
+        ..acceptance.clone()
     };
     assert!(accept(&path, &history, &unknown).is_err());
     let unknown = Acceptance {
         series: Some("golden/skin/lokated".to_owned()),
-        ..said.clone()
+        ..acceptance.clone()
     };
     let e = accept(&path, &history, &unknown).unwrap_err().to_string();
     assert!(e.contains("golden/skin/lokated"), "{e}");
     let read = load(&path, &Filter::default()).unwrap();
-    assert_eq!(read.accepted, [said]);
+    assert_eq!(read.accepted, [acceptance]);
 }
 
-/// What `append` says of a file with these bytes, which it must leave as they are.
+/// The error of `append` for a file with these bytes, which must stay unchanged.
 fn refused(bytes: &[u8]) -> HistoryError {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("history.sqlite");
@@ -195,7 +198,7 @@ fn refused(bytes: &[u8]) -> HistoryError {
 }
 
 #[test]
-fn other_files_newer_ones_and_damaged_ones_are_refused_and_left_alone() {
+fn foreign_newer_and_damaged_files_are_rejected_and_left_unchanged() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("history.sqlite");
     let missing = load(&path, &Filter::default()).unwrap_err();

@@ -14,7 +14,7 @@ extern volatile uint16_t clock_overflows_high;
 // Starts Timer1, which counts cycles and never stops.
 void clock_start(void);
 
-// The present.
+// The current time.
 uint64_t clock_now(void);
 
 // Sets `*ticks` to the instant at which Timer1 read `timer`, at most half a turn (2 ms) ago. Interrupts are off.
@@ -33,7 +33,7 @@ static inline void clock_extend(uint16_t timer, uint64_t *ticks)
         ++parts->overflows_high;
 }
 
-// The present's lower 32 bits. Interrupts are off.
+// The lower 32 bits of the current time. Interrupts are off.
 static inline uint32_t clock_low(void)
 {
     uint16_t timer = TCNT1;

@@ -5,11 +5,11 @@
 #include <util/atomic.h>
 
 #define CAPACITY 64 // a power of two
-#define FOR_TRAINS 16 // of them that edges of the input never take
+#define FOR_TRAINS 16 // reserved for trains, not for input edges
 
 static struct event ring[CAPACITY];
 static uint32_t oldest; // number of the first kept event
-static uint8_t first;   // its place
+static uint8_t first;   // its index
 static uint8_t kept;
 static uint16_t dropped;
 
@@ -55,7 +55,7 @@ void events_forget(uint32_t before)
 
 void events_get(uint32_t number, struct event *out)
 {
-    // A kept event is written no more, so that interrupts may run.
+    // A stored event is not modified any more, so interrupts may run.
     *out = ring[(uint8_t)(first + (uint8_t)(number - oldest)) % CAPACITY];
 }
 

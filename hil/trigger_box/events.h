@@ -1,4 +1,4 @@
-// What happened and the host has not yet acknowledged: trains that started, edges of the input.
+// Events that the host has not yet acknowledged: started trains and input edges.
 #pragma once
 #include <stdint.h>
 
@@ -16,17 +16,17 @@ struct event *events_new(void);
 // counted.
 struct event *events_new_input(void);
 
-// Number of the event that will come next; the first since reset is 0.
+// Number of the next event; the first since reset is 0.
 uint32_t events_next(void);
 
-// Number of the oldest event that is still kept.
+// Number of the oldest stored event.
 uint32_t events_oldest(void);
 
-// Forgets all events before number `before`, if they are kept.
+// Discards all stored events before number `before`.
 void events_forget(uint32_t before);
 
-// Copies event number `number`, which must be kept.
+// Copies event number `number`, which must be stored.
 void events_get(uint32_t number, struct event *out);
 
-// Events that found the memory full, since reset.
+// Events dropped because the memory was full, since reset.
 uint16_t events_dropped(void);

@@ -1,4 +1,4 @@
-// Input capture: Timer1's value is latched by the edge itself, whatever the processor is doing.
+// Input capture: Timer1's value is latched by the edge itself, independently of the processor's load.
 #include "input.h"
 
 #include <avr/interrupt.h>
@@ -11,9 +11,9 @@
 
 static struct input_counts counts;
 volatile bool input_muted;
-static uint8_t turn; // of the clock, in which the last edge came
+static uint8_t turn; // timer period of the last edge
 static uint8_t edges_left = EDGES_PER_TURN; // in this turn
-static bool stale; // what is latched came while the input was not looked at
+static bool stale; // the latched value dates from a pause of the input
 
 static inline void count(uint16_t *n)
 {
@@ -26,7 +26,7 @@ static inline bool is_high(void)
     return PINB & _BV(PIN_INPUT);
 }
 
-// Kept short: while it runs, an edge of a train that is due must wait.
+// Kept short: it delays train edges that are due.
 static void record(bool level, uint16_t timer)
 {
     struct event *e = events_new_input();
@@ -48,7 +48,7 @@ static inline void wait_for(bool level)
         TCCR1B &= (uint8_t)~_BV(ICES1);
 }
 
-// True while the input is within its bounds; otherwise it is left alone until `input_tend` says so.
+// True while the input is within its edge limit; otherwise it is paused until `input_tend` resumes it.
 static inline bool within_bounds(void)
 {
     uint8_t now = (uint8_t)clock_overflows;
@@ -70,14 +70,14 @@ static inline void take_edge(uint16_t timer)
 {
     bool level = TCCR1B & _BV(ICES1);
     if (is_high() != level) {
-        // Over before it could be looked at (or raised by the change of polarity itself): not an edge to rely on.
+        // Ended before it could be read (or caused by the change of polarity itself): not a reliable edge.
         count(&counts.glitches);
         return;
     }
     record(level, timer);
     wait_for(!level);
     if (is_high() != level) {
-        // The opposite edge came before the capture was ready for it: stamped a microsecond late at most.
+        // The opposite edge came before the capture was ready for it: time-stamped at most 1 us late.
         record(!level, TCNT1);
         wait_for(level);
     }
@@ -102,9 +102,9 @@ ISR(TIMER1_CAPT_vect)
 
 void input_setup(void)
 {
-    // With its pull-up an input that nothing is wired to stays silent.
+    // The pull-up keeps an unconnected input silent.
     PORTB |= _BV(PIN_INPUT);
-    // The noise canceller wants four equal samples: spikes under 250 ns are none, and stamps are late by so much.
+    // The noise canceller wants four equal samples: it rejects spikes under 250 ns and delays time stamps by as much.
     TCCR1B |= _BV(ICNC1);
     wait_for(!is_high());
     TIMSK1 |= _BV(ICIE1);

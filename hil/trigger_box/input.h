@@ -6,17 +6,17 @@
 
 void input_setup(void);
 
-// The level now.
+// The current level.
 bool input_high(void);
 
-// An input that changes without end may take neither the processor nor the memory for events from the trains. After
-// EDGES_PER_TURN edges within one turn of the clock (4.096 ms) it is not looked at until the next turn.
+// A permanently changing input must not take processor time or event memory from the trains. After
+// EDGES_PER_TURN edges within one turn of the clock (4.096 ms) it is paused until the next turn.
 #define EDGES_PER_TURN 32
 
-// The input is not looked at until the clock's next turn.
+// The input is paused until the clock's next turn.
 extern volatile bool input_muted;
 
-// Looks at the input again when its turn has come. To be called again and again.
+// Resumes the input after its pause. Call periodically.
 void input_tend(void);
 
 // Ends the precedence that the input gave to the edge of a train. Interrupts are off.

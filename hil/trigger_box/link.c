@@ -108,7 +108,7 @@ void link_send(const uint8_t *body, uint8_t length)
     put(0);
 }
 
-// Undoes COBS in place. Length of the content, or 0 when it is none.
+// Decodes COBS in place. Returns the length of the content, or 0 if it is invalid.
 static uint8_t unstuff(uint8_t *frame, uint8_t length)
 {
     uint8_t out = 0;
@@ -149,7 +149,7 @@ uint8_t link_receive(const uint8_t **body)
         length = 0;
         too_long = false;
         if (taken == 0)
-            continue; // two delimiters in a row are no frame
+            continue; // two delimiters in a row: no frame between them
         uint8_t n = whole ? unstuff(frame, taken) : 0;
         if (n <= CHECKSUM) {
             count(&counts.bad_frames);

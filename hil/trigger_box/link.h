@@ -9,16 +9,16 @@ void link_setup(void);
 // valid until the next call.
 uint8_t link_receive(const uint8_t **body);
 
-// Are there bytes that `link_receive` has not seen?
+// True while there are bytes not yet processed by `link_receive`.
 bool link_pending(void);
 
-// Sends a frame. Waits while the line's memory is full.
+// Sends a frame. Blocks while the send buffer is full.
 void link_send(const uint8_t *body, uint8_t length);
 
-// Frames that were spoiled on the way, since reset.
+// Damaged frames since reset.
 struct link_counts {
     uint16_t bad_checksums;
     uint16_t bad_frames; // too short, too long, or no COBS
-    uint16_t overruns;   // bytes lost because nobody took them in time
+    uint16_t overruns;   // bytes lost because they were not read in time
 };
 void link_count(struct link_counts *out);

@@ -1,4 +1,4 @@
-// The trigger box: answers the host's commands, sends sync trains when their time comes, disarms when the host is silent.
+// The trigger box: executes the host's commands, sends periodic sync trains, disarms when the host is silent.
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <avr/sleep.h>
@@ -15,8 +15,8 @@
 #include "store.h"
 #include "train.h"
 
-// The watchdog outlives a reset that it caused and would strike again in 15 ms: off before anything else, with the
-// cause of the reset saved first.
+// The watchdog stays on after a reset that it caused and would fire again in 15 ms: switch it off first, after the
+// cause of the reset is saved.
 static uint8_t reset_cause __attribute__((section(".noinit")));
 void before_main(void) __attribute__((naked, used, section(".init3")));
 void before_main(void)
@@ -30,14 +30,14 @@ static uint16_t boot;
 
 static bool armed;
 static bool disarmed_by_silence;
-static uint64_t silence_ticks; // 0: patience without end
-static uint64_t heard;         // the last good frame
+static uint64_t silence_ticks; // 0: no timeout
+static uint64_t heard;         // time of the last valid frame
 
 static uint64_t sync_period; // 0: none
 static uint64_t sync_due;
 static uint32_t sync_count;
 
-// The last mark that was carried out, so that a repeated request is answered without a second train.
+// The last executed mark: a repeated request gets the same reply without a second train.
 static uint32_t mark_number;
 static uint64_t mark_start;
 
@@ -71,7 +71,7 @@ static uint32_t take_32(const uint8_t *p)
 
 static void disarm(void)
 {
-    // A train under way ends as it began; nothing new begins.
+    // A running train is completed; no new train starts.
     armed = false;
     sync_period = 0;
     PORTB &= (uint8_t)~_BV(PIN_ARMED);
@@ -281,7 +281,7 @@ static void keep_schedule(void)
     if (sync_period && now >= sync_due && train_sync(sync_count)) {
         ++sync_count;
         sync_due += sync_period;
-        if (sync_due <= now) // it waited for longer than a period: no hurry to catch up
+        if (sync_due <= now) // late by more than a period: skip the missed trains
             sync_due = now + sync_period;
     }
 }
@@ -306,7 +306,7 @@ int main(void)
         keep_schedule();
         input_tend();
         // Until the next interrupt: a byte, an edge, or the clock's overflow after 4 ms at most. `sei` takes effect
-        // after the instruction that follows it, so that nothing comes between the look and the sleep.
+        // after the instruction that follows it, so that no interrupt runs between the check and the sleep.
         cli();
         if (!link_pending()) {
             sleep_enable();

@@ -1,4 +1,4 @@
-// Which pin does what. All outputs share one port, so that one write raises them in the same cycle.
+// Pin assignment. All outputs share one port, so that one write raises them in the same cycle.
 #pragma once
 #include <avr/io.h>
 

@@ -1,4 +1,4 @@
-// The wire between host and trigger box: numbers that both sides share. Twin of crates/drivers/trigger_box/src/protocol.rs.
+// Protocol constants shared by host and trigger box. Twin of crates/drivers/trigger_box/src/protocol.rs.
 #pragma once
 
 #define FIRMWARE_MAJOR 1

@@ -1,4 +1,4 @@
-// The EEPROM: 100,000 writes, of which each reset takes one.
+// The EEPROM: 100,000 writes; each reset uses one.
 #include "store.h"
 
 #include <avr/eeprom.h>

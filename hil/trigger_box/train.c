@@ -1,4 +1,4 @@
-// The pulse trains: each edge is due at an instant of the clock and rises or falls in exactly that cycle.
+// The pulse trains: each edge has a scheduled clock value and occurs in exactly that cycle.
 //
 // The compare interrupt of Timer1 comes a little early, waits for the rest in a loop that accounts for every cycle, and
 // writes the port once. Other interrupts may delay its beginning, never the edge.
@@ -19,7 +19,7 @@
 // any other stretch without interrupts (110 at most), and the interrupt's own beginning (130): 700 cycles, 44 us. Half a
 // microsecond off the grid of the edges, so that no match falls on the timer's overflow, where simavr 1.6 misses it.
 #define LEAD_TICKS (52UL * TICKS_PER_US + TICKS_PER_US / 2)
-// From "now" to the first edge of a train that need not wait.
+// Delay from the request to the first edge of a train that starts immediately.
 #define START_LEAD_TICKS (100UL * TICKS_PER_US)
 // Cycles between the reading of Timer1 in `write_at` and the change of the port, besides the wait itself.
 #define WRITE_CYCLES 17
@@ -27,7 +27,7 @@
 struct train {
     uint8_t kind;       // event_kind
     uint32_t data;      // 20 bits
-    uint32_t bits;      // of all pulses, the first on top; that of the start pulse means nothing
+    uint32_t bits;      // of all pulses, first in the highest bit; the bit of the start pulse is unused
     uint64_t start;     // first rising edge
 };
 
@@ -37,16 +37,16 @@ static volatile bool waiting; // `next` begins after `current`
 static struct train current, next;
 
 static uint8_t pulse;       // of the current train
-static uint32_t bits_left;  // of the current train, that of the present pulse on top
-static bool high;           // the outputs are up
-static uint32_t rise;       // lower 32 bits of the present pulse's rising edge
+static uint32_t bits_left;  // of the current train, current pulse in the highest bit
+static bool high;           // the outputs are high
+static uint32_t rise;       // lower 32 bits of the current pulse's rising edge
 static uint32_t due;        // lower 32 bits of the next edge
-static uint64_t free_at;    // from here on another train may begin
+static uint64_t free_at;    // earliest start of the next train
 
 static struct train_counts counts;
 
 // Writes `value` to the port of the outputs in the cycle in which the lower half of the clock reads `at`. True when
-// that cycle was over already; then it writes at once.
+// that cycle had already passed; then it writes immediately.
 static inline bool write_at(uint16_t at, uint8_t value)
 {
     uint16_t left = at - WRITE_CYCLES;
@@ -96,7 +96,7 @@ ISR(TIMER1_COMPA_vect)
     input_resume();
     if (state == IDLE)
         return;
-    // A match of an old setting, or an edge more than a turn of the timer away: it will come again.
+    // A match of an old setting, or an edge more than a timer period away: the interrupt will recur.
     int32_t left = (int32_t)(due - clock_low());
     if (left > (int32_t)(LEAD_TICKS + LEAD_TICKS / 2))
         return;
@@ -172,7 +172,7 @@ void train_setup(void)
 {
     PORTB &= (uint8_t)~OUTPUTS;
     DDRB |= OUTPUTS;
-    // Always on: without a train it finds nothing to do, once each turn of the timer.
+    // Always on: without a train it runs once per timer period and does nothing.
     TIMSK1 |= _BV(OCIE1A);
 }
 

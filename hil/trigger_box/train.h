@@ -27,13 +27,13 @@ bool train_mark(uint32_t data, uint64_t *start);
 // Starts the sync train number `count` unless any train is under way.
 bool train_sync(uint32_t count);
 
-// Is a train under way, or waiting?
+// True while a train is running or waiting.
 bool train_under_way(void);
 
 // Raises and lowers the outputs once, 100 us long, without a train; flags of self_test_flag. The line must be free.
 uint8_t train_self_test(void);
 
-// Trains that started, and edges that came too late by more than a cycle, since reset.
+// Started trains, and edges late by more than a cycle, since reset.
 struct train_counts {
     uint32_t marks;
     uint32_t syncs;

@@ -1,8 +1,9 @@
-//! Every call that reaches the disk, of a run, a seal, two kinds of resume and an analysis: the process is gone before it or in the
-//! middle of it, or the call fails. Afterwards the session is sound, goes on to its end, and its history is whole: plan against
-//! journal against camera bytes, by a program that shares no code with the writer (`history.py`).
+//! Disk faults at every system call of a run, a seal, two kinds of resume and an analysis: the process is killed before the
+//! call or in the middle of it, or the call fails. Afterwards the session is valid, can be resumed to its end, and has a
+//! complete history: plan, journal and camera bytes are compared by a program that shares no code with the writer
+//! (`history.py`).
 //!
-//! A preloaded library (`disk.c`) makes the faults. Some cases here; all of them, some thousand, by
+//! A preloaded library (`disk.c`) injects the faults. This runs a sample; all several thousand cases run with
 //!
 //!     SKINRIG_DISK_FAULTS=all cargo test -p skinrig --test crash disk -- --nocapture
 #![cfg(target_os = "linux")]
@@ -25,18 +26,18 @@ use crate::lab::{Dice, expect, journal, program, resume, session_in, words};
 
 const CAMPAIGN: &str = "tests/crash/disk.yaml";
 const KINDS: [&str; 6] = ["kill", "torn", "eio", "enospc", "full", "short"];
-/// How many cases when nobody says otherwise.
+/// Default number of cases.
 const SAMPLE: usize = 20;
 
-/// What the program does while the disk fails it.
+/// Task of the program during which the disk fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Task {
     Run,
-    /// `resume` of a session that has its end and not its seal.
+    /// `resume` of a complete session without a seal.
     Seal,
-    /// `resume` of one that was cut off.
+    /// `resume` of a session that was cut off.
     Resume,
-    /// `resume` of one that was sealed after a fault: its seal is taken off.
+    /// `resume` of a session sealed after a fault, whose seal must be removed.
     Unseal,
     Analyze,
 }
@@ -50,7 +51,7 @@ const TASKS: [Task; 5] = [
 ];
 
 impl Task {
-    /// The fault on purpose that makes the session that it begins with; none for a whole one.
+    /// Injected fault that creates the initial session; `None` for a complete one.
     fn before(self) -> Option<&'static str> {
         match self {
             Self::Run | Self::Analyze => None,
@@ -78,14 +79,14 @@ fn run(folder: &Path) -> Command {
     command
 }
 
-/// What all cases share.
+/// Data common to all cases.
 struct Bench {
     folder: tempfile::TempDir,
     library: PathBuf,
     python: Option<String>,
-    /// The files that each task begins with.
+    /// Initial files of each task.
     before: BTreeMap<Task, PathBuf>,
-    /// The calls that each task makes when nothing fails, a line each.
+    /// System calls of each task without faults, one line each.
     calls: BTreeMap<Task, Vec<String>>,
 }
 
@@ -152,13 +153,13 @@ impl Bench {
         Some(bench)
     }
 
-    /// Runs the task on its files in `case`, with a fault.
+    /// Starts the task on its files in `case`, with a fault.
     fn start(&self, task: Task, case: &Path, fault: Option<(&str, u64)>) -> Output {
         let folder = folder_of(case);
         std::fs::create_dir(&folder).unwrap();
         for entry in std::fs::read_dir(&self.before[&task]).unwrap() {
             let from = entry.unwrap().path();
-            // A run that was killed leaves its socket.
+            // A killed run leaves its socket.
             if from.is_file() {
                 std::fs::copy(&from, folder.join(from.file_name().unwrap())).unwrap();
             }
@@ -174,7 +175,7 @@ impl Bench {
         command.output().unwrap()
     }
 
-    /// One case: what may come of it, and that the session goes on to its end. What is wrong, in words.
+    /// Runs one case and checks that the session can be resumed to its end. Returns a description of what is wrong.
     fn case(&self, task: Task, kind: &str, n: u64) -> Result<(), String> {
         let case = tempfile::tempdir().unwrap();
         let output = self.start(task, case.path(), Some((kind, n)));
@@ -295,7 +296,7 @@ fn log_of(case: &Path) -> PathBuf {
     case.join("calls")
 }
 
-/// The cases to try: all of them, or as many as are asked for, spread over tasks and kinds.
+/// The cases to try: all, or the requested number, spread over tasks and kinds.
 fn cases(bench: &Bench) -> Vec<(Task, &'static str, u64)> {
     let asked = std::env::var("SKINRIG_DISK_FAULTS").unwrap_or_default();
     if asked == "all" {
@@ -313,7 +314,7 @@ fn cases(bench: &Bench) -> Vec<(Task, &'static str, u64)> {
         (task, kind, 1 + dice.below(bench.calls[&task].len() as u64))
     };
     let sampled: Vec<_> = (0..many).map(case).collect();
-    // The index of SQLite's log is a file of its own, made anew each time: a disk without room for it is not a bad session.
+    // The index of SQLite's log is a separate, temporary file: without space for it the session is not damaged.
     let index = TASKS.into_iter().flat_map(|task| {
         [("open64", "full"), ("pwrite64", "enospc")].map(|(call, kind)| {
             let is_it = |line: &&String| line.contains(call) && line.ends_with("-shm");
@@ -357,7 +358,7 @@ fn a_disk_that_fails_at_any_call_loses_nothing() {
     );
 }
 
-/// The check of the histories finds what it is there for.
+/// The history check detects the corruptions that it is meant for.
 #[test]
 fn the_check_of_histories_finds_a_press_too_many_and_a_byte_too_few() {
     let Some(bench) = Bench::get() else { return };

@@ -1,17 +1,17 @@
-//! The process is gone: at every journal write, at random instants, and again while the session goes on.
+//! Killing the process: at every journal write, at random times, and again during a resumed run.
 
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 
 use crate::lab::{Dice, Uninterrupted, campaign, expect, goes_on, journal, resume, session_in};
 
-/// How many random instants.
+/// Number of random kills.
 fn crashes() -> u64 {
     let asked = std::env::var("SKINRIG_CRASHES").ok();
     asked.and_then(|n| n.parse().ok()).unwrap_or(16)
 }
 
-/// The campaign with a fault; false when it came to its end before.
+/// Runs the campaign with a fault; false if it finished before.
 fn killed(folder: &std::path::Path, fault: &str) -> bool {
     let output = campaign(folder).args(["--fault", fault]).output().unwrap();
     match output.status.code() {
@@ -23,7 +23,7 @@ fn killed(folder: &std::path::Path, fault: &str) -> bool {
     }
 }
 
-/// Kills at journal writes `first`, `first + 2`, ... until the campaign gets through; how many.
+/// Kills at journal writes `first`, `first + 2`, ... until the campaign finishes; returns the number of kills.
 fn killed_at_every_other_write(first: usize) -> usize {
     for n in (first..).step_by(2) {
         let folder = tempfile::tempdir().unwrap();
@@ -67,13 +67,13 @@ fn killed_at_random_instants() {
         let command = command.stdout(Stdio::null()).stderr(Stdio::piped());
         let mut child = command.spawn().unwrap();
         let wait = took.mul_f64(dice.below(1_000) as f64 / 1_000.0);
-        // Not a wait for anything: the instant of the crash.
+        // The time of the kill, not a wait for a condition.
         std::thread::sleep(wait);
         child.kill().unwrap();
         let said = BufReader::new(child.stderr.take().unwrap());
         let ended = child.wait().unwrap().success();
         let case = format!("seed {seed}, killed after {wait:?}");
-        // `press 4/12` is said when the outcome of the fourth press is on the disk.
+        // `press 4/12` is printed once the outcome of the fourth press is on the disk.
         let told = said.lines().map_while(Result::ok).filter_map(|line| {
             let (n, _) = line.strip_prefix("press ")?.split_once('/')?;
             n.parse::<usize>().ok()
@@ -95,7 +95,7 @@ fn killed_at_random_instants() {
         }
         under_way += u64::from(outcomes > 0);
         if !before.is_empty() && sealed(&session) {
-            // Complete in time; or only the last bytes of its seal were missing, and are put there.
+            // Either complete in time, or only the end of its seal is missing and gets written.
             let code = resume(&session).output().unwrap().status.code();
             assert!(matches!(code, Some(0 | 2)), "{case}: {code:?}");
             Uninterrupted::get().assert_equalled_by(&session, 0, &case);
@@ -139,14 +139,14 @@ fn killed_before_the_seal() {
     let folder = tempfile::tempdir().unwrap();
     assert!(killed(folder.path(), "killed@seal"));
     let session = session_in(folder.path()).unwrap();
-    // Nothing is to be pressed: the seal alone is missing.
+    // All presses exist: only the seal is missing.
     let said = expect(resume(&session), 0);
     assert!(said.contains("only its seal was missing"), "{said}");
     Uninterrupted::get().assert_equalled_by(&session, 0, "killed before the seal");
     let said = expect(resume(&session), 2);
     assert!(said.contains("nothing to resume"), "{said}");
 
-    // The same of a further leg.
+    // Same for a further leg.
     let folder = tempfile::tempdir().unwrap();
     assert!(killed(folder.path(), "killed@journal:20"));
     let session = session_in(folder.path()).unwrap();

@@ -1,4 +1,4 @@
-//! The program, the campaign, and what must hold of a session that went on after its process was gone.
+//! Helpers: the program, the campaign, and the checks of a session resumed after a kill.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -16,21 +16,21 @@ const CAMPAIGN: &str = "tests/crash/campaign.yaml";
 /// Every planned press with its attempts.
 pub type Presses = Vec<(PlannedPress, Vec<AttemptRow>)>;
 
-/// The program with these arguments, not yet started.
+/// Command for the program with these arguments, not yet started.
 pub fn program<S: AsRef<OsStr>>(arguments: &[S]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_skinrig"));
     command.current_dir(ROOT).args(arguments);
     command
 }
 
-/// The campaign, to be recorded in `folder`.
+/// Command that records the campaign in `folder`.
 pub fn campaign(folder: &Path) -> Command {
     let mut command = program(&["run", CAMPAIGN, "--no-analysis", "--sessions"]);
     command.arg(folder);
     command
 }
 
-/// What was said, for messages.
+/// Output of a program, for messages.
 pub fn words(output: &Output) -> String {
     let text = |bytes| String::from_utf8_lossy(bytes).into_owned();
     format!(
@@ -41,7 +41,7 @@ pub fn words(output: &Output) -> String {
     )
 }
 
-/// Runs to the end and expects this exit code; what was said.
+/// Runs to the end, expects this exit code, and returns the output.
 #[track_caller]
 pub fn expect(mut command: Command, code: i32) -> String {
     let output = command.output().unwrap();
@@ -49,7 +49,7 @@ pub fn expect(mut command: Command, code: i32) -> String {
     words(&output)
 }
 
-/// The one session of a folder; none when the process was gone before it made one.
+/// The only session of a folder; `None` if the process was killed before creating one.
 pub fn session_in(folder: &Path) -> Option<PathBuf> {
     let entries = std::fs::read_dir(folder).ok()?;
     let mut found = entries
@@ -64,7 +64,7 @@ pub fn session_in(folder: &Path) -> Option<PathBuf> {
     session
 }
 
-/// What the journal holds; `None` for a session without so much as a header, which holds nothing.
+/// Content of the journal; `None` for a session without a header, which is empty.
 pub fn journal(session: &Path) -> Option<Presses> {
     let reader = SessionReader::open(session).ok()?;
     reader.header().ok()?;
@@ -73,7 +73,7 @@ pub fn journal(session: &Path) -> Option<Presses> {
 
 /// The campaign without any fault.
 pub struct Uninterrupted {
-    /// How long it took, process and all.
+    /// Total duration, including process start.
     pub took: Duration,
     presses: usize,
     counts: Value,
@@ -103,9 +103,9 @@ impl Uninterrupted {
         })
     }
 
-    /// The session is complete and sound, every press that scores was made validly once, and the results are those of the
-    /// uninterrupted campaign: equal counts, an RMSE within its 95 % interval, certified clocks. Of the attempts no more
-    /// were cut off than there were `kills`.
+    /// Checks that the session is complete and valid, that every scored press has exactly one valid attempt, and that the
+    /// results match the uninterrupted campaign: equal counts, an RMSE within its 95 % interval, certified clocks. At most
+    /// `kills` attempts may be cut off.
     #[track_caller]
     pub fn assert_equalled_by(&self, session: &Path, kills: usize, case: &str) {
         let verified = expect(program(&[OsStr::new("verify"), session.as_os_str()]), 0);
@@ -153,7 +153,7 @@ impl Uninterrupted {
     }
 }
 
-/// Analyses a session; the numbers.
+/// Analyses a session and returns its results.
 fn analysis(session: &Path) -> Value {
     let out = session.with_extension("json");
     let [session, json] = [session, &out].map(|p| p.as_os_str());
@@ -163,7 +163,7 @@ fn analysis(session: &Path) -> Value {
     results["analysis"].clone()
 }
 
-/// What was told before is told still: an attempt with an outcome keeps it, one without is marked as cut off.
+/// Earlier records are unchanged: an attempt with an outcome keeps it, one without is marked as cut off.
 #[track_caller]
 pub fn assert_kept(before: &Presses, after: &Presses, case: &str) {
     for ((_, before), (planned, after)) in before.iter().zip(after) {
@@ -184,15 +184,15 @@ pub fn assert_kept(before: &Presses, after: &Presses, case: &str) {
     }
 }
 
-/// `skinrig resume` of `session`, to be started.
+/// Command for `skinrig resume` of `session`.
 pub fn resume(session: &Path) -> Command {
     let mut command = program(&["resume", "--no-analysis"]);
     command.arg(session);
     command
 }
 
-/// Lets a session go on to its end, after `kills`, and checks that it equals the uninterrupted campaign. A session
-/// without a header is refused, and holds nothing.
+/// Resumes a session after `kills`, and checks that it equals the uninterrupted campaign. A session without a header is
+/// rejected and is empty.
 #[track_caller]
 pub fn goes_on(session: &Path, kills: usize, case: &str) {
     let Some(before) = journal(session) else {
@@ -216,12 +216,12 @@ impl Dice {
         z ^ (z >> 31)
     }
 
-    /// Below `n`, which is far below 2^64.
+    /// Uniform below `n`, which is far below 2^64.
     pub fn below(&mut self, n: u64) -> u64 {
         self.next() % n
     }
 
-    /// Bytes.
+    /// Random bytes.
     pub fn bytes(&mut self, n: u64) -> Vec<u8> {
         (0..n).map(|_| self.next() as u8).collect()
     }

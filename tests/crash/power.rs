@@ -1,10 +1,11 @@
-//! The power is gone: of what was not yet flushed to the disk, any part may be missing or torn.
+//! Power loss: any part of the data not yet flushed to the disk may be missing or torn.
 
 use std::path::{Path, PathBuf};
 
 use crate::lab::{Dice, Presses, campaign, goes_on, journal, program, session_in, words};
 
-/// Length of the header of a write-ahead log, and of each of its frames beside the page (sqlite.org/fileformat2.html, 4.1 and 4.2).
+/// Length of the header of a write-ahead log, and of each of its frames besides the page (sqlite.org/fileformat2.html, 4.1
+/// and 4.2).
 const LOG_HEADER: usize = 32;
 const FRAME_HEADER: usize = 24;
 
@@ -14,7 +15,7 @@ fn log_of(session: &Path) -> PathBuf {
     name.into()
 }
 
-/// Where the last transaction of a log ends that was committed, and thus flushed; 0 for none.
+/// End of the last committed, and thus flushed, transaction of a log; 0 if there is none.
 fn flushed(log: &[u8]) -> usize {
     let word = |at: usize| {
         let bytes = log.get(at..at + 4)?;
@@ -38,7 +39,7 @@ fn flushed(log: &[u8]) -> usize {
     last
 }
 
-/// A campaign that was killed at a random journal write, its journal, and its log.
+/// A campaign killed at a random journal write: its session, journal and log.
 fn killed(dice: &mut Dice, folder: &Path) -> (PathBuf, Presses, Vec<u8>) {
     let n = 10 + dice.below(20);
     let output = campaign(folder)
@@ -59,7 +60,7 @@ fn what_was_not_flushed_may_be_torn() {
         let folder = tempfile::tempdir().unwrap();
         let (session, before, mut log) = killed(&mut dice, folder.path());
         log.truncate(flushed(&log).max(LOG_HEADER));
-        // What was on its way: anything, of any length.
+        // Data in flight: any content, of any length.
         let length = dice.below(20_000);
         log.extend(dice.bytes(length));
         std::fs::write(log_of(&session), &log).unwrap();
@@ -87,7 +88,7 @@ fn a_log_cut_anywhere_tells_nothing_wrong() {
         let verified = program(&["verify"]).arg(&session).output().unwrap();
         match verified.status.code() {
             Some(0) => {}
-            // Told: pages were missing that had been flushed.
+            // Detected: flushed pages are missing.
             Some(2 | 4) => continue,
             _ => panic!("{case}: {}", words(&verified)),
         }
@@ -95,7 +96,7 @@ fn a_log_cut_anywhere_tells_nothing_wrong() {
         let now = journal(&session).unwrap();
         for ((_, now), (planned, before)) in now.iter().zip(&before) {
             for (is, was) in now.iter().zip(before) {
-                // As it was, or as it was earlier: without its outcome.
+                // Unchanged, or an earlier state without the last outcome.
                 let earlier = is.outcome.is_none() && is.id == was.id;
                 assert!(is == was || earlier, "{case}: {}: {is:?}", planned.id);
             }

@@ -1,5 +1,5 @@
-//! The rig costs presses of a run that comes to its end: that is no success, and the presses are taken again in a further leg, also
-//! when that leg is killed. Held against the program that shares no code with the writer.
+//! Presses lost due to the rig in a run that completes: the run does not count as a success, and a further leg repeats these
+//! presses, even if that leg is killed. Checked with the program that shares no code with the writer.
 
 use std::path::Path;
 use std::process::Command;
@@ -11,7 +11,7 @@ use crate::lab::{
     Presses, assert_kept, campaign, expect, journal, program, resume, session_in, words,
 };
 
-/// The campaign on a rig whose camera sends nothing any more from the tenth press on; the session.
+/// The campaign on a rig whose camera sends nothing from the tenth press on; returns the session.
 fn spoilt(folder: &Path) -> std::path::PathBuf {
     let mut run = campaign(folder);
     run.args(["--fault", "camera1-stalled@approach:10"]);
@@ -31,7 +31,7 @@ fn verify(session: &Path) -> String {
     expect(command, 0)
 }
 
-/// Every press is valid; of those that the run before had no attempt was added but to sync presses.
+/// Every press is valid; no attempts were added to those valid before, except sync presses.
 fn is_whole(session: &Path, before: &Presses) {
     let said = verify(session);
     assert!(said.contains("sound, sealed"), "{said}");
@@ -74,12 +74,12 @@ fn what_the_rig_cost_is_taken_again() {
             .as_ref()
             .is_some_and(|(_, end)| end.name() == "completed")
     }));
-    // Nothing is spoilt any more.
+    // No presses remain to be repeated.
     let said = expect(resume(&session), 2);
     assert!(said.contains("there is nothing to resume"), "{said}");
 }
 
-/// The rig is not mended: the leg ends as the run did, and the next one may do better.
+/// The rig is not repaired: the leg ends like the run did, and the next leg can repeat the presses.
 #[test]
 fn a_rig_that_is_not_mended_costs_them_again() {
     let folder = tempfile::tempdir().unwrap();
@@ -94,7 +94,7 @@ fn a_rig_that_is_not_mended_costs_them_again() {
     is_whole(&session, &before);
 }
 
-/// Killed at the beginning, in the middle and before the seal of the leg that takes them again.
+/// Kills at the start, in the middle and before the seal of the leg that repeats the presses.
 #[test]
 fn killed_while_they_are_taken_again() {
     for fault in ["killed@journal:1", "killed@journal:12", "killed@seal"] {

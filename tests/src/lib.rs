@@ -1,4 +1,4 @@
-//! Shared helpers of the whole-system tests: a protocol, run on any rig into a session file.
+//! Helpers of the whole-system tests: run a protocol on any rig into a session file.
 
 use std::error::Error;
 use std::path::Path;
@@ -10,13 +10,13 @@ use skinrig_protocol::{Plan, Protocol};
 use skinrig_recorder::SessionWriter;
 use skinrig_results::RigDocument;
 
-/// What a helper fails with: a test only shows it.
+/// Error of a helper; tests only display it.
 pub type Fault = Box<dyn Error>;
 
-/// A protocol from its text, and its plan.
+/// Parses a protocol and compiles its plan.
 ///
 /// # Errors
-/// Every finding, when the text is no protocol.
+/// All findings, if the text is not a valid protocol.
 pub fn planned(text: &str) -> Result<(Protocol, Plan), Fault> {
     let no_files = |path: &Path| Err(std::io::Error::other(path.display().to_string()));
     let protocol = Protocol::parse("test.yaml", text.as_bytes(), &[], &no_files)
@@ -25,10 +25,10 @@ pub fn planned(text: &str) -> Result<(Protocol, Plan), Fault> {
     Ok((protocol, plan))
 }
 
-/// The header of a run of `plan` on `rig`.
+/// Header of a run of `plan` on `rig`.
 ///
 /// # Errors
-/// When something cannot be written as JSON.
+/// When something cannot be serialised as JSON.
 pub fn header(protocol: &Protocol, plan: &Plan, rig: &Rig) -> Result<RunHeader, Fault> {
     let document = RigDocument {
         geometry: rig.geometry,
@@ -58,11 +58,10 @@ pub fn header(protocol: &Protocol, plan: &Plan, rig: &Rig) -> Result<RunHeader, 
     })
 }
 
-/// Runs `plan` on `rig` into a new session at `path`. `watch` sees each record before it is written, and may
-/// stop the run.
+/// Runs `plan` on `rig` into a new session at `path`. `watch` sees each record before it is written, and may stop the run.
 ///
 /// # Errors
-/// When the session cannot be made or sealed. How the run ended is in the report.
+/// When the session cannot be created or sealed. The report states how the run ended.
 pub fn record(
     protocol: &Protocol,
     plan: &Plan,

@@ -1,4 +1,4 @@
-//! Holds the house in order: which crate may use which, and under which licences we stand.
+//! Checks the architecture: dependencies between crates, and licences of dependencies.
 #![expect(
     clippy::unwrap_used,
     reason = "a test that cannot read the workspace must fail"
@@ -10,7 +10,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// Who may use whom among our own crates, besides tests. Twin of the table in `ARCHITECTURE.md`.
+/// Allowed dependencies between our crates, except in tests. Mirrors the table in `ARCHITECTURE.md`.
 const ALLOWED: &[(&str, &[&str])] = &[
     ("skinrig-settings-derive", &[]),
     ("skinrig-settings", &["skinrig-settings-derive"]),
@@ -111,7 +111,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
 ];
 
-/// Crates of other people that only some of our crates may know.
+/// External crates that only some of our crates may use.
 const RESTRICTED: &[(&str, &[&str])] = &[
     ("sqlx", &["skinrig-recorder", "skinrig-hil"]),
     ("tokio", &["skinrig-recorder", "skinrig-hil", "skinrig"]),
@@ -129,7 +129,7 @@ const RESTRICTED: &[(&str, &[&str])] = &[
     ("serialport", &["skinrig-trigger-box"]),
 ];
 
-/// Members that only test, measure or stand in for hardware.
+/// Members that only test, measure or emulate hardware.
 const HARNESSES: &[&str] = &[
     "skinrig-tests",
     "skinrig-bench",
@@ -144,7 +144,7 @@ const HARNESSES: &[&str] = &[
     "skinrig-usbshim",
 ];
 
-/// Licences that go with MIT OR Apache-2.0 for a program that people download.
+/// Licences compatible with MIT OR Apache-2.0 for a downloadable program.
 const LICENCES: &[&str] = &[
     "MIT",
     "MIT-0",
@@ -164,15 +164,15 @@ const LICENCES: &[&str] = &[
     "bzip2-1.0.6",
 ];
 
-/// Crates that ship the text of their licence and name none: what the text is.
+/// Crates that ship a licence text without naming it, and the licence of that text.
 const LICENCE_BY_TEXT: &[(&str, &str)] = &[
     ("neuromorphic-drivers", "MIT"),
     ("neuromorphic-types", "MIT"),
 ];
 
-/// The files that may hold `unsafe` code, all at the border to foreign functions, to memory shared with another process or to the allocator.
+/// Files that may contain `unsafe` code, all at the boundary to foreign functions, shared memory or the allocator.
 const UNSAFE_HOMES: &[&str] = &[
-    // The vendor's robot library: its functions' types, loading it, calling it.
+    // The vendor's robot library: function types, loading, calling.
     "crates/drivers/drd_abi/src/functions.rs",
     "crates/drivers/drd_abi/src/version.rs",
     "crates/drivers/drd_abi/tests/table.rs",
@@ -180,7 +180,7 @@ const UNSAFE_HOMES: &[&str] = &[
     "crates/drivers/omega3/src/load.rs",
     // libusb's asynchronous transfers.
     "crates/drivers/evk1/src/usb/transfers.rs",
-    // The stand-in for the robot library: what it exports, and the page that it shares with its firmware.
+    // The emulated robot library: its exports, and the page that it shares with its firmware.
     "hil/emulated/libdrd/src/entry.rs",
     "hil/emulated/libdrd/src/exports/device.rs",
     "hil/emulated/libdrd/src/exports/library.rs",
@@ -199,20 +199,20 @@ const UNSAFE_HOMES: &[&str] = &[
     "hil/emulated/libdrd/tests/arm/processes.rs",
     "hil/emulated/libdrd/tests/arm/strictness.rs",
     "hil/emulated/libdrd/tests/arm/support.rs",
-    // The stand-in for the USB bus: functions of the C library, interposed.
+    // The emulated USB bus: interposed C library functions.
     "hil/emulated/usbshim/src/interpose.rs",
     "hil/emulated/usbshim/src/wire.rs",
-    // Counts the memory that hostile input takes: the trait of allocators is unsafe.
+    // Counts the memory held by untrusted input: the allocator trait is unsafe.
     "tests/fuzz/tests/hostile/allocator.rs",
 ];
 
-/// A line without its comment and without what is quoted in it.
+/// A line without comments and string contents.
 fn code(line: &str) -> String {
     let line = line.split("//").next().unwrap_or_default();
     line.split('"').step_by(2).collect()
 }
 
-/// What of `source` stands against the rule that each `unsafe` block or implementation follows its reason.
+/// Lines of `source` whose `unsafe` block or implementation lacks a SAFETY comment.
 fn without_reason(source: &str) -> Vec<usize> {
     let lines: Vec<&str> = source.lines().collect();
     let needs_reason = |line: &str| {
@@ -231,7 +231,7 @@ fn without_reason(source: &str) -> Vec<usize> {
         .collect()
 }
 
-/// Rust files under `folder`, by their path from the workspace's root.
+/// Rust files under `folder`, with paths relative to the workspace root.
 fn rust_files(folder: &Path, root: &Path, to: &mut Vec<(String, String)>) {
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -278,7 +278,7 @@ fn unsafe_code_lives_at_named_borders_and_gives_its_reason() {
     assert!(without_reason(&with).is_empty());
 }
 
-/// Who may name a boxed robot: its contract, the rig that carries it, the guard that owns it, and those who hand it to the guard.
+/// Files that may name a boxed robot: its trait, the rig that owns it, the guard, and those who pass it to the guard.
 const ROBOT_HOMES: [&str; 6] = [
     "crates/cli/src/jog/mod.rs",
     "crates/cli/src/rig/bench.rs",
@@ -308,7 +308,7 @@ fn the_guard_alone_holds_the_robot() {
     );
 }
 
-/// Our Rust files, tests included.
+/// Our Rust files, including tests.
 fn all_rust_files() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let mut files = Vec::new();
@@ -318,7 +318,7 @@ fn all_rust_files() -> Vec<(String, String)> {
     files
 }
 
-/// The lines of `files` whose code, without comments and quotes, has one of `words`.
+/// Lines of `files` whose code, without comments and strings, contains one of `words`.
 fn with_words(files: &[(String, String)], words: &[&str]) -> Vec<String> {
     let mut found = Vec::new();
     for (name, source) in files {
@@ -334,7 +334,7 @@ fn with_words(files: &[(String, String)], words: &[&str]) -> Vec<String> {
 
 #[test]
 fn no_sql_is_built_from_text() {
-    // sqlx takes a statement that is part of the program, or one for which somebody vouches; nobody does.
+    // sqlx accepts static statements, or dynamic ones explicitly marked as safe; we mark none.
     let found = with_words(
         &all_rust_files(),
         &["AssertSqlSafe", "raw_sql", "QueryBuilder", "SqlStr::from"],
@@ -347,7 +347,7 @@ fn no_sql_is_built_from_text() {
     assert_eq!(with_words(&[vouched], &["AssertSqlSafe"]).len(), 1);
 }
 
-/// What opens or describes a network port. Sockets of the file system (`UnixListener`, `UnixStream`) are none.
+/// Code that opens or describes a network port. File system sockets (`UnixListener`, `UnixStream`) are allowed.
 const NETWORK: [&str; 10] = [
     "TcpListener",
     "TcpStream",
@@ -361,7 +361,7 @@ const NETWORK: [&str; 10] = [
     "AddressFamily::INET",
 ];
 
-/// Libraries that speak to a network.
+/// Libraries for networking.
 const NETWORK_LIBRARIES: [&str; 14] = [
     "actix-web",
     "axum",
@@ -471,7 +471,7 @@ fn every_dependency_has_a_licence_we_accept() {
             faults.push(format!("{name}: no licence expression"));
             continue;
         };
-        // `A OR B AND C`, old style `A/B`: one of the alternatives must be all acceptable.
+        // `A OR B AND C`, old style `A/B`: all licences of one alternative must be acceptable.
         let flat = expression.replace(['(', ')'], "").replace('/', " OR ");
         let acceptable = flat.split(" OR ").any(|alternative| {
             alternative

@@ -1,4 +1,4 @@
-//! The plausibility audit is silent on sound sessions of the geometric simulation, from the cameras' bytes on.
+//! The plausibility audit is silent on valid sessions of the geometric simulation, starting from camera bytes.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 
 use std::ops::Range;
@@ -7,10 +7,10 @@ use skinrig::results::{Choices, analyze_session};
 use skinrig_analysis::Analysis;
 use skinrig_analysis::result::{Fault as Accused, Finding};
 use skinrig_model::{CameraId, HostTime, RunEnd, SimLevel};
-use skinrig_sim::{Fault, SimConfig, When, simulated_rig};
+use skinrig_sim::{Fault, FaultTrigger, SimConfig, simulated_rig};
 use skinrig_tests::{planned, record};
 
-/// Twelve places, twice: enough for every law of the audit.
+/// Twelve locations, twice: enough for every law of the audit.
 const PROTOCOL: &str = "\
 skinrig: 1
 name: audit
@@ -27,7 +27,7 @@ evaluation: {calibrate: [1], score: [2]}
 analysis: {bootstrap_resamples: 20, study_presses: 0}
 ";
 
-/// What the audit finds in a session of [`PROTOCOL`] on a rig drawn from `seed`.
+/// Findings of the audit in a session of [`PROTOCOL`] on a rig drawn from `seed`.
 fn findings(seed: u64, faults: Vec<Fault>) -> Vec<Finding> {
     let analysis = analysed(PROTOCOL, SimLevel::Geometric, seed, faults);
     assert_eq!(analysis.counts.planned, 24);
@@ -49,9 +49,9 @@ fn analysed(protocol: &str, level: SimLevel, seed: u64, faults: Vec<Fault>) -> A
     analyze_session(&path, Choices::default()).unwrap().analysis
 }
 
-/// From the start the tip is so much higher than the robot reports, µm.
+/// From the start the tip is this much higher than the robot reports, µm.
 fn higher(by_um: i32) -> Vec<Fault> {
-    let when = When::At(HostTime::ZERO);
+    let when = FaultTrigger::At(HostTime::ZERO);
     vec![Fault::HeightOff { when, by_um }]
 }
 
@@ -59,7 +59,7 @@ fn accused(analysis: &Analysis) -> Vec<Accused> {
     analysis.findings.iter().map(|f| f.fault).collect()
 }
 
-/// Presses that do not reach half a millimetre.
+/// Presses shallower than half a millimetre.
 fn shallow() -> String {
     PROTOCOL.replace("depth: 2 mm", "depth: 0.4 mm")
 }
@@ -87,7 +87,7 @@ fn a_tip_that_never_reaches_the_skin_is_no_blind_camera() {
     assert!(found.advice.contains("--only depth"), "{found:#?}");
 }
 
-/// The same for a part of the session, by its own noise: presses 13 to 24 of the path after the sync presses.
+/// Same for part of the session: presses 13 to 24 of the path after the sync presses.
 #[test]
 fn presses_that_neither_camera_sees_are_not_touched_while_both_send_noise() {
     let both = |contact| CameraId::ALL.map(|camera| Fault::DeadPress { camera, contact });
@@ -105,7 +105,7 @@ fn presses_that_neither_camera_sees_are_not_touched_while_both_send_noise() {
     );
 }
 
-/// In one camera the same silence is that camera.
+/// The same silence in a single camera is a fault of that camera.
 #[test]
 fn one_camera_that_sees_no_press_is_blind() {
     let camera = CameraId::Two;
@@ -161,7 +161,7 @@ fn how_often_heights_that_are_off_are_named() {
     }
 }
 
-/// Seeds whose sound session is accused of something.
+/// Seeds whose valid session has findings.
 fn alarms(seeds: Range<u64>) -> Vec<(u64, Vec<Finding>)> {
     seeds
         .map(|seed| (seed, findings(seed, Vec::new())))
@@ -175,7 +175,7 @@ fn sound_simulated_sessions_are_silent() {
     assert!(alarms.is_empty(), "{alarms:#?}");
 }
 
-/// Or the silence of the others would say nothing.
+/// Control: otherwise the silence of the others would mean nothing.
 #[test]
 fn a_camera_that_sleeps_through_half_of_the_presses_is_accused() {
     let camera = CameraId::Two;

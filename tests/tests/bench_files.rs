@@ -1,4 +1,5 @@
-//! Files of the bench that no compiler reads: systemd units, udev rules, and the guide of first contact with its questions.
+//! Checks files of the bench that no compiler reads: systemd units, udev rules, and the first-contact guide with its
+//! questions.
 #![expect(
     clippy::unwrap_used,
     reason = "a test that cannot read the workspace must fail"
@@ -22,7 +23,7 @@ fn read(file: &str) -> String {
     std::fs::read_to_string(top().join(file)).unwrap_or_else(|e| panic!("{file}: {e}"))
 }
 
-/// Directives that the units use, by section; a slip of the pen is not among them, and systemd would only warn.
+/// Directives used by the units, per section; systemd only warns about typos.
 const DIRECTIVES: &[(&str, &str)] = &[
     (
         "Unit",
@@ -50,7 +51,7 @@ const UNITS: [&str; 4] = [
     "skinrig-nightly.timer",
 ];
 
-/// A unit as section and key to values.
+/// A unit as a map from section and key to values.
 fn unit(name: &str) -> BTreeMap<(String, String), Vec<String>> {
     let (mut section, mut found) = (String::new(), BTreeMap::<_, Vec<String>>::new());
     for line in read(&format!("hil/systemd/{name}")).lines() {
@@ -128,7 +129,7 @@ fn a_night_has_the_time_and_the_rights_that_it_needs() {
         let allowed = &service[&("Service".to_owned(), "DeviceAllow".to_owned())];
         assert!(allowed.iter().any(|a| a == kind), "{kind}");
     }
-    // A lease that lies in a folder of its own keeps nobody off the bench.
+    // A lease in a private folder would not protect the bench.
     assert_eq!(
         one(&service, "Service", "ReadWritePaths"),
         "-/run/lock /tmp"
@@ -163,10 +164,10 @@ fn the_night_is_a_command_that_the_program_takes() {
             "{file} is no condition"
         );
     }
-    // What it writes, it may write.
+    // It may write its outputs.
     assert_eq!(one(&service, "Service", "StateDirectory"), "skinrig");
     assert!(words.contains(&"/var/lib/skinrig/nights"), "{command}");
-    // Without a history no page says what moved; beside the nights, links between them hold when all are moved together.
+    // Without a history no page shows trends; next to the nights, relative links survive a move.
     let history = words.iter().position(|w| *w == "--history");
     assert_eq!(
         history.map(|at| words[at + 1]),
@@ -197,12 +198,12 @@ fn systemd_itself_has_nothing_to_say_about_the_units() {
         }
     };
     let said = String::from_utf8_lossy(&output.stderr);
-    // It also reads the machine's own units, and may find something there.
+    // systemd also reads the machine's own units, and may report them.
     let ours: Vec<&str> = said.lines().filter(|l| l.contains("skinrig")).collect();
     assert!(ours.is_empty(), "{said}");
 }
 
-/// Keys that may stand in the rules, without what is in braces.
+/// Keys allowed in the rules, without braces.
 const RULE_KEYS: &[&str] = &[
     "ACTION",
     "SUBSYSTEM",
@@ -310,7 +311,7 @@ fn the_rules_open_the_devices_of_the_drivers_to_a_group_and_to_nobody_else() {
     );
 }
 
-/// Whether `path` leads to a key of this schema.
+/// True if `path` leads to a key of this schema.
 fn has_key(schema: &Value, path: &str) -> bool {
     let resolved = |value: &'_ Value| match value["$ref"].as_str() {
         Some(to) => schema.pointer(to.trim_start_matches('#')).cloned(),
@@ -323,7 +324,7 @@ fn has_key(schema: &Value, path: &str) -> bool {
     at.is_some_and(|at| !at.is_null())
 }
 
-/// Rows of the tables whose first cell looks like a number of this kind.
+/// Table rows whose first cell looks like a number of this kind.
 fn rows(text: &str, is_number: impl Fn(&str) -> bool) -> Vec<Vec<String>> {
     text.lines()
         .filter_map(|l| l.strip_prefix("| ")?.strip_suffix(" |"))
@@ -377,7 +378,7 @@ fn every_question_of_the_guide_has_a_number_of_its_own_and_a_key_that_exists() {
         }
     }
     assert!(keys > 25, "{keys}");
-    // A step that sends the reader to a question sends him to one that is there.
+    // References from steps to questions must resolve.
     let words = text.split(|c: char| !c.is_ascii_alphanumeric());
     for word in words.filter(|w| number(w)) {
         assert!(numbers.contains(word), "there is no question {word}");

@@ -1,4 +1,4 @@
-//! Holds the inside of each crate in order: files that use each other in a circle.
+//! Checks dependencies between files within each crate: limits cycles.
 #![expect(
     clippy::unwrap_used,
     reason = "a test that cannot read the workspace must fail"
@@ -11,20 +11,19 @@ use std::path::{Path, PathBuf};
 use syn::visit::Visit;
 use syn::{Attribute, Item, ItemMod, UseTree, Visibility};
 
-/// Circles of files that stand today, by the first of them; none may be added, and none may have more files than
-/// [`MOST_FILES`].
+/// Present number of cycles of files; none may be added, and none may have more files than [`MAX_FILES`].
 const MOST_CIRCLES: usize = 6;
 const MOST_FILES: usize = 8;
 
-/// A module as its path from the root of its crate.
+/// Path of a module from the root of its crate.
 type Module = Vec<String>;
 
-/// What one file says of others.
+/// References from one file to others.
 #[derive(Default)]
 struct Mentions {
-    /// Paths that it uses.
+    /// Paths used.
     used: Vec<Vec<String>>,
-    /// Paths that it hands on under their last name.
+    /// Paths re-exported under their last name.
     handed_on: Vec<Vec<String>>,
 }
 
@@ -78,7 +77,7 @@ impl<'a> Visit<'a> for Mentions {
     }
 }
 
-/// The files of a crate that are no tests, by module.
+/// Non-test files of a crate, by module.
 fn files(root: &Path, file: &Path, module: &Module, out: &mut BTreeMap<Module, Mentions>) {
     let text = fs::read_to_string(file).unwrap();
     let parsed = syn::parse_file(&text).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
@@ -105,7 +104,7 @@ fn files(root: &Path, file: &Path, module: &Module, out: &mut BTreeMap<Module, M
     }
 }
 
-/// The file in which what `path` names, said in `from`, is defined: what is handed on is followed.
+/// The file that defines `path`, as seen from `from`; follows re-exports.
 fn defined_in(all: &BTreeMap<Module, Mentions>, from: &Module, path: &[String]) -> Option<Module> {
     let mut rest = path;
     let mut at: Module = match rest.first()?.as_str() {
@@ -154,7 +153,7 @@ fn reached<'a>(
     seen
 }
 
-/// The circles of a crate, each as the names of its files.
+/// Cycles of a crate, each as the names of its files.
 fn circles(root: &Path) -> Vec<Vec<String>> {
     let mut all = BTreeMap::new();
     let start = ["lib.rs", "main.rs"].map(|f| root.join(f));

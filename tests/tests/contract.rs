@@ -1,4 +1,4 @@
-//! The device contract over devices that are replayed from session files.
+//! The device contract, applied to devices replayed from session files.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ evaluation: {calibrate: [], score: [1]}
 analysis: {calibration: none}
 ";
 
-/// Chunks of about 0.1 s, so that the contract's short looks see some.
+/// Chunks of about 0.1 s, so that the contract's short polls see some.
 fn rig() -> Rig {
     let mut config = SimConfig::new(3, SimLevel::Geometric);
     config.camera_clock.chunk_bytes = 30_000;
@@ -108,12 +108,12 @@ const OPTIONS: IndenterContract = IndenterContract {
     outside: Point3::new(0.0, 81.0, 0.0),
     speed_mm_s: 80.0,
     tolerance_mm: 0.05,
-    patience: HostDuration::from_millis(1_500),
+    move_timeout: HostDuration::from_millis(1_500),
     rate_share: 0.9,
 };
 
-/// What the contract does with a simulated robot is recorded into session files, one for each robot that it asks
-/// for; then it does the same with the robots that these files replay.
+/// Records what the contract does with simulated robots, one session file per robot; then repeats the contract with robots
+/// replayed from these files.
 #[test]
 fn a_replayed_robot_keeps_the_contract() {
     let lab = tempfile::tempdir().unwrap();
@@ -149,7 +149,7 @@ fn a_replayed_robot_keeps_the_contract() {
     contract::indenter(&mut replays, &OPTIONS);
 }
 
-/// A session of these records.
+/// Writes a session with these records.
 fn write(path: &Path, records: &[Record]) {
     let (protocol, plan) = planned(PROTOCOL).unwrap();
     let mut header = header(&protocol, &plan, &rig()).unwrap();
@@ -168,7 +168,7 @@ fn write(path: &Path, records: &[Record]) {
     writer.finish().unwrap();
 }
 
-/// A clock that two can hold.
+/// A clock with shared ownership.
 #[derive(Clone)]
 struct Shared(Arc<Mutex<Box<dyn Clock>>>);
 
@@ -181,7 +181,7 @@ impl Clock for Shared {
     }
 }
 
-/// A robot whose commands and poses are taped.
+/// A robot that records its commands and poses.
 struct Taped {
     robot: Box<dyn Indenter>,
     tape: Arc<Mutex<Vec<Record>>>,

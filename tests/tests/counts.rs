@@ -1,14 +1,14 @@
-//! planned = valid + missed + invalid + excluded, whatever is planned, whatever breaks, whenever it is stopped.
+//! planned = valid + missed + invalid + excluded, for any plan, fault or stop.
 
 use proptest::prelude::*;
 use skinrig::results::{Choices, analyze_session};
 use skinrig_model::{CameraId, Record, SimLevel};
 use skinrig_recorder::{SessionReader, verify};
 use skinrig_results::Rescan;
-use skinrig_sim::{Fault, SimConfig, When, simulated_rig};
+use skinrig_sim::{Fault, FaultTrigger, SimConfig, simulated_rig};
 use skinrig_tests::{planned, record};
 
-/// A small protocol of these places.
+/// A small protocol with these locations.
 fn protocol(
     places: &[(i32, i32)],
     sync: u32,
@@ -40,7 +40,7 @@ fn protocol(
     )
 }
 
-/// How the operator interferes, by the number of the record at which it happens.
+/// Operator action, by the number of the record at which it occurs.
 #[derive(Debug, Clone)]
 enum Operator {
     Watches,
@@ -57,7 +57,7 @@ fn operators() -> impl Strategy<Value = Operator> {
 }
 
 fn faults() -> impl Strategy<Value = Vec<Fault>> {
-    let when = || (0_u32..6).prop_map(When::Contact);
+    let when = || (0_u32..6).prop_map(FaultTrigger::Contact);
     let camera = prop_oneof![Just(CameraId::One), Just(CameraId::Two)];
     prop_oneof![
         2 => Just(Vec::new()),
@@ -124,7 +124,7 @@ proptest! {
         prop_assert_eq!(u64::from(counts.planned), totals.presses.planned);
         prop_assert_eq!(u64::from(counts.sync), totals.sync.planned);
         prop_assert_eq!(u64::from(counts.missed), totals.presses.missed);
-        // Looking at the data, an analysis may find more that is invalid, never less.
+        // With the data, an analysis may find more invalid presses, never fewer.
         prop_assert!(u64::from(counts.invalid) >= totals.presses.invalid);
 
         let verified = verify(&path, &mut Rescan::default()).unwrap();

@@ -1,6 +1,7 @@
-//! Faults on purpose, each in each phase of a run: what becomes of it is what docs/reference/runs.md says, and wrong data never pass.
+//! Injected faults, each in each phase of a run: the result matches docs/reference/runs.md, and wrong data never pass as
+//! valid.
 //!
-//! With `SKINRIG_WRITE_DOCS=1` the table of docs/reference/runs.md is written instead of compared.
+//! With `SKINRIG_WRITE_DOCS=1` the test writes the table of docs/reference/runs.md instead of comparing it.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 
 use std::collections::BTreeMap;
@@ -9,7 +10,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use skinrig::fault::Saboteur;
+use skinrig::fault::FaultInjector;
 use skinrig::results::{Choices, analyze_session};
 use skinrig::rig::{self, gates};
 use skinrig_analysis::Analysis;
@@ -51,11 +52,11 @@ evaluation: {calibrate: [], score: [1]}
 analysis: {calibration: none}
 ";
 
-/// Bytes that a camera keeps for a program that does not come: a quarter of a second of an idle stream.
+/// Camera buffer for a slow program: a quarter of a second of an idle stream.
 const BUFFER_BYTES: usize = 64 << 10;
 
-/// The phases, in the order of the table, with the time of a fault that strikes then: the first press is a sync press, the
-/// third the first that is scored, the fifth the last.
+/// Phases in the order of the table, with the time of a fault in each: the first press is a sync press, the third the first
+/// scored one, the fifth the last.
 const PHASES: [(&str, &str); 10] = [
     ("preflight", "preflight"),
     ("arming", "arming"),
@@ -69,7 +70,7 @@ const PHASES: [(&str, &str); 10] = [
     ("end", "between:5"),
 ];
 
-/// The faults, in the order of the table.
+/// Faults in the order of the table.
 const FAULTS: [&str; 19] = [
     "camera1-unplugged",
     "camera1-stalled",
@@ -92,7 +93,7 @@ const FAULTS: [&str; 19] = [
     "killed",
 ];
 
-/// Those that meet records strike at the record that is the first of the phase in the run without a fault.
+/// Faults that affect records strike at the first record of the phase in the fault-free run.
 fn planted(fault: &str, phase: usize, record: usize) -> PlantedFault {
     let of_records = matches!(fault, "disk-full" | "killed");
     let when = if of_records {
@@ -103,12 +104,12 @@ fn planted(fault: &str, phase: usize, record: usize) -> PlantedFault {
     format!("{fault}@{when}").parse().unwrap()
 }
 
-/// Where records go. Killed in place, without the process: what comes later nobody writes down.
+/// Record sink that can simulate a kill: later records are not written.
 struct Sink {
     writer: Option<SessionWriter>,
-    saboteur: Saboteur,
+    saboteur: FaultInjector,
     killed_at: Option<FaultTime>,
-    /// For each record the latest time that any told so far.
+    /// For each record the latest time reported so far.
     told: Vec<HostTime>,
     moved: bool,
 }
@@ -143,7 +144,7 @@ fn time_of(record: &Record) -> Option<HostTime> {
     }
 }
 
-/// A run and what is left of it.
+/// A run and its output.
 struct Run {
     report: RunReport,
     path: PathBuf,
@@ -157,7 +158,7 @@ fn run((protocol, plan): (&Protocol, &Plan), fault: Option<PlantedFault>, path: 
     let mut config = SimConfig::new(SEED, SimLevel::Geometric);
     config.camera_clock.buffer_bytes = BUFFER_BYTES;
     config.camera_clock.chunk_bytes = 16 << 10;
-    // Every touch of a place gives the same response, so that a press taken again can be compared.
+    // Every press of a location gives the same response, so that a repeated press can be compared.
     config.geometric.dead_share = 0.0;
     config.geometric.strength_spread = 0.0;
     config.faults = rig::planted::of_devices(&faults);
@@ -167,7 +168,7 @@ fn run((protocol, plan): (&Protocol, &Plan), fault: Option<PlantedFault>, path: 
     let killed = fault.filter(|fault| fault.kind == FaultKind::Killed);
     let mut sink = Sink {
         writer: Some(SessionWriter::create(&path).unwrap()),
-        saboteur: Saboteur::new(if killed.is_some() { &[] } else { &faults }),
+        saboteur: FaultInjector::new(if killed.is_some() { &[] } else { &faults }),
         killed_at: killed.map(|fault| fault.when),
         told: Vec::new(),
         moved: false,
@@ -189,13 +190,13 @@ fn run((protocol, plan): (&Protocol, &Plan), fault: Option<PlantedFault>, path: 
     }
 }
 
-/// The run without a fault.
+/// The fault-free run.
 struct Ideal {
     presses: BTreeMap<PressId, PressResult>,
     recorded: u64,
 }
 
-/// A fingerprint of what the devices delivered. Equal seeds deliver the same: a fault that strikes changes it.
+/// Fingerprint of the delivered device data. Equal seeds deliver equal data; a fault that strikes changes it.
 fn recorded(reader: &SessionReader) -> u64 {
     let mut hash = DefaultHasher::new();
     for camera in CameraId::ALL {
@@ -217,14 +218,14 @@ fn recorded(reader: &SessionReader) -> u64 {
     hash.finish()
 }
 
-/// What a cell says, and what is wrong with it.
+/// Text of a table cell, and what is wrong.
 struct Cell {
     words: String,
     reason: String,
     wrong: Vec<String>,
 }
 
-/// What becomes of a run with a fault, looked at from its session file alone, compared with the run without.
+/// Evaluates a run with a fault from its session file alone, compared with the fault-free run.
 fn judge(run: &Run, fault: PlantedFault, without: &Ideal) -> Cell {
     let mut wrong = Vec::new();
     let verified = verify(&run.path, &mut Rescan::default()).unwrap();
@@ -236,7 +237,7 @@ fn judge(run: &Run, fault: PlantedFault, without: &Ideal) -> Cell {
     }
     let reader = SessionReader::open(&run.path).unwrap();
     let struck = recorded(&reader) != without.recorded;
-    // After the last press no mark follows that could be spoiled.
+    // No mark follows the last press that could be affected.
     let may_miss = matches!(fault.when, FaultTime::Nth(FaultPhase::Between, 5));
     if !struck && !may_miss {
         wrong.push("all that was recorded is as without the fault: it did not strike".into());
@@ -261,7 +262,7 @@ fn judge(run: &Run, fault: PlantedFault, without: &Ideal) -> Cell {
     let retaken = attempts - attempted;
     let report = &run.report;
     if !killed {
-        // A robot that answers no more cannot say that it is disarmed: its own brakes are on.
+        // A robot that stopped answering cannot report that it is disarmed; its own brakes are on.
         if !report.disarmed && fault.kind != FaultKind::RobotLost {
             wrong.push("not disarmed".into());
         }
@@ -280,7 +281,7 @@ fn judge(run: &Run, fault: PlantedFault, without: &Ideal) -> Cell {
     if let Ok(analysis) = &analysis
         && usable
     {
-        // A slow robot moves in another way: its events are others, and so are its times, which are measured.
+        // A slow robot moves differently, with other events and other measured times.
         let moves_as_ever = fault.kind != FaultKind::RobotSlow;
         wrong.extend(differences(analysis, &without.presses, moves_as_ever));
     }
@@ -331,23 +332,27 @@ fn judge(run: &Run, fault: PlantedFault, without: &Ideal) -> Cell {
     }
 }
 
-/// How far the truth of a press may be off, mm: twice the 0.0049 mm of the worst cell.
+/// Maximum truth error of a press, mm: twice the 0.0049 mm of the worst cell.
 const TRUTH_MM: f64 = 0.01;
-/// How far its number of events may be off, as a share: 0.195 in the worst cell.
+/// Maximum relative error of its event count: 0.195 in the worst cell.
 const EVENTS_SHARE: f64 = 0.25;
-/// How far its estimate may be off, mm: 1.10 mm in the worst cell.
+/// Maximum error of its estimate, mm: 1.10 mm in the worst cell.
 const ESTIMATE_MM: f64 = 1.5;
-/// The same of a slow robot, of which fewer presses are valid: twice the 0.19 mm of the worst cell.
+/// Same for a slow robot, with fewer valid presses: twice the 0.19 mm of the worst cell.
 const SLOW_ESTIMATE_MM: f64 = 0.4;
 
-/// How valid presses differ from those of the run without a fault, beyond what noise does.
+/// Differences of valid presses from the fault-free run, beyond noise.
 fn differences(
     analysis: &Analysis,
     without: &BTreeMap<PressId, PressResult>,
     moves_as_ever: bool,
 ) -> Vec<String> {
     let mut found = Vec::new();
-    for press in analysis.presses.iter().filter(|p| p.verdict == "valid") {
+    for press in analysis
+        .presses
+        .iter()
+        .filter(|p| p.verdict == skinrig_model::Verdict::Valid)
+    {
         let as_ever = &without[&press.press];
         let off_mm = press
             .truth
@@ -390,7 +395,7 @@ fn differences(
     found
 }
 
-/// The number of the first record of a phase in the run without a fault.
+/// Number of the first record of a phase in the fault-free run.
 fn record_of(phase: usize, told: &[HostTime], timings: &[PressTiming]) -> usize {
     let (sync, press, last) = (timings[0], timings[2], timings[4]);
     let t = match phase {

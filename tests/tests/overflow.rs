@@ -1,4 +1,5 @@
-//! A camera that drops events while the recorder is slow: the loss is counted, marked in time, and spoils the press. Emulated.
+//! A camera drops events while the recorder is slow: the loss is counted, located in time, and invalidates the press.
+//! Emulated.
 #![cfg(target_os = "linux")]
 
 use std::time::Duration;
@@ -41,7 +42,7 @@ analysis: {calibration: none}
 #[test]
 fn what_a_camera_drops_spoils_the_press_and_is_told() {
     let test = "what_a_camera_drops_spoils_the_press_and_is_told";
-    // A packet of some 80 kB every millisecond; the FIFO and two transfers of 16 KiB take less than half of it.
+    // A packet of about 80 kB every millisecond; the FIFO and two transfers of 16 KiB take less than half of it.
     let camera = Emulated {
         fifo_bytes: 4 << 10,
         content: Content::Dense { mev_per_s: 20.0 },

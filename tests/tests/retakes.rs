@@ -1,4 +1,4 @@
-//! Lost bytes make a press invalid and have it taken again: what the analysis makes of the session.
+//! Lost bytes invalidate a press and cause a retake: results of the analysis.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 
 use std::collections::BTreeMap;
@@ -7,7 +7,7 @@ use skinrig::results::{Choices, analyze_session};
 use skinrig_analysis::result::{AlignmentStatus, Analysis};
 use skinrig_model::{BoxReport, CameraId, PressVerdict, RunEnd, SimLevel};
 use skinrig_recorder::SessionReader;
-use skinrig_sim::{Fault, SimConfig, When, simulated_rig};
+use skinrig_sim::{Fault, FaultTrigger, SimConfig, simulated_rig};
 use skinrig_tests::{planned, record};
 
 const PROTOCOL: &str = "\
@@ -48,7 +48,7 @@ fn a_retaken_press_counts_once_and_its_marks_misname_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let lost = |camera, contact| Fault::CameraBytesLost {
         camera,
-        when: When::Contact(contact),
+        when: FaultTrigger::Contact(contact),
         words: 999,
     };
     // Two sync presses, then press 3 and its first retake: the eighth contact is that of press 6.
@@ -78,11 +78,11 @@ fn a_retaken_press_counts_once_and_its_marks_misname_nothing() {
             assert!(why.contains("lost"), "{why}");
         }
     }
-    // The loss is in the stream, and where.
+    // The loss and its position are in the stream.
     let gaps = CameraId::ALL.map(|camera| reader.gaps(camera).unwrap().len());
     assert_eq!(gaps, [1, 2]);
 
-    // The marks of a press come once per attempt under one name, within one epoch of the box.
+    // The marks of a press occur once per attempt under one name, within one epoch of the box.
     let mut names: BTreeMap<String, u32> = BTreeMap::new();
     for (_, report) in reader.box_reports().unwrap() {
         if let BoxReport::Mark { mark, .. } = report {
@@ -101,7 +101,7 @@ fn a_retaken_press_counts_once_and_its_marks_misname_nothing() {
     }
     for (fit, other) in lossy.clocks.iter().zip(&whole.clocks) {
         let (fit, other) = (fit.unwrap(), other.unwrap());
-        // The same crystals; a train taken for another would be off by seconds.
+        // The same crystals; a confused train would be off by seconds.
         assert!(
             (fit.drift_ppm - other.drift_ppm).abs() < 1.0,
             "{fit:?}, {other:?}"

@@ -1,8 +1,8 @@
-//! One pass over a camera's events: rates, the pixel counts of each press, and a few close-ups.
+//! Owns the single pass over a camera's events: rates, pixel counts of each press, and a few close-ups.
 //!
-//! Memory holds one pixel grid per window that is open at a time; for an estimator that needs the events themselves also
-//! those of the open windows, up to [`MOST_KEPT`]. Events may be out of order by up to
-//! [`SLACK_US`]; later ones are counted as late and reported, never silently dropped.
+//! Memory holds one pixel grid per open window and, for estimators that need single events, the events of the open windows,
+//! up to [`MAX_CACHED_EVENTS`]. Events may be out of order by up to [`SLACK_US`]; later ones are counted as late and
+//! reported, never dropped silently.
 
 use skinrig_model::{
     AnalysisSettings, CameraId, CdEvent, CentroidRule, Estimator, Polarity, PressId, SENSOR_HEIGHT,
@@ -12,38 +12,38 @@ use skinrig_model::{
 use crate::activity::ActivityGrid;
 use crate::dbscan::Dbscan;
 use crate::error::AnalysisError;
-use crate::estimators::{PressEstimator, Sighting, Thinning};
+use crate::estimators::{ColumnEstimate, PressEstimator, Thinning};
+use crate::event_cache::EventCache;
 use crate::grid::PixelGrid;
-use crate::held::Held;
 use crate::input::EventSource;
-use crate::keeper::{KeepPlan, Keeper};
-use crate::kept::KeptEvent;
+use crate::press_event_collector::{PressEventCollector, RetentionPlan};
+use crate::press_events::PackedEvent;
 use crate::rates::RateHistogram;
 use crate::result::{Activity, OffSensor, PicturePixel, PressPicture, PressView, RateZoom};
 use crate::segment::Window;
 use crate::width::width_u;
 
-/// How far an event may lie before the newest one seen and still find its window open, µs.
+/// Largest delay of an event relative to the newest one for which its window is still open, µs.
 pub(crate) const SLACK_US: u64 = 10_000;
 
-/// Most events of the open windows of a camera that are kept for an estimator: 512 MiB.
-const MOST_KEPT: usize = 1 << 26;
+/// Maximum number of events held for an estimator over all open windows of a camera: 512 MiB.
+const MAX_CACHED_EVENTS: usize = 1 << 26;
 
-/// Events that are handled together, so that they stay in the processor's nearest caches.
+/// Events processed together, so that they stay in the fastest caches.
 const SLICE: usize = 1024;
 
-/// A close-up of the rate around one press.
+/// Plan of a rate close-up around one press.
 #[derive(Debug, Clone)]
 pub(crate) struct ZoomPlan {
     pub press: PressId,
     pub start_us: u64,
     pub bins: usize,
-    /// Time of the first bin after the contact, s, and the release after the contact, s.
+    /// Time of the first bin relative to contact, s, and of the release relative to contact, s.
     pub start_s: f64,
     pub release_s: f64,
 }
 
-/// Takes the place of events that are still to come.
+/// Placeholder for events that have not arrived.
 const NO_EVENT: CdEvent = CdEvent {
     t_us: 0,
     x: 0,
@@ -51,24 +51,24 @@ const NO_EVENT: CdEvent = CdEvent {
     polarity: Polarity::Off,
 };
 
-/// What a pass is to collect.
+/// Outputs to collect in a pass.
 #[derive(Default)]
-pub struct Wanted<'a> {
+pub struct PassRequest<'a> {
     /// Windows, sorted by start.
     pub windows: &'a [Window],
-    /// Rows of the plan whose picture is wanted, with the press.
+    /// Rows of the plan that get an image, with their press.
     pub pictured: &'a [(usize, PressId)],
     /// Close-ups of the rate, sorted by start.
     pub zooms: Vec<ZoomPlan>,
     /// Presses whose events are kept, sorted by start.
-    pub kept: Vec<KeepPlan>,
-    /// The histogram to fill, when this pass is to fill it; it then counts the activity, too.
+    pub kept: Vec<RetentionPlan>,
+    /// Histogram to fill, if this pass fills it; the pass then also counts the activity.
     pub rates: Option<RateHistogram>,
-    /// Where to hold the events of the crop for another pass.
-    pub held: Option<Held>,
+    /// Cache for the events of the crop, for a second pass.
+    pub cache: Option<EventCache>,
 }
 
-/// What one camera gives.
+/// Collects all outputs of one camera.
 pub(crate) struct Accumulator<'a> {
     camera: CameraId,
     settings: &'a AnalysisSettings,
@@ -77,24 +77,24 @@ pub(crate) struct Accumulator<'a> {
     windows: &'a [Window],
     pictured: &'a [(usize, PressId)],
     next: usize,
-    open: Vec<Open>,
-    spare: Vec<Open>,
-    /// Nothing happens before this camera time: no window opens or closes.
+    open: Vec<OpenWindow>,
+    spare: Vec<OpenWindow>,
+    /// No window opens or closes before this camera time.
     quiet_until_us: u64,
     newest_us: u64,
     late: u64,
     off_sensor: OffSensor,
     thinning: Thinning,
     dbscan: Dbscan,
-    /// An estimator other than clusters of single pixels, and the windows keep their events for it.
+    /// Set for estimators other than clusters of single pixels; windows then hold their events.
     estimator: Option<PressEstimator>,
     most_kept: usize,
     zooms: Vec<(ZoomPlan, Vec<u32>, Vec<u32>)>,
     zoom_next: usize,
-    keeper: Keeper,
+    keeper: PressEventCollector,
     activity: Option<ActivityGrid>,
-    held: Option<Held>,
-    /// Room for the events of a slice that lie in the crop.
+    cache: Option<EventCache>,
+    /// Buffer for the events of a slice that are in the crop.
     inside: Vec<CdEvent>,
     bin_us: u64,
     views: Vec<(usize, PressView)>,
@@ -103,32 +103,36 @@ pub(crate) struct Accumulator<'a> {
 }
 
 /// A window that is collecting events.
-struct Open {
+struct OpenWindow {
     window: Window,
     grid: PixelGrid,
     on_events: u32,
     idle_events: u64,
-    /// ON events per pixel, only for a pictured press.
+    /// ON events per pixel, only for a press with an image.
     on: Option<PixelGrid>,
-    /// For an estimator that needs them; time after the start of the window.
-    events: Vec<KeptEvent>,
+    /// For estimators that need single events; time since the start of the window.
+    events: Vec<PackedEvent>,
 }
 
-/// How many events a press has in one camera.
+/// Event counts of a press in one camera.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Tally {
-    /// In its window.
+pub struct EventCounts {
+    /// Events in the window.
     pub events: u32,
-    /// Of them ON.
+    /// ON events in the window.
     pub on: u32,
-    /// In the idle time before it.
+    /// Events in the idle time before the press.
     pub idle: u64,
     /// See [`PressView::width_u`].
     pub width_u: Option<f64>,
 }
 
-/// What one camera saw of a press.
-pub(crate) fn press_view(window: &Window, tally: Tally, sighting: &Sighting) -> PressView {
+/// Combines counts and estimate into the view of one camera.
+pub(crate) fn press_view(
+    window: &Window,
+    tally: EventCounts,
+    sighting: &ColumnEstimate,
+) -> PressView {
     let per_s = |n: f64, s: f64| if s > 0.0 { n / s } else { 0.0 };
     PressView {
         events: tally.events,
@@ -145,34 +149,34 @@ pub(crate) fn press_view(window: &Window, tally: Tally, sighting: &Sighting) -> 
     }
 }
 
-/// What [`Accumulator::finish`] gives.
-pub struct Accumulated {
+/// Outputs of [`Accumulator::finish`].
+pub struct PassOutput {
     pub rates: Option<RateHistogram>,
     /// (row of the plan, view).
     pub views: Vec<(usize, PressView)>,
     pub pictures: Vec<PressPicture>,
     pub zooms: Vec<RateZoom>,
-    /// Whole views only.
-    pub kept: Vec<KeepPlan>,
+    /// Complete views only.
+    pub kept: Vec<RetentionPlan>,
     pub activity: Option<Activity>,
-    /// The events of the crop, all that another pass needs; `None` unless all of them could be held and none was late.
-    pub held: Option<Held>,
-    /// Events that came more than [`SLACK_US`] after newer ones.
+    /// All events of the crop, for a second pass; `None` if the cache overflowed or an event was late.
+    pub cache: Option<EventCache>,
+    /// Events more than [`SLACK_US`] late.
     pub late: u64,
-    /// Events outside the sensor, left out; all zero for a pass over held events.
+    /// Ignored events outside the sensor; all zero for a pass over cached events.
     pub off_sensor: OffSensor,
 }
 
 impl<'a> Accumulator<'a> {
-    /// Collects what is `wanted`.
-    pub fn new(camera: CameraId, settings: &'a AnalysisSettings, wanted: Wanted<'a>) -> Self {
-        let Wanted {
+    /// Collects the outputs in `request`.
+    pub fn new(camera: CameraId, settings: &'a AnalysisSettings, wanted: PassRequest<'a>) -> Self {
+        let PassRequest {
             windows,
             pictured,
             zooms,
             kept,
             rates,
-            held,
+            cache,
         } = wanted;
         let zooms = zooms
             .into_iter()
@@ -186,7 +190,7 @@ impl<'a> Accumulator<'a> {
             settings,
             crop: settings.crop_v[camera.index()],
             activity: rates.is_some().then(ActivityGrid::new),
-            held,
+            cache,
             inside: vec![NO_EVENT; SLICE],
             rates,
             windows,
@@ -202,10 +206,10 @@ impl<'a> Accumulator<'a> {
             dbscan: Dbscan::new(settings.eps_px, settings.min_samples),
             estimator: (settings.estimator != Estimator::Dbscan || settings.bin_px > 1)
                 .then(|| PressEstimator::new(settings, settings.crop_v[camera.index()])),
-            most_kept: MOST_KEPT,
+            most_kept: MAX_CACHED_EVENTS,
             zooms,
             zoom_next: 0,
-            keeper: Keeper::new(kept),
+            keeper: PressEventCollector::new(kept),
             bin_us: rate_bin_us(settings),
             views: Vec::new(),
             pictures: Vec::new(),
@@ -213,13 +217,13 @@ impl<'a> Accumulator<'a> {
         }
     }
 
-    /// Takes the next events of the stream.
+    /// Processes the next events of the stream.
     pub fn take(&mut self, events: &[CdEvent]) {
         for slice in events.chunks(SLICE) {
             if self.error.is_some() {
                 return;
             }
-            // Looks at every event without a branch; only a bad slice is searched.
+            // Branch-free scan of all events; only slices with a violation are searched.
             let (mut on_sensor, mut in_order, mut last_us) = (true, true, 0);
             for e in slice {
                 on_sensor &= is_on_sensor(e);
@@ -241,8 +245,8 @@ impl<'a> Accumulator<'a> {
         }
     }
 
-    /// Takes at most [`SLICE`] events by time, though the first may lie before those taken so far: what a window or a close-up wants of
-    /// them lies side by side.
+    /// Processes at most [`SLICE`] events in time order (the first may precede events already processed): the events of a
+    /// window or close-up are then contiguous.
     fn take_in_order(&mut self, events: &[CdEvent]) {
         let newest_us = self.newest_us;
         self.late += events.partition_point(|e| e.t_us.saturating_add(SLACK_US) < newest_us) as u64;
@@ -252,11 +256,11 @@ impl<'a> Accumulator<'a> {
         let (low, high) = self.crop;
         let mut inside = std::mem::take(&mut self.inside);
         let room = &mut inside[..SLICE];
-        // Stores every event and steps on for those in the crop: no branch to mispredict.
+        // Store every event, advance only for those in the crop: no branch to mispredict.
         let mut count = 0;
         for event in events {
-            // Never beyond the room, which is as long as the longest slice: the mask only tells so. As a slice of one an event is
-            // copied whole, not field by field.
+            // The index never exceeds the buffer, which has the length of the longest slice; the mask proves it to the
+            // compiler. As a slice of one, an event is copied whole instead of field by field.
             let at = count % SLICE;
             room[at..=at].copy_from_slice(std::slice::from_ref(event));
             count += usize::from((low <= event.y) & (event.y <= high));
@@ -264,7 +268,7 @@ impl<'a> Accumulator<'a> {
         if let Some(rates) = &mut self.rates {
             rates.add_in_order(&inside[..count]);
         }
-        self.held.take_if(|held| !held.add(&inside[..count]));
+        self.cache.take_if(|cache| !cache.add(&inside[..count]));
         self.take_inside(&inside[..count]);
         self.inside = inside;
         if let Some(last) = events.last() {
@@ -272,17 +276,17 @@ impl<'a> Accumulator<'a> {
         }
     }
 
-    /// Takes all the events that another pass has held.
-    pub(crate) fn take_held(&mut self, held: &Held) {
-        if held.in_order() {
-            // They were looked at by the pass that held them.
-            held.for_each_slice(|events| self.take_inside(events));
+    /// Processes all events that another pass has cached.
+    pub(crate) fn take_cached(&mut self, cache: &EventCache) {
+        if cache.in_order() {
+            // The caching pass has already checked them.
+            cache.for_each_slice(|events| self.take_inside(events));
         } else {
-            held.for_each_slice(|events| self.take(events));
+            cache.for_each_slice(|events| self.take(events));
         }
     }
 
-    /// Takes events of the crop by time.
+    /// Processes events of the crop in time order.
     fn take_inside(&mut self, events: &[CdEvent]) {
         let mut rest = events;
         while let Some(first) = rest.first()
@@ -290,7 +294,7 @@ impl<'a> Accumulator<'a> {
         {
             self.newest_us = self.newest_us.max(first.t_us);
             if self.newest_us >= self.quiet_until_us {
-                self.move_on();
+                self.advance();
             }
             let (quiet, later) = rest.split_at(first_from(rest, self.quiet_until_us).max(1));
             self.count(quiet);
@@ -301,7 +305,7 @@ impl<'a> Accumulator<'a> {
         }
     }
 
-    /// Counts events of the crop, by time, wherever they are wanted.
+    /// Counts events of the crop, in time order, for every output.
     fn count(&mut self, events: &[CdEvent]) {
         self.keeper.take(events);
         self.count_in_zooms(events);
@@ -351,7 +355,7 @@ impl<'a> Accumulator<'a> {
                     return;
                 }
                 for event in events {
-                    let packed = KeptEvent::pack(event, w.start_us);
+                    let packed = PackedEvent::pack(event, w.start_us);
                     fits &= packed.is_some();
                     open.events.extend(packed);
                 }
@@ -370,8 +374,8 @@ impl<'a> Accumulator<'a> {
         }
     }
 
-    /// Opens the windows that begin and closes those that are over, by the newest time seen.
-    fn move_on(&mut self) {
+    /// Opens windows that begin and closes those that have ended, by the newest time seen.
+    fn advance(&mut self) {
         let now = self.newest_us;
         let mut i = 0;
         while i < self.open.len() {
@@ -395,7 +399,7 @@ impl<'a> Accumulator<'a> {
             }
             self.zoom_next += 1;
         }
-        self.keeper.move_on(now.saturating_sub(SLACK_US));
+        self.keeper.advance(now.saturating_sub(SLACK_US));
         let closes = self.open.iter().map(|o| o.window.end_us + SLACK_US);
         let opens = self
             .windows
@@ -405,7 +409,7 @@ impl<'a> Accumulator<'a> {
     }
 
     fn open_window(&mut self, window: Window) {
-        let mut fresh = self.spare.pop().unwrap_or_else(|| Open {
+        let mut fresh = self.spare.pop().unwrap_or_else(|| OpenWindow {
             window,
             grid: PixelGrid::new(self.crop),
             on_events: 0,
@@ -420,18 +424,18 @@ impl<'a> Accumulator<'a> {
         self.open.push(fresh);
     }
 
-    fn close(&mut self, mut done: Open) {
+    fn close(&mut self, mut done: OpenWindow) {
         if self.estimator.is_none() || done.on.is_some() {
             self.dbscan.run(&done.grid);
         }
         let sighting = match &mut self.estimator {
-            None => Sighting::of_clusters(&self.dbscan, self.settings.centroid, 1),
+            None => ColumnEstimate::of_clusters(&self.dbscan, self.settings.centroid, 1),
             Some(estimator) => {
                 done.events.sort_unstable();
-                estimator.sight(&done.events, 0)
+                estimator.estimate(&done.events, 0)
             }
         };
-        let tally = Tally {
+        let tally = EventCounts {
             events: done.grid.events(),
             on: done.on_events,
             idle: done.idle_events,
@@ -456,7 +460,7 @@ impl<'a> Accumulator<'a> {
         let largest = self.dbscan.largest().map(|(label, _)| label);
         let clusters = self.settings.estimator == Estimator::Dbscan;
         let makes_centroid = |label: u32| match self.settings.centroid {
-            // Every event has a say where nothing is clustered.
+            // Without clusters, every event votes.
             _ if !clusters => true,
             CentroidRule::LargestCluster => Some(label) == largest,
             CentroidRule::AllClusters => label != crate::dbscan::NOISE,
@@ -476,8 +480,8 @@ impl<'a> Accumulator<'a> {
         }
     }
 
-    /// Ends the pass: what is open is closed, and windows that no event reached are empty.
-    pub fn finish(mut self) -> Result<Accumulated, AnalysisError> {
+    /// Ends the pass: closes open windows; windows without events are empty.
+    pub fn finish(mut self) -> Result<PassOutput, AnalysisError> {
         while !self.open.is_empty() {
             let done = self.open.remove(0);
             self.close(done);
@@ -505,14 +509,14 @@ impl<'a> Accumulator<'a> {
             off_per_s: per_s(offs),
             release_s: plan.release_s,
         });
-        Ok(Accumulated {
+        Ok(PassOutput {
             zooms: zooms.collect(),
             kept: self.keeper.finish(),
             activity: self.activity.map(|a| a.result(self.camera)),
             rates: self.rates,
             views: self.views,
             pictures: self.pictures,
-            held: self.held.filter(|_| self.late == 0),
+            cache: self.cache.filter(|_| self.late == 0),
             late: self.late,
             off_sensor: self.off_sensor,
         })
@@ -523,7 +527,7 @@ fn is_on_sensor(event: &CdEvent) -> bool {
     (event.x < SENSOR_WIDTH) & (event.y < SENSOR_HEIGHT)
 }
 
-/// The place of the first event, by time, from `time_us` on.
+/// Index of the first event, in time order, at or after `time_us`.
 fn first_from(events: &[CdEvent], time_us: u64) -> usize {
     events.partition_point(|e| e.t_us < time_us)
 }
@@ -532,12 +536,12 @@ fn first_from(events: &[CdEvent], time_us: u64) -> usize {
 pub(crate) fn rate_bin_us(settings: &AnalysisSettings) -> u64 {
     (settings.rate_bin_ms * 1e3).round().max(1.0) as u64
 }
-/// Everything that a camera's events say, in one pass over them.
+/// Runs one pass over the events of a camera.
 pub(crate) fn pass(
     source: &dyn EventSource,
     camera: CameraId,
     mut accumulator: Accumulator<'_>,
-) -> Result<Accumulated, AnalysisError> {
+) -> Result<PassOutput, AnalysisError> {
     source
         .for_each_slice(camera, &mut |events| accumulator.take(events))
         .map_err(|message| AnalysisError::Events { camera, message })?;

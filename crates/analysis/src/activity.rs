@@ -10,7 +10,7 @@ const CELL_PX: u16 = 2;
 const WIDTH: u16 = SENSOR_WIDTH / CELL_PX;
 const HEIGHT: u16 = SENSOR_HEIGHT / CELL_PX;
 
-/// The counters.
+/// One counter per cell.
 pub(crate) struct ActivityGrid(Counters);
 
 impl ActivityGrid {
@@ -18,7 +18,7 @@ impl ActivityGrid {
         Self(Counters::new(usize::from(WIDTH) * usize::from(HEIGHT)))
     }
 
-    /// Counts an event that lies on the sensor.
+    /// Counts an event on the sensor.
     pub fn add(&mut self, event: &CdEvent) {
         let cell =
             usize::from(event.y / CELL_PX) * usize::from(WIDTH) + usize::from(event.x / CELL_PX);

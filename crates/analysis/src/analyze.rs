@@ -1,21 +1,21 @@
-//! The analysis as a whole: from a session's values and events to one [`Analysis`].
+//! Owns the whole analysis: from a session's values and events to one [`Analysis`].
 
 use skinrig_model::CameraId;
 
-use crate::accumulate::{Accumulated, Accumulator, SLACK_US, Wanted, pass};
+use crate::accumulate::{Accumulator, PassOutput, PassRequest, SLACK_US, pass};
 use crate::audit::Streams;
-use crate::calibrate::Calibrated;
+use crate::calibrate::SessionCalibration;
+use crate::camera_clocks::{CameraClock, CameraClocks};
 use crate::closeups::{Closeups, keep_plans, zoom_plans};
 use crate::error::AnalysisError;
 use crate::input::{EventSource, SessionInput};
-use crate::judge::{Judged, Seen, judge};
-use crate::keeper::KeepPlan;
-use crate::kept::{Keep, Kept, KeptPress};
+use crate::locate_presses::{CameraObservations, LocatedPresses, locate_presses};
 use crate::metrics::{Exclusions, metrics, penalised};
 use crate::onsets::{Onset, onsets};
+use crate::press_event_collector::RetentionPlan;
+use crate::press_events::{RetainedPress, RetainedPresses, Retention};
 use crate::press_spans::{spans, timings};
 use crate::rates::RateHistogram;
-use crate::reading::{Reading, Readings};
 use crate::result::{
     ANALYSIS_VERSION, Activity, Alignment, AlignmentStatus, Analysis, ClockFit, ClockMap,
     ContactTiming, DepthResult, MapName, OffSensor, PressPicture, PressResult, PressView,
@@ -28,45 +28,45 @@ use crate::stream::{Silences, contacts_s};
 use crate::untimed::Untimed;
 use crate::{audit, bit_rates, caveats, check, cmre, coverage, latency, legs, reduction, verdict};
 
-/// Windows that share less than this, µs, only touch: their ends are rounded.
+/// Windows that overlap by less than this only touch, because their ends are rounded, µs.
 const OVERLAP_US: u64 = 100;
 
-/// Analyses a session: one pass over each camera's events when its clock can be fitted from trigger marks, two
-/// when it has to be aligned by event rates; both cameras at the same time. The second pass finds the events of the crop
-/// held in memory. It reads them again when there are more than 2^25 of a camera, or some came too late for their windows.
+/// Analyses a session. Each camera needs one pass over its events if its clock can be fitted to trigger marks, or two if it
+/// must be aligned by event rates; both cameras run in parallel. The second pass uses cached events of the crop. It reads
+/// them again if a camera has more than 2^25, or if some were too late for their windows.
 ///
-/// The same input gives the same result to the last bit on the same machine. Memory does not grow with the
-/// number of events, but for those held, 8 bytes each and at most 256 MiB per camera: it holds the rate histogram (4 bytes per `rate_bin_ms`), the table of presses, and one
-/// pixel grid per open window.
+/// The result is bit-identical for the same input on the same machine. Memory does not grow with the number of events,
+/// except for cached events (8 bytes each, at most 256 MiB per camera). It holds the rate histogram (4 bytes per
+/// `rate_bin_ms`), the table of presses, and one pixel grid per open window.
 ///
 /// # Errors
-/// When the input contradicts itself, a setting is out of its range or the events cannot be read. Whatever
-/// keeps single presses or a camera from being used becomes verdicts and warnings instead.
+/// When the input contradicts itself, a setting is out of range, or the events cannot be read. Problems with single presses
+/// or one camera become verdicts and warnings instead.
 pub fn analyze(input: &SessionInput, source: &dyn EventSource) -> Result<Analysis, AnalysisError> {
-    analyze_and_keep(input, source, Keep::Scored).map(|(analysis, _)| analysis)
+    analyze_with_events(input, source, Retention::Scored).map(|(analysis, _)| analysis)
 }
 
-/// Like [`analyze`], and hands over the events kept around the presses that `keep` says. The studies of the analysis
-/// itself look at scored presses only.
+/// Like [`analyze`], and also returns the events around the presses selected by `retention`. The studies of the analysis
+/// itself use scored presses only.
 ///
 /// # Errors
 /// See [`analyze`].
-pub fn analyze_and_keep(
+pub fn analyze_with_events(
     input: &SessionInput,
     source: &dyn EventSource,
-    keep: Keep,
-) -> Result<(Analysis, Kept), AnalysisError> {
+    keep: Retention,
+) -> Result<(Analysis, RetainedPresses), AnalysisError> {
     check::input(input)?;
     let plan = Closeups::choose(input, keep);
     let base = time_base(input);
     let legs = legs::clocks(input, base.as_ref());
     let pressed = spans(input).into_iter().map(|s| s.contact_us);
     let nominal = legs::nominal_only(&input.legs, &legs, pressed);
-    let Readings {
+    let CameraClocks {
         cameras: [reading_one, reading_two],
         evidence,
         violations,
-    } = Readings::new(input, source, base.as_ref())?;
+    } = CameraClocks::new(input, source, base.as_ref())?;
     let [one, two] = std::thread::scope(|scope| {
         let plan = &plan;
         let second =
@@ -80,15 +80,19 @@ pub fn analyze_and_keep(
     });
     let cameras = [one?, two?];
     let mut warnings: Vec<String> = Vec::new();
-    let Judged {
+    let LocatedPresses {
         presses,
         calibrated:
-            Calibrated {
+            SessionCalibration {
                 geometry,
                 calibration,
                 threshold,
             },
-    } = judge(input, [cameras[0].seen(), cameras[1].seen()], &mut warnings);
+    } = locate_presses(
+        input,
+        [cameras[0].observations(), cameras[1].observations()],
+        &mut warnings,
+    );
     let scores = ScoreSet::from_presses(&presses, &input.outcomes);
     let measure = |set: &ScoreSet, exclusions| {
         metrics(
@@ -120,9 +124,9 @@ pub fn analyze_and_keep(
     });
     let depths = depths.collect();
     let both = [&scored.rmse_mm, &scored_without_exclusions.rmse_mm];
-    warnings.extend(verdict::weight_of_exclusions(&presses, both));
+    warnings.extend(verdict::exclusion_warning(&presses, both));
     if scores.presses().is_empty() {
-        warnings.push("no scored press was attempted: there are no metrics".to_owned());
+        warnings.push("no scored press was attempted, so there are no metrics".to_owned());
     }
     let scheduled = input.outcomes.iter().flatten().any(|o| o.scheduled);
     if scheduled {
@@ -144,7 +148,7 @@ pub fn analyze_and_keep(
     let both_clocks = one.clock.is_some() && two.clock.is_some();
     if both_clocks && kept.left_out > 0 {
         warnings.push(format!(
-            "{} of {} presses chosen for the studies did not fit into memory: the studies stand on the first {}",
+            "{} of {} presses chosen for the studies did not fit into memory; the studies use only the first {}",
             kept.left_out,
             plan.kept.len(),
             kept.presses.len()
@@ -162,7 +166,7 @@ pub fn analyze_and_keep(
         rig: input.rig,
         geometry,
         counts,
-        alignment: judged_by_rates(alignment, evidence, violations),
+        alignment: with_rates_evidence(alignment, evidence, violations),
         clocks: [one.clock, two.clock],
         legs,
         contact_timing: contact_timing(input, scheduled),
@@ -192,7 +196,7 @@ pub fn analyze_and_keep(
     Ok((analysis, kept))
 }
 
-/// What can be said of the alignment without reports of a trigger box.
+/// Alignment without trigger box reports: what can be stated.
 fn uncertified(clocks: [Option<ClockFit>; 2]) -> Alignment {
     let names = [MapName::Camera1FromHost, MapName::Camera2FromHost];
     let maps = clocks.into_iter().zip(names);
@@ -204,8 +208,8 @@ fn uncertified(clocks: [Option<ClockFit>; 2]) -> Alignment {
     }
 }
 
-/// With what an alignment by event rates says of itself.
-fn judged_by_rates(
+/// Adds the evidence of an alignment by event rates.
+fn with_rates_evidence(
     found: Alignment,
     rates: Option<RatesEvidence>,
     violations: Vec<String>,
@@ -233,8 +237,13 @@ fn contact_timing(input: &SessionInput, scheduled: bool) -> ContactTiming {
     }
 }
 
-/// Fills in what stands on the finished table of presses. The parts look at the table only, not at each other.
-fn evaluate(analysis: &mut Analysis, input: &SessionInput, streams: &Streams, kept: &Kept) {
+/// Computes everything that depends on the finished table of presses. The parts do not depend on each other.
+fn evaluate(
+    analysis: &mut Analysis,
+    input: &SessionInput,
+    streams: &Streams,
+    kept: &RetainedPresses,
+) {
     let table = &*analysis;
     let (findings, (coverage, cmre, bit_rates)) = rayon::join(
         || audit::audit(input, table, streams),
@@ -255,29 +264,29 @@ fn evaluate(analysis: &mut Analysis, input: &SessionInput, streams: &Streams, ke
     analysis.warnings.extend(caveats::caveats(analysis));
 }
 
-/// What came from one camera.
+/// Results of one camera.
 struct CameraResult {
     clock: Option<ClockFit>,
     rates: RateSeries,
-    /// Per row of the plan.
+    /// One entry per row of the plan.
     views: Vec<Option<PressView>>,
     data_lost: Vec<bool>,
     untimed: Vec<Option<Untimed>>,
     silences: Silences,
-    /// Contacts that stand out of the counts, s on the host's clock, where a schedule lists the presses.
+    /// Contacts detected in the counts, s on the host clock, if the presses come from a schedule.
     contacts_s: Vec<f64>,
     onsets: Vec<Onset>,
     pictures: Vec<PressPicture>,
     zooms: Vec<RateZoom>,
-    kept: Vec<KeepPlan>,
+    kept: Vec<RetentionPlan>,
     activity: Option<Activity>,
     off_sensor: OffSensor,
     warnings: Vec<String>,
 }
 
 impl CameraResult {
-    fn seen(&self) -> Seen<'_> {
-        Seen {
+    fn observations(&self) -> CameraObservations<'_> {
+        CameraObservations {
             has_clock: self.clock.is_some(),
             views: &self.views,
             data_lost: &self.data_lost,
@@ -286,26 +295,30 @@ impl CameraResult {
     }
 }
 
-/// The views of both cameras, press by press; a press that one camera lacks is left out.
-fn paired(presses: &[PressResult], plan: &Closeups, [one, two]: [Vec<KeepPlan>; 2]) -> Kept {
-    let mut one: Vec<KeepPlan> = one;
+/// Views of both cameras per press; drops a press that one camera lacks.
+fn paired(
+    presses: &[PressResult],
+    plan: &Closeups,
+    [one, two]: [Vec<RetentionPlan>; 2],
+) -> RetainedPresses {
+    let mut one: Vec<RetentionPlan> = one;
     one.sort_by_key(|k| k.row);
-    let mut others: Vec<KeepPlan> = two;
+    let mut others: Vec<RetentionPlan> = two;
     others.sort_by_key(|k| k.row);
     let mut others = others.into_iter().peekable();
-    let presses: Vec<KeptPress> = one
+    let presses: Vec<RetainedPress> = one
         .into_iter()
         .filter_map(|first| {
             while others.next_if(|k| k.row < first.row).is_some() {}
             let second = others.next_if(|k| k.row == first.row)?;
-            Some(KeptPress {
+            Some(RetainedPress {
                 row: first.row,
                 press: presses[first.row].press,
                 views: [first.view, second.view],
             })
         })
         .collect();
-    Kept {
+    RetainedPresses {
         left_out: (plan.kept.len() - presses.len()) as u32,
         presses,
     }
@@ -316,16 +329,16 @@ fn camera_pass(
     source: &dyn EventSource,
     camera: CameraId,
     plan: &Closeups,
-    reading: Reading,
+    reading: CameraClock,
 ) -> Result<CameraResult, AnalysisError> {
     let settings = &input.settings;
     let k = camera.index();
-    let Reading {
+    let CameraClock {
         clock,
         rates,
         read,
         activity,
-        held,
+        cache,
         untimed,
         off_sensor,
         mut warnings,
@@ -334,34 +347,34 @@ fn camera_pass(
         windows(timings(input), &input.earlier, &c, settings)
     });
     let collected = match (clock, rates) {
-        // Without a clock the events have been seen once already and there is nothing else to find.
-        (None, rates) => Accumulated {
+        // Without a clock, the events have already been read and contain nothing more.
+        (None, rates) => PassOutput {
             rates,
             views: Vec::new(),
             pictures: Vec::new(),
             zooms: Vec::new(),
             kept: Vec::new(),
             activity,
-            held: None,
+            cache: None,
             late: 0,
             off_sensor,
         },
         (Some(clock), rates) => {
             let (fresh, known) = if read { (None, rates) } else { (rates, None) };
-            let wanted = Wanted {
+            let wanted = PassRequest {
                 windows: &list,
                 pictured: &plan.pictures,
                 zooms: zoom_plans(input, plan, &clock),
                 kept: keep_plans(input, plan, &list, &clock),
                 rates: fresh,
-                held: None,
+                cache: None,
             };
             let mut accumulator = Accumulator::new(camera, settings, wanted);
-            let mut done = match held {
-                Some(held) => {
-                    accumulator.take_held(&held);
+            let mut done = match cache {
+                Some(cache) => {
+                    accumulator.take_cached(&cache);
                     let done = accumulator.finish()?;
-                    Accumulated { off_sensor, ..done }
+                    PassOutput { off_sensor, ..done }
                 }
                 None => pass(source, camera, accumulator)?,
             };
@@ -391,7 +404,7 @@ fn camera_pass(
         .filter(|b| *b > 0)
     {
         warnings.push(format!(
-            "{beyond} events lie days away from the others and are not in the event rates"
+            "{beyond} events have timestamps days away from all others and are not in the event rates"
         ));
     }
     let off_sensor = collected.off_sensor;
@@ -401,7 +414,7 @@ fn camera_pass(
     }
     if off_sensor.share() > OffSensor::WARNING_SHARE {
         warnings.push(format!(
-            "{} of {} events lie outside the sensor and are left out: is the recording damaged, or of another sensor?",
+            "{} of {} events are outside the sensor and ignored: the recording may be damaged, or from another sensor",
             off_sensor.events, off_sensor.of
         ));
     }
@@ -436,10 +449,10 @@ fn camera_pass(
     })
 }
 
-/// What the counts of a camera say by themselves.
+/// Results from the counts of a camera alone.
 fn stream(
     input: &SessionInput,
-    collected: &Accumulated,
+    collected: &PassOutput,
     clock: Option<&ClockFit>,
 ) -> (Silences, Vec<f64>) {
     let (Some(rates), Some(clock)) = (&collected.rates, clock) else {

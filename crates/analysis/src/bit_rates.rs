@@ -1,19 +1,19 @@
-//! Data rates at press and idle.
+//! Data rates during presses and while idle.
 
-use skinrig_model::{PressRole, PressVerdict};
+use skinrig_model::{PressRole, Verdict};
 
 use crate::metrics::{bootstrap_over_locations, mean};
 use crate::result::{Analysis, BitRates, Estimate, PressResult, PressView};
 
-/// Mean data rates of both cameras together over the scored presses that count: in the press window, and in the idle
-/// time before it where both cameras have some. `None` when no such press was seen by both.
+/// Mean data rates of both cameras together over the counting scored presses: in the press window, and in the idle time
+/// before it where both cameras have some. `None` if both cameras saw none of them.
 #[must_use]
 pub fn bit_rates(analysis: &Analysis) -> Option<BitRates> {
     let settings = &analysis.settings;
     let presses: Vec<(&PressResult, [PressView; 2])> = analysis
         .presses
         .iter()
-        .filter(|p| p.role == PressRole::Score && p.verdict == PressVerdict::Valid.name())
+        .filter(|p| p.role == PressRole::Score && p.verdict == Verdict::Valid)
         .filter_map(|p| Some((p, [p.views[0]?, p.views[1]?])))
         .collect();
     if presses.is_empty() {
@@ -47,13 +47,13 @@ pub fn bit_rates(analysis: &Analysis) -> Option<BitRates> {
     })
 }
 
-/// Events per second of both cameras in the idle time before a press; `None` when one of them has none.
+/// Events per second of both cameras in the idle time before a press; `None` if one of them has none.
 fn idle_rate_per_s(views: &[PressView; 2]) -> Option<f64> {
     let known = views.iter().all(|v| v.idle_s > 0.0);
     known.then(|| views.iter().map(|v| v.idle_rate_per_s).sum())
 }
 
-/// Events per second as bytes per second.
+/// Converts events per second to bytes per second.
 pub(crate) fn in_bytes(events_per_s: &Estimate, bits_per_event: f64) -> Estimate {
     let bytes = |rate: Option<f64>| rate.map(|r| r * bits_per_event / 8.0);
     Estimate {

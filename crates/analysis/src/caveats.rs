@@ -1,14 +1,14 @@
-//! What a reader must know about the numbers together: settings that do not fit the data, results that disagree.
+//! Owns caveats about the results as a whole: settings that do not fit the data, contradictory results.
 
 use skinrig_model::{AnalysisSettings, CameraId, Estimator, SENSOR_WIDTH};
 
 use crate::metrics::quantile;
 use crate::result::{Analysis, Estimate, PressResult, Reduction, ReductionRow};
 
-/// A thinned row that locates at least this share of what all events locate can be compared with them.
+/// A thinned row is comparable if it locates at least this share of what all events locate.
 const COMPARABLE: f64 = 0.95;
 
-/// The caveats of a finished analysis.
+/// Caveats of a finished analysis.
 pub(crate) fn caveats(analysis: &Analysis) -> Vec<String> {
     let dense = CameraId::ALL
         .into_iter()
@@ -20,8 +20,8 @@ pub(crate) fn caveats(analysis: &Analysis) -> Vec<String> {
     dense.chain(disagree).chain(fewer).collect()
 }
 
-/// Says so when the background alone makes core events: when the events that it is expected to put into a
-/// neighbourhood, and two standard deviations more (Poisson), reach the core threshold of DBSCAN.
+/// A caveat if the background alone creates core events: the events expected in a neighbourhood plus two standard deviations
+/// (Poisson) reach the core threshold of DBSCAN.
 fn dense_background(
     settings: &AnalysisSettings,
     presses: &[PressResult],
@@ -43,7 +43,8 @@ fn dense_background(
     (neighbours + 2.0 * spread >= f64::from(settings.min_samples)).then(|| {
         format!(
             "{camera}: in a press window the background alone puts {neighbours:.1} events within eps ({} px) of an \
-             event, and {} make a cluster (min_samples): noise joins the clusters; a min_samples of {} keeps it out",
+             event, and {} make a cluster (min_samples), so noise joins the clusters; a min_samples of {} prevents \
+             this",
             settings.eps_px,
             settings.min_samples,
             (neighbours + 4.0 * spread).ceil() + 1.0
@@ -51,21 +52,21 @@ fn dense_background(
     })
 }
 
-/// Says so when the scored presses and calibrating places that the fit has not seen have errors that differ by more than
-/// both intervals.
+/// A caveat if the scored presses and the held-out calibration locations have errors that differ by more than both
+/// intervals.
 fn calibration_disagrees(scored: &Estimate, left_out: &Estimate) -> Option<String> {
     let apart = scored.low? > left_out.high? || scored.high? < left_out.low?;
     apart.then(|| {
         format!(
-            "the RMSE of the scored presses, {}, and that of calibrating places which the fit has not seen, {}, \
-             disagree: a few presses dominate one of them, or the rig changed in between",
+            "the RMSE of the scored presses, {}, and that of held-out calibration locations, {}, disagree: a few \
+             presses dominate one of them, or the rig changed in between",
             in_words(scored),
             in_words(left_out)
         )
     })
 }
 
-/// Says so when fewer events locate better than all of them.
+/// A caveat if fewer events locate better than all events.
 fn fewer_events_do_better(reduction: &Reduction) -> Option<String> {
     reduction.curves.iter().find_map(|curve| {
         let (all, fewer) = curve.rows.split_first()?;
@@ -78,7 +79,7 @@ fn fewer_events_do_better(reduction: &Reduction) -> Option<String> {
         let row = fewer.iter().find(better)?;
         Some(format!(
             "a random 1/{} of the events locates better than all of them: RMSE {} against {}; the clustering settings \
-             do not fit these event rates",
+             do not suit these event rates",
             row.factor,
             in_words(&row.rmse_mm),
             in_words(&all.rmse_mm)

@@ -1,4 +1,4 @@
-//! What an analysis asks of its input before it begins.
+//! Validates the input of an analysis before it begins.
 
 use skinrig_model::{
     AnalysisSettings, CameraId, PlannedPress, Point2, RigGeometry, SENSOR_HEIGHT, SkinOutline,
@@ -9,11 +9,10 @@ use crate::cmre::ContactMap;
 use crate::error::AnalysisError;
 use crate::input::SessionInput;
 
-/// Largest coordinate, length or skew that is taken for one: 1000 km. Squares of it and sums of them stay exact
-/// enough to be distances.
+/// Largest accepted coordinate, length or skew: 1000 km. Sums of squares remain accurate distances.
 const MAX_COORDINATE_MM: f64 = 1e9;
 
-/// Journal and plan fit together, settings are in range, the geometry can be used.
+/// Checks that journal and plan match, settings are in range, and the geometry is usable.
 pub fn input(input: &SessionInput) -> Result<(), AnalysisError> {
     if input.planned.len() != input.outcomes.len() {
         return Err(AnalysisError::JournalLength {
@@ -36,8 +35,8 @@ pub fn input(input: &SessionInput) -> Result<(), AnalysisError> {
     geometry(&input.rig)
 }
 
-/// Checks before anything is recorded what an analysis would refuse afterwards: the settings, the plan, and whether the
-/// two fit each other and the skin's outline.
+/// Checks before recording what an analysis would reject afterwards: the settings, the plan, and whether both match each
+/// other and the skin's outline.
 ///
 /// # Errors
 /// [`AnalysisError::Setting`] or [`AnalysisError::Plan`].
@@ -61,7 +60,7 @@ pub fn before_recording(
     Ok(())
 }
 
-/// Places and depths of the plan are numbers that distances can be taken of.
+/// Positions and depths of the plan are finite and within range.
 fn presses(all: &[PlannedPress]) -> Result<(), AnalysisError> {
     for planned in all {
         let numbers = [planned.at.x_mm, planned.at.y_mm, planned.depth_mm];
@@ -83,7 +82,7 @@ pub(crate) fn is_place(p: &Point2) -> bool {
     p.x_mm.abs() <= MAX_COORDINATE_MM && p.y_mm.abs() <= MAX_COORDINATE_MM
 }
 
-/// Cameras and outline are such that rays, areas and distances are numbers.
+/// Checks that cameras and outline give finite rays, areas and distances.
 ///
 /// # Errors
 /// [`AnalysisError::Geometry`] or [`AnalysisError::Outline`].
@@ -128,7 +127,7 @@ pub fn geometry(rig: &RigGeometry) -> Result<(), AnalysisError> {
     }
 }
 
-/// Every setting is in its declared range, and pairs of settings are in order.
+/// Checks that every setting is in its range, and that pairs of settings are in order.
 ///
 /// # Errors
 /// [`AnalysisError::Setting`] for the first setting out of its range.
@@ -138,7 +137,7 @@ pub fn settings(s: &AnalysisSettings) -> Result<(), AnalysisError> {
         expected: expected.to_owned(),
         found,
     };
-    // Negative margins cut the ends off a press; no file can ask for them.
+    // Negative margins shorten a press; no file can set them.
     let margins = AnalysisSettings {
         window_before_ms: s.window_before_ms.abs(),
         window_after_ms: s.window_after_ms.abs(),

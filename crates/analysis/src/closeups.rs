@@ -1,34 +1,34 @@
-//! Which presses are looked at more closely: pictures, close-ups of the rate, and events kept for the studies.
+//! Selects presses for images, rate close-ups and event retention.
 
 use skinrig_model::{Background, HostTime, PressId, PressRole};
 
 use crate::accumulate::{ZoomPlan, rate_bin_us};
 use crate::input::SessionInput;
-use crate::keeper::KeepPlan;
-use crate::kept::{Keep, KeptView};
+use crate::press_event_collector::RetentionPlan;
+use crate::press_events::{EventView, Retention};
 use crate::result::ClockFit;
 use crate::seeded;
 use crate::segment::Window;
 
-/// Scored presses with a picture.
+/// Scored presses with an image.
 const PICTURES: usize = 6;
 /// Scored presses with a rate close-up.
 const ZOOMS: usize = 3;
-/// A close-up begins this long before the contact and ends this long after the release, s.
+/// Margin of a close-up before contact and after release, s.
 const ZOOM_SIDE_S: f64 = 0.3;
-/// Most bins of a close-up.
+/// Maximum number of bins in a close-up.
 const MAX_ZOOM_BINS: usize = 2000;
 
-/// A kept view begins this long before the contact, s: the published trial is 0.85 s either side.
+/// Start of a kept view before contact, s: the published trial is 0.85 s on each side.
 const KEPT_BEFORE_S: f64 = 1.0;
-/// And ends this long after the contact, or 0.1 s after the press window, whichever is later, s.
+/// End of a kept view after contact, s, or 0.1 s after the press window, whichever is later.
 const KEPT_AFTER_S: f64 = 0.9;
-/// End of the background that the public code takes, after the middle of the press, s.
+/// End of the background in the public code, after the middle of the press, s.
 const BACKGROUND_AFTER_S: f64 = 2.4;
-/// Stream of the random choice of presses, apart from those of the bootstrap.
+/// Random stream for choosing presses, separate from the bootstrap's.
 const CHOICE: u64 = 0x6b65_7074;
 
-/// Which presses get pictures and close-ups of the rate.
+/// Presses with images and rate close-ups.
 pub(crate) struct Closeups {
     pub pictures: Vec<(usize, PressId)>,
     pub zooms: Vec<(usize, PressId)>,
@@ -37,10 +37,10 @@ pub(crate) struct Closeups {
 }
 
 impl Closeups {
-    /// Spread over the scored presses that were done (over all presses when none scores) and over their locations:
-    /// of each of equal parts of the session, the press nearest to its share of the locations. Equal steps alone
-    /// would meet the same few places in every repetition.
-    pub fn choose(input: &SessionInput, keep: Keep) -> Self {
+    /// Spreads them over the executed scored presses (over all presses if none scores) and over their locations: from each
+    /// of equal parts of the session, the press nearest to its share of the locations. Equal steps alone would hit the same
+    /// few locations in every repetition.
+    pub fn choose(input: &SessionInput, keep: Retention) -> Self {
         let done = |scored: bool| -> Vec<(usize, PressId, u32)> {
             let rows = input.planned.iter().zip(&input.outcomes).enumerate();
             rows.filter(|(_, (p, _))| !scored || p.role == PressRole::Score)
@@ -76,11 +76,11 @@ impl Closeups {
     }
 }
 
-/// A random choice, so that no rhythm of the plan shows in it.
-fn kept_rows(input: &SessionInput, keep: Keep) -> Vec<usize> {
+/// Random choice, so that it does not follow the rhythm of the plan.
+fn kept_rows(input: &SessionInput, keep: Retention) -> Vec<usize> {
     let roles: &[PressRole] = match keep {
-        Keep::Scored => &[PressRole::Score],
-        Keep::All => &[PressRole::Score, PressRole::Calibrate],
+        Retention::Scored => &[PressRole::Score],
+        Retention::All => &[PressRole::Score, PressRole::Calibrate],
     };
     let most = input.settings.study_presses as usize;
     let mut chosen: Vec<usize> = Vec::new();
@@ -102,15 +102,15 @@ fn kept_rows(input: &SessionInput, keep: Keep) -> Vec<usize> {
     chosen
 }
 
-/// The views to keep of one camera, sorted by start. `windows` are those of all presses.
+/// Views to keep of one camera, sorted by start. `windows` are those of all presses.
 pub(crate) fn keep_plans(
     input: &SessionInput,
     plan: &Closeups,
     windows: &[Window],
     clock: &ClockFit,
-) -> Vec<KeepPlan> {
+) -> Vec<RetentionPlan> {
     let seconds_after = |t: HostTime, s: f64| clock.camera_us_of_host(t) + s * 1e6;
-    let mut plans: Vec<KeepPlan> = windows
+    let mut plans: Vec<RetentionPlan> = windows
         .iter()
         .filter(|w| plan.kept.binary_search(&w.row).is_ok())
         .filter_map(|w| {
@@ -124,9 +124,9 @@ pub(crate) fn keep_plans(
                 end = end.max(0.5 * (contact + release) + BACKGROUND_AFTER_S * 1e6);
             }
             let within = |t_us: u64| u32::try_from(t_us.saturating_sub(start_us)).ok();
-            Some(KeepPlan {
+            Some(RetentionPlan {
                 row: w.row,
-                view: KeptView {
+                view: EventView {
                     start_us,
                     length_us: within(end.max(0.0) as u64)?,
                     window_us: (within(w.start_us)?, within(w.end_us)?),
@@ -142,7 +142,7 @@ pub(crate) fn keep_plans(
     plans
 }
 
-/// The close-ups of one camera, sorted by start.
+/// Close-ups of one camera, sorted by start.
 pub(crate) fn zoom_plans(input: &SessionInput, plan: &Closeups, clock: &ClockFit) -> Vec<ZoomPlan> {
     let bin_us = rate_bin_us(&input.settings);
     let mut plans: Vec<ZoomPlan> = plan

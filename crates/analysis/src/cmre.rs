@@ -1,4 +1,4 @@
-//! Contact map reconstruction error: how much a drawn map of the estimated contact differs from the true one.
+//! Contact map reconstruction error: difference between a map of the estimated contact and that of the true one.
 //!
 //! The definition is that of the public code (function `compute_CMRE`, which nothing there calls). The skin's
 //! enclosing rectangle is cut into square cells; the estimate becomes a map `R = exp(-d² / 2 sigma²)`, d from each
@@ -6,17 +6,17 @@
 //! `C = tanh(3.5 (R - T)²)` and `D` the distance from the true cell in cells, the score is `C` of the true cell minus
 //! the sum of `C / ((SR / 35)² + D²)` over all others. Cell, sigma and SR are not published.
 //!
-//! Read the score with care. At SR = cell = 5 mm and sigma = 1 mm it is 0 at the centre of the true cell, 0.02 one whole
-//! cell away, 0.75 two cells away and 0.998 far off: it counts cells beyond the first more than millimetres. It is
-//! *negative* wherever the map is bright outside the true cell without being dark in it: -0.98 for an estimate on the
-//! edge to the next cell, and below -1 when sigma is as large as a cell. Negative scores lower the mean, so that
-//! a percentage of this measure is not a share of anything; `Metrics::rmse_diagonal_percent` is.
+//! Interpret the score with care. At SR = cell = 5 mm and sigma = 1 mm it is 0 at the centre of the true cell, 0.02 one
+//! whole cell away, 0.75 two cells away and 0.998 far off: beyond the first it counts cells rather than millimetres. It is
+//! *negative* wherever the map is bright outside the true cell without being dark in it: -0.98 for an estimate on the edge
+//! to the next cell, and below -1 when sigma is as large as a cell. Negative scores lower the mean, so a percentage of this
+//! measure is not a share of anything; `Metrics::rmse_diagonal_percent` is.
 //!
-//! Two of the public code's answers are not reproduced: a truth off the map is moved there into the nearest border cell
-//! and has no score here, and far off the map R underflows to an empty map there (score 0.99818) while here its
-//! maximum is 1 as everywhere (0.99202 in the same place).
+//! Two results of the public code are not reproduced: it moves a truth off the map into the nearest border cell, which has
+//! no score here; and far off the map its R underflows to an empty map (score 0.99818), while here the maximum is always 1
+//! (0.99202 in the same position).
 
-use skinrig_model::{CmreSettings, Point2, PressRole, PressVerdict, SkinOutline};
+use skinrig_model::{CmreSettings, Point2, PressRole, SkinOutline, Verdict};
 use skinrig_settings::Settings;
 
 use crate::error::AnalysisError;
@@ -25,14 +25,14 @@ use crate::result::{Analysis, Cmre, Estimate};
 
 /// Gain of the difference between the maps (public code).
 const GAIN: f64 = 3.5;
-/// What SR is divided by in the weights (public code).
+/// Divisor of SR in the weights (public code).
 const SR_DIVISOR: f64 = 35.0;
 /// Cells along the longer side of a map, at most.
 const MAX_CELLS: f64 = 200.0;
 /// Where `ln R` is below this, `3.5 R²` is below 1e-34 and adds nothing.
 const DARK: f64 = -40.0;
 
-/// The contact map reconstruction error over the scored presses that count; `None` when the settings make no map.
+/// Contact map reconstruction error over the counting scored presses; `None` if the settings define no map.
 #[must_use]
 pub fn cmre(analysis: &Analysis) -> Option<Cmre> {
     let settings = &analysis.settings;
@@ -40,7 +40,7 @@ pub fn cmre(analysis: &Analysis) -> Option<Cmre> {
     let counting = analysis
         .presses
         .iter()
-        .filter(|p| p.role == PressRole::Score && p.verdict == PressVerdict::Valid.name());
+        .filter(|p| p.role == PressRole::Score && p.verdict == Verdict::Valid);
     let pairs = counting.filter_map(|p| Some((p.location.index(), p.estimate()?, p.truth?)));
     let (mut scores, mut without_score) = (Vec::new(), 0);
     for (location, estimate, truth) in pairs {
@@ -63,17 +63,17 @@ pub fn cmre(analysis: &Analysis) -> Option<Cmre> {
     })
 }
 
-/// The cells of a contact map and what weighs them.
+/// Cells of a contact map, and their weights.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactMap {
-    /// The corner with the smallest coordinates.
+    /// Corner with the smallest coordinates.
     corner: Point2,
     /// Extent of the rectangle, mm.
     extent_mm: (f64, f64),
     cell_mm: f64,
     sigma_mm: f64,
     sr_mm: f64,
-    /// Cells along x and y; the last ones stand out where the side is no multiple of the cell.
+    /// Cells along x and y; the last ones extend beyond a side that is not a multiple of the cell.
     cells: (u32, u32),
 }
 
@@ -81,7 +81,7 @@ impl ContactMap {
     /// The map over the rectangle that encloses `outline`.
     ///
     /// # Errors
-    /// When a parameter is not a positive number or the cell gives more than 200 cells along the longer side.
+    /// When a parameter is not a positive number, or there are more than 200 cells along the longer side.
     pub fn new(outline: &SkinOutline, settings: &CmreSettings) -> Result<Self, AnalysisError> {
         let wrong = |key: &str, expected: &str, found: String| AnalysisError::Setting {
             name: format!("cmre.{key}"),
@@ -116,8 +116,8 @@ impl ContactMap {
         })
     }
 
-    /// The score of an estimate, 0 for a perfect one (see the module's description for what else); `None` when the
-    /// truth lies off the map or the estimate is not a point.
+    /// Score of an estimate, 0 for a perfect one (see the module's description for other values); `None` if the truth is off
+    /// the map or the estimate is not a point.
     #[must_use]
     pub fn score(&self, estimate: Point2, truth: Point2) -> Option<f64> {
         if !(estimate.x_mm.is_finite() && estimate.y_mm.is_finite()) {
@@ -155,7 +155,7 @@ impl ContactMap {
         Some(score)
     }
 
-    /// The cell at `at` mm from the corner: an edge belongs to the cell above it, the last one to the last cell.
+    /// The cell at `at` mm from the corner: an edge belongs to the next cell, the last edge to the last cell.
     fn cell_of(&self, at: f64, extent: f64) -> Option<u32> {
         let last = ((extent / self.cell_mm).ceil() as u32).saturating_sub(1);
         (0.0..=extent)

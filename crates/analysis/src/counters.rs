@@ -1,12 +1,12 @@
-//! Many counters in little memory: events are counted all over them, which is as fast as they stay in the processor's caches.
+//! Owns many counters in little memory, so that random increments stay in the processor's caches.
 
 use std::ops::Range;
 
-/// Counters, a byte each; how often a byte has gone round is counted apart, from the first time on.
+/// Counters of one byte each; overflows are counted separately, from the first one on.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Counters {
     low: Vec<u8>,
-    /// As many as there are counters, or none before any has gone round.
+    /// One per counter, or none before the first overflow.
     rounds: Vec<u32>,
 }
 
@@ -19,12 +19,12 @@ impl Counters {
         }
     }
 
-    /// How many there are.
+    /// Number of counters.
     pub const fn len(&self) -> usize {
         self.low.len()
     }
 
-    /// Counts one. False when there is no such counter.
+    /// Increments one counter. False if it does not exist.
     #[inline]
     pub fn add(&mut self, index: usize) -> bool {
         let Some(low) = self.low.get_mut(index) else {
@@ -37,7 +37,7 @@ impl Counters {
         true
     }
 
-    /// Counts many. False when there is no such counter.
+    /// Adds to one counter. False if it does not exist.
     pub fn add_many(&mut self, index: usize, n: u32) -> bool {
         let Some(low) = self.low.get_mut(index) else {
             return false;
@@ -52,21 +52,21 @@ impl Counters {
         true
     }
 
-    /// Stops at the most that can be told, 2^40 - 1 or a little less.
+    /// Saturates at the maximum, 2^40 - 1 or slightly less.
     #[cold]
     fn carry(&mut self, index: usize, n: u32) {
         self.rounds.resize(self.low.len(), 0);
         self.rounds[index] = self.rounds[index].saturating_add(n);
     }
 
-    /// What has been counted.
+    /// Value of a counter.
     #[inline]
     pub fn get(&self, index: usize) -> u64 {
         let rounds = self.rounds.get(index).copied().unwrap_or(0);
         u64::from(rounds) << u8::BITS | u64::from(self.low[index])
     }
 
-    /// The sum of the eight from an index on, and a bit for each of them that is above 1.
+    /// Sum of eight counters from an index on, and a bit for each that is above 1.
     #[inline]
     pub fn eight(&self, first: usize) -> (u64, u64) {
         let word = self.low[first..first + 8]
@@ -85,10 +85,10 @@ impl Counters {
         (sum, bits)
     }
 
-    /// The sums of those that lie `N` apart, as in the columns of a table of so many.
+    /// Sums of counters that are `N` apart, like the columns of a table.
     pub fn columns<const N: usize>(&self) -> [u64; N] {
         let mut sums = [0; N];
-        // So many bytes fit into 16 bits: row by row, side by side.
+        // This many bytes fit into 16 bits: add rows side by side.
         for rows in self.low.chunks(256 * N) {
             let mut some = [0u16; N];
             for row in rows.chunks(N) {
@@ -108,7 +108,7 @@ impl Counters {
         sums
     }
 
-    /// Sets some back to 0.
+    /// Resets a range to 0.
     pub fn clear(&mut self, indices: Range<usize>) {
         self.low[indices.clone()].fill(0);
         if let Some(rounds) = self.rounds.get_mut(indices) {
@@ -116,7 +116,7 @@ impl Counters {
         }
     }
 
-    /// What has been counted, counter by counter.
+    /// All values in order.
     pub fn iter(&self) -> impl Iterator<Item = u64> {
         (0..self.len()).map(|index| self.get(index))
     }
@@ -129,14 +129,14 @@ mod bytes {
     const LOW_SEVEN: u64 = 0x7f7f_7f7f_7f7f_7f7f;
     const EVEN: u64 = 0x00ff_00ff_00ff_00ff;
 
-    /// Their sum: in four pairs, then all of those in the uppermost 16 bits of the product.
+    /// Their sum: in four pairs, then the uppermost 16 bits of the product.
     pub const fn sum(word: u64) -> u64 {
         let pairs = (word & EVEN) + (word >> 8 & EVEN);
         pairs.wrapping_mul(0x0001_0001_0001_0001) >> 48
     }
 
-    /// A bit for each that is not 0: its uppermost bit, set by a carry from those below, is moved to its place in the
-    /// uppermost byte of the product.
+    /// A bit for each non-zero byte: a carry from the lower bits sets its top bit, which the product moves into the
+    /// uppermost byte.
     pub(crate) const fn nonzero(word: u64) -> u64 {
         let uppermost = (((word & LOW_SEVEN) + LOW_SEVEN) | word) & !LOW_SEVEN;
         (uppermost >> 7).wrapping_mul(0x0102_0408_1020_4080) >> 56

@@ -12,7 +12,7 @@ pub fn normal_quantile(p: f64) -> f64 {
     invert(p, normal_cdf)
 }
 
-/// P(T <= t) of Student's distribution with `df` degrees of freedom (above 0; they need not be whole).
+/// P(T <= t) of Student's distribution with `df` degrees of freedom (above 0, not necessarily an integer).
 #[must_use]
 pub fn student_cdf(t: f64, df: f64) -> f64 {
     if t.is_infinite() {
@@ -32,7 +32,7 @@ pub fn student_quantile(p: f64, df: f64) -> f64 {
     invert(p, |t| student_cdf(t, df))
 }
 
-/// Where an increasing `cdf` that is symmetric about 0 reaches `p`, by bisection to the last bits.
+/// Inverse of an increasing `cdf` that is symmetric about 0, by bisection to the last bits.
 fn invert(p: f64, cdf: impl Fn(f64) -> f64) -> f64 {
     if p == 0.5 {
         return 0.0;
@@ -56,7 +56,7 @@ fn invert(p: f64, cdf: impl Fn(f64) -> f64) -> f64 {
     if p < 0.5 { -at } else { at }
 }
 
-/// P(X <= k) of a Poisson variable with this mean (at least 0): its terms, summed from the largest down.
+/// P(X <= k) of a Poisson variable with this mean (at least 0): terms summed from the largest down.
 #[must_use]
 pub(crate) fn poisson_cdf(k: u64, mean: f64) -> f64 {
     if mean <= 0.0 {
@@ -69,8 +69,8 @@ pub(crate) fn poisson_cdf(k: u64, mean: f64) -> f64 {
     (from..=k).rev().map(term).sum::<f64>().min(1.0)
 }
 
-/// The exact two-sided interval of the mean of a Poisson variable that was found to be `count` (Garwood 1936): below its
-/// lower end `count` or more, above its upper end `count` or fewer are seen with a probability of less than `tail`.
+/// Exact two-sided interval of a Poisson mean for an observed `count` (Garwood 1936): below its lower end `count` or more,
+/// above its upper end `count` or fewer occur with a probability below `tail`.
 #[must_use]
 pub(crate) fn poisson_interval(count: u64, tail: f64) -> (f64, f64) {
     let spread = 10.0 * (count as f64 + 25.0).sqrt();
@@ -92,8 +92,8 @@ pub(crate) fn poisson_interval(count: u64, tail: f64) -> (f64, f64) {
     (low, solve(&|mean| poisson_cdf(count, mean) < tail))
 }
 
-/// The regularised incomplete beta function I_x(a, b): continued fraction 8.17.22 of the NIST Digital Library of
-/// Mathematical Functions by Lentz's method, on the side where it converges fast.
+/// Regularised incomplete beta function I_x(a, b): continued fraction 8.17.22 of the NIST Digital Library of Mathematical
+/// Functions by Lentz's method, on the side where it converges fast.
 fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
     if x <= 0.0 {
         return 0.0;
@@ -168,7 +168,7 @@ mod tests {
             assert!((found.0 - low).abs() < 1e-4, "{count}: {found:?}");
             assert!((found.1 - high).abs() < 1e-4, "{count}: {found:?}");
         }
-        // Large counts: the normal approximation.
+        // Large counts: normal approximation.
         let (low, high) = poisson_interval(1_000_000, 0.025);
         assert!(
             (low / (1e6 - 1960.0) - 1.0).abs() < 1e-5 && (high / (1e6 + 1961.0) - 1.0).abs() < 1e-5

@@ -1,13 +1,13 @@
-//! What can keep an analysis from giving a result.
+//! Owns the errors of an analysis.
 
 use skinrig_model::{CameraId, PressId};
 
-/// Why there is no analysis. Everything else that goes wrong is a row, a count or a warning in the result.
+/// Why there is no analysis. All other problems become rows, counts or warnings in the result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum AnalysisError {
     /// The journal does not fit the plan.
     #[error(
-        "expected one outcome slot per planned press ({planned}), found {outcomes}; the session's journal and plan do not belong together"
+        "expected one outcome slot per planned press ({planned}), found {outcomes}; the session's journal does not match its plan"
     )]
     JournalLength {
         /// Planned presses.
@@ -15,8 +15,8 @@ pub enum AnalysisError {
         /// Outcome slots.
         outcomes: usize,
     },
-    /// An outcome stands in the row of another press.
-    #[error("expected the outcome of {expected} in its row of the journal, found that of {found}")]
+    /// An outcome is in the row of another press.
+    #[error("expected the outcome of {expected} in its journal row, found that of {found}")]
     JournalOrder {
         /// Press of the row.
         expected: PressId,
@@ -26,24 +26,24 @@ pub enum AnalysisError {
     /// A setting is out of its range.
     #[error("expected {expected} for the analysis setting `{name}`, found {found}")]
     Setting {
-        /// Its name in the protocol.
+        /// Name in the protocol.
         name: String,
-        /// What is allowed.
+        /// Allowed values.
         expected: String,
-        /// What was given.
+        /// Given value.
         found: String,
     },
-    /// The rig's geometry cannot be used.
+    /// The camera geometry is unusable.
     #[error(
         "expected a camera within 1000 km of the origin and away from the point it aims at, with a lens that sees, found {found} for {camera}; check the rig description of the session"
     )]
     Geometry {
-        /// Which camera.
+        /// Camera.
         camera: CameraId,
-        /// What was given.
+        /// Given value.
         found: String,
     },
-    /// The skin's outline is no outline.
+    /// The outline of the skin is invalid.
     #[error(
         "expected a skin outline with sides above 0 mm and corners that fit into them, found {found}; check the rig description of the session"
     )]
@@ -51,37 +51,37 @@ pub enum AnalysisError {
         /// What was given.
         found: String,
     },
-    /// The plan has a number that is none.
+    /// The plan contains NaN, infinity or an excessive value.
     #[error(
         "expected finite positions and depths in the plan, found {found} for {press}; check the session's plan"
     )]
     Plan {
-        /// Which press.
+        /// The press.
         press: PressId,
         /// What was given.
         found: String,
     },
-    /// The events of a camera could not be read to their end.
+    /// The events of a camera could not be read to the end.
     #[error("{camera}: {message}")]
     Events {
         /// Which camera.
         camera: CameraId,
-        /// What the source said.
+        /// Message of the source.
         message: String,
     },
-    /// An event lies off the sensor.
+    /// Too many events are off the sensor.
     #[error(
-        "expected events within 640 x 480 px but for at most 1 %, found {events} of {of} outside ({camera}); the stream is another sensor's or was decoded with the wrong format: `skinrig inspect` shows its header"
+        "expected events within 640 x 480 px but for at most 1 %, found {events} of {of} outside ({camera}); the stream is from another sensor or was decoded in the wrong format; `skinrig inspect` shows its header"
     )]
     OffSensor {
         /// Which camera.
         camera: CameraId,
         /// Events outside the sensor.
         events: u64,
-        /// Events in all.
+        /// All events.
         of: u64,
     },
-    /// More events in the windows of presses than a counter holds, or than an estimator that needs them all may keep.
+    /// Press windows contain more events than a counter can hold, or than an estimator may cache.
     #[error(
         "expected at most {most} events in the window of {press} and those that overlap it, found more ({camera}); shorten the press window or set `thinning`, both below `analysis` in the protocol"
     )]
@@ -90,15 +90,15 @@ pub enum AnalysisError {
         camera: CameraId,
         /// The press.
         press: PressId,
-        /// The most that there may be.
+        /// The limit.
         most: usize,
     },
-    /// The session is invalid: none of its numbers is to be used.
+    /// The session is invalid, and its numbers must not be used.
     #[error("the session is INVALID: {0}")]
     Invalid(String),
-    /// No press can be located in any way.
+    /// No press can be located.
     #[error(
-        "expected scored presses with measured times in the clocks of both cameras, found none; `skinrig analyze` says what is missing"
+        "expected scored presses with measured times in the clocks of both cameras, found none; `skinrig analyze` lists what is missing"
     )]
     NothingToCompare,
 }

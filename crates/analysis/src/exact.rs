@@ -1,14 +1,14 @@
-//! Exact 95 % intervals: of shares of 0 or 1, where a bootstrap sees no spread, and of counts over a time.
+//! Exact 95 % intervals for shares of 0 or 1, where a bootstrap has no spread, and for counts over a time.
 //!
-//! Resampling what never (or always) happened gives an interval of no width, as if nothing else could happen.
+//! Resampling outcomes that never (or always) happened gives an interval of zero width.
 
 use crate::distributions::poisson_interval;
 
-/// Share of a 95 % interval that lies outside on each side.
+/// Probability outside a 95 % interval on each side.
 const TAIL: f64 = 0.025;
 
-/// The interval of a share over so many locations (at least one): the exact two-sided binomial one when the share is 0
-/// or 1 (Clopper and Pearson 1934), else `bootstrap`. The presses of a location count as one draw, as in the bootstrap.
+/// Interval of a share over this many locations (at least one): the exact two-sided binomial interval if the share is 0 or 1
+/// (Clopper and Pearson 1934), otherwise `bootstrap`. The presses of a location count as one draw, as in the bootstrap.
 pub(crate) fn share(share: f64, locations: usize, bootstrap: (f64, f64)) -> (f64, f64) {
     let end = libm::pow(TAIL, 1.0 / locations as f64);
     if share == 0.0 {
@@ -20,8 +20,7 @@ pub(crate) fn share(share: f64, locations: usize, bootstrap: (f64, f64)) -> (f64
     }
 }
 
-/// The exact two-sided Poisson interval (Garwood 1936) of a rate per second at which `count` events were seen in so many
-/// seconds (above 0).
+/// Exact two-sided Poisson interval (Garwood 1936) of a rate per second, for `count` events in `seconds` (above 0).
 pub(crate) fn rate_per_s(count: u64, seconds: f64) -> (f64, f64) {
     let (low, high) = poisson_interval(count, TAIL);
     (low / seconds, high / seconds)
@@ -34,7 +33,7 @@ mod tests {
     #[test]
     fn ends_leave_a_fortieth_of_the_chance_outside() {
         const ANY: (f64, f64) = (0.2, 0.4);
-        // The published bounds of 0 and of 10 in 10: 30.85 % and 69.15 %; of 0 counts: 3.689.
+        // Published bounds of 0 and of 10 in 10: 30.85 % and 69.15 %; of 0 counts: 3.689.
         let (low, high) = share(0.0, 10, ANY);
         assert!(low == 0.0 && (high - 0.3085).abs() < 5e-5, "{high}");
         let (low, high) = share(1.0, 10, ANY);

@@ -1,4 +1,4 @@
-//! How many events fell on each pixel of the crop: all that the clustering needs to know of a press.
+//! Owns event counts per pixel of the crop, the input of clustering.
 
 use skinrig_model::{CdEvent, SENSOR_HEIGHT, SENSOR_WIDTH};
 
@@ -7,7 +7,7 @@ use crate::pixels::PixelSet;
 
 /// Event counts per pixel: all columns, the rows of a crop.
 ///
-/// The sum of all counts is below 2^32; [`PixelGrid::add_many`] refuses what would overflow it.
+/// The sum of all counts is below 2^32; [`PixelGrid::add_many`] rejects an overflow.
 #[derive(Debug, Clone)]
 pub struct PixelGrid {
     rows: (u16, u16),
@@ -17,10 +17,10 @@ pub struct PixelGrid {
 }
 
 impl PixelGrid {
-    /// Columns of every grid.
+    /// Number of columns of every grid.
     pub const WIDTH: usize = SENSOR_WIDTH as usize;
 
-    /// An empty grid over the rows `rows.0..=rows.1`; an empty crop when they are in the wrong order.
+    /// An empty grid over the rows `rows.0..=rows.1`; an empty crop if they are in the wrong order.
     #[must_use]
     pub fn new(rows: (u16, u16)) -> Self {
         let rows = (rows.0, rows.1.min(SENSOR_HEIGHT - 1));
@@ -33,7 +33,7 @@ impl PixelGrid {
         }
     }
 
-    /// First and last row, both included.
+    /// First and last row, inclusive.
     #[must_use]
     pub const fn rows(&self) -> (u16, u16) {
         self.rows
@@ -45,20 +45,20 @@ impl PixelGrid {
         self.counts.len() / Self::WIDTH
     }
 
-    /// Events on the grid.
+    /// Number of events on the grid.
     #[must_use]
     pub const fn events(&self) -> u32 {
         self.events
     }
 
-    /// Counts one event at column `u`, row `v`. False, and nothing counted, outside the crop or when the
-    /// grid already holds `u32::MAX` events.
+    /// Counts one event at column `u`, row `v`. Returns false and counts nothing outside the crop, or if the grid already
+    /// holds `u32::MAX` events.
     pub fn add(&mut self, u: u16, v: u16) -> bool {
         self.add_many(u, v, 1)
     }
 
-    /// Counts `n` events at column `u`, row `v`. False, and nothing counted, outside the crop or when the grid
-    /// would then hold more than `u32::MAX` events.
+    /// Counts `n` events at column `u`, row `v`. Returns false and counts nothing outside the crop, or if the grid would
+    /// exceed `u32::MAX` events.
     #[inline]
     pub fn add_many(&mut self, u: u16, v: u16, n: u32) -> bool {
         if u >= SENSOR_WIDTH || v < self.rows.0 || v > self.rows.1 {
@@ -78,7 +78,7 @@ impl PixelGrid {
         true
     }
 
-    /// Counts all of these events, or as many of the first as lie in the crop and fit: false when that is not all.
+    /// Counts these events, stopping at the first that is outside the crop or does not fit; false if any remain.
     pub(crate) fn add_all(&mut self, events: &[CdEvent]) -> bool {
         let first = usize::from(self.rows.0) * Self::WIDTH;
         let free = u32::MAX - self.events;
@@ -96,7 +96,7 @@ impl PixelGrid {
         fitting == events.len()
     }
 
-    /// Empties the grid; costs as much as it held.
+    /// Empties the grid, in time proportional to its content.
     pub fn clear(&mut self) {
         for pixels in self.occupied.blocks() {
             self.counts.clear(pixels);
@@ -105,8 +105,8 @@ impl PixelGrid {
         self.events = 0;
     }
 
-    /// Indices (`row * WIDTH + column`, rows counted from the crop's first) of the pixels with events, row by
-    /// row, into `out`.
+    /// Appends the indices (`row * WIDTH + column`, rows counted from the crop's first) of pixels with events to `out`, row
+    /// by row.
     pub fn sorted_pixels(&self, out: &mut Vec<u32>) {
         out.clear();
         self.occupied.append_to(out);
@@ -115,11 +115,11 @@ impl PixelGrid {
     /// Count of the pixel with this index.
     #[must_use]
     pub fn count(&self, index: u32) -> u32 {
-        // No more than all events.
+        // At most the number of all events.
         self.counts.get(index as usize) as u32
     }
 
-    /// Events on the eight pixels from an index on, and which of them have more than one.
+    /// Events on eight pixels from an index on, and which of them have more than one.
     #[inline]
     pub(crate) fn eight(&self, first: usize) -> (u32, u64) {
         let (sum, repeated) = self.counts.eight(first);
@@ -132,7 +132,7 @@ impl PixelGrid {
         self.counts.columns().map(|events| events as u32)
     }
 
-    /// The pixels with events of one row, counted from the crop's first: the first 64 in the first word.
+    /// Pixels with events in one row, counted from the crop's first: the first 64 in the first word.
     pub(crate) fn occupied(&self, row: usize) -> &[u64] {
         self.occupied.row(row)
     }

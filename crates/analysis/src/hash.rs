@@ -1,4 +1,4 @@
-//! A digest of the results, by which two analyses are known to say the same.
+//! Owns the digest of the results, which identifies identical analyses.
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -7,11 +7,11 @@ use crate::result::{
     Analysis, CalibrationResult, LocationOutcome, Metrics, PressCounts, PressResult, PressView,
 };
 use skinrig_model::{
-    AnalysisSettings, LocationId, Point2, PressId, PressRole, RepetitionId, StereoGeometry,
+    AnalysisSettings, LocationId, Point2, PressId, PressRole, RepetitionId, StereoGeometry, Verdict,
 };
 
-/// What the digest covers: settings, geometry, table of presses and metrics. Not the absolute times: a session
-/// that is replayed at another hour gives the same results.
+/// Content of the digest: settings, geometry, table of presses and metrics. It excludes absolute times, so that a replay at
+/// another time has the same digest.
 #[derive(Serialize)]
 struct Results<'a> {
     version: u32,
@@ -33,7 +33,7 @@ struct Row<'a> {
     planned: Point2,
     depth_mm: f64,
     truth: Option<Point2>,
-    verdict: &'a str,
+    verdict: Verdict,
     reason: Option<&'a str>,
     views: &'a [Option<PressView>; 2],
     location_outcome: &'a LocationOutcome,
@@ -49,7 +49,7 @@ impl<'a> Row<'a> {
             planned: press.planned,
             depth_mm: press.depth_mm,
             truth: press.truth,
-            verdict: &press.verdict,
+            verdict: press.verdict,
             reason: press.reason.as_deref(),
             views: &press.views,
             location_outcome: &press.location_outcome,
@@ -57,8 +57,8 @@ impl<'a> Row<'a> {
     }
 }
 
-/// Lower-case hex SHA-256 over the canonical JSON of the results: fields in the order of their declaration, no
-/// spaces, every number in the shortest form that reads back as the same double.
+/// Lower-case hex SHA-256 over the canonical JSON of the results: fields in order of declaration, no spaces, every number in
+/// its shortest exact form.
 #[must_use]
 pub fn results_hash(analysis: &Analysis) -> String {
     let results = Results {
@@ -72,7 +72,7 @@ pub fn results_hash(analysis: &Analysis) -> String {
         presses: analysis.presses.iter().map(Row::of).collect(),
     };
     let mut digest = Digesting(Sha256::new());
-    // Neither the writer nor any of the types can fail: no maps with odd keys, no I/O.
+    // Neither the writer nor the types can fail: no maps with non-string keys, no I/O.
     if let Err(error) = serde_json::to_writer(&mut digest, &results) {
         digest.0.update(error.to_string());
     }

@@ -1,19 +1,19 @@
-//! One leg of a session: where it begins, and what of a stream belongs to it.
+//! One leg of a session: its start, and the part of a stream that belongs to it.
 
 use skinrig_model::{HostTime, TriggerEdge};
 
 use crate::result::ClockFit;
 
-/// Where a further leg of the session begins.
+/// Start of a further leg.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LegStart {
-    /// On the host's clock; all times of the leg are at or after it, all earlier ones before.
+    /// On the host clock; separates the times of the leg from all earlier ones.
     pub origin: HostTime,
-    /// Where the recorder put each camera's zero of the leg, µs.
+    /// Zero of each camera's clock in this leg, as placed by the recorder, µs.
     pub recorded_us: [u64; 2],
-    /// On each camera's clock: all events of the leg are at or after it, all earlier ones before, µs.
+    /// On each camera's clock; separates the events of the leg from all earlier ones, µs.
     pub camera_us: [u64; 2],
-    /// By how much [`crate::legs::align`] moved each camera's times of the leg, µs; 0 before it.
+    /// Shift that [`crate::legs::align`] applied to each camera's times of the leg, µs; initially 0.
     pub moved_us: [i64; 2],
 }
 
@@ -30,14 +30,14 @@ impl LegStart {
     }
 }
 
-/// A leg's line, and a host time in the middle of what it was fitted to, µs.
+/// Line of a leg, and a host time in the middle of its points, µs.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LegLine {
     pub fit: ClockFit,
     pub middle_us: f64,
 }
 
-/// The edges of one leg, 0 for the first, out of all edges of a camera in stream order.
+/// Edges of one leg (0: the first) out of all edges of a camera in stream order.
 pub(crate) fn edges_of<'a>(
     edges: &'a [TriggerEdge],
     legs: &[LegStart],
@@ -48,13 +48,13 @@ pub(crate) fn edges_of<'a>(
     let to = legs
         .get(leg)
         .map_or(u64::MAX, |next| next.camera_us[camera]);
-    // In order but for a broken time base, whose edges are nowhere anyway.
+    // Sorted, unless the time base is broken, in which case its edges are unusable anyway.
     let start = edges.partition_point(|e| e.t_us < from);
     let end = edges.partition_point(|e| e.t_us < to).max(start);
     &edges[start..end]
 }
 
-/// When a camera was recording in one leg, 0 for the first, on its own clock, µs.
+/// Periods in which a camera was recording in one leg (0: the first), on its own clock, µs.
 pub(crate) fn recorded_of(
     recorded: &[(u64, u64)],
     legs: &[LegStart],
@@ -66,7 +66,7 @@ pub(crate) fn recorded_of(
     spans.filter(|(from, _)| of(*from) == leg).collect()
 }
 
-/// The leg that a host time belongs to, 0 for the first.
+/// Leg of a host time (0: the first).
 pub(crate) fn leg_at(legs: &[LegStart], t: HostTime) -> usize {
     legs.partition_point(|leg| leg.origin <= t)
 }

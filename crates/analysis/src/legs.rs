@@ -1,8 +1,8 @@
-//! Owns the legs of a session: the camera clocks of all of them laid on one line.
+//! Owns the legs of a session: aligns the camera clocks of all legs to one line.
 //!
-//! In each leg a camera's clock began anew, and where is not known: the recorder only put the legs behind one another. Once each
-//! leg's clock is fitted on its own, its times are moved by whole µs so that one line through camera over host time holds for all.
-//! From there on a session in legs is as any other.
+//! In each leg a camera's clock starts anew at an unknown time: the recorder only placed the legs one after another. After
+//! each leg's clock has been fitted on its own, its times are shifted by whole µs so that one line of camera time over host
+//! time holds for all legs. From then on the session is like any other.
 
 use skinrig_model::{CameraId, HostTime};
 
@@ -12,11 +12,11 @@ use crate::leg::{LegLine, LegStart, edges_of, leg_at};
 use crate::result::LegClock;
 use crate::timebase::TimeBase;
 
-/// A leg's events may come this long before its host time, µs: half of the least pause between two legs.
+/// Maximum advance of a leg's events before its host time, µs: half of the minimum pause between two legs.
 const BEFORE_US: f64 = 0.5e6;
 
-/// Moves the camera times of all further legs, those of edges and of gaps, onto the line of the first, and says in
-/// [`SessionInput::legs`] by how much: whoever hands over the events moves them too. A session in one leg stays as it is.
+/// Shifts the camera times of edges and gaps in all further legs onto the line of the first, and records the shifts in
+/// [`SessionInput::legs`]; event sources must apply them too. A session with a single leg is unchanged.
 pub fn align(input: &mut SessionInput) {
     if input.legs.is_empty() {
         return;
@@ -31,8 +31,9 @@ pub fn align(input: &mut SessionInput) {
             .collect();
         let moves = moves(&input.legs, &lines, k);
         move_camera(input, k, &moves);
-        // A camera's zero may be long before its first event; what is recorded of a leg begins with its host time.
-        // A leg without a line of its own begins where those of the others say; else one that holds nothing could cut theirs.
+        // A camera's zero may be long before its first event; the recording of a leg begins at its host time.
+        // A leg without its own line begins where the lines of the others predict; otherwise an empty leg could truncate
+        // theirs.
         let known = |leg: usize| lines[leg].map(|line| (line, moves[leg]));
         let other = (0..lines.len()).find_map(known);
         for (i, leg) in input.legs.iter_mut().enumerate() {
@@ -44,12 +45,12 @@ pub fn align(input: &mut SessionInput) {
     }
 }
 
-/// By how much each leg, the first included, has to be moved, µs.
+/// Shift of each leg, the first included, µs.
 fn moves(legs: &[LegStart], lines: &[Option<LegLine>], k: usize) -> Vec<i64> {
     let known = lines.iter().enumerate();
     let known = known.filter_map(|(leg, line)| Some((leg, (*line)?)));
     let steadiest = known.min_by(|a, b| a.1.fit.drift_se_ppm.total_cmp(&b.1.fit.drift_se_ppm));
-    // How far a leg's camera clock is ahead of the host's, would both have begun at the same instant.
+    // Offset of a leg's camera clock from the host clock, as if both had started together.
     let start = |leg: usize| {
         let begun = leg.checked_sub(1).map(|i| &legs[i]);
         begun.map_or(0.0, |b| b.origin.0 as f64 * 1e-3 - b.recorded_us[k] as f64)
@@ -61,7 +62,7 @@ fn moves(legs: &[LegStart], lines: &[Option<LegLine>], k: usize) -> Vec<i64> {
             best.fit.camera_us(best.middle_us) + (host_us - best.middle_us) * rate
                 - line.fit.camera_us(host_us)
         }
-        // Nothing ties its clocks: as if they had begun together as those of the leg that is known best.
+        // Nothing ties its clocks: assume that they started together as in the best-known leg.
         (best, _) => start(leg) - start(best.map_or(0, |(leg, _)| leg)),
     };
     let first = wanted(0);
@@ -74,7 +75,7 @@ fn move_camera(input: &mut SessionInput, k: usize, moves: &[i64]) {
     let begins: Vec<u64> = input.legs.iter().map(|leg| leg.camera_us[k]).collect();
     let moved = |t_us: u64| {
         let leg = begins.partition_point(|from| *from <= t_us);
-        // The end of a gap without an end.
+        // End of an open-ended gap.
         if t_us == u64::MAX {
             t_us
         } else {
@@ -88,7 +89,7 @@ fn move_camera(input: &mut SessionInput, k: usize, moves: &[i64]) {
         (*from, *to) = (moved(*from), moved(*to));
     }
     for (from, to) in &mut input.recorded[k] {
-        // All of it is of the leg in which it begins.
+        // All of it belongs to the leg in which it begins.
         let by = moves[begins.partition_point(|begin| begin <= from)];
         (*from, *to) = (from.saturating_add_signed(by), to.saturating_add_signed(by));
     }
@@ -98,7 +99,7 @@ fn move_camera(input: &mut SessionInput, k: usize, moves: &[i64]) {
     }
 }
 
-/// Without reports of the box: the marks that the host sent.
+/// Without box reports: uses the marks that the host sent.
 fn marks(input: &SessionInput, leg: usize, k: usize) -> Option<LegLine> {
     let channel = input.rig.trigger_channel?;
     let sent = input.marks.iter().copied();
@@ -112,7 +113,7 @@ fn marks(input: &SessionInput, leg: usize, k: usize) -> Option<LegLine> {
     })
 }
 
-/// What is known of the clocks in each leg; empty for a session in one leg.
+/// Clocks of each leg; empty for a session with a single leg.
 pub(crate) fn clocks(input: &SessionInput, base: Option<&TimeBase>) -> Vec<LegClock> {
     if input.legs.is_empty() {
         return Vec::new();
@@ -132,8 +133,8 @@ pub(crate) fn clocks(input: &SessionInput, base: Option<&TimeBase>) -> Vec<LegCl
         .collect()
 }
 
-/// Says so for every leg with presses, the first included, in which a camera's own trains or marks give no clock while there are other
-/// legs: where it lies among them is then known by its nominal start alone. `pressed_us`: host times of contacts, µs.
+/// A warning for every leg with presses in which a camera's own trains or marks give no clock while there are other legs:
+/// its position among them is then known only by its nominal start. `pressed_us`: host times of contacts, µs.
 pub(crate) fn nominal_only(
     legs: &[LegStart],
     clocks: &[LegClock],
@@ -148,8 +149,8 @@ pub(crate) fn nominal_only(
         let cameras = CameraId::ALL.into_iter().zip(&leg.cameras);
         cameras.filter(|(_, fit)| fit.is_none()).map(|(camera, _)| {
             format!(
-                "leg {}, {camera}: expected trains or marks to fit its clock, found too few: it is laid on the other legs by \
-                 its nominal start alone",
+                "leg {}, {camera}: expected trains or marks to fit its clock, found too few: it is aligned to the \
+                 other legs by its nominal start alone",
                 leg.number
             )
         })
@@ -173,7 +174,7 @@ mod tests {
 
     const LEGS: [LegStart; 3] = [
         LegStart::recorded(HostTime(10_000_000_000), [5_000_000, 7_000_000]),
-        // Nothing came in it: the next one begins at the same camera times.
+        // It is empty: the next one begins at the same camera times.
         LegStart::recorded(HostTime(12_000_000_000), [9_000_000, 8_000_000]),
         LegStart::recorded(HostTime(14_000_000_000), [9_000_000, 8_000_000]),
     ];
@@ -220,7 +221,7 @@ mod tests {
             clock(3, [None; 2]),
             clock(4, [Some(fit); 2]),
         ];
-        // Nothing was pressed in the third.
+        // The third leg has no presses.
         let pressed = [1e6, 11e6, 11.5e6, 15e6].into_iter();
         let said = nominal_only(&LEGS, &clocks, pressed);
         assert_eq!(said.len(), 1, "{said:?}");

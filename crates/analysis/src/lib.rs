@@ -1,12 +1,12 @@
-//! What a session says about the skin: clock fits, segmentation, clustering, triangulation, calibration, metrics.
+//! Analyses a session: clock fits, segmentation, clustering, triangulation, calibration, metrics.
 //!
-//! Numbers in, numbers out: no files, no SQL, no devices, no clock, no randomness but the seed in the
-//! settings. The same input gives the same result to the last bit on the same machine.
+//! Pure computation: no files, SQL, devices or clocks; randomness comes only from the seed in the settings. The result is
+//! bit-identical for the same input on the same machine.
 //!
-//! Data flows one way: [`timebase`], or [`clock`] without reports of a trigger box, finds where host time lies on each camera's clock, [`segment`] turns measured
-//! press times into windows of camera time, one pass over the events fills a [`grid`] per window and [`dbscan`]
-//! finds its clusters, [`triangulate`] intersects the rays of the two centroids, [`calibrate`] fits the
-//! camera geometry to the presses that calibrate ([`sets`]), [`metrics`] judges those that score.
+//! Data flows one way: [`timebase`], or [`clock`] without trigger box reports, maps host time to each camera's clock;
+//! [`segment`] turns measured press times into windows of camera time; one pass over the events fills a [`grid`] per window,
+//! and [`dbscan`] finds its clusters; [`triangulate`] intersects the rays of the two centroids; [`calibrate`] fits the
+//! camera geometry to the calibration presses ([`sets`]); [`metrics`] evaluates the scored ones.
 
 mod accumulate;
 mod activity;
@@ -14,6 +14,7 @@ mod analyze;
 mod audit;
 pub mod bit_rates;
 pub mod calibrate;
+mod camera_clocks;
 mod caveats;
 pub mod check;
 pub mod clock;
@@ -25,27 +26,27 @@ pub mod dbscan;
 pub mod distributions;
 mod error;
 pub mod estimators;
+mod event_cache;
 mod exact;
 pub mod grid;
 mod hash;
-mod held;
 pub mod input;
-mod judge;
-mod keeper;
-pub mod kept;
 pub mod latency;
 mod leg;
 pub mod legs;
+mod locate_presses;
 pub mod metrics;
 pub mod motion;
 mod onsets;
 mod pixels;
+mod press_event_collector;
+pub mod press_events;
 mod press_spans;
 pub mod rates;
-mod reading;
 pub mod reduction;
 pub mod reference_code;
 pub mod result;
+pub mod rule;
 pub mod seeded;
 pub mod segment;
 mod session_base;
@@ -59,10 +60,10 @@ mod untimed;
 pub mod verdict;
 mod width;
 
-pub use analyze::{analyze, analyze_and_keep};
+pub use analyze::{analyze, analyze_with_events};
 pub use error::AnalysisError;
 pub use hash::results_hash;
 pub use input::{Descent, EarlierAttempt, EventSource, SessionInput};
-pub use kept::{Keep, Kept};
 pub use leg::LegStart;
+pub use press_events::{RetainedPresses, Retention};
 pub use result::{ANALYSIS_VERSION, Analysis};

@@ -1,8 +1,8 @@
-//! How well the skin localises: errors over the scored presses, with bootstrap intervals.
+//! Localisation metrics: errors over the scored presses, with bootstrap intervals.
 //!
-//! Intervals are percentile intervals of a bootstrap that resamples *locations* with all their repetitions:
-//! presses at one place share its systematic error and are not independent. Shares of 0 and 1, which no resample
-//! changes, get exact binomial intervals over the locations.
+//! Intervals are percentile intervals of a bootstrap that resamples *locations* with all their repetitions, because presses
+//! at one location share its systematic error. Shares of 0 and 1, which no resample changes, get exact binomial intervals
+//! over the locations.
 
 use rayon::prelude::*;
 use skinrig_model::{Point2, SkinOutline};
@@ -10,40 +10,40 @@ use skinrig_model::{Point2, SkinOutline};
 use crate::exact;
 use crate::result::{Estimate, Metrics, Penalised};
 use crate::seeded;
-use crate::sets::{ScoreSet, Scored};
+use crate::sets::{ScoreSet, ScoredPress};
 use crate::sums::{self, Sum};
 
-/// Share of a 95 % interval that lies outside on each side.
+/// Probability outside a 95 % interval on each side.
 const TAIL: f64 = 0.025;
-/// Metrics with an interval, in the order of [`Values`].
+/// Number of metrics with an interval, in the order of [`Values`].
 const COUNT: usize = 10;
 /// (value, n) of each metric: rmse, x, y, bias x, bias y, median, p95, repeat std, located rate, within
 /// rate.
 type Values = [(Option<f64>, u32); COUNT];
-/// Where the shares are among them.
+/// Indices of the shares.
 const SHARES: [usize; 2] = [8, 9];
 
-/// Which presses give an estimate that counts.
+/// Presses whose estimates count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Exclusions {
-    /// Only valid presses.
+    /// Valid presses only.
     Applied,
     /// Every press with an estimate, whatever its verdict.
     Ignored,
 }
 
 /// The presses of one location.
-struct Place {
+struct LocationErrors {
     attempted: u32,
     within: u32,
     /// Sums of x², y², x and y of the errors.
     totals: [f64; 4],
     lengths: Vec<f64>,
-    /// Standard deviation between repetitions at each depth that has at least two.
+    /// Standard deviation between repetitions, for each depth with at least two.
     repeat_std: Vec<f64>,
 }
 
-/// The metrics of `set` on a skin with this outline, with `resamples` bootstrap samples from `seed`.
+/// Metrics of `set` on a skin with this outline, with `resamples` bootstrap samples from `seed`.
 #[must_use]
 pub fn metrics(
     set: &ScoreSet,
@@ -54,7 +54,7 @@ pub fn metrics(
     seed: u64,
 ) -> Metrics {
     let places = places(set, exclusions, within_mm);
-    let all: Vec<&Place> = places.iter().collect();
+    let all: Vec<&LocationErrors> = places.iter().collect();
     let values = evaluate(&all);
     let intervals = bootstrap(&places, resamples, seed);
     let estimate = |k: usize| {
@@ -89,8 +89,8 @@ pub fn metrics(
     }
 }
 
-fn places(set: &ScoreSet, exclusions: Exclusions, within_mm: f64) -> Vec<Place> {
-    let mut presses: Vec<&Scored> = set.presses().iter().collect();
+fn places(set: &ScoreSet, exclusions: Exclusions, within_mm: f64) -> Vec<LocationErrors> {
+    let mut presses: Vec<&ScoredPress> = set.presses().iter().collect();
     presses.sort_by_key(|p| p.location);
     presses
         .chunk_by(|a, b| a.location == b.location)
@@ -98,8 +98,8 @@ fn places(set: &ScoreSet, exclusions: Exclusions, within_mm: f64) -> Vec<Place> 
         .collect()
 }
 
-fn place(group: &[&Scored], exclusions: Exclusions, within_mm: f64) -> Place {
-    let counts = |p: &Scored| exclusions == Exclusions::Ignored || p.valid;
+fn place(group: &[&ScoredPress], exclusions: Exclusions, within_mm: f64) -> LocationErrors {
+    let counts = |p: &ScoredPress| exclusions == Exclusions::Ignored || p.valid;
     let mut found: Vec<_> = group
         .iter()
         .filter(|p| counts(p))
@@ -117,7 +117,7 @@ fn place(group: &[&Scored], exclusions: Exclusions, within_mm: f64) -> Place {
         .collect();
     let lengths: Vec<f64> = errors.iter().map(|e| libm::hypot(e[0], e[1])).collect();
     let total = |f: fn(&[f64; 2]) -> f64| sums::sum(errors.iter().map(f));
-    Place {
+    LocationErrors {
         totals: [
             total(|e| e[0] * e[0]),
             total(|e| e[1] * e[1]),
@@ -131,7 +131,7 @@ fn place(group: &[&Scored], exclusions: Exclusions, within_mm: f64) -> Place {
     }
 }
 
-fn evaluate(places: &[&Place]) -> Values {
+fn evaluate(places: &[&LocationErrors]) -> Values {
     let mut totals = [Sum::default(); 4];
     let mut std_sum = Sum::default();
     let mut lengths = Vec::new();
@@ -169,23 +169,22 @@ fn evaluate(places: &[&Place]) -> Values {
     ]
 }
 
-/// The RMSE of all attempted presses of `set` with failures counted. A failed press - one without an estimate that counts
-/// - counts the penalty, or its own error where it has an estimate that errs by more.
+/// RMSE of all attempted presses of `set` with failures counted. A failed press (one without a counting estimate) counts the
+/// penalty, or its own error if it has an estimate with a larger error.
 ///
-/// The penalty is `stated_mm`; without one the RMS distance of the attempted presses' true (or planned) positions from
-/// their mean, the error of an answer that knows nothing. It is never below the RMSE of the presses that count, nor below
-/// that of all presses with an estimate: a press without an estimate is no better than those with one. So counting
-/// failures never lowers the RMSE, whatever is excluded.
+/// The penalty is `stated_mm`, or the RMS distance of the attempted presses' true (or planned) positions from their mean,
+/// which is the error of a blind guess. It is never below the RMSE of the counting presses, nor below that of all presses
+/// with an estimate. Therefore counting failures never lowers the RMSE, whatever is excluded.
 #[must_use]
 pub fn penalised(set: &ScoreSet, stated_mm: Option<f64>, resamples: u32, seed: u64) -> Penalised {
     let presses = set.presses();
     let stated = stated_mm.unwrap_or_else(|| spread_mm(presses.iter().map(|p| p.at)));
-    let length = |p: &Scored| p.found.map(|(_, [dx, dy])| libm::hypot(dx, dy));
-    let rms = |of: &dyn Fn(&&Scored) -> bool| {
+    let length = |p: &ScoredPress| p.found.map(|(_, [dx, dy])| libm::hypot(dx, dy));
+    let rms = |of: &dyn Fn(&&ScoredPress) -> bool| {
         sums::root_mean_square(presses.iter().filter(of).filter_map(length)).unwrap_or(0.0)
     };
     let penalty = stated.max(rms(&|_| true)).max(rms(&|p| p.valid));
-    let error = |p: &Scored| match length(p) {
+    let error = |p: &ScoredPress| match length(p) {
         Some(own) if p.valid => own,
         Some(own) => own.max(penalty),
         None => penalty,
@@ -209,18 +208,18 @@ pub(crate) fn spread_mm(points: impl Iterator<Item = Point2> + Clone) -> f64 {
     (variance(|p| p.x_mm) + variance(|p| p.y_mm)).sqrt()
 }
 
-/// The root mean square; `None` without values.
+/// Root mean square; `None` without values.
 pub(crate) fn root_mean_square(values: &mut [f64]) -> Option<f64> {
     sums::root_mean_square(values.iter().copied())
 }
 
-/// The arithmetic mean; `None` without values.
+/// Arithmetic mean; `None` without values.
 pub(crate) fn mean(values: &mut [f64]) -> Option<f64> {
     sums::mean(values.iter().copied())
 }
 
-/// `statistic` of all values, with the percentile interval of a bootstrap that draws whole locations. Each value comes
-/// with its location, in any order; `statistic` may reorder what it gets.
+/// `statistic` of all values, with the percentile interval of a bootstrap over whole locations. Each value comes with its
+/// location, in any order; `statistic` may reorder its input.
 pub(crate) fn bootstrap_over_locations(
     values: &[(u32, f64)],
     resamples: u32,
@@ -259,7 +258,7 @@ pub(crate) fn bootstrap_over_locations(
     }
 }
 
-fn bootstrap(places: &[Place], resamples: u32, seed: u64) -> [Option<(f64, f64)>; COUNT] {
+fn bootstrap(places: &[LocationErrors], resamples: u32, seed: u64) -> [Option<(f64, f64)>; COUNT] {
     if places.len() < 2 || resamples < 2 {
         return [None; COUNT];
     }
@@ -267,7 +266,7 @@ fn bootstrap(places: &[Place], resamples: u32, seed: u64) -> [Option<(f64, f64)>
         .into_par_iter()
         .map(|sample| {
             let mut rng = seeded::generator(seed, u64::from(sample));
-            let drawn: Vec<&Place> = (0..places.len())
+            let drawn: Vec<&LocationErrors> = (0..places.len())
                 .map(|_| &places[seeded::index(&mut rng, places.len())])
                 .collect();
             evaluate(&drawn)
@@ -282,8 +281,8 @@ fn bootstrap(places: &[Place], resamples: u32, seed: u64) -> [Option<(f64, f64)>
     })
 }
 
-/// The quantile `q` (0..=1) with linear interpolation between order statistics (type 7 of Hyndman and Fan 1996,
-/// numpy's default); `None` without values. Reorders `values`.
+/// Quantile `q` (0..=1) with linear interpolation between order statistics (type 7 of Hyndman and Fan 1996, numpy's
+/// default); `None` without values. Reorders `values`.
 pub(crate) fn quantile(values: &mut [f64], q: f64) -> Option<f64> {
     if values.is_empty() {
         return None;

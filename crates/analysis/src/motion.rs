@@ -1,17 +1,17 @@
-//! The robot's path against its commands, from the pose stream in one pass and bounded memory.
+//! Compares the robot's path with its commands, in one pass over the pose stream and bounded memory.
 
 use skinrig_model::{PoseSample, PressId, PressTiming};
 
 use crate::result::{Motion, MotionBin, PressMotion, TipSample};
 
-/// A course has at most this many bins; beyond it two become one.
-const MOST_BINS: usize = 2048;
-/// Width of a bin to begin with, ns.
+/// Maximum number of bins; beyond it pairs are merged.
+const MAX_BINS: usize = 2048;
+/// Initial width of a bin, ns.
 const FIRST_BIN_NS: i64 = 50_000_000;
-/// Samples that are kept of a press, at most.
-const MOST_SAMPLES: usize = 400;
+/// Maximum number of samples kept per press.
+const MAX_SAMPLES: usize = 400;
 
-/// Squares of distances in one bin.
+/// Sum of squared distances in one bin.
 #[derive(Debug, Clone, Copy, Default)]
 struct Bin {
     squares: f64,
@@ -33,7 +33,7 @@ impl Bin {
     }
 }
 
-/// Takes pose samples in order of time.
+/// Processes pose samples in time order.
 #[derive(Debug, Clone)]
 pub struct MotionCourse {
     presses: Vec<(PressTiming, PressMotion)>,
@@ -44,7 +44,7 @@ pub struct MotionCourse {
 }
 
 impl MotionCourse {
-    /// Will keep the path during these presses.
+    /// Keeps the path during these presses.
     #[must_use]
     pub fn new(presses: impl IntoIterator<Item = (PressId, PressTiming)>) -> Self {
         let empty = |press| PressMotion {
@@ -62,7 +62,7 @@ impl MotionCourse {
         }
     }
 
-    /// The next samples.
+    /// Processes the next samples.
     pub fn push(&mut self, samples: &[PoseSample]) {
         for sample in samples {
             self.take(sample);
@@ -83,7 +83,7 @@ impl MotionCourse {
         }
         let first_ns = *self.first_ns.get_or_insert(sample.t.0);
         let since_ns = sample.t.0.saturating_sub(first_ns).max(0);
-        while since_ns / self.bin_ns >= MOST_BINS as i64 {
+        while since_ns / self.bin_ns >= MAX_BINS as i64 {
             self.bin_ns *= 2;
             let pairs = self.bins.chunks(2);
             self.bins = pairs
@@ -110,7 +110,7 @@ impl MotionCourse {
         }
     }
 
-    /// The result; `None` without a single finite sample.
+    /// The result; `None` without any finite sample.
     #[must_use]
     pub fn finish(self) -> Option<Motion> {
         let first_ns = self.first_ns?;
@@ -137,7 +137,7 @@ impl MotionCourse {
 }
 
 fn thinned(path: PressMotion) -> PressMotion {
-    let each = path.samples.len().div_ceil(MOST_SAMPLES).max(1);
+    let each = path.samples.len().div_ceil(MAX_SAMPLES).max(1);
     PressMotion {
         kept_each: each as u32,
         samples: path.samples.into_iter().step_by(each).collect(),
@@ -174,7 +174,7 @@ mod tests {
         let wanted = ((179_999.0 * 0.01 + 25.0) / 180_000.0f64).sqrt();
         assert!((motion.rms_mm - wanted).abs() < 1e-9, "{}", motion.rms_mm);
         assert!((motion.max_mm - 5.0).abs() < 1e-9);
-        assert!((MOST_BINS / 2..=MOST_BINS).contains(&motion.course.len()));
+        assert!((MAX_BINS / 2..=MAX_BINS).contains(&motion.course.len()));
         let high: Vec<_> = motion.course.iter().filter(|b| b.max_mm > 1.0).collect();
         assert_eq!(high.len(), 1);
         assert!((high[0].start_s..high[0].start_s + motion.bin_s).contains(&901.0));

@@ -1,4 +1,4 @@
-//! How high above the surface the tip still was when the events of a press began: events cannot begin before the touch.
+//! Height of the tip above the surface when the events of a press began. Events cannot begin before contact.
 
 use skinrig_model::{HostDuration, HostTime};
 
@@ -6,31 +6,31 @@ use crate::input::{Descent, SessionInput};
 use crate::rates::RateHistogram;
 use crate::result::ClockFit;
 
-/// The idle rate is counted over so long a time before the way down, at most.
+/// Maximum time before the descent for the idle rate.
 const LONGEST_IDLE: HostDuration = HostDuration::from_millis(1_000);
-/// A shorter idle time gives no rate, s.
-const LEAST_IDLE_S: f64 = 0.1;
-/// An idle time is taken to hold half an event at least: silence gives no odds.
-const LEAST_EVENTS: f64 = 0.5;
-/// Events have begun before the contact when a rise is likelier than the idle rate by this many nats (400 to 1).
+/// Minimum idle time, s.
+const MIN_IDLE_S: f64 = 0.1;
+/// Minimum number of events assumed in an idle time: silence gives no odds.
+const MIN_EVENTS: f64 = 0.5;
+/// Events begin before contact if a rise is likelier than the idle rate by this many nats (400 to 1).
 const CLEARLY: f64 = 6.0;
 
-/// When the events of a press began in one camera, if that was before the contact.
+/// Onset of the events of a press in one camera, if before contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Onset {
     /// Row of the press.
     pub row: usize,
-    /// So long before the measured contact, ms; 0 when not before.
+    /// Time before the measured contact, ms; 0 if not before.
     pub before_ms: f64,
-    /// The measured height of the tip above the surface then, mm; 0 when not before.
+    /// Measured height of the tip above the surface at that time, mm; 0 if not before.
     pub height_mm: f64,
 }
 
-/// The onsets of the presses with a known way down, in plan order.
+/// Onsets of the presses with a known descent, in plan order.
 ///
-/// In each press the time from the begin of the way down to the contact is split where a higher rate from there on is most likely
-/// (Poisson, against the rate before the way down; maximum of `n ln(n / e) - (n - e)` for `n` events where `e` were expected).
-/// Events of a press before only ever make the idle rate too high, and the onset late.
+/// In each press the time from the start of the descent to the contact is split where a higher rate from there on is most
+/// likely (Poisson, against the rate before the descent; maximum of `n ln(n / e) - (n - e)` for `n` events where `e` were
+/// expected). Events of an earlier press can only raise the idle rate and delay the onset.
 pub fn onsets(input: &SessionInput, rates: &RateHistogram, clock: &ClockFit) -> Vec<Onset> {
     let timings = || input.outcomes.iter().flatten().filter_map(|o| o.timing);
     let earlier = input.earlier.iter().filter_map(|e| e.clear);
@@ -64,7 +64,7 @@ impl Onset {
     }
 }
 
-/// The counts of a camera by host time.
+/// Counts of a camera by host time.
 struct Counts<'a> {
     rates: &'a RateHistogram,
     clock: &'a ClockFit,
@@ -75,13 +75,13 @@ impl Counts<'_> {
         self.rates.bin_us() as f64
     }
 
-    /// Where a host time lies, in bins; `None` before the first.
+    /// Position of a host time in bins; `None` before the first.
     fn position(&self, t: HostTime) -> Option<f64> {
         let bins = (self.clock.camera_us_of_host(t) - self.rates.start_us() as f64) / self.bin_us();
         (bins >= 0.0).then_some(bins)
     }
 
-    /// The whole bins between two times; `None` unless all were counted.
+    /// Whole bins between two times; `None` unless all were counted.
     fn between(&self, from: HostTime, to: HostTime) -> Option<(usize, &[u32])> {
         let (from, to) = (self.position(from)?.ceil(), self.position(to)?.floor());
         let (from, to) = (from as usize, to as usize);
@@ -93,11 +93,11 @@ impl Counts<'_> {
     fn idle_per_bin(&self, from: HostTime, to: HostTime) -> Option<f64> {
         let (_, bins) = self.between(from, to)?;
         let events: u64 = bins.iter().map(|c| u64::from(*c)).sum();
-        let long_enough = bins.len() as f64 * self.bin_us() * 1e-6 >= LEAST_IDLE_S;
-        long_enough.then(|| (events as f64).max(LEAST_EVENTS) / bins.len() as f64)
+        let long_enough = bins.len() as f64 * self.bin_us() * 1e-6 >= MIN_IDLE_S;
+        long_enough.then(|| (events as f64).max(MIN_EVENTS) / bins.len() as f64)
     }
 
-    /// The middle of the bin from which on the rate is most likely higher than the idle one; `None` when it is not.
+    /// Middle of the bin from which on the rate is most likely higher than the idle rate; `None` if it is not.
     fn rise(&self, from: HostTime, contact: HostTime, idle: f64) -> Option<HostTime> {
         let (first, bins) = self.between(from, contact)?;
         let (mut n, mut expected, mut best) = (0.0, 0.0, (CLEARLY, None));
@@ -144,7 +144,7 @@ mod tests {
         let mut rates = RateHistogram::new(10_000);
         for ms in 0..4_000i64 {
             let mean = idle / 10.0 + if ms >= from_ms { more / 10.0 } else { 0.0 };
-            // Ten chances per millisecond are near enough to Poisson.
+            // Ten draws per millisecond approximate Poisson well enough.
             for _ in 0..10 {
                 let unit = (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
                 if unit < mean / 10.0 {
@@ -180,7 +180,7 @@ mod tests {
         assert!(off / f64::from(found) < 15.0, "{off}");
     }
 
-    /// Of noise alone at most one press in a hundred seems to begin early, and a median takes half of them.
+    /// With noise alone at most one press in a hundred seems to begin early, and a median requires half of them.
     #[test]
     fn noise_alone_rarely_rises() {
         for idle in [0.2, 2.0, 20.0] {

@@ -1,4 +1,4 @@
-//! A set of pixels, one bit each, that is walked in order.
+//! A set of pixels, one bit each, with ordered iteration.
 
 use std::ops::Range;
 
@@ -48,7 +48,7 @@ impl PixelSet {
         }
     }
 
-    /// Stretches of 64 indices that hold all of the set, those without any left out.
+    /// Ranges of 64 indices that cover the set, skipping empty ones.
     pub fn blocks(&self) -> impl Iterator<Item = Range<usize>> {
         let words = self.words.iter().enumerate();
         let occupied = words.filter(|(_, word)| **word != 0);

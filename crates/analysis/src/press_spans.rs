@@ -1,17 +1,17 @@
-//! When the presses of a session happened, on the host's clock.
+//! Press times of a session on the host clock.
 
 use skinrig_model::{PressRole, PressTiming};
 
 use crate::clock::PressSpan;
 use crate::input::SessionInput;
 
-/// Rows and times of the presses that have any.
+/// Rows and times of the presses that have times.
 pub(crate) fn timings(input: &SessionInput) -> impl Iterator<Item = (usize, PressTiming)> {
     let rows = input.outcomes.iter().enumerate();
     rows.filter_map(|(row, o)| Some((row, o.as_ref()?.timing?)))
 }
 
-/// The presses that were made, in time order.
+/// Executed presses in time order.
 pub fn spans(input: &SessionInput) -> Vec<PressSpan> {
     let mut spans: Vec<PressSpan> = timings(input)
         .map(|(row, t)| PressSpan {

@@ -1,28 +1,28 @@
-//! Event rates: a streamed histogram in fine bins, and the thinned course that a report draws.
+//! Event rates: a streamed histogram in fine bins, and the reduced series that a report draws.
 
 use skinrig_model::CdEvent;
 
 use crate::result::{ClockFit, RateSeries};
 
-/// Most fine bins of a histogram: 46 hours of 10 ms. A stream that claims to be longer has broken times.
+/// Maximum number of fine bins: 46 hours of 10 ms. A longer stream has broken times.
 const MAX_BINS: u64 = 1 << 24;
-/// Most bins of a [`RateSeries`].
+/// Maximum number of bins in a [`RateSeries`].
 const MAX_SERIES: usize = 4000;
 
-/// Event counts in equal bins of camera time, grown as events come.
+/// Event counts in equal bins of camera time, growing with the stream.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RateHistogram {
     bin_us: u64,
     first_bin: u64,
     counts: Vec<u32>,
-    /// Left edge of the bin last counted in, and its place: most events fall in the same bin as the one before.
+    /// Left edge of the last bin used, and its index: most events are in the same bin as their predecessor.
     last_us: u64,
     last: usize,
     beyond: u64,
 }
 
 impl RateHistogram {
-    /// No events yet, bins of `bin_us` (at least 1).
+    /// An empty histogram with bins of `bin_us` (at least 1).
     #[must_use]
     pub const fn new(bin_us: u64) -> Self {
         Self {
@@ -40,7 +40,7 @@ impl RateHistogram {
         self.add_many(t_us, 1);
     }
 
-    /// Counts events that are in order of time among themselves.
+    /// Counts events in time order.
     pub(crate) fn add_in_order(&mut self, events: &[CdEvent]) {
         let mut rest = events;
         while let Some(first) = rest.first() {
@@ -64,12 +64,12 @@ impl RateHistogram {
         self.beyond += (n - fitting) as u64;
     }
 
-    /// Makes `bin` the current one; false when that would take more than [`MAX_BINS`].
+    /// Makes `bin` the current one; false if that would exceed [`MAX_BINS`].
     fn seek(&mut self, bin: u64) -> bool {
         if self.counts.is_empty() {
             self.first_bin = bin;
         }
-        // Last bins, not ends: the very last bin of 64 bits has no end.
+        // Compares last bins instead of ends: the last bin of 64 bits has no end.
         let last = self.first_bin + (self.counts.len() as u64).saturating_sub(1);
         let (low, high) = (bin.min(self.first_bin), bin.max(last));
         if high - low >= MAX_BINS {
@@ -104,13 +104,13 @@ impl RateHistogram {
         &self.counts
     }
 
-    /// Events that are not counted: their time lies too far from the others, or their bin is full (2^32 - 1).
+    /// Ignored events: too far from the others in time, or in a full bin (2^32 - 1).
     #[must_use]
     pub const fn beyond(&self) -> u64 {
         self.beyond
     }
 
-    /// The course in at most 4000 bins; on the host clock when there is a fit.
+    /// The series in at most 4000 bins; on the host clock if there is a fit.
     #[must_use]
     pub fn series(&self, clock: Option<&ClockFit>) -> RateSeries {
         if self.counts.is_empty() {

@@ -1,11 +1,11 @@
-//! The public code's way of judging, computed without its wrong roots.
+//! The public code's evaluation, computed with exact intersections.
 //!
-//! It calibrates on the presses that it judges (the first repetition, whatever their role here), drops estimates outside
-//! the enclosing square without counting them, and gives the spread of the error lengths as population standard
-//! deviation (numpy's default). Its data reduction keeps max(1, n / k) events of each press, clusters with a core threshold of
-//! one event, so that the centroid is the mean of all events left, drops no estimate, and lets a press without an
-//! estimate count with the largest error found at that factor, which can be a pass. The last is given beside the honest
-//! rate. Estimates are exact intersections: rays that meet behind a camera have none here.
+//! It evaluates the calibration presses themselves (the first repetition, whatever their role here), drops estimates outside
+//! the enclosing square without counting them, and reports the spread of the error lengths as population standard deviation
+//! (numpy's default). Its data reduction keeps max(1, n / k) events of each press, clusters with a core threshold of one
+//! event, so that the centroid is the mean of all remaining events, drops no estimate, and lets a press without an estimate
+//! count with the largest error at that factor, which can be a pass. The rate with such presses failing is reported beside
+//! it. Rays that meet behind a camera have no estimate here.
 
 use skinrig_model::{
     CalibrationModel, CentroidRule, LensKind, PressRole, PressVerdict, RepetitionId, StereoGeometry,
@@ -13,8 +13,8 @@ use skinrig_model::{
 
 use crate::calibrate::calibrate;
 use crate::input::SessionInput;
-use crate::kept::Kept;
 use crate::metrics::{mean, quantile, root_mean_square};
+use crate::press_events::RetainedPresses;
 use crate::reduction::{Attempt, Outcome, Trials};
 use crate::result::{
     Analysis, CalibrationResult, LocationOutcome, PressResult, ReferenceCode, ReferenceReduction,
@@ -25,13 +25,17 @@ use crate::triangulate::locate;
 
 /// Core threshold of the published data reduction, events.
 const MIN_SAMPLES: u32 = 1;
-/// What a press without an estimate errs by where no press has one, mm.
+/// Error of a press without an estimate if no press has one, mm.
 const ERROR_OF_NOTHING_MM: f64 = 1.0;
 
-/// The published numbers of an analysed session. `kept` holds the presses of the first repetition, calibrating ones too;
-/// without them there is no data reduction.
+/// The published numbers for an analysed session. `kept` holds the presses of the first repetition, including calibration
+/// presses; without them there is no data reduction.
 #[must_use]
-pub fn reference_code(input: &SessionInput, analysis: &Analysis, kept: &Kept) -> ReferenceCode {
+pub fn reference_code(
+    input: &SessionInput,
+    analysis: &Analysis,
+    kept: &RetainedPresses,
+) -> ReferenceCode {
     let mut presses = used(input, analysis);
     let (geometry, fit) = calibrated_on_all(input, &mut presses);
     for press in &mut presses {
@@ -64,7 +68,7 @@ pub fn reference_code(input: &SessionInput, analysis: &Analysis, kept: &Kept) ->
     }
 }
 
-/// The presses of the first repetition that were done as planned and that the schedule uses, whatever their role.
+/// Presses of the first repetition that were executed as planned and that the schedule uses, whatever their role.
 fn used(input: &SessionInput, analysis: &Analysis) -> Vec<PressResult> {
     let rows = analysis.presses.iter().zip(&input.outcomes);
     let of_first = rows.filter(|(p, outcome)| {
@@ -86,8 +90,8 @@ fn columns(press: &PressResult) -> [Option<f64>; 2] {
     [0, 1].map(|k| press.views[k].and_then(|v| v.centroid_u))
 }
 
-/// The paper's eight parameters on all of `presses`, which are marked as calibrating; the nominal geometry alone
-/// where they do not determine it.
+/// Fits the paper's eight parameters to all of `presses`, marked as calibration presses; the nominal geometry if they do not
+/// determine it.
 fn calibrated_on_all(
     input: &SessionInput,
     presses: &mut [PressResult],
@@ -104,8 +108,8 @@ fn calibrated_on_all(
     fit.map_or((start, None), |(geometry, fit)| (geometry, Some(fit)))
 }
 
-/// Share of the presses that pass as the public code counts: an error strictly below the threshold, a press without an
-/// error having the largest error there is (1 mm where there is none). 0 without presses.
+/// Share of presses that pass as the public code counts: an error strictly below the threshold, where a press without an
+/// error has the largest error found (1 mm if there is none). 0 without presses.
 #[must_use]
 pub(crate) fn published_pass_rate(errors_mm: &[Option<f64>], threshold_mm: f64) -> f64 {
     let filled = filled(errors_mm);
@@ -115,7 +119,7 @@ pub(crate) fn published_pass_rate(errors_mm: &[Option<f64>], threshold_mm: f64) 
     )
 }
 
-/// The same with presses without an error failing.
+/// Same, with presses without an error failing.
 #[must_use]
 pub fn honest_pass_rate(errors_mm: &[Option<f64>], threshold_mm: f64) -> f64 {
     let passed = errors_mm.iter().flatten().filter(|e| **e < threshold_mm);
@@ -126,7 +130,7 @@ fn reduction(
     analysis: &Analysis,
     geometry: &StereoGeometry,
     presses: &[PressResult],
-    kept: &Kept,
+    kept: &RetainedPresses,
 ) -> Vec<ReferenceReduction> {
     let attempts: Vec<Attempt<'_>> = kept
         .presses
@@ -177,7 +181,7 @@ fn errors(outcomes: &[Outcome], seed: usize, power: usize) -> Vec<Option<f64>> {
     trials.map(|t| t.error_mm).collect()
 }
 
-/// The errors with the largest of them in the place of those that are missing.
+/// Replaces missing errors by the largest one.
 fn filled(errors_mm: &[Option<f64>]) -> Vec<f64> {
     let largest = errors_mm.iter().flatten().copied().fold(0.0, f64::max);
     let largest = if largest > 0.0 {
@@ -207,7 +211,7 @@ fn share(part: usize, whole: usize) -> f64 {
 mod tests {
     use super::*;
 
-    /// 250 different errors from 0.02 mm up, in another order than their size.
+    /// 250 different errors from 0.02 mm up, not sorted.
     fn errors() -> Vec<Option<f64>> {
         (0..250)
             .map(|i| Some(0.02 * f64::from(1 + i * 77 % 250)))
@@ -223,13 +227,13 @@ mod tests {
                 honest_pass_rate(e, threshold),
             )
         };
-        // 237 of 250 whatever the errors: the threshold is made of them.
+        // 237 of 250 whatever the errors: they define the threshold.
         assert_eq!(rates(&errors()), (0.948, 0.948));
         assert_eq!(rates(&[None; 250]), (1.0, 0.0));
         let mut one = vec![None; 250];
         one[7] = Some(0.5);
         assert_eq!(rates(&one), (1.0, 0.004));
-        // The worst one found fails, and so do those that take its error.
+        // The largest error fails, and so do the presses that get it.
         let half = errors().into_iter().enumerate();
         let half: Vec<_> = half.map(|(i, e)| e.filter(|_| i < 125)).collect();
         assert!(half.iter().flatten().any(|e| *e >= threshold));

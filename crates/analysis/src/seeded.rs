@@ -3,9 +3,9 @@
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// A generator for stream `stream` of `seed`: streams are independent of each other and of how many there are.
+/// A generator for stream `stream` of `seed`. Streams are independent of each other and of their number.
 pub fn generator(seed: u64, stream: u64) -> Xoshiro256PlusPlus {
-    // The odd constant is 2^64 / golden ratio (Weyl sequence of SplitMix64); it keeps neighbours apart.
+    // The odd constant is 2^64 / golden ratio (Weyl sequence of SplitMix64); it separates neighbouring streams.
     Xoshiro256PlusPlus::seed_from_u64(seed ^ stream.wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }
 

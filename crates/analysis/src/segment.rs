@@ -1,16 +1,16 @@
-//! Windows: which stretch of a camera's time belongs to which press.
+//! Windows: the interval of camera time that belongs to each press.
 
 use skinrig_model::{AnalysisSettings, PressTiming, WindowAnchor};
 
 use crate::input::EarlierAttempt;
 use crate::result::ClockFit;
 
-/// Longest idle time looked at before a press, µs.
+/// Maximum idle time before a press, µs.
 const IDLE_US: u64 = 500_000;
-/// Shorter idle times give no rate, µs.
-const LEAST_IDLE_US: u64 = 20_000;
+/// Minimum idle time for a rate, µs.
+const MIN_IDLE_US: u64 = 20_000;
 
-/// The window of one press in camera time. All intervals include their start and exclude their end, µs.
+/// Window of one press in camera time. All intervals are half-open, µs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window {
     /// Row of the press in the plan.
@@ -19,8 +19,8 @@ pub struct Window {
     pub start_us: u64,
     /// `window_after_ms` after the release (or after the middle); at most `window_after_contact_ms` after the contact.
     pub end_us: u64,
-    /// The idle time before it: at most 0.5 s, up to the end of any earlier window and of any earlier attempt. Equal to
-    /// `start_us` when less than 20 ms is free, or when the end of an attempt just before it is not known.
+    /// Start of the idle time before it: at most 0.5 s, back to the end of any earlier window or attempt. Equal to
+    /// `start_us` if less than 20 ms is free, or if the end of a directly preceding attempt is unknown.
     pub idle_start_us: u64,
 }
 
@@ -37,7 +37,7 @@ impl Window {
         (self.start_us - self.idle_start_us) as f64 * 1e-6
     }
 
-    /// True when bytes were lost within the window.
+    /// True if bytes were lost within the window.
     #[must_use]
     pub fn overlaps(&self, gaps: &[(u64, u64)]) -> bool {
         gaps.iter()
@@ -45,11 +45,11 @@ impl Window {
     }
 }
 
-/// The windows of all presses with known timing, in order of their start. Attempts that were repeated have none, but their events
+/// Windows of all presses with known timing, in order of their start. Superseded attempts have no window, but their events
 /// are not idle time: `earlier` has all of them, in any order.
 ///
-/// Windows of a sane session do not overlap. If they do, each keeps all of its events, so that shared events
-/// count in both presses.
+/// Windows of a valid session do not overlap. If they do, each keeps all of its events, so shared events count in both
+/// presses.
 #[must_use]
 pub fn windows(
     timings: impl Iterator<Item = (usize, PressTiming)>,
@@ -57,7 +57,7 @@ pub fn windows(
     clock: &ClockFit,
     settings: &AnalysisSettings,
 ) -> Vec<Window> {
-    // Before the camera's zero there are no events, so a window may begin there.
+    // There are no events before the camera's zero, so a window may begin there.
     let tick = |us: f64| us.ceil().max(0.0) as u64;
     let mut windows: Vec<(Window, u64)> = timings
         .map(|(row, timing)| {
@@ -100,10 +100,10 @@ pub fn windows(
             earlier_end = earlier_end.max(clear_us.unwrap_or(window.start_us));
         }
         let from = window.start_us.saturating_sub(IDLE_US).max(earlier_end);
-        if window.start_us.saturating_sub(from) >= LEAST_IDLE_US {
+        if window.start_us.saturating_sub(from) >= MIN_IDLE_US {
             window.idle_start_us = from;
         }
-        // A window that is cut short leaves the rest of its press, which is not idle time.
+        // The rest of a press after a truncated window is not idle time.
         earlier_end = earlier_end.max(window.end_us);
         window.end_us = window.end_us.min(*cut_us).max(window.start_us);
     }
@@ -181,7 +181,7 @@ mod tests {
             (4_950_000, 4_550_000),
         ];
         assert_eq!(idle(&[]), free);
-        // Made again after its tip was clear at 3.8 s; a retake of the third that is long over changes nothing more.
+        // Retaken after its tip was clear at 3.8 s; a finished retake of the third changes nothing.
         let timed = EarlierAttempt {
             begun: t(3.0),
             clear: Some(t(3.8)),
@@ -195,7 +195,7 @@ mod tests {
             idle(&[timed, long_over]),
             [first, (3_950_000, 3_800_000), third]
         );
-        // Nobody knows when its tip was clear: no idle time before what follows it, and only there.
+        // The clearing time is unknown: no idle time before the following press, and only there.
         let unknown = EarlierAttempt {
             clear: None,
             ..timed
@@ -204,7 +204,7 @@ mod tests {
             idle(&[unknown, long_over]),
             [first, (3_950_000, 3_950_000), third]
         );
-        // Cleared within the window of its retake.
+        // Clear within the window of its retake.
         let late = EarlierAttempt {
             clear: Some(t(3.99)),
             ..timed

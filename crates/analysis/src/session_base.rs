@@ -1,16 +1,16 @@
-//! The time base of a session, from what its trigger box told.
+//! Time base of a session from the reports of its trigger box.
 
 use crate::input::SessionInput;
 use crate::press_spans::spans;
-use crate::timebase::{Ties, TimeBase};
+use crate::timebase::{TimeBase, TimeBaseInput};
 
-/// The time base, when the trigger box told of its clock.
+/// The time base, if the trigger box reported its clock.
 pub(crate) fn time_base(input: &SessionInput) -> Option<TimeBase> {
     let used_at_us: Vec<f64> = spans(input)
         .iter()
         .flat_map(|s| [s.contact_us, s.release_us])
         .collect();
-    let ties = Ties {
+    let ties = TimeBaseInput {
         reports: &input.box_reports,
         edges: [&input.edges[0], &input.edges[1]],
         channel: input.rig.trigger_channel?,

@@ -1,35 +1,33 @@
-//! Presses that calibrate and presses that score, kept apart by type.
+//! Separates calibration presses and scored presses by type.
 //!
-//! A [`CalibrationSet`] can only be built from presses whose role is to calibrate, a [`ScoreSet`] only from
-//! those whose role is to score. The calibration takes the one and the metrics the other, so that no press can
-//! ever do both.
+//! A [`CalibrationSet`] can only be built from presses with the calibration role, a [`ScoreSet`] only from presses with the
+//! score role. Calibration takes the former and metrics the latter, so that no press can do both.
 
-use skinrig_model::{Point2, PressId, PressOutcome, PressRole, PressVerdict};
+use skinrig_model::{Point2, PressId, PressOutcome, PressRole, PressVerdict, Verdict};
 
 use crate::result::PressResult;
 
-/// What the calibration needs of one press.
+/// Data of one press for the calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sight {
-    /// Which press.
+pub struct CalibrationPress {
+    /// Press.
     pub press: PressId,
-    /// Index of its location: a label to group by.
+    /// Index of its location, for grouping.
     pub location: u32,
     /// Centroid column in each camera, px.
     pub columns: [f64; 2],
-    /// The measured position.
+    /// Measured position.
     pub truth: Point2,
-    /// Clustered events of the camera that has fewer.
+    /// Number of clustered events in the weaker camera.
     pub cluster_events: u32,
 }
 
-/// Presses that calibrate: seen by both cameras, truth measured, not missed, invalid or excluded.
+/// Calibration presses: seen by both cameras, truth measured, not missed, invalid or excluded.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct CalibrationSet(Vec<Sight>);
+pub struct CalibrationSet(Vec<CalibrationPress>);
 
 impl CalibrationSet {
-    /// Takes the usable calibrating presses out of the table; where the rays of an uncalibrated geometry meet
-    /// plays no part.
+    /// Selects the usable calibration presses of the table, independent of where the rays of an uncalibrated geometry meet.
     #[must_use]
     pub fn from_presses(presses: &[PressResult]) -> Self {
         let usable = presses
@@ -40,7 +38,7 @@ impl CalibrationSet {
                 .filter_map(|p| {
                     let [one, two] = p.views;
                     let (one, two) = (one?, two?);
-                    Some(Sight {
+                    Some(CalibrationPress {
                         press: p.press,
                         location: p.location.index(),
                         columns: [one.centroid_u?, two.centroid_u?],
@@ -56,46 +54,45 @@ impl CalibrationSet {
         )
     }
 
-    /// The presses, in plan order.
+    /// Presses, in plan order.
     #[must_use]
-    pub fn sights(&self) -> &[Sight] {
+    pub fn sights(&self) -> &[CalibrationPress] {
         &self.0
     }
 }
 
-/// One attempted press that scores.
+/// An attempted scored press.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scored {
-    /// Which press.
+pub struct ScoredPress {
+    /// Press.
     pub press: PressId,
-    /// Index of its location: a label to group by.
+    /// Index of its location, for grouping.
     pub location: u32,
     /// Planned depth, mm.
     pub depth_mm: f64,
-    /// The measured position, the planned one where none was measured.
+    /// Measured position, or planned position if not measured.
     pub at: Point2,
-    /// Neither invalid nor excluded.
+    /// True if neither invalid nor excluded.
     pub valid: bool,
-    /// Estimate and error vector (estimate - truth, mm), when both exist.
+    /// Estimate and error vector (estimate - truth, mm), if both exist.
     pub found: Option<(Point2, [f64; 2])>,
 }
 
-/// Presses that score and were attempted, whatever became of them, but for those that the journal leaves out.
+/// Attempted scored presses, whatever their result, except those that the journal excludes.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct ScoreSet(Vec<Scored>);
+pub struct ScoreSet(Vec<ScoredPress>);
 
 impl ScoreSet {
-    /// Whether a press has an estimate that does not count.
+    /// True if any press has an estimate that does not count.
     #[must_use]
     pub(crate) fn excludes_estimates(&self) -> bool {
         self.0.iter().any(|p| !p.valid && p.found.is_some())
     }
 
-    /// Takes the attempted scored presses out of the table. `journal` holds the outcomes of the same presses: what
-    /// it excludes was left out before anybody looked at the data, and says nothing about the skin.
+    /// Selects the attempted scored presses of the table. `journal` holds the outcomes of the same presses: its exclusions
+    /// were decided before the data were seen, and say nothing about the skin.
     #[must_use]
     pub fn from_presses(presses: &[PressResult], journal: &[Option<PressOutcome>]) -> Self {
-        let missed = PressVerdict::Missed(String::new());
         let left_out = |outcome: Option<&PressOutcome>| {
             outcome.is_some_and(|o| matches!(o.verdict, PressVerdict::Excluded(_)))
         };
@@ -104,10 +101,10 @@ impl ScoreSet {
             .enumerate()
             .filter(|(i, _)| !left_out(journal.get(*i).and_then(Option::as_ref)))
             .map(|(_, p)| p)
-            .filter(|p| p.role == PressRole::Score && p.verdict != missed.name());
+            .filter(|p| p.role == PressRole::Score && p.verdict != Verdict::Missed);
         Self(
             attempted
-                .map(|p| Scored {
+                .map(|p| ScoredPress {
                     press: p.press,
                     location: p.location.index(),
                     depth_mm: p.depth_mm,
@@ -122,7 +119,7 @@ impl ScoreSet {
         )
     }
 
-    /// The planned depths, mm, shallowest first, each once.
+    /// Distinct planned depths, mm, shallowest first.
     #[must_use]
     pub fn depths_mm(&self) -> Vec<f64> {
         let mut depths: Vec<f64> = self.0.iter().map(|p| p.depth_mm).collect();
@@ -131,20 +128,20 @@ impl ScoreSet {
         depths
     }
 
-    /// The presses planned at this depth.
+    /// Presses planned at this depth.
     #[must_use]
     pub fn at_depth(&self, depth_mm: f64) -> Self {
         let here = self.0.iter().filter(|p| p.depth_mm == depth_mm);
         Self(here.copied().collect())
     }
 
-    /// The presses, in plan order.
+    /// Presses, in plan order.
     #[must_use]
-    pub fn presses(&self) -> &[Scored] {
+    pub fn presses(&self) -> &[ScoredPress] {
         &self.0
     }
 }
 
 fn is_valid(press: &PressResult) -> bool {
-    press.verdict == PressVerdict::Valid.name()
+    press.verdict == Verdict::Valid
 }

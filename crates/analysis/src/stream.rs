@@ -1,39 +1,39 @@
-//! What a camera's stream says by itself, without the press list: where it is silent, and where it bursts.
+//! Owns evidence from a camera's stream alone, without the press list: silent periods and bursts.
 
 use crate::metrics::quantile;
 use crate::rates::RateHistogram;
 use crate::result::{ClockFit, PressView};
 
-/// Silence is unlike noise when noise alone would have sent this many events in it: odds of e^40 against.
+/// A silence is significant if noise alone would have sent this many events: odds of e^40 against.
 const EXPECTED_EVENTS: f64 = 40.0;
-/// Shorter silences are none, s.
-const LEAST_SILENCE_S: f64 = 1.0;
-/// A contact is a rise of the counts of so long before it to so long after, s.
+/// Minimum length of a silence, s.
+const MIN_SILENCE_S: f64 = 1.0;
+/// A contact is a rise of the counts from this long before it to this long after, s.
 const RISE_S: f64 = 0.2;
-/// Half as much as at the usual listed contact,
-const LEAST_RISE: f64 = 0.5;
-/// and this many Poisson standard errors, is a contact.
+/// Minimum rise of a contact relative to the median listed contact,
+const MIN_RISE: f64 = 0.5;
+/// and in Poisson standard errors.
 const SIGMAS: f64 = 6.0;
-/// One that has not yet ended is over this long after its contact, at least, s.
-const LEAST_PRESS_S: f64 = 0.5;
+/// Minimum duration of a press, s.
+const MIN_PRESS_S: f64 = 0.5;
 
-/// A silence or a press on the camera's clock, µs.
+/// A silence or press on the camera's clock, µs.
 pub type Span = (u64, u64);
 
-/// Where the camera sent nothing at all although it sends noise: before its first event, in between, after its last.
+/// Periods without events although the camera sends noise: before its first event, in between, after its last.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Silences {
-    /// From the first microsecond to the first event; empty when that is no statement.
+    /// From time 0 to the first event; `None` if not significant.
     pub before: Option<Span>,
-    /// In between.
+    /// Between events.
     pub between: Vec<Span>,
     /// From the last event on.
     pub after: Option<Span>,
 }
 
 impl Silences {
-    /// The silences of a stream in which presses follow idle times with noise; none when there is no noise to miss. `first_us` and
-    /// `last_us` are the camera's times of the first and last planned press.
+    /// Silences of a stream with presses separated by noisy idle times; none without noise. `first_us` and `last_us` are the
+    /// camera's times of the first and last planned press.
     pub fn new(
         rates: &RateHistogram,
         views: impl Iterator<Item = PressView>,
@@ -44,7 +44,7 @@ impl Silences {
             .map(|v| v.idle_rate_per_s)
             .collect();
         let idle_per_s = quantile(&mut idle, 0.5).unwrap_or(0.0);
-        let least_s = LEAST_SILENCE_S.max(EXPECTED_EVENTS / idle_per_s);
+        let least_s = MIN_SILENCE_S.max(EXPECTED_EVENTS / idle_per_s);
         let counts = rates.counts();
         let begin = counts.iter().position(|c| *c > 0);
         let end = counts.iter().rposition(|c| *c > 0);
@@ -75,15 +75,14 @@ impl Silences {
         }
     }
 
-    /// All of them.
+    /// All silences.
     pub fn spans(&self) -> Vec<Span> {
         let ends = self.before.into_iter().chain(self.after);
         self.between.iter().copied().chain(ends).collect()
     }
 }
 
-/// The contacts that stand out of the counts, s on the host's clock, in order. `listed_s` are contact and release of the listed
-/// presses.
+/// Contacts detected in the counts, s on the host clock, in order. `listed_s` are contact and release of the listed presses.
 pub(crate) fn contacts_s(
     rates: &RateHistogram,
     clock: &ClockFit,
@@ -110,7 +109,7 @@ pub(crate) fn contacts_s(
         let camera_us = clock.camera_us(host_s * 1e6) - rates.start_us() as f64;
         (camera_us >= 0.0).then(|| (camera_us * 1e-6 / bin_s).round() as usize)
     };
-    // The clock may be off by some bins: the largest rise about each contact.
+    // The clock may be off by some bins: use the largest rise around each contact.
     let about = |bin: usize| {
         let near = bin.saturating_sub(reach / 2)..=bin + reach / 2;
         near.filter_map(|b| Some(rise(b)?.0)).max_by(f64::total_cmp)
@@ -123,13 +122,13 @@ pub(crate) fn contacts_s(
         return Vec::new();
     };
     let mut lasts: Vec<f64> = listed_s.iter().map(|(from, to)| to - from).collect();
-    let press_s = quantile(&mut lasts, 0.5).unwrap_or(0.0).max(LEAST_PRESS_S) + RISE_S;
+    let press_s = quantile(&mut lasts, 0.5).unwrap_or(0.0).max(MIN_PRESS_S) + RISE_S;
     let skip = (press_s / bin_s) as usize;
     let mut found = Vec::new();
     let mut bin = 0;
     while bin < n {
         let stands_out =
-            |b: usize| rise(b).is_some_and(|(r, se)| r > LEAST_RISE * usual && r > SIGMAS * se);
+            |b: usize| rise(b).is_some_and(|(r, se)| r > MIN_RISE * usual && r > SIGMAS * se);
         if !stands_out(bin) {
             bin += 1;
             continue;
@@ -202,7 +201,7 @@ mod tests {
         assert_eq!(found.before, Some((0, 9_000_000)));
         assert_eq!(found.between, [(15_000_000, 17_000_000)]);
         assert_eq!(found.after, Some((30_000_000, u64::MAX)));
-        // Without noise silence is nothing, and a short one may be chance.
+        // Without noise silence means nothing, and a short one may be chance.
         assert_eq!(Silences::new(&rates, views(0.0), span), Silences::default());
         assert_eq!(Silences::new(&rates, views(18.0), span).between, []);
     }

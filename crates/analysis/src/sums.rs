@@ -1,9 +1,9 @@
-//! Sums that keep their digits however many terms they have.
+//! Sums that keep their precision for any number of terms.
 //!
-//! Compensated addition after Neumaier (1974): the error of a sum of n terms is at most
-//! `u |sum| + 2 n² u² Σ|x|` with u = 2^-53, where plain addition loses up to `n u Σ|x|`.
+//! Compensated addition after Neumaier (1974): the error of a sum of n terms is at most `u |sum| + 2 n² u² Σ|x|` with u =
+//! 2^-53, while plain addition loses up to `n u Σ|x|`.
 
-/// A running sum and what rounding took from it.
+/// A running sum and its accumulated rounding error.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Sum {
     sum: f64,
@@ -23,7 +23,7 @@ impl Sum {
         self.sum = next;
     }
 
-    /// The sum. Infinite or NaN as plain addition would make it.
+    /// The sum. Infinite or NaN where plain addition is.
     #[must_use]
     pub fn total(self) -> f64 {
         if self.sum.is_finite() {
@@ -59,7 +59,7 @@ pub fn root_mean_square(values: impl Iterator<Item = f64>) -> Option<f64> {
     mean(values.map(|v| v * v)).map(f64::sqrt)
 }
 
-/// The mean square distance from the mean (the variance with n), in two passes; `None` without values.
+/// Mean square distance from the mean (variance with n), in two passes; `None` without values.
 #[must_use]
 pub fn variance(values: impl Iterator<Item = f64> + Clone) -> Option<f64> {
     let centre = mean(values.clone())?;

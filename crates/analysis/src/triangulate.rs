@@ -1,17 +1,17 @@
-//! Where two viewing rays meet: closed form, typed outcomes.
+//! Intersection of two viewing rays: closed form, typed outcomes.
 
 use skinrig_model::{Point2, SkinOutline, StereoGeometry};
 
 use crate::result::LocationOutcome;
 
-/// Rays whose angle has a smaller sine than this are parallel. At the skin's size the intersection would lie
-/// tens of thousands of kilometres away or be pure rounding.
+/// Rays with a smaller sine of their angle are parallel. At the skin's size the intersection would be tens of thousands of
+/// kilometres away, or pure rounding error.
 pub const PARALLEL_SINE: f64 = 1e-9;
 
-/// The intersection of the two lines along the rays, whatever it is worth.
+/// Intersection of the two lines along the rays, without any validation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intersection {
-    /// Where, mm. Infinite or NaN for parallel lines.
+    /// Position, mm. Infinite or NaN for parallel lines.
     pub at: Point2,
     /// Distance from each camera along its ray, mm; negative behind the camera.
     pub range_mm: [f64; 2],
@@ -51,8 +51,8 @@ pub(crate) fn meet(positions: [Point2; 2], directions: [[f64; 2]; 2]) -> Interse
     }
 }
 
-/// Locates a touch from the two viewing angles; NaN is a missing view. Numbers so large that the rays meet at no
-/// finite place give no location either.
+/// Locates a press from the two viewing angles; NaN is a missing view. Rays that meet at no finite position give no location
+/// either.
 #[must_use]
 pub fn locate_angles(
     geometry: &StereoGeometry,
@@ -64,7 +64,7 @@ pub fn locate_angles(
     }
     let Intersection { at, range_mm, sine } = intersect(geometry, angles_deg);
     if !sine.is_finite() {
-        LocationOutcome::Missing // a camera without a direction: it sits on the point it aims at
+        LocationOutcome::Missing // a camera without a direction: it is at the point it aims at
     } else if sine.abs() < PARALLEL_SINE {
         LocationOutcome::Parallel { sine }
     } else if range_mm.iter().any(|r| *r < 0.0) {
@@ -78,7 +78,7 @@ pub fn locate_angles(
     }
 }
 
-/// Locates a touch from the two centroid columns (px); `None` or NaN is a missing view.
+/// Locates a press from the two centroid columns (px); `None` or NaN is a missing view.
 #[must_use]
 pub fn locate(
     geometry: &StereoGeometry,

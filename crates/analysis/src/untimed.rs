@@ -1,4 +1,4 @@
-//! Owns which presses a camera's clock does not time: those too far from everything that ties it to the host's.
+//! Owns presses that a camera's clock does not time: those too far from all ties to the host's clock.
 
 use std::fmt;
 
@@ -10,23 +10,23 @@ use crate::press_spans::timings;
 use crate::session_base::time_base;
 use crate::timebase::{Tie, TimeBase, distance_us};
 
-/// A press that a clock does not reach.
+/// A press too far from the ties of a clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Untimed {
-    /// What is too far away.
+    /// Kind of tie.
     pub tie: Tie,
-    /// How far the nearest is from the contact or the release, µs.
+    /// Distance of the nearest tie from the contact or the release, µs.
     pub distance_us: f64,
-    /// How far it may be, µs.
+    /// Maximum distance, µs.
     pub limit_us: f64,
 }
 
 impl fmt::Display for Untimed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let what = match self.tie {
-            Tie::Exchange => "exchange of time with the trigger box",
-            Tie::Train => "train that it saw",
-            Tie::Mark => "mark that it saw",
+            Tie::Exchange => "time exchange with the trigger box",
+            Tie::Train => "train seen",
+            Tie::Mark => "mark seen",
         };
         write!(
             f,
@@ -37,8 +37,8 @@ impl fmt::Display for Untimed {
     }
 }
 
-/// The rows of the plan that the clock of `camera` does not time. `marks`: what its clock stands on where the time base has none.
-/// A clock aligned by event rates stands on the presses themselves: nothing is said of it here.
+/// Rows of the plan that the clock of `camera` does not time. `marks`: ties of its clock if there is no time base. Does not
+/// apply to a clock aligned by event rates, whose ties are the presses themselves.
 pub fn rows(
     input: &SessionInput,
     camera: CameraId,
@@ -70,7 +70,7 @@ pub fn rows(
     out
 }
 
-/// The same of both cameras, from the session alone.
+/// Same for both cameras, from the session alone.
 pub fn of_session(input: &SessionInput) -> [Vec<Option<Untimed>>; 2] {
     let base = time_base(input);
     CameraId::ALL.map(|camera| {

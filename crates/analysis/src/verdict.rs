@@ -1,29 +1,30 @@
-//! What counts: the verdict on each press, from its journal entry, its data and the rules in the settings.
+//! Decides which presses count: the verdict on each press, from its journal entry, its data and the rules in the settings.
 //!
 //! Every planned press gets exactly one verdict:
 //! - *missed*: never attempted, from the journal;
-//! - *invalid*: what happened is not what was planned (journal), or the data cannot say: bytes lost in the window,
-//!   a camera without clock or with none that reaches the press, no measured times or position;
-//! - *excluded*: done and recorded, but left out by a rule that names itself. A press that the cameras did not
-//!   see, or whose rays do not meet on the skin, is a failure of the skin: excluded from the error metrics, and
-//!   still in the denominator of the located rate;
+//! - *invalid*: not executed as planned (journal), or undecidable from the data: lost bytes in the window, a camera without
+//!   a clock or with none near the press, no measured times or position;
+//! - *excluded*: executed and recorded, but excluded by a named rule. A press that the cameras did not see, or whose rays do
+//!   not meet on the skin, is a failure of the skin: excluded from the error metrics, but still in the denominator of the
+//!   located rate;
 //! - *valid*: everything else.
 //!
-//! Sync presses are judged by the journal and their data only; no rule excludes them.
+//! Only the journal and the data decide on sync presses; no rule excludes them.
 
-use skinrig_model::{AnalysisSettings, CameraId, PressOutcome, PressRole, PressVerdict};
+use skinrig_model::{AnalysisSettings, CameraId, PressOutcome, PressRole, PressVerdict, Verdict};
 
 use crate::check;
 use crate::result::{Estimate, LocationOutcome, PressCounts, PressResult, PressView};
+use crate::rule::Rule;
 use crate::untimed::Untimed;
 
-/// A verdict and the rule behind it.
+/// A verdict and its rule.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Judgement {
-    /// The verdict, its reason in full.
+    /// The verdict with its full reason.
     pub verdict: PressVerdict,
-    /// The rule without the press's numbers; `None` for valid.
-    pub rule: Option<String>,
+    /// The rule without the press's numbers; `None` if valid.
+    pub rule: Option<Rule>,
 }
 
 impl Judgement {
@@ -32,14 +33,14 @@ impl Judgement {
         rule: None,
     };
 
-    fn invalid(rule: &str) -> Self {
+    fn invalid(rule: Rule) -> Self {
         Self {
-            verdict: PressVerdict::Invalid(rule.to_owned()),
-            rule: Some(rule.to_owned()),
+            verdict: PressVerdict::Invalid(rule.to_string()),
+            rule: Some(rule),
         }
     }
 
-    fn excluded(rule: String, reason: String) -> Self {
+    fn excluded(rule: Rule, reason: String) -> Self {
         Self {
             verdict: PressVerdict::Excluded(reason),
             rule: Some(rule),
@@ -51,57 +52,30 @@ impl Judgement {
     pub(crate) fn or_by_hand(self) -> Self {
         match self.verdict {
             PressVerdict::Missed(_) | PressVerdict::Invalid(_) => self,
-            _ => Self::excluded("by hand".to_owned(), "left out by hand".to_owned()),
+            _ => Self::excluded(Rule::ByHand, "left out by hand".to_owned()),
         }
     }
 
-    /// Invalid because a camera's clock is not known at the press, unless it is missed or invalid anyway.
+    /// Invalid because a camera's clock is unknown at the press, unless it is missed or invalid anyway.
     #[must_use]
     pub(crate) fn or_untimed(self, camera: CameraId, untimed: Untimed) -> Self {
         match self.verdict {
             PressVerdict::Missed(_) | PressVerdict::Invalid(_) => self,
             _ => Self {
                 verdict: PressVerdict::Invalid(format!("not timed: {untimed} ({camera})")),
-                rule: Some(format!("not timed ({camera})")),
+                rule: Some(Rule::NotTimed(camera)),
             },
         }
     }
 
-    /// What the journal says; its rule is the reason with every number but a camera's left out.
+    /// Verdict of the journal; its rule is the reason without numbers, except camera numbers.
     fn from_journal(verdict: PressVerdict) -> Self {
-        let rule = verdict.reason().map(without_numbers);
+        let rule = verdict.reason().map(Rule::of_journal);
         Self { verdict, rule }
     }
 }
 
-/// `text` with `…` for every number, except the number of a camera.
-fn without_numbers(text: &str) -> String {
-    let mut out = String::new();
-    let mut rest = text;
-    while let Some(at) = rest.find(|c: char| c.is_ascii_digit()) {
-        let (before, number) = rest.split_at(at);
-        let end = number
-            .find(|c: char| !(c.is_ascii_digit() || c == '.'))
-            .unwrap_or(number.len());
-        // A full stop or an ellipsis after the number is not part of it.
-        let digits = number[..end].trim_end_matches('.');
-        if before.ends_with("camera ") {
-            out.push_str(before);
-            out.push_str(digits);
-        } else {
-            // A minus sign goes with its number; a hyphen stays.
-            let sign = before.strip_suffix('-');
-            let sign = sign.filter(|b| b.chars().next_back().is_none_or(|c| !c.is_alphanumeric()));
-            out.push_str(sign.unwrap_or(before));
-            out.push('…');
-        }
-        rest = &number[digits.len()..];
-    }
-    out.push_str(rest);
-    out
-}
-
-/// The verdict before any location is known.
+/// Verdict before any location is known.
 #[must_use]
 pub fn from_data(
     role: PressRole,
@@ -118,17 +92,17 @@ pub fn from_data(
         return Judgement::from_journal(outcome.verdict.clone());
     }
     if outcome.timing.is_none() {
-        return Judgement::invalid("no measured times");
+        return Judgement::invalid(Rule::NoTimes);
     }
     if outcome.measured_at.is_none_or(|p| !check::is_place(&p)) {
-        return Judgement::invalid("no measured position");
+        return Judgement::invalid(Rule::NoPosition);
     }
     for camera in CameraId::ALL {
         if !has_clock[camera.index()] {
-            return Judgement::invalid(&format!("no clock alignment ({camera})"));
+            return Judgement::invalid(Rule::NoClock(camera));
         }
         if data_lost[camera.index()] {
-            return Judgement::invalid(&format!("data lost in window ({camera})"));
+            return Judgement::invalid(Rule::DataLost(camera));
         }
     }
     if role == PressRole::Sync {
@@ -137,8 +111,8 @@ pub fn from_data(
     for camera in CameraId::ALL {
         let view = views[camera.index()];
         let Some(view) = view.filter(|v| v.centroid_u.is_some()) else {
-            let rule = format!("no cluster ({camera})");
-            return Judgement::excluded(rule.clone(), rule);
+            let rule = Rule::NoCluster(camera);
+            return Judgement::excluded(rule.clone(), rule.to_string());
         };
         if let Some(judgement) = too_few_cluster_events(&view, settings.min_cluster_events, camera)
         {
@@ -150,7 +124,7 @@ pub fn from_data(
         }) && settings.min_response_sigma > 0.0
         {
             return Judgement::excluded(
-                format!("no response ({camera})"),
+                Rule::NoResponse(camera),
                 format!(
                     "no response: {} events, {:.0} ± {:.0} expected at the idle rate ({camera})",
                     view.events, idle.expected, idle.standard_error
@@ -161,7 +135,7 @@ pub fn from_data(
     Judgement::VALID
 }
 
-/// The rule that leaves out a press of which `camera` clustered fewer than `least` events.
+/// The rule that excludes a press with fewer than `least` clustered events in `camera`.
 #[must_use]
 pub(crate) fn too_few_cluster_events(
     view: &PressView,
@@ -170,7 +144,7 @@ pub(crate) fn too_few_cluster_events(
 ) -> Option<Judgement> {
     (view.cluster_events < least).then(|| {
         Judgement::excluded(
-            format!("too few cluster events ({camera})"),
+            Rule::FewClusterEvents(camera),
             format!(
                 "too few cluster events: {} < {least} ({camera})",
                 view.cluster_events
@@ -179,14 +153,14 @@ pub(crate) fn too_few_cluster_events(
     })
 }
 
-/// What a camera would have sent in the press window without a press.
+/// Expected events of a camera in the press window without a press.
 struct IdleEvents {
     expected: f64,
     standard_error: f64,
 }
 
-/// The prediction from the idle time before the press, with Poisson noise in both: over a window `w` and an idle
-/// time `i` the difference of the counts scatters by `sqrt(expected (1 + w / i))`. `None` without idle time.
+/// Prediction from the idle time before the press, with Poisson noise in both: over a window `w` and an idle time `i` the
+/// difference of the counts scatters by `sqrt(expected (1 + w / i))`. `None` without idle time.
 fn idle_events(view: &PressView) -> Option<IdleEvents> {
     if !(view.idle_s > 0.0 && view.rate_per_s > 0.0) {
         return None;
@@ -200,22 +174,25 @@ fn idle_events(view: &PressView) -> Option<IdleEvents> {
     })
 }
 
-/// The rule that leaves a valid press out because of where its rays meet, if any.
+/// The rule that excludes a valid press because of where its rays meet, if any.
 #[must_use]
 pub(crate) fn location_rule(
     outcome: &LocationOutcome,
     settings: &AnalysisSettings,
 ) -> Option<Judgement> {
-    let plain = |rule: &str| Some(Judgement::excluded(rule.to_owned(), rule.to_owned()));
+    let plain = |rule: Rule| {
+        let reason = rule.to_string();
+        Some(Judgement::excluded(rule, reason))
+    };
     match *outcome {
-        LocationOutcome::Missing => plain("no view"),
-        LocationOutcome::Parallel { .. } => plain("parallel rays"),
-        LocationOutcome::Behind { .. } => plain("behind camera"),
+        LocationOutcome::Missing => plain(Rule::NoView),
+        LocationOutcome::Parallel { .. } => plain(Rule::ParallelRays),
+        LocationOutcome::Behind { .. } => plain(Rule::BehindCamera),
         LocationOutcome::Located { sine, .. } | LocationOutcome::Outside { sine, .. }
             if sine.abs() < settings.min_ray_sine =>
         {
             Some(Judgement::excluded(
-                "nearly parallel rays".to_owned(),
+                Rule::NearlyParallelRays,
                 format!(
                     "nearly parallel rays: sine {:.4} < {}",
                     sine.abs(),
@@ -223,56 +200,30 @@ pub(crate) fn location_rule(
                 ),
             ))
         }
-        LocationOutcome::Outside { .. } if settings.exclude_outside => {
-            plain("outside the skin outline")
-        }
+        LocationOutcome::Outside { .. } if settings.exclude_outside => plain(Rule::OutsideOutline),
         LocationOutcome::Located { .. } | LocationOutcome::Outside { .. } => None,
     }
 }
 
-/// True for a press that was done as planned, whether or not the cameras saw it: valid, or excluded by a rule on the
-/// data. What the journal or a hand leaves out is no question to the skin.
+/// True for a press that was executed as planned, whether or not the cameras saw it: valid, or excluded by a rule on the
+/// data. Exclusions by the journal or by hand say nothing about the skin.
 #[must_use]
 pub(crate) fn is_done_as_planned(press: &PressResult) -> bool {
-    press.verdict == PressVerdict::Valid.name()
-        || press.rule.as_deref().is_some_and(is_rule_on_data)
-}
-
-/// True for the rules of [`from_data`] and `location_rule` that exclude a press for what the cameras saw of it;
-/// false for what the journal or a hand left out.
-#[must_use]
-pub fn is_rule_on_data(rule: &str) -> bool {
-    const RULES: [&str; 8] = [
-        "no cluster (",
-        "too few cluster events (",
-        "no response (",
-        "no view",
-        "parallel rays",
-        "nearly parallel rays",
-        "behind camera",
-        "outside the skin outline",
-    ];
-    RULES.iter().any(|known| match known.strip_suffix('(') {
-        Some(_) => rule.starts_with(known),
-        None => rule == *known,
-    })
+    press.verdict == Verdict::Valid || press.rule.as_ref().is_some_and(Rule::is_on_data)
 }
 
 /// Writes a verdict into a row.
 pub fn put(row: &mut PressResult, judgement: Judgement) {
-    row.verdict = judgement.verdict.name().to_owned();
+    row.verdict = judgement.verdict.kind();
     row.reason = judgement.verdict.reason().map(str::to_owned);
     row.rule = judgement.rule;
 }
 
-/// A warning when the headline stands on the rules: when the RMSE of all located presses lies outside the 95 %
-/// interval of the RMSE of those that count (without an interval: when the two differ at all), or when nothing
-/// counts. `rmse`: with and without exclusions.
+/// A warning if the headline depends on the exclusions: the RMSE of all located presses is outside the 95 % interval of the
+/// RMSE of those that count (or differs at all, without an interval), or nothing counts. `rmse`: with and without
+/// exclusions.
 #[must_use]
-pub(crate) fn weight_of_exclusions(
-    presses: &[PressResult],
-    rmse: [&Estimate; 2],
-) -> Option<String> {
+pub(crate) fn exclusion_warning(presses: &[PressResult], rmse: [&Estimate; 2]) -> Option<String> {
     let [with, without] = rmse;
     let all = without.value?;
     let left_out = without.n.saturating_sub(with.n);
@@ -286,10 +237,10 @@ pub(crate) fn weight_of_exclusions(
         (None, ..) => format!("from {all:.2} mm to nothing"),
         _ => return None,
     };
-    let mut rules: Vec<&str> = presses
+    let mut rules: Vec<&Rule> = presses
         .iter()
         .filter(|p| p.role == PressRole::Score && p.error_mm().is_some())
-        .filter_map(|p| p.rule.as_deref())
+        .filter_map(|p| p.rule.as_ref())
         .collect();
     rules.sort_unstable();
     let most = rules
@@ -298,7 +249,7 @@ pub(crate) fn weight_of_exclusions(
         .map(|group| format!(" (most often, {} times: {})", group.len(), group[0]))
         .unwrap_or_default();
     Some(format!(
-        "the RMSE stands on what was left out: leaving out {left_out} of {} located presses{most} changes it {change}",
+        "the RMSE depends on the exclusions: excluding {left_out} of {} located presses{most} changes it {change}",
         without.n
     ))
 }
@@ -313,11 +264,11 @@ pub fn count(presses: &[PressResult]) -> PressCounts {
             continue;
         }
         counts.planned += 1;
-        match press.verdict.as_str() {
-            "valid" => counts.valid += 1,
-            "missed" => counts.missed += 1,
-            "invalid" => counts.invalid += 1,
-            _ => counts.excluded += 1,
+        match press.verdict {
+            Verdict::Valid => counts.valid += 1,
+            Verdict::Missed => counts.missed += 1,
+            Verdict::Invalid => counts.invalid += 1,
+            Verdict::Excluded => counts.excluded += 1,
         }
     }
     counts
@@ -340,25 +291,22 @@ mod tests {
         assert_eq!(
             rule(LocationOutcome::Located { at, sine: -0.0499 }, &settings),
             Some(Judgement::excluded(
-                "nearly parallel rays".to_owned(),
+                Rule::NearlyParallelRays,
                 "nearly parallel rays: sine 0.0499 < 0.05".to_owned()
             ))
         );
         let rule = |outcome: LocationOutcome, s: &AnalysisSettings| rule(outcome, s)?.rule;
         let outside = LocationOutcome::Outside { at, sine: 0.5 };
-        assert_eq!(
-            rule(outside, &settings).as_deref(),
-            Some("outside the skin outline")
-        );
+        assert_eq!(rule(outside, &settings), Some(Rule::OutsideOutline));
         settings.exclude_outside = false;
         assert_eq!(rule(outside, &settings), None);
         assert_eq!(
-            rule(LocationOutcome::Behind { sine: 0.5 }, &settings).as_deref(),
-            Some("behind camera")
+            rule(LocationOutcome::Behind { sine: 0.5 }, &settings),
+            Some(Rule::BehindCamera)
         );
         assert_eq!(
-            rule(LocationOutcome::Parallel { sine: 0.0 }, &settings).as_deref(),
-            Some("parallel rays")
+            rule(LocationOutcome::Parallel { sine: 0.0 }, &settings),
+            Some(Rule::ParallelRays)
         );
     }
 
@@ -418,34 +366,22 @@ mod tests {
         assert_eq!(
             judge(PressRole::Score, 33, 32),
             Judgement::excluded(
-                "no response (camera 2)".to_owned(),
+                Rule::NoResponse(CameraId::Two),
                 "no response: 32 events, 10 ± 4 expected at the idle rate (camera 2)".to_owned()
             )
         );
         assert_eq!(
             judge(PressRole::Calibrate, 33, 19),
             Judgement::excluded(
-                "too few cluster events (camera 2)".to_owned(),
+                Rule::FewClusterEvents(CameraId::Two),
                 "too few cluster events: 19 < 20 (camera 2)".to_owned()
             )
         );
         assert_eq!(judge(PressRole::Sync, 0, 0), Judgement::VALID);
         let by_hand = judge(PressRole::Score, 33, 33).or_by_hand();
-        assert_eq!(by_hand.rule.as_deref(), Some("by hand"));
-        let lost = Judgement::invalid("data lost");
+        assert_eq!(by_hand.rule, Some(Rule::ByHand));
+        let lost = Judgement::invalid(Rule::DataLost(CameraId::One));
         assert_eq!(lost.clone().or_by_hand(), lost);
-    }
-
-    #[test]
-    fn a_rule_of_the_journal_has_no_numbers_but_a_camera() {
-        assert_eq!(
-            without_numbers("settled -0.31 mm from plan, limit 0.10. Robot-3 lost: camera 2"),
-            "settled … mm from plan, limit …. Robot-… lost: camera 2"
-        );
-        assert_eq!(
-            without_numbers("the run was stopped"),
-            "the run was stopped"
-        );
     }
 
     #[test]
@@ -456,14 +392,14 @@ mod tests {
             high: ends.map(|e| e.1),
             n,
         };
-        let weight = |a: &Estimate, b: &Estimate| weight_of_exclusions(&[], [a, b]);
+        let weight = |a: &Estimate, b: &Estimate| exclusion_warning(&[], [a, b]);
         let with = estimate(Some(0.17), 90, Some((0.16, 0.18)));
         let all = |value| estimate(Some(value), 100, None);
         assert_eq!(weight(&with, &all(0.175)), None);
         assert_eq!(
             weight(&with, &all(5.43)).as_deref(),
             Some(
-                "the RMSE stands on what was left out: leaving out 10 of 100 located presses changes it \
+                "the RMSE depends on the exclusions: excluding 10 of 100 located presses changes it \
                  from 5.43 mm to 0.17 mm, more than its 95 % interval"
             )
         );

@@ -1,15 +1,15 @@
-//! How wide a touch is in a camera's picture, whatever the noise.
+//! Width of a press in a camera's image, corrected for noise.
 
 use crate::grid::PixelGrid;
 use crate::segment::Window;
 
-/// A press must add this many standard errors of its count to tell a width.
-const LEAST_SIGMAS: f64 = 10.0;
+/// Minimum number of added events in standard errors of the count.
+const MIN_SIGMAS: f64 = 10.0;
 
-/// Columns of the narrowest stretch that holds half of the events that a press added to the idle rate, px.
+/// Width of the narrowest range of columns with half of the events that a press added to the idle rate, px.
 ///
-/// The idle rate is taken to be spread evenly over the columns. `None` when the press added fewer events than ten standard
-/// errors of the count.
+/// Assumes an idle rate that is uniform over the columns. `None` if the press added fewer events than ten standard errors of
+/// the count.
 pub(crate) fn width_u(grid: &PixelGrid, idle_events: u64, window: &Window) -> Option<f64> {
     let idle = if window.idle_s() > 0.0 {
         idle_events as f64 * window.length_s() / window.idle_s()
@@ -18,7 +18,7 @@ pub(crate) fn width_u(grid: &PixelGrid, idle_events: u64, window: &Window) -> Op
     };
     let events = f64::from(grid.events());
     let added = events - idle;
-    if added < LEAST_SIGMAS * (events + idle).sqrt().max(1.0) {
+    if added < MIN_SIGMAS * (events + idle).sqrt().max(1.0) {
         return None;
     }
     let each = idle / PixelGrid::WIDTH as f64;
@@ -26,10 +26,9 @@ pub(crate) fn width_u(grid: &PixelGrid, idle_events: u64, window: &Window) -> Op
     shortest(&columns, added / 2.0).map(|columns| columns as f64)
 }
 
-/// Length of the shortest stretch whose sum is at least `wanted`, above 0.
+/// Length of the shortest range whose sum is at least `wanted`, above 0.
 ///
-/// Candidates for its beginning are kept by rising sums before them: a later beginning with a smaller sum before it beats
-/// every earlier one.
+/// Candidate starts are kept by increasing prefix sum: a later start with a smaller prefix sum beats every earlier one.
 fn shortest(values: &[f64], wanted: f64) -> Option<usize> {
     let mut sums = Vec::with_capacity(values.len() + 1);
     let mut sum = 0.0;
@@ -86,9 +85,9 @@ mod tests {
     #[test]
     fn noise_does_not_widen_a_touch() {
         assert_eq!(width_u(&touched(0), 0, &window()), Some(10.0));
-        // As many events again per column as the noise brings, in an idle time as long as the window.
+        // As many additional events per column as the noise brings, in an idle time as long as the window.
         assert_eq!(width_u(&touched(20), 640 * 20, &window()), Some(10.0));
-        // Without the idle rate the noise takes part.
+        // Without the idle rate the noise counts.
         assert!(width_u(&touched(20), 0, &window()).unwrap() > 100.0);
     }
 

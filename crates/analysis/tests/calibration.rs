@@ -1,11 +1,11 @@
-//! Calibration: planted geometries come back, outliers and hopeless presses do no harm, roles stay apart.
+//! Calibration: recovers planted geometries, tolerates outliers and unusable presses, keeps roles separate.
 
-use skinrig_analysis::calibrate::{affordable_model, calibrate};
+use skinrig_analysis::calibrate::{calibrate, largest_supported_model};
 use skinrig_analysis::result::{LocationOutcome, PressResult, PressView};
 use skinrig_analysis::sets::{CalibrationSet, ScoreSet};
 use skinrig_analysis::triangulate::intersect;
 use skinrig_model::{
-    CalibrationModel, LocationId, Point2, PressId, PressRole, RepetitionId, StereoGeometry,
+    CalibrationModel, LocationId, Point2, PressId, PressRole, RepetitionId, StereoGeometry, Verdict,
 };
 
 const PLANTED: [f64; 8] = [
@@ -37,7 +37,7 @@ fn row(id: u32, role: PressRole, truth: Point2, columns: [f64; 2]) -> PressResul
         planned: truth,
         depth_mm: 2.0,
         truth: Some(truth),
-        verdict: "valid".to_owned(),
+        verdict: Verdict::Valid,
         reason: None,
         rule: None,
         timing: None,
@@ -120,7 +120,7 @@ fn outliers_and_presses_without_a_fix_pull_little() {
     let planted = StereoGeometry::paper_like(PLANTED);
     let mut rows = exact(&planted, 4.0);
     for i in (0..rows.len()).step_by(12) {
-        // Centroids of something else: anywhere in the image, some of them behind a camera.
+        // Unrelated centroids anywhere in the image, some of them behind a camera.
         rows[i].views = [
             view(20.0 + (i as f64 * 37.0) % 600.0),
             view(630.0 - (i as f64 * 53.0) % 600.0),
@@ -130,7 +130,7 @@ fn outliers_and_presses_without_a_fix_pull_little() {
     let (found, result) =
         calibrate(&set, &StereoGeometry::PAPER, CalibrationModel::Full, 1).unwrap();
     assert_eq!(result.n as usize, rows.len(), "every press takes part");
-    // Predicted points, not parameters: those are strongly correlated.
+    // Compare predicted points instead of parameters, which are strongly correlated.
     for p in [(10.0, 2.0), (-20.0, 20.0), (30.0, -15.0), (-15.0, -20.0)] {
         let p = Point2::new(p.0, p.1);
         let columns = planted.cameras.map(|c| c.column_of_point(p).unwrap());
@@ -150,14 +150,17 @@ fn too_few_places_get_a_smaller_model() {
         (7, CalibrationModel::PositionsSkews),
         (8, CalibrationModel::Full),
     ] {
-        // Five repetitions at the same places are no more places.
+        // Five repetitions at the same locations do not add locations.
         let few: Vec<PressResult> = (0..5).flat_map(|_| rows[..places].to_vec()).collect();
         let set = CalibrationSet::from_presses(&few);
-        assert_eq!(affordable_model(&set, CalibrationModel::Full), wanted);
+        assert_eq!(
+            largest_supported_model(&set, CalibrationModel::Full),
+            wanted
+        );
     }
     let set = CalibrationSet::from_presses(&rows);
     let positions = CalibrationModel::Positions;
-    assert_eq!(affordable_model(&set, positions), positions);
+    assert_eq!(largest_supported_model(&set, positions), positions);
 }
 
 #[test]
@@ -170,10 +173,10 @@ fn no_press_calibrates_and_scores() {
         let at = r.planned;
         r.location_outcome = LocationOutcome::Located { at, sine: 0.9 };
     }
-    rows[4].verdict = "excluded".to_owned();
-    rows[7].verdict = "invalid".to_owned();
-    rows[5].verdict = "missed".to_owned();
-    rows[8].verdict = "excluded".to_owned();
+    rows[4].verdict = Verdict::Excluded;
+    rows[7].verdict = Verdict::Invalid;
+    rows[5].verdict = Verdict::Missed;
+    rows[8].verdict = Verdict::Excluded;
     let calibration = CalibrationSet::from_presses(&rows);
     let score = ScoreSet::from_presses(&rows, &[]);
     let of = |role: PressRole| rows.iter().filter(|r| r.role == role).count();

@@ -1,4 +1,4 @@
-//! DBSCAN on pixel counts against scikit-learn's labels and against a brute-force reference on events.
+//! DBSCAN on pixel counts, compared with scikit-learn's labels and with a brute-force reference on events.
 
 use std::collections::BTreeMap;
 
@@ -17,9 +17,8 @@ fn grid_of(events: &[Event]) -> PixelGrid {
     grid
 }
 
-/// Labels per event by the definition, every pair compared; border events go to the nearest core event, of
-/// equally near ones to the first by row, then column; clusters are numbered by their first core event in that
-/// order.
+/// Labels per event by definition, comparing every pair; border events go to the nearest core event, ties to the first by
+/// row, then column; clusters are numbered by their first core event in that order.
 fn reference(events: &[Event], eps: f64, min_samples: u32) -> Vec<u32> {
     let sq = |a: Event, b: Event| {
         let d = |p: u16, q: u16| f64::from(p) - f64::from(q);
@@ -64,7 +63,7 @@ fn reference(events: &[Event], eps: f64, min_samples: u32) -> Vec<u32> {
     labels
 }
 
-/// The labels of the events by the implementation under test.
+/// Labels of the events from the implementation under test.
 fn labels(dbscan: &mut Dbscan, events: &[Event]) -> Vec<u32> {
     dbscan.run(&grid_of(events));
     let by_pixel: BTreeMap<u32, u32> = dbscan.labels().collect();
@@ -111,8 +110,8 @@ fn the_labels_are_those_of_scikit_learn() {
         let min = case["min_samples"].as_u64().unwrap() as u32;
         let mut dbscan = Dbscan::new(case["eps_px"].as_f64().unwrap(), min);
         let found = labels(&mut dbscan, &events);
-        // Cluster numbers, and the cluster of a border event between two, depend on scikit-learn's input order:
-        // compare noise for all events, and who is together with whom for all but such border events.
+        // Cluster numbers, and the cluster of a border event between two, depend on scikit-learn's input order: compare
+        // noise for all events, and cluster membership for all except such border events.
         let wanted = list("labels");
         let ambiguous = |e: &Event| name.as_str().unwrap().starts_with("border") && e.0 == 110;
         for (i, a) in events.iter().enumerate() {
@@ -200,7 +199,7 @@ proptest! {
     ) {
         let wanted = reference(&events, eps, min_samples);
         let mut dbscan = Dbscan::new(eps, min_samples);
-        // Buffers of an earlier run must not shine through.
+        // Buffers of an earlier run must have no effect.
         dbscan.run(&grid_of(&[(3, 3), (3, 4), (600, 470)]));
         prop_assert_eq!(labels(&mut dbscan, &events), wanted.clone());
         prop_assert_eq!(dbscan.clusters(), &clusters_of(&events, &wanted)[..]);

@@ -1,4 +1,4 @@
-//! Areas, taxels and contact maps against numbers worked out elsewhere.
+//! Areas, taxels and contact maps, compared with independently computed numbers.
 
 use proptest::prelude::*;
 use skinrig_analysis::cmre::ContactMap;
@@ -25,7 +25,7 @@ fn camera(at: (f64, f64), skew_deg: f64, half_fov_deg: f64, w: f64) -> CameraMod
     }
 }
 
-/// The published grid: 17 x 17 places 4 mm apart about the skin centre.
+/// The published grid: 17 x 17 locations 4 mm apart about the skin centre.
 fn grid() -> Vec<Point2> {
     let at = |i: i32| f64::from(4 * (i - 8));
     (0..289)
@@ -78,7 +78,7 @@ fn the_published_grid_stands_for_its_cells() {
     assert_eq!(probed_area_mm2(&SKIN, &places[..250], 4.0), 4000.0);
     // Cells twice as wide overlap: 68 + 4 on each axis.
     assert_eq!(probed_area_mm2(&SKIN, &places, 8.0), 72.0 * 72.0);
-    // All of the skin, its chamfers and its arcs.
+    // The whole skin, with its chamfers and arcs.
     let all = probed_area_mm2(&SKIN, &places, 60.0);
     assert!((all - SKIN.area_mm2()).abs() < 0.007, "{all}");
     assert_eq!(neighbour_distance_mm(&places[..1]), None);
@@ -106,15 +106,15 @@ fn taxels_are_the_published_ones_at_the_radius_they_need() {
             .abs()
             < 0.05
     );
-    // The interval turns over, and stays around the value.
+    // The interval is inverted, and stays around the value.
     assert!((whole.low.unwrap() - 9328.12 / (36.0 * std::f64::consts::PI)).abs() < 1e-9);
     assert!(whole.low < whole.value && whole.value < whole.high);
-    // An error of nothing makes no taxels.
+    // Zero error gives no taxels.
     assert_eq!(taxels(Some(9328.12), &estimate(0.0, 0.0, 1.0)).value, None);
     assert_eq!(taxels(None, &rmse).value, None);
 }
 
-/// Every case of the public code that was recorded: SR 5, edges -40, -35 .. 60 and -48, -43 .. 52, sigma 1 mm.
+/// Every recorded case of the public code: SR 5, edges -40, -35 .. 60 and -48, -43 .. 52, sigma 1 mm.
 #[test]
 fn contact_maps_score_as_in_the_public_code_but_for_its_two_faults() {
     let settings = CmreSettings {
@@ -192,7 +192,7 @@ fn contact_maps_without_sense_are_refused() {
     }
 }
 
-/// Points of a fine lattice over the skin's rectangle, one per `STEP_MM` squared.
+/// Spacing of the lattice over the skin's rectangle.
 const STEP_MM: f64 = 0.5;
 
 fn lattice() -> impl Iterator<Item = Point2> {
@@ -205,7 +205,7 @@ fn lattice() -> impl Iterator<Item = Point2> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
-    /// Areas against counting points that each camera has in a column, for narrow and for very wide lenses.
+    /// Compares areas with counts of points that each camera has in a column, for narrow and very wide lenses.
     #[test]
     fn views_hold_the_points_that_have_a_column(
         x in 20.0f64..58.0, y in -46.0f64..50.0, skew in -20.0f64..20.0, half in 20.0f64..170.0, w in -0.05f64..0.3,
@@ -216,7 +216,7 @@ proptest! {
         let views = [first, second].map(|c| field_of_view(&c, &skin).unwrap());
         let span = first.angle_of_column_deg(640.0) - first.angle_of_column_deg(0.0);
         prop_assert!(views[0].len() <= 1 + usize::from(span >= 180.0));
-        // By angle from the middle of the field of view, so that it does not matter where the angle wraps.
+        // By angle from the middle of the field of view, so that the wrap-around does not matter.
         let sees = |c: &CameraModel, p: Point2| {
             let (a, b) = (c.angle_of_column_deg(0.0), c.angle_of_column_deg(640.0));
             let off = (c.angle_of_point_deg(p) - (a + b) / 2.0 + 540.0).rem_euclid(360.0) - 180.0;
@@ -226,7 +226,7 @@ proptest! {
         let count = |f: &dyn Fn(Point2) -> bool| {
             inside.iter().filter(|p| f(**p)).count() as f64 * STEP_MM * STEP_MM
         };
-        // The border, at most 400 mm of it, is counted to a quarter of a step or so.
+        // The border, at most 400 mm long, is accurate to about a quarter of a step.
         let near = |exact: f64, counted: f64| (exact - counted).abs() < 0.1 * 400.0 * STEP_MM;
         let one = areas(&views[0]);
         prop_assert!(near(one, count(&|p| sees(&first, p))), "{one}");

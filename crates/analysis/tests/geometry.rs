@@ -1,4 +1,4 @@
-//! Triangulation against the answers that the public solver gets wrong, the grid, and projected points.
+//! Triangulation: the cases that the public solver gets wrong, the grid, and projected points.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -54,7 +54,7 @@ fn every_case_of_the_public_solver_comes_out_right() {
             continue;
         };
         let ranges = numbers(&case["ranges_mm"]);
-        // Far away the answer is as uncertain as 1 / sine makes it.
+        // Far away the result is as uncertain as 1 / sine.
         let slack = 1.0 / hit.sine.abs();
         for (found, wanted) in [
             (hit.at.x_mm, at[0].as_f64().unwrap()),

@@ -1,13 +1,13 @@
-//! Metrics against numbers worked out by hand, and the laws of their intervals.
+//! Metrics compared with numbers computed by hand, and properties of their intervals.
 
 use proptest::prelude::*;
 use skinrig_analysis::metrics::{Exclusions, metrics, penalised};
 use skinrig_analysis::result::{LocationOutcome, Metrics, PressResult};
 use skinrig_analysis::sets::ScoreSet;
-use skinrig_model::{LocationId, Point2, PressId, PressRole, RepetitionId, SkinOutline};
+use skinrig_model::{LocationId, Point2, PressId, PressRole, RepetitionId, SkinOutline, Verdict};
 
 /// A scored press at (10 + location, 2) whose estimate is off by `error`; `None`: no estimate.
-fn row(location: u32, error: Option<(f64, f64)>, verdict: &str) -> PressResult {
+fn row(location: u32, error: Option<(f64, f64)>, verdict: Verdict) -> PressResult {
     let truth = Point2::new(10.0 + f64::from(location), 2.0);
     PressResult {
         press: PressId::from_index(0),
@@ -17,7 +17,7 @@ fn row(location: u32, error: Option<(f64, f64)>, verdict: &str) -> PressResult {
         planned: truth,
         depth_mm: 2.0,
         truth: Some(truth),
-        verdict: verdict.to_owned(),
+        verdict,
         reason: None,
         rule: None,
         timing: None,
@@ -49,13 +49,13 @@ fn near(found: Option<f64>, wanted: f64) -> bool {
 #[test]
 fn values_are_those_of_the_definitions() {
     let rows = [
-        row(0, Some((3.0, 4.0)), "valid"),
-        row(0, Some((1.0, 0.0)), "valid"),
-        row(1, Some((0.0, -2.0)), "valid"),
-        row(1, Some((50.0, 0.0)), "excluded"),
-        row(2, None, "excluded"),
-        row(3, None, "invalid"),
-        row(4, None, "missed"),
+        row(0, Some((3.0, 4.0)), Verdict::Valid),
+        row(0, Some((1.0, 0.0)), Verdict::Valid),
+        row(1, Some((0.0, -2.0)), Verdict::Valid),
+        row(1, Some((50.0, 0.0)), Verdict::Excluded),
+        row(2, None, Verdict::Excluded),
+        row(3, None, Verdict::Invalid),
+        row(4, None, Verdict::Missed),
     ];
     let m = measure(&rows, Exclusions::Applied);
     assert!(near(m.rmse_mm.value, (30.0f64 / 3.0).sqrt()));
@@ -84,10 +84,10 @@ fn a_failure_counts_the_penalty_or_its_own_larger_error() {
     let of =
         |rows: &[PressResult], stated| penalised(&ScoreSet::from_presses(rows, &[]), stated, 0, 1);
     let rows = [
-        row(0, Some((3.0, 4.0)), "valid"),
-        row(1, Some((0.0, 12.0)), "excluded"),
-        row(2, Some((0.0, 40.0)), "excluded"),
-        row(3, None, "invalid"),
+        row(0, Some((3.0, 4.0)), Verdict::Valid),
+        row(1, Some((0.0, 12.0)), Verdict::Excluded),
+        row(2, Some((0.0, 40.0)), Verdict::Excluded),
+        row(3, None, Verdict::Invalid),
     ];
     let p = of(&rows, Some(30.0));
     assert_eq!((p.penalty_mm, p.raised, p.derived), (30.0, false, false));
@@ -96,11 +96,11 @@ fn a_failure_counts_the_penalty_or_its_own_larger_error() {
         p.rmse_mm.value,
         ((25.0 + 900.0 + 1600.0 + 900.0) / 4.0f64).sqrt()
     ));
-    // A penalty below what failures really are is raised to the RMSE of all estimates.
+    // A penalty below the actual errors is raised to the RMSE of all estimates.
     let p = of(&rows, Some(1.0));
     let all = ((25.0 + 144.0 + 1600.0) / 3.0f64).sqrt();
     assert!((p.penalty_mm - all).abs() < 1e-12 && p.raised);
-    // Locations 1 mm apart: an answer that knows nothing would be better than these.
+    // Locations 1 mm apart: a blind guess would be better than these estimates.
     assert!(of(&rows, None).raised && of(&rows, None).derived);
     assert!(of(&rows[..1], None).rmse_mm.value.is_some() && of(&[], None).rmse_mm.value.is_none());
 }
@@ -112,11 +112,14 @@ fn too_few_presses_give_no_number_instead_of_a_false_one() {
         (m.rmse_mm.value, m.rmse_mm.n, m.located_rate.value),
         (None, 0, None)
     );
-    let m = measure(&[row(0, None, "excluded")], Exclusions::Applied);
+    let m = measure(&[row(0, None, Verdict::Excluded)], Exclusions::Applied);
     assert_eq!((m.rmse_mm.value, m.median_mm.value), (None, None));
     assert_eq!((m.located_rate.value, m.located_rate.n), (Some(0.0), 1));
     // One location: a value, but nothing to resample.
-    let m = measure(&[row(0, Some((1.0, 1.0)), "valid")], Exclusions::Applied);
+    let m = measure(
+        &[row(0, Some((1.0, 1.0)), Verdict::Valid)],
+        Exclusions::Applied,
+    );
     assert!(
         m.rmse_mm.value.is_some() && m.rmse_mm.low.is_none() && m.repeat_std_mm.value.is_none()
     );
@@ -126,22 +129,22 @@ fn too_few_presses_give_no_number_instead_of_a_false_one() {
 fn what_always_or_never_happened_has_the_exact_interval_over_locations() {
     // Two presses at each of four places, all located, none within 5 mm.
     let rows: Vec<_> = (0..8)
-        .map(|i| row(i / 2, Some((6.0, 0.0)), "valid"))
+        .map(|i| row(i / 2, Some((6.0, 0.0)), Verdict::Valid))
         .collect();
     let m = measure(&rows, Exclusions::Applied);
     let end = 0.025f64.powf(1.0 / 4.0);
     assert!(near(m.located_rate.low, end) && m.located_rate.high == Some(1.0));
     assert!(m.within_rate.low == Some(0.0) && near(m.within_rate.high, 1.0 - end));
-    // A mean of 0 is no share.
+    // A mean of 0 is not a share.
     assert_eq!((m.bias_y_mm.low, m.bias_y_mm.high), (Some(0.0), Some(0.0)));
 }
 
 #[test]
 fn depths_are_not_repetitions_of_each_other() {
-    let mut deep = row(0, Some((5.0, 0.0)), "valid");
+    let mut deep = row(0, Some((5.0, 0.0)), Verdict::Valid);
     deep.depth_mm = 4.0;
     let m = measure(
-        &[row(0, Some((0.0, 0.0)), "valid"), deep],
+        &[row(0, Some((0.0, 0.0)), Verdict::Valid), deep],
         Exclusions::Applied,
     );
     assert_eq!(m.repeat_std_mm.value, None);
@@ -162,7 +165,7 @@ fn the_interval_covers_as_often_as_it_says() {
     let covered = (0..120)
         .filter(|_| {
             let rows: Vec<PressResult> = (0..60)
-                .map(|i| row(i, Some((3.0 * normal(), 3.0 * normal())), "valid"))
+                .map(|i| row(i, Some((3.0 * normal(), 3.0 * normal())), Verdict::Valid))
                 .collect();
             let m = measure(&rows, Exclusions::Applied).rmse_mm;
             let truth = 3.0 * 2f64.sqrt();
@@ -173,14 +176,14 @@ fn the_interval_covers_as_often_as_it_says() {
 }
 
 proptest! {
-    /// Whatever becomes of the presses and whatever the settings say of failures.
+    /// For any outcome of the presses and any penalty setting.
     #[test]
     fn counting_failures_never_lowers_the_rmse(
         presses in prop::collection::vec(
             (0u32..12, prop::option::of((-150.0f64..150.0, -150.0f64..150.0)), 0usize..4, -6.0f64..4.0), 1..40),
         stated in prop::option::of(1e-3f64..200.0),
     ) {
-        let verdicts = ["valid", "excluded", "invalid", "missed"];
+        let verdicts = [Verdict::Valid, Verdict::Excluded, Verdict::Invalid, Verdict::Missed];
         let rows: Vec<PressResult> = presses.iter()
             .map(|(location, error, verdict, log)| {
                 let scale = 10f64.powf(*log);
@@ -203,7 +206,7 @@ proptest! {
         errors in prop::collection::vec((-20.0f64..20.0, -20.0f64..20.0), 4..30), copies in 2usize..5,
     ) {
         let rows: Vec<PressResult> =
-            errors.iter().zip(0..).map(|(e, i)| row(i, Some(*e), "valid")).collect();
+            errors.iter().zip(0..).map(|(e, i)| row(i, Some(*e), Verdict::Valid)).collect();
         let m = measure(&rows, Exclusions::Applied);
         for e in [m.rmse_mm, m.rmse_x_mm, m.rmse_y_mm, m.bias_x_mm, m.median_mm, m.p95_mm] {
             prop_assert!(e.low <= e.high);
@@ -211,7 +214,7 @@ proptest! {
         }
         let (x, y, r) = (m.rmse_x_mm.value.unwrap(), m.rmse_y_mm.value.unwrap(), m.rmse_mm.value.unwrap());
         prop_assert!((x * x + y * y - r * r).abs() < 1e-9 * (1.0 + r * r));
-        // The same presses several times at the same places tell nothing new.
+        // Repeating the same presses at the same locations adds no information.
         let repeated: Vec<PressResult> = (0..copies).flat_map(|_| rows.clone()).collect();
         let again = measure(&repeated, Exclusions::Applied);
         prop_assert!((again.rmse_mm.low.unwrap() - m.rmse_mm.low.unwrap()).abs() < 1e-9);

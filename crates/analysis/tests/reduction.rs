@@ -7,7 +7,7 @@ mod support;
 
 use skinrig_analysis::reference_code::reference_code;
 use skinrig_analysis::result::{Analysis, Estimate, ReductionRow, Thinning};
-use skinrig_analysis::{Keep, SessionInput, analyze, analyze_and_keep, reduction};
+use skinrig_analysis::{Retention, SessionInput, analyze, analyze_with_events, reduction};
 use skinrig_model::PressRole;
 
 use support::{Memory, session};
@@ -164,7 +164,7 @@ fn a_rule_on_the_data_keeps_a_press_in_the_study_and_a_hand_does_not() {
 #[test]
 fn threads_do_not_matter_and_seeds_do() {
     let (input, source) = small();
-    let (mut a, kept) = analyze_and_keep(&input, &source, Keep::Scored).unwrap();
+    let (mut a, kept) = analyze_with_events(&input, &source, Retention::Scored).unwrap();
     let with_threads = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
         pool.build()
@@ -213,7 +213,7 @@ fn the_published_way_judges_the_first_repetition_and_counts_nothing_as_missing()
     input.settings.centroid = skinrig_model::CentroidRule::AllClusters;
     // What it calibrates on is then what this session calibrates on.
     input.settings.calibration = skinrig_model::CalibrationModel::Full;
-    let (a, kept) = analyze_and_keep(&input, &source, Keep::All).unwrap();
+    let (a, kept) = analyze_with_events(&input, &source, Retention::All).unwrap();
     let r = reference_code(&input, &a, &kept);
     assert_eq!((r.presses, r.with_centroids, r.inside), (25, 25, 25));
     assert!(r.calibrated);
@@ -241,14 +241,14 @@ fn the_published_way_judges_the_first_repetition_and_counts_nothing_as_missing()
     // 23 of 25 lie below their own 95th percentile.
     assert!(near(r.reduction[0].pass_rate, 23.0 / 25.0));
     // Kept for the scored repetition alone there is nothing to thin.
-    let (_, scored) = analyze_and_keep(&input, &source, Keep::Scored).unwrap();
+    let (_, scored) = analyze_with_events(&input, &source, Retention::Scored).unwrap();
     assert_eq!(reference_code(&input, &a, &scored).reduction, []);
     // Presses left out by hand are not judged, those that a schedule does not use are not there at all.
     input.settings.exclude_press_numbers = vec![a.presses[3].press];
     if let Some(outcome) = &mut input.outcomes[4] {
         outcome.verdict = skinrig_model::PressVerdict::Excluded("not used".to_owned());
     }
-    let (a, kept) = analyze_and_keep(&input, &source, Keep::All).unwrap();
+    let (a, kept) = analyze_with_events(&input, &source, Retention::All).unwrap();
     let r = reference_code(&input, &a, &kept);
     assert_eq!((r.presses, r.inside), (23, 23));
     assert!(near(r.reduction[0].pass_rate, 22.0 / 24.0));

@@ -137,7 +137,7 @@ fn read_summary(path: &Path) -> Result<Summary, String> {
         std::io::ErrorKind::NotFound => NOT_THERE.to_owned(),
         _ => e.to_string(),
     })?;
-    let older = || "results of an older skinrig: analyze it again".to_owned();
+    let older = || "results of an older skinrig: analyze the session again".to_owned();
     let length = file.metadata().map_err(|e| e.to_string())?.len();
     let from = SeekFrom::Start(length.saturating_sub(TAIL_BYTES));
     let mut tail = Vec::new();
@@ -153,7 +153,7 @@ fn read_summary(path: &Path) -> Result<Summary, String> {
 }
 
 /// An analysis that lies beside a session.
-pub struct Listed {
+pub struct AnalysisFile {
     /// Its name; `None`: the official one.
     pub name: Option<String>,
     /// Its file of results.
@@ -163,8 +163,8 @@ pub struct Listed {
 }
 
 /// The analyses beside a session, the official one first, then by name.
-pub fn all(session: &Path, session_id: &str) -> Vec<Listed> {
-    let listed = |name: Option<String>| Listed {
+pub fn all(session: &Path, session_id: &str) -> Vec<AnalysisFile> {
+    let listed = |name: Option<String>| AnalysisFile {
         results: results_path(session, name.as_deref()),
         summary: summary(session, session_id, name.as_deref()),
         name,

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 use skinrig_evk1::FoundState;
-use skinrig_hil::lease::{self, Standing};
+use skinrig_hil::lease::{self, LeaseState};
 use skinrig_omega3::enumerate::{Availability, SERIAL_UNKNOWN};
 use skinrig_omega3::load::LoadError;
 use skinrig_protocol::rig::{RigFile, RigKind};
@@ -128,7 +128,7 @@ fn robots(rig: Option<&RigFile>) -> Vec<Line> {
                 LoadError::Absent(tried) => format!("libdrd not found in {} places", tried.len()),
                 other => other.to_string(),
             };
-            let next = "install Force Dimension's SDK (3.10 or newer is advised) and name its libdrd in the rig file or in SKINRIG_LIBDRD; everything else works without";
+            let next = "install Force Dimension's SDK (3.10 or newer is advised) and name its libdrd in the rig file or in SKINRIG_LIBDRD; everything else works without it";
             return vec![line(
                 "omega.3 library",
                 "absent",
@@ -358,7 +358,7 @@ fn trigger_boxes(rig: Option<&RigFile>) -> Vec<Line> {
             detail: "not opened, which would reset it".to_owned(),
             role: Some("trigger_box".to_owned()),
             next_step: Some(format!(
-                "let the bench become free: held by {holder}; `skinrig hil lease` shows it"
+                "wait until the bench is free: {holder} holds it; see `skinrig hil lease`"
             )),
             ..Line::default()
         });
@@ -370,14 +370,14 @@ fn trigger_boxes(rig: Option<&RigFile>) -> Vec<Line> {
         skinrig_trigger_box::enumerate(open.map(std::slice::from_ref).unwrap_or_default(), hello)
     {
         use skinrig_trigger_box::OpenError;
-        use skinrig_trigger_box::greeting::GreetingError;
+        use skinrig_trigger_box::handshake::HandshakeError;
         let (state, detail) = match &found.state {
             PortState::Ready(identity) => ("ready", format!("firmware {}", identity.firmware)),
             PortState::Closed(OpenError::Absent(_)) => ("absent", String::new()),
             PortState::Closed(OpenError::Busy(_)) => ("busy", String::new()),
             PortState::Closed(OpenError::NotPermitted(_)) => ("not permitted", String::new()),
             PortState::Closed(_) => ("faulty", String::new()),
-            PortState::Unusable(GreetingError::WrongFirmware {
+            PortState::Unusable(HandshakeError::WrongFirmware {
                 firmware, protocol, ..
             }) => (
                 "other firmware",
@@ -419,8 +419,8 @@ fn trigger_boxes(rig: Option<&RigFile>) -> Vec<Line> {
 
 /// Who holds the lease of the bench at this moment.
 fn holder(rig: &RigFile) -> Option<String> {
-    match lease::look(&path(rig)) {
-        Ok(Standing::Held { owner, .. }) => Some(holder_of(owner.as_deref())),
+    match lease::inspect(&path(rig)) {
+        Ok(LeaseState::Held { owner, .. }) => Some(holder_of(owner.as_deref())),
         _ => None,
     }
 }

@@ -96,7 +96,7 @@ impl Failure {
 
     /// A session that could not be read: bad input, unless it was the machine that failed.
     pub fn session(error: RecorderError) -> Self {
-        if error.is_of_the_machine() {
+        if error.is_system_failure() {
             Self::internal(error)
         } else {
             Self::input(error)

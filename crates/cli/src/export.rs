@@ -54,7 +54,7 @@ fn folder(args: &ExportArgs, ending: &str) -> Result<Folder, Failure> {
     // A link in its place, in a folder from a stranger, would lead anywhere.
     if args.out.is_none() && path.is_symlink() {
         return Err(Failure::internal(format!(
-            "{}: expected a folder or nothing there, found a link\n  next: choose another folder with --out",
+            "{}: expected a folder or a new path, found a link\n  next: choose another folder with --out",
             path.display()
         )));
     }
@@ -180,11 +180,11 @@ fn one_kind(
     match kind {
         ExportKind::Parquet => {
             let mut to = ParquetFiles::new(folder);
-            all(&mut to).map(|()| to.written())
+            all(&mut to).map(|()| to.into_paths())
         }
         ExportKind::Csv => {
             let mut to = CsvFiles::new(folder);
-            all(&mut to).map(|()| to.written())
+            all(&mut to).map(|()| to.into_paths())
         }
         ExportKind::Npz => {
             let mut to = NpzFile::create(folder)?;
@@ -209,7 +209,7 @@ fn cameras(
     write: impl Fn(CameraId, &Path) -> Result<(), ExportError>,
 ) -> Result<Vec<PathBuf>, ExportError> {
     let each = CameraId::ALL.into_iter();
-    each.map(|camera| folder.whole(&camera_ending(camera, end), |path| write(camera, path)))
+    each.map(|camera| folder.write_atomic(&camera_ending(camera, end), |path| write(camera, path)))
         .collect()
 }
 
@@ -229,7 +229,7 @@ pub fn derived(
     let (json, html) = results::documents(&results)?;
     let mut written = Vec::new();
     for (ending, text) in [(".results.json", json), (".report.html", html)] {
-        let file = folder.whole(ending, |to| {
+        let file = folder.write_atomic(ending, |to| {
             std::fs::write(to, &text).map_err(|e| ExportError::File {
                 path: to.to_owned(),
                 found: e.to_string(),
@@ -281,7 +281,7 @@ fn bundle(
     }
     folder.check_free(&names).map_err(refused)?;
     let copy = |from: &Path, ending: &str| {
-        folder.whole(ending, |to| {
+        folder.write_atomic(ending, |to| {
             let copied = std::fs::copy(from, to);
             copied.map(drop).map_err(|e| ExportError::File {
                 path: to.to_owned(),

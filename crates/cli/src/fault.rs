@@ -2,14 +2,16 @@
 //!
 //! Gone means at once and without a word, as by `kill -9` or a power cut: no thread goes on, nothing is closed.
 
+use std::sync::Arc;
+
 use skinrig_controller::SinkFault;
 use skinrig_model::Record;
 use skinrig_protocol::{FaultKind, FaultPhase, FaultTime, PlantedFault};
-use skinrig_recorder::RecorderError;
+use skinrig_recorder::{RecorderError, WriteFailure};
 
 /// Counts the records of a run and makes its faults.
 #[derive(Debug, Clone, Default)]
-pub struct Saboteur {
+pub struct FaultInjector {
     faults: Vec<PlantedFault>,
     records: u32,
     journal: u32,
@@ -17,7 +19,7 @@ pub struct Saboteur {
     full: bool,
 }
 
-impl Saboteur {
+impl FaultInjector {
     /// Makes those of these faults that meet records.
     #[must_use]
     pub fn new(faults: &[PlantedFault]) -> Self {
@@ -62,7 +64,7 @@ impl Saboteur {
             }
         }
         if self.full {
-            return Err(SinkFault::Refused(full()));
+            return Err(SinkFault::Rejected(format!("writing a record: {FULL}")));
         }
         Ok(())
     }
@@ -78,16 +80,20 @@ impl Saboteur {
             gone();
         }
         if self.full {
-            return Err(RecorderError::Failed(full()));
+            return Err(RecorderError::WriteFailed(WriteFailure::System(Arc::new(
+                RecorderError::Io {
+                    path: "session".into(),
+                    doing: "writing a record",
+                    source: std::io::Error::other(FULL),
+                },
+            ))));
         }
         Ok(())
     }
 }
 
-/// What SQLite says of a full disk.
-fn full() -> String {
-    "writing a record: database or disk is full (a fault on purpose)".to_owned()
-}
+/// SQLite's message for a full disk.
+const FULL: &str = "database or disk is full (a fault on purpose)";
 
 /// Ends the process without unwinding.
 fn gone() -> ! {

@@ -48,8 +48,6 @@ mod whole_file;
 
 use std::ffi::OsString;
 
-use clap::Parser;
-
 use crate::args::{Cli, Command};
 use crate::exit::{Exit, Outcome};
 
@@ -57,7 +55,7 @@ use crate::exit::{Exit, Outcome};
 pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     signals::take_file_limits_as_errors();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
-    let cli = match Cli::try_parse_from(tag::spelled_out(arguments.clone())) {
+    let cli = match args::parse(tag::spelled_out(arguments.clone())) {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version are not errors; clap prints them to standard output.

@@ -90,7 +90,7 @@ fn gather(sessions: &[SessionSummary], analysis: Option<&str>) -> Vec<Prototype>
             prototype,
             protocol_name,
             rig_kind,
-            sayings,
+            annotations,
             ..
         } = &session.state
         else {
@@ -114,7 +114,7 @@ fn gather(sessions: &[SessionSummary], analysis: Option<&str>) -> Vec<Prototype>
         groups.entry(key).or_default().push(Point {
             session: session.path.clone(),
             started_at: started_at.clone(),
-            tags: sayings.tags.iter().cloned().collect(),
+            tags: annotations.tags.iter().cloned().collect(),
             rmse_mm,
             without,
             variant,

@@ -5,9 +5,8 @@ use chrono::DateTime;
 use skinrig_analysis::Analysis;
 use skinrig_model::{HostTime, PressVerdict, RunEnd, RunHeader, Setting};
 use skinrig_recorder::{RecorderError, SessionReader};
-use skinrig_report::{
-    DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakenRow,
-};
+use skinrig_report::{DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakeRow};
+use skinrig_results::Origin;
 
 /// Reads the provenance block of a session.
 ///
@@ -33,7 +32,7 @@ pub fn provenance(
             "not ended".to_owned(),
             Some(match skinrig_recorder::writer_of(reader.path()) {
                 Some(writer) => format!("the run is under way, {writer} writes it"),
-                None => "the run was cut off; `skinrig resume` goes on with it".to_owned(),
+                None => "the run was cut off; `skinrig resume` continues it".to_owned(),
             }),
         ),
         Some((_, end)) => {
@@ -75,6 +74,7 @@ pub fn provenance(
             time: loss.time,
         }));
     }
+    let origin = Origin::of(header);
     Ok(Provenance {
         session_id: reader.session_id()?,
         started: header.started_at.clone(),
@@ -88,9 +88,8 @@ pub fn provenance(
         seed: header.seed,
         rig_kind: header.rig_kind.clone(),
         rig_name: rig_name(reader, header)?,
-        simulated: header.rig_name.contains("simulated"),
-        // A replay keeps the name, not the kind.
-        emulated: header.rig_kind == "emulated" || header.rig_name.contains("emulated"),
+        simulated: origin == Some(Origin::Simulated),
+        emulated: origin == Some(Origin::Emulated),
         preflight: reader.preflight()?,
         devices,
         software: header.software.clone(),
@@ -158,7 +157,7 @@ fn legs(reader: &SessionReader, header: &RunHeader) -> Result<Vec<LegRow>, Recor
 }
 
 /// Attempts that were made, did not end well, and were replaced: sync presses that a further leg makes anew are none.
-fn retaken(reader: &SessionReader) -> Result<Vec<RetakenRow>, RecorderError> {
+fn retaken(reader: &SessionReader) -> Result<Vec<RetakeRow>, RecorderError> {
     let mut rows = Vec::new();
     for (planned, attempts) in reader.presses()? {
         let replaced = attempts
@@ -172,7 +171,7 @@ fn retaken(reader: &SessionReader) -> Result<Vec<RetakenRow>, RecorderError> {
             let reason = verdict
                 .and_then(PressVerdict::reason)
                 .unwrap_or("no outcome");
-            rows.push(RetakenRow {
+            rows.push(RetakeRow {
                 press: planned.id.number(),
                 attempt: attempt.id.number,
                 reason: reason.to_owned(),

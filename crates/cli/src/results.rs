@@ -7,7 +7,7 @@ use skinrig_analysis::tradeoff::Tradeoff;
 use skinrig_analysis::{Analysis, LegStart};
 use skinrig_recorder::SessionReader;
 use skinrig_report::{Provenance, ReportInput, Variant};
-use skinrig_results::{Aligned, Analyzed, Session};
+use skinrig_results::{AlignedSession, AnalyzedSession, Session};
 
 use crate::analyses;
 use crate::args::{AnalyzeArgs, ReportArgs};
@@ -54,8 +54,8 @@ pub struct Choices<'a> {
 }
 
 impl<'a> Choices<'a> {
-    const fn of_session(&self) -> skinrig_results::Choices<'a> {
-        skinrig_results::Choices {
+    const fn of_session(&self) -> skinrig_results::AnalysisOptions<'a> {
+        skinrig_results::AnalysisOptions {
             overrides: self.overrides,
             reference_code: self.reference_code,
         }
@@ -78,11 +78,11 @@ fn variant(choices: Choices<'_>) -> Variant {
 pub(crate) fn open(
     path: &Path,
     choices: Choices<'_>,
-) -> Result<(Aligned, Option<Variant>), Failure> {
+) -> Result<(AlignedSession, Option<Variant>), Failure> {
     let session = Session::open(path, choices.of_session())?;
     let changes = session.is_changed || choices.name.is_some();
     let variant = changes.then(|| variant(choices));
-    Ok((session.recorded()?.align(), variant))
+    Ok((session.read_input()?.align(), variant))
 }
 
 /// Analyses a session, with the settings it was recorded with or with others.
@@ -91,7 +91,7 @@ pub(crate) fn open(
 /// [`Failure::input`] for files that are no readable session or settings that do not parse.
 pub fn analyze_session(path: &Path, choices: Choices<'_>) -> Result<Results, Failure> {
     let (aligned, variant) = open(path, choices)?;
-    let Analyzed {
+    let AnalyzedSession {
         session,
         legs,
         analysis,

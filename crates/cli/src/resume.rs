@@ -17,21 +17,21 @@ use skinrig_recorder::{DeviceRow, RecorderError, SessionReader, SessionWriter};
 
 use crate::args::ResumeArgs;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::fault::Saboteur;
+use crate::fault::FaultInjector;
 use crate::hil::lease;
 use crate::host::host_name;
 use crate::paths;
 use crate::progress::ProgressView;
-use crate::rig::tolerated::Tolerated;
+use crate::rig::tolerated::ToleratedMismatches;
 use crate::rig::{self, bench, gates, planted};
 use crate::run::{close, conclude};
 use crate::signals::Operator;
-use crate::sink::{Foreknowledge, SessionSink};
+use crate::sink::{ReplayExpectations, SessionSink};
 use skinrig_results::Rescan;
 use skinrig_results::RigDocument;
 
 /// An unfinished session as it lies there.
-struct Unfinished {
+struct UnfinishedSession {
     header: RunHeader,
     document: RigDocument,
     plan: Plan,
@@ -50,7 +50,7 @@ pub fn resume(args: &ResumeArgs, command_line: &str, json: bool) -> Outcome {
     let session = &args.session;
     // From here on nobody else writes it, and it is what was recorded.
     let writer = match SessionWriter::resume(session, &mut Rescan::default()) {
-        Err(RecorderError::Completed { .. }) => return only_seal(session),
+        Err(RecorderError::AlreadyCompleted { .. }) => return only_seal(session),
         opened => opened.map_err(refusal)?,
     };
     let found = read(session)?;
@@ -93,7 +93,7 @@ fn refusal(error: RecorderError) -> Failure {
         } => {
             let name = path.display();
             let mut words = format!(
-                "{name}: expected a sound session to go on with, found {} problem(s)",
+                "{name}: expected a sound session to continue, found {} problem(s)",
                 problems.len() as u64 + more_problems
             );
             for problem in &problems {
@@ -104,7 +104,7 @@ fn refusal(error: RecorderError) -> Failure {
                 words += &format!("\n  and {more_problems} more");
             }
             words += &format!(
-                "\n  nothing was changed\n  next: `skinrig salvage {name}` copies what is whole into a new session"
+                "\n  nothing was changed\n  next: `skinrig salvage {name}` copies the intact part into a new session"
             );
             Failure::limit(words)
         }
@@ -121,13 +121,13 @@ fn nothing_left(session: &Path, end: &RunEnd) -> String {
         }
     };
     format!(
-        "{0}: expected presses that are still to be made, found none; the run ended {reason}\n  next: see to that, then `skinrig analyze {0}`",
+        "{0}: expected presses left to make, found none; the run ended {reason}\n  next: resolve that, then `skinrig analyze {0}`",
         session.display()
     )
 }
 
 /// Reads what a further leg needs, and refuses what none can have.
-fn read(session: &Path) -> Result<Unfinished, Failure> {
+fn read(session: &Path) -> Result<UnfinishedSession, Failure> {
     let refused = |expected: &str, found: String, next: &str| {
         let session = session.display();
         Failure::input(format!(
@@ -140,7 +140,7 @@ fn read(session: &Path) -> Result<Unfinished, Failure> {
         return Err(refused(
             "a session that a rig recorded",
             format!(
-                "one that was {}: there is nothing to press",
+                "one that was {}: there are no presses to make",
                 header.rig_kind
             ),
             "import or replay the recording again",
@@ -178,7 +178,7 @@ fn read(session: &Path) -> Result<Unfinished, Failure> {
         ))
     };
     let (histories, devices, end, legs) = all().map_err(Failure::session)?;
-    Ok(Unfinished {
+    Ok(UnfinishedSession {
         header,
         document,
         plan,
@@ -190,7 +190,7 @@ fn read(session: &Path) -> Result<Unfinished, Failure> {
 }
 
 /// What is there and what will be done, for people.
-fn describe(session: &Path, found: &Unfinished, wanted: &[bool]) -> String {
+fn describe(session: &Path, found: &UnfinishedSession, wanted: &[bool]) -> String {
     let ended = match &found.end {
         None => "cut off".to_owned(),
         Some(RunEnd::Stopped(reason)) => format!("stopped: {reason}"),
@@ -241,7 +241,7 @@ fn names(presses: &[&PlannedPress]) -> String {
 /// Opens the rig of the session and presses what is left.
 fn go_on(
     args: &ResumeArgs,
-    found: &Unfinished,
+    found: &UnfinishedSession,
     wanted: &[bool],
     header: ResumeHeader,
     writer: SessionWriter,
@@ -258,12 +258,12 @@ fn go_on(
     let expected = skinrig_model::HostDuration::from_secs_f64(rest.summary().duration_s);
     let view = ProgressView::resumed(&found.plan.presses, &found.histories, wanted, expected);
     let folder = paths::folder_of(&args.session);
-    let sink = SessionSink::new(writer, view, Foreknowledge::default());
+    let sink = SessionSink::new(writer, view, ReplayExpectations::default());
     let mut sink = sink
         .on_disk_of(folder)
         .controlled(&args.session, operator.control())
         .with_notes(notes)
-        .with_faults(Saboteur::new(&args.faults));
+        .with_faults(FaultInjector::new(&args.faults));
     let settings = bench::settings(&rig.kind);
     let run = Run::with_settings(
         &rest,
@@ -288,7 +288,7 @@ fn go_on(
 }
 
 /// The session's own protocol, read again: its text is in the session, files that it names are where they were.
-fn protocol_of(found: &Unfinished) -> Result<Protocol, Failure> {
+fn protocol_of(found: &UnfinishedSession) -> Result<Protocol, Failure> {
     let header = &found.header;
     let loader = skinrig_formats::regular::read_text;
     Protocol::parse(
@@ -315,7 +315,7 @@ fn rest_of(protocol: &Protocol, plan: &Plan, wanted: &[bool]) -> Result<Plan, Fa
 
 /// Where the simulated skin was pressed in earlier legs. An attempt that is made again does not count: it meets the contact that it would
 /// have met.
-fn pressed_before(found: &Unfinished, wanted: &[bool]) -> Vec<Point2> {
+fn pressed_before(found: &UnfinishedSession, wanted: &[bool]) -> Vec<Point2> {
     let all = found.plan.presses.iter().zip(&found.histories).zip(wanted);
     all.flat_map(|((press, history), wanted)| {
         let made = history.attempts.saturating_sub(u32::from(*wanted));
@@ -336,7 +336,7 @@ struct Opened {
 
 /// What stays with an opened bench.
 struct OpenBench {
-    tolerated: Tolerated,
+    tolerated: ToleratedMismatches,
     file: RigFile,
     _lease: Lease,
 }
@@ -344,7 +344,7 @@ struct OpenBench {
 /// The rig of the session, opened.
 fn open_rig(
     args: &ResumeArgs,
-    found: &Unfinished,
+    found: &UnfinishedSession,
     protocol: Protocol,
     rest: &Plan,
     wanted: &[bool],
@@ -355,7 +355,7 @@ fn open_rig(
     if header.rig_kind == "simulated" {
         if args.tolerant {
             return Err(Failure::input(format!(
-                "{}: expected no --tolerant, because the session is of the simulated rig, which has no mismatches",
+                "{}: expected no --tolerant, because the simulated rig of this session has no mismatches",
                 args.session.display()
             )));
         }
@@ -380,7 +380,9 @@ fn open_rig(
             pressed_before(found, wanted),
         );
         let mut preflight = gates::of_simulated(&rig, folder, summary.expected_bytes);
-        preflight.made.insert(0, gates::recorder(&args.session));
+        preflight
+            .caller_checks
+            .insert(0, gates::recorder(&args.session));
         let notes = planted::told(faults).into_iter().collect();
         return Ok(Opened {
             rig,
@@ -409,7 +411,9 @@ fn open_rig(
     let (rig, tolerated) = bench::open(&file, &protocol)?;
     let notes = same_devices(&rig, &found.devices, args.allow_other_device)?;
     let mut preflight = gates::of_bench(&file, &rig, folder, summary.duration_s);
-    preflight.made.insert(0, gates::recorder(&args.session));
+    preflight
+        .caller_checks
+        .insert(0, gates::recorder(&args.session));
     Ok(Opened {
         rig,
         preflight,
@@ -423,7 +427,7 @@ fn open_rig(
 }
 
 /// The rig file must be of the session's bench: its kind, its place of the skin, and limits that bear the plan.
-fn same_bench(file: &RigFile, found: &Unfinished) -> Result<(), Failure> {
+fn same_bench(file: &RigFile, found: &UnfinishedSession) -> Result<(), Failure> {
     let differs = |what: &str, expected: String, found: String| {
         Failure::input(format!(
             "{}: {what}: expected {expected}, as in the session, found {found}\n  \
@@ -488,14 +492,14 @@ fn same_devices(rig: &Rig, known: &[DeviceRow], others: bool) -> Result<Vec<Stri
         return Ok(notes);
     }
     Err(Failure::input(format!(
-        "{}\n  next: connect the device of the session, or accept the other one with --allow-other-device, which is recorded",
+        "{}\n  next: connect the device of the session, or accept the other one with --allow-other-device (it is recorded)",
         notes.join("\n")
     )))
 }
 
 /// Every press has its outcome and only the end is missing: it is written, and no device is touched.
 fn end_only(
-    found: &Unfinished,
+    found: &UnfinishedSession,
     header: ResumeHeader,
     mut writer: SessionWriter,
 ) -> Result<RunReport, Failure> {
@@ -533,11 +537,11 @@ fn end_only(
 
 /// The session has its end and lacks only its seal.
 fn only_seal(session: &Path) -> Outcome {
-    let writer = SessionWriter::ended(session, &mut Rescan::default()).map_err(refusal)?;
+    let writer = SessionWriter::open_ended(session, &mut Rescan::default()).map_err(refusal)?;
     let tell = || errln!("{}", crate::sink::HELD_OPEN);
-    writer.finish_or_tell(tell).map_err(Failure::internal)?;
+    writer.finish_with_notice(tell).map_err(Failure::internal)?;
     outln!(
-        "{}: ended; only its seal was missing, and is there now\n  next: skinrig analyze {0}",
+        "{}: ended; only its seal was missing, and has been added\n  next: skinrig analyze {0}",
         session.display()
     );
     Ok(Exit::Ok)

@@ -17,7 +17,7 @@ use skinrig_recorder::{RecorderError, SessionReader, SessionWriter};
 use crate::args::RunArgs;
 use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::fault::Saboteur;
+use crate::fault::FaultInjector;
 use crate::hil::lease;
 use crate::host::host_name;
 use crate::paths;
@@ -25,7 +25,7 @@ use crate::progress::ProgressView;
 use crate::results::{self};
 use crate::rig::{self, RepeatedOperator, bench, gates, planted};
 use crate::signals::Operator;
-use crate::sink::{Foreknowledge, SessionSink};
+use crate::sink::{ReplayExpectations, SessionSink};
 use skinrig_results::RigDocument;
 
 /// What is to be recorded, before the rig adds what it knows.
@@ -53,7 +53,7 @@ pub struct Intent<'a> {
     /// Rig time that the plan should take.
     pub expected: HostDuration,
     /// What is known of the presses beforehand.
-    pub known: Foreknowledge,
+    pub known: ReplayExpectations,
     /// Faults on purpose.
     pub faults: &'a [PlantedFault],
 }
@@ -81,7 +81,7 @@ pub fn record(
     let (path, writer) = new_session(intent, started, folder)?;
     let view = ProgressView::new(plan.presses.len(), intent.expected);
     let mut sink = SessionSink::new(writer, view, intent.known.clone())
-        .with_faults(Saboteur::new(intent.faults));
+        .with_faults(FaultInjector::new(intent.faults));
     let control = operator.control();
     if preflight.is_some() {
         sink = sink.on_disk_of(folder).controlled(&path, control);
@@ -101,7 +101,7 @@ pub fn record(
     }
     let report = match preflight {
         Some(mut preflight) => {
-            preflight.made.insert(0, gates::recorder(&path));
+            preflight.caller_checks.insert(0, gates::recorder(&path));
             execute_checked(plan, header, rig, control, &mut sink, preflight, settings)
         }
         None => Run::with_settings(plan, header, rig, control, &mut sink, settings).execute(),
@@ -125,7 +125,7 @@ pub(crate) fn close(
             RecorderError::Lost { .. } => lost = Some(error.to_string()),
             _ => {}
         }
-        let error = ControllerError::from(SinkFault::Refused(error.to_string()));
+        let error = ControllerError::from(SinkFault::Rejected(error.to_string()));
         if report.end == RunEnd::Completed && !is_complete {
             report.end = RunEnd::Faulted(error.to_string());
             report.causes.push(error);
@@ -260,7 +260,7 @@ pub fn conclude(
         analyse(session, max_rmse_mm, json)
     };
     // How the run ended comes first: a failing analysis must not hide a fault of the rig.
-    let kept = format!("the session up to there is kept: {}", session.display());
+    let kept = format!("everything recorded so far is kept: {}", session.display());
     let also = |analysed: Outcome| {
         if let Err(failure) = analysed {
             errln!("{}", failure.message);
@@ -344,7 +344,7 @@ fn go_on(session: &Path) -> String {
     let header = SessionReader::open(session).and_then(|reader| reader.header());
     match header {
         Ok(header) if header.is_of_a_rig() => {
-            format!("go on with `skinrig resume {}`", session.display())
+            format!("continue with `skinrig resume {}`", session.display())
         }
         _ => "run again".to_owned(),
     }
@@ -483,7 +483,7 @@ pub(crate) fn intent_of<'a>(
         analysis: &protocol.analysis,
         command_line,
         expected: HostDuration::from_secs_f64(duration_s),
-        known: Foreknowledge::default(),
+        known: ReplayExpectations::default(),
         faults: &[],
     }
 }
@@ -500,7 +500,7 @@ fn replay(
     let legs = reader.legs().map_err(Failure::session)?.len();
     if legs > 1 {
         return Err(Failure::input(format!(
-            "{}: expected a session that was recorded in one go, found one in {legs} legs, which cannot be replayed\n  \
+            "{}: expected a session of one leg, found {legs} legs, which cannot be replayed\n  \
              next: `skinrig analyze` analyses all of it",
             recording.display()
         )));
@@ -535,7 +535,7 @@ fn replay(
         analysis: &document.analysis,
         command_line,
         expected,
-        known: foreknowledge(&reader).map_err(Failure::session)?,
+        known: expectations(&reader).map_err(Failure::session)?,
         faults: &[],
     };
     let rig = rig::replayed(recording, &header, &document)?;
@@ -543,7 +543,7 @@ fn replay(
 }
 
 /// What the recording says that no device can: schedule, exclusions, and what the operator did.
-fn foreknowledge(reader: &SessionReader) -> Result<Foreknowledge, RecorderError> {
+fn expectations(reader: &SessionReader) -> Result<ReplayExpectations, RecorderError> {
     let outcomes = reader.last_outcomes()?;
     let outcomes = || outcomes.iter().flatten();
     let excluded = outcomes().filter_map(|o| match &o.verdict {
@@ -566,7 +566,7 @@ fn foreknowledge(reader: &SessionReader) -> Result<Foreknowledge, RecorderError>
         use InterruptionKind as K;
         matches!(i.kind, K::Stop | K::Abort | K::Halt)
     });
-    Ok(Foreknowledge {
+    Ok(ReplayExpectations {
         scheduled: outcomes().any(|o| o.scheduled),
         timings: timings.collect(),
         excluded: excluded.collect(),

@@ -27,7 +27,7 @@ pub fn salvage(args: &SalvageArgs, json: bool) -> Outcome {
         Ok(Exit::Ok)
     } else {
         Err(Failure::limit(format!(
-            "{}: something of it is lost, as listed\n  next: `skinrig show {}` and `skinrig analyze` work on what came back; \
+            "{}: some data are lost, as listed\n  next: `skinrig show {}` and `skinrig analyze` work on what was recovered; \
              keep the damaged file",
             args.session.display(),
             to.display()

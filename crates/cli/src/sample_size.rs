@@ -5,8 +5,8 @@ use std::path::Path;
 use serde_json::json;
 use skinrig_analysis::Analysis;
 use skinrig_compare::statistics::Sample;
-use skinrig_compare::statistics::power::{self, Measured, PowerPlan, Proposal, Target};
-use skinrig_model::{HostDuration, PressRole, PressVerdict};
+use skinrig_compare::statistics::power::{self, MetricVariance, PowerPlan, Proposal, Target};
+use skinrig_model::{HostDuration, PressRole, Verdict};
 
 use crate::args::DetectArgs;
 use crate::exit::{Exit, Failure, Outcome};
@@ -53,7 +53,7 @@ fn errors(analysis: &Analysis) -> Result<Sample, skinrig_compare::statistics::Sa
     let scored = analysis
         .presses
         .iter()
-        .filter(|p| p.role == PressRole::Score && p.verdict == PressVerdict::Valid.name());
+        .filter(|p| p.role == PressRole::Score && p.verdict == Verdict::Valid);
     Sample::rms(scored.filter_map(|p| {
         let (x, y) = p.error_mm()?;
         Some((p.location.index(), x.hypot(y)))
@@ -103,7 +103,7 @@ fn print(plan: &PowerPlan, session: &Path) {
         );
     }
     outln!("* fewest presses; half width: expected, of the interval of the difference");
-    let Measured {
+    let MetricVariance {
         value,
         between,
         within,
@@ -129,7 +129,7 @@ fn print(plan: &PowerPlan, session: &Path) {
             );
         }
         None => outln!(
-            "  nothing was pressed twice: what repetitions are worth is not known, and part of the above"
+            "  no location was pressed twice: the gain from repetitions is unknown, and is part of the above"
         ),
     }
     outln!(

@@ -85,11 +85,11 @@ pub(crate) fn find_running(place: &Path) -> Result<PathBuf, Failure> {
     });
     Err(Failure::input(match state {
         Ok((true, ..)) => format!(
-            "{shown}: expected a run under way, found a sealed session, which never changes\n  next: `skinrig tag {shown} --note \
+            "{shown}: expected a running session, found a sealed one, which never changes\n  next: `skinrig tag {shown} --note \
              TEXT` writes a remark beside it; `skinrig resume {shown}` goes on with one that was stopped"
         ),
         Ok(_) => format!(
-            "{shown}: expected a run under way, found a session that nobody runs\n  next: `skinrig resume {shown}` goes on \
+            "{shown}: expected a running session, found one that no program is running\n  next: `skinrig resume {shown}` goes on \
              with it"
         ),
         Err(e) => e.to_string(),
@@ -220,7 +220,7 @@ fn line(session: &SessionSummary) -> String {
             end,
             sealed,
             presses,
-            sayings,
+            annotations,
             tags_problem,
             ..
         } => {
@@ -232,12 +232,12 @@ fn line(session: &SessionSummary) -> String {
                 (None, _) if writer_of(&session.path).is_some() => "  (under way)".to_owned(),
                 (None, _) => "  (cut off)".to_owned(),
             };
-            let mut said = match sayings.tags.is_empty() {
+            let mut said = match annotations.tags.is_empty() {
                 true => String::new(),
-                false => format!("  [{}]", crate::tag::words(sayings)),
+                false => format!("  [{}]", crate::tag::words(annotations)),
             };
-            if !sayings.notes.is_empty() {
-                said += &format!("  {} note(s)", sayings.notes.len());
+            if !annotations.notes.is_empty() {
+                said += &format!("  {} note(s)", annotations.notes.len());
             }
             if let Some(problem) = tags_problem {
                 said += &format!("  tags unreadable: {problem}");

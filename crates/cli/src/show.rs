@@ -117,7 +117,7 @@ fn describe(args: &ShowArgs) -> Result<serde_json::Value, RecorderError> {
 
 /// The analyses that lie beside the session: the official one first, then the variants with what they change.
 fn analysis_rows(session: &std::path::Path, session_id: &str) -> serde_json::Value {
-    let row = |listed: crate::analyses::Listed| {
+    let row = |listed: crate::analyses::AnalysisFile| {
         let mut row = serde_json::json!({ "name": listed.name, "results": listed.results });
         match listed.summary {
             Ok(s) => {
@@ -306,7 +306,7 @@ fn print(d: &serde_json::Value) {
     let end = match (d["end"].as_str(), d["written_by"].as_str()) {
         (Some(end), _) => end.to_owned(),
         (None, Some(writer)) => format!("under way, {writer} writes it"),
-        (None, None) => "cut off; `skinrig resume` goes on with it".to_owned(),
+        (None, None) => "cut off; `skinrig resume` continues it".to_owned(),
     };
     outln!("end        {end}  after {duration}");
     if let Some(reason) = d["end_reason"].as_str() {

@@ -31,7 +31,7 @@ const OF_RUN: Words = [
 ];
 
 const OF_SUITE: Words = [
-    "ending the suite with this check; what it has not measured stays open. ctrl-C again breaks a golden campaign off",
+    "ending the suite with this check; later checks stay open. ctrl-C again aborts a golden campaign",
     "retracting, and ending the suite; ctrl-C again switches the motors off where the tip is",
     "switching the motors off where the tip is, and ending the suite",
 ];

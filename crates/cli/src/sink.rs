@@ -9,14 +9,14 @@ use skinrig_model::{
 };
 use skinrig_recorder::{RecorderError, Sealed, SessionWriter};
 
-use crate::fault::Saboteur;
+use crate::fault::FaultInjector;
 use crate::progress::ProgressView;
 use crate::remote::Remote;
 use crate::rig::gates;
 
 /// What the rig cannot know about its presses, but an import or the replay of one can.
 #[derive(Debug, Clone, Default)]
-pub struct Foreknowledge {
+pub struct ReplayExpectations {
     /// Times and positions come from a schedule; nothing was measured.
     pub scheduled: bool,
     /// When each scheduled press happens, each moment as the time since its attempt began. The controller sees its poses
@@ -28,7 +28,7 @@ pub struct Foreknowledge {
     pub interruption: Option<(HostTime, InterruptionKind)>,
 }
 
-impl Foreknowledge {
+impl ReplayExpectations {
     /// Adds to the outcome of an attempt that began at `begun` what no device can say.
     fn complete(&self, outcome: &mut PressOutcome, begun: HostTime) {
         outcome.scheduled |= self.scheduled;
@@ -50,14 +50,14 @@ pub(crate) const HELD_OPEN: &str = "note: another program has the session open; 
 pub(crate) struct SessionSink {
     writer: SessionWriter,
     view: ProgressView,
-    known: Foreknowledge,
+    known: ReplayExpectations,
     /// When the present attempt began.
     begun: HostTime,
     /// Where the session lies, when its free space matters.
     folder: Option<PathBuf>,
     /// Remarks to be written once the leg has begun.
     notes: Vec<String>,
-    saboteur: Saboteur,
+    fault_injector: FaultInjector,
     /// The hand on the run from other terminals; goes away last, when the session is closed.
     remote: Option<Remote>,
 }
@@ -65,7 +65,7 @@ pub(crate) struct SessionSink {
 impl SessionSink {
     /// A sink over a new session.
     #[must_use]
-    pub fn new(writer: SessionWriter, view: ProgressView, known: Foreknowledge) -> Self {
+    pub fn new(writer: SessionWriter, view: ProgressView, known: ReplayExpectations) -> Self {
         Self {
             writer,
             view,
@@ -73,7 +73,7 @@ impl SessionSink {
             begun: HostTime::ZERO,
             folder: None,
             notes: Vec::new(),
-            saboteur: Saboteur::default(),
+            fault_injector: FaultInjector::default(),
             remote: None,
         }
     }
@@ -106,8 +106,8 @@ impl SessionSink {
 
     /// With faults on purpose.
     #[must_use]
-    pub(crate) fn with_faults(mut self, saboteur: Saboteur) -> Self {
-        self.saboteur = saboteur;
+    pub(crate) fn with_faults(mut self, fault_injector: FaultInjector) -> Self {
+        self.fault_injector = fault_injector;
         self
     }
 
@@ -117,8 +117,8 @@ impl SessionSink {
     /// [`RecorderError`]; the session stays readable.
     pub fn seal(mut self) -> Result<Sealed, RecorderError> {
         self.view.finish();
-        self.saboteur.before_the_seal()?;
-        self.writer.finish_or_tell(|| errln!("{HELD_OPEN}"))
+        self.fault_injector.before_the_seal()?;
+        self.writer.finish_with_notice(|| errln!("{HELD_OPEN}"))
     }
 }
 
@@ -147,8 +147,8 @@ impl SessionSink {
 #[must_use]
 pub fn fault_of(error: &RecorderError) -> SinkFault {
     match error {
-        RecorderError::Late(_) => SinkFault::Late(error.to_string()),
-        _ => SinkFault::Refused(error.to_string()),
+        RecorderError::WriteTimeout(_) => SinkFault::Delayed(error.to_string()),
+        _ => SinkFault::Rejected(error.to_string()),
     }
 }
 
@@ -171,7 +171,7 @@ impl RecordSink for SessionSink {
         if let Record::Preflight(checks) = &record {
             self.view.say(&gates::table(checks));
         }
-        self.saboteur.before(&record)?;
+        self.fault_injector.before(&record)?;
         if let Record::Ended { t, .. } = &record {
             self.tell_waits(*t)?;
         }

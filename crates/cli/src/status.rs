@@ -10,7 +10,7 @@ use crate::args::StatusArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::paths;
 use crate::progress::{clock_text, eta_text};
-use crate::remote::{Live, Reply, Request, Silence, ask};
+use crate::remote::{Live, RemoteError, Reply, Request, ask};
 use crate::rig::gates;
 use crate::sessions;
 
@@ -27,8 +27,8 @@ pub fn status(args: &StatusArgs, as_json: bool) -> Outcome {
     let writer = writer_of(&session);
     let (live, silence) = match ask(&session, &Request::Status) {
         Ok(Reply::Live(live)) => (Some(live), None),
-        Ok(Reply::Refused(why)) | Err(Silence::Trouble(why)) => (None, Some(why)),
-        Ok(Reply::Handed(_)) | Err(Silence::Nobody) => (None, None),
+        Ok(Reply::Refused(why)) | Err(RemoteError::Failed(why)) => (None, Some(why)),
+        Ok(Reply::Handed(_)) | Err(RemoteError::NotListening) => (None, None),
     };
     let filed = match filed(&session) {
         Ok(filed) => filed,
@@ -106,14 +106,14 @@ fn state(d: &Value, live: Option<&Live>) -> String {
     let session = d["session"].as_str().unwrap_or_default();
     let next = match d["rig_kind"].as_str() {
         Some("imported" | "replayed") => "run it again".to_owned(),
-        _ => format!("`skinrig resume {session}` goes on with it"),
+        _ => format!("`skinrig resume {session}` continues it"),
     };
     match (live, d["writer"].as_str(), d["end"].as_str()) {
         (Some(live), by, _) => format!("{} ({})", live.state, by.unwrap_or("process unknown")),
         (None, Some(by), _) => {
             let why = d["silence"].as_str();
             let why = why.map_or_else(String::new, |why| format!(": {why}"));
-            format!("written by {by}, which does not answer{why}")
+            format!("written by {by}, which does not respond{why}")
         }
         (None, None, Some("completed")) if d["sealed"] == true => "completed".to_owned(),
         (None, None, Some(end)) => {
@@ -126,7 +126,7 @@ fn state(d: &Value, live: Option<&Live>) -> String {
             };
             format!("{end}{sealed}{reason}; {next}")
         }
-        (None, None, None) => format!("cut off: nobody runs it; {next}"),
+        (None, None, None) => format!("cut off: no program is running it; {next}"),
     }
 }
 

@@ -3,7 +3,9 @@
 use std::ffi::OsString;
 
 use chrono::{SecondsFormat, Utc};
-use skinrig_recorder::{Saying, Sayings, SessionReader, is_tag, say, sayings};
+use skinrig_recorder::{
+    Annotation, Annotations, SessionReader, annotate, annotations, is_valid_tag,
+};
 
 use crate::args::TagArgs;
 use crate::exit::{Exit, Failure, Outcome};
@@ -21,7 +23,7 @@ pub fn tag(args: &TagArgs, json: bool) -> Outcome {
     let (add, remove) = checked(&args.tags, &args.remove)?;
     let asked = !add.is_empty() || !remove.is_empty() || args.note.is_some();
     let all = if asked {
-        let saying = Saying {
+        let annotation = Annotation {
             session_id,
             at: Utc::now().to_rfc3339_opts(SecondsFormat::Secs, true),
             by: args.by.clone().unwrap_or_else(crate::host::user_name),
@@ -29,9 +31,9 @@ pub fn tag(args: &TagArgs, json: bool) -> Outcome {
             remove,
             note: args.note.clone(),
         };
-        say(&session, &saying)
+        annotate(&session, &annotation)
     } else {
-        sayings(&session, &session_id)
+        annotations(&session, &session_id)
     };
     let all = all.map_err(Failure::session)?;
     if json {
@@ -50,7 +52,7 @@ pub fn tag(args: &TagArgs, json: bool) -> Outcome {
 
 /// The tags, in order; `-` without any.
 #[must_use]
-pub fn words(all: &Sayings) -> String {
+pub fn words(all: &Annotations) -> String {
     let tags: Vec<&str> = all.tags.iter().map(String::as_str).collect();
     match tags[..] {
         [] => "-".to_owned(),
@@ -69,9 +71,9 @@ pub(crate) fn spelled_out(arguments: Vec<OsString>) -> Vec<OsString> {
     let mut is_value = false;
     let spell = |(i, word): (usize, OsString)| {
         let text = word.to_string_lossy().into_owned();
-        let own = text
-            .strip_prefix('-')
-            .filter(|tag| i > at + 1 && !is_value && is_tag(tag) && !matches!(*tag, "h" | "V"));
+        let own = text.strip_prefix('-').filter(|tag| {
+            i > at + 1 && !is_value && is_valid_tag(tag) && !matches!(*tag, "h" | "V")
+        });
         is_value = matches!(text.as_str(), "--note" | "--by" | "--remove");
         own.map_or(word, |tag| format!("--remove={tag}").into())
     };
@@ -80,7 +82,7 @@ pub(crate) fn spelled_out(arguments: Vec<OsString>) -> Vec<OsString> {
 
 /// Tags to give and to take away, each once.
 fn checked(add: &[String], remove: &[String]) -> Result<(Vec<String>, Vec<String>), Failure> {
-    if let Some(wrong) = add.iter().chain(remove).find(|tag| !is_tag(tag)) {
+    if let Some(wrong) = add.iter().chain(remove).find(|tag| !is_valid_tag(tag)) {
         return Err(Failure::input(format!(
             "expected a tag of 1 to 40 of a-z, 0-9, `.`, `_`, `-`, found `{}`\n  next: \
              a remark of any words goes after --note",

@@ -5,7 +5,9 @@ use std::io::IsTerminal;
 use rustix::time::{ClockId, clock_gettime};
 use skinrig_analysis::AnalysisError;
 use skinrig_analysis::tradeoff::{Cost, Plan, Row, Tradeoff, measure};
+use skinrig_model::RunHeader;
 use skinrig_report::tradeoff::{label, page, protocol_lines, terminal_table};
+use skinrig_results::Origin;
 
 use crate::analyses::tradeoff_path;
 use crate::args::{CostKind, TradeoffArgs};
@@ -30,20 +32,20 @@ impl From<CostKind> for Cost {
 }
 
 /// A demand and what meets it.
-struct Answer<'a> {
+struct Recommendation<'a> {
     question: String,
     row: Option<&'a Row>,
 }
 
-fn answers<'a>(result: &'a Tradeoff, args: &TradeoffArgs) -> Vec<Answer<'a>> {
-    let target = args.target_rmse.map(|mm| Answer {
+fn recommendations<'a>(result: &'a Tradeoff, args: &TradeoffArgs) -> Vec<Recommendation<'a>> {
+    let target = args.target_rmse.map(|mm| Recommendation {
         question: format!(
             "cheapest ({}) whose RMSE is at most {mm} mm at the upper end of its 95 % interval",
             cost_name(args.cost)
         ),
         row: result.cheapest(mm, args.cost.into()),
     });
-    let budget = args.budget.map(|s| Answer {
+    let budget = args.budget.map(|s| Recommendation {
         question: format!(
             "most accurate within {} µs of CPU time per press",
             (s * 1e9).round() / 1e3
@@ -62,8 +64,9 @@ const fn cost_name(cost: CostKind) -> &'static str {
 }
 
 /// Where a session comes from, for people.
-fn rig_in_words(name: &str) -> String {
-    if name.contains("simulated") {
+fn rig_in_words(header: &RunHeader) -> String {
+    let name = &header.rig_name;
+    if Origin::of(header) == Some(Origin::Simulated) {
         format!("Rig: {name}, SIMULATED. CPU times are this machine's.")
     } else {
         format!("Rig: {name}. CPU times are this machine's.")
@@ -85,7 +88,7 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
     if let (Some(variant), Some(out)) = (&variant, &args.out) {
         not_official(&tradeoff_path(&args.session, None), out, variant)?;
     }
-    let mut rig = rig_in_words(&aligned.session.header.rig_name);
+    let mut rig = rig_in_words(&aligned.session.header);
     if let Some(variant) = &variant {
         rig += &format!(
             " Not the session's own settings: {}.",
@@ -102,9 +105,9 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
         AnalysisError::Invalid(_) => Failure::limit(e),
         other => Failure::input(other),
     })?;
-    let answers = answers(&result, args);
+    let recommendations = recommendations(&result, args);
     let mut document = serde_json::json!({ "format": FORMAT.0, "format_version": FORMAT.1, "rig": rig, "variant": variant, "tradeoff": result });
-    let found = answers.iter().map(|a| {
+    let found = recommendations.iter().map(|a| {
         serde_json::json!({
             "question": a.question,
             "choice": a.row.map(|r| label(&r.choice)),
@@ -132,7 +135,7 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
     } else {
         let table = terminal_table(&result, &rig, std::io::stdout().is_terminal());
         crate::terminal::out(format_args!("{table}"));
-        for answer in &answers {
+        for answer in &recommendations {
             outln!("\n{}:", answer.question);
             match answer.row {
                 None => outln!("  none of the choices tried"),
@@ -151,7 +154,7 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
         outln!("\npage     {}", html_path.display());
         outln!("results  {}", json_path.display());
     }
-    match answers.iter().find(|a| a.row.is_none()) {
+    match recommendations.iter().find(|a| a.row.is_none()) {
         None => Ok(Exit::Ok),
         Some(unmet) => Err(Failure::limit(format!(
             "expected a choice that is {}, found none among the {} tried\n  next: a weaker demand, or --full",

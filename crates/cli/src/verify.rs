@@ -55,7 +55,7 @@ fn bundle(folder: &Path, json: bool) -> Outcome {
         }
         if problems == 0 {
             outln!(
-                "{name}: sound; session {} as it was sealed, and the other {} files are what it gives",
+                "{name}: sound; session {} is as it was sealed, and the other {} files follow from it",
                 report.session_id,
                 report.files - 1
             );
@@ -119,7 +119,7 @@ fn held_against(
     let unknown = report.names.iter().filter(|name| !known.contains(*name));
     problems.extend(
         unknown
-            .map(|name| format!("{name}: expected no such file: nothing in the session gives it")),
+            .map(|name| format!("{name}: expected no such file: the session does not produce it")),
     );
     Ok(problems)
 }

@@ -86,8 +86,8 @@ fn run_in_real_time(bench: &EmulatedBench, sessions: &Path) -> (PathBuf, String)
         let starved = [
             "expected a pose sample no older than",
             "the session is INVALID",
-            "no answer to",
-            "nobody looked at the live arm",
+            "no reply to",
+            "the live arm was not polled",
         ]
         .iter()
         .any(|sign| said.contains(sign));

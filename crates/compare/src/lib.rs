@@ -1,23 +1,23 @@
-//! Whether one skin is better than another.
+//! Compares skins: is one better, are they comparable, and what explains the difference.
 //!
-//! Numbers in, numbers out: no files, no SQL, no devices, no randomness but the seed in the settings.
+//! Pure computation: no files, SQL or devices; randomness comes only from the seed in the settings.
 
 pub mod causes;
 pub mod comparability;
-mod flat;
-mod maps;
+mod flatten;
+mod location_results;
+mod locations;
 mod metrics;
-mod places;
 mod result;
 pub mod statistics;
 mod subject;
 mod table;
 
-pub use causes::{Again, Causes, Contribution, Exchange, Factor, Measured};
-pub use comparability::{Difference, RULES, Rule, Weight, differences};
-pub use flat::flatten;
-pub use maps::{Here, Location};
-pub use metrics::{Metric, Shown};
-pub use result::{Choices, Comparison, Exchanged, Skin, compare};
+pub use causes::{Causes, Contribution, CrossEvaluation, Factor, FactorMeasurement, Reanalysis};
+pub use comparability::{Difference, RULES, Rule, Severity, differences};
+pub use flatten::flatten;
+pub use location_results::{Location, LocationComparison};
+pub use metrics::{DisplayFormat, Metric};
+pub use result::{Comparison, ComparisonOptions, Reanalyses, Skin, compare};
 pub use subject::{Facts, Session, Subject};
-pub use table::{Against1, Margins, Row, Value};
+pub use table::{BaselineComparison, Margins, Row, Value};

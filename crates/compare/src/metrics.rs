@@ -1,20 +1,20 @@
-//! Owns the metrics of a comparison: what each is made of, in which unit, and which direction is better.
+//! Owns the compared metrics: definition, unit and direction of each.
 
 use serde::{Deserialize, Serialize};
 
-use crate::places::{Attempt, Places};
+use crate::locations::{Attempt, Locations};
 use crate::statistics::{Better, Count, Position, Sample, SampleFault};
 use crate::subject::Subject;
 
-/// A metric.
+/// A compared metric.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Metric {
     /// Root mean square error.
     Rmse,
-    /// Along x.
+    /// Root mean square error along x.
     RmseX,
-    /// Along y.
+    /// Root mean square error along y.
     RmseY,
     /// Mean error along x.
     BiasX,
@@ -30,31 +30,31 @@ pub enum Metric {
     Latency,
     /// Time from the 5th to the 95th percentile of the detections.
     LatencyWidth,
-    /// False alarms per second without a touch.
+    /// False alarms per second without a press.
     FalseAlarms,
-    /// Events per second between presses.
+    /// Idle events per second.
     IdleEvents,
     /// Events per second during presses.
     PressEvents,
     /// Bytes per second during presses.
     PressBytes,
-    /// Places that the skin tells apart.
+    /// Number of distinguishable locations: area / (pi RMSE²).
     Taxels,
 }
 
-/// How values of a metric are written for people.
+/// Format of a metric's values for people.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Shown {
-    /// What a value is multiplied by.
+pub struct DisplayFormat {
+    /// Factor from stored to displayed values.
     pub scale: f64,
-    /// The unit it then has.
+    /// Displayed unit.
     pub unit: &'static str,
     /// Decimals.
     pub digits: usize,
 }
 
 impl Metric {
-    /// All, in the order in which they are read.
+    /// All metrics, in display order.
     pub const ALL: [Self; 15] = [
         Self::Rmse,
         Self::RmseX,
@@ -73,7 +73,7 @@ impl Metric {
         Self::Taxels,
     ];
 
-    /// The name in limits, JSON and files.
+    /// Name in limits, JSON and files.
     #[must_use]
     pub const fn key(self) -> &'static str {
         match self {
@@ -95,7 +95,7 @@ impl Metric {
         }
     }
 
-    /// The name for people; `within_mm` is the X of the pass rate.
+    /// Display name; `within_mm` is the limit of the pass rate.
     #[must_use]
     pub fn name(self, within_mm: f64) -> String {
         match self {
@@ -118,9 +118,9 @@ impl Metric {
         .to_owned()
     }
 
-    /// How its values are written.
+    /// Display format of its values.
     #[must_use]
-    pub const fn shown(self) -> Shown {
+    pub const fn display_format(self) -> DisplayFormat {
         let (scale, unit, digits) = match self {
             Self::LocatedRate | Self::WithinRate => (100.0, "%", 1),
             Self::Latency | Self::LatencyWidth => (1.0, "ms", 1),
@@ -130,14 +130,14 @@ impl Metric {
             Self::Taxels => (1.0, "", 0),
             _ => (1.0, "mm", 2),
         };
-        Shown {
+        DisplayFormat {
             scale,
             unit,
             digits,
         }
     }
 
-    /// The unit of its values in JSON.
+    /// Unit of the values in JSON.
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
@@ -146,12 +146,12 @@ impl Metric {
             Self::FalseAlarms => "1/s",
             Self::IdleEvents | Self::PressEvents => "events/s",
             Self::PressBytes => "bytes/s",
-            Self::Taxels => "places",
+            Self::Taxels => "locations",
             _ => "mm",
         }
     }
 
-    /// A margin of the limits (mm, s, percentage points, ...) in the unit of the values.
+    /// Converts a margin from the unit of the limits file (mm, s, percentage points, ...) to the unit of the values.
     #[must_use]
     pub const fn margin(self, of_limits: f64) -> f64 {
         match self {
@@ -161,7 +161,7 @@ impl Metric {
         }
     }
 
-    /// Which direction is better.
+    /// Direction in which the metric improves.
     #[must_use]
     pub const fn better(self) -> Better {
         match self {
@@ -171,20 +171,20 @@ impl Metric {
         }
     }
 
-    /// What `subject` contributes. `within_mm`: the X of the pass rate; `area_mm2`: the area that taxels fill.
+    /// Sample of `subject` for this metric. `within_mm`: limit of the pass rate; `area_mm2`: area that the taxels cover.
     ///
     /// # Errors
-    /// [`SampleFault`] for results with numbers that are none.
+    /// [`SampleFault`] when results contain NaN or infinity.
     pub(crate) fn sample(
         self,
         subject: &Subject,
-        places: &Places,
+        locations: &Locations,
         within_mm: f64,
         area_mm2: f64,
     ) -> Result<Sample, SampleFault> {
-        let attempts = || places.attempts(subject);
+        let attempts = || locations.attempts(subject);
         let counted = |value: fn(&Attempt<'_>) -> Option<f64>| {
-            attempts().filter_map(move |p| Some((p.place, value(&p)?)))
+            attempts().filter_map(move |p| Some((p.location, value(&p)?)))
         };
         match self {
             Self::Rmse => Sample::rms(counted(|p| p.error_mm())),
@@ -200,19 +200,19 @@ impl Metric {
                     x_mm: at.x_mm,
                     y_mm: at.y_mm,
                 };
-                Some((p.place, position))
+                Some((p.location, position))
             })),
             Self::LocatedRate => Ok(Sample::share(
-                attempts().map(|p| (p.place, p.error().is_some())),
+                attempts().map(|p| (p.location, p.error().is_some())),
             )),
             Self::WithinRate => {
                 Ok(Sample::share(attempts().map(|p| {
-                    (p.place, p.error_mm().is_some_and(|e| e <= within_mm))
+                    (p.location, p.error_mm().is_some_and(|e| e <= within_mm))
                 })))
             }
-            Self::Latency => Sample::median(onsets(subject, places)),
-            Self::LatencyWidth => Sample::width(onsets(subject, places)),
-            Self::FalseAlarms => Sample::count_rate(alarms(subject, places)),
+            Self::Latency => Sample::median(onsets(subject, locations)),
+            Self::LatencyWidth => Sample::width(onsets(subject, locations)),
+            Self::FalseAlarms => Sample::count_rate(alarms(subject, locations)),
             Self::IdleEvents => Sample::mean(counted(idle_per_s)),
             Self::PressEvents => Sample::mean(counted(press_per_s)),
             Self::PressBytes => Sample::mean(counted(|p| {
@@ -223,13 +223,13 @@ impl Metric {
     }
 }
 
-/// Events per second of both cameras in the window of a press that counts.
+/// Events per second of both cameras during a counting press.
 fn press_per_s(p: &Attempt<'_>) -> Option<f64> {
     p.error()?;
     Some(p.press.views[0]?.rate_per_s + p.press.views[1]?.rate_per_s)
 }
 
-/// The same in the idle time before it.
+/// Events per second of both cameras in the idle time before a counting press.
 fn idle_per_s(p: &Attempt<'_>) -> Option<f64> {
     p.error()?;
     let views = [p.press.views[0]?, p.press.views[1]?];
@@ -237,29 +237,32 @@ fn idle_per_s(p: &Attempt<'_>) -> Option<f64> {
     known.then(|| views.iter().map(|v| v.idle_rate_per_s).sum())
 }
 
-/// Place and onset after the contact (ms) of each trial of the latency study.
+/// (location, onset after contact in ms) of each press in the latency study; `None` if never detected.
 fn onsets<'a>(
     subject: &'a Subject,
-    places: &'a Places,
+    locations: &'a Locations,
 ) -> impl Iterator<Item = (u32, Option<f64>)> + 'a {
-    places.attempts(subject).filter_map(|p| {
+    locations.attempts(subject).filter_map(|p| {
         let onsets = &p.session.analysis.latency.as_ref()?.onsets;
         let at = onsets
             .binary_search_by_key(&p.press.press, |(press, _)| *press)
             .ok()?;
-        Some((p.place, onsets[at].1))
+        Some((p.location, onsets[at].1))
     })
 }
 
-/// Place and false alarms of each background of the latency study.
-fn alarms<'a>(subject: &'a Subject, places: &'a Places) -> impl Iterator<Item = (u32, Count)> + 'a {
-    places.attempts(subject).filter_map(|p| {
+/// (location, false alarms) of each idle period in the latency study.
+fn alarms<'a>(
+    subject: &'a Subject,
+    locations: &'a Locations,
+) -> impl Iterator<Item = (u32, Count)> + 'a {
+    locations.attempts(subject).filter_map(|p| {
         let all = &p.session.analysis.latency.as_ref()?.backgrounds;
         let at = all.binary_search_by_key(&p.press.press, |b| b.press).ok()?;
         let count = Count {
             events: all[at].alarms,
             exposure: all[at].length_s,
         };
-        (count.exposure > 0.0).then_some((p.place, count))
+        (count.exposure > 0.0).then_some((p.location, count))
     })
 }

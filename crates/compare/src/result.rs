@@ -1,86 +1,87 @@
-//! Owns the result of a comparison: everything that table, page and JSON show.
+//! Owns the result of a comparison: everything that terminal, page and JSON show.
 
 use serde::Serialize;
 use skinrig_model::SkinOutline;
 
-use crate::causes::{Again, Causes, causes};
-use crate::comparability::{Difference, Weight, differences};
-use crate::maps::{Location, locations};
-use crate::places::Places;
+use crate::causes::{Causes, Reanalysis, causes};
+use crate::comparability::{Difference, Severity, differences};
+use crate::location_results::{Location, compare_locations};
+use crate::locations::Locations;
 use crate::statistics::{Pairing, Settings, Verdict};
 use crate::subject::{Facts, Subject};
 use crate::table::{Margins, Row, table};
 
-/// How to compare.
+/// Options of a comparison.
 #[derive(Debug, Clone, Default)]
-pub struct Choices {
-    /// Name of the limits.
+pub struct ComparisonOptions {
+    /// Name of the limits file.
     pub limits: Option<String>,
-    /// Per metric, in the unit of its values.
+    /// Equivalence margins, in the unit of each metric's values.
     pub margins: Margins,
-    /// X of the pass rate, mm; the first skin's own when absent.
+    /// Limit of the pass rate, mm; defaults to the first skin's setting.
     pub within_mm: Option<f64>,
-    /// Keys of blocking differences to go on in spite of.
-    pub despite: Vec<String>,
-    /// Of the statistics.
+    /// Keys of blocking differences to ignore.
+    pub overrides: Vec<String>,
+    /// Statistical settings.
     pub settings: Settings,
 }
 
-/// A skin, as the result names it.
+/// Summary of one skin.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Skin {
-    /// `A`, `B`, ...
+    /// `A`, `B`, ... in the order given.
     pub letter: char,
-    /// The prototype, or what the user called it by.
+    /// Prototype, or the name that the user gave.
     pub name: String,
     /// Its sessions.
     pub sessions: Vec<Facts>,
-    /// Scored presses that were attempted at the depths that all skins share.
+    /// Scored presses attempted at the depths that all skins share.
     pub attempted: u32,
-    /// How many of them count.
+    /// Attempted presses that count.
     pub counted: u32,
-    /// Places with an attempted press.
-    pub places: u32,
+    /// Locations with an attempted press.
+    #[serde(rename = "places")]
+    pub locations: u32,
 }
 
-/// A comparison of skins.
+/// Result of comparing skins.
 #[derive(Debug, Clone, Serialize)]
 pub struct Comparison {
-    /// The skins; the first is what the others are compared with.
+    /// The skins; the first is the baseline.
     pub skins: Vec<Skin>,
-    /// Everything in which they differ, the gravest first.
+    /// All differences, most severe first.
     pub differences: Vec<Difference>,
-    /// Name of the limits.
+    /// Name of the limits file.
     pub limits: Option<String>,
-    /// X of the pass rate, mm.
+    /// Limit of the pass rate, mm.
     pub within_mm: f64,
-    /// Whether places are compared one by one.
+    /// Statistical settings, including the pairing that was used.
     pub settings: Settings,
-    /// The metrics.
+    /// One row per metric.
     pub table: Vec<Row>,
-    /// The places, all of them.
+    /// All locations.
     pub locations: Vec<Location>,
-    /// Each skin but the first: why it differs; `None` where too few places are shared.
+    /// For each skin but the first: causes of its difference; `None` with too few shared locations.
     pub causes: Vec<Option<Causes>>,
-    /// The skin's outline.
+    /// Outline of the first skin.
     #[serde(skip)]
     pub outline: Option<SkinOutline>,
 }
 
 impl Comparison {
-    /// Blocking differences that nobody lifted: with one of them there are no numbers.
+    /// Blocking differences that were not overridden; with any of them the tables are empty.
     pub fn blocking(&self) -> impl Iterator<Item = &Difference> {
         let all = self.differences.iter();
-        all.filter(|d| d.weight == Weight::Blocking && !d.lifted)
+        all.filter(|d| d.severity == Severity::Blocking && !d.overridden)
     }
 
-    /// The row of the headline.
+    /// The RMSE row.
     #[must_use]
     pub fn headline(&self) -> Option<&Row> {
         self.table.first()
     }
 
-    /// The verdict on the RMSE of a skin but the first.
+    /// Verdict on the RMSE of skin `subject` against the first.
     #[must_use]
     pub fn verdict(&self, subject: usize) -> Option<Verdict> {
         let row = self.headline()?;
@@ -91,40 +92,47 @@ impl Comparison {
     }
 }
 
-/// The skins analysed again with the settings of another one: `first[i]` the first skin with those of skin `i + 1`,
-/// `others[i]` skin `i + 1` with those of the first; `None` where they do not differ.
-pub type Exchanged = Vec<Option<[Subject; 2]>>;
+/// For each skin but the first, if its settings differ from the first's: the first skin with the settings of that skin, and
+/// that skin with the settings of the first.
+pub type Reanalyses = Vec<Option<[Subject; 2]>>;
 
-/// May they be compared, and then: how do they compare. With a blocking difference table, places and causes are empty.
+/// Checks comparability and compares. With a blocking difference, table, locations and causes are empty.
 #[must_use]
-pub fn compare(subjects: &[Subject], exchanged: &Exchanged, choices: &Choices) -> Comparison {
-    let places = Places::of(subjects);
-    let mut settings = choices.settings;
-    let differences = differences(subjects, &choices.despite);
-    if differences.iter().any(|d| d.key == "locations" && d.lifted) {
+pub fn compare(
+    subjects: &[Subject],
+    reanalyses: &Reanalyses,
+    options: &ComparisonOptions,
+) -> Comparison {
+    let locations = Locations::of(subjects);
+    let mut settings = options.settings;
+    let differences = differences(subjects, &options.overrides);
+    if differences
+        .iter()
+        .any(|d| d.key == "locations" && d.overridden)
+    {
         settings.pairing = Pairing::Independent;
     }
     let own_within = subjects.first().and_then(|s| s.sessions.first());
-    let within_mm = choices
+    let within_mm = options
         .within_mm
         .or(own_within.map(|s| s.analysis.settings.within_mm))
         .unwrap_or_default();
     let skin = |s: &Subject| {
-        let attempts: Vec<_> = places.attempts(s).collect();
-        let own: std::collections::BTreeSet<u32> = attempts.iter().map(|p| p.place).collect();
+        let attempts: Vec<_> = locations.attempts(s).collect();
+        let own: std::collections::BTreeSet<u32> = attempts.iter().map(|p| p.location).collect();
         Skin {
             letter: s.letter,
             name: s.name.clone(),
             sessions: s.sessions.iter().map(|s| s.facts.clone()).collect(),
             attempted: attempts.len() as u32,
             counted: attempts.iter().filter(|p| p.error().is_some()).count() as u32,
-            places: own.len() as u32,
+            locations: own.len() as u32,
         }
     };
     let mut result = Comparison {
         skins: subjects.iter().map(skin).collect(),
         differences,
-        limits: choices.limits.clone(),
+        limits: options.limits.clone(),
         within_mm,
         settings,
         table: Vec::new(),
@@ -135,18 +143,18 @@ pub fn compare(subjects: &[Subject], exchanged: &Exchanged, choices: &Choices) -
     if result.blocking().next().is_some() {
         return result;
     }
-    result.table = table(subjects, &places, within_mm, &choices.margins, &settings);
-    result.locations = locations(subjects, &places, &settings);
+    result.table = table(subjects, &locations, within_mm, &options.margins, &settings);
+    result.locations = compare_locations(subjects, &locations, &settings);
     let others = subjects.iter().skip(1).enumerate();
     result.causes = others
         .map(|(i, other)| {
-            let again = exchanged.get(i).and_then(Option::as_ref);
-            let again = again.map(|[first, second]| Again { first, second });
-            causes(&subjects[0], other, again, RESAMPLES, settings.seed)
+            let reanalysis = reanalyses.get(i).and_then(Option::as_ref);
+            let reanalysis = reanalysis.map(|[first, second]| Reanalysis { first, second });
+            causes(&subjects[0], other, reanalysis, RESAMPLES, settings.seed)
         })
         .collect();
     result
 }
 
-/// Draws of places for the intervals of the causes.
+/// Bootstrap draws for the intervals of the causes.
 const RESAMPLES: u32 = 400;

@@ -1,4 +1,4 @@
-//! Owns what is compared: sessions with their facts, put together to skins.
+//! Owns the inputs of a comparison: sessions with their facts, grouped into skins.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,59 +6,62 @@ use serde::{Deserialize, Serialize};
 use skinrig_analysis::Analysis;
 use skinrig_model::SkinOutline;
 
-/// What is known of a session besides its results.
+/// Everything known about a session besides its results.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Facts {
-    /// The file's name.
+    /// File name.
     pub file: String,
-    /// Names the session whatever its file is called.
+    /// Unique ID, independent of the file name.
     pub session_id: String,
-    /// Which prototype was pressed.
+    /// Name of the pressed prototype.
     pub prototype: String,
-    /// Civil time of the start, RFC 3339.
+    /// Start, civil time, RFC 3339.
     pub started: String,
     /// `simulated`, `replayed`, `imported`, `emulated` or `bench`.
     pub rig_kind: String,
+    /// What the data come from, a replay's from the recording: `simulated`, `emulated`, `bench` or `imported`; `None` when
+    /// unknown.
+    pub origin: Option<String>,
     /// Name of the rig.
     pub rig_name: String,
-    /// Everything else by path: `protocol.motion.hold`, `bias.camera1.bias_fo`, `simulation.geometric.halo_mm`, ...
+    /// All other facts by path: `protocol.motion.hold`, `bias.camera1.bias_fo`, `simulation.geometric.halo_mm`, ...
     pub values: BTreeMap<String, String>,
 }
 
-/// A session: its facts and its results.
+/// A session with its results.
 #[derive(Debug, Clone)]
 pub struct Session {
-    /// What is known of it.
+    /// Facts of the session.
     pub facts: Facts,
-    /// Its results.
+    /// Results of the session.
     pub analysis: Analysis,
 }
 
-/// One of those that are compared: a skin, with all its sessions.
+/// A skin to compare, with all its sessions.
 #[derive(Debug, Clone)]
 pub struct Subject {
     /// `A`, `B`, ... in the order given.
     pub letter: char,
-    /// The prototype, or what the user called it by.
+    /// Prototype, or the name that the user gave.
     pub name: String,
     /// At least one.
     pub sessions: Vec<Session>,
 }
 
 impl Subject {
-    /// Every value that its sessions have for a fact; `none` where one has none.
+    /// Distinct values of a fact over the sessions; `none` for a session without it.
     pub(crate) fn fact(&self, of: impl Fn(&Session) -> Option<String>) -> BTreeSet<String> {
         let value = |s: &Session| of(s).unwrap_or_else(|| "none".to_owned());
         self.sessions.iter().map(value).collect()
     }
 
-    /// The outline of the skin, as the first session has it.
+    /// Outline of the skin in the first session.
     pub(crate) fn outline(&self) -> Option<&SkinOutline> {
         self.sessions.first().map(|s| &s.analysis.rig.outline)
     }
 }
 
 /// Values in one line.
-pub(crate) fn joined(values: &BTreeSet<String>) -> String {
+pub(crate) fn join_values(values: &BTreeSet<String>) -> String {
     values.iter().cloned().collect::<Vec<_>>().join(" and ")
 }

@@ -1,66 +1,67 @@
-//! Owns the table of a comparison: per metric the value of each skin, and each skin against the first.
+//! Owns the metrics table: value of each skin per metric, and each skin against the first.
 
 use serde::Serialize;
 
-use crate::metrics::{Metric, Shown};
-use crate::places::Places;
+use crate::locations::Locations;
+use crate::metrics::{DisplayFormat, Metric};
 use crate::statistics::{
-    Adjusted, Against, Comparison, Interval, Question, Sample, Settings, Verdict, compare_all,
-    estimate,
+    Adjusted, Comparison, Interval, PairSelection, Question, Sample, Settings, Verdict,
+    compare_all, estimate,
 };
 use crate::subject::Subject;
 
-/// A metric's margin, in the unit of its values.
+/// Equivalence margins per metric, in the unit of its values.
 pub type Margins = Vec<(Metric, f64)>;
 
-/// A value, or why there is none.
+/// Value of one skin, or the reason for its absence.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Value {
-    /// With its interval, over all locations of the skin.
+    /// Value over all locations of the skin, with its interval.
     pub value: Option<Interval>,
-    /// Why there is none.
+    /// Why there is no value.
     pub missing: Option<String>,
 }
 
-/// A skin against the first.
+/// Comparison of one skin with the first.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Against1 {
-    /// Which skin, by its index.
+pub struct BaselineComparison {
+    /// Index of the skin.
     pub subject: usize,
-    /// Both over the locations that they share, and their difference; `None` when they cannot be compared.
+    /// Both over their shared locations, and their difference; `None` if they cannot be compared.
     pub comparison: Option<Comparison>,
-    /// The same among several skins: corrected for their number.
+    /// Corrected for the number of skins.
     pub adjusted: Option<Adjusted>,
-    /// What to go by: corrected for the number of skins.
+    /// Final verdict, corrected for the number of skins.
     pub verdict: Option<Verdict>,
     /// Why they cannot be compared.
-    pub refused: Option<String>,
+    #[serde(rename = "refused")]
+    pub error: Option<String>,
 }
 
-/// One metric.
+/// Results for one metric.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
-    /// Which.
+    /// The metric.
     pub metric: Metric,
-    /// For people.
+    /// Display name.
     pub name: String,
-    /// Of the values here.
+    /// Unit of the values.
     pub unit: &'static str,
-    /// How to write them.
+    /// Display format of the values.
     #[serde(skip)]
-    pub shown: Shown,
-    /// The largest difference that is none, in the unit of the values.
+    pub format: DisplayFormat,
+    /// Equivalence margin, in the unit of the values.
     pub margin: Option<f64>,
-    /// Of each skin.
+    /// Value of each skin.
     pub values: Vec<Value>,
-    /// Each skin but the first, against it.
-    pub against_first: Vec<Against1>,
+    /// Comparison of each skin but the first with the first.
+    pub against_first: Vec<BaselineComparison>,
 }
 
-/// Compares all metrics.
+/// Builds one row per metric.
 pub(crate) fn table(
     subjects: &[Subject],
-    places: &Places,
+    locations: &Locations,
     within_mm: f64,
     margins: &Margins,
     settings: &Settings,
@@ -70,7 +71,7 @@ pub(crate) fn table(
         let margin = margins.iter().find(|(m, _)| *m == metric).map(|m| m.1);
         let samples: Vec<_> = subjects
             .iter()
-            .map(|s| metric.sample(s, places, within_mm, area_mm2))
+            .map(|s| metric.sample(s, locations, within_mm, area_mm2))
             .collect();
         let values = samples.iter().map(|sample| {
             let value = sample.as_ref().map_err(ToString::to_string);
@@ -84,7 +85,7 @@ pub(crate) fn table(
             metric,
             name: metric.name(within_mm),
             unit: metric.unit(),
-            shown: metric.shown(),
+            format: metric.display_format(),
             margin,
             values: values.collect(),
             against_first: against(samples, metric, margin, settings),
@@ -98,14 +99,14 @@ fn against<F: ToString>(
     metric: Metric,
     margin: Option<f64>,
     settings: &Settings,
-) -> Vec<Against1> {
+) -> Vec<BaselineComparison> {
     let count = samples.len();
-    let refused = |subject: usize, why: String| Against1 {
+    let failed = |subject: usize, reason: String| BaselineComparison {
         subject,
         comparison: None,
         adjusted: None,
         verdict: None,
-        refused: Some(why),
+        error: Some(reason),
     };
     let question = Question {
         better: metric.better(),
@@ -114,28 +115,28 @@ fn against<F: ToString>(
     let samples: Result<Vec<Sample>, F> = samples.into_iter().collect();
     let pairs = match samples {
         Err(fault) => Err(fault.to_string()),
-        Ok(samples) => compare_all(&samples, Against::Reference(0), &question, settings)
+        Ok(samples) => compare_all(&samples, PairSelection::Reference(0), &question, settings)
             .map_err(|e| e.to_string()),
     };
     match pairs {
-        Err(why) => (1..count).map(|i| refused(i, why.clone())).collect(),
+        Err(why) => (1..count).map(|i| failed(i, why.clone())).collect(),
         Ok(pairs) => pairs
             .into_iter()
             .map(|pair| match pair.alone {
-                Err(why) => refused(pair.b, why.to_string()),
-                Ok(comparison) => Against1 {
+                Err(why) => failed(pair.b, why.to_string()),
+                Ok(comparison) => BaselineComparison {
                     subject: pair.b,
                     verdict: Some(pair.adjusted.map_or(comparison.verdict, |a| a.verdict)),
                     comparison: Some(comparison),
                     adjusted: pair.adjusted,
-                    refused: None,
+                    error: None,
                 },
             })
             .collect(),
     }
 }
 
-/// The area that taxels fill: what the first skin's locations stand for, else its outline.
+/// Area that the taxels cover: the area probed on the first skin, or its outline.
 fn area_mm2(subjects: &[Subject]) -> f64 {
     let first = subjects.first();
     let probed = first

@@ -1,17 +1,17 @@
-//! Arming: open, configure, read back, start, and know where the robot is.
+//! Arming: opens, configures, reads back and starts the devices, and waits for the robot's position.
 
 use skinrig_device::{CameraCapabilities, SyncMode};
 use skinrig_model::{CameraId, DeviceRole, Record, RunHeader};
 use skinrig_protocol::plan::Step;
 
-use crate::core::Core;
 use crate::error::{ControllerError, Halt};
+use crate::executor::Executor;
 use crate::preflight;
 use crate::states::{Action, Event, State};
 use crate::steps::internal;
 
-impl Core<'_> {
-    /// Brings every device from unknown to ready. Nothing moves.
+impl Executor<'_> {
+    /// Brings every device to readiness. Nothing moves.
     pub(crate) fn arm(&mut self) -> Result<(), Halt> {
         let Some(header) = self.header.take() else {
             return Err(ControllerError::Internal("armed twice".to_owned()).into());
@@ -21,32 +21,32 @@ impl Core<'_> {
             Some(resume) => Record::Resumed(Box::new(resume.header.clone())),
         })?;
         if let Some(preflight) = &self.preflight {
-            self.checks.extend_from_slice(&preflight.made);
+            self.checks.extend_from_slice(&preflight.caller_checks);
         }
-        let ready = self.shielded(|core| core.prepare(&header));
+        let ready = self.catch_panic(|executor| executor.prepare(&header));
         self.conclude_preflight(ready)?;
-        // Whoever asked for an end in the meantime does not want the robot to be powered.
-        self.hear()?;
+        // If the operator has requested an end meanwhile, do not power the robot.
+        self.handle_requests()?;
         if self.machine.state() == State::Retracting {
             return Err(Halt::Stopped);
         }
         self.indenter.arm()?;
         self.await_pose()?;
         if self.machine.state() == State::Retracting {
-            return Err(Halt::Stopped); // the operator did not want it to begin
+            return Err(Halt::Stopped); // the operator requested a stop meanwhile
         }
         match self.machine.fire(Event::ArmingDone) {
-            Action::Refuse => Err(internal("arming", self.machine.state())),
+            Action::Reject => Err(internal("arming", self.machine.state())),
             _ => Ok(()),
         }
     }
 
-    /// Everything short of power: devices configured and read back, cameras streaming and checked.
+    /// Everything before power: configures devices, reads them back, starts and checks the cameras.
     fn prepare(&mut self, header: &RunHeader) -> Result<(), Halt> {
         let histories = self.resume.as_ref().map(|r| r.histories.as_slice());
         preflight::check_plan(self.plan, header, histories)?;
         if header.robot_from_skin != self.robot_from_skin {
-            return Err(rig_error("header", "the rig's place of the skin", "another").into());
+            return Err(rig_error("header", "the skin pose of the rig", "a different one").into());
         }
         let can = self.indenter.capabilities();
         let touches = |s: &Step| matches!(s, Step::Press(p) if !p.surface.is_known());
@@ -55,7 +55,7 @@ impl Core<'_> {
             return Err(rig_error(
                 "indenter",
                 "forces, because the plan finds the surface by touch",
-                "a robot without; write `press: {surface: known}` and no `surface_check`",
+                "a robot without force; write `press: {surface: known}` and no `surface_check`",
             )
             .into());
         }
@@ -82,7 +82,7 @@ impl Core<'_> {
         self.check_streams()
     }
 
-    /// Cameras that follow another's time base wait for it, so they start first.
+    /// Start order of the cameras: those that follow another's time base wait for it, so they start first.
     fn start_order(&self) -> [CameraId; 2] {
         let mut order = CameraId::ALL;
         order.sort_by_key(|c| self.camera_settings[c.index()].sync != SyncMode::Slave);
@@ -133,7 +133,7 @@ impl Core<'_> {
             }
             None if marks => Err(rig_error(
                 "trigger box",
-                "one, because the plan has trigger marks",
+                "a trigger box, because the plan has trigger marks",
                 "none; connect it or remove the marks from the protocol",
             )),
             None => Ok(()),

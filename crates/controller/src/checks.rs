@@ -1,4 +1,4 @@
-//! The preflight: what is checked of rig and devices before the robot is powered.
+//! The preflight: checks of rig and devices before the robot is powered.
 
 use skinrig_device::DeviceError;
 use skinrig_model::pulse::{LOOPBACK, decode_marks};
@@ -8,57 +8,57 @@ use skinrig_model::{
 };
 use skinrig_protocol::rig::RigFile;
 
-use crate::core::{Collect, Core};
 use crate::error::{ControllerError, Halt};
+use crate::executor::{Collect, Executor};
 
-/// How often the test mark is sent before the line counts as broken: one damaged train must not cost a night.
+/// How often to send the test mark before the line counts as broken: one damaged train must not cost a night.
 const ATTEMPTS: u32 = 4;
 
-/// What a run checks before it powers the robot.
+/// Checks to make before the robot is powered.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Preflight {
-    /// Checks that the caller made already: disk, frame, recorder.
-    pub made: Vec<PreflightCheck>,
-    /// Who is expected in which role.
+    /// Results of checks that the caller has already made: disk, frame, recorder.
+    pub caller_checks: Vec<PreflightCheck>,
+    /// Expected device per role.
     pub expected: Vec<ExpectedDevice>,
-    /// Both cameras' clocks must be seen to advance within this time; not checked when absent.
+    /// Time within which both cameras' clocks must advance; `None` skips the check.
     pub clocks_within: Option<HostDuration>,
-    /// A mark must come back through both cameras; not checked when absent.
+    /// Loop-back of a mark through both cameras; `None` skips the check.
     pub loopback: Option<Loopback>,
 }
 
-/// Who is expected in a role.
+/// Expected device in a role.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ExpectedDevice {
-    /// Which role.
+    /// Role in the rig.
     pub role: DeviceRole,
-    /// Its serial number; any when absent.
+    /// Its serial number; `None` for any.
     pub serial: Option<String>,
-    /// Versions that it must name in what it says of its firmware.
+    /// Versions that its firmware text must contain.
     pub versions: Vec<String>,
-    /// Values that were read from it, by name, as they must be; a version of a library for example.
+    /// Required values of read-only settings by name, for example a library version.
     pub settings: Vec<(String, String)>,
 }
 
-/// The way of a mark from the trigger box through the cameras.
+/// Loop-back of a mark from the trigger box through the cameras.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Loopback {
-    /// The trigger channel of camera 1 and camera 2.
+    /// Trigger channels of camera 1 and camera 2.
     pub channels: [u8; 2],
-    /// From sending to both cameras' bytes at the host.
+    /// Longest time from sending until the bytes of both cameras reach the host.
     pub within: HostDuration,
 }
 
-/// What the cameras delivered while they are checked.
+/// Data from the cameras during the preflight.
 #[derive(Debug, Default)]
-pub(crate) struct Watch {
+pub(crate) struct StreamProbe {
     edges: [Vec<TriggerEdge>; 2],
     first_us: [Option<u64>; 2],
     last_us: [Option<u64>; 2],
 }
 
-impl Watch {
-    pub(crate) fn see(&mut self, chunk: &RawChunk) {
+impl StreamProbe {
+    pub(crate) fn observe(&mut self, chunk: &RawChunk) {
         let i = chunk.camera.index();
         self.edges[i].extend_from_slice(&chunk.triggers);
         for t_us in [chunk.facts.first_us, chunk.facts.last_us]
@@ -75,7 +75,7 @@ impl Watch {
         matches!((self.first_us[i], self.last_us[i]), (Some(a), Some(b)) if b > a)
     }
 
-    /// True when the loop-back's mark, and no other mark, came through on `channel`.
+    /// True if the loop-back mark, and no other mark, arrived on `channel`.
     fn saw_mark(&self, camera: CameraId, channel: u8) -> bool {
         let marks = decode_marks(&self.on(camera, channel)).marks;
         !marks.is_empty() && marks.iter().all(|m| m.mark == LOOPBACK)
@@ -86,7 +86,7 @@ impl Watch {
         edges.filter(|e| e.channel == channel).collect()
     }
 
-    /// What was seen on `channel`, and elsewhere, for "found".
+    /// Description of the edges on `channel` and elsewhere.
     fn describe(&self, camera: CameraId, channel: u8) -> String {
         let here = self.on(camera, channel);
         let mut channels: Vec<u8> = self.edges[camera.index()]
@@ -123,7 +123,7 @@ impl Watch {
 }
 
 impl ExpectedDevice {
-    /// Whom a rig file expects: the robot, both cameras, and the trigger box when it has one.
+    /// Expected devices of a rig file: the robot, both cameras, and the trigger box if it has one.
     #[must_use]
     pub fn of_rig(file: &RigFile) -> Vec<Self> {
         let robot = &file.robot;
@@ -161,7 +161,7 @@ impl ExpectedDevice {
     }
 }
 
-/// Checks who a device says it is against whom is `wanted` in its role; without one anybody will do.
+/// Checks the identity of a device against the expected one of its role, if any.
 #[must_use]
 pub fn identity_checks(
     role: DeviceRole,
@@ -185,7 +185,7 @@ pub fn identity_checks(
                 format!("{role}: version"),
                 version.as_str(),
                 identity.firmware.as_str(),
-                says_version(&identity.firmware, version),
+                contains_version(&identity.firmware, version),
                 "install the expected version, or accept this one in the rig file after testing it",
             )
             .about(CheckKind::Identity(role)),
@@ -194,14 +194,14 @@ pub fn identity_checks(
     checks
 }
 
-/// The settings that were written and read back as something else; values that were only read do not count.
+/// Settings whose read-back differs from the written value; read-only values are ignored.
 pub fn differing(settings: &[Setting]) -> impl Iterator<Item = &Setting> {
     let written = settings.iter().filter(|s| s.was_requested());
     written.filter(|s| !same(&s.requested, &s.read_back))
 }
 
-impl Core<'_> {
-    /// Checks an identity and what was read back from its device.
+impl Executor<'_> {
+    /// Checks identity and read-back settings of a device.
     pub(crate) fn check_device(
         &mut self,
         role: DeviceRole,
@@ -219,7 +219,7 @@ impl Core<'_> {
                 PreflightCheck::new(
                     format!("{role}: {name}"),
                     value.as_str(),
-                    found.map_or("not told", |s| s.read_back.as_str()),
+                    found.map_or("not reported", |s| s.read_back.as_str()),
                     found.is_some_and(|s| same(value, &s.read_back)),
                     "find out what changed, or accept the value in the rig file after testing it",
                 )
@@ -243,19 +243,19 @@ impl Core<'_> {
                 None => PreflightCheck::skipped(
                     "indenter: initialised",
                     "true",
-                    "this robot does not say",
+                    "not reported by this robot",
                 ),
             });
         }
         self.checks.extend(checks);
     }
 
-    /// With the cameras streaming: both clocks advance, and a mark comes back through both.
+    /// Checks, with the cameras streaming, that both clocks advance and a mark arrives through both.
     pub(crate) fn check_streams(&mut self) -> Result<(), Halt> {
         let Some(preflight) = self.preflight.clone() else {
             return Ok(());
         };
-        self.watch = Some(Watch::default());
+        self.watch = Some(StreamProbe::default());
         let answer = self.watch_streams(&preflight);
         self.watch = None;
         answer
@@ -291,7 +291,7 @@ impl Core<'_> {
         if self.trigger_box.is_none() {
             return Ok(());
         }
-        let seen = |w: &Watch| {
+        let seen = |w: &StreamProbe| {
             CameraId::ALL
                 .into_iter()
                 .all(|c| w.saw_mark(c, loopback.channels[c.index()]))
@@ -327,7 +327,7 @@ impl Core<'_> {
         Ok(())
     }
 
-    /// Sends the test mark as soon as the line is free: the box may be sending a train of its own.
+    /// Sends the test mark as soon as the line is free; the box may be sending its own train.
     fn send_loopback(&mut self) -> Result<(), Halt> {
         let until = self.now() + self.settings.mark_within;
         while let Some(trigger) = &mut self.trigger_box {
@@ -345,11 +345,11 @@ impl Core<'_> {
         Ok(())
     }
 
-    /// Looks at the cameras until `done`, or until `within` is over.
+    /// Polls the cameras until `done`, or until `within` has passed.
     fn watch_until(
         &mut self,
         within: HostDuration,
-        done: impl Fn(&Watch) -> bool,
+        done: impl Fn(&StreamProbe) -> bool,
     ) -> Result<(), Halt> {
         let until = self.now() + within;
         while !self.watch.as_ref().is_some_and(&done) && self.now() < until {
@@ -360,7 +360,7 @@ impl Core<'_> {
         Ok(())
     }
 
-    /// Hands over the checks. With a failed one, or when the devices failed on the way, nothing is armed.
+    /// Emits the checks. If one failed, or a device failed meanwhile, nothing is armed.
     pub(crate) fn conclude_preflight(&mut self, result: Result<(), Halt>) -> Result<(), Halt> {
         if self.preflight.is_none() {
             return result;
@@ -385,7 +385,7 @@ impl Core<'_> {
     }
 }
 
-/// Everything that was written reads back; values that were only read do not count.
+/// Checks that everything written reads back unchanged; read-only values are ignored.
 fn read_back(role: DeviceRole, settings: &[Setting]) -> PreflightCheck {
     let written = settings.iter().filter(|s| s.was_requested());
     let differing: Vec<String> = differing(settings)
@@ -405,12 +405,12 @@ fn read_back(role: DeviceRole, settings: &[Setting]) -> PreflightCheck {
     .about(CheckKind::ReadBack(role))
 }
 
-/// `2 s`, without zeros behind.
+/// `2 s`, without trailing zeros.
 fn seconds(t: HostDuration) -> String {
     format!("{} s", t.as_secs_f64())
 }
 
-/// Equal as texts, or as numbers as far as single precision tells.
+/// Equal as texts, or as numbers in single precision.
 fn same(wanted: &str, found: &str) -> bool {
     if wanted == found {
         return true;
@@ -421,10 +421,10 @@ fn same(wanted: &str, found: &str) -> bool {
     }
 }
 
-/// Whether `found`, what a device says of its firmware, names the version `wanted` as a whole: `3.0` is in
-/// `FPGA 3.0, system 1c`, not in `13.0` or `3.01`.
+/// Whether the firmware text `found` contains the version `wanted` as a whole: `3.0` is in
+/// `FPGA 3.0, system 1c`, but not in `13.0` or `3.01`.
 #[must_use]
-pub fn says_version(found: &str, wanted: &str) -> bool {
+pub fn contains_version(found: &str, wanted: &str) -> bool {
     let part = |c: char| c.is_ascii_alphanumeric() || c == '.';
     found.match_indices(wanted).any(|(at, _)| {
         let before = found[..at].chars().next_back();
@@ -439,17 +439,17 @@ mod tests {
 
     #[test]
     fn versions_and_values_are_compared_as_a_whole() {
-        assert!(says_version("FPGA 3.0, system 1c", "3.0"));
-        assert!(says_version("3.0", "3.0"));
+        assert!(contains_version("FPGA 3.0, system 1c", "3.0"));
+        assert!(contains_version("3.0", "3.0"));
         for found in ["13.0", "3.01", "3.0.1", "v3", ""] {
-            assert!(!says_version(found, "3.0"), "{found}");
+            assert!(!contains_version(found, "3.0"), "{found}");
         }
         assert!(same("0.14", "0.14000000059604645") && same("evt2", "evt2"));
         assert!(!same("0.14", "0.15") && !same("on", "off") && !same("", "0"));
     }
 
     #[test]
-    fn what_was_only_read_is_no_setting() {
+    fn read_only_values_are_not_settings() {
         let setting = |requested: &str, read_back: &str| Setting {
             name: "x".into(),
             requested: requested.into(),
@@ -461,7 +461,7 @@ mod tests {
             !check.failed() && check.expected == "1 as written",
             "{check:?}"
         );
-        // What was let pass was not asked for either, and says what it is by its name.
+        // A tolerated difference is no written setting; its name explains it.
         let passed = setting(Setting::TOLERATED, "expected 1, found 2");
         assert!(!read_back(DeviceRole::Camera1, &[passed]).failed());
         let check = read_back(DeviceRole::Indenter, &[found, setting("5", "6")]);

@@ -1,61 +1,61 @@
-//! Whether the cameras' streams go on: their time keeps pace with the host's, they reach to the end of a press, and no storm
-//! drowns it. A press whose data are spoilt is taken again.
+//! Continuity of the camera streams: their time keeps pace with the host's, their data reach the end of each press, and the event rate
+//! stays below its limit. A press with faulty data is repeated.
 
 use skinrig_device::DeviceError;
 use skinrig_model::{CameraId, HostDuration, HostTime, RawChunk, Record};
 
-use crate::core::{Collect, Core};
 use crate::error::{ControllerError, Halt};
+use crate::executor::{Collect, Executor};
 use crate::press::cleared_at;
 use crate::press_fault::PressFault;
 
-/// How fast two clocks may drift apart: far beyond any quartz, parts per million.
+/// Largest drift between two clocks, parts per million: far beyond any quartz.
 const DRIFT_PPM: i64 = 1_000;
 
-/// Where a camera's stream has come to.
+/// Position of a camera's stream in time.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Continuity {
-    /// When the last bytes came.
+    /// Time of the last bytes.
     arrived: Option<HostTime>,
-    /// When camera time came last, and how far that time then was ahead of the host's at most, µs: bytes come late at times,
+    /// Last host time with a camera time, and the largest lead of the camera's time over the host's so far, µs: bytes may come late,
     /// but never early.
     ahead: Option<(HostTime, i64)>,
-    /// The last camera time that came, µs.
+    /// The last camera time, µs.
     last_us: Option<i64>,
-    /// The last bytes came late.
+    /// True if the last bytes were late.
     late: bool,
-    /// When the flush under way was first asked for.
+    /// Start of the flush in progress.
     flushing_since: Option<HostTime>,
-    /// Everything up to then was handed over.
+    /// Everything up to this time has been delivered.
     flushed_to: Option<HostTime>,
 }
 
-/// How a chunk's time compares with the host's.
+/// Time of a chunk compared with the host's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Pace {
-    /// As ever, or the chunk has no time.
-    Even,
-    /// The camera's time stepped forward by this many µs.
+pub(crate) enum StreamTiming {
+    /// In step, or a chunk without a time.
+    InStep,
+    /// The camera's time jumped forward by this many µs.
     Stepped(i64),
-    /// The bytes came late, or the camera's time stepped back, by this many µs; told once.
+    /// The bytes came late, or the camera's time jumped back, by this many µs; reported once.
     Late(i64),
 }
 
 impl Continuity {
-    /// Takes the next chunk; `limit` is how far its time may be off.
-    pub(crate) fn see(&mut self, chunk: &RawChunk, limit: HostDuration) -> Pace {
+    /// Processes the next chunk; `limit` is the largest allowed deviation.
+    pub(crate) fn observe(&mut self, chunk: &RawChunk, limit: HostDuration) -> StreamTiming {
         if !chunk.bytes.is_empty() {
             self.arrived = Some(chunk.host_time);
         }
         let t = chunk.host_time;
         let Some(camera_us) = chunk.facts.last_us.and_then(|us| i64::try_from(us).ok()) else {
-            return Pace::Even;
+            return StreamTiming::InStep;
         };
         self.last_us = Some(camera_us);
         let ahead_us = camera_us - t.0 / 1_000;
         let Some((before, most_us)) = self.ahead else {
             self.ahead = Some((t, ahead_us));
-            return Pace::Even;
+            return StreamTiming::InStep;
         };
         let drift_us = (t - before).0 / 1_000 * DRIFT_PPM / 1_000_000;
         self.ahead = Some((t, ahead_us.max(most_us - drift_us)));
@@ -63,15 +63,15 @@ impl Continuity {
         let limit_us = limit.0 / 1_000;
         let was_late = std::mem::replace(&mut self.late, off_us < -limit_us);
         if off_us > limit_us {
-            Pace::Stepped(off_us)
+            StreamTiming::Stepped(off_us)
         } else if self.late && !was_late {
-            Pace::Late(-off_us)
+            StreamTiming::Late(-off_us)
         } else {
-            Pace::Even
+            StreamTiming::InStep
         }
     }
 
-    /// Takes the answer to a flush that was asked for at `now`; one that is under way is no fault.
+    /// Processes the answer to a flush requested at `now`; a flush still in progress is no fault.
     pub(crate) fn flush(
         &mut self,
         now: HostTime,
@@ -87,13 +87,13 @@ impl Continuity {
         answer
     }
 
-    /// Whether everything up to `t` was handed over.
+    /// Whether everything up to `t` was delivered.
     pub(crate) fn is_flushed_to(&self, t: HostTime) -> bool {
         self.flushed_to.is_some_and(|to| to >= t)
     }
 
-    /// Up to when, by the host's clock, the stream tells what the camera saw. By the camera's own time where it tells one: bytes that
-    /// come late tell of an earlier time than that at which they came. A delay that was there from the first byte on is not seen.
+    /// Host time up to which the stream is complete, from the camera's own time if it has one, since late bytes carry an earlier
+    /// time than their arrival. A constant delay since the first byte is not detected.
     pub(crate) fn reached(&self) -> Option<HostTime> {
         match (self.last_us, self.ahead) {
             (Some(last_us), Some((_, ahead_us))) => Some(HostTime((last_us - ahead_us) * 1_000)),
@@ -102,23 +102,23 @@ impl Continuity {
     }
 }
 
-impl Core<'_> {
-    /// Looks at the time of a chunk that came. Data that come late are noted: the verdict on a press waits for them. A clock that was
-    /// set forward ends the run, for no later press could be placed in time: resumed, the session gets a clock of its own for what
-    /// follows.
+impl Executor<'_> {
+    /// Checks the time of a chunk. Late data are noted, and the verdict on a press waits for them. A forward jump of the
+    /// camera's clock ends the run, because later presses could not be placed in time. When resumed, the session gets a new clock
+    /// for what follows.
     pub(crate) fn follow_stream(&mut self, chunk: &RawChunk) -> Result<(), ControllerError> {
         let Some(limit) = self.settings.camera_lag else {
             return Ok(());
         };
         let camera = chunk.camera;
-        match self.continuity[camera.index()].see(chunk, limit) {
-            Pace::Even => Ok(()),
-            Pace::Stepped(us) => Err(ControllerError::ClockStep {
+        match self.continuity[camera.index()].observe(chunk, limit) {
+            StreamTiming::InStep => Ok(()),
+            StreamTiming::Stepped(us) => Err(ControllerError::ClockStep {
                 camera,
                 limit,
                 found: HostDuration(us * 1_000),
             }),
-            Pace::Late(us) => {
+            StreamTiming::Late(us) => {
                 let text = format!(
                     "{camera}: expected data within {limit}, found them {} late",
                     HostDuration(us * 1_000)
@@ -129,8 +129,8 @@ impl Core<'_> {
         }
     }
 
-    /// Waits until both cameras have delivered what they saw of the press, so that what was lost of it is known before the verdict;
-    /// not for long.
+    /// Waits, up to a limit, until both cameras have delivered their data of the press, so that losses are known before the
+    /// verdict.
     pub(crate) fn await_streams(&mut self) -> Result<(), Halt> {
         if self.settings.camera_lag.is_none() {
             return Ok(());
@@ -138,7 +138,7 @@ impl Core<'_> {
         let end = self.end_of_press();
         let within = self.settings.data_within;
         self.collect(Collect::Flush)?;
-        // A camera that does not answer a flush is a fault in the end.
+        // A camera that never completes a flush is a fault.
         while !self.is_flushed_to(end)
             || self.first_behind(end).is_some() && self.now() < end + within
         {
@@ -154,18 +154,18 @@ impl Core<'_> {
                     waited: within,
                     reached,
                 };
-                self.with_open(|open| open.spoilt.push(late));
+                self.with_open(|open| open.data_faults.push(late));
             }
         }
         Ok(())
     }
 
-    /// Whether both cameras have handed over everything up to `t`.
+    /// Whether both cameras have delivered everything up to `t`.
     pub(crate) fn is_flushed_to(&self, t: HostTime) -> bool {
         self.continuity.iter().all(|c| c.is_flushed_to(t))
     }
 
-    /// A camera whose stream has not come to `end`.
+    /// A camera whose stream has not reached `end`.
     fn first_behind(&self, end: HostTime) -> Option<CameraId> {
         let behind = |c: &CameraId| {
             let reached = self.continuity[c.index()].reached();
@@ -174,14 +174,14 @@ impl Core<'_> {
         CameraId::ALL.into_iter().find(behind)
     }
 
-    /// When the tip was clear again; the present when it was never seen to be.
+    /// Time at which the tip was clear again; the current time if it never was.
     fn end_of_press(&self) -> HostTime {
         let cleared = self.open.as_ref().and_then(cleared_at);
         cleared.unwrap_or_else(|| self.now())
     }
 
-    /// Holds the event rates of the press under way against the level of a storm, when the plan has one.
-    pub(crate) fn weigh_storm(&mut self) {
+    /// Compares the event rates of the current press with the limit of the plan, if it has one.
+    pub(crate) fn check_event_rate(&mut self) {
         let Some(level) = self.plan.suspend.event_rate.map(|t| t.trip) else {
             return;
         };
@@ -191,7 +191,7 @@ impl Core<'_> {
             for camera in CameraId::ALL {
                 let rate = open.events[camera.index()] as f64 / seconds;
                 if rate > level {
-                    open.spoilt.push(PressFault::Storm {
+                    open.data_faults.push(PressFault::EventStorm {
                         camera,
                         level_ev_s: level,
                         found_ev_s: rate,
@@ -225,35 +225,39 @@ mod tests {
     }
 
     #[test]
-    fn a_step_forward_is_told_from_late_bytes() {
+    fn a_forward_jump_differs_from_late_bytes() {
         let limit = HostDuration::from_millis(250);
         let mut stream = Continuity::default();
-        let mut see = |host_ms, camera_ms| stream.see(&chunk(host_ms, camera_ms), limit);
-        assert_eq!(see(1_000, Some(77_000)), Pace::Even);
-        // A minute without bytes, in which the clocks drift apart.
-        assert_eq!(see(61_000, Some(137_010)), Pace::Even);
-        assert_eq!(see(62_000, None), Pace::Even);
-        // Late, and back in time: no step.
-        assert_eq!(see(63_000, Some(138_710)), Pace::Late(300_000));
-        assert_eq!(see(63_100, Some(138_720)), Pace::Even, "told once");
-        assert_eq!(see(64_000, Some(140_010)), Pace::Even);
-        assert_eq!(see(65_000, Some(141_310)), Pace::Stepped(300_000));
+        let mut see = |host_ms, camera_ms| stream.observe(&chunk(host_ms, camera_ms), limit);
+        assert_eq!(see(1_000, Some(77_000)), StreamTiming::InStep);
+        // A minute without bytes, while the clocks drift apart.
+        assert_eq!(see(61_000, Some(137_010)), StreamTiming::InStep);
+        assert_eq!(see(62_000, None), StreamTiming::InStep);
+        // Late and back in time: no jump.
+        assert_eq!(see(63_000, Some(138_710)), StreamTiming::Late(300_000));
+        assert_eq!(
+            see(63_100, Some(138_720)),
+            StreamTiming::InStep,
+            "told once"
+        );
+        assert_eq!(see(64_000, Some(140_010)), StreamTiming::InStep);
+        assert_eq!(see(65_000, Some(141_310)), StreamTiming::Stepped(300_000));
     }
 
-    /// Bytes that come late tell of the time at which the camera sent them.
+    /// Late bytes carry the time at which the camera sent them.
     #[test]
-    fn a_stream_has_come_as_far_as_its_own_time_tells() {
+    fn a_stream_has_reached_its_own_time() {
         let limit = HostDuration::from_millis(250);
         let mut stream = Continuity::default();
         assert_eq!(stream.reached(), None);
-        stream.see(&chunk(900, None), limit);
+        stream.observe(&chunk(900, None), limit);
         assert_eq!(stream.reached(), Some(HostTime(900_000_000)));
-        stream.see(&chunk(1_000, Some(77_000)), limit);
+        stream.observe(&chunk(1_000, Some(77_000)), limit);
         assert_eq!(stream.reached(), Some(HostTime(1_000_000_000)));
-        // 300 ms late; half a millisecond may be drift.
-        stream.see(&chunk(1_500, Some(77_200)), limit);
+        // 300 ms late, of which half a millisecond may be drift.
+        stream.observe(&chunk(1_500, Some(77_200)), limit);
         assert_eq!(stream.reached(), Some(HostTime(1_200_500_000)));
-        stream.see(&chunk(1_501, None), limit);
+        stream.observe(&chunk(1_501, None), limit);
         assert_eq!(stream.reached(), Some(HostTime(1_200_500_000)));
     }
 
@@ -263,7 +267,11 @@ mod tests {
         let mut stream = Continuity::default();
         for s in 0..40_000_u64 {
             let chunk = chunk(s as i64 * 1_000, Some(s * 1_000 - s / 10));
-            assert_eq!(stream.see(&chunk, limit), Pace::Even, "at {s} s");
+            assert_eq!(
+                stream.observe(&chunk, limit),
+                StreamTiming::InStep,
+                "at {s} s"
+            );
         }
     }
 }

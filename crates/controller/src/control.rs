@@ -1,4 +1,4 @@
-//! The operator's hand on a run: pause, resume, stop, abort, halt, remarks; and what it shows of itself.
+//! Requests from the operator (pause, resume, stop, abort, halt, notes), and the visible state of a run.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
@@ -13,14 +13,14 @@ const ABORT: u8 = 8;
 const PAUSE_NOW: u8 = 16;
 const HALT: u8 = 32;
 
-/// Remarks that may wait for the controller.
-const MOST_NOTES: usize = 16;
+/// Most notes that may wait for the controller.
+const MAX_NOTES: usize = 16;
 
-/// Sends requests to a running controller, which looks for them at every tick. Clones share one run.
+/// Sends requests to a running controller, which checks for them at every tick. Clones refer to the same run.
 ///
-/// Requests and the state are lock-free, so that they may be used from any thread; the controller never waits for the remarks.
-/// Counting ctrl-C (once: [`stop`](Self::stop), twice: [`abort`](Self::abort), three times: [`halt`](Self::halt)) is the
-/// caller's business.
+/// Requests and state are lock-free, so that any thread may use them; the controller never waits for notes. The caller
+/// counts ctrl-C: once for [`stop`](Self::stop), twice for [`abort`](Self::abort), three times for
+/// [`halt`](Self::halt).
 #[derive(Debug, Clone, Default)]
 pub struct ControlHandle {
     shared: Arc<Shared>,
@@ -29,9 +29,9 @@ pub struct ControlHandle {
 #[derive(Debug, Default)]
 struct Shared {
     bits: AtomicU8,
-    /// Requests made, and how many of them the controller has heard.
+    /// Number of requests made, and of those that the controller has acknowledged.
     asked: AtomicU64,
-    heard: AtomicU64,
+    acknowledged: AtomicU64,
     /// Index of the state in [`State::ALL`].
     state: AtomicU8,
     notes: Mutex<Notes>,
@@ -45,12 +45,12 @@ struct Notes {
     taken_in: u64,
 }
 
-/// So many remarks wait that no further one is taken.
+/// The queue of notes is full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("expected at most {MOST_NOTES} notes that wait to be written, found as many")]
+#[error("the queue of {MAX_NOTES} notes is full; try again")]
 pub struct NotesFull;
 
-/// What was asked for since the controller last looked, the gravest first.
+/// A request since the controller last checked, most urgent first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Request {
     Halt,
@@ -62,72 +62,72 @@ pub(crate) enum Request {
 }
 
 impl ControlHandle {
-    /// A handle with no request pending.
+    /// A handle without pending requests.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Wait at clearance height once the press under way is done. Replaces a pending [`resume`](Self::resume).
+    /// Waits at clearance height after the current press. Replaces a pending [`resume`](Self::resume).
     pub fn pause(&self) {
         self.replace(PAUSE, RESUME);
     }
 
-    /// Break the press under way off, leave the skin and wait at clearance height. Replaces a pending
+    /// Interrupts the current press, leaves the skin and waits at clearance height. Replaces a pending
     /// [`resume`](Self::resume).
     pub fn pause_now(&self) {
         self.replace(PAUSE_NOW, RESUME);
     }
 
-    /// Go on after a pause. Replaces a pending [`pause`](Self::pause) or [`pause_now`](Self::pause_now).
+    /// Continues after a pause. Replaces a pending [`pause`](Self::pause) or [`pause_now`](Self::pause_now).
     pub fn resume(&self) {
         self.replace(RESUME, PAUSE | PAUSE_NOW);
     }
 
-    /// End the run once the press under way is done.
+    /// Ends the run after the current press.
     pub fn stop(&self) {
         self.replace(STOP, 0);
     }
 
-    /// End the run now: retract, disarm, keep the data.
+    /// Ends the run now: retract, disarm, keep the data.
     pub fn abort(&self) {
         self.replace(ABORT, 0);
     }
 
-    /// Motors off now, wherever the tip is: no retraction, not even one under way goes on. Cannot be taken back.
+    /// Switches the motors off now, wherever the tip is, and cancels any retraction. Cannot be undone.
     pub fn halt(&self) {
         self.replace(HALT, 0);
     }
 
-    /// How many requests were made. One is heard, that is, has had the effect that `docs/reference/runs.md` says or has none, when
-    /// [`heard`](Self::heard) is at least what this gave after it.
+    /// Number of requests made. A request has been handled (see `docs/reference/runs.md`), or has no effect, once
+    /// [`requests_acknowledged`](Self::requests_acknowledged) has reached the value that this returned after it.
     #[must_use]
-    pub fn asked(&self) -> u64 {
+    pub fn requests_made(&self) -> u64 {
         self.shared.asked.load(Ordering::Acquire)
     }
 
-    /// How many of the requests the controller has heard.
+    /// Number of requests that the controller has handled.
     #[must_use]
-    pub fn heard(&self) -> u64 {
-        self.shared.heard.load(Ordering::Acquire)
+    pub fn requests_acknowledged(&self) -> u64 {
+        self.shared.acknowledged.load(Ordering::Acquire)
     }
 
-    /// Where the run is.
+    /// Current state of the run.
     #[must_use]
     pub fn state(&self) -> State {
         let index = usize::from(self.shared.state.load(Ordering::Acquire));
         State::ALL.get(index).copied().unwrap_or(State::Planned)
     }
 
-    /// Hands the controller a remark, which it writes at its next tick. Gives the remark's number; it is in the session's
-    /// hands once [`noted`](Self::noted) is as high.
+    /// Queues a note, which the controller records at its next tick. Returns the note's number; it is recorded
+    /// once [`notes_recorded`](Self::notes_recorded) has reached that number.
     ///
     /// # Errors
-    /// [`NotesFull`]: try again.
+    /// [`NotesFull`] if too many notes are queued: try again.
     pub fn note(&self, text: String) -> Result<u64, NotesFull> {
         let shared = &self.shared;
         let mut notes = shared.notes.lock().unwrap_or_else(PoisonError::into_inner);
-        if notes.waiting.len() >= MOST_NOTES {
+        if notes.waiting.len() >= MAX_NOTES {
             return Err(NotesFull);
         }
         notes.waiting.push_back(text);
@@ -136,13 +136,13 @@ impl ControlHandle {
         Ok(notes.taken_in)
     }
 
-    /// How many remarks were written.
+    /// Number of notes recorded.
     #[must_use]
-    pub fn noted(&self) -> u64 {
+    pub fn notes_recorded(&self) -> u64 {
         self.shared.noted.load(Ordering::Acquire)
     }
 
-    /// The remarks that wait; none when another thread is just handing one in, so that nobody is waited for.
+    /// Takes the queued notes; none while another thread is adding one, so that the controller never waits.
     pub(crate) fn take_notes(&self) -> VecDeque<String> {
         let shared = &self.shared;
         if !shared.has_notes.load(Ordering::Acquire) {
@@ -155,39 +155,39 @@ impl ControlHandle {
         std::mem::take(&mut notes.waiting)
     }
 
-    /// One more remark was written.
-    pub(crate) fn note_written(&self) {
+    /// Counts a recorded note.
+    pub(crate) fn count_note(&self) {
         self.shared.noted.fetch_add(1, Ordering::AcqRel);
     }
 
-    /// The controller has heard the first `asked` requests.
-    pub(crate) fn hear_up_to(&self, asked: u64) {
-        self.shared.heard.fetch_max(asked, Ordering::AcqRel);
+    /// Acknowledges the first `requests` requests.
+    pub(crate) fn acknowledge(&self, asked: u64) {
+        self.shared.acknowledged.fetch_max(asked, Ordering::AcqRel);
     }
 
-    /// The run is in `state` from now on.
-    pub(crate) fn show(&self, state: State) {
+    /// Publishes the state of the run.
+    pub(crate) fn publish_state(&self, state: State) {
         let index = State::ALL.iter().position(|s| *s == state).unwrap_or(0);
         self.shared.state.store(index as u8, Ordering::Release);
     }
 
-    /// True once [`halt`](Self::halt) was asked for.
+    /// True once a [`halt`](Self::halt) was requested.
     #[must_use]
     pub(crate) fn is_halted(&self) -> bool {
         self.shared.bits.load(Ordering::Acquire) & HALT != 0
     }
 
     fn replace(&self, set: u8, clear: u8) {
-        // The closure always gives a value, so the update always succeeds.
+        // The closure always returns a value, so the update always succeeds.
         let bits = &self.shared.bits;
         let _ = bits.fetch_update(Ordering::AcqRel, Ordering::Acquire, |b| {
             Some((b & !clear) | set)
         });
-        // After the bit, so that who sees the number finds the request.
+        // After the bit, so that a reader of the number finds the request.
         self.shared.asked.fetch_add(1, Ordering::AcqRel);
     }
 
-    /// Takes all pending requests, the gravest first. A halt stays: whoever looks next must see it, too.
+    /// Takes all pending requests, most urgent first. A halt stays pending, so that every later check sees it.
     pub(crate) fn take(&self) -> impl Iterator<Item = Request> + use<> {
         let bits = self.shared.bits.fetch_and(HALT, Ordering::AcqRel);
         [
@@ -208,7 +208,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn requests_are_taken_once_and_the_later_of_pause_and_resume_wins() {
+    fn requests_are_taken_once_and_a_later_pause_or_resume_wins() {
         let hand = ControlHandle::new();
         let other = hand.clone();
         other.pause();
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn a_halt_is_not_taken_back() {
+    fn a_halt_cannot_be_undone() {
         let hand = ControlHandle::new();
         hand.pause_now();
         hand.halt();
@@ -246,21 +246,21 @@ mod tests {
     }
 
     #[test]
-    fn remarks_are_bounded_and_never_taken_twice() {
+    fn notes_are_bounded_and_never_taken_twice() {
         let hand = ControlHandle::new();
-        for n in 1..=MOST_NOTES {
+        for n in 1..=MAX_NOTES {
             assert_eq!(hand.note(n.to_string()), Ok(n as u64));
         }
         assert_eq!(hand.note("one more".into()), Err(NotesFull));
         let taken = hand.take_notes();
-        assert_eq!(taken.len(), MOST_NOTES);
-        assert_eq!((hand.take_notes().len(), hand.noted()), (0, 0));
+        assert_eq!(taken.len(), MAX_NOTES);
+        assert_eq!((hand.take_notes().len(), hand.notes_recorded()), (0, 0));
         for _ in taken {
-            hand.note_written();
+            hand.count_note();
         }
-        assert_eq!(hand.noted(), MOST_NOTES as u64);
-        assert_eq!(hand.note("next".into()), Ok(MOST_NOTES as u64 + 1));
-        // Somebody is handing one in: the controller comes back later.
+        assert_eq!(hand.notes_recorded(), MAX_NOTES as u64);
+        assert_eq!(hand.note("next".into()), Ok(MAX_NOTES as u64 + 1));
+        // Another thread is adding one: the controller tries again later.
         let held = hand.shared.notes.lock().unwrap();
         assert_eq!(hand.take_notes().len(), 0);
         drop(held);
@@ -268,10 +268,10 @@ mod tests {
     }
 
     #[test]
-    fn the_state_is_seen_by_every_clone() {
+    fn every_clone_shows_the_state() {
         let hand = ControlHandle::new();
         for state in State::ALL {
-            hand.clone().show(state);
+            hand.clone().publish_state(state);
             assert_eq!(hand.state(), state);
         }
     }

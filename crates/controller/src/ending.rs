@@ -1,25 +1,25 @@
-//! The end of a run, however it came: off the skin, hold, disarm, stop, and tell.
+//! The end of a run: retracts, holds, disarms, stops the devices and writes the last records.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use skinrig_model::{CameraId, InterruptionKind, Record, RunEnd};
 
-use crate::core::Core;
 use crate::error::{ControllerError, Halt, NotAtRest};
+use crate::executor::Executor;
 use crate::press_fault::PressFault;
 use crate::run::RunReport;
 use crate::states::{Event, State};
 
-/// How often a device that does not answer is told to rise, to disarm, to stop.
-const TRIES: u32 = 3;
+/// How often to command retract, disarm and stop to a device that does not answer.
+const MAX_TRIES: u32 = 3;
 
-/// How a run ends whose motors the operator switched off.
+/// Reason of a run whose motors the operator switched off.
 const HALTED: &str =
-    "operator: halt; the tip was left where it was, look before the robot is powered again";
+    "operator: halt; the tip stayed where it was: check it before you power the robot again";
 
-impl Core<'_> {
-    /// Runs a part of the experiment; a panic in it becomes a fault.
-    pub(crate) fn shielded(
+impl Executor<'_> {
+    /// Runs a part of the experiment; a panic becomes a fault.
+    pub(crate) fn catch_panic(
         &mut self,
         part: impl FnOnce(&mut Self) -> Result<(), Halt>,
     ) -> Result<(), Halt> {
@@ -29,35 +29,35 @@ impl Core<'_> {
         }
     }
 
-    /// Like [`shielded`](Self::shielded), for the end: what fails is remembered, and the end goes on.
+    /// Like [`catch_panic`](Self::catch_panic), for the end of the run: a failure becomes a problem, and the end continues.
     fn attempt(
         &mut self,
         what: &'static str,
         part: impl FnOnce(&mut Self) -> Result<(), ControllerError>,
     ) -> bool {
-        match self.shielded(|core| Ok(part(core)?)) {
+        match self.catch_panic(|executor| Ok(part(executor)?)) {
             Ok(()) => true,
             Err(Halt::Fault(e)) => {
                 self.journal.problem(what, e);
                 false
             }
-            // `part` cannot ask for these.
+            // `part` cannot return these.
             Err(Halt::Stopped | Halt::Aborted | Halt::Halted | Halt::PausedNow) => false,
         }
     }
 
-    /// Brings the rig to rest and closes the records. Does nothing the second time.
+    /// Brings the rig to rest and closes the records. A second call does nothing.
     pub(crate) fn conclude(&mut self, result: Result<(), Halt>) {
         if self.machine.state() == State::Finished {
             return;
         }
         let at = catch_unwind(AssertUnwindSafe(|| self.now())).ok();
         self.ending = true;
-        self.journal.ending();
+        self.journal.begin_ending();
         let mut causes = Vec::new();
         let (mut end, interruption) = match result {
             Ok(()) => (RunEnd::Completed, None),
-            // The row was written when the operator asked.
+            // The interruption was recorded when the operator requested it.
             Err(Halt::Stopped) => (RunEnd::Stopped("operator: stop".to_owned()), None),
             Err(Halt::Aborted) => {
                 self.machine.fire(Event::Abort);
@@ -66,10 +66,10 @@ impl Core<'_> {
                     Some(InterruptionKind::Abort),
                 )
             }
-            // Heard below, where the motors go off.
+            // Handled below, where the motors are switched off.
             Err(Halt::Halted) => (RunEnd::Stopped("operator: halt".to_owned()), None),
             Err(Halt::PausedNow) => {
-                let lost = "a pause was caught by no motion";
+                let lost = "no motion handled a pause";
                 self.machine.fire(Event::Fault);
                 let error = ControllerError::Internal(lost.to_owned());
                 let end = RunEnd::Faulted(error.to_string());
@@ -114,12 +114,12 @@ impl Core<'_> {
         };
         let t = at.unwrap_or_else(|| self.indenter.position().map(|p| p.t).unwrap_or_default());
         let ended = catch_unwind(AssertUnwindSafe(|| self.now())).unwrap_or(t);
-        self.attempt("outcome", |core| {
-            core.emit_poses()?;
-            if core.open.is_some() {
-                core.close_press(Some(PressFault::RunEnded(reason.clone())))?;
+        self.attempt("outcome", |executor| {
+            executor.emit_poses()?;
+            if executor.open.is_some() {
+                executor.close_press(Some(PressFault::RunEnded(reason.clone())))?;
             }
-            core.journal.miss_the_rest(&reason)
+            executor.journal.miss_the_rest(&reason)
         });
         self.attempt("the operator's notes", Self::write_notes);
         let problems = self.journal.problems.clone();
@@ -129,7 +129,7 @@ impl Core<'_> {
                 text: format!("while ending: {problem}"),
             });
         }
-        // What ended the run, then what the end itself met with.
+        // First the cause of the run's end, then the problems during the end.
         let mut rows = Vec::new();
         rows.extend(interruption.map(|kind| (kind, t, first_reason)));
         rows.extend(
@@ -148,8 +148,8 @@ impl Core<'_> {
             end: end.clone(),
         });
         self.machine.fire(Event::Disarmed);
-        // Whatever is asked for from here on finds everything at rest already.
-        self.control.hear_up_to(self.control.asked());
+        // Later requests find everything already at rest.
+        self.control.acknowledge(self.control.requests_made());
         let [planned, valid, invalid, missed] = self.journal.counts();
         self.report = Some(RunReport {
             end,
@@ -167,36 +167,38 @@ impl Core<'_> {
         });
     }
 
-    /// Off the skin if the robot still answers; hold; disarm; cameras flushed and stopped; notes. Gives whether
-    /// the tip was seen at clearance height and whether the robot confirmed that it is disarmed.
+    /// Retracts if the robot still answers, holds, disarms, flushes and stops the cameras, and emits notes. Returns whether
+    /// the tip reached clearance height and whether the robot confirmed that it is disarmed.
     fn make_safe(&mut self) -> (bool, bool) {
         let tripped = self.indenter.trip().is_some();
         let mut retracted = !tripped || self.indenter.is_clear();
         if self.indenter.is_armed() {
-            retracted =
-                (0..TRIES).any(|_| !self.hear_halt() && self.attempt("retract", Self::lift));
-            if !self.hear_halt() {
-                self.attempt("hold", |core| core.indenter.hold());
+            retracted = (0..MAX_TRIES)
+                .any(|_| !self.check_halt() && self.attempt("retract", Self::rise_clear));
+            if !self.check_halt() {
+                self.attempt("hold", |executor| executor.indenter.hold());
             }
         }
-        if !self.hear_halt() {
+        if !self.check_halt() {
             self.machine.fire(Event::Cleared);
         }
-        let disarmed = (0..TRIES).any(|_| self.attempt("disarm", |core| core.indenter.disarm()));
-        // What the robot and the cameras delivered until now belongs to the session.
+        let disarmed =
+            (0..MAX_TRIES).any(|_| self.attempt("disarm", |executor| executor.indenter.disarm()));
+        // Everything that robot and cameras have delivered belongs to the session.
         self.attempt("last samples", Self::observe);
         for camera in CameraId::ALL {
-            let _ = (0..TRIES).any(|_| self.attempt("stop", |core| core.stop_camera(camera)));
+            let _ = (0..MAX_TRIES)
+                .any(|_| self.attempt("stop", |executor| executor.stop_camera(camera)));
         }
         self.attempt("notes", Self::emit_box_notes);
         (retracted, disarmed)
     }
 
-    /// Straight up to clearance height, unless the tip is there.
-    fn lift(&mut self) -> Result<(), ControllerError> {
+    /// Rises straight to clearance height, unless the tip is already there.
+    fn rise_clear(&mut self) -> Result<(), ControllerError> {
         if self.machine.state() != State::Retracting {
-            // Whatever was under way, sideways motion included, ends here.
-            self.attempt("hold", |core| core.indenter.hold());
+            // Ends any current motion, including lateral ones.
+            self.attempt("hold", |executor| executor.indenter.hold());
         }
         self.observe()?;
         if self.indenter.is_clear() {
@@ -218,7 +220,7 @@ impl Core<'_> {
             }
             self.clock.wait_until(now + self.settings.tick);
             self.observe()?;
-            if self.hear_halt() {
+            if self.check_halt() {
                 return Err(self.not_arrived("straight up", target, now - t).into());
             }
         }
@@ -226,14 +228,14 @@ impl Core<'_> {
     }
 }
 
-impl Drop for Core<'_> {
+impl Drop for Executor<'_> {
     fn drop(&mut self) {
         let dropped = ControllerError::Internal("the run was dropped before its end".to_owned());
         self.conclude(Err(Halt::Fault(dropped)));
     }
 }
 
-/// What a panic said.
+/// Message of a panic.
 fn panic_text(payload: &(dyn std::any::Any + Send)) -> String {
     let text = payload
         .downcast_ref::<&str>()

@@ -1,4 +1,4 @@
-//! What can end a run before its plan does.
+//! Reasons why a run ends before its plan does.
 
 use skinrig_device::DeviceError;
 use skinrig_model::{HostDuration, PreflightCheck};
@@ -6,23 +6,23 @@ use skinrig_model::{HostDuration, PreflightCheck};
 use crate::not_arrived::NotArrived;
 use crate::press_fault::PressFault;
 use crate::sink::SinkFault;
-use crate::watchdog::Trip;
+use crate::watchdog::WatchdogTrip;
 
-/// A motion that never reached the robot. Nothing was done; the present motion goes on unchanged.
+/// A motion rejected by the guard. The robot received no command, and its current motion continues.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GuardError {
     /// A coordinate or the speed is NaN or infinite.
     #[error("expected finite coordinates and speed, found {found}")]
     NotFinite {
-        /// What was asked for.
+        /// The requested target and speed.
         found: String,
     },
     /// The speed is not above zero or beyond the limit.
     #[error("expected a speed above 0 and at most {limit_mm_s} mm/s, found {found_mm_s} mm/s")]
     Speed {
-        /// mm/s.
+        /// Largest allowed speed, mm/s.
         limit_mm_s: f64,
-        /// mm/s.
+        /// Requested speed, mm/s.
         found_mm_s: f64,
     },
     /// The target lies outside the workspace.
@@ -30,64 +30,64 @@ pub enum GuardError {
     Workspace {
         /// `x`, `y` or `z` of the skin frame.
         axis: char,
-        /// mm.
+        /// Lower limit, mm.
         min_mm: f64,
-        /// mm.
+        /// Upper limit, mm.
         max_mm: f64,
-        /// mm.
+        /// Requested coordinate, mm.
         found_mm: f64,
     },
-    /// The target lies deeper than allowed.
+    /// The target is too deep.
     #[error("expected a depth of at most {limit_mm} mm, found {found_mm} mm")]
     Depth {
-        /// mm, positive.
+        /// Largest allowed depth, mm, positive.
         limit_mm: f64,
-        /// mm, positive.
+        /// Requested depth, mm, positive.
         found_mm: f64,
     },
-    /// The target lies deeper below the surface of the rig's frame than allowed.
+    /// The target is too far below the surface of the rig's frame.
     #[error("expected at most {limit_mm} mm below the frame's surface, found {found_mm:.3} mm")]
     Floor {
-        /// mm, positive.
+        /// Largest allowed depth, mm, positive.
         limit_mm: f64,
-        /// mm, positive.
+        /// Requested depth, mm, positive.
         found_mm: f64,
     },
-    /// Sideways motion below clearance height.
+    /// Lateral motion below clearance height.
     #[error(
         "expected lateral motion only at {clearance_mm} mm or higher, found {lateral_mm:.3} mm sideways at {height_mm:.3} mm"
     )]
     Lateral {
-        /// mm.
+        /// Clearance height, mm.
         clearance_mm: f64,
-        /// How far sideways, mm.
+        /// Lateral distance, mm.
         lateral_mm: f64,
-        /// The lower end of the motion, mm.
+        /// Lower end of the motion, mm.
         height_mm: f64,
     },
-    /// A target below clearance height beside the skin.
+    /// A target below clearance height and beside the skin.
     #[error(
-        "expected a target inside the skin's outline below clearance height, found one {outside_mm:.3} mm outside at {height_mm:.3} mm"
+        "expected a target inside the skin's outline below clearance height, found it {outside_mm:.3} mm outside at {height_mm:.3} mm"
     )]
     Outline {
-        /// How far outside, at least, mm.
+        /// Smallest distance from the outline, mm.
         outside_mm: f64,
-        /// Its height, mm.
+        /// Height of the target, mm.
         height_mm: f64,
     },
-    /// The straight way to the target leads too close to something.
+    /// The straight path to the target passes too close to an obstacle.
     #[error(
-        "expected a straight way more than {margin_mm} mm from `{name}`, found {found_mm:.3} mm"
+        "expected a straight path more than {margin_mm} mm from `{name}`, found {found_mm:.3} mm"
     )]
     KeepOut {
-        /// What stands there.
+        /// Name of the obstacle.
         name: String,
-        /// mm.
+        /// Required distance, mm.
         margin_mm: f64,
-        /// mm.
+        /// Distance of the path, mm.
         found_mm: f64,
     },
-    /// The robot's position is not known well enough to move.
+    /// The position of the robot is not known well enough to move.
     #[error("expected a pose sample no older than {limit}, found {found}")]
     StalePose {
         /// Longest allowed age.
@@ -95,18 +95,20 @@ pub enum GuardError {
         /// Age of the newest sample, or `none`.
         found: String,
     },
-    /// The watchdog tripped: only straight up.
-    #[error("expected a motion straight up after the watchdog tripped ({why}), found another one")]
+    /// The watchdog tripped: only straight upward motion is allowed.
+    #[error(
+        "expected a motion straight up after the watchdog tripped ({reason}), found another motion"
+    )]
     Tripped {
-        /// Why it did.
-        why: String,
+        /// Reason of the trip.
+        reason: String,
     },
     /// The robot is not armed.
     #[error("expected an armed robot, found it disarmed")]
     NotArmed,
 }
 
-/// A run cannot start or go on. Every one of these ends the run safely.
+/// Reason why a run cannot start or continue. Each of them ends the run safely.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ControllerError {
     /// A device failed.
@@ -115,124 +117,124 @@ pub enum ControllerError {
     /// The consumer of records failed.
     #[error(transparent)]
     Sink(#[from] SinkFault),
-    /// A motion was refused before it reached the robot.
+    /// The guard rejected a motion before the robot received it.
     #[error("motion refused: {0}")]
     Guard(#[from] GuardError),
-    /// The plan is not one that this controller executes.
+    /// This controller cannot execute the plan.
     #[error("plan, {place}: expected {expected}, found {found}; compile the plan again")]
     Plan {
-        /// Where in the plan.
+        /// Location in the plan.
         place: String,
-        /// What a plan has there.
+        /// What is valid there.
         expected: String,
-        /// What it has.
+        /// What was found.
         found: String,
     },
     /// The rig does not fit the plan or its header.
     #[error("rig, {place}: expected {expected}, found {found}")]
     Rig {
-        /// Which part of the rig.
+        /// Part of the rig.
         place: String,
         /// What the run needs.
         expected: String,
-        /// What there is.
+        /// What was found.
         found: String,
     },
-    /// The surface of the skin is not where the frame says; no press was made on it since.
+    /// The surface of the skin is not where the frame puts it; no press was made since the last check.
     #[error("surface check: {}; {next}", .failed.join("; "))]
     Surface {
-        /// Each point that failed: place, expected, found. Not empty.
+        /// Each failed point with location, expected and found. Not empty.
         failed: Vec<String>,
-        /// What to do.
+        /// Next step for the operator.
         next: &'static str,
     },
-    /// Presses went wrong one after the other.
+    /// Too many consecutive presses were invalid.
     #[error("invalid presses: expected fewer than {limit} in a row (`limits.max_consecutive_invalid`), found {limit}: {}", joined(.faults))]
     InvalidInARow {
-        /// So many are too many.
+        /// The limit, which was reached.
         limit: u32,
-        /// Why, each reason once. Not empty.
+        /// The faults, each once. Not empty.
         faults: Vec<PressFault>,
     },
-    /// A check before the run failed; nothing was powered.
+    /// A preflight check failed; nothing was powered.
     #[error("preflight: {} failed: {}", count(.failed), joined(&words(.failed)))]
     Preflight {
         /// Each failed check. Not empty.
         failed: Vec<PreflightCheck>,
     },
-    /// The pose stream did not begin, or says too little.
+    /// The pose stream did not start, or lacks required data.
     #[error("pose stream: expected {expected}, found {found}")]
     PoseStream {
-        /// What a stream delivers.
+        /// What the stream must contain.
         expected: String,
-        /// What came.
+        /// What arrived.
         found: String,
     },
-    /// A motion did not end where it should.
+    /// A motion did not reach its target.
     #[error(transparent)]
     NotArrived(#[from] NotArrived),
-    /// A measured limit was broken.
+    /// A measured limit was exceeded.
     #[error(transparent)]
-    Watchdog(#[from] Trip),
-    /// A camera's chunks do not follow each other.
+    Watchdog(#[from] WatchdogTrip),
+    /// A camera's chunks are not consecutive.
     #[error("{camera}: expected chunk {expected}, found chunk {found}")]
     ChunkOrder {
-        /// Which camera.
+        /// Camera of the chunks.
         camera: skinrig_model::CameraId,
-        /// The number due.
+        /// Expected chunk number.
         expected: u64,
-        /// The number that came.
+        /// Received chunk number.
         found: u64,
     },
-    /// A session ended whose robot did not come to rest as it should.
+    /// The robot did not come to rest properly at the end of the session.
     #[error(transparent)]
     NotAtRest(#[from] NotAtRest),
     /// The operator switched the motors off.
-    #[error("operator: halt; the motors are off, the tip was left where it was")]
+    #[error("operator: halt; the motors are off and the tip stayed where it was")]
     Halted,
-    /// A camera's clock was set forward.
+    /// A camera's clock jumped forward.
     #[error(
-        "{camera}: expected its time to go with the host's within {limit}, found it set forward by {found}; \
-         go on with a further leg, which has a clock of its own"
+        "{camera}: expected its time to follow the host's within {limit}, found a forward jump of {found}; \
+         resume the session: a further leg has its own clock"
     )]
     ClockStep {
-        /// Which camera.
+        /// Camera with the jump.
         camera: skinrig_model::CameraId,
-        /// By how much it may be off.
+        /// Largest allowed deviation.
         limit: HostDuration,
-        /// By how much it is.
+        /// Deviation found.
         found: HostDuration,
     },
-    /// What suspended the run went on for too long.
+    /// A suspension lasted too long.
     #[error("{reason}; expected it to be over within {limit}")]
     Suspended {
-        /// What suspended it.
+        /// Reason of the suspension.
         reason: String,
         /// Longest suspension.
         limit: HostDuration,
     },
-    /// The code itself failed, or the run was dropped before its end.
+    /// The controller itself failed, or the run was dropped before its end.
     #[error("internal error: {0}")]
     Internal(String),
 }
 
-/// How the robot was left at the end of a run, when it is not as it should be.
+/// Unsafe state of the robot at the end of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NotAtRest {
-    /// It may be in contact.
-    #[error("the tip was not seen at clearance height: look where it is")]
+    /// The tip may be in contact.
+    #[error("the tip did not reach clearance height: check where it is")]
     NotClear,
-    /// Its motors may be on.
+    /// The motors may be on.
     #[error("the robot did not confirm that it is disarmed: switch it off by hand")]
     NotDisarmed,
 }
 
-/// What went wrong besides what ended a run, mostly while it was brought to rest.
+/// A problem besides the cause of a run's end, mostly while bringing the robot to rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
-    /// Which part of the end failed, for example `disarm`; empty where the error says it.
+    /// Failed operation of the run's end, for example `disarm`; empty if the error is clear without it.
     pub doing: &'static str,
-    /// How.
+    /// The failure.
     pub error: ControllerError,
 }
 
@@ -253,7 +255,7 @@ fn count(failed: &[PreflightCheck]) -> String {
     }
 }
 
-/// Each failed check in words.
+/// Description of each failed check.
 fn words(failed: &[PreflightCheck]) -> Vec<String> {
     let one = |c: &PreflightCheck| {
         format!(
@@ -264,22 +266,22 @@ fn words(failed: &[PreflightCheck]) -> Vec<String> {
     failed.iter().map(one).collect()
 }
 
-/// With semicolons between.
+/// Joins descriptions with semicolons.
 fn joined(parts: &[impl std::fmt::Display]) -> String {
     let parts: Vec<String> = parts.iter().map(ToString::to_string).collect();
     parts.join("; ")
 }
 
-/// Why the steps of a plan ended early.
+/// Reason why the steps of a plan end early.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Halt {
-    /// The operator asked for it; nothing is under way.
+    /// The operator requested a stop; nothing is in progress.
     Stopped,
-    /// The operator wants it to end now.
+    /// The operator requested an abort.
     Aborted,
-    /// The operator wants the motors off, wherever the tip is.
+    /// The operator requested a halt: motors off, wherever the tip is.
     Halted,
-    /// The operator wants to wait, off the skin. Ends no run: whoever commanded the motion catches it.
+    /// The operator requested an immediate pause off the skin. The code that commanded the motion handles it; the run continues.
     PausedNow,
     /// Something failed.
     Fault(ControllerError),

@@ -1,4 +1,4 @@
-//! The only hand on the robot: every motion is checked here, against what the robot last measured.
+//! The guard: the only access to the robot. It checks every motion against the last measured pose.
 
 use skinrig_device::{
     Clock, DeviceError, Indenter, IndenterCapabilities, MotionLimits, RobotSample,
@@ -12,9 +12,9 @@ use skinrig_protocol::plan::{OnTrip, RunLimits};
 
 use crate::error::{ControllerError, GuardError};
 use crate::settings::ControllerSettings;
-use crate::watchdog::{Trip, WatchLimits, Watchdog};
+use crate::watchdog::{WatchLimits, Watchdog, WatchdogTrip};
 
-/// How deep the tip may go below the surface of a frame, where the coordinates of motions are not that frame's own.
+/// Limit on the depth below the surface of a frame, where motions use the coordinates of a different frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Floor {
     /// The frame whose z = 0 is the surface.
@@ -23,8 +23,8 @@ pub struct Floor {
     pub max_depth_mm: f64,
 }
 
-/// Owns the indenter. Takes targets in the skin frame, refuses what the limits of the run forbid, gives poses in the
-/// skin frame, and feeds them to its watchdog: when that trips, the robot holds or brakes before anybody is asked.
+/// Owns the indenter. Accepts targets in the skin frame, rejects motions that violate the limits of the run, returns poses in the
+/// skin frame, and passes them to its watchdog. After a trip the robot holds or brakes before the caller is told.
 pub struct GuardedIndenter<'a> {
     inner: Box<dyn Indenter + 'a>,
     robot_from_skin: RigidTransform<Robot, Skin>,
@@ -35,15 +35,15 @@ pub struct GuardedIndenter<'a> {
     stale_after: HostDuration,
     armed: bool,
     watchdog: Watchdog,
-    trip: Option<Trip>,
+    trip: Option<WatchdogTrip>,
     target: Option<Point3<Skin>>,
-    /// Where the tip went below clearance height: it moves up and down there until it is clear again.
+    /// Where the tip went below clearance height. It may only move vertically until it is clear again.
     foot: Option<Point2>,
     samples: Vec<RobotSample>,
 }
 
 impl<'a> GuardedIndenter<'a> {
-    /// Takes `inner` over. A newest sample older than the settings allow forbids motion.
+    /// Takes over `inner`. Rejects motions if the newest sample is older than the settings allow.
     #[must_use]
     pub fn new(
         inner: Box<dyn Indenter + 'a>,
@@ -68,41 +68,41 @@ impl<'a> GuardedIndenter<'a> {
         }
     }
 
-    /// With these surroundings: below clearance height only inside the outline, and nowhere too close to a keep-out.
+    /// Adds surroundings: below clearance height only inside the outline, and never close to a keep-out.
     #[must_use]
-    pub fn within(mut self, surroundings: Option<Surroundings>) -> Self {
+    pub fn with_surroundings(mut self, surroundings: Option<Surroundings>) -> Self {
         self.surroundings = surroundings;
         self
     }
 
-    /// With this floor; rising is always allowed.
+    /// Adds a floor; upward motion is always allowed.
     #[must_use]
-    pub const fn above(mut self, floor: Option<Floor>) -> Self {
+    pub const fn with_floor(mut self, floor: Option<Floor>) -> Self {
         self.floor = floor;
         self
     }
 
-    /// Who the robot is.
+    /// Identity of the robot.
     pub fn identity(&self) -> DeviceIdentity {
         self.inner.identity()
     }
 
-    /// What the robot can do.
+    /// Capabilities of the robot.
     pub fn capabilities(&self) -> IndenterCapabilities {
         self.inner.capabilities()
     }
 
-    /// Hands limits to the robot itself.
+    /// Configures the robot's own limits.
     ///
     /// # Errors
-    /// What the robot answers.
+    /// The error of the robot.
     pub fn configure(&mut self, limits: &MotionLimits) -> Result<Vec<Setting>, ControllerError> {
         Ok(self.inner.configure(limits)?)
     }
 
     /// Powers the motors.
     ///
-    /// # Errors
+    /// The error of the robot.
     /// What the robot answers.
     pub fn arm(&mut self) -> Result<(), ControllerError> {
         self.inner.arm()?;
@@ -112,7 +112,7 @@ impl<'a> GuardedIndenter<'a> {
         Ok(())
     }
 
-    /// What the robot has to say besides its samples.
+    /// Takes the notes of the robot.
     pub fn take_notes(&mut self) -> Vec<String> {
         let mut notes = Vec::new();
         self.inner.take_notes(&mut notes);
@@ -131,13 +131,13 @@ impl<'a> GuardedIndenter<'a> {
         self.watchdog.last()
     }
 
-    /// Why the watchdog tripped since the robot was armed; the first reason.
+    /// First trip of the watchdog since the robot was armed.
     #[must_use]
-    pub const fn trip(&self) -> Option<&Trip> {
+    pub const fn trip(&self) -> Option<&WatchdogTrip> {
         self.trip.as_ref()
     }
 
-    /// True when the tip was last seen at clearance height or above, within the tolerance.
+    /// True if the last sample was at clearance height or above, within the tolerance.
     #[must_use]
     pub(crate) fn is_clear(&self) -> bool {
         self.position()
@@ -148,14 +148,14 @@ impl<'a> GuardedIndenter<'a> {
         self.limits.clearance_mm - self.limits.position_tolerance_mm
     }
 
-    /// Where the tip was told to go last.
+    /// Target of the last command.
     #[must_use]
     pub const fn target(&self) -> Option<Point3<Skin>> {
         self.target
     }
 
-    /// The point at clearance height straight above the tip: above the present target (which does not
-    /// depend on when one looks) unless the tip is away from it sideways, then above the tip as measured.
+    /// The point at clearance height straight above the current target, which does not depend on the polling time. If the tip is
+    /// laterally away from the target, the point above the measured tip.
     #[must_use]
     pub(crate) fn point_above(&self) -> Option<Point3<Skin>> {
         let last = self.position()?;
@@ -170,8 +170,8 @@ impl<'a> GuardedIndenter<'a> {
         )
     }
 
-    /// `at`, or the nearest place of the workspace when that is within the tolerance sideways: a tip that was braked at its edge
-    /// may be found a little outside, and has to rise.
+    /// `at`, or the nearest point of the workspace if that is within the lateral tolerance: a tip that braked at the edge
+    /// may be slightly outside, and must be able to rise.
     fn inside(&self, at: Point3<Skin>) -> Point3<Skin> {
         let (min, max) = (self.limits.workspace_min_mm, self.limits.workspace_max_mm);
         let x_mm = at.x_mm.max(min[0]).min(max[0]);
@@ -184,7 +184,7 @@ impl<'a> GuardedIndenter<'a> {
         }
     }
 
-    /// Checks that the pose stream is alive.
+    /// Checks that the pose stream is current.
     ///
     /// # Errors
     /// [`GuardError::StalePose`].
@@ -198,10 +198,10 @@ impl<'a> GuardedIndenter<'a> {
         }
     }
 
-    /// Starts a straight move to `target` when every rule allows it.
+    /// Starts a straight move to `target` if all rules allow it.
     ///
     /// # Errors
-    /// [`GuardError`] when a rule forbids it (the robot hears nothing of it); what the robot answers.
+    /// [`GuardError`] if a rule forbids it (the robot receives nothing); otherwise the error of the robot.
     pub fn command(
         &mut self,
         target: Point3<Skin>,
@@ -211,7 +211,7 @@ impl<'a> GuardedIndenter<'a> {
         self.check(target, speed_mm_s, now)?;
         self.inner
             .command(self.robot_from_skin.apply(target), speed_mm_s)
-            .map_err(|e| self.failed(e))?;
+            .map_err(|e| self.hold_after(e))?;
         self.target = Some(target);
         if target.z_mm < self.clear_height_mm() {
             self.foot.get_or_insert(target.plane());
@@ -249,16 +249,16 @@ impl<'a> GuardedIndenter<'a> {
         };
         self.check_floor(last.measured, target)?;
         let lateral_mm = target.plane().distance_mm(last.measured.plane());
-        // Steeply: a long way aside in small steps would be no rise.
+        // Nearly vertical: small sideways steps must not add up to lateral motion.
         let rises = target.z_mm - last.measured.z_mm >= lateral_mm
             && lateral_mm <= limits.position_tolerance_mm;
         if let Some(trip) = self.trip.as_ref().filter(|_| !rises) {
             return Err(GuardError::Tripped {
-                why: trip.to_string(),
+                reason: trip.to_string(),
             });
         }
         let height_mm = target.z_mm.min(last.measured.z_mm);
-        // From where the tip went down, too: many small steps are one large one.
+        // Measured from where the tip went down, so that many small steps count as one large step.
         let from_foot_mm = self
             .foot
             .map_or(0.0, |foot| target.plane().distance_mm(foot));
@@ -275,12 +275,12 @@ impl<'a> GuardedIndenter<'a> {
             });
         }
         if rises {
-            return Ok(()); // away from everything, wherever it was
+            return Ok(()); // moves away from all obstacles
         }
         self.check_surroundings(last.measured, target)
     }
 
-    /// Half-spaces are convex: with both ends above the floor so is the way between them.
+    /// Half-spaces are convex: if both ends are above the floor, so is the whole path.
     fn check_floor(&self, from: Point3<Skin>, target: Point3<Skin>) -> Result<(), GuardError> {
         let Some(floor) = &self.floor else {
             return Ok(());
@@ -329,12 +329,12 @@ impl<'a> GuardedIndenter<'a> {
         Ok(())
     }
 
-    /// Appends all new samples, in the skin frame, and lets the watchdog look at them and at the present of `clock`.
+    /// Appends all new samples in the skin frame, and runs the watchdog on them and on the time of `clock`.
     ///
     /// # Errors
-    /// [`ControllerError::Watchdog`] when a limit is broken: the robot was told to hold or to brake, and until it is
-    /// armed again only a rise is allowed. A sample whose form is wrong and what came after it is not appended. What the
-    /// robot answers, after appending what it delivered.
+    /// [`ControllerError::Watchdog`] if a limit is exceeded: the robot then holds or brakes, and until it is armed again
+    /// only upward motion is allowed. A malformed sample and those after it are not appended. Errors of the robot are
+    /// returned after appending its samples.
     pub fn poll(
         &mut self,
         clock: &dyn Clock,
@@ -350,8 +350,8 @@ impl<'a> GuardedIndenter<'a> {
                 measured: to_nanometre(self.skin_from_robot.apply(s.measured)),
                 force_n: s.force_n,
             };
-            let one = self.watchdog.see(&pose);
-            let form_is_wrong = matches!(one, Err(Trip::Feedback { .. }));
+            let one = self.watchdog.check_sample(&pose);
+            let form_is_wrong = matches!(one, Err(WatchdogTrip::Feedback { .. }));
             if seen.is_ok() || form_is_wrong {
                 seen = one;
             }
@@ -360,8 +360,8 @@ impl<'a> GuardedIndenter<'a> {
             }
             poses.push(pose);
         }
-        let looked = self.watchdog.look(clock.now());
-        // Both are answered: the second one may say that the robot is to brake.
+        let looked = self.watchdog.check_poll(clock.now());
+        // React to both: the second one may require the robot to brake.
         for trip in [&seen, &looked]
             .into_iter()
             .filter_map(|r| r.as_ref().err())
@@ -369,11 +369,11 @@ impl<'a> GuardedIndenter<'a> {
             self.react(trip);
         }
         seen.and(looked)?;
-        answer.map_err(|e| self.failed(e))
+        answer.map_err(|e| self.hold_after(e))
     }
 
-    /// Holds or brakes. What the robot answers is told again by the end of the run.
-    fn react(&mut self, trip: &Trip) {
+    /// Holds or brakes. The end of the run reports a failure of the robot again.
+    fn react(&mut self, trip: &WatchdogTrip) {
         if !self.armed {
             return;
         }
@@ -384,26 +384,26 @@ impl<'a> GuardedIndenter<'a> {
         }
     }
 
-    /// A device that fails while armed is told to hold, if it still hears; a refusal is no failure.
-    fn failed(&mut self, e: DeviceError) -> ControllerError {
+    /// Commands a failed device to hold, if it still responds. A rejected request is not a failure.
+    fn hold_after(&mut self, e: DeviceError) -> ControllerError {
         if self.armed && !matches!(e, DeviceError::Refused { .. }) {
             let _ = self.inner.hold();
         }
         e.into()
     }
 
-    /// Stops where it is and holds.
+    /// Stops and holds the current position.
     ///
     /// # Errors
-    /// What the robot answers.
+    /// The error of the robot.
     pub fn hold(&mut self) -> Result<(), ControllerError> {
         Ok(self.inner.hold()?)
     }
 
-    /// Motors off.
+    /// Switches the motors off.
     ///
     /// # Errors
-    /// What the robot answers; no motion is allowed after that either.
+    /// The error of the robot; no motion is allowed afterwards either way.
     pub fn disarm(&mut self) -> Result<(), ControllerError> {
         self.armed = false;
         self.watchdog.stop();
@@ -411,7 +411,7 @@ impl<'a> GuardedIndenter<'a> {
     }
 }
 
-/// Checks that `target` lies in the workspace and not too deep.
+/// Checks that `target` is inside the workspace and not too deep.
 ///
 /// # Errors
 /// [`GuardError::Workspace`], [`GuardError::Depth`].
@@ -439,9 +439,9 @@ pub(crate) fn check_target(limits: &RunLimits, target: Point3<Skin>) -> Result<(
     }
     Ok(())
 }
-/// Rounds a pose to whole nanometres, far below any robot's resolution (omega.3: about 10 µm). Going to another
-/// frame and back changes the last bits of a coordinate; rounded, a replayed pose is the recorded one to the last
-/// bit, and so is everything computed from it.
+/// Rounds a pose to whole nanometres, far below any robot's resolution (omega.3: about 10 µm). Transforming to another
+/// frame and back changes the last bits of a coordinate. With rounding, a replayed pose equals the recorded one exactly,
+/// and so does everything computed from it.
 fn to_nanometre(p: Point3<Skin>) -> Point3<Skin> {
     let round = |mm: f64| (mm * 1e6).round() / 1e6;
     Point3::new(round(p.x_mm), round(p.y_mm), round(p.z_mm))

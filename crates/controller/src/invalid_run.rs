@@ -1,19 +1,19 @@
-//! Invalid presses in a row: past a limit something is wrong that more presses do not mend.
+//! Counts consecutive invalid presses: beyond a limit, more presses would not help.
 
 use crate::error::ControllerError;
 use crate::press_fault::PressFault;
 
-/// The present row of invalid presses.
+/// The current row of invalid presses.
 #[derive(Debug)]
 pub(crate) struct InvalidRun {
     limit: u32,
-    /// Of each press of the row.
+    /// Faults of each press in the row.
     faults: Vec<Vec<PressFault>>,
     last: Option<Vec<PressFault>>,
 }
 
 impl InvalidRun {
-    /// `limit` in a row are too many; 0: any number is borne.
+    /// Allows fewer than `limit` in a row; 0 allows any number.
     pub(crate) const fn new(limit: u32) -> Self {
         Self {
             limit,
@@ -22,12 +22,12 @@ impl InvalidRun {
         }
     }
 
-    /// An attempt ended, with these faults. The last one of a press counts.
+    /// Adds the faults of an attempt. Only the last attempt at a press counts.
     pub(crate) fn attempt(&mut self, faults: &[PressFault]) {
         self.last = Some(faults.to_vec());
     }
 
-    /// A press ended, with all its attempts. One that was broken off on purpose says nothing of the rig and is not counted.
+    /// Ends a press after its last attempt. A press that was interrupted on purpose is not counted.
     ///
     /// # Errors
     /// [`ControllerError::InvalidInARow`] at the limit.
@@ -77,7 +77,7 @@ mod tests {
         assert_eq!(press(&[&one, &valid]), Ok(()));
         assert_eq!(press(&[&one]), Ok(()));
         assert_eq!(press(&[&two]), Ok(()));
-        // The operator's own doing neither counts nor ends the row.
+        // Interruptions by the operator neither count nor end the row.
         assert_eq!(press(&[&vec![PressFault::Paused]]), Ok(()));
         let ended = press(&[&one]).unwrap_err();
         let text = ended.to_string();

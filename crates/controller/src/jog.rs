@@ -1,4 +1,4 @@
-//! Moving the robot by hand: single motions and slow touches under the guard of runs.
+//! Manual motion of the robot: single moves and slow touches under the same guard as runs.
 
 mod watch;
 
@@ -13,22 +13,22 @@ use skinrig_protocol::plan::RunLimits;
 use crate::control::ControlHandle;
 use crate::error::{ControllerError, GuardError};
 use crate::guard::{Floor, GuardedIndenter};
-use crate::moments::Settling;
 use crate::not_arrived::NotArrived;
+use crate::press_tracker::Settling;
 use crate::settings::ControllerSettings;
 use crate::touch::TouchDetector;
 
-/// After a touch the tip goes sideways only this far above its height, mm.
+/// After a touch the tip moves sideways only this far above it, mm.
 const LIFT_MM: f64 = 2.0;
-/// From one sample of the trace to the next.
+/// Interval between samples of the trace.
 const TRACE_EVERY: HostDuration = HostDuration::from_millis(100);
-/// How far the tip rises at the end, mm; less where the workspace ends.
+/// Height of the retraction at the end, mm; less at the edge of the workspace.
 const RETRACT_MM: f64 = 10.0;
 
-/// Asks whether the operator wants everything to stop now.
-pub type Stop<'a> = &'a dyn Fn() -> bool;
+/// Returns true once the operator wants everything to stop.
+pub type StopCheck<'a> = &'a dyn Fn() -> bool;
 
-/// A robot that is moved by hand. Dropped, it holds, rises and disarms.
+/// A manually moved robot. Dropping it holds, retracts and disarms.
 pub struct Jog<'a> {
     indenter: GuardedIndenter<'a>,
     clock: Box<dyn Clock + 'a>,
@@ -37,40 +37,40 @@ pub struct Jog<'a> {
     fresh: Vec<PoseSample>,
     /// Height of the last touch.
     touched_mm: Option<f64>,
-    /// Samples far enough apart for a log, not yet taken.
+    /// Samples for a log that were not yet taken, at least 100 ms apart.
     trace: Vec<PoseSample>,
     traced: Option<HostTime>,
     finished: bool,
     control: ControlHandle,
 }
 
-/// How a motion ended.
+/// Result of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Moved {
+pub enum MoveOutcome {
     /// The tip settled at its target.
     Arrived(PoseSample),
-    /// The operator stopped it; the robot holds.
+    /// The operator stopped the motion; the robot holds.
     Stopped(PoseSample),
 }
 
-/// How a touch ended.
+/// Result of a touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Touched {
-    /// The force rose here.
+pub enum TouchOutcome {
+    /// The force rose at this sample.
     At(PoseSample),
-    /// It did not, down to here.
-    Nothing(PoseSample),
-    /// The operator stopped it; the robot holds.
+    /// The force did not rise down to this sample.
+    NotFound(PoseSample),
+    /// The operator stopped the motion; the robot holds.
     Stopped(PoseSample),
 }
 
 impl<'a> Jog<'a> {
-    /// Limits the robot, powers it, and waits for its pose. Coordinates, those of `limits` included, are the robot's own:
-    /// where the skin lies is what a touch-off is to find out. Nothing goes below the `floor`. Of `control` only a halt is
-    /// heard: it disarms at once, and ends whatever is under way with [`ControllerError::Halted`].
+    /// Configures the robot's limits, powers it, and waits for its pose. All coordinates, including those of `limits`, are in the
+    /// robot frame, since the pose of the skin is still to be found by touching off. Nothing goes below the `floor`. Of `control`, only a
+    /// halt is handled: it disarms at once and ends the current call with [`ControllerError::Halted`].
     ///
     /// # Errors
-    /// What the robot answers; [`ControllerError::PoseStream`] when it tells no pose. It is then disarmed.
+    /// The error of the robot; [`ControllerError::PoseStream`] if it reports no pose. The robot is then disarmed.
     pub fn start(
         indenter: Box<dyn Indenter + 'a>,
         clock: Box<dyn Clock + 'a>,
@@ -82,12 +82,12 @@ impl<'a> Jog<'a> {
     ) -> Result<(Self, Vec<Setting>), ControllerError> {
         let indenter =
             GuardedIndenter::new(indenter, RigidTransform::identity(), limits, &settings)
-                .above(floor);
+                .with_floor(floor);
         Self::begin(indenter, clock, limits, robot_limits, control, settings)
     }
 
-    /// As [`start`](Self::start) in the frame of a skin whose place is known: below the clearance height of `limits` the tip
-    /// moves up and down only, and no deeper than they say.
+    /// Like [`start`](Self::start), in the frame of a skin with known pose: below the clearance height of `limits` the tip
+    /// moves only vertically, and no deeper than they allow.
     ///
     /// # Errors
     /// As [`start`](Self::start).
@@ -139,48 +139,48 @@ impl<'a> Jog<'a> {
         Ok((jog, written))
     }
 
-    /// Who the robot is.
+    /// Identity of the robot.
     #[must_use]
     pub fn identity(&self) -> DeviceIdentity {
         self.indenter.identity()
     }
 
-    /// The present.
+    /// Current time.
     #[must_use]
     pub fn now(&self) -> HostTime {
         self.clock.now()
     }
 
-    /// Where the tip is, after a look at the robot. To be called often: it also watches force and stream.
+    /// Polls the robot and returns the tip position. Call it often: it also monitors force and pose stream.
     ///
     /// # Errors
-    /// [`ControllerError::Watchdog`] above the force limit, with a stale or broken pose stream; what the robot answers.
+    /// [`ControllerError::Watchdog`] above the force limit or with a stale or invalid pose stream; the error of the robot.
     pub fn look(&mut self) -> Result<PoseSample, ControllerError> {
         self.tick()?;
         self.position()
     }
 
-    /// What the robot has to say besides its samples, such as the force that carries the arm.
+    /// Takes the notes of the robot, such as the force that supports the arm.
     pub fn take_notes(&mut self) -> Vec<String> {
         self.indenter.take_notes()
     }
 
-    /// Takes the path of the tip since the last call, a sample every 100 ms.
+    /// Takes the path of the tip since the last call, one sample per 100 ms.
     pub fn take_trace(&mut self) -> Vec<PoseSample> {
         std::mem::take(&mut self.trace)
     }
 
-    /// Straight to `target`. After a touch sideways only 2 mm above its height.
+    /// Moves straight to `target`. After a touch, sideways motion needs 2 mm of height above it.
     ///
     /// # Errors
-    /// [`ControllerError::Guard`] for a motion that is not allowed: nothing was done. [`ControllerError::NotArrived`]:
+    /// [`ControllerError::Guard`] for a motion that is not allowed: nothing moved. [`ControllerError::NotArrived`]:
     /// the robot holds. Otherwise as [`look`](Self::look).
     pub fn go(
         &mut self,
         target: Point3<Skin>,
         speed_mm_s: f64,
-        stop: Stop<'_>,
-    ) -> Result<Moved, ControllerError> {
+        stop: StopCheck<'_>,
+    ) -> Result<MoveOutcome, ControllerError> {
         let from = self.look()?;
         self.check_lift(from, target)?;
         let way_mm = target.distance_mm(from.measured);
@@ -191,7 +191,7 @@ impl<'a> Jog<'a> {
         while settling.settled().is_none() {
             if stop() {
                 self.indenter.hold()?;
-                return Ok(Moved::Stopped(self.look()?));
+                return Ok(MoveOutcome::Stopped(self.look()?));
             }
             if self.clock.now() >= t + allowed {
                 self.indenter.hold()?;
@@ -208,19 +208,19 @@ impl<'a> Jog<'a> {
             self.fresh.iter().for_each(|s| settling.feed(s));
         }
         let at = self.position()?;
-        Ok(Moved::Arrived(at))
+        Ok(MoveOutcome::Arrived(at))
     }
 
-    /// Slowly down, at most `way_mm`, until the force rises; then back up off what was touched.
+    /// Moves down slowly, at most `way_mm`, until the force rises, then back up off the surface.
     ///
     /// # Errors
-    /// As [`go`](Self::go); [`ControllerError::PoseStream`] for a robot that tells no force.
+    /// As [`go`](Self::go); [`ControllerError::PoseStream`] for a robot that reports no force.
     pub fn touch(
         &mut self,
         search: TouchSearch,
         way_mm: f64,
-        stop: Stop<'_>,
-    ) -> Result<Touched, ControllerError> {
+        stop: StopCheck<'_>,
+    ) -> Result<TouchOutcome, ControllerError> {
         let above = self.look()?;
         let here = above.commanded;
         let t = self.command(here, search.speed_mm_s)?;
@@ -234,7 +234,7 @@ impl<'a> Jog<'a> {
                 });
             }
             if stop() {
-                return Ok(Touched::Stopped(self.position()?));
+                return Ok(TouchOutcome::Stopped(self.position()?));
             }
             self.tick()?;
             self.fresh.iter().for_each(|s| detector.feed(s));
@@ -251,25 +251,25 @@ impl<'a> Jog<'a> {
             let at = self.position()?;
             if let Some(found) = detector.touched() {
                 self.touched_mm = Some(found.measured.z_mm);
-                // Off the skin the way the tip came, and no higher than it came from.
+                // Back along the same path, and no higher than the start.
                 let z_mm = (found.measured.z_mm + LIFT_MM).min(here.z_mm);
                 self.go(here.plane().at_height(z_mm), search.speed_mm_s, stop)?;
-                return Ok(Touched::At(found));
+                return Ok(TouchOutcome::At(found));
             }
             if stop() {
                 self.indenter.hold()?;
-                return Ok(Touched::Stopped(at));
+                return Ok(TouchOutcome::Stopped(at));
             }
             let low = at.measured.z_mm <= lowest + self.limits.position_tolerance_mm;
             if low || detector.is_blind() || self.clock.now() >= until {
                 self.indenter.hold()?;
-                return Ok(Touched::Nothing(at));
+                return Ok(TouchOutcome::NotFound(at));
             }
         }
     }
 
-    /// Holds, rises where that is possible, disarms; after a halt disarms only. Gives where the tip was then, or what went wrong on the way; the
-    /// robot is told to disarm in any case.
+    /// Holds, retracts if possible, and disarms; after a halt only disarms. Returns the last tip position, or the first error; the
+    /// robot is always commanded to disarm.
     ///
     /// # Errors
     /// The first thing that failed.
@@ -281,7 +281,7 @@ impl<'a> Jog<'a> {
             true => self.rise(),
             false => Ok(()),
         };
-        // The operator broke the rise off; whether the motors are off is told below.
+        // The operator interrupted the retraction; the result of disarming is reported below.
         let rose = rose.or_else(|e| match e {
             ControllerError::Halted => Ok(()),
             other => Err(other),
@@ -299,7 +299,7 @@ impl<'a> Jog<'a> {
         let at = self.look()?.measured;
         let z_mm = (at.z_mm + RETRACT_MM).min(self.limits.workspace_max_mm[2]);
         if z_mm <= at.z_mm {
-            return Ok(()); // nowhere to rise to
+            return Ok(()); // already at the top
         }
         let speed = self
             .settings
@@ -309,12 +309,12 @@ impl<'a> Jog<'a> {
             .map(drop)
     }
 
-    /// Well above what was touched at this height, mm.
+    /// A safe height above a touch at this height, mm.
     fn clear_of(&self, touched_mm: f64) -> f64 {
         touched_mm + LIFT_MM - self.limits.position_tolerance_mm
     }
 
-    /// After a touch, sideways motion would shear what is touched.
+    /// After a touch, sideways motion would shear the touched object.
     fn check_lift(&self, from: PoseSample, target: Point3<Skin>) -> Result<(), GuardError> {
         let Some(touched_mm) = self.touched_mm else {
             return Ok(());
@@ -337,7 +337,7 @@ impl<'a> Jog<'a> {
         target: Point3<Skin>,
         speed_mm_s: f64,
     ) -> Result<HostTime, ControllerError> {
-        // A slow reader of what is said may have held this up: look again before moving.
+        // A slow log may have delayed the loop: poll again before moving.
         if self.indenter.check_fresh(self.clock.now()).is_err() {
             self.tick()?;
         }

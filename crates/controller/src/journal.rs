@@ -1,4 +1,4 @@
-//! Hands records to the sink and keeps the books: every planned press ends as exactly one of its outcomes.
+//! Passes records to the sink and keeps the tally: every planned press ends with exactly one outcome.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -7,25 +7,25 @@ use skinrig_model::{AttemptId, PressHistory, PressId, PressOutcome, PressVerdict
 use crate::error::{ControllerError, Problem};
 use crate::sink::{RecordSink, SinkFault};
 
-/// What became of a planned press.
+/// State of a planned press.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Fate {
+enum PressState {
     Planned,
-    Under,
+    InProgress,
     Valid,
     Invalid,
     Missed,
 }
 
-/// The sink and the books.
+/// The sink and the tally of presses.
 pub(crate) struct Journal<'a> {
     sink: &'a mut dyn RecordSink,
-    fates: Vec<Fate>,
-    /// Attempts at each press so far, those of earlier legs counted.
+    states: Vec<PressState>,
+    /// Attempts at each press so far, including earlier legs.
     attempts: Vec<u32>,
-    /// While ending: a failing or panicking sink no longer stops anything.
+    /// True during the end of the run: a failing or panicking sink no longer interrupts it.
     lenient: bool,
-    /// What went wrong while ending.
+    /// Problems during the end of the run.
     pub(crate) problems: Vec<Problem>,
 }
 
@@ -33,28 +33,28 @@ impl<'a> Journal<'a> {
     pub(crate) fn new(sink: &'a mut dyn RecordSink, presses: usize) -> Self {
         Self {
             sink,
-            fates: vec![Fate::Planned; presses],
+            states: vec![PressState::Planned; presses],
             attempts: vec![0; presses],
             lenient: false,
             problems: Vec::new(),
         }
     }
 
-    /// What earlier legs of the session did, one history per planned press.
-    pub(crate) fn remember(&mut self, histories: &[PressHistory]) {
-        for (i, history) in histories.iter().enumerate().take(self.fates.len()) {
+    /// Restores the tally from earlier legs, one history per planned press.
+    pub(crate) fn restore(&mut self, histories: &[PressHistory]) {
+        for (i, history) in histories.iter().enumerate().take(self.states.len()) {
             self.attempts[i] = history.attempts;
-            self.fates[i] = match &history.verdict {
-                _ if history.attempts == 0 => Fate::Planned,
-                Some(PressVerdict::Valid | PressVerdict::Excluded(_)) => Fate::Valid,
-                Some(PressVerdict::Missed(_)) => Fate::Missed,
-                // An attempt that was cut off is invalid already.
-                Some(PressVerdict::Invalid(_)) | None => Fate::Invalid,
+            self.states[i] = match &history.verdict {
+                _ if history.attempts == 0 => PressState::Planned,
+                Some(PressVerdict::Valid | PressVerdict::Excluded(_)) => PressState::Valid,
+                Some(PressVerdict::Missed(_)) => PressState::Missed,
+                // An interrupted attempt is already invalid.
+                Some(PressVerdict::Invalid(_)) | None => PressState::Invalid,
             };
         }
     }
 
-    /// The attempt that comes next at `press`.
+    /// Identifier of the next attempt at `press`.
     pub(crate) fn next_attempt(&self, press: PressId) -> AttemptId {
         let before = self.attempts.get(press.index() as usize).copied();
         AttemptId {
@@ -63,18 +63,18 @@ impl<'a> Journal<'a> {
         }
     }
 
-    /// Bytes that the sink still has room for, when it knows.
+    /// Free space of the sink in bytes, if known.
     pub(crate) fn free_bytes(&mut self) -> Option<u64> {
         self.sink.free_bytes()
     }
 
-    /// Whether the sink still has what it took.
+    /// Checks that the sink still has its records.
     pub(crate) fn check(&mut self) -> Result<(), ControllerError> {
         Ok(self.sink.check()?)
     }
 
-    /// From now on nothing that the sink does stops the run's end.
-    pub(crate) const fn ending(&mut self) {
+    /// From now on no failure of the sink interrupts the end of the run.
+    pub(crate) const fn begin_ending(&mut self) {
         self.lenient = true;
     }
 
@@ -88,7 +88,7 @@ impl<'a> Journal<'a> {
         }
     }
 
-    /// Emits a record; while ending, a failure is remembered instead of returned.
+    /// Emits a record. During the end of the run a failure becomes a problem instead of an error.
     pub(crate) fn emit(&mut self, record: Record) -> Result<(), ControllerError> {
         if !self.lenient {
             return Ok(self.sink.accept(record)?);
@@ -96,82 +96,82 @@ impl<'a> Journal<'a> {
         match catch_unwind(AssertUnwindSafe(|| self.sink.accept(record))) {
             Ok(Ok(())) => {}
             Ok(Err(fault)) => self.problem("", fault),
-            Err(_) => self.problem("", SinkFault::Refused("panicked".to_owned())),
+            Err(_) => self.problem("", SinkFault::Rejected("panicked".to_owned())),
         }
         Ok(())
     }
 
-    fn set(&mut self, press: PressId, fate: Fate) {
-        if let Some(f) = self.fates.get_mut(press.index() as usize) {
-            *f = fate;
+    fn set(&mut self, press: PressId, state: PressState) {
+        if let Some(f) = self.states.get_mut(press.index() as usize) {
+            *f = state;
         }
     }
 
-    /// A press begins: its intent is durable when this returns.
+    /// Starts an attempt: its intent is durable on return.
     pub(crate) fn intent(
         &mut self,
         attempt: AttemptId,
         t: skinrig_model::HostTime,
     ) -> Result<(), ControllerError> {
         let told = self.emit(Record::Intent { attempt, t });
-        if !was_refused(&told) {
+        if !was_rejected(&told) {
             if let Some(attempts) = self.attempts.get_mut(attempt.press.index() as usize) {
                 *attempts = attempt.number;
             }
-            self.set(attempt.press, Fate::Under);
+            self.set(attempt.press, PressState::InProgress);
         }
         told
     }
 
-    /// A press ended.
+    /// Ends an attempt.
     pub(crate) fn outcome(&mut self, outcome: PressOutcome) -> Result<(), ControllerError> {
-        let fate = match outcome.verdict {
-            PressVerdict::Valid => Fate::Valid,
-            _ => Fate::Invalid,
+        let state = match outcome.verdict {
+            PressVerdict::Valid => PressState::Valid,
+            _ => PressState::Invalid,
         };
         let press = outcome.attempt.press;
         let told = self.emit(Record::Outcome(outcome));
-        if !was_refused(&told) {
-            self.set(press, fate);
+        if !was_rejected(&told) {
+            self.set(press, state);
         }
         told
     }
 
-    /// Every press that was never attempted is missed, for this reason.
+    /// Marks every press that was never attempted as missed.
     pub(crate) fn miss_the_rest(&mut self, reason: &str) -> Result<(), ControllerError> {
-        for i in 0..self.fates.len() {
-            if self.fates[i] == Fate::Planned {
+        for i in 0..self.states.len() {
+            if self.states[i] == PressState::Planned {
                 let attempt = self.next_attempt(PressId::from_index(i as u32));
                 self.emit(Record::Missed(attempt, reason.to_owned()))?;
-                self.fates[i] = Fate::Missed;
+                self.states[i] = PressState::Missed;
             }
         }
         Ok(())
     }
 
-    /// The presses that are valid.
+    /// The valid presses.
     pub(crate) fn valid(&self) -> Vec<PressId> {
-        let fates = self.fates.iter().zip(0..);
-        fates
-            .filter(|(f, _)| **f == Fate::Valid)
+        let states = self.states.iter().zip(0..);
+        states
+            .filter(|(f, _)| **f == PressState::Valid)
             .map(|(_, i)| PressId::from_index(i))
             .collect()
     }
 
-    /// Presses planned, valid, invalid, missed.
+    /// Numbers of presses: planned, valid, invalid, missed.
     pub(crate) fn counts(&self) -> [usize; 4] {
-        let n = |fate| self.fates.iter().filter(|f| **f == fate).count();
+        let n = |state| self.states.iter().filter(|f| **f == state).count();
         [
-            self.fates.len(),
-            n(Fate::Valid),
-            // A press whose intent stands without outcome is not valid.
-            n(Fate::Invalid) + n(Fate::Under),
-            n(Fate::Missed),
+            self.states.len(),
+            n(PressState::Valid),
+            // An intent without an outcome is not valid.
+            n(PressState::Invalid) + n(PressState::InProgress),
+            n(PressState::Missed),
         ]
     }
 }
 
-/// Whether a record is certainly not in the session: one that is late may come there yet, and must not be followed by another of its kind.
-pub(crate) const fn was_refused(told: &Result<(), ControllerError>) -> bool {
-    matches!(told, Err(ControllerError::Sink(SinkFault::Refused(_))))
+/// Whether a record is certainly not in the session. A late one may still arrive there, and must not be followed by another of its kind.
+pub(crate) const fn was_rejected(result: &Result<(), ControllerError>) -> bool {
+    matches!(result, Err(ControllerError::Sink(SinkFault::Rejected(_))))
 }

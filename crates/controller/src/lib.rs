@@ -1,9 +1,9 @@
-//! Executes plans over device traits, owns safety, emits records. Knows no driver, no SQL, no terminal.
+//! Executes plans through the device traits, owns safety and emits records. Depends on no driver, SQL or terminal.
 //!
-//! [`execute`] is the whole of it: it takes a plan, a rig, a [`ControlHandle`] for the operator and a
-//! [`RecordSink`], and returns a [`RunReport`] once the robot is disarmed again, whatever happened in
-//! between. Underneath, [`Run`] goes through `Planned -> Armed -> Running -> Finished`, and what does not
-//! fit the present state does not compile:
+//! [`execute`] is the entry point: it takes a plan, a rig, a [`ControlHandle`] for the operator and a
+//! [`RecordSink`], and returns a [`RunReport`] once the robot is disarmed, whatever happened in between.
+//! Internally a [`Run`] passes through `Planned -> Armed -> Running -> Finished`, and calls that do not fit the
+//! current state do not compile:
 //!
 //! ```compile_fail
 //! # use skinrig_controller::{Run, Planned, Running};
@@ -19,33 +19,32 @@
 //! }
 //! ```
 //!
-//! A session that was cut off goes on as a further leg of it: [`Run::resumed`] with what is left of the plan.
+//! [`Run::resumed`] continues an interrupted session as a further leg with the rest of its plan.
 //!
 //! # Decisions and replay
 //!
-//! Every decision depends on what devices delivered and on the injected clock alone, and no motion target
-//! depends on time. A [`Record::Command`](skinrig_model::Record::Command) carries the clock's present as read
-//! *after* the indenter took the command, and the phases of a press are told apart by these instants.
-//! A replayed rig that sets its clock to the recorded instant on each command therefore brings about the
-//! same commands, moments and verdicts.
+//! Every decision depends only on data from the devices and on the injected clock, and no motion target depends on
+//! time. A [`Record::Command`](skinrig_model::Record::Command) carries the clock's time *after* the indenter
+//! accepted the command, and these times separate the phases of a press. So a replayed rig that sets its clock
+//! to the recorded time at each command reproduces the same commands, phase times and verdicts.
 
 mod arming;
 pub mod checks;
 mod continuity;
 pub mod control;
-mod core;
 mod ending;
 pub mod error;
+mod executor;
 pub mod guard;
 mod invalid_run;
 pub mod jog;
 mod journal;
 mod machine;
-pub mod moments;
 mod not_arrived;
 mod preflight;
 mod press;
 pub mod press_fault;
+pub mod press_tracker;
 pub mod progress;
 pub mod run;
 pub mod settings;
@@ -58,13 +57,15 @@ mod touch;
 mod verdict;
 pub mod watchdog;
 
-pub use checks::{ExpectedDevice, Loopback, Preflight, differing, identity_checks, says_version};
+pub use checks::{
+    ExpectedDevice, Loopback, Preflight, contains_version, differing, identity_checks,
+};
 pub use control::{ControlHandle, NotesFull};
 pub use error::{ControllerError, GuardError, NotAtRest, Problem};
 pub use guard::{Floor, GuardedIndenter};
-pub use jog::{Jog, Moved, Touched};
+pub use jog::{Jog, MoveOutcome, TouchOutcome};
 pub use not_arrived::NotArrived;
-pub use press_fault::{MomentFault, PressFault, TouchFault};
+pub use press_fault::{PressFault, TimingFault, TouchFault};
 pub use progress::{Progress, ProgressTracker};
 pub use run::{
     Armed, Finished, Planned, Resume, Run, RunReport, Running, execute, execute_checked,
@@ -72,4 +73,4 @@ pub use run::{
 pub use settings::ControllerSettings;
 pub use sink::{RecordSink, SinkFault};
 pub use states::State;
-pub use watchdog::{Trip, WatchLimits, Watchdog};
+pub use watchdog::{WatchLimits, Watchdog, WatchdogTrip};

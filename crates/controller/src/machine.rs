@@ -1,20 +1,20 @@
-//! The state of a run as it goes.
+//! The state machine of a run.
 
 use crate::control::ControlHandle;
 use crate::states::{Action, Event, State, transition};
 
-/// A run's present state.
+/// Current state of a run.
 #[derive(Debug)]
 pub(crate) struct Machine {
     state: State,
-    /// Where the present state can be seen from other threads.
+    /// Shows the current state to other threads.
     shown: ControlHandle,
 }
 
 impl Machine {
     pub(crate) fn new(shown: ControlHandle) -> Self {
         let state = State::Planned;
-        shown.show(state);
+        shown.publish_state(state);
         Self { state, shown }
     }
 
@@ -22,11 +22,11 @@ impl Machine {
         self.state
     }
 
-    /// Goes to the next state and says what to do.
+    /// Enters the next state and returns the action to take.
     pub(crate) fn fire(&mut self, event: Event) -> Action {
         let (next, action) = transition(self.state, event);
         self.state = next;
-        self.shown.show(next);
+        self.shown.publish_state(next);
         action
     }
 }
@@ -53,7 +53,7 @@ mod tests {
                     continue;
                 }
                 if machine.state() == State::Halting {
-                    assert_eq!(action, Action::Ignore, "a halt is not softened");
+                    assert_eq!(action, Action::Ignore, "a halt cannot be weakened");
                     assert_eq!(machine.fire(Event::Disarmed), Action::Close);
                     continue;
                 }

@@ -1,20 +1,20 @@
-//! A motion that did not end where it should.
+//! The error of a motion that did not reach its target.
 
 use skinrig_model::{HostDuration, Point3, Skin};
 
-/// A motion did not end where it should: the tip had not settled at its target in time.
+/// The tip did not settle at its target in time.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{what}: expected to settle within {tolerance_mm} mm of {} in {allowed}, found {}", point(.target), .found.as_ref().map_or_else(|| "no pose".to_owned(), point))]
 pub struct NotArrived {
-    /// Which motion.
+    /// Name of the motion.
     pub what: String,
-    /// mm.
+    /// Largest allowed distance, mm.
     pub tolerance_mm: f64,
-    /// Where to.
+    /// Commanded position.
     pub target: Point3<Skin>,
-    /// How long it was given.
+    /// Time allowed.
     pub allowed: HostDuration,
-    /// Where the tip was then.
+    /// Measured position at the end of that time.
     pub found: Option<Point3<Skin>>,
 }
 

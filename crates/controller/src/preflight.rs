@@ -1,4 +1,4 @@
-//! What must fit together before anything is armed: plan, header and rig.
+//! Checks that plan, header and rig fit together before anything is armed.
 
 use skinrig_device::{IndenterCapabilities, MotionLimits};
 use skinrig_model::{
@@ -10,7 +10,7 @@ use skinrig_protocol::{Surface, TouchSearch};
 use crate::error::ControllerError;
 use crate::guard::check_target;
 
-/// How far a press may be from the end of the travel before it, mm: the rounding of a plan kept as text.
+/// Largest distance of a press from the end of the previous travel, mm: rounding of a plan stored as text.
 const SAME_PLACE_MM: f64 = 1e-6;
 
 fn plan_error(
@@ -25,9 +25,9 @@ fn plan_error(
     }
 }
 
-/// Checks that `plan` can be executed as it stands: every press exactly once (of a session that goes on, with the
-/// `histories` of its presses: those that are wanted, and no other), from above its place, every target and speed within
-/// the plan's own limits, and the header's presses those of the plan.
+/// Checks that `plan` is executable: every press exactly once (in a further leg, exactly those that the `histories` leave
+/// open), each from above its location, every target and speed within the plan's own limits, and the same presses in
+/// the header.
 pub(crate) fn check_plan(
     plan: &Plan,
     header: &RunHeader,
@@ -37,7 +37,7 @@ pub(crate) fn check_plan(
         return Err(plan_error(
             "header",
             format!("the plan's {} presses", plan.presses.len()),
-            format!("{} presses that differ", header.presses.len()),
+            format!("{} different presses", header.presses.len()),
         ));
     }
     let limits = &plan.limits;
@@ -107,7 +107,7 @@ pub(crate) fn check_plan(
                         return Err(plan_error(
                             name,
                             "each press once",
-                            "it again, or no such press",
+                            "a repeated or unknown press",
                         ));
                     }
                 }
@@ -132,7 +132,7 @@ pub(crate) fn check_plan(
                 if planned.at != press.at || planned.depth_mm != press.depth_mm {
                     return Err(plan_error(
                         name,
-                        format!("place and depth of the press list ({planned:?})"),
+                        format!("location and depth of the press list ({planned:?})"),
                         format!("{:?}, {} mm", press.at, press.depth_mm),
                     ));
                 }
@@ -140,7 +140,7 @@ pub(crate) fn check_plan(
                 if !there {
                     return Err(plan_error(
                         name,
-                        "a travel to above the press before it",
+                        "a travel to above the press first",
                         above.map_or_else(|| "none".to_owned(), |a| crate::not_arrived::point(&a)),
                     ));
                 }
@@ -173,7 +173,7 @@ pub(crate) fn check_plan(
     Ok(())
 }
 
-/// The search for the surface stays between clearance height and floor, and can be told from free air.
+/// Checks that the surface search stays between clearance height and floor and can distinguish contact from free air.
 fn check_search(
     plan: &Plan,
     place: &str,
@@ -220,12 +220,12 @@ fn check_point(plan: &Plan, place: &str, target: Point3<Skin>) -> Result<(), Con
         .map_err(|e| plan_error(place, "a target within the limits", e.to_string()))
 }
 
-/// The limits that the robot itself is given, and remarks about what it cannot do.
+/// Limits for the robot itself, and remarks on what it cannot do.
 ///
-/// The run's workspace, its floor at the deepest allowed indentation, widened by the position tolerance
-/// (a settled pose may be that far off) and taken to the robot frame: with axes turned by anything but
-/// quarter turns, the box around the turned box. Where the robot itself can do less, its own limits stand, and
-/// the remark says so; every target of the plan is then checked against the result.
+/// The limits are the run's workspace with its floor at the deepest allowed press, widened by the position tolerance (a
+/// settled pose may be that far off) and transformed to the robot frame. If the axes are rotated by anything but quarter
+/// turns, they are the bounding box of the rotated box. Where the robot can do less, its own limits apply and a remark
+/// states this; every target of the plan is then checked against the result.
 pub(crate) fn motion_limits(
     plan: &Plan,
     robot_from_skin: &RigidTransform<Robot, Skin>,
@@ -262,7 +262,7 @@ pub(crate) fn motion_limits(
     }
     if limits.max_force_n > can.max_force_n {
         remarks.push(format!(
-            "force: the plan allows {} N, the robot exerts at most {} N",
+            "force: the plan allows {} N, the robot can exert at most {} N",
             limits.max_force_n, can.max_force_n
         ));
     }
@@ -289,7 +289,7 @@ pub(crate) fn motion_limits(
     Ok((chosen, remarks))
 }
 
-/// Every target and speed of the plan within what the robot will accept.
+/// Checks every target and speed of the plan against the limits of the robot.
 fn check_reach(
     plan: &Plan,
     robot_from_skin: &RigidTransform<Robot, Skin>,
@@ -334,8 +334,8 @@ fn check_reach(
     Ok(())
 }
 
-/// How deep below the frame's surface a press may go, mm: with a surface that is found, as deep as the lowest surface
-/// that is believed and the floor allow.
+/// Lowest height below the frame's surface that a press may reach, mm. With a surface search, the lowest accepted surface
+/// and the floor set it.
 fn deepest_mm(plan: &Plan, press: &PressStep) -> f64 {
     match press.surface {
         Surface::Known => press.depth_mm,
@@ -343,7 +343,7 @@ fn deepest_mm(plan: &Plan, press: &PressStep) -> f64 {
     }
 }
 
-/// A target and speed that the robot will accept.
+/// Checks a target and speed against the limits of the robot.
 fn within(
     limits: &MotionLimits,
     robot_from_skin: &RigidTransform<Robot, Skin>,

@@ -1,20 +1,20 @@
-//! One press: down to the surface, to depth, hold, and back up; every moment measured.
+//! Execution of one press: down to the surface, to depth, hold and back up, with all phase times measured.
 
 use skinrig_model::HostTime;
 use skinrig_protocol::Surface;
 use skinrig_protocol::plan::PressStep;
 
-use crate::core::{Collect, Core, OpenPress};
 use crate::error::{ControllerError, Halt};
-use crate::journal::was_refused;
-use crate::moments::PressTracker;
+use crate::executor::{Collect, Executor, OpenPress};
+use crate::journal::was_rejected;
 use crate::press_fault::PressFault;
+use crate::press_tracker::PressTracker;
 use crate::touch::Probe;
 use crate::verdict::judge;
 
-impl Core<'_> {
-    /// Executes one press. A press that goes wrong without harm ends invalid and the run goes on, after it was taken again
-    /// at once where another attempt may bring what this one did not.
+impl Executor<'_> {
+    /// Executes one press. A harmless failure makes the press invalid and the run continues, after an immediate
+    /// retake where that may succeed.
     pub(crate) fn press(&mut self, step: &PressStep) -> Result<(), Halt> {
         if let Some(after) = step.start_after_begin {
             self.wait_at_clearance(self.begin + after)?;
@@ -29,12 +29,12 @@ impl Core<'_> {
             self.retaken += 1;
             again = self.attempt_press(step)?;
         }
-        // What the retakes took does not shorten the time up to the next press.
+        // Retakes do not shorten the time until the next press.
         self.begin += self.now() - first_ended;
         Ok(self.invalid_run.press_ended()?)
     }
 
-    /// One attempt at a press. Gives whether it is worth another one.
+    /// Makes one attempt at a press. Returns whether to repeat it.
     fn attempt_press(&mut self, step: &PressStep) -> Result<bool, Halt> {
         let attempt = self.journal.next_attempt(step.press);
         let t = self.now();
@@ -47,17 +47,17 @@ impl Core<'_> {
             bytes: [0; 2],
             events: [0; 2],
             began: t,
-            spoilt: Vec::new(),
+            data_faults: Vec::new(),
         });
         self.touch = None;
-        // A durable intent may have taken a while: know the present pose before moving.
+        // A durable intent may take a while: update the pose before moving.
         self.observe()?;
         let fault = self.press_motion(step)?;
         self.await_streams()?;
         Ok(self.close_press(fault)?)
     }
 
-    /// The motion. `Some` says why the press is invalid although the tip is back at clearance height.
+    /// The motion of a press. Returns the fault if it is invalid although the tip is back at clearance height.
     fn press_motion(&mut self, step: &PressStep) -> Result<Option<PressFault>, Halt> {
         let began = self.now();
         if let Surface::Touch(search) = step.surface {
@@ -65,7 +65,7 @@ impl Core<'_> {
             let tared = self.tare(Probe::of(step), search);
             let tared = tared.map(|t| t.err().map(PressFault::Touch));
             if let Some(fault) = self.unless_paused(tared)? {
-                return Ok(Some(fault)); // the tip never left clearance height
+                return Ok(Some(fault)); // still at clearance height
             }
         }
         let start = self.indenter.position();
@@ -76,9 +76,9 @@ impl Core<'_> {
         let first_stop = step.at.at_height(first_stop_mm);
         let down = match self.command_when_steady(first_stop, step.approach_speed_mm_s)? {
             Ok(t) => t,
-            Err(aside) => return Err(aside.not_arrived(&step.press.to_string()).into()),
+            Err(off_target) => return Err(off_target.not_arrived(&step.press.to_string()).into()),
         };
-        // The deadline of a press that tares counts from the tare on.
+        // With a tare, the deadline counts from the tare.
         let deadline = match step.surface {
             Surface::Known => down + step.deadline,
             Surface::Touch(_) => began + step.deadline,
@@ -91,9 +91,9 @@ impl Core<'_> {
         self.breakable = true;
         let went = self.go_down(step, down, deadline);
         let fault = self.unless_paused(went)?;
-        self.settling = None; // a search that was broken off leaves it
+        self.settling = None; // left over from an interrupted search
 
-        // Straight up, wherever the hold has left the tip.
+        // Straight up from wherever the hold ended.
         let at_clearance = step.at.at_height(self.plan.limits.clearance_mm);
         let target = self.indenter.point_above().unwrap_or(at_clearance);
         let up = self.command(target, step.retract_speed_mm_s)?;
@@ -119,7 +119,7 @@ impl Core<'_> {
         }))
     }
 
-    /// What became of a part of the press that `pause_now` may break off.
+    /// Result of a part of the press, with `pause_now` turned into a fault.
     fn unless_paused(
         &mut self,
         part: Result<Option<PressFault>, Halt>,
@@ -136,16 +136,16 @@ impl Core<'_> {
         }
     }
 
-    /// Down, settle, hold. `Some` says what did not happen in time.
+    /// Goes down, settles and holds. Returns the fault if something did not happen in time.
     fn go_down(
         &mut self,
         step: &PressStep,
         down: HostTime,
         deadline: HostTime,
     ) -> Result<Option<PressFault>, Halt> {
-        let late = |core: &Self, what: &str, z_mm: f64| {
+        let late = |executor: &Self, what: &str, z_mm: f64| {
             let target = step.at.at_height(z_mm);
-            Some(PressFault::Late(core.not_arrived(
+            Some(PressFault::MotionLate(executor.not_arrived(
                 what,
                 target,
                 step.deadline,
@@ -168,7 +168,7 @@ impl Core<'_> {
         let depth = step.at.at_height(bottom_mm);
         let t = match self.command_when_steady(depth, step.indent_speed_mm_s)? {
             Ok(t) => t,
-            Err(aside) => return Ok(Some(aside.fault())),
+            Err(off_target) => return Ok(Some(off_target.fault())),
         };
         self.with_tracker(|tracker| tracker.indent_from(t));
         if !self.until(|t| t.at_depth().is_some(), deadline)? {
@@ -200,7 +200,7 @@ impl Core<'_> {
         });
     }
 
-    /// Ticks until the tracker says so; false when `deadline` came first.
+    /// Ticks until the condition on the tracker holds; false if `deadline` passed first.
     fn until(
         &mut self,
         done: impl Fn(&PressTracker) -> bool,
@@ -217,7 +217,7 @@ impl Core<'_> {
         }
     }
 
-    /// Hands over all bytes and poses up to now, then the outcome. Gives whether the press is worth another attempt.
+    /// Emits all bytes and poses so far, then the outcome. Returns whether to repeat the press.
     pub(crate) fn close_press(
         &mut self,
         fault: Option<PressFault>,
@@ -231,17 +231,17 @@ impl Core<'_> {
             flushed?;
         }
         self.emit_poses()?;
-        self.weigh_storm();
+        self.check_event_rate();
         let Some(open) = &self.open else {
             return Ok(false);
         };
         let judged = judge(open, fault);
-        let again = judged.again();
+        let again = judged.should_retake();
         self.invalid_run.attempt(&judged.faults);
         self.press_faults
             .extend(judged.faults.into_iter().map(|f| (open.attempt, f)));
         let told = self.journal.outcome(judged.outcome);
-        if !was_refused(&told) {
+        if !was_rejected(&told) {
             self.open = None;
         }
         told?;
@@ -249,7 +249,7 @@ impl Core<'_> {
     }
 }
 
-/// When the tip was back at clearance height.
+/// Time at which the tip was back at clearance height.
 pub(crate) fn cleared_at(open: &OpenPress) -> Option<HostTime> {
     open.tracker.as_ref().and_then(PressTracker::clear)
 }

@@ -1,4 +1,4 @@
-//! Faults of a press: what is wrong with an attempt, typed where it arises; the words for people are made here.
+//! Faults of a press, typed where they arise, and their messages.
 
 use std::fmt;
 
@@ -6,147 +6,147 @@ use skinrig_model::{CameraId, HostDuration, HostTime, Point3, PressFaultKind, Pr
 
 use crate::not_arrived::{NotArrived, point};
 
-/// Reason of a press that the operator's `pause_now` broke off.
+/// Message for a press that the operator's `pause_now` interrupted.
 const PAUSED: &str = "paused by the operator";
 
-/// Why an attempt at a press is invalid.
+/// Reason why an attempt at a press is invalid.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PressFault {
     /// A camera lost bytes.
     DataLost {
-        /// Which camera.
+        /// Camera that lost them.
         camera: CameraId,
-        /// How many.
+        /// Number of bytes.
         bytes: u64,
     },
     /// A camera sent no bytes.
     NoData {
-        /// Which camera.
+        /// The silent camera.
         camera: CameraId,
     },
-    /// A camera's data of the press had not come when the verdict could wait no longer.
+    /// A camera's data of the press did not arrive before the verdict was due.
     DataLate {
-        /// Which camera.
+        /// The late camera.
         camera: CameraId,
         /// The end of the press.
         end: HostTime,
         /// How long the verdict waited.
         waited: HostDuration,
-        /// Up to when the camera's data have come; `None`: none have.
+        /// End of the camera's data so far; `None` without any.
         reached: Option<HostTime>,
     },
-    /// A camera sent more events per second than the plan bears.
-    Storm {
-        /// Which camera.
+    /// A camera sent more events per second than the plan allows.
+    EventStorm {
+        /// The camera.
         camera: CameraId,
-        /// Events per second.
+        /// Event rate of the press, ev/s.
         level_ev_s: f64,
-        /// Events per second.
+        /// Limit, ev/s.
         found_ev_s: f64,
     },
-    /// A motion of the press did not end in time.
-    Late(NotArrived),
-    /// The tip was back at clearance height too late.
+    /// A motion of the press did not arrive in time.
+    MotionLate(NotArrived),
+    /// The tip returned to clearance height too late.
     ClearLate {
-        /// The press's deadline.
+        /// Deadline of the press.
         allowed: HostDuration,
-        /// How long it took.
+        /// Time taken.
         found: HostDuration,
     },
-    /// The tip was not above its place when it was to go down or deeper.
-    Aside {
-        /// How far aside it may be, mm.
+    /// The tip was not above its location before it was to go down or deeper.
+    PushedAside {
+        /// Largest allowed lateral deviation, mm.
         tolerance_mm: f64,
-        /// Where to.
+        /// Commanded position.
         target: Point3<Skin>,
-        /// Where the tip was.
+        /// Measured position.
         found: Option<Point3<Skin>>,
     },
-    /// The operator's `pause_now` broke the press off.
+    /// The operator's `pause_now` interrupted the press.
     Paused,
-    /// A suspension broke the press off; its reason, which begins with `suspended`.
+    /// A suspension interrupted the press; its reason, which starts with `suspended`.
     Suspended(String),
     /// The run ended during the press, for this reason.
     RunEnded(String),
-    /// The search for the surface failed.
+    /// The surface search failed.
     Touch(TouchFault),
-    /// The moments of the press, or its hold.
-    Moments(MomentFault),
+    /// A phase time or the hold is wrong.
+    Timing(TimingFault),
 }
 
-/// Why the surface was not found by touch.
+/// Reason why a touch did not find the surface.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TouchFault {
-    /// The robot reported no force.
+    /// The robot did not report forces.
     #[error("{during}: expected forces, found none")]
     NoForce {
         /// `tare` or `search`.
         during: &'static str,
     },
-    /// The tare did not come to its end.
+    /// The tare received too few forces.
     #[error("tare: expected forces for {0}, found fewer")]
-    FewForces(HostDuration),
-    /// The way down to the band did not end in time.
+    ShortTare(HostDuration),
+    /// The motion down to the band did not arrive in time.
     #[error(transparent)]
     Late(NotArrived),
     /// The force did not rise within the band.
-    #[error("expected the surface within {band_mm} mm of the frame's, found none down to {}", .lowest.as_ref().map_or_else(|| "an unknown place".to_owned(), point))]
+    #[error("expected the surface within {band_mm} mm of the frame's, found none down to {}", .lowest.as_ref().map_or_else(|| "an unknown height".to_owned(), point))]
     NotFound {
-        /// mm.
+        /// Half width of the band, mm.
         band_mm: f64,
-        /// Where the tip was.
+        /// Lowest tip position.
         lowest: Option<Point3<Skin>>,
     },
-    /// The force rose where the search began.
+    /// The force rose immediately at the start of the search.
     #[error(
-        "expected the surface within {band_mm} mm of the frame's, found a touch at once, at {height_mm:.3} mm"
+        "expected the surface within {band_mm} mm of the frame's, found contact immediately, at {height_mm:.3} mm"
     )]
-    AtOnce {
-        /// mm.
+    ImmediateContact {
+        /// Half width of the band, mm.
         band_mm: f64,
-        /// mm.
+        /// Height of the contact, mm.
         height_mm: f64,
     },
-    /// From the touched surface the press would go below the floor.
+    /// A press from the touched surface would go below the floor.
     #[error(
-        "expected {depth_mm} mm below the touched surface above the floor at -{max_depth_mm} mm, found the surface at {height_mm:.3} mm"
+        "expected a press of {depth_mm} mm to stay above the floor at -{max_depth_mm} mm, found the surface at {height_mm:.3} mm"
     )]
     TooLow {
-        /// mm.
+        /// Depth of the press, mm.
         depth_mm: f64,
-        /// mm.
+        /// Depth of the floor, mm, positive.
         max_depth_mm: f64,
-        /// mm.
+        /// Height of the touched surface, mm.
         height_mm: f64,
     },
 }
 
-/// What is wrong with the moments of a press or with its hold.
+/// Fault in the phase times of a press or in its hold.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum MomentFault {
-    /// A moment was not measured.
+pub enum TimingFault {
+    /// A phase time was not measured.
     #[error("expected a measured {0}, found none")]
     Missing(&'static str),
-    /// The moments are not in order.
-    #[error("expected the moments in order, found {0:?}")]
+    /// The phase times are not in order.
+    #[error("expected phase times in order, found {0:?}")]
     OutOfOrder([HostTime; 6]),
-    /// Nothing was measured during the hold.
+    /// No sample was measured during the hold.
     #[error("expected samples during the hold, found none")]
     NoHold,
-    /// The tip left its place during the hold.
+    /// The tip left its location during the hold.
     #[error("hold: expected within {tolerance_mm} mm of {}, found {}", point(.target), point(.found))]
     Hold {
-        /// mm.
+        /// Largest allowed deviation, mm.
         tolerance_mm: f64,
-        /// Where it should have been.
+        /// Commanded position.
         target: Point3<Skin>,
-        /// The sample farthest from there.
+        /// The sample with the largest deviation.
         found: Point3<Skin>,
     },
 }
 
 impl PressFault {
-    /// Its kind, as sessions keep it.
+    /// Kind of the fault, as stored in sessions.
     #[must_use]
     pub const fn kind(&self) -> PressFaultKind {
         use PressFaultKind as K;
@@ -154,26 +154,28 @@ impl PressFault {
             Self::DataLost { .. } => K::DataLost,
             Self::NoData { .. } => K::NoData,
             Self::DataLate { .. } => K::DataLate,
-            Self::Storm { .. } => K::Storm,
-            Self::Late(_) | Self::ClearLate { .. } | Self::Touch(TouchFault::Late(_)) => K::Late,
-            Self::Aside { .. } => K::Aside,
+            Self::EventStorm { .. } => K::Storm,
+            Self::MotionLate(_) | Self::ClearLate { .. } | Self::Touch(TouchFault::Late(_)) => {
+                K::Late
+            }
+            Self::PushedAside { .. } => K::Aside,
             Self::Paused | Self::Suspended(_) => K::Paused,
             Self::RunEnded(_) => K::RunEnded,
-            Self::Touch(TouchFault::NoForce { .. } | TouchFault::FewForces(_)) => K::NoForce,
+            Self::Touch(TouchFault::NoForce { .. } | TouchFault::ShortTare(_)) => K::NoForce,
             Self::Touch(_) => K::Surface,
-            Self::Moments(MomentFault::Hold { .. }) => K::Hold,
-            Self::Moments(_) => K::Unmeasured,
+            Self::Timing(TimingFault::Hold { .. }) => K::Hold,
+            Self::Timing(_) => K::Unmeasured,
         }
     }
 
-    /// True when another attempt at once may do better. What the skin or the robot is like at this place stays, and a run that
-    /// ended makes no attempt.
+    /// True if another attempt may succeed. Properties of the skin or the robot at this location persist, and a run that has
+    /// ended makes no more attempts.
     #[must_use]
     pub const fn passes(&self) -> bool {
         !self.kind().is_of_the_place() && !matches!(self, Self::RunEnded(_))
     }
 
-    /// True for a press that was broken off on purpose: it says nothing of the rig.
+    /// True for a press that was interrupted on purpose: the rig is not at fault.
     #[must_use]
     pub(crate) const fn is_pause(&self) -> bool {
         matches!(self, Self::Paused | Self::Suspended(_))
@@ -200,7 +202,7 @@ impl fmt::Display for PressFault {
                     None => f.write_str("none"),
                 }
             }
-            Self::Storm {
+            Self::EventStorm {
                 camera,
                 level_ev_s,
                 found_ev_s,
@@ -208,12 +210,12 @@ impl fmt::Display for PressFault {
                 f,
                 "{camera}: expected at most {level_ev_s} ev/s during the press (`suspend.event_rate`), found {found_ev_s:.0} ev/s"
             ),
-            Self::Late(late) => late.fmt(f),
+            Self::MotionLate(late) => late.fmt(f),
             Self::ClearLate { allowed, found } => write!(
                 f,
                 "expected to be back at clearance height within {allowed}, found {found}"
             ),
-            Self::Aside {
+            Self::PushedAside {
                 tolerance_mm,
                 target,
                 found,
@@ -227,7 +229,7 @@ impl fmt::Display for PressFault {
             Self::Suspended(reason) => f.write_str(reason),
             Self::RunEnded(reason) => write!(f, "{}: {reason}", PressVerdict::CUT_OFF),
             Self::Touch(touch) => touch.fmt(f),
-            Self::Moments(moments) => moments.fmt(f),
+            Self::Timing(moments) => moments.fmt(f),
         }
     }
 }

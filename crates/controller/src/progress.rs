@@ -1,4 +1,4 @@
-//! What a terminal shows of a run, from its records alone.
+//! Progress of a run for display, derived from its records alone.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -8,10 +8,10 @@ use skinrig_model::{
     PulseTrain, RawChunk, Record, RunEnd, TriggerEdge,
 };
 
-/// Event rates are taken over this span of rig time.
+/// Event rates are averages over this span of rig time.
 const RATE_SPAN: HostDuration = HostDuration::from_millis(1_000);
 
-/// What is known of one camera.
+/// Progress of one camera.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct CameraProgress {
     /// CD events so far.
@@ -20,57 +20,57 @@ pub struct CameraProgress {
     pub bytes: u64,
     /// Bytes known to be lost so far.
     pub lost_bytes: u64,
-    /// CD events per second of rig time over about the last second; `None` before there are two chunks.
+    /// CD events per second of rig time over about the last second; `None` with fewer than two chunks.
     pub events_per_s: Option<f64>,
-    /// Complete marks seen on the trigger input.
+    /// Complete marks received on the trigger input.
     pub marks_seen: u64,
 }
 
-/// A run at one instant.
+/// Progress of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Progress {
     /// Presses of the plan.
     pub planned: usize,
-    /// Presses that have ended, missed ones included.
+    /// Presses that have ended, including missed ones.
     pub done: usize,
-    /// How many of them are valid.
+    /// Valid presses.
     pub valid: usize,
-    /// How many of them are invalid.
+    /// Invalid presses.
     pub invalid: usize,
-    /// How many of them were missed.
+    /// Missed presses.
     pub missed: usize,
-    /// How many of them a rule leaves out.
+    /// Presses excluded by a rule.
     pub excluded: usize,
-    /// Attempts beyond the first at a press, by this process.
+    /// Attempts beyond the first at a press, in this process.
     pub retaken: usize,
-    /// The press under way, or the last one.
+    /// The current press, or the last one.
     pub press: Option<PlannedPress>,
-    /// The measured tip's place on the skin, and its height in mm.
+    /// Measured position of the tip on the skin, and its height in mm.
     pub tip: Option<(Point2, f64)>,
-    /// Both cameras.
+    /// Progress of both cameras.
     pub cameras: [CameraProgress; 2],
     /// Marks that the trigger box sent.
     pub marks_sent: u64,
-    /// Rig time since the first record that carries a time.
+    /// Rig time since the first record with a time.
     pub elapsed: HostDuration,
-    /// Rig time still to go; `None` without an expected duration or after the end.
+    /// Expected remaining rig time; `None` without an expected duration or after the end.
     pub eta: Option<HostDuration>,
     /// True between a pause and its end.
     pub paused: bool,
-    /// How it ended.
+    /// End of the run, if it has ended.
     pub end: Option<RunEnd>,
 }
 
-/// How a press ended.
+/// Verdict of a press, without its reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Fate {
+enum VerdictKind {
     Valid,
     Invalid,
     Missed,
     Excluded,
 }
 
-impl From<&PressVerdict> for Fate {
+impl From<&PressVerdict> for VerdictKind {
     fn from(verdict: &PressVerdict) -> Self {
         match verdict {
             PressVerdict::Valid => Self::Valid,
@@ -81,14 +81,14 @@ impl From<&PressVerdict> for Fate {
     }
 }
 
-/// Follows a run by its records.
+/// Tracks the progress of a run from its records.
 #[derive(Debug, Clone, Default)]
 pub struct ProgressTracker {
     progress: Progress,
     presses: Vec<PlannedPress>,
-    /// How each press ended last, as far as it did.
-    fates: Vec<Option<Fate>>,
-    /// Presses that had ended before this process, and are not taken again.
+    /// Last verdict of each press, if any.
+    verdicts: Vec<Option<VerdictKind>>,
+    /// Presses that ended before this process and are not repeated.
     before: usize,
     expected: Option<HostDuration>,
     first: Option<HostTime>,
@@ -97,7 +97,7 @@ pub struct ProgressTracker {
 }
 
 impl ProgressTracker {
-    /// A tracker for a plan that is expected to take `expected` of rig time.
+    /// A tracker for a plan with the expected duration `expected` in rig time.
     #[must_use]
     pub fn new(expected: Option<HostDuration>) -> Self {
         Self {
@@ -106,7 +106,7 @@ impl ProgressTracker {
         }
     }
 
-    /// Goes on with a session whose presses have these histories; those that are `wanted` are still to be done.
+    /// Continues a session with these press histories, of which the `wanted` ones remain to be done.
     #[must_use]
     pub fn resumed(
         mut self,
@@ -115,11 +115,12 @@ impl ProgressTracker {
         wanted: &[bool],
     ) -> Self {
         self.plan(presses);
-        for ((fate, history), wanted) in self.fates.iter_mut().zip(histories).zip(wanted) {
-            *fate = match &history.verdict {
+        for ((verdict_kind, history), wanted) in self.verdicts.iter_mut().zip(histories).zip(wanted)
+        {
+            *verdict_kind = match &history.verdict {
                 _ if *wanted => None,
                 Some(PressVerdict::Missed(_)) | None => None,
-                Some(verdict) => Some(Fate::from(verdict)),
+                Some(verdict) => Some(VerdictKind::from(verdict)),
             };
         }
         self.count();
@@ -129,38 +130,43 @@ impl ProgressTracker {
 
     fn plan(&mut self, presses: &[PlannedPress]) {
         self.presses = presses.to_vec();
-        self.fates = vec![None; presses.len()];
+        self.verdicts = vec![None; presses.len()];
         self.progress.planned = presses.len();
     }
 
-    fn ended(&mut self, press: PressId, fate: Fate) {
-        if let Some(f) = self.fates.get_mut(press.index() as usize) {
-            *f = Some(fate);
+    fn ended(&mut self, press: PressId, verdict_kind: VerdictKind) {
+        if let Some(f) = self.verdicts.get_mut(press.index() as usize) {
+            *f = Some(verdict_kind);
         }
         self.count();
     }
 
     fn count(&mut self) {
-        let n = |fate| self.fates.iter().filter(|f| **f == Some(fate)).count();
+        let n = |verdict_kind| {
+            self.verdicts
+                .iter()
+                .filter(|f| **f == Some(verdict_kind))
+                .count()
+        };
         let p = &mut self.progress;
-        (p.valid, p.invalid) = (n(Fate::Valid), n(Fate::Invalid));
-        (p.missed, p.excluded) = (n(Fate::Missed), n(Fate::Excluded));
+        (p.valid, p.invalid) = (n(VerdictKind::Valid), n(VerdictKind::Invalid));
+        (p.missed, p.excluded) = (n(VerdictKind::Missed), n(VerdictKind::Excluded));
         p.done = p.valid + p.invalid + p.missed + p.excluded;
     }
 
-    /// The run as of the last record.
+    /// Progress after the last record.
     #[must_use]
     pub const fn progress(&self) -> &Progress {
         &self.progress
     }
 
-    /// Takes the next record.
+    /// Processes the next record.
     pub fn update(&mut self, record: &Record) -> &Progress {
         let p = &mut self.progress;
         match record {
             Record::Started(header) => self.plan(&header.presses),
             Record::Intent { attempt, t } => {
-                let known = self.fates.get(attempt.press.index() as usize);
+                let known = self.verdicts.get(attempt.press.index() as usize);
                 p.retaken += usize::from(known.is_some_and(Option::is_some));
                 p.press = self.presses.get(attempt.press.index() as usize).copied();
                 self.reached(*t);
@@ -178,9 +184,9 @@ impl ProgressTracker {
             Record::BoxReports { t, .. } => self.reached(*t),
             Record::Chunk(chunk) => self.chunk(chunk),
             Record::Outcome(outcome) => {
-                self.ended(outcome.attempt.press, Fate::from(&outcome.verdict));
+                self.ended(outcome.attempt.press, VerdictKind::from(&outcome.verdict));
             }
-            Record::Missed(attempt, _) => self.ended(attempt.press, Fate::Missed),
+            Record::Missed(attempt, _) => self.ended(attempt.press, VerdictKind::Missed),
             Record::Interruption { kind, t, .. } => {
                 use skinrig_model::InterruptionKind as K;
                 p.paused = matches!(kind, K::Pause | K::PauseNow);
@@ -214,7 +220,7 @@ impl ProgressTracker {
 
         let recent = &mut self.chunks[i];
         recent.push_back((chunk.host_time, chunk.facts.cd_events));
-        // Keep one chunk older than the span: the events of the others came after it.
+        // Keep one chunk before the span: the events of the others came after it.
         while recent
             .get(1)
             .is_some_and(|(t, _)| chunk.host_time - *t >= RATE_SPAN)
@@ -236,7 +242,7 @@ impl ProgressTracker {
         self.reached(chunk.host_time);
     }
 
-    /// Press number (from 1) of how many, for example `12/2500`.
+    /// Press number (from 1) and total, for example `12/2500`.
     #[must_use]
     pub fn press_label(&self) -> String {
         let at = self.progress.press.map_or(0, |p| p.id.number());
@@ -250,7 +256,7 @@ impl ProgressTracker {
     }
 }
 
-/// The expected rest: what the plan said at first, then more and more the pace of the presses done.
+/// Expected remaining time: from the plan at first, then increasingly from the pace of finished presses.
 fn remaining(p: &Progress, before: usize, expected: Option<HostDuration>) -> Option<HostDuration> {
     let planned = HostDuration((expected?.0 - p.elapsed.0).max(0));
     let (done, of) = (p.done - before.min(p.done), p.planned - before);
@@ -264,7 +270,7 @@ fn remaining(p: &Progress, before: usize, expected: Option<HostDuration>) -> Opt
     ))
 }
 
-/// Takes the trains that can be read off the front of a channel's edges and counts the marks.
+/// Decodes the trains at the front of a channel's edges and counts the marks.
 fn take_marks(edges: &mut Vec<TriggerEdge>) -> u64 {
     let Some(newest) = edges.last().map(|e| e.t_us) else {
         return 0;
@@ -272,7 +278,7 @@ fn take_marks(edges: &mut Vec<TriggerEdge>) -> u64 {
     let seen = decode_marks(edges);
     let marks = seen.marks.iter().map(|m| m.t_us);
     let read = marks.chain(seen.syncs.iter().map(|s| s.t_us)).max();
-    // What is older than a train and was not read never will be.
+    // Edges older than a train that remain undecoded never will be.
     let done = read
         .map_or(0, |t| t + PulseTrain::DURATION_US)
         .max(newest.saturating_sub(2 * PulseTrain::DURATION_US));

@@ -1,4 +1,4 @@
-//! The life of a run in types, and the one call that goes through all of it.
+//! The typed life cycle of a run, and the function that executes all of it.
 
 use std::marker::PhantomData;
 
@@ -8,62 +8,62 @@ use skinrig_protocol::plan::Plan;
 
 use crate::checks::Preflight;
 use crate::control::ControlHandle;
-use crate::core::Core;
 use crate::error::{ControllerError, Problem};
+use crate::executor::Executor;
 use crate::press_fault::PressFault;
 use crate::settings::ControllerSettings;
 use crate::sink::RecordSink;
 use crate::states::Event;
 
-/// How a session goes on that was cut off, stopped or broken off by a fault.
+/// Data to continue an interrupted, stopped or faulted session.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Resume {
-    /// The first record of the leg.
+    /// First record of the leg.
     pub header: ResumeHeader,
-    /// What the legs before know of each planned press, in plan order.
+    /// History of each planned press from earlier legs, in plan order.
     pub histories: Vec<PressHistory>,
 }
 
-/// What became of a run, all legs of its session together. `planned = valid + invalid + missed`, always.
+/// Result of a run over all legs of its session. `planned = valid + invalid + missed`, always.
 #[derive(Debug, Clone, PartialEq)]
 #[must_use]
 pub struct RunReport {
-    /// How it ended, as in the last record.
+    /// Kind of the end, as in the last record.
     pub end: RunEnd,
-    /// Why it ended before its plan did, typed: what ended it, and how the robot was left when that is not as it should be. Empty
-    /// after a completed run and after the operator's stop.
+    /// Causes of an early end, followed by an unsafe state of the robot, if any. Empty after a completed run and after the
+    /// operator's stop.
     pub causes: Vec<ControllerError>,
-    /// What was wrong with each attempt of this leg, in order.
+    /// Faults of each attempt in this leg, in order.
     pub press_faults: Vec<(AttemptId, PressFault)>,
-    /// The presses that are valid, all legs together.
+    /// Valid presses, over all legs.
     pub valid_presses: Vec<PressId>,
-    /// When.
+    /// Time of the end.
     pub ended_at: HostTime,
-    /// Presses of the plan.
+    /// Number of presses in the plan.
     pub planned: usize,
-    /// Presses done as planned.
+    /// Number of valid presses.
     pub valid: usize,
-    /// Presses attempted, but not as planned.
+    /// Number of presses attempted but not valid.
     pub invalid: usize,
-    /// Presses never attempted.
+    /// Number of presses never attempted.
     pub missed: usize,
-    /// True when the tip was seen at clearance height at the end, or the robot was never armed.
+    /// True if the tip reached clearance height at the end, or the robot was never armed.
     pub retracted: bool,
-    /// True when the robot confirmed that it is disarmed.
+    /// True if the robot confirmed that it is disarmed.
     pub disarmed: bool,
-    /// What else went wrong while ending.
+    /// Further problems during the end.
     pub problems: Vec<Problem>,
 }
 
 impl RunReport {
-    /// True for a press whose last attempt, in whichever leg, was valid.
+    /// True if the last attempt at the press, in any leg, was valid.
     #[must_use]
     pub fn is_valid(&self, press: PressId) -> bool {
         self.valid_presses.contains(&press)
     }
 }
 
-/// State of a [`Run`]: nothing has been opened.
+/// State of a [`Run`]: no device is open.
 #[derive(Debug)]
 pub enum Planned {}
 /// State of a [`Run`]: devices are configured and read back, cameras stream, the robot holds.
@@ -76,24 +76,24 @@ pub enum Running {}
 #[derive(Debug)]
 pub enum Finished {}
 
-/// A run in state `S`. Dropped in any state before [`Finished`], it retracts, disarms, stops the cameras and
-/// writes its last records first.
+/// A run in state `S`. Dropping it in any state before [`Finished`] first retracts, disarms, stops the cameras and
+/// writes the last records.
 pub struct Run<'a, S> {
-    core: Core<'a>,
+    executor: Executor<'a>,
     state: PhantomData<S>,
 }
 
 impl<'a, S> Run<'a, S> {
-    fn become_<T>(self) -> Run<'a, T> {
+    fn into_state<T>(self) -> Run<'a, T> {
         Run {
-            core: self.core,
+            executor: self.executor,
             state: PhantomData,
         }
     }
 }
 
 impl<'a> Run<'a, Planned> {
-    /// A run of `plan` on `rig`. Nothing happens yet.
+    /// A run of `plan` on `rig`. Nothing happens until it is armed.
     pub fn new(
         plan: &'a Plan,
         header: RunHeader,
@@ -111,7 +111,7 @@ impl<'a> Run<'a, Planned> {
         )
     }
 
-    /// As [`new`](Self::new), with other than the default settings.
+    /// Like [`new`](Self::new), with settings other than the defaults.
     pub fn with_settings(
         plan: &'a Plan,
         header: RunHeader,
@@ -121,28 +121,28 @@ impl<'a> Run<'a, Planned> {
         settings: ControllerSettings,
     ) -> Self {
         Self {
-            core: Core::new(plan, header, rig, control, sink, settings),
+            executor: Executor::new(plan, header, rig, control, sink, settings),
             state: PhantomData,
         }
     }
 
-    /// With these checks before the robot is powered.
+    /// Adds checks before the robot is powered.
     #[must_use]
     pub fn checked(mut self, preflight: Preflight) -> Self {
-        self.core.preflight = Some(preflight);
+        self.executor.preflight = Some(preflight);
         self
     }
 
-    /// As a further leg of a session: the plan given is what is left of the session's own
-    /// ([`Plan::remaining`] with the presses that [`Plan::wanted`] names), the header that of the session.
+    /// Makes it a further leg of a session: the plan must be the remaining one of the session
+    /// ([`Plan::remaining`] with the presses of [`Plan::wanted`]), the header that of the session.
     #[must_use]
     pub fn resumed(mut self, resume: Resume) -> Self {
-        self.core.journal.remember(&resume.histories);
-        self.core.resume = Some(resume);
+        self.executor.journal.restore(&resume.histories);
+        self.executor.resume = Some(resume);
         self
     }
 
-    /// Executes the plan from arming to disarming, and says what became of it; see [`execute`].
+    /// Executes the plan from arming to disarming, and returns the report; see [`execute`].
     pub fn execute(self) -> RunReport {
         match self.arm() {
             Ok(run) => run.begin().run().report(),
@@ -153,25 +153,25 @@ impl<'a> Run<'a, Planned> {
     /// Checks the plan against the rig, configures every device and reads it back, starts the cameras and
     /// powers the robot, which holds its position.
     ///
-    /// # Errors
+    /// The report of a run that ended here, with the rig at rest.
     /// The report of a run that ended here, the rig at rest.
     pub fn arm(mut self) -> Result<Run<'a, Armed>, Box<RunReport>> {
-        match self.core.shielded(Core::arm) {
-            Ok(()) => Ok(self.become_()),
+        match self.executor.catch_panic(Executor::arm) {
+            Ok(()) => Ok(self.into_state()),
             Err(halt) => {
-                self.core.conclude(Err(halt));
-                Err(Box::new(self.core.take_report()))
+                self.executor.conclude(Err(halt));
+                Err(Box::new(self.executor.take_report()))
             }
         }
     }
 }
 
 impl<'a> Run<'a, Armed> {
-    /// Begins the plan. Nothing moves yet.
+    /// Starts the plan. Nothing moves yet.
     #[must_use]
     pub fn begin(mut self) -> Run<'a, Running> {
-        self.core.machine.fire(Event::Begin);
-        self.become_()
+        self.executor.machine.fire(Event::Begin);
+        self.into_state()
     }
 }
 
@@ -179,22 +179,22 @@ impl<'a> Run<'a, Running> {
     /// Executes the plan and ends the run, whatever happens.
     #[must_use]
     pub fn run(mut self) -> Run<'a, Finished> {
-        let result = self.core.shielded(Core::steps);
-        self.core.conclude(result);
-        self.become_()
+        let result = self.executor.catch_panic(Executor::steps);
+        self.executor.conclude(result);
+        self.into_state()
     }
 }
 
 impl Run<'_, Finished> {
-    /// What became of it.
+    /// Result of the run.
     pub fn report(mut self) -> RunReport {
-        self.core.take_report()
+        self.executor.take_report()
     }
 }
 
-impl Core<'_> {
+impl Executor<'_> {
     fn take_report(&mut self) -> RunReport {
-        // Concluding always leaves a report; an absent one must not read as success.
+        // Concluding always leaves a report; a missing one must not read as success.
         self.report.take().unwrap_or_else(|| RunReport {
             end: RunEnd::Faulted("internal error: no report".to_owned()),
             causes: vec![ControllerError::Internal("no report".to_owned())],
@@ -212,9 +212,9 @@ impl Core<'_> {
     }
 }
 
-/// Executes `plan` on `rig` from arming to disarming, and tells `sink` everything that happens.
+/// Executes `plan` on `rig` from arming to disarming, and emits all records to `sink`.
 ///
-/// Returns when the rig is at rest: also after a stop, an abort, a device fault, a fault of the sink, or a panic in
+/// Returns when the rig is at rest, even after a stop, an abort, a fault of a device or of the sink, or a panic in
 /// any of them. `header` is the first record.
 pub fn execute(
     plan: &Plan,
@@ -226,7 +226,7 @@ pub fn execute(
     Run::new(plan, header, rig, control, sink).execute()
 }
 
-/// As [`execute`], after a preflight: with a failed check the robot is not powered, and the report says which.
+/// Like [`execute`], after a preflight: if a check fails, the robot is not powered, and the report names the check.
 pub fn execute_checked(
     plan: &Plan,
     header: RunHeader,

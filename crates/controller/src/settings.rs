@@ -2,38 +2,38 @@
 
 use skinrig_model::HostDuration;
 
-/// How often the controller looks, and how long it waits for a device before it calls it silent.
+/// Polling intervals and timeouts of the controller.
 ///
-/// The defaults are our own choices, not a vendor's figures.
+/// The defaults are our own choices, not vendor figures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControllerSettings {
-    /// Longest time between two looks at the devices and the operator's requests; 1 to 10 ms.
+    /// Longest time between two polls of devices and requests; 1 to 10 ms.
     pub tick: HostDuration,
-    /// A newest pose sample older than this is stale: no motion is commanded and the run ends.
+    /// Age at which the newest pose sample is stale: no motion is commanded and the run ends.
     pub stale_after: HostDuration,
-    /// The tip is low and nobody looked for longer than this: the run ends.
+    /// Longest time between two polls while the tip is low; beyond it the run ends.
     pub late_after: HostDuration,
-    /// The time over which the watchdog takes a speed: long enough that the noise of positions and of their times is no speed,
+    /// Time over which the watchdog measures speed: long enough to average out noise of positions and times, and
     /// at most a tick, so that it trips within two.
     pub speed_over: HostDuration,
     /// Longest time from arming the robot to the first sample of its pose stream.
     pub first_pose_within: HostDuration,
-    /// How far a camera's time may step away from the host's; its stream is not watched when absent.
+    /// Largest deviation of a camera's time from the host's; `None` disables the check.
     pub camera_lag: Option<HostDuration>,
-    /// How long the verdict on a press may wait for what both cameras saw of it; then its data are late, and it is invalid.
+    /// How long the verdict on a press waits for the data of both cameras; after that they are late, and the press is invalid.
     pub data_within: HostDuration,
-    /// Speed of motions that are not in the plan (rising from an unknown start, retracting after a
-    /// fault), mm/s; never more than the plan's own limit.
+    /// Speed of motions outside the plan (rising from an unknown start, retracting after a
+    /// fault), mm/s; limited by the plan's maximum.
     pub rise_speed_mm_s: f64,
-    /// What a motion that is not in the plan may take beyond twice its length divided by its speed.
+    /// Time allowed for a motion outside the plan, in addition to twice its nominal duration.
     pub rise_allowance: HostDuration,
-    /// How long a motion may be asked for again that the guard refused because of where the tip was last measured.
+    /// How long to repeat a motion that the guard rejected because of the measured position.
     pub steady_within: HostDuration,
-    /// Longest time for which a trigger box may stay busy.
+    /// Longest time that a trigger box may stay busy.
     pub mark_within: HostDuration,
     /// Pose samples per record, at least 1.
     pub pose_block: usize,
-    /// How often the consumer of records is asked whether it still has them.
+    /// How often to check that the sink still has its records.
     pub check_sink_every: HostDuration,
 }
 

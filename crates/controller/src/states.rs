@@ -1,23 +1,23 @@
-//! The transition table of a run: state and event give the next state and what to do.
+//! The transition table of a run: state and event determine the next state and the action.
 //!
-//! `docs/reference/runs.md` shows the same table; a test writes it out and compares.
+//! `docs/reference/runs.md` contains the same table; a test compares the two.
 
-/// Where a run is.
+/// State of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum State {
-    /// Nothing has been opened.
+    /// No device is open.
     Planned,
     /// Devices are configured and read back, cameras stream, the robot holds its position.
     Armed,
     /// Steps are executed.
     Running,
-    /// As running; waits at the next safe point.
+    /// Like running; waits at the next safe point.
     Pausing,
-    /// The press or motion under way is broken off, the tip leaves the skin; waits at the next safe point.
+    /// Interrupts the current press or motion and leaves the skin; waits at the next safe point.
     PausingNow,
     /// Waits at clearance height, everything streaming.
     Paused,
-    /// As running; ends at the next safe point.
+    /// Like running; ends at the next safe point.
     Stopping,
     /// The operator's abort: the robot leaves the skin now.
     Aborting,
@@ -27,48 +27,48 @@ pub enum State {
     Faulted,
     /// The operator's halt: motors off, wherever the tip is.
     Halting,
-    /// Disarmed; all is told.
+    /// Disarmed; all records are written.
     Finished,
 }
 
-/// What happens to a run.
+/// Event in a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Event {
     /// All devices are armed.
     ArmingDone,
-    /// The caller begins the plan.
+    /// The caller starts the plan.
     Begin,
-    /// The operator asks to wait.
+    /// The operator requests a pause.
     Pause,
-    /// The operator asks to leave the skin now and to wait.
+    /// The operator requests an immediate pause off the skin.
     PauseNow,
-    /// The operator asks to go on.
+    /// The operator requests to continue.
     Resume,
-    /// The operator asks to end after the press under way.
+    /// The operator requests an end after the current press.
     Stop,
-    /// The operator asks to end now.
+    /// The operator requests an immediate end.
     Abort,
-    /// The operator asks for motors off, now.
+    /// The operator requests motors off immediately.
     Halt,
-    /// A device, a limit, the recorder or the code failed.
+    /// A device, a limit, the recorder or the controller failed.
     Fault,
-    /// No press is under way and the tip is at clearance height.
+    /// No press is in progress and the tip is at clearance height.
     SafePoint,
     /// The last step is done.
     PlanDone,
     /// The tip is at clearance height, or cannot be brought there.
     Cleared,
-    /// The motors are off, or the robot was told so and does not answer.
+    /// The motors are off, or the robot does not answer the command.
     Disarmed,
 }
 
-/// What the controller does on a transition.
+/// Action of the controller on a transition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Action {
-    /// Nothing more.
+    /// No action.
     None,
     /// Execute the next step.
-    GoOn,
+    Continue,
     /// Wait at clearance height.
     Wait,
     /// Hold, rise straight to clearance height, hold.
@@ -79,8 +79,8 @@ pub(crate) enum Action {
     Close,
     /// The request has no effect here.
     Ignore,
-    /// The controller itself went wrong: treat it as [`Event::Fault`].
-    Refuse,
+    /// Internal error of the controller: treat it as [`Event::Fault`].
+    Reject,
 }
 
 impl State {
@@ -100,7 +100,7 @@ impl State {
         Self::Finished,
     ];
 
-    /// The name for programs: `running`, `pausing_now`.
+    /// Name for programs: `running`, `pausing_now`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -119,10 +119,10 @@ impl State {
         }
     }
 
-    /// True when the robot's motors may be on.
+    /// True if the robot's motors may be on.
     #[must_use]
     pub const fn may_be_armed(self) -> bool {
-        // While planned, arming may have begun; it counts from its first moment.
+        // In state planned, arming may have begun; it counts from its start.
         !matches!(self, Self::Finished)
     }
 }
@@ -146,7 +146,7 @@ impl Event {
     ];
 }
 
-/// The table. Total: the compiler checks that every pair is there.
+/// The transition table. Total: the compiler checks that every pair is covered.
 #[must_use]
 pub(crate) const fn transition(state: State, event: Event) -> (State, Action) {
     use Action as A;
@@ -155,19 +155,19 @@ pub(crate) const fn transition(state: State, event: Event) -> (State, Action) {
     match (state, event) {
         // The normal course.
         (S::Planned, E::ArmingDone) => (S::Armed, A::None),
-        (S::Armed, E::Begin) => (S::Running, A::GoOn),
-        (S::Running, E::SafePoint) => (S::Running, A::GoOn),
+        (S::Armed, E::Begin) => (S::Running, A::Continue),
+        (S::Running, E::SafePoint) => (S::Running, A::Continue),
         (S::Pausing | S::PausingNow, E::SafePoint) => (S::Paused, A::Wait),
         (S::Stopping, E::SafePoint) => (S::Retracting, A::Retract),
         (S::Running | S::Pausing | S::PausingNow | S::Stopping, E::PlanDone) => {
             (S::Retracting, A::Retract)
         }
 
-        // The operator.
+        // The operator's requests.
         (S::Running, E::Pause) => (S::Pausing, A::None),
         (S::Running | S::Pausing, E::PauseNow) => (S::PausingNow, A::Retract),
         (S::Pausing | S::PausingNow, E::Resume) => (S::Running, A::None),
-        (S::Paused, E::Resume) => (S::Running, A::GoOn),
+        (S::Paused, E::Resume) => (S::Running, A::Continue),
         (S::Running | S::Pausing | S::PausingNow, E::Stop) => (S::Stopping, A::None),
         (S::Planned | S::Armed | S::Paused, E::Stop) => (S::Retracting, A::Retract),
         (
@@ -181,7 +181,7 @@ pub(crate) const fn transition(state: State, event: Event) -> (State, Action) {
             E::Abort,
         ) => (S::Aborting, A::Retract),
 
-        // Motors off goes before every other way out, also before one under way.
+        // A halt takes precedence over every other way out, even one in progress.
         (
             S::Planned
             | S::Armed
@@ -196,7 +196,7 @@ pub(crate) const fn transition(state: State, event: Event) -> (State, Action) {
             E::Halt,
         ) => (S::Halting, A::Disarm),
 
-        // The way out. Only a disarmed robot gets to `Finished`.
+        // The way out. Only a disarmed robot reaches `Finished`.
         (S::Retracting | S::Aborting | S::Faulted, E::Cleared) => (state, A::Disarm),
         (S::Retracting | S::Aborting | S::Faulted | S::Halting, E::Disarmed) => {
             (S::Finished, A::Close)
@@ -249,7 +249,7 @@ pub(crate) const fn transition(state: State, event: Event) -> (State, Action) {
             E::Resume,
         ) => (state, A::Ignore),
 
-        // The controller's own events where they cannot be.
+        // Internal events in impossible states.
         (
             S::Armed
             | S::Running
@@ -300,7 +300,7 @@ pub(crate) const fn transition(state: State, event: Event) -> (State, Action) {
             | S::Finished,
             E::Cleared | E::Disarmed,
         )
-        | (S::Halting, E::Cleared) => (state, A::Refuse),
+        | (S::Halting, E::Cleared) => (state, A::Reject),
     }
 }
 
@@ -319,7 +319,7 @@ pub fn markdown() -> String {
         for event in Event::ALL {
             let cell = match transition(state, event) {
                 (_, Action::Ignore) => " · |".to_owned(),
-                (_, Action::Refuse) => " ✗ |".to_owned(),
+                (_, Action::Reject) => " ✗ |".to_owned(),
                 (next, Action::None) => format!(" {next:?} |"),
                 (next, action) => format!(" {next:?}: {action:?} |"),
             };
@@ -336,14 +336,14 @@ mod tests {
 
     use super::*;
 
-    /// Every state that can be reached, with a shortest way to it.
+    /// Every reachable state with a shortest path to it.
     fn reachable() -> BTreeMap<State, Vec<Event>> {
         let mut ways = BTreeMap::from([(State::Planned, vec![])]);
         let mut todo = vec![State::Planned];
         while let Some(state) = todo.pop() {
             for event in Event::ALL {
                 let (next, action) = transition(state, event);
-                if action != Action::Refuse && !ways.contains_key(&next) {
+                if action != Action::Reject && !ways.contains_key(&next) {
                     let mut way = ways[&state].clone();
                     way.push(event);
                     ways.insert(next, way);
@@ -355,19 +355,19 @@ mod tests {
     }
 
     #[test]
-    fn every_state_can_be_reached() {
+    fn every_state_is_reachable() {
         let found: BTreeSet<_> = reachable().into_keys().collect();
         assert_eq!(found, BTreeSet::from(State::ALL));
     }
 
-    /// From every state that can be reached, every course of four events: nothing leaves the way out, a pause always
-    /// ends in a resume, a stop or worse, and the run executes a step only when it is running.
+    /// From every reachable state, all sequences of four events: nothing leaves the way out, a pause always
+    /// ends in a resume, a stop or worse, and steps are executed only while running.
     #[test]
-    fn a_paused_run_goes_on_only_when_it_is_told_to() {
+    fn a_paused_run_continues_only_on_request() {
         fn explore(state: State, left: u32) {
             for event in Event::ALL.into_iter().take(if left == 0 { 0 } else { 13 }) {
                 let (next, action) = transition(state, event);
-                if action == Action::GoOn {
+                if action == Action::Continue {
                     assert_eq!(next, State::Running, "{state:?} {event:?}");
                 }
                 if state == State::Paused && next == State::Running {
@@ -395,7 +395,7 @@ mod tests {
                 if state == State::Finished {
                     assert_eq!(next, State::Finished);
                 }
-                if matches!(action, Action::Ignore | Action::Refuse) {
+                if matches!(action, Action::Ignore | Action::Reject) {
                     assert_eq!(next, state, "{state:?} {event:?} changes nothing");
                 }
                 // Once on the way out, a run never executes steps again.

@@ -1,17 +1,17 @@
-//! Executes the steps of a plan, one after the other.
+//! Executes the steps of a plan in order.
 
 use skinrig_model::{HostDuration, HostTime, Point3, Skin};
 use skinrig_protocol::plan::Step;
 
-use crate::core::Core;
 use crate::error::{ControllerError, GuardError, Halt};
-use crate::moments::Settling;
+use crate::executor::Executor;
 use crate::not_arrived::NotArrived;
 use crate::press_fault::PressFault;
+use crate::press_tracker::Settling;
 use crate::states::{Action, Event, State};
 
-impl Core<'_> {
-    /// Everything between armed and the end.
+impl Executor<'_> {
+    /// Everything between arming and the end.
     pub(crate) fn steps(&mut self) -> Result<(), Halt> {
         self.begin = self.now();
         self.safe_point()?;
@@ -39,14 +39,14 @@ impl Core<'_> {
                 }
             }
         }
-        // A stop or pause that came during the last step finds nothing left to hold back.
+        // A stop or pause during the last step has nothing left to delay.
         match self.machine.fire(Event::PlanDone) {
-            Action::Refuse => Err(internal("plan done", self.machine.state())),
+            Action::Reject => Err(internal("plan done", self.machine.state())),
             _ => Ok(()),
         }
     }
 
-    /// From an unknown start: straight up before anything sideways.
+    /// Rises straight before any lateral motion, since the start position is unknown.
     fn rise_first(&mut self) -> Result<(), Halt> {
         if self.indenter.is_clear() {
             return Ok(());
@@ -59,8 +59,8 @@ impl Core<'_> {
         self.go("rise from the start position", target, speed, allowed)
     }
 
-    /// Moves and waits until settled. For motions at clearance height and straight up only. `pause_now` holds the robot
-    /// where it is; it moves on when the operator says so.
+    /// Moves and waits until settled. Only for motions at clearance height and straight up. `pause_now` holds the robot
+    /// where it is; it continues when the operator resumes.
     pub(crate) fn go(
         &mut self,
         what: &str,
@@ -91,7 +91,7 @@ impl Core<'_> {
     ) -> Result<(), Halt> {
         let t = match self.command_when_steady(target, speed_mm_s)? {
             Ok(t) => t,
-            Err(aside) => return Err(aside.not_arrived(what).into()),
+            Err(off_target) => return Err(off_target.not_arrived(what).into()),
         };
         let mut settling = Some(Settling::before_a_motion(target, &self.plan.limits, t));
         std::mem::swap(&mut self.settling, &mut settling);
@@ -111,14 +111,14 @@ impl Core<'_> {
         }
     }
 
-    /// Commands a motion once the newest sample allows it. A tip at rest is measured a little off at times; what the guard
-    /// refuses because of where the tip was last measured is asked again at the next looks, and the guard bears no more than
-    /// before. `Err`: the tip does not come to its place.
+    /// Commands a motion once the newest sample allows it. A tip at rest may be measured slightly off. If the guard rejects a motion
+    /// because of the measured position, it is tried again at the next polls, under the same rules. `Err`: the tip does not return
+    /// to its position.
     pub(crate) fn command_when_steady(
         &mut self,
         target: Point3<Skin>,
         speed_mm_s: f64,
-    ) -> Result<Result<HostTime, Aside>, Halt> {
+    ) -> Result<Result<HostTime, OffTarget>, Halt> {
         let within = self.settings.steady_within;
         let until = self.now() + within;
         loop {
@@ -126,13 +126,13 @@ impl Core<'_> {
                 Err(ControllerError::Guard(GuardError::Lateral { .. })) if self.now() < until => {
                     self.tick(Some(until))?;
                 }
-                // Where the tip is told to be; without such a place the refusal says all.
+                // Compare with the commanded position; without one the rejection is final.
                 Err(ControllerError::Guard(refused @ GuardError::Lateral { .. })) => {
                     let Some(held) = self.indenter.target() else {
                         return Err(refused.into());
                     };
-                    return Ok(Err(Aside {
-                        held,
+                    return Ok(Err(OffTarget {
+                        target: held,
                         within,
                         tolerance_mm: self.plan.limits.position_tolerance_mm,
                         found: self.indenter.position().map(|p| p.measured),
@@ -158,7 +158,7 @@ impl Core<'_> {
         }
     }
 
-    /// Waits until `due`; a pause in between moves `due`, and the present repetition, on.
+    /// Waits until `due`; a pause delays `due` and the current repetition.
     pub(crate) fn wait_at_clearance(&mut self, mut due: HostTime) -> Result<(), Halt> {
         while self.now() < due {
             self.tick(Some(due))?;
@@ -169,8 +169,8 @@ impl Core<'_> {
         Ok(())
     }
 
-    /// No press is under way: the place to wait or to end when the operator asked for it. Gives the time
-    /// spent waiting.
+    /// Between presses: waits or ends if the operator requested it. Returns the time spent
+    /// waiting.
     pub(crate) fn safe_point(&mut self) -> Result<HostDuration, Halt> {
         let from = self.now();
         loop {
@@ -178,7 +178,7 @@ impl Core<'_> {
                 State::Paused => self.tick(None)?,
                 State::Retracting => return Err(Halt::Stopped),
                 _ => match self.machine.fire(Event::SafePoint) {
-                    Action::GoOn => return Ok(self.now() - from),
+                    Action::Continue => return Ok(self.now() - from),
                     Action::Wait => {}
                     Action::Retract => return Err(Halt::Stopped),
                     _ => return Err(internal("safe point", self.machine.state())),
@@ -188,21 +188,21 @@ impl Core<'_> {
     }
 }
 
-/// A tip that is not where it was told to be before a motion.
-pub(crate) struct Aside {
-    held: Point3<Skin>,
+/// The tip is away from its commanded position before a motion.
+pub(crate) struct OffTarget {
+    target: Point3<Skin>,
     within: HostDuration,
     tolerance_mm: f64,
     found: Option<Point3<Skin>>,
 }
 
-impl Aside {
-    /// As the end of a run: the motion before `what` did not keep its place.
+impl OffTarget {
+    /// As an error of the run: the tip left its position before `what`.
     pub(crate) fn not_arrived(self, what: &str) -> NotArrived {
         NotArrived {
             what: format!("before {what}"),
             tolerance_mm: self.tolerance_mm,
-            target: self.held,
+            target: self.target,
             allowed: self.within,
             found: self.found,
         }
@@ -210,15 +210,15 @@ impl Aside {
 
     /// As a fault of a press.
     pub(crate) fn fault(self) -> PressFault {
-        PressFault::Aside {
+        PressFault::PushedAside {
             tolerance_mm: self.tolerance_mm,
-            target: self.held,
+            target: self.target,
             found: self.found,
         }
     }
 }
 
-/// The table has no such transition.
+/// The transition table has no such transition.
 pub(crate) fn internal(what: &str, state: State) -> Halt {
     ControllerError::Internal(format!("{what}: not possible while {state:?}")).into()
 }

@@ -1,20 +1,20 @@
-//! The check of the surface: touched at the protocol's points, it must lie where the frame says.
+//! The surface check: touches the protocol's points and compares the surface with the frame.
 
 use skinrig_model::{HostDuration, Point2, PreflightCheck, PressRole, Record, RepetitionId};
 use skinrig_protocol::SurfaceCheck;
 use skinrig_protocol::plan::Step;
 
-use crate::core::Core;
 use crate::error::{ControllerError, Halt};
+use crate::executor::Executor;
 use crate::press_fault::TouchFault;
 use crate::touch::Probe;
 
-/// What to do about a surface that is not where the frame says.
-const NEXT: &str = "look at the mount and the skin; then touch it off again (`skinrig jog --rig FILE`: `touch`, `point NAME`) and put \
-                    the points into the rig file";
+/// Next step if the surface is not where the frame puts it.
+const NEXT: &str = "check the mount and the skin, touch off again (`skinrig jog --rig FILE`: `touch`, `point NAME`), and enter \
+                    the points in the rig file";
 
-impl Core<'_> {
-    /// Touches the surface at every point of the protocol's check, when it has one. The tip ends at clearance height.
+impl Executor<'_> {
+    /// Touches the surface at every point of the protocol's check, if it has one. The tip ends at clearance height.
     pub(crate) fn check_surface(&mut self, when: &str) -> Result<(), Halt> {
         let Some(check) = &self.plan.surface_check else {
             return Ok(());
@@ -45,7 +45,7 @@ impl Core<'_> {
         Err(ControllerError::Surface { failed, next: NEXT }.into())
     }
 
-    /// At the end of a repetition, when the protocol asks for it: the check, and back to where the tip was.
+    /// After a repetition, if the protocol requires it: checks the surface, then returns to the previous location.
     pub(crate) fn check_surface_after(&mut self, step: usize) -> Result<(), Halt> {
         let wanted = self
             .plan
@@ -56,13 +56,13 @@ impl Core<'_> {
             return Ok(());
         };
         let Some(from) = self.indenter.position() else {
-            return Ok(()); // the next look at the robot tells what is wrong with it
+            return Ok(()); // the next poll of the robot reports the failure
         };
         self.check_surface(&format!("after {repetition}"))?;
-        self.above("back from the check of the surface", from.measured.plane())
+        self.travel_above("return from the surface check", from.measured.plane())
     }
 
-    /// The repetition whose last press is this step.
+    /// The repetition that ends with this step.
     fn repetition_ends(&self, step: usize) -> Option<RepetitionId> {
         let planned = |s: &Step| match s {
             Step::Press(p) => self.plan.presses.get(p.press.index() as usize),
@@ -74,7 +74,7 @@ impl Core<'_> {
             .then_some(this.repetition)
     }
 
-    fn above(&mut self, what: &str, at: Point2) -> Result<(), Halt> {
+    fn travel_above(&mut self, what: &str, at: Point2) -> Result<(), Halt> {
         let target = at.at_height(self.plan.limits.clearance_mm);
         let from = self.indenter.position();
         let distance_mm = from.map_or(0.0, |p| p.measured.distance_mm(target));
@@ -82,7 +82,7 @@ impl Core<'_> {
         self.go(what, target, speed_mm_s, allowed)
     }
 
-    /// The height of the surface, mm, or why it was not found. A pause breaks the search off; it is made again.
+    /// Height of the surface, mm, or the reason why it was not found. A search that a pause interrupts is repeated.
     fn touch_point(
         &mut self,
         check: &SurfaceCheck,
@@ -91,16 +91,16 @@ impl Core<'_> {
         loop {
             let paused = self.safe_point()?;
             self.begin += paused;
-            self.above("travel to a check point", at)?;
+            self.travel_above("travel to a check point", at)?;
             self.breakable = true;
             let searched = self.search_point(check, at);
             self.breakable = false;
             self.settling = None;
             match searched {
-                Err(Halt::PausedNow) => self.above("rise from a check point", at)?,
+                Err(Halt::PausedNow) => self.travel_above("rise from a check point", at)?,
                 Err(halt) => return Err(halt),
                 Ok(found) => {
-                    self.above("rise from a check point", at)?;
+                    self.travel_above("rise from a check point", at)?;
                     return Ok(found);
                 }
             }
@@ -128,7 +128,9 @@ impl Core<'_> {
         let band = at.at_height(search.band_mm);
         let down = match self.command_when_steady(band, approach_speed_mm_s)? {
             Ok(t) => t,
-            Err(aside) => return Err(aside.not_arrived("the touch of a check point").into()),
+            Err(off_target) => {
+                return Err(off_target.not_arrived("the touch of a check point").into());
+            }
         };
         let found = self.find_surface(probe, search, down, down + within)?;
         Ok(found.map(|sample| sample.measured.z_mm))

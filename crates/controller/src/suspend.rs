@@ -1,40 +1,40 @@
-//! Suspension: a run waits at clearance height while something disturbs it, and goes on by itself when that is over.
+//! Suspension: a run waits at clearance height during a disturbance, and continues automatically afterwards.
 
 use skinrig_device::DeviceError;
 use skinrig_model::{CameraId, HostDuration, HostTime, InterruptionKind, RawChunk, Record};
 use skinrig_protocol::{Suspend, Threshold, UnderWay};
 
-use crate::core::{Collect, Core};
 use crate::error::{ControllerError, Halt};
+use crate::executor::{Collect, Executor};
 use crate::states::{Event, State};
 
-/// How the reason of every suspension begins.
+/// Prefix of the reason of every suspension.
 pub(crate) const SUSPENDED: &str = "suspended";
-/// Over so long rates are taken.
+/// Averaging time of rates.
 const WINDOW: HostDuration = HostDuration::from_millis(1_000);
 
-/// What a value did.
+/// Change of a [`Hysteresis`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Turn {
-    /// It has been beyond the level for long enough.
+pub enum Transition {
+    /// The value has been beyond the trip level for long enough.
     Tripped,
-    /// It has been well again for long enough.
+    /// The value has been back to normal for long enough.
     Cleared,
 }
 
-/// Follows one value: it trips after it was beyond one level without a break for some time, and clears after it was on the
-/// calm side of another level without a break for some time. Between the levels nothing changes.
+/// Hysteresis of one value: trips after it was beyond one level without interruption for some time, and clears after it was on
+/// the normal side of another level without interruption for some time. Between the levels nothing changes.
 #[derive(Debug, Clone)]
 pub struct Hysteresis {
     threshold: Threshold,
     resume_after: HostDuration,
     tripped: bool,
-    /// Since when the value has been on the side that changes this.
+    /// Since when the value has been on the side that leads to a change.
     since: Option<HostTime>,
 }
 
 impl Hysteresis {
-    /// One that is calm.
+    /// A hysteresis that has not tripped.
     #[must_use]
     pub const fn new(threshold: Threshold, resume_after: HostDuration) -> Self {
         Self {
@@ -51,14 +51,14 @@ impl Hysteresis {
         self.tripped
     }
 
-    /// Takes the value at `t`.
-    pub fn feed(&mut self, t: HostTime, value: f64) -> Option<Turn> {
+    /// Processes the value at `t`.
+    pub fn feed(&mut self, t: HostTime, value: f64) -> Option<Transition> {
         let (turns, lasting, turn) = if self.tripped {
             let calm = self.threshold.is_calm(value);
-            (calm, self.resume_after, Turn::Cleared)
+            (calm, self.resume_after, Transition::Cleared)
         } else {
             let beyond = self.threshold.is_beyond(value);
-            (beyond, self.threshold.lasting, Turn::Tripped)
+            (beyond, self.threshold.lasting, Transition::Tripped)
         };
         if !turns {
             self.since = None;
@@ -74,9 +74,9 @@ impl Hysteresis {
     }
 }
 
-/// What is measured.
+/// Monitored quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Measure {
+enum Quantity {
     Storm,
     Dark,
     Loss,
@@ -84,8 +84,8 @@ enum Measure {
     Disk,
 }
 
-impl Measure {
-    /// Its name and unit.
+impl Quantity {
+    /// Name and unit.
     const fn words(self) -> (&'static str, &'static str) {
         match self {
             Self::Storm => ("event rate", "ev/s"),
@@ -97,51 +97,51 @@ impl Measure {
     }
 }
 
-/// One condition.
+/// A monitored condition.
 #[derive(Debug, Clone)]
-struct Watched {
-    measure: Measure,
-    follow: Hysteresis,
+struct Condition {
+    quantity: Quantity,
+    hysteresis: Hysteresis,
 }
 
-/// What was measured over a window, besides what chunks tell.
+/// Values measured over a window, other than those from chunks.
 #[derive(Debug, Clone, Copy, Default)]
-struct Measured {
+struct WindowMeasurements {
     /// °C.
     temperatures_c: [Option<f64>; 2],
     free_b: Option<f64>,
 }
 
-/// All conditions of a run, and whether one of them holds it.
+/// All conditions of a run, and whether one of them suspends it.
 #[derive(Debug)]
 pub(crate) struct Suspender {
     settings: Suspend,
-    /// Storm, dark, loss, temperature: for each camera; then the disk.
-    cameras: [Vec<Watched>; 2],
-    disk: Option<Watched>,
+    /// Event storm, darkness, loss and temperature per camera.
+    cameras: [Vec<Condition>; 2],
+    disk: Option<Condition>,
     window_from: Option<HostTime>,
     events: [u64; 2],
     lost: [u64; 2],
-    /// What tripped while the run was not running.
+    /// Condition that tripped while the run was not running.
     pending: Option<String>,
-    /// The run waits because of this, since then.
+    /// Start and reason of the current suspension.
     holding: Option<(HostTime, String)>,
 }
 
 impl Suspender {
     pub(crate) fn new(settings: Suspend) -> Self {
-        let watched = |measure, threshold: Option<Threshold>| {
-            threshold.map(|t| Watched {
-                measure,
-                follow: Hysteresis::new(t, settings.resume_after),
+        let watched = |quantity, threshold: Option<Threshold>| {
+            threshold.map(|t| Condition {
+                quantity,
+                hysteresis: Hysteresis::new(t, settings.resume_after),
             })
         };
         let of_camera = || {
             [
-                watched(Measure::Storm, settings.event_rate),
-                watched(Measure::Dark, settings.dark),
-                watched(Measure::Loss, settings.lost_bytes),
-                watched(Measure::Temperature, settings.temperature),
+                watched(Quantity::Storm, settings.event_rate),
+                watched(Quantity::Dark, settings.dark),
+                watched(Quantity::Loss, settings.lost_bytes),
+                watched(Quantity::Temperature, settings.temperature),
             ]
             .into_iter()
             .flatten()
@@ -149,7 +149,7 @@ impl Suspender {
         };
         Self {
             cameras: [of_camera(), of_camera()],
-            disk: watched(Measure::Disk, settings.disk_free),
+            disk: watched(Quantity::Disk, settings.disk_free),
             settings,
             window_from: None,
             events: [0; 2],
@@ -159,50 +159,55 @@ impl Suspender {
         }
     }
 
-    /// Counts what a camera delivered.
+    /// Counts the data of a camera.
     pub(crate) fn count(&mut self, chunk: &RawChunk) {
         let i = chunk.camera.index();
         self.events[i] += chunk.facts.cd_events;
         self.lost[i] += chunk.lost_before;
     }
 
-    /// The operator paused or went on: whether the run waits is no longer for this to say. True when it was.
-    pub(crate) fn let_go(&mut self) -> bool {
+    /// Ends the suspension because the operator paused or resumed. Returns true if there was one.
+    pub(crate) fn release(&mut self) -> bool {
         self.holding.take().is_some()
     }
 
-    /// Why the run waits because of this.
+    /// Reason of the current suspension.
     pub(crate) fn reason(&self) -> Option<&str> {
         self.holding.as_ref().map(|(_, reason)| reason.as_str())
     }
 
-    fn is_asleep(&self) -> bool {
+    fn is_idle(&self) -> bool {
         self.disk.is_none() && self.cameras.iter().all(Vec::is_empty)
     }
 
-    fn watches_heat(&self, camera: CameraId) -> bool {
+    fn monitors_temperature(&self, camera: CameraId) -> bool {
         let watched = &self.cameras[camera.index()];
-        watched.iter().any(|w| w.measure == Measure::Temperature)
+        watched.iter().any(|w| w.quantity == Quantity::Temperature)
     }
 
-    /// This camera cannot tell its temperature.
-    fn leave_heat(&mut self, camera: CameraId) {
-        self.cameras[camera.index()].retain(|w| w.measure != Measure::Temperature);
+    /// Stops monitoring the temperature of a camera that cannot measure it.
+    fn stop_monitoring_temperature(&mut self, camera: CameraId) {
+        self.cameras[camera.index()].retain(|w| w.quantity != Quantity::Temperature);
     }
 
     fn is_calm(&self) -> bool {
         let mut all = self.cameras.iter().flatten().chain(&self.disk);
-        !all.any(|w| w.follow.is_tripped())
+        !all.any(|w| w.hysteresis.is_tripped())
     }
 
-    /// Takes a whole window; gives what tripped, in words.
-    fn judge(&mut self, t: HostTime, seconds: f64, measured: Measured) -> Option<String> {
+    /// Evaluates a whole window; returns a description of the condition that tripped.
+    fn evaluate(
+        &mut self,
+        t: HostTime,
+        seconds: f64,
+        measured: WindowMeasurements,
+    ) -> Option<String> {
         let mut words = None;
-        let mut feed = |w: &mut Watched, of: &str, value: f64| {
-            if w.follow.feed(t, value) == Some(Turn::Tripped) {
-                let Threshold { trip, .. } = w.follow.threshold;
+        let mut feed = |w: &mut Condition, of: &str, value: f64| {
+            if w.hysteresis.feed(t, value) == Some(Transition::Tripped) {
+                let Threshold { trip, .. } = w.hysteresis.threshold;
                 let side = if value > trip { "at most" } else { "at least" };
-                let (what, unit) = w.measure.words();
+                let (what, unit) = w.quantity.words();
                 words.get_or_insert_with(|| {
                     format!("{of}{what}: expected {side} {trip} {unit}, found {value:.0} {unit}")
                 });
@@ -211,11 +216,11 @@ impl Suspender {
         for camera in CameraId::ALL {
             let i = camera.index();
             for w in &mut self.cameras[i] {
-                let value = match w.measure {
-                    Measure::Storm | Measure::Dark => Some(self.events[i] as f64 / seconds),
-                    Measure::Loss => Some(self.lost[i] as f64 / seconds),
-                    Measure::Temperature => measured.temperatures_c[i],
-                    Measure::Disk => None,
+                let value = match w.quantity {
+                    Quantity::Storm | Quantity::Dark => Some(self.events[i] as f64 / seconds),
+                    Quantity::Loss => Some(self.lost[i] as f64 / seconds),
+                    Quantity::Temperature => measured.temperatures_c[i],
+                    Quantity::Disk => None,
                 };
                 if let Some(value) = value {
                     feed(w, &format!("{camera}: "), value);
@@ -230,14 +235,14 @@ impl Suspender {
     }
 }
 
-impl Core<'_> {
-    /// Looks at the conditions of the plan once in every window, waits, goes on, or gives up.
+impl Executor<'_> {
+    /// Evaluates the conditions of the plan once per window; suspends, resumes or ends the run.
     pub(crate) fn suspend(&mut self) -> Result<(), Halt> {
         let running = matches!(
             self.machine.state(),
             State::Running | State::Pausing | State::PausingNow | State::Paused
         );
-        if self.suspender.is_asleep() || !running || self.ending {
+        if self.suspender.is_idle() || !running || self.ending {
             return Ok(());
         }
         let now = self.now();
@@ -245,7 +250,7 @@ impl Core<'_> {
         if now - from < WINDOW {
             return Ok(());
         }
-        // A chunk may take long to fill, and what it holds belongs to this window. Not handed over yet: the next turn looks again.
+        // A chunk may take long to fill, and its data belong to this window. If it is not yet complete, the next turn tries again.
         if !self.is_flushed_to(from + WINDOW) {
             self.collect(Collect::Flush)?;
         }
@@ -253,16 +258,16 @@ impl Core<'_> {
             return Ok(());
         }
         self.suspender.window_from = Some(now);
-        let measured = Measured {
+        let measured = WindowMeasurements {
             temperatures_c: self.temperatures(now)?,
             free_b: self.free_space(now)?,
         };
         let seconds = (now - from).as_secs_f64();
-        let tripped = self.suspender.judge(now, seconds, measured);
+        let tripped = self.suspender.evaluate(now, seconds, measured);
         if self.machine.state() == State::Running {
-            self.suspender.holding = None; // the operator went on
+            self.suspender.holding = None; // the operator resumed
         }
-        // What begins while the run waits for another reason holds it when it would go on.
+        // A condition that begins during another wait suspends the run once that ends.
         if tripped.is_some() {
             self.suspender.pending = tripped;
         }
@@ -296,21 +301,21 @@ impl Core<'_> {
         Ok(())
     }
 
-    /// Asks the cameras that are watched for their temperature. A camera that does not answer is a fault, as in any other call.
+    /// Reads the temperatures of the monitored cameras. No answer is a fault, as in any other call.
     fn temperatures(&mut self, t: HostTime) -> Result<[Option<f64>; 2], ControllerError> {
         let mut found = [None; 2];
         for camera in CameraId::ALL {
-            if !self.suspender.watches_heat(camera) {
+            if !self.suspender.monitors_temperature(camera) {
                 continue;
             }
             let told = match self.cameras[camera.index()].temperature_c() {
-                Err(DeviceError::Pending { .. }) => continue, // told in the next window
+                Err(DeviceError::Pending { .. }) => continue, // read in the next window
                 other => other?,
             };
             if told.is_none() {
-                self.suspender.leave_heat(camera);
+                self.suspender.stop_monitoring_temperature(camera);
                 let text = format!(
-                    "suspend.temperature: expected {camera} to tell its temperature, found one that cannot: not watched"
+                    "suspend.temperature: {camera} cannot measure its temperature: not monitored"
                 );
                 self.journal.emit(Record::Note { t, text })?;
             }
@@ -319,7 +324,7 @@ impl Core<'_> {
         Ok(found)
     }
 
-    /// The free space where the session is written, in bytes, when it is watched.
+    /// Free space at the session file in bytes, if monitored.
     fn free_space(&mut self, t: HostTime) -> Result<Option<f64>, ControllerError> {
         if self.suspender.disk.is_none() {
             return Ok(None);
@@ -327,7 +332,7 @@ impl Core<'_> {
         let free_b = self.journal.free_bytes().map(|b| b as f64);
         if free_b.is_none() {
             self.suspender.disk = None;
-            let text = "suspend.disk_free: expected to know the free space, found nobody who tells it: not watched";
+            let text = "suspend.disk_free: the free space is unknown: not monitored";
             self.journal.emit(Record::Note {
                 t,
                 text: text.to_owned(),

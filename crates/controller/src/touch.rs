@@ -1,17 +1,17 @@
-//! Finding the surface: the force in free air is averaged, then the tip goes down slowly until the force rises.
+//! Surface search by touch: averages the force in free air, then moves down slowly until the force rises.
 
 use skinrig_model::{HostDuration, HostTime, Point2, PoseSample};
 use skinrig_protocol::TouchSearch;
 use skinrig_protocol::plan::PressStep;
 
-use crate::core::Core;
 use crate::error::Halt;
-use crate::moments::Settling;
+use crate::executor::Executor;
 use crate::press_fault::TouchFault;
+use crate::press_tracker::Settling;
 
-/// Follows the force through the pose stream, from the tare to the touch.
+/// Tracks the force through the pose stream, from the tare to the touch.
 ///
-/// Everything is told apart by instants of commands and by samples alone, so that a replay decides the same.
+/// Decisions depend only on command times and samples, so that a replay reproduces them.
 #[derive(Debug, Clone)]
 pub(crate) struct TouchDetector {
     search: TouchSearch,
@@ -27,7 +27,7 @@ pub(crate) struct TouchDetector {
 }
 
 impl TouchDetector {
-    /// Averages the samples that come after `tare_from`, for the search's tare time.
+    /// Averages the samples after `tare_from` over the search's tare time.
     pub(crate) const fn new(search: TouchSearch, tare_from: HostTime) -> Self {
         Self {
             search,
@@ -43,13 +43,13 @@ impl TouchDetector {
         }
     }
 
-    /// The slow way down was commanded at `t`: only the force after that tells a touch. A fast motion needs force
-    /// of its own.
+    /// Sets the time of the command for slow motion: only later forces indicate a touch, since fast motion itself needs
+    /// force.
     pub(crate) const fn search_from(&mut self, t: HostTime) {
         self.search_from = Some(t);
     }
 
-    /// Takes the next sample.
+    /// Processes the next sample.
     pub(crate) fn feed(&mut self, s: &PoseSample) {
         if s.t <= self.tare_from {
             return;
@@ -81,32 +81,32 @@ impl TouchDetector {
         }
     }
 
-    /// The force in free air, N, once it is known.
+    /// Force in free air, N, once known.
     pub(crate) const fn tare_n(&self) -> Option<f64> {
         self.tare_n
     }
 
-    /// True when a sample came without a force.
+    /// True if a sample had no force.
     pub(crate) const fn is_blind(&self) -> bool {
         self.blind
     }
 
-    /// The first of the samples that told the touch.
+    /// The first sample of the touch.
     pub(crate) const fn touched(&self) -> Option<PoseSample> {
         self.touched
     }
 }
 
-/// One search for the surface.
+/// One surface search.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Probe {
-    /// Where.
+    /// Location on the skin.
     pub(crate) at: Point2,
-    /// How deep below the surface the tip goes afterwards, mm.
+    /// Depth below the surface that the press reaches afterwards, mm.
     pub(crate) depth_mm: f64,
     /// Speed down to the band, mm/s.
     pub(crate) approach_speed_mm_s: f64,
-    /// The time given, for messages.
+    /// Time allowed, for messages.
     pub(crate) within: HostDuration,
 }
 
@@ -121,21 +121,21 @@ impl Probe {
     }
 }
 
-/// Where the surface is, or why the press cannot go on.
-pub(crate) type Found = Result<PoseSample, TouchFault>;
+/// Sample at the surface, or the reason why the press cannot continue.
+pub(crate) type TouchResult = Result<PoseSample, TouchFault>;
 
-impl Core<'_> {
-    /// Averages the force at clearance height, which the tip does not leave.
+impl Executor<'_> {
+    /// Averages the force at clearance height, without leaving it.
     pub(crate) fn tare(
         &mut self,
         step: Probe,
         search: TouchSearch,
     ) -> Result<Result<(), TouchFault>, Halt> {
         let place = step.at.at_height(self.plan.limits.clearance_mm);
-        // The command gives the tare its instant in the journal, and the tip its place.
+        // The command marks the tare in the journal, and holds the tip in place.
         let from = match self.command_when_steady(place, step.approach_speed_mm_s)? {
             Ok(t) => t,
-            Err(aside) => return Err(aside.not_arrived("the tare").into()),
+            Err(off_target) => return Err(off_target.not_arrived("the tare").into()),
         };
         self.touch = Some(TouchDetector::new(search, from));
         let deadline = from + search.tare + self.settings.first_pose_within;
@@ -143,11 +143,11 @@ impl Core<'_> {
         Ok(match self.touch() {
             Some(t) if done && !t.is_blind() => Ok(()),
             Some(t) if t.is_blind() => Err(TouchFault::NoForce { during: "tare" }),
-            _ => Err(TouchFault::FewForces(search.tare)),
+            _ => Err(TouchFault::ShortTare(search.tare)),
         })
     }
 
-    /// From clearance height to the upper end of the band, then slowly down until the surface is touched. The way
+    /// Moves from clearance height to the upper end of the band, then slowly down until contact. The motion
     /// to the band was commanded at `down`.
     pub(crate) fn find_surface(
         &mut self,
@@ -155,7 +155,7 @@ impl Core<'_> {
         search: TouchSearch,
         down: HostTime,
         deadline: HostTime,
-    ) -> Result<Found, Halt> {
+    ) -> Result<TouchResult, Halt> {
         let above = step.at.at_height(search.band_mm);
         let mut settling = Some(Settling::before_a_motion(above, &self.plan.limits, down));
         std::mem::swap(&mut self.settling, &mut settling);
@@ -179,13 +179,13 @@ impl Core<'_> {
         let way_s = 2.0 * search.band_mm / search.speed_mm_s;
         let until = t + HostDuration::from_secs_f64(2.0 * way_s) + self.settings.rise_allowance;
         let floor_mm = -search.band_mm + self.plan.limits.position_tolerance_mm;
-        let low = |core: &Self| {
-            let at = core.indenter.position();
+        let low = |executor: &Self| {
+            let at = executor.indenter.position();
             at.is_some_and(|p| p.measured.z_mm <= floor_mm)
         };
         loop {
             if let Some(found) = self.touch().and_then(TouchDetector::touched) {
-                return Ok(self.believe(found, step, search));
+                return Ok(self.check_surface_height(found, step, search));
             }
             if self.touch().is_some_and(TouchDetector::is_blind) {
                 return Ok(Err(TouchFault::NoForce { during: "search" }));
@@ -200,13 +200,18 @@ impl Core<'_> {
         }
     }
 
-    /// A touch inside the band from which the floor is not in the way.
-    fn believe(&self, found: PoseSample, step: Probe, search: TouchSearch) -> Found {
+    /// Accepts a touch inside the band if the press then stays above the floor.
+    fn check_surface_height(
+        &self,
+        found: PoseSample,
+        step: Probe,
+        search: TouchSearch,
+    ) -> TouchResult {
         let limits = &self.plan.limits;
         let height_mm = found.measured.z_mm;
         let highest_mm = search.band_mm - limits.position_tolerance_mm;
         if height_mm >= highest_mm {
-            return Err(TouchFault::AtOnce {
+            return Err(TouchFault::ImmediateContact {
                 band_mm: search.band_mm,
                 height_mm,
             });
@@ -226,7 +231,7 @@ impl Core<'_> {
         self.touch.as_ref()
     }
 
-    /// Ticks until the detector says so; false when `deadline` came first.
+    /// Ticks until the condition on the detector holds; false if `deadline` passed first.
     fn until_touch(
         &mut self,
         deadline: HostTime,
@@ -255,7 +260,7 @@ mod tests {
         tare: HostDuration::from_millis(4),
     };
 
-    /// Feeds forces, one per millisecond from 1 ms on, falling by 0.1 mm each, and gives the height of the touch.
+    /// Feeds forces, one per millisecond from 1 ms on, with heights falling by 0.1 mm each; returns the height of the touch.
     fn touched(search_from_ms: i64, forces: &[f64]) -> Option<f64> {
         let mut detector = TouchDetector::new(SEARCH, HostTime(0));
         detector.search_from(HostTime(search_from_ms * 1_000_000));
@@ -275,15 +280,15 @@ mod tests {
 
     #[test]
     fn a_touch_is_a_run_of_samples_above_the_tare() {
-        let t = 1.5; // what the hold needs anyway
+        let t = 1.5; // force of holding
         let tare = [1.4, 1.6, 1.5, 1.5];
         let with = |rest: &[f64]| [&tare[..], rest].concat();
         assert_eq!(touched(4, &with(&[t, 1.69, t, 1.6])), None);
         assert_eq!(touched(4, &with(&[t, 1.8, 1.8, 1.8])), Some(0.5));
-        // A gap starts the count again; a force the other way counts too.
+        // A gap restarts the count; a force in the other direction counts too.
         assert_eq!(touched(4, &with(&[1.8, 1.8, t, 1.8, 1.8])), None);
         assert_eq!(touched(4, &with(&[t, 1.2, 1.2, 1.2])), Some(0.5));
-        // What the fast way down needs is no touch.
+        // The force of fast motion is no touch.
         assert_eq!(touched(7, &with(&[2.5, 2.5, 2.5, t, t])), None);
         assert_eq!(
             touched(7, &with(&[2.5, 2.5, 2.5, 1.8, 1.8, 1.8])),
@@ -292,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn no_force_is_told() {
+    fn a_missing_force_is_reported() {
         let mut detector = TouchDetector::new(SEARCH, HostTime(0));
         let at = Point3::new(0.0, 0.0, 0.0);
         detector.feed(&PoseSample {

@@ -1,37 +1,37 @@
-//! What becomes of an attempt, and whether another one may bring what it did not.
+//! The verdict on an attempt, and whether to repeat it.
 
 use skinrig_model::{CameraId, Point3, PressOutcome, PressTiming, PressVerdict};
 
-use crate::core::OpenPress;
-use crate::moments::PressTracker;
+use crate::executor::OpenPress;
 use crate::press_fault::PressFault;
+use crate::press_tracker::PressTracker;
 
-/// An attempt that ended.
-pub(crate) struct Judged {
+/// A finished attempt.
+pub(crate) struct JudgedAttempt {
     pub(crate) outcome: PressOutcome,
-    /// Everything that is wrong with it.
+    /// All faults of the attempt.
     pub(crate) faults: Vec<PressFault>,
 }
 
-impl Judged {
-    /// Whether the press is worth another attempt at once: when everything that is wrong passes.
-    pub(crate) fn again(&self) -> bool {
+impl JudgedAttempt {
+    /// Whether an immediate retake may succeed: all faults are transient.
+    pub(crate) fn should_retake(&self) -> bool {
         !self.faults.is_empty() && self.faults.iter().all(PressFault::passes)
     }
 }
 
-/// The outcome of a press, valid only when all was measured, stayed in place and nothing was lost.
-pub(crate) fn judge(open: &OpenPress, fault: Option<PressFault>) -> Judged {
+/// Outcome of a press: valid only if all phases were measured, the tip stayed in place and no data were lost.
+pub(crate) fn judge(open: &OpenPress, fault: Option<PressFault>) -> JudgedAttempt {
     let mut faults: Vec<PressFault> = fault.into_iter().collect();
     let mut timing: Option<PressTiming> = None;
     if let Some(tracker) = &open.tracker {
         match tracker.timing() {
             Ok(t) => timing = Some(t),
-            Err(fault) if faults.is_empty() => faults.push(PressFault::Moments(fault)),
+            Err(fault) if faults.is_empty() => faults.push(PressFault::Timing(fault)),
             Err(_) => {}
         }
         if tracker.at_depth().is_some() {
-            faults.extend(tracker.check_hold().err().map(PressFault::Moments));
+            faults.extend(tracker.check_hold().err().map(PressFault::Timing));
         }
     }
     for camera in CameraId::ALL {
@@ -45,7 +45,7 @@ pub(crate) fn judge(open: &OpenPress, fault: Option<PressFault>) -> Judged {
             faults.push(PressFault::NoData { camera });
         }
     }
-    faults.extend_from_slice(&open.spoilt);
+    faults.extend_from_slice(&open.data_faults);
     let tracker = open.tracker.as_ref();
     let mean = tracker.and_then(PressTracker::mean);
     let outcome = PressOutcome {
@@ -64,5 +64,5 @@ pub(crate) fn judge(open: &OpenPress, fault: Option<PressFault>) -> Judged {
         peak_force_n: tracker.and_then(PressTracker::peak_force_n),
         scheduled: false,
     };
-    Judged { outcome, faults }
+    JudgedAttempt { outcome, faults }
 }

@@ -1,4 +1,4 @@
-//! An event camera.
+//! The `EventCamera` trait, its settings and capabilities.
 
 use std::collections::BTreeMap;
 
@@ -6,22 +6,22 @@ use skinrig_model::{CameraId, DeviceIdentity, DeviceRole, RawChunk, Setting, Str
 
 use crate::DeviceError;
 
-/// What a camera is.
+/// Capabilities of a camera.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CameraCapabilities {
-    /// Columns.
+    /// Width in pixels.
     pub width: u16,
-    /// Rows.
+    /// Height in pixels.
     pub height: u16,
-    /// What its bytes are.
+    /// Format of the byte stream.
     pub format: StreamFormat,
-    /// Trigger input channels that can be enabled.
+    /// Available trigger input channels.
     pub trigger_channels: Vec<u8>,
-    /// Names of the biases that can be set.
+    /// Names of the biases.
     pub biases: Vec<String>,
 }
 
-/// A rectangle of pixels that stay on.
+/// A rectangle of active pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Roi {
     /// First column.
@@ -34,79 +34,78 @@ pub struct Roi {
     pub height: u16,
 }
 
-/// Whose time base a camera follows.
+/// Source of a camera's time base.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SyncMode {
-    /// Its own.
+    /// Its own clock.
     #[default]
     Standalone,
-    /// Its own, given to others on the sync line. Started after its slaves.
+    /// Its own clock, which it also sends to others on the sync line. Started after its slaves.
     Master,
-    /// The one on the sync line. Started before the master.
+    /// The clock on the sync line. Started before the master.
     Slave,
 }
 
-/// A gate that passes events only while the sensor's total rate is above a threshold.
+/// A filter that passes events only while the sensor's total rate is above a threshold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NoiseFilter {
-    /// Events per second of the whole sensor.
+    /// Threshold in events per second of the whole sensor.
     pub min_rate_ev_s: u32,
 }
 
-/// What can be set on a camera before it starts. Everything unset keeps the device's default.
+/// Settings of a camera, written before it starts. Unset ones keep the device's default.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct CameraSettings {
-    /// Whose time base it follows.
+    /// Source of the time base.
     pub sync: SyncMode,
-    /// The sensor's own noise filter; off when absent.
+    /// The sensor's noise filter; off if `None`.
     pub noise_filter: Option<NoiseFilter>,
-    /// Bias values by name, in the device's own unit.
+    /// Bias values by name, in the device's unit.
     pub biases: BTreeMap<String, i64>,
-    /// Pixels that stay on; all when absent.
+    /// Active pixels; all if `None`.
     pub roi: Option<Roi>,
     /// Trigger input channels to enable.
     pub trigger_channels: Vec<u8>,
 }
 
-/// Events that a camera makes by itself, in place of what its pixels see.
+/// A test pattern that the camera generates in place of pixel events.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TestPattern {
-    /// How many are wanted, events per second.
+    /// Requested rate, events per second.
     pub rate_ev_s: f64,
 }
 
-/// What a camera's pattern generator makes: a scan of all pixels down each column, from the first column to the last, again and
-/// again, at an even rate.
+/// Scan of a test pattern: all pixels down each column, from the first column to the last, repeatedly, at a constant rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PatternScan {
-    /// Events per second of the camera's own clock: the nearest to what was wanted.
+    /// Actual rate in events per second of the camera's clock, the nearest to the requested one.
     pub rate_ev_s: f64,
-    /// Columns of the scan; not bound to the sensor's.
+    /// Columns of the scan; may exceed the sensor's.
     pub columns: u16,
-    /// Rows of the scan; likewise.
+    /// Rows of the scan; may exceed the sensor's.
     pub rows: u16,
 }
 
 /// A source of raw event bytes.
 ///
 /// States: stopped -> [`start`](Self::start) -> streaming -> [`stop`](Self::stop) -> stopped.
-/// Chunk numbers count on through stop and start; bytes are never changed, reordered or dropped in
-/// silence: what is lost is counted in `lost_before` of the next chunk.
+/// Chunk numbers continue through stop and start. Bytes are never changed, reordered or silently dropped: losses are counted in
+/// `lost_before` of the next chunk.
 pub trait EventCamera: Send {
-    /// Which of the two it is.
+    /// Camera 1 or 2.
     fn camera(&self) -> CameraId;
 
-    /// Who it is.
+    /// Model, serial number and firmware.
     fn identity(&self) -> DeviceIdentity;
 
-    /// What it can do.
+    /// Capabilities.
     fn capabilities(&self) -> CameraCapabilities;
 
-    /// Writes settings and reads them back; only while stopped.
+    /// Writes settings and reads them back. Only while stopped.
     ///
     /// # Errors
-    /// [`DeviceError::Refused`] for unknown biases, channels or pixels, before anything is written;
-    /// [`DeviceError::ReadBack`]; [`DeviceError::State`] while streaming.
+    /// [`DeviceError::Refused`] for unknown biases, channels or pixels, before anything is written; [`DeviceError::ReadBack`];
+    /// [`DeviceError::State`] while streaming.
     fn configure(&mut self, settings: &CameraSettings) -> Result<Vec<Setting>, DeviceError>;
 
     /// Starts streaming.
@@ -115,18 +114,17 @@ pub trait EventCamera: Send {
     /// [`DeviceError::State`] while streaming; [`DeviceError::Lost`].
     fn start(&mut self) -> Result<(), DeviceError>;
 
-    /// Appends the chunks that filled up since the last call.
+    /// Appends the chunks completed since the last call.
     ///
     /// # Errors
     /// [`DeviceError::Lost`]; chunks already appended stay valid.
     fn poll(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError>;
 
-    /// Like [`poll`](Self::poll), and closes the chunk under way, so that everything up to the present has
-    /// been handed over.
+    /// Like [`poll`](Self::poll), but also closes the current chunk, so that all data up to now is returned.
     ///
     /// # Errors
-    /// As [`poll`](Self::poll). [`DeviceError::Pending`] from a camera that needs longer: everything up to the first of the calls
-    /// that were answered so is handed over with the one that is not.
+    /// As [`poll`](Self::poll). [`DeviceError::Pending`] if the camera needs longer: call again. The first call that does not return
+    /// `Pending` has returned all data up to the first of these calls.
     fn flush(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError>;
 
     /// Flushes and stops. Allowed in every state, any number of times.
@@ -135,27 +133,24 @@ pub trait EventCamera: Send {
     /// [`DeviceError::Lost`]; chunks already appended stay valid.
     fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError>;
 
-    /// Appends, in sentences, what happened to the stream since the last call that its bytes do not say: bytes without a
-    /// time that were let go at the start, jumps of the camera's time base, its own overflow counter. A camera that
-    /// notices nothing of the kind has none.
+    /// Appends notes about events that the bytes do not show since the last call: bytes without a time discarded at the start, jumps of the
+    /// time base, overflows counted by the camera. The default has none.
     fn take_notes(&mut self, _notes: &mut Vec<String>) {}
 
-    /// Temperature of the camera, °C, at the present; of which part of it the implementation says. `None` from a camera that
-    /// cannot tell: it is not asked again. Allowed in every state; asked at most once a second, for it may take a request to
-    /// the device.
+    /// Current temperature, °C; the implementation documents where it is measured. `None` if the camera has no sensor: the caller then stops
+    /// asking. Allowed in every state, at most once a second because it may need a request to the device.
     ///
     /// # Errors
-    /// [`DeviceError::Lost`] when a camera that could tell does not answer; [`DeviceError::Pending`] from one that needs longer.
+    /// [`DeviceError::Lost`] if a camera with a sensor does not respond; [`DeviceError::Pending`] if it needs longer.
     fn temperature_c(&mut self) -> Result<Option<f64>, DeviceError> {
         Ok(None)
     }
 
-    /// From the next start on lets the camera's own generator make events in place of its pixels. `None` gives the pixels
-    /// back, and so does [`configure`](Self::configure). Only while stopped. Answers what the generator makes; `None` when the
-    /// pixels are back.
+    /// Replaces pixel events by a test pattern from the next start on; `None` and [`configure`](Self::configure) restore the pixels. Only
+    /// while stopped. Returns the scan, or `None` for pixels.
     ///
     /// # Errors
-    /// [`DeviceError::Refused`] from a camera without a generator, and for a rate that it cannot make;
+    /// [`DeviceError::Refused`] without a generator, or for an unsupported rate;
     /// [`DeviceError::ReadBack`]; [`DeviceError::State`] while streaming.
     fn test_pattern(
         &mut self,
@@ -166,7 +161,7 @@ pub trait EventCamera: Send {
             Some(_) => Err(DeviceError::Refused {
                 role: DeviceRole::of_camera(self.camera()),
                 serial: self.identity().serial,
-                expected: "a camera that makes events by itself".to_owned(),
+                expected: "a camera with a test pattern generator".to_owned(),
                 found: self.identity().model,
             }),
         }

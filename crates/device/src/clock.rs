@@ -4,17 +4,17 @@ use std::time::{Duration, Instant};
 
 use skinrig_model::HostTime;
 
-/// Host time, injected. Everything that waits, waits here.
+/// Source of host time. All waits go through it, so that tests and simulations control time.
 pub trait Clock: Send {
-    /// The present. Never goes back.
+    /// Current time. Monotonic.
     fn now(&self) -> HostTime;
 
-    /// Waits until `t` (at once when it is past). A simulated clock jumps there. A replayed clock may end a
-    /// wait early, at an instant at which its recording holds a command: wait again to go on.
+    /// Waits until `t`, or returns at once if it is past. A simulated clock jumps to `t`. A replayed clock may return early at the time of a
+    /// recorded command: wait again to continue.
     fn wait_until(&mut self, t: HostTime);
 }
 
-/// Whoever holds one for a while may lend it on.
+/// Allows passing a clock on by mutable reference.
 impl<T: Clock + ?Sized> Clock for &mut T {
     fn now(&self) -> HostTime {
         (**self).now()
@@ -25,17 +25,16 @@ impl<T: Clock + ?Sized> Clock for &mut T {
     }
 }
 
-/// The clock of a bench: the operating system's monotonic clock since the session began.
+/// Clock of a real bench: the operating system's monotonic clock, with its zero at the start of the session.
 ///
-/// Copies tell the same time, so every driver thread carries one and stamps what it receives the moment it
-/// arrives.
+/// Copies share the zero, so that each driver thread can stamp data on arrival.
 #[derive(Debug, Clone, Copy)]
 pub struct RealClock {
     start: Instant,
 }
 
 impl RealClock {
-    /// A clock that reads zero now.
+    /// A clock with its zero at the current time.
     #[must_use]
     pub fn start() -> Self {
         Self {
@@ -43,7 +42,7 @@ impl RealClock {
         }
     }
 
-    /// The present; saturates after 292 years.
+    /// Current time; saturates after 292 years.
     #[must_use]
     pub fn now(&self) -> HostTime {
         let ns = i64::try_from(self.start.elapsed().as_nanos());

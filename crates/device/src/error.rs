@@ -1,94 +1,94 @@
-//! What can go wrong with a device.
+//! Errors of devices.
 
 use skinrig_model::{DeviceRole, HostDuration};
 
-/// A device failed, or was asked for something that it cannot do.
+/// A device failed or rejected a request.
 ///
-/// Messages say what was expected, what was found, and on which device.
+/// Messages state the device, and what was expected and found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DeviceError {
-    /// The device is gone or answers no longer.
+    /// The device is disconnected or stopped responding.
     #[error("{role} {serial}: lost: {detail}")]
     Lost {
-        /// Which device.
+        /// The device.
         role: DeviceRole,
         /// Its serial number.
         serial: String,
-        /// What was seen.
+        /// Details.
         detail: String,
     },
-    /// The device did not answer a call in time, which may still be under way. What it was asked may or may not be carried out.
+    /// The device did not respond to a call in time. The call may still be executing, so its effect is unknown.
     #[error(
         "{role} {serial}: not answering: expected an answer to `{doing}` within {within}, found none"
     )]
     Silent {
-        /// Which device.
+        /// The device.
         role: DeviceRole,
         /// Its serial number.
         serial: String,
         /// The call.
         doing: &'static str,
-        /// How long it was given.
+        /// Time limit.
         within: HostDuration,
     },
-    /// Asked, and not answered yet: no fault. Whoever asked makes the same call again at the next look.
+    /// The call is still in progress. Not a fault: make the same call again later.
     #[error("{role} {serial}: expected an answer to `{doing}`, found it under way; ask again")]
     Pending {
-        /// Which device.
+        /// The device.
         role: DeviceRole,
         /// Its serial number.
         serial: String,
         /// The call.
         doing: &'static str,
     },
-    /// A setting did not read back as written.
+    /// A setting read back with another value than was written.
     #[error("{role} {serial}: {name}: expected {expected} after writing, found {found}")]
     ReadBack {
-        /// Which device.
+        /// The device.
         role: DeviceRole,
         /// Its serial number.
         serial: String,
-        /// Which setting.
+        /// Name of the setting.
         name: String,
-        /// What was written.
+        /// Written value.
         expected: String,
-        /// What was read.
+        /// Value read back.
         found: String,
     },
-    /// A request outside what the device can or may do. Nothing was done.
+    /// A request beyond the device's capabilities or limits. It had no effect.
     #[error("{role} {serial}: refused: expected {expected}, found {found}")]
     Refused {
-        /// Which device.
+        /// The device.
         role: DeviceRole,
         /// Its serial number.
         serial: String,
-        /// What would have been accepted.
+        /// Acceptable requests.
         expected: String,
-        /// What was asked for.
+        /// The request.
         found: String,
     },
-    /// The device is in a state in which it cannot do this (not armed, not started, busy).
+    /// The device is in the wrong state (not armed, not started, busy).
     #[error("{role} {serial}: expected to be {expected}, is {found}")]
     State {
-        /// Which device.
+        /// The device.
         role: DeviceRole,
         /// Its serial number.
         serial: String,
-        /// The state that the request needs.
+        /// Required state.
         expected: String,
-        /// The state it is in.
+        /// Actual state.
         found: String,
     },
-    /// A replayed device was asked for something else than what its recording holds.
+    /// A replayed device received a request that differs from its recording.
     #[error("{role}: replay diverged at {at}: recorded {expected}, requested {found}")]
     Diverged {
-        /// Which device.
+        /// The device.
         role: DeviceRole,
-        /// Where in the recording.
+        /// Position in the recording.
         at: String,
-        /// What the recording holds.
+        /// Recorded request.
         expected: String,
-        /// What was requested.
+        /// Actual request.
         found: String,
     },
 }

@@ -1,8 +1,8 @@
-//! What a device promises: small traits, capabilities as data, and a clock.
+//! Device interfaces: small traits, capabilities as data, and a clock.
 //!
-//! All verbs return at once: a real driver owns its device on a named thread of its own and these calls
-//! exchange messages with it ([`detached`]); a simulated device computes what happened up to the clock's present. The
-//! controller polls. Positions cross this border in the *robot* frame; the controller knows the skin.
+//! All calls return at once: a real driver owns its device on a separate thread and exchanges messages with it ([`detached`]); a simulated
+//! device computes everything up to the clock's current time. The controller polls. Positions are in the *robot* frame; only the
+//! controller knows the skin.
 
 pub mod camera;
 pub mod clock;
@@ -19,7 +19,7 @@ pub use camera::{
     TestPattern,
 };
 pub use clock::{Clock, RealClock};
-pub use detached::{DetachedBox, DetachedCamera, Patience};
+pub use detached::{DetachedBox, DetachedCamera, Timeouts};
 pub use error::DeviceError;
 pub use indenter::{Indenter, IndenterCapabilities, MotionLimits, RobotSample};
 pub use rig::Rig;

@@ -1,10 +1,10 @@
-//! What any indenter refuses: limits beyond its capabilities, commands beyond its limits.
+//! Checks common to all indenters: limits against capabilities, commands against limits.
 
 use skinrig_model::{DeviceRole, Point3, Robot, Setting};
 
 use crate::{DeviceError, IndenterCapabilities, MotionLimits};
 
-/// A refusal by the indenter `serial`.
+/// A [`DeviceError::Refused`] of the indenter `serial`.
 pub fn refused(serial: &str, expected: String, found: String) -> DeviceError {
     DeviceError::Refused {
         role: DeviceRole::Indenter,
@@ -14,7 +14,7 @@ pub fn refused(serial: &str, expected: String, found: String) -> DeviceError {
     }
 }
 
-/// A request that the indenter's state does not allow.
+/// A [`DeviceError::State`] of the indenter `serial`.
 pub fn wrong_state(serial: &str, expected: &str, found: &str) -> DeviceError {
     DeviceError::State {
         role: DeviceRole::Indenter,
@@ -24,7 +24,7 @@ pub fn wrong_state(serial: &str, expected: &str, found: &str) -> DeviceError {
     }
 }
 
-/// Checks `limits` against what the device can do.
+/// Checks `limits` against the device's capabilities.
 ///
 /// # Errors
 /// [`DeviceError::Refused`] for limits that are wider, empty or not finite.
@@ -36,7 +36,7 @@ pub fn check_limits(
     for axis in 0..3 {
         let (low, high) = (can.workspace_min_mm[axis], can.workspace_max_mm[axis]);
         let (min, max) = (limits.min_mm[axis], limits.max_mm[axis]);
-        // NaN fails every comparison and is refused with the rest.
+        // NaN fails every comparison and is therefore refused.
         if !(low <= min && min < max && max <= high) {
             return Err(refused(
                 serial,
@@ -95,13 +95,13 @@ pub fn check_command(
     Ok(())
 }
 
-/// `(x, y, z)` to the micrometre.
+/// Formats a point as `(x, y, z)` with three decimals.
 #[must_use]
 pub fn millimetres([x, y, z]: [f64; 3]) -> String {
     format!("({x:.3}, {y:.3}, {z:.3})")
 }
 
-/// Limits as settings, requested and read back.
+/// Formats limits as settings that read back as requested.
 #[must_use]
 pub fn settings(limits: &MotionLimits) -> Vec<Setting> {
     let all = [

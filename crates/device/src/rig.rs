@@ -1,30 +1,30 @@
-//! A rig: the devices of one bench, with what is known about it.
+//! A rig: the devices of one bench and their description.
 
 use skinrig_model::{CameraId, RigGeometry, RigidTransform, Robot, Skin};
 
 use crate::{CameraSettings, Clock, EventCamera, Indenter, TriggerBox};
 
-/// The devices of one bench and what is known about it.
+/// The devices of one bench and their description.
 pub struct Rig {
-    /// `simulated`, `replayed`, `emulated` (production drivers over stand-ins for hardware) or `bench`.
+    /// `simulated`, `replayed`, `emulated` (production drivers over emulated hardware) or `bench`.
     pub kind: String,
-    /// For people, for example `simulated (geometric)`.
+    /// Display name, for example `simulated (geometric)`.
     pub name: String,
     /// The robot.
     pub indenter: Box<dyn Indenter>,
     /// Camera 1 and camera 2, in this order.
     pub cameras: [Box<dyn EventCamera>; 2],
-    /// The settings to write to each camera.
+    /// Settings to write to each camera.
     pub camera_settings: [CameraSettings; 2],
-    /// The trigger box, when the bench has one.
+    /// The trigger box, if any.
     pub trigger_box: Option<Box<dyn TriggerBox>>,
-    /// The clock that all of them share.
+    /// Clock shared by all devices.
     pub clock: Box<dyn Clock>,
-    /// Where the skin lies.
+    /// Pose of the skin.
     pub robot_from_skin: RigidTransform<Robot, Skin>,
-    /// What analyses need to know.
+    /// Geometry for analyses.
     pub geometry: RigGeometry,
-    /// Everything worth keeping about the rig (for a simulated one: its whole configuration), as JSON.
+    /// Description of the rig for the record, as JSON; for a simulated rig its complete configuration.
     pub description_json: String,
 }
 

@@ -1,4 +1,4 @@
-//! A bundle: one folder with a session and everything made from it, which proves itself wherever it is moved to.
+//! Owns bundles: one folder with a session and everything made from it, which can be verified after a move.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -10,14 +10,14 @@ use sha2::{Digest, Sha256};
 
 use crate::error::ExportError;
 
-/// The file of a bundle that lists the others.
+/// Manifest of a bundle, which lists the other files.
 pub const MANIFEST: &str = "manifest.json";
-/// Value of its `format` field.
+/// Value of the manifest's `format` field.
 const FORMAT: &str = "skinrig-bundle";
-/// Version of its layout.
+/// Version of the manifest's layout.
 const VERSION: u32 = 1;
-/// More is no manifest.
-const MOST_BYTES: u64 = 1 << 20;
+/// Maximum size of a manifest, bytes.
+const MAX_MANIFEST_BYTES: u64 = 1 << 20;
 
 #[derive(Debug, Serialize, Deserialize)]
 struct Manifest {
@@ -37,26 +37,26 @@ struct Entry {
     sha256: String,
 }
 
-/// What a bundle holds and what is wrong with it.
+/// Content of a bundle, and its problems.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct BundleReport {
-    /// Names the session.
+    /// ID of the session.
     pub session_id: String,
-    /// Its file in the folder.
+    /// File name of the session in the folder.
     pub session: String,
-    /// Files listed.
+    /// Number of listed files.
     pub files: usize,
     /// Their names.
     pub names: Vec<String>,
-    /// Files that are not what the manifest says, are missing, or are not listed.
+    /// Files that differ from the manifest, are missing, or are not listed.
     pub problems: Vec<String>,
 }
 
-/// Lists the files of `folder` with their hashes in its manifest, which comes last: a folder without one is no bundle.
-/// `software` is the program that wrote them.
+/// Writes the manifest with the hashes of all files of `folder`, as the last step: a folder without it is not a bundle.
+/// `software` is the program that wrote the files.
 ///
 /// # Errors
-/// When a file cannot be read or the manifest not be written.
+/// When a file cannot be read, or the manifest cannot be written.
 pub fn seal_bundle(
     folder: &Path,
     session_id: &str,
@@ -88,7 +88,7 @@ pub fn seal_bundle(
         .map_err(ExportError::file(&path))
 }
 
-/// A file as it is now.
+/// Manifest entry of a file in its present state.
 fn entry(folder: &Path, name: &str) -> Result<Entry, ExportError> {
     let path = folder.join(name);
     let said = ExportError::file(&path);
@@ -112,8 +112,8 @@ fn entry(folder: &Path, name: &str) -> Result<Entry, ExportError> {
     })
 }
 
-/// Holds every file of the bundle in `folder` against its manifest. The session in it is a file like the others here; whether it
-/// is sound in itself is for `skinrig_recorder::verify`.
+/// Compares every file of the bundle in `folder` with its manifest. The session counts as an ordinary file here;
+/// `skinrig_recorder::verify` checks its content.
 ///
 /// # Errors
 /// [`ExportError::NotABundle`] for a folder without a manifest of this version; [`ExportError::File`] when it cannot be read.
@@ -134,7 +134,7 @@ pub fn verify_bundle(folder: &Path) -> Result<BundleReport, ExportError> {
     }
     let mut text = String::new();
     let file = File::open(&path).map_err(ExportError::file(&path))?;
-    file.take(MOST_BYTES)
+    file.take(MAX_MANIFEST_BYTES)
         .read_to_string(&mut text)
         .map_err(ExportError::file(&path))?;
     let manifest: Manifest = serde_json::from_str(&text).map_err(|e| not(e.to_string()))?;
@@ -142,14 +142,14 @@ pub fn verify_bundle(folder: &Path) -> Result<BundleReport, ExportError> {
         let found = format!("{} of version {}", manifest.format, manifest.format_version);
         return Err(not(found));
     }
-    // From a stranger a name may lead anywhere.
+    // A name from an untrusted manifest may lead anywhere.
     let leads_out = |name: &str| {
         let mut parts = Path::new(name).components();
         let first = parts.next();
         !matches!(first, Some(std::path::Component::Normal(_))) || parts.next().is_some()
     };
     if let Some(out) = manifest.files.iter().find(|f| leads_out(&f.name)) {
-        return Err(not(format!("a file that is not in it: {:?}", out.name)));
+        return Err(not(format!("a file outside the folder: {:?}", out.name)));
     }
     let listed: BTreeSet<&str> = manifest.files.iter().map(|f| f.name.as_str()).collect();
     if !listed.contains(manifest.session.as_str()) {
@@ -179,7 +179,7 @@ pub fn verify_bundle(folder: &Path) -> Result<BundleReport, ExportError> {
         let name = other.map_err(ExportError::file(folder))?.file_name();
         let name = name.to_string_lossy();
         if name != MANIFEST && !listed.contains(&*name) {
-            problems.push(format!("{name}: expected no such file"));
+            problems.push(format!("{name}: not listed in the manifest"));
         }
     }
     problems.sort();

@@ -1,4 +1,4 @@
-//! Camera streams as files of their own formats, and decoded for tables.
+//! Exports camera streams in their own formats, and decodes them for tables.
 
 use std::path::Path;
 
@@ -36,7 +36,7 @@ pub(crate) fn for_each_events(
     fault.map_or(Ok(()), Err)
 }
 
-/// One camera's bytes as a Prophesee RAW file at `path`, unmodified.
+/// Writes the bytes of one camera to a Prophesee RAW file at `path`, unmodified.
 ///
 /// # Errors
 /// When the session cannot be read, or the file exists or cannot be written.
@@ -51,7 +51,7 @@ pub fn write_raw(
         .iter()
         .find(|d| d.role == DeviceRole::of_camera(camera));
     let serial = device.map_or("unknown", |d| d.identity.serial.as_str());
-    // RAW headers carry a civil date without a zone; the session's start is UTC.
+    // RAW headers have a civil date without a time zone; the session's start is UTC.
     let date = header
         .started_at
         .chars()
@@ -81,7 +81,7 @@ pub fn write_raw(
         .map_err(ExportError::file(path))
 }
 
-/// One camera's events as a bimvee HDF5 container at `path`; times count from the camera's first event.
+/// Writes the events of one camera to a bimvee HDF5 container at `path`; times count from the camera's first event.
 ///
 /// # Errors
 /// When the session cannot be read, or the file exists or cannot be written.

@@ -1,4 +1,4 @@
-//! Tables as CSV (RFC 4180): a line of names, an empty cell for none, numbers that read back exactly.
+//! Writes tables as CSV (RFC 4180): a header line, empty cells for missing values, and numbers with full precision.
 
 use std::fs::File;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use crate::error::ExportError;
 use crate::folder::Folder;
 use crate::table::{Layout, TableWriter, Values};
 
-/// One file per table.
+/// Writes one file per table.
 #[derive(Debug)]
 pub struct CsvFiles {
     folder: Folder,
@@ -17,11 +17,11 @@ pub struct CsvFiles {
     written: Vec<PathBuf>,
 }
 
-/// A table's name after the stem.
-pub(crate) const ENDING: &str = "csv";
+/// Suffix of a table's file name.
+pub(crate) const SUFFIX: &str = "csv";
 
 impl CsvFiles {
-    /// Into `folder`.
+    /// Writes into `folder`.
     #[must_use]
     pub const fn new(folder: Folder) -> Self {
         Self {
@@ -31,32 +31,32 @@ impl CsvFiles {
         }
     }
 
-    /// The files, in order.
+    /// Paths of the files, in order.
     #[must_use]
-    pub fn written(mut self) -> Vec<PathBuf> {
+    pub fn into_paths(mut self) -> Vec<PathBuf> {
         std::mem::take(&mut self.written)
     }
 }
 
 impl TableWriter for CsvFiles {
     fn begin(&mut self, layout: &Layout, _rows: u64) -> Result<(), ExportError> {
-        let ending = format!(".{}.{ENDING}", layout.name);
-        let path = self.folder.begin(&ending)?;
+        let suffix = format!(".{}.{SUFFIX}", layout.name);
+        let path = self.folder.begin(&suffix)?;
         let file = File::create_new(&path).map_err(ExportError::file(&path))?;
         let mut writer = WriterBuilder::new()
             .buffer_capacity(1 << 16)
             .from_writer(file);
         let names = layout.columns.iter().map(|column| &column.name);
         let headed = writer.write_record(names);
-        self.open = Some((writer, ending));
+        self.open = Some((writer, suffix));
         headed.map_err(ExportError::file(&path))
     }
 
     fn append(&mut self, batch: &[Values]) -> Result<(), ExportError> {
-        let Some((writer, ending)) = &mut self.open else {
+        let Some((writer, suffix)) = &mut self.open else {
             return Ok(());
         };
-        let path = self.folder.file(ending);
+        let path = self.folder.file(suffix);
         let rows = batch.first().map_or(0, Values::rows);
         let mut cell = String::new();
         for row in 0..rows {
@@ -67,7 +67,7 @@ impl TableWriter for CsvFiles {
                     .write_field(&cell)
                     .map_err(ExportError::file(&path))?;
             }
-            // Ends the line.
+            // End of the line.
             writer
                 .write_record(None::<&[u8]>)
                 .map_err(ExportError::file(&path))?;
@@ -76,11 +76,11 @@ impl TableWriter for CsvFiles {
     }
 
     fn end(&mut self) -> Result<(), ExportError> {
-        if let Some((mut writer, ending)) = self.open.take() {
-            let path = self.folder.file(&ending);
+        if let Some((mut writer, suffix)) = self.open.take() {
+            let path = self.folder.file(&suffix);
             writer.flush().map_err(ExportError::file(&path))?;
             drop(writer);
-            self.written.push(self.folder.complete(&ending)?);
+            self.written.push(self.folder.complete(&suffix)?);
         }
         Ok(())
     }
@@ -88,13 +88,13 @@ impl TableWriter for CsvFiles {
 
 impl Drop for CsvFiles {
     fn drop(&mut self) {
-        if let Some((_, ending)) = self.open.take() {
-            self.folder.abandon(&ending);
+        if let Some((_, suffix)) = self.open.take() {
+            self.folder.abandon(&suffix);
         }
     }
 }
 
-/// True for a text that a spreadsheet would take for a formula (OWASP, CSV injection): it is written with a `'` before it.
+/// True for a text that a spreadsheet would interpret as a formula (OWASP, CSV injection); it is written with a leading `'`.
 fn starts_formula(text: &str) -> bool {
     text.starts_with(['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'])
 }

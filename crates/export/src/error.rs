@@ -1,10 +1,10 @@
-//! What can go wrong with an export.
+//! Owns the errors of an export.
 
 use std::path::{Path, PathBuf};
 
 use skinrig_recorder::RecorderError;
 
-/// A session could not be exported, or a bundle not be read.
+/// A session could not be exported, or a bundle could not be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
@@ -16,39 +16,39 @@ pub enum ExportError {
     File {
         /// The file or folder.
         path: PathBuf,
-        /// What its writer or the operating system said.
+        /// Message of the writer or the operating system.
         found: String,
     },
-    /// There is a file already.
-    #[error("{}: expected no file there, or the very one that this export writes, found another\n  next: move an older export away, choose another folder with --out, or --overwrite it", path.display())]
+    /// Another file exists at the destination.
+    #[error("{}: another file exists\n  next: move an older export away, choose another folder with --out, or --overwrite it", path.display())]
     Exists {
         /// The file.
         path: PathBuf,
     },
-    /// The session grew between two looks at it.
+    /// The session grew during the export.
     #[error(
         "{table}: expected {expected} rows, found {found}: the session is being written\n  next: export it again when the run has ended"
     )]
     Changed {
-        /// Which table.
+        /// Name of the table.
         table: &'static str,
-        /// Rows counted before.
+        /// Number of rows counted before.
         expected: u64,
-        /// Rows there were.
+        /// Number of rows found.
         found: u64,
     },
-    /// A folder is no bundle.
-    #[error("{}: expected a bundle, found {found}\n  next: `skinrig export SESSION --to bundle` makes one", path.display())]
+    /// The folder is not a bundle.
+    #[error("{}: expected a bundle, found {found}\n  next: create one with `skinrig export SESSION --to bundle`", path.display())]
     NotABundle {
         /// The folder or its manifest.
         path: PathBuf,
-        /// What there is.
+        /// Why it is not a bundle.
         found: String,
     },
 }
 
 impl ExportError {
-    /// What somebody said of `path`.
+    /// Converts an error on `path`.
     pub(crate) fn file<E: ToString>(path: &Path) -> impl Fn(E) -> Self + '_ {
         move |e| Self::File {
             path: path.to_owned(),

@@ -1,4 +1,4 @@
-//! The one folder that an export writes into.
+//! Owns the folder that an export writes into.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::ExportError;
 
-/// Where the files of an export go, and what their names begin with.
+/// Destination folder of an export, and the stem of its file names.
 #[derive(Debug, Clone)]
 pub struct Folder {
     path: PathBuf,
@@ -15,10 +15,10 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// The folder at `path`, made when missing. File names begin with `stem`.
+    /// Opens the folder at `path`, creating it if missing. File names begin with `stem`.
     ///
     /// # Errors
-    /// [`ExportError::File`] when it cannot be made.
+    /// [`ExportError::File`] when it cannot be created.
     pub fn new(path: &Path, stem: &str, overwrite: bool) -> Result<Self, ExportError> {
         std::fs::create_dir_all(path).map_err(ExportError::file(path))?;
         Ok(Self {
@@ -34,47 +34,47 @@ impl Folder {
         &self.path
     }
 
-    /// A file of it, `STEM` and then `ending`.
+    /// Path of the file `STEM` + `suffix`.
     #[must_use]
-    pub fn file(&self, ending: &str) -> PathBuf {
-        self.path.join(format!("{}{ending}", self.stem))
+    pub fn file(&self, suffix: &str) -> PathBuf {
+        self.path.join(format!("{}{suffix}", self.stem))
     }
 
-    /// Refuses when something else than a file is in the place of one of these: before anything is written. Whether a file that is
-    /// there is the very one that would be written, `Folder::complete` finds out.
+    /// Fails if anything other than a file occupies one of these names, before anything is written. `complete`
+    /// checks whether an existing file is identical to the one to be written.
     ///
     /// # Errors
     /// [`ExportError::Exists`].
-    pub fn check_free(&self, endings: &[String]) -> Result<(), ExportError> {
-        let taken = endings
+    pub fn check_free(&self, suffixes: &[String]) -> Result<(), ExportError> {
+        let taken = suffixes
             .iter()
-            .map(|ending| self.file(ending))
+            .map(|suffix| self.file(suffix))
             .find(|path| !self.overwrite && path.symlink_metadata().is_ok_and(|m| !m.is_file()));
         taken.map_or(Ok(()), |path| Err(ExportError::Exists { path }))
     }
 
-    /// Has `write` make a file under another name, which gets its own when it is whole.
+    /// Calls `write` with a temporary name, and renames the file once it is complete.
     ///
     /// # Errors
-    /// [`ExportError::Exists`], or what `write` said; nothing is left then.
-    pub fn whole(
+    /// [`ExportError::Exists`], or the error of `write`; the temporary file is removed then.
+    pub fn write_atomic(
         &self,
-        ending: &str,
+        suffix: &str,
         write: impl FnOnce(&Path) -> Result<(), ExportError>,
     ) -> Result<PathBuf, ExportError> {
-        let partial = self.begin(ending)?;
+        let partial = self.begin(suffix)?;
         if let Err(e) = write(&partial) {
             let _ = std::fs::remove_file(&partial);
             return Err(e);
         }
-        self.complete(ending)
+        self.complete(suffix)
     }
 
-    /// The name under which the file is to be made; there is nothing of that name.
-    pub(crate) fn begin(&self, ending: &str) -> Result<PathBuf, ExportError> {
-        self.check_free(&[ending.to_owned()])?;
-        let partial = self.file(&format!("{ending}.partial"));
-        // What an ended export left there, or a link that a stranger put there, is no place to write into.
+    /// Temporary name for the file; nothing exists under this name.
+    pub(crate) fn begin(&self, suffix: &str) -> Result<PathBuf, ExportError> {
+        self.check_free(&[suffix.to_owned()])?;
+        let partial = self.file(&format!("{suffix}.partial"));
+        // Remove leftovers of an aborted export, or a planted link.
         match std::fs::remove_file(&partial) {
             Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
                 Err(ExportError::file(&partial)(e))
@@ -83,9 +83,9 @@ impl Folder {
         }
     }
 
-    /// The file has all of it and gets its name. One that is there already stays when it has the same bytes, as after the same export.
-    pub(crate) fn complete(&self, ending: &str) -> Result<PathBuf, ExportError> {
-        let (partial, path) = (self.file(&format!("{ending}.partial")), self.file(ending));
+    /// Renames the completed file. An existing file is kept if it has the same bytes, as after a repeated export.
+    pub(crate) fn complete(&self, suffix: &str) -> Result<PathBuf, ExportError> {
+        let (partial, path) = (self.file(&format!("{suffix}.partial")), self.file(suffix));
         if !self.overwrite && path.symlink_metadata().is_ok() {
             let same = same_bytes(&partial, &path).map_err(ExportError::file(&path));
             let _ = std::fs::remove_file(&partial);
@@ -102,16 +102,16 @@ impl Folder {
         Ok(path)
     }
 
-    /// Takes away what is left of a file that was not completed.
-    pub(crate) fn abandon(&self, ending: &str) {
-        let _ = std::fs::remove_file(self.file(&format!("{ending}.partial")));
+    /// Removes the temporary file of an incomplete export.
+    pub(crate) fn abandon(&self, suffix: &str) {
+        let _ = std::fs::remove_file(self.file(&format!("{suffix}.partial")));
     }
 }
 
-/// True when both files hold the same bytes.
+/// True if both files have the same bytes.
 ///
 /// # Errors
-/// When one cannot be read.
+/// When one of them cannot be read.
 pub fn same_bytes(a: &Path, b: &Path) -> std::io::Result<bool> {
     let (mut a, mut b) = (File::open(a)?, File::open(b)?);
     if a.metadata()?.len() != b.metadata()?.len() {

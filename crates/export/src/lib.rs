@@ -1,11 +1,11 @@
-//! A session in other programs' formats: tables (Parquet, npz, CSV), camera files (RAW, HDF5), and bundles that prove themselves.
+//! Exports a session in other formats: tables (Parquet, npz, CSV), camera files (RAW, HDF5), and verifiable bundles.
 //!
-//! Four [`tables`](Source::write): `presses` (one row per press, with what the analysis says of it), `pose`, `results`, and the
-//! events of each camera. A [`TableWriter`] takes a table batch by batch, so that memory stays flat however long the session is.
-//! Every file is written under another name and gets its own when it is whole; nothing is overwritten unless asked, and nothing
-//! is written outside the given folder.
+//! There are four [`tables`](Source::write): `presses` (one row per press, with its analysis), `pose`, `results`, and the
+//! events of each camera. A [`TableWriter`] takes a table batch by batch, so memory stays constant for any session length.
+//! Every file is written under a temporary name and renamed when complete; nothing is overwritten unless requested, and
+//! nothing is written outside the given folder.
 //!
-//! What each column means is in `docs/reference/exports.md`.
+//! `docs/reference/exports.md` defines the columns.
 
 pub mod bundle;
 mod cameras;

@@ -15,7 +15,7 @@ struct Row {
     estimate: Estimate,
 }
 
-/// The table of a session; no rows without an analysis.
+/// Builds the table of a session; no rows without an analysis.
 pub(crate) fn table(source: &Source<'_>) -> Result<Table, ExportError> {
     let rows = source
         .analysis

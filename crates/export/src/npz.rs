@@ -1,6 +1,7 @@
-//! Tables as one numpy archive: a structured array each.
+//! Writes tables as one numpy archive with a structured array each.
 //!
-//! An `.npz` is a zip of `.npy` files (numpy.org, "numpy.lib.format", version 1.0); stored, not deflated, as `numpy.savez` does.
+//! An `.npz` is a zip of `.npy` files (numpy.org, "numpy.lib.format", version 1.0); stored, not deflated, like
+//! `numpy.savez`.
 
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
@@ -13,24 +14,24 @@ use crate::error::ExportError;
 use crate::folder::Folder;
 use crate::table::{Kind, Layout, TableWriter, Values};
 
-/// The archive's name after the stem.
-pub(crate) const ENDING: &str = ".npz";
+/// Suffix of the archive's file name.
+pub(crate) const SUFFIX: &str = ".npz";
 
 /// The header of a `.npy` is padded to a multiple of this.
 const ALIGN: usize = 64;
-/// Magic, version and the length of the rest.
+/// Length of magic, version and header length.
 const PREAMBLE: usize = 10;
 
-/// One file for all tables.
+/// Writes all tables into one file.
 pub struct NpzFile {
     folder: Folder,
     path: PathBuf,
     archive: Option<ZipWriter<BufWriter<File>>>,
-    table: Option<Open>,
+    table: Option<OpenTable>,
     bytes: Vec<u8>,
 }
 
-struct Open {
+struct OpenTable {
     name: &'static str,
     kinds: Vec<Kind>,
     expected: u64,
@@ -38,12 +39,12 @@ struct Open {
 }
 
 impl NpzFile {
-    /// Into `folder`.
+    /// Creates the archive in `folder`.
     ///
     /// # Errors
-    /// When the file cannot be made.
+    /// When the file cannot be created.
     pub fn create(folder: Folder) -> Result<Self, ExportError> {
-        let path = folder.begin(ENDING)?;
+        let path = folder.begin(SUFFIX)?;
         let file = File::create_new(&path).map_err(ExportError::file(&path))?;
         Ok(Self {
             archive: Some(ZipWriter::new(BufWriter::with_capacity(1 << 20, file))),
@@ -54,7 +55,7 @@ impl NpzFile {
         })
     }
 
-    /// Completes the archive; its path.
+    /// Completes the archive and returns its path.
     ///
     /// # Errors
     /// When the file cannot be written.
@@ -65,23 +66,23 @@ impl NpzFile {
                 .map_err(std::io::Error::other)
                 .and_then(|mut file| file.flush());
             if let Err(e) = finished {
-                self.folder.abandon(ENDING);
+                self.folder.abandon(SUFFIX);
                 return Err(ExportError::file(&self.path)(e));
             }
         }
-        self.folder.complete(ENDING)
+        self.folder.complete(SUFFIX)
     }
 }
 
 impl Drop for NpzFile {
     fn drop(&mut self) {
         if self.archive.take().is_some() {
-            self.folder.abandon(ENDING);
+            self.folder.abandon(SUFFIX);
         }
     }
 }
 
-/// numpy's name of a field's type: a number that may be none is a float with NaN, a text that may be none is empty then.
+/// numpy's type name of a field: an optional number is a float with NaN, an optional text is empty if missing.
 fn dtype(kind: Kind) -> String {
     match kind {
         Kind::Int => "<i8".into(),
@@ -106,7 +107,7 @@ fn header(layout: &Layout, rows: u64) -> Vec<u8> {
     }
     text.push('\n');
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-    // A header of version 1 holds 65 535 bytes: a thousand columns.
+    // A version 1 header holds 65 535 bytes: a thousand columns.
     bytes.extend((text.len() as u16).to_le_bytes());
     bytes.extend(text.as_bytes());
     bytes
@@ -114,7 +115,7 @@ fn header(layout: &Layout, rows: u64) -> Vec<u8> {
 
 impl TableWriter for NpzFile {
     fn begin(&mut self, layout: &Layout, rows: u64) -> Result<(), ExportError> {
-        let said = said(&self.path);
+        let said = zip_error(&self.path);
         if let Some(archive) = &mut self.archive {
             let options = SimpleFileOptions::default()
                 .compression_method(CompressionMethod::Stored)
@@ -126,7 +127,7 @@ impl TableWriter for NpzFile {
                 .write_all(&header(layout, rows))
                 .map_err(ExportError::file(&self.path))?;
         }
-        self.table = Some(Open {
+        self.table = Some(OpenTable {
             name: layout.name,
             kinds: layout.columns.iter().map(|c| c.kind).collect(),
             expected: rows,
@@ -164,7 +165,7 @@ impl TableWriter for NpzFile {
     }
 }
 
-fn said(path: &Path) -> impl Fn(zip::result::ZipError) -> ExportError + '_ {
+fn zip_error(path: &Path) -> impl Fn(zip::result::ZipError) -> ExportError + '_ {
     ExportError::file(path)
 }
 
@@ -180,7 +181,7 @@ fn cell(values: &Values, kind: Kind, row: usize, to: &mut Vec<u8>) {
                 Kind::Text(width) => width.max(1),
                 _ => 1,
             };
-            // numpy keeps code points of 32 bits and fills up with zeros.
+            // numpy stores 32-bit code points, padded with zeros.
             let text = v[row].as_deref().unwrap_or_default().chars();
             let padded = text.map(u32::from).chain(std::iter::repeat(0));
             to.extend(padded.take(width).flat_map(u32::to_le_bytes));

@@ -1,4 +1,4 @@
-//! Tables as Parquet (parquet.apache.org), one file each, compressed with Snappy; a batch is a row group.
+//! Writes tables as Parquet (parquet.apache.org), one file each, compressed with Snappy; a batch is a row group.
 
 use std::fs::File;
 use std::path::PathBuf;
@@ -16,18 +16,18 @@ use crate::error::ExportError;
 use crate::folder::Folder;
 use crate::table::{Kind, Layout, TableWriter, Values};
 
-/// One file per table.
+/// Writes one file per table.
 pub struct ParquetFiles {
     folder: Folder,
     open: Option<(SerializedFileWriter<File>, String)>,
     written: Vec<PathBuf>,
 }
 
-/// A table's name after the stem.
-pub(crate) const ENDING: &str = "parquet";
+/// Suffix of a table's file name.
+pub(crate) const SUFFIX: &str = "parquet";
 
 impl ParquetFiles {
-    /// Into `folder`.
+    /// Writes into `folder`.
     #[must_use]
     pub const fn new(folder: Folder) -> Self {
         Self {
@@ -37,14 +37,14 @@ impl ParquetFiles {
         }
     }
 
-    /// The files, in order.
+    /// Paths of the files, in order.
     #[must_use]
-    pub fn written(mut self) -> Vec<PathBuf> {
+    pub fn into_paths(mut self) -> Vec<PathBuf> {
         std::mem::take(&mut self.written)
     }
 }
 
-/// The schema in Parquet's own notation. A column that can have none is `optional`.
+/// Schema in Parquet's own notation. Columns with missing values are `optional`.
 fn schema(layout: &Layout) -> String {
     let columns = layout.columns.iter().map(|column| {
         let (before, after) = match column.kind {
@@ -66,8 +66,8 @@ fn schema(layout: &Layout) -> String {
 
 impl TableWriter for ParquetFiles {
     fn begin(&mut self, layout: &Layout, _rows: u64) -> Result<(), ExportError> {
-        let ending = format!(".{}.{ENDING}", layout.name);
-        let path = self.folder.begin(&ending)?;
+        let suffix = format!(".{}.{SUFFIX}", layout.name);
+        let path = self.folder.begin(&suffix)?;
         let file = File::create_new(&path).map_err(ExportError::file(&path))?;
         let properties = WriterProperties::builder()
             .set_compression(Compression::SNAPPY)
@@ -76,9 +76,9 @@ impl TableWriter for ParquetFiles {
             SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties))
         });
         match writer {
-            Ok(writer) => self.open = Some((writer, ending)),
+            Ok(writer) => self.open = Some((writer, suffix)),
             Err(e) => {
-                self.folder.abandon(&ending);
+                self.folder.abandon(&suffix);
                 return Err(ExportError::file(&path)(e));
             }
         }
@@ -86,21 +86,21 @@ impl TableWriter for ParquetFiles {
     }
 
     fn append(&mut self, batch: &[Values]) -> Result<(), ExportError> {
-        let Some((writer, ending)) = &mut self.open else {
+        let Some((writer, suffix)) = &mut self.open else {
             return Ok(());
         };
-        let path = self.folder.file(ending);
+        let path = self.folder.file(suffix);
         row_group(writer, batch).map_err(ExportError::file(&path))
     }
 
     fn end(&mut self) -> Result<(), ExportError> {
-        if let Some((writer, ending)) = self.open.take() {
-            let path = self.folder.file(&ending);
+        if let Some((writer, suffix)) = self.open.take() {
+            let path = self.folder.file(&suffix);
             if let Err(e) = writer.close() {
-                self.folder.abandon(&ending);
+                self.folder.abandon(&suffix);
                 return Err(ExportError::file(&path)(e));
             }
-            self.written.push(self.folder.complete(&ending)?);
+            self.written.push(self.folder.complete(&suffix)?);
         }
         Ok(())
     }
@@ -108,8 +108,8 @@ impl TableWriter for ParquetFiles {
 
 impl Drop for ParquetFiles {
     fn drop(&mut self) {
-        if let Some((_, ending)) = self.open.take() {
-            self.folder.abandon(&ending);
+        if let Some((_, suffix)) = self.open.take() {
+            self.folder.abandon(&suffix);
         }
     }
 }
@@ -132,8 +132,8 @@ fn row_group(
     group.close().map(drop)
 }
 
-/// Values that are there, and for each row whether it has one: Parquet's definition levels.
-fn there<T: Clone>(values: impl Iterator<Item = Option<T>>) -> (Vec<T>, Vec<i16>) {
+/// Present values, and Parquet's definition level of each row.
+fn present<T: Clone>(values: impl Iterator<Item = Option<T>>) -> (Vec<T>, Vec<i16>) {
     let (mut some, mut levels) = (Vec::new(), Vec::new());
     for value in values {
         levels.push(i16::from(value.is_some()));
@@ -151,15 +151,15 @@ fn column_of(column: &mut ColumnWriter<'_>, values: &Values) -> Result<(), Parqu
         }
         (ColumnWriter::BoolColumnWriter(w), Values::Flag(v)) => w.write_batch(v, None, None),
         (ColumnWriter::Int64ColumnWriter(w), Values::Count(v)) => {
-            let (some, levels) = there(v.iter().copied());
+            let (some, levels) = present(v.iter().copied());
             w.write_batch(&some, Some(&levels), None)
         }
         (ColumnWriter::DoubleColumnWriter(w), Values::Real(v)) => {
-            let (some, levels) = there(v.iter().map(|x| Some(*x).filter(|x| !x.is_nan())));
+            let (some, levels) = present(v.iter().map(|x| Some(*x).filter(|x| !x.is_nan())));
             w.write_batch(&some, Some(&levels), None)
         }
         (ColumnWriter::ByteArrayColumnWriter(w), Values::Text(v)) => {
-            let (some, levels) = there(v.iter().map(|t| t.as_deref().map(ByteArray::from)));
+            let (some, levels) = present(v.iter().map(|t| t.as_deref().map(ByteArray::from)));
             w.write_batch(&some, Some(&levels), None)
         }
         _ => Err(ParquetError::General(

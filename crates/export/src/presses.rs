@@ -1,4 +1,4 @@
-//! The tidy table of presses: one row per press of the plan, by its last attempt, with what both cameras saw of it.
+//! The tidy table of presses: one row per planned press, with its last attempt and the views of both cameras.
 
 use skinrig_analysis::result::{ClockFit, LocationOutcome, PressResult, PressView};
 use skinrig_model::{HostTime, PlannedPress, PressRole, PressTiming};
@@ -8,7 +8,7 @@ use crate::error::ExportError;
 use crate::source::{Source, TableName};
 use crate::table::{Table, Values};
 
-/// A press with everything that is known of it.
+/// A press with all data on it.
 struct Row<'a> {
     planned: PlannedPress,
     attempts: Vec<AttemptRow>,
@@ -69,7 +69,7 @@ impl Columns<'_> {
     }
 }
 
-/// The table of a session.
+/// Builds the table of a session.
 pub(crate) fn table(source: &Source<'_>) -> Result<Table, ExportError> {
     let session_id = source.reader.session_id()?;
     let prototype = source.header.prototype.clone();
@@ -78,7 +78,7 @@ pub(crate) fn table(source: &Source<'_>) -> Result<Table, ExportError> {
     let rows = rows.map(|(i, (planned, attempts))| Row {
         planned,
         attempts,
-        // In plan order, as the presses are.
+        // In plan order, like the presses.
         found: found.and_then(|all| all.get(i)),
     });
     let mut table = Columns {
@@ -106,7 +106,7 @@ const fn role(role: PressRole) -> &'static str {
     }
 }
 
-/// What was planned and what the rig did.
+/// Columns on plan and execution.
 fn journal(table: &mut Columns<'_>) {
     table.int("press", |r| i64::from(r.planned.id.number()));
     table.text("role", |r| Some(role(r.planned.role).to_owned()));
@@ -116,10 +116,10 @@ fn journal(table: &mut Columns<'_>) {
     table.real("y_mm", |r| Some(r.planned.at.y_mm));
     table.real("depth_mm", |r| Some(r.planned.depth_mm));
     table.int("attempts", |r| r.attempts.len() as i64);
-    // An analysis leaves presses out by rules of its own.
+    // An analysis excludes presses by its own rules.
     table.text("verdict", |r| {
         let recorded = r.last().map_or("open", |o| o.verdict.name());
-        let found = r.found.map_or(recorded, |f| &f.verdict);
+        let found = r.found.map_or(recorded, |f| f.verdict.name());
         Some(found.to_owned())
     });
     table.text("reason", |r| match r.found {
@@ -143,7 +143,7 @@ fn journal(table: &mut Columns<'_>) {
     table.real("peak_force_n", |r| r.last()?.peak_force_n);
 }
 
-/// Where the skin says it was touched.
+/// Columns on the estimated location.
 fn outcome(table: &mut Columns<'_>) {
     table.text("outcome", |r| {
         Some(r.found?.location_outcome.name().to_owned())
@@ -159,7 +159,7 @@ fn outcome(table: &mut Columns<'_>) {
     table.real("ray_sine", |r| r.sine());
 }
 
-/// What a camera saw.
+/// Columns on the view of a camera.
 fn view(table: &mut Columns<'_>, source: &Source<'_>, camera: usize) {
     let name = |what: &str| format!("camera{}_{what}", camera + 1);
     let clock = source
@@ -179,14 +179,14 @@ fn view(table: &mut Columns<'_>, source: &Source<'_>, camera: usize) {
     table.real(&name("centroid_u_px"), |r| r.view(camera)?.centroid_u);
     table.real(&name("centroid_v_px"), |r| r.view(camera)?.centroid_v);
     table.real(&name("rate_per_s"), |r| Some(r.view(camera)?.rate_per_s));
-    // Without idle time before the press there is no such rate.
+    // Without idle time before the press there is no idle rate.
     table.real(&name("idle_rate_per_s"), |r| {
         let view = r.view(camera)?;
         (view.idle_s > 0.0).then_some(view.idle_rate_per_s)
     });
 }
 
-/// A host time on the clock of `camera` as it was recorded: the analysis moves further legs onto the line of the first.
+/// A host time on the recorded clock of `camera`: the analysis shifts further legs onto the line of the first.
 fn recorded_us(source: &Source<'_>, clock: &ClockFit, camera: usize, t: HostTime) -> f64 {
     let legs = source.analysis.map_or(&[][..], |(_, legs)| legs);
     let leg = legs.iter().rev().find(|leg| leg.origin <= t);

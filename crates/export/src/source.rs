@@ -1,4 +1,4 @@
-//! A session that is exported, and its tables.
+//! Owns the input of an export: a session, and its tables.
 
 use skinrig_analysis::{Analysis, LegStart};
 use skinrig_model::{CameraId, RunHeader};
@@ -9,7 +9,7 @@ use skinrig_recorder::SessionReader;
 pub enum TableName {
     /// One row per press of the plan.
     Presses,
-    /// One row per sample of the robot's path.
+    /// One row per pose sample of the robot.
     Pose,
     /// One row per metric.
     Results,
@@ -18,7 +18,7 @@ pub enum TableName {
 }
 
 impl TableName {
-    /// All of them, the small ones first.
+    /// All tables, small ones first.
     pub const ALL: [Self; 5] = [
         Self::Presses,
         Self::Results,
@@ -27,7 +27,7 @@ impl TableName {
         Self::Events(CameraId::Two),
     ];
 
-    /// Its name in files.
+    /// Name in file names.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -39,21 +39,21 @@ impl TableName {
         }
     }
 
-    /// Whether it tells what an analysis found.
+    /// True if the table requires an analysis.
     #[must_use]
     pub const fn needs_analysis(self) -> bool {
         matches!(self, Self::Presses | Self::Results)
     }
 }
 
-/// What is exported.
+/// Input of an export.
 #[derive(Debug, Clone, Copy)]
 pub struct Source<'a> {
     /// The session.
     pub reader: &'a SessionReader,
     /// Its header.
     pub header: &'a RunHeader,
-    /// What was found in it, and its further legs as the analysis moved them. Without it the columns of the presses that stand on
-    /// an analysis are empty, and so is the table of results.
+    /// Its analysis, and its further legs as aligned by the analysis. Without it, columns of presses that depend on an
+    /// analysis are empty, and so is the table of results.
     pub analysis: Option<(&'a Analysis, &'a [LegStart])>,
 }

@@ -1,4 +1,4 @@
-//! The long tables: events and the robot's path, a batch at a time.
+//! Owns the long tables, written in batches: events and robot poses.
 
 use skinrig_model::{CameraId, CdEvent, HostTime, Polarity, PoseSample, StreamFormat};
 use skinrig_recorder::SessionReader;
@@ -8,7 +8,7 @@ use crate::error::ExportError;
 use crate::source::{Source, TableName};
 use crate::table::{Column, Kind, Layout, TableWriter, Values};
 
-/// Rows of a batch: some 10 MB of events.
+/// Rows per batch: about 10 MB of events.
 const BATCH: usize = 1 << 19;
 
 fn layout(name: &'static str, columns: &[(&str, Kind)]) -> Layout {
@@ -22,7 +22,7 @@ fn layout(name: &'static str, columns: &[(&str, Kind)]) -> Layout {
     }
 }
 
-/// Columns of events.
+/// Columns of a batch of events.
 #[derive(Default)]
 struct EventBatch {
     t_us: Vec<i64>,
@@ -42,7 +42,7 @@ impl EventBatch {
             .extend(events.iter().map(|e| e.polarity == Polarity::On));
     }
 
-    /// The rows so far; none are left.
+    /// Takes the rows so far, leaving none.
     fn take(&mut self) -> [Values; 4] {
         let Self { t_us, x, y, on } = std::mem::take(self);
         [
@@ -54,8 +54,8 @@ impl EventBatch {
     }
 }
 
-/// How many events there are. The facts of the chunks say so, but for those of an older session with losses, whose decoder knew of
-/// none: these are decoded for it.
+/// Number of events. Chunk facts give it, except for old sessions with losses, whose decoder ignored losses: these are
+/// decoded again.
 fn count(
     reader: &SessionReader,
     format: StreamFormat,
@@ -73,7 +73,7 @@ fn count(
     Ok(events)
 }
 
-/// The CD events of a camera, in stream order, on its own clock.
+/// Writes the CD events of a camera, in stream order, on its own clock.
 pub(crate) fn events(
     source: &Source<'_>,
     camera: CameraId,
@@ -112,7 +112,7 @@ pub(crate) fn events(
     to.end()
 }
 
-/// The robot's path: commanded and measured, skin frame.
+/// Writes the poses of the robot: commanded and measured, skin frame.
 pub(crate) fn pose(source: &Source<'_>, to: &mut dyn TableWriter) -> Result<(), ExportError> {
     let name = TableName::Pose.name();
     let numbers = [

@@ -1,43 +1,43 @@
-//! Tables: named columns of plain values, handed over batch by batch.
+//! Owns tables: named columns of plain values, passed on in batches.
 
 use crate::error::ExportError;
 
-/// What a column holds.
+/// Type of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// Whole numbers, 64 bits, none missing.
+    /// 64-bit integers, none missing.
     Int,
-    /// Whole numbers, 16 bits, none missing: pixels.
+    /// 16-bit integers, none missing: pixels.
     Pixel,
-    /// Yes or no, none missing.
+    /// Booleans, none missing.
     Flag,
-    /// Whole numbers, or none.
+    /// Optional integers.
     Count,
-    /// Numbers; NaN is none.
+    /// Numbers; NaN is missing.
     Real,
-    /// Text of at most so many characters, or none.
+    /// Optional text with at most this many characters.
     Text(usize),
 }
 
-/// A column's name, with its unit, and what it holds.
+/// Name of a column, including its unit, and its type.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Column {
     /// For example `depth_mm`.
     pub name: String,
-    /// What it holds.
+    /// Type of the column.
     pub kind: Kind,
 }
 
-/// The columns of a table, in order.
+/// Columns of a table, in order.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Layout {
-    /// Name of the table and, after the stem, of its file.
+    /// Name of the table, and suffix of its file name.
     pub name: &'static str,
     /// Its columns.
     pub columns: Vec<Column>,
 }
 
-/// The values of one column in one batch.
+/// Values of one column in one batch.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Values {
     /// See [`Kind::Int`].
@@ -55,7 +55,7 @@ pub enum Values {
 }
 
 impl Values {
-    /// Rows.
+    /// Number of rows.
     #[must_use]
     pub const fn rows(&self) -> usize {
         match self {
@@ -83,41 +83,41 @@ impl Values {
     }
 }
 
-/// Takes tables, one after the other, each with all of its batches in order.
+/// Receives tables, one after another, each as a sequence of batches.
 pub trait TableWriter {
-    /// The next table; it will have so many rows.
+    /// Begins the next table, which will have `rows` rows.
     ///
     /// # Errors
-    /// When its file cannot be made.
+    /// When its file cannot be created.
     fn begin(&mut self, layout: &Layout, rows: u64) -> Result<(), ExportError>;
 
-    /// Rows of it: values of all columns in their order, equally many of each.
+    /// Appends rows: values of all columns in order, equally many of each.
     ///
     /// # Errors
     /// When they cannot be written.
     fn append(&mut self, batch: &[Values]) -> Result<(), ExportError>;
 
-    /// The table is complete.
+    /// Ends the table.
     ///
     /// # Errors
-    /// When that cannot be written.
+    /// When it cannot be completed.
     fn end(&mut self) -> Result<(), ExportError>;
 }
 
 /// A table that fits in memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// Its name.
+    /// Name of the table.
     pub name: &'static str,
-    /// Its columns with all of their values.
+    /// Columns with all their values.
     pub columns: Vec<(String, Values)>,
 }
 
 impl Table {
-    /// Hands it over.
+    /// Writes the table.
     ///
     /// # Errors
-    /// What the writer says.
+    /// Errors of the writer.
     pub fn write(self, to: &mut dyn TableWriter) -> Result<(), ExportError> {
         let rows = self.columns.first().map_or(0, |(_, values)| values.rows());
         let (columns, values): (Vec<Column>, Vec<Values>) = self

@@ -1,4 +1,4 @@
-//! The tables of a session, handed to a writer.
+//! Writes the tables of a session.
 
 use crate::error::ExportError;
 use crate::source::{Source, TableName};
@@ -6,10 +6,10 @@ use crate::table::TableWriter;
 use crate::{metrics, presses, streams};
 
 impl Source<'_> {
-    /// Hands a table over.
+    /// Writes one table.
     ///
     /// # Errors
-    /// When the session cannot be read or the table not be written.
+    /// When the session cannot be read, or the table cannot be written.
     pub fn write(&self, table: TableName, to: &mut dyn TableWriter) -> Result<(), ExportError> {
         match table {
             TableName::Presses => presses::table(self)?.write(to),

@@ -1,4 +1,4 @@
-//! What the writers leave behind when all goes well, when something is in the way, and when a table breaks off.
+//! Output of the writers after success, with an obstacle, and after an abort.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 
 use std::path::Path;
@@ -61,11 +61,11 @@ fn files_get_their_names_when_they_are_whole() {
 
     let mut csv = CsvFiles::new(folder(false));
     all(&mut csv, 2).unwrap();
-    let text = std::fs::read_to_string(&csv.written()[0]).unwrap();
+    let text = std::fs::read_to_string(&csv.into_paths()[0]).unwrap();
     let expected = "t_us,on,count,x_mm,note\n1,1,,0.1,\"a,\"\"ä\"\n-2,0,7,,\n";
     assert_eq!(text, expected);
 
-    // The same again is done; another one does not replace it, unless asked.
+    // Repeating an export is accepted; replacing a different file requires --overwrite.
     all(&mut CsvFiles::new(folder(false)), 2).unwrap();
     assert_eq!(names(dir.path()), ["s.demo.csv"]);
     std::fs::write(dir.path().join("s.demo.csv"), "mine").unwrap();
@@ -122,6 +122,6 @@ fn values_of_another_kind_than_their_column_are_refused() {
     assert_eq!(names(dir.path()), [""; 0]);
     let mut parquet = ParquetFiles::new(folder);
     all(&mut parquet, 2).unwrap();
-    let bytes = std::fs::read(&parquet.written()[0]).unwrap();
+    let bytes = std::fs::read(&parquet.into_paths()[0]).unwrap();
     assert!(bytes.starts_with(b"PAR1") && bytes.ends_with(b"PAR1"));
 }

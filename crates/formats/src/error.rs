@@ -1,4 +1,4 @@
-//! Everything that can go wrong with a foreign format.
+//! Errors of foreign formats.
 
 use std::path::PathBuf;
 
@@ -8,12 +8,12 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum FormatsError {
-    /// An item handed to an encoder lies before what it already wrote.
+    /// An item is earlier than the encoder's output so far.
     #[error("expected items in time order, found {found_us} µs after {written_us} µs was written")]
     OutOfOrder {
         /// The item's time, µs.
         found_us: u64,
-        /// What the stream has reached, µs.
+        /// Time of the stream so far, µs.
         written_us: u64,
     },
     /// A value does not fit the field that the format has for it.
@@ -26,7 +26,7 @@ pub enum FormatsError {
         /// The value.
         found: u64,
     },
-    /// A time-base cadence that the format cannot keep.
+    /// A time-base cadence that the format does not support.
     #[error("expected a TIME_HIGH cadence that divides 64 µs, found {0} µs")]
     Cadence(u64),
     /// Reading or writing failed.
@@ -34,25 +34,25 @@ pub enum FormatsError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// An HDF5 file that the HDF5 library refuses; truncated files end here too.
+    /// An HDF5 file that the HDF5 library rejects, for example a truncated one.
     #[error("{}: expected a readable HDF5 file: {problem}", path.display())]
     Hdf5 {
         /// The file.
         path: PathBuf,
-        /// What the library said.
+        /// Error of the library.
         problem: String,
     },
-    /// A file that is not what it should be as a whole.
+    /// A file of the wrong kind.
     #[error("{}: expected {expected}, found {found}", path.display())]
     Container {
         /// The file.
         path: PathBuf,
-        /// What was needed.
+        /// What is valid there.
         expected: String,
-        /// What is there, and what to do next.
+        /// What was found, and the next step.
         found: String,
     },
     /// One dataset of a container does not fit.
@@ -62,9 +62,9 @@ pub enum FormatsError {
         path: PathBuf,
         /// The dataset's path inside the file.
         dataset: String,
-        /// What was needed.
+        /// What is valid there.
         expected: String,
-        /// What is there.
+        /// What was found.
         found: String,
     },
     /// One value of a dataset is impossible.
@@ -76,9 +76,9 @@ pub enum FormatsError {
         dataset: String,
         /// Index of the value, 0 for the first.
         row: u64,
-        /// What was needed.
+        /// What is valid there.
         expected: String,
-        /// What is there.
+        /// What was found.
         found: String,
     },
     /// A line of a RAW header.
@@ -93,14 +93,14 @@ pub enum FormatsError {
         offset: u64,
         /// The key; empty when the line has none.
         key: String,
-        /// What was needed.
+        /// What is valid there.
         expected: String,
-        /// What is there.
+        /// What was found.
         found: String,
     },
     /// A key or value that a RAW header cannot hold.
     #[error(
-        "header key `{key}`: expected a key of its own without spaces, and text in one line, found {value:?}"
+        "header key `{key}`: expected a unique key without spaces, and text in one line, found {value:?}"
     )]
     HeaderValue {
         /// The key.
@@ -115,9 +115,9 @@ pub enum FormatsError {
         path: PathBuf,
         /// The line, 1 for the first.
         line: u64,
-        /// What was needed.
+        /// What is valid there.
         expected: String,
-        /// What is there.
+        /// What was found.
         found: String,
     },
 }

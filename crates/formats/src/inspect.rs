@@ -1,4 +1,4 @@
-//! What is in a file of events: kind, header, counts, time span, rate, gaps. Streamed, for files of any size.
+//! Inspects an event file: kind, header, counts, time span, rate, gaps. Streams, so files may have any size.
 
 use std::io::Read as _;
 use std::path::Path;
@@ -46,12 +46,12 @@ impl FileKind {
     }
 }
 
-/// What was found in a file.
+/// Result of inspecting a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Inspection {
     /// Kind of the file.
     pub kind: FileKind,
-    /// Keys and values of the header, in file order; for HDF5 what wrote the file.
+    /// Keys and values of the header, in file order; for HDF5 the program that wrote the file.
     pub header: Vec<(String, String)>,
     /// How words encode events; `None` for HDF5.
     pub format: Option<StreamFormat>,
@@ -61,7 +61,7 @@ pub struct Inspection {
     pub streams: Vec<StreamInspection>,
 }
 
-/// What one sensor sent.
+/// Statistics of one sensor.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StreamInspection {
     /// Its name in an HDF5 container; empty when it is the only one.
@@ -95,7 +95,7 @@ pub struct Gap {
 }
 
 impl StreamInspection {
-    /// Begins to look at a stream called `name`; silences longer than `gap_us` will be reported. Feed it as the
+    /// Starts inspecting a stream called `name`; reports silences longer than `gap_us`. Feed it as the
     /// sink of a [`Decoder`](crate::Decoder), then call [`Self::finish`].
     #[must_use]
     pub fn new(name: &str, gap_us: u64) -> Self {

@@ -1,8 +1,8 @@
-//! Other people's formats: EVT2, EVT2.1 and EVT3 streams, Prophesee RAW files, bimvee HDF5 containers and
+//! Foreign formats: EVT2, EVT2.1 and EVT3 streams, Prophesee RAW files, bimvee HDF5 containers and
 //! press-position tables.
 //!
-//! Parsers of foreign bytes are total: any input gives events, or an error that says where it stands and
-//! what was expected. Words that a decoder does not deliver are counted in [`StreamStats`].
+//! Parsers of foreign bytes are total: any input yields events, or an error with position and
+//! expectation. Words without an event are counted in [`StreamStats`].
 
 pub mod error;
 pub mod hdf5;

@@ -1,7 +1,7 @@
 //! Press-position tables: CSV with a header that has at least `x` and `y`.
 //!
 //! The published table is in metres and ends in a row of empty cells (`,,`). Rows without any value are
-//! allowed only after the last press; they are reported, with their lines, and are no presses. A row with some
+//! allowed only after the last press; they are reported with their lines and do not count as presses. A row with some
 //! values must have x and y, and z when the table has that column.
 
 use std::io::Read;
@@ -53,7 +53,7 @@ pub struct PositionTable {
     pub presses: Vec<PressPosition>,
     /// Lines of the rows without any value, after the last press.
     pub blank_lines: Vec<u64>,
-    /// Columns that are neither x, y nor z; they are not read.
+    /// Ignored columns: neither x, y nor z.
     pub other_columns: Vec<String>,
 }
 
@@ -168,7 +168,7 @@ impl PositionTable {
     }
 }
 
-/// Makes errors that name the table.
+/// Builds errors that name the table.
 struct Table {
     path: PathBuf,
 }
@@ -188,7 +188,7 @@ impl Table {
         self.error(line, "a table in UTF-8", error.to_string())
     }
 
-    /// Where the column called `name` is.
+    /// Index of the column `name`.
     fn column(&self, header: &StringRecord, name: &str) -> Result<Option<usize>, FormatsError> {
         let mut places = (0..header.len()).filter(|c| header.get(*c) == Some(name));
         match (places.next(), places.next()) {

@@ -1,16 +1,16 @@
-//! Opens only regular files: a pipe, a socket or a device may never end, or never begin.
+//! Opens only regular files: reading a pipe, a socket or a device may block forever.
 
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Largest text that is read whole, bytes: protocols, schedules, rig files, suites, limits and tables are far smaller.
+/// Largest text file, bytes: protocols, schedules, rig files, suites, limits and tables are far smaller.
 pub(crate) const MAX_TEXT_BYTES: u64 = 64 << 20;
 
-/// Says what is at `path` when it is no regular file, without opening it.
+/// Checks that `path` is a regular file, without opening it.
 ///
 /// # Errors
-/// When nothing is there, it may not be looked at, or it is something else than a regular file.
+/// If `path` does not exist, is not accessible, or is not a regular file.
 pub fn check(path: &Path) -> io::Result<()> {
     let kind = std::fs::metadata(path)?.file_type();
     if kind.is_file() {

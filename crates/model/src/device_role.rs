@@ -1,4 +1,4 @@
-//! What the devices of a rig are for.
+//! Roles of devices in a rig.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::id::CameraId;
 
-/// What a device is for in the rig.
+/// Role of a device in the rig.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DeviceRole {

@@ -1,4 +1,4 @@
-//! Events: what an event camera says about one pixel, or about its trigger input.
+//! Events of an event camera: changes of a pixel, and edges on its trigger input.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! The words that every part of skinrig shares: units, frames, ids, clocks, events and session records.
+//! The vocabulary shared by all of skinrig: units, frames, ids, clocks, events and session records.
 //!
 //! Pure values. Nothing here reads a file, a wall clock or a device, and nothing depends on another
 //! skinrig crate. Every quantity names its unit in its type or its name: `*_mm`, `*_us`, `*_n` (newton),
@@ -34,7 +34,9 @@ pub use lens::{LensAngle, LensKind, LensModel};
 pub use limit::{Limit, Side};
 pub use pose::PoseSample;
 pub use preflight::{CheckKind, CheckVerdict, PreflightCheck};
-pub use press::{PlannedPress, PressHistory, PressOutcome, PressRole, PressTiming, PressVerdict};
+pub use press::{
+    PlannedPress, PressHistory, PressOutcome, PressRole, PressTiming, PressVerdict, Verdict,
+};
 pub use press_fault::PressFaultKind;
 pub use pulse::{Label, Mark, MarkKind, PulseTrain, SeenMark, SeenSync, SentMark};
 pub use record::{
@@ -49,5 +51,6 @@ pub use settings::{
 };
 pub use skin::{OUTLINE_SHAPE, SkinOutline};
 pub use stream::{ChunkFacts, LostTime, RawChunk, StreamFormat};
+pub use text::UnknownName;
 pub use time::{HostDuration, HostTime};
 pub use trigger_box::{BoxReport, BoxTime};

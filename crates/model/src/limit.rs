@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A limit that was stated before the value was measured. All in the unit of the value.
+/// A limit, set before the measurement. All fields in the unit of the value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limit {

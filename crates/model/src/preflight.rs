@@ -1,16 +1,16 @@
-//! What was checked before a run was armed.
+//! Preflight checks: made before a run is armed.
 
 use serde::{Deserialize, Serialize};
 
 use crate::device_role::DeviceRole;
 
-/// How a check ended.
+/// Verdict of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CheckVerdict {
     /// Found as expected.
     Passed,
-    /// Found otherwise: the run is not armed.
+    /// Failed: the run is not armed.
     Failed,
     /// Not checked; `found` says why.
     Skipped,
@@ -31,7 +31,7 @@ impl CheckVerdict {
     }
 }
 
-/// What a check before a run is about, for programs that name causes.
+/// Subject of a preflight check, for programs that determine causes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum CheckKind {
     /// Anything else.
@@ -41,17 +41,17 @@ pub enum CheckKind {
     Disk,
     /// The session file.
     Recorder,
-    /// The place of the skin.
+    /// The pose of the skin.
     Frame,
-    /// Who a device says it is, and its versions.
+    /// Identity and versions of a device.
     Identity(DeviceRole),
     /// Settings that read back as written.
     ReadBack(DeviceRole),
-    /// The state in which a device has to be.
+    /// Required state of a device.
     State(DeviceRole),
     /// A camera's clock.
     Clock(DeviceRole),
-    /// The way of a trigger mark to a camera.
+    /// The path of a trigger mark to a camera.
     Trigger(DeviceRole),
 }
 
@@ -60,21 +60,21 @@ pub enum CheckKind {
 pub struct PreflightCheck {
     /// What was checked, for example `trigger loop-back, camera 1`.
     pub check: String,
-    /// What a run needs.
+    /// Expected value.
     pub expected: String,
-    /// What there was, or why it was not checked.
+    /// Found value, or reason why it was not checked.
     pub found: String,
     /// How it ended.
     pub verdict: CheckVerdict,
-    /// What to do about a failed check; empty for others.
+    /// Next step after a failed check; empty for others.
     pub next_step: String,
-    /// What it is about; not kept in sessions.
+    /// Subject; not stored in sessions.
     #[serde(skip)]
     pub kind: CheckKind,
 }
 
 impl PreflightCheck {
-    /// A check that passed when `ok`; what to do is kept only when it failed.
+    /// A check that passed if `ok`; the next step is kept only for failures.
     #[must_use]
     pub fn new(
         check: impl Into<String>,
@@ -97,7 +97,7 @@ impl PreflightCheck {
         }
     }
 
-    /// A check that was not made.
+    /// A skipped check.
     #[must_use]
     pub fn skipped(
         check: impl Into<String>,

@@ -1,4 +1,6 @@
-//! A press: planned, attempted, and how it ended.
+//! Presses: planned, attempted and judged.
+
+use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +9,7 @@ use crate::id::{AttemptId, LocationId, PressId, RepetitionId, as_index};
 use crate::press_fault::PressFaultKind;
 use crate::time::{HostDuration, HostTime};
 
-/// What a press is for. Presses that calibrate never score.
+/// Role of a press. Calibration presses never score.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PressRole {
@@ -22,10 +24,10 @@ pub enum PressRole {
 /// One press of the plan. Stored plans hold its three numbers as indices, counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PlannedPress {
-    /// Its place in the plan.
+    /// Position in the plan.
     #[serde(with = "as_index")]
     pub id: PressId,
-    /// What it is for.
+    /// Purpose of the experiment.
     pub role: PressRole,
     /// Which repetition; the first for sync presses.
     #[serde(with = "as_index")]
@@ -71,7 +73,40 @@ impl PressTiming {
     }
 }
 
-/// How a press ended. Planned = valid + missed + invalid + excluded, always.
+/// How a press ended, without its reason.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Done as planned, and everything it needs was recorded.
+    Valid,
+    /// Never attempted.
+    Missed,
+    /// Attempted, but what happened is not what was planned, or data were lost in its window.
+    Invalid,
+    /// Done, but left out of the metrics by a stated rule.
+    Excluded,
+}
+
+impl Verdict {
+    /// `valid`, `missed`, `invalid` or `excluded`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Valid => "valid",
+            Self::Missed => "missed",
+            Self::Invalid => "invalid",
+            Self::Excluded => "excluded",
+        }
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Verdict on a press. Planned = valid + missed + invalid + excluded, always.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(tag = "verdict", content = "reason", rename_all = "snake_case")]
 pub enum PressVerdict {
@@ -89,11 +124,17 @@ impl PressVerdict {
     /// The verdict's name: `valid`, `missed`, `invalid`, `excluded`.
     #[must_use]
     pub const fn name(&self) -> &'static str {
+        self.kind().name()
+    }
+
+    /// The verdict without its reason.
+    #[must_use]
+    pub const fn kind(&self) -> Verdict {
         match self {
-            Self::Valid => "valid",
-            Self::Missed(_) => "missed",
-            Self::Invalid(_) => "invalid",
-            Self::Excluded(_) => "excluded",
+            Self::Valid => Verdict::Valid,
+            Self::Missed(_) => Verdict::Missed,
+            Self::Invalid(_) => Verdict::Invalid,
+            Self::Excluded(_) => Verdict::Excluded,
         }
     }
 
@@ -126,10 +167,10 @@ impl PressVerdict {
     }
 }
 
-/// What a session knows of one planned press: where a resumed run goes on.
+/// History of one planned press: the starting point of a resumed run.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct PressHistory {
-    /// Attempts so far; 0: nothing is known of it.
+    /// Attempts so far; 0: none.
     pub attempts: u32,
     /// How many of them count against the limit of retakes: all but those that ended for what passes
     /// ([`PressFaultKind::is_of_the_place`]), which the rig or the operator cost, and which are given back.

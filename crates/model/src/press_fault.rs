@@ -5,6 +5,8 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
+use crate::text::UnknownName;
+
 /// Kind of fault that made an attempt invalid. Programs decide by it; people read the reason beside it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -13,25 +15,25 @@ pub enum PressFaultKind {
     DataLost,
     /// A camera sent no bytes at all.
     NoData,
-    /// A camera's data had not come when the verdict could wait no longer.
+    /// A camera's data did not arrive before the verdict was due.
     DataLate,
-    /// A camera sent more events per second than the plan bears.
+    /// A camera sent more events per second than the plan allows.
     Storm,
-    /// The tip came too late: to the surface, to depth or back to clearance height.
+    /// The tip was too late: at the surface, at depth or back at clearance height.
     Late,
     /// The tip was pushed aside on its way down.
     Aside,
-    /// The operator or a suspension broke the press off.
+    /// The operator or a suspension interrupted the press.
     Paused,
     /// The run ended during the press.
     RunEnded,
-    /// The surface was not where it may be, or was not found.
+    /// The surface was outside its band, or was not found.
     Surface,
     /// The robot reported no force, or too few.
     NoForce,
     /// A moment of the press was not measured.
     Unmeasured,
-    /// The tip left its place during the hold.
+    /// The tip left its location during the hold.
     Hold,
 }
 
@@ -89,11 +91,14 @@ impl fmt::Display for PressFaultKind {
 }
 
 impl FromStr for PressFaultKind {
-    type Err = String;
+    type Err = UnknownName;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
         let found = Self::ALL.into_iter().find(|kind| kind.name() == text);
-        found.ok_or_else(|| format!("expected a kind of press fault, found `{text}`"))
+        found.ok_or_else(|| UnknownName {
+            expected: "a kind of press fault",
+            found: text.to_owned(),
+        })
     }
 }
 

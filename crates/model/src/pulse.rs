@@ -1,4 +1,4 @@
-//! Trigger trains: pulses on the trigger line that name themselves.
+//! Trigger trains: coded pulses on the trigger line that identify themselves.
 //!
 //! # On the wire
 //!
@@ -162,7 +162,7 @@ pub struct SentMark {
     pub uncertainty_ns: i64,
 }
 
-/// What a train says.
+/// Content of a train.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Label {
@@ -278,7 +278,7 @@ impl PulseTrain {
 /// A mark found on a camera's trigger input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SeenMark {
-    /// What the train said.
+    /// Decoded mark.
     pub mark: Mark,
     /// Rising edge of its start pulse on the camera's clock, µs.
     pub t_us: u64,

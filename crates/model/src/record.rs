@@ -1,7 +1,7 @@
 //! Records: everything that happens in a run, in the order in which it happened.
 //!
-//! The controller emits them; terminal, log and recorder consume them. They are the only language between
-//! the running experiment and what remembers it.
+//! The controller emits them; terminal, log and recorder consume them. They are the only interface
+//! between the running experiment and its storage.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +16,7 @@ use crate::stream::{RawChunk, StreamFormat};
 use crate::time::HostTime;
 use crate::trigger_box::BoxReport;
 
-/// Who a device says it is.
+/// Identity of a device.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DeviceIdentity {
     /// Maker and model, for example `Prophesee EVK1 Gen3.1`; simulated and replayed devices say so.
@@ -32,9 +32,9 @@ pub struct DeviceIdentity {
 pub struct Setting {
     /// For example `bias_fo`.
     pub name: String,
-    /// What was asked for.
+    /// Requested value.
     pub requested: String,
-    /// What the device then reported.
+    /// Value read back from the device.
     pub read_back: String,
 }
 
@@ -53,7 +53,7 @@ impl Setting {
     }
 }
 
-/// What is known before anything moves. Written first.
+/// Header of a run, known before anything moves. Written first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunHeader {
     /// The protocol as the user wrote it, byte for byte.
@@ -76,13 +76,13 @@ pub struct RunHeader {
     pub rig_name: String,
     /// The geometry and other constants of the rig as JSON.
     pub rig_json: String,
-    /// Where the skin lies in the robot's frame.
+    /// Pose of the skin in the robot's frame.
     pub robot_from_skin: RigidTransform<Robot, Skin>,
     /// Stream format of each camera (index 0: camera 1).
     pub stream_formats: [StreamFormat; 2],
     /// Which prototype is pressed.
     pub prototype: String,
-    /// Who runs it.
+    /// The operator.
     pub operator: String,
     /// Civil time of the start, RFC 3339; for people.
     pub started_at: String,
@@ -104,11 +104,11 @@ impl RunHeader {
     }
 }
 
-/// What is known before anything moves when a session goes on that was cut off or not finished. Protocol, plan, seed and frame are
+/// Header of a further leg, written when an interrupted or unfinished session is resumed. Protocol, plan, seed and frame are
 /// the session's own; everything here may differ from its first leg.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ResumeHeader {
-    /// Who runs it now.
+    /// Operator of this leg.
     pub operator: String,
     /// Civil time of this leg's start, RFC 3339; for people.
     pub started_at: String,
@@ -129,15 +129,15 @@ pub struct MotionCommand {
     pub speed_mm_s: f64,
 }
 
-/// Why a run did not simply go on.
+/// Kinds of interruptions of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum InterruptionKind {
-    /// Wait after the current press.
+    /// Waits after the current press.
     Pause,
     /// Break the current press off, retract, and wait.
     PauseNow,
-    /// Go on after a pause.
+    /// Continues after a pause.
     Resume,
     /// Finish cleanly after the current press.
     Stop,
@@ -200,19 +200,19 @@ impl RunEnd {
     }
 }
 
-/// One thing that happened.
+/// An event in a run.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Record {
     /// The first record of every run.
     Started(Box<RunHeader>),
-    /// The first record of every further *leg*: another process goes on with the session. Its host clock, its cameras' clocks
+    /// The first record of every further *leg*: another process resumes the session. Its host clock, its cameras' clocks
     /// and its chunk numbers begin anew; the recorder joins them to those before.
     Resumed(Box<ResumeHeader>),
     /// A device answered and was configured.
     Device {
         /// Its role.
         role: DeviceRole,
-        /// Who it says it is.
+        /// Identity reported by the device.
         identity: DeviceIdentity,
         /// Its settings as read back.
         settings: Vec<Setting>,
@@ -250,7 +250,7 @@ pub enum Record {
     Outcome(PressOutcome),
     /// A press of the plan that was not attempted, and why. Emitted at the end of a broken-off run.
     Missed(AttemptId, String),
-    /// Something broke the normal course.
+    /// The run deviated from its plan.
     Interruption {
         /// What.
         kind: InterruptionKind,

@@ -1,9 +1,11 @@
-//! What a simulated scene must be good for, and the cheapest simulation level that is.
+//! Requirements for a simulated scene, and the cheapest simulation level that meets them.
 
 use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
+
+use crate::text::UnknownName;
 
 /// How much of the rig is simulated. Ordered from cheap to dear; each level contains the ones before it.
 #[derive(
@@ -51,12 +53,15 @@ impl fmt::Display for SimLevel {
 }
 
 impl FromStr for SimLevel {
-    type Err = String;
-    fn from_str(s: &str) -> Result<Self, String> {
+    type Err = UnknownName;
+    fn from_str(s: &str) -> Result<Self, UnknownName> {
         Self::ALL
             .into_iter()
             .find(|l| l.name() == s)
-            .ok_or_else(|| format!("expected kinematic, geometric or optical, found `{s}`"))
+            .ok_or_else(|| UnknownName {
+                expected: "kinematic, geometric or optical",
+                found: s.to_owned(),
+            })
     }
 }
 

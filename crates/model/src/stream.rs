@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::event::TriggerEdge;
 use crate::id::CameraId;
+use crate::text::UnknownName;
 use crate::time::HostTime;
 
 /// How the bytes of a camera stream encode events.
@@ -43,14 +44,15 @@ impl fmt::Display for StreamFormat {
 }
 
 impl FromStr for StreamFormat {
-    type Err = String;
+    type Err = UnknownName;
 
-    fn from_str(s: &str) -> Result<Self, String> {
+    fn from_str(s: &str) -> Result<Self, UnknownName> {
         [Self::Evt2, Self::Evt21, Self::Evt21Legacy, Self::Evt3]
             .into_iter()
             .find(|f| f.name() == s)
-            .ok_or_else(|| {
-                format!("expected a stream format (evt2, evt21, evt21_legacy, evt3), found `{s}`")
+            .ok_or_else(|| UnknownName {
+                expected: "a stream format (evt2, evt21, evt21_legacy, evt3)",
+                found: s.to_owned(),
             })
     }
 }

@@ -1,6 +1,23 @@
-//! Text from strangers, made harmless where people read it: terminals, pages, figures, JUnit.
+//! Sanitises untrusted text for display: terminals, pages, figures, JUnit.
 
 use std::borrow::Cow;
+
+/// A text that is not the name of any variant of an enum.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UnknownName {
+    /// Description of the valid names.
+    pub expected: &'static str,
+    /// The text.
+    pub found: String,
+}
+
+impl std::fmt::Display for UnknownName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "expected {}, found `{}`", self.expected, self.found)
+    }
+}
+
+impl std::error::Error for UnknownName {}
 
 /// True for characters that do something instead of showing something: controls (C0, DEL, C1), the bidirectional formatting characters
 /// and the line separators of Unicode. A line feed and a tab are none of them.

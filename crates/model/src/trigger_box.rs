@@ -1,4 +1,4 @@
-//! What a trigger box reports on its own clock: the ties between host, box and cameras.
+//! Reports of a trigger box on its own clock: the ties between host, box and cameras.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +16,7 @@ pub struct BoxTime {
     pub us: u64,
 }
 
-/// One thing that a trigger box reported.
+/// A report of the trigger box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "what", rename_all = "snake_case")]
 pub enum BoxReport {
@@ -26,7 +26,7 @@ pub enum BoxReport {
         sent: HostTime,
         /// After the last byte of the answer reached the host.
         received: HostTime,
-        /// What the box's clock said.
+        /// Time of the box's clock.
         at: BoxTime,
     },
     /// The start pulse of a mark's train rose.
@@ -52,7 +52,7 @@ pub enum BoxReport {
     },
     /// The box lost its clock (power, watchdog, reset button): times before and after this do not compare.
     Reset {
-        /// When the host learned of it.
+        /// Host time at which the reset was noticed.
         noticed: HostTime,
     },
 }

@@ -1,8 +1,8 @@
-//! Where a fault lies.
+//! Where to look for a fault.
 
 use serde::{Deserialize, Serialize};
 
-/// What is at fault.
+/// What a failed check points to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cause {
@@ -12,12 +12,12 @@ pub enum Cause {
     Rig,
     /// The skin on the bench.
     Skin,
-    /// This program.
+    /// skinrig itself.
     Software,
 }
 
 impl Cause {
-    /// As people read it.
+    /// Display name.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

@@ -1,67 +1,66 @@
-//! What was seen during a check besides its numbers: the facts from which causes are told.
+//! Observations during a check besides its measurements, from which the rules derive a cause.
 
 use serde::{Deserialize, Serialize};
 
-/// Something that was seen.
+/// An observation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
-    /// What kind of thing.
+    /// What kind of observation.
     pub kind: EvidenceKind,
-    /// Which device or part of the computer, as the parts of a check are called: `robot`, `camera1`, `camera2`, `trigger box`,
-    /// `computer`, `skin`.
+    /// Device or part, named as in the parts of a check: `robot`, `camera1`, `camera2`, `trigger box`, `computer`, `skin`.
     pub subject: String,
-    /// What exactly: expected, found.
+    /// Description with expected and found values.
     pub what: String,
-    /// What to do next, when it is known.
+    /// What to do next, if known.
     pub next: Option<String>,
 }
 
-/// What kind of thing was seen.
+/// Kind of observation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EvidenceKind {
-    /// A device is not on its bus or port: not plugged in, or without power.
+    /// A device is missing: not connected, or without power.
     Absent,
-    /// The operating system does not let this user open it.
+    /// The operating system denies this user access.
     NotPermitted,
-    /// Another program holds it.
+    /// Another program uses the device.
     Busy,
-    /// A device that was there answers no more, or answers nonsense.
+    /// A device stopped responding, or responds with invalid data.
     DeviceLost,
-    /// A device is another one than the rig file expects, or has another firmware.
+    /// A device has another identity or firmware than the rig file expects.
     OtherDevice,
-    /// A setting did not take.
+    /// A setting reads back with another value than was written.
     ReadBack,
-    /// A device is in a state in which it cannot do what was asked of it: not initialised, forces off.
+    /// A device is in the wrong state for a request: not initialised, forces off.
     State,
-    /// A device refused a request that lies within what it can do.
+    /// A device rejected a request that is within its capabilities.
     Refused,
-    /// Bytes of a camera were lost on the way.
+    /// A camera's bytes were lost in transfer.
     DataLost,
-    /// Trigger pulses were lost, doubled or invented.
+    /// Trigger pulses are missing, doubled or spurious.
     TriggerFault,
-    /// The limit of force, speed or place took the power off the robot.
+    /// A force, speed or position limit switched the robot's motors off.
     Trip,
-    /// The disk is full, slow or not writable.
+    /// The disk is full, slow or read-only.
     Disk,
-    /// This computer did not look for too long: overloaded, asleep, or held up by its disk.
+    /// This computer did not poll its devices in time: overloaded, suspended, or blocked by its disk.
     HostLate,
-    /// Time ran out: that of the check or that of the suite.
+    /// The time limit of the check or of the suite expired.
     TimeOut,
-    /// Somebody ended the suite: ctrl-C, or the system's polite end.
+    /// The suite was stopped with ctrl-C or SIGTERM.
     Stopped,
-    /// The bench belongs to somebody else, or was taken away.
+    /// The bench is in use by another program, or another program took it over.
     Lease,
-    /// A session could not be analysed, or the audit of its plausibility found something.
+    /// A session could not be analysed, or its plausibility audit has findings.
     Audit,
     /// Fewer samples than the check needs.
     TooLittle,
-    /// A fault of this program.
+    /// A bug in skinrig.
     Software,
 }
 
 impl EvidenceKind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 19] = [
         Self::Absent,
         Self::NotPermitted,
@@ -84,7 +83,7 @@ impl EvidenceKind {
         Self::Software,
     ];
 
-    /// As people read it.
+    /// Display name.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -101,18 +100,18 @@ impl EvidenceKind {
             Self::Trip => "trip",
             Self::Disk => "disk",
             Self::HostLate => "computer late",
-            Self::TimeOut => "time ran out",
+            Self::TimeOut => "timed out",
             Self::Stopped => "stopped",
             Self::Lease => "lease",
             Self::Audit => "audit",
-            Self::TooLittle => "too little",
+            Self::TooLittle => "too few samples",
             Self::Software => "software",
         }
     }
 }
 
 impl Evidence {
-    /// Evidence of this kind about `subject`.
+    /// New evidence about `subject`.
     #[must_use]
     pub fn new(kind: EvidenceKind, subject: impl Into<String>, what: impl Into<String>) -> Self {
         Self {
@@ -123,7 +122,7 @@ impl Evidence {
         }
     }
 
-    /// The same, with what to do next.
+    /// Adds the next step.
     #[must_use]
     pub fn next(self, step: impl Into<String>) -> Self {
         Self {

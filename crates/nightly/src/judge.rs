@@ -1,31 +1,31 @@
-//! From measured parts and evidence to verdicts: of an attempt, and of a check after its repeats.
+//! Verdicts: from measurements and evidence to an attempt, and from repeated attempts to a check.
 
 use crate::cause::Cause;
 use crate::evidence::Evidence;
 use crate::night::{Attempt, Part};
-use crate::rules::{Case, Ruling, rule};
+use crate::rules::{Case, Ruling, apply_rules};
 use crate::verdict::Verdict;
 
-/// The computer runs every check: what is seen of it concerns every device.
-const SHARED: &str = "computer";
+/// The computer takes part in every check, so its evidence concerns every device.
+const COMPUTER: &str = "computer";
 
-/// An attempt from its parts and its evidence, when the check is about `about`.
+/// Judges an attempt. `default_cause` applies to a broken limit without evidence.
 ///
-/// Each part is ruled by itself, so that what is seen of one camera does not excuse the other. A part meets the evidence about
-/// its own subject, about the computer, and about subjects that have no part (a check of the skin relies on all devices). A part
-/// that was only not measured, and of whose subject nothing was seen, meets all evidence: it may have needed the others.
+/// Each part is judged separately, so that evidence about one camera does not excuse the other. A part considers evidence about its
+/// own subject, about the computer, and about subjects that have no part (a check of the skin relies on all devices). A part without
+/// a broken limit and without evidence of its own considers all evidence: its measurement may have needed the other devices.
 #[must_use]
-pub fn attempt(
+pub fn judge_attempt(
     (began_s, took_s): (f64, f64),
     parts: Vec<Part>,
     evidence: Vec<Evidence>,
-    about: Cause,
+    default_cause: Cause,
 ) -> Attempt {
     let worst = parts
         .iter()
-        .map(|part| rule_part(part, &parts, &evidence, about))
-        .max_by_key(weight)
-        .unwrap_or_else(|| rule_nothing(&evidence, about));
+        .map(|part| judge_part(part, &parts, &evidence, default_cause))
+        .max_by_key(severity)
+        .unwrap_or_else(|| judge_empty(&evidence, default_cause));
     Attempt {
         began_s,
         took_s,
@@ -37,135 +37,134 @@ pub fn attempt(
     }
 }
 
-/// Of two equally bad rulings the one that does not blame the computer holds: what is at fault elsewhere must not hide behind it.
-fn weight(ruling: &Ruling) -> (Verdict, bool) {
+/// Of two equally severe rulings, one that does not blame the computer wins, so that other faults stay visible.
+fn severity(ruling: &Ruling) -> (Verdict, bool) {
     (ruling.verdict, ruling.cause != Some(Cause::Infrastructure))
 }
 
-fn rule_part(part: &Part, parts: &[Part], evidence: &[Evidence], about: Cause) -> Ruling {
+fn judge_part(part: &Part, parts: &[Part], evidence: &[Evidence], default_cause: Cause) -> Ruling {
     let concerns = |e: &&Evidence| {
         e.subject == part.subject
-            || e.subject == SHARED
+            || e.subject == COMPUTER
             || !parts.iter().any(|p| p.subject == e.subject)
     };
-    let mut near: Vec<&Evidence> = evidence.iter().filter(concerns).collect();
-    if near.is_empty() && !part.is_broken() {
-        near = evidence.iter().collect();
+    let mut relevant: Vec<&Evidence> = evidence.iter().filter(concerns).collect();
+    if relevant.is_empty() && !part.exceeds_limit() {
+        relevant = evidence.iter().collect();
     }
-    rule(&Case {
+    apply_rules(&Case {
         verdict: part.verdict,
-        broken: part.is_broken(),
-        about,
-        evidence: &near,
+        exceeds_limit: part.exceeds_limit(),
+        default_cause,
+        evidence: &relevant,
     })
 }
 
-/// Nothing at all was measured.
-fn rule_nothing(evidence: &[Evidence], about: Cause) -> Ruling {
+/// Judges an attempt without parts.
+fn judge_empty(evidence: &[Evidence], default_cause: Cause) -> Ruling {
     let all: Vec<&Evidence> = evidence.iter().collect();
-    rule(&Case {
+    apply_rules(&Case {
         verdict: Verdict::worst([]),
-        broken: false,
-        about,
+        exceeds_limit: false,
+        default_cause,
         evidence: &all,
     })
 }
 
-/// When attempts are made again.
+/// When a failed check is repeated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RepeatRule {
-    /// How often at most.
+    /// Maximum number of repeats.
     pub at_most: u32,
-    /// So many in a row must be good after a failure.
+    /// Consecutive passes required after a failure.
     pub must_pass: u32,
 }
 
 impl RepeatRule {
-    /// A check that is never made again.
+    /// No repeats.
     pub const NEVER: Self = Self {
         at_most: 0,
         must_pass: 1,
     };
 
-    /// Whether a further attempt may change the verdict.
+    /// Whether another attempt could change the verdict.
     #[must_use]
-    pub fn goes_on(&self, attempts: &[Attempt]) -> bool {
+    pub fn should_repeat(&self, attempts: &[Attempt]) -> bool {
         let left = self.at_most.saturating_sub(repeats(attempts));
         let failed = attempts.iter().any(|a| !a.verdict.is_good());
-        let in_a_row = passed_in_a_row(attempts);
-        failed && in_a_row < self.must_pass && in_a_row + left >= self.must_pass && left > 0
+        let passes = trailing_passes(attempts);
+        failed && passes < self.must_pass && passes + left >= self.must_pass && left > 0
     }
 
-    /// What the attempts say together, and in words how, when there was more than one or one was not good. Without a failure
-    /// the only attempt's verdict holds. After a failure the worst attempt's holds, or MARGINAL once enough in a row were
-    /// good: never PASS.
+    /// Combines the attempts. Without a failure the verdict of the only attempt stands. After a failure the worst verdict stands, or
+    /// MARGINAL after enough consecutive passes; never PASS. The explanation is present for repeated checks.
     #[must_use]
-    pub fn together(&self, attempts: &[Attempt]) -> Together {
-        let weight = |a: &&Attempt| (a.verdict, a.cause != Some(Cause::Infrastructure));
-        let Some(worst) = attempts.iter().max_by_key(weight) else {
-            return Together {
+    pub fn combine(&self, attempts: &[Attempt]) -> CombinedVerdict {
+        let severity = |a: &&Attempt| (a.verdict, a.cause != Some(Cause::Infrastructure));
+        let Some(worst) = attempts.iter().max_by_key(severity) else {
+            return CombinedVerdict {
                 verdict: Verdict::worst([]),
                 cause: None,
                 rule: None,
-                words: None,
+                explanation: None,
             };
         };
-        let in_a_row = passed_in_a_row(attempts);
-        let made = repeats(attempts);
-        if worst.verdict.is_good() || (made > 0 && in_a_row >= self.must_pass) {
-            let repeated = made > 0 && !worst.verdict.is_good();
-            return Together {
-                verdict: if repeated {
+        let passes = trailing_passes(attempts);
+        let repeated = repeats(attempts);
+        if worst.verdict.is_good() || (repeated > 0 && passes >= self.must_pass) {
+            let is_repeated = repeated > 0 && !worst.verdict.is_good();
+            return CombinedVerdict {
+                verdict: if is_repeated {
                     Verdict::Marginal
                 } else {
                     worst.verdict
                 },
                 cause: None,
                 rule: None,
-                words: repeated.then(|| {
+                explanation: is_repeated.then(|| {
                     format!(
-                        "{} at first; good {in_a_row} times in a row when repeated, so MARGINAL",
+                        "{} at first; passed {passes} times in a row when repeated, so MARGINAL",
                         attempts[0].verdict.name()
                     )
                 }),
             };
         }
-        let words = (made > 0).then(|| {
+        let explanation = (repeated > 0).then(|| {
             let good = attempts.iter().filter(|a| a.verdict.is_good()).count();
             format!(
-                "repeated {} and good {}: {} in a row were needed, so the failure stays",
-                times(made),
+                "repeated {}, passed {}: {} passes in a row were needed, so the failure stands",
+                times(repeated),
                 times(u32::try_from(good).unwrap_or(u32::MAX)),
                 self.must_pass
             )
         });
-        Together {
+        CombinedVerdict {
             verdict: worst.verdict,
             cause: worst.cause,
             rule: worst.rule.clone(),
-            words,
+            explanation,
         }
     }
 }
 
-/// What the attempts at a check say together.
+/// Combined verdict of the attempts at a check.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Together {
-    /// After the rules of repeats.
+pub struct CombinedVerdict {
+    /// Verdict under the repeat rule.
     pub verdict: Verdict,
-    /// Where to look, when it is not good.
+    /// Where to look; `None` when the verdict is good.
     pub cause: Option<Cause>,
-    /// The rule that told it.
+    /// Name of the rule behind the cause.
     pub rule: Option<String>,
-    /// How it came from the attempts.
-    pub words: Option<String>,
+    /// How the verdict follows from the attempts.
+    pub explanation: Option<String>,
 }
 
 fn repeats(attempts: &[Attempt]) -> u32 {
     u32::try_from(attempts.len().saturating_sub(1)).unwrap_or(u32::MAX)
 }
 
-fn passed_in_a_row(attempts: &[Attempt]) -> u32 {
+fn trailing_passes(attempts: &[Attempt]) -> u32 {
     let good = attempts.iter().rev().take_while(|a| a.verdict.is_good());
     u32::try_from(good.count()).unwrap_or(u32::MAX)
 }

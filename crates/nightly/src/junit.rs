@@ -1,7 +1,7 @@
-//! A night as JUnit XML, for programs that collect test results: one test suite, one test case per check.
+//! A night as JUnit XML for CI servers: one test suite with one test case per check.
 //!
-//! FAIL is a `failure`, INCONCLUSIVE a `failure` of its own type; INVALID, and whatever the computer or this program is at fault
-//! for, an `error`; SKIPPED is `skipped`. MARGINAL passes, and says so in its output.
+//! FAIL becomes `failure`, INCONCLUSIVE becomes `failure` with its own type, and SKIPPED becomes `skipped`. INVALID, and failures
+//! caused by the computer or by skinrig, become `error`. MARGINAL passes; its output shows it.
 
 use std::fmt::Write as _;
 
@@ -9,24 +9,24 @@ use skinrig_model::text::visible;
 
 use crate::cause::Cause;
 use crate::night::{CheckResult, Night};
-use crate::rules::{ACROSS, RULES};
+use crate::rules::{CROSS_CHECK_RULES, RULES};
 use crate::verdict::Verdict;
 
-/// How a check is told in JUnit's words.
+/// JUnit outcome of a test case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// A test case without a child.
+    /// No child element.
     Passed,
     /// `failure`.
     Failure,
-    /// `error`: the test could not tell.
+    /// `error`: the test could not decide.
     Error,
     /// `skipped`.
     Skipped,
 }
 
 impl Outcome {
-    /// Of a check.
+    /// Outcome for a verdict and its cause.
     #[must_use]
     pub const fn of(verdict: Verdict, cause: Option<Cause>) -> Self {
         match (verdict, cause) {
@@ -40,7 +40,7 @@ impl Outcome {
     }
 }
 
-/// The night as a JUnit document. `host` is the computer's name.
+/// Formats a night as a JUnit document. `host` is the computer's name.
 #[must_use]
 pub fn junit(night: &Night, host: &str) -> String {
     let count = |outcome: Outcome| {
@@ -56,34 +56,34 @@ pub fn junit(night: &Night, host: &str) -> String {
         night.took_s.max(0.0)
     );
     let mut out = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
-    let name = escaped(&night.suite);
-    // What reads JUnit knows dates without a zone; all of ours are UTC.
-    let at = escaped(night.started.trim_end_matches('Z'));
-    let host = escaped(host);
-    push(
+    let name = escape(&night.suite);
+    // JUnit readers expect timestamps without a time zone; ours are UTC.
+    let at = escape(night.started.trim_end_matches('Z'));
+    let host = escape(host);
+    push_line(
         &mut out,
         0,
         &format!("<testsuites name=\"{name}\" {counts}>"),
     );
-    push(
+    push_line(
         &mut out,
         1,
         &format!("<testsuite name=\"{name}\" {counts} timestamp=\"{at}\" hostname=\"{host}\">"),
     );
     properties(&mut out, night);
     for check in &night.checks {
-        case(&mut out, night, check);
+        test_case(&mut out, night, check);
     }
-    push(&mut out, 1, "</testsuite>");
-    push(&mut out, 0, "</testsuites>");
+    push_line(&mut out, 1, "</testsuite>");
+    push_line(&mut out, 0, "</testsuites>");
     out
 }
 
 fn properties(out: &mut String, night: &Night) {
-    push(out, 2, "<properties>");
+    push_line(out, 2, "<properties>");
     let mut property = |name: &str, value: &str| {
-        let (name, value) = (escaped(name), escaped(value));
-        push(
+        let (name, value) = (escape(name), escape(value));
+        push_line(
             out,
             3,
             &format!("<property name=\"{name}\" value=\"{value}\"/>"),
@@ -99,62 +99,62 @@ fn properties(out: &mut String, night: &Night) {
     for (device, version) in &night.versions.firmware {
         property(&format!("firmware {device}"), version);
     }
-    push(out, 2, "</properties>");
+    push_line(out, 2, "</properties>");
 }
 
-fn case(out: &mut String, night: &Night, check: &CheckResult) {
+fn test_case(out: &mut String, night: &Night, check: &CheckResult) {
     let took_s = check.attempts.iter().fold(0.0, |sum, a| sum + a.took_s);
-    push(
+    push_line(
         out,
         2,
         &format!(
             "<testcase name=\"{}\" classname=\"{}\" time=\"{took_s:.3}\">",
-            escaped(&check.name),
-            escaped(&night.suite)
+            escape(&check.name),
+            escape(&night.suite)
         ),
     );
     let kind = check.verdict.name();
-    let message = escaped(&message(check));
+    let message = escape(&message(check));
     match Outcome::of(check.verdict, check.cause) {
         Outcome::Passed => {}
-        Outcome::Skipped => push(out, 3, &format!("<skipped message=\"{message}\"/>")),
-        Outcome::Failure => child(out, "failure", kind, &message, check),
-        Outcome::Error => child(out, "error", kind, &message, check),
+        Outcome::Skipped => push_line(out, 3, &format!("<skipped message=\"{message}\"/>")),
+        Outcome::Failure => failure(out, "failure", kind, &message, check),
+        Outcome::Error => failure(out, "error", kind, &message, check),
     }
     let values = values(check);
     if !values.is_empty() {
-        push(
+        push_line(
             out,
             3,
-            &format!("<system-out>{}</system-out>", escaped(&values)),
+            &format!("<system-out>{}</system-out>", escape(&values)),
         );
     }
-    push(out, 2, "</testcase>");
+    push_line(out, 2, "</testcase>");
 }
 
-fn child(out: &mut String, tag: &str, kind: &str, message: &str, check: &CheckResult) {
-    let text = escaped(&seen(check));
-    push(
+fn failure(out: &mut String, tag: &str, kind: &str, message: &str, check: &CheckResult) {
+    let text = escape(&evidence_text(check));
+    push_line(
         out,
         3,
         &format!("<{tag} type=\"{kind}\" message=\"{message}\">{text}</{tag}>"),
     );
 }
 
-/// Why it is as it is, in one line.
+/// One-line reason of the verdict.
 fn message(check: &CheckResult) -> String {
     if let Some(reason) = &check.skipped {
         return reason.clone();
     }
     let cause = check.cause.map_or("", Cause::name);
-    let all = RULES.iter().chain(ACROSS);
+    let all = RULES.iter().chain(CROSS_CHECK_RULES);
     let named = |rule: &String| all.clone().find(|r| r.name == rule).map(|r| r.reason);
     let reason = check.rule.as_ref().and_then(named);
     format!("{cause}: {}", reason.unwrap_or("a limit was broken"))
 }
 
-/// What was seen, and what to do next.
-fn seen(check: &CheckResult) -> String {
+/// Evidence and next steps.
+fn evidence_text(check: &CheckResult) -> String {
     let mut text = String::new();
     for e in check.attempts.iter().flat_map(|a| &a.evidence) {
         // Writing to a String cannot fail.
@@ -166,7 +166,7 @@ fn seen(check: &CheckResult) -> String {
     text
 }
 
-/// Everything that was measured, a line each, every attempt.
+/// All measurements of all attempts, one per line.
 fn values(check: &CheckResult) -> String {
     let mut text = String::new();
     for (number, attempt) in (1..).zip(&check.attempts) {
@@ -197,7 +197,7 @@ fn values(check: &CheckResult) -> String {
     text
 }
 
-fn push(out: &mut String, depth: usize, line: &str) {
+fn push_line(out: &mut String, depth: usize, line: &str) {
     for _ in 0..depth {
         out.push_str("  ");
     }
@@ -205,8 +205,8 @@ fn push(out: &mut String, depth: usize, line: &str) {
     out.push('\n');
 }
 
-/// Text for an attribute or an element: what acts instead of showing is written out, other characters that XML 1.0 forbids are replaced.
-fn escaped(text: &str) -> String {
+/// Escapes text for XML. Replaces characters that XML 1.0 forbids.
+fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in visible(text).chars() {
         match c {

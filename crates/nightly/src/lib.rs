@@ -1,9 +1,9 @@
-//! What a night of checks says: verdicts, causes, results, trends. Numbers in, numbers out.
+//! Verdicts, causes and trends of nightly runs. Pure computation, without devices or files.
 //!
 //! A [`Night`] is a tree: checks, their attempts, the parts of an attempt (one per device), the measurements of a part.
-//! Every measurement meets the limit that was stated before it was made; the worst child's verdict is its parent's
-//! ([`Verdict`]). What kept something from being measured, and what else was seen, is [`Evidence`]; [`rules`] tell from
-//! it whether the skin, the rig, the computer or the software is to be looked at.
+//! Every measurement is compared with a limit stated in advance; a parent takes the worst verdict of its children ([`Verdict`]).
+//! [`Evidence`] records what prevented a measurement and what else was observed. From it, [`rules`] derive whether to look at the
+//! skin, the rig, the computer or the software.
 
 mod cause;
 pub mod evidence;

@@ -1,4 +1,4 @@
-//! What a night of checks found: a tree from the suite down to single measurements, as it is stored and shown.
+//! Results of a night: a tree from the suite down to single measurements, as stored and displayed.
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::Limit;
@@ -7,7 +7,7 @@ use crate::cause::Cause;
 use crate::evidence::Evidence;
 use crate::verdict::{NightExit, Verdict};
 
-/// Version of the JSON form.
+/// Version of the JSON format.
 pub const NIGHT_VERSION: u32 = 1;
 
 /// A night: one pass of a suite over a bench.
@@ -15,52 +15,52 @@ pub const NIGHT_VERSION: u32 = 1;
 pub struct Night {
     /// [`NIGHT_VERSION`].
     pub version: u32,
-    /// Names this night everywhere: start and suite, for example `2026-11-20T02-00-00Z-nightly`.
+    /// Unique ID: start time and suite, for example `2026-11-20T02-00-00Z-nightly`.
     pub id: String,
     /// Name of the suite.
     pub suite: String,
-    /// SHA-256 of its text.
+    /// SHA-256 of the suite's text.
     pub suite_sha256: String,
-    /// Name of the bench; says `emulated` when it is.
+    /// Name of the bench; contains `emulated` for an emulated one.
     pub rig: String,
     /// `bench` or `emulated`.
     pub rig_kind: String,
     /// SHA-256 of the rig file's text.
     pub rig_sha256: String,
-    /// What ran.
+    /// Versions in use.
     pub versions: Versions,
-    /// When it began, RFC 3339, UTC.
+    /// Start time, RFC 3339, UTC.
     pub started: String,
-    /// How long it took, s.
+    /// Duration, s.
     pub took_s: f64,
-    /// How long it was planned to take without repeats, s.
+    /// Estimated duration without repeats, s.
     pub planned_s: f64,
-    /// How long it might take, s.
+    /// Time limit, s.
     pub budget_s: f64,
-    /// Whether it came to its end. A night that is under way, or whose program died, is not: what stands in it holds.
+    /// Whether the night ended normally. The results of an interrupted night are still valid.
     pub finished: bool,
-    /// Why it ended before its last check, when it did.
+    /// Why it ended before its last check, if it did.
     pub ended_early: Option<String>,
-    /// How the lease of the bench was got, when there is something to say: a takeover.
+    /// How the lease was taken over, if it was.
     pub lease_note: Option<String>,
-    /// The checks in the order in which they were made.
+    /// Checks in order of execution.
     pub checks: Vec<CheckResult>,
-    /// The golden session, when there is one.
+    /// The golden session, if there is one.
     pub golden: Option<Golden>,
-    /// The worst of the checks'.
+    /// The worst verdict of the checks.
     pub verdict: Verdict,
-    /// How the program ends.
+    /// Exit code of the program.
     pub exit: NightExit,
 }
 
-/// The versions that a change of a metric may come from.
+/// Versions whose change may explain a change of a metric.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Versions {
-    /// This program: version, commit, a digest of what the sources differ by; `commit unknown` when built outside a repository.
+    /// skinrig: version, commit, and a digest of uncommitted changes; `commit unknown` when built outside a repository.
     pub software: String,
-    /// Of the analysis: results of two versions do not compare.
+    /// Analysis version. Results of different versions are not comparable.
     pub analysis: u32,
-    /// `robot`, `camera1`, ... and its firmware.
+    /// Firmware by device.
     pub firmware: Vec<(String, String)>,
     /// Name of the golden skin, from its protocol.
     pub skin: Option<String>,
@@ -71,107 +71,107 @@ pub struct Versions {
 pub struct Golden {
     /// The session file, relative to the night's folder.
     pub session: String,
-    /// Its report, likewise.
+    /// Its report, relative to the night's folder.
     pub report: Option<String>,
-    /// Digest of its results.
+    /// Digest of the analysis results.
     pub results_sha256: Option<String>,
 }
 
-/// One check.
+/// Result of one check.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CheckResult {
-    /// As in the suite: `trigger_loopback`.
+    /// Name as in the suite: `trigger_loopback`.
     pub name: String,
-    /// For people.
+    /// Display name.
     pub title: String,
-    /// How long one attempt was planned to take, s.
+    /// Estimated duration of one attempt, s.
     pub planned_s: f64,
-    /// Every attempt, in order; none when it was skipped.
+    /// Attempts in order; empty if the check was skipped.
     pub attempts: Vec<Attempt>,
-    /// Why it was not made.
+    /// Why the check was skipped.
     pub skipped: Option<String>,
-    /// After the rules of repeats.
+    /// Verdict under the repeat rule.
     pub verdict: Verdict,
-    /// In words, how the verdict came from the attempts, when there was more than one.
+    /// How the verdict follows from the attempts, if there was more than one.
     pub repeats: Option<String>,
-    /// Where to look, when it is not good.
+    /// Where to look; `None` when the verdict is good.
     pub cause: Option<Cause>,
-    /// The rule that told the cause.
+    /// Name of the rule behind the cause.
     pub rule: Option<String>,
-    /// Other checks of the night that the rule relies on.
+    /// Names of other checks that the rule relies on.
     pub witnesses: Vec<String>,
 }
 
 /// One attempt at a check.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Attempt {
-    /// When it began, s after the night's start.
+    /// Start, s after the start of the night.
     pub began_s: f64,
-    /// s.
+    /// Duration, s.
     pub took_s: f64,
-    /// One per device.
+    /// One part per device.
     pub parts: Vec<Part>,
-    /// What else was seen.
+    /// Other observations.
     pub evidence: Vec<Evidence>,
-    /// The worst of the parts', after the rules over the evidence.
+    /// The worst verdict of the parts, after the rules.
     pub verdict: Verdict,
-    /// Where to look, when it is not good.
+    /// Where to look; `None` when the verdict is good.
     pub cause: Option<Cause>,
-    /// The rule that told the cause; `None`: a limit was broken, and nothing was seen that explains it.
+    /// Name of the rule behind the cause; `None`: a limit was broken, and no evidence explains it.
     pub rule: Option<String>,
 }
 
-/// What an attempt says of one device.
+/// Measurements of one device in an attempt.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Part {
     /// `robot`, `camera1`, `camera2`, `trigger box`, `computer`, `skin`.
     pub subject: String,
     /// In the order of the suite's metrics.
     pub measurements: Vec<Measurement>,
-    /// The worst of the measurements', before the rules over the evidence.
+    /// The worst verdict of the measurements, before the rules.
     pub verdict: Verdict,
 }
 
-/// One measured value and its limit.
+/// A measured value with its limit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
-    /// As in the suite: `jitter`.
+    /// Metric name as in the suite: `jitter`.
     pub metric: String,
     /// `None`: not measured.
     pub value: Option<f64>,
     /// Unit of the value; empty for counts.
     pub unit: String,
-    /// 95 % interval, when there is one.
+    /// 95 % interval, if known.
     pub interval: Option<[f64; 2]>,
-    /// Samples behind the value.
+    /// Number of samples behind the value.
     pub n: Option<u64>,
-    /// How many samples it needs.
+    /// Minimum number of samples.
     pub needs: u64,
-    /// Stated before. `None`: for the record.
+    /// Limit stated in advance. `None`: recorded only.
     pub limit: Option<Limit>,
-    /// What it means.
+    /// Verdict on this value alone.
     pub verdict: Verdict,
-    /// Anything to add.
+    /// Remark for the reader.
     pub note: Option<String>,
 }
 
 impl Part {
-    /// Whether something was measured beyond its limit, other than not measured at all.
+    /// Whether a measured value is beyond its limit. Missing values do not count.
     #[must_use]
-    pub(crate) fn is_broken(&self) -> bool {
+    pub(crate) fn exceeds_limit(&self) -> bool {
         let measured = |m: &Measurement| m.verdict == Verdict::Fail && m.value.is_some();
         self.measurements.iter().any(measured)
     }
 }
 
 impl Night {
-    /// Tells verdict and exit from the checks.
-    pub fn conclude(&mut self) {
+    /// Recomputes verdict and exit code from the checks.
+    pub fn update_verdict(&mut self) {
         self.verdict = Verdict::worst(self.checks.iter().map(|c| c.verdict));
         self.exit = NightExit::of(self.checks.iter().map(|c| (c.verdict, c.cause)));
     }
 
-    /// The last attempt's measurements, each with the name of its series: `check/subject/metric`.
+    /// Measurements of the last attempts, each with its series name: `check/subject/metric`.
     pub fn series(&self) -> impl Iterator<Item = (String, &Measurement)> {
         self.checks.iter().flat_map(|check| {
             let last = check.attempts.last();

@@ -1,48 +1,48 @@
-//! Where to look when something is not good: rules over the evidence, each with its name and its reason.
+//! Rules that derive the cause of a bad verdict from evidence.
 
 use crate::cause::Cause;
 use crate::evidence::{Evidence, EvidenceKind};
 use crate::night::CheckResult;
 use crate::verdict::Verdict;
 
-/// What the rules make of a verdict.
+/// Result of the rules.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ruling {
-    /// The verdict with the evidence in mind.
+    /// Verdict after considering the evidence.
     pub verdict: Verdict,
-    /// Where to look; `None` when it is good.
+    /// Where to look; `None` when the verdict is good.
     pub cause: Option<Cause>,
-    /// The rule that said so; `None`: a limit was broken, and nothing was seen that explains it.
+    /// Name of the applied rule; `None`: a limit was broken, and no evidence explains it.
     pub rule: Option<&'static str>,
 }
 
-/// One rule: what speaks for it, and what it means.
+/// A rule: which evidence triggers it, and what follows.
 #[derive(Debug, Clone, Copy)]
 pub struct Rule {
-    /// Its name, in results.
+    /// Name in results.
     pub name: &'static str,
-    /// Evidence of these kinds speaks for it.
-    pub seen: &'static [EvidenceKind],
-    /// Where to look then; `None`: at what the check is about.
+    /// Kinds of evidence that trigger it.
+    pub kinds: &'static [EvidenceKind],
+    /// Where to look; `None`: the default cause of the check.
     pub cause: Option<Cause>,
-    /// What becomes of a verdict that is not good. INCONCLUSIVE explains what was not measured, and no broken limit.
+    /// Replaces a bad verdict. INCONCLUSIVE explains a missing measurement, never a broken limit.
     pub verdict: Verdict,
-    /// Why, for people.
+    /// Explanation for the reader.
     pub reason: &'static str,
 }
 
-/// The rules, strongest first: the first one whose evidence was seen tells the cause.
+/// The rules by precedence: the first one with matching evidence decides.
 pub const RULES: &[Rule] = &[
     Rule {
         name: "software-fault",
-        seen: &[EvidenceKind::Software],
+        kinds: &[EvidenceKind::Software],
         cause: Some(Cause::Software),
         verdict: Verdict::Fail,
         reason: "this program failed; nothing is known about the bench",
     },
     Rule {
         name: "not-reachable",
-        seen: &[
+        kinds: &[
             EvidenceKind::Absent,
             EvidenceKind::NotPermitted,
             EvidenceKind::Busy,
@@ -50,18 +50,18 @@ pub const RULES: &[Rule] = &[
         ],
         cause: Some(Cause::Infrastructure),
         verdict: Verdict::Fail,
-        reason: "a device could not be reached from this computer: cable, power, permission, or another program",
+        reason: "a device could not be reached from this computer: cable, power, permissions, or another program",
     },
     Rule {
         name: "computer-held-up",
-        seen: &[EvidenceKind::Disk, EvidenceKind::HostLate],
+        kinds: &[EvidenceKind::Disk, EvidenceKind::HostLate],
         cause: Some(Cause::Infrastructure),
         verdict: Verdict::Fail,
-        reason: "the computer did not keep up",
+        reason: "the computer was too slow",
     },
     Rule {
         name: "device-at-fault",
-        seen: &[
+        kinds: &[
             EvidenceKind::DeviceLost,
             EvidenceKind::OtherDevice,
             EvidenceKind::ReadBack,
@@ -73,72 +73,72 @@ pub const RULES: &[Rule] = &[
         ],
         cause: Some(Cause::Rig),
         verdict: Verdict::Invalid,
-        reason: "a device of the rig was at fault; what was measured with it says nothing about the skin",
+        reason: "a device of the rig was faulty; measurements with it do not describe the skin",
     },
     Rule {
         name: "not-plausible",
-        seen: &[EvidenceKind::Audit],
+        kinds: &[EvidenceKind::Audit],
         cause: None,
         verdict: Verdict::Fail,
-        reason: "the session of the golden skin could not be analysed, or its numbers contradict one another",
+        reason: "the session of the golden skin could not be analysed, or its numbers contradict each other",
     },
     Rule {
         name: "ended-early",
-        seen: &[EvidenceKind::Stopped, EvidenceKind::TimeOut],
+        kinds: &[EvidenceKind::Stopped, EvidenceKind::TimeOut],
         cause: Some(Cause::Infrastructure),
         verdict: Verdict::Inconclusive,
-        reason: "somebody ended the suite, or its time ran out, before this was measured",
+        reason: "not measured: the suite was stopped or timed out",
     },
     Rule {
         name: "too-little",
-        seen: &[EvidenceKind::TooLittle],
+        kinds: &[EvidenceKind::TooLittle],
         cause: None,
         verdict: Verdict::Inconclusive,
-        reason: "too few samples to say",
+        reason: "too few samples for a verdict",
     },
 ];
 
-/// The rule across the checks of one night. Its evidence is other checks, not a kind of [`Evidence`].
+/// Rule for the golden skin. It is triggered by other checks of the night, not by [`Evidence`].
 pub const GOLDEN_ON_A_BAD_RIG: Rule = Rule {
     name: "golden-on-a-bad-rig",
-    seen: &[],
+    kinds: &[],
     cause: Some(Cause::Rig),
     verdict: Verdict::Invalid,
-    reason: "a device that the golden campaign relies on was found at fault in the same night",
+    reason: "a device that the golden campaign relies on was faulty in the same night",
 };
 
-/// The rule for presses of an arm that moves badly. Its evidence is other checks, as above.
+/// Rule for presses of an arm that moves badly. It is triggered by other checks as well.
 pub(crate) const TOUCH_ON_A_BAD_ARM: Rule = Rule {
     name: "touch-on-a-bad-arm",
-    seen: &[],
+    kinds: &[],
     cause: Some(Cause::Rig),
     verdict: Verdict::Inconclusive,
-    reason: "the arm did not move as it should in the same night: friction shifts the force at which a touch is detected",
+    reason: "the arm moved badly in the same night: friction shifts the force at which a touch is detected",
 };
 
-/// Rules whose evidence is other checks of the same night.
-pub const ACROSS: [&Rule; 2] = [&GOLDEN_ON_A_BAD_RIG, &TOUCH_ON_A_BAD_ARM];
+/// Rules triggered by other checks of the same night.
+pub const CROSS_CHECK_RULES: [&Rule; 2] = [&GOLDEN_ON_A_BAD_RIG, &TOUCH_ON_A_BAD_ARM];
 
-/// What a verdict is about.
+/// Input of the rules: a verdict and its evidence.
 #[derive(Debug, Clone, Copy)]
 pub struct Case<'a> {
-    /// Before the rules.
+    /// Verdict before the rules.
     pub verdict: Verdict,
-    /// Something was measured beyond its limit, other than not measured at all.
-    pub broken: bool,
-    /// What a broken limit speaks of when nothing else was seen.
-    pub about: Cause,
-    /// What was seen.
+    /// Whether a measured value is beyond its limit. Missing values do not count.
+    pub exceeds_limit: bool,
+    /// Cause of a broken limit without evidence.
+    pub default_cause: Cause,
+    /// Evidence to consider.
     pub evidence: &'a [&'a Evidence],
 }
 
-/// What the evidence makes of a verdict. A good one stays: evidence explains a failure, it does not make one.
+/// Applies the rules. A good verdict stands: evidence explains failures and does not create them.
 #[must_use]
-pub fn rule(case: &Case<'_>) -> Ruling {
+pub fn apply_rules(case: &Case<'_>) -> Ruling {
     let Case {
         verdict,
-        broken,
-        about,
+        exceeds_limit,
+        default_cause,
         evidence,
     } = *case;
     if verdict.is_good() {
@@ -148,26 +148,26 @@ pub fn rule(case: &Case<'_>) -> Ruling {
             rule: None,
         };
     }
-    let speaks = |rule: &&Rule| {
-        let explains = rule.verdict != Verdict::Inconclusive || !broken;
-        explains && evidence.iter().any(|e| rule.seen.contains(&e.kind))
+    let matches = |rule: &&Rule| {
+        let explains = rule.verdict != Verdict::Inconclusive || !exceeds_limit;
+        explains && evidence.iter().any(|e| rule.kinds.contains(&e.kind))
     };
-    RULES.iter().find(speaks).map_or(
+    RULES.iter().find(matches).map_or(
         Ruling {
             verdict,
-            cause: Some(about),
+            cause: Some(default_cause),
             rule: None,
         },
         |rule| Ruling {
             verdict: rule.verdict,
-            cause: Some(rule.cause.unwrap_or(about)),
+            cause: Some(rule.cause.unwrap_or(default_cause)),
             rule: Some(rule.name),
         },
     )
 }
 
-/// Checks of whose devices the golden campaign makes use, by name: when one of them is the rig's fault, a golden skin beyond its
-/// limits says nothing about the skin. The drills come after it and ask about the arm's brakes alone; the disk is the computer's.
+/// Names of the checks of devices that the golden campaign uses. If one of them fails because of the rig, a golden skin beyond its
+/// limits says nothing about the skin. The drills run later and test the brakes only; the disk belongs to the computer.
 pub const WITNESSES: &[&str] = &[
     "identity",
     "settings",
@@ -184,13 +184,13 @@ pub const WITNESSES: &[&str] = &[
     "force_ceiling",
 ];
 
-/// Checks of the free arm's motion, and the check whose touches rely on it, by name.
+/// Checks of the arm's free motion, and the check whose touches rely on it.
 const ARM_MOTION: [&str; 2] = ["repeatability", "step_response"];
-const PRESSES: &str = "depth";
+const PRESS_CHECK: &str = "depth";
 
-/// The rules across the checks of one night: faults that other checks found change the verdict of presses and of the golden skin.
-pub fn across(checks: &mut [CheckResult]) {
-    touches(checks);
+/// Applies the rules triggered by other checks of the night: they change the verdicts of presses and of the golden skin.
+pub fn apply_cross_check_rules(checks: &mut [CheckResult]) {
+    downgrade_presses(checks);
     let at_fault = |c: &&CheckResult| {
         WITNESSES.contains(&c.name.as_str()) && !c.verdict.is_good() && c.cause == Some(Cause::Rig)
     };
@@ -213,8 +213,8 @@ pub fn across(checks: &mut [CheckResult]) {
     }
 }
 
-/// A good press of a bad arm is not evidence of a good frame.
-fn touches(checks: &mut [CheckResult]) {
+/// A good press result of an arm that moves badly does not prove that the frame is right.
+fn downgrade_presses(checks: &mut [CheckResult]) {
     let moves_badly = |c: &&CheckResult| {
         ARM_MOTION.contains(&c.name.as_str()) && !c.verdict.is_good() && c.cause == Some(Cause::Rig)
     };
@@ -224,7 +224,7 @@ fn touches(checks: &mut [CheckResult]) {
         return;
     }
     let made = |c: &&mut CheckResult| c.verdict.is_good() && c.skipped.is_none();
-    let presses = checks.iter_mut().filter(|c| c.name == PRESSES);
+    let presses = checks.iter_mut().filter(|c| c.name == PRESS_CHECK);
     for press in presses.filter(made) {
         press.verdict = TOUCH_ON_A_BAD_ARM.verdict;
         press.cause = TOUCH_ON_A_BAD_ARM.cause;

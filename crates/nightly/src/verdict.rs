@@ -1,31 +1,30 @@
-//! Verdicts, from a single measurement up to a night, and the code that a night ends with.
+//! Verdicts on measurements, checks and nights, and the exit code of a night.
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::{Limit, Side};
 
 use crate::cause::Cause;
 
-/// What is said of a measurement, of everything above it, and of the night. In the order of their weight: of several, the last
-/// one holds.
+/// Verdict, ordered by severity: a parent takes the worst verdict of its children.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "SCREAMING_SNAKE_CASE")]
 pub enum Verdict {
-    /// Not made, for a stated reason. Weighs nothing: what was made decides.
+    /// Not run, for a stated reason. Never outweighs another verdict.
     Skipped,
     /// Within its limit.
     Pass,
-    /// Within its limit and nearer to it than the margin, or passed only when repeated.
+    /// Within its limit but close to it, or passed only when repeated.
     Marginal,
-    /// Too little data to say.
+    /// Too little data for a verdict.
     Inconclusive,
     /// Beyond its limit, or not measured.
     Fail,
-    /// The rig was at fault: what was measured says nothing about what it was meant to measure.
+    /// The rig was faulty: the measurement does not describe its subject.
     Invalid,
 }
 
 impl Verdict {
-    /// As people read it: `PASS`.
+    /// Display name: `PASS`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -38,7 +37,7 @@ impl Verdict {
         }
     }
 
-    /// All of them, in the order of their weight.
+    /// All verdicts by severity.
     pub const ALL: [Self; 6] = [
         Self::Skipped,
         Self::Pass,
@@ -48,22 +47,27 @@ impl Verdict {
         Self::Invalid,
     ];
 
-    /// Whether nothing needs to be done: passed, marginal or skipped.
+    /// Whether no action is needed: passed, marginal or skipped.
     #[must_use]
     pub const fn is_good(self) -> bool {
         matches!(self, Self::Skipped | Self::Pass | Self::Marginal)
     }
 
-    /// The worst of `children`. A parent without children was not measured: FAIL.
+    /// The worst of `children`. Without children nothing was measured: FAIL.
     #[must_use]
     pub fn worst(children: impl IntoIterator<Item = Self>) -> Self {
         children.into_iter().max().unwrap_or(Self::Fail)
     }
 
-    /// The verdict on a measured `value` (`None`: not measured) from `n` samples of which `needed` are too few, under `limit`
-    /// (`None`: for the record, and always PASS).
+    /// Verdict on `value` (`None`: not measured) from `n` samples, of which at least `needed` are required, under `limit` (`None`:
+    /// recorded only, always PASS).
     #[must_use]
-    pub fn on(value: Option<f64>, n: Option<u64>, needed: u64, limit: Option<&Limit>) -> Self {
+    pub fn of_measurement(
+        value: Option<f64>,
+        n: Option<u64>,
+        needed: u64,
+        limit: Option<&Limit>,
+    ) -> Self {
         let Some(limit) = limit else {
             return Self::Pass;
         };
@@ -74,35 +78,35 @@ impl Verdict {
                 Side::Near => Self::Marginal,
                 Side::Beyond => Self::Fail,
             },
-            // Unmeasured, or no number: what was asked for is not known to hold.
+            // Missing or not finite: the limit is not known to hold.
             _ => Self::Fail,
         }
     }
 }
 
-/// How a night ends. The numbers are part of the interface and do not change; 2 is bad input, before a night begins.
+/// Exit code of a night. The numbers are a stable interface; 2 is reserved for bad input before a night starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum NightExit {
-    /// Every check passed, was marginal, or was skipped for a stated reason; and one at least was made.
+    /// All checks passed, were marginal, or were skipped for a stated reason; at least one ran.
     Pass = 0,
-    /// A limit was broken, too little was measured, or nothing was checked at all.
+    /// A limit was broken, too little was measured, or no check ran.
     Fail = 1,
-    /// Nothing but the computer, its disk, its cables or its permissions is at fault.
+    /// Only the computer, its disk, cables or permissions are at fault.
     Infrastructure = 3,
-    /// A device of the rig was at fault: the night says nothing about the skin.
+    /// A device of the rig was faulty: the night says nothing about the skin.
     Invalid = 4,
 }
 
 impl NightExit {
-    /// The code for a night of which each check ended with this verdict and cause.
+    /// Exit code from the verdict and cause of each check.
     #[must_use]
     pub fn of(checks: impl IntoIterator<Item = (Verdict, Option<Cause>)>) -> Self {
         let made = checks.into_iter().filter(|(v, _)| *v != Verdict::Skipped);
         let made: Vec<_> = made.collect();
         let bad: Vec<_> = made.iter().filter(|(v, _)| !v.is_good()).collect();
         if made.is_empty() {
-            // Whoever looks at the code alone must not take a night for good in which nothing was looked at.
+            // The exit code must not report success for a night in which nothing was checked.
             Self::Fail
         } else if bad.is_empty() {
             Self::Pass
@@ -139,9 +143,13 @@ mod tests {
             (Some(0.5), Some(2), Inconclusive),
             (Some(0.5), Some(3), Pass),
         ] {
-            assert_eq!(Verdict::on(value, n, 3, Some(&limit)), verdict, "{value:?}");
+            assert_eq!(
+                Verdict::of_measurement(value, n, 3, Some(&limit)),
+                verdict,
+                "{value:?}"
+            );
         }
-        assert_eq!(Verdict::on(None, None, 3, None), Pass);
+        assert_eq!(Verdict::of_measurement(None, None, 3, None), Pass);
     }
 
     #[test]

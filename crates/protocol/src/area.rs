@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use skinrig_model::{Point2, SkinOutline};
 
-/// The skin's outline and what must not be touched.
+/// The skin's outline and keep-outs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Surroundings {
     /// The skin's outline.
@@ -29,7 +29,7 @@ impl Surroundings {
 /// An area that the tip must not enter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct KeepOut {
-    /// What stands there.
+    /// Name of the obstacle.
     pub name: String,
     /// The area.
     pub area: Area,

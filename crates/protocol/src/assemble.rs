@@ -1,4 +1,4 @@
-//! A protocol from its keys: what single keys cannot say, checked across keys.
+//! Assembles a protocol from its keys, with checks across keys.
 
 use std::path::Path;
 
@@ -234,7 +234,7 @@ fn depths_within(root: &Field, max_mm: Option<f64>, out: &mut Collector) {
         )
         .expected(format!("at most {max_mm} mm, `limits.max_depth`"))
         .found(format!("{depth_mm} mm"))
-        .help("press less deep, or raise `limits.max_depth` if the skin bears it");
+        .help("reduce the depth, or raise `limits.max_depth` if the skin can take it");
     }
 }
 

@@ -50,7 +50,7 @@ pub enum Segment {
 }
 
 impl Segment {
-    /// For messages.
+    /// Name for messages.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -154,7 +154,7 @@ struct Checker<'a> {
     press: Option<PressId>,
 }
 
-/// Rounding of coordinates that is no violation, mm.
+/// Tolerance for rounding of coordinates, mm.
 const TINY_MM: f64 = 1e-9;
 
 impl Checker<'_> {
@@ -178,7 +178,7 @@ impl Checker<'_> {
         });
     }
 
-    /// How far the violation that was added last is past its limit.
+    /// Sets by how much the last violation exceeds its limit.
     fn by(&mut self, excess: f64) {
         if let Some(last) = self.found.last_mut() {
             last.excess = excess;
@@ -202,7 +202,7 @@ impl Checker<'_> {
             if !positive(value) {
                 self.add(
                     Segment::Plan,
-                    &format!("{name} is senseless"),
+                    &format!("{name} is invalid"),
                     "a value above 0",
                     value,
                     key,
@@ -312,7 +312,7 @@ impl Checker<'_> {
         if least_s.is_nan() || deadline.as_secs_f64() <= least_s {
             self.add(
                 segment,
-                "the deadline cannot be kept",
+                "the deadline is too short",
                 format!("more than {least_s:.3} s"),
                 deadline,
                 "motion",
@@ -355,7 +355,7 @@ impl Checker<'_> {
         if !(band > 0.0 && band < room) {
             self.add(
                 Segment::Approach,
-                "the search for the surface begins or ends too far off",
+                "the surface search starts or ends too far from the surface",
                 format!("a band above 0 and below {room} mm"),
                 format!("{band} mm"),
                 "press.band",
@@ -396,7 +396,7 @@ impl Checker<'_> {
         }
     }
 
-    /// The points at which the surface is checked, and the ways between them.
+    /// The points of the surface check, and the paths between them.
     fn surface_check(&mut self, home: Option<Point3<Skin>>) {
         let Some(check) = &self.plan.surface_check else {
             return;
@@ -424,7 +424,7 @@ impl Checker<'_> {
             self.add(
                 Segment::Plan,
                 "the step is not the planned press",
-                "the same place and depth",
+                "the same location and depth",
                 format!("({}, {}) mm", at.x_mm, at.y_mm),
                 key,
             );
@@ -433,12 +433,12 @@ impl Checker<'_> {
         if position.is_none_or(|p| p.distance_mm(above) > TINY_MM) {
             self.add(
                 Segment::Approach,
-                "the press begins away from its place",
+                "the press starts away from its location",
                 format!(
                     "the tip above ({}, {}) mm at clearance height",
                     at.x_mm, at.y_mm
                 ),
-                position.map_or("an unknown place".to_owned(), |p| {
+                position.map_or("an unknown position".to_owned(), |p| {
                     format!("{:?} mm", p.to_array())
                 }),
                 key,

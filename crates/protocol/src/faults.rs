@@ -1,4 +1,4 @@
-//! Faults on purpose: `KIND@WHEN` in `faults:` of a protocol and in `--fault`, for rehearsals on the simulated rig.
+//! Injected faults: `KIND@WHEN` in `faults:` of a protocol and in `--fault`, for rehearsals on the simulated rig.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,7 +10,7 @@ use skinrig_settings::{Collector, closest};
 use skinrig_settings::{Dimension, quantity};
 use skinrig_settings::{Field, Shape, Value};
 
-/// A fault that a run makes on purpose.
+/// An injected fault of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PlantedFault {
     /// What goes wrong.
@@ -19,20 +19,20 @@ pub struct PlantedFault {
     pub when: FaultTime,
 }
 
-/// What goes wrong on purpose.
+/// Kind of an injected fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FaultKind {
-    /// A camera answers no more.
+    /// A camera stops answering.
     CameraUnplugged(CameraId),
-    /// A camera sends nothing any more and reports no error.
+    /// A camera stops sending without an error.
     CameraStalled(CameraId),
     /// A camera loses some bytes, and counts them.
     CameraDrops(CameraId),
     /// Hot pixels of a camera send a storm of events.
     CameraStorm(CameraId),
-    /// The clock of a camera is set forward.
+    /// The clock of a camera jumps forward.
     CameraClockStep(CameraId),
-    /// A camera grows hot, and cools down again.
+    /// A camera overheats, then cools down.
     CameraHot(CameraId),
     /// The next mark reaches no camera.
     TriggerLost,
@@ -40,29 +40,29 @@ pub enum FaultKind {
     TriggerDoubled,
     /// The next mark reaches the cameras late.
     TriggerDelayed,
-    /// The trigger box answers no more.
+    /// The trigger box stops answering.
     BoxSilent,
-    /// The trigger lines and what the box tells are full of noise.
+    /// Noise on the trigger lines and in the box's reports.
     BoxNoisy,
-    /// The robot answers no more; its brakes are on.
+    /// The robot stops answering; its brakes are on.
     RobotLost,
-    /// The robot does not move, whatever it is told.
+    /// The robot ignores all commands.
     RobotStalled,
     /// The robot follows its set point too slowly.
     RobotSlow,
-    /// The robot reports its tip higher than it is: presses are deeper than asked for.
+    /// The robot reports its tip higher than it is: presses are deeper than planned.
     RobotZHigh,
-    /// The robot reports its tip lower than it is: presses are less deep than asked for.
+    /// The robot reports its tip lower than it is: presses are shallower than planned.
     RobotZLow,
-    /// The robot reports a force beyond every limit for a moment.
+    /// The robot briefly reports a force beyond every limit.
     RobotForceSpike,
-    /// No pose comes any more, and no error.
+    /// The pose stream stops without an error.
     RobotStale,
-    /// The recorder holds the run up for a moment.
+    /// The recorder delays the run briefly.
     RecorderSlow,
-    /// The disk takes no record any more.
+    /// The disk is full.
     DiskFull,
-    /// The process is gone, as by `kill -9`.
+    /// The process dies, as by `kill -9`.
     Killed,
 }
 
@@ -111,35 +111,35 @@ impl FaultKind {
             .map_or("", |(name, _)| name)
     }
 
-    /// True for what happens to the records and not to a device.
+    /// True for a fault of the records rather than of a device.
     #[must_use]
     pub const fn is_of_records(self) -> bool {
         matches!(self, Self::DiskFull | Self::Killed)
     }
 }
 
-/// When a fault strikes. Numbers count from 1, through the whole run: sync presses, touches that look for the surface and
-/// attempts that did not succeed count too.
+/// Time of a fault. Numbers count from 1, through the whole run: sync presses, surface searches and failed attempts
+/// count too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FaultTime {
     /// From the start.
     Preflight,
     /// When the robot is powered.
     Arming,
-    /// So long after the start.
+    /// At this time after the start.
     Time(HostDuration),
-    /// At the n-th of these moments.
+    /// At the n-th occurrence of a phase.
     Nth(FaultPhase, u32),
     /// Before the session is sealed.
     Seal,
 }
 
-/// A moment of which a run has many.
+/// A phase that recurs in a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FaultPhase {
-    /// The tip is sent sideways above the skin.
+    /// The tip moves sideways above the skin.
     Travel,
-    /// The tip is sent down; for the records: a press is about to begin.
+    /// The tip moves down; for faults of records: a press is about to start.
     Press,
     /// The tip touches the skin.
     Contact,
@@ -168,7 +168,7 @@ const PHASES: [(&str, FaultPhase); 9] = [
 ];
 
 impl FaultTime {
-    /// Why this is no time for `kind`: what it may be instead.
+    /// The valid times of `kind`, if this is not one of them.
     fn misfit(self, kind: FaultKind) -> Option<&'static str> {
         use FaultPhase as P;
         let fits = match self {
@@ -245,7 +245,7 @@ impl FromStr for PlantedFault {
         };
         let misfit = match when {
             Some(when) => when.misfit(kind),
-            // The seal fits one kind alone, whose times are then told.
+            // Only one kind can occur at sealing; list its times.
             None => FaultTime::Seal
                 .misfit(kind)
                 .or(Some("`record:N`, `journal:N`, `press:N` or `seal`")),

@@ -39,7 +39,7 @@ const KEYS: &[&str] = &[
 /// Examples listed in one finding.
 const MOST_EXAMPLES: usize = 3;
 
-/// Where the keys stand; a key that is not given stands where the nearest mapping around it does.
+/// Locations of the keys; a missing key has that of the nearest mapping around it.
 pub(crate) fn places(root: &Field, sources: &Sources) -> BTreeMap<&'static str, Location> {
     KEYS.iter()
         .map(|key| {

@@ -1,10 +1,10 @@
-//! YAML text to a checked protocol to a flat plan of steps. Pure: no device, no clock, no file that is not injected.
+//! Compiles YAML text to a checked protocol and then to a flat plan of steps. Pure: no devices or clocks, and files only through an injected loader.
 //!
-//! 1. [`Protocol::parse`] reads a protocol and reports everything that is wrong with it at once, each finding with
-//!    file, line, column, key path, expected, found and the line itself ([`Diagnostics`]).
+//! 1. [`Protocol::parse`] reads a protocol and reports all errors at once, each with file, line, column, key path,
+//!    expected, found and the source line ([`Diagnostics`]).
 //! 2. [`Protocol::compile`] turns it into a [`Plan`]: seeds resolved, orders shuffled, positions absolute.
-//! 3. [`check()`] holds every segment of the plan against workspace, skin outline, keep-outs and limits.
-//! 4. [`Plan::summary`] and [`path_svg`] show it to people.
+//! 3. [`check()`] checks every segment of the plan against workspace, skin outline, keep-outs and limits.
+//! 4. [`Plan::summary`] and [`path_svg`] display it.
 //!
 //! [`Schedule`] describes a recording that was made without skinrig, for imports; [`RigFile`] a bench; [`Limits`] how much
 //! is a difference in a comparison; [`Suite`] what a bench is checked for. The keys of each language stand in a table, which

@@ -1,4 +1,6 @@
-//! What counts as a difference between skins: the margins of a comparison, from a file or one by one.
+//! Margins of a comparison between skins, from a file or one by one.
+
+use std::fmt;
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -14,7 +16,7 @@ const SHARE: ValueRange = ValueRange::above_zero(100.0);
 const TIME: ValueRange = ValueRange::above_zero(60.0);
 const RATE: ValueRange = ValueRange::above_zero(1e12);
 
-/// Limits of a comparison of skins: what is within a margin is no difference to care about.
+/// Limits of a comparison of skins: differences within a margin count as equal.
 #[derive(Debug, Clone, PartialEq, Serialize, Settings)]
 #[settings(name = "limits", version = "skinrig_limits")]
 pub struct Limits {
@@ -27,15 +29,15 @@ pub struct Limits {
     /// Name of these limits. Every comparison made with them shows it.
     #[setting(example = "mine")]
     pub name: String,
-    /// The error that `within_rate` asks about; absent: that of the first skin's analysis.
+    /// Error bound of `within_rate`; absent: that of the first skin's analysis.
     #[setting(range = LENGTH)]
     pub within_mm: Option<f64>,
-    /// Per metric, the largest difference that counts as none. A metric without a margin is shown and not judged.
+    /// Largest difference per metric that counts as equal. A metric without a margin is shown but not judged.
     #[setting(default = "{}", value = Vec::new(), shape = Margins::SHAPE, read = Margins::list)]
     pub margins: Vec<Margin>,
 }
 
-/// The largest difference that counts as none, by metric.
+/// Largest difference per metric that counts as equal.
 #[derive(Settings)]
 struct Margins {
     /// Of the RMSE.
@@ -80,7 +82,7 @@ struct Margins {
     /// Of the bytes per second during presses, both cameras together.
     #[setting(range = RATE)]
     press_bytes_b_s: Option<f64>,
-    /// Of the number of places that the skin tells apart.
+    /// Of the number of locations that the skin can distinguish.
     #[setting(above = 0, max = 1e9)]
     taxels: Option<f64>,
 }
@@ -105,7 +107,48 @@ impl Margins {
     }
 }
 
-/// A margin: the name of its metric, and how large.
+/// Reason why a text is not a margin.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum MarginError {
+    /// There is no `=`.
+    NoAssignment(String),
+    /// No metric has this name.
+    UnknownMetric {
+        /// The name.
+        name: String,
+        /// All metrics.
+        known: String,
+        /// Suggestion for a misspelt name.
+        help: Option<String>,
+    },
+    /// The value is not a valid margin of the metric.
+    Value {
+        /// What is valid.
+        expected: String,
+        /// What was found.
+        found: String,
+    },
+}
+
+impl fmt::Display for MarginError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoAssignment(text) => write!(
+                f,
+                "expected METRIC=MARGIN, for example rmse=0.5mm, found `{text}`"
+            ),
+            Self::UnknownMetric { name, known, help } => {
+                write!(f, "expected one of {known}, found `{name}`")?;
+                help.iter().try_for_each(|help| write!(f, "; {help}"))
+            }
+            Self::Value { expected, found } => write!(f, "expected {expected}, found {found}"),
+        }
+    }
+}
+
+impl std::error::Error for MarginError {}
+
+/// A margin of one metric.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Margin {
     /// As typed, for example `rmse`.
@@ -118,23 +161,26 @@ impl Margin {
     /// A margin as typed on the command line: `rmse=0.5mm`.
     ///
     /// # Errors
-    /// What is wrong, in one line: no `=`, no such metric, or no quantity that fits it.
-    pub fn parse(text: &str) -> Result<Self, String> {
+    /// A missing `=`, an unknown metric, or a quantity of the wrong kind.
+    pub fn parse(text: &str) -> Result<Self, MarginError> {
         let names = || Margins::TABLE.keys.iter().map(|k| k.name);
-        let (name, value) = text.split_once('=').ok_or_else(|| {
-            format!("expected METRIC=MARGIN, for example rmse=0.5mm, found `{text}`")
-        })?;
+        let (name, value) = text
+            .split_once('=')
+            .ok_or_else(|| MarginError::NoAssignment(text.to_owned()))?;
         let name = name.trim();
         let key = Margins::TABLE
             .keys
             .iter()
             .find(|k| k.name == name)
-            .ok_or_else(|| {
-                let near =
-                    did_you_mean(name, names()).map_or(String::new(), |text| format!("; {text}"));
-                format!("expected one of {}, found `{name}`{near}", one_of(names()))
+            .ok_or_else(|| MarginError::UnknownMetric {
+                name: name.to_owned(),
+                known: one_of(names()),
+                help: did_you_mean(name, names()),
             })?;
-        let wrong = |found: String| format!("expected {}, found {found}", expectation(&key.shape));
+        let wrong = |found: String| MarginError::Value {
+            expected: expectation(&key.shape),
+            found,
+        };
         let (value, range, unit) = match &key.shape {
             Shape::Quantity(wanted, range) => {
                 let found = quantity::parse(value, wanted).map_err(|e| wrong(e.found))?;
@@ -150,10 +196,10 @@ impl Margin {
             _ => return Err(wrong(format!("`{value}`"))),
         };
         if !range.contains(value) {
-            return Err(format!(
-                "expected {}, found {value} {unit}",
-                range.describe(unit)
-            ));
+            return Err(MarginError::Value {
+                expected: range.describe(unit),
+                found: format!("{value} {unit}"),
+            });
         }
         let metric = key.name;
         Ok(Self { metric, value })

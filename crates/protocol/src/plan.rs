@@ -27,13 +27,13 @@ pub struct Plan {
     pub seed: u64,
     /// Limits that hold for the whole run.
     pub limits: RunLimits,
-    /// Where the skin lies and what must not be touched; nothing is known of it when absent.
+    /// Outline of the skin and keep-outs; `None` if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surroundings: Option<Surroundings>,
-    /// How often a press may be taken again. Not written when it is the default.
+    /// Limits on retakes of a press. Not written when it is the default.
     #[serde(default, skip_serializing_if = "Retakes::is_default")]
     pub retakes: Retakes,
-    /// So many invalid presses in a row end the run; 0: no limit. Not written when it is the default.
+    /// Number of consecutive invalid presses that ends the run; 0: no limit. Not written when it is the default.
     #[serde(
         default = "default_invalid_in_a_row",
         skip_serializing_if = "is_default_invalid_in_a_row"
@@ -42,7 +42,7 @@ pub struct Plan {
     /// Where the surface is touched before the first press; `None`: nowhere.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surface_check: Option<SurfaceCheck>,
-    /// When the run waits by itself. Not written when it never does.
+    /// Conditions that suspend the run. Omitted if there are none.
     #[serde(default, skip_serializing_if = "Suspend::is_default")]
     pub suspend: Suspend,
     /// Every planned press; `presses[i].id == PressId::from_index(i)`, and the stored `id` is `i`.
@@ -82,12 +82,12 @@ pub struct RunLimits {
     /// Largest acceleration of the set point, mm/s²; the robot's own when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_acceleration_mm_s2: Option<f64>,
-    /// What the robot does when a limit is broken.
+    /// Reaction of the robot to an exceeded limit.
     #[serde(default, skip_serializing_if = "OnTrip::is_retract")]
     pub on_trip: OnTrip,
 }
 
-/// What the robot does when a measured limit is broken.
+/// Reaction of the robot to an exceeded limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum OnTrip {

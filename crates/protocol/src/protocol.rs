@@ -1,4 +1,4 @@
-//! A protocol: what the user asked for, typed and checked.
+//! A parsed and validated protocol.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -34,17 +34,17 @@ pub struct Protocol {
     pub overrides: Vec<String>,
     /// Short name of the experiment.
     pub name: String,
-    /// What it is for.
+    /// Purpose of the experiment.
     pub description: Option<String>,
-    /// Who runs it.
+    /// The operator.
     pub operator: String,
-    /// Which skin is pressed.
+    /// The skin under test.
     pub prototype: Prototype,
-    /// Seed of everything random that has no seed of its own.
+    /// Default seed of everything random.
     pub seed: u64,
-    /// What a simulated rig must be good for.
+    /// Requirements for a simulated rig.
     pub scene: Scene,
-    /// The skin's outline and what must not be touched.
+    /// The skin's outline and keep-outs.
     pub surroundings: Surroundings,
     /// Presses before everything else.
     pub sync: Option<Sync>,
@@ -52,9 +52,9 @@ pub struct Protocol {
     pub locations: Vec<Point2>,
     /// The kind of path as typed: `meander`, `circles`, `points`, `csv` or `random`.
     pub path_kind: &'static str,
-    /// What each repetition is for; its length is the number of repetitions, at least 1.
+    /// Role of each repetition; at least one.
     pub roles: Vec<PressRole>,
-    /// Go back above the first location before the pause between repetitions.
+    /// Whether to return above the first location before the pause between repetitions.
     pub return_to_start: bool,
     /// Pause between repetitions.
     pub pause_between: HostDuration,
@@ -66,49 +66,49 @@ pub struct Protocol {
     pub motion: Motion,
     /// Limits of the run.
     pub limits: RunLimits,
-    /// How often a press may be taken again.
+    /// Limits on retakes of a press.
     pub retakes: Retakes,
-    /// So many invalid presses in a row end the run; 0: no limit.
+    /// Number of consecutive invalid presses that ends the run; 0: no limit.
     pub max_consecutive_invalid: u32,
-    /// Where the surface is touched before the first press.
+    /// Surface check before the first press.
     pub surface_check: Option<SurfaceCheck>,
-    /// When the run waits by itself.
+    /// Conditions that suspend the run.
     pub suspend: Suspend,
-    /// Faults made on purpose; none in a real protocol.
+    /// Injected faults; none in a real protocol.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<PlantedFault>,
     /// Moments that emit a mark on the trigger line.
     pub marks: Vec<MarkKind>,
-    /// How presses find the surface; `None`: as the rig says, at z = 0 when it says nothing.
+    /// How presses find the surface; `None`: as set in the rig file, otherwise at z = 0.
     pub surface: Option<Surface>,
     /// Settings of the analysis.
     pub analysis: AnalysisSettings,
     /// Settings of camera 1 and camera 2.
     pub cameras: [CameraRequest; 2],
-    /// Where the keys stand that a plan may break.
+    /// Locations of the keys that a plan can violate.
     #[serde(skip)]
     pub(crate) key_places: BTreeMap<&'static str, Location>,
 }
 
-/// Which skin is pressed.
+/// The skin under test.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Settings)]
 pub struct Prototype {
     /// Identifier of the prototype as written on it.
     pub id: String,
-    /// Material, thickness, anything worth keeping.
+    /// Material, thickness and other details.
     pub description: Option<String>,
     /// The indenter's tip.
     pub tip: Option<String>,
 }
 
-/// What a simulated rig must be good for.
+/// Requirements for a simulated rig.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Scene {
     /// The level to simulate: the named one, or the cheapest that satisfies the needs.
     pub level: SimLevel,
-    /// The needs as given.
+    /// The requirements from the protocol.
     pub needs: Vec<SceneNeed>,
-    /// True when the protocol names the level outright.
+    /// True if the protocol sets the level explicitly.
     pub level_is_named: bool,
 }
 
@@ -117,7 +117,7 @@ pub struct Scene {
 pub struct Sync {
     /// How many.
     pub count: u32,
-    /// From begin to begin, s.
+    /// Period from start to start, s.
     pub interval_s: f64,
     /// Where.
     pub at: Point2,
@@ -161,13 +161,13 @@ pub struct Motion {
     pub retract: Pace,
     /// Lateral motion, mm/s.
     pub travel_mm_s: f64,
-    /// From begin of a press to begin of the next, s; `None`: as fast as possible.
+    /// Period from the start of one press to the next, s; `None`: as fast as possible.
     pub period_s: Option<f64>,
-    /// Where the tip waits before the run.
+    /// Position of the tip before the run.
     pub home: Point3<Skin>,
 }
 
-/// Settings of one camera; everything absent keeps the device's default.
+/// Settings of one camera; missing ones keep the device's default.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct CameraRequest {
     /// Bias values by name, in the device's own unit.

@@ -1,11 +1,11 @@
-//! What of a plan is still to be done: the steps that lead to the presses that are wanted, and nothing else.
+//! The remaining plan: the steps for the wanted presses, and nothing else.
 
 use skinrig_model::{HostDuration, Point3, PressHistory, PressId, PressRole, Skin};
 
 use crate::plan::{Plan, Step};
 use crate::timing;
 
-/// How the tip gets from a press to the next one that is wanted.
+/// Path of the tip between two wanted presses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Route {
     /// Straight, at clearance height: a new way, to be held against keep-outs by [`crate::check()`].
@@ -15,8 +15,8 @@ pub enum Route {
 }
 
 impl Plan {
-    /// Which presses a resumed run takes, given what is known of each: those that [`Retakes::wants`](crate::Retakes::wants), and
-    /// before them all sync presses again. Nothing when no press but sync presses is wanted.
+    /// Presses of a resumed run, given their histories: those that [`Retakes::wants`](crate::Retakes::wants), and
+    /// before them all sync presses. Empty if only sync presses are left.
     #[must_use]
     pub fn wanted(&self, histories: &[PressHistory]) -> Vec<bool> {
         let unknown = PressHistory::default();
@@ -44,7 +44,7 @@ impl Plan {
         let mut steps = Vec::new();
         if let (Some(first), Some(last)) = (first, last) {
             for (n, step) in self.steps.iter().enumerate().take(last + 1) {
-                // Whether a wanted press comes before a step of the same kind does.
+                // Whether a wanted press follows before the next step of the same kind.
                 let leads = |same: fn(&Step) -> bool| {
                     let rest = self.steps.iter().skip(n + 1);
                     rest.take_while(|s| !same(s)).any(is_wanted)

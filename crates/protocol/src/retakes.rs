@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use skinrig_model::{PressHistory, PressVerdict};
 use skinrig_settings::Settings;
 
-/// How often a press is taken again, at once and in place, because its data were lost or it came too late.
+/// Immediate retakes of presses whose data were lost or that were too late.
 /// `docs/reference/runs.md` lists the causes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Settings)]
 pub struct Retakes {

@@ -13,7 +13,7 @@ use crate::keys::{Evaluate, NominalCamera, ScheduleKeys, calibration_possible, r
 use crate::phases::PressPhases;
 use crate::protocol::Prototype;
 
-/// A recording that was made without skinrig: what `skinrig import` needs to know about it.
+/// Schedule of a recording made without skinrig, for `skinrig import`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Schedule {
     /// The file's name as given to [`Schedule::parse`].
@@ -26,7 +26,7 @@ pub struct Schedule {
     pub name: String,
     /// What was recorded.
     pub description: Option<String>,
-    /// Who recorded it.
+    /// Operator of the recording.
     pub operator: String,
     /// Which skin was pressed.
     pub prototype: Prototype,
@@ -98,7 +98,7 @@ impl ScheduledRoles {
         }
     }
 
-    /// What the press at `location` in `repetition` is for.
+    /// Role of the press at `location` in `repetition`.
     #[must_use]
     pub fn role(&self, repetition: RepetitionId, location: LocationId) -> PressRole {
         match self {

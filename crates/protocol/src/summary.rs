@@ -1,4 +1,4 @@
-//! A plan in a few lines: presses, path, duration, expected data.
+//! Summary of a plan: presses, path, duration, expected data.
 
 use std::fmt;
 
@@ -19,7 +19,7 @@ pub const BYTES_PER_EVENT: f64 = 4.0;
 /// camera itself is not documented.
 pub(crate) const TIME_HIGH_PERIOD_US: f64 = 16.0;
 
-/// What a plan amounts to. Durations and data volumes are estimates.
+/// Summary of a plan. Durations and data volumes are estimates.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlanSummary {
     /// Name of the protocol.

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use skinrig_model::HostDuration;
 use skinrig_settings::{Choice, Collector, Field, Settings};
 
-/// Where a press takes the surface to be.
+/// Source of the surface height of a press.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(tag = "surface", rename_all = "snake_case")]
 pub enum Surface {

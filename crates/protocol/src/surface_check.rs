@@ -1,4 +1,4 @@
-//! Where a run touches the surface before it presses anything, to check that it still lies where the frame says.
+//! The surface check: touches the skin before the first press and compares the surface with the frame.
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::Point2;
@@ -6,11 +6,11 @@ use skinrig_settings::{Choice, Collector, Field, Settings};
 
 use crate::surface::{Surface, TouchSearch};
 
-/// Touches the skin before the first press: a surface that is not where the frame says ends the run. Needs a robot that reports
-/// force.
+/// Touches the skin before the first press, and ends the run if the surface is not where the frame puts it. Needs a robot that
+/// reports force.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 pub struct SurfaceCheck {
-    /// Where to touch, skin frame. Touched as `press` says, with its defaults when it says `known` or nothing.
+    /// Points to touch, skin frame. The touch uses the settings of `press`, or its defaults if `press` is `known` or absent.
     #[setting(items = 1..=100)]
     pub points: Vec<Point2>,
     /// Largest distance of the touched surface from z = 0. A touch on a soft skin lies about threshold / stiffness below its
@@ -56,7 +56,7 @@ impl SurfaceCheck {
             out.error(
                 at.span,
                 at.path.as_str(),
-                "a surface beyond the tolerance would not be found",
+                "the search would miss a surface beyond the tolerance",
             )
             .expected(format!(
                 "less than {} mm, the band in which the surface is searched (`press.band`)",

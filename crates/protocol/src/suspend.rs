@@ -1,4 +1,4 @@
-//! When a run waits by itself until a disturbance is over.
+//! Conditions that suspend a run until a disturbance is over.
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::HostDuration;
@@ -31,7 +31,7 @@ pub struct Suspend {
     /// What becomes of the press under way.
     #[setting(default = "finish")]
     pub press: UnderWay,
-    /// How long every condition must be over before the run goes on.
+    /// How long every condition must be over before the run continues.
     #[setting(default = "5 s", above = 0, max = 3600)]
     pub resume_after: HostDuration,
     /// The run ends after this time in suspension.
@@ -100,7 +100,7 @@ enum Side {
     Below,
 }
 
-/// A threshold, whose levels must lie in the right order.
+/// A threshold; its levels must be in the right order.
 fn threshold(
     side: Side,
     threshold: Threshold,

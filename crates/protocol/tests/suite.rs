@@ -58,7 +58,7 @@ checks:
         "add `differences: {at_most: 0}`",
         "`trigger_loopback`",
         "suite.yaml:7:",
-        "no value is good",
+        "no value is within the limits",
         "suite.yaml:10:",
         "at least one of `at_most` or `at_least`",
     ] {

@@ -1,11 +1,11 @@
-//! A row of `box_report`: the columns that a report of the trigger box has, and back.
+//! Conversion between reports of the trigger box and rows of `box_report`.
 
 use skinrig_model::{BoxReport, BoxTime, HostTime, Mark, MarkKind, PressId};
 use sqlx::sqlite::SqliteRow;
 
-use crate::query::{Fault, int, named, num, text};
+use crate::query::{Fault, enum_value, int, num, text};
 
-/// The columns, null where a report has no such value.
+/// The columns; `None` where a report has no such value.
 #[derive(Debug, Default)]
 pub(crate) struct BoxRow {
     pub taken_ns: i64,
@@ -20,7 +20,7 @@ pub(crate) struct BoxRow {
 }
 
 impl BoxRow {
-    /// The columns of a report that was taken at `taken`.
+    /// Columns of a report received at `taken`.
     pub fn of(taken: HostTime, report: BoxReport) -> Result<Self, Fault> {
         let us = |at: BoxTime| {
             let fits = i64::try_from(at.us);
@@ -67,7 +67,7 @@ impl BoxRow {
     }
 }
 
-/// When a report was taken, and the report.
+/// Host time at which a report was received, and the report.
 pub(crate) fn report_from(row: &SqliteRow) -> Result<(HostTime, BoxReport), Fault> {
     let at = || {
         Ok::<_, Fault>(BoxTime {
@@ -83,7 +83,7 @@ pub(crate) fn report_from(row: &SqliteRow) -> Result<(HostTime, BoxReport), Faul
         },
         "mark" => BoxReport::Mark {
             mark: Mark {
-                kind: named(row, "kind", &MarkKind::ALL, MarkKind::name)?,
+                kind: enum_value(row, "kind", &MarkKind::ALL, MarkKind::name)?,
                 press: PressId::from_index(num(row, "press")?),
             },
             at: at()?,

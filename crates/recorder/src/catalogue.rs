@@ -1,27 +1,27 @@
-//! What a folder of sessions holds, from the head of each file: neither plans nor camera bytes are read.
+//! Catalogue of a folder of sessions, read from the head of each file without plans or camera bytes.
 
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::beside::SESSION_SUFFIX;
 use crate::error::RecorderError;
 use crate::reader::SessionReader;
 use crate::rows::{PressTally, SessionTotals};
-use crate::tags::{Sayings, sayings};
+use crate::sidecar::SESSION_SUFFIX;
+use crate::tags::{Annotations, annotations};
 
-/// One session file of a folder.
+/// Summary of one session file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SessionSummary {
     /// The file.
     pub path: PathBuf,
-    /// Its size in bytes, without a log beside it.
+    /// Size in bytes, without its log.
     pub size_bytes: u64,
-    /// What is in it.
+    /// Content of the file.
     pub state: SessionState,
 }
 
-/// What is in a session file.
+/// Content of a session file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(tag = "state", rename_all = "snake_case")]
 #[expect(
@@ -29,50 +29,50 @@ pub struct SessionSummary {
     reason = "nearly all are readable, and a folder holds hundreds"
 )]
 pub enum SessionState {
-    /// It can be read.
+    /// A readable session.
     #[serde(rename_all = "snake_case")]
     Readable {
-        /// Names the session whatever its file is called.
+        /// Identifier of the session, independent of the file's name.
         session_id: String,
         /// Civil time of the start, RFC 3339.
         started_at: String,
-        /// Which prototype was pressed.
+        /// Name of the pressed prototype.
         prototype: String,
-        /// Who ran it.
+        /// Name of the operator.
         operator: String,
-        /// Where the protocol came from.
+        /// Name of the protocol file.
         protocol_name: String,
         /// `simulated`, `replayed`, `imported`, `emulated` or `bench`.
         rig_kind: String,
         /// Name of the rig.
         rig_name: String,
-        /// `completed`, `stopped` or `faulted`; `None` for a run under way or cut off.
+        /// `completed`, `stopped` or `faulted`; `None` for a run in progress or a crashed one.
         end: Option<String>,
         /// Whether it is sealed.
         sealed: bool,
-        /// How its calibrating and scored presses ended so far.
+        /// Verdict counts of calibrating and scored presses so far.
         presses: PressTally,
-        /// How its sync presses ended so far.
+        /// Verdict counts of sync presses so far.
         sync: PressTally,
-        /// What was said of it later: tags and remarks.
+        /// Tags and remarks added later.
         #[serde(flatten)]
-        sayings: Sayings,
-        /// Why the log of tags beside it cannot be read, if so; then there are no tags here.
+        annotations: Annotations,
+        /// Error of reading the tag log; then the tags are missing here.
         tags_problem: Option<String>,
-        /// The counts of its seal; `None` for one that is not sealed, of which the whole file would have to be read.
+        /// Counts of the seal; `None` without one, since computing them would read the whole file.
         totals: Option<Box<SessionTotals>>,
     },
-    /// It has no record at all: its run ended before it wrote the header, or something emptied the file.
+    /// No records: its run ended before it wrote the header, or the file was emptied.
     Empty,
-    /// It cannot.
+    /// An unreadable file.
     Broken {
-        /// Why.
+        /// Error of reading it.
         reason: String,
     },
 }
 
-/// The session files of `folder` (names that end in [`SESSION_SUFFIX`]), oldest start first, empty and broken ones last;
-/// by name where that is equal.
+/// Summaries of the session files in `folder` (names ending in [`SESSION_SUFFIX`]), by start time, then by name. Empty and
+/// broken ones come last.
 ///
 /// # Errors
 /// [`RecorderError::Io`] when the folder cannot be read. A broken file is an entry, not an error.
@@ -109,7 +109,7 @@ pub fn list(folder: impl AsRef<Path>) -> Result<Vec<SessionSummary>, RecorderErr
 }
 
 impl SessionSummary {
-    /// Which prototype was pressed; `None` of a broken file.
+    /// Name of the pressed prototype; `None` for an unreadable file.
     #[must_use]
     pub fn prototype(&self) -> Option<&str> {
         match &self.state {
@@ -118,10 +118,10 @@ impl SessionSummary {
         }
     }
 
-    /// Whether somebody gave it this tag.
+    /// Whether the session has this tag.
     #[must_use]
     pub fn has_tag(&self, tag: &str) -> bool {
-        matches!(&self.state, SessionState::Readable { sayings, .. } if sayings.tags.contains(tag))
+        matches!(&self.state, SessionState::Readable { annotations, .. } if annotations.tags.contains(tag))
     }
 }
 
@@ -134,16 +134,16 @@ fn key(summary: &SessionSummary) -> (bool, &str, &Path) {
 
 fn summarise(path: &Path) -> Result<SessionState, RecorderError> {
     let reader = SessionReader::open(path)?;
-    let brief = reader.brief()?;
+    let brief = reader.header_texts()?;
     let seal = reader.seal()?;
     let totals = seal.map(|seal| Box::new(seal.totals));
     let (presses, sync) = match &totals {
         Some(totals) => (totals.presses, totals.sync),
         None => reader.tallies()?,
     };
-    let (sayings, tags_problem) = match sayings(path, &brief.session_id) {
-        Ok(sayings) => (sayings, None),
-        Err(e) => (Sayings::default(), Some(e.to_string())),
+    let (annotations, tags_problem) = match annotations(path, &brief.session_id) {
+        Ok(annotations) => (annotations, None),
+        Err(e) => (Annotations::default(), Some(e.to_string())),
     };
     Ok(SessionState::Readable {
         session_id: brief.session_id,
@@ -157,7 +157,7 @@ fn summarise(path: &Path) -> Result<SessionState, RecorderError> {
         sealed: totals.is_some(),
         presses,
         sync,
-        sayings,
+        annotations,
         tags_problem,
         totals,
     })

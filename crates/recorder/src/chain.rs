@@ -1,27 +1,27 @@
-//! The chain of seals: what a further leg keeps of the seal that it takes off, and whether the rows still give its hash.
+//! The chain of seals: archives the seal that a further leg removes, and checks that the rows still match it.
 
 use sqlx::Row;
 use sqlx::sqlite::SqliteConnection;
 
-use crate::digest::{Earlier, TableDigest, digest_earlier, tree_of};
+use crate::digest::{EarlierState, TableDigest, digest_earlier, tree_hash};
 use crate::hex::hex;
 use crate::query::{Fault, each_row, has_table, int, num, opt_int, sha, text};
 use crate::rows::SessionTotals;
 use crate::totals;
 
-/// What the seal before a leg proves.
+/// Result of checking the seal that a leg removed.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Link {
-    /// The rows of the legs before give its hash and its counts.
-    Proven,
-    /// It was taken off by a version of skinrig that kept the hash alone, and not what it covers.
-    Unprovable,
-    /// They do not: each difference in words.
-    Broken(Vec<String>),
+pub enum PreviousSeal {
+    /// The rows of the earlier legs match its hashes and counts.
+    Verified,
+    /// An old version of skinrig archived only its tree hash, which cannot be recomputed.
+    Unverifiable,
+    /// The rows differ from it; one text per difference.
+    Mismatch(Vec<String>),
 }
 
-/// Keeps the seal that leg `leg` takes off, of a file that had schema `schema`, when there is one.
-pub async fn keep(conn: &mut SqliteConnection, leg: u32, schema: u32) -> Result<(), Fault> {
+/// Archives the seal, if any, that leg `leg` removes from a file with schema version `schema`.
+pub async fn archive_seal(conn: &mut SqliteConnection, leg: u32, schema: u32) -> Result<(), Fault> {
     sqlx::query(
         "INSERT INTO previous_seal (leg, schema_version, planned, valid, missed, invalid, excluded, sync_planned, sync_valid,
            sync_missed, sync_invalid, sync_excluded, chunks, raw_bytes, stored_bytes, lost_bytes, cd_events, trigger_edges,
@@ -44,19 +44,19 @@ pub async fn keep(conn: &mut SqliteConnection, leg: u32, schema: u32) -> Result<
     Ok(())
 }
 
-/// A leg that took a seal off, as its own row has it.
+/// A leg that removed a seal, from its row.
 struct Leg {
     number: i64,
     tree: Option<[u8; 32]>,
     first_seq: [i64; 2],
 }
 
-/// Every leg that took a seal off, with what that seal proves.
-pub async fn check(conn: &mut SqliteConnection) -> Result<Vec<(i64, Link)>, Fault> {
+/// Checks every seal that a leg removed; returns leg number and result.
+pub async fn check(conn: &mut SqliteConnection) -> Result<Vec<(i64, PreviousSeal)>, Fault> {
     if !has_table(conn, "leg").await? {
         return Ok(Vec::new());
     }
-    let kept = has_table(conn, "previous_seal").await?;
+    let has_archive = has_table(conn, "previous_seal").await?;
     let mut legs = Vec::new();
     let sql =
         "SELECT number, previous_tree_sha256, first_seq_1, first_seq_2 FROM leg ORDER BY number";
@@ -70,19 +70,22 @@ pub async fn check(conn: &mut SqliteConnection) -> Result<Vec<(i64, Link)>, Faul
         Ok(())
     })
     .await?;
-    let mut links = Vec::new();
+    let mut results = Vec::new();
     for leg in legs {
-        let link = match (kept, leg.tree) {
+        let result = match (has_archive, leg.tree) {
             (false, None) => None,
-            (false, Some(_)) => Some(Link::Unprovable),
-            (true, _) => link(conn, &leg).await?,
+            (false, Some(_)) => Some(PreviousSeal::Unverifiable),
+            (true, _) => check_previous_seal(conn, &leg).await?,
         };
-        links.extend(link.map(|link| (leg.number, link)));
+        results.extend(result.map(|result| (leg.number, result)));
     }
-    Ok(links)
+    Ok(results)
 }
 
-async fn link(conn: &mut SqliteConnection, leg: &Leg) -> Result<Option<Link>, Fault> {
+async fn check_previous_seal(
+    conn: &mut SqliteConnection,
+    leg: &Leg,
+) -> Result<Option<PreviousSeal>, Fault> {
     let query = sqlx::query("SELECT * FROM previous_seal WHERE leg = ?");
     let row = query.bind(leg.number).fetch_optional(&mut *conn).await?;
     let (row, tree) = match (row, leg.tree) {
@@ -95,26 +98,26 @@ async fn link(conn: &mut SqliteConnection, leg: &Leg) -> Result<Option<Link>, Fa
             } else {
                 (words[0], words[1])
             };
-            let told = format!(
-                "expected the seal that it took off {expected} and {found}, found it {expected} alone"
+            let problems = format!(
+                "expected the removed seal {expected} and {found}, found it only {expected}"
             );
-            return Ok(Some(Link::Broken(vec![told])));
+            return Ok(Some(PreviousSeal::Mismatch(vec![problems])));
         }
     };
-    let mut told = Vec::new();
-    let kept = sha(&row, "tree_sha256")?;
-    if kept != tree {
-        told.push(format!(
-            "expected tree hash {} of the seal before, found {}",
-            hex(&kept),
+    let mut problems = Vec::new();
+    let archived = sha(&row, "tree_sha256")?;
+    if archived != tree {
+        problems.push(format!(
+            "expected tree hash {} of the previous seal, found {}",
+            hex(&archived),
             hex(&tree)
         ));
     }
     if opt_int(&row, "schema_version")?.is_none() {
-        return Ok(Some(if told.is_empty() {
-            Link::Unprovable
+        return Ok(Some(if problems.is_empty() {
+            PreviousSeal::Unverifiable
         } else {
-            Link::Broken(told)
+            PreviousSeal::Mismatch(problems)
         }));
     }
     let schema = num(&row, "schema_version")?;
@@ -135,7 +138,7 @@ async fn link(conn: &mut SqliteConnection, leg: &Leg) -> Result<Option<Link>, Fa
         Ok(())
     })
     .await?;
-    let earlier = Earlier {
+    let earlier = EarlierState {
         leg: leg.number,
         schema,
         last_seq: leg.first_seq.map(|seq| seq.saturating_sub(1)),
@@ -144,36 +147,36 @@ async fn link(conn: &mut SqliteConnection, leg: &Leg) -> Result<Option<Link>, Fa
     let computed = digest_earlier(conn, &earlier).await?;
     for table in &computed {
         if !recorded.contains(table) {
-            told.push(format!(
-                "{}: the rows of the legs before are not those that were sealed",
+            problems.push(format!(
+                "{}: rows of earlier legs differ from the sealed rows",
                 table.name
             ));
         }
     }
     if computed.len() != recorded.len() {
-        told.push(format!(
+        problems.push(format!(
             "expected the digests of {} tables, found {}",
             computed.len(),
             recorded.len()
         ));
     }
-    if tree_of(&computed) != tree {
-        let found = hex(&tree_of(&computed));
-        told.push(format!(
-            "expected rows with the tree hash {} of the seal before, found {found}",
+    if tree_hash(&computed) != tree {
+        let found = hex(&tree_hash(&computed));
+        problems.push(format!(
+            "expected rows with tree hash {} of the previous seal, found {found}",
             hex(&tree)
         ));
     }
     let poses = recorded.iter().find(|t| t.name == "pose_block");
     let counted = totals::totals_before(conn, &earlier, poses.map_or(0, |t| t.rows)).await?;
     if counted != totals {
-        told.push(format!(
-            "expected the counts of the seal before, {totals:?}, found {counted:?}"
+        problems.push(format!(
+            "expected the counts of the previous seal, {totals:?}, found {counted:?}"
         ));
     }
-    Ok(Some(if told.is_empty() {
-        Link::Proven
+    Ok(Some(if problems.is_empty() {
+        PreviousSeal::Verified
     } else {
-        Link::Broken(told)
+        PreviousSeal::Mismatch(problems)
     }))
 }

@@ -1,4 +1,4 @@
-//! How a chunk's bytes are kept: unchanged, or with runs of EVT2 time words folded. Both give back the same bytes.
+//! Compression of chunks: stored unchanged, or with runs of EVT2 time words folded. Both are lossless.
 //!
 //! An EVT2 camera without events sends only TIME_HIGH words (type nibble 0x8, bits 27:0 = t / 64 µs;
 //! evk1.md section 4.1), each value once or several times in a row. `th-rle` replaces a run of two or
@@ -8,16 +8,16 @@
 //! |---|---|
 //! | 31:28 | 0xB, a type that no EVK1 produces |
 //! | 27:26 | `phase`, less than `2^shift` |
-//! | 25:24 | `shift`, 0..=2: every value comes `2^shift` times |
+//! | 25:24 | `shift`, 0..=2: every value repeats `2^shift` times |
 //! | 23:0 | `n`, the number of words replaced |
 //!
-//! With `base` the value of the TIME_HIGH word before the run (literal, or the last of an earlier token),
-//! word `k` of the run has the value `base + ((phase + 1 + k) >> shift)` modulo 2^28. A chunk that holds a
-//! word of type 0xB, whose length is no multiple of 4, or that does not get smaller, is kept unchanged.
+//! Let `base` be the value of the TIME_HIGH word before the run (literal, or the last of an earlier token).
+//! Word `k` of the run then has the value `base + ((phase + 1 + k) >> shift)` modulo 2^28. A chunk is stored unchanged if it
+//! contains a word of type 0xB, has a length that is no multiple of 4, or does not shrink.
 
 use std::fmt;
 
-/// Longest chunk, bytes as they came: 256 MiB. Bounds the memory that a damaged file can ask for.
+/// Longest raw chunk: 256 MiB. Bounds the memory that a damaged file can request.
 pub(crate) const MAX_CHUNK_BYTES: usize = 1 << 28;
 
 const TIME_HIGH: u32 = 0x8;
@@ -26,7 +26,7 @@ const VALUE: u32 = 0x0FFF_FFFF;
 const MAX_RUN: usize = 0x00FF_FFFF;
 const MAX_SHIFT: u32 = 2;
 
-/// How a chunk's bytes are stored.
+/// Encoding of a stored chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Codec {
     /// Unchanged.
@@ -36,7 +36,7 @@ pub enum Codec {
 }
 
 impl Codec {
-    /// The name in the session file.
+    /// Name in the session file.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -45,7 +45,7 @@ impl Codec {
         }
     }
 
-    /// The codec of this name.
+    /// Codec with this name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         [Self::None, Self::TimeHighRuns]
@@ -60,15 +60,15 @@ impl fmt::Display for Codec {
     }
 }
 
-/// Folded bytes that do not unfold.
+/// Invalid folded bytes.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("th-rle: word {word}: expected {expected}, found {found}")]
 pub struct CodecError {
     /// Index of the 32-bit word in the folded bytes.
     pub word: usize,
-    /// What would have been valid.
+    /// What is valid there.
     pub expected: String,
-    /// What is there.
+    /// What was found.
     pub found: String,
 }
 
@@ -77,12 +77,12 @@ const fn value(base: u32, phase: u32, shift: u32, k: u32) -> u32 {
     base.wrapping_add((phase + 1 + k) >> shift) & VALUE
 }
 
-/// How many of `words` continue the run.
+/// Number of leading `words` that continue the run.
 fn run_length(words: &[[u8; 4]], base: u32, phase: u32, shift: u32) -> usize {
     let words = &words[..words.len().min(MAX_RUN)];
     let expected = |k: usize| (TIME_HIGH << 28) | value(base, phase, shift, k as u32);
     let mut k = 0;
-    // Whole blocks without a branch per word: the compiler turns this into vector code.
+    // Whole blocks without a branch per word, so that the compiler vectorises them.
     for block in words.as_chunks::<16>().0 {
         let mut difference = 0;
         for (j, word) in block.iter().enumerate() {
@@ -99,7 +99,7 @@ fn run_length(words: &[[u8; 4]], base: u32, phase: u32, shift: u32) -> usize {
     k
 }
 
-/// The longest run that begins with `words[0]`, a TIME_HIGH word: (length, phase, shift).
+/// Longest run that starts with the TIME_HIGH word `words[0]`: (length, phase, shift).
 fn best_run(words: &[[u8; 4]], base: u32) -> (usize, u32, u32) {
     let first = u32::from_le_bytes(words[0]) & VALUE;
     let mut best = (0, 0, 0);
@@ -114,7 +114,7 @@ fn best_run(words: &[[u8; 4]], base: u32) -> (usize, u32, u32) {
             consider((1 << shift) - 1, shift);
         }
     } else if first == base {
-        // The base repeats: how often it still comes tells the phase.
+        // `base` repeats: the number of further repeats gives the phase.
         let again = words.iter().take(4).take_while(|w| **w == words[0]).count() as u32;
         for shift in 1..=MAX_SHIFT {
             if again < 1 << shift {
@@ -125,7 +125,7 @@ fn best_run(words: &[[u8; 4]], base: u32) -> (usize, u32, u32) {
     best
 }
 
-/// Folds EVT2 bytes, or `None` when they are to be kept unchanged (see the module).
+/// Folds EVT2 bytes; `None` if they are to be stored unchanged (see the module).
 #[must_use]
 pub fn fold(raw: &[u8]) -> Option<Vec<u8>> {
     let (words, rest) = raw.as_chunks::<4>();
@@ -165,10 +165,10 @@ pub fn fold(raw: &[u8]) -> Option<Vec<u8>> {
     (out.len() < raw.len()).then_some(out)
 }
 
-/// Unfolds what [`fold`] made; `raw_bytes` is the length that must come out.
+/// Reverses [`fold`]; the result must have `raw_bytes` bytes.
 ///
 /// # Errors
-/// [`CodecError`] for bytes that [`fold`] never makes, or another length.
+/// [`CodecError`] for bytes that [`fold`] never produces, or for another length.
 pub fn unfold(stored: &[u8], raw_bytes: usize) -> Result<Vec<u8>, CodecError> {
     let fault = |word, expected: String, found: String| CodecError {
         word,
@@ -179,11 +179,14 @@ pub fn unfold(stored: &[u8], raw_bytes: usize) -> Result<Vec<u8>, CodecError> {
     if !rest.is_empty() || raw_bytes > MAX_CHUNK_BYTES {
         return Err(fault(
             words.len(),
-            format!("whole words that unfold to at most {MAX_CHUNK_BYTES} bytes"),
-            format!("{} bytes more, to unfold to {raw_bytes}", rest.len()),
+            format!("whole words, expanding to at most {MAX_CHUNK_BYTES} bytes"),
+            format!(
+                "{} trailing bytes, and a raw length of {raw_bytes}",
+                rest.len()
+            ),
         ));
     }
-    // Only what is there may take memory, not what the length claims.
+    // Allocate by actual input, not by the claimed length.
     let claimed = words.iter().map(|w| u32::from_le_bytes(*w));
     let unfolded: usize = claimed
         .map(|w| match w >> 28 {
@@ -218,7 +221,11 @@ pub fn unfold(stored: &[u8], raw_bytes: usize) -> Result<Vec<u8>, CodecError> {
             ));
         }
         if out.len() + 4 * n as usize > raw_bytes {
-            return Err(fault(i, format!("{raw_bytes} bytes in all"), "more".into()));
+            return Err(fault(
+                i,
+                format!("{raw_bytes} bytes in all"),
+                "more bytes".into(),
+            ));
         }
         out.extend(
             (0..n)
@@ -230,7 +237,7 @@ pub fn unfold(stored: &[u8], raw_bytes: usize) -> Result<Vec<u8>, CodecError> {
         return Err(fault(
             words.len(),
             format!("{raw_bytes} bytes in all"),
-            format!("{}", out.len()),
+            format!("{} bytes", out.len()),
         ));
     }
     Ok(out)
@@ -259,7 +266,7 @@ mod tests {
         for raw in [once, four, two] {
             assert_eq!(there_and_back(&raw), Some(8));
         }
-        // An event in the middle of a group of four: the run goes on with its phase.
+        // An event in the middle of a group of four: the run continues with its phase.
         let mut words: Vec<u32> = (0..100).map(|k| 0x8000_0000 | (9 + k / 4)).collect();
         words.insert(50, 0x1000_0000);
         assert_eq!(there_and_back(&bytes(words)), Some(16));
@@ -286,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_folded_is_kept() {
+    fn unfoldable_bytes_are_stored_unchanged() {
         let idle = bytes((0..8).map(|v| 0x8000_0000 | v));
         assert!(fold(&idle).is_some());
         assert!(fold(&idle[..idle.len() - 1]).is_none(), "not whole words");

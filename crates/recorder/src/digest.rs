@@ -1,4 +1,4 @@
-//! The tree hash: which rows and columns it covers, in the session as it is and as it was when an earlier leg was sealed.
+//! The tree hash: the rows and columns it covers, now and at the time when an earlier leg was sealed.
 
 use sha2::{Digest, Sha256};
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
@@ -6,14 +6,14 @@ use sqlx::{Row, TypeInfo, ValueRef};
 
 use crate::query::{Fault, each_row, has_table};
 
-/// A table that the tree hash covers. Blobs of camera bytes and poses are covered by the SHA-256 beside them.
+/// A table under the tree hash. For camera bytes and poses, the hash covers the SHA-256 column beside the blob.
 struct Table {
     name: &'static str,
-    /// The schema that brought it.
+    /// First schema version with this table.
     since: u32,
-    /// Its rows in key order, all columns that count. Parameters: those of [`Extent`].
+    /// Query for its rows in key order, with all hashed columns. Parameters: the fields of [`Extent`].
     rows: &'static str,
-    /// The rows of an earlier state, where `rows` is not the way to them: each from this schema on.
+    /// Queries for an earlier state where `rows` does not work, each with the schema version from which it applies.
     earlier: &'static [(u32, &'static str)],
 }
 
@@ -26,7 +26,7 @@ const fn table(name: &'static str, since: u32, rows: &'static str) -> Table {
     }
 }
 
-/// In the order of the tree hash.
+/// In the order in which the tree hash covers them.
 const TABLES: [Table; 21] = [
     table("session", 1, "SELECT * FROM session ORDER BY id LIMIT ?1"),
     table("leg", 5, "SELECT * FROM leg ORDER BY number LIMIT ?1"),
@@ -51,7 +51,7 @@ const TABLES: [Table; 21] = [
         name: "attempt",
         since: 1,
         rows: "SELECT * FROM attempt ORDER BY press, number",
-        // A session that came from an older schema does not know of each attempt which leg it belongs to; only that it is one before.
+        // Sessions migrated from an older schema do not record the leg of each attempt, only that it is an earlier one.
         earlier: &[
             (
                 1,
@@ -120,14 +120,14 @@ const TABLES: [Table; 21] = [
         name: "run_end",
         since: 1,
         rows: "SELECT * FROM run_end ORDER BY id",
-        // The next leg moved it into its own row.
+        // The next leg moves it into its own row.
         earlier: &[(
             1,
             "SELECT 1, previous_end_ns, previous_status, previous_reason FROM leg
              WHERE number = ?2 AND previous_end_ns IS NOT NULL",
         )],
     },
-    // Which migrations made the schema: name and content, not when or how fast they ran.
+    // The migrations that made the schema: version and content, not when or how fast they ran.
     table(
         "_sqlx_migrations",
         1,
@@ -153,28 +153,28 @@ pub(crate) struct TableDigest {
     pub sha256: [u8; 32],
 }
 
-/// The state of a session when it was sealed before a further leg.
+/// State of a session when it was sealed before a further leg.
 #[derive(Debug, Clone, Copy)]
-pub struct Earlier<'a> {
-    /// The leg that followed.
+pub struct EarlierState<'a> {
+    /// Number of the leg that followed.
     pub leg: i64,
-    /// The schema that the file had.
+    /// Schema version of the file at that time.
     pub schema: u32,
-    /// The last chunk of each camera, -1 for none.
+    /// Last chunk of each camera; -1 for none.
     pub last_seq: [i64; 2],
-    /// What the tables had: rows are appended, so that the first so many are those that there were.
+    /// Digests at that time. Rows are only appended, so the first `rows` of each table belong to that state.
     pub tables: &'a [TableDigest],
 }
 
-/// Which rows of a table to take: at most so many, of legs before this one, chunks up to these.
+/// Rows to cover: maximum row count, first excluded leg, last chunk of each camera.
 struct Extent(i64, i64, [i64; 2]);
 
-/// The digests of all tables that the file's schema has. A value is hashed as one type byte (0 null, 1 integer, 2 real, 3 text, 4 blob)
-/// and its eight little-endian bytes, or its length in eight such bytes and its content.
+/// Digests of all tables in the file's schema. A value is hashed as one type byte (0 null, 1 integer, 2 real, 3 text, 4 blob) and
+/// eight little-endian bytes of value; for text and blobs, eight bytes of length and the content.
 pub(crate) async fn digest_tables(conn: &mut SqliteConnection) -> Result<Vec<TableDigest>, Fault> {
     let mut digests = Vec::with_capacity(TABLES.len());
     for table in &TABLES {
-        // A table that is missing from a sealed file is missed in the tree hash.
+        // If a sealed file lacks a table, the tree hash differs.
         if has_table(conn, table.name).await? {
             let all = Extent(-1, i64::MAX, [i64::MAX; 2]);
             digests.push(digest(conn, table.name, table.rows, &all).await?);
@@ -183,10 +183,10 @@ pub(crate) async fn digest_tables(conn: &mut SqliteConnection) -> Result<Vec<Tab
     Ok(digests)
 }
 
-/// As [`digest_tables`], of an earlier state: from the rows that belonged to it.
+/// Like [`digest_tables`], over the rows of an earlier state.
 pub(crate) async fn digest_earlier(
     conn: &mut SqliteConnection,
-    earlier: &Earlier<'_>,
+    earlier: &EarlierState<'_>,
 ) -> Result<Vec<TableDigest>, Fault> {
     let mut digests = Vec::with_capacity(earlier.tables.len());
     for table in TABLES.iter().filter(|t| t.since <= earlier.schema) {
@@ -257,8 +257,8 @@ fn encode_row(row: &SqliteRow, bytes: &mut Vec<u8>) -> Result<(), Fault> {
     Ok(())
 }
 
-/// SHA-256 over, for each table, its name, a zero byte, its row count in eight little-endian bytes, its digest.
-pub(crate) fn tree_of(digests: &[TableDigest]) -> [u8; 32] {
+/// SHA-256 over name, a zero byte, row count (8 bytes, little-endian) and digest of each table.
+pub(crate) fn tree_hash(digests: &[TableDigest]) -> [u8; 32] {
     let mut hash = Sha256::new();
     for table in digests {
         hash.update(table.name.as_bytes());
@@ -274,7 +274,7 @@ mod tests {
     use super::*;
     use crate::schema;
 
-    /// A column that a later schema adds changes what `SELECT *` gives of an earlier state: such a table needs its columns by schema.
+    /// A new column changes the result of `SELECT *` for earlier states: such a table needs a column list per schema.
     #[test]
     fn earlier_states_are_read_with_the_columns_that_they_had() {
         let folder = tempfile::tempdir().unwrap();
@@ -310,7 +310,7 @@ mod tests {
                         columns(&mut old, table.rows).await,
                         columns(&mut now, sql).await,
                     );
-                    // The end of a run has other names in the row of the next leg.
+                    // The columns have other names in the row of the next leg.
                     match table.name {
                         "run_end" => assert_eq!(was.len(), is.len()),
                         name => assert_eq!(was, is, "{name} of schema {version}"),

@@ -1,189 +1,272 @@
-//! What can go wrong with a session file.
+//! Errors of session files.
 
 use std::io::ErrorKind;
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
 
-/// A session could not be written or read.
+/// Failure to write or read a session.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecorderError {
-    /// The operating system refused.
+    /// An operating system call failed.
     #[error("{}: {doing}: {source}", path.display())]
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What was being done.
+        /// Operation in progress.
         doing: &'static str,
-        /// Its answer.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// SQLite refused.
+    /// A SQLite call failed.
     #[error("{}: {doing}: {source}", path.display())]
     Sql {
         /// The session file.
         path: PathBuf,
-        /// What was being done.
+        /// Operation in progress.
         doing: &'static str,
-        /// Its answer.
+        /// Error of SQLite.
         source: Box<sqlx::Error>,
     },
-    /// A new session was to be written over a file.
-    #[error("{}: expected no file there, found one; sessions are never overwritten: choose another name", path.display())]
+    /// A file already exists where a new session should go.
+    #[error("{}: file already exists; sessions are never overwritten: choose another name", path.display())]
     Exists {
         /// The file.
         path: PathBuf,
     },
-    /// No such file.
-    #[error("{}: expected a session file, found nothing; `skinrig sessions` lists what there is", path.display())]
+    /// There is no such file.
+    #[error("{}: no such session file; `skinrig sessions` lists all sessions", path.display())]
     Missing {
         /// The file.
         path: PathBuf,
     },
-    /// The file is something else.
+    /// The file is not a session.
     #[error("{}: expected a skinrig session, found {found}", path.display())]
     NotASession {
         /// The file.
         path: PathBuf,
-        /// What it is.
+        /// Description of the file.
         found: String,
     },
-    /// There is a file, at most with tables, and no row in them: its run ended before anything was recorded.
-    #[error("{}: expected a session, found a file without a record in it: its run ended before it wrote the header, or something \
-        emptied the file; there is nothing to go on with: remove it, and begin with `skinrig run`", path.display())]
+    /// The file has no rows, and perhaps no tables: the run ended before it recorded anything.
+    #[error("{}: expected a session, found a file without records: its run ended before it wrote the header, or the file was \
+        emptied; there is nothing to resume: delete the file and start a new session with `skinrig run`", path.display())]
     Empty {
         /// The file.
         path: PathBuf,
     },
-    /// A session was to go on that is not what was recorded. Nothing in it was changed.
-    #[error("{}: expected a sound session to go on with, found {} problem(s): {}; nothing was changed: `skinrig salvage` copies what \
-        is whole into a new session", path.display(), problems.len() as u64 + more_problems, problems.join("; "))]
+    /// The session to resume fails verification. Nothing in it was changed.
+    #[error("{}: expected a sound session to resume, found {} problem(s): {}; nothing was changed: `skinrig salvage` copies \
+        the intact parts into a new session", path.display(), problems.len() as u64 + more_problems, problems.join("; "))]
     Unsound {
         /// The session file.
         path: PathBuf,
-        /// What is wrong, in words.
+        /// Problems found.
         problems: Vec<String>,
-        /// Problems found beyond these.
+        /// Number of problems beyond those in `problems`.
         more_problems: u64,
     },
-    /// Written by a newer skinrig.
+    /// A newer version of skinrig wrote the file.
     #[error("{}: expected schema version up to {supported}, found {found}; read it with a newer skinrig", path.display())]
     NewerSchema {
         /// The file.
         path: PathBuf,
         /// Its schema version.
         found: u32,
-        /// The newest version that this build knows.
+        /// Newest schema version that this build supports.
         supported: u32,
     },
-    /// Records came in an impossible order, or one cannot be kept as it is. Nothing of it was written.
+    /// A record is out of order or invalid. Nothing of it was written.
     #[error("{record}: expected {expected}, found {found}")]
     Record {
-        /// Which record.
+        /// The rejected record or field.
         record: String,
-        /// What would have been accepted.
+        /// What is valid there.
         expected: String,
-        /// What came.
+        /// What was found.
         found: String,
     },
-    /// Another process writes the session.
-    #[error("{}: expected a session that nobody writes, found {by} writing it; wait for its end, or end it", path.display())]
+    /// Another process is writing the session.
+    #[error("{}: session is in use: {by} is writing it; wait until that run ends, or stop it", path.display())]
     InUse {
         /// The session file.
         path: PathBuf,
-        /// Who.
+        /// Description of that process.
         by: String,
     },
-    /// A session was to go on that has reached its end.
-    #[error("{}: expected a session that was cut off or not finished, found a completed one: there is nothing to resume", path.display())]
-    Completed {
+    /// The session to resume is already completed.
+    #[error("{}: expected an interrupted or unfinished session, found a completed one: there is nothing to resume", path.display())]
+    AlreadyCompleted {
         /// The session file.
         path: PathBuf,
     },
-    /// The machine could not read all of a session; what is in it is not known.
+    /// The system failed while reading a session; its content is unknown.
     #[error(
-        "{0}; this says nothing of what is in the session: mend the disk or free memory, and try again"
+        "{0}; the session could not be checked: repair the disk or free memory, then try again"
     )]
     Unread(String),
-    /// An earlier write failed; the session takes nothing more.
-    #[error("the session is no longer written: {0}")]
-    Failed(String),
-    /// A record was taken, and not on the disk in time: it may come there yet.
-    #[error("the session is written too slowly: {0}")]
-    Late(String),
-    /// Another program kept the session open for so long that it could not be sealed. It is complete.
-    #[error("{}: complete, but not sealed: expected every other program to close it, found it open in one for {} s ({found}); \
-        close that program, and `skinrig resume` seals it", path.display(), waited.as_secs())]
+    /// An earlier write failed; the session accepts no more records.
+    #[error("writing the session failed: {0}")]
+    WriteFailed(WriteFailure),
+    /// A record was accepted but was not on disk in time; it may still arrive there.
+    #[error("writing the session timed out: the disk accepted no record within {} s", .0.as_secs_f64())]
+    WriteTimeout(Duration),
+    /// Another program kept the session open for too long to seal it. It is complete.
+    #[error("{}: complete, but not sealed: another program kept it open for {} s ({found}); \
+        close that program, then run `skinrig resume` to seal it", path.display(), waited.as_secs())]
     HeldOpen {
         /// The session file.
         path: PathBuf,
-        /// How long was waited for it.
-        waited: std::time::Duration,
-        /// SQLite's answer.
+        /// Time spent waiting for that program.
+        waited: Duration,
+        /// Error of SQLite.
         found: String,
     },
-    /// A file of a session under way is no longer where its run opened it.
-    #[error("{}: expected the file that this run writes, found {found}", path.display())]
+    /// A file of a session in progress is no longer where its run opened it.
+    #[error("{}: the file of the current run is missing: {found}", path.display())]
     Displaced {
         /// The session file, or its log.
         path: PathBuf,
-        /// What became of it.
+        /// What happened to it.
         found: String,
     },
-    /// A file of a session was moved or removed while it was written; all of it is kept.
-    #[error("{displaced}; all that was recorded is in {}", to.display())]
+    /// A file of a session was moved or removed during the run; all records were saved.
+    #[error("{displaced}; all records are saved in {}", to.display())]
     Rescued {
-        /// What happened, in words.
-        displaced: String,
-        /// Where the session is now.
+        /// The [`Displaced`](Self::Displaced) error.
+        displaced: Box<RecorderError>,
+        /// Path of the saved session.
         to: PathBuf,
     },
-    /// A file of a session was moved or removed while it was written, and what was recorded could not be kept.
-    #[error("{displaced}; what was recorded could not be saved: {why}")]
+    /// A file of a session was moved or removed during the run, and the records could not be saved.
+    #[error("{displaced}; the records could not be saved: {reason}")]
     Lost {
-        /// What happened, in words.
-        displaced: String,
-        /// Why, path by path.
-        why: String,
+        /// The [`Displaced`](Self::Displaced) error.
+        displaced: Box<RecorderError>,
+        /// Why no copy was made.
+        reason: RescueError,
     },
-    /// The session cannot be sealed in its present state.
+    /// The session cannot be sealed in its current state.
     #[error("{}: cannot seal: expected {expected}, found {found}; the session stays readable, and `skinrig resume` finishes it", path.display())]
     Unsealable {
         /// The session file.
         path: PathBuf,
-        /// What sealing needs.
+        /// Condition for sealing.
         expected: String,
-        /// What there is.
+        /// Current state.
         found: String,
     },
-    /// The file contradicts itself.
+    /// The file is damaged or contradicts itself.
     #[error("{}: damaged: {place}: expected {expected}, found {found}; `skinrig verify` checks everything", path.display())]
     Damaged {
         /// The session file.
         path: PathBuf,
-        /// Table and row.
+        /// Table and row, or a similar location.
         place: String,
-        /// What should be there.
+        /// What is valid there.
         expected: String,
-        /// What is there.
+        /// What was found.
         found: String,
     },
-    /// Something was asked for that the session does not hold.
-    #[error("{}: expected {wanted}, found none", path.display())]
-    NotThere {
+    /// The session has no such item.
+    #[error("{}: expected {expected}, found none", path.display())]
+    NotFound {
         /// The session file.
         path: PathBuf,
-        /// What was asked for.
-        wanted: String,
+        /// The requested item.
+        expected: String,
     },
 }
 
+/// Reason why a session can no longer be written.
+#[derive(Debug, Clone, thiserror::Error)]
+#[non_exhaustive]
+pub enum WriteFailure {
+    /// The preparation thread panicked.
+    #[error("the preparation thread panicked")]
+    PreparationPanicked,
+    /// The writer thread exited before the session was closed.
+    #[error("the writer thread exited")]
+    WriterExited,
+    /// The disk accepted no record for this time.
+    #[error("the disk accepted no record within {} s", .0.as_secs_f64())]
+    Timeout(Duration),
+    /// A record is invalid. The file is not damaged.
+    #[error("{}: {place}: expected {expected}, found {found}", path.display())]
+    InvalidRecord {
+        /// The session file.
+        path: PathBuf,
+        /// The record or its field.
+        place: String,
+        /// What is valid there.
+        expected: String,
+        /// What was found.
+        found: String,
+    },
+    /// SQLite or the operating system failed.
+    #[error(transparent)]
+    System(Arc<RecorderError>),
+}
+
+/// Reason why a displaced session could not be saved.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RescueError {
+    /// No session file is open.
+    #[error("expected an open session file, found none")]
+    NotOpen,
+    /// No folder is left to copy to.
+    #[error("expected a writable folder for a copy, found none")]
+    NoFolder,
+    /// Copying failed for every candidate path.
+    #[error("{}", attempts(.0))]
+    Copy(Vec<(PathBuf, CopyError)>),
+    /// The writer thread exited first.
+    #[error(transparent)]
+    Writer(WriteFailure),
+}
+
+/// Reason why a session could not be copied to a path.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CopyError {
+    /// SQLite accepts only UTF-8 paths.
+    #[error("expected a UTF-8 path")]
+    PathNotUtf8,
+    /// An operating system call failed.
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+    /// SQLite failed.
+    #[error(transparent)]
+    Sql(#[from] Box<sqlx::Error>),
+}
+
+fn attempts(attempts: &[(PathBuf, CopyError)]) -> String {
+    let attempts = attempts.iter();
+    let texts: Vec<_> = attempts
+        .map(|(path, error)| format!("{}: {error}", path.display()))
+        .collect();
+    texts.join("; ")
+}
+
+impl RescueError {
+    /// Error for failed copies to these paths, which may be none.
+    pub(crate) fn from_attempts(attempts: Vec<(PathBuf, CopyError)>) -> Self {
+        match attempts.is_empty() {
+            true => Self::NoFolder,
+            false => Self::Copy(attempts),
+        }
+    }
+}
+
 impl RecorderError {
-    /// True for what the machine did - no room, no memory, a disk that fails, a file that is locked or may not be written - rather than the file. SQLite
-    /// result codes: <https://www.sqlite.org/rescode.html>; a read that ends early (522) is a file that was cut off.
+    /// True if the system rather than the file caused the error: disk full, out of memory, I/O error, file locked or not accessible. SQLite
+    /// result codes: <https://www.sqlite.org/rescode.html>. A short read (522) means that the file was truncated.
     #[must_use]
-    pub fn is_of_the_machine(&self) -> bool {
+    pub fn is_system_failure(&self) -> bool {
         let Self::Sql { source, .. } = self else {
-            // No such folder, or a file where a folder should be, is what was asked for.
+            // A missing folder, or a file in place of a folder, is a wrong path.
             return match self {
                 Self::Io { source, .. } => !matches!(
                     source.kind(),

@@ -1,9 +1,9 @@
-//! From rows to plain values, each checked.
+//! Converts rows to plain values and checks each of them.
 
 use skinrig_model::{
     AttemptId, CameraId, ChunkFacts, HostTime, LocationId, PlannedPress, Point2, PoseSample,
     PressFaultKind, PressId, PressOutcome, PressTiming, PressVerdict, RepetitionId, RigidTransform,
-    RunHeader, StreamFormat, press::PressRole,
+    RunHeader, StreamFormat, UnknownName, press::PressRole,
 };
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
@@ -11,8 +11,8 @@ use sqlx::sqlite::SqliteRow;
 use crate::codec::Codec;
 use crate::pose;
 use crate::query::{
-    Fault, int, later_real, later_text, named, num, opt_int, opt_num, opt_real, opt_text, real,
-    sha, text,
+    Fault, enum_value, int, num, opt_int, opt_num, opt_real, opt_text, real, real_if_present, sha,
+    text, text_if_present,
 };
 use crate::rows::{AttemptRow, ChunkMeta};
 
@@ -29,7 +29,7 @@ pub(crate) fn header_from(row: &SqliteRow) -> Result<RunHeader, Fault> {
     let format = |column: &str| -> Result<StreamFormat, Fault> {
         text(row, column)?
             .parse()
-            .map_err(|e: String| Fault::bad(column, "a stream format", e))
+            .map_err(|e: UnknownName| Fault::bad(column, "a stream format", e))
     };
     let overrides = text(row, "overrides_json")?;
     let seed = text(row, "seed")?;
@@ -63,7 +63,7 @@ pub(crate) fn planned_from(row: &SqliteRow) -> Result<PlannedPress, Fault> {
     const ROLES: [PressRole; 3] = [PressRole::Sync, PressRole::Calibrate, PressRole::Score];
     Ok(PlannedPress {
         id: PressId::from_index(num(row, "id")?),
-        role: named(row, "role", &ROLES, role_name)?,
+        role: enum_value(row, "role", &ROLES, role_name)?,
         repetition: RepetitionId::from_index(num(row, "repetition")?),
         location: LocationId::from_index(num(row, "location")?),
         at: Point2::new(real(row, "x_mm")?, real(row, "y_mm")?),
@@ -111,7 +111,7 @@ pub(crate) fn attempt_from(row: &SqliteRow) -> Result<AttemptRow, Fault> {
             clear,
         }),
         (None, None, None, None, None, None) => None,
-        _ => return Err(Fault::bad(id, "all six moments or none", "some")),
+        _ => return Err(Fault::bad(id, "all six phase times or none", "only some")),
     };
     let measured = (
         opt_real(row, "measured_x_mm")?,
@@ -126,7 +126,7 @@ pub(crate) fn attempt_from(row: &SqliteRow) -> Result<AttemptRow, Fault> {
             timing,
             measured_at: measured.0.zip(measured.1).map(|(x, y)| Point2::new(x, y)),
             measured_depth_mm: opt_real(row, "measured_depth_mm")?,
-            touched_mm: later_real(row, "touched_mm")?,
+            touched_mm: real_if_present(row, "touched_mm")?,
             peak_force_n: opt_real(row, "peak_force_n")?,
             scheduled: int(row, "scheduled")? != 0,
         }),
@@ -139,9 +139,9 @@ pub(crate) fn attempt_from(row: &SqliteRow) -> Result<AttemptRow, Fault> {
     })
 }
 
-/// The kinds of faults of an attempt; none in a session of an older schema.
+/// Fault kinds of an attempt; empty in sessions of an older schema.
 fn faults(id: AttemptId, row: &SqliteRow) -> Result<Vec<PressFaultKind>, Fault> {
-    let kinds = later_text(row, "faults")?.unwrap_or_default();
+    let kinds = text_if_present(row, "faults")?.unwrap_or_default();
     kinds
         .split_whitespace()
         .map(|name| {
@@ -160,7 +160,7 @@ pub(crate) fn chunk_from(row: &SqliteRow) -> Result<ChunkMeta, Fault> {
         host_time: HostTime(int(row, "host_ns")?),
         lost_before: num(row, "lost_before")?,
         lost_time: None,
-        codec: named(
+        codec: enum_value(
             row,
             "codec",
             &[Codec::None, Codec::TimeHighRuns],
@@ -188,8 +188,8 @@ pub(crate) fn pose_block_from(row: &SqliteRow) -> Result<(i64, Vec<PoseSample>),
     if sha2::Sha256::digest(data).as_slice() != sha(row, "sha256")? {
         return Err(Fault::bad(
             place(),
-            "data of the recorded SHA-256",
-            "other data",
+            "data with the recorded SHA-256",
+            "different data",
         ));
     }
     let samples = pose::decode(data);
@@ -210,7 +210,7 @@ pub(crate) fn pose_block_from(row: &SqliteRow) -> Result<(i64, Vec<PoseSample>),
         return Err(Fault::bad(
             place(),
             format!("times from {} to {} ns", span.0, span.1),
-            "others",
+            "different times",
         ));
     }
     Ok((id, samples))

@@ -1,4 +1,4 @@
-//! Records become rows: the statements of the one writer, and when they are committed.
+//! Writes records as rows, and decides when to commit.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -11,22 +11,22 @@ use skinrig_model::{
 use sqlx::sqlite::SqliteConnection;
 
 use crate::pose;
-use crate::prepared::{PreparedChunk, Ready};
+use crate::prepared::{PreparedChunk, PreparedRecord};
 use crate::query::Fault;
 use crate::rows::SessionTotals;
 
-/// Uncommitted bytes that make a commit due.
+/// Uncommitted bytes that trigger a commit.
 const COMMIT_BYTES: usize = 8 << 20;
-/// Uncommitted records that make a commit due.
+/// Uncommitted records that trigger a commit.
 const COMMIT_RECORDS: usize = 4096;
-/// Samples of one pose block at most.
+/// Most samples in one pose block.
 const BLOCK_SAMPLES: usize = 4096;
 
-/// The writing end of a session file.
+/// The journal of a session file, open for writing.
 pub struct Journal {
     pub path: PathBuf,
     pub conn: SqliteConnection,
-    /// The leg that is written.
+    /// Number of the current leg.
     leg: u32,
     poses: Vec<u8>,
     pose_span: Option<(HostTime, HostTime)>,
@@ -49,17 +49,17 @@ impl Journal {
         }
     }
 
-    /// When the transaction under way was opened; `None` when nothing was written since the last commit.
+    /// Start of the current transaction; `None` if nothing was written since the last commit.
     pub const fn opened(&self) -> Option<Instant> {
         self.opened
     }
 
-    /// True when so much was written since the last commit that one is due.
+    /// True if the size of the current transaction requires a commit.
     pub(crate) const fn commit_due(&self) -> bool {
         self.pending_bytes >= COMMIT_BYTES || self.pending_records >= COMMIT_RECORDS
     }
 
-    /// Makes everything written so far durable.
+    /// Commits, so that everything written so far is durable.
     pub async fn commit(&mut self) -> Result<(), Fault> {
         self.flush_poses().await?;
         if self.opened.is_some() {
@@ -71,8 +71,8 @@ impl Journal {
         Ok(())
     }
 
-    /// Writes one record into the transaction under way.
-    pub async fn write(&mut self, ready: Ready, bytes: usize) -> Result<(), Fault> {
+    /// Writes one record in the current transaction.
+    pub async fn write(&mut self, ready: PreparedRecord, bytes: usize) -> Result<(), Fault> {
         if self.opened.is_none() {
             sqlx::query("BEGIN IMMEDIATE")
                 .execute(&mut self.conn)
@@ -82,8 +82,8 @@ impl Journal {
         self.pending_bytes += bytes;
         self.pending_records += 1;
         let record = match ready {
-            Ready::Chunk(chunk) => return self.chunk(*chunk).await,
-            Ready::Record(record) => record,
+            PreparedRecord::Chunk(chunk) => return self.chunk(*chunk).await,
+            PreparedRecord::Record(record) => record,
         };
         match record {
             Record::Started(header) => self.started(&header).await,
@@ -118,8 +118,12 @@ impl Journal {
                 Ok(())
             }
             Record::Preflight(checks) => self.preflight(&checks).await,
-            // Written by `resume`, before the journal of its leg is opened.
-            Record::Resumed(_) => Err(Fault::bad("record", "one of a leg", "the leg's header")),
+            // `resume` writes this record before it opens the journal of the leg.
+            Record::Resumed(_) => Err(Fault::bad(
+                "record",
+                "a record within a leg",
+                "the header of a leg",
+            )),
             Record::Intent { attempt, t } => {
                 sqlx::query(
                     "INSERT INTO attempt (press, number, previous, intent_ns, leg) VALUES (?, ?, ?, ?, ?)",
@@ -171,7 +175,7 @@ impl Journal {
             }
             Record::Chunk(chunk) => {
                 let place = format!("{} chunk {}", chunk.camera, chunk.seq);
-                Err(Fault::bad(place, "a prepared chunk", "one as it came"))
+                Err(Fault::bad(place, "a prepared chunk", "an unprepared one"))
             }
             Record::Outcome(outcome) => self.outcome(&outcome).await,
             Record::Missed(attempt, reason) => {
@@ -483,7 +487,7 @@ impl Journal {
         let Some(edges) = chunk.edges_json else {
             return Ok(());
         };
-        // One statement for all edges: a statement per edge would cost more than all the rest.
+        // One statement for all edges: one per edge would cost more than everything else together.
         sqlx::query(
             "INSERT INTO trigger_edge (camera, seq, position, t_us, channel, rising)
              SELECT ?, ?, key, value ->> 0, value ->> 1, value ->> 2 FROM json_each(?)",
@@ -496,7 +500,7 @@ impl Journal {
         Ok(())
     }
 
-    /// Final counts, when the session is complete enough to be sealed: (what is needed, what there is) otherwise.
+    /// Final counts if the session can be sealed; otherwise (expected, found).
     pub(crate) async fn sealable(
         &mut self,
     ) -> Result<Result<SessionTotals, (String, String)>, Fault> {
@@ -504,7 +508,10 @@ impl Journal {
             .fetch_one(&mut self.conn)
             .await?;
         if ends != 1 {
-            return Ok(Err(("the run's end as last record".into(), "none".into())));
+            return Ok(Err((
+                "the end of the run as the last record".into(),
+                "none".into(),
+            )));
         }
         let totals = crate::totals::totals(&mut self.conn).await?;
         let open = totals.presses.open() + totals.sync.open();
@@ -519,7 +526,7 @@ impl Journal {
             return Ok(Err((
                 "a verdict for every planned press".into(),
                 format!(
-                    "{open} without, the first is {}",
+                    "{open} without one; the first is {}",
                     PressId::from_index(first)
                 ),
             )));
@@ -532,7 +539,7 @@ fn previous(number: u32) -> Option<u32> {
     number.checked_sub(1).filter(|n| *n > 0)
 }
 
-/// SQLite stores NaN as null and would forget it in silence.
+/// Rejects NaN, which SQLite would silently store as null, and infinity.
 fn finite(place: impl ToString, value: f64) -> Result<(), Fault> {
     if value.is_finite() {
         Ok(())

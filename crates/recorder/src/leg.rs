@@ -1,12 +1,12 @@
-//! A further leg of a session: what its process tells on clocks of its own, joined to what is recorded already.
+//! Offsets of a further leg: moves its times and chunk numbers behind those of the earlier legs.
 
 use skinrig_model::{BoxReport, HostTime, Record};
 
 use crate::error::RecorderError;
 
-/// Where a leg's clocks and chunk numbers go on.
+/// Offsets from a leg's own clocks and chunk numbers to those of the session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Joint {
+pub(crate) struct LegOffset {
     /// Added to every host time, ns.
     pub origin_ns: i64,
     /// Added to every time on a camera's clock, µs.
@@ -15,26 +15,26 @@ pub(crate) struct Joint {
     pub first_seq: [u64; 2],
 }
 
-/// The whole second that is one to two seconds after `last`, in units of which `per_second` are one; 0 without any. `None` beyond
-/// half of the range: no leg would fit behind it.
+/// Start of the next leg: the first whole second at least one second after `last`, in units of `1 / per_second` seconds.
+/// 0 without a `last`. `None` beyond half of the range, where no leg would fit.
 pub(crate) fn next_second(last: Option<i64>, per_second: i64) -> Option<i64> {
     let Some(last) = last else { return Some(0) };
     let next = (last.max(0) / per_second).checked_add(2)?;
     next.checked_mul(per_second).filter(|t| *t <= i64::MAX / 2)
 }
 
-impl Joint {
-    /// The record as it is stored.
+impl LegOffset {
+    /// The record with the session's times and chunk numbers.
     ///
     /// # Errors
-    /// [`RecorderError::Record`] for a time beyond what a session can hold.
-    pub fn join(&self, mut record: Record) -> Result<Record, RecorderError> {
+    /// [`RecorderError::Record`] if a time or chunk number overflows.
+    pub fn apply(&self, mut record: Record) -> Result<Record, RecorderError> {
         match self.shift(&mut record) {
             Some(()) => Ok(record),
             None => Err(RecorderError::Record {
                 record: "times of a further leg".into(),
-                expected: "times and chunk numbers that fit behind those of the legs before".into(),
-                found: "one beyond the end of all".into(),
+                expected: "times and chunk numbers that fit after those of the earlier legs".into(),
+                found: "one that overflows".into(),
             }),
         }
     }
@@ -130,17 +130,17 @@ mod tests {
 
     #[test]
     fn a_time_beyond_the_end_is_refused() {
-        let joint = Joint {
+        let offset = LegOffset {
             origin_ns: 2_000_000_000,
-            ..Joint::default()
+            ..LegOffset::default()
         };
         let note = |t| Record::Note {
             t: HostTime(t),
             text: String::new(),
         };
-        assert_eq!(joint.join(note(1)).unwrap(), note(2_000_000_001));
+        assert_eq!(offset.apply(note(1)).unwrap(), note(2_000_000_001));
         assert!(matches!(
-            joint.join(note(i64::MAX)),
+            offset.apply(note(i64::MAX)),
             Err(RecorderError::Record { .. })
         ));
     }

@@ -1,16 +1,15 @@
-//! One SQLite file per session: the one writer, the read-only reader, the check of every byte, the catalogue.
+//! Session files: one SQLite file per session, with a single writer, a read-only reader, full verification and a catalogue.
 //!
-//! A session is written by a [`SessionWriter`] on threads of its own: records go in, an [`Intent`] or
-//! [`Outcome`] comes back only when it and everything before it is on the disk. [`SessionReader`] reads it
-//! while it grows and after it is sealed; [`verify()`] recomputes all of it; [`list`] describes a folder.
-//! The layout is in `docs/reference/session-file.md` and, column by column, in `migrations/`.
+//! [`SessionWriter`] writes a session on its own threads. It returns from an [`Intent`] or [`Outcome`] only when
+//! that record and all earlier ones are on disk. [`SessionReader`] reads a session while it grows and after it is
+//! sealed, [`verify()`] recomputes every hash and count in it, and [`list`] describes a folder.
+//! `docs/reference/session-file.md` describes the layout; `migrations/` documents every column.
 //!
-//! This crate knows bytes, checksums and SQL. It knows no device and no event encoding.
+//! This crate handles bytes, checksums and SQL. It depends on no device and on no event encoding.
 //!
 //! [`Intent`]: skinrig_model::Record::Intent
 //! [`Outcome`]: skinrig_model::Record::Outcome
 
-mod beside;
 mod box_row;
 pub mod catalogue;
 mod chain;
@@ -18,20 +17,21 @@ pub mod codec;
 pub mod error;
 pub mod reader;
 pub mod rows;
+mod sidecar;
 pub mod tags;
 pub mod verify;
 pub mod writer;
 
+mod close_result;
 mod digest;
-mod from_row;
 #[cfg(target_os = "linux")]
-mod held;
+mod file_lock;
 #[cfg(not(target_os = "linux"))]
-#[path = "held_elsewhere.rs"]
-mod held;
+#[path = "file_lock_portable.rs"]
+mod file_lock;
+mod from_row;
 mod hex;
 mod insert;
-mod left;
 mod leg;
 mod lock;
 mod migrations;
@@ -48,11 +48,10 @@ mod seal;
 mod totals;
 mod worker;
 
-pub use beside::SESSION_SUFFIX;
 pub use catalogue::{SessionState, SessionSummary, list};
+pub use close_result::Sealed;
 pub use codec::Codec;
-pub use error::RecorderError;
-pub use left::Sealed;
+pub use error::{CopyError, RecorderError, RescueError, WriteFailure};
 pub use lock::writer_of;
 pub use migrations::SCHEMA_VERSION;
 pub use queue::QueueLoad;
@@ -62,6 +61,10 @@ pub use rows::{
     PressTally, Seal, SessionTotals,
 };
 pub use salvage::{LostBytes, SalvageReport, SalvagedTable, salvage};
-pub use tags::{LaterNote, Saying, Sayings, TAGS_SUFFIX, is_tag, say, sayings, tags_path};
+pub use sidecar::SESSION_SUFFIX;
+pub use tags::{
+    Annotation, AnnotationNote, Annotations, TAGS_SUFFIX, annotate, annotations, is_valid_tag,
+    tags_path,
+};
 pub use verify::{ChunkScanner, VerifyReport, verify};
 pub use writer::SessionWriter;

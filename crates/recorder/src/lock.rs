@@ -1,43 +1,43 @@
-//! Who may write a session: one process at a time, told by a lock on a file beside it and by locks on the files of the session.
+//! The writer lock: at most one process writes a session. It consists of a lock file beside the session and of locks on the session files.
 //!
-//! All of them end with the process, however that ends. The file beside the session says who holds it and what it does with it,
-//! which readers heed; the locks on the session itself ([`crate::held`]) keep a second writer out when that file is removed.
+//! The operating system releases all of them when the process exits. The lock file names the holder and what it does; readers respect
+//! it. The locks on the session files ([`crate::file_lock`]) keep a second writer out even if someone deletes the lock file.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use crate::error::RecorderError;
-use crate::held::{self, Held, Refuge};
+use crate::error::{RecorderError, RescueError};
+use crate::file_lock::{self, LockedFiles, RescueTargets};
 
-/// Who asks [`writer_of`] holds the lock for an instant: a lock that is still held after this time is a writer's.
-const LOOKED_WITHIN: Duration = Duration::from_millis(500);
-/// Between two tries.
-const TRY_AGAIN: Duration = Duration::from_millis(2);
+/// [`writer_of`] takes the lock for an instant. A lock that is still held after this time belongs to a writer.
+const PROBE_TIMEOUT: Duration = Duration::from_millis(500);
+/// Wait between two attempts to take the lock.
+const RETRY_INTERVAL: Duration = Duration::from_millis(2);
 
-/// What a holder that seals its session adds to its own words.
+/// Suffix that a holder appends to its entry while it seals the session.
 const SEALING: &str = ", which seals it";
-/// A holder that left no word about itself.
-const OTHER: &str = "another process";
+/// Description of a holder that left no entry.
+const UNKNOWN_HOLDER: &str = "another process";
 
-/// Held by whoever writes a session, for as long as it does. The file goes away with it.
+/// Exclusive right to write a session, until dropped. Dropping removes the lock file.
 #[derive(Debug)]
 pub(crate) struct WriterLock {
     path: PathBuf,
     file: File,
     session: PathBuf,
-    /// None before the session file is made.
-    held: Option<Held>,
+    /// `None` until the session file exists.
+    files: Option<LockedFiles>,
 }
 
 impl WriterLock {
-    /// The only lock of the session at `session`, and of the file there when there is one.
+    /// Locks the session at `session`, including its file if one exists.
     ///
     /// # Errors
-    /// [`RecorderError::InUse`] when another writer has it.
+    /// [`RecorderError::InUse`] if another writer holds it.
     pub fn take(session: &Path) -> Result<Self, RecorderError> {
-        let path = beside(session);
+        let path = lock_path(session);
         let io = |source| RecorderError::Io {
             path: path.clone(),
             doing: "locking the session",
@@ -54,19 +54,19 @@ impl WriterLock {
                 .map_err(io)?;
             match file.try_lock() {
                 Ok(()) => {}
-                Err(TryLockError::WouldBlock) if from.elapsed() < LOOKED_WITHIN => {
-                    std::thread::sleep(TRY_AGAIN);
+                Err(TryLockError::WouldBlock) if from.elapsed() < PROBE_TIMEOUT => {
+                    std::thread::sleep(RETRY_INTERVAL);
                     continue;
                 }
                 Err(TryLockError::WouldBlock) => {
                     return Err(RecorderError::InUse {
                         path: session.to_owned(),
-                        by: holder(&mut file),
+                        by: read_holder(&mut file),
                     });
                 }
                 Err(TryLockError::Error(e)) => return Err(io(e)),
             }
-            // The one before may have removed the file between our opening and our locking: then the lock is on nothing.
+            // The previous holder may have removed the file after we opened it and before we locked it. That lock protects nothing.
             if is_still_at(&file, &path).map_err(io)? {
                 break file;
             }
@@ -74,11 +74,11 @@ impl WriterLock {
         let mut lock = Self {
             path: path.clone(),
             session: session.to_owned(),
-            held: None,
+            files: None,
             file: file.try_clone().map_err(io)?,
         };
         if session.exists() {
-            lock.hold(from)?;
+            lock.lock_files(from)?;
         }
         file.set_len(0).map_err(io)?;
         file.seek(SeekFrom::Start(0)).map_err(io)?;
@@ -86,39 +86,39 @@ impl WriterLock {
         Ok(lock)
     }
 
-    /// Locks the session file itself, which was made since.
+    /// Locks the session file, which was created after [`take`](Self::take).
     ///
     /// # Errors
     /// As [`take`](Self::take).
     pub(crate) fn take_file(&mut self) -> Result<(), RecorderError> {
-        self.hold(Instant::now())
+        self.lock_files(Instant::now())
     }
 
-    fn hold(&mut self, from: Instant) -> Result<(), RecorderError> {
+    fn lock_files(&mut self, from: Instant) -> Result<(), RecorderError> {
         loop {
-            match Held::take(&self.session).map_err(|e| self.io(e))? {
-                Some(held) => {
-                    self.held = Some(held);
+            match LockedFiles::take(&self.session).map_err(|e| self.io(e))? {
+                Some(files) => {
+                    self.files = Some(files);
                     return Ok(());
                 }
-                // Of two that come at once neither may have got it.
-                None if from.elapsed() < LOOKED_WITHIN && !held::is_ours(&self.session) => {
-                    std::thread::sleep(TRY_AGAIN);
+                // Two writers that try at the same moment may both fail.
+                None if from.elapsed() < PROBE_TIMEOUT && !file_lock::is_own(&self.session) => {
+                    std::thread::sleep(RETRY_INTERVAL);
                 }
                 None => return Err(self.in_use()),
             }
         }
     }
 
-    /// Locks the log that SQLite has made.
+    /// Locks the write-ahead log that SQLite created.
     ///
     /// # Errors
     /// As [`take`](Self::take).
     pub(crate) fn take_log(&mut self) -> Result<(), RecorderError> {
-        let Some(held) = &mut self.held else {
+        let Some(files) = &mut self.files else {
             return Ok(());
         };
-        match held.take_log() {
+        match files.take_log() {
             Ok(true) => Ok(()),
             Ok(false) => Err(self.in_use()),
             Err(e) => Err(self.io(e)),
@@ -128,7 +128,7 @@ impl WriterLock {
     fn in_use(&self) -> RecorderError {
         RecorderError::InUse {
             path: self.session.clone(),
-            by: OTHER.to_owned(),
+            by: UNKNOWN_HOLDER.to_owned(),
         }
     }
 
@@ -140,54 +140,56 @@ impl WriterLock {
         }
     }
 
-    /// Whether the session is where it was opened.
+    /// Checks that the session files are still where the writer opened them.
     ///
     /// # Errors
     /// [`RecorderError::Displaced`].
     pub fn check(&self) -> Result<(), RecorderError> {
-        self.held.as_ref().map_or(Ok(()), Held::check)
+        self.files.as_ref().map_or(Ok(()), LockedFiles::check)
     }
 
-    /// Where a session that is not can be kept.
-    pub(crate) fn refuge(&self) -> Refuge {
-        let nowhere = Refuge {
-            place: None,
+    /// Where a displaced session can be saved.
+    pub(crate) fn rescue_targets(&self) -> RescueTargets {
+        let nowhere = RescueTargets {
+            current_path: None,
             copies: Vec::new(),
         };
-        self.held.as_ref().map_or(nowhere, Held::refuge)
-    }
-
-    /// Copies the open session file; see [`Held::copy`].
-    pub fn copy(&self, paths: &[PathBuf]) -> Result<PathBuf, String> {
-        let none = || Err("expected an open session file, found none".to_owned());
-        self.held
+        self.files
             .as_ref()
-            .map_or_else(none, |held| held.copy(paths))
+            .map_or(nowhere, LockedFiles::rescue_targets)
     }
 
-    /// Removes what is left beside a session that is not where it was opened.
-    pub fn tidy(&self) {
-        if let Some(held) = &self.held {
-            held.tidy();
+    /// Copies the open session file; see [`LockedFiles::copy`].
+    pub fn copy(&self, paths: &[PathBuf]) -> Result<PathBuf, RescueError> {
+        let none = || Err(RescueError::NotOpen);
+        self.files
+            .as_ref()
+            .map_or_else(none, |files| files.copy(paths))
+    }
+
+    /// Removes the log files that a displaced session leaves behind.
+    pub fn remove_log_files(&self) {
+        if let Some(files) = &self.files {
+            files.remove_log_files();
         }
     }
 
-    /// SQLite is about to remove the log.
-    pub(crate) fn without_log(&mut self) {
-        if let Some(held) = &mut self.held {
-            held.without_log();
+    /// Releases the log before SQLite removes it.
+    pub(crate) fn forget_log(&mut self) {
+        if let Some(files) = &mut self.files {
+            files.forget_log();
         }
     }
 }
 
 impl WriterLock {
-    /// Announces that the session is being sealed, for which it must be open nowhere else: whoever wants to read it waits.
+    /// Announces that sealing begins, so that new readers wait: sealing needs the session open nowhere else.
     pub(crate) fn announce_sealing(&mut self) {
-        // At the end of what the holder wrote about itself. Unannounced, sealing takes its chance among the readers.
+        // Appended to the holder's entry. If it fails, sealing competes with readers.
         let _ = write!(self.file, "{SEALING}");
     }
 
-    /// Readers need not wait any longer.
+    /// Ends the announcement: readers no longer wait.
     pub(crate) fn withdraw_sealing(&mut self) {
         let _ = self.file.set_len(0);
         let _ = self.file.seek(SeekFrom::Start(0));
@@ -195,61 +197,61 @@ impl WriterLock {
     }
 }
 
-/// Whether the session at `session` is being sealed now.
+/// True while a writer seals the session at `session`.
 pub(crate) fn is_being_sealed(session: &Path) -> bool {
     writer_of(session).is_some_and(|by| by.ends_with(SEALING))
 }
 
 impl Drop for WriterLock {
     fn drop(&mut self) {
-        // Removed while it is locked, so that nobody removes the next one's, and only if it is ours. A file that stays behind locks nothing.
+        // Remove the file while it is locked, so that this never removes the next holder's file. A leftover file locks nothing.
         if cfg!(unix) && is_still_at(&self.file, &self.path).unwrap_or(false) {
             let _ = std::fs::remove_file(&self.path);
         }
     }
 }
 
-/// Who writes the session at `session` now, in words; `None` when nobody does.
+/// Description of the process that writes the session at `session`, such as `process 123`; `None` if no process does.
 pub fn writer_of(session: &Path) -> Option<String> {
-    let path = beside(session);
-    // To open a pipe would wait for whoever writes into it.
+    let path = lock_path(session);
+    // Opening a pipe would block until another process writes to it.
     let is_file = |path: &Path| std::fs::metadata(path).is_ok_and(|m| m.is_file());
     if is_file(&path)
         && let Ok(mut file) = File::open(&path)
         && let Err(TryLockError::WouldBlock) = file.try_lock_shared()
     {
-        return Some(holder(&mut file));
+        return Some(read_holder(&mut file));
     }
-    // The file beside it may have been removed.
-    match held::is_ours(session) {
+    // Someone may have deleted the lock file.
+    match file_lock::is_own(session) {
         true => Some(format!("process {}", std::process::id())),
-        false => held::is_held(session).then(|| OTHER.to_owned()),
+        false => file_lock::is_locked_by_writer(session).then(|| UNKNOWN_HOLDER.to_owned()),
     }
 }
 
-fn beside(session: &Path) -> PathBuf {
+fn lock_path(session: &Path) -> PathBuf {
     let mut name = session.as_os_str().to_owned();
     name.push("-lock");
     PathBuf::from(name)
 }
 
-/// What the holder wrote about itself, at most a line.
-fn holder(file: &mut File) -> String {
+/// The holder's entry: the first line of the lock file, truncated.
+fn read_holder(file: &mut File) -> String {
     let mut text = String::new();
     match file.take(64).read_to_string(&mut text) {
         Ok(n) if n > 0 => text,
-        _ => OTHER.to_owned(),
+        _ => UNKNOWN_HOLDER.to_owned(),
     }
 }
 
 #[cfg(unix)]
 fn is_still_at(file: &File, path: &Path) -> std::io::Result<bool> {
     use std::os::unix::fs::MetadataExt;
-    let held = file.metadata()?;
-    Ok(std::fs::metadata(path).is_ok_and(|m| (m.dev(), m.ino()) == (held.dev(), held.ino())))
+    let locked = file.metadata()?;
+    Ok(std::fs::metadata(path).is_ok_and(|m| (m.dev(), m.ino()) == (locked.dev(), locked.ino())))
 }
 
-/// Elsewhere the file is never removed.
+/// On other systems the lock file is never removed.
 #[cfg(not(unix))]
 fn is_still_at(_file: &File, _path: &Path) -> std::io::Result<bool> {
     Ok(true)
@@ -278,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn who_only_looks_keeps_no_writer_out() {
+    fn a_query_does_not_block_a_writer() {
         let folder = tempfile::tempdir().unwrap();
         let session = folder.path().join("a.session.sqlite");
         let over = std::sync::atomic::AtomicBool::new(false);

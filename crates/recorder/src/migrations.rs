@@ -5,11 +5,11 @@ use std::sync::LazyLock;
 use sqlx::SqlSafeStr;
 use sqlx::migrate::{Migration, MigrationType, Migrator};
 
-/// The schema version that this build writes, and the newest that it reads (`PRAGMA user_version`).
+/// Schema version that this build writes, and the newest that it reads (`PRAGMA user_version`).
 pub const SCHEMA_VERSION: u32 = 10;
 
-/// Every migration, oldest first: version, description and SQL. Written out: the macro that reads the folder would build SQLite a
-/// second time, for the compiler.
+/// All migrations, oldest first: version, description and SQL. Listed by hand, because the macro that reads the folder would
+/// build SQLite a second time for the compiler.
 const MIGRATIONS: [(i64, &str, &str); SCHEMA_VERSION as usize] = [
     (
         20261121000000,
@@ -65,7 +65,7 @@ const MIGRATIONS: [(i64, &str, &str); SCHEMA_VERSION as usize] = [
 
 pub(crate) static MIGRATOR: LazyLock<Migrator> = LazyLock::new(|| migrator(&MIGRATIONS));
 
-/// A migrator of these migrations: version, description and SQL of each.
+/// Builds a migrator from version, description and SQL of each migration.
 fn migrator(migrations: &[(i64, &'static str, &'static str)]) -> Migrator {
     let migrations = migrations.iter().map(|&(version, description, sql)| {
         let kind = MigrationType::Simple;

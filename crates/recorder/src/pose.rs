@@ -14,7 +14,7 @@ pub fn encode(sample: &PoseSample, data: &mut Vec<u8>) {
     data.extend_from_slice(&sample.force_n.to_le_bytes());
 }
 
-/// The samples of a block; bytes after the last whole record are left to the caller's length check.
+/// Samples of a block. Ignores bytes after the last whole record: the caller checks the length.
 pub fn decode(data: &[u8]) -> Vec<PoseSample> {
     data.as_chunks::<SAMPLE_BYTES>()
         .0

@@ -1,4 +1,4 @@
-//! Work on records that needs no file: camera bytes are checked, hashed and folded while SQLite writes those before.
+//! Preparation of records on a thread of its own: checks, hashes and folds camera bytes while SQLite writes earlier records.
 
 use std::sync::Arc;
 
@@ -6,22 +6,23 @@ use sha2::{Digest, Sha256};
 use skinrig_model::{RawChunk, Record, StreamFormat};
 
 use crate::codec::{self, Codec};
-use crate::prepared::{Prepared, PreparedChunk, PreparedGap, Ready};
+use crate::error::WriteFailure;
+use crate::prepared::{Prepared, PreparedChunk, PreparedGap, PreparedRecord};
 use crate::query::Fault;
 use crate::queue::Shared;
 
-/// Where the time of a camera's stream stands.
+/// Time of a camera's stream.
 #[derive(Debug, Clone, Copy, Default)]
-struct Course {
-    /// The last time that came.
+struct StreamClock {
+    /// The latest time in the stream.
     last_us: Option<i64>,
-    /// The first lossy chunk since which none came.
+    /// First chunk after lost bytes since which no time has arrived.
     open_gap: Option<i64>,
 }
 
-impl Course {
-    /// Takes the next chunk: the time that was lost before it, and the gap that it ends.
-    fn see(
+impl StreamClock {
+    /// Advances by one chunk; returns the time lost before it and the gap that it ends.
+    fn advance(
         &mut self,
         seq: i64,
         lost: bool,
@@ -47,39 +48,38 @@ impl Course {
     }
 }
 
-/// Tells waiting callers when the thread ends by a panic.
-struct Farewell(Arc<Shared>);
+/// Notifies waiting callers if the thread panics.
+struct PanicNotifier(Arc<Shared>);
 
-impl Drop for Farewell {
+impl Drop for PanicNotifier {
     fn drop(&mut self) {
         if std::thread::panicking() {
-            self.0
-                .fail("the recorder's preparing thread ended".to_owned());
+            self.0.fail(WriteFailure::PreparationPanicked);
         }
     }
 }
 
-/// Prepares records in their order until there are no more.
+/// Prepares records in order until the queue closes.
 pub fn run(shared: &Arc<Shared>, mut preparer: Preparer) {
-    let _farewell = Farewell(Arc::clone(shared));
+    let _notifier = PanicNotifier(Arc::clone(shared));
     while let Some((record, bytes)) = shared.next_to_prepare() {
-        shared.prepared(preparer.prepare(record), bytes);
+        shared.push_prepared(preparer.prepare(record), bytes);
     }
 }
 
-/// What is remembered from record to record.
+/// State carried from record to record.
 #[derive(Debug, Default)]
 pub(crate) struct Preparer {
-    /// How the cameras' bytes encode events; known from the run's header on.
+    /// Stream formats of the cameras; known once the run's header has arrived.
     pub formats: Option<[StreamFormat; 2]>,
-    /// The next chunk of each camera.
+    /// Number of the next chunk of each camera.
     pub next_seq: [u64; 2],
-    /// How far each camera's time has come in this leg.
-    courses: [Course; 2],
+    /// Stream time of each camera in this leg.
+    clocks: [StreamClock; 2],
 }
 
 impl Preparer {
-    /// One that goes on with a session: how its cameras' bytes encode events, and the next chunk of each.
+    /// Preparer for a further leg: stream formats of its cameras, and the next chunk of each.
     pub(crate) fn resuming(formats: [StreamFormat; 2], next_seq: [u64; 2]) -> Self {
         Self {
             formats: Some(formats),
@@ -92,12 +92,12 @@ impl Preparer {
 impl Preparer {
     fn prepare(&mut self, record: Record) -> Prepared {
         match record {
-            Record::Chunk(chunk) => Ok(Ready::Chunk(Box::new(self.chunk(chunk)?))),
+            Record::Chunk(chunk) => Ok(PreparedRecord::Chunk(Box::new(self.chunk(chunk)?))),
             other => {
                 if let Record::Started(header) = &other {
                     self.formats = Some(header.stream_formats);
                 }
-                Ok(Ready::Record(other))
+                Ok(PreparedRecord::Record(other))
             }
         }
     }
@@ -115,7 +115,10 @@ impl Preparer {
         }
         let facts = chunk.facts;
         if facts.trigger_edges != chunk.triggers.len() as u64 {
-            let counted = format!("{} trigger edges as counted", facts.trigger_edges);
+            let counted = format!(
+                "the {} trigger edges that were counted",
+                facts.trigger_edges
+            );
             return Err(Fault::bad(place, counted, chunk.triggers.len()));
         }
         self.next_seq[camera] += 1;
@@ -145,7 +148,7 @@ impl Preparer {
         let first_us = facts.first_us.map(signed).transpose()?;
         let last_us = facts.last_us.map(signed).transpose()?;
         let lost_from_us = chunk.lost_from_us.map(signed).transpose()?;
-        let (gap, ends_gaps_from) = self.courses[camera].see(
+        let (gap, ends_gaps_from) = self.clocks[camera].advance(
             seq,
             chunk.lost_before > 0,
             lost_from_us,

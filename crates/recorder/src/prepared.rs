@@ -1,24 +1,24 @@
-//! Records on their way from the thread that prepares them to the one that writes.
+//! Records between the preparation thread and the writer thread.
 
 use skinrig_model::{CameraId, HostTime, Record};
 
 use crate::codec::Codec;
 use crate::query::Fault;
 
-/// A record that can be written, or why it cannot. It keeps its place in the order either way.
-pub type Prepared = Result<Ready, Fault>;
+/// A record ready to write, or the reason why it cannot be written. Keeps its place in the order either way.
+pub type Prepared = Result<PreparedRecord, Fault>;
 
-/// A record that can be written.
+/// A record ready to write.
 #[derive(Debug)]
-pub enum Ready {
+pub enum PreparedRecord {
     /// Camera bytes.
     Chunk(Box<PreparedChunk>),
-    /// Anything else, as it came.
+    /// Any other record, unchanged.
     Record(Record),
 }
 
-impl Ready {
-    /// Whether it must be on the disk before the caller goes on.
+impl PreparedRecord {
+    /// Whether it must be on disk before the caller continues.
     pub(crate) fn is_durable(&self) -> bool {
         matches!(self, Self::Record(record) if is_durable(record))
     }
@@ -31,9 +31,9 @@ pub(crate) struct PreparedChunk {
     pub seq: i64,
     pub host_time: HostTime,
     pub lost_before: i64,
-    /// The time that was lost before it, as far as it is known by now; `None` without a loss.
+    /// Time lost before it, as far as known; `None` without a loss.
     pub gap: Option<PreparedGap>,
-    /// The first gap since which no time came, when this chunk's is the time that ends it and those after it.
+    /// The chunk of the first gap that this chunk's first time ends. It also ends all later open gaps.
     pub ends_gaps_from: Option<i64>,
     pub codec: Codec,
     pub raw_bytes: i64,
@@ -56,7 +56,7 @@ pub(crate) struct PreparedGap {
     pub to_us: Option<i64>,
 }
 
-/// Whether a record must be on the disk before the caller goes on.
+/// Whether a record must be on disk before the caller continues.
 pub(crate) fn is_durable(record: &Record) -> bool {
     matches!(
         record,

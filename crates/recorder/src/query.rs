@@ -1,4 +1,4 @@
-//! Small helpers between SQL rows and plain values.
+//! Helpers between SQL rows and plain values.
 
 use std::future::poll_fn;
 use std::path::Path;
@@ -8,12 +8,12 @@ use sqlx::sqlite::{Sqlite, SqliteArguments, SqliteConnection, SqliteRow};
 
 use crate::error::RecorderError;
 
-/// A failed query, or a row that contradicts the schema; not yet told which file.
+/// A failed query, or a row that violates the schema, before its file is known.
 #[derive(Debug)]
 pub enum Fault {
-    /// SQLite's.
+    /// SQLite failed.
     Sql(Box<sqlx::Error>),
-    /// A value that should not be there.
+    /// A value violates the schema.
     Bad {
         place: String,
         expected: String,
@@ -28,7 +28,7 @@ impl From<sqlx::Error> for Fault {
 }
 
 impl Fault {
-    /// A value that should not be there.
+    /// Fault for a value that violates the schema.
     pub fn bad(place: impl ToString, expected: impl ToString, found: impl ToString) -> Self {
         Self::Bad {
             place: place.to_string(),
@@ -37,7 +37,7 @@ impl Fault {
         }
     }
 
-    /// The error for the user.
+    /// Converts it to the error for this file.
     pub fn at(self, path: &Path, doing: &'static str) -> RecorderError {
         let path = path.to_owned();
         match self {
@@ -105,7 +105,7 @@ pub(crate) fn opt_real(row: &SqliteRow, column: &str) -> Result<Option<f64>, Fau
     Ok(row.try_get(column)?)
 }
 
-/// Whether the file has this table: sessions of an older schema lack the later ones.
+/// Whether the file has this table; older schemas lack the later ones.
 pub(crate) async fn has_table(conn: &mut SqliteConnection, name: &str) -> Result<bool, Fault> {
     let row =
         sqlx::query("SELECT count(*) AS n FROM sqlite_schema WHERE type = 'table' AND name = ?")
@@ -115,16 +115,16 @@ pub(crate) async fn has_table(conn: &mut SqliteConnection, name: &str) -> Result
     Ok(int(&row, "n")? > 0)
 }
 
-/// A real column that may be null, and that sessions of an older schema do not have.
-pub(crate) fn later_real(row: &SqliteRow, column: &str) -> Result<Option<f64>, Fault> {
+/// A real column that may be null, and that older schemas lack.
+pub(crate) fn real_if_present(row: &SqliteRow, column: &str) -> Result<Option<f64>, Fault> {
     match row.try_get(column) {
         Err(sqlx::Error::ColumnNotFound(_)) => Ok(None),
         other => Ok(other?),
     }
 }
 
-/// A text column that older schemas do not have.
-pub(crate) fn later_text(row: &SqliteRow, column: &str) -> Result<Option<String>, Fault> {
+/// A text column that may be null, and that older schemas lack.
+pub(crate) fn text_if_present(row: &SqliteRow, column: &str) -> Result<Option<String>, Fault> {
     match row.try_get(column) {
         Err(sqlx::Error::ColumnNotFound(_)) => Ok(None),
         other => Ok(other?),
@@ -153,8 +153,8 @@ pub fn sha(row: &SqliteRow, column: &str) -> Result<[u8; 32], Fault> {
         .map_err(|_| Fault::bad(column, "32 bytes", format!("{} bytes", bytes.len())))
 }
 
-/// A text column that names one of `all`.
-pub fn named<T: Copy>(
+/// A text column with the name of one of `all`.
+pub fn enum_value<T: Copy>(
     row: &SqliteRow,
     column: &str,
     all: &[T],
@@ -174,7 +174,7 @@ pub fn named<T: Copy>(
         })
 }
 
-/// The schema that the file was made with.
+/// Schema version of the file.
 pub(crate) async fn schema_version(conn: &mut SqliteConnection) -> Result<u32, Fault> {
     let version = sqlx::query("PRAGMA user_version").fetch_one(conn).await?;
     num(&version, "user_version")

@@ -1,4 +1,4 @@
-//! The way of a record: accepted, prepared, written, durable; in order, in bounded memory.
+//! The record queue, in order and in bounded memory: accepted, prepared, written, durable.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -6,25 +6,28 @@ use std::time::{Duration, Instant};
 
 use skinrig_model::Record;
 
-use crate::error::RecorderError;
-use crate::held::Refuge;
+use crate::error::{RecorderError, WriteFailure};
+use crate::file_lock::RescueTargets;
 use crate::prepared::{Prepared, is_durable};
 
-/// Bytes of records that may wait to be written; beyond, [`accept`](crate::SessionWriter::accept) waits.
+/// Most bytes of records that may wait to be written; beyond that, [`accept`](crate::SessionWriter::accept) blocks.
 const QUEUE_BYTES: usize = 64 << 20;
 
-/// Longest time for which a caller waits for the disk.
-const PATIENCE: Duration = Duration::from_secs(30);
+/// Longest time that a caller waits for the disk.
+const DISK_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// How long sealing waits for other programs that have the session open, unless told otherwise.
-const SEAL_PATIENCE: Duration = Duration::from_secs(60);
+/// Default time that sealing waits for other programs that have the session open.
+const SEAL_TIMEOUT: Duration = Duration::from_secs(60);
 
-/// What the caller, the preparing and the writing thread share.
+/// No record reached the disk for this time.
+struct DiskTimeout(Duration);
+
+/// State shared by the caller, the preparation thread and the writer thread.
 #[derive(Debug)]
 pub struct Shared {
     queue: Mutex<Queue>,
     changed: Condvar,
-    patience: Duration,
+    disk_timeout: Duration,
 }
 
 impl Default for Shared {
@@ -32,7 +35,7 @@ impl Default for Shared {
         Self {
             queue: Mutex::default(),
             changed: Condvar::new(),
-            patience: PATIENCE,
+            disk_timeout: DISK_TIMEOUT,
         }
     }
 }
@@ -40,54 +43,54 @@ impl Default for Shared {
 #[derive(Debug, Default)]
 struct Queue {
     accepted: VecDeque<(Record, usize)>,
-    /// One record is neither in `accepted` nor in `prepared`: it is being prepared.
+    /// True while a record is being prepared; it is then in neither `accepted` nor `prepared`.
     preparing: bool,
     prepared: VecDeque<(Prepared, usize)>,
     /// Bytes accepted and not yet written.
     bytes: usize,
-    /// The most of them at any time, and how often a caller waited for room.
+    /// Highest value of `bytes`, and how often a caller waited for space.
     most_bytes: usize,
     waits: u64,
-    /// Records accepted, and how many of them are durable, since the beginning.
+    /// Records accepted, and how many of them are durable, since the session was opened.
     taken: u64,
     durable: u64,
-    failed: Option<String>,
-    closed: Option<Close>,
-    /// Another program keeps the session from being sealed.
+    failed: Option<WriteFailure>,
+    closed: Option<CloseMode>,
+    /// Another program has the session open and delays sealing.
     held_open: bool,
-    seal_patience: Option<Duration>,
+    seal_timeout: Option<Duration>,
 }
 
-/// How full the queue of records has been.
+/// Load of the record queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct QueueLoad {
-    /// The most bytes that waited to be written at any time.
+    /// Highest number of bytes that waited to be written.
     pub most_bytes: usize,
-    /// How many may wait.
+    /// Most bytes that may wait.
     pub limit_bytes: usize,
-    /// How often the run waited for room. Meanwhile data wait in the drivers, which count what they lose.
+    /// How often the run waited for space. Data then accumulate in the drivers, which count what they drop.
     pub waits: u64,
 }
 
-/// How a session is left.
+/// How to close a session.
 #[derive(Debug, Clone)]
-pub enum Close {
-    /// Committed, readable, not sealed.
-    AsItIs,
-    /// Sealed.
+pub enum CloseMode {
+    /// Commit and leave it unsealed.
+    Unsealed,
+    /// Seal it.
     Seal,
-    /// Brought to where it can be found: it was moved or removed.
-    Rescue(Refuge),
+    /// Save it elsewhere: it was moved or removed.
+    Rescue(RescueTargets),
 }
 
-/// What the writing thread does next.
-pub enum Next {
-    /// Writes these, each with its bytes in the queue.
+/// Next task of the writer thread.
+pub enum WriterTask {
+    /// Write these records, each with its bytes in the queue.
     Write(VecDeque<(Prepared, usize)>),
-    /// Commits: nothing came in time.
+    /// Commit: no record arrived in time.
     Commit,
-    /// Ends: everything is written.
-    Close(Close),
+    /// Close the session: everything is written.
+    Close(CloseMode),
 }
 
 impl Shared {
@@ -95,18 +98,15 @@ impl Shared {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for a change; gives up on a disk that took nothing since `since`: an arm must not wait for it in the skin.
+    /// Waits for a change. Fails if the disk has accepted nothing since `since`: the tip must not stay in the skin because of a slow disk.
     fn wait_for_disk<'a>(
         &self,
         queue: MutexGuard<'a, Queue>,
         since: Instant,
-    ) -> Result<MutexGuard<'a, Queue>, String> {
-        let left = self.patience.saturating_sub(since.elapsed());
+    ) -> Result<MutexGuard<'a, Queue>, DiskTimeout> {
+        let left = self.disk_timeout.saturating_sub(since.elapsed());
         if left.is_zero() {
-            return Err(format!(
-                "expected the disk to take a record within {} s, found that it did not",
-                self.patience.as_secs_f64()
-            ));
+            return Err(DiskTimeout(self.disk_timeout));
         }
         let (queue, _) = self
             .changed
@@ -121,11 +121,11 @@ impl Shared {
             .unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes a record when there is room for it, and returns when it is durable if it has to be; or says why
-    /// nothing is written any more.
+    /// Queues a record as soon as there is space. Durable records return only when they are on disk. Fails once writing
+    /// has failed.
     ///
     /// # Errors
-    /// [`RecorderError::Failed`] when it was not taken, [`RecorderError::Late`] when it was, and is not known to be durable.
+    /// [`RecorderError::WriteFailed`] if the record was not queued; [`RecorderError::WriteTimeout`] if it was queued but may not be durable.
     pub fn accept(&self, record: Record) -> Result<(), RecorderError> {
         let (bytes, durable) = (size_of(&record), is_durable(&record));
         let mut queue = self.lock();
@@ -134,10 +134,12 @@ impl Shared {
         let since = Instant::now();
         while full(&queue) {
             let waited = self.wait_for_disk(queue, since);
-            queue = waited.map_err(RecorderError::Failed)?;
+            queue = waited.map_err(|DiskTimeout(limit)| {
+                RecorderError::WriteFailed(WriteFailure::Timeout(limit))
+            })?;
         }
-        if let Some(detail) = &queue.failed {
-            return Err(RecorderError::Failed(detail.clone()));
+        if let Some(failure) = &queue.failed {
+            return Err(RecorderError::WriteFailed(failure.clone()));
         }
         queue.accepted.push_back((record, bytes));
         queue.bytes += bytes;
@@ -146,16 +148,16 @@ impl Shared {
         let mine = queue.taken;
         self.changed.notify_all();
         while durable && queue.durable < mine {
-            if let Some(detail) = &queue.failed {
-                return Err(RecorderError::Failed(detail.clone()));
+            if let Some(failure) = &queue.failed {
+                return Err(RecorderError::WriteFailed(failure.clone()));
             }
             let waited = self.wait_for_disk(queue, since);
-            queue = waited.map_err(RecorderError::Late)?;
+            queue = waited.map_err(|DiskTimeout(limit)| RecorderError::WriteTimeout(limit))?;
         }
         Ok(())
     }
 
-    /// How full the queue has been.
+    /// Load of the queue so far.
     pub fn load(&self) -> QueueLoad {
         let queue = self.lock();
         QueueLoad {
@@ -165,7 +167,7 @@ impl Shared {
         }
     }
 
-    /// The next record to prepare, with its bytes; `None` when there will be no more.
+    /// Next record to prepare, with its bytes; `None` once the queue is closed.
     pub(crate) fn next_to_prepare(&self) -> Option<(Record, usize)> {
         let mut queue = self.lock();
         loop {
@@ -180,8 +182,8 @@ impl Shared {
         }
     }
 
-    /// Hands on what [`next_to_prepare`](Self::next_to_prepare) gave out.
-    pub fn prepared(&self, prepared: Prepared, bytes: usize) {
+    /// Passes on the result for the record that [`next_to_prepare`](Self::next_to_prepare) returned.
+    pub fn push_prepared(&self, prepared: Prepared, bytes: usize) {
         let mut queue = self.lock();
         queue.preparing = false;
         if queue.failed.is_none() {
@@ -190,25 +192,25 @@ impl Shared {
         self.changed.notify_all();
     }
 
-    /// What the writing thread does next; it has something to commit at `commit_at`.
-    pub fn next(&self, commit_at: Option<Instant>) -> Next {
+    /// Waits for the next task of the writer thread. Returns a commit at `commit_at`.
+    pub fn next_task(&self, commit_at: Option<Instant>) -> WriterTask {
         let mut queue = self.lock();
         loop {
             if !queue.prepared.is_empty() {
-                return Next::Write(std::mem::take(&mut queue.prepared));
+                return WriterTask::Write(std::mem::take(&mut queue.prepared));
             }
             if let Some(close) = queue.closed.clone()
                 && queue.accepted.is_empty()
                 && !queue.preparing
             {
-                return Next::Close(close);
+                return WriterTask::Close(close);
             }
             match commit_at.filter(|_| queue.failed.is_none()) {
                 None => queue = self.wait(queue),
                 Some(at) => {
                     let left = at.saturating_duration_since(Instant::now());
                     if left.is_zero() {
-                        return Next::Commit;
+                        return WriterTask::Commit;
                     }
                     queue = self
                         .changed
@@ -220,63 +222,63 @@ impl Shared {
         }
     }
 
-    /// Makes room: a record of so many bytes was written.
-    pub fn written(&self, bytes: usize) {
+    /// Frees the space of a record that was written.
+    pub fn release(&self, bytes: usize) {
         let mut queue = self.lock();
         queue.bytes = queue.bytes.saturating_sub(bytes);
         self.changed.notify_all();
     }
 
-    /// The first `records` records are on the disk.
-    pub fn durable(&self, records: u64) {
+    /// Reports that the first `records` records are on disk.
+    pub fn mark_durable(&self, records: u64) {
         self.lock().durable = records;
         self.changed.notify_all();
     }
 
-    /// Nothing is written any more. The first reason stays.
-    pub fn fail(&self, detail: String) {
+    /// Stops all writing. The first reason is kept.
+    pub fn fail(&self, failure: WriteFailure) {
         let mut queue = self.lock();
-        queue.failed.get_or_insert(detail);
+        queue.failed.get_or_insert(failure);
         queue.accepted.clear();
-        queue.preparing = false; // what still comes is dropped, and nobody waits for it
+        queue.preparing = false; // a record still being prepared is dropped; nothing waits for it
         queue.prepared.clear();
         queue.bytes = 0;
         self.changed.notify_all();
     }
 
-    /// Why nothing is written any more.
-    pub fn failure(&self) -> Option<String> {
+    /// Reason why writing stopped, if it has.
+    pub fn failure(&self) -> Option<WriteFailure> {
         self.lock().failed.clone()
     }
 
     /// How long sealing waits for other programs.
-    pub(crate) fn seal_patience(&self) -> Duration {
-        self.lock().seal_patience.unwrap_or(SEAL_PATIENCE)
+    pub(crate) fn seal_timeout(&self) -> Duration {
+        self.lock().seal_timeout.unwrap_or(SEAL_TIMEOUT)
     }
 
-    /// Sets that time.
-    pub(crate) fn set_seal_patience(&self, patience: Duration) {
-        self.lock().seal_patience = Some(patience);
+    /// Sets how long sealing waits for other programs.
+    pub(crate) fn set_seal_timeout(&self, timeout: Duration) {
+        self.lock().seal_timeout = Some(timeout);
     }
 
-    /// Another program keeps the session from being sealed; that is waited for.
-    pub(crate) fn held_open(&self) {
+    /// Reports that sealing waits for another program that has the session open.
+    pub(crate) fn mark_held_open(&self) {
         self.lock().held_open = true;
     }
 
-    /// Whether one does.
+    /// Whether sealing waits for another program.
     pub(crate) fn is_held_open(&self) -> bool {
         self.lock().held_open
     }
 
-    /// No record follows.
-    pub fn close(&self, how: Close) {
-        self.lock().closed = Some(how);
+    /// Closes the queue: no record follows.
+    pub fn close(&self, mode: CloseMode) {
+        self.lock().closed = Some(mode);
         self.changed.notify_all();
     }
 }
 
-/// About how much memory a record takes.
+/// Approximate memory of a record, bytes.
 fn size_of(record: &Record) -> usize {
     const SMALL: usize = 256;
     SMALL
@@ -310,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn who_finds_no_room_waits_and_is_counted() {
+    fn a_full_queue_blocks_the_caller_and_counts_the_wait() {
         let shared = Shared::default();
         let most = QUEUE_BYTES / 4 * 3;
         assert!(shared.accept(chunk(most)).is_ok());
@@ -318,24 +320,24 @@ mod tests {
         assert!(before.most_bytes >= most && before.waits == 0, "{before:?}");
         std::thread::scope(|scope| {
             let second = scope.spawn(|| shared.accept(chunk(most)));
-            // It cannot be accepted before there is room, whenever it comes.
+            // Whenever it arrives, it cannot be accepted before there is space.
             while shared.load().waits == 0 {
                 std::thread::yield_now();
             }
             assert!(!second.is_finished());
-            shared.written(before.most_bytes);
+            shared.release(before.most_bytes);
             assert!(second.join().is_ok_and(|accepted| accepted.is_ok()));
         });
         let after = shared.load();
         assert_eq!((after.most_bytes, after.waits), (before.most_bytes, 1));
     }
 
-    /// A disk that hangs ends the run while the arm can still be retracted.
+    /// A hanging disk ends the run while the tip can still be retracted.
     #[test]
-    fn nobody_waits_for_a_disk_for_ever() {
-        assert_eq!(Shared::default().patience, Duration::from_secs(30));
+    fn waiting_for_the_disk_times_out() {
+        assert_eq!(Shared::default().disk_timeout, Duration::from_secs(30));
         let shared = Shared {
-            patience: Duration::from_millis(50),
+            disk_timeout: Duration::from_millis(50),
             ..Shared::default()
         };
         let end = Record::Ended {
@@ -344,7 +346,7 @@ mod tests {
         };
         let refused = shared.accept(end);
         assert!(
-            matches!(&refused, Err(RecorderError::Late(e)) if e.contains("expected the disk")),
+            matches!(&refused, Err(RecorderError::WriteTimeout(limit)) if *limit == shared.disk_timeout),
             "{refused:?}"
         );
     }

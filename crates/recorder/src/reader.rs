@@ -1,4 +1,4 @@
-//! The read-only side: plain values and streams out of a session, sealed or still growing.
+//! Read access to a session, sealed or still growing, as plain values and streams.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -9,7 +9,7 @@ use tokio::runtime::Runtime;
 
 use crate::error::RecorderError;
 use crate::from_row::{header_from, planned_from};
-use crate::query::{Fault, each_row, int, named, real, sha, text};
+use crate::query::{Fault, each_row, enum_value, int, real, sha, text};
 use crate::rows::{DeviceRow, PressTally, Seal, SessionTotals};
 use crate::schema;
 use crate::seal::placeholder_of;
@@ -20,18 +20,18 @@ mod legs;
 mod poses;
 mod stream;
 
-/// Reads one session file; never writes to it.
+/// Read-only access to one session file.
 ///
-/// Memory stays bounded: chunks and pose blocks are read one at a time, everything else is small. Usable from
-/// several threads; not on a thread that runs async tasks.
+/// Memory is bounded: chunks and pose blocks are read one at a time, and everything else is small. Safe to use from
+/// several threads, but not from a thread that runs async tasks.
 #[derive(Debug)]
 pub struct SessionReader {
     path: PathBuf,
     inner: Mutex<(Runtime, SqliteConnection)>,
 }
 
-/// The short texts of a header.
-pub(crate) struct Brief {
+/// Text fields of a header.
+pub(crate) struct HeaderTexts {
     pub session_id: String,
     pub started_at: String,
     pub prototype: String,
@@ -42,11 +42,11 @@ pub(crate) struct Brief {
 }
 
 impl SessionReader {
-    /// Opens a session, sealed or not, also while it is being written.
+    /// Opens a session, sealed or not, even while it is being written.
     ///
     /// # Errors
-    /// [`RecorderError::Missing`], [`RecorderError::NotASession`], [`RecorderError::NewerSchema`], or what the
-    /// operating system or SQLite said.
+    /// [`RecorderError::Missing`], [`RecorderError::NotASession`], [`RecorderError::NewerSchema`], or the error of the
+    /// operating system or of SQLite.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
         let path = path.as_ref().to_owned();
         let runtime = tokio::runtime::Builder::new_current_thread()
@@ -69,8 +69,8 @@ impl SessionReader {
         &self.path
     }
 
-    /// Runs queries with the connection.
-    pub(crate) fn ask<T>(
+    /// Runs queries on the connection.
+    pub(crate) fn query<T>(
         &self,
         doing: &'static str,
         queries: impl AsyncFnOnce(&mut SqliteConnection) -> Result<T, Fault>,
@@ -82,13 +82,13 @@ impl SessionReader {
             .map_err(|fault| fault.at(&self.path, doing))
     }
 
-    fn all<T>(
+    fn query_all<T>(
         &self,
         doing: &'static str,
         sql: &'static str,
         mut from: impl FnMut(&SqliteRow) -> Result<T, Fault>,
     ) -> Result<Vec<T>, RecorderError> {
-        self.ask(doing, async |conn| {
+        self.query(doing, async |conn| {
             let mut out = Vec::new();
             each_row(sqlx::query(sql), conn, |row| {
                 out.push(from(row)?);
@@ -103,12 +103,12 @@ impl SessionReader {
         Fault::bad(place, expected, found).at(&self.path, "reading")
     }
 
-    /// The 32 hex digits that name this session whatever its file is called.
+    /// Identifier of the session: 32 hex digits, independent of the file's name.
     ///
     /// # Errors
-    /// When the file is damaged, or its header is not yet written.
+    /// If the file is damaged or its header is not yet written.
     pub fn session_id(&self) -> Result<String, RecorderError> {
-        self.all(
+        self.query_all(
             "reading its header",
             "SELECT session_id FROM session",
             |row| text(row, "session_id"),
@@ -117,13 +117,13 @@ impl SessionReader {
         .ok_or_else(|| self.no_header())
     }
 
-    /// The short texts of the header, without protocol, plan and presses.
-    pub(crate) fn brief(&self) -> Result<Brief, RecorderError> {
+    /// Text fields of the header, without protocol, plan and presses.
+    pub(crate) fn header_texts(&self) -> Result<HeaderTexts, RecorderError> {
         let sql =
             "SELECT session_id, started_at, prototype, operator, protocol_name, rig_kind, rig_name
                    FROM session";
-        self.all("reading its header", sql, |row| {
-            Ok(Brief {
+        self.query_all("reading its header", sql, |row| {
+            Ok(HeaderTexts {
                 session_id: text(row, "session_id")?,
                 started_at: text(row, "started_at")?,
                 prototype: text(row, "prototype")?,
@@ -138,7 +138,7 @@ impl SessionReader {
     }
 
     fn no_header(&self) -> RecorderError {
-        match self.ask("reading its header", async |conn| {
+        match self.query("reading its header", async |conn| {
             schema::is_blank(conn).await
         }) {
             Ok(true) => RecorderError::Empty {
@@ -149,13 +149,13 @@ impl SessionReader {
         }
     }
 
-    /// What was known before anything moved, the planned presses included.
+    /// The run's header, including the planned presses.
     ///
     /// # Errors
-    /// When the file is damaged, or its header is not yet written.
+    /// If the file is damaged or its header is not yet written.
     pub fn header(&self) -> Result<RunHeader, RecorderError> {
         const DOING: &str = "reading its header";
-        let axes = self.all(
+        let axes = self.query_all(
             DOING,
             "SELECT * FROM robot_from_skin ORDER BY axis",
             |row| {
@@ -165,13 +165,13 @@ impl SessionReader {
                 ))
             },
         )?;
-        let presses = self.all(
+        let presses = self.query_all(
             "reading presses",
             "SELECT * FROM press ORDER BY id",
             planned_from,
         )?;
         let mut header = self
-            .all(DOING, "SELECT * FROM session", header_from)?
+            .query_all(DOING, "SELECT * FROM session", header_from)?
             .pop()
             .ok_or_else(|| self.no_header())?;
         let [(x, tx), (y, ty), (z, tz)] = axes[..] else {
@@ -182,18 +182,18 @@ impl SessionReader {
         Ok(header)
     }
 
-    /// The seal, or `None` for a session that is not sealed, or whose sealing was cut off before the last step.
+    /// The seal; `None` for a session that is unsealed, or whose sealing was interrupted before the last step.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn seal(&self) -> Result<Option<Seal>, RecorderError> {
         let is_stamped = |seal: &Seal| seal.file_sha256 != placeholder_of(&seal.tree_sha256);
         Ok(self.seal_row()?.filter(is_stamped))
     }
 
-    /// The row of the seal, also one without its file hash.
+    /// The row of the seal, even if its file hash is missing.
     pub(crate) fn seal_row(&self) -> Result<Option<Seal>, RecorderError> {
-        let seals = self.all("reading its seal", "SELECT * FROM seal", |row| {
+        let seals = self.query_all("reading its seal", "SELECT * FROM seal", |row| {
             let mut totals = SessionTotals {
                 presses: totals::tally(row, "")?,
                 sync: totals::tally(row, "sync_")?,
@@ -209,10 +209,10 @@ impl SessionReader {
         Ok(seals.into_iter().next())
     }
 
-    /// Every device as it introduced itself, in order; one that was configured again appears again.
+    /// Identity and settings of every device, in order. A device that was reconfigured appears again.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn devices(&self) -> Result<Vec<DeviceRow>, RecorderError> {
         const DOING: &str = "reading devices";
         const ROLES: [DeviceRole; 4] = [
@@ -221,8 +221,8 @@ impl SessionReader {
             DeviceRole::Camera2,
             DeviceRole::TriggerBox,
         ];
-        // First: in a session that is written a device and its settings may come between the two.
-        let settings = self.all(
+        // Read settings first: while a session is being written, a device and its settings may arrive between the two queries.
+        let settings = self.query_all(
             DOING,
             "SELECT * FROM setting ORDER BY device, position",
             |row| {
@@ -234,13 +234,13 @@ impl SessionReader {
                 Ok((int(row, "device")?, setting))
             },
         )?;
-        let mut devices = self.all(DOING, "SELECT * FROM device ORDER BY id", |row| {
+        let mut devices = self.query_all(DOING, "SELECT * FROM device ORDER BY id", |row| {
             let identity = DeviceIdentity {
                 model: text(row, "model")?,
                 serial: text(row, "serial")?,
                 firmware: text(row, "firmware")?,
             };
-            let role = named(row, "role", &ROLES, DeviceRole::name)?;
+            let role = enum_value(row, "role", &ROLES, DeviceRole::name)?;
             Ok((
                 int(row, "id")?,
                 DeviceRow {
@@ -262,19 +262,19 @@ impl SessionReader {
         Ok(devices.into_iter().map(|(_, device)| device).collect())
     }
 
-    /// How the presses ended so far, from the journal alone: calibrating and scored ones, then sync presses.
+    /// Verdict counts so far, from the journal: calibrating and scored presses, then sync presses.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn tallies(&self) -> Result<(PressTally, PressTally), RecorderError> {
-        self.ask("counting presses", totals::tallies)
+        self.query("counting presses", totals::tallies)
     }
 
     /// Counts and sizes, from the rows themselves.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn totals(&self) -> Result<SessionTotals, RecorderError> {
-        self.ask("counting", totals::totals)
+        self.query("counting", totals::totals)
     }
 }

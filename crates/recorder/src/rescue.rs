@@ -1,4 +1,4 @@
-//! A session that was moved or removed while it was written: all that was recorded is brought into one file that can be found.
+//! Rescue of a session that was moved or removed while it was written: saves all records in one file that can be found.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -7,23 +7,27 @@ use std::time::{Duration, Instant};
 use sqlx::sqlite::SqliteConnection;
 use sqlx::{Connection, Row};
 
-use crate::held::Refuge;
+use crate::error::{CopyError, RescueError};
+use crate::file_lock::RescueTargets;
 use crate::query::Fault;
 
-/// How long readers are waited for that keep the log from being emptied, beyond what SQLite itself waits.
-const READERS: Duration = Duration::from_secs(20);
-const TRY_AGAIN: Duration = Duration::from_millis(50);
+/// How long to wait for readers that keep the log from being emptied, after SQLite's own timeout.
+const READER_TIMEOUT: Duration = Duration::from_secs(20);
+const RETRY_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Empties the log into the session file where that can still be found; else, or when readers prevent it, copies all of it through the
-/// open connection. Where it is now, or why it could not be saved.
-pub async fn rescue(mut conn: SqliteConnection, refuge: Refuge) -> Result<PathBuf, String> {
-    // Of a commit that failed; an error where there is none.
+/// Checkpoints the log into the session file if that file still exists. Otherwise, or if readers prevent it, copies everything through
+/// the open connection. Returns the path, or the reason for failure.
+pub async fn rescue(
+    mut conn: SqliteConnection,
+    targets: RescueTargets,
+) -> Result<PathBuf, RescueError> {
+    // Rolls back a failed commit; fails harmlessly without one.
     let _ = sqlx::query("ROLLBACK").execute(&mut conn).await;
-    let saved = match refuge.place {
-        Some(place) if empty_log(&mut conn).await.is_ok() => Ok(place),
-        _ => copy(&mut conn, &refuge.copies).await,
+    let saved = match targets.current_path {
+        Some(path) if empty_log(&mut conn).await.is_ok() => Ok(path),
+        _ => copy(&mut conn, &targets.copies).await,
     };
-    // Nothing can be done about a failing close: what was recorded is safe.
+    // A failing close cannot be handled: the records are safe.
     let _ = conn.close().await;
     saved
 }
@@ -37,37 +41,33 @@ async fn empty_log(conn: &mut SqliteConnection) -> Result<(), Fault> {
         if row.try_get::<i64, _>(0)? == 0 {
             return Ok(());
         }
-        if from.elapsed() > READERS {
-            return Err(Fault::bad("log", "no reader of it", "one"));
+        if from.elapsed() > READER_TIMEOUT {
+            return Err(Fault::bad("log", "no readers", "a reader"));
         }
-        std::thread::sleep(TRY_AGAIN);
+        std::thread::sleep(RETRY_INTERVAL);
     }
 }
 
-async fn copy(conn: &mut SqliteConnection, paths: &[PathBuf]) -> Result<PathBuf, String> {
-    let mut refused = Vec::new();
+async fn copy(conn: &mut SqliteConnection, paths: &[PathBuf]) -> Result<PathBuf, RescueError> {
+    let mut attempts = Vec::new();
     for path in paths {
         match copy_to(conn, path).await {
             Ok(()) => return Ok(path.clone()),
-            Err(e) => refused.push(format!("{}: {e}", path.display())),
+            Err(e) => attempts.push((path.clone(), e)),
         }
     }
-    Err(if refused.is_empty() {
-        "expected a folder for a copy, found none".to_owned()
-    } else {
-        refused.join("; ")
-    })
+    Err(RescueError::from_attempts(attempts))
 }
 
-async fn copy_to(conn: &mut SqliteConnection, path: &Path) -> Result<(), String> {
-    let name = path.to_str().ok_or("expected a path in UTF-8")?;
-    let file = File::create_new(path).map_err(|e| e.to_string())?;
+async fn copy_to(conn: &mut SqliteConnection, path: &Path) -> Result<(), CopyError> {
+    let name = path.to_str().ok_or(CopyError::PathNotUtf8)?;
+    let file = File::create_new(path)?;
     let copied = sqlx::query("VACUUM INTO ?").bind(name).execute(conn).await;
-    // SQLite does not flush such a copy by itself.
+    // SQLite does not flush such a copy.
     let flushed = file.sync_all();
     let saved = copied
-        .map_err(|e| e.to_string())
-        .and_then(|_| flushed.map_err(|e| e.to_string()));
+        .map_err(|e| CopyError::Sql(Box::new(e)))
+        .and_then(|_| Ok(flushed?));
     if saved.is_err() {
         let _ = std::fs::remove_file(path);
     }

@@ -1,28 +1,30 @@
-//! How a session goes on that was cut off, stopped or broken off by a fault: the one transaction that begins a further leg.
+//! Resuming a session that was interrupted, stopped or faulted: the transaction that begins a further leg.
 
 use std::path::Path;
 
-use skinrig_model::{PressFaultKind, PressRole, PressVerdict, ResumeHeader, RunEnd, StreamFormat};
+use skinrig_model::{
+    PressFaultKind, PressRole, PressVerdict, ResumeHeader, RunEnd, StreamFormat, UnknownName,
+};
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use sqlx::{Connection, Sqlite, Transaction};
 
 use crate::error::RecorderError;
-use crate::leg::{Joint, next_second};
+use crate::leg::{LegOffset, next_second};
 use crate::lock::WriterLock;
 use crate::query::{Fault, blob, int, opt_int, opt_text, schema_version, text};
 use crate::reader::SessionReader;
 use crate::verify::{ChunkScanner, VerifyReport, verify};
 use crate::{chain, schema};
 
-/// What the writer of a leg needs to know.
-pub(crate) struct Begun {
-    /// Which leg it is.
+/// What the writer of a new leg needs.
+pub(crate) struct LegStart {
+    /// Number of the leg, from 2.
     pub number: u32,
-    pub joint: Joint,
+    pub offset: LegOffset,
     pub formats: [StreamFormat; 2],
 }
 
-/// Locks a session that can go on, and checks all of it: what is not what was recorded is never sealed anew. Nothing changes.
+/// Locks a session that can be resumed, and verifies all of it, so that damage is never sealed. Nothing changes.
 pub(crate) fn lock_unfinished(
     path: &Path,
     scanner: &mut dyn ChunkScanner,
@@ -30,7 +32,7 @@ pub(crate) fn lock_unfinished(
     let lock = lock(path)?;
     let completed = SessionReader::open(path).and_then(|reader| is_completed(&reader));
     if let Ok(true) = completed {
-        return Err(RecorderError::Completed {
+        return Err(RecorderError::AlreadyCompleted {
             path: path.to_owned(),
         });
     }
@@ -38,7 +40,7 @@ pub(crate) fn lock_unfinished(
     Ok(lock)
 }
 
-/// Whether a session came to its end and has no press that a rig could give anew.
+/// Whether a session is complete, and no press can be repeated by a rig.
 fn is_completed(reader: &SessionReader) -> Result<bool, RecorderError> {
     if !matches!(reader.end()?, Some((_, RunEnd::Completed))) {
         return Ok(false);
@@ -51,7 +53,7 @@ fn is_completed(reader: &SessionReader) -> Result<bool, RecorderError> {
     Ok(!all.any(|((press, _), known)| press.role != PressRole::Sync && known.given_back))
 }
 
-/// Locks a session that has its end and no seal, or half a one, and checks all of it; nothing changes.
+/// Locks a session whose end is recorded but whose seal is missing or incomplete, and verifies all of it. Nothing changes.
 pub(crate) fn lock_unsealed(
     path: &Path,
     scanner: &mut dyn ChunkScanner,
@@ -59,13 +61,13 @@ pub(crate) fn lock_unsealed(
     let lock = lock(path)?;
     let end = SessionReader::open(path).and_then(|reader| reader.end());
     if let Ok(None) = end {
-        return Err(RecorderError::NotThere {
+        return Err(RecorderError::NotFound {
             path: path.to_owned(),
-            wanted: "the end of its run".into(),
+            expected: "the end of its run".into(),
         });
     }
     if check(path, scanner)?.sealed {
-        return Err(RecorderError::Completed {
+        return Err(RecorderError::AlreadyCompleted {
             path: path.to_owned(),
         });
     }
@@ -85,15 +87,15 @@ fn check(path: &Path, scanner: &mut dyn ChunkScanner) -> Result<VerifyReport, Re
 }
 
 /// Opens an unsealed session for writing.
-pub(crate) async fn open_again(path: &Path) -> Result<SqliteConnection, RecorderError> {
-    let mut conn = schema::open_again(path).await?;
+pub(crate) async fn reopen(path: &Path) -> Result<SqliteConnection, RecorderError> {
+    let mut conn = schema::reopen(path).await?;
     let fault = |fault: Fault| fault.at(path, "opening it again");
     clear_seal(&mut conn).await.map_err(fault)?;
-    schema::log_ahead(&mut conn).await.map_err(fault)?;
+    schema::enable_wal(&mut conn).await.map_err(fault)?;
     Ok(conn)
 }
 
-/// Takes off a seal whose last bytes were never written.
+/// Removes an incomplete seal.
 async fn clear_seal(conn: &mut SqliteConnection) -> Result<(), Fault> {
     let mut all = conn.begin_with("BEGIN IMMEDIATE").await?;
     for delete in ["DELETE FROM seal", "DELETE FROM table_digest"] {
@@ -103,9 +105,9 @@ async fn clear_seal(conn: &mut SqliteConnection) -> Result<(), Fault> {
 }
 
 fn lock(path: &Path) -> Result<WriterLock, RecorderError> {
-    // Before the lock: it would lie beside a file that is no session, and a write that was cut off is undone only without one.
+    // Roll back before locking: the lock file must not lie beside a file that is no session, and a rollback needs the file unlocked.
     match SessionReader::open(path).and_then(|reader| reader.session_id()) {
-        // What is wrong, and what to do about it, is for the check to tell.
+        // The following check reports what is wrong and what to do about it.
         Ok(_) | Err(RecorderError::Damaged { .. } | RecorderError::Sql { .. }) => {
             WriterLock::take(path)
         }
@@ -113,29 +115,29 @@ fn lock(path: &Path) -> Result<WriterLock, RecorderError> {
     }
 }
 
-/// Begins the leg: durable on return, all of it or nothing.
+/// Begins the leg in one transaction: durable on return, or nothing changed.
 pub async fn begin(
     path: &Path,
     header: &ResumeHeader,
-) -> Result<(SqliteConnection, Begun), RecorderError> {
-    let mut conn = schema::open_again(path).await?;
+) -> Result<(SqliteConnection, LegStart), RecorderError> {
+    let mut conn = schema::reopen(path).await?;
     let begun = write(&mut conn, header)
         .await
         .map_err(|fault| fault.at(path, "beginning a further leg"))?;
-    schema::log_ahead(&mut conn)
+    schema::enable_wal(&mut conn)
         .await
         .map_err(|fault| fault.at(path, "beginning a further leg"))?;
     Ok((conn, begun))
 }
 
-async fn write(conn: &mut SqliteConnection, header: &ResumeHeader) -> Result<Begun, Fault> {
-    // A sealed session is still in rollback mode: killed at any instant in here, it is rolled back to the sealed bytes.
+async fn write(conn: &mut SqliteConnection, header: &ResumeHeader) -> Result<LegStart, Fault> {
+    // A sealed session is in rollback mode: if the process is killed here, SQLite rolls back to the sealed bytes.
     let mut all = conn.begin_with("BEGIN IMMEDIATE").await?;
     let schema = schema_version(&mut all).await?;
     schema::migrate(&mut all).await?;
-    let (joint, formats) = joint(&mut all).await?;
-    let number = insert_leg(&mut all, header, &joint).await?;
-    chain::keep(&mut all, number, schema).await?;
+    let (offset, formats) = offset(&mut all).await?;
+    let number = insert_leg(&mut all, header, &offset).await?;
+    chain::archive_seal(&mut all, number, schema).await?;
     sqlx::query(
         "UPDATE attempt SET verdict = 'invalid', reason = ?, scheduled = 0, faults = ? WHERE verdict IS NULL",
     )
@@ -143,9 +145,9 @@ async fn write(conn: &mut SqliteConnection, header: &ResumeHeader) -> Result<Beg
     .bind(PressFaultKind::RunEnded.name())
     .execute(&mut *all)
     .await?;
-    // The box's clock in this leg does not go on from the one before.
+    // The box's clock of this leg does not continue the previous one.
     sqlx::query("INSERT INTO box_report (taken_ns, what, received_ns) VALUES (?1, 'reset', ?1)")
-        .bind(joint.origin_ns)
+        .bind(offset.origin_ns)
         .execute(&mut *all)
         .await?;
     for delete in [
@@ -156,14 +158,16 @@ async fn write(conn: &mut SqliteConnection, header: &ResumeHeader) -> Result<Beg
         sqlx::query(delete).execute(&mut *all).await?;
     }
     all.commit().await?;
-    Ok(Begun {
+    Ok(LegStart {
         number,
-        joint,
+        offset,
         formats,
     })
 }
 
-async fn joint(conn: &mut Transaction<'_, Sqlite>) -> Result<(Joint, [StreamFormat; 2]), Fault> {
+async fn offset(
+    conn: &mut Transaction<'_, Sqlite>,
+) -> Result<(LegOffset, [StreamFormat; 2]), Fault> {
     let row = sqlx::query(
         "SELECT (SELECT coalesce(max(t), 0) FROM (
              SELECT max(intent_ns) AS t FROM attempt UNION ALL SELECT max(clear_ns) FROM attempt
@@ -183,17 +187,22 @@ async fn joint(conn: &mut Transaction<'_, Sqlite>) -> Result<(Joint, [StreamForm
     .await?;
     let origin = |column: &str, per_second: i64| {
         let last = opt_int(&row, column)?;
-        next_second(last, per_second)
-            .ok_or_else(|| Fault::bad("recorded times", "less than a century", format!("{last:?}")))
+        next_second(last, per_second).ok_or_else(|| {
+            Fault::bad(
+                "recorded times",
+                "times below half of the range",
+                format!("{last:?}"),
+            )
+        })
     };
     let unsigned =
         |value: i64| u64::try_from(value).map_err(|_| Fault::bad("leg", "a number from 0", value));
     let format = |column: &str| -> Result<StreamFormat, Fault> {
         text(&row, column)?
             .parse()
-            .map_err(|e: String| Fault::bad(column, "a stream format", e))
+            .map_err(|e: UnknownName| Fault::bad(column, "a stream format", e))
     };
-    let joint = Joint {
+    let offset = LegOffset {
         origin_ns: origin("host_ns", 1_000_000_000)?,
         camera_origin_us: [
             unsigned(origin("camera1_us", 1_000_000)?)?,
@@ -202,7 +211,7 @@ async fn joint(conn: &mut Transaction<'_, Sqlite>) -> Result<(Joint, [StreamForm
         first_seq: [unsigned(int(&row, "seq1")?)?, unsigned(int(&row, "seq2")?)?],
     };
     Ok((
-        joint,
+        offset,
         [format("stream_format_1")?, format("stream_format_2")?],
     ))
 }
@@ -211,7 +220,7 @@ async fn joint(conn: &mut Transaction<'_, Sqlite>) -> Result<(Joint, [StreamForm
 async fn insert_leg(
     conn: &mut Transaction<'_, Sqlite>,
     header: &ResumeHeader,
-    joint: &Joint,
+    offset: &LegOffset,
 ) -> Result<u32, Fault> {
     let one = |sql: &'static str| sqlx::query(sql);
     let counts = one(
@@ -240,8 +249,8 @@ async fn insert_leg(
     .bind(&header.host)
     .bind(&header.software)
     .bind(&header.command_line)
-    .bind(joint.origin_ns);
-    for value in joint.camera_origin_us.into_iter().chain(joint.first_seq) {
+    .bind(offset.origin_ns);
+    for value in offset.camera_origin_us.into_iter().chain(offset.first_seq) {
         insert = insert.bind(signed(value));
     }
     insert = insert

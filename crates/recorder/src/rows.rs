@@ -8,123 +8,122 @@ use skinrig_model::{
 
 use crate::codec::Codec;
 
-/// A device as it introduced itself, with its settings.
+/// A device with its settings.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeviceRow {
-    /// What it is for.
+    /// Purpose in the rig.
     pub role: DeviceRole,
-    /// Who it says it is.
+    /// Identity that the device reported.
     pub identity: DeviceIdentity,
-    /// Its settings, asked for and read back, in the order in which they were written.
+    /// Requested and read-back settings, in the order of writing.
     pub settings: Vec<Setting>,
 }
 
-/// One leg of a session: one life of the process that ran it. The first has number 1 and begins at zero of everything.
+/// One leg of a session: the part recorded by one process. The first has number 1, and all its origins are zero.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LegRow {
     /// 1, 2, 3, ...
     pub number: u32,
-    /// Who began it, when, with what.
+    /// Who started it, when, and with which software.
     pub began: ResumeHeader,
-    /// Where its host clock begins on the session's. No time of an earlier leg is at or after it.
+    /// Start of its host clock on the session's. All times of earlier legs are before it.
     pub origin: HostTime,
-    /// Where each camera's clock begins on the session's, µs.
+    /// Start of each camera's clock on the session's, µs.
     pub camera_origin_us: [u64; 2],
-    /// Number of each camera's first chunk; there is none of that number when the leg ended before it.
+    /// Number of each camera's first chunk. That chunk is missing if the leg ended before it.
     pub first_seq: [u64; 2],
     /// How many of [`devices`](crate::SessionReader::devices) belong to earlier legs.
     pub devices_before: usize,
     /// How many of [`preflight`](crate::SessionReader::preflight) belong to earlier legs.
     pub preflight_before: usize,
-    /// When and how it ended; `None`: under way or cut off.
+    /// Time and kind of its end; `None` while in progress or after a crash.
     pub end: Option<(HostTime, RunEnd)>,
-    /// The tree hash that it was sealed with before the next leg took the seal off, or that the session has.
+    /// Tree hash of its seal, including one that the next leg removed.
     pub tree_sha256: Option<[u8; 32]>,
 }
 
 /// One attempt at a press.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AttemptRow {
-    /// Which.
+    /// Press and attempt number.
     pub id: AttemptId,
-    /// Number of the attempt that it repeats.
+    /// Number of the attempt that this one repeats.
     pub previous: Option<u32>,
-    /// When it was about to begin; `None` for a press that was never attempted.
+    /// Start of the attempt; `None` for a press that was never attempted.
     pub intent: Option<HostTime>,
-    /// How it ended; `None` while it runs, and for ever when it was cut off.
+    /// Result; `None` while it runs, and permanently if it was interrupted.
     pub outcome: Option<PressOutcome>,
 }
 
 /// A motion command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CommandRow {
-    /// When.
+    /// Host time at which it was sent.
     pub t: HostTime,
-    /// What.
+    /// Target and speed.
     pub command: MotionCommand,
 }
 
-/// Something that broke the normal course.
+/// A deviation from the planned course of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InterruptionRow {
-    /// When.
+    /// Host time at which it began.
     pub t: HostTime,
-    /// What.
+    /// Type of the deviation.
     pub kind: InterruptionKind,
-    /// In words.
+    /// Reason given.
     pub reason: String,
 }
 
-/// A remark.
+/// An operator note.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NoteRow {
-    /// When.
+    /// Host time of the note.
     pub t: HostTime,
-    /// The remark.
+    /// Content of the note.
     pub text: String,
 }
 
-/// A chunk without its bytes.
+/// Metadata of a chunk, without its bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ChunkMeta {
-    /// Which camera.
+    /// Camera that sent it.
     pub camera: CameraId,
-    /// Its number, from 0.
+    /// Position in the camera's stream, from 0.
     pub seq: u64,
-    /// When its last byte reached the host.
+    /// Host time at which its last byte arrived.
     pub host_time: HostTime,
-    /// Bytes lost before it.
+    /// Bytes lost immediately before it.
     pub lost_before: u64,
-    /// The time that was lost with them. `None` without a loss, and where the session does not tell: one of a schema before 6, and a
-    /// place that a salvage left empty. When it is there, the facts are those of a decoder that carried nothing over.
+    /// Camera time lost with them. `None` without a loss, before schema 6, and for chunks that a salvage replaced. If it is set,
+    /// a decoder that carried no state across the loss computed the facts.
     pub lost_time: Option<LostTime>,
-    /// How it is stored.
+    /// Storage encoding.
     pub codec: Codec,
-    /// Bytes as they came.
+    /// Raw bytes.
     pub raw_bytes: u64,
     /// Bytes in the file.
     pub stored_bytes: u64,
-    /// CRC-32 (zlib) of the bytes as they came.
+    /// CRC-32 (zlib) of the raw bytes.
     pub raw_crc32: u32,
-    /// What one decoding in stream order found.
+    /// Results of decoding the stream in order.
     pub facts: ChunkFacts,
-    /// Set on the first chunk of a further leg: these bytes do not go on from those before. Their decoder starts anew, and the
-    /// times that it finds are moved by this, µs.
+    /// Set on the first chunk of a further leg, where the decoder restarts: the offset of its times, µs.
     pub restart_us: Option<u64>,
 }
 
-/// Bytes of a camera that were lost, and when.
+/// A loss of camera bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Loss {
-    /// The chunk before which they were lost.
+    /// Number of the chunk after the loss.
     pub seq: u64,
-    /// How many; together with those of the chunks that follow without a time.
+    /// Bytes lost, including those before following chunks without a time.
     pub bytes: u64,
-    /// When, on the camera's clock, joined over the legs.
+    /// Lost interval on the camera's clock, continuous over all legs.
     pub time: LostTime,
 }
 
-/// How presses ended, each counted once by its last attempt.
+/// Verdict counts of presses, each by its last attempt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct PressTally {
     /// In the plan.
@@ -135,12 +134,12 @@ pub struct PressTally {
     pub missed: u64,
     /// Last attempt invalid.
     pub invalid: u64,
-    /// Last attempt left out by a rule.
+    /// Last attempt excluded by a rule.
     pub excluded: u64,
 }
 
 impl PressTally {
-    /// Presses without a verdict yet: none of a finished session.
+    /// Presses without a verdict; 0 in a finished session.
     #[must_use]
     pub const fn open(&self) -> u64 {
         self.planned
@@ -157,9 +156,9 @@ pub struct SessionTotals {
     pub sync: PressTally,
     /// Chunks of both cameras.
     pub chunks: u64,
-    /// Camera bytes as they came.
+    /// Raw camera bytes.
     pub raw_bytes: u64,
-    /// Camera bytes in the file.
+    /// Camera bytes as stored in the file.
     pub stored_bytes: u64,
     /// Camera bytes known to be lost.
     pub lost_bytes: u64,
@@ -171,13 +170,13 @@ pub struct SessionTotals {
     pub pose_samples: u64,
 }
 
-/// What a session was sealed with.
+/// Seal of a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Seal {
     /// Final counts.
     pub totals: SessionTotals,
     /// SHA-256 of the content.
     pub tree_sha256: [u8; 32],
-    /// SHA-256 of the file, these 32 bytes taken as zero.
+    /// SHA-256 of the file, with these 32 bytes as zero.
     pub file_sha256: [u8; 32],
 }

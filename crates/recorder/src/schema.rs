@@ -1,4 +1,4 @@
-//! How a session file is opened, for writing and for reading, and which schema it has.
+//! Opening session files for writing and reading, and checking their schema.
 
 use std::fs::File;
 use std::io::Read;
@@ -8,34 +8,34 @@ use std::time::{Duration, Instant};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqliteSynchronous};
 use sqlx::{ConnectOptions, Connection, Row, Sqlite, Transaction};
 
-use crate::beside::{beside, refuse_special_files, refuse_super_journal};
 use crate::error::RecorderError;
 use crate::migrations::{MIGRATOR, SCHEMA_VERSION};
 use crate::query::{Fault, each_row};
+use crate::sidecar::{reject_special_files, reject_super_journal, sidecar_path};
 
 /// `skrg` in ASCII (`PRAGMA application_id`).
 pub(crate) const APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrg");
 
-/// Bytes of a page, the largest that SQLite knows. Every page of camera bytes costs three system calls on its way
-/// through the log: 64 KiB took in 500 MB/s where 16 KiB took in 380 (`cargo bench -p skinrig-bench --bench ingest`).
-/// Its price: an empty session has 1.4 MB, and a commit of one small row writes 128 KiB.
+/// Page size in bytes, the largest that SQLite supports. Each page of camera bytes costs three system calls on its way
+/// through the log: 64 KiB pages sustained 500 MB/s, 16 KiB pages 380 (`cargo bench -p skinrig-bench --bench ingest`).
+/// The cost: an empty session has 1.4 MB, and a commit of one small row writes 128 KiB.
 const PAGE_BYTES: u32 = 65536;
 
-/// Pages in the log that start a checkpoint: 16 MiB, which stay in the system's cache. A longer log was no faster.
+/// Log pages that trigger a checkpoint: 16 MiB, which fit in the system's cache. A longer log was no faster.
 const CHECKPOINT_PAGES: u32 = 256;
 
-/// How long to wait for another program's lock.
-const BUSY: Duration = Duration::from_secs(10);
+/// How long to wait for a lock of another program.
+const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Makes a new session file with an empty schema.
+/// Creates a session file with an empty schema.
 pub async fn create(path: &Path) -> Result<SqliteConnection, RecorderError> {
     create_file(path)?;
-    fill(path).await
+    create_schema(path).await
 }
 
-/// Makes a new, empty file.
+/// Creates an empty file.
 pub(crate) fn create_file(path: &Path) -> Result<(), RecorderError> {
-    refuse_special_files(path)?;
+    reject_special_files(path)?;
     match File::create_new(path) {
         Ok(_) => Ok(()),
         Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => Err(RecorderError::Exists {
@@ -49,8 +49,8 @@ pub(crate) fn create_file(path: &Path) -> Result<(), RecorderError> {
     }
 }
 
-/// Makes the schema in an empty file.
-pub async fn fill(path: &Path) -> Result<SqliteConnection, RecorderError> {
+/// Creates the schema in an empty file.
+pub async fn create_schema(path: &Path) -> Result<SqliteConnection, RecorderError> {
     let fault = |e: sqlx::Error| Fault::from(e).at(path, "creating the schema");
     let mut conn = new_file(path).await.map_err(fault)?;
     MIGRATOR.run(&mut conn).await.map_err(|e| fault(e.into()))?;
@@ -61,13 +61,13 @@ async fn new_file(path: &Path) -> sqlx::Result<SqliteConnection> {
     writable(path)
         .page_size(PAGE_BYTES)
         .journal_mode(SqliteJournalMode::Wal)
-        // Feasibility measurement: after a power cut NORMAL lost acknowledged rows, FULL none.
+        // Measured: after a power cut NORMAL lost acknowledged rows, FULL none.
         .synchronous(SqliteSynchronous::Full)
         .connect()
         .await
 }
 
-/// A new file with the schema of an older version of skinrig.
+/// Creates a file with the schema of an older version of skinrig.
 #[cfg(test)]
 pub(crate) async fn create_version(path: &Path, version: u32) -> sqlx::Result<SqliteConnection> {
     File::create_new(path)?;
@@ -84,34 +84,34 @@ fn writable(path: &Path) -> SqliteConnectOptions {
         .filename(path)
         .pragma("wal_autocheckpoint", CHECKPOINT_PAGES.to_string())
         .foreign_keys(true)
-        .busy_timeout(BUSY)
+        .busy_timeout(BUSY_TIMEOUT)
         .thread_name(|_| "session-sqlite".to_owned())
 }
 
-/// Opens an existing session for writing, in the journal mode that it is in: a sealed one is in rollback mode.
-pub(crate) async fn open_again(path: &Path) -> Result<SqliteConnection, RecorderError> {
-    refuse_super_journal(path)?;
+/// Opens an existing session for writing, in its current journal mode: sealed sessions are in rollback mode.
+pub(crate) async fn reopen(path: &Path) -> Result<SqliteConnection, RecorderError> {
+    reject_super_journal(path)?;
     allow_writing(path).map_err(|source| RecorderError::Io {
         path: path.to_owned(),
         doing: "making it writable",
         source,
     })?;
     writable(path)
-        // In rollback mode a transaction is durable only with its folder synchronised too.
+        // In rollback mode a transaction is durable only if its folder is synchronised too.
         .synchronous(SqliteSynchronous::Extra)
         .connect()
         .await
         .map_err(|e| Fault::from(e).at(path, "opening it for writing"))
 }
 
-/// Brings the schema up to this build's, within a transaction. What a session of an older schema does not know stays empty.
+/// Migrates the schema to this build's version within a transaction. Data that an older schema lacks stay empty.
 pub async fn migrate(all: &mut Transaction<'_, Sqlite>) -> Result<(), Fault> {
     let done = MIGRATOR.run(&mut **all).await;
     done.map_err(|e| Fault::from(sqlx::Error::from(e)))
 }
 
-/// From here on a write-ahead log, as in a new session.
-pub(crate) async fn log_ahead(conn: &mut SqliteConnection) -> Result<(), Fault> {
+/// Switches to a write-ahead log, as in a new session.
+pub(crate) async fn enable_wal(conn: &mut SqliteConnection) -> Result<(), Fault> {
     let mode: String = sqlx::query_scalar("PRAGMA journal_mode = WAL")
         .fetch_one(&mut *conn)
         .await?;
@@ -121,14 +121,14 @@ pub(crate) async fn log_ahead(conn: &mut SqliteConnection) -> Result<(), Fault> 
     sqlx::query("PRAGMA synchronous = FULL")
         .execute(&mut *conn)
         .await?;
-    // Makes the log and its index.
+    // Creates the log and its index.
     sqlx::query("SELECT count(*) FROM sqlite_schema")
         .execute(conn)
         .await?;
     Ok(())
 }
 
-/// A sealed session is read-only.
+/// Makes a sealed, read-only session writable.
 fn allow_writing(path: &Path) -> std::io::Result<()> {
     let mut permissions = std::fs::metadata(path)?.permissions();
     if !permissions.readonly() {
@@ -144,9 +144,9 @@ fn allow_writing(path: &Path) -> std::io::Result<()> {
     std::fs::set_permissions(path, permissions)
 }
 
-/// Undoes a transaction in rollback mode in the middle of which a writer was ended: until then nobody can read the file.
+/// Rolls back a transaction whose writer was killed; until then nobody can read the file.
 async fn roll_back(path: &Path) -> Result<(), RecorderError> {
-    let fault = |e: sqlx::Error| Fault::from(e).at(path, "undoing a write that was cut off");
+    let fault = |e: sqlx::Error| Fault::from(e).at(path, "rolling back an interrupted write");
     let mut conn = writable(path).connect().await.map_err(fault)?;
     sqlx::query("SELECT count(*) FROM sqlite_schema")
         .execute(&mut conn)
@@ -155,37 +155,37 @@ async fn roll_back(path: &Path) -> Result<(), RecorderError> {
     conn.close().await.map_err(fault)
 }
 
-/// How long a reader stays away from a session that is being sealed: a bit longer than its writer waits for those before it.
-const SEALED_WITHIN: Duration = Duration::from_secs(90);
-/// Between two looks whether it is.
-const LOOK_AGAIN: Duration = Duration::from_millis(10);
+/// How long a reader waits for sealing: slightly longer than the writer waits for readers.
+const SEAL_WAIT: Duration = Duration::from_secs(90);
+/// Interval at which a reader checks whether sealing has ended.
+const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Opens a session file for reading, after a look at its first page.
+/// Opens a session file for reading, after checking its first page.
 pub async fn open(path: &Path) -> Result<SqliteConnection, RecorderError> {
-    refuse_special_files(path)?;
+    reject_special_files(path)?;
     let from = Instant::now();
-    while crate::lock::is_being_sealed(path) && from.elapsed() < SEALED_WITHIN {
-        std::thread::sleep(LOOK_AGAIN);
+    while crate::lock::is_being_sealed(path) && from.elapsed() < SEAL_WAIT {
+        std::thread::sleep(POLL_INTERVAL);
     }
-    refuse_super_journal(path)?;
+    reject_super_journal(path)?;
     let mut mode = check_first_page(path)?;
-    // Also of a change into or out of the log, whose first page may already say the other mode.
-    if beside(path, "-journal").exists() && crate::lock::writer_of(path).is_none() {
+    // Also while the journal mode changes, when the first page may already give the new mode.
+    if sidecar_path(path, "-journal").exists() && crate::lock::writer_of(path).is_none() {
         roll_back(path).await?;
         mode = check_first_page(path)?;
     }
-    // A sealed file is in rollback mode, has nothing beside it and does not change; one that is being sealed still does.
-    let immutable = mode == Mode::Rollback
+    // A sealed file is in rollback mode, has no files beside it and never changes, unless it is just being sealed.
+    let immutable = mode == JournalMode::Rollback
         && crate::lock::writer_of(path).is_none()
         && !["-wal", "-journal"]
             .iter()
-            .any(|end| beside(path, end).exists());
+            .any(|end| sidecar_path(path, end).exists());
     let mut conn = SqliteConnectOptions::new()
         .filename(path)
         .read_only(true)
         .immutable(immutable)
         .foreign_keys(true)
-        .busy_timeout(BUSY)
+        .busy_timeout(BUSY_TIMEOUT)
         .thread_name(|_| "session-reader".to_owned())
         .connect()
         .await
@@ -201,7 +201,7 @@ fn empty(path: &Path) -> RecorderError {
     }
 }
 
-/// Whether the schema was made: a writer that ends before that leaves a file without any table of a session.
+/// Whether the schema exists: a writer that ends early leaves a file without tables.
 async fn check_schema(conn: &mut SqliteConnection) -> Result<bool, Fault> {
     check_schema_text(conn).await?;
     check_schema_is_data(conn).await?;
@@ -209,7 +209,7 @@ async fn check_schema(conn: &mut SqliteConnection) -> Result<bool, Fault> {
     Ok(sqlx::query_scalar(sql).fetch_one(conn).await?)
 }
 
-/// Whether no row was ever written: nothing but the schema is there.
+/// Whether no row was ever written: the file holds only the schema.
 pub(crate) async fn is_blank(conn: &mut SqliteConnection) -> Result<bool, Fault> {
     let sql =
         "SELECT NOT EXISTS (SELECT 1 FROM session) AND NOT EXISTS (SELECT 1 FROM robot_from_skin)
@@ -223,7 +223,7 @@ pub(crate) async fn is_blank(conn: &mut SqliteConnection) -> Result<bool, Fault>
     Ok(sqlx::query_scalar(sql).fetch_one(conn).await?)
 }
 
-/// The schema of a damaged file may hold names that are no text, over which the SQLite client would panic.
+/// Checks that names in the schema are valid text; the SQLite client panics otherwise.
 async fn check_schema_text(conn: &mut SqliteConnection) -> Result<(), Fault> {
     let sql = "SELECT CAST(sql AS BLOB) AS sql FROM sqlite_schema WHERE sql IS NOT NULL";
     each_row(sqlx::query(sql), conn, |row| {
@@ -236,8 +236,8 @@ async fn check_schema_text(conn: &mut SqliteConnection) -> Result<(), Fault> {
     .await
 }
 
-/// A session is data: tables and their indices. A stranger's file may hold what runs when it is read or written, for ever or out of
-/// all memory: views, triggers, virtual tables, columns that are computed.
+/// Checks that the schema has only tables and their indices. Views, triggers, virtual tables and computed columns of an untrusted
+/// file would run code when it is read or written, for unlimited time or memory.
 async fn check_schema_is_data(conn: &mut SqliteConnection) -> Result<(), Fault> {
     let runs = "SELECT type, CAST(name AS BLOB) AS name FROM sqlite_schema
          WHERE type NOT IN ('table', 'index') OR coalesce(rootpage, 0) = 0
@@ -260,15 +260,15 @@ async fn check_schema_is_data(conn: &mut SqliteConnection) -> Result<(), Fault> 
     }
 }
 
-/// The journal mode that the first page says.
+/// Journal mode according to the first page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Mode {
+enum JournalMode {
     Rollback,
     Log,
 }
 
 /// Layout: sqlite.org/fileformat.html sections 1.3 and 1.6.
-fn check_first_page(path: &Path) -> Result<Mode, RecorderError> {
+fn check_first_page(path: &Path) -> Result<JournalMode, RecorderError> {
     let io = |source: std::io::Error| {
         if source.kind() == std::io::ErrorKind::NotFound {
             RecorderError::Missing {
@@ -290,7 +290,7 @@ fn check_first_page(path: &Path) -> Result<Mode, RecorderError> {
     };
     let mut file = File::open(path).map_err(io)?;
     let metadata = file.metadata().map_err(io)?;
-    // A writer makes the file first; what it then writes may still be in the log or the journal beside it.
+    // The writer creates the file first; its first pages may still be in the log or the journal beside it.
     if metadata.len() == 0 {
         return Err(empty(path));
     }
@@ -302,18 +302,18 @@ fn check_first_page(path: &Path) -> Result<Mode, RecorderError> {
         };
     }
     if &page[..16] != b"SQLite format 3\0" {
-        return not("a file that is not SQLite");
+        return not("a file that is not an SQLite database");
     }
-    // Before the first checkpoint of a session under way the schema is still in the log alone.
+    // Before the first checkpoint of a running session, the schema is only in the log.
     let number =
         |at: usize| u32::from_be_bytes([page[at], page[at + 1], page[at + 2], page[at + 3]]);
     let (version, application) = (number(60), number(68));
-    if application != APPLICATION_ID && !(application == 0 && beside(path, "-wal").exists()) {
-        // A leaf of the tree of tables that has no cell: there is no table.
+    if application != APPLICATION_ID && !(application == 0 && sidecar_path(path, "-wal").exists()) {
+        // An empty leaf as root of the schema: there is no table.
         if application == 0 && page[100] == 0x0d && page[103..105] == [0, 0] {
             return Err(empty(path));
         }
-        return not("another program's SQLite file");
+        return not("an SQLite database of another program");
     }
     if version > SCHEMA_VERSION {
         return Err(RecorderError::NewerSchema {
@@ -323,8 +323,8 @@ fn check_first_page(path: &Path) -> Result<Mode, RecorderError> {
         });
     }
     Ok(match (page[18], page[19]) {
-        (1, 1) => Mode::Rollback,
-        _ => Mode::Log,
+        (1, 1) => JournalMode::Rollback,
+        _ => JournalMode::Log,
     })
 }
 
@@ -332,10 +332,10 @@ fn check_first_page(path: &Path) -> Result<Mode, RecorderError> {
 mod tests {
     use super::*;
 
-    use crate::beside::SUPER_JOURNAL_END;
+    use crate::sidecar::SUPER_JOURNAL_END;
 
-    struct NoBytes;
-    impl crate::ChunkScanner for NoBytes {
+    struct NullScanner;
+    impl crate::ChunkScanner for NullScanner {
         fn restart(&mut self, _: skinrig_model::CameraId, _: skinrig_model::StreamFormat, _: u64) {}
         fn lost(&mut self, _: skinrig_model::CameraId, _: skinrig_model::StreamFormat, _: u64) {}
         fn scan(
@@ -353,7 +353,7 @@ mod tests {
         assert_eq!(MIGRATOR.iter().count(), SCHEMA_VERSION as usize);
     }
 
-    /// Schema 10 makes the table of legs anew, although the rows of kept seals refer to it.
+    /// Schema 10 recreates the table of legs, although archived seals refer to its rows.
     #[test]
     fn legs_and_what_refers_to_them_survive_their_new_table() {
         let folder = tempfile::tempdir().unwrap();
@@ -376,14 +376,14 @@ mod tests {
             let before = digest(&mut conn).await;
             conn.close().await.unwrap();
 
-            let mut conn = open_again(&path).await.unwrap();
+            let mut conn = reopen(&path).await.unwrap();
             let mut all = conn.begin_with("BEGIN IMMEDIATE").await.unwrap();
             migrate(&mut all).await.unwrap();
             let of_completed = "UPDATE leg SET previous_status = 'completed', previous_reason = NULL WHERE number = ?";
             all.commit().await.unwrap();
             assert_eq!(digest(&mut conn).await, before);
             sqlx::query(of_completed).bind(3).execute(&mut conn).await.unwrap();
-            // What refers to the legs still does.
+            // References to the legs are still enforced.
             for refused in [
                 "DELETE FROM leg WHERE number = 2",
                 "INSERT INTO previous_seal (leg, tree_sha256) VALUES (4, zeroblob(32))",
@@ -398,7 +398,7 @@ mod tests {
         });
     }
 
-    /// A sealed session of schema 1 is read and verified as before: the tables that came later are no part of it.
+    /// A sealed session of schema 1 can be read and verified as before: later tables are not part of it.
     #[test]
     fn sessions_of_the_first_schema_stay_sound() {
         let folder = tempfile::tempdir().unwrap();
@@ -432,8 +432,8 @@ mod tests {
         let reader = crate::SessionReader::open(&path).unwrap();
         assert_eq!(reader.box_reports().unwrap(), []);
         assert_eq!(reader.preflight().unwrap(), []);
-        // Nobody wrote a header.
-        let empty = crate::verify(&path, &mut NoBytes);
+        // Without a header.
+        let empty = crate::verify(&path, &mut NullScanner);
         assert!(
             matches!(empty, Err(RecorderError::Empty { .. })),
             "{empty:?}"
@@ -442,13 +442,13 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_beside_a_session_lead_nowhere() {
+    fn links_beside_a_session_are_rejected() {
         let folder = tempfile::tempdir().unwrap();
         let victim = folder.path().join("victim");
         std::fs::write(&victim, "precious").unwrap();
         for ending in ["-wal", "-shm", "-journal", "-lock"] {
             let path = folder.path().join(format!("of{ending}.session.sqlite"));
-            let link = beside(&path, ending);
+            let link = sidecar_path(&path, ending);
             std::os::unix::fs::symlink(&victim, &link).unwrap();
             assert!(crate::SessionWriter::create(&path).is_err(), "{ending}");
             std::fs::remove_file(&link).unwrap();
@@ -456,8 +456,8 @@ mod tests {
             std::os::unix::fs::symlink(&victim, &link).unwrap();
             for refused in [
                 crate::SessionReader::open(&path).map(drop),
-                crate::SessionWriter::resume(&path, &mut NoBytes).map(drop),
-                crate::SessionWriter::ended(&path, &mut NoBytes).map(drop),
+                crate::SessionWriter::resume(&path, &mut NullScanner).map(drop),
+                crate::SessionWriter::open_ended(&path, &mut NullScanner).map(drop),
             ] {
                 let refused = refused.unwrap_err().to_string();
                 assert!(refused.contains("a link beside it"), "{refused}");
@@ -466,7 +466,7 @@ mod tests {
         }
     }
 
-    /// A journal that SQLite would play, of a transaction that changed nothing, with a super-journal's name at its end.
+    /// A hot journal of a transaction that changed nothing, with the name of a super-journal at its end.
     fn journal_naming(name: &str, pages: u32) -> Vec<u8> {
         let mut journal = SUPER_JOURNAL_END.to_vec();
         for number in [0, 1, pages, 512, PAGE_BYTES] {
@@ -504,7 +504,7 @@ mod tests {
             std::fs::write(&victim, "precious").unwrap();
             let pages = std::fs::metadata(&path).unwrap().len() / u64::from(PAGE_BYTES);
             let journal = journal_naming(victim.to_str().unwrap(), pages as u32);
-            std::fs::write(beside(&path, "-journal"), journal).unwrap();
+            std::fs::write(sidecar_path(&path, "-journal"), journal).unwrap();
         };
         for mode in ["PRAGMA journal_mode = DELETE", "PRAGMA journal_mode = WAL"] {
             let _ = std::fs::remove_file(&path);
@@ -516,9 +516,9 @@ mod tests {
             forge();
             for refused in [
                 crate::SessionReader::open(&path).map(drop),
-                crate::SessionWriter::resume(&path, &mut NoBytes).map(drop),
-                crate::SessionWriter::ended(&path, &mut NoBytes).map(drop),
-                runtime.block_on(open_again(&path)).map(drop),
+                crate::SessionWriter::resume(&path, &mut NullScanner).map(drop),
+                crate::SessionWriter::open_ended(&path, &mut NullScanner).map(drop),
+                runtime.block_on(reopen(&path)).map(drop),
             ] {
                 let refused = refused.unwrap_err().to_string();
                 assert!(refused.contains("a journal beside it"), "{refused}");
@@ -531,14 +531,14 @@ mod tests {
                 assert!(crate::SessionReader::open(&link).is_err());
                 std::fs::remove_file(&link).unwrap();
             }
-            // What the refusal is for: SQLite itself does delete it.
+            // The reason for the rejection: SQLite itself does delete it.
             unprotected(&path);
             assert!(!victim.exists(), "{mode}");
         }
     }
 
     #[test]
-    fn a_schema_that_runs_is_refused() {
+    fn a_schema_with_code_is_rejected() {
         let folder = tempfile::tempdir().unwrap();
         let runtime = tokio::runtime::Builder::new_current_thread()
             .build()

@@ -1,8 +1,8 @@
-//! The seal: a tree hash over the content, and a hash over every byte of the file that holds it.
+//! The seal: a tree hash over the content, and a hash over every byte of the file that contains it.
 //!
-//! The file hash must lie in the file that it covers. So the seal's row is written with a placeholder of
-//! 32 bytes in its place; when SQLite has closed the file, the placeholder's position is found in the one page
-//! of table `seal`, the file is hashed with those 32 bytes taken as zero, and the hash overwrites them.
+//! The file contains its own hash. So the seal's row is first written with a 32-byte placeholder. After SQLite has closed
+//! the file, the placeholder is located on the page of table `seal`, the file is hashed with those 32 bytes as zero,
+//! and the hash replaces the placeholder.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -11,7 +11,7 @@ use std::path::Path;
 use sha2::{Digest, Sha256};
 use sqlx::sqlite::SqliteConnection;
 
-use crate::digest::{digest_tables, tree_of};
+use crate::digest::{digest_tables, tree_hash};
 use crate::query::Fault;
 use crate::rows::SessionTotals;
 
@@ -22,7 +22,7 @@ pub(crate) async fn write_rows(
     totals: &SessionTotals,
 ) -> Result<([u8; 32], [u8; 32]), Fault> {
     let digests = digest_tables(conn).await?;
-    let tree = tree_of(&digests);
+    let tree = tree_hash(&digests);
     let placeholder = placeholder_of(&tree);
     sqlx::query("BEGIN IMMEDIATE").execute(&mut *conn).await?;
     for table in &digests {
@@ -64,7 +64,7 @@ pub(crate) async fn write_rows(
     Ok((tree, placeholder))
 }
 
-/// What stands in the seal until the file hash is known.
+/// Placeholder for the file hash.
 pub(crate) fn placeholder_of(tree: &[u8; 32]) -> [u8; 32] {
     let mut hash = Sha256::new();
     hash.update(b"skinrig: the file hash goes here");
@@ -72,7 +72,7 @@ pub(crate) fn placeholder_of(tree: &[u8; 32]) -> [u8; 32] {
     hash.finalize().into()
 }
 
-/// The page of table `seal`, from 1.
+/// Page number of table `seal`, from 1.
 pub(crate) async fn seal_page(conn: &mut SqliteConnection) -> Result<u32, Fault> {
     let row =
         sqlx::query("SELECT rootpage FROM sqlite_schema WHERE type = 'table' AND name = 'seal'")
@@ -81,11 +81,11 @@ pub(crate) async fn seal_page(conn: &mut SqliteConnection) -> Result<u32, Fault>
     crate::query::num(&row, "rootpage")
 }
 
-/// Replaces `placeholder` on page `page` of the closed file by the file's hash, and returns it.
+/// Replaces `placeholder` on page `page` of the closed file with the file's hash, and returns the hash.
 pub fn stamp(path: &Path, page: u32, placeholder: &[u8; 32]) -> std::io::Result<[u8; 32]> {
     let mut file = OpenOptions::new().read(true).write(true).open(path)?;
     let at = locate(&mut file, page, placeholder)?.ok_or_else(|| {
-        std::io::Error::other("expected the seal's placeholder exactly once on its page")
+        std::io::Error::other("expected the placeholder exactly once on the page of the seal")
     })?;
     let digest = hash_around(&mut file, at)?;
     file.seek(SeekFrom::Start(at))?;
@@ -94,21 +94,21 @@ pub fn stamp(path: &Path, page: u32, placeholder: &[u8; 32]) -> std::io::Result<
     Ok(digest)
 }
 
-/// How far the file hash was written that covers every byte of the file.
+/// State of the file hash in a sealed file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Stamp {
-    /// All of it, and the file is what it covers.
+    /// Complete, and it matches the file.
     Whole,
-    /// Sealing was cut off before or while it was written: the placeholder, or the first bytes of the hash and then those of the
+    /// Sealing was interrupted: the file still has the placeholder, or the first bytes of the hash followed by the rest of the
     /// placeholder.
     CutOff,
-    /// The file is not what it covers: this is the hash of the file.
+    /// It differs; the actual hash of the file.
     Wrong([u8; 32]),
-    /// The recorded hash does not lie exactly once on the page of the seal.
+    /// The recorded hash is not exactly once on the page of the seal.
     Misplaced,
 }
 
-/// Holds the file hash `recorded` on page `page` against the file, whose tree hash is recorded as `tree`.
+/// Compares the file hash `recorded` on page `page` with the file, whose recorded tree hash is `tree`.
 pub(crate) fn check_stamp(
     path: &Path,
     page: u32,
@@ -130,7 +130,7 @@ pub(crate) fn check_stamp(
     })
 }
 
-/// Where in the file `needle` lies on page `page`, when it lies there exactly once.
+/// Offset of `needle` in the file, if page `page` contains it exactly once.
 fn locate(file: &mut File, page: u32, needle: &[u8; 32]) -> std::io::Result<Option<u64>> {
     let mut head = [0u8; 18];
     file.seek(SeekFrom::Start(0))?;
@@ -156,7 +156,7 @@ fn locate(file: &mut File, page: u32, needle: &[u8; 32]) -> std::io::Result<Opti
     })
 }
 
-/// SHA-256 of the file with the 32 bytes at `at` taken as zero.
+/// SHA-256 of the file with the 32 bytes at `at` as zero.
 fn hash_around(file: &mut File, at: u64) -> std::io::Result<[u8; 32]> {
     let mut hash = Sha256::new();
     let mut buffer = vec![0u8; 1 << 20];

@@ -1,12 +1,12 @@
-//! The counts that seal, reader and check share.
+//! Counts and sizes, shared by seal, reader and verification.
 
 use sqlx::sqlite::{Sqlite, SqliteArguments, SqliteConnection, SqliteRow};
 
-use crate::digest::Earlier;
+use crate::digest::EarlierState;
 use crate::query::{Fault, each_row, int, num, opt_text};
 use crate::rows::{PressTally, SessionTotals};
 
-/// How the presses ended, the sync presses apart, each counted by its last attempt.
+/// Verdict counts by last attempt: calibrating and scored presses, then sync presses.
 pub async fn tallies(conn: &mut SqliteConnection) -> Result<(PressTally, PressTally), Fault> {
     let presses = "SELECT p.role = 'sync' AS sync, a.verdict AS verdict, count(*) AS n
          FROM press p LEFT JOIN attempt a
@@ -41,7 +41,7 @@ async fn tally_all(
     Ok((scored, sync))
 }
 
-/// Sizes and counts as the rows have them.
+/// Sizes and counts, computed from the rows.
 pub async fn totals(conn: &mut SqliteConnection) -> Result<SessionTotals, Fault> {
     let (presses, sync) = tallies(conn).await?;
     let mut totals = SessionTotals {
@@ -62,10 +62,10 @@ pub async fn totals(conn: &mut SqliteConnection) -> Result<SessionTotals, Fault>
     Ok(totals)
 }
 
-/// As [`totals`], of an earlier state that had so many pose blocks.
+/// Like [`totals`], for an earlier state with this many pose blocks.
 pub(crate) async fn totals_before(
     conn: &mut SqliteConnection,
-    earlier: &Earlier<'_>,
+    earlier: &EarlierState<'_>,
     pose_blocks: i64,
 ) -> Result<SessionTotals, Fault> {
     let presses = "SELECT p.role = 'sync' AS sync, a.verdict AS verdict, count(*) AS n
@@ -95,7 +95,7 @@ pub(crate) async fn totals_before(
     Ok(totals)
 }
 
-/// The columns that `chunk` sums and the seal share.
+/// Reads the columns that the sums over `chunk` and the seal have in common.
 pub fn sizes(row: &SqliteRow, totals: &mut SessionTotals) -> Result<(), Fault> {
     totals.chunks = num(row, "chunks")?;
     totals.raw_bytes = num(row, "raw_bytes")?;
@@ -107,7 +107,7 @@ pub fn sizes(row: &SqliteRow, totals: &mut SessionTotals) -> Result<(), Fault> {
     Ok(())
 }
 
-/// A tally of the seal; `prefix` is empty or `sync_`.
+/// Reads a tally of the seal; `prefix` is empty or `sync_`.
 pub fn tally(row: &SqliteRow, prefix: &str) -> Result<PressTally, Fault> {
     let column = |name: &str| num(row, &format!("{prefix}{name}"));
     Ok(PressTally {

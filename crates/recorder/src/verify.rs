@@ -1,4 +1,4 @@
-//! Recomputes everything that a session claims about itself.
+//! Verification: recomputes every hash, count and fact that a session stores.
 
 use std::path::Path;
 
@@ -21,10 +21,10 @@ use crate::query::{each_row, sha, text};
 use crate::reader::SessionReader;
 use crate::rows::{AttemptRow, SessionTotals};
 
-/// Decodes camera bytes for the check. This crate knows no event encoding, so the caller brings one.
+/// Decoder for camera bytes. This crate decodes no events, so the caller supplies one.
 pub trait ChunkScanner {
-    /// What the next bytes of `camera` hold. Called for every chunk, per camera in stream order; state carries
-    /// over from chunk to chunk (a word may be split).
+    /// Decodes the next bytes of `camera`. Called for every chunk in stream order; state carries over between
+    /// chunks, because a word may be split.
     fn scan(
         &mut self,
         camera: CameraId,
@@ -32,22 +32,22 @@ pub trait ChunkScanner {
         bytes: &[u8],
     ) -> (ChunkFacts, Vec<TriggerEdge>);
 
-    /// The next bytes of `camera` are the first of a further leg: nothing carries over from those before, and times count from
-    /// `origin_us`. Called before their `scan`.
+    /// Resets the decoder: the next bytes of `camera` start a further leg, whose times count from `origin_us`.
+    /// Called before their `scan`.
     fn restart(&mut self, camera: CameraId, format: StreamFormat, origin_us: u64);
 
-    /// Bytes were lost between the previous chunk of `camera` and the next one: nothing that they may have changed carries over.
-    /// Called before its `scan`, where the session tells the time that was lost.
+    /// Discards state that lost bytes may have changed. Called before the `scan` of the chunk that follows them,
+    /// if the session records the time of the loss.
     fn lost(&mut self, camera: CameraId, format: StreamFormat, bytes: u64);
 }
 
-/// Checks a session: SQLite's own integrity, foreign keys, protocol and plan digests, every chunk's checksum
-/// and facts, every pose block, the order of everything, the journal, the counts, and of a sealed session the
-/// tree hash and the hash of the whole file.
+/// Verifies a session: SQLite's integrity and foreign keys, protocol and plan digests, checksum and facts of every
+/// chunk, pose blocks, the order of records, the journal and the counts. For a sealed session also the tree hash and
+/// the hash of the whole file.
 ///
 /// # Errors
-/// [`RecorderError::Missing`] and [`RecorderError::Io`] when there is no file to read, [`RecorderError::Empty`] when nothing was ever
-/// recorded in it, [`RecorderError::Unread`] when the machine could not read all of it. Everything that is wrong inside the file is a problem in the report.
+/// [`RecorderError::Missing`] and [`RecorderError::Io`] if there is no readable file, [`RecorderError::Empty`] if it holds no records,
+/// [`RecorderError::Unread`] if the system failed to read all of it. Everything wrong inside the file is a problem in the report.
 pub fn verify(
     path: impl AsRef<Path>,
     scanner: &mut dyn ChunkScanner,
@@ -61,7 +61,7 @@ pub fn verify(
             | RecorderError::Io { .. }
             | RecorderError::Empty { .. }),
         ) => return Err(e),
-        Err(e) if e.is_of_the_machine() => return Err(e),
+        Err(e) if e.is_system_failure() => return Err(e),
         Err(e) => {
             report.add(e);
             return Ok(report);
@@ -83,11 +83,11 @@ pub fn verify(
     }
     check_journal(&reader, &mut report);
     legs::check(&reader, &mut report);
-    report.totals = report.take_totals(&reader);
+    report.totals = report.read_totals(&reader);
     seal::check(&reader, &mut report);
     chain::check(&reader, &mut report);
     drop(reader);
-    if let Some(problem) = report.unread {
+    if let Some(problem) = report.system_failure {
         return Err(RecorderError::Unread(problem));
     }
     if report.sealed && report.is_sound() {
@@ -97,13 +97,13 @@ pub fn verify(
 }
 
 impl VerifyReport {
-    fn take_totals(&mut self, reader: &SessionReader) -> Option<SessionTotals> {
-        self.take(reader.totals())
+    fn read_totals(&mut self, reader: &SessionReader) -> Option<SessionTotals> {
+        self.ok_or_add(reader.totals())
     }
 }
 
 fn check_sqlite(reader: &SessionReader, report: &mut VerifyReport) {
-    let messages = reader.ask("checking its integrity", async |conn| {
+    let messages = reader.query("checking its integrity", async |conn| {
         let messages: Vec<String> = sqlx::query_scalar("PRAGMA integrity_check")
             .fetch_all(&mut *conn)
             .await?;
@@ -112,27 +112,27 @@ fn check_sqlite(reader: &SessionReader, report: &mut VerifyReport) {
         each_row(orphans, conn, |row| {
             let (child, parent) = (text(row, "table")?, text(row, "parent")?);
             problems.push(format!(
-                "a row of {child} names a row of {parent} that is not there"
+                "a row of {child} refers to a missing row of {parent}"
             ));
             Ok(())
         })
         .await?;
         Ok(problems)
     });
-    for message in report.take(messages).unwrap_or_default() {
+    for message in report.ok_or_add(messages).unwrap_or_default() {
         report.add(format!("sqlite: {message}"));
     }
 }
 
 fn check_header(reader: &SessionReader, report: &mut VerifyReport) -> Option<[StreamFormat; 2]> {
-    let header = report.take(reader.header())?;
+    let header = report.ok_or_add(reader.header())?;
     let digest = |text: &str| hex(&Sha256::digest(text.as_bytes()));
-    report.equal(
+    report.expect_equal(
         "protocol_sha256",
         &digest(&header.protocol_text),
         &header.protocol_sha256,
     );
-    report.equal(
+    report.expect_equal(
         "plan_sha256",
         &digest(&header.plan_json),
         &header.plan_sha256,
@@ -145,7 +145,7 @@ fn check_header(reader: &SessionReader, report: &mut VerifyReport) -> Option<[St
             break;
         }
     }
-    if let Some(devices) = report.take(reader.devices())
+    if let Some(devices) = report.ok_or_add(reader.devices())
         && devices.is_empty()
         && header.rig_kind != "imported"
         && matches!(reader.end(), Ok(Some((_, RunEnd::Completed))))
@@ -181,7 +181,7 @@ fn check_chunks(
             ));
         }
         (previous, host) = (Some(meta.seq), meta.host_time);
-        let sound = reader.ask("checking a chunk", async |conn| {
+        let sound = reader.query("checking a chunk", async |conn| {
             let row =
                 sqlx::query("SELECT stored, stored_sha256 FROM chunk WHERE camera = ? AND seq = ?")
                     .bind(camera.number())
@@ -192,11 +192,9 @@ fn check_chunks(
             Ok(Sha256::digest(&stored).as_slice() == sha(&row, "stored_sha256")?)
         })?;
         if !sound {
-            report.add(format!(
-                "{place}: stored bytes are not those of stored_sha256"
-            ));
+            report.add(format!("{place}: stored bytes do not match stored_sha256"));
         }
-        let Some(bytes) = report.take(reader.chunk_bytes(camera, meta.seq)) else {
+        let Some(bytes) = report.ok_or_add(reader.chunk_bytes(camera, meta.seq)) else {
             continue;
         };
         let Some(format) = format else { continue };
@@ -207,11 +205,11 @@ fn check_chunks(
             scanner.lost(camera, format, meta.lost_before);
         }
         let (facts, edges) = scanner.scan(camera, format, &bytes);
-        report.equal(&format!("{place}: facts"), &facts, &meta.facts);
+        report.expect_equal(&format!("{place}: facts"), &facts, &meta.facts);
         let recorded = reader.edges(camera, meta.seq as i64, meta.seq as i64)?;
         if edges != recorded {
             report.add(format!(
-                "{place}: expected the {} trigger edges in its bytes, found {} others in trigger_edge",
+                "{place}: expected the {} trigger edges in its bytes, found {} different ones in trigger_edge",
                 edges.len(),
                 recorded.len()
             ));
@@ -237,7 +235,7 @@ fn check_poses(reader: &SessionReader, report: &mut VerifyReport) -> Result<(), 
     Ok(())
 }
 
-/// The planned presses of the table are those of the stored plan, where the plan lists any under `presses`.
+/// Checks that the planned presses match the stored plan, if the plan lists any under `presses`.
 fn check_plan(header: &RunHeader, report: &mut VerifyReport) {
     #[derive(serde::Deserialize)]
     struct Presses {
@@ -251,27 +249,27 @@ fn check_plan(header: &RunHeader, report: &mut VerifyReport) {
     if plan.presses.is_empty() {
         return;
     }
-    report.equal("press: rows", &plan.presses.len(), &header.presses.len());
+    report.expect_equal("press: rows", &plan.presses.len(), &header.presses.len());
     for (planned, row) in plan.presses.iter().zip(&header.presses) {
         if planned != row {
             report.add(format!(
-                "{}: expected what the stored plan says, found another place, depth or role",
+                "{}: expected the press of the stored plan, found a different location, depth or role",
                 row.id
             ));
         }
     }
 }
 
-/// The journal: moments in order, lineage without holes, no open attempt once the run has ended.
+/// Checks the journal: phase times in order, consecutive attempt numbers, no open attempt after the run has ended.
 fn check_journal(reader: &SessionReader, report: &mut VerifyReport) {
-    let ended = report.take(reader.end()).flatten().is_some();
-    // A missing header, and with it no legs, is told elsewhere.
+    let ended = report.ok_or_add(reader.end()).flatten().is_some();
+    // Another check reports a missing header, and with it missing legs.
     let legs = reader.legs().unwrap_or_default();
     let leg_of = |attempt: &AttemptRow| {
         let intent = attempt.intent?;
         Some(legs.partition_point(|leg| leg.origin <= intent))
     };
-    for (planned, attempts) in report.take(reader.presses()).unwrap_or_default() {
+    for (planned, attempts) in report.ok_or_add(reader.presses()).unwrap_or_default() {
         for (number, attempt) in (1u32..).zip(&attempts) {
             if attempt.id.number != number {
                 report.add(format!("{}: expected attempt {number}", attempt.id));
@@ -280,15 +278,15 @@ fn check_journal(reader: &SessionReader, report: &mut VerifyReport) {
             if let Some(next) = attempts.get(number as usize) {
                 match verdict {
                     None => report.add(format!(
-                        "{}: expected a verdict of an attempt that was repeated, found none",
+                        "{}: expected a verdict for a repeated attempt, found none",
                         attempt.id
                     )),
-                    // Sync presses are made again in every leg.
+                    // Every leg repeats the sync presses.
                     Some(PressVerdict::Valid | PressVerdict::Excluded(_))
                         if planned.role != PressRole::Sync || leg_of(attempt) == leg_of(next) =>
                     {
                         report.add(format!(
-                            "{}: expected no further attempt, found the press made twice",
+                            "{}: expected no further attempt, found one after a valid or excluded attempt",
                             attempt.id
                         ));
                     }
@@ -301,7 +299,7 @@ fn check_journal(reader: &SessionReader, report: &mut VerifyReport) {
                 ];
                 if !moments.is_sorted() {
                     report.add(format!(
-                        "{}: expected its moments in order, found others",
+                        "{}: expected phase times in order, found them out of order",
                         attempt.id
                     ));
                 }
@@ -314,19 +312,19 @@ fn check_journal(reader: &SessionReader, report: &mut VerifyReport) {
             ));
         }
     }
-    report.take(reader.preflight());
-    report.take(reader.commands());
-    report.take(reader.marks_sent());
+    report.ok_or_add(reader.preflight());
+    report.ok_or_add(reader.commands());
+    report.ok_or_add(reader.marks_sent());
     check_box_reports(reader, report);
-    report.take(reader.notes());
-    report.take(reader.interruptions());
+    report.ok_or_add(reader.notes());
+    report.ok_or_add(reader.interruptions());
 }
 
-/// The box's clock never goes back but by a reset. Answers and events take different ways through the box, so each is
-/// in order only among its like.
+/// Checks that the box's clock never goes back without a reset. Answers and events take different paths through the box, so
+/// each kind is in order only among its own.
 fn check_box_reports(reader: &SessionReader, report: &mut VerifyReport) {
     let mut last = [BoxTime::default(); 3];
-    for (taken, said) in report.take(reader.box_reports()).unwrap_or_default() {
+    for (taken, said) in report.ok_or_add(reader.box_reports()).unwrap_or_default() {
         let (like, at) = match said {
             BoxReport::Exchange { at, .. } => (0, at),
             BoxReport::Mark { at, .. } | BoxReport::Sync { at, .. } => (1, at),
@@ -338,7 +336,7 @@ fn check_box_reports(reader: &SessionReader, report: &mut VerifyReport) {
         };
         if at < last[like] {
             report.add(format!(
-                "box report taken at {taken}: expected box times from {} µs without a reset, found {} µs",
+                "box report received at {taken}: expected box times from {} µs without a reset, found {} µs",
                 last[like].us, at.us
             ));
         }

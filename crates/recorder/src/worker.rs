@@ -1,4 +1,4 @@
-//! The thread that owns the session file: writes what is prepared, commits, seals.
+//! The writer thread, which owns the session file: writes prepared records, commits and seals.
 
 use std::collections::VecDeque;
 use std::path::Path;
@@ -8,17 +8,17 @@ use std::time::{Duration, Instant};
 use sqlx::Connection;
 use tokio::runtime::Runtime;
 
-use crate::error::RecorderError;
+use crate::close_result::{CloseResult, Sealed};
+use crate::error::{RecorderError, WriteFailure};
 use crate::insert::Journal;
-use crate::left::{Left, Sealed};
 use crate::prepared::Prepared;
 use crate::query::Fault;
-use crate::queue::{Close, Next, Shared};
+use crate::queue::{CloseMode, Shared, WriterTask};
 use crate::{rescue, seal};
 
-/// What is not committed by a durable record or by its size is committed after this time.
+/// Longest time until records are committed that neither durability nor size has committed before.
 const COMMIT_AFTER: Duration = Duration::from_millis(500);
-const SEAL_AGAIN: Duration = Duration::from_millis(20);
+const SEAL_RETRY_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Writes prepared records into the session file.
 pub struct Worker {
@@ -27,54 +27,54 @@ pub struct Worker {
     pub shared: Arc<Shared>,
 }
 
-/// Tells waiting callers when the thread ends, however it ends.
-struct Farewell(Arc<Shared>);
+/// Notifies waiting callers when the thread exits, including by panic.
+struct ExitNotifier(Arc<Shared>);
 
-impl Drop for Farewell {
+impl Drop for ExitNotifier {
     fn drop(&mut self) {
-        self.0.fail("the recorder thread ended".to_owned());
+        self.0.fail(WriteFailure::WriterExited);
     }
 }
 
-/// A fault of the writing side in words: a record that cannot be kept is no damage to the file.
-fn told(fault: Fault, path: &Path, doing: &'static str) -> String {
+/// Failure for a fault of the writer: unlike in a reader, an invalid value does not mean that the file is damaged.
+fn failure(fault: Fault, path: &Path, doing: &'static str) -> WriteFailure {
     match fault {
         Fault::Bad {
             place,
             expected,
             found,
-        } => {
-            format!(
-                "{}: {place}: expected {expected}, found {found}",
-                path.display()
-            )
-        }
-        sql @ Fault::Sql(_) => sql.at(path, doing).to_string(),
+        } => WriteFailure::InvalidRecord {
+            path: path.to_owned(),
+            place,
+            expected,
+            found,
+        },
+        sql @ Fault::Sql(_) => WriteFailure::System(Arc::new(sql.at(path, doing))),
     }
 }
 
 impl Worker {
-    /// Writes until the session is closed, then leaves it as it was asked to.
-    pub fn run(mut self) -> Option<Left> {
-        let farewell = Farewell(Arc::clone(&self.shared));
+    /// Writes until the session is closed, then closes it as requested.
+    pub fn run(mut self) -> Option<CloseResult> {
+        let notifier = ExitNotifier(Arc::clone(&self.shared));
         let path = self.journal.path.clone();
         let mut written = 0;
         let close = loop {
             let commit_at = self.journal.opened().map(|t| t + COMMIT_AFTER);
-            let step = match self.shared.next(commit_at) {
-                Next::Write(records) => self.write_all(records, &mut written),
-                Next::Commit => self.commit(written),
-                Next::Close(close) => break close,
+            let step = match self.shared.next_task(commit_at) {
+                WriterTask::Write(records) => self.write_all(records, &mut written),
+                WriterTask::Commit => self.commit(written),
+                WriterTask::Close(close) => break close,
             };
             if let Err(fault) = step {
-                self.shared.fail(told(fault, &path, "writing a record"));
+                self.shared.fail(failure(fault, &path, "writing a record"));
             }
         };
         if self.shared.failure().is_none()
             && let Err(fault) = self.commit(written)
         {
             self.shared
-                .fail(told(fault, &path, "committing the last records"));
+                .fail(failure(fault, &path, "committing the last records"));
         }
         let failed = self.shared.failure().is_some();
         let Self {
@@ -83,21 +83,21 @@ impl Worker {
             shared,
         } = self;
         let result = match close {
-            Close::Seal if !failed => {
+            CloseMode::Seal if !failed => {
                 let sealed = runtime.block_on(seal_session(journal, &shared));
-                Some(Left::Sealed(sealed))
+                Some(CloseResult::Sealed(sealed))
             }
-            Close::Rescue(refuge) => {
-                let saved = runtime.block_on(rescue::rescue(journal.conn, refuge));
-                Some(Left::Saved(saved))
+            CloseMode::Rescue(targets) => {
+                let saved = runtime.block_on(rescue::rescue(journal.conn, targets));
+                Some(CloseResult::Rescued(saved))
             }
-            Close::Seal | Close::AsItIs => {
-                // Nothing can be done about a failing close: what was committed is safe.
+            CloseMode::Seal | CloseMode::Unsealed => {
+                // A failing close cannot be handled: the commit is safe.
                 let _ = runtime.block_on(journal.conn.close());
                 None
             }
         };
-        drop(farewell);
+        drop(notifier);
         result
     }
 
@@ -111,7 +111,7 @@ impl Worker {
             let record = match record {
                 Ok(record) => record,
                 Err(fault) => {
-                    // Nothing of it was written; what came before it is sound.
+                    // Nothing of this record was written; everything before it is sound.
                     self.commit(*written)?;
                     return Err(fault);
                 }
@@ -119,13 +119,13 @@ impl Worker {
             durable |= record.is_durable();
             self.runtime.block_on(self.journal.write(record, bytes))?;
             *written += 1;
-            self.shared.written(bytes);
+            self.shared.release(bytes);
             if self.journal.commit_due() {
                 self.commit(*written)?;
                 durable = false;
             }
         }
-        // A steady trickle of small records must not put the commit off for ever.
+        // A steady trickle of small records must not delay the commit indefinitely.
         let late = self
             .journal
             .opened()
@@ -139,12 +139,12 @@ impl Worker {
 
     fn commit(&mut self, written: u64) -> Result<(), Fault> {
         self.runtime.block_on(self.journal.commit())?;
-        self.shared.durable(written);
+        self.shared.mark_durable(written);
         Ok(())
     }
 }
 
-/// Whether SQLite refuses because another program has the file open: `SQLITE_BUSY` or `SQLITE_LOCKED`.
+/// Whether SQLite failed because another program has the file open: `SQLITE_BUSY` or `SQLITE_LOCKED`.
 fn is_held(error: &sqlx::Error) -> bool {
     let code = error.as_database_error().and_then(|e| e.code());
     let code = code.and_then(|code| code.parse::<u32>().ok());
@@ -166,12 +166,12 @@ async fn seal_session(mut journal: Journal, shared: &Shared) -> Result<Sealed, R
         }
     };
     let mut conn = journal.conn;
-    // Out of the log first, while no seal exists: should this fail, the session is plainly unsealed.
+    // Leave the log before a seal exists: if this fails, the session is clearly unsealed.
     conn.clear_cached_statements()
         .await
         .map_err(|e| sql(e.into()))?;
-    // Whoever just looks is gone in a moment; SQLite itself does not wait here.
-    let patience = shared.seal_patience();
+    // Readers usually leave within moments; SQLite's own timeout does not apply here.
+    let patience = shared.seal_timeout();
     let from = Instant::now();
     let mode: String = loop {
         let asked = sqlx::query_scalar("PRAGMA journal_mode = DELETE");
@@ -179,8 +179,8 @@ async fn seal_session(mut journal: Journal, shared: &Shared) -> Result<Sealed, R
             Ok(mode) => break mode,
             Err(e) if !is_held(&e) => return Err(sql(e.into())),
             Err(_) if from.elapsed() < patience => {
-                shared.held_open();
-                std::thread::sleep(SEAL_AGAIN);
+                shared.mark_held_open();
+                std::thread::sleep(SEAL_RETRY_INTERVAL);
             }
             Err(e) => {
                 return Err(RecorderError::HeldOpen {

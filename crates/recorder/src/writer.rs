@@ -1,4 +1,4 @@
-//! The writing handle: records in, in order, never dropped.
+//! The writing handle of a session: accepts records in order and never drops one.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,39 +10,40 @@ use skinrig_model::{Record, ResumeHeader, RunHeader};
 use sqlx::sqlite::SqliteConnection;
 use tokio::runtime::Runtime;
 
-use crate::error::RecorderError;
+use crate::close_result::{CloseResult, Sealed};
+use crate::error::{RecorderError, RescueError, WriteFailure};
 use crate::hex::hex;
 use crate::insert::Journal;
-use crate::left::{Left, Sealed};
-use crate::leg::Joint;
+use crate::leg::LegOffset;
 use crate::lock::WriterLock;
 use crate::prepare::Preparer;
-use crate::queue::{Close, QueueLoad, Shared};
+use crate::queue::{CloseMode, QueueLoad, Shared};
 use crate::verify::ChunkScanner;
 use crate::worker::Worker;
-use crate::{beside, prepare, resume, schema};
+use crate::{prepare, resume, schema, sidecar};
 
 /// Writes one session file.
 ///
-/// Two threads of its own work for it: one checks, hashes and folds camera bytes, the next owns the file. Dropped without [`finish`](Self::finish), everything accepted is
-/// committed and a readable, unsealed session stays behind. Not to be used on a thread that runs async tasks.
+/// Two threads work for it: one checks, hashes and folds camera bytes, the other owns the file. If it is dropped without
+/// [`finish`](Self::finish), all accepted records are committed and the session stays readable but unsealed. Do not use it on a thread
+/// that runs async tasks.
 #[derive(Debug)]
 pub struct SessionWriter {
     path: PathBuf,
     shared: Arc<Shared>,
-    /// The preparing and the writing one.
-    threads: Option<(JoinHandle<()>, Written)>,
+    /// The preparation thread and the writer thread.
+    threads: Option<(JoinHandle<()>, WriterThread)>,
     phase: Phase,
-    /// Of a further leg; nothing moves in the first.
-    joint: Joint,
-    /// Given back when everything else is done: fields are dropped in their order, after `drop`.
+    /// Offsets of a further leg; zero in the first.
+    offset: LegOffset,
+    /// Last field: fields are dropped in order after `drop`, and the lock goes last.
     lock: WriterLock,
 }
 
-/// Between two looks whether the session is sealed.
-const LOOK_AGAIN: Duration = Duration::from_millis(5);
+/// Interval at which `finish` checks whether the session is sealed.
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
-type Written = JoinHandle<Option<Left>>;
+type WriterThread = JoinHandle<Option<CloseResult>>;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
@@ -53,16 +54,16 @@ enum Phase {
 }
 
 impl SessionWriter {
-    /// Makes a new session file. Its folder must exist.
+    /// Creates a session file. Its folder must exist.
     ///
     /// # Errors
-    /// [`RecorderError::Exists`] when there is a file of that name; [`RecorderError::Io`] and
-    /// [`RecorderError::Sql`] when it cannot be made.
+    /// [`RecorderError::Exists`] if the file exists; [`RecorderError::Io`] and [`RecorderError::Sql`] if it cannot be
+    /// created.
     pub fn create(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
         let path = path.as_ref().to_owned();
         let runtime = runtime(&path)?;
-        beside::refuse_special_files(&path)?;
-        // The lock before the file: whoever sees the file sees that somebody writes it.
+        sidecar::reject_special_files(&path)?;
+        // Lock before creating the file: a visible file is always locked.
         let exists = || RecorderError::Exists { path: path.clone() };
         if path.exists() {
             return Err(exists());
@@ -73,7 +74,7 @@ impl SessionWriter {
         })?;
         schema::create_file(&path)?;
         lock.take_file()?;
-        let conn = runtime.block_on(schema::fill(&path))?;
+        let conn = runtime.block_on(schema::create_schema(&path))?;
         lock.take_log()?;
         let mut writer = Self {
             lock,
@@ -81,21 +82,21 @@ impl SessionWriter {
             shared: Arc::new(Shared::default()),
             threads: None,
             phase: Phase::New,
-            joint: Joint::default(),
+            offset: LegOffset::default(),
         };
         writer.start(runtime, conn, Preparer::default(), 1)?;
         Ok(writer)
     }
 
-    /// Opens a session that was cut off, stopped or broken off by a fault, to go on with it in a further leg. Nothing in the file
-    /// changes before the first record, which is [`Record::Resumed`]: with it, in one durable step, the seal is taken off, attempts
-    /// that were cut off get their verdict, and the schema becomes the newest. All times and chunk numbers of the leg may begin
-    /// anew: they are joined to those before. The whole session is checked first, as by [`verify`](crate::verify()).
+    /// Opens an interrupted, stopped or faulted session to continue it in a further leg. The whole session is verified first, as by
+    /// [`verify`](crate::verify()). Nothing in the file changes before the first record, which is [`Record::Resumed`]: one durable
+    /// transaction then removes the seal, gives interrupted attempts their verdict and migrates the schema. Times and chunk numbers
+    /// of the leg may start at zero: they are moved behind the existing ones.
     ///
     /// # Errors
-    /// [`RecorderError::InUse`] while another process writes the session; [`RecorderError::Completed`] when there is nothing to
-    /// resume; [`RecorderError::Unsound`] when [`verify`](crate::verify()) finds anything wrong; [`RecorderError::Empty`] without a
-    /// header; or why it cannot be read.
+    /// [`RecorderError::InUse`] while another process writes the session; [`RecorderError::AlreadyCompleted`] if there is nothing to
+    /// resume; [`RecorderError::Unsound`] if [`verify`](crate::verify()) finds a problem; [`RecorderError::Empty`] without a
+    /// header; or a read error.
     pub fn resume(
         path: impl AsRef<Path>,
         scanner: &mut dyn ChunkScanner,
@@ -108,24 +109,24 @@ impl SessionWriter {
             shared: Arc::new(Shared::default()),
             threads: None,
             phase: Phase::Resuming,
-            joint: Joint::default(),
+            offset: LegOffset::default(),
         })
     }
 
-    /// Opens a session whose end is recorded and whose seal is not: [`finish`](Self::finish) is all that is left to it.
+    /// Opens a session whose end is recorded but whose seal is missing: only [`finish`](Self::finish) remains to be called.
     ///
     /// # Errors
-    /// [`RecorderError::InUse`] while another process writes the session; [`RecorderError::Completed`] when it is sealed;
-    /// [`RecorderError::NotThere`] without an end; [`RecorderError::Unsound`] when [`verify`](crate::verify()) finds anything wrong;
-    /// or why it cannot be read.
-    pub fn ended(
+    /// [`RecorderError::InUse`] while another process writes the session; [`RecorderError::AlreadyCompleted`] if it is sealed;
+    /// [`RecorderError::NotFound`] without an end; [`RecorderError::Unsound`] if [`verify`](crate::verify()) finds a problem;
+    /// or a read error.
+    pub fn open_ended(
         path: impl AsRef<Path>,
         scanner: &mut dyn ChunkScanner,
     ) -> Result<Self, RecorderError> {
         let path = path.as_ref().to_owned();
         let mut lock = resume::lock_unsealed(&path, scanner)?;
         let runtime = runtime(&path)?;
-        let conn = runtime.block_on(resume::open_again(&path))?;
+        let conn = runtime.block_on(resume::reopen(&path))?;
         lock.take_log()?;
         let mut writer = Self {
             lock,
@@ -133,13 +134,13 @@ impl SessionWriter {
             shared: Arc::new(Shared::default()),
             threads: None,
             phase: Phase::Ended,
-            joint: Joint::default(),
+            offset: LegOffset::default(),
         };
         writer.start(runtime, conn, Preparer::default(), 1)?;
         Ok(writer)
     }
 
-    /// Starts the two threads on an open file.
+    /// Starts both threads on an open file.
     fn start(
         &mut self,
         runtime: Runtime,
@@ -159,20 +160,20 @@ impl SessionWriter {
             .spawn(move || prepare::run(&records, preparer))
             .map_err(io)?;
         let writing = named("recorder").spawn(move || worker.run()).map_err(|e| {
-            self.shared.close(Close::AsItIs);
+            self.shared.close(CloseMode::Unsealed);
             io(e)
         })?;
         self.threads = Some((preparing, writing));
         Ok(())
     }
 
-    /// Writes the beginning of a further leg; it is durable on return.
+    /// Writes the start of a further leg; it is durable on return.
     fn begin_leg(&mut self, header: &ResumeHeader) -> Result<(), RecorderError> {
         let runtime = runtime(&self.path)?;
         let (conn, leg) = runtime.block_on(resume::begin(&self.path, header))?;
         self.lock.take_log()?;
-        self.joint = leg.joint;
-        let preparer = Preparer::resuming(leg.formats, leg.joint.first_seq);
+        self.offset = leg.offset;
+        let preparer = Preparer::resuming(leg.formats, leg.offset.first_seq);
         self.start(runtime, conn, preparer, leg.number)
     }
 
@@ -182,32 +183,31 @@ impl SessionWriter {
         &self.path
     }
 
-    /// How full the queue of records has been.
+    /// Load of the record queue.
     #[must_use]
     pub fn load(&self) -> QueueLoad {
         self.shared.load()
     }
 
-    /// Takes one record. `Started`, `Resumed`, `Intent`, `Outcome` and `Ended` return when they and all records before
-    /// them are on the disk; others return at once, or wait while 64 MiB of records wait to be written. Nobody waits for longer than 30 s.
+    /// Accepts one record. `Started`, `Resumed`, `Intent`, `Outcome` and `Ended` return when they and all earlier records
+    /// are on disk. Others return at once, or block while 64 MiB of records are queued. No call blocks for more than 30 s.
     ///
-    /// The first record is `Started`, or `Resumed` in a further leg, the last is `Ended`. An `Outcome` needs its `Intent` before it.
+    /// The first record is `Started`, or `Resumed` in a further leg; the last is `Ended`. An `Outcome` must follow its `Intent`.
     ///
     /// # Errors
-    /// [`RecorderError::Record`] for a record out of order or a header whose digests are not those of its texts
-    /// (nothing of it is written, the session goes on); [`RecorderError::Failed`] when this or an earlier
-    /// record could not be written, from then on always; [`RecorderError::Late`] when this one was taken and is not known to be on the
-    /// disk.
+    /// [`RecorderError::Record`] for a record out of order, or a header whose digests do not match its texts: nothing of it is
+    /// written, and the session continues. [`RecorderError::WriteFailed`] if this or an earlier record could not be written, and from then
+    /// on always. [`RecorderError::WriteTimeout`] if this record was accepted but may not be on disk.
     pub fn accept(&mut self, record: Record) -> Result<(), RecorderError> {
         let next = self.next_phase(&record)?;
         if let Record::Resumed(header) = &record {
             self.begin_leg(header)?;
         } else {
-            let record = self.joint.join(record)?;
+            let record = self.offset.apply(record)?;
             match self.shared.accept(record) {
                 Ok(()) => {}
-                Err(late @ RecorderError::Late(_)) => {
-                    self.phase = next; // it was taken
+                Err(late @ RecorderError::WriteTimeout(_)) => {
+                    self.phase = next; // the record was accepted
                     return Err(late);
                 }
                 Err(refused) => return Err(refused),
@@ -238,75 +238,75 @@ impl SessionWriter {
             }
             (Phase::Started, Record::Ended { .. }) => Ok(Phase::Ended),
             (Phase::Started, _) => Ok(Phase::Started),
-            (Phase::Ended, _) => out_of_order("nothing after the run's end", "a record"),
+            (Phase::Ended, _) => out_of_order("no records after the end of the run", "a record"),
         }
     }
 
-    /// How long [`finish`](Self::finish) waits for other programs that have the session open; 60 s unless it is set here. New readers of
-    /// this version stay away meanwhile.
-    pub fn seal_within(&mut self, patience: Duration) {
-        self.shared.set_seal_patience(patience);
+    /// Sets how long [`finish`](Self::finish) waits for other programs that have the session open; 60 s by default. New readers
+    /// of this version of skinrig wait meanwhile.
+    pub fn set_seal_timeout(&mut self, timeout: Duration) {
+        self.shared.set_seal_timeout(timeout);
     }
 
-    /// Commits, writes the seal (final counts, tree hash, file hash), leaves one file and makes it read-only.
+    /// Commits, writes the seal (final counts, tree hash, file hash), removes the log and makes the file read-only.
     ///
     /// # Errors
-    /// [`RecorderError::Unsealable`] before `Ended` and while a planned press has no verdict; [`RecorderError::HeldOpen`] when another
-    /// program had the session open for too long; [`RecorderError::Failed`] after a failed write. The session then stays
+    /// [`RecorderError::Unsealable`] before `Ended` and while a planned press has no verdict; [`RecorderError::HeldOpen`] if another
+    /// program kept the session open for too long; [`RecorderError::WriteFailed`] after a failed write. The session then stays
     /// readable and unsealed.
     pub fn finish(self) -> Result<Sealed, RecorderError> {
-        self.finish_or_tell(|| {})
+        self.finish_with_notice(|| {})
     }
 
-    /// As [`finish`](Self::finish); calls `tell` once when it has to wait for another program that has the session open.
+    /// Like [`finish`](Self::finish); calls `on_wait` once if it has to wait for another program.
     ///
     /// # Errors
     /// As [`finish`](Self::finish).
-    pub fn finish_or_tell(mut self, tell: impl FnOnce()) -> Result<Sealed, RecorderError> {
+    pub fn finish_with_notice(mut self, on_wait: impl FnOnce()) -> Result<Sealed, RecorderError> {
         if self.threads.is_none() {
             return Err(RecorderError::Unsealable {
                 path: self.path.clone(),
-                expected: "the run's end as last record".into(),
-                found: "a leg that was not begun".into(),
+                expected: "the end of the run as the last record".into(),
+                found: "a leg without records".into(),
             });
         }
         if let Err(displaced) = self.check() {
-            return Err(self.rescue(&displaced));
+            return Err(self.rescue(displaced));
         }
-        if let Some(detail) = self.shared.failure() {
-            return Err(RecorderError::Failed(detail));
+        if let Some(failure) = self.shared.failure() {
+            return Err(RecorderError::WriteFailed(failure));
         }
         self.lock.announce_sealing();
-        self.lock.without_log();
-        self.shared.close(Close::Seal);
-        let mut tell = Some(tell);
+        self.lock.forget_log();
+        self.shared.close(CloseMode::Seal);
+        let mut on_wait = Some(on_wait);
         while self.threads.as_ref().is_some_and(|(_, w)| !w.is_finished()) {
             if self.shared.is_held_open()
-                && let Some(tell) = tell.take()
+                && let Some(on_wait) = on_wait.take()
             {
-                tell();
+                on_wait();
             }
-            std::thread::sleep(LOOK_AGAIN);
+            std::thread::sleep(POLL_INTERVAL);
         }
-        let sealed = match self.close(Close::Seal) {
-            Some(Left::Sealed(sealed)) => sealed,
-            _ => Err(self.ended_early()),
+        let sealed = match self.close(CloseMode::Seal) {
+            Some(CloseResult::Sealed(sealed)) => sealed,
+            _ => Err(RecorderError::WriteFailed(self.failure())),
         };
         self.lock.withdraw_sealing();
-        // What sealing met with when the file went away under it; the file is closed, and without a log.
+        // Sealing failed because the file disappeared; it is closed and has no log.
         if let (Err(_), Err(displaced)) = (&sealed, self.check()) {
-            let refuge = self.lock.refuge();
-            let saved = refuge
-                .place
-                .map_or_else(|| self.lock.copy(&refuge.copies), Ok);
-            return Err(rescued(&displaced, saved));
+            let targets = self.lock.rescue_targets();
+            let saved = targets
+                .current_path
+                .map_or_else(|| self.lock.copy(&targets.copies), Ok);
+            return Err(rescued(displaced, saved));
         }
         sealed
     }
 
-    /// Whether the session is still where it was opened: it is written to the open file, whatever becomes of its name. To be asked
-    /// now and then during a run. When it is not, the run is to be ended; [`finish`](Self::finish) then brings all that was recorded,
-    /// its end included, to where it can be found.
+    /// Checks that the session files are still where they were opened; records go to the open file regardless of its name. Call it
+    /// regularly during a run, and end the run if it fails: [`finish`](Self::finish) then saves all records, including the end of the
+    /// run, in a file that can be found.
     ///
     /// # Errors
     /// [`RecorderError::Displaced`].
@@ -314,48 +314,48 @@ impl SessionWriter {
         self.lock.check()
     }
 
-    /// Brings what was recorded to where it can be found; says where.
-    fn rescue(&mut self, displaced: &RecorderError) -> RecorderError {
-        let saved = match self.close(Close::Rescue(self.lock.refuge())) {
-            Some(Left::Saved(saved)) => saved,
-            _ => Err(self.ended_early().to_string()),
+    /// Saves the records in a file that can be found; returns an error that names it.
+    fn rescue(&mut self, displaced: RecorderError) -> RecorderError {
+        let saved = match self.close(CloseMode::Rescue(self.lock.rescue_targets())) {
+            Some(CloseResult::Rescued(saved)) => saved,
+            _ => Err(RescueError::Writer(self.failure())),
         };
         if saved.is_ok() {
-            self.lock.tidy();
+            self.lock.remove_log_files();
         }
         rescued(displaced, saved)
     }
 
-    fn ended_early(&self) -> RecorderError {
-        let ended = || "the recorder thread ended".to_owned();
-        RecorderError::Failed(self.shared.failure().unwrap_or_else(ended))
+    fn failure(&self) -> WriteFailure {
+        let failure = self.shared.failure();
+        failure.unwrap_or(WriteFailure::WriterExited)
     }
 
-    fn close(&mut self, how: Close) -> Option<Left> {
+    fn close(&mut self, mode: CloseMode) -> Option<CloseResult> {
         let (preparing, writing) = self.threads.take()?;
-        self.shared.close(how);
-        // A panic of the first thread has told the second, which leaves an unsealed session.
+        self.shared.close(mode);
+        // After a panic of the preparation thread, the writer thread leaves an unsealed session.
         let _ = preparing.join();
         writing.join().ok().flatten()
     }
 }
 
-/// What became of a session that was moved or removed.
-fn rescued(displaced: &RecorderError, saved: Result<PathBuf, String>) -> RecorderError {
-    let displaced = displaced.to_string();
+/// Error for a session that was moved or removed during the run.
+fn rescued(displaced: RecorderError, saved: Result<PathBuf, RescueError>) -> RecorderError {
+    let displaced = Box::new(displaced);
     match saved {
         Ok(to) => RecorderError::Rescued { displaced, to },
-        Err(why) => RecorderError::Lost { displaced, why },
+        Err(reason) => RecorderError::Lost { displaced, reason },
     }
 }
 
 impl Drop for SessionWriter {
     fn drop(&mut self) {
-        self.close(Close::AsItIs);
+        self.close(CloseMode::Unsealed);
     }
 }
 
-/// What the connections of a session run on.
+/// Async runtime of a session's connections.
 fn runtime(path: &Path) -> Result<Runtime, RecorderError> {
     tokio::runtime::Builder::new_current_thread()
         .build()
@@ -383,7 +383,7 @@ fn check_digests(header: &RunHeader) -> Result<(), RecorderError> {
         if expected != *digest {
             return Err(RecorderError::Record {
                 record: record.into(),
-                expected: format!("{expected}, the SHA-256 of its text"),
+                expected: format!("{expected}, the SHA-256 of the text"),
                 found: digest.clone(),
             });
         }

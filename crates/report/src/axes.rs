@@ -1,13 +1,13 @@
-//! Owns the axes of figures: linear scales, readable ticks, labels.
+//! Owns the axes of figures: linear scales, ticks and labels.
 
 use crate::svg::{Px, Svg};
 
-/// Width of a digit of a tick, px: 0.6 of the 11 px that figure.css sets, rounded up.
+/// Width of a tick digit, px: 0.6 of the 11 px in figure.css, rounded up.
 const DIGIT_PX: f64 = 6.7;
-/// Middle of the label at the left to the axis, px: as far as ticks of four digits need, or more.
+/// Minimum distance from the axis to the middle of its left label, px; enough for four-digit ticks.
 const LABEL_PX: f64 = 46.0;
 
-/// Tick positions at 1, 2 or 5 times a power of ten inside `low..=high`, about `wanted` of them; none for 0.
+/// About `wanted` tick positions inside `low..=high`, at 1, 2 or 5 times a power of ten; none for 0.
 #[must_use]
 pub fn ticks(low: f64, high: f64, wanted: u32) -> Vec<f64> {
     let span = high - low;
@@ -26,7 +26,7 @@ pub fn ticks(low: f64, high: f64, wanted: u32) -> Vec<f64> {
     (first..=last).map(|k| k as f64 * step).collect()
 }
 
-/// Writes a tick with as many decimals as the distance `step` between ticks needs.
+/// Formats a tick with the decimals that the distance `step` between ticks needs.
 #[must_use]
 pub(crate) fn tick_label(value: f64, step: f64) -> String {
     let digits = if step > 0.0 {
@@ -37,7 +37,7 @@ pub(crate) fn tick_label(value: f64, step: f64) -> String {
     crate::format::number(Some(value), digits.min(9))
 }
 
-/// A linear map from data to pixels along one axis.
+/// Linear map from data to pixels along one axis.
 #[derive(Debug, Clone, Copy)]
 pub struct Scale {
     /// Data range; never empty.
@@ -47,7 +47,7 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// The map of `data` onto `px`. An empty or non-finite data range is widened to one unit.
+    /// Maps `data` onto `px`. Widens an empty or non-finite data range to one unit.
     #[must_use]
     pub fn new(data: (f64, f64), px: (f64, f64)) -> Self {
         let (mut low, mut high) = data;
@@ -133,7 +133,7 @@ impl Axes {
             "middle",
             &self.x_label,
         );
-        // Beside the widest tick, but inside the drawing.
+        // Left of the widest tick, but inside the drawing.
         let widest = ys.iter().map(|(_, l)| l.chars().count()).max().unwrap_or(0);
         let away = (widest as f64).mul_add(DIGIT_PX, 17.0).max(LABEL_PX);
         let (x, y) = ((left - away).max(left.min(12.0)), (top + bottom) / 2.0);
@@ -174,7 +174,7 @@ mod tests {
         assert!(Scale::new((f64::NAN, 2.0), (0.0, 10.0)).at(2.0).is_finite());
     }
 
-    /// Ticks end 7 px beside the axis; the label keeps clear of the widest, half its height and more.
+    /// Ticks end 7 px beside the axis; the label must clear the widest one by more than half its height.
     #[test]
     fn the_label_at_the_left_stands_clear_of_wide_ticks() {
         let scale = Scale::new((0.0, 1.0), (100.0, 200.0));

@@ -1,4 +1,4 @@
-//! How a choice between speed and accuracy is written.
+//! Formats the analysis options of a tradeoff.
 
 use std::fmt::Write as _;
 
@@ -7,7 +7,7 @@ use skinrig_model::{CentroidRule, Estimator, Precision};
 
 use crate::format::number;
 
-/// A choice in a few words: estimator, then what is not at its plainest.
+/// Short label: estimator, then every option that differs from its default.
 #[must_use]
 pub fn label(choice: &Choice) -> String {
     let mut out = match (choice.estimator, choice.centroid) {
@@ -38,7 +38,7 @@ pub fn label(choice: &Choice) -> String {
     out
 }
 
-/// Three digits, or whole from 100 on.
+/// Three significant digits; no decimals from 100.
 pub(crate) fn short(value: f64) -> String {
     let digits = if value >= 100.0 {
         0

@@ -1,6 +1,6 @@
-//! Owns the colour scale of the figures: viridis, readable with every common colour vision.
+//! Owns the colour scale of the figures: viridis, readable with all common types of colour vision.
 //!
-//! Nine anchor colours of matplotlib's viridis table (at 0, 1/8, ... 1), linear in between.
+//! Nine anchor colours from matplotlib's viridis table (at 0, 1/8, ... 1), with linear interpolation.
 
 const VIRIDIS: [[u8; 3]; 9] = [
     [68, 1, 84],
@@ -14,7 +14,7 @@ const VIRIDIS: [[u8; 3]; 9] = [
     [253, 231, 37],
 ];
 
-/// The colour at `share` of the scale (0..=1, clamped: the scale's ends are labelled as such), `#rrggbb`.
+/// Colour at `share` of the scale as `#rrggbb`. Clamps to 0..=1; figures label the ends of the scale accordingly.
 #[must_use]
 pub(crate) fn viridis(share: f64) -> String {
     let [r, g, b] = viridis_rgb(share);

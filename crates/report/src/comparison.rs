@@ -5,29 +5,29 @@ use skinrig_analysis::result::{Analysis, Estimate, ReductionRow, Thinning};
 
 use crate::published::{MSOWS, Metric};
 
-/// The factor of the published comparison.
+/// Thinning factor of the published comparison.
 pub(crate) const FACTOR: u32 = 1024;
 
-/// What a session says about one quantity.
+/// Value of the session for one quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Cell {
-    /// Nothing: not measured, or the study is missing.
+    /// Not measured, or the study is missing.
     Missing,
-    /// In words.
+    /// A qualitative value.
     Text(&'static str),
     /// A number in the unit of [`Metric::name`], with its interval.
     Value(Estimate),
 }
 
-/// One row: what the session says without reduction and at `FACTOR`.
+/// One quantity of the session, without reduction and at `FACTOR`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Row {
-    /// Which quantity.
+    /// The quantity.
     pub metric: Metric,
-    /// All events.
+    /// Value with all events.
     pub session: Cell,
-    /// One event in `FACTOR` kept, chosen at random by exact count as in the public code: emulated.
+    /// Value with one event in `FACTOR` kept at random, exact count, as in the public code (emulated).
     pub reduced: Cell,
     /// Lo Preti et al. 2022, as given in the paper.
     pub msows: &'static str,
@@ -39,7 +39,7 @@ pub struct Row {
     pub notes: &'static str,
 }
 
-/// The comparison with the multitouch soft optical waveguide skin (the paper's table "MSOWS"), row by row.
+/// Compares the session with the multitouch soft optical waveguide skin (the paper's table "MSOWS"), row by row.
 #[must_use]
 pub fn rows(analysis: &Analysis) -> Vec<Row> {
     let thinned = reduced_row(analysis);
@@ -69,7 +69,7 @@ pub fn rows(analysis: &Analysis) -> Vec<Row> {
         .collect()
 }
 
-/// The study's row at [`FACTOR`], exact-count thinning.
+/// The study's row at [`FACTOR`] with exact-count thinning.
 fn reduced_row(analysis: &Analysis) -> Option<ReductionRow> {
     let curves = &analysis.reduction.as_ref()?.curves;
     let curve = curves.iter().find(|c| c.thinning == Thinning::Exact)?;
@@ -148,7 +148,7 @@ fn whole(a: &Analysis, metric: Metric) -> Cell {
 fn reduced(a: &Analysis, row: &ReductionRow, metric: Metric) -> Cell {
     let latency = a.latency.as_ref().and_then(|l| l.reduced.as_ref());
     let latency = latency.filter(|l| l.factor == FACTOR);
-    // Circles of radius RMSE that fill the area, as without reduction: area / (pi RMSE²).
+    // Circles with radius RMSE that fill the area, as without reduction: area / (pi RMSE²).
     let taxels = |area: Option<f64>| {
         let (Some(area), Some(rmse)) = (area, row.rmse_mm.value.filter(|r| *r > 0.0)) else {
             return Cell::Missing;
@@ -176,7 +176,7 @@ fn reduced(a: &Analysis, row: &ReductionRow, metric: Metric) -> Cell {
         Metric::LatencyWidth => latency.map_or(Cell::Missing, |l| scaled(&l.width_ms, 1.0)),
         Metric::LatencyFromContact | Metric::GlobalError => Cell::Missing,
         Metric::DiagonalError => {
-            // The share that one millimetre is, from the headline's own pair.
+            // Percent of the diagonal per millimetre, from the headline's own pair of values.
             let per_mm = a.scored.rmse_diagonal_percent.zip(a.scored.rmse_mm.value);
             match per_mm.filter(|(_, rmse)| *rmse > 0.0) {
                 Some((percent, rmse)) => scaled(&row.rmse_mm, percent / rmse),

@@ -1,12 +1,12 @@
-//! Owns how the course of a session is told in words: its legs, and the attempts that others replaced.
+//! Describes the course of a session: its legs, losses and retaken presses.
 
 use crate::format::{number, or_missing};
 use crate::provenance::{LegRow, LossRow, Provenance};
 
-/// A leg in words, without its number.
+/// Description of a leg, without its number.
 pub(crate) fn leg(leg: &LegRow) -> String {
     let apart = leg.apart_s.map_or(String::new(), |s| {
-        format!(", {} after the leg before", duration(s))
+        format!(", {} after the previous leg", duration(s))
     });
     format!(
         "{}, from {} s{apart}: {}",
@@ -16,7 +16,7 @@ pub(crate) fn leg(leg: &LegRow) -> String {
     )
 }
 
-/// How many attempts were replaced, and what to make of it; `None` without any.
+/// Number of superseded attempts and how they count; `None` without retakes.
 pub(crate) fn retaken(p: &Provenance) -> Option<String> {
     let mut presses: Vec<u32> = p.retaken.iter().map(|r| r.press).collect();
     presses.sort_unstable();
@@ -26,12 +26,12 @@ pub(crate) fn retaken(p: &Provenance) -> Option<String> {
     let what = if presses == 1 { "press" } else { "presses" };
     (n > 0).then(|| {
         format!(
-            "{n} {attempts} at {presses} {what} made again; a press counts once, by its last attempt"
+            "{n} {attempts} at {presses} {what} retaken; each press counts once, by its last attempt"
         )
     })
 }
 
-/// One line for each reason why attempts were replaced, the first press first.
+/// One line per reason for a retake, in the order of the first press.
 pub(crate) fn reasons(p: &Provenance) -> Vec<String> {
     let mut groups: Vec<(&str, Vec<String>)> = Vec::new();
     for row in &p.retaken {
@@ -48,24 +48,24 @@ pub(crate) fn reasons(p: &Provenance) -> Vec<String> {
     lines.collect()
 }
 
-/// How many losses of a camera are told one by one.
-const MOST_LOSSES: usize = 5;
+/// Losses of one camera listed individually.
+const MAX_LOSSES: usize = 5;
 
-/// When the camera with this index lost data, and how much time with it.
+/// Time and length of each loss of the camera with this index.
 pub(crate) fn losses(p: &Provenance, camera: usize) -> Vec<String> {
     let mine = |row: &&LossRow| usize::from(row.camera) == camera + 1;
     let times = p.losses.iter().filter(mine).map(|row| row.time.to_string());
-    let mut told: Vec<String> = times.collect();
-    if let Some(more) = told.len().checked_sub(MOST_LOSSES + 1) {
-        told.truncate(MOST_LOSSES);
-        told.push(format!("and {} times more", more + 1));
+    let mut lines: Vec<String> = times.collect();
+    if let Some(more) = lines.len().checked_sub(MAX_LOSSES + 1) {
+        lines.truncate(MAX_LOSSES);
+        lines.push(format!("and {} times more", more + 1));
     }
-    told
+    lines
 }
 
 /// `40 s`, `25 min` or `7 h 5 min`.
 fn duration(seconds: f64) -> String {
-    // Not negative and not a number are 0: `as` saturates.
+    // Negative values and NaN become 0, because `as` saturates.
     let minutes = (seconds / 60.0).round() as u64;
     match minutes {
         0..2 => format!("{} s", seconds.round().max(0.0) as u64),

@@ -1,20 +1,23 @@
-//! Owns the summaries that only a drawing needs: per location, shares of sorted errors. Nothing here is a result.
+//! Owns summaries for drawing only: per location, shares of sorted errors. None of them is a result.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use skinrig_analysis::result::{Analysis, Latency, OffSensor, PressResult};
+use skinrig_analysis::rule::Rule;
 use skinrig_analysis::triangulate::locate;
-use skinrig_model::{CameraId, LocationId, Point2, PressId, PressRole};
+use skinrig_model::{CameraId, LocationId, Point2, PressId, PressRole, Verdict};
 
 use crate::format::grouped;
 
-/// True for the presses behind the headline: scored, valid, with a truth and an estimate.
+/// True for the presses behind the headline: scored, valid, with truth and estimate.
 #[must_use]
-pub fn counts(press: &PressResult) -> bool {
-    press.role == PressRole::Score && press.verdict == "valid" && error_norm_mm(press).is_some()
+pub fn is_counted(press: &PressResult) -> bool {
+    press.role == PressRole::Score
+        && press.verdict == Verdict::Valid
+        && error_norm_mm(press).is_some()
 }
 
-/// Euclidean length of the error vector, mm; `None` without truth or estimate, or when it is not finite.
+/// Euclidean length of the error vector, mm; `None` without truth or estimate, or if not finite.
 #[must_use]
 pub(crate) fn error_norm_mm(press: &PressResult) -> Option<f64> {
     press
@@ -23,34 +26,34 @@ pub(crate) fn error_norm_mm(press: &PressResult) -> Option<f64> {
         .filter(|e| e.is_finite())
 }
 
-/// The 95 % interval of a value with this standard error: 1.96 of them to either side (normal).
+/// 95 % interval of a value with this standard error: ± 1.96 of them (normal).
 #[must_use]
 pub(crate) fn interval_95(value: f64, standard_error: f64) -> (f64, f64) {
     let half = 1.96 * standard_error;
     (value - half, value + half)
 }
 
-/// What the map shows at one location.
+/// Data of the skin map at one location.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocationSummary {
-    /// Location.
+    /// Number of the location.
     pub location: LocationId,
-    /// Where it was planned.
+    /// Planned position, skin frame.
     pub planned: Point2,
-    /// Presses behind the summary.
+    /// Number of presses.
     pub n: u32,
     /// Mean Euclidean error, mm.
     pub mean_error_mm: f64,
-    /// Sample standard deviation (n - 1) of the estimates of equally deep presses about their mean, Euclid,
-    /// mm, averaged over depths: the analysis' own definition. `None` without two equally deep presses.
+    /// Sample standard deviation (n - 1, Euclidean) of the estimates of equally deep presses about their mean, mm, averaged
+    /// over depths, as the analysis defines it. `None` without two equally deep presses.
     pub std_mm: Option<f64>,
 }
 
-/// One summary per location with at least one press that [`counts`], by location number.
+/// One summary per location with at least one press that [`is_counted`], by location number.
 #[must_use]
 pub fn locations(analysis: &Analysis) -> Vec<LocationSummary> {
     let mut groups: BTreeMap<LocationId, Vec<&PressResult>> = BTreeMap::new();
-    for press in analysis.presses.iter().filter(|p| counts(p)) {
+    for press in analysis.presses.iter().filter(|p| is_counted(p)) {
         groups.entry(press.location).or_default().push(press);
     }
     groups
@@ -91,42 +94,48 @@ fn spread_mm(presses: &[&PressResult]) -> Option<f64> {
     (!stds.is_empty()).then(|| stds.iter().sum::<f64>() / stds.len() as f64)
 }
 
-/// The errors of all presses that [`counts`], ascending, mm.
+/// Errors of all presses that [`is_counted`] accepts, ascending, mm.
 #[must_use]
 pub(crate) fn sorted_errors_mm(analysis: &Analysis) -> Vec<f64> {
     let mut errors: Vec<f64> = analysis
         .presses
         .iter()
-        .filter(|p| counts(p))
+        .filter(|p| is_counted(p))
         .filter_map(error_norm_mm)
         .collect();
     errors.sort_by(f64::total_cmp);
     errors
 }
 
-/// Presses that one rule left out.
+/// Presses rejected by one rule.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Rejection {
-    /// `missed`, `invalid` or `excluded`.
-    pub verdict: String,
-    /// The rule; the reason in full when all of them share it.
+    /// Missed, invalid or excluded.
+    pub verdict: Verdict,
+    /// The rule; the full reason when all presses share it.
     pub rule: String,
-    /// The reason of the first of them, when they differ.
+    /// Reason of the first press, when reasons differ.
     pub example: Option<String>,
-    /// How many.
+    /// Number of presses.
     pub n: u32,
 }
 
-/// Presses that are not valid, grouped by verdict and rule, most frequent first. Sync presses, which the counts
-/// leave apart, only with `sync`; all others only without.
+/// Presses that are not valid, grouped by verdict and rule, most frequent first. `sync`: only sync presses, which the counts
+/// exclude; otherwise all other presses.
 #[must_use]
 pub fn rejections(analysis: &Analysis, sync: bool) -> Vec<Rejection> {
-    let mut groups: BTreeMap<(&str, &str), Vec<&str>> = BTreeMap::new();
-    let rejected = analysis.presses.iter().filter(|p| p.verdict != "valid");
+    let mut groups: BTreeMap<(Verdict, String), Vec<&str>> = BTreeMap::new();
+    let rejected = analysis
+        .presses
+        .iter()
+        .filter(|p| p.verdict != Verdict::Valid);
     for press in rejected.filter(|p| (p.role == PressRole::Sync) == sync) {
-        let reason = press.reason.as_deref().unwrap_or("no reason given");
-        let rule = press.rule.as_deref().unwrap_or(reason);
-        let group = groups.entry((&press.verdict, rule)).or_default();
+        let reason = press.reason.as_deref().unwrap_or("no reason recorded");
+        let rule = press
+            .rule
+            .as_ref()
+            .map_or_else(|| reason.to_owned(), Rule::to_string);
+        let group = groups.entry((press.verdict, rule)).or_default();
         group.push(reason);
     }
     let mut rows: Vec<Rejection> = groups
@@ -135,8 +144,8 @@ pub fn rejections(analysis: &Analysis, sync: bool) -> Vec<Rejection> {
             let first = reasons[0];
             let alike = reasons.iter().all(|r| *r == first);
             Rejection {
-                verdict: verdict.to_owned(),
-                rule: if alike { first } else { rule }.to_owned(),
+                verdict,
+                rule: if alike { first.to_owned() } else { rule },
                 example: (!alike).then(|| first.to_owned()),
                 n: reasons.len() as u32,
             }
@@ -146,7 +155,7 @@ pub fn rejections(analysis: &Analysis, sync: bool) -> Vec<Rejection> {
     rows
 }
 
-/// Repetitions and locations in the plan, without the sync presses.
+/// Number of repetitions and locations in the plan, without sync presses.
 #[must_use]
 pub fn extent(analysis: &Analysis) -> (u32, u32) {
     let planned = || {
@@ -160,18 +169,17 @@ pub fn extent(analysis: &Analysis) -> (u32, u32) {
     (repetitions, locations.len() as u32)
 }
 
-/// Says so when the figures stand on another number of presses than the headline: they must not.
+/// A warning if the figures use another number of presses than the headline, which is a defect.
 #[must_use]
 pub fn disagreement(analysis: &Analysis) -> Option<String> {
-    let drawn = analysis.presses.iter().filter(|p| counts(p)).count() as u64;
+    let drawn = analysis.presses.iter().filter(|p| is_counted(p)).count() as u64;
     let headline = u64::from(analysis.scored.rmse_mm.n);
     (drawn != headline).then(|| {
-        format!("figures show {drawn} scored presses, the headline stands on {headline}: do not trust this report")
+        format!("figures show {drawn} scored presses, but the headline uses {headline}: do not trust this report")
     })
 }
 
-/// Says so when the presses were located with another camera geometry than the settings ask for: the nominal one, or that of
-/// a smaller model. `None` without presses.
+/// A note if the geometry differs from the one in the settings: nominal, or a smaller model. `None` without presses.
 #[must_use]
 pub(crate) fn geometry_note(analysis: &Analysis) -> Option<String> {
     use skinrig_model::CalibrationModel::{Auto, None as Nominal};
@@ -180,15 +188,14 @@ pub(crate) fn geometry_note(analysis: &Analysis) -> Option<String> {
         return None;
     }
     match analysis.calibration.as_ref().map(|c| c.model) {
-        None if asked == Nominal => Some(
-            "Located with the nominal camera geometry, not calibrated, as the settings say"
-                .to_owned(),
-        ),
+        None if asked == Nominal => {
+            Some("Located with the nominal camera geometry, uncalibrated, as configured".to_owned())
+        }
         None => {
             Some("Located with the nominal camera geometry: no calibration was possible".to_owned())
         }
         Some(used) if asked != Auto && used != asked => Some(format!(
-            "Calibrated with a smaller model ({}) than the settings say ({}): that one could not be fitted",
+            "Calibrated with a smaller model ({}) than configured ({}), which could not be fitted",
             crate::figures::model_name(used),
             crate::figures::model_name(asked)
         )),
@@ -196,8 +203,7 @@ pub(crate) fn geometry_note(analysis: &Analysis) -> Option<String> {
     }
 }
 
-/// The onsets that count: within the settings' window of the median onset, ascending, ms (the paper's true
-/// positives).
+/// Onsets within the settings' window around the median onset, ascending, ms (the paper's true positives).
 #[must_use]
 pub fn onsets_ms(latency: &Latency) -> Vec<f64> {
     let mut onsets: Vec<f64> = latency
@@ -225,27 +231,27 @@ pub(crate) fn onset_percentiles(latency: &Latency) -> Option<(f64, f64, f64)> {
     ))
 }
 
-/// Quantile of ascending values, linear between neighbours.
+/// Quantile of ascending values, linearly interpolated.
 fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let at = share * sorted.len().checked_sub(1)? as f64;
     let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
     Some(low + (high - low) * at.fract())
 }
 
-/// Where a calibrating press was, and where it was located before and after the calibration.
+/// A calibration press: ground truth, and estimates before and after the calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Residual {
-    /// Which press.
+    /// The press.
     pub press: PressId,
-    /// Its measured position.
+    /// Measured position.
     pub truth: Point2,
-    /// Located with the geometry that the calibration started from.
+    /// Estimate with the geometry before calibration.
     pub before: Option<Point2>,
     /// Located with the calibrated geometry.
     pub after: Option<Point2>,
 }
 
-/// One line per camera with events outside the sensor, which no number uses.
+/// One line per camera with events outside the sensor, which the analysis ignores.
 #[must_use]
 pub fn off_sensor(analysis: &Analysis) -> Vec<String> {
     let cameras = CameraId::ALL.into_iter().zip(&analysis.off_sensor);
@@ -260,8 +266,8 @@ pub fn off_sensor(analysis: &Analysis) -> Vec<String> {
     found.map(line).collect()
 }
 
-/// One row per calibrating press with a truth and both centroids, in plan order; empty without a calibration.
-/// "Before" intersects the rays of the same centroids with the geometry that the calibration started from.
+/// One row per calibration press with truth and both centroids, in plan order; empty without a calibration. "Before" uses
+/// the same centroids with the geometry before calibration.
 #[must_use]
 pub fn residuals(analysis: &Analysis) -> Vec<Residual> {
     let Some(calibration) = &analysis.calibration else {
@@ -285,6 +291,6 @@ pub fn residuals(analysis: &Analysis) -> Vec<Residual> {
     let calibrating = analysis
         .presses
         .iter()
-        .filter(|p| p.role == PressRole::Calibrate && p.verdict == "valid");
+        .filter(|p| p.role == PressRole::Calibrate && p.verdict == Verdict::Valid);
     calibrating.filter_map(row).collect()
 }

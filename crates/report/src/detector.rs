@@ -1,24 +1,24 @@
-//! Owns what a reader must know about the latency detector: the choice of its threshold, its false detections.
+//! Owns remarks on the latency detector: choice of its threshold, false detections.
 
 use skinrig_analysis::result::Latency;
 
 use crate::format::number;
 
-/// One choice of a threshold h.
-struct Choice {
-    /// What the trials were looked at with, as in "at all events".
+/// The choice of a threshold h, and the range it came from.
+struct ThresholdChoice {
+    /// Data that the detector saw, as in "with all events".
     data: String,
-    /// The protocol's keys are below this one.
+    /// Prefix of the protocol keys.
     key: &'static str,
-    /// First and last threshold tried.
+    /// First and last candidate.
     range: (f64, f64),
     chosen: Option<f64>,
     detected_rate: Option<f64>,
     target_rate: f64,
 }
 
-impl Choice {
-    /// The target that no threshold reaches, and a choice at an end of what was tried.
+impl ThresholdChoice {
+    /// Warnings when no candidate reaches the target rate, or the chosen one is at the end of the range.
     fn remarks(&self) -> Vec<String> {
         let Self { data, key, .. } = self;
         let (first, last) = self.range;
@@ -31,8 +31,8 @@ impl Choice {
         let detected = self.detected_rate.unwrap_or(0.0);
         if detected < self.target_rate {
             out.push(format!(
-                "with {data} no threshold h from {first} to {last} detects the wanted {:.0} % of the trials: h {chosen} \
-                 detects most, {:.1} % ({key}.target_rate)",
+                "with {data} no threshold h from {first} to {last} detects {:.0} % of the trials, the target rate: h \
+                 {chosen} detects most, {:.1} % ({key}.target_rate)",
                 100.0 * self.target_rate,
                 100.0 * detected
             ));
@@ -45,33 +45,33 @@ impl Choice {
         };
         out.extend(edge.map(|(end, better)| {
             format!(
-                "with {data} the threshold chosen, h {chosen}, is the {end} of those tried: {better} ({key}.thresholds)"
+                "with {data} the chosen threshold, h {chosen}, is the {end} candidate: {better} ({key}.thresholds)"
             )
         }));
         out
     }
 }
 
-/// Most false detections that are named.
-const NAMED: usize = 8;
+/// False detections listed individually.
+const MAX_LISTED: usize = 8;
 
-/// The presses whose detector tripped before the contact, and when; `None` when there are none.
+/// Presses whose detector fired before contact, with the time; `None` without any.
 pub(crate) fn false_detections(l: &Latency) -> Option<String> {
     let all = &l.false_detections;
-    let named = all.iter().take(NAMED);
+    let named = all.iter().take(MAX_LISTED);
     let named = named.map(|(press, ms)| format!("{press} at {} ms", number(Some(*ms), 0)));
     let mut list = named.collect::<Vec<_>>().join(", ");
-    if all.len() > NAMED {
-        list += &format!(" and {} more", all.len() - NAMED);
+    if all.len() > MAX_LISTED {
+        list += &format!(" and {} more", all.len() - MAX_LISTED);
     }
     (!all.is_empty()).then_some(list)
 }
 
-/// Remarks on the thresholds chosen for all events and for thinned ones; none when both lie within what was tried and
-/// detect as much as wanted.
+/// Warnings about the thresholds chosen for all and for thinned events; none if both are inside their range and reach the
+/// target rate.
 pub(crate) fn remarks(l: &Latency) -> Vec<String> {
     let chosen = l.chosen.and_then(|i| l.sweep.get(i as usize));
-    let all = Choice {
+    let all = ThresholdChoice {
         data: "all events".to_owned(),
         key: "analysis.latency",
         range: (l.settings.thresholds.from, l.settings.thresholds.to),
@@ -79,7 +79,7 @@ pub(crate) fn remarks(l: &Latency) -> Vec<String> {
         detected_rate: chosen.map(|r| r.detected_rate),
         target_rate: l.settings.target_rate,
     };
-    let few = l.reduced.as_ref().map(|r| Choice {
+    let few = l.reduced.as_ref().map(|r| ThresholdChoice {
         data: format!("1/{} of the events", r.factor),
         key: "analysis.latency.reduced",
         range: (r.thresholds.from, r.thresholds.to),
@@ -87,7 +87,7 @@ pub(crate) fn remarks(l: &Latency) -> Vec<String> {
         detected_rate: r.detected_rate.value,
         target_rate: r.target_rate,
     });
-    // Without trials nothing was tried.
+    // Without trials no threshold was tried.
     let tried = (l.trials > 0).then_some(all).into_iter();
     let few = few.filter(|_| l.trials > 0);
     tried.chain(few).flat_map(|c| c.remarks()).collect()
@@ -97,8 +97,8 @@ pub(crate) fn remarks(l: &Latency) -> Vec<String> {
 mod tests {
     use super::*;
 
-    fn choice(chosen: Option<f64>, detected_rate: f64) -> Choice {
-        Choice {
+    fn choice(chosen: Option<f64>, detected_rate: f64) -> ThresholdChoice {
+        ThresholdChoice {
             data: "1/1024 of the events".to_owned(),
             key: "analysis.latency.reduced",
             range: (3.0, 8.0),
@@ -114,9 +114,9 @@ mod tests {
         assert_eq!(said(Some(5.0), 0.85), "");
         let low = said(Some(3.0), 0.712);
         assert!(low.contains("85 %") && low.contains("71.2 %"), "{low}");
-        assert!(low.contains("the lowest of those tried"), "{low}");
+        assert!(low.contains("the lowest candidate"), "{low}");
         let high = said(Some(8.0), 0.9);
-        assert!(high.contains("the highest of those tried"), "{high}");
+        assert!(high.contains("the highest candidate"), "{high}");
         assert!(!high.contains("no threshold"), "{high}");
         assert!(said(None, 0.0).contains("detects anything"));
         let mut one = choice(Some(3.0), 0.9);

@@ -10,34 +10,35 @@ use crate::provenance::Variant;
 
 /// Value of the document's `format` field.
 pub const JSON_FORMAT: &str = "skinrig-report";
-/// Version of the document's layout. 1 counted presses, repetitions and locations from 0, 2 counts them from 1.
+/// Version of the document's layout. Version 1 counted presses, repetitions and locations from 0; version 2 counts from 1.
 pub const JSON_VERSION: u32 = 2;
 
-/// Fields of the analysis that are bulk data for figures.
+/// Analysis fields that hold bulk data for figures.
 const BULK: [&str; 5] = ["rates", "pictures", "zooms", "activity", "motion"];
 
-/// What a list of many sessions shows of each. Stands at the end of the document, so that nobody has to read all of it for this.
+/// Per-session summary for lists of many sessions. It is at the end of the document, so that readers need not parse all of
+/// it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
-    /// Names the session.
+    /// Unique ID of the session.
     pub session_id: String,
     /// Version of the analysis.
     pub analysis_version: u32,
-    /// Hash of its result.
+    /// Hash of the result.
     pub results_hash: String,
-    /// What it changed of the session's own settings; `None` for the official analysis.
+    /// Differences from the session's own settings; `None` for the official analysis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variant: Option<Variant>,
-    /// Values that were overridden when the session was recorded, as `key=value`.
+    /// Settings overridden when the session was recorded, as `key=value`.
     #[serde(default)]
     pub overrides: Vec<String>,
-    /// False when the numbers are not to be used: its clocks are not known well enough, or the audit found
-    /// that positions, cameras or rows are others than they are taken for.
+    /// False if the numbers must not be used: the clocks are not known well enough, or the audit found that positions,
+    /// cameras or rows are not what they claim to be.
     pub valid: bool,
-    /// The likely faults that the audit found, the most certain first, as people read them.
+    /// Likely faults found by the audit, most certain first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<String>,
-    /// How the presses ended.
+    /// Outcomes of the presses.
     pub counts: PressCounts,
     /// RMSE of the scored presses.
     pub rmse_mm: Estimate,
@@ -72,7 +73,7 @@ impl Summary {
 
 /// See [`crate::json`].
 pub(crate) fn json(input: &ReportInput<'_>) -> Value {
-    // Both are plain data with string keys; JSON has a place for everything in them (NaN becomes null).
+    // Both are plain data with string keys, so JSON can hold them (NaN becomes null).
     let mut analysis = serde_json::to_value(input.analysis).unwrap_or(Value::Null);
     if let Some(map) = analysis.as_object_mut() {
         for field in BULK {

@@ -1,16 +1,16 @@
-//! Owns how numbers are written for people: digits, units, intervals, the dash for "no value".
+//! Formats numbers for people: digits, units, intervals, the dash for "no value".
 
 use skinrig_analysis::result::{Estimate, RatesEvidence};
 
-/// What stands where there is no value.
+/// Placeholder for a missing value.
 pub(crate) const NONE: &str = "–";
 
-/// `value` with `digits` decimals, or the dash for a missing or non-finite one.
+/// `value` with `digits` decimals, or the dash if missing or non-finite.
 pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
     match value {
         Some(v) if v.is_finite() => {
             let text = format!("{v:.digits$}");
-            // A rounded negative zero reads as an error.
+            // A rounded negative zero looks like an error.
             if text.starts_with('-') && text.bytes().all(|b| matches!(b, b'-' | b'0' | b'.')) {
                 text[1..].to_owned()
             } else {
@@ -21,7 +21,7 @@ pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
     }
 }
 
-/// Decimals that show two digits of a standard error, at least 1 and at most 4; 3 without one.
+/// Decimals that show two digits of a standard error, 1 to 4; 3 without one.
 pub(crate) fn digits_of_error(standard_error: f64) -> usize {
     if standard_error.is_finite() && standard_error > 0.0 {
         (1.0 - standard_error.log10().floor()).clamp(1.0, 4.0) as usize
@@ -30,7 +30,7 @@ pub(crate) fn digits_of_error(standard_error: f64) -> usize {
     }
 }
 
-/// The 95 % interval as `[low, high]`, or the dash.
+/// 95 % interval as `[low, high]`, or the dash.
 pub(crate) fn interval(e: &Estimate, scale: f64, digits: usize) -> String {
     match (e.low, e.high) {
         (Some(l), Some(h)) if l.is_finite() && h.is_finite() => format!(
@@ -42,7 +42,7 @@ pub(crate) fn interval(e: &Estimate, scale: f64, digits: usize) -> String {
     }
 }
 
-/// A whole number with thin groups of three: `12 345 678`.
+/// Whole number in groups of three, separated by thin spaces: `12 345 678`.
 pub(crate) fn grouped(n: u64) -> String {
     let digits = n.to_string();
     let mut out = String::with_capacity(digits.len() + digits.len() / 3);
@@ -55,7 +55,7 @@ pub(crate) fn grouped(n: u64) -> String {
     out
 }
 
-/// The name that serde writes for a variant without fields, with spaces for underscores.
+/// Serialised name of a unit variant, with spaces for underscores.
 pub(crate) fn words<T: serde::Serialize>(variant: &T) -> String {
     match serde_json::to_value(variant) {
         Ok(serde_json::Value::String(name)) => name.replace('_', " "),
@@ -63,7 +63,7 @@ pub(crate) fn words<T: serde::Serialize>(variant: &T) -> String {
     }
 }
 
-/// A remark as a sentence: its first letter large, a full stop at its end.
+/// Turns a remark into a sentence: capital first letter, full stop.
 pub(crate) fn sentence(remark: &str) -> String {
     let mut letters = remark.chars();
     let first = letters.next().map(char::to_uppercase);
@@ -71,7 +71,7 @@ pub(crate) fn sentence(remark: &str) -> String {
     first.chain(letters).chain(['.']).collect()
 }
 
-/// How sure an alignment by event rates is, as a clause.
+/// Certainty of an alignment by event rates, as a clause.
 pub(crate) fn by_rates(evidence: &RatesEvidence) -> String {
     let mut parts = vec![format!(
         "by event rates, log-odds {} against all other alignments",

@@ -1,4 +1,4 @@
-//! Owns what all pages have in common: head, heading, theme switch, style, and that nothing runs on them but their own script.
+//! Owns the parts common to all pages: head, heading, theme switch, style, and a policy that allows only their own script.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -8,27 +8,27 @@ use skinrig_model::text::visible;
 
 use crate::error::ReportError;
 
-/// The frame that each page's template extends, and the macros that it may import.
+/// Base template that each page extends, and the macros that it may import.
 const TEMPLATES: [(&str, &str); 2] = [
     ("frame.html", include_str!("../assets/frame/frame.html")),
     ("macros.html", include_str!("../assets/frame/macros.html")),
 ];
 const STYLE: &str = include_str!("../assets/frame/page.css");
-/// Stands before the page's own script.
+/// Comes before the page's own script.
 const SCRIPT: &str = include_str!("../assets/frame/theme.js");
 
-/// What one kind of page adds to the frame.
+/// Additions of one kind of page to the frame.
 pub(crate) struct Frame<'a> {
-    /// Its templates; the first one extends `frame.html`.
+    /// Templates; the first one extends `frame.html`.
     pub templates: &'a [(&'static str, &'static str)],
-    /// Its style sheets, after that of all pages.
+    /// Style sheets, after the common one.
     pub styles: &'a [&'a str],
-    /// Its script, after that of all pages.
+    /// Script, after the common one.
     pub script: &'a str,
 }
 
 impl Frame<'_> {
-    /// The page with this content.
+    /// Renders the page with this content.
     pub fn render(&self, content: Value) -> Result<String, ReportError> {
         let mut env = Environment::new();
         env.set_auto_escape_callback(|_| AutoEscape::Html);
@@ -40,18 +40,19 @@ impl Frame<'_> {
         let frame = context! {
             styles => styles.map(safe).collect::<Vec<_>>(),
             script => safe(&script),
-            // As a content security policy names it: nothing else on the page may run.
+            // Digest for the content security policy, which blocks all other scripts.
             script_hash => safe(&format!("sha256-{}", STANDARD.encode(Sha256::digest(&script)))),
             ..content
         };
         let first = self.templates.first().map_or("frame.html", |t| t.0);
         let page = env.get_template(first)?.render(frame)?;
-        // HTML has no place for controls (html.spec.whatwg.org, 13.2.3.5), readers none for text that turns round; names may hold any.
+        // HTML forbids control characters (html.spec.whatwg.org, 13.2.3.5), and bidirectional controls would deceive
+        // readers; names may contain any.
         Ok(visible(&page).into_owned())
     }
 }
 
-/// Markup, style or script that stands in the page as it is.
+/// Trusted markup, style or script, inserted without escaping.
 pub(crate) fn safe(text: &str) -> Value {
     Value::from_safe_string(text.to_owned())
 }

@@ -1,17 +1,17 @@
-//! What a report is made from.
+//! Owns the input of a report.
 
 use skinrig_analysis::result::Analysis;
 use skinrig_analysis::tradeoff::Tradeoff;
 
 use crate::provenance::Provenance;
 
-/// What a report is made from.
+/// Input of a report.
 #[derive(Debug, Clone)]
 pub struct ReportInput<'a> {
-    /// The numbers.
+    /// Results of the analysis.
     pub analysis: &'a Analysis,
-    /// Where they come from.
+    /// Origin of the session.
     pub provenance: Provenance,
-    /// What speed costs in accuracy, when that was measured on this session: the result, or why it cannot be read.
+    /// Tradeoff measured on this session: its result, or why it cannot be read.
     pub tradeoff: Option<Result<&'a Tradeoff, &'a str>>,
 }

@@ -1,20 +1,20 @@
-//! Owns the plain description of where a session comes from, as the report shows it.
+//! Owns the description of a session's origin, as the report shows it.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::{LostTime, PreflightCheck};
 
-/// Where the numbers of a report come from. Plain strings; empty strings are shown as "not recorded".
+/// Origin of the numbers of a report. The report shows empty strings as "not recorded".
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Provenance {
-    /// Identifier of the session; appears in every figure.
+    /// ID of the session; appears in every figure.
     pub session_id: String,
-    /// Civil time of the start, RFC 3339.
+    /// Start, civil time, RFC 3339.
     pub started: String,
-    /// Which prototype was pressed.
+    /// Name of the pressed prototype.
     pub prototype: String,
-    /// Who ran the session.
+    /// Person who ran the session.
     pub operator: String,
     /// Name of the protocol.
     pub protocol_name: String,
@@ -24,26 +24,26 @@ pub struct Provenance {
     pub overrides: Vec<String>,
     /// Lower-case hex SHA-256 of the plan.
     pub plan_sha256: String,
-    /// What this analysis changed of the session's own settings; `None` for the official one.
+    /// Differences from the session's own settings; `None` for the official analysis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variant: Option<Variant>,
-    /// The seed of the run.
+    /// Seed of the run.
     pub seed: u64,
     /// `simulated`, `replayed`, `imported`, `emulated` or `bench`.
     pub rig_kind: String,
     /// Name of the rig, with the level of a simulated one.
     pub rig_name: String,
-    /// True when the rig was simulated: the report then says so plainly.
+    /// True for a simulated rig, which the report states.
     pub simulated: bool,
-    /// True when stand-ins stood behind the drivers: the report then says so plainly.
+    /// True for an emulated bench, which the report states.
     #[serde(default)]
     pub emulated: bool,
-    /// What was checked before the robot was powered.
+    /// Checks made before the robot was powered.
     #[serde(default)]
     pub preflight: Vec<PreflightCheck>,
-    /// The devices, in the order in which they were configured.
+    /// Devices in order of configuration.
     pub devices: Vec<DeviceRow>,
-    /// Version of skinrig that recorded the session.
+    /// skinrig version that recorded the session.
     pub software: String,
     /// Host name of the recording machine.
     pub host: String,
@@ -51,35 +51,35 @@ pub struct Provenance {
     pub command_line: String,
     /// SHA-256 of the results, hex.
     pub results_hash: String,
-    /// `completed`, `stopped`, `faulted`, or what the session says instead (for example `not ended`).
+    /// `completed`, `stopped`, `faulted`, or another state of the session (for example `not ended`).
     pub run_end: String,
-    /// Why the run ended, when it did not simply complete.
+    /// Why the run ended, unless it completed normally.
     pub run_end_reason: Option<String>,
-    /// The legs in order; one alone when the session never went on.
+    /// Legs in order; a single one if the session was never resumed.
     #[serde(default)]
     pub legs: Vec<LegRow>,
-    /// Attempts that another one replaced, in the plan's order.
+    /// Superseded attempts, in plan order.
     #[serde(default)]
-    pub retaken: Vec<RetakenRow>,
-    /// Everything that broke the normal course.
+    pub retaken: Vec<RetakeRow>,
+    /// Pauses, stops, aborts and faults.
     pub interruptions: Vec<InterruptionRow>,
-    /// Remarks.
+    /// Operator notes.
     pub notes: Vec<NoteRow>,
     /// Bytes known to be lost, camera 1 and camera 2.
     pub lost_bytes: [u64; 2],
-    /// When they were lost, in the order of each stream, camera 1 first.
+    /// Losses in stream order, camera 1 first.
     #[serde(default)]
     pub losses: Vec<LossRow>,
 }
 
-/// An analysis of a session with other settings than its own.
+/// An analysis with settings other than the session's own.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Variant {
-    /// Its name; part of the names of its files.
+    /// Name; part of its file names.
     pub name: String,
     /// Settings that it overrides, as `key=value`.
     pub changed: Vec<String>,
-    /// True when it makes the choices of the public code.
+    /// True if it uses the choices of the public code.
     #[serde(default)]
     pub reference_code: bool,
 }
@@ -98,20 +98,20 @@ impl fmt::Display for Variant {
             }
         }
         match &self.changed[..] {
-            [] if !self.reference_code => f.write_str("a name and nothing else"),
+            [] if !self.reference_code => f.write_str("no changed settings"),
             changed => f.write_str(&changed.join(", ")),
         }
     }
 }
 
-/// A loss of a camera.
+/// Lost data of a camera.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LossRow {
     /// 1 or 2.
     pub camera: u8,
     /// Bytes known to be lost.
     pub bytes: u64,
-    /// When, on the camera's clock.
+    /// Time on the camera's clock.
     pub time: LostTime,
 }
 
@@ -125,12 +125,12 @@ impl Provenance {
         }
     }
 
-    /// The legs, when there are several.
+    /// The legs, or nothing if there is only one.
     pub(crate) fn several_legs(&self) -> &[LegRow] {
         if self.legs.len() > 1 { &self.legs } else { &[] }
     }
 
-    /// True when this interruption is the one that ended the run: both give the same reason.
+    /// True if this interruption ended the run: both have the same reason.
     pub(crate) fn ended_by(&self, interruption: &InterruptionRow) -> bool {
         self.run_end_reason.as_ref() == Some(&interruption.reason)
     }
@@ -139,7 +139,7 @@ impl Provenance {
 /// One device.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct DeviceRow {
-    /// What it is for, for example `camera1`.
+    /// Role, for example `camera1`.
     pub role: String,
     /// Maker and model.
     pub model: String,
@@ -149,30 +149,30 @@ pub struct DeviceRow {
     pub firmware: String,
 }
 
-/// One leg: one life of the process that recorded the session.
+/// A leg: the recording between two starts of the program.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct LegRow {
     /// 1, 2, 3, ...
     pub number: u32,
-    /// Civil time of its beginning, RFC 3339.
+    /// Start, civil time, RFC 3339.
     pub started: String,
-    /// Where it begins on the session's host clock, s.
+    /// Start on the session's host clock, s.
     pub start_s: f64,
     /// How it ended: `completed`, `cut off`, `stopped: ...`, `faulted: ...` or `under way`.
     pub end: String,
-    /// Civil time since the last record of the leg before, s, to about a second; `None` for the first leg, and where
-    /// the rig's clock is not the civil one.
+    /// Civil time since the last record of the previous leg, s, accurate to about a second; `None` for the first leg, and if
+    /// the rig's clock is not civil time.
     pub apart_s: Option<f64>,
 }
 
-/// An attempt that another one replaced.
+/// A superseded attempt at a press.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct RetakenRow {
-    /// Which press, from 1.
+pub struct RetakeRow {
+    /// Number of the press, from 1.
     pub press: u32,
-    /// Which attempt, from 1.
+    /// Number of the attempt, from 1.
     pub attempt: u32,
-    /// Why it does not count.
+    /// Why it was retaken.
     pub reason: String,
 }
 
@@ -183,15 +183,15 @@ pub struct InterruptionRow {
     pub t_s: f64,
     /// `pause`, `resume`, `stop`, `abort` or `fault`.
     pub kind: String,
-    /// In words.
+    /// Reason given.
     pub reason: String,
 }
 
-/// One remark.
+/// An operator note.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct NoteRow {
     /// Host time, s.
     pub t_s: f64,
-    /// The remark.
+    /// Text of the note.
     pub text: String,
 }

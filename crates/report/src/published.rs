@@ -1,16 +1,16 @@
-//! Owns the published numbers that a session is compared with, each with its source.
+//! Owns the published numbers that sessions are compared with, with their sources.
 //!
-//! "The paper" is Koolani et al., "An Event-Based Opto-Tactile Skin" (Frontiers); table and figure names are
-//! its own. Numbers only: what a cell says in words is said here in our own. Where published numbers
-//! contradict each other, both stand here and a `Footnote` says so.
+//! "The paper" is Koolani et al., "An Event-Based Opto-Tactile Skin" (Frontiers); table and figure names are its own.
+//! Numbers are quoted; wording is ours. Where published numbers contradict each other, both are listed and a `Footnote`
+//! explains it.
 
 use serde::Serialize;
 
 /// Localisation RMSE without reduction, mm (section 3.1).
 pub(crate) const RMSE_MM: f64 = 4.66;
-/// The same along x, mm (section 3.1).
+/// Localisation RMSE along x, mm (section 3.1).
 pub(crate) const RMSE_X_MM: f64 = 4.17;
-/// The same along y, mm (section 3.1).
+/// Localisation RMSE along y, mm (section 3.1).
 pub(crate) const RMSE_Y_MM: f64 = 3.28;
 /// Mean standard deviation between repetitions, mm (section 3.1).
 pub(crate) const REPEAT_STD_MM: f64 = 2.85;
@@ -24,21 +24,21 @@ pub(crate) const AREAS_MM2: [f64; 3] = [9328.0, 8763.0, 4620.0];
 pub(crate) const TAXELS: (f64, f64) = (105.0, 46.0);
 /// Width of the 5-95 % interval of the onsets, ms: without reduction, and at 1024-fold reduction (section 3.2).
 pub const LATENCY_WIDTH_MS: (f64, f64) = (31.0, 113.0);
-/// False alarms per second at that (section 3.2).
+/// False alarms per second, at the same reductions (section 3.2).
 pub(crate) const FALSE_ALARMS_PER_S: (f64, f64) = (0.13, 1.86);
-/// Share of trials detected at that: the target without reduction, what was reached at 1024 (section 3.2).
+/// Share of trials detected, at the same reductions: target without reduction, result at 1024 (section 3.2).
 pub(crate) const DETECTED_RATE: (f64, f64) = (0.95, 0.88);
 
-/// A remark below a comparison.
+/// A note below a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Footnote {
-    /// Its mark.
+    /// Mark in the table.
     pub mark: &'static str,
-    /// The remark.
+    /// Text of the note.
     pub text: &'static str,
 }
 
-/// What the published numbers do not agree on, and what is known of the reason.
+/// Contradictions between published numbers, and their likely reason.
 pub(crate) const FOOTNOTES: [Footnote; 7] = [
     Footnote {
         mark: "a",
@@ -77,7 +77,7 @@ pub(crate) const FOOTNOTES: [Footnote; 7] = [
 /// One row of the published comparison with the multitouch soft optical waveguide skin (table "MSOWS").
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct MsowsRow {
-    /// Which quantity.
+    /// The quantity.
     pub metric: Metric,
     /// Lo Preti et al. 2022, as given in the paper.
     pub msows: &'static str,
@@ -119,7 +119,7 @@ pub enum Metric {
     DiagonalError,
     /// Localisation RMSE.
     Rmse,
-    /// Presses that pass.
+    /// Share of presses that pass.
     PassRate,
     /// Effective taxels over the sensor.
     TaxelsSkin,
@@ -128,7 +128,7 @@ pub enum Metric {
 }
 
 impl Metric {
-    /// Its name with unit.
+    /// Name with unit.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -168,7 +168,7 @@ const fn row(
     }
 }
 
-/// Table "MSOWS" of the paper; `–` where it has no value. The pass rates are those of its abstract and section 3.
+/// Table "MSOWS" of the paper; `–` where it has no value. Pass rates are from its abstract and section 3.
 pub(crate) const MSOWS: [MsowsRow; 16] = [
     row(
         Metric::Sensor,
@@ -206,14 +206,14 @@ pub(crate) const MSOWS: [MsowsRow; 16] = [
     row(Metric::TaxelsProbed, "–", "46", "15", "c"),
 ];
 
-/// A skin that localises touch, as the paper's table of tactile localisation technologies gives it.
+/// A touch-localising skin from the paper's table of tactile localisation technologies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Skin {
-    /// What it is.
+    /// Kind of skin.
     pub name: &'static str,
-    /// Author and year of its source.
+    /// Author and year of the source.
     pub source: &'static str,
-    /// Which touches it locates.
+    /// Kinds of touch that it locates.
     pub touches: &'static str,
     /// Material.
     pub material: &'static str,
@@ -286,17 +286,17 @@ pub(crate) const SKINS: [Skin; 7] = [
 /// A tactile sensor of the paper's overview table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sensor {
-    /// What it is.
+    /// Kind of sensor.
     pub name: &'static str,
-    /// Author and year of its source.
+    /// Author and year of the source.
     pub source: &'static str,
-    /// What senses.
+    /// Sensing element.
     pub hardware: &'static str,
-    /// What is measured.
+    /// Measured quantity.
     pub measures: &'static str,
     /// Method.
     pub method: &'static str,
-    /// How well.
+    /// Performance.
     pub result: &'static str,
 }
 

@@ -1,10 +1,9 @@
-//! Owns the writing of SVG: elements with escaped attributes and text.
+//! Writes SVG: elements with escaped attributes and text.
 //!
-//! Why not a plotting crate: figures must follow the page's light and dark theme, so every colour that
-//! means "ink", "grid" or "camera 1" is a CSS class (`assets/frame/figure.css`), not a baked-in value; each figure
-//! needs a title, a description and one element per press that a script can find; and a page of 2,500
-//! presses must stay small. Plotting crates bake colours in, and write neither. What is left is little:
-//! elements here, scales and ticks in [`crate::axes`].
+//! Why not a plotting crate: figures must follow the page's light and dark theme, so every colour that means "ink", "grid"
+//! or "camera 1" is a CSS class (`assets/frame/figure.css`) instead of a fixed value; each figure needs a title, a
+//! description and one element per press for scripts; and a page of 2,500 presses must stay small. Plotting crates provide
+//! none of this. The remaining work is small: elements here, scales and ticks in [`crate::axes`].
 
 use std::fmt::{self, Display, Write};
 
@@ -13,7 +12,7 @@ use skinrig_model::text::visible;
 /// Style of the figures: classes and theme variables, light by default.
 pub(crate) const FIGURE_CSS: &str = include_str!("../assets/frame/figure.css");
 
-/// [`FIGURE_CSS`] with every `var(--name)` replaced by its light value, for programs that know no variables.
+/// [`FIGURE_CSS`] with every `var(--name)` replaced by its light value, for programs without CSS variables.
 #[must_use]
 pub(crate) fn plain_css() -> String {
     let mut css = FIGURE_CSS.to_owned();
@@ -26,7 +25,7 @@ pub(crate) fn plain_css() -> String {
     css
 }
 
-/// Writes text with the five XML specials escaped, what acts instead of showing written out, and non-characters replaced.
+/// Writes text with the five XML specials escaped, control characters spelled out, and non-characters replaced.
 struct Escaping<'a>(&'a mut String);
 
 impl Write for Escaping<'_> {
@@ -49,7 +48,7 @@ impl Write for Escaping<'_> {
     }
 }
 
-/// A coordinate with two decimals and no trailing zeros; non-finite values become 0 so that no file breaks.
+/// Coordinate with two decimals and no trailing zeros; non-finite values become 0 so that the file stays valid.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Px(pub f64);
 
@@ -63,10 +62,10 @@ impl Display for Px {
     }
 }
 
-/// Attribute list: name and value, the value is escaped.
+/// Attributes: name and value. Values are escaped.
 pub type Attributes<'a> = &'a [(&'a str, &'a dyn Display)];
 
-/// An SVG document, or part of one, being written.
+/// An SVG document or fragment under construction.
 #[derive(Debug, Default)]
 pub struct Svg {
     out: String,
@@ -74,7 +73,7 @@ pub struct Svg {
 }
 
 impl Svg {
-    /// Nothing yet.
+    /// An empty document.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
@@ -101,7 +100,7 @@ impl Svg {
         self
     }
 
-    /// Closes the innermost open element; nothing when none is open.
+    /// Closes the innermost open element, if any.
     pub fn close(&mut self) -> &mut Self {
         if let Some(tag) = self.open.pop() {
             let _ = write!(self.out, "</{tag}>");
@@ -116,7 +115,7 @@ impl Svg {
         self
     }
 
-    /// An element that holds only text.
+    /// An element that contains only text.
     pub fn holding(&mut self, tag: &str, attributes: Attributes<'_>, text: &str) -> &mut Self {
         self.start(tag, attributes);
         self.out.push('>');
@@ -161,7 +160,7 @@ impl Svg {
         self.leaf("path", &[("class", &class), ("d", &data)])
     }
 
-    /// The text; open elements are closed.
+    /// Closes all open elements and returns the text.
     #[must_use]
     pub fn finish(mut self) -> String {
         while !self.open.is_empty() {
@@ -171,7 +170,7 @@ impl Svg {
     }
 }
 
-/// Path data through the points; `close` adds the way back.
+/// Path through the points; `close` returns to the first one.
 pub fn polyline(points: impl IntoIterator<Item = (f64, f64)>, close: bool) -> String {
     let mut d = String::new();
     for (x, y) in points {
@@ -189,7 +188,7 @@ pub fn polyline(points: impl IntoIterator<Item = (f64, f64)>, close: bool) -> St
     d
 }
 
-/// Path data of dots: zero-length strokes, round with `stroke-linecap: round`. Far smaller than circles.
+/// Path of dots: zero-length strokes, round with `stroke-linecap: round`. Much smaller than circles.
 pub fn dots(points: impl IntoIterator<Item = (f64, f64)>) -> String {
     let mut d = String::new();
     for (x, y) in points {

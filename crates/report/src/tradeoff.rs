@@ -1,4 +1,4 @@
-//! Owns the presentation of a tradeoff: table for the terminal, page with its figure.
+//! Owns the presentation of a tradeoff: terminal table, and page with its figure.
 
 use std::fmt::Write as _;
 
@@ -19,11 +19,11 @@ use crate::svg::FIGURE_CSS;
 const TEMPLATE: &str = include_str!("../assets/tradeoff/page.html");
 const CSS: &str = include_str!("../assets/tradeoff/page.css");
 
-/// More rows than this are not all printed: what is on a front is, and the rest is in the files.
-const MOST_ROWS: usize = 120;
+/// Above this many rows only the session's own and those on a front are printed; the files have all.
+const MAX_ROWS: usize = 120;
 const LABEL: usize = 31;
 
-/// The fronts of a row as letters: c for CPU time, b for bytes, d for delay.
+/// Fronts of a row as letters: c for CPU time, b for bytes, d for delay.
 fn fronts(row: &Row) -> String {
     let letter = |(cost, letter): (Cost, char)| {
         if row.fronts.contains(&cost) {
@@ -42,7 +42,7 @@ fn percent(e: &Estimate) -> String {
     number(e.value.map(|v| 100.0 * v), 1)
 }
 
-/// The rows in the order in which they are read: the session's own, then by RMSE those on a front, then the others.
+/// Rows in display order: the session's own, then those on a front by RMSE, then the others.
 fn ordered(result: &Tradeoff) -> Vec<&Row> {
     let (first, rest) = match result.rows.split_first() {
         Some((first, rest)) => (Some(first), rest),
@@ -51,7 +51,7 @@ fn ordered(result: &Tradeoff) -> Vec<&Row> {
     let rmse = |r: &&Row| r.rmse_mm.value.unwrap_or(f64::INFINITY);
     let (mut on, others): (Vec<&Row>, Vec<&Row>) = rest.iter().partition(|r| !r.fronts.is_empty());
     on.sort_by(|a, b| rmse(a).total_cmp(&rmse(b)));
-    let others = if result.rows.len() > MOST_ROWS {
+    let others = if result.rows.len() > MAX_ROWS {
         Vec::new()
     } else {
         others
@@ -59,7 +59,7 @@ fn ordered(result: &Tradeoff) -> Vec<&Row> {
     first.into_iter().chain(on).chain(others).collect()
 }
 
-/// The table for a terminal: at most 100 columns, ends with a newline. `rig` says in words where the session comes from.
+/// At most 100 columns, ends with a newline. `rig` describes the origin of the session.
 #[must_use]
 pub fn terminal_table(result: &Tradeoff, rig: &str, color: bool) -> String {
     let (used, of) = result.scored;
@@ -115,10 +115,14 @@ pub fn terminal_table(result: &Tradeoff, rig: &str, color: bool) -> String {
             writeln!(out, "{line}")
         };
         if i == 0 {
-            let _ = writeln!(out, "{:<4}^ the settings that all others change", "");
+            let _ = writeln!(
+                out,
+                "{:<4}^ the session's settings; all others change them",
+                ""
+            );
         }
     }
-    if result.rows.len() > MOST_ROWS {
+    if result.rows.len() > MAX_ROWS {
         out += "\nOnly choices on a front are shown; all are in the files.\n";
     }
     out
@@ -131,7 +135,7 @@ fn model(result: &Tradeoff) -> String {
         .unwrap_or_default()
 }
 
-/// The lines of a protocol that select a row, indented below `analysis:`; nothing for the session's own settings.
+/// Protocol lines that select a row, indented below `analysis:`; empty for the session's own settings.
 #[must_use]
 pub fn protocol_lines(row: &Row) -> String {
     if row.overrides.is_empty() {
@@ -154,7 +158,7 @@ pub fn protocol_lines(row: &Row) -> String {
     out
 }
 
-/// The columns of numbers, with units.
+/// Names of the numeric columns, with units.
 const HEADS: [&str; 11] = [
     "Front",
     "RMSE (mm)",
@@ -177,11 +181,10 @@ struct Line {
     cells: [String; HEADS.len()],
 }
 
-/// The page: figure and table of all rows; needs no network and no other file. `rig` says in words where the session
-/// comes from.
+/// A self-contained page with the figure and a table of all rows. `rig` describes the origin of the session.
 ///
 /// # Errors
-/// [`ReportError`] when the template cannot be written; no input is known to cause it.
+/// [`ReportError`] when rendering fails; no known input causes this.
 pub fn page(result: &Tradeoff, session: &str, rig: &str) -> Result<String, ReportError> {
     let frame = Frame {
         templates: &[("tradeoff.html", TEMPLATE)],
@@ -202,7 +205,7 @@ pub fn page(result: &Tradeoff, session: &str, rig: &str) -> Result<String, Repor
 
 fn line(row: &Row, is_own: bool) -> Line {
     let own = if is_own {
-        " (the settings that all others change)"
+        " (the session's settings; all others change them)"
     } else {
         ""
     };

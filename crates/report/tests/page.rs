@@ -4,6 +4,8 @@ mod support;
 #[path = "page/traces.rs"]
 mod traces;
 
+use skinrig_analysis::rule::Rule;
+use skinrig_model::{CameraId, Verdict};
 use skinrig_report::{ReportInput, html};
 
 fn input(analysis: &skinrig_analysis::result::Analysis) -> ReportInput<'_> {
@@ -14,7 +16,7 @@ fn input(analysis: &skinrig_analysis::result::Analysis) -> ReportInput<'_> {
     }
 }
 
-/// 2,500 presses, two cameras: 250 locations are not a square, 256 are near enough.
+/// 2,500 presses, two cameras: 250 locations do not form a square, 256 are close enough.
 #[test]
 fn a_campaign_fits_into_two_and_a_half_megabytes() {
     let analysis = support::analysis(16, 10);
@@ -27,7 +29,7 @@ fn a_campaign_fits_into_two_and_a_half_megabytes() {
 
 const HOSTILE: &str = "</script><img src=x onerror=alert(1)>\"'><!--]]>&{{ 7*7 }}\u{2028}\u{0}";
 
-/// Only these may carry an address: the namespace of SVG.
+/// Only the SVG namespace may be an address.
 #[test]
 fn the_page_refers_to_nothing_outside() {
     let analysis = support::analysis(5, 3);
@@ -50,8 +52,7 @@ fn hostile_text_stays_text() {
     for press in &mut analysis.presses {
         if press.reason.is_some() {
             press.reason = Some(format!("{HOSTILE} in full"));
-            press.rule = Some(HOSTILE.into());
-            press.verdict = HOSTILE.into();
+            press.rule = Some(HOSTILE.to_owned().into());
         }
     }
     if let Some(c) = &mut analysis.calibration {
@@ -83,7 +84,7 @@ fn hostile_text_stays_text() {
     assert!(!page.contains("<img"), "an element came through");
     assert!(!page.contains("<!--"));
     assert!(!page.contains("49}}") && page.contains("7*7"));
-    // The page's own three scripts and no other end.
+    // Only the page's own three scripts, and no other end tag.
     assert_eq!(page.matches("<script").count(), 3);
     assert_eq!(page.matches("</script>").count(), 3);
     let data = page
@@ -146,7 +147,7 @@ fn emulated_is_said_as_plainly_and_the_preflight_is_shown() {
     let page = html(&input).unwrap();
     for part in [
         "data-testid=\"emulated\"",
-        "stand-ins for the hardware",
+        "software that replaces the hardware",
         "data-testid=\"preflight\"",
         "camera 2: clock",
         "&lt;no time&gt;",
@@ -281,8 +282,8 @@ fn everything_a_browser_test_needs_has_a_name() {
     );
 }
 
-/// A broken law stands before every number, with fault, evidence and advice; the public code's numbers only where
-/// they were computed.
+/// A violation comes before every number, with fault, evidence and advice; the public code's numbers appear only if
+/// computed.
 #[test]
 fn findings_come_first_and_reference_numbers_only_when_asked_for() {
     let mut analysis = support::analysis(4, 3);
@@ -302,7 +303,7 @@ fn findings_come_first_and_reference_numbers_only_when_asked_for() {
     assert!(at("data-testid=\"reference-table\"") < at("data-testid=\"reference-reduction\""));
 }
 
-/// Every id once, and every reference to one has its target.
+/// Every ID occurs once, and every reference has its target.
 #[test]
 fn ids_are_unique_and_references_lead_somewhere() {
     let analysis = support::analysis(4, 3);
@@ -335,7 +336,7 @@ fn figures_that_disagree_with_the_headline_are_called_out() {
     assert!(html(&input(&analysis)).unwrap().contains("Disagreement"));
 }
 
-/// The mean of the map's spreads is the headline's: same definition (here computed by hand).
+/// The mean of the map's spreads is the headline's: same definition (computed by hand here).
 #[test]
 fn spread_at_a_location_is_the_sample_standard_deviation() {
     let mut analysis = support::analysis(2, 3);
@@ -360,17 +361,17 @@ fn spread_at_a_location_is_the_sample_standard_deviation() {
     assert_eq!(here.n, 2);
 }
 
-/// What a rule left out is one row with its number, an example, and sync presses apart from those that the counts hold.
+/// Presses rejected by a rule form one row with a count and an example; sync presses are listed separately.
 #[test]
 fn presses_that_do_not_count_are_grouped_by_rule() {
     let mut analysis = support::analysis(6, 3);
     for (i, press) in analysis.presses.iter_mut().enumerate() {
         if i % 10 == 1 {
-            press.verdict = "excluded".into();
-            press.rule = Some("no response (camera 2)".into());
+            press.verdict = Verdict::Excluded;
+            press.rule = Some(Rule::NoResponse(CameraId::Two));
             press.reason = Some(format!("no response: {i} events, 800 expected (camera 2)"));
-        } else if press.verdict != "valid" {
-            press.verdict = "valid".into();
+        } else if press.verdict != Verdict::Valid {
+            press.verdict = Verdict::Valid;
         }
     }
     let outside = |sync: bool| skinrig_report::derive::rejections(&analysis, sync);
@@ -379,7 +380,7 @@ fn presses_that_do_not_count_are_grouped_by_rule() {
     let all = analysis
         .presses
         .iter()
-        .filter(|p| p.verdict != "valid")
+        .filter(|p| p.verdict != Verdict::Valid)
         .count() as u32;
     assert_eq!((counted[0].n + sync[0].n, sync[0].n), (all, 1));
     let page = html(&input(&analysis)).unwrap();
@@ -404,7 +405,7 @@ fn the_head_names_protocol_prototype_and_extent() {
     assert!(head.contains("<code>2026-03-02_14-05-09_meander</code>"));
 }
 
-/// A camera without a clock fit has no place on the host's time axis.
+/// A camera without a clock fit is not on the host's time axis.
 #[test]
 fn an_unaligned_camera_is_drawn_from_its_first_event() {
     let mut analysis = support::analysis(4, 3);
@@ -436,7 +437,7 @@ fn the_reason_that_ended_the_run_is_said_once() {
     assert!(table.contains("fault at 1803.2 s"), "{table}");
 }
 
-/// A lower error with fewer events is explained where the intervals are apart, and only there.
+/// A lower error with fewer events is explained only if the intervals do not overlap.
 #[test]
 fn less_error_with_fewer_events_is_explained() {
     let caption = |rmse: f64, spread: f64| {
@@ -446,14 +447,14 @@ fn less_error_with_fewer_events_is_explained() {
         row.rmse_mm = support::studies::estimate(rmse, spread, 16);
         html(&input(&analysis))
             .unwrap()
-            .contains("A is lowest at k = 2 (")
+            .contains("A has its minimum at k = 2 (")
     };
     assert!(caption(0.5, 0.01));
     assert!(!caption(0.5, 50.0));
     assert!(!caption(500.0, 0.01));
 }
 
-/// The probed area is drawn about the places that its number stands for.
+/// The probed area is drawn around the locations behind its number.
 #[test]
 fn the_probed_area_is_drawn_as_it_is_counted() {
     let mut analysis = support::analysis(4, 3);

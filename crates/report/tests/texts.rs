@@ -1,4 +1,4 @@
-//! What people and programs read outside a browser: terminal table and JSON, as snapshots.
+//! Snapshots of the terminal table and the JSON document.
 
 mod support;
 
@@ -78,7 +78,7 @@ fn counts_that_do_not_add_up_are_called_out() {
     );
 }
 
-/// The numbers of a session whose clocks are not known are nowhere given as results.
+/// If the clocks of a session are unknown, its numbers never appear as results.
 #[test]
 fn an_invalid_session_says_so_in_the_place_of_every_metric() {
     let mut analysis = support::analysis(16, 10);
@@ -115,7 +115,7 @@ fn an_invalid_session_says_so_in_the_place_of_every_metric() {
     let hero = &hero[..hero.find("</div>").unwrap()];
     assert!(hero.contains("INVALID") && !hero.contains(&rmse), "{hero}");
 
-    // So does a finding after which the numbers are not the skin's.
+    // So does a finding that invalidates the errors.
     analysis.alignment.status = skinrig_analysis::result::AlignmentStatus::Valid;
     analysis.alignment.violations.clear();
     analysis.findings = support::studies::findings();
@@ -138,7 +138,7 @@ fn json_document_has_this_layout() {
     let mut reference = support::studies::reference();
     reference.reduction.truncate(1);
     analysis.reference = Some(reference);
-    // The layout needs a row of each kind, not hundreds.
+    // The layout needs one row of each kind, not hundreds.
     if let Some(latency) = &mut analysis.latency {
         latency.onsets.truncate(2);
         latency.sweep.truncate(2);
@@ -166,7 +166,7 @@ fn json_document_has_this_layout() {
     );
 }
 
-/// What is wrong comes before every number.
+/// Findings come before every number.
 #[test]
 fn terminal_table_begins_with_findings() {
     let mut analysis = support::analysis(3, 2);
@@ -178,7 +178,7 @@ fn terminal_table_begins_with_findings() {
         tradeoff: None,
     };
     let table = terminal_table(&input, false);
-    let fault = table.find("fault     cameras swapped. Broken:").unwrap();
+    let fault = table.find("fault     cameras swapped. Violated:").unwrap();
     assert!(fault < table.find("scored presses").unwrap(), "{table}");
     assert!(table.contains("clock wrong, camera 2."), "{table}");
     assert!(table.contains("do: check which camera"), "{table}");
@@ -189,7 +189,7 @@ fn terminal_table_begins_with_findings() {
     assert!(table.lines().all(|l| l.chars().count() <= 80), "{table}");
 }
 
-/// Floats to six decimals: the layout is what is held, not the last bits of a platform's sine.
+/// Rounds floats to six decimals: the test pins the layout, not the last bits of a platform's sine.
 fn blunt(value: serde_json::Value) -> serde_json::Value {
     use serde_json::Value;
     match value {

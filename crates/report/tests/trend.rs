@@ -1,4 +1,4 @@
-//! Trends as they are shown: nothing in a name becomes markup, and a terminal of 80 columns holds every line.
+//! Presentation of trends: names are escaped, and every line fits a terminal of 80 columns.
 
 use skinrig_nightly::trend::{History, NightHead, Point, Report, judge};
 use skinrig_nightly::{Verdict, Versions};
@@ -6,7 +6,7 @@ use skinrig_report::trend::{Links, Style, page, terminal};
 
 const HOSTILE: &str = "golden/<script>alert(1)</script>\u{1b}[2J/press_events";
 
-/// 40 nights, of which the last four gave a fifth less.
+/// 40 nights; the last four are lower by a fifth.
 fn report() -> Report {
     let mut history = History::default();
     for night in 0..40 {
@@ -53,7 +53,7 @@ fn the_page_shows_the_alarm_first_and_names_as_text() {
         missing: None,
     };
     let html = page(&report, &[links], &[]).unwrap();
-    // The page's own script, and nothing else that begins like one.
+    // Only the page's own script, and nothing else that starts like one.
     assert_eq!(html.matches("<script").count(), 1);
     assert!(!html.contains("<b>") && !html.contains('\u{1b}'));
     assert!(html.contains("href=\"a&quot;b\"") && html.contains("x&lt;y"));

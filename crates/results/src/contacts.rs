@@ -1,21 +1,20 @@
-//! What the pose stream of a session says of its contacts: how well they are timed, and the way down to them.
+//! Timing of contacts and descents from the pose stream of a session.
 
 use skinrig_analysis::Descent;
 use skinrig_model::{HostDuration, HostTime, PoseSample, PressOutcome};
 use skinrig_recorder::{RecorderError, SessionReader};
 
-/// Contacts that are looked at, at most, evenly spread.
-const MOST: usize = 100;
-/// The pose is read this far to either side of a contact, ms.
+/// Maximum number of contacts to examine, evenly spread.
+const MAX_CONTACTS: usize = 100;
+/// Poses are read this far on each side of a contact, ms.
 const SIDE_MS: i64 = 20;
-/// A way down is looked at over so long a time before its contact, at most.
+/// Maximum duration of a descent before its contact.
 const LONGEST_DESCENT: HostDuration = HostDuration::from_millis(2_000);
-/// The tip's path is taken as straight this far to either side of a contact, ms.
+/// The tip's path is assumed straight this far on each side of a contact, ms.
 const STRAIGHT_MS: i64 = 5;
 
-/// (RMS interval between the two pose samples around a measured contact, RMS standard error of the instant at which the
-/// pose crossed the surface), µs: the contact is interpolated between those samples, and each sample is noisy. `None`
-/// without measured contacts.
+/// (RMS interval between the two pose samples around a measured contact, RMS standard error of the instant at which the pose
+/// crossed the surface), µs: the contact is interpolated between noisy samples. `None` without measured contacts.
 ///
 /// # Errors
 /// When the poses cannot be read.
@@ -29,7 +28,7 @@ pub fn timing(
     let (mut intervals, mut errors) = (Squares::default(), Squares::default());
     for contact in contacts
         .iter()
-        .step_by(contacts.len().div_ceil(MOST).max(1))
+        .step_by(contacts.len().div_ceil(MAX_CONTACTS).max(1))
     {
         let poses = reader.poses(*contact - side, *contact + side)?;
         let after = poses.partition_point(|p| p.t < *contact);
@@ -43,7 +42,7 @@ pub fn timing(
     Ok((intervals.rms(), errors.rms()))
 }
 
-/// The ways down to the contacts whose height was taken from the frame; those of at most 100 presses, evenly spread.
+/// Descents to the contacts whose height was taken from the frame, for at most 100 presses, evenly spread.
 ///
 /// # Errors
 /// When the poses cannot be read.
@@ -60,7 +59,10 @@ pub fn descents(
     let ways: Vec<_> = rows
         .filter_map(|(row, o)| Some((row, of_frame(o.as_ref()?)?)))
         .collect();
-    for (row, timing) in ways.iter().step_by(ways.len().div_ceil(MOST).max(1)) {
+    for (row, timing) in ways
+        .iter()
+        .step_by(ways.len().div_ceil(MAX_CONTACTS).max(1))
+    {
         let begin = timing.approach.max(timing.contact - LONGEST_DESCENT);
         let poses = reader.poses(begin, timing.contact)?;
         found[*row] = Some(descent(&poses));
@@ -68,7 +70,7 @@ pub fn descents(
     Ok(found)
 }
 
-/// The way down that these poses end with.
+/// The descent at the end of these poses.
 fn descent(poses: &[PoseSample]) -> Descent {
     let heights = (1..=Descent::STEPS).map(|k| k as f64 * Descent::STEP_MM);
     let last_above = heights.map_while(|mm| {
@@ -80,8 +82,8 @@ fn descent(poses: &[PoseSample]) -> Descent {
     }
 }
 
-/// Standard error of the instant at which a straight line through the heights about `contact` is at the line's height
-/// there, µs: that of the height over the speed. `None` when the tip does not move.
+/// Standard error of the instant at which a straight line through the heights around `contact` reaches its height there, µs:
+/// that of the height divided by the speed. `None` if the tip does not move.
 fn crossing_se_us(poses: &[PoseSample], contact: HostTime) -> Option<f64> {
     let near = HostDuration::from_millis(STRAIGHT_MS);
     let points: Vec<(f64, f64)> = poses
@@ -109,7 +111,7 @@ fn crossing_se_us(poses: &[PoseSample], contact: HostTime) -> Option<f64> {
     error_us.is_finite().then_some(error_us)
 }
 
-/// Squares of values.
+/// Sum of squares.
 #[derive(Default)]
 struct Squares {
     sum: f64,

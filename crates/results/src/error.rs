@@ -1,4 +1,4 @@
-//! Why a session has no analysis.
+//! Owns the reasons for which a session has no analysis.
 
 use std::path::PathBuf;
 
@@ -14,17 +14,17 @@ pub enum ResultsError {
     Session(#[from] RecorderError),
     /// The description of the rig in the session cannot be read.
     #[error(
-        "{}: expected the description of the rig in the session, found: {source}\n  \
-         next: `skinrig verify` says whether the file is damaged",
+        "{}: cannot read the rig description in the session: {source}\n  next: run `skinrig verify` to check the file \
+         for damage",
         path.display()
     )]
     Rig {
         /// The session.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Parse error.
         source: serde_json::Error,
     },
-    /// An override of something that a recorded session cannot change.
+    /// An override of a value that a recorded session cannot change.
     #[error(
         "--set {given}: expected a key below `analysis.`; a recorded session's other values cannot change"
     )]
@@ -32,7 +32,7 @@ pub enum ResultsError {
         /// The override.
         given: String,
     },
-    /// An override of a key that only recordings of earlier versions may hold.
+    /// An override with a key that only recordings of earlier versions may contain.
     #[error(
         "--set {given}: expected `analysis.exclude_press_numbers`, which counts presses from 1, found the key of earlier versions, \
          which counts from 0"
@@ -41,7 +41,7 @@ pub enum ResultsError {
         /// The override.
         given: String,
     },
-    /// The session's protocol or schedule with the overrides does not parse.
+    /// The session's protocol or schedule does not parse with the overrides.
     #[error("{0}")]
     Settings(Diagnostics),
     /// The analysis rejects its input.

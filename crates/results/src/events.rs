@@ -1,4 +1,4 @@
-//! Events of a session for the analysis, and the decoder that the recorder's check borrows.
+//! Owns the events of a session as input of the analysis, and the decoder used by the recorder's check.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,20 +8,20 @@ use skinrig_formats::{Decoder, Geometry, Scanner};
 use skinrig_model::{CameraId, CdEvent, ChunkFacts, StreamFormat, TriggerEdge};
 use skinrig_recorder::{ChunkScanner, SessionReader};
 
-/// The events of a session file, decoded chunk by chunk. Each pass opens the file anew, so that both cameras
-/// can be read at once.
+/// Events of a session file, decoded chunk by chunk. Each pass opens the file again, so that both cameras can be read in
+/// parallel.
 pub struct SessionEvents {
     path: PathBuf,
     formats: [StreamFormat; 2],
-    /// By how much the times of each further leg are moved, by where they were recorded.
+    /// Time shift of each further leg, by its recorded start.
     moves: [BTreeMap<u64, i64>; 2],
 }
 
 impl SessionEvents {
-    /// The events of `path`, whose cameras send `formats`, in the camera times of its aligned `legs`.
+    /// Events of `path`, whose cameras send `formats`, in the camera times of its aligned `legs`.
     #[must_use]
     pub fn new(path: &Path, formats: [StreamFormat; 2], legs: &[LegStart]) -> Self {
-        // Of legs that begin at the same camera time only the last has events.
+        // Of legs with the same camera start time only the last has events.
         let recorded = |leg: &LegStart, k: usize| (leg.recorded_us[k], leg.moved_us[k]);
         Self {
             path: path.to_owned(),
@@ -55,17 +55,17 @@ impl EventSource for SessionEvents {
     }
 }
 
-/// Decodes leg after leg and moves each event by what the edges of its leg are moved by.
+/// Decodes leg after leg and shifts each event like the edges of its leg.
 struct LegDecoder {
     decoder: Decoder,
-    /// What is left to move: 0 but for a leg that would begin below zero, where no decoder can begin.
+    /// Remaining shift: 0, except for a leg that would begin below zero, where no decoder can begin.
     by_us: i64,
     moved: Vec<CdEvent>,
 }
 
 impl LegDecoder {
     fn new(format: StreamFormat) -> Self {
-        // Events outside the sensor are delivered too: the analysis counts them and leaves them out.
+        // Deliver events outside the sensor too: the analysis counts and ignores them.
         Self {
             decoder: Decoder::with_geometry(format, Geometry::ANY),
             by_us: 0,
@@ -73,7 +73,7 @@ impl LegDecoder {
         }
     }
 
-    /// The next leg was recorded from `origin_us` on and is moved by `by_us`.
+    /// Starts the next leg, recorded from `origin_us` on and shifted by `by_us`.
     fn restart(&mut self, origin_us: u64, by_us: i64) {
         let (begin_us, rest_us) = match origin_us.checked_add_signed(by_us) {
             Some(moved_us) => (moved_us, 0),
@@ -83,7 +83,7 @@ impl LegDecoder {
         self.by_us = rest_us;
     }
 
-    /// Bytes were lost here: what follows has a time again from the next time base word on.
+    /// Notes lost bytes: events get times again from the next time base word on.
     fn lost(&mut self, bytes: u64) {
         self.decoder.lost(bytes);
     }
@@ -143,7 +143,7 @@ impl ChunkScanner for Rescan {
 mod tests {
     use super::*;
 
-    /// Times of the events of an EVT2 leg, which come at 100, 700 and 200 000 µs of its own.
+    /// Times of the events of an EVT2 leg with events at 100, 700 and 200 000 µs.
     fn times(restart: impl Fn(&mut LegDecoder)) -> Vec<u64> {
         let word = |t: u64| [0x8000_0000 | (t >> 6) as u32, ((t & 63) as u32) << 22];
         let words = [100, 700, 200_000].into_iter().flat_map(word);
@@ -167,7 +167,7 @@ mod tests {
             let events = times(|legs| legs.restart(5_000_000, by));
             assert!(events.iter().copied().eq(edges), "by {by}: {events:?}");
         }
-        // What was left to move ends with the leg.
+        // The remaining shift ends with the leg.
         let next = times(|legs| {
             legs.restart(5_000_000, -5_000_300);
             legs.restart(6_000_000, 1);

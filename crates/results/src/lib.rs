@@ -1,15 +1,18 @@
-//! From a session file to its analysis, in named stages.
+//! Turns a session file into its analysis, in named stages.
 //!
-//! 1. [`Session::open`]: the file, its header and the rig that it describes, with the settings of the analysis.
-//! 2. [`Session::recorded`]: everything the analysis needs but the events, in the times in which each leg was recorded.
-//! 3. [`Recorded::align`]: the legs of a resumed run in one time.
-//! 4. [`Aligned::analyze`]: the complete analysis, with the robot's path and, when asked for, the public code's results.
+//! 1. [`Session::open`]: reads the file, its header and rig description, and the analysis settings.
+//! 2. [`Session::read_input`]: reads everything that the analysis needs except the events, with the times of each leg as
+//!    recorded.
+//! 3. [`RecordedSession::align`]: aligns the legs of a resumed run.
+//! 4. [`AlignedSession::analyze`]: runs the complete analysis, with the robot's path and, on request, the public code's
+//!    results.
 //!
-//! [`analyze`] runs all four. Other programs call this crate; the command line parses, calls it and prints.
+//! [`analyze`] runs all four. The command line parses its arguments, calls this crate and prints.
 
 mod contacts;
 mod error;
 mod events;
+mod origin;
 mod rig_document;
 mod session;
 mod settings;
@@ -17,7 +20,8 @@ mod stages;
 
 pub use error::ResultsError;
 pub use events::{Rescan, SessionEvents};
+pub use origin::Origin;
 pub use rig_document::RigDocument;
 pub use session::Session;
-pub use settings::Choices;
-pub use stages::{Aligned, Analyzed, Recorded, analyze};
+pub use settings::AnalysisOptions;
+pub use stages::{AlignedSession, AnalyzedSession, RecordedSession, analyze};

@@ -1,22 +1,22 @@
-//! What a session says of its rig, for whoever analyses it.
+//! Owns the rig description in a session.
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use skinrig_model::{AnalysisSettings, PressId, RigGeometry};
 
-/// What `RunHeader::rig_json` holds.
+/// Content of `RunHeader::rig_json`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(try_from = "RecordedRig")]
 pub struct RigDocument {
-    /// What an analysis needs to know of the rig.
+    /// Geometry for the analysis.
     pub geometry: RigGeometry,
     /// The analysis settings of the protocol.
     pub analysis: AnalysisSettings,
-    /// Everything worth keeping about the rig.
+    /// Full description of the rig.
     pub rig: Value,
 }
 
-/// [`RigDocument`] as any version wrote it.
+/// [`RigDocument`] as written by any version.
 #[derive(Deserialize)]
 struct RecordedRig {
     geometry: RigGeometry,
@@ -29,7 +29,7 @@ impl TryFrom<RecordedRig> for RigDocument {
 
     fn try_from(recorded: RecordedRig) -> Result<Self, Self::Error> {
         let mut analysis = recorded.analysis;
-        // Earlier versions counted presses that are left out from 0, under another name.
+        // Earlier versions counted excluded presses from 0, under another name.
         if let Some(settings) = analysis.as_object_mut()
             && let Some(indices) = settings.remove("exclude_presses")
         {
@@ -52,7 +52,7 @@ impl TryFrom<RecordedRig> for RigDocument {
     }
 }
 
-/// Earlier versions kept a grid of thresholds as its ends and its number: `threshold_range` and `thresholds`.
+/// Earlier versions stored a grid of thresholds as its ends and its size: `threshold_range` and `thresholds`.
 fn name_thresholds(study: &mut Value) {
     let Some(study) = study.as_object_mut() else {
         return;

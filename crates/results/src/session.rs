@@ -1,4 +1,4 @@
-//! An open session: its header, its rig, and the settings of its analysis.
+//! Owns an open session: header, rig, and analysis settings.
 
 use std::path::{Path, PathBuf};
 
@@ -9,31 +9,30 @@ use skinrig_recorder::{AttemptRow, RecorderError, SessionReader};
 use crate::contacts;
 use crate::error::ResultsError;
 use crate::rig_document::RigDocument;
-use crate::settings::Choices;
-use crate::stages::Recorded;
+use crate::settings::AnalysisOptions;
 
 /// An open session.
 pub struct Session {
-    /// Where the file is.
+    /// Path of the file.
     pub path: PathBuf,
     /// The file.
     pub reader: SessionReader,
-    /// Who recorded it, with what and how.
+    /// Header of the run.
     pub header: RunHeader,
     /// The settings of the analysis.
     pub settings: AnalysisSettings,
-    /// Whether they differ from those that it was recorded with.
+    /// True if they differ from the recorded settings.
     pub is_changed: bool,
     pub(crate) reference_code: bool,
     rig: RigGeometry,
 }
 
 impl Session {
-    /// Opens a session with the settings that it was recorded with, or with others.
+    /// Opens a session with its recorded settings, or with others.
     ///
     /// # Errors
-    /// [`ResultsError`] for a file that is no readable session, and for settings that do not parse.
-    pub fn open(path: &Path, choices: Choices<'_>) -> Result<Self, ResultsError> {
+    /// [`ResultsError`] for a file that is not a readable session, and for settings that do not parse.
+    pub fn open(path: &Path, options: AnalysisOptions<'_>) -> Result<Self, ResultsError> {
         let reader = SessionReader::open(path)?;
         let header = reader.header()?;
         let rig: RigDocument =
@@ -41,31 +40,19 @@ impl Session {
                 path: path.to_owned(),
                 source,
             })?;
-        let settings = choices.settings(&header, rig.analysis.clone())?;
+        let settings = options.settings(&header, rig.analysis.clone())?;
         Ok(Self {
             path: path.to_owned(),
             reader,
-            is_changed: settings != rig.analysis || choices.reference_code,
+            is_changed: settings != rig.analysis || options.reference_code,
             settings,
-            reference_code: choices.reference_code,
+            reference_code: options.reference_code,
             header,
             rig: rig.geometry,
         })
     }
 
-    /// Reads everything that the analysis needs but the events.
-    ///
-    /// # Errors
-    /// [`ResultsError::Session`] when the file cannot be read.
-    pub fn recorded(self) -> Result<Recorded, ResultsError> {
-        let input = self.input()?;
-        Ok(Recorded {
-            session: self,
-            input,
-        })
-    }
-
-    fn input(&self) -> Result<SessionInput, RecorderError> {
+    pub(crate) fn input(&self) -> Result<SessionInput, RecorderError> {
         let reader = &self.reader;
         let (mut planned, mut outcomes, mut earlier) = (Vec::new(), Vec::new(), Vec::new());
         for (press, mut attempts) in reader.presses()? {
@@ -91,7 +78,10 @@ impl Session {
             marks: reader.marks_sent()?,
             box_reports: reports.map(|(_, report)| report).collect(),
             gaps: [reader.gaps(one)?, reader.gaps(two)?],
-            recorded: [reader.recorded(one)?, reader.recorded(two)?],
+            recorded: [
+                reader.recorded_intervals(one)?,
+                reader.recorded_intervals(two)?,
+            ],
             pose_interval_us,
             crossing_se_us,
             descents,
@@ -111,8 +101,8 @@ fn earlier_attempt(attempt: &AttemptRow) -> Option<EarlierAttempt> {
     })
 }
 
-/// Edges at the instants at which they reached the camera's input: it stamps them so much later. An edge within that time of
-/// the camera's first microsecond is put on it.
+/// Shifts edges to the instants at which they reached the camera's input, which are earlier by its timestamp delay. An edge
+/// within the delay after the camera's first microsecond moves to that microsecond.
 fn on_time(mut edges: Vec<TriggerEdge>, delay_us: u16) -> Vec<TriggerEdge> {
     for edge in &mut edges {
         edge.t_us = edge.t_us.saturating_sub(u64::from(delay_us));

@@ -1,21 +1,21 @@
-//! The settings with which a session is analysed.
+//! Owns the choice of settings for analysing a session.
 
 use skinrig_model::{AnalysisSettings, RunHeader};
 use skinrig_protocol::{Protocol, REFERENCE_CODE, Schedule};
 
 use crate::error::ResultsError;
 
-/// The settings with which a session is analysed: those that it was recorded with, unless changed.
+/// Changes to the recorded settings of a session.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Choices<'a> {
+pub struct AnalysisOptions<'a> {
     /// Overrides, as `analysis.key=value`.
     pub overrides: &'a [String],
-    /// Make the choices of the public code before them, and judge its way too.
+    /// First apply the choices of the public code, and also evaluate as it does.
     pub reference_code: bool,
 }
 
-impl Choices<'_> {
-    /// The settings of the session's own protocol or schedule, changed as chosen.
+impl AnalysisOptions<'_> {
+    /// Settings of the session's own protocol or schedule, with the changes applied.
     pub(crate) fn settings(
         &self,
         header: &RunHeader,

@@ -5,51 +5,65 @@ use std::path::Path;
 use skinrig_analysis::motion::MotionCourse;
 use skinrig_analysis::reference_code::reference_code;
 use skinrig_analysis::result::{Motion, PressResult};
-use skinrig_analysis::{Analysis, Keep, LegStart, SessionInput, analyze_and_keep, legs};
+use skinrig_analysis::{Analysis, LegStart, Retention, SessionInput, analyze_with_events, legs};
 use skinrig_model::HostTime;
 use skinrig_recorder::{RecorderError, SessionReader};
 
 use crate::error::ResultsError;
 use crate::events::SessionEvents;
 use crate::session::Session;
-use crate::settings::Choices;
+use crate::settings::AnalysisOptions;
 
-/// Everything the analysis needs but the events, in the times in which each leg was recorded.
-pub struct Recorded {
+/// Complete input of the analysis except the events, with the times of each leg as recorded.
+pub struct RecordedSession {
     /// The session.
     pub session: Session,
-    /// What it holds.
+    /// Input of the analysis.
     pub input: SessionInput,
 }
 
-/// The same with the legs of a resumed run in one time, and the events in it.
-pub struct Aligned {
+/// A session with aligned legs, and its events on the same time scale.
+pub struct AlignedSession {
     /// The session.
     pub session: Session,
-    /// What it holds.
+    /// Input of the analysis.
     pub input: SessionInput,
-    /// Its events.
+    /// Events of the session.
     pub events: SessionEvents,
 }
 
 /// A session and its complete analysis.
-pub struct Analyzed {
+pub struct AnalyzedSession {
     /// The session.
     pub session: Session,
-    /// Where its further legs begin, as they were aligned.
+    /// Start of its further legs, as aligned.
     pub legs: Vec<LegStart>,
     /// The analysis.
     pub analysis: Analysis,
 }
 
-impl Recorded {
-    /// Brings the legs of a resumed run to one time.
+impl Session {
+    /// Reads everything that the analysis needs except the events.
+    ///
+    /// # Errors
+    /// [`ResultsError::Session`] when the file cannot be read.
+    pub fn read_input(self) -> Result<RecordedSession, ResultsError> {
+        let input = self.input()?;
+        Ok(RecordedSession {
+            session: self,
+            input,
+        })
+    }
+}
+
+impl RecordedSession {
+    /// Aligns the legs of a resumed run.
     #[must_use]
-    pub fn align(mut self) -> Aligned {
+    pub fn align(mut self) -> AlignedSession {
         legs::align(&mut self.input);
         let formats = self.session.header.stream_formats;
         let events = SessionEvents::new(&self.session.path, formats, &self.input.legs);
-        Aligned {
+        AlignedSession {
             session: self.session,
             input: self.input,
             events,
@@ -57,23 +71,23 @@ impl Recorded {
     }
 }
 
-impl Aligned {
-    /// The complete analysis.
+impl AlignedSession {
+    /// Runs the complete analysis.
     ///
     /// # Errors
     /// [`ResultsError::Analysis`] when the analysis rejects its input, [`ResultsError::Session`] when the poses cannot be read.
-    pub fn analyze(self) -> Result<Analyzed, ResultsError> {
-        // The public code judges calibrating presses too.
+    pub fn analyze(self) -> Result<AnalyzedSession, ResultsError> {
+        // The public code also evaluates calibration presses.
         let wants_reference = self.session.reference_code;
         let keep = if wants_reference {
-            Keep::All
+            Retention::All
         } else {
-            Keep::Scored
+            Retention::Scored
         };
-        let (analysis, kept) = analyze_and_keep(&self.input, &self.events, keep)?;
+        let (analysis, kept) = analyze_with_events(&self.input, &self.events, keep)?;
         let reference = wants_reference.then(|| reference_code(&self.input, &analysis, &kept));
         let motion = motion(&self.session.reader, &analysis)?;
-        Ok(Analyzed {
+        Ok(AnalyzedSession {
             analysis: Analysis {
                 reference,
                 motion,
@@ -85,15 +99,18 @@ impl Aligned {
     }
 }
 
-/// Opens a session and analyses it: all stages.
+/// Opens a session and analyses it, through all stages.
 ///
 /// # Errors
 /// [`ResultsError`] of any stage.
-pub fn analyze(path: &Path, choices: Choices<'_>) -> Result<Analyzed, ResultsError> {
-    Session::open(path, choices)?.recorded()?.align().analyze()
+pub fn analyze(path: &Path, options: AnalysisOptions<'_>) -> Result<AnalyzedSession, ResultsError> {
+    Session::open(path, options)?
+        .read_input()?
+        .align()
+        .analyze()
 }
 
-/// The robot's path against its commands, in full around the presses that the report looks at closely.
+/// The robot's path compared with its commands, in full around the presses with a rate close-up.
 fn motion(reader: &SessionReader, analysis: &Analysis) -> Result<Option<Motion>, RecorderError> {
     let is_close = |p: &&PressResult| analysis.zooms.iter().any(|z| z.press == p.press);
     let presses = analysis.presses.iter().filter(is_close);

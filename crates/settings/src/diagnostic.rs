@@ -18,7 +18,7 @@ pub struct Diagnostic {
     pub location: Location,
     /// What would have been accepted.
     pub expected: Option<String>,
-    /// What is there.
+    /// What was found.
     pub found: Option<String>,
     /// What to do next: a fix to type, or a "did you mean".
     pub help: Option<String>,
@@ -168,7 +168,7 @@ impl Finding<'_> {
         self
     }
 
-    /// What is there.
+    /// What was found.
     pub fn found(mut self, text: impl Into<String>) -> Self {
         if let Some(d) = self.0.as_mut() {
             d.found = Some(text.into());

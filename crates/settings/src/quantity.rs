@@ -179,7 +179,7 @@ pub struct QuantityError {
     pub message: String,
     /// What would have been accepted.
     pub expected: String,
-    /// What is there.
+    /// What was found.
     pub found: String,
     /// What to type instead, when it can be told.
     pub help: Option<String>,

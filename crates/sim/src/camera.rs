@@ -1,4 +1,4 @@
-//! A simulated event camera: pixel events and trigger edges as the EVT2 bytes that a real one would send.
+//! A simulated event camera: encodes pixel events and trigger edges as EVT2 bytes, like a real camera.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -14,15 +14,14 @@ use skinrig_model::{
 use crate::camera_stream::{Outgoing, Streaming};
 use crate::config::SimConfig;
 use crate::drifting::DriftingClock;
-use crate::faults::{Fault, HOT_C, HOT_NS, HOT_RISE_NS, STORM_NS, When};
+use crate::faults::{Fault, FaultTrigger, HOT_C, HOT_NS, HOT_RISE_NS, STORM_NS};
 use crate::line::LineEdge;
-use crate::pattern::Scanning;
+use crate::pattern::ScanModel;
 use crate::random::{Purpose, Stream};
 use crate::scene::{GRID_NS, PixelModel};
 use crate::world::{Shared, World};
 
-/// Bias names, ranges and defaults in mV (evk1.md section 2.9). The simulation stores them; they have no
-/// effect on its events.
+/// Bias names, ranges and defaults in mV (evk1.md section 2.9). The simulation stores them without effect on its events.
 const BIASES: [(&str, i64, i64, i64); 6] = [
     ("bias_diff_off", 0, 1800, 221),
     ("bias_diff_on", 0, 1800, 384),
@@ -35,13 +34,13 @@ const BIASES: [(&str, i64, i64, i64); 6] = [
 /// Trigger inputs of an EVK1 (evk1.md section 2.12).
 const CHANNELS: [u8; 3] = [0, 6, 7];
 
-/// Temperature of a simulated camera that no fault heats, °C.
+/// Temperature of a simulated camera without faults, °C.
 pub(crate) const TEMPERATURE_C: f64 = 35.0;
 
-/// Rates of the pattern that a simulated camera makes, events per second.
+/// Supported rates of the test pattern, events per second.
 const PATTERN_RATES_EV_S: std::ops::RangeInclusive<f64> = 1.0..=50e6;
 
-/// Makes the pixel model for the n-th start of a camera; `None` when there are no pixels at this level.
+/// Creates the pixel model for the n-th start of a camera; `None` at levels without pixels.
 pub(crate) type PixelFactory = Box<dyn Fn(u64) -> Option<Box<dyn PixelModel>> + Send>;
 
 /// A simulated event camera.
@@ -52,12 +51,12 @@ pub(crate) struct SimCamera {
     chunk_bytes: usize,
     jitter_ns: i64,
     read_back_fault: bool,
-    lost: Vec<(When, u64)>,
-    unplug: Option<When>,
-    stall: Option<When>,
-    storms: Vec<When>,
-    steps: Vec<(When, u32)>,
-    hot: Option<When>,
+    lost: Vec<(FaultTrigger, u64)>,
+    unplug: Option<FaultTrigger>,
+    stall: Option<FaultTrigger>,
+    storms: Vec<FaultTrigger>,
+    steps: Vec<(FaultTrigger, u32)>,
+    hot: Option<FaultTrigger>,
     buffer_bytes: usize,
     make_pixels: PixelFactory,
     random: Stream,
@@ -135,7 +134,7 @@ impl SimCamera {
         }
     }
 
-    /// Neither gone nor streaming.
+    /// Fails if the camera is unplugged or streaming.
     fn expect_stopped(&self) -> Result<(), DeviceError> {
         if self.gone {
             return Err(self.gone_error());
@@ -204,7 +203,7 @@ impl SimCamera {
         Ok(())
     }
 
-    /// Simulates and encodes what happened up to the present.
+    /// Simulates and encodes everything up to the current time.
     fn catch_up(&mut self) {
         let Some(stream) = &mut self.streaming else {
             return;
@@ -222,20 +221,20 @@ impl SimCamera {
                 stream.edges.push_back(LineEdge { t_ns, ..edge });
             }
             stream.grid = world.grid();
-            Struck {
-                unplugged_ns: known(&world, self.unplug),
-                stalled_ns: known(&world, self.stall),
+            CameraFaults {
+                unplugged_ns: occurred(&world, self.unplug),
+                stalled_ns: occurred(&world, self.stall),
                 storms_ns: self
                     .storms
                     .iter()
-                    .filter_map(|s| world.struck_at(*s))
+                    .filter_map(|s| world.occurred_at(*s))
                     .collect(),
-                losses: take_known(&world, &mut self.lost),
-                steps: take_known(&world, &mut self.steps),
+                losses: take_occurred(&world, &mut self.lost),
+                steps: take_occurred(&world, &mut self.steps),
             }
         };
         let Some(mut clock) = self.clock else { return };
-        // What nobody has fetched for too long is lost, newest first.
+        // Bytes that were not fetched in time are lost, newest first.
         let mut room = self.buffer_bytes;
         let tips = std::mem::take(&mut stream.tips);
         for pair in tips.windows(2) {
@@ -296,8 +295,8 @@ impl SimCamera {
     }
 }
 
-/// Faults of a camera on world time, ns.
-struct Struck {
+/// Faults of a camera in world time, ns.
+struct CameraFaults {
     unplugged_ns: Option<i64>,
     stalled_ns: Option<i64>,
     storms_ns: Vec<i64>,
@@ -305,16 +304,16 @@ struct Struck {
     steps: Vec<(i64, u32)>,
 }
 
-/// When a fault struck, when it did before the present.
-fn known(world: &World, when: Option<When>) -> Option<i64> {
+/// Time of a fault, if it has occurred.
+fn occurred(world: &World, when: Option<FaultTrigger>) -> Option<i64> {
     let now_ns = world.grid() * GRID_NS;
-    world.struck_at(when?).filter(|&t| t < now_ns)
+    world.occurred_at(when?).filter(|&t| t < now_ns)
 }
 
-/// Takes those faults that struck before the present, with the instant.
-fn take_known<T: Copy>(world: &World, faults: &mut Vec<(When, T)>) -> Vec<(i64, T)> {
+/// Takes the faults that have occurred, with their times.
+fn take_occurred<T: Copy>(world: &World, faults: &mut Vec<(FaultTrigger, T)>) -> Vec<(i64, T)> {
     let mut struck = Vec::new();
-    faults.retain(|&(when, what)| match known(world, Some(when)) {
+    faults.retain(|&(when, what)| match occurred(world, Some(when)) {
         Some(t) => {
             struck.push((t, what));
             false
@@ -406,7 +405,7 @@ impl EventCamera for SimCamera {
         self.clock = Some(clock);
         let pixels = match &self.pattern {
             None => (self.make_pixels)(self.starts),
-            Some(scan) => Some(Box::new(Scanning::new(*scan)) as Box<dyn PixelModel>),
+            Some(scan) => Some(Box::new(ScanModel::new(*scan)) as Box<dyn PixelModel>),
         };
         self.streaming = Some(Streaming {
             grid,
@@ -476,13 +475,13 @@ impl EventCamera for SimCamera {
             return Err(self.gone_error());
         }
         let world = self.shared.world();
-        let struck_ns = self.hot.and_then(|when| world.struck_at(when));
+        let struck_ns = self.hot.and_then(|when| world.occurred_at(when));
         let after_ns = struck_ns.map(|t| world.grid() * GRID_NS - t);
         Ok(Some(TEMPERATURE_C + after_ns.map_or(0.0, heat_c)))
     }
 }
 
-/// By how much a camera is hotter so long after the fault that heats it, °C.
+/// Temperature rise this long after the fault that heats the camera, °C.
 fn heat_c(after_ns: i64) -> f64 {
     let cooling_ns = 2 * HOT_RISE_NS + HOT_NS - after_ns;
     let near_ns = after_ns.min(cooling_ns).clamp(0, HOT_RISE_NS);

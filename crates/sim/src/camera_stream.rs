@@ -1,4 +1,4 @@
-//! What a simulated camera has under way: events and edges being encoded, bytes on their way to the host.
+//! State of a streaming simulated camera: encoding of events and edges, and bytes on their way to the host.
 
 use std::collections::VecDeque;
 
@@ -14,14 +14,14 @@ use crate::line::LineEdge;
 use crate::line::TRIGGER_CHANNEL;
 use crate::scene::{GRID_NS, PixelEvent, PixelModel, TipSample};
 
-/// What exists only while streaming.
+/// State that exists only while streaming.
 pub(crate) struct Streaming {
     pub grid: i64,
     pub pixels: Option<Box<dyn PixelModel>>,
-    /// Events come from pixels, of which a region may be on.
+    /// Whether the events come from pixels, to which a region of interest applies.
     pub has_region: bool,
     pub encoder: evt2::Encoder,
-    /// Trigger edges not yet encoded, with the instant at which the camera sees them.
+    /// Trigger edges to encode, with the time at which the camera sees them.
     pub edges: VecDeque<LineEdge>,
     pub tips: Vec<TipSample>,
     pub events: Vec<PixelEvent>,
@@ -33,9 +33,9 @@ pub(crate) struct Streaming {
 pub(crate) struct Outgoing {
     pub seq: u64,
     pub bytes: Vec<u8>,
-    /// Length of the chunk before.
+    /// Length of the previous chunk.
     pub last_len: usize,
-    /// When the last of `bytes` arrived.
+    /// Arrival of the last of `bytes`.
     pub arrived: HostTime,
     /// Bytes lost since the last chunk.
     pub lost_before: u64,
@@ -45,7 +45,7 @@ pub(crate) struct Outgoing {
 }
 
 impl Streaming {
-    /// One grid step, in a `storm` or not: its events and edges as bytes in `fresh`.
+    /// Simulates one grid step, with or without an event storm, and encodes its events and edges into `fresh`.
     pub fn step(
         &mut self,
         from: TipSample,
@@ -59,7 +59,7 @@ impl Streaming {
             pixels.advance(&[from, to], &mut self.events);
         }
         if storm {
-            blow(from.t_ns, &mut self.events);
+            add_storm(from.t_ns, &mut self.events);
         }
         let triggered = set.trigger_channels.contains(&TRIGGER_CHANNEL);
         for event in &self.events {
@@ -97,11 +97,11 @@ impl Streaming {
     }
 }
 
-/// Adds a millisecond of a storm of hot pixels to the events from `from_ns` on.
-fn blow(from_ns: i64, events: &mut Vec<PixelEvent>) {
+/// Adds one millisecond of an event storm from `from_ns` on.
+fn add_storm(from_ns: i64, events: &mut Vec<PixelEvent>) {
     for pixel in 0..STORM_PIXELS {
         for n in 0..STORM_PER_MS {
-            // Spread over the sensor and over the millisecond by steps that share no factor with their ranges.
+            // Spread over the sensor and the millisecond with steps that are coprime to their ranges.
             events.push(PixelEvent {
                 t_ns: from_ns + (n * GRID_NS / STORM_PER_MS + i64::from(pixel) * 997) % GRID_NS,
                 x: pixel * 211 % SENSOR_WIDTH,
@@ -136,7 +136,7 @@ fn encode_edge(
 }
 
 impl Outgoing {
-    /// Takes fresh bytes, which arrived at `at`.
+    /// Adds new bytes that arrived at `at`.
     pub fn take(
         &mut self,
         fresh: &mut Vec<u8>,
@@ -157,7 +157,7 @@ impl Outgoing {
             self.close(camera, scanner);
         }
         if self.bytes.capacity() == 0 {
-            // About as much as last time: growing step by step costs more than the bytes themselves.
+            // Reserve the size of the previous chunk: growing step by step costs more than copying the bytes.
             let like_last =
                 (self.last_len + self.last_len / 8).clamp(1 << 12, chunk_bytes.max(1 << 12));
             self.bytes.reserve_exact(like_last);
@@ -166,7 +166,7 @@ impl Outgoing {
         fresh.clear();
     }
 
-    /// Closes the chunk under way, when there is anything to say.
+    /// Closes the current chunk if it has content.
     pub fn close(&mut self, camera: CameraId, scanner: &mut Scanner) {
         if self.bytes.is_empty() && self.lost_before == 0 {
             return;

@@ -1,4 +1,4 @@
-//! The simulated clock, and the one that keeps pace with real time.
+//! The simulated clock, and a wrapper that runs in real time.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -7,14 +7,14 @@ use std::time::{Duration, Instant};
 use skinrig_device::Clock;
 use skinrig_model::HostTime;
 
-/// Simulated host time: waiting jumps there. Clones share one time.
+/// Simulated host time: a wait jumps to its end. Clones share the time.
 #[derive(Debug, Clone, Default)]
 pub struct SimClock {
     now_ns: Arc<AtomicI64>,
 }
 
 impl SimClock {
-    /// A clock at time 0.
+    /// A clock at time zero.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
@@ -31,15 +31,15 @@ impl Clock for SimClock {
     }
 }
 
-/// Lets another clock jump only as fast as real time passes (`--real-time`): for watching.
-pub struct Paced<C> {
+/// Slows another clock down to real time, for `--real-time`.
+pub struct PacedClock<C> {
     inner: C,
     began: Instant,
     from: HostTime,
 }
 
-impl<C: Clock> Paced<C> {
-    /// Paces `inner`, whose present corresponds to the real present.
+impl<C: Clock> PacedClock<C> {
+    /// Wraps `inner`, whose current time corresponds to the real current time.
     pub fn new(inner: C) -> Self {
         Self {
             began: Instant::now(),
@@ -49,7 +49,7 @@ impl<C: Clock> Paced<C> {
     }
 }
 
-impl<C: Clock> Clock for Paced<C> {
+impl<C: Clock> Clock for PacedClock<C> {
     fn now(&self) -> HostTime {
         self.inner.now()
     }
@@ -61,10 +61,10 @@ impl<C: Clock> Clock for Paced<C> {
     }
 }
 
-/// A boxed clock is a clock, so that the clock of a finished rig can be paced too.
-pub(crate) struct Boxed(pub Box<dyn Clock>);
+/// Makes a boxed clock a clock, so that the clock of a finished rig can be wrapped.
+pub(crate) struct BoxedClock(pub Box<dyn Clock>);
 
-impl Clock for Boxed {
+impl Clock for BoxedClock {
     fn now(&self) -> HostTime {
         self.0.now()
     }

@@ -1,13 +1,13 @@
-//! Columns of one contact as a camera sees them: the flat tip's footprint, projected point by point.
+//! Sensor columns of a contact: the footprint of the flat tip, projected point by point.
 
 use skinrig_model::{CameraModel, Point2, SENSOR_WIDTH};
 
-/// Points along each side of the footprint.
+/// Points per side of the footprint.
 const SIDE: usize = 24;
-/// A finite angle per column border, for a quick inverse of the lens.
+/// Number of column borders in the lens table.
 const BORDERS: usize = SENSOR_WIDTH as usize + 1;
 
-/// The lens as a table: the viewing angle at each column border, degrees, skew included.
+/// The lens as a table: viewing angle at each column border, degrees, including skew.
 #[derive(Debug, Clone)]
 pub(crate) struct ColumnTable {
     camera: CameraModel,
@@ -15,7 +15,7 @@ pub(crate) struct ColumnTable {
 }
 
 impl ColumnTable {
-    /// The table of `camera`.
+    /// Table of `camera`.
     #[must_use]
     pub fn new(camera: CameraModel) -> Self {
         let angles = (0..BORDERS)
@@ -24,8 +24,7 @@ impl ColumnTable {
         Self { camera, angles }
     }
 
-    /// The fractional column of `p`, linear between borders (within 1e-3 px of the exact inverse), or `None`
-    /// outside the field of view.
+    /// Fractional column of `p`, linear between borders (within 1e-3 px of the exact inverse); `None` outside the field of view.
     #[must_use]
     pub fn column(&self, p: Point2) -> Option<f64> {
         let angle = self.camera.angle_of_point_deg(p);
@@ -37,8 +36,7 @@ impl ColumnTable {
         Some((above - 1) as f64 + (angle - low) / (high - low))
     }
 
-    /// The columns of the points of a square of `side_mm` about `centre`. Points outside the field of view are
-    /// NaN.
+    /// Columns of the points of a square of `side_mm` around `centre`; NaN outside the field of view.
     #[must_use]
     pub(crate) fn footprint(&self, centre: Point2, side_mm: f64) -> Vec<f64> {
         let at = |k: usize| ((k as f64 + 0.5) / SIDE as f64 - 0.5) * side_mm;
@@ -52,7 +50,7 @@ impl ColumnTable {
         columns
     }
 
-    /// Columns per mm across the line of sight at `p`; 0 outside the field of view.
+    /// Columns per mm perpendicular to the line of sight at `p`; 0 outside the field of view.
     #[must_use]
     pub(crate) fn columns_per_mm(&self, p: Point2) -> f64 {
         let Some(u) = self.column(p) else { return 0.0 };

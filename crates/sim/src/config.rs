@@ -1,4 +1,4 @@
-//! Every constant of a simulated rig, with documented defaults.
+//! Configuration of a simulated rig, with documented defaults.
 
 use skinrig_model::{
     CameraId, CameraModel, LensModel, Point2, Point3, RigidTransform, Robot, SimLevel, Skin,
@@ -12,18 +12,18 @@ use crate::motion::MotionConfig;
 use crate::random::{Purpose, Stream};
 use crate::scene::SceneConfig;
 
-/// How the cameras' clocks and trigger inputs behave. All figures are assumed: none is published for the EVK1.
+/// Camera clocks and trigger inputs. All values are assumptions: none is published for the EVK1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraClockConfig {
-    /// The drift of a camera's clock is drawn from -max..=max, parts per million.
+    /// Largest clock drift, ppm; the drift is drawn uniformly from -max..=max.
     pub max_drift_ppm: f64,
-    /// The camera's time at the first start is drawn from 0..max, s.
+    /// Largest camera time at the first start, s; drawn uniformly from 0..max.
     pub max_origin_s: f64,
-    /// Trigger edges are seen late by 0..max, ns.
+    /// Largest delay of trigger edges, ns; drawn uniformly from 0..max.
     pub trigger_jitter_ns: i64,
-    /// A full chunk, bytes; a multiple of 4.
+    /// Chunk size, bytes; a multiple of 4.
     pub chunk_bytes: usize,
-    /// Bytes that wait for the host at most; what comes beyond is lost and counted.
+    /// Capacity for bytes that wait for the host; further bytes are lost and counted.
     pub buffer_bytes: usize,
 }
 
@@ -39,26 +39,26 @@ impl Default for CameraClockConfig {
     }
 }
 
-/// How the trigger box behaves (assumed).
+/// The trigger box (assumed values).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TriggerBoxConfig {
-    /// The first edge rises this long after the request at least, ns.
+    /// Shortest delay from the request to the first edge, ns.
     pub min_latency_ns: i64,
-    /// And at most this long, ns.
+    /// Longest delay, ns.
     pub max_latency_ns: i64,
-    /// The drift of its clock is drawn from -max..=max, parts per million: a ceramic resonator's.
+    /// Largest clock drift of a ceramic resonator, ppm; drawn uniformly from -max..=max.
     pub max_drift_ppm: f64,
-    /// Its time at the beginning is drawn from 0..max, s.
+    /// Largest time of its clock at the beginning, s; drawn uniformly from 0..max.
     pub max_origin_s: f64,
-    /// It sends a sync train each such time on its own clock, ms; 0 for none.
+    /// Period of its sync trains on its own clock, ms; 0 for none.
     pub sync_period_ms: u32,
-    /// The host asks it for its time this often, ms; 0 for never.
+    /// Period of the host's time exchanges, ms; 0 for none.
     pub exchange_period_ms: u32,
-    /// A question or an answer is under way this long at least, µs.
+    /// Shortest transmission time of a request or reply, µs.
     pub min_delay_us: f64,
-    /// And on average this much longer, with an exponential distribution, µs.
+    /// Mean of the additional, exponentially distributed transmission time, µs.
     pub mean_delay_us: f64,
-    /// Whether its input is closed while the tip touches the skin.
+    /// Whether its contact input closes while the tip touches the skin.
     pub contact_input: bool,
 }
 
@@ -78,15 +78,15 @@ impl Default for TriggerBoxConfig {
     }
 }
 
-/// How far the true camera geometry is from the drawn one: half widths of uniform distributions (assumed;
-/// the paper's measured and calibrated positions differ by 1 to 6 mm).
+/// Deviation of the true camera geometry from the nominal one: half widths of uniform distributions (assumed; the paper's measured and
+/// calibrated positions differ by 1 to 6 mm).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GeometryErrors {
     /// Camera positions, per axis, mm.
     pub position_mm: f64,
     /// Skews, degrees.
     pub skew_deg: f64,
-    /// Distortion W, dimensionless.
+    /// Distortion coefficient W, dimensionless.
     pub w: f64,
 }
 
@@ -100,29 +100,29 @@ impl Default for GeometryErrors {
     }
 }
 
-/// A simulated rig.
+/// Configuration of a simulated rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimConfig {
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// How much is simulated.
+    /// Level of detail.
     pub level: SimLevel,
     /// The skin.
     pub outline: SkinOutline,
-    /// The drawn geometry: what the rig says about itself.
+    /// Nominal geometry, as reported by the rig.
     pub nominal: StereoGeometry,
-    /// How far the truth is from it.
+    /// Deviation of the true geometry from it.
     pub geometry_errors: GeometryErrors,
-    /// Where the skin lies in the robot's frame.
+    /// Pose of the skin in the robot frame.
     pub robot_from_skin: RigidTransform<Robot, Skin>,
-    /// Smallest and largest coordinates that the robot reaches, robot frame, mm (omega3.md: axis extremes that
-    /// users of an omega.3 report; the true workspace shrinks off the axes, and x reaches less).
+    /// Smallest and largest reachable coordinates, robot frame, mm (omega3.md: axis extremes reported by users of an omega.3; the true
+    /// workspace is smaller off the axes, and in x).
     pub workspace_mm: ([f64; 3], [f64; 3]),
-    /// Where the tip is at the beginning, skin frame.
+    /// Initial tip position, skin frame.
     pub start: Point3<Skin>,
     /// Rows of each camera that see the skin (public code: 185..=360 and 200..=355).
     pub skin_rows: [(u16, u16); 2],
-    /// Side of the tip's square end, mm. The paper says "cubic tip" without a size (assumed).
+    /// Side length of the tip's square end, mm. The paper says "cubic tip" without a size (assumed).
     pub tip_side_mm: f64,
     /// Thickness of the skin, mm (paper: 4).
     pub skin_thickness_mm: f64,
@@ -132,16 +132,16 @@ pub struct SimConfig {
     pub camera_clock: CameraClockConfig,
     /// The trigger box.
     pub trigger_box: TriggerBoxConfig,
-    /// Rates and spreads of the geometric level.
+    /// Event rates and spreads of the geometric level.
     pub geometric: GeometricConfig,
-    /// Where the tip touched the skin before this rig began, skin frame: a further leg of a run goes on with them.
+    /// Earlier contacts, skin frame, for further legs of a run.
     pub pressed_before: Vec<Point2>,
-    /// What goes wrong.
+    /// Injected faults.
     pub faults: Vec<Fault>,
 }
 
-/// The drawn rig: cameras at the guesses that the public code gives as measured, (45, -35) and (45, 46), with
-/// an undistorted lens of 120° and no skew.
+/// Nominal geometry: cameras at the positions that the public code states as measured, (45, -35) and (45, 46), with an undistorted lens of
+/// 120° and no skew.
 pub const DRAWN: StereoGeometry = {
     const fn camera(y_mm: f64) -> CameraModel {
         CameraModel {
@@ -160,7 +160,7 @@ pub const DRAWN: StereoGeometry = {
 };
 
 impl SimConfig {
-    /// The default rig with this seed and level.
+    /// Default rig with this seed and level.
     #[must_use]
     pub fn new(seed: u64, level: SimLevel) -> Self {
         Self {
@@ -169,7 +169,7 @@ impl SimConfig {
             outline: SkinOutline::PAPER,
             nominal: DRAWN,
             geometry_errors: GeometryErrors::default(),
-            // The skin lies turned by the angle of the 7-24-25 triangle about z; its centre is near the robot's.
+            // The skin is rotated by the angle of the 7-24-25 triangle about z; its centre is near the robot's.
             robot_from_skin: RigidTransform::new(
                 [[0.96, -0.28, 0.0], [0.28, 0.96, 0.0], [0.0, 0.0, 1.0]],
                 [-6.0, -3.0, -15.0],
@@ -188,7 +188,7 @@ impl SimConfig {
         }
     }
 
-    /// The true geometry: the drawn one with this seed's errors.
+    /// The true geometry: the nominal one with the errors of this seed.
     #[must_use]
     pub fn true_geometry(&self) -> StereoGeometry {
         let errors = self.geometry_errors;
@@ -206,7 +206,7 @@ impl SimConfig {
         StereoGeometry { cameras }
     }
 
-    /// What the pixel model of `camera` is told.
+    /// Input of the pixel model of `camera`.
     #[must_use]
     pub fn scene(&self, camera: CameraId) -> SceneConfig {
         SceneConfig {

@@ -1,7 +1,7 @@
-//! What single contacts of the tip with the skin are like, drawn by their identity: place, and how often the tip was there before.
+//! Random properties of contacts, determined by location and number of earlier contacts there.
 //!
-//! A counter over all contacts would let a run that is resumed, or that retakes a press, meet other contacts than the same run in one
-//! go. By place and number, what happens elsewhere has no influence.
+//! With one counter over all contacts, a resumed run or a retake would get other contacts than the same run without interruption. With a
+//! counter per location, events elsewhere have no influence.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -10,31 +10,31 @@ use skinrig_model::Point2;
 
 use crate::random::{Purpose, Stream, derive_seed};
 
-/// Side of the squares that tell places apart, mm.
+/// Size of the grid cells that distinguish locations, mm.
 const CELL_MM: f64 = 1.0;
-/// Where the squares' sides lie, as a share of [`CELL_MM`] below whole multiples of it: far from the round numbers at which protocols
-/// press, so that the robot's wander of some 0.01 mm does not move a place into the next square.
+/// Offset of the cell borders as a share of [`CELL_MM`] below whole multiples: far from the round numbers at which protocols press, so that
+/// the robot's wander of some 0.01 mm does not change the cell.
 const OFFSET: f64 = 0.55;
 
-/// A square of the skin.
+/// A grid cell of the skin.
 type Cell = (i64, i64);
 
-/// Where the tip touched the skin so far. Clones share it: it goes on from one start of a camera to the next.
+/// Number of contacts per cell so far. Clones share it, across starts of a camera.
 #[derive(Debug, Clone, Default)]
 pub struct Contacts(Arc<Mutex<BTreeMap<Cell, u32>>>);
 
-/// Which contact it is.
+/// Identity of a contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Contact {
     cell: Cell,
-    /// Earlier contacts there.
+    /// Earlier contacts in the cell.
     before: u32,
-    /// Earlier contacts anywhere.
+    /// Earlier contacts in total.
     pub number: u32,
 }
 
 impl Contacts {
-    /// After contacts at these places, in whichever order.
+    /// State after contacts at these points, in any order.
     #[must_use]
     pub fn after(places: &[Point2]) -> Self {
         let contacts = Self::default();
@@ -48,7 +48,7 @@ impl Contacts {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The tip touches at `place`.
+    /// Registers a contact at `place`.
     pub(crate) fn next(&self, place: Point2) -> Contact {
         let cell = (cell(place.x_mm), cell(place.y_mm));
         let mut contacts = self.lock();
@@ -71,7 +71,7 @@ impl PartialEq for Contacts {
 }
 
 impl Contact {
-    /// The numbers of this contact alone, for a camera whose pixels have this seed.
+    /// Random numbers of this contact, for a camera whose pixels have this seed.
     pub(crate) fn random(self, seed: u64) -> Stream {
         let (x, y) = self.cell;
         let seed = [x as u64, y as u64].into_iter().fold(seed, |seed, part| {

@@ -1,15 +1,15 @@
-//! The own clock of a simulated camera or trigger box: an offset and a constant drift against world time.
+//! Clock of a simulated camera or trigger box: an offset and a constant drift against world time.
 
 use crate::random::Stream;
 
-/// World time (ns) to a device's own time (µs), in integers.
+/// Converts world time (ns) to a device's time (µs) in integer arithmetic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DriftingClock {
     /// The device's time at `epoch_ns`, ns.
     origin_ns: i64,
-    /// World time at which the clock began to count from its origin, ns.
+    /// World time at which the clock had its origin, ns.
     epoch_ns: i64,
-    /// Parts per billion by which it is fast.
+    /// Rate deviation, parts per billion; positive is fast.
     drift_ppb: i64,
 }
 
@@ -25,7 +25,7 @@ impl DriftingClock {
         }
     }
 
-    /// The device's time at world time `t_ns`, µs.
+    /// Device time at world time `t_ns`, µs.
     #[must_use]
     pub(crate) const fn own_us(&self, t_ns: i64) -> u64 {
         let passed = t_ns - self.epoch_ns;
@@ -33,28 +33,27 @@ impl DriftingClock {
         if ns < 0 { 0 } else { ns as u64 / 1_000 }
     }
 
-    /// The same clock, set forward by `by_us`.
+    /// The same clock set forward by `by_us`.
     #[must_use]
     pub const fn stepped(mut self, by_us: i64) -> Self {
         self.origin_ns += by_us * 1_000;
         self
     }
 
-    /// What the clock gains on world time in `passed` ns.
+    /// Deviation from world time after `passed` ns.
     const fn gained_ns(&self, passed: i64) -> i64 {
-        // Whole and broken seconds apart, so that no product leaves 64 bits in any run.
+        // Separate whole seconds and fraction, so that no product exceeds 64 bits in any run.
         let (whole, rest) = (passed / 1_000_000_000, passed % 1_000_000_000);
         whole * self.drift_ppb + rest * self.drift_ppb / 1_000_000_000
     }
 
-    /// How much world time a span of the device's time takes, ns; for spans short enough that the drift's square does
-    /// not count.
+    /// World time of a device time span, ns; for spans so short that the square of the drift is negligible.
     #[must_use]
     pub(crate) const fn world_ns(&self, own_ns: i64) -> i64 {
         own_ns - self.gained_ns(own_ns)
     }
 
-    /// Parts per billion by which the clock is fast.
+    /// Rate deviation, parts per billion; positive is fast.
     #[must_use]
     pub const fn drift_ppb(&self) -> i64 {
         self.drift_ppb

@@ -1,168 +1,166 @@
-//! Fault injection: what goes wrong in a simulated rig, as data.
+//! Fault injection: faults of a simulated rig, as data.
 
 use skinrig_model::{CameraId, HostTime};
 
-/// When a fault strikes.
+/// When a fault occurs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum When {
-    /// At this instant.
+pub enum FaultTrigger {
+    /// At this time.
     At(HostTime),
-    /// When the tip touches the skin for the n-th time, counted from 0.
+    /// At the n-th contact, counted from 0.
     Contact(u32),
-    /// When this moment comes for the n-th time, counted from 0.
-    Moment(Moment, u32),
+    /// At the n-th occurrence of this motion phase, counted from 0.
+    Moment(MotionPhase, u32),
 }
 
-/// A moment of a run as the simulated robot sees it. Every way down counts, also one that looks for the surface and one of
-/// an attempt that did not succeed.
+/// A motion phase as seen by the simulated robot. Every descent counts, including those that search for the surface and those of failed
+/// attempts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Moment {
+pub enum MotionPhase {
     /// The motors are switched on.
     Arming,
-    /// The tip is sent sideways above the skin.
+    /// A sideways motion above the skin starts.
     Travel,
-    /// The tip is sent down to the skin.
+    /// A descent to the skin starts.
     Approach,
-    /// The set point comes to rest in the skin.
+    /// The set point stops in the skin.
     Hold,
-    /// The tip is sent up out of the skin.
+    /// An ascent from the skin starts.
     Retract,
-    /// The set point comes to rest above the skin after a way up.
+    /// The set point stops above the skin after an ascent.
     Between,
 }
 
-/// Something that goes wrong.
+/// A fault.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Fault {
-    /// The robot answers no more; it brakes where it is. Seen as [`skinrig_device::DeviceError::Lost`].
-    IndenterLost(When),
-    /// From then on the robot follows its set point with this share (in percent) of its usual swiftness: it
-    /// settles late, or with a small share never in time.
+    /// The robot stops responding and brakes at its position. Seen as [`skinrig_device::DeviceError::Lost`].
+    IndenterLost(FaultTrigger),
+    /// The robot follows its set point with this percentage of its usual bandwidth: it settles late, or never in time.
     Sluggish {
-        /// When it begins.
-        when: When,
+        /// Start.
+        when: FaultTrigger,
         /// 1 to 100.
         percent: u32,
     },
-    /// From then on the tip is so much higher than the robot reports (negative: lower); it gets there at `HEIGHT_OFF_MM_S`.
+    /// The tip is higher than the robot reports (negative: lower); the offset grows at `HEIGHT_OFF_MM_S`.
     HeightOff {
-        /// When it begins.
-        when: When,
-        /// How much higher, µm.
+        /// Start.
+        when: FaultTrigger,
+        /// Offset, µm.
         by_um: i32,
     },
-    /// The tip stays where it is, whatever the robot is told; its pose stream goes on.
-    IndenterStuck(When),
-    /// For `SPIKE_NS` the robot reports `SPIKE_N` more than it feels.
-    ForceSpike(When),
-    /// No pose sample comes any more, and no error either.
-    PosesStale(When),
+    /// The tip stays in place and ignores commands; the pose stream continues.
+    IndenterStuck(FaultTrigger),
+    /// The robot reports a force that is `SPIKE_N` too high, for `SPIKE_NS`.
+    ForceSpike(FaultTrigger),
+    /// The pose stream stops without an error.
+    PosesStale(FaultTrigger),
     /// A limit reads back with another value than written. Seen as
     /// [`skinrig_device::DeviceError::ReadBack`].
     IndenterReadBack,
-    /// A camera is unplugged. What it had sent is still delivered; then
+    /// A camera is unplugged. Data already sent is still delivered; then
     /// [`skinrig_device::DeviceError::Lost`].
     CameraUnplugged {
-        /// Which.
+        /// The camera.
         camera: CameraId,
-        /// When.
-        when: When,
+        /// Time of the fault.
+        when: FaultTrigger,
     },
     /// The next `words` 32-bit words of a camera are lost; seen in `lost_before` of the next chunk.
     CameraBytesLost {
-        /// Which.
+        /// The camera.
         camera: CameraId,
-        /// When.
-        when: When,
-        /// How many words.
+        /// Time of the fault.
+        when: FaultTrigger,
+        /// Number of words.
         words: u64,
     },
-    /// A camera sends nothing any more, and no error either.
+    /// A camera stops sending without an error.
     CameraStalled {
-        /// Which.
+        /// The camera.
         camera: CameraId,
-        /// When.
-        when: When,
+        /// Time of the fault.
+        when: FaultTrigger,
     },
     /// [`STORM_PIXELS`] pixels of a camera send [`STORM_PER_MS`] events per millisecond each, for `STORM_NS`.
     HotPixelStorm {
-        /// Which.
+        /// The camera.
         camera: CameraId,
-        /// When.
-        when: When,
+        /// Time of the fault.
+        when: FaultTrigger,
     },
-    /// The camera's clock is set forward.
+    /// A camera's clock jumps forward.
     ClockStep {
-        /// Which.
+        /// The camera.
         camera: CameraId,
-        /// When.
-        when: When,
-        /// By how much, µs.
+        /// Time of the fault.
+        when: FaultTrigger,
+        /// Size of the jump, µs.
         by_us: u32,
     },
-    /// A camera grows hotter by `HOT_C` within `HOT_RISE_NS`, stays so for `HOT_NS`, and cools down as fast.
+    /// A camera heats up by `HOT_C` within `HOT_RISE_NS`, stays hot for `HOT_NS`, and cools down as fast.
     CameraHot {
-        /// Which.
+        /// The camera.
         camera: CameraId,
-        /// When it begins.
-        when: When,
+        /// Start.
+        when: FaultTrigger,
     },
     /// A bias reads back with another value than written. Seen as
     /// [`skinrig_device::DeviceError::ReadBack`].
     CameraReadBack(CameraId),
-    /// A pulse of a mark never reaches a camera. Seen as lost edges; the start pulse's loss as stray edges and a missing
-    /// mark.
+    /// A pulse of a mark does not reach a camera. Seen as lost edges; a lost start pulse as stray edges and a missing mark.
     PulseLost {
-        /// Which camera.
+        /// The camera.
         camera: CameraId,
-        /// Which of the marks sent, from 0.
+        /// Index of the mark, from 0.
         train: u32,
-        /// Which pulse of it, from 0.
+        /// Index of the pulse, from 0.
         pulse: u32,
     },
-    /// A camera's trigger input loses, doubles and invents edges, each with this share of the edges sent, in percent.
+    /// A camera's trigger input loses, doubles and invents edges, each as a percentage of the edges sent.
     NoisyLine {
-        /// Which camera.
+        /// The camera.
         camera: CameraId,
         /// Edges that never arrive.
         lost_percent: u8,
         /// Edges that arrive twice, within 10 µs.
         doubled_percent: u8,
-        /// Edges that nobody sent, anywhere within a train.
+        /// Spurious edges anywhere within a train.
         spurious_percent: u8,
     },
-    /// The next mark reaches no camera, reaches both twice, or late; the box tells that it was sent as ever.
+    /// The next mark does not reach the cameras, reaches them twice, or late; the box reports it as sent.
     Mark {
-        /// What becomes of it.
-        fate: MarkFate,
-        /// From when on the next mark is meant.
-        when: When,
+        /// Effect on the mark.
+        fate: MarkFault,
+        /// The first mark after this time is affected.
+        when: FaultTrigger,
     },
-    /// From then on the trigger inputs of both cameras lose, double and invent edges, a fifth of each, and what the box sends to the
-    /// host is unreadable every now and then. Seen as [`skinrig_device::DeviceError::State`] when it is polled.
-    TriggerBoxNoisy(When),
-    /// The program is held up so long, as by a recorder that is slow: nobody looks at any device meanwhile.
+    /// The trigger inputs of both cameras lose, double and invent edges, 20 % each, and some data from the box to the host is unreadable. Seen
+    /// as [`skinrig_device::DeviceError::State`] when polled.
+    TriggerBoxNoisy(FaultTrigger),
+    /// The program stalls, for example because of a slow recorder: no device is polled meanwhile.
     HostHeldUp {
-        /// When.
-        when: When,
-        /// For so long, ms.
+        /// Time of the fault.
+        when: FaultTrigger,
+        /// Duration, ms.
         for_ms: u32,
     },
-    /// The trigger box answers no more. Seen as [`skinrig_device::DeviceError::Lost`].
-    TriggerBoxLost(When),
-    /// The n-th contact, counted from 0, gives no events in a camera (geometric level).
+    /// The trigger box stops responding. Seen as [`skinrig_device::DeviceError::Lost`].
+    TriggerBoxLost(FaultTrigger),
+    /// The n-th contact, counted from 0, produces no events in a camera (geometric level).
     DeadPress {
-        /// Which camera.
+        /// The camera.
         camera: CameraId,
-        /// Which contact.
+        /// Index of the contact.
         contact: u32,
     },
 }
 
-/// What becomes of a mark.
+/// Effect of a fault on a mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MarkFate {
-    /// No pulse of it arrives.
+pub enum MarkFault {
+    /// None of its pulses arrives.
     Lost,
     /// It arrives twice, one after the other.
     Doubled,
@@ -170,23 +168,23 @@ pub enum MarkFate {
     Delayed,
 }
 
-/// How late a delayed mark arrives, ns.
+/// Delay of a delayed mark, ns.
 pub(crate) const DELAY_NS: i64 = 20_000_000;
-/// How long a force spike lasts, ns.
+/// Duration of a force spike, ns.
 pub(crate) const SPIKE_NS: i64 = 50_000_000;
-/// How high it is, N: more than the robot can push.
+/// Height of a force spike, N; more than the robot can exert.
 pub(crate) const SPIKE_N: f64 = 20.0;
-/// How fast the true height leaves the reported one, mm/s: slow enough for the skin's viscous force to stay small.
+/// Rate at which the true height deviates from the reported one, mm/s; slow enough for a small viscous force.
 pub(crate) const HEIGHT_OFF_MM_S: f64 = 10.0;
-/// How many pixels take part in a storm.
+/// Number of pixels in an event storm.
 pub const STORM_PIXELS: u16 = 40;
-/// Events of each of them per millisecond.
+/// Events per pixel and millisecond.
 pub const STORM_PER_MS: i64 = 20;
-/// How long a storm lasts, ns.
+/// Duration of an event storm, ns.
 pub(crate) const STORM_NS: i64 = 300_000_000;
-/// How much hotter a camera grows, °C.
+/// Temperature rise of a hot camera, °C.
 pub(crate) const HOT_C: f64 = 40.0;
-/// How long it takes to grow so hot, and to cool down again, ns.
+/// Time to heat up, and to cool down again, ns.
 pub(crate) const HOT_RISE_NS: i64 = 1_000_000_000;
-/// How long it stays so hot, ns.
+/// Time at the raised temperature, ns.
 pub(crate) const HOT_NS: i64 = 6_000_000_000;

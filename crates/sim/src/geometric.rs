@@ -1,5 +1,5 @@
-//! The geometric level: Poisson events around the projected column of the contact, from rates fitted to
-//! the published recording's figures. No optics, and no localisation error but that of sampling.
+//! The geometric level: Poisson events around the projected column of the contact, with rates fitted to figures of the published
+//! recording. No optics; the only localisation error is sampling noise.
 
 use skinrig_model::{Point2, Polarity, SENSOR_HEIGHT, SENSOR_WIDTH};
 
@@ -7,11 +7,10 @@ use crate::columns::ColumnTable;
 use crate::random::{Purpose, Stream};
 use crate::scene::{GRID_NS, PixelEvent, PixelModel, SceneConfig, TipSample};
 
-/// Rates and spreads per camera.
+/// Event rates and spreads of a camera.
 ///
-/// Sources: dataset.md section 5 gives both cameras together 28.6 kev/s during a press of 0.55 s and 9.1 kev/s
-/// between presses; dependence on distance, share of polarities and decay are fitted to the synthetic sample
-/// recordings in the published layout.
+/// Sources: dataset.md section 5 gives 28.6 kev/s for both cameras together during a press of 0.55 s, and 9.1 kev/s between presses. The
+/// dependence on distance, the polarity shares and the decay are fitted to the synthetic sample recordings in the published layout.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GeometricConfig {
     /// Events per mm of the tip's downward travel in the skin, at `reference_mm`.
@@ -24,12 +23,11 @@ pub struct GeometricConfig {
     pub relax_s: f64,
     /// Share of OFF events while pressing, and of ON events while releasing.
     pub polarity_share: f64,
-    /// Distance from the camera at which the rates above hold, mm.
+    /// Distance from the camera at which these rates hold, mm.
     pub reference_mm: f64,
-    /// Rates fall as `1 / (distance + this)`, mm.
+    /// Rates are proportional to `1 / (distance + fall_off_mm)`.
     pub fall_off_mm: f64,
-    /// Standard deviation of the soft halo around the tip's footprint at 2 mm depth, mm; grows with the
-    /// square root of the depth.
+    /// Standard deviation of the soft halo around the tip's footprint at 2 mm depth, mm; proportional to the square root of the depth.
     pub halo_mm: f64,
     /// Standard deviation along the rows as a share of the height of the visible skin.
     pub row_share: f64,
@@ -37,14 +35,14 @@ pub struct GeometricConfig {
     pub background_hz: f64,
     /// Number of hot pixels.
     pub hot_pixels: usize,
-    /// Events per second of the hottest; the k-th has a 1/k-th of it.
+    /// Event rate of the hottest pixel, events per second; the k-th has 1/k of it.
     pub hottest_hz: f64,
-    /// Probability that a contact gives no events in a camera (the public code removes 11 of 250 presses by
-    /// hand; the paper: no prominent cluster).
+    /// Probability that a contact produces no events in a camera (the public code removes 11 of 250 presses by hand; the paper: no prominent
+    /// cluster).
     pub dead_share: f64,
-    /// Half width of the uniform variation of a contact's strength about 1.
+    /// Half width of the uniform variation of a contact's strength around 1.
     pub strength_spread: f64,
-    /// Contacts, counted from 0 over all places, that are dead whatever is drawn (fault injection).
+    /// Contacts, counted from 0 over all locations, without events (fault injection).
     pub dead_contacts: Vec<u32>,
 }
 
@@ -71,8 +69,8 @@ impl Default for GeometricConfig {
 }
 
 impl GeometricConfig {
-    /// The same camera when the lamps are off (assumption): presses make no events, and of the background a third is left, about
-    /// what leakage is of the optical level's noise. Hot pixels need no light.
+    /// The same camera with the lamps off (assumption): presses produce no events, and a third of the background remains, about the share of
+    /// leakage in the noise of the optical level. Hot pixels remain.
     #[must_use]
     pub fn dark(&self) -> Self {
         Self {
@@ -85,7 +83,7 @@ impl GeometricConfig {
     }
 }
 
-/// One place where the skin was pressed and still relaxes.
+/// A pressed location that is still relaxing.
 #[derive(Debug, Clone)]
 struct Site {
     at: Point2,
@@ -93,9 +91,9 @@ struct Site {
     columns: Vec<f64>,
     /// Standard deviation of the halo, columns at 2 mm depth.
     halo_px: f64,
-    /// Rate factor: distance, strength, dead or not.
+    /// Rate factor: distance, strength, and whether the contact is dead.
     gain: f64,
-    /// Events still to come from the relaxation.
+    /// Expected events left in the relaxation.
     left: f64,
 }
 
@@ -116,12 +114,12 @@ pub struct GeometricModel {
     decay: f64,
 }
 
-/// Where an event comes from.
+/// Origin of an event.
 #[derive(Clone, Copy)]
 enum Source {
     Background,
     Hot,
-    /// The newest site, at this depth, with this share of ON.
+    /// The newest site, at this depth, with this share of ON events.
     Motion {
         depth_mm: f64,
         on_share: f64,
@@ -129,11 +127,11 @@ enum Source {
     Relaxing(usize),
 }
 
-/// A site with fewer events to come is forgotten.
+/// A site with fewer expected events is removed.
 const NEGLIGIBLE: f64 = 0.5;
 
 impl GeometricModel {
-    /// The model of one camera.
+    /// Model of one camera.
     #[must_use]
     pub fn new(scene: &SceneConfig, config: &GeometricConfig) -> Self {
         let mut pixels = Stream::new(scene.seed, Purpose::Pixels, 1);
@@ -188,13 +186,13 @@ impl GeometricModel {
         });
     }
 
-    /// One grid step: from `a` to `b`.
+    /// Simulates one grid step from `a` to `b`.
     fn step(&mut self, a: TipSample, b: TipSample, out: &mut Vec<PixelEvent>) {
         let dt_s = (b.t_ns - a.t_ns) as f64 * 1e-9;
         let (from, to) = ((-a.position.z_mm).max(0.0), (-b.position.z_mm).max(0.0));
         if b.position.z_mm < 0.0 {
             let at = b.position.plane();
-            // A tip that slides along the skin (no protocol does it) leaves a row of sites 1 mm apart.
+            // A tip that slides along the skin (no protocol does that) leaves a row of sites 1 mm apart.
             let slid = self
                 .sites
                 .last()
@@ -295,7 +293,7 @@ impl GeometricModel {
                 (x, y, 0.48)
             }
             Source::Hot => {
-                // The k-th hottest has a share of 1/k.
+                // The k-th hottest has a weight of 1/k.
                 let mut pick = self.events.unit() * self.hot_hz;
                 let mut chosen = 0;
                 for k in 0..self.hot.len() {
@@ -328,7 +326,7 @@ impl GeometricModel {
         })
     }
 
-    /// A pixel near the contact: a point of the footprint, plus the halo, and a row about the skin's middle.
+    /// A pixel near the contact: a point of the footprint plus halo, and a row near the middle of the skin.
     fn around(&mut self, site: usize, depth_mm: f64) -> Option<(f64, f64)> {
         let site = self.sites.get(site)?;
         let point = ((self.events.bits() >> 32) * site.columns.len() as u64) >> 32;
@@ -338,7 +336,7 @@ impl GeometricModel {
         let (low, high) = (f64::from(low), f64::from(high));
         let sigma = self.config.row_share * (high - low);
         let y = (low + high + 1.0) / 2.0 + sigma * self.events.gauss();
-        // A point outside the field of view is NaN, which lies in no range of columns.
+        // A point outside the field of view is NaN, which is in no column range.
         Some((x, y))
     }
 }

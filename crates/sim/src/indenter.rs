@@ -1,22 +1,22 @@
-//! The simulated robot behind the `Indenter` trait.
+//! The simulated robot.
 
 use skinrig_device::{DeviceError, Indenter, IndenterCapabilities, MotionLimits, RobotSample};
 use skinrig_model::{DeviceIdentity, DeviceRole, Point3, Robot, Setting};
 
 use crate::config::SimConfig;
-use crate::faults::{Fault, When};
+use crate::faults::{Fault, FaultTrigger};
 use crate::world::{Shared, World};
 use skinrig_device::limits;
 
-/// The simulated robot: like an omega.3, with force sensing that a real one only estimates.
+/// A simulated robot like an omega.3, but with real force sensing.
 pub(crate) struct SimIndenter {
     shared: Shared,
     serial: String,
     workspace_mm: ([f64; 3], [f64; 3]),
     max_acceleration_mm_s2: f64,
     limits: Option<MotionLimits>,
-    lost: Option<When>,
-    stale: Option<When>,
+    lost: Option<FaultTrigger>,
+    stale: Option<FaultTrigger>,
     read_back_fault: bool,
 }
 
@@ -45,7 +45,7 @@ impl SimIndenter {
     }
 
     fn check_lost(&self, world: &World) -> Result<(), DeviceError> {
-        match self.lost.filter(|&when| world.has_struck(when)) {
+        match self.lost.filter(|&when| world.has_occurred(when)) {
             None => Ok(()),
             Some(_) => Err(DeviceError::Lost {
                 role: DeviceRole::Indenter,
@@ -140,7 +140,7 @@ impl Indenter for SimIndenter {
         for at in [self.lost, self.stale]
             .into_iter()
             .flatten()
-            .filter_map(|when| world.struck_at(when))
+            .filter_map(|when| world.occurred_at(when))
         {
             let new = samples.split_off(from);
             samples.extend(new.into_iter().filter(|s| s.t.0 < at));

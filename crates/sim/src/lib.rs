@@ -1,9 +1,8 @@
-//! A seeded skin world, simulated devices, replayed devices, fault injection.
+//! Simulated and replayed rigs: a seeded skin world, simulated devices, fault injection, and replay of recordings.
 //!
-//! [`simulated_rig`] gives the devices of a bench that exists only in numbers: a robot, two event cameras and a
-//! trigger box which share one world and one clock. Everything follows from [`SimConfig`]: equal configurations
-//! and equal commands at equal times give equal bytes on every machine, however often the devices are
-//! polled. [`replay`] serves a recording through the same traits.
+//! [`simulated_rig`] returns the devices of a simulated bench: a robot, two event cameras and a trigger box with a common world and clock.
+//! [`SimConfig`] determines everything: equal configurations and equal commands at equal times give equal bytes on every machine,
+//! however often the devices are polled. [`replay`] serves a recording through the same traits.
 
 pub mod camera;
 mod camera_stream;
@@ -14,21 +13,21 @@ pub mod contacts;
 pub mod drifting;
 pub mod faults;
 pub mod geometric;
-mod held_up;
 pub mod indenter;
 pub mod line;
-pub mod moments;
 pub mod motion;
 pub mod optical;
 mod pattern;
+pub mod phase_tracker;
 pub mod random;
 pub mod replay;
 pub mod rig;
 pub mod scene;
+mod stalling_clock;
 pub mod trigger;
 pub mod world;
 
-pub use clock::{Paced, SimClock};
+pub use clock::{PacedClock, SimClock};
 pub use config::SimConfig;
-pub use faults::{Fault, MarkFate, Moment, When};
+pub use faults::{Fault, FaultTrigger, MarkFault, MotionPhase};
 pub use rig::{in_real_time, simulated_rig};

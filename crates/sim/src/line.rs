@@ -1,5 +1,5 @@
-//! The trigger line of a simulated rig: trains on the inputs of both cameras, marks and periodic ones, what goes wrong on
-//! the way, and what the box tells of them on its own clock.
+//! The trigger line of a simulated rig: mark and sync trains on the inputs of both cameras, line faults, and the box's reports on its own
+//! clock.
 
 use std::collections::VecDeque;
 
@@ -7,30 +7,30 @@ use skinrig_model::{BoxReport, BoxTime, CameraId, Mark, PulseTrain};
 
 use crate::config::SimConfig;
 use crate::drifting::DriftingClock;
-use crate::faults::{DELAY_NS, Fault, MarkFate};
+use crate::faults::{DELAY_NS, Fault, MarkFault};
 use crate::random::{Purpose, Stream};
 
-/// The channel that the trigger box is wired to.
+/// Camera channel to which the trigger box is connected.
 pub(crate) const TRIGGER_CHANNEL: u8 = 0;
 
-/// An edge on a camera's trigger input, on world time.
+/// An edge on a camera's trigger input, in world time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LineEdge {
     /// World time, ns.
     pub t_ns: i64,
-    /// True for a rising edge.
+    /// Whether it is a rising edge.
     pub rising: bool,
 }
 
-/// A doubled edge follows the first within this, ns: a contact that bounces.
+/// Largest delay of a doubled edge, as from a bouncing contact, ns.
 const BOUNCE_NS: f64 = 10_000.0;
-/// A report reaches the host this long after what it tells, ns.
+/// Delay of a report to the host, ns.
 const REPORT_NS: i64 = 300_000;
 
-/// A train and the silence after it, ns of world time; the box's clock is at most some thousandths off.
+/// Duration of a train and the pause after it, ns of world time; the box's clock deviates by a few thousandths at most.
 const TRAIN_NS: i64 = PulseTrain::DURATION_US as i64 * 1_010;
 
-/// Shares of the edges of one camera, in percent.
+/// Line noise of one camera, in percent of the edges.
 #[derive(Debug, Clone, Copy, Default)]
 struct Noise {
     lost: f64,
@@ -38,35 +38,35 @@ struct Noise {
     spurious: f64,
 }
 
-/// The line.
+/// The trigger line.
 #[derive(Debug)]
 pub struct Line {
     clock: DriftingClock,
-    /// World time between two periodic trains, ns; 0 for none.
+    /// Interval of sync trains in world time, ns; 0 for none.
     sync_ns: i64,
     next_sync_ns: i64,
     syncs: u32,
     marks: u32,
-    /// The line is taken until then, world time, ns.
+    /// World time until which the line is busy, ns.
     busy_until_ns: i64,
-    /// A periodic train may start then, world time, ns: a whole train after the first edge of the one before.
+    /// World time from which a sync train may start, ns: a whole train after the first edge of the previous one.
     sync_after_ns: i64,
     lost_pulses: Vec<(CameraId, u32, u32)>,
-    /// What becomes of the next marks.
-    doomed: VecDeque<MarkFate>,
-    /// Faults whose mark was found.
+    /// Pending faults of marks.
+    doomed: VecDeque<MarkFault>,
+    /// Faults that were applied to a mark.
     done: Vec<usize>,
     noise: [Noise; 2],
     random: [Stream; 2],
-    /// Edges that the cameras have not taken yet.
+    /// Edges that the cameras have not fetched yet.
     edges: [VecDeque<LineEdge>; 2],
-    /// Reports with the world time at which they reach the host, in order.
+    /// Reports in order, with the world time of their arrival at the host.
     reports: VecDeque<(i64, BoxReport)>,
     input: bool,
 }
 
 impl Line {
-    /// The line of a rig, at world time 0.
+    /// Line of a rig at world time 0.
     #[must_use]
     pub fn new(config: &SimConfig) -> Self {
         let set = &config.trigger_box;
@@ -122,8 +122,8 @@ impl Line {
         self.clock
     }
 
-    /// From now on edges of both cameras are lost, doubled and invented.
-    pub(crate) const fn get_noisy(&mut self) {
+    /// Makes edges of both cameras noisy from now on.
+    pub(crate) const fn add_noise(&mut self) {
         let noise = Noise {
             lost: 20.0,
             doubled: 20.0,
@@ -132,15 +132,15 @@ impl Line {
         self.noise = [noise; 2];
     }
 
-    /// Fault `n` meets the next mark.
-    pub(crate) fn doom(&mut self, n: usize, fate: MarkFate) {
+    /// Applies fault `n` to the next mark.
+    pub(crate) fn set_mark_fault(&mut self, n: usize, fate: MarkFault) {
         if !self.done.contains(&n) {
             self.done.push(n);
             self.doomed.push_back(fate);
         }
     }
 
-    /// Sends the periodic trains that are due by `now_ns`; one that finds the line taken waits until it is free.
+    /// Sends the sync trains due by `now_ns`. A train waits while the line is busy.
     pub fn advance(&mut self, now_ns: i64) {
         while self.sync_ns > 0 {
             let start_ns = self.next_sync_ns.max(self.sync_after_ns);
@@ -162,35 +162,35 @@ impl Line {
         }
     }
 
-    /// Until when the line is taken, when it is at world time `now_ns`.
+    /// End of the current train, if the line is busy at world time `now_ns`.
     #[must_use]
     pub(crate) fn busy_until(&self, now_ns: i64) -> Option<i64> {
         (now_ns < self.busy_until_ns).then_some(self.busy_until_ns)
     }
 
-    /// Sends the train of a mark whose first edge rises at `rise_ns`; the line is taken until `until_ns`.
+    /// Sends the train of a mark whose first edge rises at `rise_ns`; the line is then busy until `until_ns`.
     pub fn send(&mut self, mark: Mark, train: PulseTrain, rise_ns: i64, until_ns: i64) {
         let at = self.time(rise_ns);
         self.tell(rise_ns, BoxReport::Mark { mark, at });
         let fate = self.doomed.pop_front();
         let late_ns = match fate {
-            None | Some(MarkFate::Lost) => 0,
-            Some(MarkFate::Doubled) => TRAIN_NS,
-            Some(MarkFate::Delayed) => DELAY_NS,
+            None | Some(MarkFault::Lost) => 0,
+            Some(MarkFault::Doubled) => TRAIN_NS,
+            Some(MarkFault::Delayed) => DELAY_NS,
         };
         let (first, second) = match fate {
             None => (Some(rise_ns), None),
-            Some(MarkFate::Lost) => (None, None),
-            Some(MarkFate::Doubled) => (Some(rise_ns), Some(rise_ns + late_ns)),
-            Some(MarkFate::Delayed) => (Some(rise_ns + late_ns), None),
+            Some(MarkFault::Lost) => (None, None),
+            Some(MarkFault::Doubled) => (Some(rise_ns), Some(rise_ns + late_ns)),
+            Some(MarkFault::Delayed) => (Some(rise_ns + late_ns), None),
         };
         for at_ns in [first, second].into_iter().flatten() {
             self.put(train, at_ns, Some(self.marks));
         }
         self.marks += 1;
-        // No other train comes into this one's way.
+        // No other train overlaps this one.
         self.busy_until_ns = until_ns + late_ns;
-        // What the host was told is free a latency earlier than the line is.
+        // For the host the line is free one latency earlier than in reality.
         self.sync_after_ns = rise_ns + late_ns + TRAIN_NS;
     }
 
@@ -202,12 +202,12 @@ impl Line {
         }
     }
 
-    /// The next report that has reached the host by `now_ns`, with the instant at which it did.
+    /// The next report that arrived at the host by `now_ns`, with its arrival time.
     pub fn take_report(&mut self, now_ns: i64) -> Option<(i64, BoxReport)> {
         self.reports.pop_front_if(|(t_ns, _)| *t_ns <= now_ns)
     }
 
-    /// Takes the edges on the input of camera `index`, in time order.
+    /// Takes the edges of camera `index` in time order.
     pub fn take_edges(&mut self, index: usize) -> impl Iterator<Item = LineEdge> {
         self.edges[index].drain(..)
     }
@@ -224,7 +224,7 @@ impl Line {
         self.reports.insert(at, (reaches, report));
     }
 
-    /// Puts the edges of a train on both inputs, `mark` being its number among the marks.
+    /// Puts a train on both inputs; `mark` is its index among the marks.
     fn put(&mut self, train: PulseTrain, rise_ns: i64, mark: Option<u32>) {
         for camera in CameraId::ALL {
             let i = camera.index();

@@ -1,4 +1,4 @@
-//! The robot's motion: a set point with limited acceleration, a tip that lags behind it, noise, and force.
+//! Motion of the simulated robot: a set point with limited acceleration, a lagging tip, noise, and force.
 
 use skinrig_model::{Point3, Robot};
 
@@ -7,17 +7,17 @@ use crate::random::{Purpose, Stream};
 /// Time step of the motion, s.
 const DT_S: f64 = 1e-3;
 
-/// How the simulated robot moves. Figures marked *assumed* have no public source.
+/// Motion parameters. Values marked *assumed* have no public source.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionConfig {
-    /// Acceleration and deceleration of the set point, mm/s² (omega3.md quotes public sample values of 0.1 to
-    /// 10 m/s²; assumed within them).
+    /// Acceleration and deceleration of the set point, mm/s² (omega3.md quotes public sample values of 0.1 to 10 m/s²; assumed within this
+    /// range).
     pub acceleration_mm_s2: f64,
     /// Natural frequency of the tip behind its set point, rad/s (assumed).
     pub lag_rad_s: f64,
     /// Damping ratio of the tip (assumed).
     pub damping: f64,
-    /// Standard deviation of the tip's wander about its place, per axis, mm (assumed).
+    /// Standard deviation of the tip's wander per axis, mm (assumed).
     pub wander_mm: f64,
     /// Correlation time of the wander, s (assumed).
     pub wander_s: f64,
@@ -48,7 +48,7 @@ impl Default for MotionConfig {
     }
 }
 
-/// The moving parts. Robot frame, one step per millisecond.
+/// State of the motion in the robot frame, in steps of one millisecond.
 #[derive(Debug, Clone)]
 pub struct Motion {
     config: MotionConfig,
@@ -60,14 +60,14 @@ pub struct Motion {
     velocity: [f64; 3],
     wander: [f64; 3],
     powered: bool,
-    /// Factor on the lag's frequency; a fault makes it small.
+    /// Factor on the lag frequency; reduced by a fault.
     pub sluggish: f64,
-    /// The tip does not move, by a fault.
+    /// Whether a fault holds the tip in place.
     pub stuck: bool,
 }
 
 impl Motion {
-    /// At rest at `at`, brakes on.
+    /// At rest with the brakes on.
     #[must_use]
     pub fn new(config: MotionConfig, seed: u64, at: Point3<Robot>) -> Self {
         Self {
@@ -85,7 +85,7 @@ impl Motion {
         }
     }
 
-    /// Motors on, holding the present position.
+    /// Switches the motors on and holds the current position.
     pub fn power_on(&mut self) {
         if !self.powered {
             self.powered = true;
@@ -95,7 +95,7 @@ impl Motion {
         }
     }
 
-    /// Motors off, brakes on: the tip stays where it is.
+    /// Switches the motors off and the brakes on: the tip stays in place.
     pub fn power_off(&mut self) {
         self.powered = false;
         self.target = None;
@@ -103,29 +103,29 @@ impl Motion {
         self.velocity = [0.0; 3];
     }
 
-    /// True between [`power_on`](Self::power_on) and [`power_off`](Self::power_off).
+    /// Whether the motors are on.
     #[must_use]
     pub(crate) const fn is_powered(&self) -> bool {
         self.powered
     }
 
-    /// From now on the set point accelerates by at most this much, mm/s².
+    /// Limits the acceleration of the set point from now on, mm/s².
     pub const fn set_acceleration(&mut self, acceleration_mm_s2: f64) {
         self.config.acceleration_mm_s2 = acceleration_mm_s2;
     }
 
-    /// Sends the set point to `target` along a straight line.
+    /// Moves the set point to `target` along a straight line.
     pub fn move_to(&mut self, target: Point3<Robot>, speed_mm_s: f64) {
         self.target = Some((target.to_array(), speed_mm_s));
     }
 
-    /// True when the set point does not move.
+    /// Whether the set point is at rest.
     #[must_use]
     pub(crate) fn is_at_rest(&self) -> bool {
         self.set_velocity == [0.0; 3]
     }
 
-    /// Brings the set point to rest.
+    /// Stops the set point.
     pub fn hold(&mut self) {
         self.target = None;
     }
@@ -136,21 +136,21 @@ impl Motion {
         point(self.set_point)
     }
 
-    /// Where the tip truly is, wander included.
+    /// True tip position, including wander.
     #[must_use]
     pub fn tip(&self) -> Point3<Robot> {
         point(std::array::from_fn(|i| self.tip[i] + self.wander[i]))
     }
 
-    /// The tip as measured. Draws noise: call once per step.
+    /// Measured tip position. Draws noise: call once per step.
     pub fn measure(&mut self) -> Point3<Robot> {
         let tip = self.tip().to_array();
         let sigma = self.config.measurement_mm;
         point(tip.map(|c| c + sigma * self.noise.gauss()))
     }
 
-    /// The force pushing the tip out of the skin at `depth_mm` (positive below the surface) and
-    /// `rate_mm_s`, without and with measurement noise, N. Call once per step.
+    /// Force that pushes the tip out of the skin at `depth_mm` (positive below the surface) and `rate_mm_s`, without and with measurement noise,
+    /// N. Call once per step.
     pub fn force_n(&mut self, depth_mm: f64, rate_mm_s: f64) -> (f64, f64) {
         let c = &self.config;
         let push = if depth_mm > 0.0 {
@@ -161,7 +161,7 @@ impl Motion {
         (push, push + c.force_noise_n * self.noise.gauss())
     }
 
-    /// One millisecond.
+    /// Simulates one millisecond.
     pub fn step(&mut self) {
         self.step_set_point();
         self.step_tip();
@@ -179,7 +179,7 @@ impl Motion {
                     self.set_velocity = [0.0; 3];
                     return;
                 }
-                // The fastest speed from which the set point can still stop in time, in steps of DT_S.
+                // The largest speed from which the set point can still stop in time, in steps of DT_S.
                 let stoppable = a_dt * ((0.25 + 2.0 * left / (a_dt * DT_S)).sqrt() - 0.5);
                 let v = speed.min(stoppable).min(left / DT_S);
                 way.map(|c| c / left * v)
@@ -202,7 +202,7 @@ impl Motion {
         for i in 0..3 {
             let noise = self.noise.gauss();
             if !self.powered || self.stuck {
-                continue; // the brakes hold; the draw keeps the streams of both cases in step
+                continue; // braked; the draw keeps both random streams in step
             }
             let pull = w * w * (self.set_point[i] - self.tip[i]);
             self.velocity[i] += (pull - 2.0 * c.damping * w * self.velocity[i]) * DT_S;

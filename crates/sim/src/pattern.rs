@@ -1,21 +1,21 @@
-//! The pattern that a simulated camera makes in place of its pixels' events.
+//! The test pattern of a simulated camera.
 
 use skinrig_device::PatternScan;
 use skinrig_model::Polarity;
 
 use crate::scene::{PixelEvent, PixelModel, TipSample};
 
-/// A scan of all pixels, column by column, at an even rate.
-pub(crate) struct Scanning {
+/// A scan of all pixels, column by column, at a constant rate.
+pub(crate) struct ScanModel {
     scan: PatternScan,
     /// Pixel of the next event.
     next: u32,
-    /// Part of an event that is due.
+    /// Fraction of the next event.
     due: f64,
 }
 
-impl Scanning {
-    /// A scan that begins in the first pixel.
+impl ScanModel {
+    /// A scan that starts at the first pixel.
     pub fn new(scan: PatternScan) -> Self {
         Self {
             scan,
@@ -25,7 +25,7 @@ impl Scanning {
     }
 }
 
-impl PixelModel for Scanning {
+impl PixelModel for ScanModel {
     fn advance(&mut self, tips: &[TipSample], out: &mut Vec<PixelEvent>) {
         let rows = u32::from(self.scan.rows);
         let pixels = u32::from(self.scan.columns) * rows;

@@ -1,14 +1,13 @@
-//! Seeded randomness that is the same on every machine: integer generators, and few transcendental functions,
-//! those from `libm`.
+//! Seeded random numbers that are equal on every machine: integer generators, and few transcendental functions, from `libm`.
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// What a stream of random numbers is for. Each purpose has its own stream, so that none disturbs another.
+/// Purpose of a random stream. Each purpose has its own stream, so that they do not influence each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Purpose {
-    /// How the simulated rig differs from its drawing.
+    /// Deviation of the simulated rig from its nominal geometry.
     Geometry = 1,
     /// The robot's settling and measurement noise.
     Robot = 2,
@@ -18,11 +17,11 @@ pub enum Purpose {
     CameraClock = 10,
     /// Pixels of camera 1 (camera 2: the next).
     Pixels = 20,
-    /// What a contact of the tip with the skin is like, by place and number.
+    /// Properties of contacts, by location and number.
     Contacts = 30,
 }
 
-/// The seed of a stream: `seed` and purpose mixed (SplitMix64's finaliser), `index` tells instances apart.
+/// Seed of a stream: mixes `seed` and purpose (SplitMix64's finaliser); `index` distinguishes instances.
 #[must_use]
 pub(crate) const fn derive_seed(seed: u64, purpose: Purpose, index: u64) -> u64 {
     let mut z = seed
@@ -38,7 +37,7 @@ pub(crate) const fn derive_seed(seed: u64, purpose: Purpose, index: u64) -> u64 
 pub struct Stream(Xoshiro256PlusPlus);
 
 impl Stream {
-    /// The stream for `purpose`.
+    /// Stream for `purpose`.
     #[must_use]
     pub fn new(seed: u64, purpose: Purpose, index: u64) -> Self {
         Self(Xoshiro256PlusPlus::seed_from_u64(derive_seed(
@@ -61,8 +60,7 @@ impl Stream {
         low + (high - low) * self.unit()
     }
 
-    /// Mean 0, standard deviation 1: the sum of four uniform numbers. Close to normal, never beyond 3.47, and
-    /// made without transcendental functions.
+    /// Mean 0, standard deviation 1: the sum of four uniform numbers. Nearly normal, within ±3.47, without transcendental functions.
     pub(crate) fn gauss(&mut self) -> f64 {
         let b = self.bits();
         let sum = (b & 0xffff) + ((b >> 16) & 0xffff) + ((b >> 32) & 0xffff) + (b >> 48);
@@ -70,7 +68,7 @@ impl Stream {
         (sum as f64 - 131_070.0) * (1.0 / 37_837.227_214_0)
     }
 
-    /// Exponential with mean 1: the distance of two events of a Poisson process of rate 1.
+    /// Exponential with mean 1: distance of consecutive events of a Poisson process with rate 1.
     pub fn exponential(&mut self) -> f64 {
         -libm::log(1.0 - self.unit())
     }

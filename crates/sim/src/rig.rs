@@ -1,22 +1,22 @@
-//! Puts a simulated rig together.
+//! Assembles a simulated rig.
 
 use skinrig_device::{CameraSettings, EventCamera, Rig, TriggerBox};
 use skinrig_model::{CameraId, LensKind, RigGeometry, SimLevel, StereoGeometry};
 
 use crate::camera::{PixelFactory, SimCamera};
-use crate::clock::{Boxed, Paced};
+use crate::clock::{BoxedClock, PacedClock};
 use crate::config::SimConfig;
 use crate::faults::Fault;
 use crate::geometric::GeometricModel;
-use crate::held_up::HeldUp;
 use crate::indenter::SimIndenter;
 use crate::line::TRIGGER_CHANNEL;
 use crate::optical::OpticalModel;
 use crate::scene::{PixelModel, SceneConfig};
+use crate::stalling_clock::StallingClock;
 use crate::trigger::SimTriggerBox;
 use crate::world::Shared;
 
-/// The rig that `config` describes, at time 0, with the jumping clock.
+/// The rig of `config` at time 0 with a simulated clock.
 #[must_use]
 pub fn simulated_rig(config: &SimConfig) -> Rig {
     let shared = Shared::new(config);
@@ -36,8 +36,8 @@ pub fn simulated_rig(config: &SimConfig) -> Rig {
         cameras: CameraId::ALL.map(camera),
         camera_settings: [settings.clone(), settings],
         trigger_box: Some(trigger_box),
-        clock: match HeldUp::new(shared.clone(), &config.faults) {
-            Some(held_up) => Box::new(held_up),
+        clock: match StallingClock::new(shared.clone(), &config.faults) {
+            Some(stalling) => Box::new(stalling),
             None => Box::new(shared.clock.clone()),
         },
         robot_from_skin: config.robot_from_skin,
@@ -51,10 +51,10 @@ pub fn simulated_rig(config: &SimConfig) -> Rig {
     }
 }
 
-/// Lets the clock of `rig` keep pace with real time.
+/// Slows the clock of `rig` down to real time.
 #[must_use]
 pub fn in_real_time(mut rig: Rig) -> Rig {
-    rig.clock = Box::new(Paced::new(Boxed(rig.clock)));
+    rig.clock = Box::new(PacedClock::new(BoxedClock(rig.clock)));
     rig
 }
 
@@ -82,7 +82,7 @@ fn pixel_factory(config: &SimConfig, id: CameraId) -> PixelFactory {
     })
 }
 
-/// The whole configuration as JSON: drawn and true geometry, every constant, the seed.
+/// The complete configuration as JSON: nominal and true geometry, all constants, and the seed.
 #[must_use]
 pub fn describe(config: &SimConfig) -> String {
     let cameras = |g: &StereoGeometry| -> Vec<serde_json::Value> {
@@ -97,7 +97,7 @@ pub fn describe(config: &SimConfig) -> String {
                     "half_fov_deg": half_fov_deg,
                     "w": w,
                 });
-                // The paper's lens goes without saying.
+                // Omit the paper's lens, which is the default.
                 if c.lens.kind() != LensKind::Exponential {
                     camera["lens"] = serde_json::json!(c.lens.kind());
                 }

@@ -1,27 +1,26 @@
-//! The seam between the skin world and what the pixels of a camera make of it.
+//! Interface between the skin world and the pixel models of the cameras.
 //!
-//! The world moves the tip; a [`PixelModel`] turns the tip's path into the events of one camera. Both live on
-//! *world time*: nanoseconds of the rig's host clock. A camera's own clock is added later.
+//! The world moves the tip; a [`PixelModel`] converts the tip's path into the events of one camera. Both use *world time*: nanoseconds of
+//! the rig's host clock. The camera's own clock is applied later.
 
 use skinrig_model::{CameraId, CameraModel, Point3, Polarity, Skin, SkinOutline};
 
 use crate::contacts::Contacts;
 use crate::random::{Purpose, derive_seed};
 
-/// Where the tip was. Samples lie on a grid of [`GRID_NS`]; the tip moves linearly between two of them.
+/// A tip position. Samples lie on a grid of [`GRID_NS`]; the tip moves linearly between them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TipSample {
     /// World time, ns.
     pub t_ns: i64,
-    /// Where the flat end of the tip truly was (without measurement noise), skin frame, mm. Below the surface
-    /// when `z_mm < 0`.
+    /// True position of the tip's flat end (without measurement noise), skin frame, mm. Below the surface if `z_mm < 0`.
     pub position: Point3<Skin>,
 }
 
-/// Distance of two tip samples, ns: the 1 kHz of the robot.
+/// Interval of tip samples, ns: the robot's 1 kHz.
 pub const GRID_NS: i64 = 1_000_000;
 
-/// An event of one pixel on world time.
+/// An event of one pixel in world time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PixelEvent {
     /// World time, ns.
@@ -30,46 +29,44 @@ pub struct PixelEvent {
     pub x: u16,
     /// Row, 0..480.
     pub y: u16,
-    /// Sign of the change.
+    /// Sign of the brightness change.
     pub polarity: Polarity,
 }
 
 /// The pixels of one camera.
 pub trait PixelModel: Send {
-    /// Goes on to the last of `tips` (in time order, strictly increasing, on the grid) and appends the events
-    /// from the end of the previous call (at the first call: from the first of `tips`) up to, not including,
-    /// `tips.last().t_ns`, sorted by time.
+    /// Advances to the last of `tips` (in strictly increasing time order, on the grid) and appends the events from the end of the previous
+    /// call (at the first call: from the first of `tips`) up to but excluding `tips.last().t_ns`, sorted by time.
     ///
-    /// Equal seeds and tips give equal events on every machine, however the tips are divided among calls.
+    /// Equal seeds and tips give equal events on every machine, however the tips are divided into calls.
     fn advance(&mut self, tips: &[TipSample], out: &mut Vec<PixelEvent>);
 }
 
-/// What a pixel model is told about its camera and skin.
+/// Input of a pixel model: its camera and the skin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneConfig {
-    /// Seed of everything random in this camera's pixels.
+    /// Seed of all random numbers of this camera's pixels.
     pub seed: u64,
-    /// How often the camera was started before. Each start has noise of its own; what the pixels are, hot ones among them, stays.
+    /// Number of earlier starts of the camera. Each start has its own noise; pixel properties, such as hot pixels, stay.
     pub start: u64,
     /// The skin.
     pub outline: SkinOutline,
     /// Which camera.
     pub camera_id: CameraId,
-    /// The camera's true geometry (what a calibration is looking for).
+    /// The camera's true geometry, which a calibration estimates.
     pub camera: CameraModel,
-    /// Rows that see the skin's edge from inside, both ends included (public code: camera 1 185..=360, camera 2
-    /// 200..=355). Other rows see the mould.
+    /// Rows that see the skin's edge from inside, inclusive (public code: camera 1 185..=360, camera 2 200..=355). Other rows see the mould.
     pub skin_rows: (u16, u16),
-    /// Side of the tip's square end, mm. The paper says "cubic tip" and no size: configuration.
+    /// Side length of the tip's square end, mm. The paper says "cubic tip" without a size: configurable.
     pub tip_side_mm: f64,
     /// Thickness of the skin, mm (paper: 4).
     pub skin_thickness_mm: f64,
-    /// Where the tip touched the skin so far. Models made of clones of this go on with it.
+    /// Contacts so far; shared by models built from clones.
     pub contacts: Contacts,
 }
 
 impl SceneConfig {
-    /// Seed of what is drawn anew at every start.
+    /// Seed of values drawn anew at every start.
     #[must_use]
     pub(crate) const fn seed_of_start(&self) -> u64 {
         match self.start {

@@ -1,4 +1,4 @@
-//! The simulated trigger box: the pulse trains of `skinrig_model::pulse` on the lines of both cameras.
+//! The simulated trigger box: sends the pulse trains of `skinrig_model::pulse` to both cameras.
 
 use skinrig_device::{DeviceError, TriggerBox, TriggerCapabilities};
 use skinrig_model::{
@@ -8,11 +8,11 @@ use skinrig_model::{
 
 use crate::config::{SimConfig, TriggerBoxConfig};
 use crate::drifting::DriftingClock;
-use crate::faults::{Fault, When};
+use crate::faults::{Fault, FaultTrigger};
 use crate::random::{Purpose, Stream};
 use crate::world::Shared;
 
-/// A noisy box sends something unreadable once in this time, ns.
+/// Interval at which a noisy box sends unreadable data, ns.
 const NOISE_EVERY_NS: i64 = 1_000_000_000;
 
 /// A simulated trigger box.
@@ -22,13 +22,13 @@ pub(crate) struct SimTriggerBox {
     serial: String,
     latencies: Stream,
     delays: Stream,
-    /// When the host next asks for the time, ns.
+    /// Time of the next time exchange, ns.
     next_exchange_ns: i64,
-    /// An exchange whose answer is still under way.
+    /// An exchange whose reply is still in transit.
     exchange: Option<(i64, BoxReport)>,
-    lost: Option<When>,
-    noisy: Option<When>,
-    /// When something unreadable came last, ns.
+    lost: Option<FaultTrigger>,
+    noisy: Option<FaultTrigger>,
+    /// Time of the last unreadable data, ns.
     noise_ns: Option<i64>,
 }
 
@@ -66,7 +66,7 @@ impl SimTriggerBox {
         }
     }
 
-    /// The next exchange of time, with the instant at which its answer reaches the host.
+    /// The next time exchange with the arrival time of its reply.
     fn next_exchange(&mut self, clock: DriftingClock) -> Option<(i64, BoxReport)> {
         if self.config.exchange_period_ms == 0 {
             return None;
@@ -100,7 +100,7 @@ impl TriggerBox for SimTriggerBox {
 
     fn capabilities(&self) -> TriggerCapabilities {
         TriggerCapabilities {
-            // 200 µs longer than the longest train, which covers the latency.
+            // 200 µs longer than the longest train, to cover the latency.
             train_duration: HostDuration::from_micros(PulseTrain::DURATION_US as i64),
         }
     }
@@ -108,7 +108,7 @@ impl TriggerBox for SimTriggerBox {
     fn send(&mut self, mark: Mark) -> Result<SentMark, DeviceError> {
         let now = self.shared.now();
         let mut world = self.shared.world();
-        if self.lost.is_some_and(|when| world.has_struck(when)) {
+        if self.lost.is_some_and(|when| world.has_occurred(when)) {
             return Err(self.gone());
         }
         if let Some(until) = world.line.busy_until(now.0) {
@@ -145,11 +145,11 @@ impl TriggerBox for SimTriggerBox {
         let now = self.shared.now();
         let shared = self.shared.clone();
         let mut world = shared.world();
-        if self.lost.is_some_and(|when| world.has_struck(when)) {
+        if self.lost.is_some_and(|when| world.has_occurred(when)) {
             return Err(self.gone());
         }
         let clock = world.line.clock();
-        // Both in the order in which they reach the host.
+        // Both in order of arrival at the host.
         loop {
             if self.exchange.is_none() && self.next_exchange_ns <= now.0 {
                 self.exchange = self.next_exchange(clock);
@@ -164,7 +164,7 @@ impl TriggerBox for SimTriggerBox {
             }
         }
         let due_ns = self.noise_ns.map_or(0, |t_ns| t_ns + NOISE_EVERY_NS);
-        if self.noisy.is_some_and(|when| world.has_struck(when)) && now.0 >= due_ns {
+        if self.noisy.is_some_and(|when| world.has_occurred(when)) && now.0 >= due_ns {
             self.noise_ns = Some(now.0);
             return Err(DeviceError::State {
                 role: DeviceRole::TriggerBox,

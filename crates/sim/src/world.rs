@@ -1,8 +1,7 @@
-//! The skin world that the simulated devices share: the robot's motion on a grid of 1 ms, who has seen how
-//! much of it, and the edges on the trigger lines.
+//! The skin world shared by the simulated devices: motion on a grid of 1 ms, the reading position of each device, and the trigger line.
 //!
-//! The world never depends on who looks when: it goes on in steps of [`GRID_NS`], and each device reads what
-//! has happened up to the last grid point before the clock's present.
+//! The world does not depend on polling: it advances in steps of [`GRID_NS`], and each device reads everything up to the last grid point
+//! before the current time.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -12,16 +11,16 @@ use skinrig_model::{HostTime, Point3, RigidTransform, Robot, Skin};
 
 use crate::clock::SimClock;
 use crate::config::SimConfig;
-use crate::faults::{Fault, HEIGHT_OFF_MM_S, SPIKE_N, SPIKE_NS, When};
+use crate::faults::{Fault, FaultTrigger, HEIGHT_OFF_MM_S, SPIKE_N, SPIKE_NS};
 use crate::line::Line;
-use crate::moments::Moments;
 use crate::motion::Motion;
+use crate::phase_tracker::PhaseTracker;
 use crate::scene::{GRID_NS, TipSample};
 
-/// The tip has left the skin above this height, mm: measured at rest on the surface, it does not leave and touch again.
+/// Height above which the tip has left the skin, mm; a hysteresis for a tip measured at rest on the surface.
 const LEFT_MM: f64 = 0.05;
 
-/// What the tip and the trigger line do.
+/// State of the world.
 #[derive(Debug)]
 pub struct World {
     /// The robot.
@@ -33,23 +32,23 @@ pub struct World {
     tips: VecDeque<TipSample>,
     /// Grid index of `tips[0]`.
     tips_from: i64,
-    /// Next grid index that each camera wants; `None` while it does not stream.
+    /// Next grid index of each camera; `None` while it does not stream.
     wanted: [Option<i64>; 2],
     /// The trigger line.
     pub line: Line,
     contacts: u32,
     contact_times: Vec<i64>,
-    moments: Moments,
+    phases: PhaseTracker,
     touching: bool,
     last_z_mm: f64,
-    /// How much higher the tip is than the robot reports, by a fault, mm.
+    /// Height of the tip above the reported one because of a fault, mm.
     height_off_mm: f64,
     force_limit_n: f64,
-    /// The robot has stopped by itself; the next rise releases it.
+    /// Whether the robot stopped by itself; the next rise releases it.
     tripped: bool,
-    /// The force is above its limit.
+    /// Whether the force exceeds its limit.
     overloaded: bool,
-    /// The present motion leads away from the skin; no force stops it.
+    /// Whether the current motion leads away from the skin, so that no force stops it.
     rising: bool,
 }
 
@@ -68,7 +67,7 @@ impl World {
             line: Line::new(config),
             contacts: 0,
             contact_times: Vec::new(),
-            moments: Moments::default(),
+            phases: PhaseTracker::default(),
             touching: false,
             last_z_mm: config.start.z_mm,
             height_off_mm: 0.0,
@@ -81,7 +80,7 @@ impl World {
         world
     }
 
-    /// Goes on to the last grid point at or before `now`.
+    /// Advances to the last grid point at or before `now`.
     pub fn advance_to(&mut self, now: HostTime) {
         let until = now.0.div_euclid(GRID_NS);
         while self.grid < until {
@@ -96,24 +95,26 @@ impl World {
     fn apply_faults(&mut self) {
         for n in 0..self.faults.len() {
             match self.faults[n] {
-                Fault::Sluggish { when, percent } if self.has_struck(when) => {
+                Fault::Sluggish { when, percent } if self.has_occurred(when) => {
                     self.motion.sluggish = f64::from(percent) / 100.0;
                 }
-                Fault::IndenterLost(when) if self.has_struck(when) => self.motion.power_off(),
-                Fault::HeightOff { when, by_um } if self.has_struck(when) => {
+                Fault::IndenterLost(when) if self.has_occurred(when) => self.motion.power_off(),
+                Fault::HeightOff { when, by_um } if self.has_occurred(when) => {
                     let most_mm = HEIGHT_OFF_MM_S * GRID_NS as f64 * 1e-9;
                     let left_mm = f64::from(by_um) * 1e-3 - self.height_off_mm;
                     self.height_off_mm += left_mm.clamp(-most_mm, most_mm);
                 }
-                Fault::IndenterStuck(when) if self.has_struck(when) => self.motion.stuck = true,
-                Fault::TriggerBoxNoisy(when) if self.has_struck(when) => self.line.get_noisy(),
-                Fault::Mark { fate, when } if self.has_struck(when) => self.line.doom(n, fate),
+                Fault::IndenterStuck(when) if self.has_occurred(when) => self.motion.stuck = true,
+                Fault::TriggerBoxNoisy(when) if self.has_occurred(when) => self.line.add_noise(),
+                Fault::Mark { fate, when } if self.has_occurred(when) => {
+                    self.line.set_mark_fault(n, fate)
+                }
                 _ => {}
             }
         }
     }
 
-    /// Where the tip truly is on the skin, whatever the robot reports.
+    /// True tip position on the skin, whatever the robot reports.
     fn true_tip(&self) -> Point3<Skin> {
         let mut tip = self.skin_from_robot.apply(self.motion.tip());
         tip.z_mm += self.height_off_mm;
@@ -124,7 +125,7 @@ impl World {
         let t_ns = self.grid * GRID_NS;
         let position = self.true_tip();
         let rate = (self.last_z_mm - position.z_mm) / (GRID_NS as f64 * 1e-9);
-        // When the straight path from the last grid point to this one went through a height.
+        // When the straight path from the last grid point to this one crossed a height.
         let passed = |z_mm: f64| {
             let ahead = (position.z_mm - z_mm) / (position.z_mm - self.last_z_mm);
             t_ns - (ahead.clamp(0.0, 1.0) * GRID_NS as f64) as i64
@@ -140,12 +141,12 @@ impl World {
         }
         self.last_z_mm = position.z_mm;
         if self.motion.is_at_rest() {
-            self.moments.at_rest(t_ns, self.touching);
+            self.phases.at_rest(t_ns, self.touching);
         }
         let (force_n, mut felt_n) = self.motion.force_n(-position.z_mm, rate);
         for fault in &self.faults {
             if let Fault::ForceSpike(when) = *fault
-                && let Some(from_ns) = self.struck_at(when)
+                && let Some(from_ns) = self.occurred_at(when)
                 && (from_ns..from_ns + SPIKE_NS).contains(&t_ns)
             {
                 felt_n += SPIKE_N;
@@ -170,36 +171,36 @@ impl World {
         }
     }
 
-    /// Grid index reached.
+    /// Current grid index.
     #[must_use]
     pub const fn grid(&self) -> i64 {
         self.grid
     }
 
-    /// True once `when` has come.
+    /// Whether the trigger `when` has occurred.
     #[must_use]
-    pub(crate) fn has_struck(&self, when: When) -> bool {
-        self.struck_at(when)
+    pub(crate) fn has_occurred(&self, when: FaultTrigger) -> bool {
+        self.occurred_at(when)
             .is_some_and(|t| t <= self.grid * GRID_NS)
     }
 
-    /// The instant of `when` on world time, ns, when it is known already.
+    /// World time of `when`, ns, if it has occurred.
     #[must_use]
-    pub(crate) fn struck_at(&self, when: When) -> Option<i64> {
+    pub(crate) fn occurred_at(&self, when: FaultTrigger) -> Option<i64> {
         match when {
-            When::At(t) => Some(t.0),
-            When::Contact(n) => self.contact_times.get(n as usize).copied(),
-            When::Moment(moment, n) => self.moments.when(moment, n),
+            FaultTrigger::At(t) => Some(t.0),
+            FaultTrigger::Contact(n) => self.contact_times.get(n as usize).copied(),
+            FaultTrigger::Moment(moment, n) => self.phases.when(moment, n),
         }
     }
 
-    /// The faults of this rig.
+    /// Faults of this rig.
     #[must_use]
     pub fn faults(&self) -> &[Fault] {
         &self.faults
     }
 
-    /// How often the skin has been touched.
+    /// Number of contacts so far.
     #[must_use]
     pub const fn contacts(&self) -> u32 {
         self.contacts
@@ -220,7 +221,7 @@ impl World {
     /// Switches the motors on.
     pub fn power_on(&mut self) {
         self.motion.power_on();
-        self.moments.armed(self.grid * GRID_NS);
+        self.phases.armed(self.grid * GRID_NS);
     }
 
     /// Sends the robot to `target`.
@@ -229,7 +230,7 @@ impl World {
         self.tripped &= !rises;
         let from = self.skin_from_robot.apply(self.motion.set_point());
         let to = self.skin_from_robot.apply(target);
-        self.moments.sent(self.grid * GRID_NS, from, to);
+        self.phases.sent(self.grid * GRID_NS, from, to);
         self.motion.move_to(target, speed_mm_s);
     }
 

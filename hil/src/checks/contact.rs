@@ -1,4 +1,4 @@
-//! Checks: the robot against the skin.
+//! Checks `depth` and `force_ceiling`: the robot against the skin.
 
 use skinrig_model::{HostDuration, PoseSample};
 use skinrig_nightly::{Evidence, EvidenceKind};
@@ -6,133 +6,136 @@ use skinrig_protocol::suite::{Check, Measure};
 
 use super::robot::{last, mean};
 use crate::arm::{Arm, Reach, with_arm};
-use crate::bench::{Bench, Trouble};
+use crate::bench::{Bench, Problem};
 use crate::findings::Findings;
-use crate::room::refused;
+use crate::test_volume::motion_refused;
 
 const ROBOT: &str = "robot";
-/// Down into the skin, mm/s.
-const INDENT_MM_S: f64 = 2.0;
-/// The tip stays down for so long before its depth is taken: what the driver corrects it has corrected by then.
+/// Indentation speed, mm/s.
+const INDENTATION_MM_S: f64 = 2.0;
+/// Hold time before the depth is measured; the driver's position correction finishes within it.
 const SETTLE: HostDuration = HostDuration::from_millis(1_000);
-/// Over so long a time a depth and a force are means.
-const MEAN_OVER: HostDuration = HostDuration::from_millis(200);
-/// Under a new limit of its force the arm may sink so far in free air, mm; more, and it does not carry itself.
-const SINKS_MM: f64 = 0.5;
-/// A force of this share of the limit has reached it.
-const REACHED: f64 = 0.9;
+/// Averaging time of depths and forces.
+const AVERAGING: HostDuration = HostDuration::from_millis(200);
+/// Largest sag in free air under a reduced force limit, mm. Beyond it the motors do not carry the arm's weight.
+const MAX_SAG_MM: f64 = 0.5;
+/// Share of the force limit that counts as reaching it.
+const LIMIT_SHARE: f64 = 0.9;
 
-/// Makes the check.
+/// Runs the check.
 pub fn depth(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::Depth { depth_mm, presses } = check.measure else {
         return;
     };
-    if without_skin(bench, found) {
+    if skip_without_skin(bench, found) {
         return;
     }
     let metrics = &["surface", "error"];
     with_arm(bench, Reach::Skin, found, metrics, &mut |arm, found| {
-        deep_enough(arm, depth_mm)?;
+        check_depth_limit(arm, depth_mm)?;
         let (mut surface_mm, mut squares, mut n) = (0.0_f64, 0.0, 0);
-        for at in arm.room.presses.clone() {
+        for at in arm.volume.press_points.clone() {
             for _ in 0..presses {
-                arm.above(at)?;
+                arm.go_above(at)?;
                 let touched_mm = arm.touch()?;
                 let mut seen = Vec::new();
                 let bottom = at.at_height(touched_mm - depth_mm);
-                arm.send(bottom, INDENT_MM_S)?;
+                arm.send(bottom, INDENTATION_MM_S)?;
                 let down = HostDuration::from_secs_f64(
-                    (arm.search.band_mm * 2.0 + depth_mm) / INDENT_MM_S,
+                    (arm.search.band_mm * 2.0 + depth_mm) / INDENTATION_MM_S,
                 );
                 arm.watch(HostDuration(down.0 + SETTLE.0), &mut seen, |_| false)?;
-                arm.go(at.at_height(arm.search.band_mm), INDENT_MM_S)?;
-                let reached_mm = touched_mm - mean(last(&seen, MEAN_OVER)).z_mm;
+                arm.go(at.at_height(arm.search.band_mm), INDENTATION_MM_S)?;
+                let reached_mm = touched_mm - mean(last(&seen, AVERAGING)).z_mm;
                 squares += (reached_mm - depth_mm).powi(2);
                 surface_mm = surface_mm.max(touched_mm.abs());
                 n += 1;
             }
         }
-        found.value(ROBOT, "surface", surface_mm).of(n, 3);
+        found.value(ROBOT, "surface", surface_mm).with_samples(n, 3);
         let error_mm = (squares / n as f64).sqrt();
-        found.value(ROBOT, "error", error_mm).of(n, 3);
+        found.value(ROBOT, "error", error_mm).with_samples(n, 3);
         Ok(())
     });
 }
 
-/// Nothing to press.
-fn without_skin(bench: &dyn Bench, found: &mut Findings) -> bool {
+/// Marks the check as not applicable if the rig has no skin mounted.
+fn skip_without_skin(bench: &dyn Bench, found: &mut Findings) -> bool {
     let off = bench.rig().robot.sample_is_off;
     if off {
-        found.not_here = Some("the rig file says `robot.sample_is_off: true`".to_owned());
+        found.not_applicable = Some("the rig file says `robot.sample_is_off: true`".to_owned());
     }
     off
 }
 
-/// A touch may lie at the lower end of the band.
-fn deep_enough(arm: &Arm<'_>, depth_mm: f64) -> Result<(), Trouble> {
-    let (need_mm, most_mm) = (depth_mm + arm.search.band_mm, arm.room.limits.max_depth_mm);
+/// Verifies that the depth limit allows `depth_mm` below a surface at the lower end of the touch band.
+fn check_depth_limit(arm: &Arm<'_>, depth_mm: f64) -> Result<(), Problem> {
+    let (need_mm, most_mm) = (
+        depth_mm + arm.search.band_mm,
+        arm.volume.limits.max_depth_mm,
+    );
     if need_mm <= most_mm {
         return Ok(());
     }
-    Err(refused(
+    Err(motion_refused(
         format!(
-            "expected `limits.max_depth` of the rig file to be at least {need_mm} mm (depth and band of the touch), found {most_mm} mm"
+            "expected `limits.max_depth` of the rig file to be at least {need_mm} mm (depth plus touch band), found {most_mm} mm"
         ),
-        "make `depth` of the check smaller",
+        "reduce `depth` of the check",
     ))
 }
 
-/// Makes the check.
+/// Runs the check.
 pub fn force_ceiling(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::ForceCeiling { force_n, depth_mm } = check.measure else {
         return;
     };
-    if without_skin(bench, found) {
+    if skip_without_skin(bench, found) {
         return;
     }
     let metrics = &["peak", "trips"];
     with_arm(bench, Reach::Skin, found, metrics, &mut |arm, found| {
-        deep_enough(arm, depth_mm)?;
-        let at = arm.room.middle;
-        let [high, ..] = arm.room.air();
+        check_depth_limit(arm, depth_mm)?;
+        let at = arm.volume.centre;
+        let [high, ..] = arm.volume.air_points();
         arm.go(high, super::robot::TRAVEL_MM_S)?;
         let settings = arm.limit_force(Some(force_n))?;
-        carries_itself(arm, force_n)?;
-        arm.above(at)?;
+        check_carries_arm(arm, force_n)?;
+        arm.go_above(at)?;
         let mut seen = Vec::new();
-        arm.send(at.at_height(-depth_mm), INDENT_MM_S)?;
-        let down = HostDuration::from_secs_f64((depth_mm + arm.search.band_mm) / INDENT_MM_S);
+        arm.send(at.at_height(-depth_mm), INDENTATION_MM_S)?;
+        let down = HostDuration::from_secs_f64((depth_mm + arm.search.band_mm) / INDENTATION_MM_S);
         let pressed = arm.watch(HostDuration(down.0 + SETTLE.0), &mut seen, |_| false);
         let peak_n = peak_n(&seen);
         let trips = match pressed {
-            // The robot took its own power away: that is one way to hold a limit.
-            Err(why) if why.kind == EvidenceKind::State => {
-                found.evidence.push(*why);
+            // The robot switched its motors off: one way to enforce a limit.
+            Err(problem) if problem.kind == EvidenceKind::State => {
+                found.evidence.push(*problem);
                 1.0
             }
-            Err(why) => return Err(why),
+            Err(problem) => return Err(problem),
             Ok(()) => {
-                arm.go(at.at_height(arm.search.band_mm), INDENT_MM_S)?;
+                arm.go(at.at_height(arm.search.band_mm), INDENTATION_MM_S)?;
                 arm.limit_force(None)?;
                 0.0
             }
         };
-        let enough = peak_n >= REACHED * force_n;
+        let enough = peak_n >= LIMIT_SHARE * force_n;
         let read_back = settings.iter().find(|s| s.name == "max_force_n");
         let read_back = read_back.map_or("nothing", |s| s.read_back.as_str());
         let lowest_mm = seen.iter().map(|s| -s.measured.z_mm).fold(0.0, f64::max);
         found
             .value(ROBOT, "peak", peak_n)
-            .of(usize::from(enough), 1)
-            .noting(format!(
-                "limit {force_n} N, read back {read_back}; sent {depth_mm} mm deep, came {lowest_mm:.2} mm"
+            .with_samples(usize::from(enough), 1)
+            .with_note(format!(
+                "limit {force_n} N, read back {read_back}; commanded {depth_mm} mm, reached {lowest_mm:.2} mm"
             ));
-        found.value(ROBOT, "trips", trips).of(1, 1);
+        found.value(ROBOT, "trips", trips).with_samples(1, 1);
         if !enough {
             let what = format!(
-                "expected a force of about {force_n} N, found {peak_n:.2} N: the skin is too soft there for this depth"
+                "expected a force of about {force_n} N, found {peak_n:.2} N: the skin is too soft at this depth"
             );
-            let next = "make `depth` of the check larger, or `force` smaller";
+            let next = "increase `depth` of the check, or reduce `force`";
             let few = Evidence::new(EvidenceKind::TooLittle, ROBOT, what);
             found.evidence.push(few.next(next));
         }
@@ -140,25 +143,25 @@ pub fn force_ceiling(check: &Check, bench: &mut dyn Bench, found: &mut Findings)
     });
 }
 
-/// With too low a limit the motors do not carry the arm: that shows in free air, where sinking does no harm.
-fn carries_itself(arm: &mut Arm<'_>, force_n: f64) -> Result<(), Trouble> {
-    let from = arm.look()?.measured;
+/// Verifies in free air, where sagging is harmless, that the motors carry the arm under the force limit.
+fn check_carries_arm(arm: &mut Arm<'_>, force_n: f64) -> Result<(), Problem> {
+    let from = arm.pose()?.measured;
     let mut seen = Vec::new();
-    let sinks = |s: &PoseSample| from.z_mm - s.measured.z_mm > SINKS_MM;
+    let sinks = |s: &PoseSample| from.z_mm - s.measured.z_mm > MAX_SAG_MM;
     arm.watch(SETTLE, &mut seen, sinks)?;
     if !seen.iter().any(sinks) {
         return Ok(());
     }
     arm.limit_force(None)?;
-    Err(refused(
+    Err(motion_refused(
         format!(
-            "expected the arm to carry itself with a limit of {force_n} N, found it sinking by more than {SINKS_MM} mm"
+            "expected the arm to hold its position with a limit of {force_n} N, found it sinking by more than {MAX_SAG_MM} mm"
         ),
-        "measure `robot.motor_force.gravity_ratio` of the rig file, or make `force` of the check larger",
+        "measure `robot.motor_force.gravity_ratio` of the rig file, or increase `force` of the check",
     ))
 }
 
 fn peak_n(seen: &[PoseSample]) -> f64 {
-    let told = seen.iter().map(|s| s.force_n.abs());
-    told.filter(|f| f.is_finite()).fold(0.0, f64::max)
+    let forces = seen.iter().map(|s| s.force_n.abs());
+    forces.filter(|f| f.is_finite()).fold(0.0, f64::max)
 }

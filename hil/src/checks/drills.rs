@@ -1,4 +1,4 @@
-//! Checks: drills: what must stop the arm stops it.
+//! Checks `watchdog_drill` and `stop_drill`: does everything that must stop the arm stop it?
 
 use skinrig_model::{HostDuration, HostTime, Point3, PoseSample, Skin};
 use skinrig_nightly::{Evidence, EvidenceKind};
@@ -7,134 +7,141 @@ use skinrig_protocol::suite::Check;
 
 use super::robot::{TRAVEL_MM_S, last, mean};
 use crate::arm::{Arm, Reach, with_arm};
-use crate::bench::{Bench, Trouble};
+use crate::bench::{Bench, Problem};
 use crate::findings::Findings;
 
 const ROBOT: &str = "robot";
-/// The tip is stopped after this much of its way, mm.
-const INTO_MM: f64 = 6.0;
-/// It is looked at for so long after that.
-const AFTER: HostDuration = HostDuration::from_millis(1_000);
-/// A place is a mean over so long a time.
-const MEAN_OVER: HostDuration = HostDuration::from_millis(100);
-/// Nearer to where it ends than this it rests, mm.
-const RESTS_MM: f64 = 0.1;
+/// Distance from the start at which the tip is told to stop, mm.
+const STOP_AFTER_MM: f64 = 6.0;
+/// Observation time after the stop.
+const OBSERVATION: HostDuration = HostDuration::from_millis(1_000);
+/// Averaging time of a position.
+const AVERAGING: HostDuration = HostDuration::from_millis(100);
+/// Distance from the final position within which the tip counts as at rest, mm.
+const REST_TOLERANCE_MM: f64 = 0.1;
 
-/// Makes the check.
+/// Runs the check.
 pub fn watchdog(_: &Check, bench: &mut dyn Bench, found: &mut Findings) {
-    if not_permitted(bench, Drill::Watchdog, "watchdog", found) {
+    if skip_unless_permitted(bench, Drill::Watchdog, "watchdog", found) {
         return;
     }
     match bench.watchdog_drill() {
-        Ok(drilled) => {
-            match drilled.braked_within_s {
+        Ok(result) => {
+            match result.braked_within_s {
                 Some(seconds) => {
-                    let value = found.value(ROBOT, "braked_within", seconds).of(1, 1);
-                    value.note = drilled.note;
+                    let value = found
+                        .value(ROBOT, "braked_within", seconds)
+                        .with_samples(1, 1);
+                    value.note = result.note;
                     value
                 }
-                None => found.unmeasured(ROBOT, "braked_within").noting(
-                    "the motors were still live when the robot was opened again; they are off now",
+                None => found.unmeasured(ROBOT, "braked_within").with_note(
+                    "the motors were still live when the robot was reopened; they are off now",
                 ),
             };
-            found.value(ROBOT, "drop", drilled.drop_mm).of(1, 1);
+            found
+                .value(ROBOT, "drop", result.drop_mm)
+                .with_samples(1, 1);
         }
-        Err(why) => found.trouble(*why, ROBOT, &["braked_within", "drop"]),
+        Err(why) => found.failed(*why, ROBOT, &["braked_within", "drop"]),
     }
 }
 
-/// A bench of hardware says in its rig file which drills it permits.
-fn not_permitted(bench: &dyn Bench, drill: Drill, name: &str, found: &mut Findings) -> bool {
+/// Marks the check as not applicable unless the rig file permits the drill.
+fn skip_unless_permitted(
+    bench: &dyn Bench,
+    drill: Drill,
+    name: &str,
+    found: &mut Findings,
+) -> bool {
     let permitted = bench.permits(drill);
     if !permitted {
-        found.not_here = Some(format!(
-            "the rig file does not permit it; `hil: {{drills: [{name}]}}` does"
+        found.not_applicable = Some(format!(
+            "the rig file does not permit this drill; add `hil: {{drills: [{name}]}}`"
         ));
     }
     !permitted
 }
 
-/// Makes the check.
+/// Runs the check.
 pub fn stop(_: &Check, bench: &mut dyn Bench, found: &mut Findings) {
-    if not_permitted(bench, Drill::Stop, "stop", found) {
+    if skip_unless_permitted(bench, Drill::Stop, "stop", found) {
         return;
     }
     let metrics = &["stopped_within", "distance"];
     with_arm(bench, Reach::Air, found, metrics, &mut |arm, found| {
-        let [_, east, _, west, _] = arm.room.air();
+        let [_, east, _, west, _] = arm.volume.air_points();
         let held = stop_between(arm, west, east, |arm| arm.hold())?;
-        // Motors off: what an operator's third ctrl-C does. The arm is armed no more after it.
+        // Motors off, like an operator's third ctrl-C. The arm cannot be armed after it.
         let halted = stop_between(arm, west, east, |arm| arm.halt())?;
-        let words = format!(
+        let note = format!(
             "held: {:.0} ms, {:.2} mm; motors off: {:.0} ms, {:.2} mm",
             held.within_s * 1e3,
-            held.way_mm,
+            held.distance_mm,
             halted.within_s * 1e3,
-            halted.way_mm
+            halted.distance_mm
         );
         let within_s = held.within_s.max(halted.within_s);
         found
             .value(ROBOT, "stopped_within", within_s)
-            .of(2, 2)
-            .noting(words.as_str());
-        let way_mm = held.way_mm.max(halted.way_mm);
+            .with_samples(2, 2)
+            .with_note(note.as_str());
+        let distance_mm = held.distance_mm.max(halted.distance_mm);
         found
-            .value(ROBOT, "distance", way_mm)
-            .of(2, 2)
-            .noting(words);
+            .value(ROBOT, "distance", distance_mm)
+            .with_samples(2, 2)
+            .with_note(note);
         Ok(())
     });
 }
 
-/// How a stop went.
+/// Response to a stop command.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Stopped {
+struct StopResponse {
     within_s: f64,
-    way_mm: f64,
+    distance_mm: f64,
 }
 
 fn stop_between(
     arm: &mut Arm<'_>,
     from: Point3<Skin>,
     to: Point3<Skin>,
-    order: impl FnOnce(&mut Arm<'_>) -> Result<HostTime, Trouble>,
-) -> Result<Stopped, Trouble> {
+    order: impl FnOnce(&mut Arm<'_>) -> Result<HostTime, Problem>,
+) -> Result<StopResponse, Problem> {
     arm.go(from, TRAVEL_MM_S)?;
     let mut seen = Vec::new();
     arm.send(to, TRAVEL_MM_S)?;
-    let into = |s: &PoseSample| s.measured.distance_mm(from) >= INTO_MM;
+    let into = |s: &PoseSample| s.measured.distance_mm(from) >= STOP_AFTER_MM;
     arm.watch(HostDuration::from_millis(2_000), &mut seen, into)?;
     let Some(at) = seen.last().copied().filter(into) else {
         return Err(Box::new(
             Evidence::new(
                 EvidenceKind::State,
                 ROBOT,
-                format!(
-                    "expected the tip to be {INTO_MM} mm on its way within 2 s, found it nearer"
-                ),
+                format!("expected the tip to move {STOP_AFTER_MM} mm within 2 s, found less"),
             )
-            .next("look at the arm: is anything in its way, does it move freely by hand?"),
+            .next("check the arm: is anything in its way, does it move freely by hand?"),
         ));
     };
     let ordered = order(arm)?;
     seen.clear();
-    arm.watch(AFTER, &mut seen, |_| false)?;
-    stopped(&seen, at.measured, ordered).ok_or_else(|| {
-        let what = "expected samples of the tip after it was told to stop, found none";
+    arm.watch(OBSERVATION, &mut seen, |_| false)?;
+    stop_response(&seen, at.measured, ordered).ok_or_else(|| {
+        let what = "expected samples of the tip after the stop command, found none";
         Box::new(Evidence::new(EvidenceKind::DeviceLost, ROBOT, what))
     })
 }
 
-/// When and where it came to rest: sideways, as it moved. Braked, it goes on to sink slowly.
-fn stopped(seen: &[PoseSample], at: Point3<Skin>, ordered: HostTime) -> Option<Stopped> {
-    let end = mean(last(seen, MEAN_OVER)).plane();
-    let moves = |s: &PoseSample| s.measured.plane().distance_mm(end) > RESTS_MM;
+/// When and where the tip came to rest in the plane of its motion. A braked arm keeps sinking slowly.
+fn stop_response(seen: &[PoseSample], at: Point3<Skin>, ordered: HostTime) -> Option<StopResponse> {
+    let end = mean(last(seen, AVERAGING)).plane();
+    let moves = |s: &PoseSample| s.measured.plane().distance_mm(end) > REST_TOLERANCE_MM;
     let rests = match seen.iter().rposition(moves) {
         Some(n) => seen.get(n + 1).or(seen.last())?,
         None => seen.first()?,
     };
-    Some(Stopped {
+    Some(StopResponse {
         within_s: (rests.t - ordered).as_secs_f64().max(0.0),
-        way_mm: end.distance_mm(at.plane()),
+        distance_mm: end.distance_mm(at.plane()),
     })
 }

@@ -1,24 +1,23 @@
-//! Checks: the golden skin.
+//! Check `golden`: a campaign on the golden skin.
 
 use skinrig_protocol::suite::{Check, Measure};
 
 use crate::bench::Bench;
-use crate::findings::{Findings, GoldenKept};
+use crate::findings::{Findings, GoldenRecord};
 
-/// Makes the check. What it measured comes from the bench, which runs and analyses the campaign; what that did not measure is
-/// unmeasured.
+/// Runs the check. The bench runs and analyses the campaign; metrics that it did not measure become unmeasured.
 pub fn golden(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::Golden { protocol } = &check.measure else {
         return;
     };
     if bench.rig().robot.sample_is_off {
-        found.not_here = Some("the rig file says `robot.sample_is_off: true`".to_owned());
+        found.not_applicable = Some("the rig file says `robot.sample_is_off: true`".to_owned());
         return;
     }
-    match bench.golden(protocol) {
+    match bench.run_golden(protocol) {
         Ok(run) => {
             *found = run.findings;
-            found.golden = Some(GoldenKept {
+            found.golden = Some(GoldenRecord {
                 files: run.files,
                 skin: run.skin,
                 analysis_version: run.analysis_version,

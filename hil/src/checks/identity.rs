@@ -1,4 +1,4 @@
-//! Checks: who each device is.
+//! Check `identity`: model, serial number and firmware of each device.
 
 use skinrig_controller::{ExpectedDevice, identity_checks};
 
@@ -6,49 +6,49 @@ use skinrig_model::{CameraId, DeviceIdentity, DeviceRole};
 use skinrig_nightly::{Evidence, EvidenceKind};
 use skinrig_protocol::suite::Check;
 
-use crate::bench::{Bench, Trouble};
+use crate::bench::{Bench, Problem};
+use crate::device_evidence;
 use crate::findings::Findings;
-use crate::trouble;
 
 const METRICS: &[&str] = &["differences"];
 
-/// Makes the check.
+/// Runs the check.
 pub fn identity(_check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let expected = ExpectedDevice::of_rig(bench.rig());
     let devices = bench.devices();
-    let mut one = |role: DeviceRole, answer: Result<DeviceIdentity, Trouble>| {
-        let subject = trouble::subject(role);
+    let mut check = |role: DeviceRole, answer: Result<DeviceIdentity, Problem>| {
+        let subject = device_evidence::subject(role);
         match answer {
             Ok(identity) => {
-                let wanted = expected.iter().find(|e| e.role == role);
-                compare(role, wanted, &identity, found);
+                let expected_device = expected.iter().find(|e| e.role == role);
+                compare(role, expected_device, &identity, found);
             }
-            Err(trouble) => found.trouble(*trouble, subject, METRICS),
+            Err(problem) => found.failed(*problem, subject, METRICS),
         }
     };
     let robot = devices.robot.as_ref().map(|d| d.identity());
-    one(DeviceRole::Indenter, robot.map_err(Clone::clone));
+    check(DeviceRole::Indenter, robot.map_err(Clone::clone));
     for camera in CameraId::ALL {
         let answer = devices.cameras[camera.index()]
             .as_ref()
             .map(|d| d.identity());
-        one(DeviceRole::of_camera(camera), answer.map_err(Clone::clone));
+        check(DeviceRole::of_camera(camera), answer.map_err(Clone::clone));
     }
     if let Some(slot) = &devices.trigger_box {
         let answer = slot.as_ref().map(|d| d.identity());
-        one(DeviceRole::TriggerBox, answer.map_err(Clone::clone));
+        check(DeviceRole::TriggerBox, answer.map_err(Clone::clone));
     }
 }
 
-/// Counts what differs from what is wanted; who it is stays on record.
+/// Counts the differences from the rig file and records the device's identity.
 fn compare(
     role: DeviceRole,
-    wanted: Option<&ExpectedDevice>,
+    expected_device: Option<&ExpectedDevice>,
     identity: &DeviceIdentity,
     found: &mut Findings,
 ) {
-    let subject = trouble::subject(role);
-    let checks = identity_checks(role, wanted, identity);
+    let subject = device_evidence::subject(role);
+    let checks = identity_checks(role, expected_device, identity);
     let differences = checks.iter().filter(|c| c.failed());
     for check in differences.clone() {
         let what = format!(
@@ -66,5 +66,5 @@ fn compare(
     } = identity;
     found
         .value(subject, "differences", count as f64)
-        .noting(format!("{model}, serial {serial}, {firmware}"));
+        .with_note(format!("{model}, serial {serial}, {firmware}"));
 }

@@ -1,4 +1,4 @@
-//! The checks, each over device traits alone.
+//! The checks of a suite. They use devices through their traits alone.
 
 mod clocks;
 mod contact;
@@ -19,10 +19,10 @@ use skinrig_protocol::suite::{Check, Measure};
 use crate::bench::Bench;
 use crate::findings::Findings;
 
-/// Makes `check` once. Devices may stay open; the robot is braked and the cameras are stopped in the end.
-pub fn make(check: &Check, bench: &mut dyn Bench) -> Findings {
+/// Runs one attempt at `check`. Devices may stay open; the robot is braked and the cameras are stopped afterwards.
+pub fn run(check: &Check, bench: &mut dyn Bench) -> Findings {
     let mut found = Findings::default();
-    let make: fn(&Check, &mut dyn Bench, &mut Findings) = match &check.measure {
+    let run: fn(&Check, &mut dyn Bench, &mut Findings) = match &check.measure {
         Measure::Identity => identity::identity,
         Measure::Settings => settings::settings,
         Measure::Disk { .. } => disk::disk,
@@ -40,13 +40,13 @@ pub fn make(check: &Check, bench: &mut dyn Bench) -> Findings {
         Measure::WatchdogDrill => drills::watchdog,
         Measure::StopDrill => drills::stop,
     };
-    make(check, bench, &mut found);
+    run(check, bench, &mut found);
     found
 }
 
-/// What a limit that is broken without any other evidence speaks of.
+/// Cause of a broken limit when there is no evidence.
 #[must_use]
-pub const fn about(measure: &Measure) -> Cause {
+pub const fn default_cause(measure: &Measure) -> Cause {
     match measure {
         Measure::Golden { .. } => Cause::Skin,
         Measure::Disk { .. } => Cause::Infrastructure,

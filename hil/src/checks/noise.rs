@@ -1,23 +1,23 @@
-//! Checks: noise floor and hot pixels.
+//! Checks `noise_dark` and `noise_lit`: noise floor and hot pixels.
 
 use skinrig_device::{DeviceError, EventCamera};
 use skinrig_model::{CameraId, HostDuration};
 use skinrig_protocol::suite::{Check, Light, Measure};
 
 use super::pixels::{Counts, Reader, watch};
-use crate::bench::{Bench, Trouble};
+use crate::bench::{Bench, Problem};
+use crate::device_evidence;
 use crate::findings::Findings;
 use crate::streams::Streams;
-use crate::trouble;
 
 const METRICS: &[&str] = &["rate", "hot_pixels", "hottest"];
 
-/// Lamps that were switched, and pixels that saw it, come to rest within this.
+/// Time for the lamps, and for the pixels that saw them change, to settle.
 const SETTLE: HostDuration = HostDuration::from_millis(1_000);
-/// Events that a rate of one pixel needs before it is called hot: fewer may be chance.
-const LEAST_EVENTS: u32 = 5;
+/// Events that one pixel needs before it can be hot; fewer may be chance.
+const MIN_EVENTS: u32 = 5;
 
-/// Makes the check.
+/// Runs the check.
 pub fn noise(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::Noise {
         light,
@@ -27,30 +27,30 @@ pub fn noise(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     else {
         return;
     };
-    let switched = match bench.light(light) {
+    let switched = match bench.set_light(light) {
         Ok(switched) => switched,
-        Err(trouble) => return no_light(&trouble, found),
+        Err(problem) => return light_failed(&problem, found),
     };
     if light == Light::Dark && !switched {
-        let why = "the rig file names no programs that switch the lamps (`hil.light`)";
-        found.not_here = Some(why.to_owned());
+        let why = "the rig file names no program that switches the lamps (`hil.light`)";
+        found.not_applicable = Some(why.to_owned());
         return;
     }
     measure(bench, duration, hot_above_ev_s, switched, found);
-    // Every other check, and every campaign, is made in the light.
+    // All other checks and campaigns need the light.
     if light == Light::Dark
-        && let Err(trouble) = bench.light(Light::Lit)
+        && let Err(problem) = bench.set_light(Light::Lit)
     {
-        found.evidence.push(*trouble);
+        found.evidence.push(*problem);
     }
 }
 
-/// The lamps did not obey: nothing is known about the light.
-fn no_light(trouble: &Trouble, found: &mut Findings) {
-    found.evidence.push(*trouble.clone());
+/// The lamps failed, so the light is unknown.
+fn light_failed(problem: &Problem, found: &mut Findings) {
+    found.evidence.push(*problem.clone());
     for camera in CameraId::ALL {
         for metric in METRICS {
-            found.unmeasured(trouble::of_camera(camera), metric);
+            found.unmeasured(device_evidence::camera_subject(camera), metric);
         }
     }
 }
@@ -64,40 +64,46 @@ fn measure(
 ) {
     let mut readers = [None, None];
     let mut prepare = |id: CameraId, camera: &mut dyn EventCamera| -> Result<(), DeviceError> {
-        readers[id.index()] = Some(Reader::of_pixels(&camera.capabilities()));
+        readers[id.index()] = Some(Reader::per_pixel(&camera.capabilities()));
         Ok(())
     };
     let streams = Streams::start(bench, &mut prepare);
     for (camera, seen, reader) in watch(streams, [SETTLE, duration], readers, found, METRICS) {
-        let subject = trouble::of_camera(camera);
+        let subject = device_evidence::camera_subject(camera);
         let Some(span_s) = seen.span_s() else {
             for metric in METRICS {
                 found.unmeasured(subject, metric);
             }
             continue;
         };
-        tell(subject, &reader.counts, span_s, hot_above_ev_s, found);
+        add_rates(subject, &reader.counts, span_s, hot_above_ev_s, found);
         if !switched && let Some(rate) = found.values.iter_mut().rfind(|v| v.metric == "rate") {
-            rate.noting("the lamps as they are: the rig file names no programs that switch them");
+            rate.with_note("lamps not switched: the rig file names no program for them");
         }
     }
 }
 
-/// Rate of the sensor, and of its pixels.
-fn tell(subject: &str, counts: &Counts, span_s: f64, hot_above_ev_s: f64, found: &mut Findings) {
+/// Adds the rates of the sensor and of its pixels.
+fn add_rates(
+    subject: &str,
+    counts: &Counts,
+    span_s: f64,
+    hot_above_ev_s: f64,
+    found: &mut Findings,
+) {
     let rate = |events: f64| events / span_s;
     let events = counts.events as f64;
-    // Of a number of events that come by chance, one by one (Poisson).
+    // 95 % interval of a Poisson count.
     let half = 1.96 * events.sqrt();
     found.value(subject, "rate", rate(events)).interval =
         Some([rate((events - half).max(0.0)), rate(events + half)]);
-    let is_hot = |n: &&u32| **n >= LEAST_EVENTS && rate(f64::from(**n)) > hot_above_ev_s;
+    let is_hot = |n: &&u32| **n >= MIN_EVENTS && rate(f64::from(**n)) > hot_above_ev_s;
     let hot = counts.by_pixel.iter().filter(is_hot).count();
     found.value(subject, "hot_pixels", hot as f64);
     let hottest = counts.by_pixel.iter().enumerate().max_by_key(|(_, n)| **n);
     if let Some((at, n)) = hottest {
         found
             .value(subject, "hottest", rate(f64::from(*n)))
-            .noting(counts.place(at));
+            .with_note(counts.pixel_name(at));
     }
 }

@@ -1,56 +1,60 @@
-//! What a check reads out of the cameras' bytes: events by pixel, steps of the time base, the order of a scan.
+//! Decodes camera streams for checks: events per pixel, time base jumps, and the order of a test pattern.
 
 use skinrig_device::CameraCapabilities;
 use skinrig_formats::{Decoder, Discontinuity, EventSink, Geometry};
 use skinrig_model::{CameraId, CdEvent, HostDuration, RawChunk, TriggerEdge};
 
 use crate::findings::Findings;
-use crate::streams::{Seen, Streams};
+use crate::streams::{StreamStats, Streams};
 
-/// Reads one camera's stream from its start on; counts between the beginning that [`watch`] tells and the end.
+/// Decodes one camera's stream from its start. Counts only in the measuring period of [`watch`].
 pub(super) struct Reader {
     decoder: Decoder,
     pub counts: Counts,
 }
 
-/// What was counted.
+/// Counts of a camera's stream.
 pub(super) struct Counts {
     counting: bool,
     width: usize,
-    /// Events by pixel, row after row; empty when they are not wanted.
+    /// Events per pixel, row by row; empty if not needed.
     pub by_pixel: Vec<u32>,
-    /// Events.
+    /// Number of events.
     pub events: u64,
-    /// Steps of the time base that are neither progress nor a wrap.
+    /// Time base steps that are neither progress nor a wrap.
     pub jumps: u64,
-    /// A scan that is followed.
+    /// State of the expected scan, if the events form one.
     pub scan: Option<Scan>,
 }
 
-/// A scan: each event one row below the last, after the last row at the top of the next column.
+/// A scan: each event is one row below the last, and after the last row at the top of the next column.
 pub(super) struct Scan {
     columns: u32,
     rows: u32,
     next: Option<u32>,
-    /// Events that were not where the one before led to, and events outside.
+    /// Events outside the scan, or not at the expected position.
     pub breaks: u64,
-    /// Largest column and row that were seen.
+    /// Largest column and row seen.
     pub largest: (u16, u16),
 }
 
 impl Reader {
-    /// Of a sensor whose pixels are counted one by one.
-    pub(crate) fn of_pixels(can: &CameraCapabilities) -> Self {
+    /// Counts events per pixel.
+    pub(crate) fn per_pixel(capabilities: &CameraCapabilities) -> Self {
         let geometry = Geometry {
-            width: can.width,
-            height: can.height,
+            width: capabilities.width,
+            height: capabilities.height,
         };
-        let pixels = usize::from(can.width) * usize::from(can.height);
-        Self::new(can, geometry, vec![0; pixels], None)
+        let pixels = usize::from(capabilities.width) * usize::from(capabilities.height);
+        Self::new(capabilities, geometry, vec![0; pixels], None)
     }
 
-    /// Of events that come in the order of a scan over `columns` and `rows`, which need not be the sensor's.
-    pub(crate) fn of_scan(can: &CameraCapabilities, columns: u16, rows: u16) -> Self {
+    /// Follows a scan over `columns` and `rows`, which may differ from the sensor's size.
+    pub(crate) fn following_scan(
+        capabilities: &CameraCapabilities,
+        columns: u16,
+        rows: u16,
+    ) -> Self {
         let scan = Scan {
             columns: columns.into(),
             rows: rows.into(),
@@ -58,25 +62,25 @@ impl Reader {
             breaks: 0,
             largest: (0, 0),
         };
-        Self::new(can, Geometry::ANY, Vec::new(), Some(scan))
+        Self::new(capabilities, Geometry::ANY, Vec::new(), Some(scan))
     }
 
-    /// Of the stream alone.
-    pub(crate) fn of_time(can: &CameraCapabilities) -> Self {
-        Self::new(can, Geometry::ANY, Vec::new(), None)
+    /// Checks the time base only.
+    pub(crate) fn time_base_only(capabilities: &CameraCapabilities) -> Self {
+        Self::new(capabilities, Geometry::ANY, Vec::new(), None)
     }
 
     fn new(
-        can: &CameraCapabilities,
+        capabilities: &CameraCapabilities,
         geometry: Geometry,
         by_pixel: Vec<u32>,
         scan: Option<Scan>,
     ) -> Self {
         Self {
-            decoder: Decoder::with_geometry(can.format, geometry),
+            decoder: Decoder::with_geometry(capabilities.format, geometry),
             counts: Counts {
                 counting: false,
-                width: can.width.into(),
+                width: capabilities.width.into(),
                 by_pixel,
                 events: 0,
                 jumps: 0,
@@ -85,11 +89,11 @@ impl Reader {
         }
     }
 
-    /// Takes a chunk.
-    pub fn see(&mut self, chunk: &RawChunk) {
+    /// Decodes a chunk.
+    pub fn push(&mut self, chunk: &RawChunk) {
         if chunk.lost_before > 0 {
             self.decoder.lost(chunk.lost_before);
-            // What is lost is counted as such: the scan goes on wherever it is then.
+            // Lost data is counted as such: accept any position afterwards.
             if let Some(scan) = &mut self.counts.scan {
                 scan.next = None;
             }
@@ -98,23 +102,22 @@ impl Reader {
     }
 }
 
-/// Lets the streams settle, counts for the second of the two spans, and stops the cameras. What each camera gave that streamed
-/// to the end.
+/// Lets the streams settle, counts for `duration`, and stops the cameras. Returns the results of each camera that streamed to the end.
 pub(super) fn watch(
     streams: Streams<'_>,
     [settle, duration]: [HostDuration; 2],
     mut readers: [Option<Reader>; 2],
     found: &mut Findings,
     metrics: &[&'static str],
-) -> Vec<(CameraId, Seen, Reader)> {
+) -> Vec<(CameraId, StreamStats, Reader)> {
     let mut streams = streams.without_box();
     let see = |readers: &mut [Option<Reader>; 2], chunk: &RawChunk| {
         if let Some(reader) = &mut readers[chunk.camera.index()] {
-            reader.see(chunk);
+            reader.push(chunk);
         }
     };
     streams.pass(settle, &mut |chunk| see(&mut readers, chunk));
-    streams.begin(&mut |chunk| see(&mut readers, chunk));
+    streams.start_counting(&mut |chunk| see(&mut readers, chunk));
     for reader in readers.iter_mut().flatten() {
         reader.counts.counting = true;
     }
@@ -126,8 +129,8 @@ pub(super) fn watch(
 }
 
 impl Counts {
-    /// Where a pixel is, in words.
-    pub fn place(&self, at: usize) -> String {
+    /// Coordinates of a pixel for messages.
+    pub fn pixel_name(&self, at: usize) -> String {
         format!(
             "column {}, row {}",
             at % self.width.max(1),
@@ -170,8 +173,8 @@ impl Scan {
         let inside = column < self.columns && row < self.rows;
         let at = column * self.rows + row;
         if counting {
-            let led_here = inside && self.next.is_none_or(|next| next == at);
-            self.breaks += u64::from(!led_here);
+            let is_expected = inside && self.next.is_none_or(|next| next == at);
+            self.breaks += u64::from(!is_expected);
             self.largest = (self.largest.0.max(x), self.largest.1.max(y));
         }
         let pixels = self.columns * self.rows;
@@ -192,13 +195,13 @@ mod tests {
             breaks: 0,
             largest: (0, 0),
         };
-        // Anything before it counts is no break, wherever it begins.
+        // Events before counting starts are never breaks.
         scan.follow(9, 9, false);
         for (x, y) in [(0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (0, 0)] {
             scan.follow(x, y, true);
         }
         assert_eq!((scan.breaks, scan.largest), (0, (1, 2)));
-        scan.follow(0, 2, true); // one is missing
+        scan.follow(0, 2, true); // skips one
         scan.follow(1, 0, true);
         scan.follow(1, 3, true); // outside
         scan.follow(1, 1, true);

@@ -1,36 +1,36 @@
-//! Checks: the robot in free air.
+//! Checks `robot_state`, `repeatability` and `step_response`: the robot in free air.
 
 use skinrig_model::{HostDuration, Point3, PoseSample, Skin};
 use skinrig_nightly::EvidenceKind;
 use skinrig_protocol::suite::{Check, Measure};
 
 use crate::arm::{Arm, Reach, with_arm};
-use crate::bench::{Bench, Trouble};
+use crate::bench::{Bench, Problem};
 use crate::findings::Findings;
 
 const ROBOT: &str = "robot";
-/// Between two points in free air, where the check itself says no speed, mm/s.
+/// Travel speed in free air where a check has no speed parameter, mm/s.
 pub(super) const TRAVEL_MM_S: f64 = 40.0;
-/// Held still for so long.
-const STILL: HostDuration = HostDuration::from_millis(1_000);
-/// Over so long a time a place is a mean.
-const MEAN_OVER: HostDuration = HostDuration::from_millis(100);
-/// A point is approached from this far aside, mm.
-const FROM_MM: f64 = 4.0;
-/// A tip this near its target has settled, mm.
-const SETTLED_MM: f64 = 0.1;
-/// A set point this near its target is there, mm.
-const THERE_MM: f64 = 1e-3;
+/// Rest time.
+const REST: HostDuration = HostDuration::from_millis(1_000);
+/// Averaging time of a position.
+const AVERAGING: HostDuration = HostDuration::from_millis(100);
+/// Distance from which a point is approached, mm.
+const APPROACH_MM: f64 = 4.0;
+/// Distance from the target within which the tip has settled, mm.
+const SETTLE_TOLERANCE_MM: f64 = 0.1;
+/// Distance from the target within which the set point has arrived, mm.
+const SET_POINT_TOLERANCE_MM: f64 = 1e-3;
 
-/// Makes the check.
+/// Runs the check.
 pub fn robot_state(_: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     with_arm(bench, Reach::Air, found, &["creep"], &mut |arm, found| {
         let mut seen = Vec::new();
-        arm.watch(STILL, &mut seen, |_| false)?;
+        arm.watch(REST, &mut seen, |_| false)?;
         if let Some(creep_mm) = creep_mm(&seen) {
             found
                 .value(ROBOT, "creep", creep_mm)
-                .of(seen.len(), ENOUGH_SAMPLES);
+                .with_samples(seen.len(), MIN_SAMPLES);
         }
         Ok(())
     });
@@ -39,7 +39,7 @@ pub fn robot_state(_: &Check, bench: &mut dyn Bench, found: &mut Findings) {
         matches!(kind, K::State | K::ReadBack | K::Refused | K::Trip)
     };
     let n = found.evidence.iter().filter(|e| faults(&e.kind)).count();
-    // Nothing is known of a robot that is not there.
+    // Without a robot its faults are unknown.
     if n == found.evidence.len() {
         found.value(ROBOT, "faults", n as f64);
     } else {
@@ -47,25 +47,25 @@ pub fn robot_state(_: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     }
 }
 
-/// So many samples tell where a tip is that stands still.
-const ENOUGH_SAMPLES: u64 = 50;
+/// Samples needed to locate a tip at rest.
+const MIN_SAMPLES: u64 = 50;
 
-/// How far the mean place moved away from the first, mm.
+/// Largest distance of the mean position from its first value, mm.
 fn creep_mm(seen: &[PoseSample]) -> Option<f64> {
     let begin = seen.first()?.t;
-    let window = |s: &PoseSample| (s.t - begin).0 / MEAN_OVER.0;
-    let places = seen.chunk_by(|a, b| window(a) == window(b)).map(mean);
-    let places: Vec<Point3<Skin>> = places.collect();
-    let first = *places.first()?;
+    let window = |s: &PoseSample| (s.t - begin).0 / AVERAGING.0;
+    let positions = seen.chunk_by(|a, b| window(a) == window(b)).map(mean);
+    let positions: Vec<Point3<Skin>> = positions.collect();
+    let first = *positions.first()?;
     Some(
-        places
+        positions
             .iter()
             .map(|p| p.distance_mm(first))
             .fold(0.0, f64::max),
     )
 }
 
-/// The mean place of a non-empty list.
+/// Mean position of a non-empty list.
 pub(super) fn mean(samples: &[PoseSample]) -> Point3<Skin> {
     let n = samples.len() as f64;
     let mut sum = [0.0; 3];
@@ -78,7 +78,7 @@ pub(super) fn mean(samples: &[PoseSample]) -> Point3<Skin> {
     Point3::new(x, y, z)
 }
 
-/// Makes the check.
+/// Runs the check.
 pub fn repeatability(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::Repeatability {
         approaches,
@@ -89,90 +89,93 @@ pub fn repeatability(check: &Check, bench: &mut dyn Bench, found: &mut Findings)
     };
     let metrics = &["spread", "error"];
     with_arm(bench, Reach::Air, found, metrics, &mut |arm, found| {
-        let points = arm.room.air();
-        let mut places = vec![Vec::new(); points.len()];
+        let points = arm.volume.air_points();
+        let mut positions = vec![Vec::new(); points.len()];
         for approach in 0..approaches {
-            for (target, places) in points.iter().zip(&mut places) {
-                let from = beside(*target, approach, approaches);
-                places.push(approach_from(arm, from, *target, speed_mm_s)?);
+            for (target, positions) in points.iter().zip(&mut positions) {
+                let from = approach_start(*target, approach, approaches);
+                positions.push(approach_from(arm, from, *target, speed_mm_s)?);
             }
         }
-        let n = places.iter().map(Vec::len).sum::<usize>();
-        let spread_mm = spread_mm(&places);
-        found.value(ROBOT, "spread", spread_mm).of(n, 10);
+        let n = positions.iter().map(Vec::len).sum::<usize>();
+        let spread_mm = spread_mm(&positions);
+        found.value(ROBOT, "spread", spread_mm).with_samples(n, 10);
         let off = points
             .iter()
-            .zip(&places)
-            .flat_map(|(target, places)| places.iter().map(|p| p.distance_mm(*target)));
+            .zip(&positions)
+            .flat_map(|(target, positions)| positions.iter().map(|p| p.distance_mm(*target)));
         let error_mm = off.sum::<f64>() / n as f64;
-        found.value(ROBOT, "error", error_mm).of(n, 10);
+        found.value(ROBOT, "error", error_mm).with_samples(n, 10);
         Ok(())
     });
 }
 
-/// Where the `n`-th of `of` approaches comes from: another side each time, from above and from below in turn.
-fn beside(target: Point3<Skin>, n: u32, of: u32) -> Point3<Skin> {
+/// Start of approach `n` of `of`: from another side each time, alternately from above and from below.
+fn approach_start(target: Point3<Skin>, n: u32, of: u32) -> Point3<Skin> {
     let (sin, cos) = (std::f64::consts::TAU * f64::from(n) / f64::from(of)).sin_cos();
     let up = if n.is_multiple_of(2) { 1.0 } else { -1.0 };
     let [x, y, z] = target.to_array();
-    let aside = FROM_MM * std::f64::consts::FRAC_1_SQRT_2;
+    let aside = APPROACH_MM * std::f64::consts::FRAC_1_SQRT_2;
     Point3::new(x + aside * cos, y + aside * sin, z + aside * up)
 }
 
-/// Where the tip comes to rest.
+/// Position where the tip comes to rest.
 fn approach_from(
     arm: &mut Arm<'_>,
     from: Point3<Skin>,
     target: Point3<Skin>,
     speed_mm_s: f64,
-) -> Result<Point3<Skin>, Trouble> {
+) -> Result<Point3<Skin>, Problem> {
     arm.go(from, speed_mm_s)?;
     arm.go(target, speed_mm_s)?;
-    let mut seen = vec![arm.look()?];
-    arm.watch(HostDuration(3 * MEAN_OVER.0), &mut seen, |_| false)?;
-    Ok(mean(last(&seen, MEAN_OVER)))
+    let mut seen = vec![arm.pose()?];
+    arm.watch(HostDuration(3 * AVERAGING.0), &mut seen, |_| false)?;
+    Ok(mean(last(&seen, AVERAGING)))
 }
 
-/// The samples of the last `span`; not empty when `seen` is not.
+/// Samples of the last `span`; not empty unless `seen` is.
 pub(super) fn last(seen: &[PoseSample], span: HostDuration) -> &[PoseSample] {
     let Some(end) = seen.last() else { return seen };
     let first = seen.partition_point(|s| end.t - s.t > span);
     &seen[first..]
 }
 
-/// Pooled standard deviation about the means, all axes together, mm: the root of the sum of squares over the degrees of freedom.
-fn spread_mm(places: &[Vec<Point3<Skin>>]) -> f64 {
+/// Pooled standard deviation about the means over all axes, mm: root of the sum of squares over the degrees of freedom.
+fn spread_mm(positions: &[Vec<Point3<Skin>>]) -> f64 {
     let (mut squares, mut freedom) = (0.0, 0.0);
-    for places in places {
-        let n = places.len() as f64;
+    for positions in positions {
+        let n = positions.len() as f64;
         for axis in 0..3 {
             let of = |p: &Point3<Skin>| p.to_array()[axis];
-            let mean = places.iter().map(of).sum::<f64>() / n;
-            squares += places.iter().map(|p| (of(p) - mean).powi(2)).sum::<f64>();
+            let mean = positions.iter().map(of).sum::<f64>() / n;
+            squares += positions
+                .iter()
+                .map(|p| (of(p) - mean).powi(2))
+                .sum::<f64>();
         }
         freedom += n - 1.0;
     }
     (squares / freedom).sqrt()
 }
 
-/// Makes the check.
+/// Runs the check.
 pub fn step_response(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::StepResponse { distance_mm, steps } = check.measure else {
         return;
     };
     let metrics = &["settling", "overshoot", "error"];
     with_arm(bench, Reach::Air, found, metrics, &mut |arm, found| {
-        let [middle, ..] = arm.room.air();
+        let [centre, ..] = arm.volume.air_points();
         let mut responses = Vec::new();
-        arm.go(middle, TRAVEL_MM_S)?;
-        let mut from = middle;
+        arm.go(centre, TRAVEL_MM_S)?;
+        let mut from = centre;
         for n in 0..steps {
             let target = if n.is_multiple_of(2) {
-                step(middle, distance_mm, n / 2)
+                step_target(centre, distance_mm, n / 2)
             } else {
-                middle
+                centre
             };
-            let response = respond(arm, from, target)?;
+            let response = measure_step(arm, from, target)?;
             responses.extend(response);
             from = target;
         }
@@ -181,24 +184,26 @@ pub fn step_response(check: &Check, bench: &mut dyn Bench, found: &mut Findings)
         let mut settling: Vec<f64> = responses.iter().map(|r| r.settling_s).collect();
         settling.sort_by(f64::total_cmp);
         if let Some(median) = settling.get(n / 2) {
-            found.value(ROBOT, "settling", *median).of(n, 3);
+            found.value(ROBOT, "settling", *median).with_samples(n, 3);
             found
                 .value(ROBOT, "overshoot", most(|r| r.overshoot_mm))
-                .of(n, 3);
-            found.value(ROBOT, "error", most(|r| r.error_mm)).of(n, 3);
+                .with_samples(n, 3);
+            found
+                .value(ROBOT, "error", most(|r| r.error_mm))
+                .with_samples(n, 3);
         }
         Ok(())
     });
 }
 
-/// Aside along x, y, and back, in turn.
-fn step(middle: Point3<Skin>, distance_mm: f64, n: u32) -> Point3<Skin> {
+/// Target of step `n`: alternately along +x, +y, -x and -y.
+fn step_target(centre: Point3<Skin>, distance_mm: f64, n: u32) -> Point3<Skin> {
     let (sin, cos) = (f64::from(n) * std::f64::consts::FRAC_PI_2).sin_cos();
-    let [x, y, z] = middle.to_array();
+    let [x, y, z] = centre.to_array();
     Point3::new(x + distance_mm * cos, y + distance_mm * sin, z)
 }
 
-/// How a tip answered a step.
+/// Response of the tip to a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Response {
     settling_s: f64,
@@ -206,21 +211,22 @@ struct Response {
     error_mm: f64,
 }
 
-fn respond(
+fn measure_step(
     arm: &mut Arm<'_>,
     from: Point3<Skin>,
     target: Point3<Skin>,
-) -> Result<Option<Response>, Trouble> {
+) -> Result<Option<Response>, Problem> {
     let mut seen = Vec::new();
     let t = arm.send(target, TRAVEL_MM_S)?;
-    let there = move |s: &PoseSample| s.t > t && s.commanded.distance_mm(target) <= THERE_MM;
+    let there =
+        move |s: &PoseSample| s.t > t && s.commanded.distance_mm(target) <= SET_POINT_TOLERANCE_MM;
     arm.watch(HostDuration::from_millis(5_000), &mut seen, there)?;
-    arm.watch(STILL, &mut seen, |_| false)?;
-    Ok(response(&seen, from, target, there))
+    arm.watch(REST, &mut seen, |_| false)?;
+    Ok(evaluate_step(&seen, from, target, there))
 }
 
-/// From the samples of a step. `None`: the set point never came there.
-fn response(
+/// Evaluates the samples of a step. `None`: the set point never arrived.
+fn evaluate_step(
     seen: &[PoseSample],
     from: Point3<Skin>,
     target: Point3<Skin>,
@@ -230,7 +236,7 @@ fn response(
     let after = &seen[end..];
     let (begin, last_seen) = (after.first()?.t, after.last()?.t);
     let away = |s: &PoseSample| s.measured.distance_mm(target);
-    let outside = after.iter().rposition(|s| away(s) > SETTLED_MM);
+    let outside = after.iter().rposition(|s| away(s) > SETTLE_TOLERANCE_MM);
     let settled = match outside.map(|n| after.get(n + 1)) {
         None => begin,
         Some(Some(s)) => s.t,
@@ -247,6 +253,6 @@ fn response(
     Some(Response {
         settling_s: (settled - begin).as_secs_f64(),
         overshoot_mm: seen.iter().map(beyond).fold(0.0, f64::max),
-        error_mm: mean(last(after, MEAN_OVER)).distance_mm(target),
+        error_mm: mean(last(after, AVERAGING)).distance_mm(target),
     })
 }

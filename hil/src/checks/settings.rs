@@ -1,4 +1,4 @@
-//! Checks: settings of the cameras, read back.
+//! Check `settings`: camera settings, written and read back.
 
 use skinrig_controller::differing;
 use skinrig_model::{CameraId, Setting};
@@ -6,66 +6,66 @@ use skinrig_nightly::{Evidence, EvidenceKind};
 use skinrig_protocol::suite::Check;
 
 use crate::bench::Bench;
+use crate::device_evidence;
 use crate::findings::Findings;
-use crate::trouble;
 
 const METRICS: &[&str] = &["differences"];
 
-/// Makes the check.
+/// Runs the check.
 pub fn settings(_check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     for camera in CameraId::ALL {
-        one(camera, bench, found);
+        check_camera(camera, bench, found);
     }
 }
 
-fn one(camera: CameraId, bench: &mut dyn Bench, found: &mut Findings) {
-    let subject = trouble::of_camera(camera);
-    let wanted = match bench.camera_settings(camera) {
-        Ok(wanted) => wanted,
-        Err(trouble) => return found.trouble(*trouble, subject, METRICS),
+fn check_camera(camera: CameraId, bench: &mut dyn Bench, found: &mut Findings) {
+    let subject = device_evidence::camera_subject(camera);
+    let settings = match bench.camera_settings(camera) {
+        Ok(settings) => settings,
+        Err(problem) => return found.failed(*problem, subject, METRICS),
     };
     let device = match &mut bench.devices().cameras[camera.index()] {
         Ok(device) => device,
-        Err(trouble) => return found.trouble(*trouble.clone(), subject, METRICS),
+        Err(problem) => return found.failed(*problem.clone(), subject, METRICS),
     };
-    // An earlier check may have been cut off.
+    // The previous check may have been interrupted while it streamed.
     let stopped = device.stop(&mut Vec::new());
-    let read = match stopped.and_then(|()| device.configure(&wanted)) {
+    let read = match stopped.and_then(|()| device.configure(&settings)) {
         Ok(read) => read,
         Err(e) => {
-            let trouble = trouble::of(&e);
-            if trouble.kind != EvidenceKind::ReadBack {
-                return found.trouble(*trouble, subject, METRICS);
+            let problem = device_evidence::from_error(&e);
+            if problem.kind != EvidenceKind::ReadBack {
+                return found.failed(*problem, subject, METRICS);
             }
-            // The first one ends it: what comes after it is not written.
+            // The first mismatch ends the configuration: later settings were not written.
             found
                 .value(subject, "differences", 1.0)
-                .noting(format!("at least: {}", trouble.what));
-            found.evidence.push(*trouble);
+                .with_note(format!("at least: {}", problem.what));
+            found.evidence.push(*problem);
             return;
         }
     };
     let mut count = 0;
     for setting in differing(&read) {
-        let (name, wrote, told) = (&setting.name, &setting.requested, &setting.read_back);
-        let what = format!("{name}: expected {wrote} after writing, found {told}");
-        let next = "power-cycle the camera; `read_back_exceptions` is for registers that a camera is known to read differently";
+        let (name, wrote, found_value) = (&setting.name, &setting.requested, &setting.read_back);
+        let what = format!("{name}: expected {wrote} after writing, found {found_value}");
+        let next = "power-cycle the camera; use `read_back_exceptions` only for registers that this camera is known to read back differently";
         found
             .evidence
             .push(Evidence::new(EvidenceKind::ReadBack, subject, what).next(next));
         count += 1;
     }
-    // A night on tolerance must not look like one on settings that hold.
+    // A tolerated mismatch must not look like a setting that was accepted.
     for mismatch in read.iter().filter(|s| s.requested == Setting::TOLERATED) {
-        let next = "add the key to the rig file if that is right for this camera, and run without --tolerant";
+        let next = "if this value is right for this camera, add the key to the rig file and run without --tolerant";
         let what = format!("{}: {}", mismatch.name, mismatch.read_back);
         found
             .evidence
             .push(Evidence::new(EvidenceKind::ReadBack, subject, what).next(next));
         count += 1;
     }
-    let told = read.iter().map(|s| format!("{} {}", s.name, s.read_back));
+    let values = read.iter().map(|s| format!("{} {}", s.name, s.read_back));
     found
         .value(subject, "differences", f64::from(count))
-        .noting(told.collect::<Vec<_>>().join(", "));
+        .with_note(values.collect::<Vec<_>>().join(", "));
 }

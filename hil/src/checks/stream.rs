@@ -1,4 +1,4 @@
-//! Checks: data rate and loss, at rest and under the test pattern.
+//! Checks `idle` and `test_pattern`: data rate and loss.
 
 use skinrig_device::{DeviceError, EventCamera, PatternScan, TestPattern};
 use skinrig_model::{CameraId, HostDuration};
@@ -7,29 +7,29 @@ use skinrig_protocol::suite::{Check, Measure};
 
 use super::pixels::{Reader, watch};
 use crate::bench::Bench;
+use crate::device_evidence;
 use crate::findings::Findings;
-use crate::streams::{Seen, Streams};
-use crate::trouble;
+use crate::streams::{StreamStats, Streams};
 
 const IDLE: &[&str] = &["data_rate", "lost", "gaps"];
 const PATTERN: &[&str] = &["received", "lost", "gaps"];
 
-/// Start-up bursts do not count: the stream is looked at this long before it does.
+/// Streaming time before counting starts, to skip start-up bursts.
 const SETTLE: HostDuration = HostDuration::from_millis(500);
 
-/// Makes the check.
+/// Runs the check.
 pub fn idle(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::Idle { duration } = check.measure else {
         return;
     };
     let mut readers = [None, None];
     let mut prepare = |id: CameraId, camera: &mut dyn EventCamera| -> Result<(), DeviceError> {
-        readers[id.index()] = Some(Reader::of_time(&camera.capabilities()));
+        readers[id.index()] = Some(Reader::time_base_only(&camera.capabilities()));
         Ok(())
     };
     let streams = Streams::start(bench, &mut prepare);
     for (camera, seen, reader) in watch(streams, [SETTLE, duration], readers, found, IDLE) {
-        let subject = trouble::of_camera(camera);
+        let subject = device_evidence::camera_subject(camera);
         let Some(span_s) = seen.span_s() else {
             for metric in IDLE {
                 found.unmeasured(subject, metric);
@@ -41,7 +41,7 @@ pub fn idle(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     }
 }
 
-/// Makes the check.
+/// Runs the check.
 pub fn test_pattern(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::TestPattern {
         duration,
@@ -55,22 +55,22 @@ pub fn test_pattern(check: &Check, bench: &mut dyn Bench, found: &mut Findings) 
     let mut prepare = |id: CameraId, camera: &mut dyn EventCamera| -> Result<(), DeviceError> {
         if let Some(scan) = camera.test_pattern(Some(TestPattern { rate_ev_s }))? {
             scans[id.index()] = Some(scan);
-            let reader = Reader::of_scan(&camera.capabilities(), scan.columns, scan.rows);
+            let reader = Reader::following_scan(&camera.capabilities(), scan.columns, scan.rows);
             readers[id.index()] = Some(reader);
         }
         Ok(())
     };
     let streams = Streams::start(bench, &mut prepare);
     let watched = watch(streams, [SETTLE, duration], readers, found, PATTERN);
-    give_pixels_back(bench, found);
+    disable_test_pattern(bench, found);
     let refused = |e: &&Evidence| e.kind == EvidenceKind::Refused;
     if scans == [None, None] && found.evidence.iter().filter(refused).count() == scans.len() {
         let whats = found.evidence.iter().map(|e| e.what.as_str());
-        found.not_here = Some(whats.collect::<Vec<_>>().join("; "));
+        found.not_applicable = Some(whats.collect::<Vec<_>>().join("; "));
         return;
     }
     for (camera, seen, reader) in watched {
-        let subject = trouble::of_camera(camera);
+        let subject = device_evidence::camera_subject(camera);
         let (Some(span_s), Some(scan)) = (seen.span_s(), scans[camera.index()]) else {
             for metric in PATTERN {
                 found.unmeasured(subject, metric);
@@ -83,8 +83,8 @@ pub fn test_pattern(check: &Check, bench: &mut dyn Bench, found: &mut Findings) 
         let (columns, rows) = followed.as_ref().map_or((0, 0), |s| s.largest);
         found
             .value(subject, "received", events as f64 / expected * 100.0)
-            .noting(format!(
-                "{events} of {expected:.0} events at {:.0} events/s; up to column {columns} and row {rows} of {} x {}",
+            .with_note(format!(
+                "{events} of {expected:.0} events at {:.0} events/s; largest column {columns}, largest row {rows} of {} x {}",
                 scan.rate_ev_s, scan.columns, scan.rows
             ));
         let breaks = followed.map_or(0, |s| s.breaks);
@@ -92,31 +92,31 @@ pub fn test_pattern(check: &Check, bench: &mut dyn Bench, found: &mut Findings) 
     }
 }
 
-/// Bytes lost, and gaps: losses, steps of the time base, and events that a scan misses.
-fn losses(subject: &str, seen: &Seen, jumps: u64, breaks: u64, found: &mut Findings) {
+/// Adds lost bytes and gaps: losses, time base jumps and breaks of the test pattern.
+fn losses(subject: &str, seen: &StreamStats, jumps: u64, breaks: u64, found: &mut Findings) {
     let lost = found.value(subject, "lost", seen.lost_bytes as f64);
     if !seen.notes.is_empty() {
-        lost.noting(seen.notes.join("; "));
+        lost.with_note(seen.notes.join("; "));
     }
     let gaps = seen.losses + jumps + breaks;
     found.value(subject, "gaps", gaps as f64);
     if gaps > 0 {
         let what = format!(
-            "expected a stream without gaps, found {} losses of {} bytes together, {jumps} jumps of the time base and {breaks} breaks of the pattern",
+            "expected a stream without gaps, found {} losses with {} bytes in total, {jumps} time base jumps and {breaks} breaks of the test pattern",
             seen.losses, seen.lost_bytes
         );
-        let next = "look at the cable, the port (USB 3, no hub) and what else runs on the computer";
+        let next = "check the cable, the port (USB 3, no hub) and what else runs on this computer";
         found
             .evidence
             .push(Evidence::new(EvidenceKind::DataLost, subject, what).next(next));
     }
 }
 
-/// Both cameras see again; one that does not is told.
-fn give_pixels_back(bench: &mut dyn Bench, found: &mut Findings) {
+/// Switches the test pattern off on both cameras; a failure becomes evidence.
+fn disable_test_pattern(bench: &mut dyn Bench, found: &mut Findings) {
     for camera in bench.devices().cameras.iter_mut().flatten() {
         if let Err(e) = camera.test_pattern(None) {
-            found.evidence.push(*trouble::of(&e));
+            found.evidence.push(*device_evidence::from_error(&e));
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Checks: coded trains through both cameras.
+//! Check `trigger_loopback`: coded trains from the trigger box through both cameras.
 
 use std::collections::BTreeSet;
 
@@ -11,26 +11,26 @@ use skinrig_nightly::{Evidence, EvidenceKind};
 use skinrig_protocol::suite::{Check, Measure};
 
 use crate::bench::Bench;
+use crate::device_evidence;
 use crate::findings::Findings;
 use crate::streams::Streams;
-use crate::trouble;
 
 const METRICS: &[&str] = &["lost_pulses", "extra_pulses", "unread_trains", "jitter"];
 
-/// After a train the line rests for so long, at least: the box may send one of its own.
-const REST: HostDuration = HostDuration::from_millis(15);
-/// The cameras stream for so long before the first train, and after the last: start-up bursts, and reports on their way.
+/// Minimum pause after a train: the box may send one of its own.
+const PAUSE: HostDuration = HostDuration::from_millis(15);
+/// Streaming time before the first train and after the last, for start-up bursts and late reports.
 const MARGIN: HostDuration = HostDuration::from_millis(300);
-/// Trains that a verdict needs: through fewer there is no line, and pulses cannot be told from noise.
-const LEAST_TRAINS: u64 = 3;
-/// Rising edges that the jitter needs: two trains' worth.
-const LEAST_EDGES: u64 = 64;
-/// What a camera's time counts in, s.
-const US: f64 = 1e-6;
+/// Trains needed for a verdict: with fewer there is no fit, and pulses are indistinguishable from noise.
+const MIN_TRAINS: u64 = 3;
+/// Rising edges needed for the jitter: two trains.
+const MIN_EDGES: u64 = 64;
+/// Resolution of a camera's time, s.
+const TICK_S: f64 = 1e-6;
 
-/// The n-th mark of a check: every one has a name of its own, and neighbours differ in many bits.
+/// The `n`-th mark of a check. All marks differ, and consecutive ones in many bits.
 pub(super) fn mark(n: u32) -> Mark {
-    /// Odd, so that the numbers of 2^17 marks are all different.
+    /// Odd, so that 2^17 consecutive marks have different numbers.
     const STRIDE: u32 = 52_361;
     Mark {
         kind: MarkKind::ALL[n as usize % MarkKind::ALL.len()],
@@ -38,43 +38,43 @@ pub(super) fn mark(n: u32) -> Mark {
     }
 }
 
-/// Trigger edges by camera, as they come.
+/// Trigger edges by camera, in order of arrival.
 #[derive(Default)]
 pub(super) struct Edges(pub [Vec<TriggerEdge>; 2]);
 
 impl Edges {
-    /// Takes those of `chunk`.
-    pub fn see(&mut self, chunk: &RawChunk) {
+    /// Adds the edges of `chunk`.
+    pub fn add(&mut self, chunk: &RawChunk) {
         self.0[chunk.camera.index()].extend_from_slice(&chunk.triggers);
     }
 
-    /// Those of `camera` on `channel`.
-    pub fn on(&self, camera: CameraId, channel: u8) -> Vec<TriggerEdge> {
+    /// Edges of `camera` on `channel`.
+    pub fn on_channel(&self, camera: CameraId, channel: u8) -> Vec<TriggerEdge> {
         let edges = self.0[camera.index()].iter().copied();
         edges.filter(|e| e.channel == channel).collect()
     }
 
-    /// The other channels of `camera` that had edges.
-    fn elsewhere(&self, camera: CameraId, channel: u8) -> Vec<u8> {
+    /// Other channels of `camera` with edges.
+    fn other_channels(&self, camera: CameraId, channel: u8) -> Vec<u8> {
         let edges = self.0[camera.index()].iter().map(|e| e.channel);
         let others: BTreeSet<u8> = edges.filter(|c| *c != channel).collect();
         others.into_iter().collect()
     }
 }
 
-/// Makes the check.
+/// Runs the check.
 pub fn trigger_loopback(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::TriggerLoopback { trains } = check.measure else {
         return;
     };
     if bench.rig().trigger_box.is_none() {
-        found.not_here = Some("the rig file has no `trigger_box`".to_owned());
+        found.not_applicable = Some("the rig file has no `trigger_box`".to_owned());
         return;
     }
     let channels = bench.rig().cameras.each_ref().map(|c| c.trigger_channel);
     let mut edges = Edges::default();
     let mut streams = Streams::start(bench, &mut |_, _| Ok(()));
-    let see = &mut |chunk: &RawChunk| edges.see(chunk);
+    let see = &mut |chunk: &RawChunk| edges.add(chunk);
     streams.pass(MARGIN, see);
     let mut sent = Vec::new();
     for n in 0..trains {
@@ -82,16 +82,16 @@ pub fn trigger_loopback(check: &Check, bench: &mut dyn Bench, found: &mut Findin
             break;
         }
         sent.push(mark(n));
-        streams.pass(REST, see);
+        streams.pass(PAUSE, see);
     }
     streams.pass(MARGIN, see);
-    let reports = among(streams.reports(), &sent);
-    let told_of_all = streams.box_was_heard_well() && !skips(&reports);
+    let reports = trim_to_marks(streams.reports(), &sent);
+    let reports_complete = streams.box_reports_are_complete() && !has_missing_syncs(&reports);
     let seen = streams.finish(found, METRICS, see);
     if reports.iter().any(|r| matches!(r, BoxReport::Reset { .. })) {
-        let what = "expected the box's clock to go on, found that the box was reset";
-        let subject = trouble::subject(skinrig_model::DeviceRole::TriggerBox);
-        let next = "look at the box's power and its cable";
+        let what = "expected the box's clock to continue, found a reset of the box";
+        let subject = device_evidence::subject(skinrig_model::DeviceRole::TriggerBox);
+        let next = "check the box's power and its cable";
         found
             .evidence
             .push(Evidence::new(EvidenceKind::TriggerFault, subject, what).next(next));
@@ -100,39 +100,40 @@ pub fn trigger_loopback(check: &Check, bench: &mut dyn Bench, found: &mut Findin
         if seen[camera.index()].is_none() {
             continue;
         }
-        let subject = trouble::of_camera(camera);
-        // Of a train that the box's reports leave out nothing says whether it was lost or nobody sent it.
-        if sent.len() < trains as usize || !told_of_all {
+        let subject = device_evidence::camera_subject(camera);
+        // If the box's reports are incomplete, a missing train may be lost or may never have been sent.
+        if sent.len() < trains as usize || !reports_complete {
             for metric in METRICS {
                 let value = found.unmeasured(subject, metric);
-                if !told_of_all {
-                    value.noting("the box did not tell of every train that it sent");
+                if !reports_complete {
+                    value.with_note("the box did not report every train that it sent");
                 }
             }
             continue;
         }
         let channel = channels[camera.index()];
-        let line = Line::of(&sent, &reports, &edges.on(camera, channel), channel);
-        line.tell(subject, &edges.elsewhere(camera, channel), found);
+        let line =
+            LineQuality::measure(&sent, &reports, &edges.on_channel(camera, channel), channel);
+        line.report(subject, &edges.other_channels(camera, channel), found);
     }
 }
 
-/// What came through one camera's line.
-struct Line {
+/// Quality of one camera's trigger line.
+struct LineQuality {
     sent: usize,
     unread: usize,
     lost_pulses: u64,
     extra_edges: u64,
-    /// s, and the edges behind it.
+    /// Jitter, s, and the number of edges behind it.
     jitter: Option<(f64, u64)>,
-    /// Why the pulses could only be counted, when no clock could be laid on them.
-    unclocked: Option<String>,
+    /// Why no clock could be fitted, in which case pulses are only counted.
+    unfitted: Option<String>,
 }
 
-impl Line {
-    fn of(sent: &[Mark], reports: &[BoxReport], edges: &[TriggerEdge], channel: u8) -> Self {
+impl LineQuality {
+    fn measure(sent: &[Mark], reports: &[BoxReport], edges: &[TriggerEdge], channel: u8) -> Self {
         let read = decode_marks(edges);
-        // In the order in which they were sent: a train that is read out of turn is not read.
+        // In the order of sending: a train decoded out of order counts as unread.
         let mut turn = sent.iter();
         let read_in_turn = read
             .marks
@@ -146,25 +147,25 @@ impl Line {
             lost_pulses: 0,
             extra_edges: 0,
             jitter: None,
-            unclocked: None,
+            unfitted: None,
         };
         match wire(reports, edges, channel) {
             Ok(wire) => Self {
                 lost_pulses: lost_pulses(&wire, sent),
                 extra_edges: wire.counts.doubled + wire.counts.spurious,
-                jitter: wire.jitter.map(|(us, n)| (us * US, n)),
+                jitter: wire.jitter.map(|(us, n)| (us * TICK_S, n)),
                 ..line
             },
             Err(why) => Self {
                 lost_pulses: unread as u64 * PULSES_PER_TRAIN,
                 extra_edges: read.stray_edges,
-                unclocked: Some(why),
+                unfitted: Some(why),
                 ..line
             },
         }
     }
 
-    fn tell(self, subject: &str, elsewhere: &[u8], found: &mut Findings) {
+    fn report(self, subject: &str, other_channels: &[u8], found: &mut Findings) {
         let trains = self.sent;
         for (metric, count) in [
             ("lost_pulses", self.lost_pulses),
@@ -173,17 +174,17 @@ impl Line {
         ] {
             let value = found
                 .value(subject, metric, count as f64)
-                .of(trains, LEAST_TRAINS);
-            if let Some(why) = &self.unclocked {
-                value.noting(format!("only counted, not followed edge by edge: {why}"));
+                .with_samples(trains, MIN_TRAINS);
+            if let Some(why) = &self.unfitted {
+                value.with_note(format!("counted only, not matched edge by edge: {why}"));
             }
         }
         match self.jitter {
             Some((jitter_s, n)) => {
-                // Of a standard deviation from n samples, which are nearly normal.
+                // Standard error of a standard deviation from n nearly normal samples.
                 let half = 1.96 * jitter_s / (2.0 * n as f64).sqrt();
                 let value = found.value(subject, "jitter", jitter_s);
-                value.of(n as usize, LEAST_EDGES).interval =
+                value.with_samples(n as usize, MIN_EDGES).interval =
                     Some([(jitter_s - half).max(0.0), jitter_s + half]);
             }
             None => drop(found.unmeasured(subject, "jitter")),
@@ -192,14 +193,14 @@ impl Line {
             return;
         }
         let mut what = format!(
-            "expected {} pulses in {trains} trains, found {} of them missing, {} edges too many and {} trains unread",
+            "expected {} pulses in {trains} trains, found {} missing pulses, {} extra edges and {} unread trains",
             trains as u64 * PULSES_PER_TRAIN,
             self.lost_pulses,
             self.extra_edges,
             self.unread,
         );
-        if !elsewhere.is_empty() {
-            what += &format!("; edges on channel {elsewhere:?}");
+        if !other_channels.is_empty() {
+            what += &format!("; edges on channel {other_channels:?}");
         }
         let next = "check the trigger cable, its channel in the rig file, and levels (docs/how-to/bench.md)";
         found
@@ -208,9 +209,8 @@ impl Line {
     }
 }
 
-/// The reports without the trains before the first of the marks that were sent, and without those after the last: the cameras may have
-/// seen a part of these only.
-fn among(reports: &[BoxReport], sent: &[Mark]) -> Vec<BoxReport> {
+/// `reports` without trains before the first sent mark and after the last: the cameras may have seen only parts of those.
+fn trim_to_marks(reports: &[BoxReport], sent: &[Mark]) -> Vec<BoxReport> {
     let is_ours = |r: &BoxReport| matches!(r, BoxReport::Mark { mark, .. } if sent.contains(mark));
     let (first, last) = (
         reports.iter().position(is_ours),
@@ -225,8 +225,8 @@ fn among(reports: &[BoxReport], sent: &[Mark]) -> Vec<BoxReport> {
     kept.map(|(_, r)| *r).collect()
 }
 
-/// Whether sync trains, which the box counts, are missing among `reports`.
-fn skips(reports: &[BoxReport]) -> bool {
+/// Whether the counters of the sync trains in `reports` have a gap.
+fn has_missing_syncs(reports: &[BoxReport]) -> bool {
     let counts = reports.iter().filter_map(|r| match r {
         BoxReport::Sync { count, .. } => Some(*count),
         _ => None,
@@ -237,7 +237,7 @@ fn skips(reports: &[BoxReport]) -> bool {
         .any(|c| c[1] != (c[0] + 1) & MAX_MARKED_PRESS)
 }
 
-/// Pulses that did not come through whole. A mark that the box does not know of is lost as a whole.
+/// Lost pulses. A mark without a report of the box counts as completely lost.
 fn lost_pulses(wire: &Wire, sent: &[Mark]) -> u64 {
     let is_ours = |t: &&WireTrain| matches!(t.label, Label::Mark(m) if sent.contains(&m));
     let known = wire.trains.iter().filter(is_ours).count();
@@ -252,7 +252,7 @@ mod tests {
     use skinrig_model::BoxTime;
 
     #[test]
-    fn trains_between_the_first_mark_and_the_last_count_and_a_hole_among_them_shows() {
+    fn trains_between_the_first_and_the_last_mark_count_and_a_missing_one_is_detected() {
         let sync = |count, us| BoxReport::Sync {
             count,
             at: BoxTime { us },
@@ -269,15 +269,15 @@ mod tests {
             marked(1, 5),
             sync(8, 6),
         ]);
-        let within = among(&reports, &sent);
+        let within = trim_to_marks(&reports, &sent);
         assert_eq!(within, reports[1..6]);
-        assert!(!skips(&within));
-        assert!(skips(&reports));
+        assert!(!has_missing_syncs(&within));
+        assert!(has_missing_syncs(&reports));
         let reset = BoxReport::Reset {
             noticed: skinrig_model::HostTime(9),
         };
         reports.push(reset);
-        assert_eq!(among(&reports, &sent).last(), Some(&reset));
-        assert_eq!(among(&reports[..1], &sent), []);
+        assert_eq!(trim_to_marks(&reports, &sent).last(), Some(&reset));
+        assert_eq!(trim_to_marks(&reports[..1], &sent), []);
     }
 }

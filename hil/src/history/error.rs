@@ -1,43 +1,43 @@
-//! What can go wrong with a history file.
+//! Errors of a history file.
 
 use std::path::{Path, PathBuf};
 
-/// A history could not be written or read.
+/// A history file could not be written or read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum HistoryError {
-    /// The operating system refused.
+    /// An operation of the file system failed.
     #[error("{}: {doing}: {source}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What was being done.
+        /// The failed operation.
         doing: &'static str,
-        /// Its answer.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// SQLite refused.
+    /// A query failed.
     #[error("{}: {doing}: {source}", path.display())]
     Sql {
         /// The file.
         path: PathBuf,
-        /// What was being done.
+        /// The failed operation.
         doing: &'static str,
-        /// Its answer.
+        /// Error of SQLite.
         source: Box<sqlx::Error>,
     },
-    /// No such file.
-    #[error("{}: expected a history of nights, found nothing; `skinrig hil run` begins one, `skinrig hil trend --rebuild FOLDER` makes one from the nights in a folder", path.display())]
+    /// The file does not exist.
+    #[error("{}: expected a history of nights, found no file; `skinrig hil run` creates one, `skinrig hil trend --rebuild FOLDER` creates one from the nights in a folder", path.display())]
     Missing {
         /// The file.
         path: PathBuf,
     },
-    /// The file is something else.
-    #[error("{}: expected a history of nights, found {found}; name another file", path.display())]
+    /// The file is not a history.
+    #[error("{}: expected a history of nights, found {found}; choose another file", path.display())]
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What it is.
+        /// Kind of file.
         found: String,
     },
     /// Written by a newer skinrig.
@@ -45,69 +45,69 @@ pub enum HistoryError {
     Newer {
         /// The file.
         path: PathBuf,
-        /// Its version.
+        /// Its schema version.
         found: u32,
-        /// The newest that this program knows.
+        /// The newest supported version.
         supported: u32,
     },
-    /// The file contradicts itself.
+    /// The file is damaged.
     #[error("{}: damaged: {found}; move it away and rebuild it from the nights: `skinrig hil trend {} --rebuild FOLDER`", path.display(), path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
-        /// What was found.
+        /// Description of the damage.
         found: String,
     },
-    /// Two different nights of one name.
-    #[error("{}: expected one night {night} of {rig}, found another one of that name in the history; one of them was changed", path.display())]
-    OtherNight {
+    /// The history has a different night with the same name.
+    #[error("{}: the history already has a different night {night} of {rig}; one of the two was changed", path.display())]
+    ConflictingNight {
         /// The file.
         path: PathBuf,
-        /// Its name.
+        /// Name of the night.
         night: String,
-        /// The bench.
+        /// Name of the bench.
         rig: String,
     },
-    /// Something that the history does not hold.
-    #[error("{}: expected {wanted}, found {found}", path.display())]
-    NotThere {
+    /// The history does not contain the requested night or series.
+    #[error("{}: expected {expected}, found {found}", path.display())]
+    NotFound {
         /// The file.
         path: PathBuf,
-        /// What was asked for.
-        wanted: String,
-        /// What there is.
+        /// The request.
+        expected: String,
+        /// What the history contains instead.
         found: String,
     },
-    /// A night that is not over, or none.
-    #[error("{}: expected the JSON of a night that came to its end, found {found}", path.display())]
-    NoNight {
+    /// The file is not the JSON of a finished night.
+    #[error("{}: expected the JSON of a finished night, found {found}", path.display())]
+    InvalidNight {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Description of the content.
         found: String,
     },
 }
 
-/// A fault of one query, before it is known of which file.
+/// A failed query, before the file is added.
 #[derive(Debug)]
-pub(super) enum Fault {
+pub(super) enum QueryError {
     Sql(Box<sqlx::Error>),
     Damaged(String),
 }
 
-impl From<sqlx::Error> for Fault {
+impl From<sqlx::Error> for QueryError {
     fn from(e: sqlx::Error) -> Self {
         Self::Sql(Box::new(e))
     }
 }
 
-impl Fault {
-    /// `place` holds `found` where `expected` should be.
+impl QueryError {
+    /// `found` at `place`, where `expected` should be.
     pub fn damaged(place: &str, expected: &str, found: impl std::fmt::Display) -> Self {
         Self::Damaged(format!("{place}: expected {expected}, found {found}"))
     }
 
-    /// The error for the user.
+    /// Adds the file and the operation.
     pub fn at(self, path: &Path, doing: &'static str) -> HistoryError {
         let path = path.to_owned();
         match self {
@@ -125,7 +125,7 @@ impl Fault {
     }
 }
 
-/// SQLITE_CORRUPT and SQLITE_NOTADB (sqlite.org/rescode.html), and columns of another type.
+/// SQLITE_CORRUPT and SQLITE_NOTADB (sqlite.org/rescode.html), and columns with an unexpected type.
 fn is_damage(e: &sqlx::Error) -> bool {
     match e {
         sqlx::Error::Database(e) => e

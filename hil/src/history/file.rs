@@ -1,4 +1,4 @@
-//! How a history file is opened: which file is one, and how two programs share it.
+//! Opens history files: format check, migrations, and locking between programs.
 
 use std::fs::File;
 use std::io::{ErrorKind, Read};
@@ -10,9 +10,9 @@ use sqlx::migrate::{Migration, MigrationType, Migrator};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqliteSynchronous};
 use sqlx::{ConnectOptions, Connection, Row, SqlSafeStr, Sqlite, Transaction};
 
-use super::error::{Fault, HistoryError};
+use super::error::{HistoryError, QueryError};
 
-/// The schema version that this program writes, and the newest that it reads (`PRAGMA user_version`).
+/// Schema version that this program writes, and the newest that it reads (`PRAGMA user_version`).
 pub const HISTORY_SCHEMA_VERSION: u32 = 1;
 /// `skrh` in ASCII (`PRAGMA application_id`).
 pub const HISTORY_APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrh");
@@ -32,10 +32,10 @@ static MIGRATOR: LazyLock<Migrator> = LazyLock::new(|| {
     Migrator::with_migrations(migrations.collect())
 });
 
-/// How long to wait for another program that writes. A write takes milliseconds.
+/// How long to wait for another writer. A write takes milliseconds.
 const BUSY: Duration = Duration::from_secs(30);
 
-/// Opens a history, after a look at its first page. `create`: one that is not there yet begins empty.
+/// Opens a history after checking its first page. `create`: start an empty one if the file does not exist.
 pub(super) async fn open(path: &Path, create: bool) -> Result<SqliteConnection, HistoryError> {
     let is_new = !check_first_page(path)?;
     if is_new && !create {
@@ -46,7 +46,7 @@ pub(super) async fn open(path: &Path, create: bool) -> Result<SqliteConnection, 
     let mut conn = SqliteConnectOptions::new()
         .filename(path)
         .create_if_missing(create)
-        // One file, and nothing beside it when nobody writes: it can be copied.
+        // No side files between writes, so that the file can be copied.
         .journal_mode(SqliteJournalMode::Delete)
         .synchronous(SqliteSynchronous::Extra)
         .foreign_keys(true)
@@ -54,40 +54,42 @@ pub(super) async fn open(path: &Path, create: bool) -> Result<SqliteConnection, 
         .thread_name(|_| "history-sqlite".to_owned())
         .connect()
         .await
-        .map_err(|e| Fault::from(e).at(path, "opening it"))?;
-    let sound = check_sound(&mut conn).await;
+        .map_err(|e| QueryError::from(e).at(path, "opening it"))?;
+    let sound = check_integrity(&mut conn).await;
     sound.map_err(|fault| fault.at(path, "checking it"))?;
     Ok(conn)
 }
 
-/// A transaction in which nobody else writes, with the schema of this program.
-pub(super) async fn begin(conn: &mut SqliteConnection) -> Result<Transaction<'_, Sqlite>, Fault> {
-    // Locked from its first statement: of two programs that begin a file together, one makes the schema and the other waits.
+/// Starts a transaction that excludes other writers, and migrates the schema.
+pub(super) async fn begin(
+    conn: &mut SqliteConnection,
+) -> Result<Transaction<'_, Sqlite>, QueryError> {
+    // Lock at the first statement: of two programs that create a file together, one creates the schema and the other waits.
     let mut all = conn.begin_with("BEGIN IMMEDIATE").await?;
     let done = MIGRATOR.run(&mut *all).await;
     done.map_err(sqlx::Error::from)?;
     Ok(all)
 }
 
-async fn check_sound(conn: &mut SqliteConnection) -> Result<(), Fault> {
-    // Names that are no text, over which the SQLite client would panic.
+async fn check_integrity(conn: &mut SqliteConnection) -> Result<(), QueryError> {
+    // Check for invalid UTF-8 in the schema, on which the SQLite client would panic.
     let sql = "SELECT CAST(coalesce(sql, '') AS BLOB) AS sql FROM sqlite_schema";
     for row in sqlx::query(sql).fetch_all(&mut *conn).await? {
         let text: Vec<u8> = row.try_get("sql")?;
         if std::str::from_utf8(&text).is_err() {
-            return Err(Fault::damaged("schema", "UTF-8 text", "other bytes"));
+            return Err(QueryError::damaged("schema", "UTF-8 text", "other bytes"));
         }
     }
-    let said: String = sqlx::query_scalar("PRAGMA quick_check(1)")
+    let result: String = sqlx::query_scalar("PRAGMA quick_check(1)")
         .fetch_one(conn)
         .await?;
-    if said == "ok" {
+    if result == "ok" {
         return Ok(());
     }
-    Err(Fault::Damaged(said))
+    Err(QueryError::Damaged(result))
 }
 
-/// True for a history, false for nothing at all. Layout: sqlite.org/fileformat.html section 1.3.
+/// True for a history, false for a missing or empty file. Layout: sqlite.org/fileformat.html section 1.3.
 fn check_first_page(path: &Path) -> Result<bool, HistoryError> {
     let io = |source| HistoryError::Io {
         path: path.to_owned(),
@@ -102,7 +104,7 @@ fn check_first_page(path: &Path) -> Result<bool, HistoryError> {
     };
     match std::fs::metadata(path) {
         Ok(m) if m.is_dir() => return foreign("a folder"),
-        // To open a pipe would wait for whoever writes into it.
+        // Opening a pipe would block until another program writes to it.
         Ok(m) if !m.is_file() => return foreign("a pipe, a socket or a device"),
         Ok(_) => {}
         Err(e) if e.kind() == ErrorKind::NotFound => return Ok(false),
@@ -112,7 +114,7 @@ fn check_first_page(path: &Path) -> Result<bool, HistoryError> {
     let mut page = Vec::new();
     file.take(100).read_to_end(&mut page).map_err(io)?;
     if page.is_empty() {
-        // Another program has just begun it.
+        // Another program has just created it.
         return Ok(false);
     }
     if page.len() < 100 || !page.starts_with(b"SQLite format 3\0") {

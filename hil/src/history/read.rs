@@ -1,4 +1,4 @@
-//! Rows of a history, read back.
+//! Reads rows of a history.
 
 use std::collections::BTreeMap;
 
@@ -8,11 +8,11 @@ use skinrig_nightly::{Verdict, Versions};
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
-use super::error::Fault;
-use super::line::Line;
+use super::error::QueryError;
+use super::suite_nights::SuiteNights;
 
-/// The benches and suites that the history knows, the one with the newest night first.
-pub(super) async fn lines(conn: &mut SqliteConnection) -> Result<Vec<Line>, Fault> {
+/// The suites in the history, the one with the newest night first.
+pub(super) async fn suites(conn: &mut SqliteConnection) -> Result<Vec<SuiteNights>, QueryError> {
     let rows = sqlx::query(
         "SELECT rig, suite, count(*) AS nights, max(started) AS newest FROM night GROUP BY rig, suite
          ORDER BY newest DESC, rig, suite",
@@ -21,7 +21,7 @@ pub(super) async fn lines(conn: &mut SqliteConnection) -> Result<Vec<Line>, Faul
     .await?;
     rows.iter()
         .map(|row| {
-            Ok(Line {
+            Ok(SuiteNights {
                 rig: row.try_get("rig")?,
                 suite: row.try_get("suite")?,
                 nights: number(row, "nights")?,
@@ -30,33 +30,33 @@ pub(super) async fn lines(conn: &mut SqliteConnection) -> Result<Vec<Line>, Faul
         .collect()
 }
 
-/// Everything of one bench and suite.
+/// All nights and measurements of one suite on one bench.
 pub(super) async fn history(
     conn: &mut SqliteConnection,
     rig: &str,
     suite: &str,
-) -> Result<History, Fault> {
+) -> Result<History, QueryError> {
     let mut all = History::default();
-    let mut place = BTreeMap::new();
+    let mut index = BTreeMap::new();
     let rows = sqlx::query("SELECT * FROM night WHERE rig = ? AND suite = ? ORDER BY started, id")
         .bind(rig)
         .bind(suite)
         .fetch_all(&mut *conn)
         .await?;
     for row in &rows {
-        place.insert(row.try_get::<i64, _>("id")?, all.nights.len());
+        index.insert(row.try_get::<i64, _>("id")?, all.nights.len());
         all.nights.push(head(row)?);
     }
     let rows = sqlx::query("SELECT * FROM firmware ORDER BY night, device")
         .fetch_all(&mut *conn)
         .await?;
     for row in &rows {
-        if let Some(&at) = place.get(&row.try_get("night")?) {
+        if let Some(&at) = index.get(&row.try_get("night")?) {
             let device = (row.try_get("device")?, row.try_get("version")?);
             all.nights[at].versions.firmware.push(device);
         }
     }
-    points(conn, &place, &mut all).await?;
+    points(conn, &index, &mut all).await?;
     let rows = sqlx::query("SELECT * FROM acceptance WHERE rig = ? ORDER BY id")
         .bind(rig)
         .fetch_all(conn)
@@ -73,12 +73,12 @@ pub(super) async fn history(
     Ok(all)
 }
 
-/// The last attempt's measurements.
+/// Adds the measurements of the last attempts.
 async fn points(
     conn: &mut SqliteConnection,
-    place: &BTreeMap<i64, usize>,
+    index: &BTreeMap<i64, usize>,
     all: &mut History,
-) -> Result<(), Fault> {
+) -> Result<(), QueryError> {
     let rows = sqlx::query(
         "SELECT m.*, c.attempts FROM measurement m
          JOIN check_made c ON c.night = m.night AND c.name = m.check_name AND c.attempts = m.attempt
@@ -88,7 +88,7 @@ async fn points(
     .fetch_all(conn)
     .await?;
     for row in &rows {
-        let Some(&night) = place.get(&row.try_get("night")?) else {
+        let Some(&night) = index.get(&row.try_get("night")?) else {
             continue;
         };
         let text = |column| row.try_get::<String, _>(column);
@@ -100,7 +100,7 @@ async fn points(
         );
         let real = |column| row.try_get::<Option<f64>, _>(column);
         let limit = real("margin")?.map(|margin| {
-            Ok::<_, Fault>(Limit {
+            Ok::<_, QueryError>(Limit {
                 at_least: real("at_least")?,
                 at_most: real("at_most")?,
                 margin,
@@ -124,7 +124,7 @@ async fn points(
     Ok(())
 }
 
-fn head(row: &SqliteRow) -> Result<NightHead, Fault> {
+fn head(row: &SqliteRow) -> Result<NightHead, QueryError> {
     Ok(NightHead {
         id: row.try_get("night_id")?,
         started: row.try_get("started")?,
@@ -145,15 +145,17 @@ fn head(row: &SqliteRow) -> Result<NightHead, Fault> {
     })
 }
 
-fn verdict(row: &SqliteRow, column: &str) -> Result<Verdict, Fault> {
+fn verdict(row: &SqliteRow, column: &str) -> Result<Verdict, QueryError> {
     let name: String = row.try_get(column)?;
     Verdict::ALL
         .into_iter()
         .find(|v| v.name() == name)
-        .ok_or_else(|| Fault::damaged(column, "a verdict", format!("`{}`", name.escape_debug())))
+        .ok_or_else(|| {
+            QueryError::damaged(column, "a verdict", format!("`{}`", name.escape_debug()))
+        })
 }
 
-fn number<T: TryFrom<i64>>(row: &SqliteRow, column: &str) -> Result<T, Fault> {
+fn number<T: TryFrom<i64>>(row: &SqliteRow, column: &str) -> Result<T, QueryError> {
     let value: i64 = row.try_get(column)?;
-    T::try_from(value).map_err(|_| Fault::damaged(column, "a count", value))
+    T::try_from(value).map_err(|_| QueryError::damaged(column, "a count", value))
 }

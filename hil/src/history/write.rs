@@ -1,4 +1,4 @@
-//! Rows of a night, written in one transaction.
+//! Writes the rows of a night in one transaction.
 
 use sha2::{Digest, Sha256};
 use skinrig_nightly::Night;
@@ -6,19 +6,22 @@ use skinrig_nightly::night::{CheckResult, Measurement, Part};
 use skinrig_nightly::trend::{Acceptance, NightHead};
 use sqlx::{Sqlite, Transaction};
 
-use super::error::Fault;
+use super::error::QueryError;
 
 type Rows<'a> = Transaction<'a, Sqlite>;
 
 /// SHA-256 of the night's JSON, in hexadecimal.
-pub(super) fn digest(night: &Night) -> Result<String, Fault> {
-    let json = serde_json::to_vec(night).map_err(|e| Fault::Damaged(e.to_string()))?;
+pub(super) fn digest(night: &Night) -> Result<String, QueryError> {
+    let json = serde_json::to_vec(night).map_err(|e| QueryError::Damaged(e.to_string()))?;
     let sum = Sha256::digest(&json);
     Ok(sum.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
-/// The digest of the night of this name, when there is one.
-pub(super) async fn known(all: &mut Rows<'_>, head: &NightHead) -> Result<Option<String>, Fault> {
+/// Digest of the stored night with this name, if any.
+pub(super) async fn known(
+    all: &mut Rows<'_>,
+    head: &NightHead,
+) -> Result<Option<String>, QueryError> {
     let found = sqlx::query_scalar("SELECT sha256 FROM night WHERE rig = ? AND night_id = ?")
         .bind(&head.rig)
         .bind(&head.id)
@@ -27,13 +30,13 @@ pub(super) async fn known(all: &mut Rows<'_>, head: &NightHead) -> Result<Option
     Ok(found)
 }
 
-/// Everything of a night.
+/// Inserts a night with all its checks.
 pub(super) async fn night(
     all: &mut Rows<'_>,
     night: &Night,
     head: &NightHead,
     sha256: &str,
-) -> Result<(), Fault> {
+) -> Result<(), QueryError> {
     let versions = &head.versions;
     let id: i64 = sqlx::query_scalar(
         "INSERT INTO night (night_id, started, suite, suite_sha256, rig, rig_kind, rig_sha256, software, analysis, skin,
@@ -70,7 +73,7 @@ pub(super) async fn night(
     Ok(())
 }
 
-async fn check(all: &mut Rows<'_>, night: i64, check: &CheckResult) -> Result<(), Fault> {
+async fn check(all: &mut Rows<'_>, night: i64, check: &CheckResult) -> Result<(), QueryError> {
     sqlx::query("INSERT INTO check_made (night, name, verdict, attempts) VALUES (?, ?, ?, ?)")
         .bind(night)
         .bind(&check.name)
@@ -93,8 +96,8 @@ async fn measurement(
     (night, check, attempt): (i64, &str, i64),
     part: &Part,
     m: &Measurement,
-) -> Result<(), Fault> {
-    // SQLite has no NaN, and infinity is no value either.
+) -> Result<(), QueryError> {
+    // SQLite has no NaN, and infinity is not a measurement.
     let value = m.value.filter(|v| v.is_finite());
     sqlx::query(
         "INSERT INTO measurement (night, check_name, attempt, subject, metric, value, unit, at_least, at_most, margin, low, high,
@@ -121,27 +124,27 @@ async fn measurement(
     Ok(())
 }
 
-/// What somebody accepts.
+/// Inserts an acceptance.
 pub(super) async fn acceptance(
     all: &mut Rows<'_>,
     rig: &str,
-    said: &Acceptance,
-) -> Result<(), Fault> {
+    acceptance: &Acceptance,
+) -> Result<(), QueryError> {
     sqlx::query(
         "INSERT INTO acceptance (rig, night_id, series, reason, by, at) VALUES (?, ?, ?, ?, ?, ?)",
     )
     .bind(rig)
-    .bind(&said.night)
-    .bind(&said.series)
-    .bind(&said.reason)
-    .bind(&said.by)
-    .bind(&said.at)
+    .bind(&acceptance.night)
+    .bind(&acceptance.series)
+    .bind(&acceptance.reason)
+    .bind(&acceptance.by)
+    .bind(&acceptance.at)
     .execute(&mut **all)
     .await?;
     Ok(())
 }
 
-/// Counts of samples never come near 2^63.
+/// Sample counts never reach 2^63.
 fn whole(count: u64) -> i64 {
     i64::try_from(count).unwrap_or(i64::MAX)
 }

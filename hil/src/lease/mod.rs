@@ -1,11 +1,11 @@
-//! The lease of a bench: one holder at a time, whoever asks, and from whichever program.
+//! The lease of a bench: at most one program holds it.
 //!
-//! A lease is a file named after the robot. Its holder keeps an exclusive lock on it, which the kernel takes away when the
-//! process ends, however it ends: on one computer the lock alone decides, and no clock. Where the folder is shared between computers that do not see
-//! each other's locks, the holder's heartbeat decides: it counts up in the file, and who asks watches for [`Pace::expiry`]
-//! whether it does. Clocks of two computers, or one that was set back, are never compared.
+//! A lease is a file named after the robot. The holder keeps an exclusive lock on it, which the kernel releases when the process ends.
+//! On one computer the lock alone decides, and no clock is involved. If computers share the folder without sharing locks, the
+//! holder's heartbeat decides: it increments a counter in the file, and another program watches the counter for [`LeaseTiming::expiry`].
+//! Clocks are never compared.
 //!
-//! The file stays when the lease is released: removing it would let two holders lock two files of one name.
+//! Releasing a lease keeps the file: after a removal two programs could lock two files of the same name.
 
 mod file;
 mod owner;
@@ -23,54 +23,54 @@ pub use file::{VARIABLE, folder};
 pub use owner::Owner;
 use owner::{Entry, VERSION};
 
-/// How fast a lease's heart beats.
+/// Intervals of a lease.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Pace {
-    /// From one beat to the next.
-    pub beat: Duration,
-    /// Who asks on another computer watches so long for a beat.
+pub struct LeaseTiming {
+    /// Interval between heartbeats.
+    pub heartbeat: Duration,
+    /// How long another computer watches for a heartbeat before the lease expires.
     pub expiry: Duration,
-    /// A lock that somebody holds for so long is held; shorter is somebody who only looks.
-    pub glance: Duration,
+    /// A lock held for longer than this is a holder's; a shorter one belongs to a program that only inspects the lease.
+    pub lock_wait: Duration,
 }
 
-impl Default for Pace {
+impl Default for LeaseTiming {
     fn default() -> Self {
         Self {
-            beat: Duration::from_secs(3),
+            heartbeat: Duration::from_secs(3),
             expiry: Duration::from_secs(15),
-            glance: Duration::from_millis(300),
+            lock_wait: Duration::from_millis(300),
         }
     }
 }
 
-/// Why a bench could not be had.
+/// Why the lease could not be taken.
 #[derive(Debug, thiserror::Error)]
 pub enum LeaseError {
-    /// Somebody has it.
+    /// Another program holds it.
     #[error(
-        "expected the bench for ourselves, found it held by {}; lease {}\n  next: wait for its end, or end it ({}); `skinrig hil lease` shows who holds it",
-        of(owner.as_deref()), path.display(), how_to_end(owner.as_deref())
+        "expected a free bench, found it in use by {}; lease {}\n  next: wait until it finishes, or end it ({}); `skinrig hil lease` shows the holder",
+        holder(owner.as_deref()), path.display(), how_to_end(owner.as_deref())
     )]
     Held {
-        /// Who; `None` in the moment before it wrote its name.
+        /// The holder; `None` in the moment before it writes its name.
         owner: Option<Box<Owner>>,
-        /// The file.
+        /// The lease file.
         path: PathBuf,
     },
-    /// The file cannot be used.
+    /// The lease file cannot be used.
     #[error("{}: cannot be used as the bench's lease: {cause}\n  next: make it writable for every user of the bench, or name a folder for leases in {VARIABLE}", path.display())]
     File {
-        /// The file.
+        /// The lease file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         cause: io::Error,
     },
 }
 
-fn of(owner: Option<&Owner>) -> String {
+fn holder(owner: Option<&Owner>) -> String {
     owner.map_or_else(
-        || "somebody who is just taking it".to_owned(),
+        || "a program that is just taking it".to_owned(),
         |o| o.to_string(),
     )
 }
@@ -82,18 +82,18 @@ fn how_to_end(owner: Option<&Owner>) -> String {
     )
 }
 
-/// The name of a robot's lease.
+/// Path of a robot's lease.
 #[must_use]
 pub fn path_of(folder: &Path, robot: &str) -> PathBuf {
     folder.join(format!("skinrig-{robot}.lease"))
 }
 
-/// A bench that is ours until this is dropped, or the process ends.
+/// A held lease. Dropping it, or the end of the process, releases it.
 #[derive(Debug)]
 pub struct Lease {
     shared: Arc<Shared>,
     stop: Option<Sender<()>>,
-    heart: Option<JoinHandle<()>>,
+    thread: Option<JoinHandle<()>>,
     note: Option<String>,
 }
 
@@ -105,18 +105,18 @@ struct Shared {
 }
 
 impl Lease {
-    /// Takes the lease at `path` for `owner`. Comes back at once, except where the last holder is on another computer and did
-    /// not release it: then a heartbeat is waited for.
+    /// Takes the lease at `path` for `owner`. Returns at once, unless the last holder is on another computer and did not release it:
+    /// then this call waits for a heartbeat.
     ///
     /// # Errors
-    /// [`LeaseError`].
-    pub fn take(path: &Path, owner: Owner, pace: Pace) -> Result<Self, LeaseError> {
+    /// [`LeaseError::Held`] or [`LeaseError::File`].
+    pub fn take(path: &Path, owner: Owner, timing: LeaseTiming) -> Result<Self, LeaseError> {
         let wrong = |cause| LeaseError::File {
             path: path.to_owned(),
             cause,
         };
         let mut file = file::open(path).map_err(wrong)?;
-        if !lock(&file, pace.glance).map_err(wrong)? {
+        if !lock(&file, timing.lock_wait).map_err(wrong)? {
             let held = file::read(&mut file).ok().flatten();
             return Err(LeaseError::Held {
                 owner: held.map(|e| Box::new(e.owner)),
@@ -127,7 +127,7 @@ impl Lease {
         let left = left.filter(|e| !e.released);
         if let Some(entry) = &left
             && entry.owner.host != owner.host
-            && beats(&mut file, entry, pace).map_err(wrong)?
+            && has_heartbeat(&mut file, entry, timing).map_err(wrong)?
         {
             return Err(LeaseError::Held {
                 owner: Some(Box::new(entry.owner.clone())),
@@ -136,7 +136,7 @@ impl Lease {
         }
         let note = left.map(|e| {
             format!(
-                "taken over from {}, which ended without releasing it; its last sign of life was at {}",
+                "taken over from {}, which ended without releasing it; its last heartbeat was at {}",
                 e.owner, e.beat_at
             )
         });
@@ -159,42 +159,42 @@ impl Lease {
             lost: AtomicBool::new(false),
         });
         let (stop, stopped) = channel();
-        let heart = Arc::clone(&shared);
+        let thread = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
             .name("lease".to_owned())
             .spawn(move || {
-                while stopped.recv_timeout(pace.beat) == Err(RecvTimeoutError::Timeout) {
-                    heart.beat();
+                while stopped.recv_timeout(timing.heartbeat) == Err(RecvTimeoutError::Timeout) {
+                    thread.beat();
                 }
             })
             .map_err(wrong)?;
         Ok(Self {
             shared,
             stop: Some(stop),
-            heart: Some(thread),
+            thread: Some(thread),
             note,
         })
     }
 
-    /// How it was taken over, when it was.
+    /// Describes the takeover, if the last holder did not release the lease.
     #[must_use]
     pub fn note(&self) -> Option<&str> {
         self.note.as_deref()
     }
 
-    /// Its file.
+    /// The lease file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.shared.path
     }
 
-    /// Whether somebody else took it, which can only be after this computer showed no sign of life for long.
+    /// Whether another program took it, which is possible only if this computer stopped its heartbeat for a long time.
     #[must_use]
     pub fn is_lost(&self) -> bool {
         self.shared.lost.load(Ordering::SeqCst)
     }
 
-    /// [`is_lost`](Self::is_lost), for whoever does not hold the lease itself.
+    /// [`is_lost`](Self::is_lost) as a function, for code that does not own the lease.
     pub fn watch(&self) -> impl Fn() -> bool + use<> {
         let shared = Arc::clone(&self.shared);
         move || shared.lost.load(Ordering::SeqCst)
@@ -204,28 +204,28 @@ impl Lease {
 impl Drop for Lease {
     fn drop(&mut self) {
         self.stop = None;
-        if let Some(heart) = self.heart.take() {
-            let _ = heart.join();
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
         }
         if !self.is_lost() {
-            let mut held = self.shared.held();
+            let mut held = self.shared.lock_file();
             let (file, entry) = &mut *held;
             entry.released = true;
             entry.beat_at = now();
-            // Should that fail, the next holder takes it over, for the lock goes with the file.
+            // If this fails the next holder reports a takeover: closing the file releases the lock anyway.
             let _ = file::write(file, entry);
         }
     }
 }
 
 impl Shared {
-    fn held(&self) -> std::sync::MutexGuard<'_, (File, Entry)> {
+    fn lock_file(&self) -> std::sync::MutexGuard<'_, (File, Entry)> {
         self.file.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Counts up, unless the file became another's. What cannot be read or written now may be a moment later.
+    /// Increments the counter, unless another program took the lease. A failed read or write is retried at the next heartbeat.
     fn beat(&self) {
-        let mut held = self.held();
+        let mut held = self.lock_file();
         let (file, entry) = &mut *held;
         match file::read(file) {
             Ok(Some(there)) if there.token != entry.token => {
@@ -241,66 +241,68 @@ impl Shared {
     }
 }
 
-/// Tries to lock the file for as long as somebody may only be looking.
-fn lock(file: &File, glance: Duration) -> io::Result<bool> {
-    let until = Instant::now() + glance;
+/// Tries to lock the file, for as long as another program may only be inspecting it.
+fn lock(file: &File, lock_wait: Duration) -> io::Result<bool> {
+    let until = Instant::now() + lock_wait;
     loop {
         match file.try_lock() {
             Ok(()) => return Ok(true),
             Err(TryLockError::WouldBlock) if Instant::now() >= until => return Ok(false),
-            Err(TryLockError::WouldBlock) => std::thread::sleep(glance / 10),
+            Err(TryLockError::WouldBlock) => std::thread::sleep(lock_wait / 10),
             Err(TryLockError::Error(e)) => return Err(e),
         }
     }
 }
 
-/// Whether the heart of `last` beats.
-fn beats(file: &mut File, last: &Entry, pace: Pace) -> io::Result<bool> {
-    let until = Instant::now() + pace.expiry;
+/// Whether the holder of `last` still sends heartbeats.
+fn has_heartbeat(file: &mut File, last: &Entry, timing: LeaseTiming) -> io::Result<bool> {
+    let until = Instant::now() + timing.expiry;
     loop {
         match file::read(file)? {
             Some(now) if now.token == last.token && now.released => return Ok(false),
             Some(now) if now.token != last.token || now.beats != last.beats => return Ok(true),
             _ if Instant::now() >= until => return Ok(false),
-            _ => std::thread::sleep(pace.beat.min(pace.expiry) / 10),
+            _ => std::thread::sleep(timing.heartbeat.min(timing.expiry) / 10),
         }
     }
 }
 
-/// How a lease stands.
+/// State of a lease.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Standing {
-    /// Nobody ever took it, or the last holder released it.
+pub enum LeaseState {
+    /// Never taken, or released.
     Free {
         /// The last holder.
         last: Option<Box<Owner>>,
     },
-    /// Somebody holds it.
+    /// In use.
     Held {
-        /// Who; `None` in the moment before it wrote its name.
+        /// The holder; `None` in the moment before it writes its name.
         owner: Option<Box<Owner>>,
-        /// Its last sign of life, by its own clock.
+        /// Its last heartbeat, by its own clock.
         beat_at: Option<String>,
     },
-    /// The last holder ended without releasing it, or is on another computer whose locks are not seen here.
-    Left {
-        /// Who.
+    /// The last holder ended without releasing it, or is on another computer whose locks are invisible here.
+    Abandoned {
+        /// The last holder.
         owner: Box<Owner>,
-        /// Its last sign of life, by its own clock.
+        /// Its last heartbeat, by its own clock.
         beat_at: String,
     },
 }
 
-/// How the lease at `path` stands. Takes nothing.
+/// Reads the state of the lease at `path` without taking it.
 ///
 /// # Errors
-/// What the system answers.
-pub fn look(path: &Path) -> io::Result<Standing> {
+/// Errors of the operating system.
+pub fn inspect(path: &Path) -> io::Result<LeaseState> {
     let mut file = match File::open(path) {
-        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Standing::Free { last: None }),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => {
+            return Ok(LeaseState::Free { last: None });
+        }
         opened => opened?,
     };
-    // Shared, and for a moment only: a holder keeps an exclusive one.
+    // A shared lock for a moment: a holder keeps an exclusive one.
     let held = match file.try_lock_shared() {
         Ok(()) => {
             file.unlock()?;
@@ -311,19 +313,19 @@ pub fn look(path: &Path) -> io::Result<Standing> {
     };
     let entry = file::read(&mut file)?;
     Ok(match entry {
-        Some(e) if held => Standing::Held {
+        Some(e) if held => LeaseState::Held {
             owner: (!e.released).then(|| Box::new(e.owner)),
             beat_at: (!e.released).then_some(e.beat_at),
         },
-        None if held => Standing::Held {
+        None if held => LeaseState::Held {
             owner: None,
             beat_at: None,
         },
-        Some(e) if !e.released => Standing::Left {
+        Some(e) if !e.released => LeaseState::Abandoned {
             owner: Box::new(e.owner),
             beat_at: e.beat_at,
         },
-        other => Standing::Free {
+        other => LeaseState::Free {
             last: other.map(|e| Box::new(e.owner)),
         },
     })
@@ -333,7 +335,7 @@ fn now() -> String {
     chrono::Utc::now().to_rfc3339_opts(chrono::SecondsFormat::Millis, true)
 }
 
-/// Tells two takings of one process apart.
+/// Distinguishes two leases taken by one process.
 fn nonce() -> String {
     use std::sync::atomic::AtomicU64;
     static TAKEN: AtomicU64 = AtomicU64::new(0);

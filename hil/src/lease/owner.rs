@@ -1,28 +1,28 @@
-//! The lease: who holds a bench, as it stands in the lease's file.
+//! The holder of a lease, as stored in the lease file.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Who holds a bench.
+/// Holder of a bench.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Owner {
     /// Login name.
     pub user: String,
     /// Name of the computer.
     pub host: String,
-    /// Process.
+    /// Process ID.
     pub pid: u32,
-    /// When the process began, in the kernel's ticks since the computer's start: tells it from a later one with the same number.
+    /// Start of the process in kernel ticks since boot: distinguishes it from a later process with the same ID.
     pub process_started: Option<u64>,
-    /// What it does: `hil run nightly`.
+    /// Its command: `hil run nightly`.
     pub what: String,
-    /// Since when, RFC 3339, UTC.
+    /// Start of the lease, RFC 3339, UTC.
     pub since: String,
 }
 
 impl Owner {
-    /// This process, doing `what`.
+    /// This process, running the command `what`.
     #[must_use]
     pub fn this_process(user: String, host: String, what: String) -> Self {
         let pid = std::process::id();
@@ -36,9 +36,9 @@ impl Owner {
         }
     }
 
-    /// Whether the process is there; `None` where that cannot be told, as on another computer.
+    /// Whether the process is running; `None` if unknown, as on another computer.
     #[must_use]
-    pub fn lives(&self, this_host: &str) -> Option<bool> {
+    pub fn is_running(&self, this_host: &str) -> Option<bool> {
         let known = self.host == this_host && self.process_started.is_some();
         known.then(|| process_started(self.pid) == self.process_started)
     }
@@ -61,28 +61,28 @@ impl fmt::Display for Owner {
     }
 }
 
-/// When a process of this computer began: field 22 of proc_pid_stat(5). `None` where there is no such process, or no /proc.
+/// Start time of a process: field 22 of proc_pid_stat(5). `None` without such a process, or without /proc.
 fn process_started(pid: u32) -> Option<u64> {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    // The second field is a name in parentheses that may hold anything.
+    // The second field is a name in parentheses that may contain any character.
     let (_, rest) = stat.rsplit_once(") ")?;
     rest.split(' ').nth(19)?.parse().ok()
 }
 
-/// What stands in the file.
+/// Content of the lease file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Entry {
-    /// Of this form.
+    /// Format version.
     pub version: u32,
-    /// The last one that took the lease.
+    /// The current or last holder.
     pub owner: Owner,
-    /// Names this taking, so that an owner sees when it is another's.
+    /// Unique per lease, so that a holder notices when another program has taken it.
     pub token: String,
-    /// Counts up while the owner lives. Whoever asks on another computer watches it change: no two clocks are compared.
+    /// Counts heartbeats. Another computer watches whether it changes, so that clocks are never compared.
     pub beats: u64,
-    /// When it was last counted, by the owner's clock; for people.
+    /// Time of the last heartbeat by the holder's clock; for display only.
     pub beat_at: String,
-    /// The owner let go of it.
+    /// Whether the holder released it.
     pub released: bool,
 }
 

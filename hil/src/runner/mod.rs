@@ -1,4 +1,4 @@
-//! The runner: makes the checks of a suite in their order, repeats what failed, holds the budget, and keeps the night.
+//! The runner: runs a suite's checks in order, repeats failed ones, enforces the time budget and builds the night's result.
 
 mod parts;
 pub mod plan;
@@ -7,52 +7,52 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use skinrig_device::Clock;
 use skinrig_model::{HostDuration, HostTime};
-use skinrig_nightly::judge::{self, RepeatRule, Together};
+use skinrig_nightly::judge::{self, CombinedVerdict, RepeatRule};
 use skinrig_nightly::{Attempt, CheckResult, Evidence, EvidenceKind, Night, Verdict, rules};
 use skinrig_protocol::suite::{Check, Suite};
 
 use crate::bench::Bench;
 use crate::checks;
 use crate::findings::Findings;
-use plan::Known;
+use plan::PlanInputs;
 
-/// What is made tonight.
-pub struct Tonight<'a> {
+/// One pass of a suite over a bench.
+pub struct SuiteRunner<'a> {
     /// The suite.
     pub suite: &'a Suite,
-    /// Only these checks; the others are SKIPPED.
+    /// Names of the checks to run; the others are SKIPPED. `None` runs all.
     pub only: Option<&'a [String]>,
-    /// What the plan of the night relies on.
-    pub known: Known,
-    /// Measures the budget.
+    /// Inputs of the time estimates that the suite does not contain.
+    pub inputs: PlanInputs,
+    /// Clock that measures the budget.
     pub clock: &'a dyn Clock,
-    /// Makes one check once: [`checks::make`].
+    /// Runs one attempt at a check: [`checks::run`].
     pub make: &'a dyn Fn(&Check, &mut dyn Bench) -> Findings,
 }
 
-/// Sees the night grow.
-pub trait Onlooker {
-    /// Attempt number `attempt` (from 1) of a check begins.
-    fn begins(&mut self, night: &Night, check: &Check, attempt: usize);
+/// Receives the progress of a night.
+pub trait NightObserver {
+    /// Attempt number `attempt` (from 1) at `check` starts.
+    fn attempt_started(&mut self, night: &Night, check: &Check, attempt: usize);
 
-    /// A check has its verdict; `night` holds everything so far and may be kept.
-    fn made(&mut self, night: &Night);
+    /// A check has its verdict. `night` holds all results so far and can be saved.
+    fn check_finished(&mut self, night: &Night);
 }
 
-impl<'a> Tonight<'a> {
-    /// All checks of `suite`, on this clock.
+impl<'a> SuiteRunner<'a> {
+    /// All checks of `suite`, timed by `clock`.
     #[must_use]
     pub fn new(suite: &'a Suite, clock: &'a dyn Clock) -> Self {
         Self {
             suite,
             only: None,
-            known: Known::default(),
+            inputs: PlanInputs::default(),
             clock,
-            make: &checks::make,
+            make: &checks::run,
         }
     }
 
-    /// Why a check is not made.
+    /// Why `check` is skipped; `None` if it runs.
     fn skipped(&self, check: &Check) -> Option<String> {
         let left_out = |only: &[String]| !only.iter().any(|o| o == check.name);
         if self.only.is_some_and(left_out) {
@@ -61,28 +61,33 @@ impl<'a> Tonight<'a> {
         check.skip.clone()
     }
 
-    /// How long an attempt at `check` should take; nothing when it is skipped.
+    /// Estimated duration of one attempt at `check`; zero if it is skipped.
     #[must_use]
     pub fn planned(&self, check: &Check) -> HostDuration {
         match self.skipped(check) {
             Some(_) => HostDuration::ZERO,
-            None => plan::planned(check, &self.known),
+            None => plan::estimated_duration(check, &self.inputs),
         }
     }
 
-    /// How long the checks from number `from` on should take without repeats.
+    /// Estimated duration of all checks from index `from` on, without repeats.
     #[must_use]
     pub fn planned_from(&self, from: usize) -> HostDuration {
         let checks = self.suite.checks.iter().skip(from);
         HostDuration(checks.map(|c| self.planned(c).0).sum())
     }
 
-    /// Makes the night; `night` holds who and when. Devices are closed in the end.
-    pub fn run(&self, night: Night, bench: &mut dyn Bench, onlooker: &mut dyn Onlooker) -> Night {
-        let mut run = Run {
-            tonight: self,
+    /// Runs the suite. `night` comes with its identity and start time filled in; all devices are closed at the end.
+    pub fn run(
+        &self,
+        night: Night,
+        bench: &mut dyn Bench,
+        observer: &mut dyn NightObserver,
+    ) -> Night {
+        let mut run = NightRun {
+            runner: self,
             bench,
-            onlooker,
+            observer,
             night,
             began: self.clock.now(),
         };
@@ -91,28 +96,28 @@ impl<'a> Tonight<'a> {
         for (at, check) in self.suite.checks.iter().enumerate() {
             let result = run.check(at, check);
             run.night.checks.push(result);
-            run.keep();
+            run.publish();
         }
         run.bench.close();
         run.night.finished = true;
-        run.keep();
+        run.publish();
         run.night
     }
 }
 
-/// A night under way.
-struct Run<'a, 'b> {
-    tonight: &'a Tonight<'a>,
+/// A night in progress.
+struct NightRun<'a, 'b> {
+    runner: &'a SuiteRunner<'a>,
     bench: &'b mut dyn Bench,
-    onlooker: &'b mut dyn Onlooker,
+    observer: &'b mut dyn NightObserver,
     night: Night,
     began: HostTime,
 }
 
-impl Run<'_, '_> {
-    /// Brings the night up to date and shows it.
-    fn keep(&mut self) {
-        rules::across(&mut self.night.checks);
+impl NightRun<'_, '_> {
+    /// Updates the night's totals and passes it to the observer.
+    fn publish(&mut self) {
+        rules::apply_cross_check_rules(&mut self.night.checks);
         self.night.took_s = self.elapsed().as_secs_f64();
         for (device, version) in self.bench.firmware() {
             let known = &mut self.night.versions.firmware;
@@ -120,27 +125,27 @@ impl Run<'_, '_> {
                 known.push((device, version));
             }
         }
-        self.night.conclude();
-        self.onlooker.made(&self.night);
+        self.night.update_verdict();
+        self.observer.check_finished(&self.night);
     }
 
     fn elapsed(&self) -> HostDuration {
-        self.tonight.clock.now() - self.began
+        self.runner.clock.now() - self.began
     }
 
-    /// What is left of the budget.
+    /// Time left in the budget; negative once it is exceeded.
     fn left(&self) -> HostDuration {
-        HostDuration(self.tonight.suite.budget.0 - self.elapsed().0)
+        HostDuration(self.runner.suite.budget.0 - self.elapsed().0)
     }
 
     fn check(&mut self, at: usize, check: &Check) -> CheckResult {
-        let planned = self.tonight.planned(check);
+        let planned = self.runner.planned(check);
         let result = CheckResult {
             name: check.name.to_owned(),
             title: check.title.to_owned(),
             planned_s: planned.as_secs_f64(),
             attempts: Vec::new(),
-            skipped: self.tonight.skipped(check),
+            skipped: self.runner.skipped(check),
             verdict: Verdict::Skipped,
             repeats: None,
             cause: None,
@@ -150,7 +155,7 @@ impl Run<'_, '_> {
         if result.skipped.is_some() {
             return result;
         }
-        if let Some((evidence, witnesses)) = self.withheld(check, planned) {
+        if let Some((evidence, witnesses)) = self.blocked_by(check, planned) {
             let found = Findings {
                 evidence,
                 ..Findings::default()
@@ -159,52 +164,54 @@ impl Run<'_, '_> {
             let attempt = self.judge(check, found, now_s);
             return CheckResult {
                 witnesses,
-                ..concluded(result, RepeatRule::NEVER, vec![attempt])
+                ..with_attempts(result, RepeatRule::NEVER, vec![attempt])
             };
         }
-        let rule = plan::repeats(self.tonight.suite, &check.measure);
+        let rule = plan::repeat_rule(self.runner.suite, &check.measure);
         let mut attempts: Vec<Attempt> = Vec::new();
         let mut ended = None;
         loop {
-            self.onlooker.begins(&self.night, check, attempts.len() + 1);
+            self.observer
+                .attempt_started(&self.night, check, attempts.len() + 1);
             let began_s = self.elapsed().as_secs_f64();
             let found = self.make(check);
-            if let Some(reason) = found.not_here {
+            if let Some(reason) = found.not_applicable {
                 return CheckResult {
                     skipped: Some(reason),
                     ..result
                 };
             }
             attempts.push(self.judge(check, found, began_s));
-            if !rule.goes_on(&attempts) {
+            if !rule.should_repeat(&attempts) {
                 break;
             }
-            if self.bench.stop_asked() {
-                ended = Some("not repeated: the suite was ended");
+            if self.bench.stop_requested() {
+                ended = Some("not repeated: the suite was stopped");
                 break;
             }
-            // A repeat must leave room for everything that is still to come.
-            if self.left().0 < planned.0 + self.tonight.planned_from(at + 1).0 {
-                ended = Some("not repeated: the budget holds only what is still to come");
+            // A repeat must leave time for all remaining checks.
+            if self.left().0 < planned.0 + self.runner.planned_from(at + 1).0 {
+                ended =
+                    Some("not repeated: the remaining budget is needed for the remaining checks");
                 break;
             }
-            // What was not there may be there now, and what is stuck may come free.
+            // Reopening may find a device that was missing, or free one that is stuck.
             self.bench.close();
         }
-        let mut result = concluded(result, rule, attempts);
-        if let Some(words) = ended {
+        let mut result = with_attempts(result, rule, attempts);
+        if let Some(reason) = ended {
             let before = result.repeats.take().map_or(String::new(), |r| r + "; ");
-            result.repeats = Some(before + words);
+            result.repeats = Some(before + reason);
         }
         result
     }
 
-    /// Makes the check behind a wall: its panic is evidence, and the night goes on.
+    /// Runs one attempt. A panic becomes evidence, and the night continues.
     fn make(&mut self, check: &Check) -> Findings {
-        let (make, bench) = (self.tonight.make, &mut *self.bench);
-        let made = catch_unwind(AssertUnwindSafe(|| make(check, bench)));
-        let mut found = made.unwrap_or_else(|panic| {
-            let words = panic
+        let (make, bench) = (self.runner.make, &mut *self.bench);
+        let outcome = catch_unwind(AssertUnwindSafe(|| make(check, bench)));
+        let mut found = outcome.unwrap_or_else(|panic| {
+            let message = panic
                 .downcast_ref::<&str>()
                 .map(|s| (*s).to_owned())
                 .or_else(|| panic.downcast_ref::<String>().cloned())
@@ -214,14 +221,14 @@ impl Run<'_, '_> {
                 Evidence::new(
                     EvidenceKind::Software,
                     "computer",
-                    format!("{} broke off: {words}", check.name),
+                    format!("{} panicked: {message}", check.name),
                 )
-                .next("report this as a defect of skinrig, with the night's folder"),
+                .next("report this as a bug in skinrig, with the night's folder"),
             );
-            // Whatever it held is in an unknown state.
+            // The devices that the check used are in an unknown state.
             let closed = catch_unwind(AssertUnwindSafe(|| self.bench.close()));
             if closed.is_err() {
-                found.saw(
+                found.add_evidence(
                     EvidenceKind::Software,
                     "computer",
                     "the devices could not be closed",
@@ -229,70 +236,70 @@ impl Run<'_, '_> {
             }
             found
         });
-        if let Some(kept) = found.golden.take() {
-            self.night.golden = Some(kept.files);
-            self.night.versions.skin = kept.skin;
-            self.night.versions.analysis = kept.analysis_version;
+        if let Some(record) = found.golden.take() {
+            self.night.golden = Some(record.files);
+            self.night.versions.skin = record.skin;
+            self.night.versions.analysis = record.analysis_version;
         }
         found
     }
 
-    /// An attempt, from what was found.
+    /// Turns the findings of an attempt into its verdict.
     fn judge(&mut self, check: &Check, mut found: Findings, began_s: f64) -> Attempt {
-        if self.bench.stop_asked() {
+        if self.bench.stop_requested() {
             let (kind, what) = if self.bench.lease_is_lost() {
-                (EvidenceKind::Lease, "somebody else took the bench")
+                (EvidenceKind::Lease, "another program took the bench")
             } else {
-                (EvidenceKind::Stopped, "the suite was ended")
+                (EvidenceKind::Stopped, "the suite was stopped")
             };
-            found.saw(
+            found.add_evidence(
                 kind,
                 "computer",
-                format!("{what} during this check, or before it"),
+                format!("{what} during this check or before it"),
             );
-            let whole = || format!("{what}, at {}", check.name);
-            self.night.ended_early.get_or_insert_with(whole);
+            let reason = || format!("{what}, at {}", check.name);
+            self.night.ended_early.get_or_insert_with(reason);
         }
         let has_box = self.bench.rig().trigger_box.is_some();
-        let parts = parts::parts(check, &mut found, has_box);
+        let parts = parts::group_by_device(check, &mut found, has_box);
         let took_s = self.elapsed().as_secs_f64() - began_s;
-        let about = checks::about(&check.measure);
-        judge::attempt((began_s, took_s), parts, found.evidence, about)
+        let default_cause = checks::default_cause(&check.measure);
+        judge::judge_attempt((began_s, took_s), parts, found.evidence, default_cause)
     }
 
-    /// Why a check may not begin: what stands for it in the night, and the checks that say so.
-    fn withheld(
+    /// Evidence against running `check`, and the names of the checks that provide it; `None` if it can run.
+    fn blocked_by(
         &self,
         check: &Check,
         planned: HostDuration,
     ) -> Option<(Vec<Evidence>, Vec<String>)> {
-        if self.bench.stop_asked() {
-            // Told by `judge`.
+        if self.bench.stop_requested() {
+            // `judge` adds the evidence.
             return Some((Vec::new(), Vec::new()));
         }
         let left = self.left();
         if left.0 < planned.0 {
             let what = format!(
-                "not begun: it should take {:.0} s, and {:.0} s of the budget are left",
+                "not started: it needs about {:.0} s, and {:.0} s of the budget are left",
                 planned.as_secs_f64(),
                 left.as_secs_f64().max(0.0)
             );
-            let next = "raise the suite's `budget`, or see what took so long";
+            let next = "raise the suite's `budget`, or find out which check took too long";
             let late = Evidence::new(EvidenceKind::TimeOut, "computer", what).next(next);
             return Some((vec![late], Vec::new()));
         }
-        let relied = plan::relies_on(&check.measure);
+        let prerequisites = plan::prerequisites(&check.measure);
         let bad = self
             .night
             .checks
             .iter()
-            .find(|c| relied.contains(&c.name.as_str()) && !c.verdict.is_good())?;
+            .find(|c| prerequisites.contains(&c.name.as_str()) && !c.verdict.is_good())?;
         let what = format!(
-            "not begun: {} was {}, and the arm is not moved before that is well",
+            "not started: {} was {}, and the arm must not move until that check is good",
             bad.name,
             bad.verdict.name()
         );
-        // What explains that check explains this one; without anything, the arm's state does.
+        // The evidence of the failed check explains this one too. Without any, report the arm's state.
         let mut evidence: Vec<Evidence> = bad
             .attempts
             .iter()
@@ -310,20 +317,20 @@ impl Run<'_, '_> {
     }
 }
 
-/// A result with its attempts and what they say together.
-fn concluded(result: CheckResult, rule: RepeatRule, attempts: Vec<Attempt>) -> CheckResult {
-    let Together {
+/// `result` with its attempts and their combined verdict.
+fn with_attempts(result: CheckResult, rule: RepeatRule, attempts: Vec<Attempt>) -> CheckResult {
+    let CombinedVerdict {
         verdict,
         cause,
         rule,
-        words,
-    } = rule.together(&attempts);
+        explanation,
+    } = rule.combine(&attempts);
     CheckResult {
         attempts,
         verdict,
         cause,
         rule,
-        repeats: words,
+        repeats: explanation,
         ..result
     }
 }

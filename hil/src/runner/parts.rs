@@ -1,5 +1,4 @@
-//! The runner: from what a check found to parts and measurements, each with its limit. What should have been measured and was
-//! not is there too.
+//! The runner: groups the values of an attempt by device and adds their limits. Expected values that are missing become unmeasured.
 
 use skinrig_nightly::{Evidence, EvidenceKind, Measurement, Part, Verdict};
 use skinrig_protocol::suite::{Check, Measure};
@@ -7,7 +6,7 @@ use skinrig_protocol::suite::{Check, Measure};
 use crate::findings::{Findings, Value};
 
 const CAMERAS: &[&str] = &["camera1", "camera2"];
-/// Parts appear in this order, whatever is found first.
+/// Order of the parts in results.
 const ORDER: &[&str] = &[
     "robot",
     "camera1",
@@ -16,16 +15,16 @@ const ORDER: &[&str] = &[
     "computer",
     "skin",
 ];
-/// What a metric belongs to that nobody measured and that may belong to any device.
-const ANY: &[&str] = &["bench"];
+/// Subject of an unmeasured metric that could belong to any device.
+const ANY_DEVICE: &[&str] = &["bench"];
 
-/// On which devices a check must measure `metric`.
-fn subjects(measure: &Measure, metric: &str, has_box: bool) -> &'static [&'static str] {
+/// Devices on which a check must measure `metric`.
+fn expected_subjects(measure: &Measure, metric: &str, has_box: bool) -> &'static [&'static str] {
     match measure {
         Measure::Identity if has_box => &["robot", "camera1", "camera2", "trigger box"],
         Measure::Identity => &["robot", "camera1", "camera2"],
-        // From one camera to the other.
-        Measure::Clocks { .. } if metric == "offset" => ANY,
+        // The offset is between the two cameras.
+        Measure::Clocks { .. } if metric == "offset" => ANY_DEVICE,
         Measure::Settings
         | Measure::TriggerLoopback { .. }
         | Measure::Clocks { .. }
@@ -44,16 +43,20 @@ fn subjects(measure: &Measure, metric: &str, has_box: bool) -> &'static [&'stati
     }
 }
 
-/// The parts of an attempt. A value that the suite does not know, or that came twice, is a fault of this program and told as
-/// one in `found.evidence`.
-pub(super) fn parts(check: &Check, found: &mut Findings, has_box: bool) -> Vec<Part> {
+/// The parts of an attempt. A metric that is unknown or measured twice is a bug in a check: it becomes evidence in
+/// `found.evidence` and no part.
+pub(super) fn group_by_device(check: &Check, found: &mut Findings, has_box: bool) -> Vec<Part> {
     let mut faults = Vec::new();
     let mut parts: Vec<Part> = Vec::new();
     for value in &found.values {
         let known = check.metrics.iter().any(|m| m.name == value.metric);
-        let twice = find(&parts, &value.subject, value.metric);
+        let twice = has_measurement(&parts, &value.subject, value.metric);
         if !known || twice {
-            let what = if twice { "measured twice" } else { "not known" };
+            let what = if twice {
+                "measured twice"
+            } else {
+                "unknown metric"
+            };
             faults.push(format!(
                 "{}: {} of {}: {what}",
                 check.name, value.metric, value.subject
@@ -66,13 +69,14 @@ pub(super) fn parts(check: &Check, found: &mut Findings, has_box: bool) -> Vec<P
         if !check.limits.contains_key(metric.name) {
             continue;
         }
-        let wanted = subjects(&check.measure, metric.name, has_box);
+        let expected = expected_subjects(&check.measure, metric.name, has_box);
         let anywhere = parts
             .iter()
             .any(|p| p.measurements.iter().any(|m| m.metric == metric.name));
-        for subject in wanted {
-            let there = find(&parts, subject, metric.name) || (wanted == ANY && anywhere);
-            if !there {
+        for subject in expected {
+            let is_present = has_measurement(&parts, subject, metric.name)
+                || (expected == ANY_DEVICE && anywhere);
+            if !is_present {
                 let missing = Value {
                     subject: (*subject).to_owned(),
                     metric: metric.name,
@@ -101,7 +105,7 @@ pub(super) fn parts(check: &Check, found: &mut Findings, has_box: bool) -> Vec<P
     parts
 }
 
-fn find(parts: &[Part], subject: &str, metric: &str) -> bool {
+fn has_measurement(parts: &[Part], subject: &str, metric: &str) -> bool {
     let part = parts.iter().find(|p| p.subject == subject);
     part.is_some_and(|p| p.measurements.iter().any(|m| m.metric == metric))
 }
@@ -120,9 +124,9 @@ fn add(parts: &mut Vec<Part>, subject: &str, measurement: Measurement) {
 fn measurement(check: &Check, value: &Value) -> Measurement {
     let metric = check.metrics.iter().find(|m| m.name == value.metric);
     let limit = check.limits.get(value.metric).copied();
-    // JSON has no number for these; what is no number was not measured.
+    // JSON has no NaN or infinity: store such a value as unmeasured and put it into the note.
     let number = value.value.filter(|v| v.is_finite());
-    let odd = value.value.filter(|v| !v.is_finite());
+    let non_finite = value.value.filter(|v| !v.is_finite());
     Measurement {
         metric: value.metric.to_owned(),
         value: number,
@@ -131,10 +135,10 @@ fn measurement(check: &Check, value: &Value) -> Measurement {
         n: value.n,
         needs: value.needs,
         limit,
-        verdict: Verdict::on(number, value.n, value.needs, limit.as_ref()),
-        note: match (&value.note, odd) {
-            (Some(note), Some(odd)) => Some(format!("{note}; measured {odd}")),
-            (None, Some(odd)) => Some(format!("measured {odd}")),
+        verdict: Verdict::of_measurement(number, value.n, value.needs, limit.as_ref()),
+        note: match (&value.note, non_finite) {
+            (Some(note), Some(non_finite)) => Some(format!("{note}; measured {non_finite}")),
+            (None, Some(non_finite)) => Some(format!("measured {non_finite}")),
             (note, None) => note.clone(),
         },
     }

@@ -1,70 +1,69 @@
-//! The cameras of a bench, and its trigger box, while they stream for a check: started in order, looked at, stopped whatever
-//! happens. Every wait ends.
+//! Streaming cameras and trigger box of a check: started in order, polled, and always stopped. Every wait has a time limit.
 
-mod seen;
+mod stats;
 
 use skinrig_device::{CameraSettings, DeviceError, EventCamera, SyncMode};
 use skinrig_model::{BoxReport, CameraId, HostDuration, HostTime, Mark, RawChunk};
 use skinrig_nightly::{Evidence, EvidenceKind};
 
-use self::seen::Live;
-use crate::bench::{Bench, Devices, Trouble};
+use self::stats::CameraStream;
+use crate::bench::{Bench, Devices, Problem};
+use crate::device_evidence::{self, COMPUTER};
 use crate::findings::Findings;
-use crate::trouble::{self, COMPUTER};
 
-pub use self::seen::Seen;
+pub use self::stats::StreamStats;
 
-/// From one look at the devices to the next.
+/// Interval between two polls of the devices.
 const STEP: HostDuration = HostDuration::from_millis(10);
-/// Bytes that do not fill a chunk are fetched this often.
+/// Interval at which partly filled chunks are fetched.
 const FLUSH_EVERY: HostDuration = HostDuration::from_millis(200);
-/// A box that sends a train of its own is free again within this.
+/// Time within which a box that is sending its own train becomes free.
 const LINE_WITHIN: HostDuration = HostDuration::from_millis(1_000);
-/// A look that comes this much later than asked for is evidence of a computer that was held up.
-const HELD_UP: HostDuration = HostDuration::from_millis(1_000);
+/// A poll that is later than this is evidence of an overloaded computer.
+const MAX_POLL_DELAY: HostDuration = HostDuration::from_millis(1_000);
 
-/// The streaming devices of a bench. The cameras stop with this value.
+/// The streaming devices of a bench. Dropping this value stops the cameras.
 pub struct Streams<'a> {
     devices: &'a mut Devices,
-    cameras: [Live; 2],
-    box_trouble: Option<Trouble>,
-    box_noise: Option<Trouble>,
-    /// Whether the check needs the box.
-    box_matters: bool,
+    cameras: [CameraStream; 2],
+    box_problem: Option<Problem>,
+    box_read_error: Option<Problem>,
+    /// Whether faults of the box concern the check.
+    box_is_needed: bool,
     reports: Vec<BoxReport>,
     chunks: Vec<RawChunk>,
     flushed_at: HostTime,
-    patience: HostDuration,
-    held_up: Option<Trouble>,
+    timing_slack: HostDuration,
+    host_late: Option<Problem>,
     measuring: bool,
-    /// Whether everything is to end soon.
+    /// Whether the suite must end.
     stop: Box<dyn Fn() -> bool>,
 }
 
 impl<'a> Streams<'a> {
-    /// Configures both cameras as for a run, lets `prepare` do the rest, and starts them, slaves before their master.
+    /// Configures both cameras as for a run, calls `prepare` for each, and starts them, sync slaves before their master.
     pub fn start(
         bench: &'a mut dyn Bench,
         prepare: &mut dyn FnMut(CameraId, &mut dyn EventCamera) -> Result<(), DeviceError>,
     ) -> Self {
-        let (patience, stop) = (bench.patience(), bench.stopping());
+        let (timing_slack, stop) = (bench.timing_slack(), bench.stop_signal());
         let settings = CameraId::ALL.map(|camera| bench.camera_settings(camera));
         let devices = bench.devices();
         let now = devices.clock.now();
         let mut streams = Self {
-            cameras: [Live::default(), Live::default()],
-            box_trouble: match &devices.trigger_box {
-                Some(Err(trouble)) => Some(trouble.clone()),
+            cameras: [CameraStream::default(), CameraStream::default()],
+            box_problem: match &devices.trigger_box {
+                Some(Err(problem)) => Some(problem.clone()),
                 _ => None,
             },
             devices,
-            box_noise: None,
-            box_matters: true,
+            box_read_error: None,
+            box_is_needed: true,
             reports: Vec::new(),
             chunks: Vec::new(),
             flushed_at: now,
-            patience,
-            held_up: None,
+            timing_slack,
+            host_late: None,
             measuring: false,
             stop,
         };
@@ -76,43 +75,43 @@ impl<'a> Streams<'a> {
         let (slaves, others): (Vec<_>, Vec<_>) = CameraId::ALL.into_iter().partition(is_slave);
         for camera in slaves.iter().chain(&others).copied() {
             let started = match &settings[camera.index()] {
-                Ok(settings) => streams.start_one(camera, settings, prepare),
-                Err(trouble) => Err(trouble.clone()),
+                Ok(settings) => streams.start_camera(camera, settings, prepare),
+                Err(problem) => Err(problem.clone()),
             };
-            streams.cameras[camera.index()].trouble = started.err();
+            streams.cameras[camera.index()].problem = started.err();
         }
         let now = streams.now();
-        for live in &mut streams.cameras {
-            live.moved_at = now;
+        for stream in &mut streams.cameras {
+            stream.advanced_at = now;
         }
-        streams.listen();
+        streams.poll_box();
         streams.reports.clear();
         streams
     }
 
-    fn start_one(
+    fn start_camera(
         &mut self,
         id: CameraId,
         settings: &CameraSettings,
         prepare: &mut dyn FnMut(CameraId, &mut dyn EventCamera) -> Result<(), DeviceError>,
-    ) -> Result<(), Trouble> {
+    ) -> Result<(), Problem> {
         let camera = match &mut self.devices.cameras[id.index()] {
             Ok(camera) => camera.as_mut(),
-            Err(trouble) => return Err(trouble.clone()),
+            Err(problem) => return Err(problem.clone()),
         };
-        // An earlier check may have been cut off.
+        // The previous check may have been interrupted while it streamed.
         let stopped = camera.stop(&mut self.chunks);
         self.chunks.clear();
-        let told = stopped
+        let started = stopped
             .and_then(|()| camera.configure(settings).map(drop))
             .and_then(|()| prepare(id, camera))
             .and_then(|()| camera.start());
-        // What was noticed before says nothing about this stream.
+        // Earlier notes do not concern this stream.
         camera.take_notes(&mut Vec::new());
-        told.map_err(|e| trouble::of(&e))
+        started.map_err(|e| device_evidence::from_error(&e))
     }
 
-    /// The present.
+    /// Current time.
     #[must_use]
     pub fn now(&self) -> HostTime {
         self.devices.clock.now()
@@ -121,35 +120,37 @@ impl<'a> Streams<'a> {
     /// Whether this camera still streams.
     #[must_use]
     pub(crate) fn is_live(&self, camera: CameraId) -> bool {
-        self.cameras[camera.index()].trouble.is_none()
+        self.cameras[camera.index()].problem.is_none()
     }
 
-    /// What the box reported so far.
+    /// All reports of the box so far.
     #[must_use]
     pub fn reports(&self) -> &[BoxReport] {
         &self.reports
     }
 
-    /// Whether everything that came from the box could be read, and the box says that it told everything.
+    /// Whether every report of the box arrived and could be read.
     #[must_use]
-    pub(crate) fn box_was_heard_well(&self) -> bool {
-        self.box_trouble.is_none() && self.box_noise.is_none()
+    pub(crate) fn box_reports_are_complete(&self) -> bool {
+        self.box_problem.is_none() && self.box_read_error.is_none()
     }
 
-    /// What becomes of the trigger box is no matter of this check: told here, it would excuse what is wrong with a camera.
+    /// Ignores faults of the trigger box: in a check of the cameras alone they would excuse a camera's fault.
     pub fn without_box(mut self) -> Self {
-        self.box_matters = false;
+        self.box_is_needed = false;
         self
     }
 
-    /// From now on what comes counts.
-    pub fn begin(&mut self, see: &mut dyn FnMut(&RawChunk)) {
-        self.look(true, see);
+    /// Starts counting.
+    pub fn start_counting(&mut self, see: &mut dyn FnMut(&RawChunk)) {
+        self.poll_devices(true, see);
         self.measuring = true;
-        self.cameras.iter_mut().for_each(Live::begin);
+        self.cameras
+            .iter_mut()
+            .for_each(CameraStream::start_counting);
     }
 
-    /// Looks at the devices for `span`, or until everything is to end, and hands each chunk to `see`.
+    /// Polls the devices for `span`, or until the suite must end, and passes each chunk to `see`.
     pub fn pass(&mut self, span: HostDuration, see: &mut dyn FnMut(&RawChunk)) {
         let end = self.now() + span;
         while self.now() < end && !(self.stop)() {
@@ -157,11 +158,11 @@ impl<'a> Streams<'a> {
         }
     }
 
-    /// Sends a mark as soon as the line is free, and looks at the devices meanwhile until its train is over. False when it was not
-    /// sent: the box is of no more use ([`Self::finish`] tells why), or everything is to end.
+    /// Sends a mark as soon as the line is free, and polls the devices until its train is over. Returns false if the mark was not sent:
+    /// the box failed ([`Self::finish`] adds the evidence), or the suite must end.
     pub fn send(&mut self, mark: Mark, see: &mut dyn FnMut(&RawChunk)) -> bool {
-        let until = self.now() + LINE_WITHIN + self.patience;
-        while self.box_trouble.is_none() && !(self.stop)() {
+        let until = self.now() + LINE_WITHIN + self.timing_slack;
+        while self.box_problem.is_none() && !(self.stop)() {
             let Some(Ok(trigger)) = &mut self.devices.trigger_box else {
                 return false;
             };
@@ -175,24 +176,24 @@ impl<'a> Streams<'a> {
                 }
                 Err(DeviceError::Pending { .. }) => self.step(self.now() + STEP, see),
                 Err(DeviceError::State { .. }) if self.now() < until => self.step(until, see),
-                Err(e) => self.box_trouble = Some(trouble::of(&e)),
+                Err(e) => self.box_problem = Some(device_evidence::from_error(&e)),
             }
         }
         false
     }
 
-    /// Waits until both cameras' streams go beyond the present, or are known to stand still; then stops the cameras. Everything
-    /// that came in the end is counted too. Troubles go to `found`, with `metrics` unmeasured on the camera that had them.
+    /// Waits until the streams of both cameras pass the present or stall, then stops the cameras and counts their last data. Failures
+    /// go to `found`, with `metrics` unmeasured on the failed camera.
     pub fn finish(
         mut self,
         found: &mut Findings,
         metrics: &[&'static str],
         see: &mut dyn FnMut(&RawChunk),
-    ) -> [Option<Seen>; 2] {
+    ) -> [Option<StreamStats>; 2] {
         let end = self.now();
         while CameraId::ALL
             .iter()
-            .any(|c| self.is_live(*c) && self.cameras[c.index()].moved_at <= end)
+            .any(|c| self.is_live(*c) && self.cameras[c.index()].advanced_at <= end)
         {
             self.flushed_at = self.flushed_at.min(end - FLUSH_EVERY);
             self.step(self.now() + STEP, see);
@@ -200,65 +201,67 @@ impl<'a> Streams<'a> {
         for camera in CameraId::ALL {
             if let Ok(device) = &mut self.devices.cameras[camera.index()] {
                 let stopped = device.stop(&mut self.chunks);
-                let live = &mut self.cameras[camera.index()];
-                device.take_notes(&mut live.seen.notes);
+                let stream = &mut self.cameras[camera.index()];
+                device.take_notes(&mut stream.stats.notes);
                 if let Err(e) = stopped {
-                    live.trouble.get_or_insert_with(|| trouble::of(&e));
+                    stream
+                        .problem
+                        .get_or_insert_with(|| device_evidence::from_error(&e));
                 }
             }
-            self.take(see);
+            self.forward_chunks(see);
         }
-        if let (Some(trouble), Some(slot)) = (&self.box_trouble, &mut self.devices.trigger_box) {
-            *slot = Err(trouble.clone());
+        if let (Some(problem), Some(slot)) = (&self.box_problem, &mut self.devices.trigger_box) {
+            *slot = Err(problem.clone());
         }
-        let of_box = [self.box_trouble.take(), self.box_noise.take()];
-        let of_box = of_box.into_iter().filter(|_| self.box_matters);
-        let others = of_box.chain([self.held_up.take()]);
+        let box_problems = [self.box_problem.take(), self.box_read_error.take()];
+        let box_problems = box_problems.into_iter().filter(|_| self.box_is_needed);
+        let others = box_problems.chain([self.host_late.take()]);
         found.evidence.extend(others.flatten().map(|t| *t));
         CameraId::ALL.map(|camera| {
-            let live = std::mem::take(&mut self.cameras[camera.index()]);
-            match live.trouble {
-                None => Some(live.seen),
-                Some(trouble) => {
-                    if trouble.kind == EvidenceKind::DeviceLost {
-                        // Only opening it again helps, and the bench does so for whoever asks next.
-                        self.devices.cameras[camera.index()] = Err(trouble.clone());
+            let stream = std::mem::take(&mut self.cameras[camera.index()]);
+            match stream.problem {
+                None => Some(stream.stats),
+                Some(problem) => {
+                    if problem.kind == EvidenceKind::DeviceLost {
+                        // A lost camera must be reopened; the bench does that for the next check.
+                        self.devices.cameras[camera.index()] = Err(problem.clone());
                     }
-                    found.trouble(*trouble, trouble::of_camera(camera), metrics);
+                    found.failed(*problem, device_evidence::camera_subject(camera), metrics);
                     None
                 }
             }
         })
     }
 
-    /// Waits for the next look, not beyond `end`, and looks.
+    /// Waits for the next poll, at most until `end`, and polls.
     fn step(&mut self, end: HostTime, see: &mut dyn FnMut(&RawChunk)) {
         let due = (self.now() + STEP).min(end);
         self.devices.clock.wait_until(due);
         let now = self.now();
         let late = now - due;
-        if late > HELD_UP + self.patience {
+        if late > MAX_POLL_DELAY + self.timing_slack {
             let what = format!(
-                "expected to look at the devices every {} ms, found {:.1} s without a look",
+                "expected a poll of the devices every {} ms, found {:.1} s without one",
                 STEP.0 / 1_000_000,
                 late.as_secs_f64()
             );
             let evidence = Evidence::new(EvidenceKind::HostLate, COMPUTER, what)
-                .next("see what else ran at that time (`journalctl`, backups, sleep)");
-            self.held_up = Some(Box::new(evidence));
+                .next("find out what else ran at that time (`journalctl`, backups, sleep)");
+            self.host_late = Some(Box::new(evidence));
         }
-        self.look(now - self.flushed_at >= FLUSH_EVERY, see);
+        self.poll_devices(now - self.flushed_at >= FLUSH_EVERY, see);
     }
 
-    /// Fetches what the devices have; `all` of it, or full chunks only.
-    fn look(&mut self, all: bool, see: &mut dyn FnMut(&RawChunk)) {
+    /// Fetches data from the devices: everything if `all`, otherwise full chunks only.
+    fn poll_devices(&mut self, all: bool, see: &mut dyn FnMut(&RawChunk)) {
         let now = self.now();
         if all {
             self.flushed_at = now;
         }
         for camera in CameraId::ALL {
             let i = camera.index();
-            if self.cameras[i].trouble.is_some() {
+            if self.cameras[i].problem.is_some() {
                 continue;
             }
             let Ok(device) = &mut self.devices.cameras[i] else {
@@ -268,43 +271,45 @@ impl<'a> Streams<'a> {
                 true => device.flush(&mut self.chunks),
                 false => device.poll(&mut self.chunks),
             };
-            self.take(see);
-            let live = &mut self.cameras[i];
+            self.forward_chunks(see);
+            let stream = &mut self.cameras[i];
             let fetched = match fetched {
-                Err(DeviceError::Pending { .. }) => Ok(()), // the rest comes with a later look
+                Err(DeviceError::Pending { .. }) => Ok(()), // a later poll fetches the rest
                 other => other,
             };
             if let Err(e) = fetched {
-                live.trouble = Some(trouble::of(&e));
+                stream.problem = Some(device_evidence::from_error(&e));
             } else if all {
-                live.trouble = live.stalled(camera, now, self.patience);
+                stream.problem = stream.check_stall(camera, now, self.timing_slack);
             }
         }
-        self.listen();
+        self.poll_box();
     }
 
-    /// Counts the chunks that came, and hands them over.
-    fn take(&mut self, see: &mut dyn FnMut(&RawChunk)) {
+    /// Counts the new chunks and passes them on.
+    fn forward_chunks(&mut self, see: &mut dyn FnMut(&RawChunk)) {
         let now = self.devices.clock.now();
         for chunk in self.chunks.drain(..) {
-            self.cameras[chunk.camera.index()].see(&chunk, now, self.measuring);
+            self.cameras[chunk.camera.index()].add_chunk(&chunk, now, self.measuring);
             see(&chunk);
         }
     }
 
     /// Fetches the box's reports.
-    fn listen(&mut self) {
+    fn poll_box(&mut self) {
         let Some(Ok(trigger)) = &mut self.devices.trigger_box else {
             return;
         };
         match trigger.poll(&mut self.reports) {
             Ok(()) => {}
             Err(e @ (DeviceError::Lost { .. } | DeviceError::Silent { .. })) => {
-                self.box_trouble.get_or_insert_with(|| trouble::of(&e));
+                self.box_problem
+                    .get_or_insert_with(|| device_evidence::from_error(&e));
             }
-            // Something unreadable on its line: it goes on.
+            // Unreadable data on its line; the stream of reports continues.
             Err(e) => {
-                self.box_noise.get_or_insert_with(|| trouble::of(&e));
+                self.box_read_error
+                    .get_or_insert_with(|| device_evidence::from_error(&e));
             }
         }
     }
@@ -313,7 +318,7 @@ impl<'a> Streams<'a> {
 impl Drop for Streams<'_> {
     fn drop(&mut self) {
         for camera in self.devices.cameras.iter_mut().flatten() {
-            // After `finish` they are stopped; before, somebody gave up and has said why.
+            // `finish` stopped them already; without it, the error that ended the check has been reported.
             let _ = camera.stop(&mut self.chunks);
         }
     }

@@ -1,9 +1,9 @@
-//! A bench of simulated devices that a check cannot tell from another.
+//! A bench of simulated devices behind the `Bench` trait.
 
 use std::path::{Path, PathBuf};
 
 use skinrig_device::CameraSettings;
-use skinrig_hil::bench::{Bench, Devices, Drilled, GoldenRun, Trouble};
+use skinrig_hil::bench::{Bench, Devices, DrillResult, GoldenRun, Problem};
 use skinrig_hil::findings::Value;
 use skinrig_hil::{Findings, checks};
 use skinrig_model::{CameraId, HostDuration, SimLevel};
@@ -17,17 +17,17 @@ use skinrig_sim::{Fault, SimConfig, simulated_rig};
 
 const RIG: &str = include_str!("../../rigs/emulated.yaml");
 
-/// Simulated devices under an emulated bench's rig file.
+/// Simulated devices with the rig file of an emulated bench.
 pub struct SimBench {
     pub config: SimConfig,
     pub rig: RigFile,
     pub devices: Option<Devices>,
     pub folder: PathBuf,
-    /// Whether the lamps can be switched, and every time that they were.
-    pub lamps: Result<bool, Trouble>,
+    /// Result of switching the lamps.
+    pub lamps: Result<bool, Problem>,
     pub switched: Vec<Light>,
-    /// Everything is to end.
-    pub ends: bool,
+    /// Whether the stop signal is set.
+    pub stop: bool,
 }
 
 impl SimBench {
@@ -44,15 +44,15 @@ impl SimBench {
             folder: std::env::temp_dir(),
             lamps: Ok(false),
             switched: Vec::new(),
-            ends: false,
+            stop: false,
         }
     }
 
-    /// Makes the check that `text` declares, with its parameters.
-    pub fn make(&mut self, text: &str) -> Findings {
+    /// Runs the check `text`.
+    pub fn run_check(&mut self, text: &str) -> Findings {
         let text = format!("skinrig_suite: 1\nname: one\nbudget: 1 h\nchecks:\n  {text}\n");
         let suite = Suite::parse("suite.yaml", text.as_bytes()).unwrap_or_else(|e| panic!("{e}"));
-        let found = checks::make(&suite.checks[0], self);
+        let found = checks::run(&suite.checks[0], self);
         for camera in self.devices().cameras.iter_mut().flatten() {
             assert!(
                 camera.start().is_ok(),
@@ -63,7 +63,7 @@ impl SimBench {
         found
     }
 
-    /// How much faster a camera's clock is than the box's, ppm.
+    /// Rate difference between a camera's clock and the box's, ppm.
     pub fn drift_ppm(&self, camera: CameraId) -> f64 {
         let of = |purpose, index, origin_s, ppm| {
             let mut random = Stream::new(self.config.seed, purpose, index);
@@ -77,7 +77,7 @@ impl SimBench {
     }
 }
 
-/// The one value of `metric` on `subject`.
+/// The only value of `metric` on `subject`.
 pub fn value<'a>(found: &'a Findings, subject: &str, metric: &str) -> &'a Value {
     let is_it = |v: &&Value| v.subject == subject && v.metric == metric;
     let mut values = found.values.iter().filter(is_it);
@@ -91,14 +91,14 @@ pub fn value<'a>(found: &'a Findings, subject: &str, metric: &str) -> &'a Value 
     first
 }
 
-/// What was measured of `metric` on `subject`.
+/// The measured number of `metric` on `subject`.
 pub fn number(found: &Findings, subject: &str, metric: &str) -> f64 {
     let value = value(found, subject, metric).value;
     value.unwrap_or_else(|| panic!("{subject} {metric} unmeasured in {found:#?}"))
 }
 
-/// The kinds of the evidence, each with whom it is about.
-pub fn seen(found: &Findings) -> Vec<(EvidenceKind, &str)> {
+/// Kind and subject of each piece of evidence.
+pub fn kinds_and_subjects(found: &Findings) -> Vec<(EvidenceKind, &str)> {
     found
         .evidence
         .iter()
@@ -128,14 +128,14 @@ impl Bench for SimBench {
         self.devices = None;
     }
 
-    fn camera_settings(&self, _camera: CameraId) -> Result<CameraSettings, Trouble> {
+    fn camera_settings(&self, _camera: CameraId) -> Result<CameraSettings, Problem> {
         Ok(CameraSettings {
             trigger_channels: vec![0],
             ..CameraSettings::default()
         })
     }
 
-    fn light(&mut self, light: Light) -> Result<bool, Trouble> {
+    fn set_light(&mut self, light: Light) -> Result<bool, Problem> {
         self.switched.push(light);
         self.lamps.clone()
     }
@@ -144,7 +144,7 @@ impl Bench for SimBench {
         false
     }
 
-    fn watchdog_drill(&mut self) -> Result<Drilled, Trouble> {
+    fn watchdog_drill(&mut self) -> Result<DrillResult, Problem> {
         Err(Box::new(Evidence::new(
             EvidenceKind::Software,
             "robot",
@@ -152,7 +152,7 @@ impl Bench for SimBench {
         )))
     }
 
-    fn golden(&mut self, _protocol: &Path) -> Result<GoldenRun, Trouble> {
+    fn run_golden(&mut self, _protocol: &Path) -> Result<GoldenRun, Problem> {
         Err(Box::new(Evidence::new(
             EvidenceKind::Software,
             "skin",
@@ -160,16 +160,16 @@ impl Bench for SimBench {
         )))
     }
 
-    fn stopping(&self) -> Box<dyn Fn() -> bool> {
-        let ends = self.ends;
-        Box::new(move || ends)
+    fn stop_signal(&self) -> Box<dyn Fn() -> bool> {
+        let stop = self.stop;
+        Box::new(move || stop)
     }
 
     fn folder(&self) -> &Path {
         &self.folder
     }
 
-    fn patience(&self) -> HostDuration {
+    fn timing_slack(&self) -> HostDuration {
         HostDuration::ZERO
     }
 }

@@ -1,4 +1,4 @@
-//! The disk.
+//! Check `disk`.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use skinrig_model::SimLevel;
 use skinrig_nightly::EvidenceKind;
 
-use crate::bench::{SimBench, number, seen, value};
+use crate::bench::{SimBench, kinds_and_subjects, number, value};
 
 const DISK: &str = "disk: {amount: 10 MB, write_rate: {at_least: 1 MB/s}}";
 const TOO_MUCH: &str = "disk: {amount: 100 GB, write_rate: {at_least: 1 MB/s}}";
@@ -17,7 +17,7 @@ fn bench(folder: &Path) -> SimBench {
     bench
 }
 
-/// A folder of this test's own, which is gone with it.
+/// A temporary folder, removed on drop.
 struct Folder(std::path::PathBuf);
 
 impl Folder {
@@ -38,7 +38,7 @@ impl Drop for Folder {
 fn what_is_written_comes_back_and_nothing_stays() {
     let folder = Folder::new("disk-well");
     let inner = folder.0.join("sessions"); // to be made first
-    let found = bench(&inner).make(DISK);
+    let found = bench(&inner).run_check(DISK);
     assert_eq!(found.evidence, []);
     assert!(number(&found, "computer", "write_rate") > 0.0);
     assert!(number(&found, "computer", "free") > 10e6);
@@ -48,25 +48,31 @@ fn what_is_written_comes_back_and_nothing_stays() {
 #[test]
 fn a_disk_that_is_too_small_is_left_alone() {
     let folder = Folder::new("disk-small");
-    let free = number(&bench(&folder.0).make(DISK), "computer", "free");
+    let free = number(&bench(&folder.0).run_check(DISK), "computer", "free");
     if free > 100e9 {
-        return; // there is room: nothing to see, and nothing that a test should write
+        return; // this disk has enough space
     }
-    let found = bench(&folder.0).make(TOO_MUCH);
+    let found = bench(&folder.0).run_check(TOO_MUCH);
     assert_eq!(value(&found, "computer", "write_rate").value, None);
-    assert_eq!(seen(&found), [(EvidenceKind::Disk, "computer")]);
+    assert_eq!(
+        kinds_and_subjects(&found),
+        [(EvidenceKind::Disk, "computer")]
+    );
     assert!(found.evidence[0].next.is_some());
 }
 
 #[test]
-fn a_folder_that_cannot_be_one_is_told_with_the_next_step() {
+fn an_unusable_folder_is_reported_with_the_next_step() {
     let folder = Folder::new("disk-file");
     let file = folder.0.join("file");
     fs::write(&file, "").unwrap();
-    let found = bench(&file.join("sessions")).make(DISK);
+    let found = bench(&file.join("sessions")).run_check(DISK);
     assert_eq!(value(&found, "computer", "write_rate").value, None);
     assert_eq!(value(&found, "computer", "free").value, None);
-    assert_eq!(seen(&found), [(EvidenceKind::Disk, "computer")]);
+    assert_eq!(
+        kinds_and_subjects(&found),
+        [(EvidenceKind::Disk, "computer")]
+    );
     let next = found.evidence[0].next.clone().unwrap();
     assert!(next.contains("--sessions"), "{next}");
 }

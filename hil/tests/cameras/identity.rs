@@ -1,15 +1,15 @@
-//! Who the devices are, and whether they keep what they are told.
+//! Checks `identity` and `settings`.
 
 use skinrig_model::{CameraId, SimLevel};
 use skinrig_nightly::EvidenceKind;
 use skinrig_sim::Fault;
 
-use crate::bench::{SimBench, number, seen, value};
+use crate::bench::{SimBench, kinds_and_subjects, number, value};
 
 const IDENTITY: &str = "identity: {differences: {at_most: 0}}";
 const SETTINGS: &str = "settings: {differences: {at_most: 0}}";
 
-/// A rig file that knows the simulated devices.
+/// A bench whose rig file names the simulated devices.
 fn known(faults: Vec<Fault>) -> SimBench {
     use skinrig_hil::Bench as _;
     let mut bench = SimBench::new(SimLevel::Kinematic, faults);
@@ -25,9 +25,9 @@ fn known(faults: Vec<Fault>) -> SimBench {
 }
 
 #[test]
-fn everybody_is_named_and_compared_with_the_rig_file() {
+fn every_device_is_identified_and_compared_with_the_rig_file() {
     let mut bench = known(Vec::new());
-    let found = bench.make(IDENTITY);
+    let found = bench.run_check(IDENTITY);
     for device in ["camera1", "camera2", "trigger box"] {
         assert_eq!(number(&found, device, "differences"), 0.0, "{found:#?}");
         let note = value(&found, device, "differences").note.clone().unwrap();
@@ -36,27 +36,33 @@ fn everybody_is_named_and_compared_with_the_rig_file() {
             "{note}"
         );
     }
-    // The simulated robot is not number 4711.
+    // The simulated robot does not have serial number 4711.
     assert_eq!(number(&found, "robot", "differences"), 1.0);
-    assert_eq!(seen(&found), [(EvidenceKind::OtherDevice, "robot")]);
+    assert_eq!(
+        kinds_and_subjects(&found),
+        [(EvidenceKind::OtherDevice, "robot")]
+    );
     bench.rig.cameras[1].fpga = Some("3.0.1".to_owned());
     bench.rig.cameras.swap(0, 1);
-    let swapped = bench.make(IDENTITY);
+    let swapped = bench.run_check(IDENTITY);
     assert_eq!(number(&swapped, "camera1", "differences"), 2.0);
     assert_eq!(number(&swapped, "camera2", "differences"), 1.0);
 }
 
 #[test]
-fn settings_that_keep_are_noted_and_those_that_do_not_are_differences() {
-    let found = known(Vec::new()).make(SETTINGS);
+fn accepted_settings_are_noted_and_others_count_as_differences() {
+    let found = known(Vec::new()).run_check(SETTINGS);
     assert_eq!(found.evidence, []);
     for camera in ["camera1", "camera2"] {
         assert_eq!(number(&found, camera, "differences"), 0.0);
         let note = value(&found, camera, "differences").note.clone().unwrap();
         assert!(note.contains("bias_fo 1477"), "{note}");
     }
-    let found = known(vec![Fault::CameraReadBack(CameraId::Two)]).make(SETTINGS);
+    let found = known(vec![Fault::CameraReadBack(CameraId::Two)]).run_check(SETTINGS);
     assert_eq!(number(&found, "camera1", "differences"), 0.0);
     assert_eq!(number(&found, "camera2", "differences"), 1.0);
-    assert_eq!(seen(&found), [(EvidenceKind::ReadBack, "camera2")]);
+    assert_eq!(
+        kinds_and_subjects(&found),
+        [(EvidenceKind::ReadBack, "camera2")]
+    );
 }

@@ -1,9 +1,8 @@
-//! The checks of cameras, trigger box and disk over simulated devices: near the truth when all is well, and each fault where it
-//! belongs.
+//! Checks of cameras, trigger box and disk on simulated devices: results close to the truth, and each fault attributed correctly.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod bench;
 mod disk;
 mod identity;
-mod line;
 mod pixels;
+mod trigger_line;

@@ -1,13 +1,13 @@
-//! Rates, losses, noise, the test pattern.
+//! Checks `idle`, `test_pattern` and `noise_*`.
 
 use skinrig_device::DeviceError;
 use skinrig_model::{CameraId, DeviceRole, HostTime, SimLevel};
 use skinrig_nightly::{Evidence, EvidenceKind};
 use skinrig_protocol::suite::Light;
 use skinrig_sim::faults::{STORM_PER_MS, STORM_PIXELS};
-use skinrig_sim::{Fault, When};
+use skinrig_sim::{Fault, FaultTrigger};
 
-use crate::bench::{SimBench, number, seen, value};
+use crate::bench::{SimBench, kinds_and_subjects, number, value};
 
 const IDLE: &str = "idle: {duration: 2 s, gaps: {at_most: 0}}";
 const PATTERN: &str = "test_pattern: {duration: 1 s, rate: 1 Mev/s, received: {at_least: 99 %}}";
@@ -15,11 +15,11 @@ const LIT: &str = "noise_lit: {duration: 4 s, hot_above: 20 ev/s, rate: {at_most
 const DARK: &str = "noise_dark: {duration: 1 s, hot_above: 20 ev/s, rate: {at_most: 1 Mev/s}}";
 const CAMERAS: [&str; 2] = ["camera1", "camera2"];
 
-fn at(seconds: f64) -> When {
-    When::At(HostTime::from_secs_f64(seconds))
+fn at(seconds: f64) -> FaultTrigger {
+    FaultTrigger::At(HostTime::from_secs_f64(seconds))
 }
 
-fn lost(when: When) -> Fault {
+fn lost(when: FaultTrigger) -> Fault {
     Fault::CameraBytesLost {
         camera: CameraId::Two,
         when,
@@ -29,8 +29,8 @@ fn lost(when: When) -> Fault {
 
 #[test]
 fn a_quiet_stream_has_its_rate_and_no_gap() {
-    // Nothing but the time base: a word of 4 bytes every 16 µs.
-    let found = SimBench::new(SimLevel::Kinematic, Vec::new()).make(IDLE);
+    // Only the time base: one word of 4 bytes every 16 µs.
+    let found = SimBench::new(SimLevel::Kinematic, Vec::new()).run_check(IDLE);
     assert_eq!(found.evidence, []);
     for camera in CAMERAS {
         let rate = number(&found, camera, "data_rate");
@@ -42,19 +42,23 @@ fn a_quiet_stream_has_its_rate_and_no_gap() {
 
 #[test]
 fn lost_bytes_are_counted_on_their_camera() {
-    let found = SimBench::new(SimLevel::Kinematic, vec![lost(at(1.0)), lost(at(0.2))]).make(IDLE);
+    let found =
+        SimBench::new(SimLevel::Kinematic, vec![lost(at(1.0)), lost(at(0.2))]).run_check(IDLE);
     assert_eq!(number(&found, "camera1", "lost"), 0.0);
-    // What was lost before the stream had settled does not count.
+    // Losses before counting starts do not count.
     assert_eq!(number(&found, "camera2", "lost"), 1000.0);
     assert_eq!(number(&found, "camera2", "gaps"), 1.0);
-    assert_eq!(seen(&found), [(EvidenceKind::DataLost, "camera2")]);
+    assert_eq!(
+        kinds_and_subjects(&found),
+        [(EvidenceKind::DataLost, "camera2")]
+    );
 }
 
 #[test]
 fn a_stalled_camera_ends_the_wait() {
     let stalled = Fault::CameraStalled {
         camera: CameraId::Two,
-        when: at(2.3), // so late that only the end of the check can notice
+        when: at(2.3), // so late that only the end of the check notices it
     };
     for (check, metric) in [(IDLE, "gaps"), (PATTERN, "received"), (LIT, "rate")] {
         let mut faults = vec![stalled.clone()];
@@ -64,9 +68,9 @@ fn a_stalled_camera_ends_the_wait() {
                 when: at(1.4),
             }];
         }
-        let found = SimBench::new(SimLevel::Kinematic, faults).make(check);
+        let found = SimBench::new(SimLevel::Kinematic, faults).run_check(check);
         assert_eq!(
-            seen(&found),
+            kinds_and_subjects(&found),
             [(EvidenceKind::DeviceLost, "camera2")],
             "{check}"
         );
@@ -76,16 +80,16 @@ fn a_stalled_camera_ends_the_wait() {
 }
 
 #[test]
-fn the_pattern_comes_whole_and_the_pixels_are_given_back() {
+fn the_pattern_arrives_completely_and_is_switched_off_afterwards() {
     let mut bench = SimBench::new(SimLevel::Kinematic, Vec::new());
-    let found = bench.make(PATTERN);
+    let found = bench.run_check(PATTERN);
     assert_eq!(found.evidence, []);
     for camera in CAMERAS {
         let received = number(&found, camera, "received");
         assert!((received - 100.0).abs() < 0.2, "{received}");
         assert_eq!(number(&found, camera, "gaps"), 0.0);
     }
-    let after = bench.make(LIT);
+    let after = bench.run_check(LIT);
     assert_eq!(
         number(&after, "camera1", "rate"),
         0.0,
@@ -94,19 +98,22 @@ fn the_pattern_comes_whole_and_the_pixels_are_given_back() {
 }
 
 #[test]
-fn what_the_pattern_misses_shows_in_every_number() {
-    let found = SimBench::new(SimLevel::Kinematic, vec![lost(at(1.0))]).make(PATTERN);
+fn losses_in_the_pattern_show_in_every_metric() {
+    let found = SimBench::new(SimLevel::Kinematic, vec![lost(at(1.0))]).run_check(PATTERN);
     assert_eq!(number(&found, "camera2", "lost"), 1000.0);
     assert!(number(&found, "camera2", "gaps") >= 1.0);
     assert!(number(&found, "camera2", "received") < 99.99);
-    assert_eq!(seen(&found), [(EvidenceKind::DataLost, "camera2")]);
+    assert_eq!(
+        kinds_and_subjects(&found),
+        [(EvidenceKind::DataLost, "camera2")]
+    );
 }
 
 #[test]
 fn noise_and_hot_pixels_are_those_of_the_scene() {
     let mut bench = SimBench::new(SimLevel::Geometric, Vec::new());
     let g = bench.config.geometric.clone();
-    let found = bench.make(LIT);
+    let found = bench.run_check(LIT);
     assert_eq!(found.evidence, []);
     for camera in CAMERAS {
         let hot = number(&found, camera, "hot_pixels");
@@ -131,13 +138,13 @@ fn a_storm_of_hot_pixels_is_counted_pixel_by_pixel() {
         camera: CameraId::Two,
         when: at(2.0),
     };
-    let found = SimBench::new(SimLevel::Kinematic, vec![storm]).make(LIT);
+    let found = SimBench::new(SimLevel::Kinematic, vec![storm]).run_check(LIT);
     assert_eq!(number(&found, "camera1", "hot_pixels"), 0.0);
     assert_eq!(
         number(&found, "camera2", "hot_pixels"),
         f64::from(STORM_PIXELS)
     );
-    // 300 ms of it within 4 s.
+    // 300 ms of the storm within 4 s.
     let hottest = number(&found, "camera2", "hottest");
     let expected = STORM_PER_MS as f64 * 300.0 / 4.0;
     assert!(
@@ -147,37 +154,45 @@ fn a_storm_of_hot_pixels_is_counted_pixel_by_pixel() {
 }
 
 #[test]
-fn the_dark_needs_lamps_that_obey_and_the_light_comes_back() {
+fn noise_in_the_dark_needs_working_lamps_and_switches_them_on_again() {
     let mut bench = SimBench::new(SimLevel::Kinematic, Vec::new());
-    let found = bench.make(DARK);
-    assert!(found.not_here.is_some_and(|why| why.contains("hil.light")));
+    let found = bench.run_check(DARK);
+    assert!(
+        found
+            .not_applicable
+            .is_some_and(|why| why.contains("hil.light"))
+    );
     bench.lamps = Ok(true);
     bench.switched.clear();
-    let found = bench.make(DARK);
+    let found = bench.run_check(DARK);
     assert_eq!(number(&found, "camera1", "rate"), 0.0);
     assert_eq!(value(&found, "camera1", "rate").note, None);
     assert_eq!(bench.switched, [Light::Dark, Light::Lit]);
     let refused = Evidence::new(EvidenceKind::State, "computer", "the program failed");
     bench.lamps = Err(Box::new(refused));
-    let found = bench.make(DARK);
-    assert_eq!(seen(&found), [(EvidenceKind::State, "computer")]);
+    let found = bench.run_check(DARK);
+    assert_eq!(
+        kinds_and_subjects(&found),
+        [(EvidenceKind::State, "computer")]
+    );
     assert_eq!(value(&found, "camera2", "hot_pixels").value, None);
 }
 
 #[test]
-fn a_camera_that_cannot_be_opened_keeps_the_other_from_nothing() {
+fn a_camera_that_cannot_be_opened_does_not_affect_the_other_one() {
     let mut bench = SimBench::new(SimLevel::Kinematic, Vec::new());
-    bench.make(IDLE);
+    bench.run_check(IDLE);
     let gone = DeviceError::Lost {
         role: DeviceRole::Camera1,
         serial: "00000001".to_owned(),
         detail: "unplugged".to_owned(),
     };
-    bench.devices.as_mut().unwrap().cameras[0] = Err(skinrig_hil::trouble::of(&gone));
+    bench.devices.as_mut().unwrap().cameras[0] =
+        Err(skinrig_hil::device_evidence::from_error(&gone));
     for (check, metric) in [(IDLE, "lost"), (PATTERN, "received"), (LIT, "rate")] {
-        let found = bench.make(check);
+        let found = bench.run_check(check);
         assert_eq!(
-            seen(&found),
+            kinds_and_subjects(&found),
             [(EvidenceKind::DeviceLost, "camera1")],
             "{check}"
         );

@@ -1,4 +1,4 @@
-//! The lease of a bench between processes: only one ever holds it, and whoever dies lets go.
+//! The lease of a bench between processes: one holder at a time, released even when it dies.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up must fail")]
 
 use std::io::{BufRead, BufReader, Write};
@@ -7,18 +7,18 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use skinrig_hil::lease::{Lease, LeaseError, Owner, Pace, Standing, look, path_of};
+use skinrig_hil::lease::{Lease, LeaseError, LeaseState, LeaseTiming, Owner, inspect, path_of};
 
-/// Tells a child of these tests where the lease is.
+/// Environment variable that passes the lease's path to a child process.
 const LEASE: &str = "SKINRIG_TEST_LEASE";
-/// So long may anything take that must happen.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// Time limit for anything that must happen.
+const TIMEOUT: Duration = Duration::from_secs(60);
 
-/// Fast enough for tests; a beat is awaited by looking, never by sleeping.
-const PACE: Pace = Pace {
-    beat: Duration::from_millis(20),
+/// Fast enough for tests; they poll for a heartbeat and never sleep.
+const TIMING: LeaseTiming = LeaseTiming {
+    heartbeat: Duration::from_millis(20),
     expiry: Duration::from_millis(500),
-    glance: Duration::from_millis(50),
+    lock_wait: Duration::from_millis(50),
 };
 
 fn owner(host: &str, what: &str) -> Owner {
@@ -26,14 +26,14 @@ fn owner(host: &str, what: &str) -> Owner {
 }
 
 fn take(path: &Path, what: &str) -> Result<Lease, LeaseError> {
-    Lease::take(path, owner("here", what), PACE)
+    Lease::take(path, owner("here", what), TIMING)
 }
 
-/// What stands in the lease's file.
+/// The content of the lease file.
 fn entry(path: &Path) -> serde_json::Value {
-    let until = Instant::now() + PATIENCE;
+    let until = Instant::now() + TIMEOUT;
     loop {
-        // A beat may just be written.
+        // A heartbeat may be writing it.
         let text = std::fs::read_to_string(path).unwrap();
         match serde_json::from_str(&text) {
             Ok(value) => return value,
@@ -48,10 +48,10 @@ fn rewrite(path: &Path, change: impl Fn(&mut serde_json::Value)) {
     std::fs::write(path, value.to_string()).unwrap();
 }
 
-/// Waits until the holder's heart has beaten once more.
-fn await_beat(path: &Path) {
+/// Waits for the holder's next heartbeat.
+fn await_heartbeat(path: &Path) {
     let before = entry(path)["beats"].clone();
-    let until = Instant::now() + PATIENCE;
+    let until = Instant::now() + TIMEOUT;
     while entry(path)["beats"] == before {
         assert!(Instant::now() < until, "no beat");
         std::thread::yield_now();
@@ -59,47 +59,47 @@ fn await_beat(path: &Path) {
 }
 
 #[test]
-fn a_held_bench_is_refused_with_its_holder_and_free_when_released() {
+fn a_held_lease_is_refused_with_its_holder_and_free_after_release() {
     let folder = tempfile::tempdir().unwrap();
     let path = path_of(folder.path(), "omega3-7");
-    assert_eq!(look(&path).unwrap(), Standing::Free { last: None });
+    assert_eq!(inspect(&path).unwrap(), LeaseState::Free { last: None });
     let lease = take(&path, "hil run nightly").unwrap();
     assert_eq!(lease.note(), None);
     let refused = take(&path, "run paper").unwrap_err().to_string();
-    for said in [
+    for phrase in [
         "`skinrig hil run nightly` of somebody on here",
         &format!("kill {}", std::process::id()),
         "next: ",
     ] {
-        assert!(refused.contains(said), "{refused}");
+        assert!(refused.contains(phrase), "{refused}");
     }
     assert!(
-        matches!(look(&path).unwrap(), Standing::Held { owner: Some(o), .. } if o.what == "hil run nightly")
+        matches!(inspect(&path).unwrap(), LeaseState::Held { owner: Some(o), .. } if o.what == "hil run nightly")
     );
-    await_beat(&path);
+    await_heartbeat(&path);
     drop(lease);
     assert!(
-        matches!(look(&path).unwrap(), Standing::Free { last: Some(o) } if o.what == "hil run nightly")
+        matches!(inspect(&path).unwrap(), LeaseState::Free { last: Some(o) } if o.what == "hil run nightly")
     );
-    // Released, so there is nothing to tell.
+    // Released, so there is no takeover to report.
     assert_eq!(take(&path, "jog").unwrap().note(), None);
-    // Another robot's is another lease.
+    // Another robot has its own lease.
     let _one = take(&path, "jog").unwrap();
     take(&path_of(folder.path(), "omega3-8"), "jog").unwrap();
 }
 
 #[test]
-fn no_clock_decides_on_one_computer() {
+fn clocks_do_not_matter_on_one_computer() {
     let folder = tempfile::tempdir().unwrap();
     let path = path_of(folder.path(), "omega3-7");
     for beat_at in ["1970-01-01T00:00:00.000Z", "2999-01-01T00:00:00.000Z"] {
-        // The holder's clock was set back, or forward: it holds the lock, and so the bench.
+        // The holder's clock was set back or forward: it still has the lock and therefore the bench.
         let lease = take(&path, "hil run nightly").unwrap();
         rewrite(&path, |e| e["beat_at"] = beat_at.into());
         assert!(matches!(take(&path, "jog"), Err(LeaseError::Held { .. })));
         assert!(!lease.is_lost());
         drop(lease);
-        // It died, and its last sign of life lies anywhere: the bench is free at once, and that is told.
+        // The holder died, with its last heartbeat at any time: the bench is free at once, and the takeover is reported.
         rewrite(&path, |e| {
             e["released"] = false.into();
             e["beat_at"] = beat_at.into();
@@ -115,14 +115,14 @@ fn no_clock_decides_on_one_computer() {
     }
 }
 
-/// Locks of another computer may not be seen here: then its heart decides.
+/// Locks of another computer may be invisible here: then its heartbeat decides.
 #[test]
-fn an_owner_on_another_computer_is_left_alone_while_its_heart_beats() {
+fn a_holder_on_another_computer_keeps_the_lease_while_it_sends_heartbeats() {
     let folder = tempfile::tempdir().unwrap();
     let path = path_of(folder.path(), "omega3-7");
-    drop(Lease::take(&path, owner("there", "hil run nightly"), PACE).unwrap());
+    drop(Lease::take(&path, owner("there", "hil run nightly"), TIMING).unwrap());
     rewrite(&path, |e| e["released"] = false.into());
-    // A file whose lock is free and whose counter counts: as a file server shows it that does not share locks.
+    // A free lock and a running counter, as on a file server without shared locks.
     let (stop, stopped) = channel::<()>();
     let beating = {
         let path = path.clone();
@@ -135,29 +135,29 @@ fn an_owner_on_another_computer_is_left_alone_while_its_heart_beats() {
             }
         })
     };
-    let patient = Pace {
-        expiry: PATIENCE,
-        ..PACE
+    let patient = LeaseTiming {
+        expiry: TIMEOUT,
+        ..TIMING
     };
     let refused = Lease::take(&path, owner("here", "jog"), patient).unwrap_err();
     assert!(refused.to_string().contains("on there"), "{refused}");
     stop.send(()).unwrap();
     beating.join().unwrap();
-    // Its heart stands still: it is gone.
+    // The heartbeat stopped: the holder is gone.
     let lease = take(&path, "jog").unwrap();
     assert!(lease.note().unwrap().contains("on there"));
 }
 
 #[test]
-fn an_owner_sees_that_its_bench_was_taken() {
+fn a_holder_notices_that_its_lease_was_taken() {
     let folder = tempfile::tempdir().unwrap();
     let path = path_of(folder.path(), "omega3-7");
     let lease = take(&path, "hil run nightly").unwrap();
     rewrite(&path, |e| e["token"] = "another".into());
-    let until = Instant::now() + PATIENCE;
+    let until = Instant::now() + TIMEOUT;
     while !lease.is_lost() {
         assert!(Instant::now() < until, "not noticed");
-        // The heart may have overwritten what this test wrote while it was beating.
+        // A heartbeat may have overwritten the change of this test.
         rewrite(&path, |e| e["token"] = "another".into());
         std::thread::yield_now();
     }
@@ -165,32 +165,32 @@ fn an_owner_sees_that_its_bench_was_taken() {
     assert_eq!(
         entry(&path)["token"],
         "another",
-        "what is not ours is not released"
+        "a lease taken by another program is not released"
     );
 }
 
 #[test]
-fn a_file_that_cannot_be_a_lease_is_told() {
+fn an_unusable_lease_file_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let path = path_of(&folder.path().join("not made"), "omega3-7");
     let refused = take(&path, "jog").unwrap_err().to_string();
     assert!(refused.contains("SKINRIG_LEASES"), "{refused}");
-    // Rubbish in it is nobody's.
+    // A damaged file belongs to no holder.
     let path = path_of(folder.path(), "omega3-7");
     std::fs::write(&path, "{\"owner\": 12").unwrap();
-    assert_eq!(look(&path).unwrap(), Standing::Free { last: None });
+    assert_eq!(inspect(&path).unwrap(), LeaseState::Free { last: None });
     assert_eq!(take(&path, "jog").unwrap().note(), None);
 }
 
-/// A process of its own that wants the lease.
+/// Another process that wants the lease.
 struct Rival {
     child: Child,
     stdin: ChildStdin,
-    said: Receiver<String>,
+    lines: Receiver<String>,
 }
 
 impl Rival {
-    /// Starts it; it waits to be told to `go`.
+    /// Starts it; it waits for `go`.
     fn start(path: &Path) -> Self {
         let mut child = Command::new(std::env::current_exe().unwrap())
             .args(["--exact", "rival", "--ignored", "--nocapture"])
@@ -201,17 +201,21 @@ impl Rival {
             .unwrap();
         let stdin = child.stdin.take().unwrap();
         let stdout = BufReader::new(child.stdout.take().unwrap());
-        let (tell, said) = channel();
+        let (sender, lines) = channel();
         std::thread::spawn(move || {
             for line in stdout.lines().map_while(Result::ok) {
-                // The test's harness writes lines of its own.
+                // The test harness prints lines of its own.
                 if let Some(word) = line.split("rival: ").nth(1) {
-                    let _ = tell.send(word.to_owned());
+                    let _ = sender.send(word.to_owned());
                 }
             }
         });
-        let rival = Self { child, stdin, said };
-        assert_eq!(rival.hear(), "ready");
+        let rival = Self {
+            child,
+            stdin,
+            lines,
+        };
+        assert_eq!(rival.read_line(), "ready");
         rival
     }
 
@@ -219,8 +223,8 @@ impl Rival {
         writeln!(self.stdin, "go").unwrap();
     }
 
-    fn hear(&self) -> String {
-        self.said.recv_timeout(PATIENCE).unwrap()
+    fn read_line(&self) -> String {
+        self.lines.recv_timeout(TIMEOUT).unwrap()
     }
 
     fn end(mut self) {
@@ -229,9 +233,9 @@ impl Rival {
     }
 }
 
-/// Not a test by itself: the process that [`Rival`] starts.
+/// The process that [`Rival`] starts; not a test.
 #[test]
-#[ignore = "no test by itself: the tests here start it as their other process"]
+#[ignore = "not a test: other tests start it as their second process"]
 fn rival() {
     let Some(path) = std::env::var_os(LEASE) else {
         return;
@@ -241,12 +245,12 @@ fn rival() {
     lines.next();
     let lease = take(Path::new(&path), "rival");
     println!("rival: {}", if lease.is_ok() { "taken" } else { "refused" });
-    // Until the parent lets go, or kills.
+    // Until the parent closes its pipe or kills it.
     lines.next();
 }
 
 #[test]
-fn of_several_processes_at_once_exactly_one_gets_the_bench() {
+fn exactly_one_of_several_processes_gets_the_lease() {
     let folder = tempfile::tempdir().unwrap();
     let path = path_of(folder.path(), "omega3-7");
     for _ in 0..3 {
@@ -254,29 +258,29 @@ fn of_several_processes_at_once_exactly_one_gets_the_bench() {
         for rival in &mut rivals {
             rival.go();
         }
-        let heard: Vec<String> = rivals.iter().map(Rival::hear).collect();
-        let taken = heard.iter().filter(|h| *h == "taken").count();
-        assert_eq!(taken, 1, "{heard:?}");
+        let answers: Vec<String> = rivals.iter().map(Rival::read_line).collect();
+        let taken = answers.iter().filter(|h| *h == "taken").count();
+        assert_eq!(taken, 1, "{answers:?}");
         rivals.into_iter().for_each(Rival::end);
     }
 }
 
 #[test]
-fn a_killed_owner_lets_go_and_the_next_one_says_so() {
+fn the_lease_of_a_killed_holder_is_free_and_the_next_holder_notes_the_takeover() {
     let folder = tempfile::tempdir().unwrap();
     let path = path_of(folder.path(), "omega3-7");
     let mut rival = Rival::start(&path);
     rival.go();
-    assert_eq!(rival.hear(), "taken");
+    assert_eq!(rival.read_line(), "taken");
     assert!(matches!(take(&path, "jog"), Err(LeaseError::Held { .. })));
     let pid = rival.child.id();
     rival.child.kill().unwrap();
     rival.child.wait().unwrap();
-    let standing = look(&path).unwrap();
-    let Standing::Left { owner, .. } = &standing else {
+    let standing = inspect(&path).unwrap();
+    let LeaseState::Abandoned { owner, .. } = &standing else {
         panic!("{standing:?}");
     };
-    assert_eq!((owner.pid, owner.lives("here")), (pid, Some(false)));
+    assert_eq!((owner.pid, owner.is_running("here")), (pid, Some(false)));
     let lease = take(&path, "jog").unwrap();
     assert!(lease.note().unwrap().contains(&format!("process {pid}")));
 }

@@ -1,11 +1,11 @@
-//! A bench of simulated devices that a check cannot tell from another.
+//! A bench of simulated devices behind the `Bench` trait.
 
 use std::cell::Cell;
 use std::path::Path;
 use std::rc::Rc;
 
 use skinrig_device::CameraSettings;
-use skinrig_hil::bench::{Bench, Devices, Drilled, GoldenRun, Trouble};
+use skinrig_hil::bench::{Bench, Devices, DrillResult, GoldenRun, Problem};
 use skinrig_hil::{Findings, checks};
 use skinrig_model::{CameraId, HostDuration, SimLevel};
 use skinrig_nightly::{Evidence, EvidenceKind};
@@ -16,16 +16,16 @@ use skinrig_sim::{Fault, SimConfig, simulated_rig};
 
 const RIG: &str = include_str!("../../rigs/emulated.yaml");
 
-/// Opens again when closed; counts how often.
+/// Reopens its devices after a close and counts how often.
 pub struct SimBench {
     pub rig: RigFile,
     config: SimConfig,
     devices: Option<Devices>,
     pub opened: u32,
     pub drills: Vec<Drill>,
-    pub drilled: Option<Drilled>,
-    /// Looks until everything is to end.
-    pub patience_of_operator: Rc<Cell<Option<u32>>>,
+    pub drill_result: Option<DrillResult>,
+    /// Polls of the stop signal before it fires; `None`: never.
+    pub polls_until_stop: Rc<Cell<Option<u32>>>,
 }
 
 impl SimBench {
@@ -42,19 +42,19 @@ impl SimBench {
             devices: None,
             opened: 0,
             drills: vec![Drill::Watchdog, Drill::Stop],
-            drilled: None,
-            patience_of_operator: Rc::default(),
+            drill_result: None,
+            polls_until_stop: Rc::default(),
         }
     }
 
-    /// Makes the check that `text` asks for, with its parameters: `robot_state: {creep: {at_most: 1 mm}}`.
-    pub fn make(&mut self, text: &str) -> Findings {
+    /// Runs the check `text`, for example `robot_state: {creep: {at_most: 1 mm}}`.
+    pub fn run_check(&mut self, text: &str) -> Findings {
         let text = format!("skinrig_suite: 1\nname: one\nbudget: 1 h\nchecks:\n  {text}\n");
         let suite = Suite::parse("suite.yaml", text.as_bytes()).unwrap_or_else(|e| panic!("{e}"));
         let [check] = &suite.checks[..] else {
             panic!("one check");
         };
-        checks::make(check, self)
+        checks::run(check, self)
     }
 }
 
@@ -84,11 +84,11 @@ impl Bench for SimBench {
         self.devices = None;
     }
 
-    fn camera_settings(&self, _: CameraId) -> Result<CameraSettings, Trouble> {
+    fn camera_settings(&self, _: CameraId) -> Result<CameraSettings, Problem> {
         Ok(CameraSettings::default())
     }
 
-    fn light(&mut self, _: Light) -> Result<bool, Trouble> {
+    fn set_light(&mut self, _: Light) -> Result<bool, Problem> {
         Ok(false)
     }
 
@@ -96,12 +96,12 @@ impl Bench for SimBench {
         self.drills.contains(&drill)
     }
 
-    fn watchdog_drill(&mut self) -> Result<Drilled, Trouble> {
+    fn watchdog_drill(&mut self) -> Result<DrillResult, Problem> {
         let why = || Evidence::new(EvidenceKind::Software, "robot", "no drill here");
-        self.drilled.clone().ok_or_else(|| Box::new(why()))
+        self.drill_result.clone().ok_or_else(|| Box::new(why()))
     }
 
-    fn golden(&mut self, _: &Path) -> Result<GoldenRun, Trouble> {
+    fn run_golden(&mut self, _: &Path) -> Result<GoldenRun, Problem> {
         let why = Evidence::new(EvidenceKind::Absent, "robot", "no golden skin here");
         Err(Box::new(why))
     }
@@ -110,8 +110,8 @@ impl Bench for SimBench {
         Path::new(".")
     }
 
-    fn stopping(&self) -> Box<dyn Fn() -> bool> {
-        let left = Rc::clone(&self.patience_of_operator);
+    fn stop_signal(&self) -> Box<dyn Fn() -> bool> {
+        let left = Rc::clone(&self.polls_until_stop);
         Box::new(move || {
             let was = left.get();
             left.set(was.map(|n| n.saturating_sub(1)));
@@ -119,7 +119,7 @@ impl Bench for SimBench {
         })
     }
 
-    fn patience(&self) -> HostDuration {
+    fn timing_slack(&self) -> HostDuration {
         HostDuration::ZERO
     }
 }

@@ -1,13 +1,13 @@
-//! The robot's checks on simulated devices: what a healthy robot gives, and what each fault makes of it.
+//! Robot checks on simulated devices: results of a healthy robot and of each fault.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod bench;
 
 use bench::SimBench;
-use skinrig_hil::{Drilled, Findings};
+use skinrig_hil::{DrillResult, Findings};
 use skinrig_model::HostTime;
 use skinrig_nightly::EvidenceKind;
-use skinrig_sim::{Fault, Moment, When};
+use skinrig_sim::{Fault, FaultTrigger, MotionPhase};
 
 const STATE: &str = "robot_state: {faults: {at_most: 0}}";
 const REPEATABILITY: &str = "repeatability: {approaches: 3, spread: {at_most: 1 mm}}";
@@ -28,7 +28,7 @@ fn kinds(found: &Findings) -> Vec<EvidenceKind> {
     found.evidence.iter().map(|e| e.kind).collect()
 }
 
-/// The arm is braked after every check: it takes no command.
+/// Whether the arm is braked, in which state it rejects commands.
 fn is_braked(bench: &mut SimBench) -> bool {
     use skinrig_hil::bench::Bench;
     let devices = bench.devices();
@@ -44,37 +44,37 @@ fn is_braked(bench: &mut SimBench) -> bool {
 #[test]
 fn a_healthy_robot_gives_small_numbers_and_is_braked_after_each_check() {
     let mut bench = SimBench::new(Vec::new());
-    let state = bench.make(STATE);
+    let state = bench.run_check(STATE);
     assert_eq!(value(&state, "faults"), Some(0.0));
-    // Its wander is 4 um, its noise 3 um per axis: a mean over 100 ms knows a place to a few um.
+    // Wander 4 µm, noise 3 µm per axis: a mean over 100 ms is accurate to a few µm.
     assert!(value(&state, "creep").unwrap() < 0.02, "{state:?}");
-    let repeats = bench.make(REPEATABILITY);
+    let repeats = bench.run_check(REPEATABILITY);
     assert!(value(&repeats, "spread").unwrap() < 0.02, "{repeats:?}");
     assert!(value(&repeats, "error").unwrap() < 0.05, "{repeats:?}");
-    let step = bench.make(STEP);
+    let step = bench.run_check(STEP);
     assert!(value(&step, "settling").unwrap() < 0.2, "{step:?}");
     assert!(value(&step, "overshoot").unwrap() < 0.2, "{step:?}");
     assert!(value(&step, "error").unwrap() < 0.05, "{step:?}");
     assert!(is_braked(&mut bench));
-    let depth = bench.make(DEPTH);
+    let depth = bench.run_check(DEPTH);
     assert_eq!(depth.evidence, []);
-    // A touch is told at 0.2 N, which a skin of 0.6 N/mm gives 0.33 mm deep.
+    // A touch is detected at 0.2 N, 0.33 mm deep in a skin of 0.6 N/mm.
     let surface = value(&depth, "surface").unwrap();
     assert!((0.25..0.5).contains(&surface), "{depth:?}");
     assert!(value(&depth, "error").unwrap() < 0.05, "{depth:?}");
-    let force = bench.make(FORCE);
+    let force = bench.run_check(FORCE);
     let peak = value(&force, "peak").unwrap();
     assert!((0.9..1.3).contains(&peak), "{force:?}");
     assert_eq!(value(&force, "trips"), Some(0.0));
     assert!(is_braked(&mut bench));
-    let stop = bench.make(STOP);
+    let stop = bench.run_check(STOP);
     assert!(value(&stop, "stopped_within").unwrap() < 1.0, "{stop:?}");
     let way = value(&stop, "distance").unwrap();
-    // From 40 mm/s with 500 mm/s^2: 1.6 mm, and the lag behind the set point.
+    // From 40 mm/s at 500 mm/s^2: 1.6 mm, plus the lag behind the set point.
     assert!((0.2..4.0).contains(&way), "{stop:?}");
     for found in [state, repeats, step, depth, force, stop] {
         assert_eq!(found.evidence, [], "{found:?}");
-        assert_eq!(found.not_here, None);
+        assert_eq!(found.not_applicable, None);
     }
     assert!(is_braked(&mut bench));
     assert_eq!(bench.opened, 1);
@@ -82,16 +82,16 @@ fn a_healthy_robot_gives_small_numbers_and_is_braked_after_each_check() {
 
 #[test]
 fn a_robot_that_is_lost_leaves_nothing_measured_and_is_opened_again() {
-    let lost = Fault::IndenterLost(When::Moment(Moment::Travel, 4));
+    let lost = Fault::IndenterLost(FaultTrigger::Moment(MotionPhase::Travel, 4));
     let mut bench = SimBench::new(vec![lost]);
-    let found = bench.make(REPEATABILITY);
+    let found = bench.run_check(REPEATABILITY);
     assert!(
         kinds(&found).contains(&EvidenceKind::DeviceLost),
         "{found:?}"
     );
     assert_eq!(value(&found, "spread"), None);
     assert_eq!(value(&found, "error"), None);
-    let again = bench.make(STATE);
+    let again = bench.run_check(STATE);
     assert_eq!(value(&again, "faults"), Some(0.0), "{again:?}");
     assert_eq!(bench.opened, 2);
 }
@@ -99,25 +99,25 @@ fn a_robot_that_is_lost_leaves_nothing_measured_and_is_opened_again() {
 #[test]
 fn a_limit_that_does_not_read_back_is_a_fault_of_the_robot() {
     let mut bench = SimBench::new(vec![Fault::IndenterReadBack]);
-    let found = bench.make(STATE);
+    let found = bench.run_check(STATE);
     assert_eq!(value(&found, "faults"), Some(1.0), "{found:?}");
     assert_eq!(value(&found, "creep"), None);
     assert_eq!(kinds(&found), [EvidenceKind::ReadBack]);
 }
 
 #[test]
-fn a_stuck_and_a_sluggish_robot_are_found_out() {
-    let mut bench = SimBench::new(vec![Fault::IndenterStuck(When::At(HostTime(0)))]);
-    let found = bench.make(REPEATABILITY);
+fn a_stuck_and_a_sluggish_robot_are_detected() {
+    let mut bench = SimBench::new(vec![Fault::IndenterStuck(FaultTrigger::At(HostTime(0)))]);
+    let found = bench.run_check(REPEATABILITY);
     assert_eq!(value(&found, "spread"), None);
     assert!(kinds(&found).contains(&EvidenceKind::State), "{found:?}");
     let slow = Fault::Sluggish {
-        when: When::At(HostTime(0)),
+        when: FaultTrigger::At(HostTime(0)),
         percent: 10,
     };
     let mut bench = SimBench::new(vec![slow]);
-    let healthy = SimBench::new(Vec::new()).make(STEP);
-    let found = bench.make(STEP);
+    let healthy = SimBench::new(Vec::new()).run_check(STEP);
+    let found = bench.run_check(STEP);
     let settling = |found: &Findings| value(found, "settling").unwrap();
     assert!(
         settling(&found) > 2.0 * settling(&healthy) + 0.1,
@@ -126,9 +126,9 @@ fn a_stuck_and_a_sluggish_robot_are_found_out() {
 }
 
 #[test]
-fn a_skin_that_is_too_soft_for_the_depth_says_nothing_about_the_limit() {
+fn a_skin_too_soft_for_the_depth_makes_the_force_limit_inconclusive() {
     let mut bench = SimBench::new(Vec::new());
-    let found = bench.make("force_ceiling: {force: 6 N, depth: 1 mm, peak: {at_most: 7 N}}");
+    let found = bench.run_check("force_ceiling: {force: 6 N, depth: 1 mm, peak: {at_most: 7 N}}");
     assert_eq!(kinds(&found), [EvidenceKind::TooLittle]);
     let peak = found.values.iter().find(|v| v.metric == "peak").unwrap();
     assert!(peak.n < Some(peak.needs), "{peak:?}");
@@ -139,47 +139,47 @@ fn nothing_goes_deeper_than_the_rig_file_allows() {
     let mut bench = SimBench::new(Vec::new());
     bench.rig.limits.max_depth_mm = 1.5;
     for text in [DEPTH, FORCE] {
-        let found = bench.make(text);
+        let found = bench.run_check(text);
         assert_eq!(kinds(&found), [EvidenceKind::Refused], "{found:?}");
         assert!(found.values.iter().all(|v| v.value.is_none()));
     }
     bench.rig.robot.sample_is_off = true;
-    assert!(bench.make(DEPTH).not_here.is_some());
+    assert!(bench.run_check(DEPTH).not_applicable.is_some());
     bench.rig.limits.workspace.max_mm[2] = -12.0;
-    let found = bench.make(REPEATABILITY);
+    let found = bench.run_check(REPEATABILITY);
     assert_eq!(kinds(&found), [EvidenceKind::Refused], "{found:?}");
 }
 
 #[test]
-fn drills_are_made_where_they_are_permitted() {
+fn drills_run_only_where_they_are_permitted() {
     let mut bench = SimBench::new(Vec::new());
     bench.drills.clear();
     for text in [STOP, WATCHDOG] {
-        let found = bench.make(text);
-        assert!(found.not_here.unwrap().contains("hil"), "{text}");
+        let found = bench.run_check(text);
+        assert!(found.not_applicable.unwrap().contains("hil"), "{text}");
         assert_eq!(found.values, []);
     }
     assert_eq!(bench.opened, 0);
     let mut bench = SimBench::new(Vec::new());
     for (braked_within_s, expected) in [(Some(0.3), Some(0.3)), (None, None)] {
-        bench.drilled = Some(Drilled {
+        bench.drill_result = Some(DrillResult {
             braked_within_s,
             drop_mm: 2.0,
             note: None,
         });
-        let found = bench.make(WATCHDOG);
+        let found = bench.run_check(WATCHDOG);
         assert_eq!(value(&found, "braked_within"), expected);
         assert_eq!(value(&found, "drop"), Some(2.0));
     }
 }
 
 #[test]
-fn who_wants_to_stop_gets_a_braked_arm_soon() {
+fn a_stop_request_soon_leaves_a_braked_arm() {
     let mut bench = SimBench::new(Vec::new());
-    bench.patience_of_operator.set(Some(400));
-    let found = bench.make(REPEATABILITY);
+    bench.polls_until_stop.set(Some(400));
+    let found = bench.run_check(REPEATABILITY);
     assert_eq!(kinds(&found), [EvidenceKind::Stopped], "{found:?}");
     assert_eq!(value(&found, "spread"), None);
-    bench.patience_of_operator.set(None);
+    bench.polls_until_stop.set(None);
     assert!(is_braked(&mut bench));
 }

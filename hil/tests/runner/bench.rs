@@ -1,4 +1,4 @@
-//! A bench without devices, a clock that is set, and checks that find what is written down for them.
+//! A bench without devices, a manual clock, and checks with scripted findings.
 
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, VecDeque};
@@ -7,8 +7,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
 
 use skinrig_device::{CameraSettings, Clock};
-use skinrig_hil::bench::{Bench, Devices, Drilled, GoldenRun, Trouble};
-use skinrig_hil::{Findings, Onlooker, Tonight};
+use skinrig_hil::bench::{Bench, Devices, DrillResult, GoldenRun, Problem};
+use skinrig_hil::{Findings, NightObserver, SuiteRunner};
 use skinrig_model::{CameraId, HostDuration, HostTime};
 use skinrig_nightly::{Night, NightExit, Verdict, Versions};
 use skinrig_protocol::RigFile;
@@ -17,17 +17,17 @@ use skinrig_protocol::suite::{Check, Light, Suite};
 
 const RIG: &str = include_str!("../../rigs/emulated.yaml");
 
-/// Time that passes when a check says so.
+/// A clock that tests advance by hand.
 #[derive(Clone, Default)]
-pub struct Hands(Arc<AtomicI64>);
+pub struct ManualClock(Arc<AtomicI64>);
 
-impl Hands {
-    pub fn pass(&self, seconds: i64) {
+impl ManualClock {
+    pub fn advance(&self, seconds: i64) {
         self.0.fetch_add(seconds * 1_000_000_000, Ordering::SeqCst);
     }
 }
 
-impl Clock for Hands {
+impl Clock for ManualClock {
     fn now(&self) -> HostTime {
         HostTime(self.0.load(Ordering::SeqCst))
     }
@@ -37,15 +37,15 @@ impl Clock for Hands {
     }
 }
 
-/// Counts how often it is closed; hands out nothing.
-pub struct NoBench {
+/// A bench without devices; counts how often it is closed.
+pub struct DevicelessBench {
     rig: RigFile,
     pub closed: u32,
     pub stop: Cell<bool>,
     pub lost: Cell<bool>,
 }
 
-impl NoBench {
+impl DevicelessBench {
     pub fn new() -> Self {
         let environment = |_: &str| Some("/nowhere".to_owned());
         Self {
@@ -57,7 +57,7 @@ impl NoBench {
     }
 }
 
-impl Bench for NoBench {
+impl Bench for DevicelessBench {
     fn rig(&self) -> &RigFile {
         &self.rig
     }
@@ -67,19 +67,19 @@ impl Bench for NoBench {
     fn close(&mut self) {
         self.closed += 1;
     }
-    fn camera_settings(&self, _: CameraId) -> Result<CameraSettings, Trouble> {
+    fn camera_settings(&self, _: CameraId) -> Result<CameraSettings, Problem> {
         Ok(CameraSettings::default())
     }
-    fn light(&mut self, _: Light) -> Result<bool, Trouble> {
+    fn set_light(&mut self, _: Light) -> Result<bool, Problem> {
         Ok(false)
     }
     fn permits(&self, _: Drill) -> bool {
         true
     }
-    fn watchdog_drill(&mut self) -> Result<Drilled, Trouble> {
+    fn watchdog_drill(&mut self) -> Result<DrillResult, Problem> {
         panic!("a bench without devices")
     }
-    fn golden(&mut self, _: &Path) -> Result<GoldenRun, Trouble> {
+    fn run_golden(&mut self, _: &Path) -> Result<GoldenRun, Problem> {
         panic!("a bench without devices")
     }
     fn folder(&self) -> &Path {
@@ -88,25 +88,25 @@ impl Bench for NoBench {
     fn firmware(&self) -> Vec<(String, String)> {
         vec![("robot".to_owned(), "3.1".to_owned())]
     }
-    fn stop_asked(&self) -> bool {
+    fn stop_requested(&self) -> bool {
         self.stop.get() || self.lost.get()
     }
     fn lease_is_lost(&self) -> bool {
         self.lost.get()
     }
-    fn patience(&self) -> HostDuration {
+    fn timing_slack(&self) -> HostDuration {
         HostDuration::ZERO
     }
 }
 
 type Step = Box<dyn Fn(&mut Findings)>;
 
-/// What the checks find, attempt by attempt; a check of which nothing is written finds nothing.
+/// Scripted findings, attempt by attempt; a check without a script finds nothing.
 #[derive(Default)]
 pub struct Script(RefCell<BTreeMap<&'static str, VecDeque<Step>>>);
 
 impl Script {
-    pub fn then(self, check: &'static str, step: impl Fn(&mut Findings) + 'static) -> Self {
+    pub fn attempt(self, check: &'static str, step: impl Fn(&mut Findings) + 'static) -> Self {
         let mut all = self.0.borrow_mut();
         all.entry(check).or_default().push_back(Box::new(step));
         drop(all);
@@ -127,24 +127,24 @@ impl Script {
     }
 }
 
-/// Keeps what it is shown.
+/// Records the progress.
 #[derive(Default)]
-pub struct Notes {
-    pub begun: Vec<(String, usize)>,
-    pub kept: Vec<(usize, bool)>,
+pub struct ProgressLog {
+    pub started: Vec<(String, usize)>,
+    pub published: Vec<(usize, bool)>,
 }
 
-impl Onlooker for Notes {
-    fn begins(&mut self, _: &Night, check: &Check, attempt: usize) {
-        self.begun.push((check.name.to_owned(), attempt));
+impl NightObserver for ProgressLog {
+    fn attempt_started(&mut self, _: &Night, check: &Check, attempt: usize) {
+        self.started.push((check.name.to_owned(), attempt));
     }
 
-    fn made(&mut self, night: &Night) {
-        self.kept.push((night.checks.len(), night.finished));
+    fn check_finished(&mut self, night: &Night) {
+        self.published.push((night.checks.len(), night.finished));
     }
 }
 
-/// A suite of these checks, within a budget of so many seconds.
+/// A suite with these checks and a budget in seconds.
 pub fn suite(budget_s: u32, checks: &str) -> Suite {
     let text = format!(
         "skinrig_suite: 1\nname: scripted\nbudget: {budget_s} s\nrepeats: {{at_most: 2, must_pass: 2}}\nchecks:\n{checks}"
@@ -152,26 +152,32 @@ pub fn suite(budget_s: u32, checks: &str) -> Suite {
     Suite::parse("suite.yaml", text.as_bytes()).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// A night of `suite` on `bench`, as the script tells it.
+/// Runs `suite` on `bench` with scripted findings.
 pub fn night(
     suite: &Suite,
     script: &Script,
-    hands: &Hands,
-    bench: &mut NoBench,
-    notes: &mut Notes,
+    clock: &ManualClock,
+    bench: &mut DevicelessBench,
+    progress: &mut ProgressLog,
 ) -> Night {
     let make = |check: &Check, _: &mut dyn Bench| script.make(check);
-    let tonight = Tonight {
+    let tonight = SuiteRunner {
         make: &make,
-        ..Tonight::new(suite, hands)
+        ..SuiteRunner::new(suite, clock)
     };
-    tonight.run(blank(), bench, notes)
+    tonight.run(blank(), bench, progress)
 }
 
-/// As [`night`], on a bench of its own.
-pub fn plain(suite: &Suite, script: &Script) -> Night {
-    let (hands, mut bench) = (Hands::default(), NoBench::new());
-    night(suite, script, &hands, &mut bench, &mut Notes::default())
+/// As [`night`], with a new bench.
+pub fn run_suite(suite: &Suite, script: &Script) -> Night {
+    let (clock, mut bench) = (ManualClock::default(), DevicelessBench::new());
+    night(
+        suite,
+        script,
+        &clock,
+        &mut bench,
+        &mut ProgressLog::default(),
+    )
 }
 
 pub fn blank() -> Night {

@@ -1,4 +1,4 @@
-//! Owns the browser as a process: where it is, how it starts, that it ends.
+//! Owns the browser process: finding, starting and ending it.
 
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use crate::devtools::{BrowserError, Devtools};
 use crate::page::Page;
 
-/// Names under which distributions install it.
+/// Executable names used by distributions.
 const NAMES: [&str; 5] = [
     "chromium",
     "chromium-browser",
@@ -18,11 +18,11 @@ const NAMES: [&str; 5] = [
     "chrome",
 ];
 
-/// Nothing that asks the network, and the same picture on every machine.
+/// No network access, and identical rendering on every machine.
 const FLAGS: [&str; 14] = [
     "--headless=new",
     "--remote-debugging-pipe",
-    // As root, and in containers, there is no sandbox to be had; only files of the tests are opened.
+    // There is no sandbox for root and in containers; only files of the tests are opened.
     "--no-sandbox",
     "--disable-gpu",
     "--disable-dev-shm-usage",
@@ -37,7 +37,7 @@ const FLAGS: [&str; 14] = [
     "--force-color-profile=srgb",
 ];
 
-/// The browser of this machine: what `SKINRIG_CHROMIUM` names, or else the first of the usual names in `PATH`.
+/// The browser of this machine: `SKINRIG_CHROMIUM`, or the first common name in `PATH`.
 ///
 /// # Errors
 /// [`BrowserError::Absent`].
@@ -58,7 +58,7 @@ pub fn find() -> Result<PathBuf, BrowserError> {
     })
 }
 
-/// A running browser with a profile of its own; it ends with this value.
+/// A running browser with its own profile; dropping this value ends it.
 #[derive(Debug)]
 pub struct Browser {
     process: Child,
@@ -67,14 +67,14 @@ pub struct Browser {
 }
 
 impl Browser {
-    /// Starts it.
+    /// Starts the browser.
     ///
     /// # Errors
-    /// [`BrowserError`] when there is none, or it does not start.
+    /// [`BrowserError`] when there is no browser, or it does not start.
     pub fn start() -> Result<Self, BrowserError> {
         let program = find()?;
         let profile = tempfile::tempdir()?;
-        // It reads from descriptor 3 and writes to 4: the shell lays our two pipes there.
+        // It reads from descriptor 3 and writes to 4; the shell connects our two pipes.
         let mut process = Command::new("sh")
             .arg("-c")
             .arg(r#"exec "$0" "$@" 3<&0 4>&1 </dev/null >/dev/null"#)
@@ -104,13 +104,13 @@ impl Browser {
         Ok(browser)
     }
 
-    /// Where downloads go.
+    /// Folder of downloads.
     #[must_use]
     pub fn downloads(&self) -> PathBuf {
         self.profile.path().join("downloads")
     }
 
-    /// An empty page.
+    /// Opens an empty page.
     ///
     /// # Errors
     /// [`BrowserError`].
@@ -121,7 +121,7 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // Asked first, so that its helpers go too and leave the profile alone.
+        // Ask it to close first, so that its helper processes end too and leave the profile alone.
         let asked = self.devtools.call(None, "Browser.close", json!({}));
         if asked.is_err() {
             let _ = self.process.kill();

@@ -1,4 +1,4 @@
-//! Owns the conversation with the browser: calls, their answers, and what the browser tells unasked.
+//! Owns the DevTools connection: calls, answers, and events.
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -8,41 +8,41 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-/// No answer takes this long, on the slowest machine: what does has hung.
+/// Timeout of an answer; even the slowest machine is faster.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Why the browser could not be driven.
 #[derive(Debug, thiserror::Error)]
 pub enum BrowserError {
-    /// There is none on this machine.
+    /// No browser on this machine.
     #[error("{0}")]
     Absent(String),
     /// It could not be started, or its pipe broke.
     #[error("browser: {0}")]
     Io(#[from] std::io::Error),
-    /// It ended, or said nothing for too long.
+    /// It ended, or did not answer in time.
     #[error("browser: expected {0}, found none within {PATIENCE:?}")]
     Silent(String),
-    /// It refused a call.
+    /// It rejected a call.
     #[error("browser: {method}: {reason}")]
     Refused {
-        /// What was asked.
+        /// Name of the method.
         method: String,
-        /// What it said.
+        /// Message of the browser.
         reason: String,
     },
 }
 
-/// What the browser tells unasked.
+/// An event from the browser.
 #[derive(Debug, Clone)]
 pub struct Event {
-    /// Its name, such as `Page.loadEventFired`.
+    /// Name, such as `Page.loadEventFired`.
     pub method: String,
-    /// What it says.
+    /// Parameters.
     pub params: Value,
 }
 
-/// The conversation.
+/// A DevTools connection.
 #[derive(Debug)]
 pub(crate) struct Devtools {
     to: ChildStdin,
@@ -61,7 +61,7 @@ impl Devtools {
         }
     }
 
-    /// Calls a method, in a session with one target or of the browser itself, and waits for its answer.
+    /// Calls a method, in a target's session or on the browser itself, and waits for its answer.
     pub(crate) fn call(
         &mut self,
         session: Option<&str>,
@@ -94,7 +94,7 @@ impl Devtools {
         }
     }
 
-    /// The next event that `wanted` says yes to; those before it stay.
+    /// The next event that `wanted` accepts; earlier ones stay queued.
     pub(crate) fn wait(
         &mut self,
         what: &str,
@@ -111,7 +111,7 @@ impl Devtools {
         }
     }
 
-    /// All events that came so far and were not waited for.
+    /// All queued events.
     pub(crate) fn events(&mut self) -> Vec<Event> {
         self.events.extend(self.from.try_iter().filter_map(event));
         self.events.drain(..).collect()
@@ -135,7 +135,7 @@ fn event(message: Value) -> Option<Event> {
     })
 }
 
-/// Reads messages for as long as the browser lives.
+/// Reads messages until the browser ends.
 fn listen(from: impl Read + Send + 'static) -> Receiver<Value> {
     let (to, out) = channel();
     std::thread::spawn(move || {

@@ -1,8 +1,8 @@
-//! Drives a Chromium that is on the machine: a page is opened, asked, clicked, printed and pictured as a reader would.
+//! Drives an installed Chromium: opens a page, evaluates, clicks, prints and takes screenshots like a reader.
 //!
-//! The DevTools protocol is spoken over a pipe (`--remote-debugging-pipe`): JSON messages, each ended by a zero byte. No port is
-//! opened and no browser is fetched. The client crates there are bring some 140 others, most of it for the whole protocol as
-//! generated types; the dozen methods needed here are a few lines each.
+//! Speaks the DevTools protocol over a pipe (`--remote-debugging-pipe`): JSON messages, each terminated by a zero byte. It
+//! opens no port and downloads no browser. Existing client crates pull in about 140 others, mostly generated types for the
+//! whole protocol; the dozen methods needed here are a few lines each.
 
 mod chromium;
 mod devtools;

@@ -1,4 +1,4 @@
-//! Owns a page: what a reader does with it, and what it tells.
+//! Owns a page: actions of a reader, and queries.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use crate::chromium::Browser;
 use crate::devtools::{BrowserError, Event};
 
-/// A window.
+/// Size of a window.
 #[derive(Debug, Clone, Copy)]
 pub struct Size {
     /// Width, CSS px.
@@ -19,19 +19,19 @@ pub struct Size {
 }
 
 impl Size {
-    /// A laptop's window.
+    /// A laptop window.
     pub const LAPTOP: Self = Self {
         width: 1440,
         height: 900,
     };
-    /// A phone held upright.
+    /// An upright phone.
     pub const PHONE: Self = Self {
         width: 390,
         height: 844,
     };
 }
 
-/// One page of the browser.
+/// A page of the browser.
 #[derive(Debug)]
 pub struct Page<'a> {
     browser: &'a mut Browser,
@@ -58,7 +58,7 @@ impl<'a> Page<'a> {
         Ok(page)
     }
 
-    /// Any method of the protocol.
+    /// Calls any method of the protocol.
     ///
     /// # Errors
     /// [`BrowserError`].
@@ -68,7 +68,7 @@ impl<'a> Page<'a> {
             .call(Some(&self.session), method, params)
     }
 
-    /// Opens a file and waits until it is loaded; what was told before is forgotten.
+    /// Opens a file and waits until it is loaded; drops earlier events.
     ///
     /// # Errors
     /// [`BrowserError`].
@@ -87,15 +87,15 @@ impl<'a> Page<'a> {
         Ok(())
     }
 
-    /// What the browser told since the last time.
+    /// Events since the last call.
     pub fn events(&mut self) -> Vec<Event> {
         self.browser.devtools.events()
     }
 
-    /// The value of an expression; promises are waited for.
+    /// Value of an expression; awaits promises.
     ///
     /// # Errors
-    /// [`BrowserError::Refused`] with the text of the exception that it throws.
+    /// [`BrowserError::Refused`] with the text of a thrown exception.
     pub fn ask(&mut self, expression: &str) -> Result<Value, BrowserError> {
         let asked =
             json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
@@ -109,7 +109,7 @@ impl<'a> Page<'a> {
         }
     }
 
-    /// As text, for expressions that are.
+    /// Value of a text expression.
     ///
     /// # Errors
     /// [`BrowserError`].
@@ -120,19 +120,19 @@ impl<'a> Page<'a> {
             .map_or_else(|| answer.to_string(), str::to_owned))
     }
 
-    /// Moves the pointer to the middle of what the selector finds, scrolled into view.
+    /// Moves the pointer to the middle of the selected element, scrolled into view.
     ///
     /// # Errors
-    /// [`BrowserError`]; there must be such an element.
+    /// [`BrowserError`]; the element must exist.
     pub fn hover(&mut self, selector: &str) -> Result<(), BrowserError> {
         let (x, y) = self.middle(selector)?;
         self.mouse("mouseMoved", x, y)
     }
 
-    /// Clicks the middle of what the selector finds.
+    /// Clicks the middle of the selected element.
     ///
     /// # Errors
-    /// [`BrowserError`]; there must be such an element.
+    /// [`BrowserError`]; the element must exist.
     pub fn click(&mut self, selector: &str) -> Result<(), BrowserError> {
         let (x, y) = self.middle(selector)?;
         for kind in ["mouseMoved", "mousePressed", "mouseReleased"] {
@@ -161,7 +161,7 @@ impl<'a> Page<'a> {
         Ok(())
     }
 
-    /// Presses a key, by its name (`ArrowRight`) or what it writes (`+`).
+    /// Presses a key, by name (`ArrowRight`) or character (`+`).
     ///
     /// # Errors
     /// [`BrowserError`].
@@ -186,7 +186,7 @@ impl<'a> Page<'a> {
         Ok(())
     }
 
-    /// Clicks something that downloads a file, and reads it: its name and its bytes.
+    /// Clicks an element that downloads a file, and returns its name and bytes.
     ///
     /// # Errors
     /// [`BrowserError`].
@@ -208,7 +208,7 @@ impl<'a> Page<'a> {
         Ok((name.to_owned(), bytes))
     }
 
-    /// Another window size.
+    /// Resizes the window.
     ///
     /// # Errors
     /// [`BrowserError`].
@@ -218,7 +218,7 @@ impl<'a> Page<'a> {
         Ok(())
     }
 
-    /// As a system set to dark, or a printer, sees it; empty strings for neither.
+    /// Emulates dark mode or print media; empty strings for neither.
     ///
     /// # Errors
     /// [`BrowserError`].
@@ -229,7 +229,7 @@ impl<'a> Page<'a> {
         Ok(())
     }
 
-    /// A picture of the window, or of the whole page, as PNG.
+    /// A screenshot of the window, or of the whole page, as PNG.
     ///
     /// # Errors
     /// [`BrowserError`].
@@ -243,7 +243,7 @@ impl<'a> Page<'a> {
         decoded(&answer)
     }
 
-    /// The page as it prints, as PDF.
+    /// The printed page, as PDF.
     ///
     /// # Errors
     /// [`BrowserError`].

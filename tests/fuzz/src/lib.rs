@@ -1,8 +1,8 @@
-//! What foreign bytes can do to skinrig: nothing. One target per kind of input, and the mutations that make inputs hostile.
+//! Fuzzing of untrusted input: one target per kind of input, and mutations that make inputs hostile.
 //!
-//! A [`Target`] takes any bytes and returns. It must not panic, must not hold more memory than [`Bound`] says, and must end.
-//! The driver in `tests/hostile` runs every target over its corpus and over seeded mutations of it; a target function is also
-//! what libFuzzer wants: `fuzz_target!(|data: &[u8]| skinrig_fuzz::target("raw").run(data))`.
+//! A [`Target`] accepts any bytes and returns. It must not panic, must not hold more memory than [`Bound`] allows, and must
+//! terminate. The driver in `tests/hostile` runs every target over its corpus and over seeded mutations of it; target
+//! functions also fit libFuzzer: `fuzz_target!(|data: &[u8]| skinrig_fuzz::target("raw").run(data))`.
 
 pub mod mutate;
 mod targets;
@@ -11,12 +11,12 @@ use std::path::{Path, PathBuf};
 
 pub use targets::{all, target};
 
-/// Most memory that a target may hold at once, in bytes allocated by Rust code.
+/// Maximum memory held by a target, in bytes allocated by Rust code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bound {
-    /// Whatever the input.
+    /// Independent of the input.
     pub fixed: usize,
-    /// More for each of its bytes.
+    /// Per input byte.
     pub per_byte: usize,
 }
 
@@ -28,32 +28,32 @@ impl Bound {
     }
 }
 
-/// One kind of foreign input.
+/// One kind of untrusted input.
 #[derive(Debug, Clone, Copy)]
 pub struct Target {
-    /// Its name, and that of its folder in the corpus.
+    /// Name, also of its folder in the corpus.
     pub name: &'static str,
-    /// Takes any bytes.
+    /// Processes any bytes.
     pub function: fn(&[u8]),
-    /// Most memory that it may hold.
+    /// Memory bound.
     pub bound: Bound,
-    /// Mutations that a bounded run makes, so that all targets together take seconds.
+    /// Number of mutations in a short run, so that all targets together take seconds.
     pub cases: u64,
-    /// Longest input that is made.
+    /// Maximum length of a generated input.
     pub longest: usize,
-    /// Words of the format.
+    /// Tokens of the format.
     pub dictionary: &'static [&'static [u8]],
-    /// Further files of the corpus elsewhere in the workspace: folder and ending.
+    /// Further corpus files elsewhere in the workspace: folder and suffix.
     pub elsewhere: &'static [(&'static str, &'static str)],
 }
 
 impl Target {
-    /// Gives it these bytes.
+    /// Runs the target on these bytes.
     pub fn run(&self, bytes: &[u8]) {
         (self.function)(bytes);
     }
 
-    /// The files of its corpus, sorted.
+    /// Corpus files, sorted.
     ///
     /// # Errors
     /// When a folder cannot be listed.
@@ -63,7 +63,7 @@ impl Target {
         let mut files = Vec::new();
         for (folder, ending) in [(own.as_str(), "")].iter().chain(self.elsewhere) {
             let entries = match std::fs::read_dir(root.join(folder)) {
-                // Some kinds have all of theirs elsewhere.
+                // Some kinds have all their files elsewhere.
                 Err(e) if e.kind() == std::io::ErrorKind::NotFound && *folder == own => continue,
                 entries => entries?,
             };

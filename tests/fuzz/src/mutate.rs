@@ -1,11 +1,11 @@
-//! Seeded damage: flips, splices, cuts, lies in length fields, words of the format in wrong places.
+//! Seeded mutations: bit flips, splices, truncations, wrong length fields, misplaced tokens of the format.
 
 /// A small seeded generator of 64-bit numbers (SplitMix64, Steele, Lea and Flood 2014).
 #[derive(Debug, Clone)]
 pub struct Dice(u64);
 
 impl Dice {
-    /// Always the same for the same seed.
+    /// A generator with this seed.
     #[must_use]
     pub const fn seeded(seed: u64) -> Self {
         Self(seed)
@@ -20,7 +20,7 @@ impl Dice {
         z ^ (z >> 31)
     }
 
-    /// Below `n`, which is far below 2^64; 0 for none.
+    /// Uniform below `n`, which is far below 2^64; 0 if `n` is 0.
     pub const fn below(&mut self, n: usize) -> usize {
         if n == 0 {
             return 0;
@@ -29,7 +29,7 @@ impl Dice {
     }
 }
 
-/// Numbers at which counts, lengths and offsets go wrong.
+/// Numbers at which counts, lengths and offsets often fail.
 const EDGES: [u64; 16] = [
     0,
     1,
@@ -49,7 +49,7 @@ const EDGES: [u64; 16] = [
     0x0010_0000_0000,
 ];
 
-/// Damages `bytes` one to eight times; `other` is another input to splice from.
+/// Mutates `bytes` one to eight times; `other` is another input to splice from.
 pub fn mutate(
     bytes: &mut Vec<u8>,
     other: &[u8],
@@ -66,11 +66,12 @@ pub fn mutate(
 fn once(bytes: &mut Vec<u8>, other: &[u8], dictionary: &[&[u8]], dice: &mut Dice) {
     let at = dice.below(bytes.len());
     match dice.below(10) {
-        // One bit.
+        // Flip one bit.
         0 | 1 if !bytes.is_empty() => bytes[at] ^= 1 << dice.below(8),
-        // One byte.
+        // Replace one byte.
         2 if !bytes.is_empty() => bytes[at] = EDGES[dice.below(EDGES.len())] as u8,
-        // A number of 2, 4 or 8 bytes in either order, as lengths are: an edge, or a little more or less than what is there.
+        // Write a number of 2, 4 or 8 bytes in either byte order, like a length: an edge, or slightly more or less than the
+        // present value.
         3 | 4 => {
             let size = [2, 4, 8][dice.below(3)];
             let at = if dice.below(2) == 0 {
@@ -93,26 +94,26 @@ fn once(bytes: &mut Vec<u8>, other: &[u8], dictionary: &[&[u8]], dice: &mut Dice
                 }
             }
         }
-        // Cut off.
+        // Truncate.
         5 => bytes.truncate(at),
-        // A piece left out.
+        // Remove a piece.
         6 => {
             let end = at + dice.below((bytes.len() - at).min(64) + 1);
             bytes.drain(at..end);
         }
-        // A piece twice, somewhere else.
+        // Duplicate a piece elsewhere.
         7 => {
             let end = at + dice.below((bytes.len() - at).min(256) + 1);
             let piece = bytes[at..end].to_vec();
             insert(bytes, &piece, dice);
         }
-        // A piece of another input.
+        // Splice a piece of another input.
         8 => {
             let start = dice.below(other.len());
             let end = start + dice.below((other.len() - start).min(512) + 1);
             insert(bytes, &other[start..end], dice);
         }
-        // A word of the format, or noise.
+        // Insert a token of the format, or noise.
         _ => match dictionary.get(dice.below(dictionary.len() + 1)) {
             Some(word) => insert(bytes, word, dice),
             None => insert(bytes, &dice.roll().to_le_bytes(), dice),
@@ -120,7 +121,7 @@ fn once(bytes: &mut Vec<u8>, other: &[u8], dictionary: &[&[u8]], dice: &mut Dice
     }
 }
 
-/// Puts a piece between the bytes, or over them.
+/// Inserts a piece between the bytes, or overwrites them.
 fn insert(bytes: &mut Vec<u8>, piece: &[u8], dice: &mut Dice) {
     let at = dice.below(bytes.len() + 1);
     let end = match dice.below(2) {

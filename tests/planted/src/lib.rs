@@ -1,4 +1,4 @@
-//! Sessions made in memory, press by press: what is known of them besides their events, and the events themselves.
+//! Sessions created in memory, press by press: inputs of the analysis and events.
 
 use skinrig_analysis::{EventSource, SessionInput};
 use skinrig_model::{
@@ -9,9 +9,9 @@ use skinrig_model::{
 
 /// Events in memory.
 pub struct Memory {
-    /// Of each camera.
+    /// Events of each camera.
     pub events: [Vec<CdEvent>; 2],
-    /// How many are handed out at once.
+    /// Number of events per slice.
     pub slice: usize,
 }
 
@@ -49,31 +49,31 @@ pub fn session(rig: RigGeometry, settings: AnalysisSettings) -> SessionInput {
     }
 }
 
-/// A valid press as it was planned and measured.
+/// A valid press as planned and measured.
 #[derive(Debug, Clone, Copy)]
 pub struct Touch {
-    /// What it is for.
+    /// Role.
     pub role: PressRole,
-    /// Which repetition, from 0.
+    /// Index of the repetition, from 0.
     pub repetition: u32,
-    /// Which place.
+    /// Index of the location.
     pub location: u32,
-    /// Where it was planned.
+    /// Planned position.
     pub at: Point2,
-    /// How deep it was planned, mm.
+    /// Planned depth, mm.
     pub depth_mm: f64,
-    /// When.
+    /// Measured times.
     pub timing: PressTiming,
-    /// Where the tip was.
+    /// Measured position.
     pub measured_at: Point2,
-    /// How deep, mm; `None`: not measured.
+    /// Measured depth, mm; `None` if not measured.
     pub measured_depth_mm: Option<f64>,
-    /// Its times come from a schedule.
+    /// True if its times come from a schedule.
     pub scheduled: bool,
 }
 
 impl Touch {
-    /// A press that went where it was sent, 2 mm deep.
+    /// A press at its planned position, 2 mm deep.
     #[must_use]
     pub fn new(role: PressRole, repetition: u32, location: u32, at: Point2) -> Self {
         Self {
@@ -90,8 +90,8 @@ impl Touch {
     }
 }
 
-/// The times of a press that touches at `contact_s` on the host's clock: its approach begins so many seconds before, and the tip is at
-/// depth, retracts, releases and is clear so many after.
+/// Times of a press with contact at `contact_s` on the host clock, from the durations before contact (approach) and after it
+/// (at depth, retract, release, clear), s.
 #[must_use]
 pub fn timing(
     contact_s: f64,
@@ -108,7 +108,7 @@ pub fn timing(
     }
 }
 
-/// Adds a press to `input`; the answer is its number.
+/// Adds a press to `input` and returns its ID.
 pub fn press(input: &mut SessionInput, touch: Touch) -> PressId {
     let id = PressId::from_index(input.planned.len() as u32);
     input.planned.push(PlannedPress {
@@ -136,7 +136,7 @@ pub fn press(input: &mut SessionInput, touch: Touch) -> PressId {
     id
 }
 
-/// Sends a mark of `press` at `t`; camera `k` sees its first edge when its own clock reads `seen_us(k)`.
+/// Sends a mark of `press` at `t`; camera `k` sees its first edge at `seen_us(k)` on its own clock.
 pub fn mark(
     input: &mut SessionInput,
     (kind, press): (MarkKind, PressId),

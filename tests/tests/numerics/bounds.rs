@@ -1,4 +1,4 @@
-//! Every bound that a test of this suite holds, by its name in `docs/reference/numerics.md`, and the worst error seen.
+//! Error bounds of this suite, by their names in `docs/reference/numerics.md`, and the worst error observed.
 
 use std::cell::RefCell;
 use std::fmt::Display;
@@ -6,11 +6,11 @@ use std::fmt::Display;
 /// Half the distance of 1.0 from the next double.
 pub const UNIT: f64 = f64::EPSILON / 2.0;
 
-/// A promise: no error above the limit.
+/// A guaranteed bound on an error.
 pub struct Bound {
-    /// As in the table of the document.
+    /// Name in the table of the document.
     pub name: &'static str,
-    /// In the unit that the document states.
+    /// Limit in the unit stated in the document.
     pub limit: f64,
 }
 
@@ -46,7 +46,7 @@ bounds! {
     RATE: "event rate" <= 2.0;
 }
 
-/// Watches one bound: fails at the first error above it, and says at the end how near the worst one came.
+/// Tracks one bound: fails at the first larger error, and finally reports the worst one.
 pub struct Watch {
     bound: &'static Bound,
     worst: RefCell<(f64, String)>,
@@ -60,7 +60,7 @@ impl Watch {
         }
     }
 
-    /// Judges one error; `at` is shown when it is too large. Not-a-number is too large.
+    /// Checks one error; `at` is shown if it is too large. NaN is too large.
     pub fn see(&self, error: f64, at: impl Display) {
         let Bound { name, limit } = self.bound;
         assert!(error <= *limit, "{name}: {error:e} > {limit:e} at {at}");

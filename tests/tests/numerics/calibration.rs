@@ -1,7 +1,7 @@
-//! Calibrating presses that cannot tell the parameters: too few, repeated at too few places, on a line through a camera.
+//! Calibration presses that do not determine the parameters: too few, at too few locations, or on a line through a camera.
 
 use skinrig_analysis::analyze;
-use skinrig_analysis::calibrate::{Chosen, choose};
+use skinrig_analysis::calibrate::{ModelChoice, choose};
 use skinrig_analysis::result::CalibrationResult;
 use skinrig_analysis::sets::CalibrationSet;
 use skinrig_model::{AnalysisSettings, CalibrationModel, Point2, PressRole, StereoGeometry};
@@ -9,7 +9,7 @@ use skinrig_model::{AnalysisSettings, CalibrationModel, Point2, PressRole, Stere
 use crate::support::{PLANTED, session};
 use crate::wild::holds_only_numbers;
 
-/// The planted session with `calibrate` deciding which calibrating presses stay; the full model is asked for.
+/// The planted session; `calibrate` selects its calibration presses, and the full model is requested.
 fn calibrated(calibrate: impl Fn(Point2, usize) -> bool) -> (Option<CalibrationResult>, String) {
     let (mut input, source) = session();
     input.settings.calibration = CalibrationModel::Full;
@@ -51,8 +51,8 @@ fn presses_that_cannot_tell_the_parameters_are_reported_and_not_guessed_from() {
     }
 }
 
-/// What is chosen from exact views of `places`, each a location of its own in the plan; the full model is asked for.
-fn chosen(places: &[Point2]) -> Chosen {
+/// Model choice for exact views of `places`, each a separate location of the plan; the full model is requested.
+fn chosen(places: &[Point2]) -> ModelChoice {
     let (input, source) = session();
     let mut presses = analyze(&input, &source).unwrap().presses;
     presses.retain(|p| p.role == PressRole::Calibrate);
@@ -77,7 +77,7 @@ fn chosen(places: &[Point2]) -> Chosen {
     )
 }
 
-/// `n` places at equal distances, the ends included.
+/// `n` equidistant positions, including the ends.
 fn along(from: [f64; 2], to: [f64; 2], n: u32) -> Vec<Point2> {
     let at = |t: f64, axis: usize| from[axis] + (to[axis] - from[axis]) * t;
     (0..n)
@@ -87,9 +87,9 @@ fn along(from: [f64; 2], to: [f64; 2], n: u32) -> Vec<Point2> {
 }
 
 const TOO_FEW_FOR_FULL: &str =
-    "the calibrating presses touch too few places for the calibration `full`";
+    "the calibration presses cover too few locations for the calibration `full`";
 
-/// A row of the planted session: what is too little is the number of places.
+/// A row of the planted session with too few locations.
 #[test]
 fn five_places_on_one_line_give_the_positions() {
     let (found, said) = calibrated(|at, _| at.x_mm < -13.0);
@@ -98,13 +98,13 @@ fn five_places_on_one_line_give_the_positions() {
         (found.model, found.rank, found.n),
         (CalibrationModel::Positions, 4, 5)
     );
-    // Scored places far from the line may be worse, which is said too.
-    let wanted = format!("{TOO_FEW_FOR_FULL}: `positions` is used");
+    // Scored locations far from the line may be worse, which gives another warning.
+    let wanted = format!("{TOO_FEW_FOR_FULL}: using `positions`");
     assert!(said.starts_with(&wanted), "{said}");
 }
 
-/// Angles of eight places leave nothing open even on one line: the places are known, and a camera beside their line
-/// sees each under another angle.
+/// The angles of eight positions suffice even on one line: the positions are known, and a camera beside their line sees each
+/// at another angle.
 #[test]
 fn eight_places_on_a_line_beside_the_cameras_determine_eight_parameters() {
     for (from, to) in [([-5.0, -20.0], [-5.0, 20.0]), ([-14.0, -5.0], [26.0, -5.0])] {
@@ -118,26 +118,26 @@ fn eight_places_on_a_line_beside_the_cameras_determine_eight_parameters() {
     }
 }
 
-/// A camera that looks along the line sees all of its places in one column.
+/// A camera that looks along the line sees all positions in one column.
 #[test]
 fn a_line_through_a_camera_leaves_its_parameters_open() {
     let camera = [PLANTED[2], PLANTED[3]];
     let places = along([-14.0, -14.0], camera, 26);
     let found = chosen(&places[..20]);
     let result = found.calibration.unwrap();
-    // That column tells one angle and one offset of four parameters.
+    // That column determines one angle and one offset of four parameters.
     assert_eq!((result.model, result.rank), (CalibrationModel::Full, 6));
     assert_eq!(
         found.warnings,
         [
-            "the calibrating presses determine 6 of the 8 parameters of the calibration `full`: the values of camera 2 x \
-             (mm), camera 2 y (mm), camera 2 skew (deg), camera 2 distortion W (1) are one choice of many that fit \
-             equally well; calibrate at more places, spread over the skin"
+            "the calibration presses determine 6 of the 8 parameters of the calibration `full`: the values of camera 2 x \
+             (mm), camera 2 y (mm), camera 2 skew (deg), camera 2 distortion W (1) are one of many equally good solutions; calibrate at \
+             more locations, spread over the skin"
         ]
     );
 }
 
-/// Repeated presses tell no more parameters than one at each place, however many there are.
+/// Repeated presses determine no more parameters than a single press per location.
 #[test]
 fn repeated_presses_count_as_one_place() {
     let corners = [[-14.0, -20.0], [30.0, 24.0], [-14.0, 24.0], [30.0, -20.0]];
@@ -149,7 +149,7 @@ fn repeated_presses_count_as_one_place() {
     assert_eq!(
         two.warnings,
         [
-            "2 calibrating places are too few for any calibration: the nominal camera geometry is used"
+            "2 calibration locations are too few for any calibration: using the nominal camera geometry"
         ]
     );
 
@@ -161,11 +161,11 @@ fn repeated_presses_count_as_one_place() {
     );
     assert_eq!(
         four.warnings,
-        [format!("{TOO_FEW_FOR_FULL}: `positions` is used")]
+        [format!("{TOO_FEW_FOR_FULL}: using `positions`")]
     );
 }
 
-/// The same by way of the plan: both repetitions of two places calibrate, eight residuals for eight parameters.
+/// Same via the plan: both repetitions of two locations calibrate, eight residuals for eight parameters.
 #[test]
 fn two_places_pressed_twice_calibrate_nothing() {
     let (mut input, source) = session();
@@ -186,7 +186,6 @@ fn two_places_pressed_twice_calibrate_nothing() {
     let usable = CalibrationSet::from_presses(&a.presses);
     assert_eq!(usable.sights().len(), 4);
     assert_eq!(a.calibration, None);
-    let said =
-        "2 calibrating places are too few for any calibration: the nominal camera geometry is used";
+    let said = "2 calibration locations are too few for any calibration: using the nominal camera geometry";
     assert!(a.warnings.iter().any(|w| w == said), "{:?}", a.warnings);
 }

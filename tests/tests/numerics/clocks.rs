@@ -1,5 +1,5 @@
-//! Clocks and windows: counters at the wrap of 34 bits and beyond 2^53, drifts up to 1000 ppm with edges missing and
-//! doubled, times out of order.
+//! Clocks and windows: counters at the 34-bit wrap and beyond 2^53, drifts up to 1000 ppm with missing and doubled edges,
+//! times out of order.
 
 use skinrig_analysis::analyze;
 use skinrig_analysis::clock::{PressSpan, fit_marks, fit_rates};
@@ -101,7 +101,7 @@ fn windows_begin_and_end_on_the_right_microsecond_as_long_as_doubles_have_one() 
                     let exact = real(offset)
                         + real(host as f64) / real(1000.0) * (real(1.0) + real(drift) / real(1e6))
                         + real(side);
-                    // The first microsecond at or after the exact instant: 0 up to 1 late, if all is exact.
+                    // The first microsecond at or after the exact instant: 0 to 1 late if all is exact.
                     let late = precise::near(&(real(edge as f64) - &exact));
                     if (0.0..1.0).contains(&late) {
                         exactly += 1;
@@ -132,7 +132,7 @@ fn marks(count: u32, period_ns: i64) -> Vec<SentMark> {
     (0..count).map(mark).collect()
 }
 
-/// The edges of one train whose start pulse rises at `t_us`.
+/// Edges of one train whose start pulse rises at `t_us`.
 fn train(mark: Mark, t_us: u64) -> impl Iterator<Item = TriggerEdge> {
     let pulses = PulseTrain::new(mark).unwrap().pulses();
     pulses.flat_map(move |(rise, width)| {
@@ -164,7 +164,7 @@ fn drifts_up_to_1000_ppm_come_out_with_a_third_of_the_trains_spoiled() {
                 let mut these: Vec<TriggerEdge> = train(mark.mark, base_us + after).collect();
                 let k = (random.unit() * 48.0) as usize;
                 match i % 6 {
-                    // Eight pulses in a row: more than the code can do without.
+                    // Eight pulses in a row: more than the code can correct.
                     1 => drop(these.drain(k..k + 16)),
                     3 => these.insert(k, these[k]),
                     _ => {}
@@ -223,13 +223,13 @@ fn times_that_are_no_times_give_no_clock_and_say_so() {
     }
 }
 
-/// Sessions whose camera clock passes the end of 34 bits, by way of the bytes that a camera sends.
+/// Sessions whose camera clock passes the 34-bit wrap, encoded as camera bytes.
 #[test]
 fn a_session_over_the_wrap_of_34_bits_is_the_session_without_it() {
     let (mut input, mut source) = session();
     for k in 0..2 {
         let first = source.events[k].iter().map(|e| e.t_us).min().unwrap();
-        // The wrap falls into the middle of a press.
+        // The wrap is in the middle of a press.
         let shift = |t: u64| t + (1 << 34) - first - 43_000_000;
         for event in &mut source.events[k] {
             event.t_us = shift(event.t_us);
@@ -274,7 +274,7 @@ fn disorder_within_ten_milliseconds_changes_nothing() {
     let mut moved = 0;
     for events in &mut shuffled.events {
         events.sort_by_key(|e| e.t_us);
-        // Every stretch of 9 ms backwards.
+        // Reverse every stretch of 9 ms.
         for stretch in events.chunk_by_mut(|a, b| a.t_us / 9_000 == b.t_us / 9_000) {
             moved += stretch.len() / 2;
             stretch.reverse();
@@ -287,7 +287,7 @@ fn disorder_within_ten_milliseconds_changes_nothing() {
     assert_eq!(found.warnings, wanted.warnings);
 }
 
-/// Presses at irregular steps, and what a camera with this clock counts of them in 10 ms bins.
+/// Presses at irregular intervals, and the counts of a camera with this clock in 10 ms bins.
 fn pressed(count: u32, offset_us: f64, drift_ppm: f64) -> (Vec<PressSpan>, RateHistogram) {
     let mut random = Random(5);
     let mut rates = RateHistogram::new(10_000);

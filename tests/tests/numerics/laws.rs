@@ -1,4 +1,4 @@
-//! Laws of the geometry: what scale and place the coordinates have changes nothing but scale and place.
+//! Invariances of the geometry: scaling and translating coordinates only scales and translates the result.
 
 use proptest::strategy::Strategy;
 use proptest::test_runner::{Config, TestRunner};
@@ -69,7 +69,7 @@ fn check(case: &Case, bound: &Watch, factor: f64, by: [f64; 2]) {
         _ => f64::NAN,
     };
     let (Some(p), Some(q)) = (here.estimate(), there.estimate()) else {
-        // Parallel and behind are judged on numbers that scale and place leave alone, to rounding.
+        // Parallel and behind depend on numbers that are invariant up to rounding.
         if here.name() != there.name() {
             let near = [sine(here), sine(there)]
                 .iter()
@@ -83,9 +83,9 @@ fn check(case: &Case, bound: &Watch, factor: f64, by: [f64; 2]) {
         .map(|(x, y)| p.distance_mm(Point2::new(x, y)))
         .into_iter()
         .fold(0.0, f64::max);
-    // Coordinates far from zero have coarse last bits; what the cameras cannot hold the point cannot either.
+    // Coordinates far from zero have coarse last bits; neither cameras nor points can be more accurate.
     let size = factor * (reach + 100.0) + by[0].abs() + by[1].abs();
-    // A turn of the axis by the rounding of its ends moves the point in proportion to the range.
+    // Rounding of the axis ends rotates the axis, which moves the point in proportion to the range.
     let lever = (reach + 100.0) / 40.0;
     let error = q.distance_mm(wanted) * sine(here).abs() / (UNIT * size * lever);
     bound.see(error, format!("{case:?}, factor {factor}, by {by:?}"));

@@ -1,4 +1,4 @@
-//! The lens at the edge of its range: |W s| up to 1, where the angle stops growing with the column.
+//! The lens at the end of its range: |W s| up to 1, where the angle stops growing with the column.
 
 use skinrig_model::{CameraModel, LensModel, Point2};
 
@@ -31,7 +31,7 @@ const DISTORTIONS: [f64; 11] = [
     1.0,
 ];
 
-/// A point on the ray of a column, 40 mm out.
+/// A point on the ray of a column, at 40 mm.
 fn point_of(camera: &CameraModel, u: f64) -> Point2 {
     let [dx, dy] = camera.direction(camera.angle_of_column_deg(u));
     Point2::new(
@@ -71,7 +71,7 @@ fn the_column_of_a_point_shows_it_wherever_the_angle_still_grows() {
             let p = point_of(&camera, f64::from(i));
             let wanted = precise::angle_of_point(&camera, p);
             let at = format!("W = {w}, u = {i}");
-            // The very edge of the field of view may fall on either side of it.
+            // The very edge of the field of view may be on either side.
             let Some(u) = camera.column_of_point(p) else {
                 assert!(i == 0 || i == 640, "{at}");
                 continue;
@@ -82,7 +82,7 @@ fn the_column_of_a_point_shows_it_wherever_the_angle_still_grows() {
                 precise::near(&(shown - &wanted)).abs() / (UNIT * 180.0),
                 &at,
             );
-            // Where the slope vanishes the column is only known to the root of the rounding.
+            // Where the slope vanishes the column is accurate only to the root of the rounding error.
             if i % 64 == 1 || !(4..637).contains(&i) {
                 fold.see((u - precise::column_of_angle(w, &wanted)).abs(), &at);
             }

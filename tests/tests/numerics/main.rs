@@ -1,5 +1,5 @@
-//! Stable at the extremes: the fast code beside a slow, obvious reference of higher precision, within bounds that
-//! `docs/reference/numerics.md` states and these tests hold. `-- --nocapture` prints the worst error seen against each bound.
+//! Numerical stability at extremes: fast code compared with slow, simple references of higher precision, within the bounds
+//! stated in `docs/reference/numerics.md`. `-- --nocapture` prints the worst error observed for each bound.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 

@@ -1,6 +1,6 @@
-//! The reference: plain formulas on 256-bit floating point numbers, correctly rounded, from another crate.
+//! The reference: plain formulas on 256-bit floating-point numbers, correctly rounded, from an independent crate.
 //!
-//! Nothing here shares code or formulas with what it judges: rays meet where their line equations hold at once
+//! It shares no code or formulas with the code under test: rays meet where their line equations hold simultaneously
 //! (Cramer's rule on normal forms), columns come from bisection over 80 steps, sums are exact to 70 digits.
 
 use dashu_float::FBig;
@@ -31,7 +31,7 @@ pub fn error(fast: f64, exact: &Real) -> f64 {
     }
 }
 
-/// Distance of a point from its exact place.
+/// Distance of a point from its exact position.
 pub fn distance(fast: Point2, exact: &[Real; 2]) -> f64 {
     let [x, y] = exact;
     error(fast.x_mm, x).hypot(error(fast.y_mm, y))
@@ -82,11 +82,11 @@ fn from(a: Point2, b: Point2) -> [Real; 2] {
     [real(b.x_mm) - real(a.x_mm), real(b.y_mm) - real(a.y_mm)]
 }
 
-/// Where two rays meet.
+/// Intersection of two rays.
 pub struct Meeting {
-    /// The place, `None` when the lines are exactly parallel.
+    /// Position; `None` if the lines are exactly parallel.
     pub at: Option<[Real; 2]>,
-    /// Signed distance from each camera along its ray; zero when there is no place.
+    /// Signed distance from each camera along its ray; zero without an intersection.
     pub ranges: [Real; 2],
     /// Sine of the angle from ray 1 to ray 2.
     pub sine: Real,
@@ -151,7 +151,7 @@ mod tests {
             near(&real(1.0).atan2(&real(-1.0))),
             0.75 * std::f64::consts::PI
         );
-        // A third has an error that only higher precision sees.
+        // A third has an error that only higher precision shows.
         let third = real(1.0) / real(3.0);
         let rounding = error(1.0 / 3.0, &third);
         assert!((1.8e-17..1.9e-17).contains(&rounding), "{rounding}");

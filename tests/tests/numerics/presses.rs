@@ -1,15 +1,14 @@
-//! Presses with no, one, two and ten million events, all on one pixel, all at one instant, and counts at the end of
-//! 32 bits.
+//! Presses with no, one, two and ten million events, all on one pixel, all simultaneous, and counts at the end of 32 bits.
 
 use skinrig_analysis::dbscan::{Cluster, Dbscan};
 use skinrig_analysis::grid::PixelGrid;
-use skinrig_analysis::kept::KeptEvent;
+use skinrig_analysis::press_events::PackedEvent;
 use skinrig_model::{CdEvent, Polarity};
 
 use crate::bounds::{self, UNIT, Watch};
 use crate::precise::{self, real};
 
-/// Centroid column of all pixels, in 256 bits, from the counts alone.
+/// Exact centroid column of all pixels, in 256 bits, from the counts alone.
 fn exact_column(pixels: &[(u16, u16, u32)]) -> precise::Real {
     let (mut events, mut sum) = (real(0.0), real(0.0));
     for &(u, _, n) in pixels {
@@ -77,7 +76,7 @@ fn counts_reach_the_end_of_32_bits_and_not_beyond() {
     ] {
         let mut grid = grid_of(&pixels);
         assert_eq!(grid.events(), u32::MAX);
-        // Full: nothing more is counted, on old pixels or new ones, and the count stays as it was.
+        // Full: nothing more is counted, on old or new pixels, and the count is unchanged.
         let (u, v, _) = pixels[0];
         assert!(!grid.add(u, v) && !grid.add(320, 240) && !grid.add_many(320, 240, 7));
         assert_eq!(grid.events(), u32::MAX);
@@ -94,7 +93,7 @@ fn counts_reach_the_end_of_32_bits_and_not_beyond() {
             centroid.see(error, format!("{pixels:?}"));
         }
     }
-    // One too many at once: refused whole.
+    // One too many at once: rejected as a whole.
     let mut grid = PixelGrid::new((0, 479));
     assert!(grid.add_many(5, 5, 2) && !grid.add_many(5, 6, u32::MAX - 1));
     assert_eq!(grid.events(), 2);
@@ -116,7 +115,7 @@ fn a_kept_event_reaches_32_bits_of_time_at_any_camera_time() {
                 y: 479,
                 polarity: Polarity::Off,
             };
-            assert_eq!(KeptEvent::pack(&event, start_us).unwrap().t_us(), after);
+            assert_eq!(PackedEvent::pack(&event, start_us).unwrap().t_us(), after);
         }
     }
 }

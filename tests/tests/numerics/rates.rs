@@ -1,5 +1,6 @@
-//! Background rates from nothing to fifty million events per second, and presses all at one instant.
+//! Background rates from zero to fifty million events per second, and simultaneous presses.
 
+use skinrig_analysis::rule::Rule;
 use skinrig_analysis::{Analysis, EventSource, SessionInput, analyze};
 use skinrig_model::{
     AnalysisSettings, CalibrationModel, CameraId, CdEvent, HostTime, MarkKind, Point2, Polarity,
@@ -9,7 +10,7 @@ use skinrig_planted::{Touch, mark, press};
 
 use crate::bounds::{self, UNIT, Watch};
 
-/// A press every 0.1 s, 20 ms long: with 5 ms on both sides the window is 30 ms and 70 ms are idle.
+/// A press every 0.1 s, 20 ms long: with 5 ms on both sides the window is 30 ms, and 70 ms are idle.
 const PERIOD_US: u64 = 100_000;
 const PRESS_US: u64 = 20_000;
 const SIDE_US: u64 = 5_000;
@@ -98,8 +99,8 @@ fn analysed(flood: &Flood) -> Analysis {
     a
 }
 
-fn rule(a: &Analysis, press: usize) -> Option<&str> {
-    a.presses[press].rule.as_deref()
+fn rule(a: &Analysis, press: usize) -> Option<Rule> {
+    a.presses[press].rule.clone()
 }
 
 #[test]
@@ -122,7 +123,7 @@ fn fifty_million_background_events_per_second_are_counted_and_predicted() {
             rate.see((view.rate_per_s - wanted).abs() / wanted / UNIT, &at);
         }
     }
-    assert_eq!(rule(&a, 1), Some("no response (camera 1)"));
+    assert_eq!(rule(&a, 1), Some(Rule::NoResponse(CameraId::One)));
     assert_eq!((rule(&a, 2), rule(&a, 3)), (None, None));
     let peak = a.rates[0].peak_per_s.iter().copied().fold(0.0, f32::max);
     assert_eq!(peak, 1.5e8, "a million events more in one bin of 10 ms");
@@ -140,10 +141,10 @@ fn without_background_and_without_events_everything_has_its_row() {
         assert_eq!(view.centroid_u.is_some(), events >= 10);
     }
     for k in [0, 1] {
-        assert_eq!(rule(&a, k), Some("no cluster (camera 1)"));
+        assert_eq!(rule(&a, k), Some(Rule::NoCluster(CameraId::One)));
     }
     assert_eq!((rule(&a, 2), rule(&a, 3)), (None, None));
-    // Ten million at one instant on 800 pixels: the centroid is the middle of the block.
+    // Ten million simultaneous events on 800 pixels: the centroid is the middle of the block.
     assert_eq!(a.presses[3].views[0].unwrap().centroid_u, Some(319.5));
 
     let silent = analysed(&Flood {

@@ -1,5 +1,4 @@
-//! Two rays, from a right angle to a millionth of a millionth of a degree; contacts where the
-//! geometry degenerates.
+//! Two rays, from a right angle to a millionth of a millionth of a degree; contacts at degenerate geometries.
 
 use skinrig_analysis::result::LocationOutcome;
 use skinrig_analysis::triangulate::{PARALLEL_SINE, intersect, locate_angles};
@@ -10,7 +9,7 @@ use crate::precise;
 
 const SKIN: SkinOutline = SkinOutline::PAPER;
 
-/// Cameras about the published places, deterministic.
+/// Cameras about the published positions, deterministic.
 fn geometries() -> impl Iterator<Item = StereoGeometry> {
     (0..12u32).map(|i| {
         let step = |k: u32, low: f64, high: f64| {
@@ -53,7 +52,7 @@ fn rays_from_a_right_angle_to_a_millionth_of_a_millionth_of_a_degree_apart() {
         for first in [-89.0, -40.3, 0.0, 17.25, 63.0] {
             let powers = (-12..=1).flat_map(|p| [1.0, 3.7].map(|m| m * 10f64.powi(p)));
             for apart in powers.chain([45.0, 90.0]).flat_map(|a| [a, -a]) {
-                // Clockwise angles: ray 2 lies `apart` degrees counter-clockwise of ray 1.
+                // Clockwise angles: ray 2 is `apart` degrees counter-clockwise of ray 1.
                 let angles = [first, first + turn - apart];
                 let exact = precise::intersect(&g, angles.map(precise::real));
                 let hit = intersect(&g, angles);
@@ -61,7 +60,7 @@ fn rays_from_a_right_angle_to_a_millionth_of_a_millionth_of_a_degree_apart() {
                 sine.see(precise::error(hit.sine, &exact.sine) / UNIT, &at);
                 let s = precise::near(&exact.sine).abs();
                 let outcome = locate_angles(&g, &SKIN, angles);
-                // The threshold itself is known to the error of a sine.
+                // The threshold itself is accurate to the error of a sine.
                 if s < PARALLEL_SINE - 8.0 * UNIT {
                     assert!(matches!(outcome, LocationOutcome::Parallel { .. }), "{at}");
                     parallel += 1;
@@ -92,7 +91,7 @@ fn a_contact_near_the_baseline_is_as_good_as_its_sine_or_parallel() {
         let baseline = wx.hypot(wy);
         for share in [0.1, 0.5, 0.83] {
             for height in [30.0, 1.0, 1e-3, 1e-6, 3e-8, 1e-10, 0.0] {
-                // Towards the skin's left, where the presses are.
+                // To the left of the skin, where the presses are.
                 let (nx, ny) = (-wy / baseline, wx / baseline);
                 let p = Point2::new(
                     one.x_mm + share * wx + height * nx,
@@ -159,7 +158,7 @@ fn behind_is_told_from_in_front_down_to_the_rounding_of_the_range() {
                 let angles = [g.cameras[0].angle_of_point_deg(p), angle];
                 let found = locate_angles(&g, &SKIN, angles);
                 if distance < 1e-9 {
-                    // Below the rounding of the coordinates either answer is right; nothing else is.
+                    // Below the rounding of the coordinates both results are correct.
                     assert!(["located", "behind"].contains(&found.name()), "{found:?}");
                 } else if SKIN.contains(p) || side < 0.0 {
                     assert_eq!(found.name(), name, "{distance:e} mm: {found:?}");

@@ -1,8 +1,7 @@
-//! Which named test each collected case of the public code going wrong is mapped to.
+//! Maps each collected failure of the public code to a named test.
 //!
-//! The names of the cases are those of the collection that was made by running the public code. The checks here see
-//! that a test of the name is in the file, and that the fixtures of geometry and clusters hold the listed cases; what
-//! those tests assert is theirs alone.
+//! The case names come from a collection made by running the public code. The checks verify that the named tests exist, and
+//! that the fixtures of geometry and clusters contain the listed cases; the tests themselves assert the results.
 
 /// (group, case, file under the workspace's root, test).
 const CASES: &[(&str, &str, &str, &str)] = &[

@@ -1,4 +1,4 @@
-//! The same session gives the same bytes, however many threads work and however its events are cut.
+//! Identical sessions give identical bytes, for any number of threads and any slicing of the events.
 
 use skinrig_analysis::{SessionInput, analyze};
 
@@ -22,7 +22,7 @@ fn one_thread_or_two_and_slices_of_any_size_give_identical_bytes() {
         let found = bytes(threads, &input, &source);
         assert!(found == wanted, "{threads} threads, slices of {slice}");
     }
-    // And they are bytes of this session: another seed gives others.
+    // Control: another seed gives other bytes.
     input.settings.seed += 1;
     assert!(bytes(2, &input, &source) != wanted);
 }

@@ -1,11 +1,11 @@
-//! Means, RMSE and variance of ten million values always, of a thousand million on request.
+//! Means, RMSE and variance of ten million values, and of a thousand million on request.
 
 use skinrig_analysis::sums::{mean, root_mean_square, sum, variance};
 
 use crate::bounds::{self, UNIT, Watch};
 use crate::precise::{self, Real, real};
 
-/// `centre + step * ((i * 7) mod 11 - 5)`, rounded to doubles: eleven values, each as often as the others.
+/// `centre + step * ((i * 7) mod 11 - 5)`, rounded to doubles: eleven equally frequent values.
 #[derive(Clone, Copy)]
 struct Sequence {
     centre: f64,
@@ -22,7 +22,7 @@ impl Sequence {
         (0..self.n).map(move |i| self.value(i))
     }
 
-    /// Sum of `f` over all values, exact to 70 digits: whole rounds of eleven and the rest.
+    /// Exact sum of `f` over all values, to 70 digits: whole periods of eleven plus the rest.
     fn exact(self, f: impl Fn(Real) -> Real) -> Real {
         (0..11).fold(real(0.0), |sum, k| {
             let times = self.n / 11 + u64::from(k < self.n % 11);
@@ -63,7 +63,7 @@ fn hold(n: u64) {
         let exact = s.exact(|x| (&x - &centre) * (&x - &centre)) / &count;
         let found = variance(s.values()).unwrap();
         if step == 0.0 {
-            // Equal values have no spread but that of the error of their mean.
+            // Equal values have no spread except the error of their mean.
             let (mean, rounding) = (mean(s.values()).unwrap(), 4.0 * UNIT * 0.1);
             assert!(
                 (mean - 0.1).abs() <= rounding && found <= rounding * rounding,

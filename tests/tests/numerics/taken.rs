@@ -1,4 +1,4 @@
-//! What a protocol takes, the analysis takes: every key of `analysis`, over its range and beyond.
+//! The analysis accepts every `analysis` value that a protocol accepts: every key, over its range and beyond.
 
 use std::sync::OnceLock;
 
@@ -9,7 +9,7 @@ use skinrig_protocol::{Protocol, schema_json};
 
 const PROTOCOL: &[u8] = include_bytes!("../../../protocols/demo.yaml");
 
-/// Numbers about every limit that a setting may have, and far beyond.
+/// Numbers around every possible limit of a setting, and far beyond.
 const LADDER: [&str; 30] = [
     "-1",
     "0",
@@ -43,7 +43,7 @@ const LADDER: [&str; 30] = [
     "1e300",
 ];
 
-/// A key below `analysis` and values that it may or may not take, as `--set` has them.
+/// A key below `analysis` and candidate values in `--set` syntax.
 #[derive(Debug)]
 struct Key {
     name: String,
@@ -58,7 +58,7 @@ fn keys() -> Vec<Key> {
     found
 }
 
-/// The keys at and below `node`, which stands at `name`.
+/// Keys at and below `node`, whose path is `name`.
 fn walk(schema: &Value, node: &Value, name: &str, found: &mut Vec<Key>) {
     let node = match node["$ref"].as_str() {
         Some(place) => schema.pointer(place.trim_start_matches('#')).unwrap(),
@@ -101,7 +101,8 @@ fn values(node: &Value) -> Vec<String> {
     }
 }
 
-/// Read as that of a recording, which takes keys of earlier versions besides. `Ok(false)` when the protocol is refused, `Ok(true)` when it is taken and the analysis takes its settings.
+/// Parses like the protocol of a recording, which also accepts keys of earlier versions. `Ok(false)` if the protocol is
+/// rejected, `Ok(true)` if protocol and analysis accept the settings.
 fn taken(overrides: &[String]) -> Result<bool, String> {
     let no_files =
         |_: &std::path::Path| -> std::io::Result<Vec<u8>> { unreachable!("no file is named") };
@@ -138,7 +139,7 @@ fn every_value_that_a_protocol_takes() {
         );
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    // The keys are all there, and the ladder leaves every range.
+    // All keys are covered, and the values exceed every range.
     assert!(
         keys.len() > 60 && refuses > 500,
         "{} keys, {takes} taken, {refuses} refused",
@@ -146,7 +147,7 @@ fn every_value_that_a_protocol_takes() {
     );
 }
 
-/// The values of a key that are taken, as overrides.
+/// Accepted values of a key, as overrides.
 fn good(key: &Key) -> Vec<String> {
     let all = key.values.iter().map(|v| one(key, v));
     all.filter(|o| taken(std::slice::from_ref(o)) == Ok(true))
@@ -156,7 +157,7 @@ fn good(key: &Key) -> Vec<String> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Two settings, or five, may contradict each other where each alone is fine.
+    /// Two to five settings may contradict each other although each alone is valid.
     #[test]
     fn values_that_a_protocol_takes_together(
         chosen in prop::collection::vec((any::<prop::sample::Index>(), any::<prop::sample::Index>()), 2..6),

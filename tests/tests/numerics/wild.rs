@@ -1,4 +1,4 @@
-//! Whatever the numbers of a session are, its analysis has none that is not one.
+//! Analysis results never contain NaN or infinity, whatever the input.
 
 use proptest::prelude::*;
 use skinrig_analysis::{Analysis, analyze};
@@ -7,7 +7,7 @@ use skinrig_model::{CalibrationModel, HostTime, LensModel, Point2};
 use crate::laws::runner;
 use crate::support::{Memory, session};
 
-/// Written and read back nothing has changed: a number that is NaN or infinite would be gone.
+/// Serialising and parsing must change nothing: NaN and infinity would be lost.
 pub fn holds_only_numbers(a: &Analysis) {
     let text = serde_json::to_string(a).unwrap();
     let back: Analysis = serde_json::from_str(&text)
@@ -19,7 +19,7 @@ fn around(text: &str, column: usize) -> &str {
     &text[column.saturating_sub(200)..column.min(text.len())]
 }
 
-/// Where in the debug text the numbers are that JSON cannot hold.
+/// Positions of unserialisable numbers in the debug text.
 fn lost(a: &Analysis) -> String {
     let text = format!("{a:?}");
     let places = text.match_indices("NaN").chain(text.match_indices("inf,"));
@@ -30,7 +30,7 @@ fn lost(a: &Analysis) -> String {
         .join(" ... ")
 }
 
-/// Numbers that nobody would type on purpose.
+/// Extreme numbers.
 fn number() -> impl Strategy<Value = f64> {
     prop_oneof![
         Just(f64::NAN),
@@ -46,7 +46,7 @@ fn number() -> impl Strategy<Value = f64> {
     ]
 }
 
-/// One thing that is wrong with a session: what, how much, and at which press.
+/// A defect of a session: kind, amount, and press.
 fn faults() -> impl Strategy<Value = Vec<(u8, f64, usize)>> {
     prop::collection::vec((0u8..26, number(), 0usize..53), 1..4)
 }

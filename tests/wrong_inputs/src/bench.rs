@@ -1,4 +1,4 @@
-//! Owns small recordings: what was pressed, what both cameras saw of it, and the papers that come with it.
+//! Owns small recordings: presses, camera streams, and the accompanying documents.
 
 use skinrig_analysis::SessionInput;
 use skinrig_model::{
@@ -39,108 +39,108 @@ impl Random {
     }
 }
 
-/// A press that was made.
+/// An executed press.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pressed {
-    /// Where, in the skin's frame.
+    /// Position, skin frame.
     pub at: Point2,
-    /// When: its contact, s on the host's clock.
+    /// Contact, s on the host clock.
     pub contact_s: f64,
 }
 
-/// How a camera's picture comes out.
+/// Orientation of a camera's image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Picture {
-    /// As the lens throws it.
+    /// As projected by the lens.
     Upright,
-    /// Columns from the other side.
+    /// Columns mirrored.
     Mirrored,
-    /// Turned by 180 degrees.
+    /// Rotated by 180 degrees.
     UpsideDown,
-    /// Turned by 90 degrees.
+    /// Rotated by 90 degrees.
     OnItsSide,
 }
 
-/// Sync presses as the schedule lists them.
+/// Sync presses in the schedule.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sync {
-    /// How many.
+    /// Number of presses.
     pub count: u32,
-    /// From one to the next, s.
+    /// Interval, s.
     pub interval_s: f64,
-    /// From the last one to the path, s.
+    /// Pause before the path, s.
     pub pause_s: f64,
 }
 
-/// The schedule of a recording.
+/// Schedule of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Timetable {
-    /// Its sync presses.
+    /// Sync presses.
     pub sync: Sync,
-    /// From press to press, s.
+    /// Period of the presses, s.
     pub period_s: f64,
     /// Rows of the table.
     pub presses: u32,
-    /// Rows that are used, from the first.
+    /// Rows used, from the first.
     pub used: u32,
     /// Repetitions.
     pub repetitions: u32,
-    /// Between two of them, s.
+    /// Pause between repetitions, s.
     pub pause_s: f64,
 }
 
-/// The paper's press: moments after its contact, s: approach (before), at depth, retract, release, clear.
+/// Times of the paper's press relative to contact, s: approach (before), at depth, retract, release, clear.
 pub const MOMENTS_S: [f64; 5] = [0.175, 0.175, 0.325, 0.55, 0.725];
-/// The contact of the first press of a recording, s after time 0 of its schedule.
+/// Contact of the first press of a recording, s after time 0 of its schedule.
 pub const FIRST_CONTACT_S: f64 = MOMENTS_S[0];
 /// Columns and rows of the path.
 const LINES: usize = 5;
 const LINE: usize = 5;
 
-/// What was done and what is said about it.
+/// What was executed, and what the documents claim.
 #[derive(Debug, Clone)]
 pub struct Bench {
-    /// Seeds noise.
+    /// Seed of the noise.
     pub seed: u64,
-    /// Every press that was made, in order of time, sync presses first.
+    /// Executed presses in time order, sync presses first.
     pub pressed: Vec<Pressed>,
-    /// The true cameras.
+    /// True cameras.
     pub cameras: StereoGeometry,
     /// Camera time at host time 0, µs, and drift, ppm.
     pub clocks: [(f64, f64); 2],
-    /// What camera each stream comes from.
+    /// Source camera of each stream.
     pub feeds: [usize; 2],
-    /// How each stream's picture comes out.
+    /// Orientation of each stream's image.
     pub pictures: [Picture; 2],
-    /// Host times between which a stream has nothing, s.
+    /// Host times between which a stream is silent, s.
     pub silent_s: [Vec<(f64, f64)>; 2],
     /// Background, events per second and camera, all rows.
     pub noise_per_s: f64,
-    /// From this time on the columns of camera 2 are moved by so many px.
+    /// From this time on the columns of camera 2 are shifted by this many px.
     pub nudged: Option<(f64, f64)>,
 
-    /// The schedule.
+    /// Schedule.
     pub timetable: Timetable,
-    /// The table of positions, as it is taken for mm in the skin's frame.
+    /// Table of positions, read as mm in the skin frame.
     pub table: Vec<Point2>,
-    /// The rig description.
+    /// Rig description.
     pub rig: RigGeometry,
     /// Rows of the crop.
     pub crop: Option<[(u16, u16); 2]>,
-    /// The analysis chooses the camera model, as it does unless a protocol names one.
+    /// True if the analysis chooses the camera model, which is the default.
     pub chosen_model: bool,
-    /// A session of the robot with a trigger line instead of an import: positions are measured, and planned as `planned`.
+    /// A robot session with a trigger line instead of an import: measured positions, and a plan.
     pub robot: Option<Robot>,
 }
 
-/// What a session of the robot has besides.
+/// Additional properties of a robot session.
 #[derive(Debug, Clone, Default)]
 pub struct Robot {
-    /// The plan, where it is another than what was measured.
+    /// The plan, if it differs from the measurement.
     pub planned: Option<Vec<Point2>>,
-    /// The marks of each camera arrive at the other one.
+    /// True if the marks of each camera arrive at the other one.
     pub wires_crossed: bool,
-    /// The share of the session after which no mark arrives.
+    /// Share of the session after which no mark arrives.
     pub line_cut: Option<f64>,
 }
 
@@ -156,11 +156,11 @@ fn camera(at: (f64, f64), skew_deg: f64, w: f64) -> CameraModel {
     }
 }
 
-/// Cameras near the published ones.
+/// Camera positions near the published ones.
 const DRAWN: [(f64, f64); 2] = [(45.0, -38.0), (45.0, 44.0)];
 
 impl Bench {
-    /// A faultless recording of two repetitions of a meander of 25 places, with three sync presses, and its papers.
+    /// A faultless recording of two repetitions of a meander with 25 locations and three sync presses, with its documents.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self::of(
@@ -181,7 +181,7 @@ impl Bench {
         )
     }
 
-    /// The same with another schedule and path.
+    /// Same with another schedule and path.
     #[must_use]
     pub fn of(seed: u64, timetable: Timetable, path: Vec<Point2>) -> Self {
         let mut random = Random::new(seed ^ 0x5eed);
@@ -218,7 +218,7 @@ impl Bench {
         }
     }
 
-    /// The faultless session of a robot, with a trigger line.
+    /// A faultless robot session with a trigger line.
     #[must_use]
     pub fn robot(seed: u64) -> Self {
         let mut bench = Self::new(seed);
@@ -227,7 +227,7 @@ impl Bench {
         bench
     }
 
-    /// The end of the recording, s on the host's clock.
+    /// End of the recording, s on the host clock.
     #[must_use]
     pub fn end_s(&self) -> f64 {
         self.pressed.last().map_or(0.0, |p| p.contact_s) + 3.0
@@ -247,7 +247,7 @@ impl Bench {
         (camera_us - offset) * 1e-6 / (1.0 + ppm * 1e-6)
     }
 
-    /// What both streams hold.
+    /// Events of both streams.
     #[must_use]
     pub fn events(&self) -> Memory {
         Memory {
@@ -256,7 +256,7 @@ impl Bench {
         }
     }
 
-    /// A stream is that of one camera, on that camera's clock.
+    /// A stream comes from one camera, on that camera's clock.
     fn stream(&self, k: usize) -> Vec<CdEvent> {
         let camera = self.feeds[k];
         let mut random = Random::new(self.seed ^ (0xca3e_u64 << camera));
@@ -270,7 +270,7 @@ impl Bench {
                 .nudged
                 .filter(|(from, _)| camera == 1 && pressed.contact_s >= *from)
                 .map_or(0.0, |(_, px)| px);
-            // A skin errs alike at neighbouring places, and a little anew each time.
+            // Errors of a skin are correlated between neighbouring locations, with a small random part.
             let bias = 5.0 * (pressed.at.x_mm / 11.0 + 2.0 * camera as f64).sin()
                 + 4.0 * (pressed.at.y_mm / 9.0).sin();
             let centre = u + bias + nudge + 3.0 * random.normal();
@@ -311,17 +311,17 @@ impl Bench {
         events
     }
 
-    /// What the analysis is given besides the events.
+    /// Input of the analysis besides the events.
     ///
     /// # Errors
-    /// Why schedule or table are refused.
+    /// Why the schedule or the table is rejected.
     pub fn input(&self) -> Result<SessionInput, String> {
         let schedule = Schedule::parse("case", self.schedule().as_bytes(), &[])
             .map_err(|found| found.render(false))?;
         let (planned, times) = schedule.planned(&self.table).map_err(|e| e.to_string())?;
         let mut settings = schedule.analysis.clone();
         settings.bootstrap_resamples = 200;
-        // The choice of a model takes most of the time, and none of what is tried here stands on it.
+        // Choosing a model takes most of the time and does not affect these cases.
         if !self.chosen_model {
             settings.calibration = CalibrationModel::PositionsSkews;
         }
@@ -389,7 +389,7 @@ impl Bench {
         }
     }
 
-    /// The schedule as a file.
+    /// The schedule as file content.
     #[must_use]
     pub fn schedule(&self) -> String {
         let t = &self.timetable;
@@ -411,7 +411,7 @@ impl Bench {
             )
         });
         let centre = self.rig.outline.centre;
-        // Time 0 of a schedule is when the first approach begins.
+        // Time 0 of a schedule is the start of the first approach.
         format!(
             "skinrig_schedule: 1\nname: case\noperator: tests\nprototype: {{id: none}}\n\
              sync: {{count: {}, interval: {} s, pause_after: {} s, at: {}}}\nperiod: {} s\n\
@@ -439,7 +439,7 @@ impl Bench {
         )
     }
 
-    /// The press during which the tip was nearest to a host time, when one was.
+    /// The press in progress at a host time, if any.
     #[must_use]
     pub fn pressed_at(&self, host_s: f64) -> Option<Point2> {
         let near = self.pressed.iter().min_by(|a, b| {
@@ -451,7 +451,7 @@ impl Bench {
 }
 
 impl Timetable {
-    /// The presses of this schedule over a path.
+    /// Presses of this schedule along a path.
     #[must_use]
     pub fn pressed(&self, path: &[Point2]) -> Vec<Pressed> {
         let sync = (0..self.sync.count).map(|k| Pressed {

@@ -1,4 +1,4 @@
-//! The cases: what is wrong with each, and the only outcomes allowed. To add one, add a few lines to [`all`].
+//! The cases: what is wrong with each, and the allowed outcomes. To add one, add a few lines to [`all`].
 
 use skinrig_analysis::result::Fault::{self, *};
 use skinrig_model::Point2;
@@ -6,18 +6,18 @@ use skinrig_model::Point2;
 use crate::bench::{Bench, Picture, Pressed, Random, Timetable, meander};
 use crate::judge::Allowed::{self, Named, Refused, Right, Unknowable};
 
-/// A wrong or odd recording or set-up.
+/// A wrong or unusual recording or setup.
 #[derive(Clone)]
 pub struct Case {
-    /// Its group in the table.
+    /// Group in the table.
     pub group: &'static str,
-    /// What is wrong.
+    /// Description of the defect.
     pub name: &'static str,
-    /// The recording and its papers.
+    /// The recording and its documents.
     pub bench: fn(u64) -> Bench,
-    /// Puts the papers right, where that is possible: the number then is what the faulty ones should have given.
+    /// Corrects the documents, if possible; the result is then what the faulty ones should have given.
     pub papers: Option<fn(&mut Bench)>,
-    /// The only outcomes allowed.
+    /// Allowed outcomes.
     pub allowed: Vec<Allowed>,
 }
 
@@ -33,12 +33,12 @@ fn robot(seed: u64, change: impl FnOnce(&mut Bench)) -> Bench {
     bench
 }
 
-/// Every position of the table in another frame.
+/// Transforms every position of the table.
 fn table(bench: &mut Bench, change: impl Fn(Point2) -> Point2) {
     bench.table.iter_mut().for_each(|p| *p = change(*p));
 }
 
-/// The robot's measured positions in another frame than the plan.
+/// Transforms the robot's measured positions.
 fn measured(bench: &mut Bench, change: impl Fn(Point2) -> Point2) {
     let plan = bench.table.clone();
     table(bench, change);
@@ -57,7 +57,7 @@ fn times(p: Point2, factor: f64) -> Point2 {
     Point2::new(p.x_mm * factor, p.y_mm * factor)
 }
 
-/// An extra press at `at_s`, at the path's middle.
+/// An extra press at `at_s`, in the middle of the path.
 fn extra(bench: &mut Bench, at_s: f64) {
     let at = bench.pressed.iter().position(|p| p.contact_s > at_s);
     let press = Pressed {
@@ -69,19 +69,19 @@ fn extra(bench: &mut Bench, at_s: f64) {
         .insert(at.unwrap_or(bench.pressed.len()), press);
 }
 
-/// From press `from` on (sync presses count) everything comes `by_s` later.
+/// Delays everything from press `from` on (sync presses count) by `by_s`.
 fn later(bench: &mut Bench, from: usize, by_s: f64) {
     bench.pressed[from..]
         .iter_mut()
         .for_each(|p| p.contact_s += by_s);
 }
 
-/// The contact of the first press of the path, s.
+/// Contact of the first press of the path, s.
 fn path_begins_s(bench: &Bench) -> f64 {
     bench.pressed[3].contact_s
 }
 
-/// Three of the five lines, once: 15 places.
+/// Three of the five lines, once: 15 locations.
 fn single(seed: u64) -> Bench {
     let base = Bench::new(seed).timetable;
     let timetable = Timetable {
@@ -93,7 +93,7 @@ fn single(seed: u64) -> Bench {
     Bench::of(seed, timetable, meander(6, 5, 8.0))
 }
 
-/// Four places, four times.
+/// Four locations, four times.
 fn short(seed: u64) -> Bench {
     let base = Bench::new(seed).timetable;
     let timetable = Timetable {
@@ -124,7 +124,7 @@ impl Table {
         });
     }
 
-    /// With what puts the papers right.
+    /// Adds a case whose documents can be corrected.
     fn papers(
         &mut self,
         name: &'static str,
@@ -164,7 +164,7 @@ fn right_pictures(bench: &mut Bench) {
 const NEARLY: &str = "a rig description that is a few mm off looks the same";
 const TWO_BAD: &str = "two places at which the skin is bad look the same";
 
-/// Every case.
+/// All cases.
 #[must_use]
 pub fn all() -> Vec<Case> {
     let mut t = Table(Vec::new(), "sound");

@@ -1,59 +1,59 @@
-//! Owns the verdict on a case: what came out, held against what was done.
+//! Owns the verdict on a case: compares the result with what was executed.
 
 use std::fmt;
 
 use skinrig_analysis::result::Fault;
 use skinrig_analysis::{Analysis, analyze};
-use skinrig_model::{PressRole, PressVerdict};
+use skinrig_model::{PressRole, Verdict};
 
 use crate::bench::Bench;
 use crate::cases::Case;
 
-/// A number is right when it is within its own interval, widened by this share of the true one and this length, mm, of the
-/// true number.
+/// A result is right if it differs from the true value by less than its own interval plus this share of the true value plus
+/// this length, mm.
 const SHARE: f64 = 0.3;
 const SLACK_MM: f64 = 0.4;
-/// Presses whose two views show different presses, at most, as a share of those that count.
+/// Maximum share of counting presses whose two views show different presses.
 const MIXED: f64 = 0.1;
 
-/// What a case may come out as.
+/// An allowed outcome of a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Allowed {
-    /// The right number, valid; whatever is remarked besides.
+    /// Valid with the right result, with or without remarks.
     Right,
-    /// A finding with this fault; valid only with the right number.
+    /// A finding with this fault; valid only with the right result.
     Named(Fault),
-    /// Not read, not aligned, or without a number, and a reason.
+    /// Not read, not aligned, or without a result, with a reason.
     Refused,
-    /// Nothing in the data speaks against a wrong number, because of this.
+    /// The data cannot reveal the wrong result, for this reason.
     Unknowable(&'static str),
 }
 
-/// What came out.
+/// Observed outcome.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Observed {
-    /// Valid, and the number is right.
+    /// Valid with the right result.
     Right,
-    /// A fault that the case allows was named; whether the session is valid.
+    /// An allowed fault was reported; the flag states whether the session is valid.
     Named(Fault, bool),
-    /// No number, and why.
+    /// No result, with the reason.
     Refused(String),
-    /// INVALID for another cause than any that the case allows.
+    /// INVALID due to a fault that the case does not allow.
     Misnamed(Vec<Fault>),
-    /// Valid with a wrong number.
+    /// Valid with a wrong result.
     Wrong(Numbers),
 }
 
-/// The number, and what it should be.
+/// The result, and its true value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Numbers {
-    /// RMSE as reported, mm.
+    /// Reported RMSE, mm.
     pub reported: f64,
-    /// Half of its interval, mm.
+    /// Half the width of its interval, mm.
     pub half_width: f64,
-    /// Distance of the estimates from where the tip truly was, mm.
+    /// RMS distance of the estimates from the true tip positions, mm.
     pub done: Option<f64>,
-    /// RMSE of the same recording with faultless papers, mm.
+    /// RMSE of the same recording with correct documents, mm.
     pub faultless: Option<f64>,
     /// Share of presses whose views show different presses.
     pub mixed: f64,
@@ -66,7 +66,7 @@ impl Numbers {
         for press in analysis
             .presses
             .iter()
-            .filter(|p| p.role == PressRole::Score && p.verdict == PressVerdict::Valid.name())
+            .filter(|p| p.role == PressRole::Score && p.verdict == Verdict::Valid)
         {
             let (Some(estimate), Some(timing)) = (press.estimate(), press.timing) else {
                 continue;
@@ -94,7 +94,7 @@ impl Numbers {
         })
     }
 
-    /// Every number that is known agrees with the reported one.
+    /// True if every known value agrees with the reported one.
     #[must_use]
     pub fn are_right(&self) -> bool {
         let near = |other: Option<f64>| {
@@ -106,16 +106,16 @@ impl Numbers {
     }
 }
 
-/// The verdict on a case.
+/// Verdict on a case.
 #[derive(Debug, Clone)]
 pub struct Judged {
-    /// What came out.
+    /// Observed outcome.
     pub observed: Observed,
-    /// True when the case allows that.
+    /// True if the case allows it.
     pub holds: bool,
-    /// The numbers, when there is one.
+    /// The result, if there is one.
     pub numbers: Option<Numbers>,
-    /// What the audit said.
+    /// Findings of the audit.
     pub findings: Vec<String>,
 }
 
@@ -128,7 +128,7 @@ impl fmt::Display for Judged {
     }
 }
 
-/// Analyses a case and judges what came out.
+/// Analyses a case and evaluates the outcome.
 #[must_use]
 pub fn judge(case: &Case, seed: u64) -> Judged {
     let bench = (case.bench)(seed);

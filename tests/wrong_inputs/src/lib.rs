@@ -1,8 +1,8 @@
-//! Wrong and odd recordings and set-ups, each with the only outcomes allowed: no wrong number may end valid.
+//! Wrong and unusual recordings and setups, each with its allowed outcomes: no wrong result may be valid.
 //!
-//! A [`bench::Bench`] is what was done (presses, cameras, clocks) and what is said about it (schedule, table of positions, rig
-//! description); a case of [`cases::all`] changes either by a few lines, and [`judge::judge`] compares what the analysis makes of
-//! it with what was done.
+//! A [`bench::Bench`] holds what was executed (presses, cameras, clocks) and what the documents claim (schedule, table of
+//! positions, rig description); a case of [`cases::all`] changes either in a few lines, and [`judge::judge`] compares the
+//! analysis with the truth.
 
 pub mod bench;
 pub mod cases;

@@ -1,4 +1,4 @@
-//! Every case of the battery, or a sample of the seeds: none ends valid with a wrong number.
+//! Every case of the battery, for a sample of seeds: none is valid with a wrong result.
 
 #![expect(clippy::print_stdout, reason = "the table of the documentation")]
 
@@ -25,7 +25,7 @@ fn row(case: &Case, judged: &Judged) -> String {
     format!("| {} | {} | {outcome} |", case.group, case.name)
 }
 
-/// Every case with this many seeds; those that do not hold, with what came out.
+/// Runs every case with this many seeds; returns failures with their outcome.
 fn failures(seeds: u64) -> Vec<String> {
     let cases: Vec<(Case, u64)> = all()
         .into_iter()

@@ -1,4 +1,4 @@
-//! One pass over events, held against what a plain count gives.
+//! One pass over events, compared with a plain count.
 
 use super::*;
 
@@ -20,11 +20,11 @@ fn event(t_us: u64, y: u16, polarity: Polarity) -> CdEvent {
     }
 }
 
-fn run(windows: &[Window], events: &[CdEvent]) -> Accumulated {
+fn run(windows: &[Window], events: &[CdEvent]) -> PassOutput {
     let settings = AnalysisSettings::default();
-    let wanted = Wanted {
+    let wanted = PassRequest {
         windows,
-        ..Wanted::default()
+        ..PassRequest::default()
     };
     let mut all = Accumulator::new(CameraId::One, &settings, wanted);
     events.chunks(2).for_each(|slice| all.take(slice));
@@ -48,7 +48,7 @@ fn windows_include_their_start_and_exclude_their_end_in_any_order_within_the_sla
     // Rows outside the crop (185..=360) count nowhere.
     events.push(event(1_600_001, 184, Polarity::On));
     events.push(event(1_600_002, 361, Polarity::On));
-    // Behind the newest event, but within the slack.
+    // Older than the newest event, but within the slack.
     events.push(off(1_599_000));
     let done = run(&windows, &events);
     let (row, view) = done.views[0];
@@ -88,16 +88,16 @@ fn an_estimator_keeps_so_many_events_of_all_open_windows_and_no_more() {
             estimator,
             ..AnalysisSettings::default()
         };
-        let wanted = Wanted {
+        let wanted = PassRequest {
             windows: &windows,
-            ..Wanted::default()
+            ..PassRequest::default()
         };
         let mut all = Accumulator::new(CameraId::Two, &settings, wanted);
         all.most_kept = most_kept;
         events.chunks(2).for_each(|slice| all.take(slice));
         all.finish().map(|done| done.views.len())
     };
-    // 40 and 60 while both are open; the 40 of the last come when those are gone.
+    // 40 and 60 while both are open; the 40 of the last one arrive after those are closed.
     assert_eq!(done(Estimator::ColumnMedian, 100), Ok(3));
     let too_many = AnalysisError::TooManyEvents {
         camera: CameraId::Two,
@@ -105,7 +105,7 @@ fn an_estimator_keeps_so_many_events_of_all_open_windows_and_no_more() {
         most: 99,
     };
     assert_eq!(done(Estimator::ColumnMedian, 99), Err(too_many));
-    // Clusters of pixels need counts only.
+    // Clusters of pixels need only counts.
     assert_eq!(done(Estimator::Dbscan, 0), Ok(3));
 }
 
@@ -123,7 +123,7 @@ fn slices_of_any_size_and_a_little_disorder_give_what_each_event_gives() {
         window(1, 50_000, 50_000, 90_000),
         window(2, 90_000, 120_000, 150_000),
     ];
-    // Every seventh event comes 4 ms late, and some lie outside the crop.
+    // Every seventh event is 4 ms late, and some are outside the crop.
     let events: Vec<CdEvent> = (0..5_000u64)
         .map(|i| {
             let t_us = 40 * i + 4_000 - if i % 7 == 0 { 4_000 } else { 0 };
@@ -132,10 +132,10 @@ fn slices_of_any_size_and_a_little_disorder_give_what_each_event_gives() {
         .collect();
     let settings = AnalysisSettings::default();
     let seen = |size: usize| {
-        let wanted = Wanted {
+        let wanted = PassRequest {
             windows: &windows,
             rates: Some(RateHistogram::new(10_000)),
-            ..Wanted::default()
+            ..PassRequest::default()
         };
         let mut all = Accumulator::new(CameraId::One, &settings, wanted);
         events.chunks(size).for_each(|slice| all.take(slice));

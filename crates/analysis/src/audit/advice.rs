@@ -1,4 +1,4 @@
-//! What to do next about each fault.
+//! Next step for each fault.
 
 use crate::result::Fault;
 
@@ -6,22 +6,22 @@ use crate::result::Fault;
 pub const fn of(fault: Fault) -> &'static str {
     match fault {
         Fault::CamerasSwapped => {
-            "exchange the two camera files of the import (--camera1, --camera2), or the camera serials of the rig"
+            "swap the two camera files of the import (--camera1, --camera2), or the camera serials in the rig file"
         }
         Fault::OneCameraTwice => {
-            "give the import the recording of the other camera, or the rig two different camera serials"
+            "import the recording of the other camera, or set two different camera serials in the rig file"
         }
         Fault::PictureTurned => {
-            "check how the camera is mounted and whether its recording was mirrored or turned afterwards; record again or turn it back"
+            "check the camera mounting, and whether the recording was mirrored or rotated afterwards; undo that or record again"
         }
         Fault::GeometryOff => {
-            "compare the positions of the cameras with the rig description; the calibration makes up for it, but starts far away"
+            "compare the camera positions with the rig description; the calibration compensates, but starts far off"
         }
         Fault::AxesExchanged => {
             "compare the columns of the position table with the skin frame of the rig description: which is x, which is y"
         }
         Fault::PositionsDisplaced => {
-            "give the positions in the skin frame of the rig description (its origin, not the middle of the skin), or correct the camera positions there"
+            "give positions in the skin frame of the rig description (its origin is not the middle of the skin), or correct the camera positions there"
         }
         Fault::AxisMirrored => {
             "compare the sign of the axis in the position table with the skin frame of the rig description"
@@ -30,25 +30,23 @@ pub const fn of(fault: Fault) -> &'static str {
             "check the unit of the position table (csv.unit of the schedule) and of the robot"
         }
         Fault::IndexShifted => {
-            "compare the first and last rows of the press list with the recording: rows too many or too few, sync presses"
+            "compare the first and last rows of the press list with the recording: extra or missing rows, sync presses"
         }
         Fault::OrderOfPresses => {
-            "use the press list of this very recording, row by row in the order in which it was pressed"
+            "use the press list of this recording, with rows in the order of pressing"
         }
         Fault::PressesUnlisted => {
-            "correct presses_per_repetition and repetitions of the schedule, and the press list, to what was recorded"
+            "correct presses_per_repetition and repetitions in the schedule, and the press list, to match the recording"
         }
         Fault::SyncPattern => {
-            "correct sync.count, sync.interval and sync.pause_after of the schedule to what was recorded"
+            "correct sync.count, sync.interval and sync.pause_after in the schedule to match the recording"
         }
         Fault::RecordingShort => {
-            "find out why the camera started late or stopped early; the presses that it has not recorded do not count"
+            "find out why the camera started late or stopped early; presses that it did not record do not count"
         }
-        Fault::RecordingGap => {
-            "check cable, power and load of the computer; the presses in the gap do not count"
-        }
+        Fault::RecordingGap => "check cable, power and CPU load; presses in the gap do not count",
         Fault::CameraBlind => {
-            "look at the event pictures: lens cap, light, focus, hot pixels, rows of the crop, cable"
+            "look at the event images; check lens cap, light, focus, hot pixels, rows of the crop and cable"
         }
         Fault::NoEvents => {
             "check that the camera was connected and running, and that the right stream was read"
@@ -56,35 +54,35 @@ pub const fn of(fault: Fault) -> &'static str {
         Fault::NoTriggers => "check the cable, the channel and the level of the trigger line",
         Fault::NoTruth => "check the pose stream of the robot, or the position table of the import",
         Fault::PressesMissing => {
-            "find out why the run or the recording ended early; record the rest again"
+            "find out why the run or the recording ended early, and record the rest"
         }
         Fault::ClockWrong => {
-            "check that journal and recording belong together, and the trigger line; record a longer session to know the drift better"
+            "check that journal and recording belong together, and check the trigger line; a longer session determines the drift better"
         }
         Fault::JournalContradictory => {
-            "the journal's times or rows cannot all be true: check where the press times come from, and their unit"
+            "press times contradict each other; check their source and unit"
         }
         Fault::HeightOff => {
-            "either may be off, and the cameras cannot tell which. On the bench `skinrig hil run hil/nightly.yaml --rig NAME.yaml \
-             --only depth` touches the surface: when it FAILs, calibrate the robot and touch the frame off again (`skinrig jog --rig \
-             NAME.yaml`); when it PASSes, mend the skin's frame in the protocol, or look at what was mounted for this run. Events \
-             come early as well when poses are stamped late"
+            "either may be off, and the cameras cannot tell which. On the bench, `skinrig hil run hil/nightly.yaml \
+             --rig NAME.yaml --only depth` presses_seen the surface: if it FAILs, calibrate the robot and touch off the \
+             frame again (`skinrig jog --rig NAME.yaml`); if it PASSes, correct the skin frame in the protocol, or \
+             check what was mounted for this run. Poses with late timestamps also make events appear early"
         }
         Fault::NotTouched => {
-            "both cameras send noise, so this is neither a camera nor its cable. Either the tip did not reach the skin (surface lower \
-             than the frame says, no skin, or the robot reports its tip lower than it is), or there was no light, or the crop shows rows \
-             without the skin. On the bench \
-             `skinrig hil run hil/nightly.yaml --rig NAME.yaml --only depth,noise_lit` tells which: a FAIL of `depth` is the height, \
-             one of `noise_lit` the light"
+            "both cameras record noise, so neither a camera nor its cable is at fault. Either the tip did not reach \
+             the skin (surface lower than in the frame, no skin, or the robot reports its tip too low), or there was \
+             no light, or the crop shows rows without the skin. On the bench, `skinrig hil run hil/nightly.yaml --rig \
+             NAME.yaml --only depth,noise_lit` decides: if `depth` FAILs it is the height, if `noise_lit` FAILs the \
+             light"
         }
         Fault::RobotOff => {
             "check the robot's calibration, its limits and the skin frame before using the positions as truth"
         }
         Fault::RigMoved => {
-            "check that skin, cameras and light are fixed; analyse the repetitions apart"
+            "check that skin, cameras and light are fixed; analyse the repetitions separately"
         }
         Fault::Unknown => {
-            "look at the pictures and centroid tracks; the nominal camera geometry may be wrong"
+            "look at the images and centroid tracks; the nominal camera geometry may be wrong"
         }
     }
 }

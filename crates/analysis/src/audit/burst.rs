@@ -4,28 +4,30 @@ use skinrig_model::{CameraId, PressId};
 
 use super::drift::has_bursts;
 use super::finding::finding;
+use super::observed_press::ObservedPress;
 use super::statistics::median;
-use super::touch::Touch;
 use crate::result::{Analysis, Fault, Finding, Law};
 
-/// A camera whose median response is below this many standard errors sees nothing: of noise alone it is 0.
-const LEAST_MEDIAN: f64 = 1.0;
-/// A press with a response below this many standard errors may have been missed.
-const LEAST_RESPONSE: f64 = 2.0;
-/// A statement about a camera needs this many presses.
-const LEAST_PRESSES: usize = 4;
-/// In a stretch without bursts, a press that responds counts against this many that do not: noise responds too.
-const AGAINST: i64 = 3;
-/// A stretch is a fault when it has at least this many presses,
-const LEAST_STRETCH: i64 = 6;
-/// and this share of all,
-const LEAST_STRETCH_SHARE: f64 = 0.15;
-/// while this share of the other presses respond.
+/// A camera is blind if its median response is below this many standard errors (noise alone gives 0).
+const MIN_MEDIAN: f64 = 1.0;
+/// A press with a smaller response, in standard errors, may be missing.
+const MIN_RESPONSE: f64 = 2.0;
+/// Minimum number of presses for a statement about a camera.
+const MIN_PRESSES: usize = 4;
+/// Weight of a press with response in a stretch without bursts: noise sometimes responds too.
+const RESPONSE_WEIGHT: i64 = 3;
+/// Minimum number of presses in a faulty stretch,
+const MIN_STRETCH: i64 = 6;
+/// its minimum share of all presses,
+const MIN_STRETCH_SHARE: f64 = 0.15;
+/// and the minimum share of the other presses that respond.
 const SHARE_ELSEWHERE: f64 = 0.7;
 
-pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
+pub fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) -> Vec<Finding> {
     let [one, two] = CameraId::ALL.map(|camera| {
-        let sights = touches.iter().filter(|t| t.done() && t.timing.is_some());
+        let sights = presses_seen
+            .iter()
+            .filter(|t| t.done() && t.timing.is_some());
         sights
             .filter_map(|t| Some((t.press, t.sights[camera.index()].response?)))
             .collect::<Vec<(PressId, f64)>>()
@@ -39,9 +41,12 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
                 "; both cameras burst at other times".to_owned(),
             )
         } else if bursts == [false; 2]
-            && let Some(noise) = noise(touches.iter())
+            && let Some(noise) = noise(presses_seen.iter())
         {
-            (Fault::NotTouched, format!("; {noise}{}", forces(touches)))
+            (
+                Fault::NotTouched,
+                format!("; {noise}{}", forces(presses_seen)),
+            )
         } else {
             (Fault::CameraBlind, String::new())
         };
@@ -50,14 +55,14 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
             a.0, a.1, b.0, b.1
         );
         let mut found = finding(Law::BurstWithMotion, fault, None, evidence);
-        // What was located was not the presses.
+        // The located events were not those of the presses.
         found.invalidates = true;
         return vec![found];
     }
     let mut found: Vec<Finding> = Vec::new();
     for (camera, blind) in CameraId::ALL.into_iter().zip(blind) {
         if let Some((usual, n)) = blind {
-            let rates = usual_rates(touches, camera);
+            let rates = usual_rates(presses_seen, camera);
             let evidence = format!(
                 "expected events to burst in presses, found {usual:.1} standard errors above idle in the median of {n} ({camera}){rates}"
             );
@@ -73,9 +78,9 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
     match stretches {
         [Some(a), Some(b)] if a.first <= b.last && b.first <= a.last => {
             let (first, last) = (a.first.max(b.first), a.last.min(b.last));
-            // Presses that were measured were made.
-            let there = |t: &&Touch<'_>| (first..=last).contains(&t.press);
-            let (fault, but) = match noise(touches.iter().filter(there)) {
+            // Measured presses did happen.
+            let there = |t: &&ObservedPress<'_>| (first..=last).contains(&t.press);
+            let (fault, but) = match noise(presses_seen.iter().filter(there)) {
                 Some(noise) => (Fault::NotTouched, format!("; {noise}")),
                 None => (Fault::PressesMissing, String::new()),
             };
@@ -104,13 +109,14 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
     found
 }
 
-/// That both cameras send noise before these presses, in words; `None` when one does not, or when nobody measured the presses.
-fn noise<'a>(touches: impl Iterator<Item = &'a Touch<'a>> + Clone) -> Option<String> {
-    if touches.clone().any(|t| t.outcome.scheduled) {
+/// Noise rates, if both cameras record noise before these presses; `None` if one does not, or if the presses were not
+/// measured.
+fn noise<'a>(presses_seen: impl Iterator<Item = &'a ObservedPress<'a>> + Clone) -> Option<String> {
+    if presses_seen.clone().any(|t| t.outcome.scheduled) {
         return None;
     }
     let [one, two] = CameraId::ALL.map(|camera| {
-        let idle = touches
+        let idle = presses_seen
             .clone()
             .filter_map(|t| Some(t.sights[camera.index()].rates?.1));
         median(idle.collect()).filter(|rate| *rate > 0.0)
@@ -121,9 +127,9 @@ fn noise<'a>(touches: impl Iterator<Item = &'a Touch<'a>> + Clone) -> Option<Str
     ))
 }
 
-/// The usual peak of the force, where the robot reports forces.
-fn forces(touches: &[Touch<'_>]) -> String {
-    let peaks: Vec<f64> = touches
+/// Median peak force, if the robot reports forces.
+fn forces(presses_seen: &[ObservedPress<'_>]) -> String {
+    let peaks: Vec<f64> = presses_seen
         .iter()
         .filter_map(|t| t.outcome.peak_force_n)
         .collect();
@@ -133,27 +139,27 @@ fn forces(touches: &[Touch<'_>]) -> String {
     })
 }
 
-/// (median response, presses) when the camera sees nothing.
+/// (median response, presses) of a blind camera.
 fn blind(seen: &[(PressId, f64)]) -> Option<(f64, usize)> {
     let n = seen.len();
     let usual = median(seen.iter().map(|(_, response)| *response).collect())?;
-    (n >= LEAST_PRESSES && usual < LEAST_MEDIAN).then_some((usual, n))
+    (n >= MIN_PRESSES && usual < MIN_MEDIAN).then_some((usual, n))
 }
 
-/// Presses without a burst, one after another.
+/// Consecutive presses without a burst.
 #[derive(Debug, Clone, Copy)]
 struct Stretch {
     first: PressId,
     last: PressId,
 }
 
-/// The longest stretch without bursts, when it stands out of the rest: the largest sum of consecutive presses when
-/// one without response counts 1 and one with it -[`AGAINST`].
+/// The longest significant stretch without bursts: the maximum sum of consecutive presses, where one without response counts
+/// 1 and one with a response -[`RESPONSE_WEIGHT`].
 fn stretch(seen: &[(PressId, f64)]) -> Option<Stretch> {
-    let responds = |i: usize| seen[i].1 >= LEAST_RESPONSE;
+    let responds = |i: usize| seen[i].1 >= MIN_RESPONSE;
     let (mut best, mut sum, mut from) = ((0, 0..0), 0, 0);
     for i in 0..seen.len() {
-        sum += if responds(i) { -AGAINST } else { 1 };
+        sum += if responds(i) { -RESPONSE_WEIGHT } else { 1 };
         if sum <= 0 {
             (sum, from) = (0, i + 1);
         } else if sum > best.0 {
@@ -163,8 +169,7 @@ fn stretch(seen: &[(PressId, f64)]) -> Option<Stretch> {
     let (sum, range) = best;
     let others = (0..seen.len()).filter(|i| !range.contains(i));
     let respond = others.clone().filter(|i| responds(*i)).count();
-    let long =
-        sum >= LEAST_STRETCH && range.len() as f64 >= LEAST_STRETCH_SHARE * seen.len() as f64;
+    let long = sum >= MIN_STRETCH && range.len() as f64 >= MIN_STRETCH_SHARE * seen.len() as f64;
     let stands_out = respond > 0 && respond as f64 >= SHARE_ELSEWHERE * others.count() as f64;
     (long && stands_out).then(|| Stretch {
         first: seen[range.start].0,
@@ -172,10 +177,10 @@ fn stretch(seen: &[(PressId, f64)]) -> Option<Stretch> {
     })
 }
 
-/// The usual rates in and before presses, for the evidence.
-fn usual_rates(touches: &[Touch<'_>], camera: CameraId) -> String {
+/// Median rates during and before presses, as evidence.
+fn usual_rates(presses_seen: &[ObservedPress<'_>], camera: CameraId) -> String {
     let rates = || {
-        touches
+        presses_seen
             .iter()
             .filter_map(|t| t.sights[camera.index()].rates)
     };

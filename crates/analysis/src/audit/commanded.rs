@@ -1,4 +1,4 @@
-//! Law: position, depth and speed are as commanded.
+//! Law: position, depth and speed match the commands.
 
 use std::collections::BTreeSet;
 
@@ -6,32 +6,32 @@ use skinrig_model::{Point2, PressRole};
 
 use super::finding::finding;
 use super::frames::Frame;
+use super::observed_press::ObservedPress;
 use super::statistics::median;
-use super::touch::Touch;
 use crate::input::SessionInput;
 use crate::result::{Fault, Finding, Law};
 
-/// Positions off by more than this in the median are no settling errors, mm: a tenth of the paper's tip.
-const MOST_OFF_MM: f64 = 1.0;
-/// Depths off by more than this in the median, mm,
-const MOST_DEPTH_OFF_MM: f64 = 0.25;
-/// and by more than this share of the depth, are not as commanded.
-const MOST_DEPTH_SHARE: f64 = 0.15;
-/// An indentation this many times as long or as short as the usual one at its depth was not made at its speed.
-const MOST_SPEED_FACTOR: f64 = 2.0;
-/// Above this share of presses that were off, the robot is.
-const MOST_PRESSES: f64 = 0.2;
-/// A statement needs this many presses.
-const LEAST_PRESSES: usize = 4;
-/// A path smaller than this share of the skin is in another unit when the centroids say that it is not small.
+/// Larger median position errors are not settling errors, mm: a tenth of the paper's tip.
+const MAX_OFF_MM: f64 = 1.0;
+/// Depths are wrong if off by more than this in the median, mm,
+const MAX_DEPTH_OFF_MM: f64 = 0.25;
+/// and by more than this share of the depth.
+const MAX_DEPTH_SHARE: f64 = 0.15;
+/// Indentation at another speed: duration differs from the median at its depth by more than this factor.
+const MAX_SPEED_FACTOR: f64 = 2.0;
+/// Above this share of wrong presses the robot is at fault.
+const MAX_PRESSES: f64 = 0.2;
+/// Minimum number of presses for a statement.
+const MIN_PRESSES: usize = 4;
+/// A path below this share of the skin is in the wrong unit if the centroids contradict it.
 const SMALL_PATH: f64 = 0.01;
-/// Columns that scatter by more than this in the median do not come from such a small path, px.
+/// Columns with a larger median scatter do not come from such a small path, px.
 const MOVING_PX: f64 = 20.0;
-/// Largest shift of the press list that is looked for.
-const MOST_SHIFT: i32 = 5;
+/// Largest shift of the press list to consider.
+const MAX_SHIFT: i32 = 5;
 
-pub fn findings(input: &SessionInput, touches: &[Touch<'_>]) -> Vec<Finding> {
-    let path: Vec<&Touch<'_>> = touches
+pub fn findings(input: &SessionInput, presses_seen: &[ObservedPress<'_>]) -> Vec<Finding> {
+    let path: Vec<&ObservedPress<'_>> = presses_seen
         .iter()
         .filter(|t| t.role != PressRole::Sync && t.done())
         .collect();
@@ -40,15 +40,15 @@ pub fn findings(input: &SessionInput, touches: &[Touch<'_>]) -> Vec<Finding> {
     found.extend(position(input, &path));
     found.extend(depth(&path));
     found.extend(speed(&path));
-    found.extend(refused(touches));
+    found.extend(refused(presses_seen));
     found
 }
 
-/// Planned and measured positions agree, but no skin is that large, or that small.
-fn unit(input: &SessionInput, path: &[&Touch<'_>]) -> Option<Finding> {
+/// Planned and measured positions agree, but their extent does not match a skin.
+fn unit(input: &SessionInput, path: &[&ObservedPress<'_>]) -> Option<Finding> {
     let outline = &input.rig.outline;
     let points: Vec<Point2> = path.iter().filter_map(|t| t.truth).collect();
-    if points.len() < LEAST_PRESSES {
+    if points.len() < MIN_PRESSES {
         return None;
     }
     let size_mm = outline.width_mm.max(outline.height_mm);
@@ -57,7 +57,7 @@ fn unit(input: &SessionInput, path: &[&Touch<'_>]) -> Option<Finding> {
         .iter()
         .map(|p| (p.x_mm.to_bits(), p.y_mm.to_bits()))
         .collect();
-    let small = distinct.len() >= LEAST_PRESSES
+    let small = distinct.len() >= MIN_PRESSES
         && extent < SMALL_PATH * size_mm
         && (0..2).any(|k| moves(path, k));
     let outside = points.iter().filter(|p| !outline.box_contains(**p)).count();
@@ -71,7 +71,7 @@ fn unit(input: &SessionInput, path: &[&Touch<'_>]) -> Option<Finding> {
     })
 }
 
-fn moves(path: &[&Touch<'_>], camera: usize) -> bool {
+fn moves(path: &[&ObservedPress<'_>], camera: usize) -> bool {
     let columns: Vec<f64> = path
         .iter()
         .filter_map(|t| t.sights[camera].column)
@@ -80,7 +80,7 @@ fn moves(path: &[&Touch<'_>], camera: usize) -> bool {
         return false;
     };
     let scatter = median(columns.iter().map(|c| (c - middle).abs()).collect());
-    columns.len() >= LEAST_PRESSES && scatter.is_some_and(|s| s > MOVING_PX)
+    columns.len() >= MIN_PRESSES && scatter.is_some_and(|s| s > MOVING_PX)
 }
 
 fn extent_mm(points: &[Point2]) -> f64 {
@@ -92,17 +92,17 @@ fn extent_mm(points: &[Point2]) -> f64 {
     range(|p| p.x_mm).max(range(|p| p.y_mm))
 }
 
-/// The fault of a reading of the plan, the reading in words, and its [`residual_mm`].
+/// A reinterpretation of the plan: its fault, description, and [`residual_mm`].
 type Reading = (Fault, String, Option<(f64, f64)>);
 
-/// Measured against planned positions: the fault is the reading of the plan that gives the measurement.
-fn position(input: &SessionInput, path: &[&Touch<'_>]) -> Option<Finding> {
+/// Compares measured and planned positions; the fault is the reinterpretation of the plan that matches the measurement.
+fn position(input: &SessionInput, path: &[&ObservedPress<'_>]) -> Option<Finding> {
     let measured = path.iter().filter(|t| t.truth.is_some()).count();
-    if measured < LEAST_PRESSES {
+    if measured < MIN_PRESSES {
         return None;
     }
     let off = residual_mm(path, 0, |p| p)?.0;
-    if off <= MOST_OFF_MM {
+    if off <= MAX_OFF_MM {
         return None;
     }
     let mut readings: Vec<Reading> = Frame::all(&input.rig.outline)
@@ -110,16 +110,16 @@ fn position(input: &SessionInput, path: &[&Touch<'_>]) -> Option<Finding> {
         .chain(displaced(path))
         .map(|frame| {
             let left = residual_mm(path, 0, |p| frame.skin(p));
-            (frame.fault, format!("with {}", frame.words), left)
+            (frame.fault, format!("with {}", frame.description), left)
         })
         .collect();
-    for by in (1..=MOST_SHIFT).flat_map(|k| [k, -k]) {
+    for by in (1..=MAX_SHIFT).flat_map(|k| [k, -k]) {
         let what = format!("of the planned ones {by:+} rows on");
         readings.push((Fault::IndexShifted, what, residual_mm(path, by, |p| p)));
     }
-    // A reading fits when what is left is small against the planned positions.
+    // A reinterpretation fits if its residual is small against the planned positions.
     let fits = |(_, _, r): &Reading| {
-        r.is_some_and(|(left, extent)| left < MOST_OFF_MM && left < 0.1 * extent)
+        r.is_some_and(|(left, extent)| left < MAX_OFF_MM && left < 0.1 * extent)
     };
     let best = readings
         .into_iter()
@@ -130,14 +130,14 @@ fn position(input: &SessionInput, path: &[&Touch<'_>]) -> Option<Finding> {
         Some((fault, what, left)) => {
             let left = left_of(left);
             let evidence = format!(
-                "expected measured positions within {MOST_OFF_MM} mm of the planned ones, found them {off:.2} mm off in the \
+                "expected measured positions within {MAX_OFF_MM} mm of the planned ones, found them {off:.2} mm off in the \
                  median, and {left:.3} mm {what} (n {n})"
             );
             finding(Law::AsCommanded, fault, None, evidence)
         }
         None => {
             let evidence = format!(
-                "expected measured positions within {MOST_OFF_MM} mm of the planned ones, found them {off:.2} mm off in the median (n {n})"
+                "expected measured positions within {MAX_OFF_MM} mm of the planned ones, found them {off:.2} mm off in the median (n {n})"
             );
             finding(Law::AsCommanded, Fault::RobotOff, None, evidence)
         }
@@ -148,8 +148,8 @@ fn left_of(residual: Option<(f64, f64)>) -> f64 {
     residual.map_or(f64::INFINITY, |r| r.0)
 }
 
-/// The frame that lies as far from the skin's as the measured positions do from the planned ones in the median.
-fn displaced(path: &[&Touch<'_>]) -> Option<Frame> {
+/// A frame displaced by the median offset between measured and planned positions.
+fn displaced(path: &[&ObservedPress<'_>]) -> Option<Frame> {
     let off = |of: fn(&Point2) -> f64| {
         let each = path
             .iter()
@@ -163,10 +163,10 @@ fn displaced(path: &[&Touch<'_>]) -> Option<Frame> {
     ))
 }
 
-/// Median distance of the measured positions, in another frame, from the planned ones `by` rows on, and the extent of the
-/// latter, mm; `None` without numbers.
+/// Median distance of measured positions, in another frame, from the planned ones `by` rows later, and the extent of the
+/// latter, mm; `None` without values.
 fn residual_mm(
-    path: &[&Touch<'_>],
+    path: &[&ObservedPress<'_>],
     by: i32,
     frame: impl Fn(Point2) -> Point2,
 ) -> Option<(f64, f64)> {
@@ -177,14 +177,14 @@ fn residual_mm(
             let there = usize::try_from(i as i64 + i64::from(by)).ok()?;
             Some((frame(touch.truth?), path.get(there)?.planned))
         })
-        .filter(|(p, _)| super::touch::is_number(*p))
+        .filter(|(p, _)| super::observed_press::is_number(*p))
         .collect();
     let planned: Vec<Point2> = pairs.iter().map(|p| p.1).collect();
     let left = median(pairs.iter().map(|(a, b)| a.distance_mm(*b)).collect())?;
-    (pairs.len() >= LEAST_PRESSES).then(|| (left, extent_mm(&planned)))
+    (pairs.len() >= MIN_PRESSES).then(|| (left, extent_mm(&planned)))
 }
 
-fn depth(path: &[&Touch<'_>]) -> Option<Finding> {
+fn depth(path: &[&ObservedPress<'_>]) -> Option<Finding> {
     let pairs: Vec<(f64, f64)> = path
         .iter()
         .filter_map(|t| Some((t.outcome.measured_depth_mm?, t.depth_mm)))
@@ -193,29 +193,29 @@ fn depth(path: &[&Touch<'_>]) -> Option<Finding> {
     let off = |(measured, planned): &(f64, f64)| (measured - planned).abs();
     let wrong = pairs
         .iter()
-        .filter(|p| off(p) > MOST_DEPTH_OFF_MM.max(MOST_DEPTH_SHARE * p.1.abs()))
+        .filter(|p| off(p) > MAX_DEPTH_OFF_MM.max(MAX_DEPTH_SHARE * p.1.abs()))
         .count();
     let n = pairs.len();
-    if n < LEAST_PRESSES || wrong as f64 <= MOST_PRESSES * n as f64 {
+    if n < MIN_PRESSES || wrong as f64 <= MAX_PRESSES * n as f64 {
         return None;
     }
     let usual = median(pairs.iter().map(|(m, p)| m - p).collect())?;
     let evidence = format!(
-        "expected the commanded depths within {MOST_DEPTH_OFF_MM} mm, found {wrong} of {n} off, {usual:+.2} mm in the median"
+        "expected the commanded depths within {MAX_DEPTH_OFF_MM} mm, found {wrong} of {n} off, {usual:+.2} mm in the median"
     );
     Some(finding(Law::AsCommanded, Fault::RobotOff, None, evidence))
 }
 
-/// The commanded speed is not part of the plan of presses, but the same depth takes the same time.
-fn speed(path: &[&Touch<'_>]) -> Option<Finding> {
-    let lasted = |t: &Touch<'_>| {
+/// The plan does not contain the commanded speed, but equal depths take equal time.
+fn speed(path: &[&ObservedPress<'_>]) -> Option<Finding> {
+    let lasted = |t: &ObservedPress<'_>| {
         let timing = t.timing?;
         let s = (timing.at_depth - timing.contact).as_secs_f64();
         (s > 0.0).then_some((t.place.1, s))
     };
     let all: Vec<(u64, f64)> = path.iter().filter_map(|t| lasted(t)).collect();
     let n = all.len();
-    if n < LEAST_PRESSES {
+    if n < MIN_PRESSES {
         return None;
     }
     let usual = |depth: u64| {
@@ -229,24 +229,33 @@ fn speed(path: &[&Touch<'_>]) -> Option<Finding> {
         .collect();
     let strange = |(depth, s): &&(u64, f64)| {
         let own = usual.iter().find(|(d, _)| d == depth);
-        own.is_some_and(|(_, u)| *s > MOST_SPEED_FACTOR * u || *s < u / MOST_SPEED_FACTOR)
+        own.is_some_and(|(_, u)| *s > MAX_SPEED_FACTOR * u || *s < u / MAX_SPEED_FACTOR)
     };
     let wrong = all.iter().filter(strange).count();
-    (wrong as f64 > MOST_PRESSES * n as f64).then(|| {
+    (wrong as f64 > MAX_PRESSES * n as f64).then(|| {
         let evidence = format!(
-            "expected indentations of equal depth to take equal time, found {wrong} of {n} off by more than a factor of {MOST_SPEED_FACTOR}"
+            "expected indentations of equal depth to take equal time, found {wrong} of {n} off by more than a factor of {MAX_SPEED_FACTOR}"
         );
         finding(Law::AsCommanded, Fault::RobotOff, None, evidence)
     })
 }
 
-/// Presses that the journal itself calls not as planned.
-fn refused(touches: &[Touch<'_>]) -> Option<Finding> {
-    let invalid =
-        |t: &&Touch<'_>| matches!(t.outcome.verdict, skinrig_model::PressVerdict::Invalid(_));
-    let (wrong, n) = (touches.iter().filter(invalid).count(), touches.len());
-    let example = touches.iter().find(invalid)?.outcome.verdict.reason()?;
-    (n >= LEAST_PRESSES && wrong as f64 > MOST_PRESSES * n as f64).then(|| {
+/// Presses that the journal reports as not executed as planned.
+fn refused(presses_seen: &[ObservedPress<'_>]) -> Option<Finding> {
+    let invalid = |t: &&ObservedPress<'_>| {
+        matches!(t.outcome.verdict, skinrig_model::PressVerdict::Invalid(_))
+    };
+    let (wrong, n) = (
+        presses_seen.iter().filter(invalid).count(),
+        presses_seen.len(),
+    );
+    let example = presses_seen
+        .iter()
+        .find(invalid)?
+        .outcome
+        .verdict
+        .reason()?;
+    (n >= MIN_PRESSES && wrong as f64 > MAX_PRESSES * n as f64).then(|| {
         let evidence = format!(
             "expected presses as planned, found {wrong} of {n} that the journal calls invalid, the first one: {example}"
         );

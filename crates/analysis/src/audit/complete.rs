@@ -1,20 +1,20 @@
-//! Law: the data that a session of this kind has are there, and the journal does not contradict itself.
+//! Law: all data of such a session exist, and the journal is consistent.
 
 use std::collections::BTreeSet;
 
 use skinrig_model::{CameraId, PressRole, PressVerdict};
 
 use super::finding::finding;
-use super::touch::is_number;
+use super::observed_press::is_number;
 use crate::input::SessionInput;
 use crate::result::{Analysis, ClockMethod, Fault, Finding, Law};
 
-/// Above this share of planned presses that were never attempted, the session is incomplete.
-const MOST_MISSED: f64 = 0.1;
-/// Above this share of attempted presses without a measured time or position, there is no truth.
-const MOST_WITHOUT_TRUTH: f64 = 0.2;
-/// Below this share of the marks sent that a clock fit could use, the trigger line does not work.
-const LEAST_MARKS: f64 = 0.5;
+/// Largest share of planned but never attempted presses in a complete session.
+const MAX_MISSED: f64 = 0.1;
+/// Largest share of attempted presses without a measured time or position.
+const MAX_WITHOUT_TRUTH: f64 = 0.2;
+/// Smallest share of sent marks that a clock fit can use if the trigger line works.
+const MIN_MARKS: f64 = 0.5;
 
 pub fn findings(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
     let mut found = Vec::new();
@@ -26,7 +26,7 @@ pub fn findings(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
     found
 }
 
-/// Times that cannot be: moments out of order or before the session, presses that overlap or stand twice.
+/// Impossible times: out of order, before the session, or overlapping presses.
 fn contradiction(input: &SessionInput) -> Option<Finding> {
     let mut spans = Vec::new();
     let (mut disordered, mut negative) = (0u32, 0u32);
@@ -110,7 +110,7 @@ fn truth(input: &SessionInput) -> Option<Finding> {
     };
     let positions = without(&|o| !o.measured_at.is_some_and(is_number));
     let times = without(&|o| o.timing.is_none());
-    let too_many = |count: usize| count as f64 > MOST_WITHOUT_TRUTH * n as f64;
+    let too_many = |count: usize| count as f64 > MAX_WITHOUT_TRUTH * n as f64;
     (too_many(positions) || too_many(times)).then(|| {
         let evidence = format!(
             "expected a measured time and position of each press done, found {positions} of {n} without a \
@@ -129,17 +129,17 @@ fn missed(input: &SessionInput) -> Option<Finding> {
         let verdict = outcome.as_ref().map(|o| &o.verdict);
         missed += u32::from(matches!(verdict, None | Some(PressVerdict::Missed(_))));
     }
-    (planned == 0 || f64::from(missed) > MOST_MISSED * f64::from(planned)).then(|| {
+    (planned == 0 || f64::from(missed) > MAX_MISSED * f64::from(planned)).then(|| {
         let evidence = if planned == 0 {
-            "expected presses besides the sync presses in the plan, found none".to_owned()
+            "expected presses other than sync presses in the plan, found none".to_owned()
         } else {
-            format!("expected {planned} presses, found {missed} of them never attempted")
+            format!("expected {planned} presses, found {missed} never attempted")
         };
         finding(Law::Complete, Fault::PressesMissing, None, evidence)
     })
 }
 
-/// Marks were sent on the line, and hardly any came through.
+/// Marks were sent, but hardly any arrived.
 fn triggers(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
     let Some(channel) = input.rig.trigger_channel else {
         return Vec::new();
@@ -154,7 +154,7 @@ fn triggers(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
         let used = used.map_or(0, |c| c.n);
         let edges = input.edges[camera.index()].iter();
         let edges = edges.filter(|e| e.channel == channel).count();
-        (f64::from(used) < LEAST_MARKS * sent as f64).then_some((edges, used))
+        (f64::from(used) < MIN_MARKS * sent as f64).then_some((edges, used))
     };
     let found: Vec<_> = CameraId::ALL
         .into_iter()

@@ -1,4 +1,4 @@
-//! Law: a camera clock is aligned with the host's, and drifts no more than a crystal does.
+//! Law: a camera clock aligns with the host clock, and its drift is plausible for a crystal.
 
 use skinrig_model::CameraId;
 
@@ -7,14 +7,13 @@ use super::statistics::median;
 use crate::input::SessionInput;
 use crate::result::{Analysis, Fault, Finding, Law, RateSeries};
 
-/// Largest plausible rate difference between two clocks, ppm: the tolerance that Ethernet allows a crystal
-/// (IEEE 802.3, 100BASE-X: 125 MHz within 100 ppm). Crystals on boards are sold within 10 to 50 ppm, so that even
-/// two of them at opposite ends stay below.
-pub(crate) const MOST_DRIFT_PPM: f64 = 100.0;
-/// A drift counts as above the bound when this many standard errors are left.
+/// Largest plausible rate difference between two clocks, ppm: the tolerance of Ethernet crystals (IEEE 802.3, 100BASE-X: 125
+/// MHz within 100 ppm). Board crystals are specified within 10 to 50 ppm, so even two at opposite extremes are below this.
+pub(crate) const MAX_DRIFT_PPM: f64 = 100.0;
+/// A drift exceeds the bound if the excess is more than this many standard errors.
 const SIGMAS: f64 = 3.0;
-/// An alignment needs this many presses with times (`clock::fit_rates`).
-const LEAST_PRESSES: usize = 4;
+/// Minimum number of presses with times for an alignment (`clock::fit_rates`).
+const MIN_PRESSES: usize = 4;
 
 pub fn findings(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
     let timed = input
@@ -25,8 +24,8 @@ pub fn findings(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
     let timed = timed.count();
     let judge = |camera: CameraId| -> Option<Finding> {
         let Some(fit) = analysis.clocks[camera.index()] else {
-            // Too few presses are no fault of the clock.
-            if timed < LEAST_PRESSES {
+            // Too few presses are not a clock fault.
+            if timed < MIN_PRESSES {
                 return None;
             }
             let fault = if has_bursts(&analysis.rates[camera.index()]) {
@@ -40,10 +39,10 @@ pub fn findings(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
             return Some(finding(Law::ClockDrift, fault, Some(camera), evidence));
         };
         let (size, error) = (fit.drift_ppm.abs(), fit.drift_se_ppm);
-        // Of a single line through three points the error is not known: `NaN` is no evidence.
-        (size - SIGMAS * error > MOST_DRIFT_PPM).then(|| {
+        // With three points the error of the line is unknown, and `NaN` is not evidence.
+        (size - SIGMAS * error > MAX_DRIFT_PPM).then(|| {
             let evidence = format!(
-                "expected the clock of {camera} within {MOST_DRIFT_PPM} ppm of the host's, found {:.1} ± {error:.1} ppm (n {})",
+                "expected the clock of {camera} within {MAX_DRIFT_PPM} ppm of the host's, found {:.1} ± {error:.1} ppm (n {})",
                 fit.drift_ppm, fit.n
             );
             finding(Law::ClockDrift, Fault::ClockWrong, Some(camera), evidence)
@@ -52,7 +51,7 @@ pub fn findings(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
     CameraId::ALL.into_iter().filter_map(judge).collect()
 }
 
-/// True when the busiest hundredth of the session stands out of the median by Poisson noise.
+/// True if the busiest hundredth of the session exceeds the median by more than Poisson noise.
 pub(crate) fn has_bursts(series: &RateSeries) -> bool {
     let counts = series
         .mean_per_s

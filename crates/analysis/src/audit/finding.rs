@@ -1,11 +1,11 @@
-//! A finding of the audit.
+//! Constructor of findings.
 
 use skinrig_model::CameraId;
 
 use super::advice;
 use crate::result::{Fault, Finding, Law};
 
-/// A finding, with the advice that belongs to its fault.
+/// A finding with the advice for its fault.
 pub(super) fn finding(
     law: Law,
     fault: Fault,

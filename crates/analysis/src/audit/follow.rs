@@ -1,45 +1,45 @@
 //! Law: a camera's centroid column follows the viewing angle of the press.
 //!
-//! The session is read in every way that has a name - cameras exchanged, an axis mirrored, rows shifted - and each reading is
-//! judged by the cameras near the drawn ones that explain it best ([`super::readings`]). A reading that is much likelier than the
-//! session as it is names the fault.
+//! The audit interprets the session in every known way (cameras swapped, an axis mirrored, rows shifted, ...) and scores
+//! each reading by the best-fitting cameras near the nominal ones ([`super::readings`]). A reading that is much likelier
+//! than the session as recorded identifies the fault.
 
 use skinrig_model::{CameraId, Point2};
 
 use super::finding::finding;
-use super::readings::{Judged, Path, Reading};
+use super::observed_press::ObservedPress;
+use super::readings::{Path, Reading, ScoredReading};
 use super::resection::{residuals, spread_deg};
 use super::segments::shifted_rest;
 use super::statistics::median;
-use super::touch::Touch;
 use crate::result::{Analysis, Fault, Finding, Law};
 
-/// Places that a statement needs; the drawn geometry makes up for few.
-const LEAST_PLACES: usize = 3;
-/// A reading is named when it is this much likelier than the session as it is, nats: 3000 to 1, where some forty are tried.
+/// Minimum number of locations for a statement; the nominal geometry compensates for a small number.
+const MIN_PLACES: usize = 3;
+/// A reading must be this much likelier than the session as recorded, nats: 3000 to 1, because about forty are compared.
 const CLEARLY: f64 = 8.0;
-/// Streams follow the presses when they leave less than this share of what knowing nothing leaves.
+/// Streams follow the presses if their residual is below this share of the ignorance residual.
 const FOLLOWS: f64 = 1.0 / 3.0;
-/// They do not when they leave more than this share.
+/// They do not follow if it is above this share.
 const FOLLOWS_NOT: f64 = 0.7;
-/// Places that it takes to say so.
+/// Minimum number of locations to state that.
 const MANY_PLACES: usize = 6;
-/// A camera this far from where it is drawn is worth a remark: four standard deviations of the prior, mm and degrees.
+/// Distance from the nominal camera worth a finding: four standard deviations of the prior, mm and degrees.
 const FAR_MM: f64 = 20.0;
 const FAR_DEG: f64 = 10.0;
-/// Columns of a fixed pixel scatter less than this in the median, px.
+/// Median scatter of the columns of a fixed pixel, px.
 const FIXED_PX: f64 = 2.0;
-/// Angles must scatter more than this in the median for columns to have to move, degrees.
-const LEAST_SPREAD_DEG: f64 = 5.0;
-/// Two streams whose columns differ by less than this, px, at this share of the presses are one.
+/// Median scatter of the angles above which columns must move, degrees.
+const MIN_SPREAD_DEG: f64 = 5.0;
+/// Two streams are identical if their columns differ by less than this, px, at this share of the presses.
 const SAME_PX: f64 = 0.5;
 const SAME_SHARE: f64 = 0.9;
-/// Located presses of another order cover the same area as the list: within this factor, each way.
+/// Presses in another order cover the same area as the list, within this factor along each axis.
 const SAME_EXTENT: f64 = 1.5;
 
-pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
-    let path = Path::new(&analysis.rig, touches);
-    if path.places < LEAST_PLACES {
+pub fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) -> Vec<Finding> {
+    let path = Path::new(&analysis.rig, presses_seen);
+    if path.places < MIN_PLACES {
         return Vec::new();
     }
     if path.places >= MANY_PLACES {
@@ -48,11 +48,11 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
             return vec![finding];
         }
     }
-    if let Some(finding) = one_camera_twice(touches) {
+    if let Some(finding) = one_camera_twice(presses_seen) {
         return vec![finding];
     }
     let own = path.as_it_is();
-    let as_is = path.judge(&own);
+    let as_is = path.score(&own);
     if as_is.fits == [None; 2] {
         return Vec::new();
     }
@@ -78,18 +78,18 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
         .collect()
 }
 
-/// Both streams show the same columns.
-fn one_camera_twice(touches: &[Touch<'_>]) -> Option<Finding> {
-    let both = touches.iter().filter_map(|t| {
+/// Both streams have the same columns.
+fn one_camera_twice(presses_seen: &[ObservedPress<'_>]) -> Option<Finding> {
+    let both = presses_seen.iter().filter_map(|t| {
         let [one, two] = t.sights;
         Some((one.column? - two.column?).abs())
     });
     let off: Vec<f64> = both.collect();
     let same = off.iter().filter(|o| **o < SAME_PX).count();
     let n = off.len();
-    (n >= LEAST_PLACES && same as f64 >= SAME_SHARE * n as f64).then(|| {
+    (n >= MIN_PLACES && same as f64 >= SAME_SHARE * n as f64).then(|| {
         let evidence = format!(
-            "expected each camera to see a press in a column of its own, found the same column, within {SAME_PX} px, in {same} of {n} presses"
+            "expected different columns in the two cameras, found the same column, within {SAME_PX} px, in {same} of {n} presses"
         );
         finding(
             Law::CentroidFollowsPosition,
@@ -100,12 +100,12 @@ fn one_camera_twice(touches: &[Touch<'_>]) -> Option<Finding> {
     })
 }
 
-/// The likeliest other reading, when it is clearly likelier than the session as it is and explains it.
-fn another_reading(path: &Path<'_>, as_is: &Judged<'_>) -> Option<Finding> {
+/// The likeliest other reading, if it is clearly likelier than the session as recorded and explains it.
+fn another_reading(path: &Path<'_>, as_is: &ScoredReading<'_>) -> Option<Finding> {
     let mut readings = path.alternatives();
     readings.extend(path.displaced(as_is));
     readings.push(path.as_planned());
-    let judged = readings.iter().map(|r| path.judge(r));
+    let judged = readings.iter().map(|r| path.score(r));
     let best = judged
         .filter(|j| j.follows(FOLLOWS))
         .min_by(|a, b| a.cost.total_cmp(&b.cost))?;
@@ -117,30 +117,30 @@ fn another_reading(path: &Path<'_>, as_is: &Judged<'_>) -> Option<Finding> {
              odds of e^{gain:.0} (n {} places)",
             in_degrees(as_is),
             in_degrees(&best),
-            best.reading.words,
+            best.reading.description,
             path.places
         );
         let mut found = finding(Law::CentroidFollowsPosition, fault, None, evidence);
-        // The cameras bear the plan out, and not what was measured.
+        // The cameras confirm the plan instead of the measurement.
         found.invalidates = true;
         found
     })
 }
 
-/// Robust standard deviations of both streams about the cameras that explain them best.
-fn in_degrees(judged: &Judged<'_>) -> String {
+/// Robust standard deviations of both streams about their best-fitting cameras.
+fn in_degrees(judged: &ScoredReading<'_>) -> String {
     let [one, two] = judged
         .fits
         .map(|f| f.map_or_else(|| "-".to_owned(), |f| format!("{:.1}", f.spread_deg)));
     format!("{one} and {two} degrees (cameras 1 and 2)")
 }
 
-/// A shift from some press on, in both streams or in one.
-fn shifted_later(path: &Path<'_>, as_is: &Judged<'_>) -> Option<Finding> {
+/// A shift that starts at some press, in both streams or in one.
+fn shifted_later(path: &Path<'_>, as_is: &ScoredReading<'_>) -> Option<Finding> {
     let both = shifted_rest(path, as_is, &[0, 1]);
     let alone = [0, 1].map(|k| shifted_rest(path, as_is, &[k]));
     let (rest, camera) = match (both, alone) {
-        // One stream that is shifted alone is a clock; the press list concerns both.
+        // A shift in one stream is a clock fault; a faulty press list shifts both.
         (_, [Some(rest), None]) => (rest, Some(CameraId::One)),
         (_, [None, Some(rest)]) => (rest, Some(CameraId::Two)),
         (Some(rest), _) => (rest, None),
@@ -152,31 +152,31 @@ fn shifted_later(path: &Path<'_>, as_is: &Judged<'_>) -> Option<Finding> {
         Fault::IndexShifted
     };
     let evidence = format!(
-        "expected columns on the viewing angles of their own presses, found those from press {} on at the position {:+} rows on: \
-         odds of e^{:.0} (n {} presses)",
-        path.touches[rest.from].press,
+        "expected columns on the viewing angles of their own presses, found those from press {} onwards at the \
+         position {:+} rows later: odds of e^{:.0} (n {} presses)",
+        path.presses_seen[rest.from].press,
         rest.by,
         rest.gain,
-        path.touches.len() - rest.from
+        path.presses_seen.len() - rest.from
     );
     let mut found = finding(Law::CentroidFollowsPosition, fault, camera, evidence);
     found.invalidates = true;
     Some(found)
 }
 
-/// Neither the cameras near the drawn ones nor the calibrated ones explain the stream.
+/// Neither cameras near the nominal ones nor the calibrated ones explain the stream.
 fn does_not_follow(
     analysis: &Analysis,
     path: &Path<'_>,
-    as_is: &Judged<'_>,
+    as_is: &ScoredReading<'_>,
     camera: CameraId,
 ) -> bool {
     let k = camera.index();
     let Some(fit) = as_is.fits[k] else {
         return false;
     };
-    // Where most presses share one angle, as at one place pressed again and again, columns have no way to follow.
-    if as_is.ignorance_deg[k] < LEAST_SPREAD_DEG {
+    // If most presses share one angle, for instance at a single location, columns cannot follow it.
+    if as_is.ignorance_deg[k] < MIN_SPREAD_DEG {
         return false;
     }
     let limit = FOLLOWS_NOT * as_is.ignorance_deg[k];
@@ -188,24 +188,24 @@ fn does_not_follow(
 }
 
 fn columns(path: &Path<'_>, reading: &Reading, k: usize) -> Vec<(f64, Point2)> {
-    let pairs = path.touches.iter().zip(&reading.at);
+    let pairs = path.presses_seen.iter().zip(&reading.at);
     pairs
         .filter_map(|(t, at)| Some((t.sights[k].column?, (*at)?)))
         .collect()
 }
 
-/// Presses whose columns have nothing to do with the positions: in another order, when the located ones cover the same area.
+/// Presses whose columns are unrelated to the positions. If the located presses cover the same area, their order is wrong.
 fn not_following(
     analysis: &Analysis,
     path: &Path<'_>,
-    as_is: &Judged<'_>,
+    as_is: &ScoredReading<'_>,
     lost: &[CameraId],
 ) -> Vec<Finding> {
     let law = Law::CentroidFollowsPosition;
     if lost.len() == 2 && covers_the_list(analysis, path) {
         let evidence = format!(
-            "expected columns on the viewing angles of the presses, found them {} off, no better than in any order, while the \
-             presses are located over the area of the list (n {} places)",
+            "expected columns on the viewing angles of the presses, found them {} off, no better than in random order, \
+             while the located presses cover the area of the list (n {} locations)",
             in_degrees(as_is),
             path.places
         );
@@ -215,8 +215,8 @@ fn not_following(
         let k = camera.index();
         let off = as_is.fits[k].map_or(f64::NAN, |f| f.spread_deg);
         let evidence = format!(
-            "expected columns on the viewing angles of the presses, found them {off:.1} degrees off where knowing nothing leaves \
-             {:.1} ({camera}, n {} places), and no reading of the session that does better",
+            "expected columns on the viewing angles of the presses, found them {off:.1} degrees off where a blind \
+             guess gives {:.1} ({camera}, n {} locations), and no other reading of the session explains them",
             as_is.ignorance_deg[k], path.places
         );
         let mut found = finding(law, Fault::Unknown, Some(*camera), evidence);
@@ -226,18 +226,18 @@ fn not_following(
     lost.iter().map(one).collect()
 }
 
-/// The presses that the drawn cameras locate spread as far as the positions of the list, along both axes.
+/// True if the presses located with the nominal cameras spread as far as the listed positions, along both axes.
 fn covers_the_list(analysis: &Analysis, path: &Path<'_>) -> bool {
     let (nominal, outline) = (&analysis.rig.nominal, &analysis.rig.outline);
     let located: Vec<Point2> = path
-        .touches
+        .presses_seen
         .iter()
         .filter_map(|t| {
             let columns = [t.sights[0].column, t.sights[1].column];
             crate::triangulate::locate(nominal, outline, columns).estimate()
         })
         .collect();
-    let listed: Vec<Point2> = path.touches.iter().map(|t| t.at()).collect();
+    let listed: Vec<Point2> = path.presses_seen.iter().map(|t| t.at()).collect();
     let spread = |points: &[Point2], of: fn(&Point2) -> f64| {
         let middle = median(points.iter().map(of).collect())?;
         median(points.iter().map(|p| (of(p) - middle).abs()).collect())
@@ -249,8 +249,8 @@ fn covers_the_list(analysis: &Analysis, path: &Path<'_>) -> bool {
     2 * located.len() > listed.len() && alike(|p| p.x_mm) && alike(|p| p.y_mm)
 }
 
-/// A camera that stands elsewhere than it is drawn: the calibration makes up for it.
-fn far_off(as_is: &Judged<'_>, camera: CameraId) -> Option<Finding> {
+/// A camera far from its nominal position; the calibration compensates for it.
+fn far_off(as_is: &ScoredReading<'_>, camera: CameraId) -> Option<Finding> {
     let k = camera.index();
     let fit = as_is.fits[k]?;
     if fit.spread_deg >= FOLLOWS * as_is.ignorance_deg[k] {
@@ -260,8 +260,8 @@ fn far_off(as_is: &Judged<'_>, camera: CameraId) -> Option<Finding> {
     let far = libm::hypot(x, y) > FAR_MM || skew.abs() > FAR_DEG;
     far.then(|| {
         let evidence = format!(
-            "expected {camera} within {FAR_MM} mm and {FAR_DEG} degrees of where the rig description draws it, found it about \
-             ({x:+.0}, {y:+.0}) mm and {skew:+.0} degrees off"
+            "expected {camera} within {FAR_MM} mm and {FAR_DEG} degrees of its position in the rig description, found \
+             it about ({x:+.0}, {y:+.0}) mm and {skew:+.0} degrees off"
         );
         finding(
             Law::CentroidFollowsPosition,
@@ -272,8 +272,8 @@ fn far_off(as_is: &Judged<'_>, camera: CameraId) -> Option<Finding> {
     })
 }
 
-/// All centroids of a camera on one spot, though the presses are not: the usual column, and how far the columns (px)
-/// and the angles (degrees) scatter in the median.
+/// Detects that all centroids of a camera are on one pixel although the presses are not: median column, and median scatter
+/// of the columns (px) and the angles (degrees).
 fn fixed_pixel(path: &Path<'_>, camera: CameraId) -> Option<[f64; 3]> {
     let drawn = &path.rig.nominal.cameras[camera.index()];
     let seen = columns(path, &path.as_it_is(), camera.index());
@@ -287,7 +287,7 @@ fn fixed_pixel(path: &Path<'_>, camera: CameraId) -> Option<[f64; 3]> {
     };
     let (column, columns) = spread(seen.iter().map(|c| c.0).collect())?;
     let (_, angles) = spread(seen.iter().map(|c| drawn.angle_of_point_deg(c.1)).collect())?;
-    (columns < FIXED_PX && angles > LEAST_SPREAD_DEG).then_some([column, columns, angles])
+    (columns < FIXED_PX && angles > MIN_SPREAD_DEG).then_some([column, columns, angles])
 }
 
 fn on_a_fixed_pixel(fixed: [Option<[f64; 3]>; 2]) -> Option<Finding> {

@@ -1,28 +1,28 @@
-//! Ways in which a table of positions can be written other than in the skin's frame, in mm.
+//! Owns the known ways to write a table of positions in another frame or unit than the skin frame in mm.
 
 use skinrig_model::{Point2, SkinOutline};
 
 use crate::result::Fault;
 
-/// Factors between units of length that are in use: m and cm for mm, inches, and the reverse.
+/// Factors between common units of length: m and cm for mm, inches, and the reverse.
 const FACTORS: [f64; 6] = [1e-3, 0.1, 1.0 / 25.4, 1e3, 10.0, 25.4];
 
-/// One way: where a position of the table lies in the skin's frame.
+/// A transform from positions of the table to the skin frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
-    /// What is wrong with the table.
+    /// Fault of the table.
     pub fault: Fault,
-    /// In words, as "the positions with ...".
-    pub words: String,
-    /// `[[xx, xy], [yx, yy]]`: turns, mirrors and scales about `about`.
+    /// Description, as in "the positions with ...".
+    pub description: String,
+    /// `[[xx, xy], [yx, yy]]`: rotation, mirroring and scale about `about`.
     matrix: [[f64; 2]; 2],
     about: Point2,
-    /// Added afterwards, mm.
+    /// Offset added afterwards, mm.
     by: [f64; 2],
 }
 
 impl Frame {
-    /// The position of the skin's frame.
+    /// Transforms a position to the skin frame.
     pub fn skin(&self, p: Point2) -> Point2 {
         let (x, y) = (p.x_mm - self.about.x_mm, p.y_mm - self.about.y_mm);
         let [[xx, xy], [yx, yy]] = self.matrix;
@@ -32,18 +32,18 @@ impl Frame {
         )
     }
 
-    /// The table is displaced by as much.
-    pub fn displaced(by: [f64; 2], words: String) -> Self {
+    /// A table displaced by this offset.
+    pub fn displaced(by: [f64; 2], description: String) -> Self {
         Self {
             fault: Fault::PositionsDisplaced,
-            words,
+            description,
             matrix: [[1.0, 0.0], [0.0, 1.0]],
             about: Point2::default(),
             by,
         }
     }
 
-    /// All ways that have a name, about 0 and about the middle of the skin.
+    /// All known transforms, about 0 and about the middle of the skin.
     pub fn all(outline: &SkinOutline) -> Vec<Self> {
         let centre = outline.centre;
         let mut all = Vec::new();
@@ -51,7 +51,7 @@ impl Frame {
             for (fault, what, matrix) in TURNS {
                 all.push(Self {
                     fault,
-                    words: format!("{what} about {name}"),
+                    description: format!("{what} about {name}"),
                     matrix,
                     about,
                     by: [0.0; 2],
@@ -61,7 +61,7 @@ impl Frame {
         for factor in FACTORS {
             all.push(Self {
                 fault: Fault::UnitOfPositions,
-                words: format!("all multiplied by {factor:.3}"),
+                description: format!("all multiplied by {factor:.3}"),
                 matrix: [[factor, 0.0], [0.0, factor]],
                 about: Point2::default(),
                 by: [0.0; 2],
@@ -72,7 +72,7 @@ impl Frame {
             centre.y_mm - 0.5 * outline.height_mm,
         );
         for (origin, name) in [(centre, "centre"), (corner, "lower left corner")] {
-            for (sign, verb) in [(1.0, "added"), (-1.0, "taken off")] {
+            for (sign, verb) in [(1.0, "added"), (-1.0, "subtracted")] {
                 let by = [sign * origin.x_mm, sign * origin.y_mm];
                 all.push(Self::displaced(by, format!("the skin's {name} {verb}")));
             }
@@ -81,7 +81,7 @@ impl Frame {
     }
 }
 
-/// The mirrored and the turned ones of the square's eight symmetries.
+/// Reflections and rotations among the eight symmetries of the square.
 const TURNS: [(Fault, &str, [[f64; 2]; 2]); 7] = [
     (Fault::AxisMirrored, "x mirrored", [[-1.0, 0.0], [0.0, 1.0]]),
     (Fault::AxisMirrored, "y mirrored", [[1.0, 0.0], [0.0, -1.0]]),

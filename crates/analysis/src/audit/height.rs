@@ -1,4 +1,4 @@
-//! Law: events begin at the touch of the surface, and not above it.
+//! Law: events begin when the tip reaches the surface, not above it.
 
 use skinrig_model::PressVerdict;
 
@@ -8,20 +8,19 @@ use crate::input::SessionInput;
 use crate::onsets::Onset;
 use crate::result::{Analysis, ClockMethod, Fault, Finding, Law, MapName};
 
-/// A statement needs this many presses: of fewer no two of them enclose the median with 95 %.
-const LEAST_PRESSES: usize = 6;
-/// Events that begin less than this above the surface are no offset: twice the tolerance within which a tip is taken to have
-/// arrived, mm.
-const MOST_HEIGHT_MM: f64 = 0.1;
-/// Nor those that begin less than this before the contact, beyond what the clocks leave open: two bins of the event rate, ms.
-const MOST_BEFORE_MS: f64 = 20.0;
+/// Minimum number of presses: with fewer, no two of them enclose the median with 95 %.
+const MIN_PRESSES: usize = 6;
+/// Smaller heights above the surface are not an offset: twice the arrival tolerance of the tip, mm.
+const MAX_HEIGHT_MM: f64 = 0.1;
+/// Nor are shorter times before contact, beyond the clock uncertainty: two bins of the event rate, ms.
+const MAX_BEFORE_MS: f64 = 20.0;
 
 pub fn findings(
     input: &SessionInput,
     analysis: &Analysis,
     onsets: [&[Onset]; 2],
 ) -> Option<Finding> {
-    // A clock that was fitted to the events themselves says nothing of when they began.
+    // A clock fitted to the events themselves cannot show when they began.
     let measured = |c: &_| matches!(c, Some(fit) if is_measured(fit));
     if !analysis.clocks.iter().all(measured) || !analysis.alignment.is_usable() {
         return None;
@@ -30,9 +29,9 @@ pub fn findings(
     let (one, two) = (one?, two?);
     // Late poses shift all contacts alike.
     let bound_us = analysis.alignment.bound_us(MapName::RobotFromHost);
-    let most_ms = MOST_BEFORE_MS + 1e-3 * bound_us.unwrap_or(0.0);
-    // What only one camera says is a matter of its clock, or of its noise.
-    let early = |h: &Height| h.low_mm > MOST_HEIGHT_MM && h.before_ms > most_ms;
+    let most_ms = MAX_BEFORE_MS + 1e-3 * bound_us.unwrap_or(0.0);
+    // An offset in a single camera is due to its clock or its noise.
+    let early = |h: &Height| h.low_mm > MAX_HEIGHT_MM && h.before_ms > most_ms;
     (early(&one) && early(&two)).then(|| {
         let evidence = format!(
             "expected events to begin when the tip reaches the surface, found them begin above it in the median: {one} (camera 1), \
@@ -47,19 +46,19 @@ fn is_measured(fit: &crate::result::ClockFit) -> bool {
     fit.method != ClockMethod::EventRates
 }
 
-/// How high above the surface the events of a camera begin.
+/// Height above the surface at which the events of a camera begin.
 struct Height {
     n: usize,
     median_mm: f64,
     /// 95 % interval of the median.
     low_mm: f64,
     high_mm: f64,
-    /// Median time before the contact, ms.
+    /// Median time before contact, ms.
     before_ms: f64,
 }
 
 impl Height {
-    /// Over the presses that the journal calls valid.
+    /// Over the presses that the journal reports as valid.
     fn of(input: &SessionInput, onsets: &[Onset]) -> Option<Self> {
         let valid = |o: &&Onset| {
             let outcome = input.outcomes.get(o.row).and_then(Option::as_ref);
@@ -90,13 +89,13 @@ impl std::fmt::Display for Height {
     }
 }
 
-/// Places in order of the two of `n` values that enclose the median of what they were drawn from with at least 95 % (sign test);
-/// `None` for too few.
+/// 1-based ranks of two of `n` values that enclose the population median with at least 95 % (sign test); `None` for too few
+/// values.
 fn rank_interval(n: usize) -> Option<(usize, usize)> {
-    if n < LEAST_PRESSES {
+    if n < MIN_PRESSES {
         return None;
     }
-    // Chances that exactly k of n lie below the median, from k = 0 on; for large n they underflow, and add nothing.
+    // Probability that exactly k of n are below the median, from k = 0. For large n they underflow and add nothing.
     let mut chance = libm::exp(-(n as f64) * core::f64::consts::LN_2);
     let (mut below, mut low) = (0.0, 0);
     for k in 0..n / 2 {
@@ -114,7 +113,7 @@ fn rank_interval(n: usize) -> Option<(usize, usize)> {
 mod tests {
     use super::rank_interval;
 
-    /// Ranks of the sign test's 95 % interval, counted from 1, as tables give them (Conover, Practical Nonparametric Statistics).
+    /// Ranks of the sign test's 95 % interval, 1-based as in tables (Conover, Practical Nonparametric Statistics).
     #[test]
     fn the_interval_of_a_median_is_the_sign_test_s() {
         assert_eq!(rank_interval(5), None);

@@ -1,56 +1,56 @@
-//! The plausibility audit: independent laws that every sane session obeys, and the fault that most likely broke one.
+//! Plausibility audit: independent laws that every valid session obeys, and the likeliest fault behind a violation.
 //!
-//! Each law is judged on its own, in its own file. A fault often breaks several laws; what follows from a finding
-//! that is more certain is left out, so that one fault gives one finding. Bounds and their sources: `docs/reference/audit.md`.
+//! Each law has its own file and is checked independently. One fault often violates several laws; findings that follow from
+//! a more certain one are dropped, so that one fault gives one finding. Bounds and sources: `docs/reference/audit.md`.
 
 mod advice;
+mod blind_guess;
 mod burst;
 mod commanded;
 mod complete;
-mod covered;
 mod drift;
 mod finding;
 mod follow;
 mod frames;
 mod height;
+mod observed_press;
 mod order;
 mod pattern;
 mod readings;
+mod recording_gaps;
 mod repetitions;
 mod resection;
 mod segments;
 mod statistics;
-mod touch;
-mod worth;
 
 use crate::input::SessionInput;
 use crate::onsets::Onset;
 use crate::result::{Analysis, Finding};
 use crate::stream::Silences;
 
-/// What the streams say by themselves, camera 1 and camera 2.
+/// Evidence from the streams alone, camera 1 and camera 2.
 #[derive(Debug, Clone, Default)]
 pub struct Streams {
-    /// Where they are silent.
+    /// Silent periods.
     pub silences: [Silences; 2],
-    /// Contacts that stand out of their counts, s on the host's clock; empty when nobody asks for them.
+    /// Contacts detected in the counts, s on the host clock; empty unless requested.
     pub contacts_s: [Vec<f64>; 2],
-    /// When the events of the presses began.
+    /// Onsets of the presses.
     pub onsets: [Vec<Onset>; 2],
 }
 
-/// The laws that the session breaks, the most certain finding first; empty for a plausible session.
+/// Violated laws, most certain finding first; empty for a plausible session.
 ///
-/// Reads the table of presses, the journal, the clock fits and the event rates of `analysis`. Where the presses were located
-/// plays a part only in the last law: a calibration can absorb a fault that the nominal geometry shows.
+/// Uses the table of presses, the journal, the clock fits and the event rates of `analysis`. Only the last law uses located
+/// positions: a calibration can absorb a fault that the nominal geometry shows.
 #[must_use]
 pub fn audit(input: &SessionInput, analysis: &Analysis, streams: &Streams) -> Vec<Finding> {
-    let touches = touch::touches(input, analysis);
+    let presses_seen = observed_press::observed_presses(input, analysis);
     let [one, two] = &streams.silences;
     let found = [
         complete::findings(input, analysis),
-        covered::findings(input, analysis, [one, two]),
-        commanded::findings(input, &touches),
+        recording_gaps::findings(input, analysis, [one, two]),
+        commanded::findings(input, &presses_seen),
         height::findings(
             input,
             analysis,
@@ -58,12 +58,15 @@ pub fn audit(input: &SessionInput, analysis: &Analysis, streams: &Streams) -> Ve
         )
         .into_iter()
         .collect(),
-        pattern::findings(&touches, streams.contacts_s.each_ref().map(Vec::as_slice)),
-        burst::findings(analysis, &touches),
-        follow::findings(analysis, &touches),
-        repetitions::findings(&touches),
+        pattern::findings(
+            &presses_seen,
+            streams.contacts_s.each_ref().map(Vec::as_slice),
+        ),
+        burst::findings(analysis, &presses_seen),
+        follow::findings(analysis, &presses_seen),
+        repetitions::findings(&presses_seen),
         drift::findings(input, analysis),
-        worth::findings(analysis).into_iter().collect(),
+        blind_guess::findings(analysis).into_iter().collect(),
     ]
     .concat();
     order::leading_first(found)

@@ -1,8 +1,8 @@
-//! Which findings follow from others, and which leads.
+//! Decides which findings follow from others, and which comes first.
 
 use crate::result::{Fault, Finding};
 
-/// The findings that do not follow from a more certain one, the most certain first.
+/// Drops findings that follow from a more certain one; the most certain comes first.
 pub(crate) fn leading_first(mut found: Vec<Finding>) -> Vec<Finding> {
     found.sort_by_key(|f| (place(f.fault), !f.invalidates));
     let mut kept: Vec<Finding> = Vec::new();
@@ -15,7 +15,7 @@ pub(crate) fn leading_first(mut found: Vec<Finding>) -> Vec<Finding> {
     kept
 }
 
-/// How directly a fault is seen: what is simply absent or contradictory first, what is inferred last.
+/// Rank by directness: missing or contradictory data first, inferred faults last.
 const fn place(fault: Fault) -> u8 {
     match fault {
         Fault::JournalContradictory => 0,
@@ -47,11 +47,11 @@ const fn place(fault: Fault) -> u8 {
     }
 }
 
-/// True when `b` is what one has to expect after `a`.
+/// True if `a` implies `b`.
 fn explains(a: &Finding, b: &Finding) -> bool {
     let same_camera = a.camera.is_none() || b.camera.is_none() || a.camera == b.camera;
     match a.fault {
-        // With wrong times no window holds its press.
+        // With wrong times no window contains its press.
         Fault::JournalContradictory => !matches!(
             b.fault,
             Fault::NoEvents | Fault::NoTruth | Fault::NoTriggers | Fault::UnitOfPositions
@@ -70,7 +70,7 @@ fn explains(a: &Finding, b: &Finding) -> bool {
             b.fault,
             Fault::CameraBlind | Fault::NotTouched | Fault::RobotOff | Fault::RecordingGap
         ),
-        // What is taken for something else: one of them is enough, and makes the rest look wrong.
+        // Misinterpretations: a single one makes everything else look wrong.
         Fault::UnitOfPositions
         | Fault::OneCameraTwice
         | Fault::IndexShifted
@@ -126,7 +126,7 @@ fn explains(a: &Finding, b: &Finding) -> bool {
         | Fault::HeightOff
         | Fault::PressesUnlisted
         | Fault::SyncPattern => false,
-        // One law that nothing explains is enough.
+        // One unexplained violation is enough.
         Fault::Unknown => b.fault == Fault::Unknown,
     }
 }

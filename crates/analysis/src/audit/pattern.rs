@@ -1,25 +1,29 @@
-//! Law: the recording holds the presses that the schedule lists, no more and no others.
+//! Law: the recording contains exactly the presses of the schedule.
 //!
-//! Only for recordings whose press times come from a schedule: a robot that is driven by this program lists what it does.
+//! Applies only to recordings with scheduled press times: a robot driven by skinrig lists what it does.
 
 use skinrig_model::PressRole;
 
 use super::finding::finding;
-use super::touch::Touch;
+use super::observed_press::ObservedPress;
 use crate::result::{Fault, Finding, Law};
 
-/// A contact within this of a listed one is it, s.
+/// A contact this close to a listed one matches it, s.
 const NEAR_S: f64 = 0.3;
-/// Contacts in both cameras within this of each other are one press, s.
+/// Contacts in both cameras this close are one press, s.
 const TOGETHER_S: f64 = 0.15;
-/// Unlisted contacts before the path belong to the sync part within this many of its lengths, and so many seconds.
+/// Unlisted contacts before the path belong to the sync part if they are within this many of its lengths, and so many
+/// seconds.
 const SYNC_LENGTHS: f64 = 2.0;
 const SYNC_S: f64 = 3.0;
 
-/// `contacts_s` are the contacts that stand out of the counts of each camera, s on the host's clock.
-pub fn findings(touches: &[Touch<'_>], contacts_s: [&[f64]; 2]) -> Vec<Finding> {
-    let scheduled: Vec<&Touch<'_>> = touches.iter().filter(|t| t.outcome.scheduled).collect();
-    let contact = |t: &&Touch<'_>| Some(t.timing?.contact.as_secs_f64());
+/// `contacts_s`: contacts detected in the counts of each camera, s on the host clock.
+pub fn findings(presses_seen: &[ObservedPress<'_>], contacts_s: [&[f64]; 2]) -> Vec<Finding> {
+    let scheduled: Vec<&ObservedPress<'_>> = presses_seen
+        .iter()
+        .filter(|t| t.outcome.scheduled)
+        .collect();
+    let contact = |t: &&ObservedPress<'_>| Some(t.timing?.contact.as_secs_f64());
     let listed: Vec<f64> = scheduled.iter().filter_map(contact).collect();
     let sync = scheduled.iter().filter(|t| t.role == PressRole::Sync);
     let sync: Vec<f64> = sync.filter_map(contact).collect();
@@ -101,7 +105,7 @@ pub fn findings(touches: &[Touch<'_>], contacts_s: [&[f64]; 2]) -> Vec<Finding> 
     found
 }
 
-/// Something was seen before the sync part should have begun, or at its begin: the cameras ran.
+/// True if anything was seen before or at the start of the sync part, which shows that the cameras were running.
 fn begin_is_recorded(contacts_s: [&[f64]; 2], begin: f64) -> bool {
     contacts_s
         .iter()

@@ -1,61 +1,62 @@
-//! Ways to read a session, and how well each explains what the cameras saw.
+//! Owns the readings of a session, and how well each explains what the cameras saw.
 //!
-//! A reading says which camera gave which stream, whether its picture is mirrored, and where each press was. Its cost is that of
-//! the best cameras near the drawn ones ([`super::resection`]): a reading that lays the columns on the viewing angles with cameras
-//! that stand where they are drawn costs little. The difference of two costs is the logarithm of the odds between them.
+//! A reading assigns streams to cameras, states whether an image is mirrored, and where each press was. Its cost is that of
+//! the best-fitting cameras near the nominal ones ([`super::resection`]): low if the columns match the viewing angles of
+//! cameras at their nominal positions. The difference of two costs is the log odds between the readings.
 
 use std::collections::BTreeSet;
 
 use skinrig_model::{CameraId, Point2, PressRole, RigGeometry, SENSOR_WIDTH};
 
 use super::frames::Frame;
+use super::observed_press::ObservedPress;
 use super::resection::{Resection, resect, residual_deg};
 use super::statistics::median;
-use super::touch::Touch;
 use crate::result::Fault;
 
-/// Most presses that readings are compared on; of more, every n-th.
-const MOST_PRESSES: usize = 600;
-/// Largest shift of the press list that is looked for.
-pub(crate) const MOST_SHIFT: i32 = 5;
-/// What a displacement that is itself fitted costs, nats: two parameters that may be anywhere on the skin.
+/// Maximum number of presses for the comparison; of more, every n-th is used.
+const MAX_PRESSES: usize = 600;
+/// Largest shift of the press list to consider.
+pub(crate) const MAX_SHIFT: i32 = 5;
+/// Cost of a fitted displacement, nats: two free parameters anywhere on the skin.
 const FREE_DISPLACEMENT: f64 = 4.0;
-/// Most that the sync presses say against a reading, nats per camera: they are one place, and may be badly seen.
-const MOST_SYNC: f64 = 8.0;
+/// Maximum evidence of the sync presses against a reading, nats per camera: they share one location, which may be poorly
+/// visible.
+const MAX_SYNC: f64 = 8.0;
 /// A line of the path ends where the direction turns by more than 45 degrees.
 const SAME_DIRECTION: f64 = 0.7;
 
-/// One way to read the session.
+/// One reading of the session.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
-    /// The fault of a session that has to be read like this; `None`: as it is.
+    /// Fault that this reading implies; `None` for the session as recorded.
     pub fault: Option<Fault>,
-    /// In words.
-    pub words: String,
-    /// The drawn camera of each stream.
+    /// Description.
+    pub description: String,
+    /// Nominal camera of each stream.
     pub cameras: [usize; 2],
-    /// Streams whose columns count from the other side.
+    /// Streams with mirrored columns.
     pub mirrored: [bool; 2],
-    /// Where each press of the path was; `None`: nothing is said of it.
+    /// Position of each press of the path; `None` if the reading does not define it.
     pub at: Vec<Option<Point2>>,
     /// Added to the cost, nats.
     penalty: f64,
 }
 
-/// What a reading makes of the session.
+/// A reading with its best fit.
 #[derive(Debug, Clone)]
-pub struct Judged<'a> {
+pub struct ScoredReading<'a> {
     pub reading: &'a Reading,
-    /// The cameras that explain the streams best.
+    /// Cameras that explain the streams best.
     pub fits: [Option<Resection>; 2],
-    /// Robust standard deviation of the viewing angles of the presses about their median: of an answer that knows nothing.
+    /// Robust standard deviation of the viewing angles about their median: the error of a blind guess.
     pub ignorance_deg: [f64; 2],
     /// Negative log likelihood, nats.
     pub cost: f64,
 }
 
-impl Judged<'_> {
-    /// The streams follow the presses: within this share of what knowing nothing leaves.
+impl ScoredReading<'_> {
+    /// True if the streams follow the presses: residual below this share of the ignorance residual.
     pub fn follows(&self, share: f64) -> bool {
         let each = self.fits.iter().zip(self.ignorance_deg);
         each.clone().any(|(fit, _)| fit.is_some())
@@ -65,23 +66,23 @@ impl Judged<'_> {
     }
 }
 
-/// The presses of the path that readings are about, in order, and the sync presses.
+/// Presses of the path in order, and the sync presses.
 pub struct Path<'a> {
     pub rig: &'a RigGeometry,
     /// All presses of the path with a column in at least one camera.
-    pub touches: Vec<&'a Touch<'a>>,
-    /// Different places among them.
+    pub presses_seen: Vec<&'a ObservedPress<'a>>,
+    /// Number of distinct locations.
     pub places: usize,
-    /// For each stream the sync presses' usual column and where they are said to be, when that comes from elsewhere than the
-    /// positions of the path.
+    /// Median column and stated position of the sync presses for each stream, if it has another source than the positions of
+    /// the path.
     sync: [Option<(f64, Point2)>; 2],
     stride: usize,
 }
 
 impl<'a> Path<'a> {
-    pub fn new(rig: &'a RigGeometry, touches: &'a [Touch<'a>]) -> Self {
-        let seen = |t: &&Touch<'_>| t.sights.iter().any(|s| s.column.is_some());
-        let path: Vec<&Touch<'_>> = touches
+    pub fn new(rig: &'a RigGeometry, presses_seen: &'a [ObservedPress<'a>]) -> Self {
+        let seen = |t: &&ObservedPress<'_>| t.sights.iter().any(|s| s.column.is_some());
+        let path: Vec<&ObservedPress<'_>> = presses_seen
             .iter()
             .filter(|t| t.role != PressRole::Sync)
             .collect();
@@ -91,20 +92,20 @@ impl<'a> Path<'a> {
             .filter(|t| seen(t))
             .map(|t| (t.planned.x_mm.to_bits(), t.planned.y_mm.to_bits()))
             .collect();
-        // Positions of a recording that was imported come from a table, those of its sync presses from the schedule.
+        // In an imported recording positions come from a table, those of sync presses from the schedule.
         let sync = CameraId::ALL.map(|camera| {
             let own = || {
-                touches
+                presses_seen
                     .iter()
                     .filter(|t| t.role == PressRole::Sync && t.outcome.scheduled)
             };
             let columns = own().filter_map(|t| t.sights[camera.index()].column);
             Some((median(columns.collect())?, own().next()?.at()))
         });
-        let stride = path.len().div_ceil(MOST_PRESSES).max(1);
+        let stride = path.len().div_ceil(MAX_PRESSES).max(1);
         Self {
             rig,
-            touches: path,
+            presses_seen: path,
             places: places.len(),
             sync,
             stride,
@@ -112,14 +113,14 @@ impl<'a> Path<'a> {
     }
 
     fn positions(&self) -> Vec<Option<Point2>> {
-        self.touches.iter().map(|t| Some(t.at())).collect()
+        self.presses_seen.iter().map(|t| Some(t.at())).collect()
     }
 
-    /// The session as it is.
+    /// The session as recorded.
     pub(crate) fn as_it_is(&self) -> Reading {
         Reading {
             fault: None,
-            words: "as it is".to_owned(),
+            description: "as recorded".to_owned(),
             cameras: [0, 1],
             mirrored: [false; 2],
             at: self.positions(),
@@ -127,30 +128,30 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// Every other reading that has a name.
+    /// All other known readings.
     pub fn alternatives(&self) -> Vec<Reading> {
         let base = self.as_it_is();
         let mut all = Vec::new();
-        for (cameras, fault, words) in [
+        for (cameras, fault, description) in [
             ([1, 0], Fault::CamerasSwapped, "cameras exchanged"),
             ([0, 0], Fault::OneCameraTwice, "both streams of camera 1"),
             ([1, 1], Fault::OneCameraTwice, "both streams of camera 2"),
         ] {
             all.push(Reading {
                 fault: Some(fault),
-                words: words.to_owned(),
+                description: description.to_owned(),
                 cameras,
                 ..base.clone()
             });
         }
-        for (mirrored, words) in [
+        for (mirrored, description) in [
             ([true, false], "the picture of camera 1 mirrored"),
             ([false, true], "the picture of camera 2 mirrored"),
             ([true, true], "the pictures of both cameras mirrored"),
         ] {
             all.push(Reading {
                 fault: Some(Fault::PictureTurned),
-                words: words.to_owned(),
+                description: description.to_owned(),
                 mirrored,
                 ..base.clone()
             });
@@ -158,16 +159,16 @@ impl<'a> Path<'a> {
         for frame in Frame::all(&self.rig.outline) {
             all.push(self.in_frame(&frame));
         }
-        // On one straight line a shift of the list moves all places alike, as cameras that stand elsewhere do.
+        // On a single straight line, a shift of the list displaces all locations alike, just as displaced cameras would.
         let bends = self
             .repetitions()
             .into_iter()
             .any(|r| self.lines(r).len() > 1);
-        for by in (1..=MOST_SHIFT).flat_map(|k| [k, -k]).filter(|_| bends) {
-            let at = (0..self.touches.len()).map(|i| self.shifted(i, by));
+        for by in (1..=MAX_SHIFT).flat_map(|k| [k, -k]).filter(|_| bends) {
+            let at = (0..self.presses_seen.len()).map(|i| self.shifted(i, by));
             all.push(Reading {
                 fault: Some(Fault::IndexShifted),
-                words: format!("the press list shifted by {by:+}"),
+                description: format!("the press list shifted by {by:+} rows"),
                 at: at.collect(),
                 ..base.clone()
             });
@@ -176,53 +177,52 @@ impl<'a> Path<'a> {
         all
     }
 
-    /// The positions of a table that is in `frame`.
+    /// The positions of a table given in `frame`.
     pub(crate) fn in_frame(&self, frame: &Frame) -> Reading {
         let base = self.as_it_is();
         Reading {
             fault: Some(frame.fault),
-            words: format!("the positions with {}", frame.words),
+            description: format!("the positions with {}", frame.description),
             at: base.at.iter().map(|p| p.map(|p| frame.skin(p))).collect(),
             ..base
         }
     }
 
-    /// The positions displaced by what both cameras seem to be displaced by the other way.
-    pub fn displaced(&self, as_is: &Judged<'_>) -> Option<Reading> {
+    /// Positions displaced opposite to the common displacement of both cameras.
+    pub fn displaced(&self, as_is: &ScoredReading<'_>) -> Option<Reading> {
         let [Some(one), Some(two)] = as_is.fits else {
             return None;
         };
         let by = [0, 1].map(|k| -0.5 * (one.off[k] + two.off[k]));
-        let words = format!("({:+.0}, {:+.0}) mm added", by[0], by[1]);
+        let description = format!("({:+.0}, {:+.0}) mm added", by[0], by[1]);
         Some(Reading {
             penalty: FREE_DISPLACEMENT,
-            ..self.in_frame(&Frame::displaced(by, words))
+            ..self.in_frame(&Frame::displaced(by, description))
         })
     }
 
-    /// The planned positions, where the measured ones are others.
+    /// The planned positions, if the measured ones differ.
     pub(crate) fn as_planned(&self) -> Reading {
         Reading {
             fault: Some(Fault::RobotOff),
-            words: "the planned positions in place of the measured ones".to_owned(),
-            at: self.touches.iter().map(|t| Some(t.planned)).collect(),
+            description: "the planned positions instead of the measured ones".to_owned(),
+            at: self.presses_seen.iter().map(|t| Some(t.planned)).collect(),
             ..self.as_it_is()
         }
     }
 
-    /// Where the press `by` rows after press `i` was, in the same repetition or another.
+    /// Position of the press `by` rows after press `i`, in the same repetition or another one.
     pub fn shifted(&self, i: usize, by: i32) -> Option<Point2> {
         let there = usize::try_from(i as i64 + i64::from(by)).ok()?;
-        Some(self.touches.get(there)?.at())
+        Some(self.presses_seen.get(there)?.at())
     }
 
-    /// The list from its end to its beginning, and every second line of the path the other way round: what a raster and a
-    /// meander make of each other.
+    /// The list reversed, and with every second line of the path reversed, which converts between a raster and a meander.
     fn reordered(&self, base: &Reading) -> Vec<Reading> {
-        let n = self.touches.len();
-        let reading = |words: &str, at: Vec<Option<Point2>>| Reading {
+        let n = self.presses_seen.len();
+        let reading = |description: &str, at: Vec<Option<Point2>>| Reading {
             fault: Some(Fault::OrderOfPresses),
-            words: words.to_owned(),
+            description: description.to_owned(),
             at,
             ..base.clone()
         };
@@ -236,10 +236,10 @@ impl<'a> Path<'a> {
             }
         }
         if n > 2 {
-            all.push(reading("the press list from its end", reversed));
-            let words = "every second line of the press list the other way round";
-            all.push(reading(words, odd));
-            all.push(reading(words, even));
+            all.push(reading("the press list reversed", reversed));
+            let description = "every second line of the press list reversed";
+            all.push(reading(description, odd));
+            all.push(reading(description, even));
         }
         all
     }
@@ -248,11 +248,11 @@ impl<'a> Path<'a> {
     fn repetitions(&self) -> Vec<std::ops::Range<usize>> {
         let mut from = 0;
         let mut all = Vec::new();
-        for i in 1..=self.touches.len() {
+        for i in 1..=self.presses_seen.len() {
             let ends = self
-                .touches
+                .presses_seen
                 .get(i)
-                .is_none_or(|t| t.repetition != self.touches[from].repetition);
+                .is_none_or(|t| t.repetition != self.presses_seen[from].repetition);
             if ends {
                 all.push(from..i);
                 from = i;
@@ -261,10 +261,10 @@ impl<'a> Path<'a> {
         all
     }
 
-    /// The straight lines of the path within `range`.
+    /// Straight lines of the path within `range`.
     fn lines(&self, range: std::ops::Range<usize>) -> Vec<std::ops::Range<usize>> {
         let step = |i: usize| {
-            let (a, b) = (self.touches[i - 1].at(), self.touches[i].at());
+            let (a, b) = (self.presses_seen[i - 1].at(), self.presses_seen[i].at());
             (b.x_mm - a.x_mm, b.y_mm - a.y_mm)
         };
         let (mut all, mut from) = (Vec::new(), range.start);
@@ -284,9 +284,9 @@ impl<'a> Path<'a> {
         all
     }
 
-    /// What `reading` makes of the session.
-    pub fn judge<'r>(&self, reading: &'r Reading) -> Judged<'r> {
-        let mut judged = Judged {
+    /// Fits the cameras to `reading`.
+    pub fn score<'r>(&self, reading: &'r Reading) -> ScoredReading<'r> {
+        let mut judged = ScoredReading {
             reading,
             fits: [None; 2],
             ignorance_deg: [0.0; 2],
@@ -309,16 +309,20 @@ impl<'a> Path<'a> {
             if let Some((column, at)) = self.sync[k] {
                 let column = mirrored(column, reading.mirrored[k]);
                 let off = residual_deg(&fit.camera, column, at) / fit.spread_deg;
-                judged.cost += (0.5 * off * off).min(MOST_SYNC);
+                judged.cost += (0.5 * off * off).min(MAX_SYNC);
             }
             judged.fits[k] = Some(fit);
         }
         judged
     }
 
-    /// What stream `k` saw and where the press was by `reading`.
+    /// Columns of stream `k` and positions by `reading`.
     fn pairs(&self, reading: &Reading, k: usize) -> Vec<(f64, Point2)> {
-        let seen = self.touches.iter().zip(&reading.at).step_by(self.stride);
+        let seen = self
+            .presses_seen
+            .iter()
+            .zip(&reading.at)
+            .step_by(self.stride);
         seen.filter_map(|(touch, at)| {
             let column = mirrored(touch.sights[k].column?, reading.mirrored[k]);
             Some((column, (*at)?))

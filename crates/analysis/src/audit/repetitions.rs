@@ -1,36 +1,36 @@
-//! Law: repetitions at one place agree.
+//! Law: repetitions at one location agree.
 
 use std::collections::BTreeMap;
 
 use skinrig_model::{CameraId, LocationId, RepetitionId};
 
 use super::finding::finding;
+use super::observed_press::ObservedPress;
 use super::statistics::median;
-use super::touch::Touch;
 use crate::result::{Fault, Finding, Law};
 
-/// Repetitions that differ by less than this in the median are not worth a remark, px: the radius of a cluster.
-const LEAST_MOVE_PX: f64 = 10.0;
-/// A move is sure when it is this many standard errors of the median.
+/// Smaller median differences between repetitions are ignored, px: the radius of a cluster.
+const MIN_MOVE_PX: f64 = 10.0;
+/// A move is certain above this many standard errors of the median.
 const SIGMAS: f64 = 5.0;
-/// Pairs of presses that a statement needs.
-const LEAST_PAIRS: usize = 6;
-/// Repetitions disagree when a place differs from itself by more than this share of what places differ.
-const MOST_SHARE: f64 = 0.5;
-/// Standard error of a median over the median absolute deviation and the root of n: 1.4826 sqrt(pi / 2).
+/// Minimum number of press pairs for a statement.
+const MIN_PAIRS: usize = 6;
+/// Repetitions disagree if a location differs from itself by more than this share of the differences between locations.
+const MAX_SHARE: f64 = 0.5;
+/// Standard error of a median divided by the median absolute deviation and the root of n: 1.4826 sqrt(pi / 2).
 const MEDIAN_ERROR: f64 = 1.858;
 
-pub fn findings(touches: &[Touch<'_>]) -> Vec<Finding> {
+pub fn findings(presses_seen: &[ObservedPress<'_>]) -> Vec<Finding> {
     CameraId::ALL
         .into_iter()
-        .filter_map(|camera| disagreement(touches, camera))
+        .filter_map(|camera| disagreement(presses_seen, camera))
         .collect()
 }
 
-fn disagreement(touches: &[Touch<'_>], camera: CameraId) -> Option<Finding> {
+fn disagreement(presses_seen: &[ObservedPress<'_>], camera: CameraId) -> Option<Finding> {
     let mut first: BTreeMap<(LocationId, u64), (RepetitionId, f64)> = BTreeMap::new();
     let mut moves: BTreeMap<RepetitionId, Vec<f64>> = BTreeMap::new();
-    for touch in touches
+    for touch in presses_seen
         .iter()
         .filter(|t| t.role != skinrig_model::PressRole::Sync)
     {
@@ -52,13 +52,13 @@ fn disagreement(touches: &[Touch<'_>], camera: CameraId) -> Option<Finding> {
     let between = median(columns.iter().map(|c| (c - middle).abs()).collect())?;
     for (repetition, moves) in &moves {
         let n = moves.len();
-        if n < LEAST_PAIRS {
+        if n < MIN_PAIRS {
             continue;
         }
         let moved = median(moves.clone())?;
         let scatter = median(moves.iter().map(|m| (m - moved).abs()).collect())?;
         let error = MEDIAN_ERROR * scatter / (n as f64).sqrt();
-        if moved.abs() > LEAST_MOVE_PX && moved.abs() > SIGMAS * error {
+        if moved.abs() > MIN_MOVE_PX && moved.abs() > SIGMAS * error {
             let evidence = format!(
                 "expected centroids at the same columns in each repetition, found {repetition} moved by {moved:.1} ± {error:.1} px \
                  ({camera}, n {n})"
@@ -71,10 +71,10 @@ fn disagreement(touches: &[Touch<'_>], camera: CameraId) -> Option<Finding> {
             ));
         }
         let within = median(moves.iter().map(|m| m.abs()).collect())?;
-        if within > LEAST_MOVE_PX && within > MOST_SHARE * between {
+        if within > MIN_MOVE_PX && within > MAX_SHARE * between {
             let evidence = format!(
-                "expected repetitions of a place to agree, found {repetition} off by {within:.1} px in the median, where \
-                 places differ by {between:.1} px from their middle ({camera}, n {n})"
+                "expected repetitions of a location to agree, found {repetition} off by {within:.1} px in the median, \
+                 where locations differ by {between:.1} px from their middle ({camera}, n {n})"
             );
             let mut found = finding(
                 Law::RepetitionsAgree,
@@ -82,7 +82,7 @@ fn disagreement(touches: &[Touch<'_>], camera: CameraId) -> Option<Finding> {
                 Some(camera),
                 evidence,
             );
-            // The rows of a repetition are other presses than they are taken for.
+            // The rows of a repetition belong to other presses than assumed.
             found.invalidates = true;
             return Some(found);
         }

@@ -1,50 +1,49 @@
-//! Where a camera stands, by the columns in which it saw known positions, with the rig description as prior.
+//! Estimates the position of a camera from the columns in which it saw known positions, with the rig description as prior.
 //!
-//! One camera at a time: its position, skew, distortion and field of view are fitted to (column, position) pairs so that the
-//! viewing angles agree, robustly, and no further from the drawn geometry than the data ask for. The prior makes the fit
-//! possible with any number of pairs, and makes its cost comparable between different readings of the same session: positions
-//! that are mirrored can be explained by a camera that stands elsewhere, and the prior says what that costs.
+//! Fits position, skew, distortion and field of view of one camera to (column, position) pairs, robustly, and deviates from
+//! the nominal geometry only as far as the data require. The prior allows any number of pairs and makes the cost comparable
+//! between readings of a session: a displaced camera can explain mirrored positions, and the prior charges for the
+//! displacement.
 
 use nalgebra::{SMatrix, SVector};
 use skinrig_model::{CameraModel, Point2};
 
 use super::statistics::median;
 
-/// x and y (mm), skew (degrees), distortion W, share of the field of view.
+/// x and y (mm), skew (degrees), distortion W, relative field of view.
 const PARAMETERS: usize = 5;
-/// How far a rig is from its drawing, one standard deviation. The published rig's measured guess was 3.5 mm off per coordinate
-/// (rms of four), 1.7 degrees of skew and 0.13 in W: a little more, so that a hastily measured rig is no fault.
+/// Standard deviation of a rig from its description. The initial guess for the published rig was off by 3.5 mm per
+/// coordinate (rms of four), 1.7 degrees of skew and 0.13 in W; slightly larger values tolerate a hastily measured rig.
 const PRIOR: [f64; PARAMETERS] = [5.0, 5.0, 2.5, 0.2, 0.05];
-/// Places count as independent up to this many: a skin errs alike at neighbouring places.
-const MOST_PLACES: f64 = 25.0;
-/// Angles are never taken for better known than this, degrees: half a degree is 5 columns.
-const LEAST_SPREAD_DEG: f64 = 0.5;
-/// Standard deviation of a normal distribution over its median absolute value.
+/// Maximum number of independent locations: errors of a skin are correlated between neighbours.
+const MAX_PLACES: f64 = 25.0;
+/// Lower bound of the angle uncertainty, degrees: half a degree is 5 columns.
+const MIN_SPREAD_DEG: f64 = 0.5;
+/// Standard deviation of a normal distribution divided by its median absolute value.
 const MEDIAN_TO_SIGMA: f64 = 1.4826;
-/// Residuals of this many spreads weigh half.
+/// Residuals of this many standard deviations have half weight.
 const SOFT: f64 = 2.5;
-/// Rounds of the fit.
+/// Iterations of the fit.
 const ROUNDS: usize = 12;
-/// Steps for the numerical derivatives.
+/// Step sizes of the numerical derivatives.
 const STEP: [f64; PARAMETERS] = [1e-3, 1e-3, 1e-3, 1e-4, 1e-4];
 
 type Vector = SVector<f64, PARAMETERS>;
 
-/// A camera fitted to what it saw.
+/// A camera fitted to observations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Resection {
-    /// The fitted camera.
     pub camera: CameraModel,
-    /// How far it is from the drawn one: x and y (mm), skew (degrees), W, share of the field of view.
+    /// Difference from the nominal camera: x and y (mm), skew (degrees), W, relative field of view.
     pub off: [f64; PARAMETERS],
     /// Robust standard deviation of the viewing angles about the fit, degrees.
     pub spread_deg: f64,
-    /// Negative logarithm of the likelihood of the angles and of the prior of the fit, up to a constant that depends on the
-    /// places alone, nats.
+    /// Negative log likelihood of the angles plus the prior of the fit, nats, up to a constant that depends only on the
+    /// locations.
     pub cost: f64,
 }
 
-/// Fits `drawn` to the pairs, which count as many times as there are `places`. `None` with fewer than 3 pairs.
+/// Fits `nominal` to the pairs, which have the weight of `locations` observations. `None` with fewer than 3 pairs.
 pub(crate) fn resect(
     drawn: &CameraModel,
     pairs: &[(f64, Point2)],
@@ -53,7 +52,7 @@ pub(crate) fn resect(
     if pairs.len() < 3 {
         return None;
     }
-    let independent = (places as f64).min(MOST_PLACES);
+    let independent = (places as f64).min(MAX_PLACES);
     let weight = independent / pairs.len() as f64;
     let mut off = Vector::zeros();
     let mut best: Option<(f64, Vector, f64)> = None;
@@ -69,7 +68,7 @@ pub(crate) fn resect(
             break;
         };
         off += step;
-        // A lens that folds, or a camera at the other end of the room, is no fit.
+        // A lens that folds, or a camera at the other end of the room, is not a fit.
         for k in 0..PARAMETERS {
             off[k] = off[k].clamp(-12.0 * PRIOR[k], 12.0 * PRIOR[k]);
         }
@@ -103,7 +102,7 @@ pub(crate) fn residual_deg(camera: &CameraModel, column: f64, at: Point2) -> f64
 pub(crate) fn spread_deg(residuals: &[f64]) -> Option<f64> {
     let usual = median(residuals.iter().map(|r| r.abs()).collect())?;
     let spread = MEDIAN_TO_SIGMA * usual;
-    spread.is_finite().then(|| spread.max(LEAST_SPREAD_DEG))
+    spread.is_finite().then(|| spread.max(MIN_SPREAD_DEG))
 }
 
 fn moved(drawn: &CameraModel, off: &Vector) -> CameraModel {

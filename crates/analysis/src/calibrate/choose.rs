@@ -1,41 +1,40 @@
-//! The calibration of a session: which model, which presses, and what a reader must know about it.
+//! Owns the calibration of a session: choice of model and presses, and warnings about it.
 
 use rayon::prelude::*;
 use skinrig_model::{
-    AnalysisSettings, CalibrationModel, CameraId, PressRole, PressVerdict, StereoGeometry,
-    ThresholdRule,
+    AnalysisSettings, CalibrationModel, CameraId, PressRole, StereoGeometry, ThresholdRule, Verdict,
 };
 
 use super::crossval::Folds;
-use super::paired::{Difference, Losses, Step, climb};
+use super::paired::{Difference, Losses, Step, select_model};
 use super::parameters::{MODELS, model_name, parameter_count};
-use super::{Fit, affordable, different_places, error_lengths, threshold};
+use super::{Fit, different_places, error_lengths, largest_supported, threshold};
 use crate::input::SessionInput;
 use crate::metrics::{bootstrap_over_locations, root_mean_square as rms, spread_mm};
 use crate::result::{
     CalibrationResult, Estimate, ModelComparison, ModelTest, PressResult, ThresholdChoice,
 };
-use crate::sets::{CalibrationSet, Sight};
+use crate::sets::{CalibrationPress, CalibrationSet};
 use crate::verdict;
 
-/// What locates the presses of a session.
-pub struct Calibrated {
-    /// The geometry.
+/// Geometry for locating the presses of a session.
+pub struct SessionCalibration {
+    /// Geometry.
     pub geometry: StereoGeometry,
-    /// How it was found; `None`: it is the nominal one.
+    /// How it was found; `None` for the nominal geometry.
     pub calibration: Option<CalibrationResult>,
-    /// The threshold on cluster events, when one was chosen.
+    /// Threshold on cluster events, if one was chosen.
     pub threshold: Option<ThresholdChoice>,
 }
 
-/// Calibrates on the calibrating presses. With [`ThresholdRule::Calibrated`] the least number of cluster events is
-/// chosen first, from cross-validated errors; presses of either role that have fewer get their verdict, and the
-/// calibration - the choice of the model included - is done again without them.
-pub fn calibrated(
+/// Calibrates on the calibration presses. With [`ThresholdRule::Calibrated`] it first chooses the minimum number of cluster
+/// events from cross-validated errors; presses of either role with fewer events get their verdict, and the calibration,
+/// including the choice of the model, is repeated without them.
+pub fn calibrate_session(
     input: &SessionInput,
     presses: &mut [PressResult],
     warnings: &mut Vec<String>,
-) -> Calibrated {
+) -> SessionCalibration {
     let settings = &input.settings;
     let nominal = &input.rig.nominal;
     let set = CalibrationSet::from_presses(presses);
@@ -50,24 +49,23 @@ pub fn calibrated(
         _ => None,
     };
     if let Some(choice) = &threshold {
-        leave_out(presses, choice.events);
+        reject_presses(presses, choice.events);
         if choice.left_out > 0 {
             let kept = CalibrationSet::from_presses(presses);
             chosen = choose(&kept, nominal, settings);
         }
     }
     warnings.append(&mut chosen.warnings);
-    Calibrated {
+    SessionCalibration {
         geometry: chosen.geometry,
         calibration: chosen.calibration,
         threshold,
     }
 }
 
-/// The verdict on valid presses of both roles with fewer cluster events than `threshold` in either camera.
-fn leave_out(presses: &mut [PressResult], threshold: u32) {
-    let judged =
-        |p: &&mut PressResult| p.role != PressRole::Sync && p.verdict == PressVerdict::Valid.name();
+/// Sets the verdict of valid presses of both roles with fewer cluster events than `threshold` in either camera.
+fn reject_presses(presses: &mut [PressResult], threshold: u32) {
+    let judged = |p: &&mut PressResult| p.role != PressRole::Sync && p.verdict == Verdict::Valid;
     for press in presses.iter_mut().filter(judged) {
         let views = press.views;
         let judgement = CameraId::ALL.into_iter().find_map(|camera| {
@@ -80,33 +78,32 @@ fn leave_out(presses: &mut [PressResult], threshold: u32) {
     }
 }
 
-/// A calibration and the errors of its presses at a geometry that has not seen them.
+/// A calibration, and held-out errors of its presses.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Chosen {
-    /// The geometry; the nominal one where no calibration was possible.
+pub struct ModelChoice {
+    /// The nominal geometry if no calibration was possible.
     pub geometry: StereoGeometry,
     /// How it was found.
     pub calibration: Option<CalibrationResult>,
-    /// In the order of the presses, mm; `None` when there are none, or too few locations for cross-validation.
+    /// In the order of the presses, mm; `None` without presses, or with too few locations for cross-validation.
     pub errors_mm: Option<Vec<f64>>,
-    /// What a reader must know.
+    /// Warnings for the reader.
     pub warnings: Vec<String>,
 }
 
-/// Fits the nested models to the set, compares them by leave-locations-out cross-validation and takes the one that
-/// `settings.calibration` names; of `Auto` the smallest that no larger one beats by more than noise explains. When the fit
-/// of a model fails the next smaller one that was fitted takes its place, and a warning says so; the nominal geometry
-/// is used only when all fail.
+/// Fits the nested models, compares them by leave-locations-out cross-validation, and selects the one in
+/// `settings.calibration`; for `Auto` the smallest that no larger one beats significantly. If a model fails to fit, the next
+/// smaller one replaces it with a warning; the nominal geometry is used only if all fail.
 #[must_use]
 pub fn choose(
     set: &CalibrationSet,
     nominal: &StereoGeometry,
     settings: &AnalysisSettings,
-) -> Chosen {
-    Chosen::for_set(set, nominal, settings)
+) -> ModelChoice {
+    ModelChoice::for_set(set, nominal, settings)
 }
 
-impl Chosen {
+impl ModelChoice {
     fn nominal(geometry: StereoGeometry, warnings: Vec<String>) -> Self {
         Self {
             geometry,
@@ -130,7 +127,7 @@ impl Chosen {
             };
         }
         if sights.is_empty() {
-            let warning = "no usable calibrating press: the nominal camera geometry is used";
+            let warning = "no usable calibration press: using the nominal camera geometry";
             return Self::nominal(*nominal, vec![warning.to_owned()]);
         }
         let mut start = *nominal;
@@ -138,67 +135,67 @@ impl Chosen {
             camera.lens = camera.lens.as_kind(settings.lens);
         }
         let places = different_places(sights);
-        let largest = affordable(places, wanted);
+        let largest = largest_supported(places, wanted);
         let mut warnings = Vec::new();
         let named = wanted != CalibrationModel::Auto;
         if named && largest != wanted && largest != CalibrationModel::None {
             warnings.push(format!(
-                "the calibrating presses touch too few places for the calibration `{}`: `{}` is used",
+                "the calibration presses cover too few locations for the calibration `{}`: using `{}`",
                 model_name(wanted),
                 model_name(largest)
             ));
         }
-        let contenders = contenders(sights, &start, places, settings);
+        let candidates = candidates(sights, &start, places, settings);
         let locations = locations(sights);
-        let comparison = Comparison::of(&locations, &contenders);
+        let comparison = Comparison::of(&locations, &candidates);
         let index = match wanted {
             CalibrationModel::Auto => comparison.as_ref().map(|c| c.best).or_else(|| {
-                let best = contenders.iter().rposition(Contender::is_determined)?;
+                let best = candidates.iter().rposition(ModelCandidate::is_determined)?;
                 warnings.push(format!(
-                    "too few calibrating places ({places}) to compare calibrations by cross-validation: `{}`, the \
-                     largest that they determine, is used",
-                    model_name(contenders[best].model)
+                    "too few calibration locations ({places}) to compare calibrations by cross-validation: using `{}`, \
+                     the largest that they determine",
+                    model_name(candidates[best].model)
                 ));
                 Some(best)
             }),
             _ => {
-                let named = contenders.iter().position(|c| c.model == largest);
-                let fitted = |i: &usize| contenders[*i].fit.is_some();
+                let named = candidates.iter().position(|c| c.model == largest);
+                let fitted = |i: &usize| candidates[*i].fit.is_some();
                 let used = named.and_then(|named| (0..=named).rev().find(fitted));
                 if let Some(used) = used.filter(|i| Some(*i) != named) {
                     warnings.push(format!(
-                        "the fit of the calibration `{}` found no plausible geometry: `{}`, the largest smaller one that \
-                         fits, is used",
+                        "the fit of the calibration `{}` found no plausible geometry: using `{}`, the next smaller one \
+                         that fits",
                         model_name(largest),
-                        model_name(contenders[used].model)
+                        model_name(candidates[used].model)
                     ));
                 }
                 used
             }
         };
-        let used = index.map(|i| &contenders[i]);
+        let used = index.map(|i| &candidates[i]);
         let Some((used, fit)) = used.and_then(|c| Some((c, c.fit.as_ref()?))) else {
             warnings.push(if largest == CalibrationModel::None {
                 format!(
-                    "{places} calibrating places are too few for any calibration: the nominal camera geometry is used"
+                    "{places} calibration locations are too few for any calibration: using the nominal camera geometry"
                 )
-            } else if contenders.iter().any(|c| c.fit.is_some()) {
-                "the calibrating presses determine no calibration: the nominal camera geometry is used"
+            } else if candidates.iter().any(|c| c.fit.is_some()) {
+                "the calibration presses determine no calibration: using the nominal camera geometry"
                     .to_owned()
             } else {
-                "no calibration found a plausible geometry: the nominal camera geometry is used"
+                "no calibration found a plausible geometry: using the nominal camera geometry"
                     .to_owned()
             });
             return Self::nominal(*nominal, warnings);
         };
         if let Some(comparison) = comparison.as_ref().filter(|_| named) {
-            warnings.extend(comparison.clearly_worse(used, &contenders[comparison.best]));
+            warnings.extend(comparison.clearly_worse(used, &candidates[comparison.best]));
         }
         let mut result = fit.result.clone();
-        warnings.extend(concerns(&result, sights));
+        warnings.extend(calibration_warnings(&result, sights));
         if let Some(comparison) = &comparison {
-            let rows = contenders.iter().enumerate().map(|(i, contender)| {
-                let test = comparison.test(i, &contenders);
+            let rows = candidates.iter().enumerate().map(|(i, contender)| {
+                let test = comparison.test(i, &candidates);
                 contender.row(sights, settings, contender.model == used.model, test)
             });
             result.compared = rows.collect();
@@ -213,16 +210,16 @@ impl Chosen {
     }
 }
 
-/// One of the nested models.
-struct Contender {
+/// A candidate model.
+struct ModelCandidate {
     model: CalibrationModel,
     fit: Option<Fit>,
     /// Cross-validated error of each press, mm.
     errors_mm: Option<Vec<f64>>,
 }
 
-impl Contender {
-    /// The data leave none of its parameters open.
+impl ModelCandidate {
+    /// True if the data determine all its parameters.
     fn is_determined(&self) -> bool {
         self.fit
             .as_ref()
@@ -231,7 +228,7 @@ impl Contender {
 
     fn row(
         &self,
-        sights: &[Sight],
+        sights: &[CalibrationPress],
         settings: &AnalysisSettings,
         chosen: bool,
         test: (Option<f64>, Option<ModelTest>),
@@ -255,13 +252,13 @@ impl Contender {
     }
 }
 
-/// All nested models, fitted and cross-validated as far as the number of places allows.
-fn contenders(
-    sights: &[Sight],
+/// All nested models, fitted and cross-validated as far as the number of locations allows.
+fn candidates(
+    sights: &[CalibrationPress],
     start: &StereoGeometry,
     places: usize,
     settings: &AnalysisSettings,
-) -> Vec<Contender> {
+) -> Vec<ModelCandidate> {
     let folds = Folds::deal(sights, settings.seed);
     MODELS
         .into_par_iter()
@@ -270,13 +267,13 @@ fn contenders(
             let fit = (count <= places)
                 .then(|| Fit::search(sights, start, model, settings.seed))
                 .flatten();
-            let mut contender = Contender {
+            let mut contender = ModelCandidate {
                 model,
                 fit,
                 errors_mm: None,
             };
-            // In every fold as many different places as parameters, as for the whole; fewer positions than locations
-            // are as many fewer in the folds.
+            // Every fold needs as many distinct locations as parameters, like the whole set. If there are fewer positions
+            // than locations, the folds have proportionally fewer.
             let doubles = locations_of(sights).saturating_sub(places);
             if contender.is_determined()
                 && count + doubles <= folds.least_kept()
@@ -289,7 +286,7 @@ fn contenders(
         .collect()
 }
 
-/// The contenders that could be validated, compared.
+/// Comparison of the candidates that could be validated.
 struct Comparison<'a> {
     losses: Losses<'a>,
     /// The smallest that no larger one beats.
@@ -298,12 +295,12 @@ struct Comparison<'a> {
 }
 
 impl<'a> Comparison<'a> {
-    /// `None` when no model could be validated.
-    fn of(locations: &'a [u32], contenders: &[Contender]) -> Option<Self> {
+    /// `None` if no model could be validated.
+    fn of(locations: &'a [u32], candidates: &[ModelCandidate]) -> Option<Self> {
         let errors: Vec<Option<&[f64]>> =
-            contenders.iter().map(|c| c.errors_mm.as_deref()).collect();
+            candidates.iter().map(|c| c.errors_mm.as_deref()).collect();
         let losses = Losses::new(locations, errors.iter().flatten().copied());
-        let (best, steps) = climb(&losses, &errors)?;
+        let (best, steps) = select_model(&losses, &errors)?;
         Some(Self {
             losses,
             best,
@@ -311,11 +308,11 @@ impl<'a> Comparison<'a> {
         })
     }
 
-    /// Bounded error of a contender, and how it did against the one in hand.
-    fn test(&self, i: usize, contenders: &[Contender]) -> (Option<f64>, Option<ModelTest>) {
-        let bounded = contenders[i].errors_mm.as_deref();
+    /// Bounded error of a candidate, and its comparison with the current one.
+    fn test(&self, i: usize, candidates: &[ModelCandidate]) -> (Option<f64>, Option<ModelTest>) {
+        let bounded = candidates[i].errors_mm.as_deref();
         let test = self.steps[i].map(|step| ModelTest {
-            against: contenders[step.against].model,
+            against: candidates[step.against].model,
             gain_mm: step.difference.mm,
             standard_error_mm: step.difference.standard_error_mm,
             ratio: step.difference.ratio(),
@@ -324,14 +321,14 @@ impl<'a> Comparison<'a> {
         (bounded.map(|e| self.losses.rms_mm(e)), test)
     }
 
-    /// Says so when the model that is used errs more than `better` by more than noise explains.
-    fn clearly_worse(&self, used: &Contender, better: &Contender) -> Option<String> {
+    /// A warning if the model in use has a significantly larger error than `better`.
+    fn clearly_worse(&self, used: &ModelCandidate, better: &ModelCandidate) -> Option<String> {
         let (a, b) = (used.errors_mm.as_deref()?, better.errors_mm.as_deref()?);
         let found: Difference = self.losses.clearly_worse(a, b)?;
         found.is_significant().then(|| {
             format!(
-                "the calibration `{}` is clearly worse than `{}`: {:.2} mm against {:.2} mm at locations left out (errors \
-                 bounded at {:.1} mm), a paired difference of {:.2} ± {:.2} mm (standard error)",
+                "the calibration `{}` is significantly worse than `{}`: {:.2} mm against {:.2} mm at held-out \
+                 locations (errors bounded at {:.1} mm), a paired difference of {:.2} ± {:.2} mm (standard error)",
                 model_name(used.model),
                 model_name(better.model),
                 self.losses.rms_mm(a),
@@ -344,8 +341,8 @@ impl<'a> Comparison<'a> {
     }
 }
 
-/// What a reader must know about a calibration.
-fn concerns(result: &CalibrationResult, sights: &[Sight]) -> Vec<String> {
+/// Warnings about a calibration.
+fn calibration_warnings(result: &CalibrationResult, sights: &[CalibrationPress]) -> Vec<String> {
     let mut out = Vec::new();
     let open: Vec<&str> = result
         .names
@@ -357,8 +354,8 @@ fn concerns(result: &CalibrationResult, sights: &[Sight]) -> Vec<String> {
     let count = result.names.len();
     if (result.rank as usize) < count {
         out.push(format!(
-            "the calibrating presses determine {} of the {count} parameters of the calibration `{}`: the values of {} \
-             are one choice of many that fit equally well; calibrate at more places, spread over the skin",
+            "the calibration presses determine {} of the {count} parameters of the calibration `{}`: the values of {} \
+             are one of many equally good solutions; calibrate at more locations, spread over the skin",
             result.rank,
             model_name(result.model),
             open.join(", ")
@@ -366,27 +363,27 @@ fn concerns(result: &CalibrationResult, sights: &[Sight]) -> Vec<String> {
     }
     if result.rmse_after_mm > result.rmse_before_mm {
         out.push(format!(
-            "the calibration does not lower the error of its own presses ({:.2} mm before, {:.2} mm after): outliers \
-             among them?",
+            "the calibration does not lower the error of its own presses ({:.2} mm before, {:.2} mm after); check for \
+             outliers",
             result.rmse_before_mm, result.rmse_after_mm
         ));
     }
     let spread = spread_mm(sights.iter().map(|s| s.truth));
     if sights.len() > 1 && result.rmse_after_mm >= spread {
         out.push(format!(
-            "the calibrated geometry places its own presses no better than their mean would ({:.2} mm against \
-             {spread:.2} mm): swapped cameras, another unit or a shifted order of presses?",
+            "the calibrated geometry locates its own presses no better than their mean position would ({:.2} mm \
+             against {spread:.2} mm); check for swapped cameras, a wrong unit or a shifted order of presses",
             result.rmse_after_mm
         ));
     }
     out
 }
 
-fn locations(sights: &[Sight]) -> Vec<u32> {
+fn locations(sights: &[CalibrationPress]) -> Vec<u32> {
     sights.iter().map(|s| s.location).collect()
 }
 
-fn locations_of(sights: &[Sight]) -> usize {
+fn locations_of(sights: &[CalibrationPress]) -> usize {
     let mut all = locations(sights);
     all.sort_unstable();
     all.dedup();

@@ -1,4 +1,4 @@
-//! Leave-locations-out cross-validation: the errors of presses at places that a fit has never seen.
+//! Leave-locations-out cross-validation: errors of presses at locations that a fit has not seen.
 
 use rayon::prelude::*;
 use skinrig_model::StereoGeometry;
@@ -8,14 +8,14 @@ use super::problem::Problem;
 use super::solver::minimise;
 use super::{best, error_lengths};
 use crate::seeded;
-use crate::sets::Sight;
+use crate::sets::CalibrationPress;
 
-/// Folds; with fewer locations each is a fold.
+/// Number of folds; with fewer locations, each is a fold.
 const FOLDS: usize = 10;
-/// Stream of the seed that deals locations to folds; the starts of a calibration use the small ones.
+/// Random stream for dealing locations to folds; the starts of a calibration use small numbers.
 const STREAM: u64 = 1 << 32;
 
-/// Which presses are held out together: all those of a location.
+/// Assignment of presses to folds: all presses of a location are held out together.
 pub struct Folds {
     of_sight: Vec<usize>,
     count: usize,
@@ -25,7 +25,7 @@ pub struct Folds {
 
 impl Folds {
     /// Deals the locations to folds of equal size, in an order drawn from `seed`.
-    pub(crate) fn deal(sights: &[Sight], seed: u64) -> Self {
+    pub(crate) fn deal(sights: &[CalibrationPress], seed: u64) -> Self {
         let mut locations: Vec<u32> = sights.iter().map(|s| s.location).collect();
         locations.sort_unstable();
         locations.dedup();
@@ -36,7 +36,7 @@ impl Folds {
         for i in (1..n).rev() {
             fold_of.swap(i, seeded::index(&mut rng, i + 1));
         }
-        let of = |s: &Sight| {
+        let of = |s: &CalibrationPress| {
             locations
                 .binary_search(&s.location)
                 .map_or(0, |i| fold_of[i])
@@ -48,19 +48,19 @@ impl Folds {
         }
     }
 
-    /// How many locations every fit has at least.
+    /// Smallest number of locations in any fit.
     pub(crate) fn least_kept(&self) -> usize {
         self.least_kept
     }
 
-    /// Error length of each press, mm, at the geometry fitted to the other folds; `None` when one of these fits fails.
+    /// Error length of each press, mm, with the geometry fitted to the other folds; `None` if one of these fits fails.
     ///
-    /// Every fold starts from `start` and from `full`, the solution for all presses. `full` has seen the held-out ones,
-    /// but only the fold's own presses decide which end is better, and bound the last fit. On a planted noisy set the
-    /// folds end where searches with all starts, without `full`, end (tested below).
+    /// Every fold starts from `start` and from `full`, the solution for all presses. `full` has seen the held-out presses,
+    /// but only the fold's own presses decide between the two results and bound the last fit. On a noisy planted set the
+    /// folds reach the same optimum as searches with all starts and without `full` (tested below).
     pub(crate) fn held_out_errors(
         &self,
-        sights: &[Sight],
+        sights: &[CalibrationPress],
         start: &StereoGeometry,
         count: usize,
         full: &Parameters,
@@ -82,7 +82,7 @@ impl Folds {
 }
 
 fn fitted(
-    sights: &[Sight],
+    sights: &[CalibrationPress],
     start: &StereoGeometry,
     count: usize,
     full: &Parameters,
@@ -101,8 +101,8 @@ fn fitted(
     is_plausible(start, &fine).then(|| with_parameters(start, &fine))
 }
 
-/// Mean of `a - b` over presses, and its standard error when whole locations are the independent units (ratio
-/// estimator: locations may have different numbers of presses); `None` with fewer than two locations.
+/// Mean of `a - b` over presses, and its standard error with whole locations as independent units (ratio estimator:
+/// locations may have different numbers of presses); `None` with fewer than two locations.
 pub(crate) fn mean_difference(locations: &[u32], a: &[f64], b: &[f64]) -> (f64, Option<f64>) {
     let mut rows: Vec<(u32, f64)> = locations
         .iter()
@@ -131,12 +131,12 @@ mod tests {
     use super::super::parameters::{MODELS, parameter_count};
     use super::*;
 
-    fn sights() -> Vec<Sight> {
+    fn sights() -> Vec<CalibrationPress> {
         let planted = StereoGeometry::paper_like([43.0, -33.0, 47.5, 38.0, -1.2, 0.4, -0.11, 0.03]);
         let mut noise = seeded::generator(5, 0);
         let mut out = Vec::new();
         for i in 0..60u32 {
-            // 30 places, each touched twice.
+            // 30 locations, each pressed twice.
             let truth = Point2::new(
                 -15.0 + 9.0 * f64::from(i % 30 % 6),
                 -18.0 + 9.0 * f64::from(i % 30 / 6),
@@ -144,7 +144,7 @@ mod tests {
             let columns = planted
                 .cameras
                 .map(|c| c.column_of_point(truth).unwrap() + 3.0 * seeded::signed_unit(&mut noise));
-            out.push(Sight {
+            out.push(CalibrationPress {
                 press: PressId::from_index(i),
                 location: i % 30,
                 columns,
@@ -170,17 +170,17 @@ mod tests {
         assert_eq!(Folds::deal(&[], 3).count, 0);
     }
 
-    /// If the fits saw the held-out location, moving its truth would move where they place it.
+    /// If the fits saw the held-out location, a change of its truth would change its estimates.
     #[test]
     fn a_held_out_location_has_no_say_in_its_own_error() {
         let start = StereoGeometry::PAPER;
         let mut sights = sights();
         let folds = Folds::deal(&sights, 3);
-        let errors = |sights: &[Sight]| {
+        let errors = |sights: &[CalibrationPress]| {
             let problem = Problem::coarse(sights, &start, 8);
             let full = problem.descend(parameters_of(&start)).parameters;
             let geometry = |fold: usize| {
-                let kept: Vec<Sight> = (0..sights.len())
+                let kept: Vec<CalibrationPress> = (0..sights.len())
                     .filter(|i| folds.of_sight[*i] != fold)
                     .map(|i| sights[i])
                     .collect();
@@ -202,16 +202,16 @@ mod tests {
             assert!((after[i] - wanted).abs() < 1e-6);
             assert!((after[i] - before[i]).abs() > 1.0);
         }
-        // The others learn from it.
+        // The others do use it.
         assert!((0..60).any(|i| i % 30 != 11 && (after[i] - before[i]).abs() > 0.01));
     }
 
-    /// A fold's two descents find what the search with all its starts finds.
+    /// The two descents of a fold find the same optimum as the search with all starts.
     #[test]
     fn folds_end_where_a_full_search_of_their_presses_ends() {
         let start = StereoGeometry::PAPER;
         let mut sights = sights();
-        // A press far off, so that the bounds of the fits matter.
+        // A distant press, so that the bounds of the fits matter.
         sights[17].columns[0] += 60.0;
         let folds = Folds::deal(&sights, 3);
         for model in MODELS {

@@ -1,14 +1,14 @@
-//! Calibration of the camera geometry by damped least squares on the error vectors of the calibrating presses.
+//! Calibration of the camera geometry by damped least squares on the error vectors of the calibration presses.
 //!
-//! Residuals are (dx, dy) per press, not the distance, which has a kink at 0. They are bounded: an error vector
-//! of length e counts as `e / sqrt(1 + (e / c)²)`, which is e for small errors and never more than c. So every
-//! press with two centroids takes part to the end: one far outside the skin pulls no more than c, one whose rays
-//! meet behind a camera or not at all counts c. c is 25 mm (a quarter of the skin) while the starts compete, then
-//! ten robust standard deviations of the best solution's errors, so that the last fit is ordinary least squares
-//! for all but outliers. Each start first goes downhill on a smooth stand-in for the error (`problem`).
+//! Residuals are (dx, dy) per press, not the distance, which has a kink at 0. They are bounded: an error vector of length e
+//! counts as `e / sqrt(1 + (e / c)²)`, which is e for small errors and never more than c. So every press with two centroids
+//! stays in the fit: one far outside the skin pulls no more than c, and one whose rays meet behind a camera or not at all
+//! counts c. c is 25 mm (a quarter of the skin) while the starts compete, then ten robust standard deviations of the best
+//! solution's errors, so that the last fit is ordinary least squares for all but outliers. Each start first descends on a
+//! smooth surrogate of the error (`problem`).
 //!
-//! [`calibrate`] fits one model; `choose` fits the nested ones, and `paired` takes the smallest whose errors at places left
-//! out (`crossval`) no larger one lowers; `threshold` finds how many cluster events a press needs to be worth its place.
+//! [`calibrate`] fits one model; `choose` fits the nested ones, and `paired` selects the smallest whose held-out errors
+//! (`crossval`) no larger one lowers; `threshold` finds how many cluster events a press needs to be useful.
 
 mod choose;
 mod crossval;
@@ -24,48 +24,48 @@ use skinrig_model::{CalibrationModel, StereoGeometry};
 
 use crate::result::CalibrationResult;
 use crate::seeded;
-use crate::sets::{CalibrationSet, Sight};
-pub(crate) use choose::{Calibrated, calibrated};
-pub use choose::{Chosen, choose};
+use crate::sets::{CalibrationPress, CalibrationSet};
+pub use choose::{ModelChoice, choose};
+pub(crate) use choose::{SessionCalibration, calibrate_session};
 use parameters::{
     MODELS, NAMES, PARAMETERS, Parameters, SPREAD, is_plausible, parameters_of, with_parameters,
 };
 pub use parameters::{model_name, parameter_count};
-use problem::{Eyes, Measure, Problem};
+use problem::{Measure, Problem, StereoModel};
 use solver::{Descent, minimise};
 
 /// Bound on an error vector while the starts compete, mm: a quarter of the skin's side.
 const COARSE_BOUND_MM: f64 = 25.0;
-/// Where descents end, as [`Problem::settled`]: along the arcs, which lead into the valley only (stopped at 1e-4, many
-/// starts found another one); along the errors while starts compete, whose ends then differ by about a millionth of their
-/// standard errors; in the last fit, about the rounding of the sum.
-const SETTLED_ARCS: f64 = 1e-9;
-const SETTLED_COARSE: f64 = 1e-12;
-const SETTLED_FINE: f64 = 1e-15;
+/// Convergence thresholds, see [`Problem::tolerance`]. Along the arcs, which only lead into the valley (with 1e-4 many
+/// starts found another one); along the errors while starts compete, whose results then differ by about a millionth of their
+/// standard errors; in the last fit, about the rounding error of the sum.
+const TOLERANCE_ARCS: f64 = 1e-9;
+const TOLERANCE_COARSE: f64 = 1e-12;
+const TOLERANCE_FINE: f64 = 1e-15;
 /// Bound of the last fit in robust standard deviations of one coordinate.
 const FINE_BOUND_SIGMAS: f64 = 10.0;
 /// Smallest bound of the last fit, mm.
-const LEAST_BOUND_MM: f64 = 1.0;
+const MIN_BOUND_MM: f64 = 1.0;
 /// Median of the length of a standard normal 2-vector, `sqrt(2 ln 2)`.
 const RAYLEIGH_MEDIAN: f64 = 1.177_410_022_515_474_7;
 /// Starts: the nominal geometry, the same grown model by model, and perturbed ones.
 const STARTS: u32 = 10;
-/// Starts whose RMSE differs by no more than this ended in the same optimum, mm.
+/// Starts with RMSEs within this found the same optimum, mm.
 const SAME_OPTIMUM_MM: f64 = 1e-6;
-/// Error length charged to a press whose rays do not meet in front of both cameras, and the most that any press is
-/// charged, mm: the skin's diagonal (100 x 100 mm).
+/// Error assigned to a press whose rays do not meet in front of both cameras, and the maximum for any press, mm: the skin's
+/// diagonal (100 x 100 mm).
 const NO_FIX_ERROR_MM: f64 = 141.421_356_237_309_5;
-/// Places closer than this are one place, mm.
+/// Positions closer than this are one location, mm.
 const SAME_PLACE_MM: f64 = 0.1;
 
-/// The largest model of `wanted` and the smaller ones that the data can bear: at least as many different
-/// locations as parameters, that is two residuals per parameter.
+/// The largest model, up to `wanted`, that the data support: at least as many distinct locations as parameters, which is two
+/// residuals per parameter.
 #[must_use]
-pub fn affordable_model(set: &CalibrationSet, wanted: CalibrationModel) -> CalibrationModel {
-    affordable(different_places(set.sights()), wanted)
+pub fn largest_supported_model(set: &CalibrationSet, wanted: CalibrationModel) -> CalibrationModel {
+    largest_supported(different_places(set.sights()), wanted)
 }
 
-fn affordable(places: usize, wanted: CalibrationModel) -> CalibrationModel {
+fn largest_supported(places: usize, wanted: CalibrationModel) -> CalibrationModel {
     let most = parameter_count(wanted).min(places);
     let mut largest_first = MODELS.into_iter().rev();
     largest_first
@@ -73,8 +73,8 @@ fn affordable(places: usize, wanted: CalibrationModel) -> CalibrationModel {
         .unwrap_or(CalibrationModel::None)
 }
 
-/// Different locations of the plan, or different measured positions when there are fewer of them.
-fn different_places(sights: &[Sight]) -> usize {
+/// Number of distinct locations of the plan, or of distinct measured positions if there are fewer.
+fn different_places(sights: &[CalibrationPress]) -> usize {
     let cell = |mm: f64| (mm / SAME_PLACE_MM).round() as i64;
     let mut places: Vec<_> = sights
         .iter()
@@ -88,12 +88,11 @@ fn different_places(sights: &[Sight]) -> usize {
     places.len().min(locations.len())
 }
 
-/// Fits `model` (of `Auto`, all parameters) to the set, starting from `start` and from seeded perturbations of it.
+/// Fits `model` (for `Auto`, all parameters) to the set, from `start` and from seeded perturbations of it.
 ///
-/// `None` when the model has no parameters, there are fewer residuals than parameters, or no start led to a plausible
-/// geometry (positions within 60 mm of the start, |skew| < 45 degrees, lenses monotone). When the data do not
-/// determine all parameters, `rank` says so and the solution is one of many: the one that the unperturbed start slides
-/// into.
+/// `None` if the model has no parameters, there are fewer residuals than parameters, or no start led to a plausible geometry
+/// (positions within 60 mm of the start, |skew| < 45 degrees, lenses monotone). If the data do not determine all parameters,
+/// `rank` shows it and the solution is one of many: the one reached from the unperturbed start.
 #[must_use]
 pub fn calibrate(
     set: &CalibrationSet,
@@ -114,7 +113,7 @@ struct Fit {
 
 impl Fit {
     fn search(
-        sights: &[Sight],
+        sights: &[CalibrationPress],
         start: &StereoGeometry,
         model: CalibrationModel,
         seed: u64,
@@ -128,7 +127,7 @@ impl Fit {
         let ends: Vec<Descent> = (0..STARTS)
             .into_par_iter()
             .map(|attempt| match attempt {
-                1 => problem.grown(base),
+                1 => problem.descend_nested(base),
                 _ => problem.descend(perturbed(base, count, attempt, seed)),
             })
             .collect();
@@ -140,14 +139,14 @@ impl Fit {
         let starts_agreeing = agreeing.count() as u32;
         let mut fit = Self::finish(&problem, coarse, model);
         if (fit.result.rank as usize) < count && is_plausible(start, &ends[0].parameters) {
-            // Many solutions are equally good: take the one nearest to the start, the same from every seed.
+            // Many solutions are equally good: take the one nearest to the start, independent of the seed.
             fit = Self::finish(&problem, &ends[0], model);
         }
         fit.result.starts_agreeing = starts_agreeing;
         Some(fit)
     }
 
-    /// The last fit from a solution of the coarse one, and what there is to say about it.
+    /// The last fit from a coarse solution, with its diagnostics.
     fn finish(problem: &Problem<'_>, coarse: &Descent, model: CalibrationModel) -> Self {
         let Problem {
             sights,
@@ -181,7 +180,7 @@ impl Fit {
             rmse_before_mm: rmse_mm(sights, start),
             rmse_after_mm: root_mean_square(&lengths),
             n: sights.len() as u32,
-            // The weight `1 / (1 + (e / c)²)` is a half at e = c.
+            // The weight `1 / (1 + (e / c)²)` is one half at e = c.
             outliers: lengths.iter().filter(|e| **e > problem.bound_mm).count() as u32,
             starts: STARTS,
             starts_agreeing: 0,
@@ -197,7 +196,7 @@ impl Fit {
     }
 }
 
-/// The first of the best plausible ends.
+/// First of the best plausible results.
 fn best<'a>(ends: &'a [Descent], start: &StereoGeometry) -> Option<&'a Descent> {
     ends.iter()
         .filter(|d| d.cost.is_finite() && is_plausible(start, &d.parameters))
@@ -217,29 +216,29 @@ fn perturbed(base: Parameters, count: usize, attempt: u32, seed: u64) -> Paramet
 
 impl<'a> Problem<'a> {
     /// The problem while the starts compete.
-    fn coarse(sights: &'a [Sight], base: &'a StereoGeometry, count: usize) -> Self {
+    fn coarse(sights: &'a [CalibrationPress], base: &'a StereoGeometry, count: usize) -> Self {
         Problem {
             sights,
             base,
             count,
             measure: Measure::Error,
             bound_mm: COARSE_BOUND_MM,
-            settled: SETTLED_COARSE,
+            tolerance: TOLERANCE_COARSE,
         }
     }
 
-    /// Downhill from anywhere: first along the arcs, then along the errors.
+    /// Descends from any start: first along the arcs, then along the errors.
     fn descend(&self, from: Parameters) -> Descent {
         let smooth = Problem {
             measure: Measure::Arc,
-            settled: SETTLED_ARCS,
+            tolerance: TOLERANCE_ARCS,
             ..*self
         };
         minimise(self, minimise(&smooth, from).parameters)
     }
 
-    /// Downhill with the smallest model, from its end with the next, up to this one: no model ends above a smaller one.
-    fn grown(&self, from: Parameters) -> Descent {
+    /// Descends with the smallest model, then from there with the next, up to this one: no model ends above a smaller one.
+    fn descend_nested(&self, from: Parameters) -> Descent {
         let of = |count: usize| Problem { count, ..*self };
         let counts = MODELS.map(parameter_count).into_iter();
         let mut end = of(parameter_count(MODELS[0])).descend(from);
@@ -249,22 +248,22 @@ impl<'a> Problem<'a> {
         end
     }
 
-    /// The same with the bound of the last fit, from the errors at `parameters`.
+    /// The problem with the bound of the last fit, from the errors at `parameters`.
     fn with_fine_bound(&self, parameters: &Parameters) -> Problem<'a> {
         let mut lengths = error_lengths(self.sights, &with_parameters(self.base, parameters));
         lengths.sort_unstable_by(f64::total_cmp);
         let sigma = lengths[lengths.len() / 2] / RAYLEIGH_MEDIAN;
         Problem {
-            bound_mm: (FINE_BOUND_SIGMAS * sigma).max(LEAST_BOUND_MM),
-            settled: SETTLED_FINE,
+            bound_mm: (FINE_BOUND_SIGMAS * sigma).max(MIN_BOUND_MM),
+            tolerance: TOLERANCE_FINE,
             ..*self
         }
     }
 }
 
-/// Root mean square error over all presses, mm; a press without a fix counts the skin's diagonal, and none counts more.
+/// Root mean square error over all presses, mm; a press without a fix counts the skin's diagonal, which is also the maximum.
 #[must_use]
-pub fn rmse_mm(sights: &[Sight], geometry: &StereoGeometry) -> f64 {
+pub fn rmse_mm(sights: &[CalibrationPress], geometry: &StereoGeometry) -> f64 {
     root_mean_square(&error_lengths(sights, geometry))
 }
 
@@ -273,10 +272,10 @@ fn root_mean_square(lengths: &[f64]) -> f64 {
     (squares / lengths.len() as f64).sqrt()
 }
 
-fn error_lengths(sights: &[Sight], geometry: &StereoGeometry) -> Vec<f64> {
-    let eyes = Eyes::of(geometry);
-    let length = |s: &Sight| {
-        eyes.error_vector(s).map_or(NO_FIX_ERROR_MM, |[dx, dy]| {
+fn error_lengths(sights: &[CalibrationPress], geometry: &StereoGeometry) -> Vec<f64> {
+    let stereo = StereoModel::of(geometry);
+    let length = |s: &CalibrationPress| {
+        stereo.error_vector(s).map_or(NO_FIX_ERROR_MM, |[dx, dy]| {
             libm::hypot(dx, dy).min(NO_FIX_ERROR_MM)
         })
     };

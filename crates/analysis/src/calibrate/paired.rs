@@ -1,33 +1,31 @@
-//! Which of several models places presses better: robust differences of their errors, paired by location.
+//! Compares models by robust differences of their errors, paired by location.
 //!
-//! The errors of two models at the same presses are compared press by press, so that what both share - the noise of the
-//! centroids, a bad place - cancels. Squared errors are bounded (Winsor's way), so that a tenth of outliers neither
-//! hides a difference nor makes one. The presses of a location count as one observation: they share its systematic
-//! error.
+//! The errors of two models are compared press by press, so that common contributions (centroid noise, a bad location)
+//! cancel. Squared errors are bounded (winsorised), so that a tenth of outliers neither hides a difference nor creates one.
+//! The presses of a location count as one observation, because they share its systematic error.
 
 use super::crossval::mean_difference;
-use super::{LEAST_BOUND_MM, RAYLEIGH_MEDIAN};
+use super::{MIN_BOUND_MM, RAYLEIGH_MEDIAN};
 use crate::distributions::student_quantile;
 
-/// An error longer than this many robust standard deviations of one coordinate counts no more than that. Of normal errors
-/// four in a million are longer.
+/// Bound on errors in robust standard deviations of one coordinate. Four in a million normal errors exceed it.
 const BOUND_SIGMAS: f64 = 5.0;
-/// One-sided level of all comparisons of a choice together. High on purpose: a model that is too large costs about one
-/// percent of the error, one that is too small ten and more (`docs/adr/0022-*`).
+/// One-sided level of all comparisons of a choice together. High on purpose: too large a model costs about one percent of
+/// the error, too small a model ten and more (`docs/adr/0022-*`).
 const CHOICE: f64 = 0.3;
-/// One-sided level from which a model is called clearly worse than another.
+/// One-sided level at which a model is called significantly worse than another.
 const CLEARLY_WORSE: f64 = 0.025;
-/// Models whose errors differ by less than this do equally well, mm: rounding, on noiseless data.
+/// Smaller differences are rounding errors on noiseless data, mm.
 const NO_DIFFERENCE_MM: f64 = 1e-6;
 
-/// How two models differ in their errors.
+/// Difference between the errors of two models.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Difference {
-    /// Bounded root mean square error of the one less that of the other, mm. Above 0: the other is better.
+    /// Bounded root mean square error of the one minus that of the other, mm. Positive: the other is better.
     pub mm: f64,
     /// Its standard error over locations, mm.
     pub standard_error_mm: f64,
-    /// Standard errors that noise alone does not reach.
+    /// Standard errors required for significance.
     pub needed: f64,
 }
 
@@ -41,7 +39,7 @@ impl Difference {
         }
     }
 
-    /// The other model is better by more than noise explains.
+    /// True if the other model is significantly better.
     pub(crate) fn is_significant(&self) -> bool {
         self.ratio() > self.needed
     }
@@ -54,8 +52,8 @@ pub struct Losses<'a> {
 }
 
 impl<'a> Losses<'a> {
-    /// `locations[i]` is that of press i in each of the models' `errors_mm`. The bound is the same for all models and
-    /// comes from the one with the least median error.
+    /// `locations[i]` belongs to press i in each of the models' `errors_mm`. The bound is common to all models and comes
+    /// from the one with the smallest median error.
     pub fn new<'b>(locations: &'a [u32], errors_mm: impl Iterator<Item = &'b [f64]>) -> Self {
         let median = |errors: &[f64]| {
             let mut sorted = errors.to_vec();
@@ -66,11 +64,11 @@ impl<'a> Losses<'a> {
         let sigma_mm = least / RAYLEIGH_MEDIAN;
         Self {
             locations,
-            bound_mm: (BOUND_SIGMAS * sigma_mm).max(LEAST_BOUND_MM),
+            bound_mm: (BOUND_SIGMAS * sigma_mm).max(MIN_BOUND_MM),
         }
     }
 
-    /// Errors longer than this count as this, mm.
+    /// Bound on the errors, mm.
     pub const fn bound_mm(&self) -> f64 {
         self.bound_mm
     }
@@ -90,15 +88,15 @@ impl<'a> Losses<'a> {
         )
     }
 
-    /// How much `a` errs more than `b`, by more than noise explains or not. `None` with fewer than two locations.
+    /// Tests whether `a` has larger errors than `b`. `None` with fewer than two locations.
     pub(crate) fn clearly_worse(&self, a: &[f64], b: &[f64]) -> Option<Difference> {
         self.difference(a, b, CLEARLY_WORSE)
     }
 
-    /// How much `a` errs more than `b`.
+    /// Error of `a` minus error of `b`.
     ///
-    /// The mean difference of squares over the sum of the two roots is the difference of the roots; its standard error
-    /// is that of the squares over the same. The limit is Student's t with one degree of freedom less than locations.
+    /// The mean difference of squares divided by the sum of the two roots is the difference of the roots; its standard error
+    /// scales alike. The limit is Student's t with locations - 1 degrees of freedom.
     fn difference(&self, a: &[f64], b: &[f64], level: f64) -> Option<Difference> {
         let (mean, error) = mean_difference(self.locations, &self.squares(a), &self.squares(b));
         let roots = self.rms_mm(a) + self.rms_mm(b);
@@ -114,19 +112,19 @@ impl<'a> Losses<'a> {
     }
 }
 
-/// One model against the one in hand when its turn came.
+/// Comparison of one model with the current one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
-    /// Index of the model in hand.
+    /// Index of the current model.
     pub against: usize,
-    /// How much the one in hand errs more.
+    /// Error of the current model minus that of the candidate.
     pub difference: Difference,
 }
 
-/// The choice among nested models, smallest first: the smallest is taken in hand; each larger one in turn replaces it if it
-/// errs less by more than noise explains, at a level that all comparisons share (Bonferroni). `errors_mm[i]`: those of model i at locations left out of its fit; `None` where
-/// it could not be validated. Returns the model in hand at the end and, of each model that was compared, with what.
-pub(crate) fn climb(
+/// Chooses among nested models, smallest first: starting from the smallest, each larger one replaces the current one if its
+/// errors are significantly smaller, at a level shared by all comparisons (Bonferroni). `errors_mm[i]`: held-out errors of
+/// model i; `None` if it could not be validated. Returns the chosen model and, for each compared model, its comparison.
+pub(crate) fn select_model(
     losses: &Losses<'_>,
     errors_mm: &[Option<&[f64]>],
 ) -> Option<(usize, Vec<Option<Step>>)> {
@@ -173,7 +171,7 @@ mod tests {
         // Differences of squares 5, 7, 0, 7: mean 4.75, sample variance 10.9167.
         let roots = once.rms_mm(&a) + once.rms_mm(&b);
         assert!((found.standard_error_mm - (32.75f64 / 3.0 / 4.0).sqrt() / roots).abs() < 1e-12);
-        // The same presses twice at the same places tell nothing new.
+        // The same presses at the same locations twice add no information.
         let twice = |v: [f64; 4]| [v, v].concat();
         let places = [0, 1, 2, 3, 0, 1, 2, 3];
         let again = Losses::new(&places, [&twice(a)[..], &twice(b)[..]].into_iter());
@@ -196,7 +194,7 @@ mod tests {
             losses.clearly_worse(small, large).unwrap().ratio()
         };
         assert!(ratio(&small, &large) > 4.0);
-        // Outliers far off that the models place differently, in favour of the worse one.
+        // Distant outliers that the models place differently, in favour of the worse one.
         for i in (0..n).step_by(10) {
             (small[i], large[i]) = (60.0, 90.0);
         }
@@ -225,14 +223,14 @@ mod tests {
         let (a, b, c) = (times(2.0), times(2.001), times(1.0));
         let climb_of = |list: &[Option<&[f64]>]| {
             let losses = Losses::new(&places, list.iter().flatten().copied());
-            climb(&losses, list)
+            select_model(&losses, list)
         };
         let (chosen, steps) = climb_of(&[Some(&a), Some(&b), Some(&c), Some(&c)]).unwrap();
         assert_eq!(chosen, 2);
         let against: Vec<_> = steps.iter().map(|s| s.map(|s| s.against)).collect();
         assert_eq!(against, [None, Some(0), Some(0), Some(2)]);
         assert_eq!(steps[3].unwrap().difference.ratio(), 0.0);
-        // A model that could not be validated takes no part.
+        // A model that could not be validated is skipped.
         let (chosen, steps) = climb_of(&[None, Some(&a), None, Some(&c)]).unwrap();
         assert_eq!((chosen, steps[3].unwrap().against), (3, 1));
         assert_eq!(climb_of(&[None, None]), None);

@@ -1,4 +1,4 @@
-//! The parameters of a calibration: their names, their order, how they sit in a camera geometry.
+//! Owns the parameters of a calibration: names, order, mapping to a camera geometry.
 
 use nalgebra::SVector;
 use skinrig_model::{CalibrationModel, StereoGeometry};
@@ -9,7 +9,7 @@ pub(crate) const PARAMETERS: usize = 10;
 /// All parameters; a nested model moves only the first 4, 6, 8 or 10.
 pub type Parameters = SVector<f64, PARAMETERS>;
 
-/// Their names, in order.
+/// Names, in order.
 pub const NAMES: [&str; PARAMETERS] = [
     "camera 1 x (mm)",
     "camera 1 y (mm)",
@@ -23,14 +23,14 @@ pub const NAMES: [&str; PARAMETERS] = [
     "camera 2 field of view scale (1)",
 ];
 
-/// Largest perturbation of a start: mm for positions, degrees for skews, 1 for distortions and scales. About the half
-/// widths of the public code's search box (positions 5 to 10 mm, skews 5 degrees, W 1).
+/// Largest perturbation of a start: mm for positions, degrees for skews, 1 for distortions and scales. About half the widths
+/// of the public code's search box (positions 5 to 10 mm, skews 5 degrees, W 1).
 pub(crate) const SPREAD: [f64; PARAMETERS] = [8.0, 8.0, 8.0, 8.0, 4.0, 4.0, 0.4, 0.4, 0.1, 0.1];
 
-/// A solution further than this from the start is not a calibration of this rig, mm.
+/// Largest plausible distance of a solution from the start, mm.
 const FARTHEST_MM: f64 = 60.0;
-/// Nor one with a larger skew, degrees.
-const MOST_SKEWED_DEG: f64 = 45.0;
+/// Largest plausible skew, degrees.
+const MAX_SKEWED_DEG: f64 = 45.0;
 
 /// The nested models, smallest first.
 pub const MODELS: [CalibrationModel; 4] = [
@@ -40,7 +40,7 @@ pub const MODELS: [CalibrationModel; 4] = [
     CalibrationModel::FullScale,
 ];
 
-/// How many parameters a model fits; of `Auto`, the most that it may choose.
+/// Number of parameters that a model fits; for `Auto`, the maximum.
 #[must_use]
 pub const fn parameter_count(model: CalibrationModel) -> usize {
     match model {
@@ -52,7 +52,7 @@ pub const fn parameter_count(model: CalibrationModel) -> usize {
     }
 }
 
-/// What a model is called in settings and messages.
+/// Name of a model in settings and messages.
 #[must_use]
 pub const fn model_name(model: CalibrationModel) -> &'static str {
     match model {
@@ -65,7 +65,7 @@ pub const fn model_name(model: CalibrationModel) -> &'static str {
     }
 }
 
-/// (x1, y1, x2, y2, skew 1, skew 2, W 1, W 2, scale 1, scale 2); the scales of a geometry are relative to itself: 1.
+/// (x1, y1, x2, y2, skew 1, skew 2, W 1, W 2, scale 1, scale 2); scales are relative to the geometry itself: 1.
 pub(crate) fn parameters_of(geometry: &StereoGeometry) -> Parameters {
     let [a, b] = &geometry.cameras;
     Parameters::from([
@@ -95,13 +95,13 @@ pub(crate) fn with_parameters(base: &StereoGeometry, p: &Parameters) -> StereoGe
     geometry
 }
 
-/// True when `p` can be a calibration of the rig that was drawn as `base`: positions within 60 mm of it, skews below
-/// 45 degrees, lenses in the range in which they are monotone.
+/// True if `p` is a plausible calibration of the nominal rig `base`: positions within 60 mm of it, skews below 45 degrees,
+/// lenses in their monotone range.
 pub(crate) fn is_plausible(base: &StereoGeometry, p: &Parameters) -> bool {
     let start = parameters_of(base);
     let geometry = with_parameters(base, p);
     p.iter().all(|v| v.is_finite())
         && (0..4).all(|i| (p[i] - start[i]).abs() <= FARTHEST_MM)
-        && p[4].abs().max(p[5].abs()) < MOST_SKEWED_DEG
+        && p[4].abs().max(p[5].abs()) < MAX_SKEWED_DEG
         && geometry.cameras.iter().all(|c| c.lens.is_monotone())
 }

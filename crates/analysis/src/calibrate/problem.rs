@@ -1,22 +1,22 @@
-//! The least-squares problem: bounded residuals of the calibrating presses and their analytic derivatives.
+//! The least-squares problem: bounded residuals of the calibration presses and their analytic derivatives.
 //!
-//! There are two measures of how well a geometry places a press. What counts is the [error](Measure::Error), estimate
-//! minus truth. It is hard to follow from afar: it has poles where rays are parallel and jumps where they meet at a
-//! camera. The [arc](Measure::Arc) from ray to truth is smooth everywhere, and each camera's concerns that camera alone:
-//! it leads from any start into the valley whose bottom the error then finds.
+//! There are two measures of how well a geometry locates a press. The final one is the [error](Measure::Error), estimate
+//! minus truth. It is hard to minimise from far away: it has poles where rays are parallel and jumps where they meet at a
+//! camera. The [arc](Measure::Arc) from ray to truth is smooth everywhere, and each camera's arc depends on that camera
+//! alone: it leads from any start into the valley whose minimum the error then finds.
 
 use nalgebra::{DMatrix, DVector, SMatrix};
 use skinrig_model::{CameraModel, LensAngle, SENSOR_WIDTH, StereoGeometry};
 
 use super::parameters::{PARAMETERS, Parameters, with_parameters};
-use crate::sets::Sight;
+use crate::sets::CalibrationPress;
 use crate::triangulate::{Intersection, PARALLEL_SINE, meet};
 
-/// Errors longer than this many bounds have no slope left: it falls with the cube of the length.
+/// Errors longer than this many bounds have no slope: it falls with the cube of the length.
 const SATURATED: f64 = 1e6;
 
-/// One camera at given parameters, with what does not depend on the press.
-struct Eye {
+/// One camera at given parameters, with everything that does not depend on the press.
+struct PosedCamera {
     camera: CameraModel,
     /// Unit vector of the axis before skew, and the derivative of its counter-clockwise angle by x and y, rad/mm.
     axis: [f64; 2],
@@ -25,7 +25,7 @@ struct Eye {
     half_fov_deg: f64,
 }
 
-impl Eye {
+impl PosedCamera {
     fn new(camera: CameraModel, half_fov_deg: f64) -> Self {
         let ax = camera.aim.x_mm - camera.position.x_mm;
         let ay = camera.aim.y_mm - camera.position.y_mm;
@@ -39,7 +39,7 @@ impl Eye {
         }
     }
 
-    /// The lens's angle at this column and the unit direction of the ray: the axis turned clockwise by angle and skew.
+    /// Lens angle at this column and unit direction of the ray: the axis turned clockwise by angle and skew.
     fn ray(&self, column: f64) -> (LensAngle, [f64; 2]) {
         let half = f64::from(SENSOR_WIDTH) / 2.0;
         let s = (column - half) / half;
@@ -51,21 +51,27 @@ impl Eye {
 }
 
 /// Both cameras at given parameters.
-pub(crate) struct Eyes([Eye; 2]);
+pub(crate) struct StereoModel([PosedCamera; 2]);
 
-impl Eyes {
+impl StereoModel {
     /// `base` at its own parameters.
     pub fn of(base: &StereoGeometry) -> Self {
-        Self(base.cameras.map(|c| Eye::new(c, c.lens.coefficients().0)))
+        Self(
+            base.cameras
+                .map(|c| PosedCamera::new(c, c.lens.coefficients().0)),
+        )
     }
 
     fn at(base: &StereoGeometry, p: &Parameters) -> Self {
         let moved = with_parameters(base, p);
-        Self([0, 1].map(|k| Eye::new(moved.cameras[k], base.cameras[k].lens.coefficients().0)))
+        Self(
+            [0, 1]
+                .map(|k| PosedCamera::new(moved.cameras[k], base.cameras[k].lens.coefficients().0)),
+        )
     }
 
-    /// Estimate minus truth, mm; `None` where the rays do not meet in front of both cameras.
-    pub(crate) fn error_vector(&self, sight: &Sight) -> Option<[f64; 2]> {
+    /// Estimate minus truth, mm; `None` if the rays do not meet in front of both cameras.
+    pub(crate) fn error_vector(&self, sight: &CalibrationPress) -> Option<[f64; 2]> {
         let d = [0, 1].map(|k| self.0[k].ray(sight.columns[k]).1);
         self.error_of(sight, &self.meet(d))
     }
@@ -75,7 +81,7 @@ impl Eyes {
         meet(positions, directions)
     }
 
-    fn error_of(&self, sight: &Sight, hit: &Intersection) -> Option<[f64; 2]> {
+    fn error_of(&self, sight: &CalibrationPress, hit: &Intersection) -> Option<[f64; 2]> {
         let fixed = hit.sine.abs() >= PARALLEL_SINE && hit.range_mm.iter().all(|r| *r >= 0.0);
         let error = [
             hit.at.x_mm - sight.truth.x_mm,
@@ -89,7 +95,7 @@ impl Eyes {
     /// With n_k the direction d_k turned by +90 degrees, the intersection X solves `n_k . (X - p_k) = 0`. Its
     /// differential is `n_k . dX = n_k . dp_k + r_k dphi_k`, where phi_k is the ray's counter-clockwise angle: the
     /// axis angle `atan2(aim - p_k)` minus theta_k.
-    fn linearised(&self, sight: &Sight) -> Option<([f64; 2], [[f64; PARAMETERS]; 2])> {
+    fn linearised(&self, sight: &CalibrationPress) -> Option<([f64; 2], [[f64; PARAMETERS]; 2])> {
         let rays = [0, 1].map(|k| self.0[k].ray(sight.columns[k]));
         let hit = self.meet(rays.map(|(_, d)| d));
         let error = self.error_of(sight, &hit)?;
@@ -98,7 +104,7 @@ impl Eyes {
             let (angle, d) = rays[k];
             let r = hit.range_mm[k];
             let per_degree = -r * 1f64.to_radians();
-            // Solve [n_1; n_2] dX = b e_k: along the other ray, as n_1 . d_2 = s and n_2 . d_1 = -s.
+            // Solve [n_1; n_2] dX = b e_k: along the other ray, because n_1 . d_2 = s and n_2 . d_1 = -s.
             let other = rays[1 - k].1;
             let along = if k == 0 { 1.0 } else { -1.0 } / hit.sine;
             let right_hand_sides = [
@@ -119,7 +125,7 @@ impl Eyes {
     /// For each camera the arc from its ray to the truth, counter-clockwise, mm, and its derivative by all parameters.
     ///
     /// With v = truth - p the arc is `|v| (angle of v - phi)`, phi as above.
-    fn arcs(&self, sight: &Sight) -> ([f64; 2], [[f64; PARAMETERS]; 2]) {
+    fn arcs(&self, sight: &CalibrationPress) -> ([f64; 2], [[f64; PARAMETERS]; 2]) {
         let mut arcs = [0.0; 2];
         let mut slope = [[0.0; PARAMETERS]; 2];
         for (k, eye) in self.0.iter().enumerate() {
@@ -141,10 +147,10 @@ impl Eyes {
     }
 }
 
-/// What the two residuals of a press are, mm.
+/// Definition of the two residuals of a press, mm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measure {
-    /// Estimate minus truth, x and y; the bound is on the length of the vector.
+    /// Estimate minus truth, x and y; the bound applies to the length of the vector.
     Error,
     /// Arc about camera 1 and camera 2 from the ray to the truth; each is bounded.
     Arc,
@@ -160,31 +166,31 @@ pub struct Normal {
 /// Bounded residuals of presses as functions of the first `count` parameters.
 #[derive(Clone, Copy)]
 pub struct Problem<'a> {
-    pub sights: &'a [Sight],
+    pub sights: &'a [CalibrationPress],
     pub base: &'a StereoGeometry,
     pub count: usize,
     pub measure: Measure,
-    /// What an error vector, or an arc, can count at most, mm.
+    /// Maximum contribution of an error vector or arc, mm.
     pub bound_mm: f64,
-    /// A descent has ended when a step promises to lower the cost by no more than this share of it.
-    pub settled: f64,
+    /// A descent ends when a step promises to lower the cost by at most this share of it.
+    pub tolerance: f64,
 }
 
 impl Problem<'_> {
-    /// Everything that a step needs, in one pass over the presses and without allocation. Sums run in the order of the
+    /// Everything that a step needs, in one pass over the presses and without allocation. Sums are in the order of the
     /// presses.
     pub fn normal(&self, p: &Parameters) -> Normal {
-        let eyes = Eyes::at(self.base, p);
+        let stereo = StereoModel::at(self.base, p);
         let mut cost = 0.0;
         let mut gradient = [0.0; PARAMETERS];
         let mut matrix = [[0.0; PARAMETERS]; PARAMETERS];
         for sight in self.sights {
-            let (residual, slope) = self.bounded(&eyes, sight);
+            let (residual, slope) = self.bounded(&stereo, sight);
             cost += residual[0] * residual[0] + residual[1] * residual[1];
             for i in 0..self.count {
                 let (x, y) = (slope[0][i], slope[1][i]);
                 gradient[i] += x * residual[0] + y * residual[1];
-                // The half above the diagonal is not used, but whole rows are faster than half ones.
+                // The upper triangle is not used, but whole rows are faster than half rows.
                 for j in 0..PARAMETERS {
                     matrix[i][j] += x * slope[0][j] + y * slope[1][j];
                 }
@@ -200,11 +206,11 @@ impl Problem<'_> {
 
     /// All residuals (x and y of each press in turn) and the whole Jacobian.
     pub fn rows(&self, p: &Parameters) -> (DVector<f64>, DMatrix<f64>) {
-        let eyes = Eyes::at(self.base, p);
+        let stereo = StereoModel::at(self.base, p);
         let mut residuals = DVector::zeros(2 * self.sights.len());
         let mut jacobian = DMatrix::zeros(2 * self.sights.len(), self.count);
         for (i, sight) in self.sights.iter().enumerate() {
-            let (residual, slope) = self.bounded(&eyes, sight);
+            let (residual, slope) = self.bounded(&stereo, sight);
             for axis in 0..2 {
                 residuals[2 * i + axis] = residual[axis];
                 for j in 0..self.count {
@@ -215,16 +221,24 @@ impl Problem<'_> {
         (residuals, jacobian)
     }
 
-    fn bounded(&self, eyes: &Eyes, sight: &Sight) -> ([f64; 2], [[f64; PARAMETERS]; 2]) {
+    fn bounded(
+        &self,
+        stereo: &StereoModel,
+        sight: &CalibrationPress,
+    ) -> ([f64; 2], [[f64; PARAMETERS]; 2]) {
         match self.measure {
-            Measure::Error => self.bounded_error(eyes, sight),
-            Measure::Arc => self.bounded_arcs(eyes, sight),
+            Measure::Error => self.bounded_error(stereo, sight),
+            Measure::Arc => self.bounded_arcs(stereo, sight),
         }
     }
 
     /// `r / sqrt(1 + (r / c)²)` of each arc, and its slope.
-    fn bounded_arcs(&self, eyes: &Eyes, sight: &Sight) -> ([f64; 2], [[f64; PARAMETERS]; 2]) {
-        let (mut arcs, mut slope) = eyes.arcs(sight);
+    fn bounded_arcs(
+        &self,
+        stereo: &StereoModel,
+        sight: &CalibrationPress,
+    ) -> ([f64; 2], [[f64; PARAMETERS]; 2]) {
+        let (mut arcs, mut slope) = stereo.arcs(sight);
         for (r, by) in arcs.iter_mut().zip(&mut slope) {
             let ratio = *r / self.bound_mm;
             let shrink = 1.0 / (1.0 + ratio * ratio).sqrt();
@@ -238,11 +252,15 @@ impl Problem<'_> {
         (arcs, slope)
     }
 
-    /// `e / sqrt(1 + (e / c)²)` and its slope. A press without a fix counts c and has no slope to follow.
-    fn bounded_error(&self, eyes: &Eyes, sight: &Sight) -> ([f64; 2], [[f64; PARAMETERS]; 2]) {
+    /// `e / sqrt(1 + (e / c)²)` and its slope. A press without a fix counts c and has no slope.
+    fn bounded_error(
+        &self,
+        stereo: &StereoModel,
+        sight: &CalibrationPress,
+    ) -> ([f64; 2], [[f64; PARAMETERS]; 2]) {
         let flat = [[0.0; PARAMETERS]; 2];
         let c = self.bound_mm;
-        let Some((e, mut slope)) = eyes.linearised(sight) else {
+        let Some((e, mut slope)) = stereo.linearised(sight) else {
             return ([c * std::f64::consts::FRAC_1_SQRT_2; 2], flat);
         };
         let length = libm::hypot(e[0], e[1]);
@@ -268,9 +286,9 @@ mod tests {
     use super::super::parameters::parameters_of;
     use super::*;
 
-    fn sights() -> Vec<Sight> {
+    fn sights() -> Vec<CalibrationPress> {
         (0u32..12)
-            .map(|i| Sight {
+            .map(|i| CalibrationPress {
                 press: PressId::from_index(i),
                 location: i,
                 columns: [180.0 + 25.0 * f64::from(i), 410.0 - 9.0 * f64::from(i)],
@@ -308,7 +326,7 @@ mod tests {
                     count: PARAMETERS,
                     measure,
                     bound_mm: 25.0,
-                    settled: 0.0,
+                    tolerance: 0.0,
                 };
                 let (_, jacobian) = problem.rows(&p);
                 for k in 0..PARAMETERS {
@@ -340,7 +358,7 @@ mod tests {
                 count,
                 measure: Measure::Error,
                 bound_mm: 25.0,
-                settled: 0.0,
+                tolerance: 0.0,
             };
             let (r, j) = problem.rows(&p);
             let normal = problem.normal(&p);

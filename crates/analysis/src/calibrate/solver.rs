@@ -1,27 +1,27 @@
-//! Damped least squares (Levenberg 1944, Marquardt 1963) on normal equations of at most ten unknowns.
+//! Damped least squares (Levenberg 1944, Marquardt 1963) on normal equations with at most ten unknowns.
 //!
-//! Each step solves `(JᵀJ + lambda D) delta = -Jᵀr` with D the largest diagonal of JᵀJ met so far (Moré 1978), which
-//! makes it independent of the parameters' units; lambda follows the gain ratio (Nielsen 1999). Normal equations
-//! square the condition number, which is harmless here: gradient and cost are exact whatever the step, so that only
-//! the speed of the last digits suffers. Errors of parameters come from the Jacobian itself (`uncertainty`).
+//! Each step solves `(JᵀJ + lambda D) delta = -Jᵀr` with D the largest diagonal of JᵀJ so far (Moré 1978), which makes it
+//! independent of the parameters' units; lambda follows the gain ratio (Nielsen 1999). Normal equations square the condition
+//! number, which is harmless here: gradient and cost are exact whatever the step, so only the speed of the last digits
+//! suffers. Parameter errors come from the Jacobian itself (`uncertainty`).
 
 use nalgebra::Cholesky;
 
 use super::parameters::{PARAMETERS, Parameters};
 use super::problem::{Normal, Problem};
 
-/// Most steps tried.
-const MOST_STEPS: usize = 200;
-/// First damping, relative to D.
+/// Maximum number of steps.
+const MAX_STEPS: usize = 200;
+/// Initial damping, relative to D.
 const FIRST_DAMPING: f64 = 1e-3;
-/// Least and most damping.
+/// Smallest and largest damping.
 const DAMPING: (f64, f64) = (1e-14, 1e16);
 /// Converged: the cosine between residuals and each column of the Jacobian is at most this.
 const FLAT: f64 = 1e-10;
-/// A step counts when it reduces the cost by at least this share of what it promised.
-const LEAST_GAIN_RATIO: f64 = 1e-4;
+/// A step is accepted if it lowers the cost by at least this share of its prediction.
+const MIN_GAIN_RATIO: f64 = 1e-4;
 
-/// Where a descent ended.
+/// Result of a descent.
 pub struct Descent {
     pub parameters: Parameters,
     pub cost: f64,
@@ -29,7 +29,7 @@ pub struct Descent {
     pub termination: &'static str,
 }
 
-/// Goes downhill from `from`.
+/// Minimises from `from`.
 pub(crate) fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
     let mut at = from;
     let mut here = problem.normal(&at);
@@ -40,7 +40,7 @@ pub(crate) fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
         cost,
         termination,
     };
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         if !here.cost.is_finite() {
             return ended(at, here.cost, "not converged: the error is not a number");
         }
@@ -59,17 +59,13 @@ pub(crate) fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
             continue;
         };
         let promised = damping * step.component_mul(&step).dot(&scale) - step.dot(&here.gradient);
-        if promised <= problem.settled * here.cost {
-            return ended(
-                at,
-                here.cost,
-                "converged: the error does not change any more",
-            );
+        if promised <= problem.tolerance * here.cost {
+            return ended(at, here.cost, "converged: the error no longer changes");
         }
         let there = at + step;
         let next = problem.normal(&there);
         let ratio = (here.cost - next.cost) / promised;
-        if ratio > LEAST_GAIN_RATIO {
+        if ratio > MIN_GAIN_RATIO {
             (at, here) = (there, next);
             let slack = 2.0 * ratio - 1.0;
             damping = (damping * (1.0 - slack * slack * slack).max(1.0 / 3.0)).max(DAMPING.0);
@@ -78,11 +74,7 @@ pub(crate) fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
             damping *= growth;
             growth *= 2.0;
             if damping > DAMPING.1 {
-                return ended(
-                    at,
-                    here.cost,
-                    "converged to the resolution of floating point",
-                );
+                return ended(at, here.cost, "converged to floating-point resolution");
             }
         }
     }
@@ -121,9 +113,9 @@ mod tests {
     use super::super::problem::Measure;
     use super::*;
     use crate::seeded;
-    use crate::sets::Sight;
+    use crate::sets::CalibrationPress;
 
-    /// The same problem for the orthogonal (QR) solver of a library.
+    /// The same problem for a library's orthogonal (QR) solver.
     struct Reference<'a>(Problem<'a>, Parameters);
 
     impl LeastSquaresProblem<f64, Dyn, Dyn> for Reference<'_> {
@@ -149,7 +141,7 @@ mod tests {
     fn it_ends_where_an_orthogonal_solver_ends() {
         let planted = StereoGeometry::paper_like([43.0, -33.0, 47.5, 38.0, -1.2, 0.4, -0.11, 0.03]);
         let mut noise = seeded::generator(2, 0);
-        let sights: Vec<Sight> = (0..80u32)
+        let sights: Vec<CalibrationPress> = (0..80u32)
             .map(|i| {
                 let at = [
                     -20.0 + 6.0 * f64::from(i % 10),
@@ -157,7 +149,7 @@ mod tests {
                 ];
                 let truth = Point2::new(at[0], at[1]);
                 let column = |c: skinrig_model::CameraModel| c.column_of_point(truth).unwrap();
-                Sight {
+                CalibrationPress {
                     press: PressId::from_index(i),
                     location: i,
                     columns: planted
@@ -183,7 +175,7 @@ mod tests {
                 count,
                 measure,
                 bound_mm,
-                settled: 1e-15,
+                tolerance: 1e-15,
             };
             let start = parameters_of(&base);
             let ours = minimise(&problem, start);

@@ -1,35 +1,35 @@
-//! How many clustered events a press needs, found on the calibrating presses alone.
+//! Finds how many cluster events a press needs, on the calibration presses alone.
 //!
-//! A press that is left out costs what an answer that knows nothing costs: the RMS distance of the true positions from
-//! their mean. One that is kept costs its cross-validated error, at most that of an answer drawn at random from the true
-//! positions, which errs by sqrt(2) times as much: so one bad press justifies leaving out one good one, and no more.
-//! The threshold with the least mean square cost is taken if it gains more than chance explains: the errors of whole
-//! locations are dealt anew to the locations (a permutation test of the largest gain over all thresholds, which so knows
-//! how many were tried). A gain that stands on a single location never does.
+//! A rejected press costs as much as a blind guess: the RMS distance of the true positions from their mean. A kept one costs
+//! its cross-validated error, at most that of a position drawn at random from the true ones, which errs by sqrt(2) times as
+//! much: so one bad press justifies rejecting one good one, and no more. The threshold with the smallest mean square cost is
+//! used if its gain is significant: a permutation test deals the errors of whole locations anew and compares the largest
+//! gain over all thresholds, which accounts for the number of candidates. A gain that depends on a single location never
+//! suffices.
 
 use super::crossval::mean_difference;
 use crate::metrics::spread_mm;
 use crate::result::ThresholdChoice;
 use crate::seeded;
-use crate::sets::Sight;
+use crate::sets::CalibrationPress;
 
-/// At most this share of the calibrating presses is left out: what lies above is no threshold but a broken session.
-const MOST_LEFT_OUT: f64 = 0.5;
-/// Most candidates that are reported.
+/// Largest share of calibration presses to reject; more indicates a broken session, not a threshold.
+const MAX_LEFT_OUT: f64 = 0.5;
+/// Maximum number of candidates reported.
 const REPORTED: usize = 60;
-/// A gain that chance reaches at least this often leaves the floor.
+/// A gain with a larger p value keeps the floor.
 const LEVEL: f64 = 0.05;
-/// Deals of the permutation test.
+/// Permutations of the test.
 const DEALS: u32 = 999;
-/// Stream of the seed that deals.
+/// Random stream of the permutations.
 const STREAM: u64 = 3 << 32;
 
 /// Chooses from the presses and their cross-validated errors (mm, in the same order). `None` without presses.
 ///
-/// Candidates are `floor` and, of each press above it, the least threshold that leaves this press out. The floor also
-/// stays when not even the best threshold does better than an answer that knows nothing.
+/// Candidates are `floor` and, for each press above it, the smallest threshold that rejects this press. The floor also stays
+/// if even the best threshold is no better than a blind guess.
 pub fn choose(
-    sights: &[Sight],
+    sights: &[CalibrationPress],
     errors_mm: &[f64],
     floor: u32,
     seed: u64,
@@ -44,7 +44,7 @@ pub fn choose(
         .iter()
         .map(|e| (e * e).min(2.0 * penalty))
         .collect();
-    let ranked = Ranked::new(sights, floor);
+    let ranked = RankedPresses::new(sights, floor);
     let candidates = ranked.costs(&kept, penalty);
     let (mut best, at_floor) = (*candidates.first()?, *candidates.first()?);
     for candidate in &candidates {
@@ -82,31 +82,31 @@ pub fn choose(
     })
 }
 
-/// One threshold.
+/// A candidate threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Candidate {
     events: u32,
-    /// Presses left out.
+    /// Presses rejected.
     left_out: usize,
     /// Mean square cost, mm².
     cost: f64,
 }
 
-/// The presses by their cluster events.
-struct Ranked {
+/// The presses sorted by cluster events.
+struct RankedPresses {
     /// Weakest first.
     order: Vec<usize>,
-    /// (threshold, presses left out), ascending.
+    /// (threshold, presses rejected), ascending.
     thresholds: Vec<(u32, usize)>,
 }
 
-impl Ranked {
-    fn new(sights: &[Sight], floor: u32) -> Self {
+impl RankedPresses {
+    fn new(sights: &[CalibrationPress], floor: u32) -> Self {
         let n = sights.len();
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by_key(|i| sights[*i].cluster_events);
         let events = |rank: usize| sights[order[rank]].cluster_events;
-        let most = (MOST_LEFT_OUT * n as f64) as usize;
+        let most = (MAX_LEFT_OUT * n as f64) as usize;
         let first = (0..n).find(|r| events(*r) >= floor).unwrap_or(n);
         let mut thresholds = vec![(floor, first)];
         let ends_a_group = |rank: &usize| *rank == n || events(*rank) != events(*rank - 1);
@@ -115,7 +115,7 @@ impl Ranked {
         Self { order, thresholds }
     }
 
-    /// All candidates when kept presses cost this, mm².
+    /// All candidates, given the costs of kept presses, mm².
     fn costs(&self, kept: &[f64], penalty: f64) -> Vec<Candidate> {
         let n = self.order.len();
         let mut cost: f64 = self.order.iter().map(|i| kept[*i]).sum();
@@ -135,11 +135,11 @@ impl Ranked {
     }
 }
 
-/// The share of deals, the real one among them, in which some threshold gains at least `gain`, mm². Locations with equally
-/// many presses exchange the costs of these.
+/// Share of permutations, including the identity, in which some threshold gains at least `gain`, mm². Locations with equally
+/// many presses exchange their costs.
 fn chance(
-    ranked: &Ranked,
-    sights: &[Sight],
+    ranked: &RankedPresses,
+    sights: &[CalibrationPress],
     kept: &[f64],
     penalty: f64,
     gain: f64,
@@ -167,13 +167,13 @@ fn chance(
         }
         let costs = ranked.costs(&dealt, penalty);
         let least = costs.iter().map(|c| c.cost).fold(f64::INFINITY, f64::min);
-        // Rounding of sums in another order must not decide between equals.
+        // Rounding of sums in another order must not decide between equal values.
         costs[0].cost - least >= gain * (1.0 - 1e-9)
     });
     (reached.count() + 1) as f64 / f64::from(DEALS + 1)
 }
 
-/// At most 60 of the candidates, evenly, with the first, the last and the chosen one among them.
+/// At most 60 of the candidates, evenly spaced, including the first, the last and the chosen one.
 fn thinned(candidates: &[Candidate], chosen: u32) -> Vec<(u32, f64)> {
     let n = candidates.len();
     let spaced = REPORTED - 1;
@@ -193,10 +193,10 @@ mod tests {
     use super::*;
 
     /// Presses on a circle of 30 mm, with these (cluster events, error in mm).
-    fn presses(rows: &[(u32, f64)]) -> (Vec<Sight>, Vec<f64>) {
+    fn presses(rows: &[(u32, f64)]) -> (Vec<CalibrationPress>, Vec<f64>) {
         let sights = rows.iter().enumerate().map(|(i, (events, _))| {
             let angle = std::f64::consts::TAU * i as f64 / rows.len() as f64;
-            Sight {
+            CalibrationPress {
                 press: PressId::from_index(i as u32),
                 location: i as u32,
                 columns: [320.0; 2],
@@ -221,7 +221,7 @@ mod tests {
         assert_eq!((found.events, found.left_out, found.n), (41, 3, 23));
         assert!((found.penalty_mm - 30.0).abs() < 1e-9);
         assert_eq!(found.candidates[0].0, 20);
-        // The cost of the choice: 20 presses of 3 mm, 3 of 30 mm.
+        // Cost of the choice: 20 presses of 3 mm, 3 of 30 mm.
         let wanted = ((20.0 * 9.0 + 3.0 * 900.0) / 23.0f64).sqrt();
         let cost = found.candidates.iter().find(|c| c.0 == 41).unwrap().1;
         assert!((cost - wanted).abs() < 1e-9);
@@ -237,7 +237,7 @@ mod tests {
     fn noise_leaves_the_floor() {
         assert_eq!(session(&[]).events, 20);
         assert_eq!(session(&[(25, 29.0), (30, 31.0), (40, 30.5)]).events, 20);
-        // Weak presses that are accurate stay, and so does a bad one among strong ones.
+        // Weak but accurate presses stay, and so does a bad one among strong ones.
         assert_eq!(session(&[(25, 2.0), (26, 1.0), (590, 90.0)]).events, 20);
     }
 
@@ -263,7 +263,7 @@ mod tests {
         assert_eq!((found.events, found.candidates[0].0), (15, 15));
     }
 
-    /// A tenth of outliers among presses whose events say nothing about them.
+    /// A tenth of outliers among presses whose events do not predict them.
     #[test]
     fn outliers_at_random_seldom_move_the_threshold() {
         let moved = (0..200u64).filter(|seed| {
@@ -279,13 +279,13 @@ mod tests {
             choose(&sights, &errors, 20, *seed).unwrap().events > 20
         });
         let moved = moved.count();
-        // 5 % at most by the test's level; 17 of 200 is two standard deviations above.
+        // At most 5 % by the test's level; 17 of 200 is two standard deviations above.
         assert!(moved <= 17, "{moved} of 200");
     }
 
     #[test]
     fn a_bad_press_at_the_strong_end_takes_no_good_ones_with_it() {
-        // The two weakest are bad, and so is one in the middle: leaving that out too would cost ten good ones.
+        // The two weakest are bad, and one in the middle: rejecting that one too would cost ten good ones.
         let found = session(&[(25, 140.0), (26, 140.0), (549, 140.0)]);
         assert_eq!((found.events, found.left_out), (27, 2));
         assert!(found.chance.unwrap() < 0.05);

@@ -1,34 +1,33 @@
 //! How well the data determine the fitted parameters: rank, condition, standard errors, correlations.
 //!
-//! Standard errors are those of the jackknife over locations: each location is left out once, and how far the
-//! solution moves (to first order) says how much it depends on the places that happened to be touched. Unlike
-//! `s² (JᵀJ)⁻¹` they need neither errors of equal size everywhere - those of a distant press are larger - nor
-//! independent repetitions at one place (MacKinnon, Nielsen and Webb 2023, "CV3").
+//! Standard errors come from the jackknife over locations: leave out each location once and see how far the solution moves
+//! (to first order). Unlike `s² (JᵀJ)⁻¹` this requires neither errors of equal size everywhere (distant presses have larger
+//! ones) nor independent repetitions at one location (MacKinnon, Nielsen and Webb 2023, "CV3").
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-/// Directions in which the Jacobian (columns scaled to unit length) is weaker than this, relative to its strongest, are
-/// not determined by the data: about the square root of the rounding error of a double.
+/// Directions in which the Jacobian (columns scaled to unit length) is weaker than this, relative to its strongest, are not
+/// determined by the data: about the square root of the rounding error of a double.
 const WEAKEST: f64 = 1e-7;
-/// A parameter with a larger share than this in an undetermined direction has no standard error.
+/// A parameter with a larger share in an undetermined direction has no standard error.
 const SHARE: f64 = 1e-4;
-/// A location that carries more than all but this of some direction decides it alone: nothing is left to judge it by.
-const LEAST_LEFT: f64 = 1e-9;
+/// A location that determines all but this share of some direction decides it alone, and its error cannot be estimated.
+const MIN_LEFT: f64 = 1e-9;
 
-/// What the data say about the parameters.
+/// Uncertainty of the parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Uncertainty {
-    /// Directions that are determined.
+    /// Number of determined directions.
     pub rank: usize,
-    /// Condition number of the Jacobian with columns scaled to unit length, when all are.
+    /// Condition number of the Jacobian with columns scaled to unit length, if all directions are determined.
     pub condition: Option<f64>,
-    /// Standard error of each parameter; `None` where it is not determined.
+    /// Standard error of each parameter; `None` if not determined.
     pub standard_errors: Vec<Option<f64>>,
-    /// Correlation of each pair; `None` where one is not determined.
+    /// Correlation of each pair; `None` if one is not determined.
     pub correlation: Vec<Vec<Option<f64>>>,
 }
 
-/// `residuals` and `jacobian` at the solution; `locations[i]` is where rows 2i and 2i + 1 belong.
+/// `residuals` and `jacobian` at the solution; `locations[i]` belongs to rows 2i and 2i + 1.
 pub fn uncertainty(
     residuals: &DVector<f64>,
     jacobian: &DMatrix<f64>,
@@ -103,8 +102,8 @@ pub fn uncertainty(
     }
 }
 
-/// Covariance of the coordinates in which `rows` is orthonormal. Without location g the solution moves by
-/// `(I - U_gᵀ U_g)⁻¹ U_gᵀ r_g`. `None` when fewer than two locations are left or one decides a direction alone.
+/// Covariance of the coordinates in which `rows` is orthonormal. Without location g the solution moves by `(I - U_gᵀ U_g)⁻¹
+/// U_gᵀ r_g`. `None` with fewer than two remaining locations, or if one decides a direction alone.
 fn jackknife(
     residuals: &DVector<f64>,
     rows: &DMatrix<f64>,
@@ -124,12 +123,7 @@ fn jackknife(
             pull.axpy(residuals[row], &u, 1.0);
         }
         let factor = Cholesky::new(left)?;
-        if factor
-            .l_dirty()
-            .diagonal()
-            .iter()
-            .any(|d| d * d < LEAST_LEFT)
-        {
+        if factor.l_dirty().diagonal().iter().any(|d| d * d < MIN_LEFT) {
             return None;
         }
         let moved = factor.solve(&pull);
@@ -159,7 +153,7 @@ mod tests {
         let (residuals, jacobian, locations) = line();
         let found = uncertainty(&residuals, &jacobian, &locations);
         assert_eq!(found.rank, 2);
-        // The slow way: fit the line again without each location.
+        // Reference: refit the line without each location.
         let mut squares = DVector::zeros(2);
         let mut product = 0.0;
         for left_out in 0..6 {
@@ -202,7 +196,7 @@ mod tests {
             });
             uncertainty(&residuals, &wide, &locations)
         };
-        // Parameter 2 is parameter 1 again, twice as strong.
+        // Parameter 2 is twice parameter 1.
         let twins = with(|i| 2.0 * i as f64);
         assert_eq!((twins.rank, twins.condition), (2, None));
         assert!(twins.standard_errors[0].is_some());

@@ -1,4 +1,4 @@
-//! Owns the activity of a camera over its recording: the event rate on a scale from idle to pressed.
+//! Owns the activity of a camera over its recording: event rate on a scale from idle to pressed.
 
 use super::span::PressSpan;
 use crate::rates::RateHistogram;
@@ -6,14 +6,14 @@ use crate::rates::RateHistogram;
 /// Rate per bin, scaled to 0..=1.
 pub(super) struct Activity {
     pub(super) bin_us: f64,
-    /// One per bin, 0 (idle) to 1 (pressed).
+    /// One value per bin, 0 (idle) to 1 (pressed).
     pub(super) values: Vec<f64>,
 }
 
 impl Activity {
     pub(super) fn new(rates: &RateHistogram, presses: &[PressSpan]) -> Result<Self, String> {
         let bin_us = rates.bin_us() as f64;
-        // Square roots make Poisson noise the same at all rates.
+        // Square roots make Poisson noise equal at all rates.
         let roots: Vec<f64> = rates
             .counts()
             .iter()
@@ -22,7 +22,7 @@ impl Activity {
         let total_us = roots.len() as f64 * bin_us;
         let pressed_us: f64 = presses.iter().map(|p| p.release_us - p.contact_us).sum();
         let share = (pressed_us / total_us).clamp(0.0, 0.8);
-        // Half of the idle bins lie below `low`, a quarter of the pressed ones above `high`.
+        // Half of the idle bins are below `low`, a quarter of the pressed ones above `high`.
         let low = crate::metrics::quantile(&mut roots.clone(), 0.5 * (1.0 - share)).unwrap_or(0.0);
         let high = crate::metrics::quantile(&mut roots.clone(), 1.0 - 0.25 * share).unwrap_or(0.0);
         if high - low < 0.5 {
@@ -43,8 +43,8 @@ impl Activity {
         self.values.len() as f64 * self.bin_us
     }
 
-    /// Mean activity in each of `n` bin-wide intervals side by side, the first about `t_us`. All of them part the bins
-    /// that they meet in the same way; outside the recording nothing is active.
+    /// Mean activity in each of `n` adjacent bin-wide intervals, the first about `t_us`. Intervals split bins consistently;
+    /// outside the recording activity is 0.
     pub(super) fn samples(&self, t_us: f64, n: usize) -> impl Iterator<Item = f64> {
         let at = t_us / self.bin_us - 0.5;
         let first = at.floor();

@@ -1,29 +1,29 @@
 //! Owns the bursts of a camera: every instant at which its activity looks like a press, planned or not.
 
 use super::activity::Activity;
-use super::refine::{LEAST_STRENGTH, Profile, products};
+use super::refine::{MIN_STRENGTH, Profile, products};
 use super::search::Map;
 use super::span::PressSpan;
 
-/// Bins that are merged before the recording is compared with the mean press.
+/// Bins merged for comparing the recording with the mean press.
 const MERGE: usize = 2;
-/// Two bursts are at least this share of the smallest step of the plan apart, and at most and at least so much, µs.
+/// Minimum distance of two bursts as a share of the smallest step of the plan, and its limits, µs.
 const APART: f64 = 0.45;
 const APART_US: (f64, f64) = (200_000.0, 600_000.0);
 
-/// The bursts of one camera on the host's clock, as far as a clock fit gives it: a shift of all is still possible.
+/// Bursts of one camera on the host clock, up to a common shift.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Train {
-    /// Contacts, rising, µs.
+pub(super) struct Bursts {
+    /// Contacts, ascending, µs.
     pub at_us: Vec<f64>,
-    /// The recording begins, µs.
+    /// Start of the recording, µs.
     pub from_us: f64,
-    /// The recording ends, µs.
+    /// End of the recording, µs.
     pub to_us: f64,
 }
 
-impl Train {
-    /// All bursts that are at least a third as strong as the mean press.
+impl Bursts {
+    /// All bursts at least a third as strong as the mean press.
     pub(super) fn new(activity: &Activity, presses: &[PressSpan], map: Map) -> Self {
         let profile = Profile::new(activity, presses, map);
         let merged_us = activity.bin_us * MERGE as f64;
@@ -32,7 +32,7 @@ impl Train {
         let level = mean(&template);
         template.iter_mut().for_each(|v| *v -= level);
         let strength: f64 = template.iter().map(|v| v * v).sum();
-        // Presses at the ends of the recording reach beyond it.
+        // Presses at the ends of the recording extend beyond it.
         let mut series = vec![0.0; template.len()];
         series.extend(activity.values.chunks(MERGE).map(mean));
         series.resize(series.len() + template.len(), 0.0);
@@ -41,7 +41,7 @@ impl Train {
             |i: usize| (i as f64 - template.len() as f64 + 0.25) * merged_us - profile.from_us;
         let found = strongest(
             &matches,
-            LEAST_STRENGTH * strength,
+            MIN_STRENGTH * strength,
             apart(presses) / merged_us,
         );
         let length_us = activity.length_us();
@@ -57,7 +57,7 @@ impl Train {
     }
 }
 
-/// How far apart two bursts are at least, µs.
+/// Minimum distance of two bursts, µs.
 fn apart(presses: &[PressSpan]) -> f64 {
     let steps = presses
         .windows(2)
@@ -66,7 +66,7 @@ fn apart(presses: &[PressSpan]) -> f64 {
     (APART * smallest).clamp(APART_US.0, APART_US.1)
 }
 
-/// The places of the largest values from `least` on, in order, none within `apart` of a larger one.
+/// Positions of local maxima from `least` on, ascending, none within `apart` of a larger one.
 fn strongest(values: &[f64], least: f64, apart: f64) -> Vec<usize> {
     let mut peaks: Vec<usize> = (1..values.len().saturating_sub(1))
         .filter(|i| values[*i] >= least.max(f64::MIN_POSITIVE))

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 type Complex = (f64, f64);
 
-/// The roots of unity of which a transform of length `n` makes use, by falling angle.
+/// Roots of unity for a transform of length `n`, by falling angle.
 fn roots(n: usize) -> Vec<Complex> {
     let root = |k| {
         let (sin, cos) = libm::sincos(-TAU * k as f64 / n as f64);
@@ -13,8 +13,8 @@ fn roots(n: usize) -> Vec<Complex> {
     (0..n / 2).map(root).collect()
 }
 
-/// In-place radix-2 transform (Cooley and Tukey 1965) of a power-of-two length, for which the roots are; unscaled.
-/// `inverse` flips the sign of the exponent.
+/// In-place radix-2 transform (Cooley and Tukey 1965) of a power-of-two length, with its roots; unscaled. `inverse` flips
+/// the sign of the exponent.
 fn transform(data: &mut [Complex], roots: &[Complex], inverse: bool) {
     let n = data.len();
     let bits = n.trailing_zeros();
@@ -45,7 +45,7 @@ fn product(a: Complex, b: Complex) -> Complex {
     (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
 }
 
-/// One series, transformed once, to be correlated with several templates.
+/// One series, transformed once, for correlation with several templates.
 pub(crate) struct Correlator {
     transformed: Vec<Complex>,
     roots: Vec<Complex>,
@@ -71,12 +71,11 @@ impl Correlator {
         }
     }
 
-    /// For each of two templates the lag (in `1 - template.len()..series.len()`) at which
-    /// `sum series[i + lag] * template[i]` is largest, and that sum. Values outside the series count 0. Templates beyond
-    /// the longest are cut.
+    /// For each of two templates, the lag (in `1 - template.len()..series.len()`) that maximises `sum series[i + lag] *
+    /// template[i]`, and that sum. Values outside the series count 0. Longer templates are truncated.
     pub(crate) fn best_lags(&self, templates: [&[f64]; 2]) -> [(i64, f64); 2] {
         let templates = templates.map(|t| &t[..t.len().min(self.longest_template)]);
-        // One transform does for both, as the parts of complex numbers: the series is real.
+        // One transform serves both as real and imaginary parts, because the series is real.
         let mut work = vec![(0.0, 0.0); self.transformed.len()];
         for (to, from) in work.iter_mut().zip(templates[0]) {
             to.0 = *from;
@@ -95,11 +94,11 @@ impl Correlator {
         ]
     }
 
-    /// The first largest of the unscaled sums for a template of this length, which `part` takes from the transform, and
-    /// its lag.
+    /// First maximum of the unscaled sums for a template of this length, which `part` extracts from the transform, and its
+    /// lag.
     fn largest(&self, work: &[Complex], template: usize, part: fn(&Complex) -> f64) -> (i64, f64) {
         let behind = template.saturating_sub(1);
-        // Negative lags stand at the end.
+        // Negative lags are at the end.
         let (ahead, late) = (&work[..self.length], &work[work.len() - behind..]);
         let mut best = (0, f64::NEG_INFINITY);
         for (lag, sum) in (-(behind as i64)..).zip(late.iter().chain(ahead).map(part)) {

@@ -1,7 +1,7 @@
 //! A robust line through (host time, camera time minus host time).
 //!
-//! Times are kept as a difference from exact integer references, so that hours in µs lose no digits: what is
-//! fitted is the small deviation of the camera clock from the host clock.
+//! Times are differences from exact integer references, so that hours in µs lose no digits: the fit sees only the small
+//! deviation of the camera clock from the host clock.
 
 /// One pair of simultaneous times.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -12,48 +12,47 @@ pub struct Pair {
     pub camera_us: f64,
 }
 
-/// A line `camera = offset + (1 + drift) host` and how well it fits.
+/// A line `camera = offset + (1 + drift) host` and its quality.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
     /// Camera time at host time 0, µs.
     pub offset_us: f64,
-    /// How much faster the camera's clock is, as a fraction.
+    /// Relative rate of the camera clock minus 1.
     pub drift: f64,
     /// Standard error of the drift.
     pub drift_se: f64,
-    /// RMS residual of the pairs that were used, µs.
+    /// RMS residual of the used pairs, µs.
     pub rms_us: f64,
-    /// Their largest absolute residual, µs.
+    /// Largest absolute residual of the used pairs, µs.
     pub max_us: f64,
-    /// For each pair, whether it was used.
+    /// For each pair, whether the fit uses it.
     pub used: Vec<bool>,
 }
 
 impl Line {
-    /// How many pairs were used.
+    /// Number of used pairs.
     #[must_use]
     pub fn n(&self) -> usize {
         self.used.iter().filter(|u| **u).count()
     }
 
-    /// How much later than the line the camera's time of `pair` is, µs.
+    /// Camera time of `pair` minus the line, µs.
     #[must_use]
     pub fn residual_us(&self, pair: Pair) -> f64 {
         (pair.camera_us - pair.host_us) - self.offset_us - self.drift * pair.host_us
     }
 }
 
-/// Rounds of "fit, then choose the inliers anew".
+/// Maximum number of iterations of fit and inlier selection.
 const ROUNDS: usize = 8;
 /// Residuals beyond this many robust standard deviations are outliers.
 const OUTLIER_SIGMAS: f64 = 5.0;
 /// Standard deviation of a normal distribution over its median absolute deviation.
 const MAD_TO_SIGMA: f64 = 1.482_602_218_505_602;
 
-/// Fits a line robustly: median of the slopes between pairs half the session apart (Theil 1950, with the
-/// pairing that keeps it linear in time), then least squares on the pairs within five robust standard
-/// deviations, which are never taken smaller than `floor_us`, µs. `None` with fewer than 3 usable pairs or no
-/// spread in time.
+/// Fits a line robustly: median of the slopes between pairs half the session apart (Theil 1950, with the pairing that keeps
+/// it linear in time), then least squares on the pairs within five robust standard deviations, but at least `floor_us`, µs.
+/// `None` with fewer than 3 usable pairs or no spread in time.
 #[must_use]
 pub fn fit(pairs: &[Pair], floor_us: f64) -> Option<Line> {
     let n = pairs.len();
@@ -137,7 +136,7 @@ fn square(x: f64) -> f64 {
     x * x
 }
 
-/// The median; `None` without values. Reorders them.
+/// The median; `None` without values. Reorders the values.
 pub fn median(values: &mut [f64]) -> Option<f64> {
     crate::metrics::quantile(values, 0.5)
 }

@@ -1,4 +1,4 @@
-//! The clock fit from coded trigger marks: what was sent, matched by name with what the camera saw.
+//! Fits the clock to coded trigger marks: sent marks, matched by name with those that the camera saw.
 
 use std::collections::BTreeMap;
 
@@ -8,32 +8,31 @@ use skinrig_model::{Mark, SentMark, TriggerEdge};
 use super::line::{self, Pair};
 use super::{NO_CLOCK_DRIFT, NO_TIME_US};
 use crate::result::{ClockFit, ClockMethod};
-use crate::timebase::{Point, STEP_US, Smooth};
+use crate::timebase::{Point, STEP_US, SmoothMap};
 
-/// Residuals are never judged finer than this, µs: the camera's clock ticks in µs.
+/// Lower bound of the residual scale, µs: the camera's clock ticks in µs.
 const FLOOR_US: f64 = 1.0;
-/// A repeated mark is matched with the one seen within this of its predicted time, µs.
+/// A repeated mark matches one within this distance of its predicted time, µs.
 const NEAR_US: f64 = 50_000.0;
-/// Residuals above this are suspicious, µs: three orders above the trigger input's resolution.
+/// Residuals above this are suspicious, µs: three orders of magnitude above the resolution of the trigger input.
 const SUSPICIOUS_RMS_US: f64 = 100.0;
 
-/// A clock fit from marks and what to say about it.
+/// A clock fit from marks, with its warnings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MarksFit {
     /// The fit.
     pub fit: ClockFit,
-    /// Remarks for the reader.
+    /// Warnings for the reader.
     pub warnings: Vec<String>,
-    /// Host times of the marks that the fit stands on, ascending, µs.
+    /// Host times of the marks used by the fit, ascending, µs.
     pub seen_us: Vec<f64>,
 }
 
 /// Fits a camera's clock from the edges on its trigger channel and the marks that were sent.
 ///
-/// `None` when fewer than three marks can be matched, when they lie on no line that could be a clock, or when their
-/// camera times are beyond 2^62 µs; the session then has to be aligned by its presses.
-/// Marks that were sent or seen several times (a repeated attempt sends the same name again) are matched by
-/// time once the others have given a first fit.
+/// `None` if fewer than three marks match, if they are not on a plausible line, or if their camera times are beyond 2^62 µs;
+/// the session must then be aligned by its presses. Marks sent or seen several times (a repeated attempt sends the same name
+/// again) are matched by time after the others have given a first fit.
 #[must_use]
 pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Option<MarksFit> {
     let on_channel: Vec<TriggerEdge> = edges
@@ -42,7 +41,7 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
         .filter(|e| e.channel == channel)
         .collect();
     let mut decoded = decode_marks(&on_channel);
-    decoded.marks.retain(|m| m.mark != LOOPBACK); // the test of the line before the run
+    decoded.marks.retain(|m| m.mark != LOOPBACK); // test of the line before the run
     let mut sent_by: BTreeMap<Mark, Vec<f64>> = BTreeMap::new();
     for mark in sent {
         let host_us = mark.t.0 as f64 * 1e-3;
@@ -52,7 +51,7 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
     for mark in &decoded.marks {
         seen_by.entry(mark.mark).or_default().push(mark.t_us);
     }
-    // Camera times relative to the first mark, exactly, so that large counters lose nothing.
+    // Camera times relative to the first mark, exactly, so that large counters lose no digits.
     let reference = decoded.marks.first()?.t_us;
     if decoded.marks.iter().any(|m| m.t_us >= NO_TIME_US) {
         return None;
@@ -75,7 +74,7 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
         }
     }
     if pairs.len() < 3 {
-        // Hardly any unique names: trust the order where nothing is missing.
+        // Hardly any unique names: rely on the order, which requires that none is missing.
         for (hosts, cameras) in repeated.iter().filter(|(h, c)| h.len() == c.len()) {
             pairs.extend(hosts.iter().zip(cameras.iter()).map(|(h, c)| Pair {
                 host_us: *h,
@@ -123,7 +122,7 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
     }
     if fit.rejected > 0 {
         warnings.push(format!(
-            "{} of {} trigger marks do not fit the clock and were left out",
+            "{} of {} trigger marks do not fit the clock and were rejected",
             fit.rejected,
             decoded.marks.len()
         ));
@@ -137,7 +136,7 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
     }
     if decoded.stray_edges > 0 {
         warnings.push(format!(
-            "{} edges on trigger channel {channel} belong to no complete mark",
+            "{} edges on trigger channel {channel} do not belong to a complete mark",
             decoded.stray_edges
         ));
     }
@@ -148,13 +147,13 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
     })
 }
 
-/// Standard error of the mean rate, with what the clocks wander and what the host's estimates of the marks wander.
+/// Standard error of the mean rate, including the wander of the clocks and of the host's estimates of the marks.
 fn drift_se(pairs: &[Pair]) -> Option<f64> {
     let mut points: Vec<Point> = pairs
         .iter()
         .map(|p| Point::new(p.host_us, p.camera_us))
         .collect();
     points.sort_by(|a, b| a.from_us.total_cmp(&b.from_us));
-    let fit = Smooth::fit(&points, STEP_US, FLOOR_US)?;
+    let fit = SmoothMap::fit(&points, STEP_US, FLOOR_US)?;
     Some(fit.drift.stated_se())
 }

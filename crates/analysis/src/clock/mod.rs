@@ -1,4 +1,4 @@
-//! Camera clocks: where host time lies on a camera's clock, and how surely.
+//! Camera clocks: the map from host time to a camera's clock, and its certainty.
 
 mod activity;
 mod bursts;
@@ -21,10 +21,10 @@ use skinrig_model::HostTime;
 
 use crate::result::ClockFit;
 
-/// Camera times from here on, 2^62 µs (146 000 years), come from a broken time base, and no clock is fitted to them:
-/// windows and views about them would end beyond 64 bits.
+/// Camera times from 2^62 µs (146 000 years) come from a broken time base; no clock is fitted, because windows around them
+/// would exceed 64 bits.
 const NO_TIME_US: u64 = 1 << 62;
-/// A line with a larger drift is no clock.
+/// A line with a larger drift is not a clock.
 pub(crate) const NO_CLOCK_DRIFT: f64 = 0.01;
 
 impl ClockFit {
@@ -37,7 +37,7 @@ impl ClockFit {
     /// Camera time (µs) of a host time in µs.
     #[must_use]
     pub fn camera_us(&self, host_us: f64) -> f64 {
-        // The small term apart: the sum keeps the drift's digits at large times.
+        // The small term is separate, so that the sum keeps the digits of the drift at large times.
         self.offset_us + host_us + self.drift_ppm * 1e-6 * host_us
     }
 

@@ -1,53 +1,53 @@
-//! The clock fit from the presses themselves: where the planned rhythm is found in the event rates.
+//! Fits the clock to the presses themselves, by finding the planned rhythm in the event rates.
 //!
-//! No start time is typed in. The search has four steps:
-//! 1. The rate (10 ms bins) becomes an *activity* between 0 (idle) and 1 (as busy as presses are).
-//! 2. A matched filter over every offset: the expected press spans against the mean activity around them, for a
-//!    few drifts up to 200 ppm, so that hours of presses line up.
-//! 3. Offset and drift are refined by each press's own lag against the session's mean press, robustly. The onset
-//!    of the mean press is put at the measured contacts.
-//! 4. Every other alignment is judged: all bursts of both cameras, planned or not, against the plan at every shift. The
-//!    likeliest pair of shifts is taken, and its odds against all others together are stated.
+//! No start time is needed. The search has four steps:
+//! 1. Scale the rate (10 ms bins) to an *activity* between 0 (idle) and 1 (as busy as presses).
+//! 2. Apply a matched filter at every offset: expected press spans against the mean activity around them, for a few drifts
+//!    up to 200 ppm, so that hours of presses line up.
+//! 3. Refine offset and drift robustly by each press's lag against the session's mean press. Put the onset of the mean press
+//!    at the measured contacts.
+//! 4. Score every other alignment: all bursts of both cameras, planned or not, against the plan at every shift. Use the
+//!    likeliest pair of shifts and state its odds against all others together.
 
 use super::NO_TIME_US;
 use super::activity::Activity;
-use super::bursts::Train;
+use super::bursts::Bursts;
 use super::line::Line;
 use super::refine::{UNKNOWN_DRIFT, refine};
-use super::search::{MOST_DRIFT, Map, first_map};
-use super::shifts::{Choice, SAME_US, choose};
+use super::search::{MAX_DRIFT, Map, first_map};
+use super::shifts::{SAME_US, ShiftChoice, choose};
 use super::span::PressSpan;
 use super::tally::Plan;
 use crate::rates::RateHistogram;
-use crate::result::{ClockFit, ClockMethod, RatesEvidence, RatesSights};
+use crate::result::{ClockFit, ClockMethod, RatesDetections, RatesEvidence};
 
-/// The clock of one camera from event rates, and what to say about it.
+/// Clock of one camera from event rates, with its warnings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RatesFit {
     /// The fit.
     pub fit: ClockFit,
-    /// Remarks for the reader.
+    /// Warnings for the reader.
     pub warnings: Vec<String>,
 }
 
 /// The clocks of both cameras from event rates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RatesAlignment {
-    /// Per camera that was asked for: its clock, or a sentence that says why there is none.
+    /// Per requested camera: its clock, or why there is none.
     pub cameras: [Option<Result<RatesFit, String>>; 2],
-    /// How sure the alignment is; `None` without any clock.
+    /// Certainty of the alignment; `None` without any clock.
     pub evidence: Option<RatesEvidence>,
 }
 
-/// Longest session that is searched, bins (46 hours of 10 ms).
-const MOST_BINS: f64 = 16_777_216.0;
-/// Lags that scatter more than this are suspicious, µs.
+/// Longest session to search, bins (46 hours of 10 ms).
+const MAX_BINS: f64 = 16_777_216.0;
+/// Lags with a larger scatter are suspicious, µs.
 const SUSPICIOUS_RMS_US: f64 = 40_000.0;
-/// The choice among all shifts is made again from the shift that it gave, at most so often.
+/// Maximum iterations: the choice among all shifts is repeated from its own result.
 const ROUNDS: usize = 3;
 
-/// Finds the clocks of both cameras, or of one, from their rate histograms and the presses that were made, in time order.
-/// Both are judged together: their bursts coincide, planned or not.
+/// Finds the clocks of both cameras, or of one, from their rate histograms and the presses in time order. Both are scored
+/// together, because their bursts coincide, planned or not.
 #[must_use]
 pub fn align_by_rates(rates: [Option<&RateHistogram>; 2], presses: &[PressSpan]) -> RatesAlignment {
     let (first, second) = rayon::join(
@@ -56,10 +56,10 @@ pub fn align_by_rates(rates: [Option<&RateHistogram>; 2], presses: &[PressSpan])
     );
     let mut cameras = [first, second];
     let plan = Plan::new(presses);
-    let mut choice: Option<Choice> = None;
+    let mut choice: Option<ShiftChoice> = None;
     for _ in 0..ROUNDS {
         let trains = [0, 1].map(|k| match &cameras[k] {
-            Some(Ok(camera)) => Some(Train::new(&camera.activity, presses, camera.map)),
+            Some(Ok(camera)) => Some(Bursts::new(&camera.activity, presses, camera.map)),
             _ => None,
         });
         if trains.iter().all(Option::is_none) {
@@ -91,7 +91,7 @@ pub fn align_by_rates(rates: [Option<&RateHistogram>; 2], presses: &[PressSpan])
     }
     let sights = |k: usize| {
         let tally = choice?.tally;
-        matches!(cameras[k], Some(Ok(_))).then_some(RatesSights {
+        matches!(cameras[k], Some(Ok(_))).then_some(RatesDetections {
             expected: tally.expected[k],
             found: tally.found[k],
             unexplained: tally.unexplained[k],
@@ -112,10 +112,10 @@ pub fn align_by_rates(rates: [Option<&RateHistogram>; 2], presses: &[PressSpan])
     }
 }
 
-/// Finds the clock of one camera by itself: see [`align_by_rates`].
+/// Finds the clock of one camera alone: see [`align_by_rates`].
 ///
 /// # Errors
-/// A sentence that says why no alignment was found.
+/// Why no alignment was found.
 pub fn fit_rates(
     rates: &RateHistogram,
     presses: &[PressSpan],
@@ -129,7 +129,7 @@ pub fn fit_rates(
     }
 }
 
-/// One camera and its clock, as far as it is known.
+/// One camera and the present estimate of its clock.
 struct Camera {
     start_us: f64,
     activity: Activity,
@@ -147,7 +147,7 @@ impl Camera {
             ));
         }
         let span_us = presses[presses.len() - 1].release_us - presses[0].contact_us;
-        if !(0.0..=MOST_BINS * rates.bin_us() as f64).contains(&span_us) {
+        if !(0.0..=MAX_BINS * rates.bin_us() as f64).contains(&span_us) {
             return Err(format!(
                 "expected the presses in time order within two days, found {:.0} s between the first and the last",
                 span_us * 1e-6
@@ -162,8 +162,8 @@ impl Camera {
         let activity = Activity::new(rates, presses)?;
         let map = first_map(&activity, presses, 0.0);
         let (mut map, mut line) = refine(&activity, presses, map)?;
-        if line.drift.abs() > MOST_DRIFT {
-            // The presses ran away from the first search by more than their own lags show: search about this drift.
+        if line.drift.abs() > MAX_DRIFT {
+            // The refined drift differs from the first search by more than the lags allow: search again around it.
             map = first_map(&activity, presses, line.drift);
             (map, line) = refine(&activity, presses, map)?;
         }
@@ -175,7 +175,7 @@ impl Camera {
         })
     }
 
-    /// Moves the presses to later in the recording and refines the clock there.
+    /// Shifts the presses to later times and refines the clock there.
     fn shift(&mut self, presses: &[PressSpan], shift_us: f64) -> Result<(), String> {
         self.map.offset_us += shift_us * (1.0 + self.map.drift);
         (self.map, self.line) = refine(&self.activity, presses, self.map)?;
@@ -187,7 +187,7 @@ impl Camera {
         let mut warnings = Vec::new();
         if line.drift_se > UNKNOWN_DRIFT {
             warnings.push(format!(
-                "the session is too short to find the clock's drift by event rates ({:.0} ± {:.0} ppm): it is taken as 0",
+                "the session is too short to find the clock drift from event rates ({:.0} ± {:.0} ppm): assuming 0",
                 line.drift * 1e6,
                 line.drift_se * 1e6
             ));

@@ -1,20 +1,20 @@
-//! Owns the refinement of a camera's clock: each press's own lag against the mean press, and the instant at which that begins.
+//! Owns the refinement of a camera clock: lag of each press against the mean press, and onset of the mean press.
 
 use super::activity::Activity;
 use super::line::{self, Pair, median};
 use super::search::{Map, period_us};
 use super::span::PressSpan;
 
-/// Largest lag of one press against the prediction, µs, in the first and the later rounds.
+/// Largest lag of one press against the prediction, µs, in successive iterations.
 const LAGS_US: [f64; 4] = [400_000.0, 250_000.0, 120_000.0, 120_000.0];
-/// A drift with a larger standard error than this is worse than none: crystals are within tens of ppm.
+/// A drift with a larger standard error is worse than none: crystals are within tens of ppm.
 pub(super) const UNKNOWN_DRIFT: f64 = 50e-6;
-/// Lags are never judged finer than this, µs (a fifth of a bin).
+/// Lower bound of the lag scale, µs (a fifth of a bin).
 const FLOOR_US: f64 = 2_000.0;
-/// The press begins where the mean activity leaves this share of its rise.
+/// The press begins where the mean activity reaches this share of its rise.
 const ONSET_SHARE: f64 = 0.1;
-/// A press weaker than this share of the mean press is not found.
-pub(super) const LEAST_STRENGTH: f64 = 0.33;
+/// Presses weaker than this share of the mean press are not found.
+pub(super) const MIN_STRENGTH: f64 = 0.33;
 
 /// Refines offset and drift by the lags of all presses.
 pub(super) fn refine(
@@ -49,20 +49,20 @@ pub(super) fn refine(
         }
         last = Some(line);
     }
-    // The onset once more, now that the presses are well aligned.
+    // Recompute the onset with well-aligned presses.
     map.offset_us += onset_us(activity, presses, map);
     last.map(|line| (map, line))
-        .ok_or_else(|| "no round of refinement".to_owned())
+        .ok_or_else(|| "no refinement iteration".to_owned())
 }
 
-/// Mean activity about the predicted contacts within the recording.
+/// Mean activity around the predicted contacts within the recording.
 pub(super) struct Profile {
-    /// Time of the first sample after the contact, µs.
+    /// Time of the first sample relative to contact, µs.
     pub from_us: f64,
     pub values: Vec<f64>,
 }
 
-/// A press is compared over its span and this much on both sides, at most, µs.
+/// Maximum margin on both sides of a press for the comparison, µs.
 const SIDE_US: f64 = 300_000.0;
 
 impl Profile {
@@ -95,7 +95,7 @@ impl Profile {
     }
 }
 
-/// When the mean press begins, µs after the predicted contacts.
+/// Start of the mean press relative to the predicted contacts, µs.
 fn onset_us(activity: &Activity, presses: &[PressSpan], map: Map) -> f64 {
     let profile = Profile::new(activity, presses, map);
     let values = &profile.values;
@@ -113,12 +113,12 @@ fn onset_us(activity: &Activity, presses: &[PressSpan], map: Map) -> f64 {
     profile.from_us + (before as f64 + part) * activity.bin_us
 }
 
-/// The sum of the products of a template with the samples, from each sample on after which there are enough.
+/// Sliding dot products of a template with the samples, from each sample with enough followers.
 pub(super) fn products(template: &[f64], samples: &[f64]) -> Vec<f64> {
-    /// Sums that are made side by side: none has to wait for another.
+    /// Independent sums in parallel.
     const LANES: usize = 4;
     let n = (samples.len() + 1).saturating_sub(template.len());
-    // The last sums may have neighbours that are not wanted.
+    // The last sums may include unwanted neighbours.
     let mut samples = samples.to_vec();
     samples.resize(samples.len() + LANES - 1, 0.0);
     let mut sums = vec![0.0; n.next_multiple_of(LANES)];
@@ -136,7 +136,7 @@ pub(super) fn products(template: &[f64], samples: &[f64]) -> Vec<f64> {
     sums
 }
 
-/// For each press that stands out, its predicted contact moved by its own lag against the profile.
+/// For each significant press, its predicted contact shifted by its own lag against the profile.
 fn lags(
     activity: &Activity,
     presses: &[PressSpan],
@@ -152,7 +152,7 @@ fn lags(
     let mut pairs = Vec::new();
     for press in presses {
         let contact = map.camera(press.contact_us);
-        // All samples that any lag needs, once.
+        // All samples for any lag, computed once.
         let start = contact + profile.from_us - (steps + 1.0) * activity.bin_us;
         let samples: Vec<f64> = activity.samples(start, count).collect();
         let matches = products(&template, &samples);
@@ -161,8 +161,8 @@ fn lags(
             continue;
         };
         let (left, top, right) = (matches[best - 1], matches[best], matches[best + 1]);
-        // Weaker than a third of the mean press, or best at the edge of the search: not found.
-        if top < LEAST_STRENGTH * strength || left > top || right > top {
+        // Not found: weaker than a third of the mean press, or best at the edge of the search.
+        if top < MIN_STRENGTH * strength || left > top || right > top {
             continue;
         }
         let bend = left - 2.0 * top + right;

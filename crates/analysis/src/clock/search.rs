@@ -1,15 +1,15 @@
-//! Owns the first search for a camera's clock: the rhythm of the planned presses, correlated with the activity.
+//! Owns the initial search for a camera clock: correlates the rhythm of the planned presses with the activity.
 
 use super::activity::Activity;
 use super::correlate::Correlator;
 use super::line::median;
 use super::span::PressSpan;
 
-/// Bins that are merged for the search.
+/// Bins merged for the search.
 const MERGE: usize = 5;
 /// Largest drift of the search.
-pub(super) const MOST_DRIFT: f64 = 200e-6;
-/// Two drifts of the search differ by this at the ends of the session, µs.
+pub(super) const MAX_DRIFT: f64 = 200e-6;
+/// Distance of two candidate drifts at the ends of the session, µs.
 const DRIFT_STEP_US: f64 = 150_000.0;
 
 /// A clock that maps host µs to camera µs relative to the histogram's start.
@@ -38,7 +38,7 @@ pub(super) fn period_us(presses: &[PressSpan]) -> f64 {
     median(&mut steps).unwrap_or(0.0)
 }
 
-/// The clock at which the press spans best match the activity, with a drift within [`MOST_DRIFT`] of `about`.
+/// The clock whose press spans best match the activity, with a drift within [`MAX_DRIFT`] of `about`.
 pub(super) fn first_map(activity: &Activity, presses: &[PressSpan], about: f64) -> Map {
     let bin_us = activity.bin_us * MERGE as f64;
     let mean = activity.values.iter().sum::<f64>() / activity.values.len() as f64;
@@ -54,20 +54,20 @@ pub(super) fn first_map(activity: &Activity, presses: &[PressSpan], about: f64) 
         .max(presses[presses.len() - 1].release_us - middle_us)
         .max(1.0);
     let length = ((presses[presses.len() - 1].release_us + side_us - from_us) / bin_us
-        * (1.0 + about.abs() + MOST_DRIFT))
+        * (1.0 + about.abs() + MAX_DRIFT))
         .ceil() as usize
         + 1;
     let correlator = Correlator::new(&merged, length);
-    let steps = (MOST_DRIFT * half_us / DRIFT_STEP_US).ceil() as i32;
+    let steps = (MAX_DRIFT * half_us / DRIFT_STEP_US).ceil() as i32;
     let drifts = (-steps..=steps).map(|step| {
         if steps == 0 {
             about
         } else {
-            about + MOST_DRIFT * f64::from(step) / f64::from(steps)
+            about + MAX_DRIFT * f64::from(step) / f64::from(steps)
         }
     });
     let template = |drift: f64| {
-        // Time within the template of a host time: the middle of the session stays where it is.
+        // Time within the template of a host time; the middle of the session is fixed.
         let place = |host_us: f64| {
             let stretched = host_us + drift * (host_us - middle_us) - from_us;
             ((stretched / bin_us).max(0.0) as usize).min(length)

@@ -1,43 +1,43 @@
-//! Owns the choice among all alignments of both cameras: the likeliest pair of shifts, and the odds of it against all others.
+//! Owns the choice among all alignments of both cameras: the likeliest pair of shifts, and its odds against all others.
 
-use super::bursts::Train;
+use super::bursts::Bursts;
 use super::tally::{Counter, NEAR_US, Plan, Tally};
 
-/// Differences between bursts and presses are gathered in cells of this width, µs.
+/// Cell width for differences between bursts and presses, µs.
 const CELL_US: f64 = 0.5 * NEAR_US;
-/// Shifts nearer than this are the same alignment, µs.
+/// Closer shifts are the same alignment, µs.
 pub(super) const SAME_US: f64 = 2.0 * NEAR_US;
-/// Shifts of one camera that are looked at, those with most presses that have a burst.
-const MOST_SHIFTS: usize = 2000;
-/// Shifts of each camera that are paired, its likeliest.
-const MOST_PAIRED: usize = 400;
-/// The likeliest shifts of a camera that are carried over to the other by bursts of both that coincide, and how many ways.
-const CARRIED: usize = 12;
-/// Pairs that are counted in full.
-const MOST_PAIRS: usize = 1000;
-/// What a burst that both cameras have is taken to be worth when pairs are chosen for that.
+/// Shifts of one camera to consider: those with the most presses that have a burst.
+const MAX_SHIFTS: usize = 2000;
+/// Likeliest shifts of each camera to pair.
+const MAX_PAIRED: usize = 400;
+/// Likeliest shifts of a camera to transfer to the other via coinciding bursts, and the number of ways.
+const TRANSFERRED: usize = 12;
+/// Pairs to score in full.
+const MAX_PAIRS: usize = 1000;
+/// Assumed weight of a burst seen by both cameras when choosing pairs.
 const COINCIDENCE: f64 = 5.0;
-/// Most comparisons of a burst with a press.
-const MOST_WORK: u64 = 1 << 32;
+/// Maximum number of burst-press comparisons.
+const MAX_WORK: u64 = 1 << 32;
 
 /// The likeliest alignment.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Choice {
-    /// By how much the planned presses come later in each camera than its clock fit says, µs.
+pub(super) struct ShiftChoice {
+    /// Delay of the planned presses in each camera relative to its clock fit, µs.
     pub shift_us: [f64; 2],
-    /// What it says of the recording.
+    /// Its tally.
     pub tally: Tally,
-    /// Natural logarithm of its odds against all other alignments together, and against none being right.
+    /// Log odds against all other alignments together, and against none being right.
     pub log_odds: f64,
-    /// The likeliest other one; `None` when there is none, or the plan being foreign to the recording is likelier still.
+    /// Second likeliest; `None` if there is none, or if a plan unrelated to the recording is likelier.
     pub runner_up_us: Option<[f64; 2]>,
 }
 
 /// Chooses among all shifts of both cameras, or of the only one.
 ///
 /// # Errors
-/// A sentence when there are too many bursts to look at all shifts.
-pub(super) fn choose(plan: &Plan, trains: [Option<&Train>; 2]) -> Result<Choice, String> {
+/// When there are too many bursts to consider all shifts.
+pub(super) fn choose(plan: &Plan, trains: [Option<&Bursts>; 2]) -> Result<ShiftChoice, String> {
     let mut shifts: [Vec<(f64, f64)>; 2] = [Vec::new(), Vec::new()];
     for k in 0..2 {
         if let Some(train) = trains[k] {
@@ -70,7 +70,7 @@ pub(super) fn choose(plan: &Plan, trains: [Option<&Train>; 2]) -> Result<Choice,
     let mut in_order: Vec<(usize, f64)> = likelihoods.collect();
     in_order.sort_by(|a, b| b.1.total_cmp(&a.1));
     for (i, likelihood) in in_order {
-        // The same alignment is found from several sides: its likeliest stands for it.
+        // The same alignment is found several times; keep its likeliest instance.
         let again = |o: &([f64; 2], f64)| (0..2).all(|k| (o.0[k] - pairs[i][k]).abs() <= SAME_US);
         if is_other(&pairs[i]) && !others.iter().any(again) {
             others.push((pairs[i], likelihood));
@@ -83,7 +83,7 @@ pub(super) fn choose(plan: &Plan, trains: [Option<&Train>; 2]) -> Result<Choice,
         .map(|l| libm::exp(l - best.1))
         .sum();
     let runner_up_us = others.first().filter(|o| o.1 > foreign).map(|o| o.0);
-    Ok(Choice {
+    Ok(ShiftChoice {
         shift_us,
         tally: tallies[best.0],
         log_odds: -libm::log(sum.max(f64::MIN_POSITIVE)),
@@ -91,12 +91,12 @@ pub(super) fn choose(plan: &Plan, trains: [Option<&Train>; 2]) -> Result<Choice,
     })
 }
 
-/// The likeliest shifts of one camera by itself with the logarithms of their likelihoods, the likeliest first.
-fn likeliest(plan: &Plan, train: &Train, k: usize) -> Result<Vec<(f64, f64)>, String> {
+/// Likeliest shifts of one camera alone with their log likelihoods, likeliest first.
+fn likeliest(plan: &Plan, train: &Bursts, k: usize) -> Result<Vec<(f64, f64)>, String> {
     let differences = Differences::new(&train.at_us, plan.contacts_us())?;
     let mut found = differences.peaks();
     found.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.total_cmp(&b.0)));
-    found.truncate(MOST_SHIFTS);
+    found.truncate(MAX_SHIFTS);
     let mut alone = [None; 2];
     alone[k] = Some(train);
     let mut counter = Counter::new(plan, alone);
@@ -105,22 +105,22 @@ fn likeliest(plan: &Plan, train: &Train, k: usize) -> Result<Vec<(f64, f64)>, St
         .map(|(shift_us, _)| (shift_us, counter.tally([shift_us; 2]).log_likelihood))
         .collect();
     judged.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.total_cmp(&b.0)));
-    judged.truncate(MOST_PAIRED);
+    judged.truncate(MAX_PAIRED);
     Ok(judged)
 }
 
-/// The pairs of shifts that are worth counting in full.
+/// Pairs of shifts to score in full.
 fn paired(
     plan: &Plan,
-    first: &Train,
-    second: &Train,
+    first: &Bursts,
+    second: &Bursts,
     shifts: &mut [Vec<(f64, f64)>; 2],
 ) -> Result<Vec<[f64; 2]>, String> {
     let coincidences = Differences::new(&second.at_us, first.at_us.iter().copied())?;
     let mut between = coincidences.peaks();
     between.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.total_cmp(&b.0)));
-    between.truncate(CARRIED);
-    // What one camera says of itself goes to the other by the bursts that both have.
+    between.truncate(TRANSFERRED);
+    // Transfer candidates to the other camera via bursts that both saw.
     let mut carried: [Vec<(f64, f64)>; 2] = [Vec::new(), Vec::new()];
     for (difference_us, _) in between {
         for (k, sign) in [(0, 1.0), (1, -1.0)] {
@@ -129,7 +129,7 @@ fn paired(
             let mut alone = [None; 2];
             alone[to] = Some(train);
             let mut counter = Counter::new(plan, alone);
-            for (shift_us, _) in shifts[k].iter().take(CARRIED) {
+            for (shift_us, _) in shifts[k].iter().take(TRANSFERRED) {
                 let there = shift_us + sign * difference_us;
                 let known = |s: &(f64, f64)| (s.0 - there).abs() < CELL_US;
                 if !shifts[to].iter().chain(&carried[to]).any(known) {
@@ -149,15 +149,15 @@ fn paired(
             pairs.push(([one.0, two.0], score));
         }
     }
-    if pairs.len() > MOST_PAIRS {
-        pairs.select_nth_unstable_by(MOST_PAIRS, |a, b| b.1.total_cmp(&a.1));
-        pairs.truncate(MOST_PAIRS);
+    if pairs.len() > MAX_PAIRS {
+        pairs.select_nth_unstable_by(MAX_PAIRS, |a, b| b.1.total_cmp(&a.1));
+        pairs.truncate(MAX_PAIRS);
     }
     pairs.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0[0].total_cmp(&b.0[0])));
     Ok(pairs.into_iter().map(|p| p.0).collect())
 }
 
-/// How often each difference between the times of two lists occurs.
+/// Histogram of differences between the times of two lists.
 struct Differences {
     first_cell: i64,
     counts: Vec<u32>,
@@ -169,9 +169,9 @@ impl Differences {
     fn new(later: &[f64], earlier: impl Iterator<Item = f64> + Clone) -> Result<Self, String> {
         let n = earlier.clone().count();
         let work = later.len() as u64 * n as u64;
-        if work > MOST_WORK {
+        if work > MAX_WORK {
             return Err(format!(
-                "expected at most {MOST_WORK} comparisons of a burst with a press, found {} bursts and {n} presses: is the \
+                "expected at most {MAX_WORK} comparisons of a burst with a press, found {} bursts and {n} presses: is the \
                  recording mostly noise?",
                 later.len()
             ));
@@ -213,14 +213,14 @@ impl Differences {
         })
     }
 
-    /// Count and sum of the three cells about `i`.
+    /// Count and sum of the three cells around `i`.
     fn about(&self, i: usize) -> (u32, f64) {
         let range = i.saturating_sub(1)..(i + 2).min(self.counts.len());
         let sum = self.sums_us[range.clone()].iter().sum();
         (self.counts[range].iter().sum(), sum)
     }
 
-    /// How many pairs differ by about `us`.
+    /// Number of pairs that differ by about `us`.
     fn at(&self, us: f64) -> u32 {
         let i = ((us / CELL_US).floor() as i64).saturating_sub(self.first_cell);
         match usize::try_from(i) {
@@ -229,7 +229,7 @@ impl Differences {
         }
     }
 
-    /// Every difference, µs, that is more frequent than its neighbours, and how often it occurs.
+    /// Local maxima of the histogram: difference, µs, and count.
     fn peaks(&self) -> Vec<(f64, u32)> {
         let all: Vec<u32> = (0..self.counts.len()).map(|i| self.about(i).0).collect();
         let is_peak = |i: usize| {

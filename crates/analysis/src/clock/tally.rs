@@ -1,37 +1,38 @@
-//! Owns the likelihood of an alignment: what was pressed by it, what each camera saw of that, and what remains.
+//! Owns the likelihood of an alignment: expected presses, what each camera saw of them, and the remaining bursts.
 //!
-//! The model: the planned presses were made, perhaps some more before or after them in the same rhythm, and each was seen by
-//! both cameras, one or none with shares that are not known. All other bursts came at any time or a press period after another
-//! one, in both cameras at once or in one, with rates that are not known. Shares and rates are integrated out (Dirichlet priors), so that every count has the
-//! weight that the recording itself gives it. `docs/explanation/time-base.md` has the formulae and the priors.
+//! The model: the planned presses were executed, possibly with more before or after them in the same rhythm, and each was
+//! seen by both cameras, one or none, with unknown probabilities. All other bursts came at any time or one press period
+//! after another burst, in one camera or both, with unknown rates. Probabilities and rates are integrated out (Dirichlet
+//! priors), so that the recording itself weights every count. `docs/explanation/time-base.md` has the formulae and the
+//! priors.
 
-use super::bursts::Train;
+use super::bursts::Bursts;
 use super::search::period_us;
 use super::span::PressSpan;
 
-/// A burst within this of a predicted contact is that press, µs.
+/// A burst this close to a predicted contact is that press, µs.
 pub(super) const NEAR_US: f64 = 150_000.0;
-/// Unplanned bursts are counted per stretch of this length, µs.
+/// Length of the slots for counting unplanned bursts, µs.
 const SLOT_US: f64 = 2.0 * NEAR_US;
-/// Presses seen by both cameras, by the first, by the second, by none: what is taken to have been seen beforehand.
+/// Prior counts of presses seen by both cameras, by the first, by the second, by none.
 const PATH_PRIOR: [f64; 4] = [4.0, 0.7, 0.7, 0.6];
-/// The same for sync presses. They share one place: all are seen, or none.
+/// The same for sync presses. They share one location: all are seen, or none.
 const SYNC_PRIOR: [f64; 4] = [0.8, 0.06, 0.06, 0.08];
-/// Unplanned bursts in both cameras, in the first, in the second, stretches without any.
+/// Prior counts of unplanned bursts in both cameras, in the first, in the second, and of slots without any.
 const NOISE_PRIOR: [f64; 4] = [0.5, 0.5, 0.5, 100.0];
-/// The same for one that comes a press period after another burst; the last: bursts that none follows so.
+/// The same for bursts one press period after another; the last: bursts without a follower.
 const REPEAT_PRIOR: [f64; 4] = [4.0, 0.7, 0.7, 1.0];
-/// Probability that more presses were made than planned, before the first or after the last.
+/// Probability of more presses than planned, before the first or after the last.
 const MORE_PRIOR: f64 = 0.1;
-/// More presses in a row than this that no camera saw end what was pressed beyond the plan.
+/// Presses beyond the plan end after this many in a row that no camera saw.
 const UNSEEN_IN_A_ROW: u32 = 5;
 
-/// The planned presses as the likelihood needs them.
+/// Planned presses in the form that the likelihood needs.
 #[derive(Debug, Clone)]
 pub(super) struct Plan {
     /// Contact, µs, and whether it is a sync press; in order.
     contacts: Vec<(f64, bool)>,
-    /// How long a press lasts, µs.
+    /// Duration of a press, µs.
     span_us: f64,
     period_us: f64,
     /// First and last contact of the path, µs.
@@ -74,29 +75,29 @@ impl Plan {
     }
 }
 
-/// What one alignment says of a recording.
+/// Evidence for one alignment.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Tally {
-    /// Logarithm of the likelihood, up to a constant of the recording.
+    /// Log likelihood, up to a constant of the recording.
     pub log_likelihood: f64,
-    /// Per camera: planned presses within the recording, those that were seen, and bursts that no planned press explains.
+    /// Per camera: planned presses within the recording, seen presses, and bursts that no planned press explains.
     pub expected: [u32; 2],
     pub found: [u32; 2],
     pub unexplained: [u32; 2],
-    /// Those of the latter between the first and the last planned press.
+    /// Unexplained bursts between the first and the last planned press.
     pub strays: [u32; 2],
 }
 
-/// Presses by who saw them.
+/// Presses by the cameras that saw them.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sights {
+struct SightingCounts {
     /// Recorded by both cameras: seen by both, by the first, by the second, by none.
     both: [u32; 4],
-    /// Recorded by one camera: seen by it, or not.
+    /// Recorded by one camera: seen, not seen.
     one: [[u32; 2]; 2],
 }
 
-impl Sights {
+impl SightingCounts {
     fn add(&mut self, seen: [Option<bool>; 2]) {
         match seen {
             [Some(a), Some(b)] => self.both[2 * usize::from(!a) + usize::from(!b)] += 1,
@@ -109,7 +110,7 @@ impl Sights {
     fn log_likelihood(&self, prior: [f64; 4]) -> f64 {
         let n = self.both.map(f64::from);
         let after: [f64; 4] = std::array::from_fn(|i| prior[i] + n[i]);
-        // What both cameras saw says what one alone sees.
+        // Observations of both cameras also inform single-camera ones.
         let first = [after[0] + after[1], after[2] + after[3]];
         let second = [after[0] + after[2], after[1] + after[3]];
         log_dirichlet(n, prior)
@@ -118,7 +119,7 @@ impl Sights {
     }
 }
 
-/// Logarithm of the probability of a sequence with these counts, its shares Dirichlet distributed.
+/// Log probability of a sequence with these counts and Dirichlet-distributed shares.
 fn log_dirichlet<const N: usize>(counts: [f64; N], prior: [f64; N]) -> f64 {
     let (n, a): (f64, f64) = (counts.iter().sum(), prior.iter().sum());
     let each = counts.iter().zip(&prior).filter(|(n, _)| **n > 0.0);
@@ -128,19 +129,19 @@ fn log_dirichlet<const N: usize>(counts: [f64; N], prior: [f64; N]) -> f64 {
     libm::lgamma(a) - libm::lgamma(a + n) + parts
 }
 
-/// Counts what alignments say. Holds room that all of them share.
+/// Computes tallies, with buffers common to all alignments.
 pub(super) struct Counter<'a> {
     plan: &'a Plan,
-    trains: [Option<&'a Train>; 2],
+    trains: [Option<&'a Bursts>; 2],
     /// Bursts of each camera that a press explains.
     explained: [Vec<bool>; 2],
-    /// Bursts of each camera that come a press period after another.
+    /// Bursts of each camera one press period after another.
     repeats: [Vec<bool>; 2],
-    /// Bursts that none follows after a press period, in the camera that has more of them.
+    /// Bursts without a follower after one press period, in the camera that has more of them.
     unrepeated: f64,
 }
 
-/// For each of these times, in order, whether another one lies `by_us` before it.
+/// For each of these times, in order, whether another one precedes it by `by_us`.
 fn repeats(at_us: &[f64], by_us: f64) -> Vec<bool> {
     let mut earlier = 0;
     let mut follows = |at: &f64| {
@@ -156,7 +157,7 @@ fn repeats(at_us: &[f64], by_us: f64) -> Vec<bool> {
 }
 
 impl<'a> Counter<'a> {
-    pub(super) fn new(plan: &'a Plan, trains: [Option<&'a Train>; 2]) -> Self {
+    pub(super) fn new(plan: &'a Plan, trains: [Option<&'a Bursts>; 2]) -> Self {
         let explained = trains.map(|t| vec![false; t.map_or(0, |t| t.at_us.len())]);
         let repeats = trains.map(|t| repeats(t.map_or(&[], |t| &t.at_us), plan.period_us));
         let fresh = |r: &Vec<bool>| r.iter().filter(|r| !**r).count();
@@ -169,10 +170,10 @@ impl<'a> Counter<'a> {
         }
     }
 
-    /// What it means that the planned presses come `shift_us` later in each camera than its clock fit says.
+    /// Tally for planned presses that come `shift_us` later in each camera than its clock fit predicts.
     pub(super) fn tally(&mut self, shift_us: [f64; 2]) -> Tally {
         let mut tally = Tally::default();
-        let (mut path, mut sync) = (Sights::default(), Sights::default());
+        let (mut path, mut sync) = (SightingCounts::default(), SightingCounts::default());
         self.clear();
         for &(contact_us, is_sync) in &self.plan.contacts {
             let seen = [0, 1].map(|k| self.look(k, contact_us + shift_us[k]));
@@ -207,7 +208,7 @@ impl<'a> Counter<'a> {
         tally
     }
 
-    /// The likelihood of the bursts when the plan is foreign to the recording: neither its presses nor its rhythm are there.
+    /// Likelihood of the bursts if the plan is unrelated to the recording: neither its presses nor its rhythm occur.
     pub(super) fn without_plan(&mut self, shift_us: [f64; 2]) -> f64 {
         self.clear();
         self.noise(shift_us, false)
@@ -217,7 +218,7 @@ impl<'a> Counter<'a> {
         self.explained.iter_mut().for_each(|e| e.fill(false));
     }
 
-    /// Whether camera `k` saw a press at `at_us`; `None` when it did not record then.
+    /// Whether camera `k` saw a press at `at_us`; `None` if it was not recording.
     fn look(&mut self, k: usize, at_us: f64) -> Option<bool> {
         let train = self.trains[k]?;
         if at_us < train.from_us - NEAR_US || at_us > train.to_us {
@@ -241,9 +242,15 @@ impl<'a> Counter<'a> {
         recorded.then_some(false)
     }
 
-    /// Adds presses beyond one end of the plan to `path`, as far as bursts follow the rhythm, and gives the logarithm of the
-    /// probability that so many were made.
-    fn beyond(&mut self, end_us: f64, step_us: f64, shift_us: [f64; 2], path: &mut Sights) -> f64 {
+    /// Adds presses beyond one end of the plan to `path`, as long as bursts follow the rhythm, and returns the log
+    /// probability of that number.
+    fn beyond(
+        &mut self,
+        end_us: f64,
+        step_us: f64,
+        shift_us: [f64; 2],
+        path: &mut SightingCounts,
+    ) -> f64 {
         let none = libm::log(1.0 - MORE_PRIOR);
         if step_us.abs() < SLOT_US {
             return none;
@@ -286,8 +293,8 @@ impl<'a> Counter<'a> {
         libm::log(MORE_PRIOR / planned) - (more - 1.0) / planned
     }
 
-    /// The bursts of camera `k` that nothing explains, on the plan's clock, and whether each repeats another; only those in
-    /// `within`, when there is one.
+    /// Unexplained bursts of camera `k`, on the plan's clock, and whether each repeats another; limited to `within`, if
+    /// given.
     fn rest(
         &self,
         k: usize,
@@ -301,7 +308,7 @@ impl<'a> Counter<'a> {
         on_plan.filter(move |(at, _)| within.is_none_or(|(from, to)| (from..=to).contains(at)))
     }
 
-    /// The likelihood of the bursts that nothing explains; `in_rhythm`: one may follow another after a press period.
+    /// Likelihood of the unexplained bursts; `in_rhythm`: one may follow another after one press period.
     fn noise(&self, shift_us: [f64; 2], in_rhythm: bool) -> f64 {
         let span = |k: usize| {
             let train = self.trains[k]?;

@@ -1,4 +1,4 @@
-//! The area that probed places stand for: the union of one square cell per place, within the outline.
+//! Owns the probed area: union of one square cell per location, clipped to the outline.
 
 use skinrig_model::skin::polygon_area_mm2;
 use skinrig_model::{Point2, SkinOutline};
@@ -6,11 +6,10 @@ use skinrig_model::{Point2, SkinOutline};
 use super::{ARC_SEGMENTS, clip};
 use crate::metrics::quantile;
 
-/// The median distance of a place from its nearest neighbour, mm; `None` with fewer than two places. Places are
-/// distinct.
+/// Median distance between nearest neighbours, mm; `None` with fewer than two points. The points are distinct.
 ///
-/// Along the longer side of all places, the search for a neighbour stops where that alone is further than the nearest
-/// found.
+/// Sorted along the longer side of all points; the search for a neighbour stops where that distance alone exceeds the
+/// nearest found.
 #[must_use]
 pub fn neighbour_distance_mm(places: &[Point2]) -> Option<f64> {
     if places.len() < 2 {
@@ -51,11 +50,10 @@ pub fn neighbour_distance_mm(places: &[Point2]) -> Option<f64> {
     quantile(&mut distances, 0.5)
 }
 
-/// The area in mm² of the union of axis-parallel squares of this side about the places, as far as it lies within the
-/// outline.
+/// Area in mm² of the union of axis-parallel squares with this side around the points, within the outline.
 ///
-/// Between two neighbouring left or right sides of squares the union is a set of rectangles; each is clipped alone. From
-/// one such strip to the next only the squares change that begin or end between them.
+/// Between two adjacent left or right edges of squares the union is a set of rectangles; each is clipped alone. From one
+/// such strip to the next only squares that begin or end there change.
 #[must_use]
 pub fn probed_area_mm2(outline: &SkinOutline, places: &[Point2], side_mm: f64) -> f64 {
     let half = side_mm / 2.0;
@@ -70,7 +68,7 @@ pub fn probed_area_mm2(outline: &SkinOutline, places: &[Point2], side_mm: f64) -
     let mut coming: Vec<Point2> = places.to_vec();
     coming.sort_by(|a, b| a.x_mm.total_cmp(&b.x_mm).then(a.y_mm.total_cmp(&b.y_mm)));
     let mut coming = coming.into_iter().peekable();
-    // The squares across the strip, by y.
+    // Squares across the strip, by y.
     let mut across: Vec<Point2> = Vec::new();
     for strip in sides.windows(2) {
         let (left, right) = (strip[0], strip[1]);
@@ -80,7 +78,7 @@ pub fn probed_area_mm2(outline: &SkinOutline, places: &[Point2], side_mm: f64) -
             across.push(place);
         }
         if across.len() > known {
-            // Two runs by y, mostly: as good as a merge.
+            // Two sorted runs, mostly: sorting is as good as merging.
             across.sort_by(|a, b| a.y_mm.total_cmp(&b.y_mm));
         }
         let mut spans = across.iter().map(|p| (p.y_mm - half, p.y_mm + half));
@@ -100,7 +98,7 @@ pub fn probed_area_mm2(outline: &SkinOutline, places: &[Point2], side_mm: f64) -
     area
 }
 
-/// The part of a rectangle within the outline, mm²; `polygon` is the outline.
+/// Part of a rectangle within the outline, mm²; `polygon` is the outline.
 fn rectangle_area_mm2(
     outline: &SkinOutline,
     polygon: &[Point2],
@@ -109,7 +107,7 @@ fn rectangle_area_mm2(
 ) -> f64 {
     let corners = [(x.0, y.0), (x.1, y.0), (x.1, y.1), (x.0, y.1)];
     let corners = corners.map(|(x, y)| Point2::new(x, y));
-    // The outline is convex: with its corners in it the rectangle is.
+    // The outline is convex: if it contains the corners, it contains the rectangle.
     if corners.iter().all(|c| outline.contains(*c)) {
         return (x.1 - x.0) * (y.1 - y.0);
     }
@@ -121,7 +119,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Every pair.
+    /// Brute force over all pairs.
     fn slow_neighbour_distance_mm(places: &[Point2]) -> Option<f64> {
         if places.len() < 2 {
             return None;
@@ -137,7 +135,7 @@ mod tests {
         quantile(&mut distances, 0.5)
     }
 
-    /// Every place for every strip.
+    /// Brute force over all points per strip.
     fn slow_probed_area_mm2(outline: &SkinOutline, places: &[Point2], side_mm: f64) -> f64 {
         let half = side_mm / 2.0;
         let polygon = outline.polygon(ARC_SEGMENTS);
@@ -175,7 +173,7 @@ mod tests {
     }
 
     proptest! {
-        /// On a lattice many places share a side.
+        /// On a lattice many points share an edge.
         #[test]
         fn neighbours_and_areas_are_those_of_looking_at_every_place(
             mut places in prop_oneof![

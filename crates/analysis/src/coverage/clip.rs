@@ -2,8 +2,8 @@
 
 use skinrig_model::Point2;
 
-/// The part of a convex polygon on the side of the line through `on` that `normal` points to, the line included. The
-/// result has fewer than three points where nothing is left.
+/// Part of a convex polygon on the side of the line through `on` that `normal` points to, including the line. The result has
+/// fewer than three points if nothing remains.
 pub(crate) fn half_plane(polygon: &[Point2], on: Point2, normal: [f64; 2]) -> Vec<Point2> {
     let side = |p: Point2| (p.x_mm - on.x_mm) * normal[0] + (p.y_mm - on.y_mm) * normal[1];
     let mut out = Vec::with_capacity(polygon.len() + 1);
@@ -24,7 +24,7 @@ pub(crate) fn half_plane(polygon: &[Point2], on: Point2, normal: [f64; 2]) -> Ve
     out
 }
 
-/// The intersection of a convex polygon with a convex polygon whose points go round counter-clockwise.
+/// Intersection of two convex polygons; `window` is counter-clockwise.
 pub fn convex(polygon: &[Point2], window: &[Point2]) -> Vec<Point2> {
     let mut out = polygon.to_vec();
     let next = window.iter().cycle().skip(1);

@@ -1,32 +1,31 @@
 //! Areas: skin, seen by both cameras, probed; effective taxels.
 //!
-//! A camera sees the wedge between the viewing angles of its first and last column (0 and 640); what it sees of the
-//! skin is that wedge within the outline. A location stands for a square cell about it whose side is the median
-//! distance between neighbours, so that a regular grid is covered exactly once. Arcs of the outline are polygons of
-//! [`ARC_SEGMENTS`] pieces each: 0.006 mm² less than the true area of the published skin.
+//! A camera sees the wedge between the viewing angles of its first and last column (0 and 640), clipped to the outline. A
+//! location represents a square cell around it with the median neighbour distance as its side, so that a regular grid is
+//! covered exactly once. Arcs of the outline are polygons of [`ARC_SEGMENTS`] segments each: 0.006 mm² less than the true
+//! area of the published skin.
 
 mod cells;
 mod clip;
 
 use skinrig_model::skin::polygon_area_mm2;
-use skinrig_model::{CameraModel, Point2, PressRole, PressVerdict};
+use skinrig_model::{CameraModel, Point2, PressRole, Verdict};
 
 pub use cells::{neighbour_distance_mm, probed_area_mm2};
 
 use crate::result::{Analysis, Coverage, Estimate};
-use crate::verdict::is_rule_on_data;
+use crate::rule::Rule;
 
-/// Pieces per arc of the outline wherever an area is computed.
+/// Segments per arc of the outline for computing areas.
 pub const ARC_SEGMENTS: u32 = 256;
-/// Pieces per arc of the polygons that are only drawn: 0.01 mm from the arc.
+/// Segments per arc of polygons for drawing: 0.01 mm from the arc.
 const DRAWN_ARC_SEGMENTS: u32 = 24;
 /// Columns at the borders of the sensor, px.
 const BORDER_COLUMNS: [f64; 2] = [0.0, skinrig_model::SENSOR_WIDTH as f64];
 
-/// Areas and taxels of an analysed session; `None` when a camera has no direction (it sits on the point it aims at).
+/// Areas and taxels of an analysed session; `None` if a camera has no direction (it is at the point it aims at).
 ///
-/// Probed are the planned places of the calibrating and scored presses that were attempted and that neither the journal nor
-/// a hand leaves out.
+/// Probed locations are those of attempted calibration and scored presses that neither the journal nor an operator excludes.
 #[must_use]
 pub fn coverage(analysis: &Analysis) -> Option<Coverage> {
     let outline = &analysis.rig.outline;
@@ -61,8 +60,8 @@ pub fn coverage(analysis: &Analysis) -> Option<Coverage> {
     })
 }
 
-/// What `camera` sees of the convex polygon `within`, as convex pieces: one as long as the field of view spans less
-/// than 180°, none when it sees nothing of it. `None` when the camera has no direction.
+/// Part of the convex polygon `within` that `camera` sees, as convex pieces: a single one if the field of view is below
+/// 180°, none if it sees nothing. `None` if the camera has no direction.
 #[must_use]
 pub fn field_of_view(camera: &CameraModel, within: &[Point2]) -> Option<Vec<Vec<Point2>>> {
     let [first, last] = BORDER_COLUMNS.map(|u| camera.angle_of_column_deg(u));
@@ -87,7 +86,7 @@ pub fn field_of_view(camera: &CameraModel, within: &[Point2]) -> Option<Vec<Vec<
     Some(pieces.filter(|p| p.len() > 2).collect())
 }
 
-/// Where the pieces of both views overlap, as convex pieces.
+/// Overlap of the pieces of both views, as convex pieces.
 #[must_use]
 pub fn overlap(views: &[Vec<Vec<Point2>>; 2]) -> Vec<Vec<Point2>> {
     let [first, second] = views;
@@ -97,8 +96,8 @@ pub fn overlap(views: &[Vec<Vec<Point2>>; 2]) -> Vec<Vec<Point2>> {
     pairs.filter(|p| p.len() > 2).collect()
 }
 
-/// Circles of radius RMSE that fill an area: area / (pi RMSE²), the paper's effective taxels. The interval is that of
-/// the RMSE turned over: the larger the error, the fewer the taxels. No value without an area or with an RMSE of 0.
+/// Number of circles of radius RMSE that fill an area: area / (pi RMSE²), the paper's effective taxels. The interval is that
+/// of the RMSE, inverted. No value without an area or with an RMSE of 0.
 #[must_use]
 pub fn taxels(area_mm2: Option<f64>, rmse_mm: &Estimate) -> Estimate {
     let of = |radius: Option<f64>| {
@@ -113,12 +112,11 @@ pub fn taxels(area_mm2: Option<f64>, rmse_mm: &Estimate) -> Estimate {
     }
 }
 
-/// The planned places of the presses that were attempted and are used, each once, and the number of their locations.
+/// Distinct planned positions of attempted presses that are used, and the number of their locations.
 fn probed_places(analysis: &Analysis) -> (Vec<Point2>, u32) {
-    let missed = PressVerdict::Missed(String::new());
     let probed = analysis.presses.iter().filter(|p| {
-        let used = p.verdict != "excluded" || p.rule.as_deref().is_some_and(is_rule_on_data);
-        p.role != PressRole::Sync && p.verdict != missed.name() && used
+        let used = p.verdict != Verdict::Excluded || p.rule.as_ref().is_some_and(Rule::is_on_data);
+        p.role != PressRole::Sync && p.verdict != Verdict::Missed && used
     });
     let mut locations: Vec<(u32, Point2)> =
         probed.map(|p| (p.location.index(), p.planned)).collect();

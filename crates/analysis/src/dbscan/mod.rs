@@ -1,15 +1,13 @@
-//! DBSCAN as scikit-learn defines it, computed on pixel counts instead of events.
+//! DBSCAN as defined by scikit-learn, computed on pixel counts instead of events.
 //!
-//! Events are integer pixels, so a press is a grid of counts and every question about neighbours becomes a
-//! question about discs on that grid: an event is *core* when the disc of radius eps about it (border
-//! included) holds at least `min_samples` events, itself and duplicates counted. Core pixels within eps of
-//! each other are one cluster. A *border* event is not core but within eps of a core pixel. Everything else is
-//! noise. Core, border and noise are exactly scikit-learn's.
+//! Events are on integer pixels, so a press is a grid of counts and every question about neighbours becomes one about discs
+//! on that grid: an event is *core* if the disc of radius eps around it (border included) holds at least `min_samples`
+//! events, counting itself and duplicates. Core pixels within eps of each other are one cluster. A *border* event is not
+//! core but within eps of a core pixel. Everything else is noise. Core, border and noise are exactly scikit-learn's.
 //!
-//! Where two clusters reach the same border event, scikit-learn gives it to the one that its input order
-//! happened to expand first. There is no input order here; the rule is: **the border event belongs to the
-//! cluster of its nearest core pixel; of equally near ones the first by row, then column, decides.** Clusters
-//! are numbered by their first core pixel in the same order.
+//! If two clusters reach the same border event, scikit-learn assigns it to the one that its input order happens to expand
+//! first. There is no input order here; the rule is: **the border event belongs to the cluster of its nearest core pixel;
+//! ties go to the first by row, then column.** Clusters are numbered by their first core pixel in the same order.
 //!
 //! Distances are compared squared (`dx² + dy² <= eps * eps`), as scikit-learn's trees do.
 
@@ -18,13 +16,13 @@ mod tiles;
 use self::tiles::{Part, SIDE, Tiles, WIDTH, ones};
 use crate::grid::PixelGrid;
 
-/// The label of events that belong to no cluster.
+/// Label of events outside all clusters.
 pub const NOISE: u32 = u32::MAX;
 
 /// One cluster.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Cluster {
-    /// Events in it, core and border.
+    /// Number of core and border events.
     pub events: u64,
     /// Sum of their columns, px.
     pub sum_u: u64,
@@ -48,12 +46,12 @@ impl Cluster {
     #[must_use]
     pub fn spread_u(&self) -> Option<f64> {
         let n = u128::from(self.events);
-        // Whole numbers: nothing cancels.
+        // Integers: no cancellation.
         let squares = n * u128::from(self.sum_uu) - u128::from(self.sum_u).pow(2);
         (n > 0).then(|| (squares as f64).sqrt() / n as f64)
     }
 
-    /// Both together.
+    /// Sum of both clusters.
     #[must_use]
     pub const fn merged(self, other: Self) -> Self {
         Self {
@@ -65,23 +63,22 @@ impl Cluster {
     }
 }
 
-/// The algorithm with its buffers, to be used for press after press.
+/// The algorithm with reusable buffers.
 ///
-/// The pixels are handled in tiles of 8 by 8, each a word of bits. What a disc covers of the tiles about it is a mask
-/// for each of them, so that counting the events near a pixel, joining core pixels and finding borders take a few
-/// words each.
+/// Pixels are processed in tiles of 8 by 8, each a 64-bit word. A disc is a set of masks on the tiles around it, so counting
+/// the events near a pixel, joining core pixels and finding borders take a few words each.
 #[derive(Debug, Clone)]
 pub struct Dbscan {
     min_samples: u32,
     tiles: Tiles,
-    /// True when all pixels of a tile lie within eps of each other.
+    /// True if all pixels of a tile are within eps of each other.
     tile_is_near: bool,
-    /// Per tile, frame included, what is known of it.
+    /// State per tile, including the frame.
     all: Vec<Tile>,
-    /// The tiles with events.
+    /// Tiles with events.
     occupied: Vec<usize>,
     groups: Vec<Group>,
-    /// Per group another one of its cluster, with an earlier first pixel; or itself.
+    /// Union-find parent per group, with an earlier first pixel; or itself.
     parents: Vec<u32>,
     /// Rows of the grid.
     height: usize,
@@ -98,11 +95,11 @@ struct Tile {
     core: u64,
     /// Events.
     events: u32,
-    /// Its groups: the first and the one after the last.
+    /// Range of its groups.
     groups: (u32, u32),
 }
 
-/// Core pixels of one tile that are one cluster without the help of others.
+/// Core pixels of one tile that form one cluster without the help of others.
 #[derive(Debug, Clone, Copy)]
 struct Group {
     tile: usize,
@@ -131,7 +128,7 @@ impl Dbscan {
         }
     }
 
-    /// Clusters the events of `grid`; the result lasts until the next call.
+    /// Clusters the events of `grid`; the result is valid until the next call.
     pub fn run(&mut self, grid: &PixelGrid) -> &[Cluster] {
         self.load(grid);
         self.find_core(grid);
@@ -153,12 +150,12 @@ impl Dbscan {
             .map(|(index, tile, at)| (index, self.label(tile, at).unwrap_or(NOISE)))
     }
 
-    /// Indices of the core pixels of the last run, ascending; every event of such a pixel is core.
+    /// Indices of the core pixels of the last run, ascending; every event on such a pixel is core.
     pub fn core_pixels(&self) -> impl Iterator<Item = u32> {
         self.pixels(|tile| tile.core).map(|(index, ..)| index)
     }
 
-    /// The largest cluster of the last run, the first of equal ones, with its number.
+    /// Largest cluster of the last run, the first of equal ones, with its number.
     #[must_use]
     pub fn largest(&self) -> Option<(u32, Cluster)> {
         let mut best: Option<(u32, Cluster)> = None;
@@ -170,7 +167,7 @@ impl Dbscan {
         best
     }
 
-    /// (index, tile, place in the tile) of some pixels, ascending.
+    /// (index, tile, position in the tile) of some pixels, ascending.
     fn pixels(&self, of: fn(&Tile) -> u64) -> impl Iterator<Item = (u32, usize, usize)> {
         (0..self.height).flat_map(move |row| {
             let first = self.tiles.first(row);
@@ -189,7 +186,7 @@ impl Dbscan {
         row * WIDTH + column
     }
 
-    /// The pixels and events of each tile.
+    /// Loads pixels and events of each tile.
     fn load(&mut self, grid: &PixelGrid) {
         self.height = grid.height();
         for tile in self.occupied.drain(..) {
@@ -255,12 +252,12 @@ impl Dbscan {
         }
     }
 
-    /// True when enough events lie in the disc about a pixel of a tile whose first pixel has the index `corner`.
+    /// True if enough events are in the disc around a pixel of the tile whose first pixel has index `corner`.
     #[inline]
     fn is_core(&self, grid: &PixelGrid, tile: usize, corner: usize, at: usize) -> bool {
         let parts = self.tiles.parts(at);
         let (mut events, mut repeated) = (0, 0);
-        // Every pixel has one event at least: no branch depends on single pixels.
+        // Every pixel has at least one event, so no branch depends on single pixels.
         for Part { by, mask, .. } in parts {
             let near = &self.all[tile.wrapping_add(*by)];
             events += (near.occupied & mask).count_ones();
@@ -285,7 +282,7 @@ impl Dbscan {
         false
     }
 
-    /// Those of the core pixels of a tile that are one cluster with the one at `first`.
+    /// Core pixels of a tile that form one cluster with the one at `first`.
     fn connected(&self, first: usize, core: u64) -> u64 {
         if self.tile_is_near {
             return core;
@@ -299,12 +296,12 @@ impl Dbscan {
         all
     }
 
-    /// Joins the groups that have pixels within eps of each other.
+    /// Joins groups with pixels within eps of each other.
     fn join(&mut self) {
         let parents = &mut self.parents;
         for (a, Group { tile, core, .. }) in self.groups.iter().enumerate() {
             let mut root = find(parents, a);
-            // Near tiles first: what they join need not be looked at again.
+            // Near tiles first: groups that they join need no further comparison.
             for (k, step) in self.tiles.forward() {
                 let able = core & step.able;
                 if able == 0 {
@@ -350,7 +347,7 @@ impl Dbscan {
         self.clusters.resize(roots.len(), Cluster::default());
     }
 
-    /// Sums of the clusters.
+    /// Computes the sums of the clusters.
     fn sum(&mut self, grid: &PixelGrid) {
         let mut clusters = std::mem::take(&mut self.clusters);
         let top = u64::from(grid.rows().0);
@@ -390,25 +387,24 @@ impl Dbscan {
         self.clusters = clusters;
     }
 
-    /// True when a disc about a pixel of a tile may hold core pixels.
+    /// True if a disc around a pixel of the tile may contain core pixels.
     fn is_near_core(&self, tile: usize) -> bool {
         let core = |by| self.all[tile.wrapping_add(by)].core;
         self.tiles.steps().iter().any(|step| core(step.by) != 0)
     }
 
-    /// The cluster of a pixel with events.
+    /// Cluster of a pixel with events.
     fn label(&self, tile: usize, at: usize) -> Option<u32> {
         self.core_label(tile, at).or_else(|| self.border(tile, at))
     }
 
-    /// The cluster of a core pixel.
+    /// Cluster of a core pixel.
     fn core_label(&self, tile: usize, at: usize) -> Option<u32> {
         let mut groups = self.groups_of(tile).iter();
         groups.find(|g| g.core >> at & 1 == 1).map(|g| g.label)
     }
 
-    /// The cluster of the core pixel that is nearest to one that is not core and within eps; of equally near ones the
-    /// first by row, then column, counts.
+    /// Cluster of the nearest core pixel within eps of a non-core pixel; ties go to the first by row, then column.
     #[inline]
     fn border(&self, tile: usize, at: usize) -> Option<u32> {
         let met = self
@@ -445,13 +441,13 @@ impl Dbscan {
     }
 }
 
-/// What is added to the index of a tile's first pixel for the pixel at a place.
+/// Offset from the index of a tile's first pixel to the pixel at a position.
 #[inline]
 const fn offset(at: usize) -> usize {
     at / SIDE * WIDTH + at % SIDE
 }
 
-/// The first group of a group's cluster, as far as it is known.
+/// First known group of a group's cluster.
 #[inline]
 fn find(parents: &mut [u32], mut i: usize) -> usize {
     while parents[i] as usize != i {

@@ -1,4 +1,4 @@
-//! Tiles of 8 by 8 pixels, each a word of bits, and discs as masks of tiles: a disc meets a few tiles only.
+//! Owns tiles of 8 by 8 pixels, each a 64-bit word, and discs as masks of tiles: a disc covers a few tiles only.
 
 use crate::grid::PixelGrid;
 
@@ -9,14 +9,14 @@ pub(super) const SIDE: usize = 8;
 const ACROSS: usize = WIDTH / SIDE;
 const _: () = assert!(WIDTH.is_multiple_of(SIDE) && SIDE * SIDE == u64::BITS as usize);
 
-/// The way from a tile to one that discs about its pixels may meet.
+/// Step from a tile to another one that discs around its pixels may reach.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step {
-    /// To be added to the index of the tile, wrapping.
+    /// Added to the tile index, wrapping.
     pub by: usize,
-    /// To be added to the index of a pixel, wrapping.
+    /// Added to the pixel index, wrapping.
     pub pixels: usize,
-    /// The pixels of the tile of which the discs meet the other, by their places.
+    /// Pixels of the tile whose discs reach the other tile.
     pub able: u64,
     /// Tiles down and to the right.
     rows: isize,
@@ -24,12 +24,12 @@ pub(super) struct Step {
 }
 
 impl Step {
-    /// True for half of the steps to other tiles, one of each two that lead there and back.
+    /// True for one step of each pair that leads there and back.
     fn is_forward(&self) -> bool {
         (self.rows, self.columns) > (0, 0)
     }
 
-    /// The squared distance of a pixel of the tile, by its place, from one of the other.
+    /// Squared distance between a pixel of the tile and one of the other tile.
     pub fn squared(&self, from: usize, to: usize) -> usize {
         let apart = |tiles: isize, from: usize, to: usize| {
             (tiles * SIDE as isize + to as isize).abs_diff(from as isize)
@@ -40,38 +40,38 @@ impl Step {
     }
 }
 
-/// What a disc covers of one of the tiles that it meets.
+/// Part of a disc in one of the tiles that it reaches.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Part {
-    /// The way to the tile: the place of its step among all.
+    /// Index of the step to the tile.
     pub step: usize,
     /// [`Step::by`].
     pub by: usize,
-    /// The pixels covered, at least one.
+    /// Covered pixels, at least one.
     pub mask: u64,
 }
 
-/// The tiles of a grid, in a frame of empty ones as wide as discs reach, and the steps between them.
+/// Tiles of a grid in a frame of empty tiles as wide as the discs reach, and the steps between them.
 #[derive(Debug, Clone)]
 pub(super) struct Tiles {
     /// Width of the frame.
     margin: usize,
     /// Tiles from one row of tiles to the next.
     stride: usize,
-    /// Near tiles first, the tile itself the very first. None when no disc holds even its own pixel.
+    /// Near tiles first, starting with the tile itself. Empty if a disc does not even cover its own pixel.
     steps: Vec<Step>,
-    /// One of each two that lead to another tile and back, with its place among all.
+    /// One step of each pair that leads to another tile and back, with its index.
     forward: Vec<(usize, Step)>,
-    /// For each pixel of a tile, what the disc about it covers of the tile at each step.
+    /// For each pixel of a tile, the mask of its disc on the tile at each step.
     masks: Vec<u64>,
-    /// For each pixel of a tile the parts of the disc about it, near tiles first.
+    /// For each pixel of a tile, the parts of its disc, near tiles first.
     parts: Vec<Part>,
-    /// Where those of each pixel begin, and where those of the last one end.
+    /// Start of the parts of each pixel, and the end of the last.
     starts: [usize; SIDE * SIDE + 1],
 }
 
 impl Tiles {
-    /// For discs of radius `eps_px`, border included, of which no more than the sensor's width counts.
+    /// For discs of radius `eps_px`, border included, limited to the width of the sensor.
     pub fn new(eps_px: f64) -> Self {
         let eps_sq = eps_px * eps_px;
         let fits = |dx: usize, dy: usize| (dx * dx + dy * dy) as f64 <= eps_sq;
@@ -131,31 +131,30 @@ impl Tiles {
         }
     }
 
-    /// The steps to all tiles that a disc about some pixel of a tile meets.
+    /// Steps to all tiles that a disc around some pixel of a tile reaches.
     pub fn steps(&self) -> &[Step] {
         &self.steps
     }
 
-    /// One of each two steps that lead to another tile and back, with its place among all; near tiles first.
+    /// One step of each pair that leads to another tile and back, with its index; near tiles first.
     pub fn forward(&self) -> &[(usize, Step)] {
         &self.forward
     }
 
-    /// What the disc about a pixel of a tile, by its place, covers at each step.
+    /// Masks of the disc around a pixel of a tile, at each step.
     #[inline]
     pub fn masks(&self, at: usize) -> &[u64] {
         let n = self.steps.len();
         &self.masks[at * n..(at + 1) * n]
     }
 
-    /// The parts of the disc about a pixel of a tile, by its place, in the tiles that it meets: half of the steps, on
-    /// average, when a disc is as large as a tile.
+    /// Parts of the disc around a pixel of a tile: half of the steps, on average, if a disc is as large as a tile.
     #[inline]
     pub fn parts(&self, at: usize) -> &[Part] {
         &self.parts[self.starts[at]..self.starts[at + 1]]
     }
 
-    /// How many tiles there are for so many rows of pixels, with the frame.
+    /// Number of tiles for this many rows of pixels, including the frame.
     pub const fn count(&self, height: usize) -> usize {
         (height.div_ceil(SIDE) + 2 * self.margin) * self.stride
     }
@@ -166,14 +165,14 @@ impl Tiles {
         (row / SIDE + self.margin) * self.stride + self.margin
     }
 
-    /// (row, column) of the first pixel of a tile that is none of the frame.
+    /// (row, column) of the first pixel of a tile outside the frame.
     pub const fn corner(&self, tile: usize) -> (usize, usize) {
         let (row, column) = (tile / self.stride, tile % self.stride);
         ((row - self.margin) * SIDE, (column - self.margin) * SIDE)
     }
 }
 
-/// For each pixel of a tile, what the disc about it covers of the tile so many tiles away.
+/// For each pixel of a tile, the mask of its disc on the tile this many tiles away.
 fn masks(half: &[usize], rows: isize, columns: isize) -> [u64; SIDE * SIDE] {
     let side = SIDE as isize;
     let mut masks = [0; SIDE * SIDE];
@@ -183,7 +182,7 @@ fn masks(half: &[usize], rows: isize, columns: isize) -> [u64; SIDE * SIDE] {
             let Some(half) = half.get((rows * side + other - row).unsigned_abs()) else {
                 continue;
             };
-            // The columns of the other tile that lie within.
+            // Columns of the other tile within the disc.
             let middle = column - columns * side;
             let first = (middle - *half as isize).max(0);
             let last = (middle + *half as isize).min(side - 1);
@@ -196,7 +195,7 @@ fn masks(half: &[usize], rows: isize, columns: isize) -> [u64; SIDE * SIDE] {
     masks
 }
 
-/// The places of the ones in a word, ascending.
+/// Positions of the ones in a word, ascending.
 #[inline]
 pub(super) fn ones(mut word: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {

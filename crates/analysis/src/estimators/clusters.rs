@@ -1,14 +1,14 @@
-//! Mean column of the largest cluster, or of all of them.
+//! Mean column of the largest cluster, or of all clusters.
 
 use skinrig_model::{AnalysisSettings, CentroidRule};
 
-use super::{Sighting, column_px};
+use super::{ColumnEstimate, column_px};
 use crate::dbscan::{Cluster, Dbscan};
 use crate::grid::PixelGrid;
-use crate::kept::KeptEvent;
+use crate::press_events::PackedEvent;
 
-/// DBSCAN on bins of pixels. The radius is that of the settings in bins; the core threshold counts events, which
-/// larger bins do not change. A radius below one bin joins only events of the same bin.
+/// DBSCAN on bins of pixels. The radius is converted from the settings to bins; the core threshold counts events, which does
+/// not depend on the bin size. A radius below one bin joins only events of the same bin.
 #[derive(Debug, Clone)]
 pub struct Clusters {
     side_px: u16,
@@ -19,7 +19,7 @@ pub struct Clusters {
 }
 
 impl Clusters {
-    /// For the kept rows `rows.0..=rows.1` of a camera.
+    /// For the cropped rows `rows.0..=rows.1` of a camera.
     #[must_use]
     pub fn new(settings: &AnalysisSettings, rows: (u16, u16)) -> Self {
         let side = settings.bin_px.max(1);
@@ -32,20 +32,20 @@ impl Clusters {
         }
     }
 
-    /// See `super::PressEstimator::sight`.
-    pub fn sight(&mut self, events: &[KeptEvent]) -> Sighting {
+    /// See `super::PressEstimator::estimate`.
+    pub fn estimate(&mut self, events: &[PackedEvent]) -> ColumnEstimate {
         for event in events {
             self.grid
                 .add(event.x() >> self.shift, event.y() >> self.shift);
         }
         self.dbscan.run(&self.grid);
         self.grid.clear();
-        Sighting::of_clusters(&self.dbscan, self.rule, self.side_px)
+        ColumnEstimate::of_clusters(&self.dbscan, self.rule, self.side_px)
     }
 }
 
-impl Sighting {
-    /// What the last run says, on bins of side `side_px`.
+impl ColumnEstimate {
+    /// Result of the last run, on bins of side `side_px`.
     #[must_use]
     pub(crate) fn of_clusters(dbscan: &Dbscan, rule: CentroidRule, side_px: u16) -> Self {
         let chosen = match rule {

@@ -2,12 +2,12 @@
 
 use skinrig_model::SENSOR_WIDTH;
 
-use super::{Sighting, column_px};
-use crate::kept::KeptEvent;
+use super::{ColumnEstimate, column_px};
+use crate::press_events::PackedEvent;
 
 const COLUMNS: usize = SENSOR_WIDTH as usize;
 
-/// How many events fell on each column of bins.
+/// Number of events in each column of bins.
 #[derive(Debug, Clone)]
 pub struct ColumnCounts {
     shift: u32,
@@ -16,7 +16,7 @@ pub struct ColumnCounts {
 }
 
 impl ColumnCounts {
-    /// Columns of bins of this side, px.
+    /// For bins of side `side_px`, px.
     #[must_use]
     pub fn new(side_px: u16) -> Self {
         let shift = side_px.max(1).trailing_zeros();
@@ -27,8 +27,8 @@ impl ColumnCounts {
         }
     }
 
-    /// Starts again with these events.
-    pub fn fill(&mut self, events: &[KeptEvent]) {
+    /// Resets the counts and fills them with `events`.
+    pub fn fill(&mut self, events: &[PackedEvent]) {
         self.counts.fill(0);
         for event in events {
             if let Some(count) = self.counts.get_mut(usize::from(event.x() >> self.shift)) {
@@ -38,21 +38,21 @@ impl ColumnCounts {
         self.events = events.len() as u32;
     }
 
-    /// The counts, left to right.
+    /// Counts, left to right.
     #[must_use]
     pub fn counts(&self) -> &[u32] {
         &self.counts
     }
 
-    /// All events.
+    /// Number of all events.
     #[must_use]
     pub const fn events(&self) -> u32 {
         self.events
     }
 }
 
-/// The count-weighted median of the columns. The events of a column are spread evenly over its width, so that the median
-/// lies between pixels; when exactly half of the events lie on either side of a gap, it is the gap's middle.
+/// Count-weighted median of the columns. The events of a column are spread evenly over its width, so the median has
+/// sub-pixel resolution; if exactly half of the events are on either side of a gap, it is the middle of the gap.
 #[derive(Debug, Clone)]
 pub struct Median {
     side_px: u16,
@@ -60,7 +60,7 @@ pub struct Median {
 }
 
 impl Median {
-    /// On bins of this side, px.
+    /// For bins of side `side_px`, px.
     #[must_use]
     pub fn new(side_px: u16) -> Self {
         Self {
@@ -69,8 +69,8 @@ impl Median {
         }
     }
 
-    /// See `super::PressEstimator::sight`.
-    pub fn sight(&mut self, events: &[KeptEvent]) -> Sighting {
+    /// See `super::PressEstimator::estimate`.
+    pub fn estimate(&mut self, events: &[PackedEvent]) -> ColumnEstimate {
         self.columns.fill(events);
         let total = u64::from(self.columns.events());
         let mut below = 0u64;
@@ -90,10 +90,10 @@ impl Median {
                     let share = (total - 2 * below) as f64 / (2 * count) as f64;
                     column as f64 - 0.5 + share
                 };
-                return Sighting::at(column_px(bin, self.side_px), self.columns.events());
+                return ColumnEstimate::at(column_px(bin, self.side_px), self.columns.events());
             }
             below = upto;
         }
-        Sighting::default()
+        ColumnEstimate::default()
     }
 }

@@ -1,7 +1,8 @@
-//! What turns the events of one press in one camera into a column: clusters, median, histogram peak, running histogram.
+//! Estimators that turn the events of one press in one camera into a column: clusters, median, histogram peak, running
+//! histogram.
 //!
-//! All of them take the events of the window in order of time and give the same answer for the same events, whatever
-//! the machine. They see square bins of pixels: bin `b` of side `s` px lies about column `s b + (s - 1) / 2`.
+//! All of them process the events of the window in time order and give the same result for the same events on every machine.
+//! They see square bins of pixels: bin `b` of side `s` px is at column `s b + (s - 1) / 2`.
 
 mod clusters;
 mod columns;
@@ -19,24 +20,24 @@ pub use thinning::Thinning;
 
 use skinrig_model::{AnalysisSettings, Estimator, Precision};
 
-use crate::kept::KeptEvent;
+use crate::press_events::PackedEvent;
 
-/// What an estimator says.
+/// Result of an estimator.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Sighting {
-    /// The column, px; `None` when the estimator found nothing.
+pub struct ColumnEstimate {
+    /// Column, px; `None` if the estimator found nothing.
     pub column: Option<f64>,
-    /// The row, px, where the estimator looks at rows.
+    /// Row, px, for estimators that use rows.
     pub row: Option<f64>,
-    /// Clusters found; without clustering 1 when there is a column.
+    /// Clusters found; without clustering, 1 if there is a column.
     pub clusters: u32,
-    /// Events that the column stands on; a running histogram: its weight, in events.
+    /// Events behind the column; for a running histogram its weight in events.
     pub events: u32,
-    /// Standard deviation of their columns, px, where the estimator clusters.
+    /// Standard deviation of their columns, px, for estimators that cluster.
     pub spread_u: Option<f64>,
 }
 
-impl Sighting {
+impl ColumnEstimate {
     const fn at(column: f64, events: u32) -> Self {
         Self {
             column: Some(column),
@@ -48,7 +49,7 @@ impl Sighting {
     }
 }
 
-/// An estimator with its buffers, to be used for press after press.
+/// An estimator with reusable buffers.
 #[derive(Debug, Clone)]
 pub(crate) struct PressEstimator(Kind);
 
@@ -63,7 +64,7 @@ enum Kind {
 }
 
 impl PressEstimator {
-    /// The estimator of these settings for a camera whose rows `rows.0..=rows.1` are kept. The settings are in range.
+    /// Estimator for these settings and a camera with the cropped rows `rows.0..=rows.1`. The settings are validated.
     #[must_use]
     pub fn new(settings: &AnalysisSettings, rows: (u16, u16)) -> Self {
         let (side, eps) = (settings.bin_px, settings.eps_px);
@@ -82,20 +83,20 @@ impl PressEstimator {
         })
     }
 
-    /// The sighting of a window that begins at `from_us`, from its events in order of time.
-    pub fn sight(&mut self, events: &[KeptEvent], from_us: u32) -> Sighting {
+    /// Estimates the column of a window that begins at `from_us`, from its events in time order.
+    pub fn estimate(&mut self, events: &[PackedEvent], from_us: u32) -> ColumnEstimate {
         match &mut self.0 {
-            Kind::Clusters(e) => e.sight(events),
-            Kind::Median(e) => e.sight(events),
-            Kind::Peak64(e) => e.sight(events),
-            Kind::Peak32(e) => e.sight(events),
-            Kind::Streaming64(e) => e.sight(events, from_us),
-            Kind::Streaming32(e) => e.sight(events, from_us),
+            Kind::Clusters(e) => e.estimate(events),
+            Kind::Median(e) => e.estimate(events),
+            Kind::Peak64(e) => e.estimate(events),
+            Kind::Peak32(e) => e.estimate(events),
+            Kind::Streaming64(e) => e.estimate(events, from_us),
+            Kind::Streaming32(e) => e.estimate(events, from_us),
         }
     }
 }
 
-/// The column of a place among bins of this side, px.
+/// Column of a position among bins of this side, px.
 fn column_px(bin: f64, side_px: u16) -> f64 {
     let side = f64::from(side_px);
     side * bin + (side - 1.0) / 2.0

@@ -1,34 +1,33 @@
-//! The peak of the smoothed histogram of columns, between pixels.
+//! Peak of the smoothed histogram of columns, with sub-pixel resolution.
 
-use super::{ColumnCounts, Real, Sighting, column_px};
-use crate::kept::KeptEvent;
+use super::{ColumnCounts, ColumnEstimate, Real, column_px};
+use crate::press_events::PackedEvent;
 
-/// The kernel ends at this many standard deviations; what is beyond is 0.3 % of it.
+/// Cut-off of the kernel in standard deviations; 0.3 % of it is beyond.
 const KERNEL_SIGMAS: f64 = 3.0;
-/// Smallest standard deviation, bins: a narrower kernel would not reach the neighbours.
-const LEAST_SIGMA_BINS: f64 = 0.5;
+/// Minimum standard deviation, bins: a narrower kernel would not reach the neighbours.
+const MIN_SIGMA_BINS: f64 = 0.5;
 
-/// Smooths the events per column with a Gaussian whose standard deviation is the clustering radius and takes the
-/// highest place, the first of equal ones; a parabola through it and its neighbours says where between the bins it
-/// lies.
+/// Smooths the events per column with a Gaussian whose standard deviation is the clustering radius, and takes the first
+/// maximum; a parabola through it and its neighbours gives the position between bins.
 #[derive(Debug, Clone)]
 pub struct Peak<R> {
     side_px: u16,
     reach_px: f64,
     columns: ColumnCounts,
-    /// Weights at distance 0, 1, ...
+    /// Weights at distances 0, 1, ...
     kernel: Vec<R>,
-    /// Counts with as many zeros on both sides as the kernel needs.
+    /// Counts, zero-padded on both sides for the kernel.
     padded: Vec<R>,
     smooth: Vec<R>,
 }
 
 impl<R: Real> Peak<R> {
-    /// On bins of this side, smoothed by `sigma_px`.
+    /// For bins of this side, smoothed by `sigma_px`.
     #[must_use]
     pub fn new(side_px: u16, sigma_px: f64) -> Self {
         let columns = ColumnCounts::new(side_px);
-        let sigma = (sigma_px / f64::from(side_px.max(1))).max(LEAST_SIGMA_BINS);
+        let sigma = (sigma_px / f64::from(side_px.max(1))).max(MIN_SIGMA_BINS);
         let radius = (KERNEL_SIGMAS * sigma).ceil() as usize;
         let weight = |k: usize| libm::exp(-0.5 * (k as f64 / sigma) * (k as f64 / sigma));
         let bins = columns.counts().len();
@@ -36,18 +35,18 @@ impl<R: Real> Peak<R> {
             side_px,
             reach_px: sigma_px,
             kernel: (0..=radius).map(|k| R::of(weight(k))).collect(),
-            // One more on each side: the parabola looks at the neighbours of the first and last bin.
+            // One more on each side: the parabola uses the neighbours of the first and last bin.
             padded: vec![R::default(); bins + 2 * (radius + 1)],
             smooth: vec![R::default(); bins + 2],
             columns,
         }
     }
 
-    /// See `super::PressEstimator::sight`.
-    pub fn sight(&mut self, events: &[KeptEvent]) -> Sighting {
+    /// See `super::PressEstimator::estimate`.
+    pub fn estimate(&mut self, events: &[PackedEvent]) -> ColumnEstimate {
         self.columns.fill(events);
         if self.columns.events() == 0 {
-            return Sighting::default();
+            return ColumnEstimate::default();
         }
         let radius = self.kernel.len() - 1;
         let bins = self.columns.counts().len();
@@ -71,11 +70,11 @@ impl<R: Real> Peak<R> {
         };
         let bin = (at - 1) as f64 + offset.wide();
         let column = column_px(bin, self.side_px);
-        Sighting::at(column, self.events_near(bin))
+        ColumnEstimate::at(column, self.events_near(bin))
     }
 
-    /// `smooth[i]` is the kernel about bin `i - 1`; both sides are added before they are weighted, so that a mirrored
-    /// histogram gives the mirrored curve to the last bit.
+    /// `smooth[i]` is the kernel about bin `i - 1`; both sides are added before weighting, so that a mirrored histogram
+    /// gives the bit-identical mirrored curve.
     fn convolve(&mut self, radius: usize) {
         let length = self.smooth.len();
         let centre = &self.padded[radius..radius + length];
@@ -92,7 +91,7 @@ impl<R: Real> Peak<R> {
         }
     }
 
-    /// Events of the bins that lie within the smoothing radius of the peak, at least its own.
+    /// Events in the bins within the smoothing radius of the peak, at least those of its own bin.
     fn events_near(&self, bin: f64) -> u32 {
         let reach = (self.reach_px / f64::from(self.side_px)).max(0.5);
         let counts = self.columns.counts();

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Sub};
 
-/// `f32` or `f64`: what an estimator that is written once is computed in.
+/// `f32` or `f64`, for estimators that support both.
 pub trait Real:
     Copy
     + PartialOrd
@@ -14,10 +14,10 @@ pub trait Real:
     + AddAssign
     + MulAssign
 {
-    /// The nearest number of this width.
+    /// Nearest number of this width.
     fn of(value: f64) -> Self;
 
-    /// The same number in 64 bits.
+    /// Same number as `f64`.
     fn wide(self) -> f64;
 }
 

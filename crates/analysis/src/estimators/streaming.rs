@@ -1,42 +1,42 @@
-//! A column from a running histogram: one update per event, constant memory, an answer at any instant.
+//! Column from a running histogram: one update per event, constant memory, a result at any time.
 
 use skinrig_model::SENSOR_WIDTH;
 
-use super::{Real, Sighting};
-use crate::kept::KeptEvent;
+use super::{ColumnEstimate, Real};
+use crate::press_events::PackedEvent;
 
-/// Width of a bin, px. The mean within each bin keeps the answer between pixels.
+/// Width of a bin, px. The mean within each bin gives sub-bin resolution.
 const BIN_PX: u16 = 16;
 const BIN_SHIFT: u32 = BIN_PX.trailing_zeros();
 const BINS: usize = (SENSOR_WIDTH / BIN_PX) as usize;
-/// Forgetting happens in this many steps per time constant; within a step events weigh the same.
+/// Number of decay steps per time constant; within a step events have equal weight.
 const STEPS: f64 = 64.0;
-/// The answer is made of the bins next to each other about the heaviest that have at least this share of its weight.
-const LEAST_SHARE: f64 = 0.1;
+/// The result uses adjacent bins around the heaviest one with at least this share of its weight.
+const MIN_SHARE: f64 = 0.1;
 
-/// Forty bins, each with a weight and a first moment that decay exponentially: 336 bytes in 32 bits, 664 in 64.
+/// Forty bins, each with a weight and a first moment that decay exponentially: 336 bytes with `f32`, 664 with `f64`.
 ///
-/// An event adds 1 to the weight of its bin and its distance from the bin's middle to the moment. The answer takes the
-/// median weight off every bin (what the background puts everywhere; a touch covers far less than half of the
-/// columns), finds the heaviest one and takes the mean over it and its neighbours. It is a sum over forty bins, whatever the
-/// number of events.
+/// An event adds 1 to the weight of its bin, and its distance from the middle of the bin to the moment. The result subtracts
+/// the median weight from every bin (the uniform background; a press covers far less than half of the columns), finds the
+/// heaviest bin, and takes the mean over it and its neighbours. It costs a sum over forty bins, whatever the number of
+/// events.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Streaming<R> {
     weights: [R; BINS],
     moments: [R; BINS],
-    /// Factor of one step.
+    /// Decay factor of one step.
     decay: R,
     step_us: u32,
-    /// The next step happens at this time, µs.
+    /// Time of the next step, µs.
     next_us: u64,
-    /// Distance of the middle of a bin of pixels from its first column, px.
+    /// Distance from the first column of a pixel bin to its middle, px.
     middle_px: R,
-    /// Clears the low bits of a column: pixels of one bin are one.
+    /// Clears the low bits of a column, so that pixels of one bin coincide.
     mask: u16,
 }
 
 impl<R: Real> Streaming<R> {
-    /// On bins of pixels of side `side_px`; an event's weight is 1/e after `forget_ms` (above 0).
+    /// For pixel bins of side `side_px`; the weight of an event is 1/e after `forget_ms` (above 0).
     #[must_use]
     pub fn new(side_px: u16, forget_ms: f64) -> Self {
         let step_us = (forget_ms * 1e3 / STEPS).round().max(1.0);
@@ -51,14 +51,14 @@ impl<R: Real> Streaming<R> {
         }
     }
 
-    /// Forgets everything; time begins at `from_us`.
+    /// Resets the state; time begins at `from_us`.
     pub fn restart(&mut self, from_us: u32) {
         self.weights.fill(R::default());
         self.moments.fill(R::default());
         self.next_us = u64::from(from_us) + u64::from(self.step_us);
     }
 
-    /// Takes the next event: time, not before the last one (µs), and column.
+    /// Adds the next event: time, not before the previous one (µs), and column.
     pub fn add(&mut self, t_us: u32, x: u16) {
         if u64::from(t_us) >= self.next_us {
             self.forget(t_us);
@@ -75,7 +75,7 @@ impl<R: Real> Streaming<R> {
         let steps = (u64::from(t_us) - self.next_us) / u64::from(self.step_us) + 1;
         self.next_us += steps * u64::from(self.step_us);
         let mut factor = R::of(1.0);
-        // After 40 time constants nothing is left of any count.
+        // After 40 time constants no count has any weight left.
         for _ in 0..steps.min(STEPS as u64 * 40) {
             factor *= self.decay;
         }
@@ -84,9 +84,9 @@ impl<R: Real> Streaming<R> {
         }
     }
 
-    /// The answer now.
+    /// Current result.
     #[must_use]
-    pub fn now(&self) -> Sighting {
+    pub fn now(&self) -> ColumnEstimate {
         let zero = R::default();
         let level = self.background();
         let net = |bin: usize| {
@@ -99,9 +99,9 @@ impl<R: Real> Streaming<R> {
                 top = bin;
             }
         }
-        let least = R::of(LEAST_SHARE) * net(top);
+        let least = R::of(MIN_SHARE) * net(top);
         if least <= zero {
-            return Sighting::default();
+            return ColumnEstimate::default();
         }
         let mut first = top;
         while first > 0 && net(first - 1) >= least {
@@ -113,18 +113,18 @@ impl<R: Real> Streaming<R> {
         }
         let (mut weight, mut sum) = (zero, zero);
         for bin in first..=last {
-            // From the heaviest bin, so that the numbers stay small.
+            // Relative to the heaviest bin, so that the numbers stay small.
             let distance = R::of((bin as f64 - top as f64) * f64::from(BIN_PX));
-            // The background lies evenly over the bin: it has no first moment.
+            // The background is uniform over the bin, so it has no first moment.
             weight += net(bin);
             sum += net(bin) * distance + self.moments[bin];
         }
         let middle = top as f64 * f64::from(BIN_PX) + f64::from(BIN_PX - 1) / 2.0;
         let column = middle + (sum / weight).wide();
-        Sighting::at(column, weight.wide() as u32)
+        ColumnEstimate::at(column, weight.wide() as u32)
     }
 
-    /// The median weight, the lower one of two.
+    /// Median weight, the lower one of two.
     fn background(&self) -> R {
         let mut sorted = self.weights;
         let order = |a: &R, b: &R| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal);
@@ -132,8 +132,8 @@ impl<R: Real> Streaming<R> {
         *median
     }
 
-    /// See `super::PressEstimator::sight`.
-    pub fn sight(&mut self, events: &[KeptEvent], from_us: u32) -> Sighting {
+    /// See `super::PressEstimator::estimate`.
+    pub fn estimate(&mut self, events: &[PackedEvent], from_us: u32) -> ColumnEstimate {
         self.restart(from_us);
         for event in events {
             self.add(event.t_us(), event.x());

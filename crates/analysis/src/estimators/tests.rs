@@ -1,4 +1,4 @@
-//! Estimators against slow references, on planted presses and at the extremes.
+//! Compares estimators with slow references, on planted presses and edge cases.
 
 use proptest::prelude::*;
 use skinrig_model::{AnalysisSettings, CdEvent, CentroidRule, Estimator, Polarity, Precision};
@@ -16,14 +16,14 @@ const ALL: [(Estimator, Precision); 6] = [
     (Estimator::Streaming, Precision::F32),
 ];
 
-fn event(t_us: u32, x: u16, y: u16) -> KeptEvent {
+fn event(t_us: u32, x: u16, y: u16) -> PackedEvent {
     let event = CdEvent {
         t_us: u64::from(t_us),
         x,
         y,
         polarity: Polarity::On,
     };
-    KeptEvent::pack(&event, 0).unwrap()
+    PackedEvent::pack(&event, 0).unwrap()
 }
 
 fn settings(estimator: Estimator, precision: Precision, bin_px: u16) -> AnalysisSettings {
@@ -35,12 +35,12 @@ fn settings(estimator: Estimator, precision: Precision, bin_px: u16) -> Analysis
     }
 }
 
-fn sight(s: &AnalysisSettings, events: &[KeptEvent]) -> Sighting {
-    PressEstimator::new(s, ROWS).sight(events, 0)
+fn estimate(s: &AnalysisSettings, events: &[PackedEvent]) -> ColumnEstimate {
+    PressEstimator::new(s, ROWS).estimate(events, 0)
 }
 
-/// A touch: events about column `u` (standard deviation `sd`), and background over the whole crop, in order of time.
-fn planted(u: f64, sd: f64, touch: usize, background: usize, seed: u64) -> Vec<KeptEvent> {
+/// A press: events around column `u` (standard deviation `sd`), and background over the whole crop, in time order.
+fn planted(u: f64, sd: f64, touch: usize, background: usize, seed: u64) -> Vec<PackedEvent> {
     let mut rng = seeded::generator(seed, 0);
     let mut unit = || seeded::signed_unit(&mut rng);
     let mut events = Vec::new();
@@ -70,13 +70,13 @@ fn a_planted_touch_is_found_by_each_estimator_without_bias() {
                 .map(|i| {
                     let u = 150.0 + 5.77 * f64::from(i);
                     let events = planted(u, 12.0, 3000, 150, u64::from(i as u32));
-                    sight(&s, &events).column.unwrap() - u
+                    estimate(&s, &events).column.unwrap() - u
                 })
                 .collect();
             let n = errors.len() as f64;
             let mean = errors.iter().sum::<f64>() / n;
             let std = (errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
-            // Bins of 16 px are wider than the touch; what is left over is periodic and no bias.
+            // Bins of 16 px are wider than the press; the remaining error is periodic, not a bias.
             let most = if bin == 16 { 5.0 } else { 1.6 };
             assert!(
                 std < most,
@@ -96,7 +96,7 @@ fn background_moves_the_running_histogram_less_than_the_median() {
     let events = planted(150.0, 12.0, 2000, 2000, 5);
     let error = |estimator| {
         let s = settings(estimator, Precision::F64, 1);
-        (sight(&s, &events).column.unwrap() - 150.0).abs()
+        (estimate(&s, &events).column.unwrap() - 150.0).abs()
     };
     assert!(error(Estimator::ColumnMedian) > 6.0);
     assert!(error(Estimator::Streaming) < 2.0);
@@ -112,14 +112,14 @@ fn none_one_two_and_many_events_in_one_place_have_their_answers() {
                 ..settings(estimator, precision, bin)
             };
             let label = format!("{estimator:?} {precision:?} bin {bin}");
-            assert_eq!(sight(&s, &[]), Sighting::default(), "{label}");
-            // A single pixel of a bin is known to the bin only.
+            assert_eq!(estimate(&s, &[]), ColumnEstimate::default(), "{label}");
+            // Positions within a bin are indistinguishable.
             let tolerance = f64::from(bin) / 2.0 + 1e-4;
             for x in [0u16, 15, 320, 639] {
                 for count in [1u32, 2, 1000] {
                     for step in [0, 7] {
                         let events: Vec<_> = (0..count).map(|i| event(step * i, x, 300)).collect();
-                        let found = sight(&s, &events).column.unwrap();
+                        let found = estimate(&s, &events).column.unwrap();
                         assert!(
                             (found - f64::from(x)).abs() <= tolerance,
                             "{label}: {x} is {found}"
@@ -128,7 +128,7 @@ fn none_one_two_and_many_events_in_one_place_have_their_answers() {
                 }
             }
             let two = [event(0, 300, 250), event(1, 303, 250)];
-            let found = sight(&s, &two).column.unwrap();
+            let found = estimate(&s, &two).column.unwrap();
             assert!(
                 (found - 301.5).abs() <= f64::from(bin),
                 "{label}: two events at {found}"
@@ -146,9 +146,9 @@ fn an_estimator_says_the_same_again_after_another_press() {
     for (estimator, precision) in ALL {
         let s = settings(estimator, precision, 2);
         let mut used = PressEstimator::new(&s, ROWS);
-        let fresh = used.sight(&a, 0);
-        used.sight(&b, 0);
-        assert_eq!(used.sight(&a, 0), fresh, "{estimator:?}");
+        let fresh = used.estimate(&a, 0);
+        used.estimate(&b, 0);
+        assert_eq!(used.estimate(&a, 0), fresh, "{estimator:?}");
     }
 }
 
@@ -163,9 +163,9 @@ fn the_running_histogram_is_small_and_forgets() {
     assert_eq!(
         stream.now().column,
         Some(500.0),
-        "20 time constants later the first touch is gone"
+        "20 time constants later the first press is forgotten"
     );
-    // After one time constant 1/e is left, to the width of a step.
+    // After one time constant 1/e remains, within the width of a step.
     let mut one = Streaming::<f64>::new(1, 50.0);
     one.restart(0);
     (0..1_000_000).for_each(|_| one.add(0, 100));
@@ -177,7 +177,7 @@ fn the_running_histogram_is_small_and_forgets() {
     );
 }
 
-/// All columns of all events, sorted: the median of their places within the columns.
+/// Reference: sort all columns of all events and take the median of their positions within the columns.
 fn slow_median(columns: &mut [u16]) -> f64 {
     columns.sort_unstable();
     let n = columns.len();
@@ -232,7 +232,7 @@ proptest! {
     #[test]
     fn the_median_is_that_of_the_sorted_columns(mut columns in columns()) {
         let events: Vec<_> = columns.iter().enumerate().map(|(i, x)| event(i as u32, *x, 200)).collect();
-        let found = sight(&settings(Estimator::ColumnMedian, Precision::F64, 1), &events);
+        let found = estimate(&settings(Estimator::ColumnMedian, Precision::F64, 1), &events);
         prop_assert!((found.column.unwrap() - slow_median(&mut columns)).abs() < 1e-9);
         prop_assert_eq!(found.events as usize, columns.len());
     }
@@ -240,7 +240,7 @@ proptest! {
     #[test]
     fn the_peak_is_that_of_the_summed_kernels(columns in columns()) {
         let events: Vec<_> = columns.iter().enumerate().map(|(i, x)| event(i as u32, *x, 200)).collect();
-        let found = sight(&settings(Estimator::HistogramPeak, Precision::F64, 1), &events);
+        let found = estimate(&settings(Estimator::HistogramPeak, Precision::F64, 1), &events);
         let slow = slow_peak(&columns, 10.0);
         prop_assert!((found.column.unwrap() - slow).abs() < 1e-6, "{:?} is not {slow}", found.column);
     }
@@ -252,11 +252,11 @@ proptest! {
             let of = |flip: bool| {
                 let events: Vec<_> = columns.iter().enumerate()
                     .map(|(i, x)| event(i as u32, if flip { 639 - x } else { *x }, 200)).collect();
-                sight(&s, &events)
+                estimate(&s, &events)
             };
             let (seen, mirrored) = (of(false), of(true));
             prop_assert_eq!(seen.column.is_some(), mirrored.column.is_some());
-            // Of two equally high places the first one counts, and it is another one in the mirror.
+            // Of two equal maxima the first counts, and the mirror image has the other one first.
             let tie = matches!(estimator, Estimator::HistogramPeak | Estimator::Streaming);
             if let (Some(a), Some(b)) = (seen.column, mirrored.column) && (!tie || (a + b - 639.0).abs() < 0.5) {
                 prop_assert!((a + b - 639.0).abs() < 1e-2, "{estimator:?} {precision:?}: {a} and {b}");
@@ -268,7 +268,7 @@ proptest! {
     fn half_the_bits_move_a_column_by_less_than_a_hundredth_of_a_pixel(u in 40.0..600.0f64, seed in 0u64..50) {
         let events = planted(u, 10.0, 800, 40, seed);
         for estimator in [Estimator::HistogramPeak, Estimator::Streaming] {
-            let of = |precision| sight(&settings(estimator, precision, 1), &events).column.unwrap();
+            let of = |precision| estimate(&settings(estimator, precision, 1), &events).column.unwrap();
             let (wide, narrow) = (of(Precision::F64), of(Precision::F32));
             prop_assert!((wide - narrow).abs() < 0.01, "{estimator:?}: {wide} and {narrow}");
         }

@@ -1,13 +1,13 @@
-//! Keeps one event in k at random, the same ones in any order of arrival.
+//! Keeps one event in k at random, independent of the order of arrival.
 
 use skinrig_model::{CameraId, CdEvent, Polarity};
 
-/// Bernoulli thinning whose coin is a hash of the event itself: an event is kept or not wherever the stream is cut and
-/// whichever window asks. Events that agree in time, pixel and polarity share one fate.
+/// Bernoulli thinning with a hash of the event as its coin: the decision does not depend on how the stream is split or which
+/// window asks. Events with equal time, pixel and polarity share one decision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Thinning {
     key: u64,
-    /// Kept when the hash is at most this.
+    /// Kept if the hash is at most this.
     limit: u64,
 }
 
@@ -21,19 +21,19 @@ impl Thinning {
         }
     }
 
-    /// True when every event stays.
+    /// True if every event is kept.
     #[must_use]
     pub(crate) fn keeps_all(&self) -> bool {
         self.limit == u64::MAX
     }
 
-    /// True for an event that stays; `event` in camera time.
+    /// True if the event is kept; `event` in camera time.
     #[must_use]
     pub fn keeps(&self, event: &CdEvent) -> bool {
         self.keeps_at(event.t_us, event.x, event.y, event.polarity == Polarity::On)
     }
 
-    /// The same for an event of a view.
+    /// Same for an event of a view.
     #[must_use]
     pub(crate) fn keeps_at(&self, t_us: u64, x: u16, y: u16, on: bool) -> bool {
         let pixel = u64::from(on) << 32 | u64::from(y) << 16 | u64::from(x);
@@ -41,7 +41,7 @@ impl Thinning {
     }
 }
 
-/// The output function of SplitMix64 (Steele, Lea and Flood 2014): every bit of the input changes half of the output.
+/// Output function of SplitMix64 (Steele, Lea and Flood 2014): every bit of the input changes half of the output.
 fn mixed(value: u64) -> u64 {
     let mut z = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,22 +1,22 @@
-//! Event counts in bins of equal width about a contact, on host time.
+//! Event counts in bins of equal width around a contact, on host time.
 
-use crate::kept::{KeptEvent, KeptView};
+use crate::press_events::{EventView, PackedEvent};
 use crate::result::ClockFit;
 
-/// Consecutive bins; bin 0 begins at the contact, so that no bin mixes what was before it with what was after.
+/// Consecutive bins; bin 0 begins at the contact, so that no bin mixes events before and after it.
 ///
-/// A bin includes its start and excludes its end. (numpy's histogram closes the last bin; here an event at the end of
-/// a window belongs to what follows, so that adjoining windows count every event once.)
+/// Bins are half-open. (numpy's histogram closes the last bin; here an event at the end of a window belongs to the next one,
+/// so that adjoining windows count every event once.)
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Grid {
     /// Number of the first bin; negative before the contact.
     pub first: i64,
-    /// How many bins.
+    /// Number of bins.
     pub len: usize,
 }
 
 impl Grid {
-    /// The whole bins of `bin_us` between two host times after the contact, µs.
+    /// The whole bins of `bin_us` between two host times relative to the contact, µs.
     #[must_use]
     pub fn within(from_us: f64, to_us: f64, bin_us: f64) -> Self {
         let first = (from_us / bin_us).ceil() as i64;
@@ -27,39 +27,39 @@ impl Grid {
         }
     }
 
-    /// Number of the first bin after it.
+    /// Number of the bin after the last one.
     #[must_use]
     pub const fn end(&self) -> i64 {
         self.first + self.len as i64
     }
 
-    /// The middle of the bin at `index`, ms after the contact.
+    /// Middle of the bin at `index`, ms after the contact.
     #[must_use]
     pub(crate) fn centre_ms(&self, index: usize, bin_ms: f64) -> f64 {
         ((self.first + index as i64) as f64 + 0.5) * bin_ms
     }
 
-    /// Its length, s.
+    /// Total length, s.
     #[must_use]
     pub fn length_s(&self, bin_ms: f64) -> f64 {
         self.len as f64 * bin_ms * 1e-3
     }
 }
 
-/// The events of one camera, placed on host time after the contact.
+/// Events of one camera on host time relative to the contact.
 #[derive(Debug, Clone, Copy)]
-pub struct Sight<'a> {
-    view: &'a KeptView,
-    /// The contact, camera time after the view's start, µs.
+pub struct HostTimeView<'a> {
+    view: &'a EventView,
+    /// Contact in camera time after the view's start, µs.
     contact_us: f64,
     /// Camera µs per host µs.
     rate: f64,
 }
 
-impl<'a> Sight<'a> {
-    /// A view and the clock of its camera, on which the contact is `late_us` later than the one line through it says.
+impl<'a> HostTimeView<'a> {
+    /// A view with the clock of its camera; the contact is `late_us` later than the single line through that clock predicts.
     #[must_use]
-    pub fn new(view: &'a KeptView, clock: &ClockFit, late_us: f64) -> Self {
+    pub fn new(view: &'a EventView, clock: &ClockFit, late_us: f64) -> Self {
         Self {
             view,
             contact_us: view.contact_us + late_us,
@@ -67,7 +67,7 @@ impl<'a> Sight<'a> {
         }
     }
 
-    /// Host time after the contact of a camera time after the view's start, µs.
+    /// Host time relative to the contact of a camera time after the view's start, µs.
     #[must_use]
     pub fn host_us(&self, camera_us: f64) -> f64 {
         (camera_us - self.contact_us) / self.rate
@@ -75,18 +75,18 @@ impl<'a> Sight<'a> {
 
     /// The view.
     #[must_use]
-    pub const fn view(&self) -> &'a KeptView {
+    pub const fn view(&self) -> &'a EventView {
         self.view
     }
 
-    /// Where an event lies, in bins after the contact.
-    fn position(&self, event: KeptEvent, bin_us: f64) -> f64 {
+    /// Position of an event in bins after the contact.
+    fn position(&self, event: PackedEvent, bin_us: f64) -> f64 {
         (f64::from(event.t_us()) - self.contact_us) / (self.rate * bin_us)
     }
 
-    /// The events in the bins of `grid`.
+    /// Events in the bins of `grid`.
     #[must_use]
-    pub fn within(&self, grid: Grid, bin_us: f64) -> &'a [KeptEvent] {
+    pub fn within(&self, grid: Grid, bin_us: f64) -> &'a [PackedEvent] {
         let before = |edge: i64| {
             let edge = edge as f64;
             let events = &self.view.events;
@@ -96,10 +96,10 @@ impl<'a> Sight<'a> {
         &self.view.events[from..to.max(from)]
     }
 
-    /// Adds events that lie in `grid`.
+    /// Adds events within `grid` to `counts`.
     pub fn count(
         &self,
-        events: impl Iterator<Item = KeptEvent>,
+        events: impl Iterator<Item = PackedEvent>,
         grid: Grid,
         bin_us: f64,
         counts: &mut [u32],

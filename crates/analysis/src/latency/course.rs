@@ -1,4 +1,4 @@
-//! The event rate about the contact, for drawing.
+//! Event rate around the contact, for drawing.
 
 use rayon::prelude::*;
 
@@ -7,22 +7,22 @@ use super::trial::Trial;
 use crate::metrics::quantile;
 use crate::result::LatencyCourse;
 
-/// About this wide is a drawn bin, ms: 850 for a whole trial.
+/// Approximate width of a drawn bin, ms: 850 for a whole trial.
 const DRAWN_MS: f64 = 2.0;
-/// The percentiles drawn.
+/// Drawn percentiles.
 const QUANTILES: [f64; 3] = [0.05, 0.5, 0.95];
 
-/// The rate of one trial, averaged within drawn bins; one of them begins at the contact.
+/// Rate of one trial, averaged over drawn bins; one of them begins at the contact.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Drawn {
+pub struct DrawnRates {
     /// Number of the first drawn bin; negative before the contact.
     pub first: i64,
-    /// Events per second in each.
+    /// Events per second in each bin.
     pub per_s: Vec<f64>,
 }
 
-impl Drawn {
-    /// The whole drawn bins among the (smoothed) counts of a grid.
+impl DrawnRates {
+    /// The whole drawn bins of the (smoothed) counts on a grid.
     #[must_use]
     pub fn new(grid: Grid, counts: &[f64], bin_ms: f64) -> Self {
         let fine = bins_drawn_as_one(bin_ms);
@@ -41,12 +41,12 @@ impl Drawn {
     }
 }
 
-/// Percentiles of the trials about the contact, and of all their backgrounds.
+/// Percentiles of the trials around the contact, and of all their backgrounds.
 #[must_use]
 pub fn course(trials: &[Trial], bin_ms: f64) -> LatencyCourse {
     let fine = bins_drawn_as_one(bin_ms);
     let from = trials.iter().map(|t| t.course.first).min().unwrap_or(0);
-    let end = |d: &Drawn| d.first + d.per_s.len() as i64;
+    let end = |d: &DrawnRates| d.first + d.per_s.len() as i64;
     let to = trials.iter().map(|t| end(&t.course)).max().unwrap_or(0);
     let bins: Vec<(i64, [f32; 3])> = (from..to)
         .into_par_iter()

@@ -1,20 +1,20 @@
-//! The detector: a one-sided CUSUM (Page 1954) of Poisson counts, tuned to a rate increase.
+//! The detector: a one-sided CUSUM (Page 1954) on Poisson counts, tuned to a rate increase.
 
-/// Fewest events that a background is taken to hold. Without a floor a silent background makes the first event a
+/// Minimum number of events assumed in a background. Without this floor, the first event after a silent background is a
 /// detection.
-const LEAST_EVENTS: f64 = 0.5;
+const MIN_EVENTS: f64 = 0.5;
 
-/// The rate of a background of `events` in `length_s`, events per second; `length_s` is above 0.
+/// Rate of a background of `events` in `length_s` (above 0), events per second.
 ///
-/// Events over the length of the *window*, at least half an event. (The public code divides by the time between the
-/// first and the last event, which is 0 for simultaneous ones and says nothing for a single one.)
+/// Divides by the length of the *window*, with at least half an event. (The public code divides by the time between the
+/// first and the last event, which is 0 for simultaneous events and undefined for a single one.)
 #[must_use]
 pub fn background_rate_per_s(events: u64, length_s: f64) -> f64 {
-    (events as f64).max(LEAST_EVENTS) / length_s
+    (events as f64).max(MIN_EVENTS) / length_s
 }
 
-/// A CUSUM: each bin with x counts adds the log-likelihood ratio of `alpha` times the background rate to the background
-/// rate, x ln(alpha) - (alpha - 1) lambda0 dt; the sum never falls below 0.
+/// Each bin with x counts adds the log-likelihood ratio of `alpha` times the background rate to the background rate, x
+/// ln(alpha) - (alpha - 1) lambda0 dt; the sum never falls below 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Cusum {
     gain: f64,
@@ -23,8 +23,8 @@ pub(crate) struct Cusum {
 }
 
 impl Cusum {
-    /// A detector of an `alpha`-fold (above 1) increase over `rate_per_s` that asks for `consecutive` bins (at least
-    /// 1) in a row at or above the threshold.
+    /// A detector of an `alpha`-fold (above 1) increase over `rate_per_s` that requires `consecutive` bins (at least 1) in a
+    /// row at or above the threshold.
     #[must_use]
     pub fn new(alpha: f64, rate_per_s: f64, bin_s: f64, consecutive: u32) -> Self {
         Self {
@@ -34,13 +34,13 @@ impl Cusum {
         }
     }
 
-    /// The sum after `sum` and a bin of `x` (smoothed) counts.
+    /// The sum after adding a bin of `x` (smoothed) counts.
     fn step(&self, sum: f64, x: f64) -> f64 {
         (sum + (x * self.gain - self.loss)).max(0.0)
     }
 
-    /// The first bin of the first run at or above each of `thresholds` (ascending), all in one sweep: the sum does not
-    /// depend on the threshold, and a run at a higher one never begins before the first at a lower one.
+    /// First bin of the first run at or above each of `thresholds` (ascending), in one pass: the sum does not depend on the
+    /// threshold, and a run at a higher threshold never begins before the first at a lower one.
     #[must_use]
     pub fn onsets(&self, smoothed: &[f64], thresholds: &[f64]) -> Vec<Option<usize>> {
         let mut found = vec![None; thresholds.len()];

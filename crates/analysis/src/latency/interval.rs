@@ -1,65 +1,64 @@
-//! Estimates of a detector at one threshold, with bootstrap intervals over locations; exact ones for false alarms, and where
-//! nothing, or everything, was detected.
+//! Estimates of a detector at one threshold, with bootstrap intervals over locations; exact intervals for false alarms, and
+//! where nothing or everything was detected.
 
 use rayon::prelude::*;
 
-use super::sweep::Hits;
+use super::sweep::OnsetStatistics;
 use crate::exact;
 use crate::metrics::quantile;
 use crate::result::Estimate;
 use crate::seeded;
 
-/// Share of a 95 % interval that lies outside on each side.
+/// Probability outside a 95 % interval on each side.
 const TAIL: f64 = 0.025;
-/// Quantities with an interval, in the order of [`Figures`].
+/// Number of quantities with an interval, in the order of [`Figures`].
 const COUNT: usize = 6;
-/// (value, n) of each: detected share, width, median, 5th percentile, median and 95th percentile after contact.
+/// (value, n) of each: detected share, width, median; 5th percentile, median and 95th percentile after contact.
 type Figures = [(Option<f64>, u32); COUNT];
 const DETECTED: usize = 0;
 
 /// One trial at one threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
-    /// Its location.
+    /// Location of the press.
     pub location: u32,
-    /// Onset of the touch after the contact, ms; `None` when it was not detected, or a false alarm came first.
+    /// Onset after contact, ms; `None` if not detected, or preceded by a false alarm.
     pub onset_ms: Option<f64>,
-    /// A false alarm ended the search.
+    /// True if a false alarm ended the search.
     pub false_alarm: bool,
-    /// Time in which a trip is a false alarm, s.
+    /// Time in which a detection is a false alarm, s.
     pub at_risk_s: f64,
 }
 
-/// What is estimated.
+/// Estimated quantities.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimates {
-    /// Share of trials with an onset that counts; n: trials. Of a share of 0 or 1 the interval is the exact binomial
-    /// one over the locations.
+    /// Share of trials with a counting onset; n: trials. For a share of 0 or 1 the interval is the exact binomial one over
+    /// the locations.
     pub detected_rate: Estimate,
-    /// Width of the onsets that count, ms; n: those.
+    /// Width of the counting onsets, ms; n: their number.
     pub width_ms: Estimate,
-    /// Median of all onsets, ms; n: those.
+    /// Median of all onsets, ms; n: their number.
     pub median_ms: Estimate,
-    /// False alarms over the time at risk, per second; n: trials. The interval is the exact Poisson one.
+    /// False alarms divided by the time at risk, per second; n: trials. The interval is the exact Poisson interval.
     pub false_alarms_per_s: Estimate,
-    /// 5th, 50th and 95th percentile of the onsets, ms; n: those.
+    /// 5th, 50th and 95th percentile of the onsets, ms; n: their number.
     pub from_contact_ms: [Estimate; 3],
 }
 
-/// How to estimate.
+/// Parameters of the estimation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plan {
-    /// An onset counts within this of the median, ms.
+    /// An onset counts if it is this close to the median, ms.
     pub window_ms: f64,
-    /// Resamples of the bootstrap.
+    /// Bootstrap resamples.
     pub resamples: u32,
-    /// Its seed.
+    /// Seed of the bootstrap.
     pub seed: u64,
 }
 
 impl Plan {
-    /// The estimates, with intervals of a bootstrap that draws whole locations. Threshold and cool-down stay what they
-    /// were chosen to be.
+    /// Estimates with bootstrap intervals over whole locations. Threshold and margins stay fixed.
     #[must_use]
     pub fn estimate(&self, outcomes: &[Outcome]) -> Estimates {
         let mut sorted = outcomes.to_vec();
@@ -107,7 +106,7 @@ impl Plan {
         let trials = all().count() as u32;
         let onsets: Vec<f64> = all().filter_map(|o| o.onset_ms).collect();
         let mut late: Vec<f64> = onsets.clone();
-        let hits = Hits::of(onsets, self.window_ms);
+        let hits = OnsetStatistics::of(onsets, self.window_ms);
         let share = (trials > 0).then(|| f64::from(hits.count) / f64::from(trials));
         let n = late.len() as u32;
         let mut after = |q| (quantile(&mut late, q), n);
@@ -122,7 +121,7 @@ impl Plan {
     }
 }
 
-/// Of no time at risk there is no rate, neither 0 nor any other.
+/// Without time at risk there is no rate, not even 0.
 fn false_alarms_per_s(outcomes: &[Outcome]) -> Estimate {
     let count = outcomes.iter().filter(|o| o.false_alarm).count();
     let at_risk_s: f64 = outcomes.iter().map(|o| o.at_risk_s).sum();

@@ -1,15 +1,15 @@
-//! When the cameras know of a touch: the detection-latency study.
+//! The detection-latency study: when the cameras detect a press.
 //!
-//! The method is the paper's ("Data Ablation and Latency Distribution Analysis"): the events of both cameras, binned
-//! and smoothed, a one-sided CUSUM tuned to a rate increase over the background, an onset where it stays above a
-//! threshold for some bins, the threshold chosen by detections against false alarms. Four things differ. Both cameras
-//! are placed on host time by their own clock fits. Rates are events over the length of a window, with a floor. Where the
-//! contact was measured, onsets are also reported as latencies from it, with their uncertainty. And the first trip ends
-//! the search, as it would online: one before the contact is a false alarm, counted over the time in which there could be
-//! one, and its press is not detected.
+//! The method follows the paper ("Data Ablation and Latency Distribution Analysis"): bin and smooth the events of both
+//! cameras, run a one-sided CUSUM tuned to a rate increase over the background, report an onset where it stays above a
+//! threshold for some bins, and choose the threshold by detections against false alarms. Four things differ. Both cameras
+//! are placed on host time by their own clock fits. Rates are events divided by the length of a window, with a floor. Where
+//! the contact was measured, onsets are also reported as latencies from it, with their uncertainty. And the first detection
+//! ends the search, as in online operation: one before contact is a false alarm, counted over the time in which there could
+//! be one, and its press is not detected.
 //!
-//! [`spans`] says which time is trial and which background, [`bins`] counts, [`smooth`] smooths, [`cusum`] detects,
-//! [`sweep`] chooses the threshold, [`interval`] estimates, [`course`] is for drawing.
+//! [`spans`] defines trial and background, [`bins`] counts, [`smooth`] smooths, [`cusum`] detects, [`sweep`] chooses the
+//! threshold, [`interval`] estimates, [`course`] prepares drawing.
 
 pub mod bins;
 pub mod course;
@@ -24,13 +24,13 @@ pub mod trial;
 use rayon::prelude::*;
 use skinrig_model::{Background, PressRole};
 
-use self::bins::Sight;
+use self::bins::HostTimeView;
 use self::interval::{Estimates, Outcome, Plan};
 use self::smooth::Edges;
 use self::spans::{Neighbours, Spans};
 use self::trial::{Detector, Label, Trial};
-use crate::kept::{Kept, KeptPress};
 use crate::metrics::quantile;
+use crate::press_events::{RetainedPress, RetainedPresses};
 use crate::result::{
     Analysis, ClockFit, ClockMethod, ContactLatency, Latency, MapName, ReducedLatency,
     ThresholdRow, TrialBackground,
@@ -38,22 +38,22 @@ use crate::result::{
 use crate::seeded;
 use crate::verdict;
 
-/// Streams of random numbers from here on thin events; the bootstrap counts from 0.
+/// First random stream for thinning events; the bootstrap counts from 0.
 const THINNING: u64 = 1 << 40;
 
-/// When the cameras know of a touch: over the scored presses among `kept` that were done as planned, whether or not the
-/// cameras saw them; what the journal or the settings leave out by hand is no trial.
-/// `None` without any scored press or without a clock for both cameras.
+/// Studies the scored presses among `kept` that were executed as planned, whether or not the cameras saw them; presses that
+/// the journal or the settings exclude by hand are not trials. `None` without any scored press or without a clock for both
+/// cameras.
 #[must_use]
-pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Latency> {
+pub fn study(analysis: &Analysis, kept: &RetainedPresses) -> Option<Latency> {
     let [Some(one), Some(two)] = analysis.clocks else {
         return None;
     };
     let clocks = [one, two];
     let settings = &analysis.settings.latency;
-    let role = |p: &&KeptPress| analysis.presses.get(p.row).map(|r| r.role);
+    let role = |p: &&RetainedPress| analysis.presses.get(p.row).map(|r| r.role);
     let presses = kept.presses.iter();
-    let presses: Vec<&KeptPress> = presses
+    let presses: Vec<&RetainedPress> = presses
         .filter(|p| role(p) == Some(PressRole::Score))
         .collect();
     if presses.is_empty() {
@@ -67,15 +67,15 @@ pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Latency> {
     let margin_ms = margin_ms(analysis, &clocks);
     let grid = sweep::thresholds(settings.thresholds);
     let detector = Detector::new(settings, edges, grid, margin_ms);
-    let trials = look(&usable, &detector, None);
-    let found = Found::new(analysis, &detector, settings.target_rate, &trials);
+    let trials = run(&usable, &detector, None);
+    let found = DetectorResult::new(analysis, &detector, settings.target_rate, &trials);
 
     let asked = settings.reduced;
     let few = sweep::thresholds(asked.thresholds.into());
     let few = Detector::new(settings, edges, few, margin_ms);
     let thinning = Some((asked.factor, analysis.settings.seed));
-    let thinned = look(&usable, &few, thinning);
-    let reduced = Found::new(analysis, &few, asked.target_rate, &thinned);
+    let thinned = run(&usable, &few, thinning);
+    let reduced = DetectorResult::new(analysis, &few, asked.target_rate, &thinned);
 
     let onset = |t: &Trial| found.chosen.and_then(|i| t.searches[i].onset_ms());
     let early = |t: &Trial| Some((t.label.press, t.searches[found.chosen?].false_alarm_ms()?));
@@ -126,30 +126,30 @@ pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Latency> {
     })
 }
 
-/// A press with all that the study needs.
-struct Usable<'a> {
+/// A press with everything that the study needs.
+struct UsablePress<'a> {
     row: usize,
     label: Label,
-    sights: [Sight<'a>; 2],
+    sights: [HostTimeView<'a>; 2],
     spans: Spans,
 }
 
 fn usable<'a>(
     analysis: &Analysis,
     clocks: &[ClockFit; 2],
-    presses: &[&'a KeptPress],
-) -> Vec<Usable<'a>> {
+    presses: &[&'a RetainedPress],
+) -> Vec<UsablePress<'a>> {
     let neighbours = Neighbours::of(&analysis.presses);
-    let one = |kept: &&'a KeptPress| {
+    let one = |kept: &&'a RetainedPress| {
         let press = &analysis.presses[kept.row];
         if !verdict::is_done_as_planned(press) {
             return None;
         }
         let contact_us = press.timing.map_or(0.0, |t| t.contact.0 as f64 * 1e-3);
         let late_us = |k: usize| analysis.alignment.off_line_us(k, &clocks[k], contact_us);
-        let sights = [0, 1].map(|k| Sight::new(&kept.views[k], &clocks[k], late_us(k)));
+        let sights = [0, 1].map(|k| HostTimeView::new(&kept.views[k], &clocks[k], late_us(k)));
         let background = analysis.settings.latency.background;
-        Some(Usable {
+        Some(UsablePress {
             row: kept.row,
             label: Label {
                 press: kept.press,
@@ -163,18 +163,22 @@ fn usable<'a>(
 }
 
 /// All trials, on all events or on one in `factor` of them, chosen anew for each `(factor, seed)`.
-fn look(usable: &[Usable<'_>], detector: &Detector, thinning: Option<(u32, u64)>) -> Vec<Trial> {
-    let one = |u: &Usable<'_>| {
+fn run(
+    usable: &[UsablePress<'_>],
+    detector: &Detector,
+    thinning: Option<(u32, u64)>,
+) -> Vec<Trial> {
+    let one = |u: &UsablePress<'_>| {
         let stream = THINNING + u.row as u64;
         let thinning = thinning.map(|(k, seed)| (k, seeded::generator(seed, stream)));
-        detector.look_at(u.label, &u.sights, &u.spans, thinning)
+        detector.run_on_events(u.label, &u.sights, &u.spans, thinning)
     };
     let found: Vec<Option<Trial>> = usable.par_iter().map(one).collect();
     found.into_iter().flatten().collect()
 }
 
-/// False alarms before each contact; nothing without a threshold.
-fn backgrounds(trials: &[Trial], found: &Found) -> Vec<TrialBackground> {
+/// False alarms before each contact; empty without a threshold.
+fn backgrounds(trials: &[Trial], found: &DetectorResult) -> Vec<TrialBackground> {
     let of = |(t, o): (&Trial, &Outcome)| TrialBackground {
         press: t.label.press,
         alarms: u32::from(o.false_alarm),
@@ -186,15 +190,15 @@ fn backgrounds(trials: &[Trial], found: &Found) -> Vec<TrialBackground> {
     chosen.unwrap_or_default()
 }
 
-/// A detector at the threshold that was chosen for it.
-struct Found {
+/// Results of a detector at its chosen threshold.
+struct DetectorResult {
     rows: Vec<ThresholdRow>,
     chosen: Option<usize>,
     estimates: Estimates,
     outcomes: Vec<Outcome>,
 }
 
-impl Found {
+impl DetectorResult {
     fn new(analysis: &Analysis, detector: &Detector, target_rate: f64, trials: &[Trial]) -> Self {
         let settings = &analysis.settings;
         let rows = sweep::sweep(trials, detector, settings.latency.window_ms);
@@ -205,7 +209,7 @@ impl Found {
                 location: t.label.location,
                 onset_ms: search.and_then(|s| s.onset_ms()),
                 false_alarm: search.is_some_and(|s| s.false_alarm_ms().is_some()),
-                // Without a threshold there is no false-alarm rate, neither 0 nor any other.
+                // Without a threshold there is no false-alarm rate, not even 0.
                 at_risk_s: search.map_or(0.0, |s| s.at_risk_s),
             }
         };
@@ -224,21 +228,21 @@ impl Found {
     }
 }
 
-/// Half the kernel, ms: so much before its event a smoothed count can rise.
+/// Half the kernel, ms: how early a smoothed count can rise before its event.
 fn reach_ms(detector: &Detector) -> f64 {
     detector.kernel.reach() as f64 * detector.bin_ms
 }
 
-/// From the reported onset, the middle of the first bin of a run, to the end of the last bin that decided on it.
+/// Time from the reported onset, the middle of the first bin of a run, to the end of the last bin used for the decision.
 fn decision_delay_ms(detector: &Detector) -> f64 {
     let rest = f64::from(detector.consecutive.max(1)) - 0.5;
     rest * detector.bin_ms + reach_ms(detector)
 }
 
-/// Standard uncertainty of a camera's time of a host time, ms, without what cannot be known from the clocks.
+/// Standard uncertainty of a camera's time for a host time, ms, without systematic errors that the clocks cannot reveal.
 fn from_clocks_ms(analysis: &Analysis, clocks: &[ClockFit; 2]) -> f64 {
     let certificate = &analysis.alignment;
-    // A 95 % interval by the noise, and anywhere within bounds besides.
+    // A 95 % interval for random error, plus a uniform distribution within the bounds.
     let of = |name: MapName| -> Option<f64> {
         let (noise_us, bound_us) = (certificate.interval_us(name)?, certificate.bound_us(name)?);
         Some(libm::hypot(noise_us / 1.96, uniform(2.0 * bound_us)))
@@ -256,12 +260,12 @@ fn from_clocks_ms(analysis: &Analysis, clocks: &[ClockFit; 2]) -> f64 {
     1e-3 * libm::hypot(residual_us, uniform(2.0 * half_width_us))
 }
 
-/// Standard deviation of something that lies anywhere in an interval of this width.
+/// Standard deviation of a uniform distribution of this width.
 fn uniform(width: f64) -> f64 {
     width / 12f64.sqrt()
 }
 
-/// Standard uncertainty of a latency, ms, by where it comes from.
+/// Standard uncertainty of a latency, ms, by source.
 struct Uncertainty {
     bins_ms: f64,
     clocks_ms: f64,
@@ -269,8 +273,8 @@ struct Uncertainty {
 }
 
 impl Uncertainty {
-    /// `None` when the contacts were not measured on a clock of their own: they come from a schedule, or a camera's clock
-    /// from the events themselves.
+    /// `None` if the contacts were not measured on an independent clock: they come from a schedule, or a camera clock from
+    /// the events themselves.
     fn of(analysis: &Analysis, clocks: &[ClockFit; 2]) -> Option<Self> {
         let timing = &analysis.contact_timing;
         if timing.scheduled || clocks.iter().any(|c| c.method == ClockMethod::EventRates) {
@@ -293,20 +297,20 @@ impl Uncertainty {
     }
 }
 
-/// How much earlier than its contact a touch may seem to begin, ms: the 95 % uncertainty of a measured contact. One that
-/// was not measured may be a little off: as far as an onset may be from the median.
+/// How much earlier than its contact a press may seem to begin, ms: the 95 % uncertainty of a measured contact, or, if not
+/// measured, the allowed distance of an onset from the median.
 fn margin_ms(analysis: &Analysis, clocks: &[ClockFit; 2]) -> f64 {
     Uncertainty::of(analysis, clocks)
         .map_or(analysis.settings.latency.window_ms, |u| 1.96 * u.total_ms())
 }
 
-/// Latencies from the measured contact. The trigger box ties host time, on which the contact was measured, to each
-/// camera's clock.
+/// Latencies from the measured contact. The trigger box ties host time, on which the contact was measured, to each camera's
+/// clock.
 fn from_contact(
     analysis: &Analysis,
     clocks: &[ClockFit; 2],
     trials: &[Trial],
-    found: &Found,
+    found: &DetectorResult,
 ) -> Option<ContactLatency> {
     let uncertainty = Uncertainty::of(analysis, clocks)?;
     let searches = || {
@@ -320,7 +324,7 @@ fn from_contact(
         median_ms,
         p95_ms,
         before_contact: searches().filter(|s| s.false_alarm_ms().is_some()).count() as u32,
-        missed: trials.len() as u32 - searches().filter(|s| s.trip.is_some()).count() as u32,
+        missed: trials.len() as u32 - searches().filter(|s| s.detection.is_some()).count() as u32,
         uncertainty_ms: uncertainty.total_ms(),
         from_bins_ms: uncertainty.bins_ms,
         from_clocks_ms: uncertainty.clocks_ms,

@@ -1,27 +1,27 @@
 //! Smoothing of counts with a short Gaussian kernel.
 
-/// The kernel is cut off at this many standard deviations (public code).
+/// Cut-off of the kernel in standard deviations (public code).
 const REACH_SIGMAS: f64 = 4.0;
 
-/// What lies beyond the ends of a series.
+/// Assumption beyond the ends of a series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Edges {
-    /// Nothing is known: the taps inside are scaled to a sum of 1, so that a constant stays a constant.
+    /// Unknown: the taps inside are scaled to a sum of 1, so that a constant stays constant.
     Renormalised,
-    /// Zeros, as in the public code: the first and last bins come out low.
+    /// Zeros, as in the public code: the first and last bins are too low.
     ZeroPadded,
 }
 
 /// A symmetric kernel whose taps sum to 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kernel {
-    /// The centre tap, then those to one side.
+    /// Centre tap, then those to one side.
     taps: Vec<f64>,
 }
 
 impl Kernel {
-    /// A Gaussian of this standard deviation, sampled at the bins up to four of them (at least one bin) to either
-    /// side; 0.5 ms at 0.2 ms bins: 21 taps. A single tap when `sigma_ms` is 0.
+    /// Gaussian of this standard deviation, sampled at the bins up to four standard deviations (at least one bin) to either
+    /// side; 0.5 ms at 0.2 ms bins: 21 taps. A single tap if `sigma_ms` is 0.
     #[must_use]
     pub fn gaussian(sigma_ms: f64, bin_ms: f64) -> Self {
         if sigma_ms <= 0.0 {
@@ -38,26 +38,26 @@ impl Kernel {
         }
     }
 
-    /// The taps from the centre outwards.
+    /// Taps from the centre outwards.
     #[must_use]
     pub fn taps(&self) -> &[f64] {
         &self.taps
     }
 
-    /// Bins to either side of the centre.
+    /// Bins on either side of the centre.
     #[must_use]
     pub const fn reach(&self) -> usize {
         self.taps.len() - 1
     }
 
-    /// Smooths `counts`; as many values come out as go in, also when there are fewer than taps.
+    /// Smooths `counts`; the output has the same length, even if it is shorter than the kernel.
     #[must_use]
     pub fn smooth(&self, counts: &[u32], edges: Edges) -> Vec<f64> {
         let n = counts.len();
         let input: Vec<f64> = counts.iter().map(|c| f64::from(*c)).collect();
         let mut out: Vec<f64> = input.iter().map(|x| self.taps[0] * x).collect();
         for (k, tap) in self.taps.iter().enumerate().skip(1).take(n) {
-            // What lies k bins earlier and k bins later, as whole slices: this is most of the study's time.
+            // Processes bins k earlier and k later as whole slices: this is most of the study's time.
             let shared = n.saturating_sub(k);
             for (o, x) in out[n - shared..].iter_mut().zip(&input[..shared]) {
                 *o += tap * x;
@@ -78,7 +78,7 @@ impl Kernel {
         out
     }
 
-    /// Sum of the taps with `before` and `after` bins to the sides.
+    /// Sum of the taps with `before` and `after` bins on the sides.
     fn weight_inside(&self, before: usize, after: usize) -> f64 {
         let side = |bins: usize| self.taps[1..=bins.min(self.reach())].iter().sum::<f64>();
         self.taps[0] + side(before) + side(after)

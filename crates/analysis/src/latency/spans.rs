@@ -1,34 +1,34 @@
-//! Which stretch of time about a contact is the trial and which the background.
+//! Defines the trial and the background around a contact.
 
 use skinrig_model::Background;
 
-use super::bins::Sight;
+use super::bins::HostTimeView;
 use crate::result::PressResult;
 
-/// A trial reaches this far to either side of the contact (public code: of the middle of the press), µs.
+/// Length of a trial on either side of the contact (public code: of the middle of the press), µs.
 const TRIAL_US: f64 = 850_000.0;
-/// Nothing within this of a touch is called idle, µs.
+/// Minimum distance of idle time from a press, µs.
 const GUARD_US: f64 = 50_000.0;
 /// Period of the presses in the published recording (public code), µs.
 const PERIOD_US: f64 = 868e6 / 289.0;
 /// Background of the public code after the middle of the press, µs.
 const AFTER_US: (f64, f64) = (1_500_000.0, 2_400_000.0);
-/// A shorter background gives no rate, µs.
-const LEAST_BACKGROUND_US: f64 = 20_000.0;
-/// Slack for the comparison of times that were converted from whole µs, µs.
+/// Minimum length of a background, µs.
+const MIN_BACKGROUND_US: f64 = 20_000.0;
+/// Tolerance for comparing times converted from whole µs, µs.
 const ROUNDING_US: f64 = 2.0;
 
-/// How much time a press has to itself.
+/// Time between a press and its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Neighbours {
-    /// Release of the press before, µs after the contact (negative); minus infinity without one.
+    /// Release of the previous press, µs after the contact (negative); minus infinity without one.
     pub release_before_us: f64,
-    /// Contact of the press after, µs after the contact; infinity without one.
+    /// Contact of the next press, µs after the contact; infinity without one.
     pub contact_after_us: f64,
 }
 
 impl Neighbours {
-    /// Those of every press with known timing, by row.
+    /// Neighbours of every press with known timing, by row.
     #[must_use]
     pub fn of(presses: &[PressResult]) -> Vec<Option<Self>> {
         let mut order: Vec<usize> = (0..presses.len()).collect();
@@ -51,28 +51,28 @@ impl Neighbours {
     }
 }
 
-/// Trial and background: host times after the contact, µs.
+/// Trial and background: host times relative to the contact, µs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spans {
-    /// The trial; holds the contact.
+    /// Trial; includes the contact.
     pub trial_us: (f64, f64),
-    /// The background.
+    /// Background.
     pub background_us: (f64, f64),
-    /// True when the trial is shorter than it should be.
+    /// True if the trial is shorter than nominal.
     pub shortened: bool,
 }
 
 impl Spans {
-    /// Those of a press, where both cameras were looking and no neighbour is touching; `None` when no trial or no
-    /// background of 20 ms is left.
+    /// Trial and background of a press, where both cameras were recording and no neighbour is in contact; `None` without a
+    /// trial or without a background of 20 ms.
     #[must_use]
     pub fn of(
-        sights: &[Sight<'_>; 2],
+        sights: &[HostTimeView<'_>; 2],
         neighbours: Neighbours,
         background: Background,
     ) -> Option<Self> {
-        let latest = |f: fn(&Sight<'_>) -> f64| f(&sights[0]).max(f(&sights[1]));
-        let earliest = |f: fn(&Sight<'_>) -> f64| f(&sights[0]).min(f(&sights[1]));
+        let latest = |f: fn(&HostTimeView<'_>) -> f64| f(&sights[0]).max(f(&sights[1]));
+        let earliest = |f: fn(&HostTimeView<'_>) -> f64| f(&sights[0]).min(f(&sights[1]));
         let begin = latest(|s| s.host_us(0.0));
         let end = earliest(|s| s.host_us(f64::from(s.view().length_us)));
         let middle = 0.5 * latest(|s| s.host_us(s.view().release_us));
@@ -83,7 +83,7 @@ impl Spans {
                 let idle = (idle_from, window_from.min(-GUARD_US));
                 ((-TRIAL_US, TRIAL_US), idle)
             }
-            // The public code cuts 1.5 s -/+ 0.85 s out of a window of one period about the middle of the press.
+            // The public code cuts 1.5 s -/+ 0.85 s out of a window of one period around the middle of the press.
             Background::After => {
                 let from = middle - 0.5 * PERIOD_US + 1.5e6;
                 let trial = (from - TRIAL_US, from + TRIAL_US);
@@ -107,7 +107,7 @@ impl Spans {
             idle.1.min(end).min(neighbours.contact_after_us - GUARD_US),
         );
         let usable =
-            trial.0 <= 0.0 && trial.1 > 0.0 && idle.1 - idle.0 >= LEAST_BACKGROUND_US - ROUNDING_US;
+            trial.0 <= 0.0 && trial.1 > 0.0 && idle.1 - idle.0 >= MIN_BACKGROUND_US - ROUNDING_US;
         usable.then_some(Self {
             trial_us: trial,
             background_us: idle,

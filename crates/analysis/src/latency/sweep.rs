@@ -1,4 +1,4 @@
-//! The choice of the threshold.
+//! Choice of the threshold.
 
 use rayon::prelude::*;
 
@@ -8,7 +8,7 @@ use super::trial::{Detector, Trial};
 use crate::metrics::quantile;
 use crate::result::ThresholdRow;
 
-/// Evenly spaced thresholds, both ends included; the first alone when one is asked for.
+/// Evenly spaced thresholds, both ends included; only the first if one is requested.
 #[must_use]
 pub fn thresholds(grid: ThresholdGrid) -> Vec<f64> {
     let ThresholdGrid {
@@ -21,22 +21,22 @@ pub fn thresholds(grid: ThresholdGrid) -> Vec<f64> {
     (0..count).map(at).collect()
 }
 
-/// Onsets about their median.
+/// Statistics of the onsets around their median.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hits {
-    /// Onsets at all, none of them before the contact.
+pub struct OnsetStatistics {
+    /// Number of onsets, none of them before contact.
     pub onsets: u32,
-    /// Their median, ms.
+    /// Median onset, ms.
     pub median_ms: Option<f64>,
-    /// Those within the window of the median, both ends included: the ones that count.
+    /// Number of counting onsets: within the window around the median, both ends included.
     pub count: u32,
-    /// 95th minus 5th percentile of those that count, ms; `None` when none does, as when two onsets lie further apart
-    /// than two windows.
+    /// 95th minus 5th percentile of the counting onsets, ms; `None` if there are none, for instance if two onsets are
+    /// further apart than two windows.
     pub width_ms: Option<f64>,
 }
 
-impl Hits {
-    /// Of these onsets, in any order.
+impl OnsetStatistics {
+    /// Computes the statistics; the onsets may be in any order.
     #[must_use]
     pub fn of(mut onsets_ms: Vec<f64>, window_ms: f64) -> Self {
         let onsets = onsets_ms.len() as u32;
@@ -72,7 +72,7 @@ pub fn sweep(trials: &[Trial], detector: &Detector, window_ms: f64) -> Vec<Thres
     let rows = detector.thresholds.par_iter().enumerate();
     rows.map(|(i, &threshold)| {
         let onsets = trials.iter().filter_map(|t| t.searches[i].onset_ms());
-        let hits = Hits::of(onsets.collect(), window_ms);
+        let hits = OnsetStatistics::of(onsets.collect(), window_ms);
         let (false_alarms, at_risk_s) = false_alarms(trials, i);
         ThresholdRow {
             threshold,
@@ -82,7 +82,7 @@ pub fn sweep(trials: &[Trial], detector: &Detector, window_ms: f64) -> Vec<Thres
             width_ms: hits.width_ms,
             false_alarms,
             at_risk_s,
-            // Without time at risk nothing can be an alarm.
+            // Without time at risk there are no alarms.
             false_alarms_per_s: if at_risk_s > 0.0 {
                 f64::from(false_alarms) / at_risk_s
             } else {
@@ -93,8 +93,8 @@ pub fn sweep(trials: &[Trial], detector: &Detector, window_ms: f64) -> Vec<Thres
     .collect()
 }
 
-/// The row with the fewest false alarms per second among those that detect at least `target_rate`; when none does, among
-/// those that detect most. The lowest threshold of equals; `None` when nothing is detected at any.
+/// The row with the fewest false alarms per second among those that detect at least `target_rate`; if none does, among those
+/// that detect most. Ties go to the lowest threshold; `None` if nothing is detected at any.
 #[must_use]
 pub fn choose(rows: &[ThresholdRow], target_rate: f64) -> Option<usize> {
     let candidates = || {

@@ -1,4 +1,4 @@
-//! The choice of events that thinning leaves.
+//! Random choice of events for thinning.
 
 use std::collections::BTreeSet;
 
@@ -6,10 +6,10 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::seeded;
 
-/// Which of `n` events are kept at factor `factor` (at least 1): n / factor of them, rounded, ties to even (public
-/// code), without replacement, ascending. Floyd's method (Bentley and Floyd 1987): one random number per event kept.
+/// Indices of the kept events out of `n` at factor `factor` (at least 1): n / factor of them, rounded, ties to even (public
+/// code), without replacement, ascending. Floyd's method (Bentley and Floyd 1987): one random number per kept event.
 #[must_use]
-pub fn chosen(n: usize, factor: u32, rng: &mut Xoshiro256PlusPlus) -> Vec<usize> {
+pub fn choose_events(n: usize, factor: u32, rng: &mut Xoshiro256PlusPlus) -> Vec<usize> {
     let keep = ((n as f64 / f64::from(factor.max(1))).round_ties_even() as usize).min(n);
     let mut kept = BTreeSet::new();
     for last in n - keep..n {

@@ -1,37 +1,37 @@
-//! One press as the detector sees it.
+//! Runs the detector on one press.
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use skinrig_model::{LatencySettings, PressId};
 
-use super::bins::{Grid, Sight};
-use super::course::Drawn;
+use super::bins::{Grid, HostTimeView};
+use super::course::DrawnRates;
 use super::cusum::{Cusum, background_rate_per_s};
 use super::smooth::{Edges, Kernel};
 use super::spans::Spans;
-use super::thin::chosen;
+use super::thin::choose_events;
 
-/// The settings of a detector, worked out once for all trials.
+/// Detector settings, prepared once for all trials.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detector {
     /// Width of a bin, ms.
     pub bin_ms: f64,
     /// The smoothing kernel.
     pub kernel: Kernel,
-    /// What it does at the ends.
+    /// Treatment of the ends.
     pub edges: Edges,
     /// Rate increase that the detector is tuned to.
     pub alpha: f64,
-    /// Bins in a row.
+    /// Required number of bins in a row.
     pub consecutive: u32,
     /// Thresholds, ascending.
     pub thresholds: Vec<f64>,
-    /// An onset earlier than this after the contact (a negative time) is no detection of the touch, ms.
+    /// Earlier onsets (a negative time after contact) are false alarms, ms.
     pub earliest_ms: f64,
 }
 
 impl Detector {
     /// With these thresholds, ascending, for contacts known to `margin_ms`. A smoothed count can rise half a kernel before
-    /// its event: only what is earlier than both together is before the contact.
+    /// its event, so only onsets earlier than both together are before contact.
     #[must_use]
     pub fn new(
         settings: &LatencySettings,
@@ -51,9 +51,9 @@ impl Detector {
         }
     }
 
-    /// Looks at counts per bin of a trial and of its background.
+    /// Runs on counts per bin of a trial and of its background.
     #[must_use]
-    pub fn look(&self, label: Label, grid: Grid, counts: &[u32], background: &[u32]) -> Trial {
+    pub fn run(&self, label: Label, grid: Grid, counts: &[u32], background: &[u32]) -> Trial {
         let bin_s = self.bin_ms * 1e-3;
         let background_s = background.len() as f64 * bin_s;
         let events: u64 = background.iter().map(|c| u64::from(*c)).sum();
@@ -64,13 +64,13 @@ impl Detector {
         let onset_ms = |bin: usize| grid.centre_ms(bin, self.bin_ms);
         let early = (0..grid.len).take_while(|bin| onset_ms(*bin) < self.earliest_ms);
         let early = early.count();
-        let search = |trip: Option<usize>| match trip {
-            Some(bin) if bin < early => Search {
-                trip: Some(Trip::BeforeContact(onset_ms(bin))),
+        let search = |detection: Option<usize>| match detection {
+            Some(bin) if bin < early => SearchResult {
+                detection: Some(Detection::BeforeContact(onset_ms(bin))),
                 at_risk_s: (bin + 1) as f64 * bin_s,
             },
-            _ => Search {
-                trip: trip.map(|bin| Trip::Touch(onset_ms(bin))),
+            _ => SearchResult {
+                detection: detection.map(|bin| Detection::AfterContact(onset_ms(bin))),
                 at_risk_s: early as f64 * bin_s,
             },
         };
@@ -80,17 +80,17 @@ impl Detector {
             searches: trips.map(search).collect(),
             background_s,
             background_per_s: events as f64 / background_s,
-            course: Drawn::new(grid, &smoothed, self.bin_ms),
+            course: DrawnRates::new(grid, &smoothed, self.bin_ms),
             background,
         }
     }
 
-    /// Looks at the events of both cameras: all of them, or one in `factor`, chosen by `rng`.
+    /// Runs on the events of both cameras: all of them, or one in `factor`, chosen by `rng`.
     #[must_use]
-    pub(crate) fn look_at(
+    pub(crate) fn run_on_events(
         &self,
         label: Label,
-        sights: &[Sight<'_>; 2],
+        sights: &[HostTimeView<'_>; 2],
         spans: &Spans,
         mut thinning: Option<(u32, Xoshiro256PlusPlus)>,
     ) -> Option<Trial> {
@@ -101,7 +101,7 @@ impl Detector {
             let events = sights.map(|s| s.within(grid, bin_us));
             if let Some((factor, rng)) = &mut thinning {
                 let of_first = events[0].len();
-                for i in chosen(of_first + events[1].len(), *factor, rng) {
+                for i in choose_events(of_first + events[1].len(), *factor, rng) {
                     let (k, i) = match i.checked_sub(of_first) {
                         None => (0, i),
                         Some(i) => (1, i),
@@ -118,71 +118,71 @@ impl Detector {
         };
         let (grid, counts) = count(spans.trial_us);
         let (quiet, background) = count(spans.background_us);
-        (grid.len > 0 && quiet.len > 0).then(|| self.look(label, grid, &counts, &background))
+        (grid.len > 0 && quiet.len > 0).then(|| self.run(label, grid, &counts, &background))
     }
 }
 
-/// Which press, and where.
+/// Press and location of a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Label {
-    /// Which press.
+    /// Press.
     pub press: PressId,
-    /// Its location.
+    /// Location.
     pub location: u32,
 }
 
-/// The first trip of a detector: it ends the search, as it would online.
+/// First detection; it ends the search, as in online operation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Trip {
-    /// Before the contact, ms after it (negative): a false alarm. The press that follows is not detected.
+pub enum Detection {
+    /// Before contact, ms after it (negative): a false alarm. The press that follows is not detected.
     BeforeContact(f64),
-    /// Not before the contact, ms after it.
-    Touch(f64),
+    /// At or after contact, ms after it.
+    AfterContact(f64),
 }
 
-/// What a detector did at one threshold.
+/// Result of a detector at one threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Search {
-    /// `None` when it never tripped.
-    pub trip: Option<Trip>,
-    /// How long it looked where a trip is a false alarm, s: from the start of the trial to the contact, or to the end of the
-    /// bin of the false alarm.
+pub struct SearchResult {
+    /// `None` if nothing was detected.
+    pub detection: Option<Detection>,
+    /// Search time in which a detection is a false alarm, s: from the start of the trial to the contact, or to the end of
+    /// the bin of the false alarm.
     pub at_risk_s: f64,
 }
 
-impl Search {
-    /// The onset of a detected touch, ms after the contact.
+impl SearchResult {
+    /// Onset of a detected press, ms after contact.
     #[must_use]
     pub const fn onset_ms(&self) -> Option<f64> {
-        match self.trip {
-            Some(Trip::Touch(ms)) => Some(ms),
+        match self.detection {
+            Some(Detection::AfterContact(ms)) => Some(ms),
             _ => None,
         }
     }
 
-    /// The onset of a false alarm, ms after the contact (negative).
+    /// Onset of a false alarm, ms after contact (negative).
     #[must_use]
     pub const fn false_alarm_ms(&self) -> Option<f64> {
-        match self.trip {
-            Some(Trip::BeforeContact(ms)) => Some(ms),
+        match self.detection {
+            Some(Detection::BeforeContact(ms)) => Some(ms),
             _ => None,
         }
     }
 }
 
-/// What a detector found in a trial.
+/// Results of a detector in one trial.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
-    /// Which press.
+    /// Press and location.
     pub label: Label,
     /// One per threshold.
-    pub searches: Vec<Search>,
+    pub searches: Vec<SearchResult>,
     /// Length of the background, s.
     pub background_s: f64,
-    /// Its events per second.
+    /// Background events per second.
     pub background_per_s: f64,
     /// Smoothed rate of the trial, for drawing.
-    pub course: Drawn,
+    pub course: DrawnRates,
     /// Smoothed counts of the background, for drawing.
     pub background: Vec<f64>,
 }

@@ -1,4 +1,4 @@
-//! The rows of a reduction curve: means over seeds, intervals over locations (exact ones for shares of 0 and 1).
+//! Rows of a reduction curve: means over seeds, intervals over locations (exact ones for shares of 0 and 1).
 
 use rayon::prelude::*;
 use skinrig_model::AnalysisSettings;
@@ -10,25 +10,25 @@ use crate::metrics::quantile;
 use crate::result::{Estimate, ReductionRow};
 use crate::seeded;
 
-/// Share of a 95 % interval that lies outside on each side.
+/// Probability outside a 95 % interval on each side.
 const TAIL: f64 = 0.025;
 
-/// What the rows of all curves have in common.
-pub(super) struct Course<'a> {
+/// Data common to the rows of all curves.
+pub(super) struct CurveContext<'a> {
     pub settings: &'a AnalysisSettings,
-    /// An error below this passes, mm.
+    /// Smaller errors pass, mm.
     pub pass_threshold_mm: Option<f64>,
     /// Mean idle rate of both cameras before the presses.
     pub idle_events_per_s: Estimate,
 }
 
-/// Counts and squares of some presses at one factor.
+/// Counts and squared errors of some presses at one factor.
 #[derive(Debug, Clone, PartialEq)]
 struct Sums {
     presses: f64,
-    /// Of each seed: presses located, and the sum of their squared errors, mm².
+    /// Per seed: presses located, and the sum of their squared errors, mm².
     seeds: Vec<[f64; 2]>,
-    /// Passed and within, summed over seeds.
+    /// Presses that pass and presses within the limit, summed over seeds.
     passed: f64,
     within: f64,
     /// Events per second of both cameras, summed over seeds.
@@ -37,7 +37,7 @@ struct Sums {
 
 /// RMSE, pass rate, within rate, located rate and events per second: means over seeds.
 type Values = [Option<f64>; 5];
-/// Where the RMSE and the events per second are among them; the others are shares.
+/// Indices of the RMSE and the events per second; the others are shares.
 const RMSE: usize = 0;
 const RATE: usize = 4;
 
@@ -63,13 +63,13 @@ impl Sums {
         }
     }
 
-    /// The RMSE of each seed that locates any press, mm.
+    /// RMSE of each seed that locates any press, mm.
     fn rmse_of_seeds_mm(&self) -> impl Iterator<Item = f64> {
         let located = self.seeds.iter().filter(|[n, _]| *n > 0.0);
         located.map(|[n, squares]| (squares / n).sqrt())
     }
 
-    /// `passes` is false when there is no threshold to pass.
+    /// `passes` is false without a pass threshold.
     fn values(&self, passes: bool) -> Values {
         let (mut sum, mut count) = (0.0, 0.0);
         for rmse in self.rmse_of_seeds_mm() {
@@ -89,8 +89,8 @@ impl Sums {
     }
 }
 
-impl Course<'_> {
-    /// The rows of the curve of one kind of thinning, factor 1 first.
+impl CurveContext<'_> {
+    /// Rows of the curve for one kind of thinning, factor 1 first.
     pub fn rows(&self, outcomes: &[Outcome], kind: usize) -> Vec<ReductionRow> {
         let mut sorted: Vec<&Outcome> = outcomes.iter().collect();
         sorted.sort_by_key(|o| o.location);

@@ -1,14 +1,14 @@
-//! Localisation on thinned events: how much of the data the skin needs.
+//! The data-reduction study: localisation on thinned events.
 //!
-//! Everything but the number of events stays as it is: one clustering for all factors, the centroid rule, the calibrated
-//! geometry and the location rules of the settings. In the study are the kept scored presses that were done as planned:
-//! valid ones, and those that a rule on the data left out; what the journal or the settings leave out by hand is no
-//! question to the skin. A press is *located* when its rays meet where no location rule excludes it (behind a camera,
-//! parallel, outside the outline as far as the settings say so). The rules on the amount of events (threshold, response)
-//! do not apply: they ask the very thing that the study changes, and at high factors they would leave nothing to study.
+//! Everything except the number of events is fixed: one clustering for all factors, and the centroid rule, calibrated
+//! geometry and location rules of the settings. The study uses the retained scored presses that were executed as planned:
+//! valid ones, and those excluded by a rule on the data, but not those that the journal or the settings exclude by hand. A
+//! press is *located* if its rays meet where no location rule excludes it (behind a camera, parallel, outside the outline,
+//! depending on the settings). Rules on the number of events (threshold, response) do not apply: the study varies exactly
+//! that, and at high factors they would leave nothing.
 //!
-//! The study asks about the paper's method: all events of the press window, DBSCAN on single pixels. An estimator, a thinning
-//! or bins that the settings choose for the analysis are not part of it; without such a choice factor 1 is the analysis.
+//! The study evaluates the paper's method: all events of the press window, DBSCAN on single pixels. Estimators, thinning or
+//! bins chosen in the settings do not apply; with default settings factor 1 equals the analysis.
 
 mod curve;
 mod thinning;
@@ -16,16 +16,16 @@ mod trials;
 
 use skinrig_model::PressRole;
 
-use crate::kept::Kept;
 use crate::metrics::{bootstrap_over_locations, mean, quantile};
+use crate::press_events::RetainedPresses;
 use crate::result::{Analysis, Reduction, ReductionCurve, Thinning};
 use crate::verdict;
 
 pub(crate) use trials::{Attempt, Outcome, Trials};
 
-/// Thins the kept scored presses and locates them again; `None` when there are none.
+/// Thins the retained scored presses and locates them again; `None` if there are none.
 #[must_use]
-pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Reduction> {
+pub fn study(analysis: &Analysis, kept: &RetainedPresses) -> Option<Reduction> {
     let settings = &analysis.settings;
     let attempts = attempts(analysis, kept);
     if attempts.is_empty() {
@@ -52,7 +52,7 @@ pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Reduction> {
         .iter()
         .filter_map(|a| Some((a.location, a.idle_events_per_s()?)))
         .collect();
-    let course = curve::Course {
+    let course = curve::CurveContext {
         settings,
         pass_threshold_mm,
         idle_events_per_s: bootstrap_over_locations(
@@ -81,8 +81,8 @@ pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Reduction> {
     })
 }
 
-/// The presses of the study.
-fn attempts<'a>(analysis: &Analysis, kept: &'a Kept) -> Vec<Attempt<'a>> {
+/// Presses of the study.
+fn attempts<'a>(analysis: &Analysis, kept: &'a RetainedPresses) -> Vec<Attempt<'a>> {
     let presses = kept.presses.iter().filter_map(|k| {
         let row = analysis.presses.get(k.row)?;
         let attempt = Attempt::new(row, k)?;

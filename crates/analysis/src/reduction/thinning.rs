@@ -1,45 +1,45 @@
-//! Random thinning of one camera's view of a press, and the centroid of what is left.
+//! Random thinning of one camera's view of a press, and the centroid of the remaining events.
 //!
-//! The clustering sees how many events fell on each pixel and nothing of their times, and thinning treats all events
-//! of a view alike; so a random choice among events is a random choice among the entries of the pixel list, whatever
-//! their order. One random order of that list serves all factors: its first m entries are a uniform choice of m
-//! events. For the exact count m = max(1, n / k). For independent events m is binomial: Bernoulli thinning with
-//! probability 1 / k is a Binomial(n, 1 / k) count of uniformly chosen events. Binomial counts of successive powers of two
-//! are drawn by halving, Binomial(m, 1 / 2) of the m left, which is the number of ones in m random bits.
+//! Clustering uses only event counts per pixel, not times, and thinning treats all events of a view alike; so a random
+//! choice among events is a random choice among the entries of the pixel list, whatever their order. One random order of
+//! that list serves all factors: its first m entries are a uniform choice of m events. For the exact count m = max(1, n /
+//! k). For independent events m is binomial: Bernoulli thinning with probability 1 / k is a Binomial(n, 1 / k) count of
+//! uniformly chosen events. Binomial counts of successive powers of two are drawn by halving, Binomial(m, 1 / 2) of the m
+//! remaining, which is the number of ones in m random bits.
 //!
-//! The events left at a factor are thus among those left at all smaller ones, and both kinds share their order: rows of a
-//! curve and the two curves differ by what was taken away and not by chance as well. Each row alone is
-//! distributed exactly as if drawn alone.
+//! The events kept at a factor are thus a subset of those at all smaller factors, and both kinds share their order:
+//! differences between rows and between the two curves come from the removed events and not also from chance. Each row alone
+//! has exactly the same distribution as if drawn alone.
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::Rng;
 use skinrig_model::CentroidRule;
 
 use crate::dbscan::Dbscan;
-use crate::estimators::Sighting;
+use crate::estimators::ColumnEstimate;
 use crate::grid::PixelGrid;
-use crate::kept::KeptEvent;
+use crate::press_events::PackedEvent;
 use crate::result::Thinning;
 use crate::seeded;
 
-/// What is left of a view at one factor.
+/// A view at one factor.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Left {
-    /// Events.
+pub(super) struct ThinnedView {
+    /// Number of remaining events.
     pub events: u32,
     /// Column of their centroid, px; `None` without a cluster.
     pub column: Option<f64>,
 }
 
-/// Thins one view after another in one camera.
+/// Thins the views of one camera, one after another.
 pub(super) struct Thinner {
     grid: PixelGrid,
     dbscan: Dbscan,
     min_samples: u32,
     centroid: CentroidRule,
-    /// (column, row) of each event of the view, in an order that each seed shuffles again.
+    /// (column, row) of each event of the view, in an order that each seed reshuffles.
     pixels: Vec<(u16, u16)>,
-    /// (events, index in the result) of the present seed.
+    /// (events, index in the result) for the current seed.
     steps: Vec<(u32, usize)>,
 }
 
@@ -55,8 +55,8 @@ impl Thinner {
         }
     }
 
-    /// Takes the events of a view, of which there are less than 2^32, and says what they are without thinning.
-    pub fn load(&mut self, events: &[KeptEvent]) -> Left {
+    /// Loads the events of a view, fewer than 2^32, and returns the unthinned result.
+    pub fn load(&mut self, events: &[PackedEvent]) -> ThinnedView {
         self.pixels.clear();
         self.pixels.extend(events.iter().map(|e| (e.x(), e.y())));
         let n = self.count();
@@ -66,14 +66,14 @@ impl Thinner {
         full
     }
 
-    /// Thins the view by 2, 4 .. 2^`max_power` in each of `kinds`; all factors of the first kind come first. Takes its
-    /// random numbers from `rng` alone and depends on earlier calls only since the last [`Self::load`].
+    /// Thins the view by 2, 4 .. 2^`max_power` with each of `kinds`; all factors of the first kind come first. All random
+    /// numbers come from `rng`; the result depends on earlier calls only since the last [`Self::load`].
     pub fn thin(
         &mut self,
         rng: &mut Xoshiro256PlusPlus,
         kinds: &[Thinning],
         max_power: u32,
-        out: &mut Vec<Left>,
+        out: &mut Vec<ThinnedView>,
     ) {
         let n = self.count();
         self.steps.clear();
@@ -90,8 +90,8 @@ impl Thinner {
         self.steps.sort_unstable();
         self.shuffle(rng, self.steps.last().map_or(0, |s| s.0));
         out.clear();
-        out.resize(self.steps.len(), Left::default());
-        let mut last = Left::default();
+        out.resize(self.steps.len(), ThinnedView::default());
+        let mut last = ThinnedView::default();
         for i in 0..self.steps.len() {
             let (events, at) = self.steps[i];
             if events != last.events {
@@ -103,12 +103,12 @@ impl Thinner {
         self.grid.clear();
     }
 
-    /// Events of the view.
+    /// Number of events in the view.
     fn count(&self) -> u32 {
         u32::try_from(self.pixels.len()).unwrap_or(u32::MAX)
     }
 
-    /// Puts a uniform choice of `count` events in uniform order at the front (Fisher and Yates, as far as needed).
+    /// Moves a uniform choice of `count` events in uniform order to the front (partial Fisher-Yates shuffle).
     fn shuffle(&mut self, rng: &mut Xoshiro256PlusPlus, count: u32) {
         for i in 0..count as usize {
             let other = i + seeded::index(rng, self.pixels.len() - i);
@@ -123,20 +123,20 @@ impl Thinner {
         }
     }
 
-    /// The centroid of what is on the grid.
-    fn left(&mut self) -> Left {
+    /// Centroid of the events on the grid.
+    fn left(&mut self) -> ThinnedView {
         let events = self.grid.events();
         let column = if events < self.min_samples {
-            None // nobody can have that many neighbours
+            None // no event has that many neighbours
         } else {
             self.dbscan.run(&self.grid);
-            Sighting::of_clusters(&self.dbscan, self.centroid, 1).column
+            ColumnEstimate::of_clusters(&self.dbscan, self.centroid, 1).column
         };
-        Left { events, column }
+        ThinnedView { events, column }
     }
 }
 
-/// Heads among `tosses` of a fair coin.
+/// Number of heads in `tosses` of a fair coin.
 fn heads(rng: &mut Xoshiro256PlusPlus, tosses: u32) -> u32 {
     let whole: u32 = (0..tosses / 64).map(|_| rng.next_u64().count_ones()).sum();
     match tosses % 64 {
@@ -153,7 +153,7 @@ mod tests {
 
     const CROP: (u16, u16) = (185, 360);
 
-    fn events(pixels: &[(u16, u16)]) -> Vec<KeptEvent> {
+    fn events(pixels: &[(u16, u16)]) -> Vec<PackedEvent> {
         let event = |(t_us, &(x, y)): (u64, &(u16, u16))| CdEvent {
             t_us,
             x,
@@ -161,11 +161,11 @@ mod tests {
             polarity: Polarity::On,
         };
         let packed = (0..).zip(pixels).map(event);
-        packed.map(|e| KeptEvent::pack(&e, 0).unwrap()).collect()
+        packed.map(|e| PackedEvent::pack(&e, 0).unwrap()).collect()
     }
 
     proptest! {
-        /// Against clustering each choice of events afresh.
+        /// Reference: cluster each choice of events from scratch.
         #[test]
         fn every_step_is_the_clustering_of_what_is_left(
             pixels in prop::collection::vec((300u16..340, 250u16..270), 0..300), min_samples in 1u32..12, seed in 0u64..1000,
@@ -179,7 +179,7 @@ mod tests {
                 let mut dbscan = Dbscan::new(3.0, min_samples);
                 dbscan.run(&grid);
                 let column = dbscan.largest().and_then(|(_, c)| c.centroid()).map(|c| c.0);
-                Left { events: chosen.len() as u32, column }
+                ThinnedView { events: chosen.len() as u32, column }
             };
             prop_assert_eq!(thinner.load(&events(&pixels)), fresh(&pixels));
             let mut rng = seeded::generator(seed, 0);
@@ -195,7 +195,7 @@ mod tests {
                     prop_assert_eq!(left.events, if n == 0 { 0 } else { (n / 2u32.pow(power)).max(1) });
                 }
                 prop_assert!(out[POWERS as usize..].is_sorted_by(|a, b| a.events >= b.events));
-                // Nothing is lost or made.
+                // No event is lost or duplicated.
                 let mut before = pixels.clone();
                 before.sort_unstable();
                 shuffled.sort_unstable();
@@ -206,7 +206,7 @@ mod tests {
 
     #[test]
     fn every_event_is_as_likely_and_counts_are_binomial() {
-        // 40 events on as many pixels, far from each other: the grid tells which are left.
+        // 40 events on as many distant pixels: the grid shows which remain.
         let pixels: Vec<(u16, u16)> = (0..40).map(|i| (15 * i, 200)).collect();
         let mut thinner = Thinner::new(CROP, 1.0, 1, CentroidRule::AllClusters);
         thinner.load(&events(&pixels));

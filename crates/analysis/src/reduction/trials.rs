@@ -1,28 +1,28 @@
-//! The thinned presses: each press, seed and factor located anew.
+//! Locates thinned presses: each press, seed and factor.
 
 use rayon::prelude::*;
 use skinrig_model::{AnalysisSettings, CentroidRule, Point2, PressId, SkinOutline, StereoGeometry};
 
-use super::thinning::{Left, Thinner};
-use crate::kept::{KeptPress, KeptView};
+use super::thinning::{ThinnedView, Thinner};
+use crate::press_events::{EventView, RetainedPress};
 use crate::result::{LocationOutcome, PressResult, Thinning};
 use crate::seeded;
 use crate::triangulate::locate;
 
-/// Streams of random numbers that no other part of an analysis uses.
+/// First random stream; no other part of an analysis uses these.
 const STREAMS: u64 = 1 << 63;
 
-/// A press to be thinned.
+/// A press to thin.
 pub(crate) struct Attempt<'a> {
     press: PressId,
     pub(super) location: u32,
     truth: Point2,
-    views: &'a [KeptView; 2],
+    views: &'a [EventView; 2],
 }
 
 impl<'a> Attempt<'a> {
-    /// A kept press with its row of the table; `None` without a measured position.
-    pub fn new(row: &PressResult, kept: &'a KeptPress) -> Option<Self> {
+    /// A retained press with its row of the table; `None` without a measured position.
+    pub fn new(row: &PressResult, kept: &'a RetainedPress) -> Option<Self> {
         Some(Self {
             press: row.press,
             location: row.location.index(),
@@ -31,9 +31,9 @@ impl<'a> Attempt<'a> {
         })
     }
 
-    /// Events per second of both cameras in the idle time before the press; `None` when one of them has none.
+    /// Events per second of both cameras in the idle time before the press; `None` if one of them has none.
     pub(super) fn idle_events_per_s(&self) -> Option<f64> {
-        let rate = |view: &KeptView| {
+        let rate = |view: &EventView| {
             let (from, to) = (view.idle_from_us, view.window_us.0);
             let idle_s = f64::from(to.saturating_sub(from)) * 1e-6;
             (idle_s > 0.0).then(|| view.between(from, to).len() as f64 / idle_s)
@@ -43,18 +43,18 @@ impl<'a> Attempt<'a> {
     }
 }
 
-/// One located or lost press.
+/// A press located, or not, from some of its events.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Trial {
-    /// Length of the error vector, mm; `None` when the press is not located.
+    /// Length of the error vector, mm; `None` if the press is not located.
     pub error_mm: Option<f64>,
-    /// Events left in both cameras.
+    /// Remaining events of both cameras.
     pub events: u32,
-    /// The same per second of the press window.
+    /// Remaining events per second of the press window.
     pub events_per_s: f64,
 }
 
-/// What became of one press.
+/// Results of one press.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Outcome {
     pub location: u32,
@@ -76,7 +76,7 @@ impl Outcome {
     }
 }
 
-/// How presses are thinned, clustered and located.
+/// Parameters for thinning, clustering and locating presses.
 pub(crate) struct Trials<'a> {
     pub geometry: &'a StereoGeometry,
     pub outline: &'a SkinOutline,
@@ -89,8 +89,8 @@ pub(crate) struct Trials<'a> {
 }
 
 impl Trials<'_> {
-    /// Thins and locates every press; `accept` says where it counts as located. In the order of `attempts` and to the
-    /// last bit the same for any number of threads: each press, seed and camera has random numbers of its own.
+    /// Thins and locates every press; `accept` decides whether a position counts as located. The result is in the order of
+    /// `attempts` and bit-identical for any number of threads: each press, seed and camera has its own random numbers.
     pub fn run(
         &self,
         attempts: &[Attempt<'_>],
@@ -120,7 +120,7 @@ impl Trials<'_> {
             let (start, end) = attempt.views[k].window_us;
             f64::from(end.saturating_sub(start)) * 1e-6
         });
-        let trial = |left: [Left; 2]| {
+        let trial = |left: [ThinnedView; 2]| {
             let columns = left.map(|l| l.column);
             let estimate = accept(&locate(self.geometry, self.outline, columns));
             let truth = attempt.truth;

@@ -1,18 +1,18 @@
-//! Owns the alignment certificate: how well all clocks of a session are laid on one another, and whether that is enough.
+//! Owns the alignment certificate: how well all clocks of a session are aligned, and whether that suffices.
 
 use serde::{Deserialize, Serialize};
 
 use super::ClockFit;
 
-/// The verdict on the alignment of a session.
+/// Verdict on the alignment of a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AlignmentStatus {
-    /// Every figure is within its limit.
+    /// Every value is within its limit.
     Valid,
-    /// A figure is beyond its limit, or a map is missing: the session is invalid, and its numbers are not to be used.
+    /// A value exceeds its limit, or a map is missing: the session is invalid, and its numbers must not be used.
     Invalid,
-    /// The session has no reports of a trigger box (imported, or recorded before there were any): nothing to certify with.
+    /// The session has no trigger box reports (imported, or recorded by an old version), so nothing can be certified.
     #[default]
     NotCertified,
 }
@@ -22,58 +22,57 @@ pub enum AlignmentStatus {
 pub struct Alignment {
     /// The verdict.
     pub status: AlignmentStatus,
-    /// What is beyond its limit, in words; empty unless invalid.
+    /// Exceeded limits, as text; empty unless invalid.
     pub violations: Vec<String>,
-    /// What stands on an assumption instead of a measurement, in words.
+    /// Assumptions that replace measurements, as text.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
     /// The maps between the clocks.
     pub maps: Vec<ClockMap>,
     /// The trigger input of each camera; empty when not certified.
     pub lines: Vec<LineCounts>,
-    /// How sure an alignment by event rates is; `None` where no camera was aligned by them.
+    /// Certainty of an alignment by event rates; `None` if no camera was aligned by them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rates: Option<RatesEvidence>,
-    /// How often the trigger box lost its clock.
+    /// Number of times that the trigger box lost its clock.
     pub resets: u32,
     /// The map from host to camera time, piecewise affine between these knots, for camera 1 and camera 2.
     pub camera_from_host: [Vec<Knot>; 2],
-    /// What each fitted map leaves of its points, for drawing; empty when not certified.
+    /// Residuals of each fitted map, for drawing; empty if not certified.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub residuals: Vec<ClockResiduals>,
 }
 
-/// How sure an alignment by the presses in the event rates is: against all shifts of the plan over the recordings, both cameras
-/// judged together, bursts outside the plan included.
+/// Certainty of an alignment by the presses in the event rates: against all shifts of the plan over the recordings, both
+/// cameras together, including bursts outside the plan.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RatesEvidence {
-    /// Natural logarithm of the odds of the alignment against all others together, and against the plan being foreign to
-    /// the recordings.
+    /// Log odds (natural) of the alignment against all others together, and against a plan unrelated to the recordings.
     pub log_odds: f64,
-    /// How much later the planned presses come in each camera by the likeliest other alignment, s; `None` when none is likelier
-    /// than a plan that is foreign to the recordings.
+    /// Delay of the planned presses in each camera in the likeliest other alignment, s; `None` if none is likelier than a
+    /// plan unrelated to the recordings.
     pub runner_up_s: Option<[f64; 2]>,
-    /// Usual time from one planned press to the next, s.
+    /// Median time from one planned press to the next, s.
     pub period_s: f64,
-    /// What each camera saw of the plan; `None` for one that was not aligned by its event rates.
-    pub cameras: [Option<RatesSights>; 2],
+    /// Presses that each camera saw; `None` if it was not aligned by event rates.
+    pub cameras: [Option<RatesDetections>; 2],
 }
 
-/// What one camera saw of the planned presses.
+/// Presses that one camera saw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct RatesSights {
+pub struct RatesDetections {
     /// Planned presses within the recording.
     pub expected: u32,
-    /// Of them, those with a burst of events.
+    /// Planned presses with a burst of events.
     pub found: u32,
     /// Bursts that no planned press explains.
     pub unexplained: u32,
-    /// Of them, those between the first and the last planned press, but for presses in the plan's rhythm.
+    /// Unexplained bursts between the first and the last planned press, without presses in the plan's rhythm.
     pub strays: u32,
 }
 
 impl Alignment {
-    /// False when the numbers of the session are not to be used.
+    /// False if the numbers of the session must not be used.
     #[must_use]
     pub fn is_usable(&self) -> bool {
         self.status != AlignmentStatus::Invalid
@@ -81,7 +80,7 @@ impl Alignment {
 }
 
 impl Alignment {
-    /// How far the piecewise map of camera `k` is from one line at a host time, µs; 0 without a map.
+    /// Distance of the piecewise map of camera `k` from one line at a host time, µs; 0 without a map.
     #[must_use]
     pub(crate) fn off_line_us(&self, k: usize, line: &ClockFit, host_us: f64) -> f64 {
         let knots = &self.camera_from_host[k];
@@ -95,14 +94,14 @@ impl Alignment {
         off(a) + share * (off(b) - off(a))
     }
 
-    /// The largest half width of the 95 % interval of a map at the presses, µs.
+    /// Largest half width of the 95 % interval of a map at the presses, µs.
     #[must_use]
     pub fn interval_us(&self, name: MapName) -> Option<f64> {
         let map = self.maps.iter().find(|m| m.map == name)?;
         Some(map.interval_us?.1)
     }
 
-    /// The most that comes on top of it, µs.
+    /// Largest systematic bound of a map at the presses, µs.
     #[must_use]
     pub fn bound_us(&self, name: MapName) -> Option<f64> {
         let map = self.maps.iter().find(|m| m.map == name)?;
@@ -110,7 +109,7 @@ impl Alignment {
     }
 }
 
-/// Which clock on which.
+/// A map between two clocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MapName {
@@ -120,18 +119,18 @@ pub enum MapName {
     Camera1FromBox,
     /// Camera 2's clock over the trigger box's.
     Camera2FromBox,
-    /// Camera 2's clock over camera 1's, by the edges that both saw.
+    /// Camera 2's clock over camera 1's, by edges that both saw.
     Camera2FromCamera1,
-    /// The robot's poses are stamped with the host's clock.
+    /// Robot poses have host clock timestamps.
     RobotFromHost,
-    /// Camera 1's clock over the host's: both maps above together.
+    /// Camera 1's clock over the host's: both maps combined.
     Camera1FromHost,
     /// Camera 2's clock over the host's.
     Camera2FromHost,
 }
 
 impl MapName {
-    /// As it is written in reports.
+    /// Name in reports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -146,39 +145,39 @@ impl MapName {
     }
 }
 
-/// How well one clock is known from another. Piecewise affine: the rate may wander.
+/// Quality of a map between two clocks. Piecewise affine: the rate may wander.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ClockMap {
-    /// Which.
+    /// The map.
     pub map: MapName,
-    /// Pieces.
+    /// Number of pieces.
     pub pieces: u32,
-    /// Points (exchanges, trains) that it stands on; 0 for a map that is not fitted.
+    /// Points (exchanges, trains) of the fit; 0 for a map that is not fitted.
     pub n: u32,
-    /// Points left out as outliers.
+    /// Points rejected as outliers.
     pub rejected: u32,
-    /// Rate difference over the session, parts per million; `None` where none is fitted.
+    /// Rate difference over the session, parts per million; `None` if not fitted.
     pub drift_ppm: Option<f64>,
     /// RMS residual, µs.
     pub residual_rms_us: Option<f64>,
     /// Largest absolute residual, µs.
     pub residual_max_us: Option<f64>,
-    /// Half width of the 95 % interval at the presses (contacts and releases that are timed), median and largest, µs: what the noise
-    /// of its points leaves open. `None` for a map that is not fitted.
+    /// Half width of the 95 % interval at the presses (timed contacts and releases), median and largest, µs: random error.
+    /// `None` for a map that is not fitted.
     pub interval_us: Option<(f64, f64)>,
-    /// What comes on top at the presses, at most, median and largest, µs: what no number of points averages out. Of host over box
-    /// time it is the bound that the exchanges give for certain; of camera over box time the unknown mean delay of an edge, the whole
-    /// µs of both clocks and what a rate may change by before the first train and after the last; of robot poses the stated delay.
+    /// Systematic bound at the presses, median and largest, µs: not reduced by more points. Host over box time: the certain
+    /// bound from the exchanges. Camera over box time: the unknown mean delay of an edge, the 1 µs resolution of both
+    /// clocks, and possible rate changes before the first train and after the last. Robot poses: the stated delay.
     #[serde(default)]
     pub bound_us: Option<(f64, f64)>,
-    /// Share of points, each held out of the fit with every second other, that lie in the interval stated for them.
+    /// Share of points within the interval stated for them, each held out of the fit with every second other point.
     pub coverage: Option<f64>,
-    /// Points behind that share.
+    /// Number of points behind that share.
     pub coverage_n: u32,
 }
 
 impl ClockMap {
-    /// What one line through two clocks says.
+    /// Summary of a single line between two clocks.
     #[must_use]
     pub(crate) const fn of_line(map: MapName, fit: &ClockFit) -> Self {
         Self {
@@ -197,47 +196,48 @@ impl ClockMap {
     }
 }
 
-/// What one map leaves of the points that it is fitted to.
+/// Residuals of one map.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ClockResiduals {
-    /// Which map.
+    /// The map.
     pub map: MapName,
-    /// Points of the map, left-out ones included.
+    /// Points of the map, including rejected ones.
     pub n: u32,
-    /// In order of time. Of more than a few hundred every n-th, with the largest of those used; left-out ones are thinned apart.
+    /// In time order. Above a few hundred, every n-th and the largest of the used ones; rejected ones are thinned
+    /// separately.
     pub points: Vec<ClockResidual>,
 }
 
 /// One point of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ClockResidual {
-    /// When, on the host's clock, s.
+    /// Time on the host clock, s.
     pub host_s: f64,
     /// Observed minus mapped time, µs.
     pub residual_us: f64,
-    /// False for one that the fit left out.
+    /// False if the fit rejected it.
     pub used: bool,
 }
 
-/// Edges on the trigger input of one camera: of all trains that the box sent while the camera was recording.
+/// Edges on the trigger input of one camera, for all trains that the box sent while the camera was recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct LineCounts {
     /// Trains that the box sent.
     pub trains_sent: u32,
-    /// Trains of which enough was seen to time them.
+    /// Trains with enough edges to time them.
     pub trains_seen: u32,
     /// Further trains, sent while this camera was not recording: neither seen nor lost.
     #[serde(default)]
     pub trains_unrecorded: u32,
     /// Edges that the box sent.
     pub sent: u64,
-    /// Edges seen where the box sent them.
+    /// Edges seen at the expected time.
     pub seen: u64,
-    /// Edges sent and not seen.
+    /// Edges sent but not seen.
     pub lost: u64,
     /// Edges seen again within 20 µs.
     pub doubled: u64,
-    /// Edges that nobody sent.
+    /// Edges that were never sent.
     pub spurious: u64,
 }
 
@@ -253,7 +253,7 @@ impl LineCounts {
     }
 }
 
-/// A point of a piecewise-affine map.
+/// A knot of a piecewise affine map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Knot {
     /// Host time, µs.

@@ -1,9 +1,9 @@
-//! Owns what the plausibility audit reports.
+//! Owns the findings of the plausibility audit.
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::CameraId;
 
-/// A law that every sane session obeys.
+/// A law that every valid session obeys.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Law {
@@ -11,33 +11,33 @@ pub enum Law {
     BurstWithMotion,
     /// The centroid's column follows the viewing angle of the press in rank.
     CentroidFollowsPosition,
-    /// Repetitions at one place agree.
+    /// Repetitions at one location agree.
     RepetitionsAgree,
-    /// Depth, speed and position are as commanded.
+    /// Depth, speed and position match the commands.
     AsCommanded,
-    /// The camera clock drifts no more than a crystal does.
+    /// The drift of a camera clock is plausible for a crystal.
     ClockDrift,
-    /// Data that a session of this kind has are there.
+    /// All data of such a session exist.
     Complete,
 }
 
-/// What most likely broke a law.
+/// Likely cause of a violation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fault {
-    /// The two cameras' streams are exchanged.
+    /// The streams of the two cameras are swapped.
     CamerasSwapped,
     /// Both streams come from the same camera.
     OneCameraTwice,
-    /// A camera's picture is mirrored or upside down.
+    /// The image of a camera is mirrored or upside down.
     PictureTurned,
-    /// A camera is far from where the rig description draws it.
+    /// A camera is far from its position in the rig description.
     GeometryOff,
     /// An axis of the measured positions (or of the skin frame) is mirrored.
     AxisMirrored,
-    /// The x and y columns of the measured positions are exchanged, or the positions are turned by 90 degrees.
+    /// The x and y columns of the measured positions are exchanged, or the positions are rotated by 90 degrees.
     AxesExchanged,
-    /// Positions are relative to another origin than the skin frame's.
+    /// Positions have another origin than the skin frame.
     PositionsDisplaced,
     /// Positions are in another unit (metres for millimetres, or the reverse).
     UnitOfPositions,
@@ -47,33 +47,32 @@ pub enum Fault {
     OrderOfPresses,
     /// The recording holds presses that are not in the press list.
     PressesUnlisted,
-    /// The sync presses are others than the press list says, in number or spacing.
+    /// The number or spacing of the sync presses differs from the press list.
     SyncPattern,
     /// A camera saw nothing, or nothing but noise.
     CameraBlind,
     /// A camera's recording begins after the first press or ends before the last.
     RecordingShort,
-    /// A camera sent nothing for a while in the middle of the recording.
+    /// A camera sent nothing for some time in the middle of the recording.
     RecordingGap,
     /// A camera sent no events.
     NoEvents,
-    /// There are no trigger edges where the rig has a trigger line.
+    /// No trigger edges although the rig has a trigger line.
     NoTriggers,
-    /// There are no measured positions, or no measured times.
+    /// No measured positions, or no measured times.
     NoTruth,
     /// Many planned presses are not in the recording.
     PressesMissing,
     /// A clock runs far from its nominal rate, or the alignment is wrong.
     ClockWrong,
-    /// The journal contradicts itself: moments out of order or before the session, presses that overlap or are
-    /// listed twice.
+    /// The journal contradicts itself: times out of order or before the session, presses that overlap or are listed twice.
     JournalContradictory,
-    /// The surface is not where the frame and the height that the robot reports say.
+    /// The surface is not at the height given by the frame and the robot.
     HeightOff,
-    /// Both cameras work and saw no press: the tip did not touch the skin, there was no light, or the crop shows
-    /// no skin.
+    /// Both cameras work but saw no press: the tip did not touch the skin, there was no light, or the crop does not show the
+    /// skin.
     NotTouched,
-    /// The robot did not do what was commanded.
+    /// The robot did not execute its commands.
     RobotOff,
     /// Skin, camera or light moved between repetitions.
     RigMoved,
@@ -82,7 +81,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// As people read it: `axis mirrored`.
+    /// Name for people: `axis mirrored`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -115,7 +114,7 @@ impl Fault {
         }
     }
 
-    /// True when positions, cameras or rows are taken for others than they are.
+    /// True if positions, cameras or rows are confused with others.
     #[must_use]
     pub(crate) const fn is_mistaken_identity(self) -> bool {
         matches!(
@@ -132,28 +131,27 @@ impl Fault {
         )
     }
 
-    /// True for a fault after which the errors of the session are no errors of the skin. What is only absent, or moved,
-    /// leaves the rest usable.
+    /// True if the errors of the session do not describe the skin. Missing or displaced data leave the rest usable.
     #[must_use]
     pub const fn invalidates(self) -> bool {
         self.is_mistaken_identity() || matches!(self, Self::JournalContradictory)
     }
 }
 
-/// One broken law.
+/// A violated law.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     /// The law.
     pub law: Law,
     /// The likely fault.
     pub fault: Fault,
-    /// The camera concerned, when it is one.
+    /// Camera concerned, if it is a single one.
     pub camera: Option<CameraId>,
-    /// What was expected and what was found, in words with numbers and n.
+    /// What was expected and what was found, with numbers and n.
     pub evidence: String,
     /// What to do next.
     pub advice: String,
-    /// True when the session's numbers are not to be used ([`Fault::invalidates`], or what a law makes sure of).
+    /// True if the session's numbers must not be used ([`Fault::invalidates`], or established by the law itself).
     #[serde(default)]
     pub invalidates: bool,
 }

@@ -1,34 +1,33 @@
-//! Owns what is said about areas, taxels, contact maps and data rates.
+//! Owns the results on areas, taxels, contact maps and data rates.
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::{CameraId, CmreSettings, Point2};
 
 use super::Estimate;
 
-/// How much of the skin is seen, how much was probed, and how many places can be told apart.
+/// Visible area, probed area, and number of distinguishable locations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Coverage {
     /// Area of the outline, mm².
     pub skin_mm2: f64,
     /// Area of the outline in the field of view of both cameras, mm².
     pub seen_by_both_mm2: f64,
-    /// Area that the locations stand for, mm²: the union of one cell per location, clipped to the outline; `None` with
-    /// fewer than two locations.
+    /// Probed area, mm²: the union of one cell per location, clipped to the outline; `None` with fewer than two locations.
     pub probed_mm2: Option<f64>,
-    /// Side of a cell, mm: the median distance of a location from its nearest neighbour.
+    /// Side of a cell, mm: the median distance between nearest neighbours.
     pub cell_mm: Option<f64>,
-    /// Locations probed: with a scored press that was attempted.
+    /// Number of locations with an attempted scored press.
     pub locations: u32,
-    /// Where they are, each place once.
+    /// Their distinct positions.
     pub places: Vec<Point2>,
-    /// The field of view of each camera within the outline, mm: convex polygons that touch but do not overlap, one as
-    /// long as a field of view spans less than 180°.
+    /// Field of view of each camera within the outline, mm: convex polygons that touch but do not overlap, a single one for
+    /// a field of view below 180°.
     pub views: [Vec<Vec<Point2>>; 2],
-    /// Their overlap, in the same form.
+    /// Overlap of the fields of view, in the same form.
     pub overlap: Vec<Vec<Point2>>,
-    /// Circles of radius RMSE that fill the skin's area: area / (pi RMSE²).
+    /// Number of circles of radius RMSE that fill the skin's area: area / (pi RMSE²).
     pub taxels_skin: Estimate,
-    /// The same over the probed area. Only there was the RMSE measured.
+    /// Same for the probed area, the only area in which the RMSE was measured.
     pub taxels_probed: Estimate,
 }
 
@@ -39,16 +38,16 @@ pub struct Cmre {
     pub settings: CmreSettings,
     /// Cells along x and y.
     pub cells: (u32, u32),
-    /// Mean score over the scored presses that count, percent.
+    /// Mean score over the counting scored presses, percent.
     pub percent: Estimate,
-    /// Presses whose truth lies outside the map and that have no score.
+    /// Presses with a truth outside the map, which have no score.
     pub without_score: u32,
 }
 
 /// Data rates of both cameras together, rows of the crop only.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BitRates {
-    /// Bits per event that the byte rates assume.
+    /// Bits per event assumed for byte rates.
     pub bits_per_event: f64,
     /// Mean events per second in the press windows.
     pub press_events_per_s: Estimate,
@@ -65,20 +64,20 @@ pub struct BitRates {
 /// Events of a camera per pixel over the whole recording, whole sensor.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Activity {
-    /// Which camera.
+    /// Camera.
     pub camera: CameraId,
-    /// Side of a cell of the picture, px.
+    /// Side of a cell of the image, px.
     pub cell_px: u16,
     /// Cells along u.
     pub width: u16,
     /// Cells along v.
     pub height: u16,
-    /// Events per cell, row by row. Written as one text per row, the numbers of its cells apart by spaces.
+    /// Events per cell, row by row. Serialised as one text per row, with the numbers of its cells separated by spaces.
     #[serde(with = "rows")]
     pub counts: Vec<u64>,
 }
 
-/// A picture's counts as short text, a line per 320 cells (the width of a picture).
+/// Compact serialisation of an image's counts, a line per 320 cells (the width of an image).
 mod rows {
     use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
@@ -105,19 +104,19 @@ mod rows {
     }
 }
 
-/// Events that a camera's stream places outside the sensor: none of them is used.
+/// Events outside the sensor in a camera's stream; none of them is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct OffSensor {
     /// Events outside the sensor.
     pub events: u64,
-    /// All events of the stream, these among them.
+    /// All events of the stream, including these.
     pub of: u64,
 }
 
 impl OffSensor {
-    /// A larger share is a warning.
+    /// A larger share gives a warning.
     pub(crate) const WARNING_SHARE: f64 = 1e-4;
-    /// With a larger share there is no analysis: the stream is another sensor's, or broken.
+    /// A larger share prevents the analysis: the stream is from another sensor, or broken.
     pub(crate) const MAX_SHARE: f64 = 0.01;
 
     /// The share of the events outside the sensor, 0 to 1.

@@ -1,4 +1,4 @@
-//! The result of an analysis: every number that a report shows, with its n.
+//! Owns the result of an analysis: every number in a report, with its n.
 
 mod alignment;
 mod audit;
@@ -12,7 +12,7 @@ mod validity;
 
 pub use alignment::{
     Alignment, AlignmentStatus, ClockMap, ClockResidual, ClockResiduals, Knot, LineCounts, MapName,
-    RatesEvidence, RatesSights,
+    RatesDetections, RatesEvidence,
 };
 pub use audit::{Fault, Finding, Law};
 pub use calibration::{CalibrationResult, ModelComparison, ModelTest, ThresholdChoice};
@@ -28,8 +28,10 @@ pub use reference::{ReferenceCode, ReferenceReduction};
 use serde::{Deserialize, Serialize};
 use skinrig_model::{
     AnalysisSettings, CameraId, LocationId, Point2, PressId, PressRole, PressTiming, RepetitionId,
-    RigGeometry, StereoGeometry,
+    RigGeometry, StereoGeometry, Verdict,
 };
+
+use crate::rule::Rule;
 
 /// Version of this layout and of the algorithms behind it; part of every result.
 pub const ANALYSIS_VERSION: u32 = 7;
@@ -43,29 +45,29 @@ pub struct Analysis {
     pub settings: AnalysisSettings,
     /// The rig as described by the session.
     pub rig: RigGeometry,
-    /// The camera geometry that located the presses (calibrated, or the nominal one).
+    /// Camera geometry that located the presses (calibrated, or nominal).
     pub geometry: StereoGeometry,
-    /// How the presses ended: planned = valid + missed + invalid + excluded.
+    /// Outcomes of the presses: planned = valid + missed + invalid + excluded.
     pub counts: PressCounts,
-    /// Clock fits, camera 1 and camera 2; `None` where no alignment was possible.
+    /// Clock fits, camera 1 and camera 2; `None` if no alignment was possible.
     pub clocks: [Option<ClockFit>; 2],
-    /// The clocks of each leg, for a session in several: `clocks` are one line through all of them.
+    /// Clocks of each leg, if there are several; `clocks` are one line through all of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub legs: Vec<LegClock>,
-    /// The alignment certificate: whether the clocks are known well enough for the numbers to be used.
+    /// Alignment certificate: whether the clocks are known well enough.
     #[serde(default)]
     pub alignment: Alignment,
-    /// How the contacts were timed.
+    /// Timing of the contacts.
     pub contact_timing: ContactTiming,
-    /// The calibration, when there was one.
+    /// The calibration, if there was one.
     pub calibration: Option<CalibrationResult>,
-    /// Metrics over the scored presses that are valid and not excluded.
+    /// Metrics over the valid, not excluded scored presses.
     pub scored: Metrics,
-    /// Metrics over all scored presses with an estimate, exclusions ignored.
+    /// Metrics over all scored presses with an estimate, ignoring exclusions.
     pub scored_without_exclusions: Metrics,
-    /// RMSE over all attempted scored presses, failed ones included.
+    /// RMSE over all attempted scored presses, including failed ones.
     pub penalised: Penalised,
-    /// The least number of cluster events, when it was chosen on the calibrating presses.
+    /// Minimum number of cluster events, if chosen on the calibration presses.
     pub threshold: Option<ThresholdChoice>,
     /// Areas and taxels.
     pub coverage: Option<Coverage>,
@@ -77,51 +79,51 @@ pub struct Analysis {
     pub reduction: Option<Reduction>,
     /// The detection-latency study.
     pub latency: Option<Latency>,
-    /// The public code's numbers, in reference-code mode only.
+    /// The public code's numbers, only in reference-code mode.
     pub reference: Option<ReferenceCode>,
-    /// Broken laws; empty for a plausible session.
+    /// Violated laws; empty for a plausible session.
     pub findings: Vec<Finding>,
     /// Events per pixel over the whole recording, camera 1 and camera 2.
     pub activity: Vec<Activity>,
-    /// Events outside the sensor, left out of everything, camera 1 and camera 2.
+    /// Ignored events outside the sensor, camera 1 and camera 2.
     #[serde(default)]
     pub off_sensor: [OffSensor; 2],
-    /// The RMSE of the scored presses at each depth, shallowest first; empty when one depth was scored.
+    /// RMSE of the scored presses at each depth, shallowest first; empty for a single depth.
     pub depths: Vec<DepthResult>,
-    /// Event-rate course of each camera over the whole session.
+    /// Event rates of each camera over the whole session.
     pub rates: [RateSeries; 2],
     /// One row per planned press, in plan order.
     pub presses: Vec<PressResult>,
-    /// Things a reader must know: fallbacks taken, data missing, suspicious residuals.
+    /// Warnings for the reader: fallbacks, missing data, suspicious residuals.
     pub warnings: Vec<String>,
-    /// What the cameras saw of a few scored presses, spread over the session and the skin.
+    /// Events per pixel of a few scored presses, spread over the session and the skin.
     pub pictures: Vec<PressPicture>,
-    /// The event rates around a few scored presses.
+    /// Event rates around a few scored presses.
     pub zooms: Vec<RateZoom>,
-    /// How the robot followed its commands; `None` when no pose was handed over ([`crate::motion`]).
+    /// How the robot followed its commands; `None` without poses ([`crate::motion`]).
     #[serde(default)]
     pub motion: Option<Motion>,
 }
 
-/// How the presses ended. Sync presses are counted apart.
+/// Outcomes of the presses. Sync presses are counted separately.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct PressCounts {
-    /// Calibrating and scored presses in the plan.
+    /// Calibration and scored presses in the plan.
     pub planned: u32,
-    /// Done, recorded, not excluded.
+    /// Executed, recorded, not excluded.
     pub valid: u32,
     /// Never attempted.
     pub missed: u32,
-    /// Attempted but not as planned, or with data lost.
+    /// Attempted but not as planned, or with lost data.
     pub invalid: u32,
-    /// Done, but left out by a rule.
+    /// Executed, but excluded by a rule.
     pub excluded: u32,
     /// Sync presses in the plan.
     pub sync: u32,
 }
 
 impl PressCounts {
-    /// True when every planned press is counted exactly once.
+    /// True if every planned press is counted exactly once.
     #[must_use]
     pub const fn add_up(&self) -> bool {
         self.planned == self.valid + self.missed + self.invalid + self.excluded
@@ -131,14 +133,14 @@ impl PressCounts {
 /// `camera_us = offset_us + (1 + drift_ppm * 1e-6) * host_us`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ClockFit {
-    /// How it was found.
+    /// How the fit was found.
     pub method: ClockMethod,
     /// Camera time at host time 0, µs.
     pub offset_us: f64,
     /// Rate difference, parts per million.
     pub drift_ppm: f64,
-    /// Standard error of the drift, ppm: 1.96 of it are half of the 95 % interval, for rates that change evenly or in small steps. Of
-    /// rates that swing it may be too small (`docs/reference/time-base.md`).
+    /// Standard error of the drift, ppm: 1.96 of them are half of the 95 % interval, for rates that change evenly or in
+    /// small steps. It may be too small for oscillating rates (`docs/reference/time-base.md`).
     pub drift_se_ppm: f64,
     /// Root mean square residual, µs.
     pub residual_rms_us: f64,
@@ -146,60 +148,59 @@ pub struct ClockFit {
     pub residual_max_us: f64,
     /// Points used.
     pub n: u32,
-    /// Points left out as outliers or strays.
+    /// Points rejected as outliers or strays.
     pub rejected: u32,
 }
 
-/// The cameras' clocks in one leg of a session.
+/// Camera clocks in one leg of a session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LegClock {
     /// 1, 2, 3, ...
     pub number: u32,
-    /// Where it begins on the host's clock, s.
+    /// Start on the host clock, s.
     pub start_s: f64,
-    /// The fit to this leg alone, camera 1 and camera 2, in the camera times of the whole session; `None` where its own trains or
+    /// Fit to this leg alone, camera 1 and camera 2, in the camera times of the whole session; `None` if its own trains or
     /// marks give none.
     pub cameras: [Option<ClockFit>; 2],
 }
 
-/// How a clock fit was found.
+/// Source of a clock fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ClockMethod {
-    /// From the reports of the trigger box and the coded edges that the cameras saw of it.
+    /// Trigger box reports and the coded edges that the cameras saw.
     TimeBase,
-    /// From coded marks on the trigger line.
+    /// Coded marks on the trigger line.
     TriggerMarks,
-    /// From the presses found in the event rates.
+    /// Presses found in the event rates.
     EventRates,
 }
 
-/// A number with its 95 % interval and the n behind it. Intervals come from a bootstrap, which sees no spread in what
-/// never or always happened: those of a share of 0 or 1 are exact binomial ones with the number of locations for n
-/// (0: up to 1 - 0.025^(1 / n); 1: from 0.025^(1 / n)). That of a count over a time is the exact Poisson one.
+/// A number with its 95 % interval and its n. Intervals come from a bootstrap, except where it has no spread: a share of 0
+/// or 1 has the exact binomial interval with the number of locations for n (0: up to 1 - 0.025^(1 / n); 1: from 0.025^(1 /
+/// n)), and a count over a time the exact Poisson interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
-    /// The value; `None` when n is too small for it.
+    /// Value; `None` if n is too small.
     pub value: Option<f64>,
     /// Lower end of the 95 % interval.
     pub low: Option<f64>,
     /// Upper end.
     pub high: Option<f64>,
-    /// How many presses (or, for the std between repetitions, locations at one depth) it stands on.
+    /// Number of presses (for the std between repetitions, of locations at one depth).
     pub n: u32,
 }
 
-/// The error at one depth.
+/// Error at one depth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DepthResult {
     /// Planned depth, mm.
     pub depth_mm: f64,
-    /// Root mean square Euclidean error of the presses that count at this depth.
+    /// Root mean square Euclidean error of the counting presses at this depth.
     pub rmse_mm: Estimate,
 }
 
-/// Localisation metrics, mm. Intervals come from a bootstrap that resamples locations; shares of 0 and 1 as in
-/// [`Estimate`].
+/// Localisation metrics, mm. Intervals come from a bootstrap over locations; for shares of 0 and 1 see [`Estimate`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Metrics {
     /// Root mean square Euclidean error.
@@ -216,44 +217,42 @@ pub struct Metrics {
     pub median_mm: Estimate,
     /// 95th percentile of the Euclidean error.
     pub p95_mm: Estimate,
-    /// Mean over locations and depths of the std between repetitions (Euclid, sample std with n-1).
+    /// Mean over locations and depths of the std between repetitions (Euclidean, sample std with n - 1).
     pub repeat_std_mm: Estimate,
-    /// Share of the attempted scored presses, invalid ones included, that got an estimate which counts here.
+    /// Share of the attempted scored presses, including invalid ones, with a counting estimate.
     pub located_rate: Estimate,
-    /// Share of the attempted scored presses that got an estimate which counts here and errs by at most
-    /// `within_mm`.
+    /// Share of the attempted scored presses with a counting estimate and an error of at most `within_mm`.
     pub within_rate: Estimate,
     /// RMSE as a share of the skin's diagonal, percent.
     pub rmse_diagonal_percent: Option<f64>,
 }
 
-/// The RMSE with failures counted. Its value is never below that of the presses that count, nor below that of all presses
-/// with an estimate.
+/// RMSE with failures counted. Never below that of the counting presses, nor below that of all presses with an estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Penalised {
-    /// What a failed press counts at least, mm. One with an estimate that errs by more counts its own error.
+    /// Minimum error of a failed press, mm. One with an estimate and a larger error counts its own error.
     pub penalty_mm: f64,
-    /// True when the penalty was derived from the probed locations, false when the settings name it.
+    /// True if the penalty was derived from the probed locations, false if set in the settings.
     pub derived: bool,
-    /// True when that was below the RMSE of the presses with an estimate, and the penalty was raised to it.
+    /// True if the penalty was raised to the RMSE of the presses with an estimate.
     #[serde(default)]
     pub raised: bool,
-    /// Failed presses: attempted, and without an estimate that counts.
+    /// Failed presses: attempted, but without a counting estimate.
     pub failures: u32,
-    /// How many of them count an error of their own above the penalty.
+    /// Failed presses that count their own error above the penalty.
     #[serde(default)]
     pub beyond_penalty: u32,
     /// The RMSE, mm.
     pub rmse_mm: Estimate,
 }
 
-/// An event-rate course.
+/// Event rates over time.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct RateSeries {
-    /// Host time of the first bin's left edge, s (camera time when there is no clock fit). Only events in
-    /// the rows of the crop are counted.
+    /// Host time of the first bin's left edge, s (camera time without a clock fit). Only events in the rows of the crop are
+    /// counted.
     pub start_s: f64,
-    /// Width of a bin, s. Grows for long sessions so that a series stays below a few thousand bins.
+    /// Width of a bin, s. Grows for long sessions, to limit a series to a few thousand bins.
     pub bin_s: f64,
     /// Mean rate in each bin, events per second.
     pub mean_per_s: Vec<f32>,
@@ -261,12 +260,12 @@ pub struct RateSeries {
     pub peak_per_s: Vec<f32>,
 }
 
-/// What came out for one press.
+/// Result of one press.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PressResult {
-    /// Which press.
+    /// Press.
     pub press: PressId,
-    /// What for.
+    /// Role of the press.
     pub role: PressRole,
     /// Repetition.
     pub repetition: RepetitionId,
@@ -276,24 +275,24 @@ pub struct PressResult {
     pub planned: Point2,
     /// Planned depth, mm.
     pub depth_mm: f64,
-    /// Measured position: the truth.
+    /// Measured position, which is the ground truth.
     pub truth: Option<Point2>,
-    /// `valid`, `missed`, `invalid` or `excluded`.
-    pub verdict: String,
-    /// The reason in full, with this press's numbers, for everything but valid.
+    /// Verdict on the press.
+    pub verdict: Verdict,
+    /// Full reason with this press's numbers, unless valid.
     pub reason: Option<String>,
-    /// The rule behind the reason: a short name without this press's numbers, so that presses can be grouped.
-    pub rule: Option<String>,
-    /// Measured moments, host clock.
+    /// Rule behind the reason, without this press's numbers, for grouping.
+    pub rule: Option<Rule>,
+    /// Measured times, host clock.
     pub timing: Option<PressTiming>,
-    /// What each camera saw.
+    /// View of each camera.
     pub views: [Option<PressView>; 2],
-    /// Where the skin says it was touched.
+    /// Location estimate from the cameras.
     pub location_outcome: LocationOutcome,
 }
 
 impl PressResult {
-    /// The estimate, when there is one.
+    /// The estimate, if there is one.
     #[must_use]
     pub const fn estimate(&self) -> Option<Point2> {
         self.location_outcome.estimate()
@@ -307,47 +306,46 @@ impl PressResult {
     }
 }
 
-/// What one camera saw of one press.
+/// View of a press by one camera.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PressView {
     /// Events in the window and crop.
     pub events: u32,
-    /// How many of them ON.
+    /// ON events among them.
     pub on_events: u32,
     /// Clusters found.
     pub clusters: u32,
-    /// Events in the cluster(s) that make the centroid.
+    /// Events in the cluster(s) behind the centroid.
     pub cluster_events: u32,
-    /// Their mean column, px; `None` without a cluster.
+    /// Mean column of these events, px; `None` without a cluster.
     pub centroid_u: Option<f64>,
-    /// Their mean row, px.
+    /// Mean row of these events, px.
     pub centroid_v: Option<f64>,
     /// Events per second in the window.
     pub rate_per_s: f64,
     /// Events per second in the idle time before the press; 0 when `idle_s` is 0.
     pub idle_rate_per_s: f64,
-    /// Length of the idle time that the idle rate stands on, s; 0 when the presses leave none.
+    /// Length of the idle time behind the idle rate, s; 0 if there is none.
     pub idle_s: f64,
-    /// Standard deviation of the columns of the events in the cluster(s) that make the centroid, px; `None` without
-    /// clusters.
+    /// Standard deviation of the columns of the events in the cluster(s) behind the centroid, px; `None` without clusters.
     #[serde(default)]
     pub spread_u: Option<f64>,
-    /// Columns of the narrowest stretch that holds half of the events that the press added to the idle rate, px; `None`
-    /// when it added too few to tell.
+    /// Width of the narrowest range of columns with half of the events that the press added to the idle rate, px; `None` if
+    /// it added too few.
     #[serde(default)]
     pub width_u: Option<f64>,
 }
 
-/// The events of one press in one camera, counted per pixel: columns all, rows of the crop.
+/// Events of one press in one camera, counted per pixel: all columns, rows of the crop.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PressPicture {
-    /// Which press.
+    /// Press.
     pub press: PressId,
-    /// Which camera.
+    /// Camera.
     pub camera: CameraId,
-    /// First and last row of the crop, both included.
+    /// First and last row of the crop, inclusive.
     pub rows: (u16, u16),
-    /// The pixels with events, row by row.
+    /// Pixels with events, row by row.
     pub pixels: Vec<PicturePixel>,
 }
 
@@ -362,18 +360,18 @@ pub struct PicturePixel {
     pub on: u32,
     /// OFF events.
     pub off: u32,
-    /// True when the pixel belongs to the cluster(s) that make the centroid.
+    /// True if the pixel belongs to the cluster(s) behind the centroid.
     pub clustered: bool,
 }
 
-/// The event rate of one camera around one press, in fine bins.
+/// Event rate of one camera around one press, in fine bins.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RateZoom {
-    /// Which press.
+    /// Press.
     pub press: PressId,
-    /// Which camera.
+    /// Camera.
     pub camera: CameraId,
-    /// Time of the first bin's left edge after the measured contact, s (negative: before it).
+    /// Left edge of the first bin after measured contact, s (negative: before it).
     pub start_s: f64,
     /// Width of a bin, s.
     pub bin_s: f64,
@@ -381,29 +379,29 @@ pub struct RateZoom {
     pub on_per_s: Vec<f32>,
     /// OFF events per second in each bin.
     pub off_per_s: Vec<f32>,
-    /// The measured release after the measured contact, s.
+    /// Measured release after measured contact, s.
     pub release_s: f64,
 }
 
-/// The result of intersecting the two rays.
+/// Result of intersecting the two rays.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "status", rename_all = "snake_case")]
 pub enum LocationOutcome {
     /// Inside the outline.
     Located {
-        /// Where, mm.
+        /// Position, mm.
         at: Point2,
         /// Sine of the angle between the rays.
         sine: f64,
     },
     /// The rays meet outside the outline.
     Outside {
-        /// Where, mm.
+        /// Position, mm.
         at: Point2,
         /// Sine of the angle between the rays.
         sine: f64,
     },
-    /// The rays are parallel, or too nearly so.
+    /// The rays are parallel, or nearly so.
     Parallel {
         /// Sine of the angle between the rays.
         sine: f64,

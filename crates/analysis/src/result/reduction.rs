@@ -1,4 +1,4 @@
-//! Owns what the data-reduction study reports.
+//! Owns the results of the data-reduction study.
 
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +17,7 @@ pub struct Reduction {
     pub presses: u32,
     /// Error below which a press passes: the 95th percentile at factor 1, mm; `None` when nothing is located there.
     pub pass_threshold_mm: Option<f64>,
-    /// Error up to which a press is "within", mm.
+    /// Largest error of a press that is "within", mm.
     pub within_mm: f64,
     /// One curve per kind of thinning.
     pub curves: Vec<ReductionCurve>,
@@ -36,33 +36,32 @@ pub enum Thinning {
 /// The study with one kind of thinning.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReductionCurve {
-    /// Kind.
+    /// Kind of thinning.
     pub thinning: Thinning,
     /// One row per factor, ascending.
     pub rows: Vec<ReductionRow>,
 }
 
-/// The study at one factor. Values are means over seeds; intervals come from a bootstrap over locations of the
-/// seed means, so that they hold the spread between presses and not only between seeds; shares of 0 and 1 as in
-/// [`Estimate`].
+/// Results at one factor. Values are means over seeds; intervals come from a bootstrap over locations of the seed means, so
+/// they include the spread between presses; for shares of 0 and 1 see [`Estimate`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ReductionRow {
     /// k.
     pub factor: u32,
-    /// Mean events per press and camera that are left.
+    /// Mean number of remaining events per press and camera.
     pub events_per_view: f64,
-    /// RMSE of the located presses, mm; its n: presses that at least one seed locates.
+    /// RMSE of the located presses, mm; n: presses located by at least one seed.
     pub rmse_mm: Estimate,
     /// Lowest and highest RMSE of a single seed, mm.
     pub rmse_of_seeds_mm: Option<(f64, f64)>,
-    /// Share of all presses whose error is below the pass threshold; what is not located fails.
+    /// Share of all presses with an error below the pass threshold; presses that are not located fail.
     pub pass_rate: Estimate,
     /// Share of all presses within `within_mm`.
     pub within_rate: Estimate,
-    /// Share of all presses that are located: an estimate that no location rule of the settings excludes.
+    /// Share of located presses: with an estimate that no location rule of the settings excludes.
     pub located_rate: Estimate,
     /// Bytes per second of both cameras during a press, at the stated bits per event.
     pub press_bytes_per_s: Estimate,
-    /// And while idle, over the presses with idle time before them; without a value when there is none.
+    /// Same while idle, over the presses with idle time before them; no value if there are none.
     pub idle_bytes_per_s: Estimate,
 }

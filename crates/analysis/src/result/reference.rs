@@ -1,21 +1,22 @@
-//! Owns what the reference-code mode reports: the public code's numbers, computed without its wrong roots.
+//! Owns the results of reference-code mode: the public code's numbers, computed with exact intersections.
 
 use serde::{Deserialize, Serialize};
 
-/// The published way of judging: on the presses that calibrated, inside the enclosing square only.
+/// The published evaluation: on the calibration presses, inside the enclosing square only.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReferenceCode {
     /// Presses used: all of the first repetition, whatever their role.
     pub presses: u32,
-    /// False when they determine no plausible geometry: the nominal one judges, and the numbers say nothing about the skin.
+    /// False if the presses determine no plausible geometry: the nominal one is used, and the numbers do not describe the
+    /// skin.
     pub calibrated: bool,
-    /// The parameters of its calibration, by name: positions in mm, skews in degrees, distortions without unit; empty when
-    /// it was not calibrated.
+    /// Parameters of its calibration, by name: positions in mm, skews in degrees, distortions without unit; empty if not
+    /// calibrated.
     #[serde(default)]
     pub parameters: Vec<(String, f64)>,
-    /// How many have two centroids.
+    /// Presses with two centroids.
     pub with_centroids: u32,
-    /// How many of those have their estimate in the enclosing square.
+    /// Presses with two centroids and an estimate in the enclosing square.
     pub inside: u32,
     /// RMSE of those inside, mm.
     pub rmse_mm: Option<f64>,
@@ -29,16 +30,16 @@ pub struct ReferenceCode {
     pub reduction: Vec<ReferenceReduction>,
 }
 
-/// The published data reduction at one factor: mean over seeds.
+/// Published data reduction at one factor: mean over seeds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ReferenceReduction {
     /// k.
     pub factor: u32,
     /// RMSE of all presses with an estimate, mm.
     pub rmse_mm: Option<f64>,
-    /// Share of all presses whose error is strictly below the 95th percentile at factor 1; a press without an
-    /// estimate counts with the largest error found, which can pass.
+    /// Share of all presses with an error strictly below the 95th percentile at factor 1; a press without an estimate counts
+    /// with the largest error found, which can pass.
     pub pass_rate: f64,
-    /// The same with presses without an estimate failing.
+    /// Same, with presses without an estimate failing.
     pub honest_pass_rate: f64,
 }

@@ -1,16 +1,16 @@
-//! Owns whether the numbers of an analysis may be used.
+//! Decides whether the numbers of an analysis may be used.
 
 use super::Analysis;
 
 impl Analysis {
-    /// False when the numbers of the session are not to be used: its clocks are not known well enough, or the audit found
-    /// that positions, cameras or rows are others than they are taken for.
+    /// False if the numbers of the session must not be used: its clocks are not known well enough, or the audit found that
+    /// positions, cameras or rows are not what they claim to be.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         self.alignment.is_usable() && !self.findings.iter().any(|f| f.invalidates)
     }
 
-    /// Why the numbers are not to be used, a sentence each; empty for a valid session.
+    /// Why the numbers must not be used, one text per reason; empty for a valid session.
     #[must_use]
     pub fn invalid_because(&self) -> Vec<String> {
         let clocks = if self.alignment.is_usable() {

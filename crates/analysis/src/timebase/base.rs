@@ -1,62 +1,62 @@
-//! The time base of a session: all its epochs, and what each clock showed when.
+//! Time base of a session: all its epochs, and conversions between clocks.
 
 use skinrig_model::{AlignmentSettings, BoxReport, HostTime, TriggerEdge};
 
 use super::edges::Edges;
+use super::epoch_maps::{EpochMaps, map_epoch, shared};
 use super::epochs::epochs;
 use super::line::{best_drift, clock};
-use super::piece::{Piece, piece, shared};
 use super::reading::{Drift, Reading};
 use crate::leg::{LegLine, LegStart, edges_of, leg_at, recorded_of};
 use crate::result::{Alignment, AlignmentStatus, ClockFit};
 
-/// What the time base is made of.
+/// Input of the time base.
 #[derive(Debug, Clone, Copy)]
-pub struct Ties<'a> {
+pub struct TimeBaseInput<'a> {
     /// Reports of the trigger box, in order.
     pub reports: &'a [BoxReport],
     /// Trigger edges of each camera, all channels.
     pub edges: [&'a [TriggerEdge]; 2],
     /// The channel that carries the trains.
     pub channel: u8,
-    /// Camera-time intervals in which each camera was recording, µs; empty where that is not known.
+    /// Camera-time intervals in which each camera was recording, µs; empty if unknown.
     pub recorded: [&'a [(u64, u64)]; 2],
-    /// Where further legs of the session begin.
+    /// Start of further legs of the session.
     pub legs: &'a [LegStart],
-    /// Host instants at which the time base is used, µs: contacts and releases.
+    /// Host times at which the time base is used, µs: contacts and releases.
     pub used_at_us: &'a [f64],
 }
 
-/// What ties one clock to another at an instant.
+/// Kind of observation that ties two clocks at an instant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tie {
-    /// The host asked the trigger box for its time.
+    /// A time request from the host to the trigger box.
     Exchange,
-    /// A camera saw a train that the box reports.
+    /// A reported train that a camera saw.
     Train,
-    /// A camera saw a mark that the host sent.
+    /// A mark sent by the host that a camera saw.
     Mark,
 }
 
 /// The time base of a session.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeBase {
-    /// How good it is.
+    /// Quality of the time base.
     pub alignment: Alignment,
-    /// One line through camera over host time each; `None` when that camera's clock is not known.
+    /// One line of camera time over host time each; `None` if that camera's clock is unknown.
     pub clocks: [Option<ClockFit>; 2],
-    pub(super) pieces: Vec<Piece>,
+    pub(super) pieces: Vec<EpochMaps>,
 }
 
 impl TimeBase {
-    /// From what the box told and the cameras saw; `None` without any report of the box.
+    /// Builds the time base from box reports and camera edges; `None` without any report.
     #[must_use]
-    pub fn new(ties: &Ties<'_>, limits: &AlignmentSettings) -> Option<Self> {
+    pub fn new(ties: &TimeBaseInput<'_>, limits: &AlignmentSettings) -> Option<Self> {
         if ties.reports.is_empty() {
             return None;
         }
         let resets = ties.reports.iter();
-        // A further leg is no fault of the box.
+        // A further leg is not a fault of the box.
         let begins_leg = |t: HostTime| ties.legs.iter().any(|leg| leg.origin == t);
         let resets = resets
             .filter(|r| matches!(r, BoxReport::Reset { noticed } if !begins_leg(*noticed)))
@@ -69,24 +69,24 @@ impl TimeBase {
         };
         let mut lines = Vec::new();
         for leg in 0..=ties.legs.len() {
-            // Edges of one leg say nothing of trains of another.
+            // Edges of one leg do not inform trains of another.
             let edges = |k: usize| edges_of(ties.edges[k], ties.legs, leg, k);
             let recorded = |k: usize| recorded_of(ties.recorded[k], ties.legs, leg, k);
             lines.push([0, 1].map(|k| (Edges::new(edges(k), ties.channel), recorded(k))));
         }
         for epoch in epochs(ties.reports, ties.legs) {
             let mut found = Vec::new();
-            if let Some(piece) = piece(&epoch, &mut lines[epoch.leg], &mut found) {
+            if let Some(piece) = map_epoch(&epoch, &mut lines[epoch.leg], &mut found) {
                 pieces.push(piece);
             }
-            // A leg that was cut off before its first press has no trains, and needs no clock.
+            // A leg that ended before its first press has no trains, and needs no clock.
             if used(epoch.leg) {
                 violations.extend(found);
             }
         }
         pieces.sort_by(|a, b| a.span_us.0.total_cmp(&b.span_us.0));
         if pieces.is_empty() && violations.is_empty() {
-            violations.push("host from box: expected exchanges of time, found none".to_owned());
+            violations.push("host from box: expected time exchanges, found none".to_owned());
         }
         let mut base = Self {
             alignment: Alignment::default(),
@@ -104,7 +104,7 @@ impl TimeBase {
             camera_from_host: [0, 1].map(|k| base.knots(k)),
             residuals: base.residuals(),
         };
-        // What could not be mapped matters where the session has presses.
+        // A missing map matters only where the session has presses.
         for k in 0..2 {
             let unknown = |at: &&f64| base.at(**at).is_none_or(|p| p.cameras[k].is_none());
             if let Some(at) = ties.used_at_us.iter().find(unknown) {
@@ -133,14 +133,14 @@ impl TimeBase {
         Some(base)
     }
 
-    /// Camera time of a host time; `None` when that camera's clock is not known then.
+    /// Camera time of a host time; `None` if that camera's clock is unknown then.
     #[must_use]
     pub fn camera_us(&self, camera: usize, host_us: f64) -> Option<Reading> {
         self.at(host_us)?.camera_us(camera, host_us)
     }
 
-    /// From a host time to the nearest exchange with the box, or to the nearest train that the camera saw when that is further, µs;
-    /// `None` when that camera's clock is not known then.
+    /// Distance from a host time to the nearest exchange with the box, or to the nearest train that the camera saw if that
+    /// is further, µs; `None` if that camera's clock is unknown then.
     #[must_use]
     pub fn tie_distance_us(&self, camera: usize, host_us: f64) -> Option<(Tie, f64)> {
         let piece = self.at(host_us)?;
@@ -154,14 +154,14 @@ impl TimeBase {
         })
     }
 
-    /// Mean rate of a camera's clock over the host's from its first train to its last, with its error: that of [`Self::clocks`],
-    /// whose standard error is made for 95 % alone.
+    /// Mean rate of a camera's clock over the host's from its first train to its last, with its error. Same rate as in
+    /// [`Self::clocks`], whose standard error is valid only for 95 %.
     #[must_use]
     pub fn drift(&self, camera: usize) -> Option<Drift> {
         best_drift(self.pieces.iter(), camera).map(Drift::new)
     }
 
-    /// One line through camera over host time at the trains of one leg, 0 for the first.
+    /// One line of camera time over host time at the trains of one leg (0: the first).
     pub(crate) fn leg_line(&self, leg: usize, camera: usize) -> Option<LegLine> {
         clock(self.pieces.iter().filter(|p| p.leg == leg), camera)
     }
@@ -173,15 +173,15 @@ impl TimeBase {
         piece.camera_us_of_box(camera, piece.relative(box_us))
     }
 
-    /// Host time of an instant on the box's clock in its first epoch. It certainly lies within the bound; the 95 % interval takes both
-    /// ways of an exchange to last equally long on average.
+    /// Host time of an instant on the box's clock in its first epoch. It is certainly within the bound; the 95 % interval
+    /// assumes that both directions of an exchange take equally long on average.
     #[must_use]
     pub fn host_us_of_box(&self, box_us: u64) -> Option<Reading> {
         let piece = self.pieces.first()?;
         Some(piece.host_us_of_box(piece.relative(box_us)))
     }
 
-    /// Camera 2's time of a camera 1's in the box's first epoch, µs.
+    /// Camera 2's time for a time of camera 1 in the box's first epoch, µs.
     #[must_use]
     pub fn camera_2_of_camera_1(&self, camera_1_us: f64) -> Option<Reading> {
         let piece = self.pieces.first()?;
@@ -189,15 +189,15 @@ impl TimeBase {
         piece.camera_2_of_camera_1(camera_1_us - reference_us)
     }
 
-    /// Instants on camera 2's and on camera 1's clock of all trains that both saw, µs: (camera 1, camera 2).
+    /// Instants of all trains that both cameras saw, µs: (camera 1, camera 2), each on its own clock.
     #[must_use]
     pub fn shared_trains(&self) -> Vec<(f64, f64)> {
         self.pieces.iter().flat_map(shared).collect()
     }
 
-    /// The epoch that a host time belongs to: the one that holds it, or else the nearest.
-    pub(super) fn at(&self, host_us: f64) -> Option<&Piece> {
-        let off = |p: &&Piece| {
+    /// Epoch that contains a host time, or the nearest one.
+    pub(super) fn at(&self, host_us: f64) -> Option<&EpochMaps> {
+        let off = |p: &&EpochMaps| {
             let (from, to) = p.span_us;
             (from - host_us).max(host_us - to).max(0.0)
         };

@@ -1,12 +1,12 @@
-//! The certificate: of every map its points, what they leave, and how sure it is where the session has presses.
+//! The certificate: points, residuals, and uncertainty at the presses for every map.
 
 use skinrig_model::AlignmentSettings;
 
 use super::base::TimeBase;
+use super::epoch_maps::{EpochMaps, pairs, trains};
 use super::held_out::coverage;
-use super::piece::{Piece, pairs, trains};
 use super::reading::Reading;
-use super::smooth::Smooth;
+use super::smooth::SmoothMap;
 use crate::metrics::quantile;
 use crate::result::{ClockMap, Knot, LineCounts, MapName};
 
@@ -48,7 +48,7 @@ impl TimeBase {
         if self.pieces.is_empty() {
             return maps;
         }
-        let read = |map: ClockMap, of: &dyn Fn(&Piece, f64) -> Option<Reading>| {
+        let read = |map: ClockMap, of: &dyn Fn(&EpochMaps, f64) -> Option<Reading>| {
             let each = used_at_us.iter();
             let all: Vec<Reading> = each.filter_map(|at| of(self.at(*at)?, *at)).collect();
             let usual = |of: &dyn Fn(&Reading) -> f64| {
@@ -62,13 +62,13 @@ impl TimeBase {
                 ..map
             }
         };
-        let fits: Vec<&Smooth> = self.pieces.iter().map(|p| &p.host.fit).collect();
+        let fits: Vec<&SmoothMap> = self.pieces.iter().map(|p| &p.host.fit).collect();
         maps.push(read(summary(MapName::HostFromBox, &fits), &|p, at| {
             Some(p.host_us_of_box(p.host.box_us(at)))
         }));
         for (k, name) in [(0, MapName::Camera1FromBox), (1, MapName::Camera2FromBox)] {
             let cameras = self.pieces.iter().filter_map(|p| p.cameras[k].as_ref());
-            let fits: Vec<&Smooth> = cameras.map(|c| &c.map).collect();
+            let fits: Vec<&SmoothMap> = cameras.map(|c| &c.map).collect();
             if fits.is_empty() {
                 continue;
             }
@@ -81,7 +81,7 @@ impl TimeBase {
             maps.push(read(map, &|p, at| p.camera_us_of_box(k, p.host.box_us(at))));
         }
         let between = self.pieces.iter().filter_map(|p| p.between.as_ref());
-        let fits: Vec<&Smooth> = between.collect();
+        let fits: Vec<&SmoothMap> = between.collect();
         if !fits.is_empty() {
             let pairs = self.pieces.iter().map(|p| pairs(&p.cameras));
             let held_out: Vec<(u32, u32)> = pairs.filter_map(|p| coverage(&p)).collect();
@@ -117,7 +117,7 @@ fn covered(map: ClockMap, held_out: &[(u32, u32)]) -> ClockMap {
     }
 }
 
-fn summary(map: MapName, fits: &[&Smooth]) -> ClockMap {
+fn summary(map: MapName, fits: &[&SmoothMap]) -> ClockMap {
     let n: usize = fits.iter().map(|f| f.n()).sum();
     let all: usize = fits.iter().map(|f| f.used.len()).sum();
     let squares: f64 = fits
@@ -134,7 +134,7 @@ fn summary(map: MapName, fits: &[&Smooth]) -> ClockMap {
             .max(1),
         n: n as u32,
         rejected: (all - n) as u32,
-        // Of the epoch with the most points.
+        // From the epoch with the most points.
         drift_ppm: fits
             .iter()
             .max_by_key(|f| f.n())

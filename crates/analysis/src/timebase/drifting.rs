@@ -1,23 +1,23 @@
-//! Clocks that drift faster than a clock may, told from wires that lose edges.
+//! Distinguishes implausibly drifting clocks from wires that lose edges.
 
 use skinrig_model::AlignmentSettings;
 
 use super::base::TimeBase;
-use super::edges::{NEAR_US, OffLine};
+use super::edges::{NEAR_US, OffLineTrains};
 use crate::result::Alignment;
 
 impl TimeBase {
     /// Trains that camera `k` saw away from the line of its clock, in all legs.
-    pub(super) fn off_line(&self, k: usize) -> OffLine {
+    pub(super) fn off_line(&self, k: usize) -> OffLineTrains {
         let each = self.pieces.iter().filter_map(|p| p.cameras[k].as_ref());
-        each.fold(OffLine::default(), |sum, c| sum.and(c.off_line))
+        each.fold(OffLineTrains::default(), |sum, c| sum.and(c.off_line))
     }
 }
 
-/// True when most of what camera `k` misses came, away from the line: the wire is well, and a clock is not.
+/// True if most of the trains that camera `k` misses did arrive, away from the line: the wire works, but a clock does not.
 pub fn drifts(
     k: usize,
-    off_line: OffLine,
+    off_line: OffLineTrains,
     alignment: &Alignment,
     limits: &AlignmentSettings,
 ) -> bool {
@@ -27,10 +27,10 @@ pub fn drifts(
     })
 }
 
-/// Which clock drifts, in words: what both cameras see is the box's.
+/// The drifting clock: if both cameras agree it is the box's.
 pub fn drifting(
     drifts: [bool; 2],
-    off_line: [OffLine; 2],
+    off_line: [OffLineTrains; 2],
     alignment: &Alignment,
 ) -> Option<String> {
     let (clock, k) = match drifts {
@@ -40,8 +40,8 @@ pub fn drifting(
         [false, false] => return None,
     };
     Some(format!(
-        "{clock}, clock drift: expected the trains that camera {} saw within {:.0} µs of the line of a clock, found {} of {} up to {:.0} µs \
-         off it: they came, and this clock drifts faster than a clock may, or jumps",
+        "{clock}, clock drift: expected the trains that camera {} saw within {:.0} µs of a clock's line, found {} of \
+         {} up to {:.0} µs off it: they arrived, but this clock drifts faster than plausible, or jumps",
         k + 1,
         NEAR_US[1],
         off_line[k].trains,

@@ -1,73 +1,73 @@
-//! `camera_from_box`: which edge on a camera's trigger input is which edge that the box sent, and the map that follows.
+//! `camera_from_box`: matches edges on a camera's trigger input with the edges that the box sent, and fits the map.
 //!
-//! First *anchors*: trains whose bits, as far as they can be read, agree with one train that the box sent and contradict
-//! every other one in at least [`LEAST_CONTRADICTED`] bits. Then every edge that was sent is looked for where the anchors
-//! put it. What is found gives each train an instant, and these the map. The label of an edge is thus never counted off,
-//! and no lost, doubled or spurious edge can shift those after it.
+//! First *anchors*: trains whose readable bits agree with one sent train and contradict every other one in at least
+//! [`MIN_CONTRADICTED`] bits. Then every sent edge is searched at its position predicted by the anchors. The edges found
+//! give each train an instant, and these give the map. Labels are never counted off, so lost, doubled or spurious edges
+//! cannot shift those after them.
 
 use std::collections::HashMap;
 
 use skinrig_model::TriggerEdge;
 use skinrig_model::pulse::{PulseTrain, ReadTrain, read_trains};
 
-use super::epochs::{Epoch, Sent};
-use super::smooth::{FLOOR_US, Figure, Point, STEP_US, Smooth, WANDER};
+use super::epochs::{Epoch, SentTrain};
+use super::smooth::{FLOOR_US, Figure, Point, STEP_US, SmoothMap, WANDER};
 use crate::clock::line::median;
 use crate::result::LineCounts;
 
-/// Bits of an anchor that may be unreadable: the others still name it among what was sent.
-const MOST_ERASED: u32 = 12;
-/// Readable bits that contradict every other train that was sent.
-const LEAST_CONTRADICTED: u32 = 3;
-/// Edges are looked for within this of where anchors, and then trains, put them, µs. Edges of the same direction are at least
+/// Maximum number of unreadable bits in an anchor: the others still identify it among the sent trains.
+const MAX_ERASED: u32 = 12;
+/// Minimum number of readable bits that contradict every other sent train.
+const MIN_CONTRADICTED: u32 = 3;
+/// Search radius around the positions predicted by anchors, and then by trains, µs. Edges of the same direction are at least
 /// 300 µs apart.
 pub(crate) const NEAR_US: [f64; 2] = [60.0, 25.0];
-/// An edge this soon after another of the same direction is its double, µs.
+/// Maximum distance of a doubled edge from the first, µs.
 const DOUBLE_US: u64 = 20;
-/// A train with fewer rising edges than this gives no instant.
-const LEAST_RISES: usize = 4;
-/// The first reading of a train may rest on an edge that is off by this, µs.
+/// Minimum number of rising edges to give a train an instant.
+const MIN_RISES: usize = 4;
+/// The first estimate of a train may use an edge that is off by this, µs.
 const ANCHOR_FLOOR_US: f64 = 3.0;
 
 /// A camera's clock over the box's.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CameraFromBox {
-    /// The map, from box time to camera time, both relative to their references.
-    pub map: Smooth,
-    /// Camera time to which the map is relative, µs.
+    /// Map from box time to camera time, both relative to their references.
+    pub map: SmoothMap,
+    /// Reference of the camera times, µs.
     pub reference_us: u64,
-    /// Box times of all trains that were sent, relative to the epoch's reference, µs.
+    /// Box times of all sent trains, relative to the epoch's reference, µs.
     pub sent_us: Vec<f64>,
-    /// For each of them its instant on the camera's clock relative to the reference, if it was seen.
+    /// For each sent train its instant on the camera's clock relative to the reference, if seen.
     pub instants: Vec<Option<f64>>,
     /// Standard deviation of a rising edge about the instant of its train, µs.
     pub edge_sigma_us: f64,
-    /// Of each train that was sent, how many of its pulses have both edges.
+    /// For each sent train, the number of pulses with both edges.
     pub whole_pulses: Vec<u32>,
-    /// Standard deviation of the rising edges about their own train's mean, µs, and how many edges it stands on; no edge is left
-    /// out.
+    /// Standard deviation of the rising edges about their own train's mean, µs, and the number of edges; no edge is
+    /// rejected.
     pub jitter: Option<(f64, u64)>,
-    /// Box times of the trains that the map stands on, ascending, µs.
+    /// Box times of the trains used by the map, ascending, µs.
     pub ties_us: Vec<f64>,
     /// Edges sent, seen, lost, doubled, spurious.
     pub counts: LineCounts,
-    /// Anchors that the others contradict.
+    /// Anchors that contradict the others.
     pub contradicted: u32,
-    /// Trains that came, by what they spell, away from where the map puts them.
-    pub off_line: OffLine,
+    /// Trains identified by their label away from the predicted position.
+    pub off_line: OffLineTrains,
 }
 
-/// Trains that came, and not where any map that a clock may have puts them.
+/// Trains that arrived at positions that no plausible clock map predicts.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct OffLine {
-    /// How many.
+pub(crate) struct OffLineTrains {
+    /// Number of trains.
     pub trains: u32,
-    /// How far off at most, µs.
+    /// Largest distance, µs.
     pub most_us: f64,
 }
 
-impl OffLine {
-    fn of(points: &[Point], sent: &[Sent], instants: &[Option<f64>], map: &Smooth) -> Self {
+impl OffLineTrains {
+    fn of(points: &[Point], sent: &[SentTrain], instants: &[Option<f64>], map: &SmoothMap) -> Self {
         let missing = sent.iter().zip(instants).filter(|(_, at)| at.is_none());
         let missing: Vec<f64> = missing.map(|(sent, _)| sent.box_us).collect();
         let away = points.iter().filter(|p| {
@@ -80,7 +80,7 @@ impl OffLine {
         })
     }
 
-    /// Both together.
+    /// Combines both.
     pub fn and(self, other: Self) -> Self {
         Self {
             trains: self.trains + other.trains,
@@ -90,12 +90,12 @@ impl OffLine {
 }
 
 impl CameraFromBox {
-    /// From a box time to that of the nearest train that the map stands on, µs.
+    /// Distance from a box time to the nearest train used by the map, µs.
     pub fn tie_distance_us(&self, box_us: f64) -> f64 {
         distance_us(&self.ties_us, box_us)
     }
 
-    /// The camera time of a box time, relative to the reference, µs.
+    /// Camera time of a box time, relative to the reference, µs.
     pub fn at(&self, box_us: f64) -> Figure {
         Figure {
             value: self.map.value(box_us),
@@ -104,15 +104,15 @@ impl CameraFromBox {
         }
     }
 
-    /// What no number of edges averages out, µs: edges come late by an unknown mean, of the size of their scatter (less than 2
-    /// standard deviations for any delay that is spread evenly or dies away), both clocks show whole µs, and before the first train
-    /// and after the last the rate may have changed by [`WANDER`].
+    /// Systematic error, not reduced by more edges, µs: edges have an unknown mean delay of the size of their scatter (less
+    /// than 2 standard deviations for any uniform or decaying delay), both clocks have a resolution of 1 µs, and before the
+    /// first train and after the last the rate may have changed by [`WANDER`].
     pub fn bound_us(&self, box_us: f64) -> f64 {
         2.0 * self.edge_sigma_us + 1.0 + WANDER * beyond_us(&self.ties_us, box_us)
     }
 }
 
-/// From `at` to the nearest of `ties`, which ascend.
+/// Distance from `at` to the nearest of `ties`, which ascend.
 pub(crate) fn distance_us(ties: &[f64], at: f64) -> f64 {
     let k = ties.partition_point(|t| *t < at);
     let near = &ties[k.saturating_sub(1)..(k + 1).min(ties.len())];
@@ -120,7 +120,7 @@ pub(crate) fn distance_us(ties: &[f64], at: f64) -> f64 {
         .fold(f64::INFINITY, |d, t| d.min((t - at).abs()))
 }
 
-/// How far `at` is before the first or after the last of `ties`, which ascend; 0 between them.
+/// Distance of `at` before the first or after the last of `ties`, which ascend; 0 between them.
 pub(crate) fn beyond_us(ties: &[f64], at: f64) -> f64 {
     match (ties.first(), ties.last()) {
         (Some(first), Some(last)) => (first - at).max(at - last).max(0.0),
@@ -128,7 +128,7 @@ pub(crate) fn beyond_us(ties: &[f64], at: f64) -> f64 {
     }
 }
 
-/// The edges of one channel, sorted; those used are struck out.
+/// Edges of one channel, sorted; used ones are removed.
 pub struct Edges {
     all: Vec<TriggerEdge>,
     used: Vec<bool>,
@@ -150,13 +150,13 @@ impl Edges {
         }
     }
 
-    /// The map of one epoch, or why there is none. `recorded`: when the camera was recording, on its own clock, µs; empty when that
-    /// is not known.
+    /// Map of one epoch, or why there is none. `recorded`: periods in which the camera was recording, on its own clock, µs;
+    /// empty if unknown.
     pub fn map(&mut self, epoch: &Epoch, recorded: &[(u64, u64)]) -> Result<CameraFromBox, String> {
         let anchors = anchors(&self.trains, &epoch.trains);
         let Some(reference_us) = anchors.first().map(|a| a.1) else {
             return Err(format!(
-                "none of {} trains sent is certain among {} edges",
+                "none of {} sent trains can be identified among {} edges",
                 epoch.trains.len(),
                 self.all.len()
             ));
@@ -165,11 +165,11 @@ impl Edges {
             .iter()
             .map(|(box_us, t_us)| Point::new(*box_us, relative(*t_us, reference_us)))
             .collect();
-        let mut map = Smooth::fit(&points, STEP_US, ANCHOR_FLOOR_US)
+        let mut map = SmoothMap::fit(&points, STEP_US, ANCHOR_FLOOR_US)
             .filter(|map| map.drift.value.abs() <= crate::clock::NO_CLOCK_DRIFT)
             .ok_or_else(|| {
                 format!(
-                    "{} of {} trains sent are certain, and they are on no clock's line",
+                    "{} of {} sent trains can be identified, but they are not on a plausible clock line",
                     anchors.len(),
                     epoch.trains.len()
                 )
@@ -180,14 +180,14 @@ impl Edges {
         let mut seen_us = Vec::new();
         for near_us in NEAR_US {
             matched = self.look(&epoch.trains, &map, reference_us, near_us);
-            instants = matched.iter().map(Matched::instant).collect::<Vec<_>>();
+            instants = matched.iter().map(TrainMatch::instant).collect::<Vec<_>>();
             let seen: Vec<Point> = epoch
                 .trains
                 .iter()
                 .zip(&instants)
                 .filter_map(|(sent, at)| Some(Point::new(sent.box_us, (*at)?)))
                 .collect();
-            map = Smooth::fit(&seen, STEP_US, FLOOR_US)
+            map = SmoothMap::fit(&seen, STEP_US, FLOOR_US)
                 .ok_or_else(|| format!("only {} trains were seen", seen.len()))?;
             seen_us = seen.iter().map(|p| p.from_us).collect();
         }
@@ -201,7 +201,7 @@ impl Edges {
             .map(|(from, to)| (relative(*from, reference_us), relative(*to, reference_us)))
             .collect();
         let counts = self.count(&matched, &spans, reference_us);
-        let off_line = OffLine::of(&points, &epoch.trains, &instants, &map);
+        let off_line = OffLineTrains::of(&points, &epoch.trains, &instants, &map);
         Ok(CameraFromBox {
             map,
             reference_us,
@@ -217,16 +217,22 @@ impl Edges {
         })
     }
 
-    /// Looks for every edge that was sent where the map puts it.
-    fn look(&self, sent: &[Sent], map: &Smooth, reference_us: u64, near_us: f64) -> Vec<Matched> {
+    /// Searches every sent edge at its position predicted by the map.
+    fn look(
+        &self,
+        sent: &[SentTrain],
+        map: &SmoothMap,
+        reference_us: u64,
+        near_us: f64,
+    ) -> Vec<TrainMatch> {
         sent.iter()
             .map(|train| {
                 let start = map.value(train.box_us);
                 let end = train.box_us + PulseTrain::DURATION_US as f64;
-                let mut out = Matched {
+                let mut out = TrainMatch {
                     start_us: start,
                     end_us: map.value(end),
-                    ..Matched::default()
+                    ..TrainMatch::default()
                 };
                 let mut rose = false;
                 for (offset, rising) in train.train.edges() {
@@ -238,7 +244,7 @@ impl Edges {
                             out.rises.push(off);
                         }
                     }
-                    // A falling edge follows its rising one.
+                    // A falling edge follows its rising edge.
                     out.whole_pulses += u32::from(!rising && rose && found.is_some());
                     rose = rising && found.is_some();
                 }
@@ -268,16 +274,16 @@ impl Edges {
             .min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
     }
 
-    /// Counts over all trains that were seen or sent while the camera was recording, and strikes out their edges. What is before the
-    /// first train that was seen, or after the last, is lost like any other.
+    /// Counts all trains that were seen, or sent while the camera was recording, and removes their edges. Trains before the
+    /// first seen one, or after the last, count as lost.
     fn count(
         &mut self,
-        matched: &[Matched],
+        matched: &[TrainMatch],
         recorded: &[(f64, f64)],
         reference_us: u64,
     ) -> LineCounts {
-        let seen = |m: &&Matched| m.rises.len() >= LEAST_RISES;
-        let is_recorded = |m: &&Matched| {
+        let seen = |m: &&TrainMatch| m.rises.len() >= MIN_RISES;
+        let is_recorded = |m: &&TrainMatch| {
             let holds = |(from, to): &(f64, f64)| *from <= m.start_us && m.end_us <= *to;
             recorded.is_empty() || recorded.iter().any(holds)
         };
@@ -299,7 +305,7 @@ impl Edges {
             }
         }
         counts.lost = counts.sent - counts.seen;
-        // A train that nobody has told of may begin where the rest after the last one ends.
+        // An unreported train may begin after the pause that follows the last one.
         let within = first.start_us - NEAR_US[0]..=last.end_us - NEAR_US[0];
         let (mut rise, mut fall) = (None, None);
         for (edge, used) in self.all.iter().zip(&mut self.used) {
@@ -323,24 +329,24 @@ impl Edges {
 /// Edges of a train.
 const EDGES_PER_TRAIN: u64 = 2 * skinrig_model::pulse::PULSES_PER_TRAIN;
 
-/// What was found of a train.
+/// Edges found for one train.
 #[derive(Debug, Default)]
-struct Matched {
-    /// Where its first edge should be, and its last may be.
+struct TrainMatch {
+    /// Earliest position of its first edge, and latest of its last.
     start_us: f64,
     end_us: f64,
     /// Edges found.
     edges: Vec<usize>,
-    /// How much later than it should be each of the rising edges is: falling ones may have another delay.
+    /// Delay of each rising edge; falling edges may have another delay.
     rises: Vec<f64>,
-    /// Pulses of which both edges were found.
+    /// Pulses with both edges found.
     whole_pulses: u32,
 }
 
-impl Matched {
-    /// The instant of the train: where the median of its rising edges puts it.
+impl TrainMatch {
+    /// Instant of the train: the median of its rising edges.
     fn instant(&self) -> Option<f64> {
-        if self.rises.len() < LEAST_RISES {
+        if self.rises.len() < MIN_RISES {
             return None;
         }
         Some(self.start_us + median(&mut self.rises.clone())?)
@@ -348,7 +354,7 @@ impl Matched {
 }
 
 /// Robust standard deviation of rising edges about the instants of their trains.
-fn edge_sigma_us(matched: &[Matched]) -> f64 {
+fn edge_sigma_us(matched: &[TrainMatch]) -> f64 {
     let mut off: Vec<f64> = matched
         .iter()
         .filter_map(|m| Some((m, m.instant()? - m.start_us)))
@@ -357,12 +363,12 @@ fn edge_sigma_us(matched: &[Matched]) -> f64 {
     1.482_602_218_505_602 * median(&mut off).unwrap_or(0.0)
 }
 
-/// Standard deviation of rising edges about the means of their trains, pooled over trains (each takes one degree of freedom), and
-/// the number of edges.
-fn jitter(matched: &[Matched]) -> Option<(f64, u64)> {
+/// Standard deviation of rising edges about the means of their trains, pooled over trains (each takes one degree of
+/// freedom), and the number of edges.
+fn jitter(matched: &[TrainMatch]) -> Option<(f64, u64)> {
     let (mut squares, mut free, mut n) = (0.0, 0, 0);
     for rises in matched.iter().map(|m| &m.rises) {
-        if rises.len() >= LEAST_RISES {
+        if rises.len() >= MIN_RISES {
             let mean = rises.iter().sum::<f64>() / rises.len() as f64;
             squares += rises.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>();
             free += rises.len() - 1;
@@ -372,8 +378,8 @@ fn jitter(matched: &[Matched]) -> Option<(f64, u64)> {
     (free > 0).then(|| ((squares / free as f64).sqrt(), n))
 }
 
-/// (box time, camera time) of the trains that are certain, in order of box time.
-fn anchors(read: &[ReadTrain], sent: &[Sent]) -> Vec<(f64, u64)> {
+/// (box time, camera time) of the identified trains, in order of box time.
+fn anchors(read: &[ReadTrain], sent: &[SentTrain]) -> Vec<(f64, u64)> {
     let by_word: HashMap<u32, usize> = sent
         .iter()
         .enumerate()
@@ -388,7 +394,7 @@ fn anchors(read: &[ReadTrain], sent: &[Sent]) -> Vec<(f64, u64)> {
     };
     let mut found: Vec<(f64, u64)> = read
         .iter()
-        .filter(|r| r.erased.count_ones() <= MOST_ERASED)
+        .filter(|r| r.erased.count_ones() <= MAX_ERASED)
         .filter_map(|r| Some((name(r)?.box_us, r.t_us)))
         .collect();
     found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -397,14 +403,15 @@ fn anchors(read: &[ReadTrain], sent: &[Sent]) -> Vec<(f64, u64)> {
     found
 }
 
-/// The one train that was sent with which all readable bits agree, when they contradict all others.
-fn named(read: &ReadTrain, sent: &[Sent]) -> Option<usize> {
-    let contradicted = |s: &Sent| ((s.train.bits() ^ read.bits) & !read.erased & WORD).count_ones();
+/// The only sent train with which all readable bits agree, if they contradict all others.
+fn named(read: &ReadTrain, sent: &[SentTrain]) -> Option<usize> {
+    let contradicted =
+        |s: &SentTrain| ((s.train.bits() ^ read.bits) & !read.erased & WORD).count_ones();
     let mut found = None;
     for (k, train) in sent.iter().enumerate() {
         match contradicted(train) {
             0 if found.is_none() => found = Some(k),
-            n if n < LEAST_CONTRADICTED => return None,
+            n if n < MIN_CONTRADICTED => return None,
             _ => {}
         }
     }

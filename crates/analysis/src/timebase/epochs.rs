@@ -1,4 +1,4 @@
-//! What the trigger box told, cut at its resets: within an epoch its clock goes on without a break.
+//! Reports of the trigger box, split at its resets: within an epoch its clock is continuous.
 
 use std::collections::BTreeMap;
 
@@ -6,41 +6,40 @@ use skinrig_model::{BoxReport, Label, PulseTrain};
 
 use crate::leg::{LegStart, leg_at};
 
-/// An exchange of time: `sent <= box time <= received`, µs.
+/// A time exchange: `sent <= box time <= received`, µs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tie {
     pub sent_us: f64,
     pub received_us: f64,
-    /// What the box's clock showed, relative to [`Epoch::reference_us`]; it shows whole µs.
+    /// Box clock relative to [`Epoch::reference_us`]; resolution 1 µs.
     pub box_us: f64,
 }
 
 /// A train that the box sent.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sent {
+pub struct SentTrain {
     pub label: Label,
     pub train: PulseTrain,
-    /// The first rising edge on the box's clock, relative to [`Epoch::reference_us`].
+    /// First rising edge on the box's clock, relative to [`Epoch::reference_us`].
     pub box_us: f64,
-    /// No other train of its leg has this label.
+    /// True if no other train of its leg has this label.
     pub unique: bool,
 }
 
 /// Reports between two resets.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Epoch {
-    /// The leg that it belongs to, 0 for the first.
+    /// Its leg (0: the first).
     pub leg: usize,
-    /// Box time to which all others are relative, µs.
+    /// Reference of all box times, µs.
     pub reference_us: u64,
     /// In time order.
     pub ties: Vec<Tie>,
     /// In time order.
-    pub trains: Vec<Sent>,
+    pub trains: Vec<SentTrain>,
 }
 
-/// The epochs of a session in order; those without any train or exchange are left out. Every further leg begins with a reset at its
-/// origin.
+/// Epochs of a session in order, without empty ones. Every further leg begins with a reset at its origin.
 pub(crate) fn epochs(reports: &[BoxReport], legs: &[LegStart]) -> Vec<Epoch> {
     let mut leg = 0;
     let mut parts = Vec::new();
@@ -50,7 +49,7 @@ pub(crate) fn epochs(reports: &[BoxReport], legs: &[LegStart]) -> Vec<Epoch> {
             leg = leg_at(legs, *noticed);
         }
     }
-    // The same label may come in every leg: its trains are looked for among the edges of its own.
+    // Labels may repeat in every leg; trains are searched among the edges of their own leg.
     let mut times: BTreeMap<(usize, Label), u32> = BTreeMap::new();
     for (leg, part) in &parts {
         for (label, _) in part.iter().filter_map(train_of) {
@@ -91,7 +90,7 @@ fn epoch(part: &[BoxReport], leg: usize, times: &BTreeMap<(usize, Label), u32>) 
         } else if let Some((label, us)) = train_of(report)
             && let Some(train) = PulseTrain::of(label)
         {
-            out.trains.push(Sent {
+            out.trains.push(SentTrain {
                 label,
                 train,
                 box_us: relative(us),

@@ -1,14 +1,14 @@
-//! How often trains that a fit has not seen lie in the interval that it states for them.
+//! Share of held-out trains within their stated interval.
 
-use super::smooth::{FLOOR_US, Point, STEP_US, Smooth};
+use super::smooth::{FLOOR_US, Point, STEP_US, SmoothMap};
 
-/// (inside, of how many): each half of the points against the fit to the other half, in the interval stated for a point;
-/// `None` when a half allows no fit, or has too few points to state such an interval.
+/// (inside, number): each half of the points against the fit to the other half, with the stated prediction interval; `None`
+/// if a half allows no fit, or has too few points for such an interval.
 pub(super) fn coverage(points: &[Point]) -> Option<(u32, u32)> {
     let halves = halves(points);
     let (mut inside, mut n) = (0, 0);
     for (half, other) in [(&halves[0], &halves[1]), (&halves[1], &halves[0])] {
-        let fit = Smooth::fit(half, STEP_US, FLOOR_US)?;
+        let fit = SmoothMap::fit(half, STEP_US, FLOOR_US)?;
         let width = width_us(&fit, 0.95)?;
         for p in other {
             n += 1;
@@ -18,11 +18,10 @@ pub(super) fn coverage(points: &[Point]) -> Option<(u32, u32)> {
     Some((inside, n))
 }
 
-/// Half width of the interval that holds this share of further points, µs: what holds it of the points used, each against the fit
-/// without it (Vovk, Gammerman and Shafer, "Algorithmic learning in a random world", 2005). Whatever the shape of the noise, and
-/// whether or not it is a multiple of a µs, no more than chance leaves a point outside; points that the fit left out widen nothing.
-/// `None` of fewer points than can hold that share: 19 for 95 %.
-fn width_us(fit: &Smooth, share: f64) -> Option<f64> {
+/// Half width of the prediction interval with this coverage, µs: the quantile of leave-one-out residuals of the used points
+/// (Vovk, Gammerman and Shafer, "Algorithmic learning in a random world", 2005). It holds for any shape of the noise,
+/// quantised or not; rejected points do not widen it. `None` with too few points: at least 19 for 95 %.
+fn width_us(fit: &SmoothMap, share: f64) -> Option<f64> {
     let sigma2 = fit.sigma_us * fit.sigma_us;
     let without = |(at, residual): &(f64, f64)| {
         let se = fit.standard_error(*at);
@@ -37,11 +36,11 @@ fn width_us(fit: &Smooth, share: f64) -> Option<f64> {
     sizes.get(k.max(1) - 1).copied()
 }
 
-/// One of each two neighbours for either half, which one after Thue and Morse (the parity of the ones of its number).
+/// Splits neighbouring points between the halves by the Thue-Morse sequence (parity of the ones of the index).
 ///
-/// Trains that come in step meet the microseconds of a camera in a pattern: 100 ms apart at 25 ppm, by turns at its start
-/// and in its middle. Every second point would put all of one kind into one half, whose fit lies half a microsecond from the
-/// other kind; this sequence repeats no pattern.
+/// Periodic trains hit the microseconds of a camera in a pattern: at 100 ms and 25 ppm, alternately at the start and in the
+/// middle. Taking every second point would put one kind into each half, and the fits would differ by half a microsecond; the
+/// Thue-Morse sequence repeats no pattern.
 fn halves(points: &[Point]) -> [Vec<Point>; 2] {
     let of = |parity: usize| {
         let each = points.iter().enumerate();
@@ -55,7 +54,7 @@ fn halves(points: &[Point]) -> [Vec<Point>; 2] {
 mod tests {
     use super::*;
 
-    /// Trains of the box every 100 ms, stamped in whole microseconds by a camera that runs so much faster.
+    /// Trains every 100 ms, timestamped in whole microseconds by a camera with this drift.
     fn stamped(ppm: f64, phase_us: f64) -> Vec<Point> {
         (0..600)
             .map(|k| {
@@ -80,7 +79,7 @@ mod tests {
         }
     }
 
-    /// What the check is for: a clock that no line of the model follows.
+    /// The purpose of the check: a clock that the model cannot follow.
     #[test]
     fn a_clock_that_jumps_about_is_found_out() {
         let mut points = stamped(23.6, 0.1);

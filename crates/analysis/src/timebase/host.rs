@@ -1,34 +1,34 @@
-//! `host_from_box`: the host's clock over the box's, within bounds that hold for certain.
+//! `host_from_box`: the host's clock over the box's, with certain bounds.
 //!
-//! Every exchange says that the box's clock showed a value between two instants of the host. The map is a fit to the quickest
-//! exchanges; where it may lie follows from all of them: above the latest `sent` and below the earliest `received`, each moved
-//! along the fit by no more than its rate may be wrong. No assumption is made on how a delay divides into its two ways; that both
-//! ways take equally long on average is what the map itself stands on, and the bounds hold without it.
+//! Every exchange shows that the box's clock had a value between two host times. The map is a fit to the fastest exchanges;
+//! its certain bounds follow from all of them: above the latest `sent` and below the earliest `received`, each extended
+//! along the fit by the maximum rate error. The bounds make no assumption on how a delay divides into its two directions;
+//! the map itself assumes that both take equally long on average.
 
 use super::edges::{beyond_us, distance_us};
 use super::epochs::Tie;
-use super::smooth::{Figure, Point, STEP_US, Smooth, WANDER};
+use super::smooth::{Figure, Point, STEP_US, SmoothMap, WANDER};
 use crate::clock::NO_CLOCK_DRIFT;
 use crate::clock::line::median;
 
-/// The quickest exchange in each such span of box time makes a point of the fit, µs.
+/// The fastest exchange in each such span of box time is a point of the fit, µs.
 const QUICKEST_OF_US: f64 = 5e6;
-/// Exchanges about one that say how busy the line is: the 50 quickest of them give their scatter to 7 %, by chance.
+/// Number of neighbouring exchanges that define how busy the line is: their 50 fastest give the scatter to 7 %.
 const NEAR: usize = 150;
-/// The box's clock shows whole µs.
+/// Resolution of the box's clock: 1 µs.
 const TICK_US: f64 = 1.0;
-/// Points of the fit, at least, where there are as many exchanges.
+/// Minimum number of points of the fit, if there are as many exchanges.
 const POINTS: f64 = 40.0;
-/// What the rate of the fit may be wrong by is bounded in each such span, µs.
+/// Span in which the rate error of the fit is bounded, µs.
 const WINDOW_US: f64 = 60e6;
-/// Parts of such a span, of each of which the tightest bounds count.
+/// Parts of such a span; the tightest bounds of each part count.
 const PARTS: usize = 40;
-/// Within a window the rates wander by no more than this about the fit: a crystal that wanders by 6 ppm per hour, 0.05 ppm in half
-/// a minute.
+/// Maximum wander of the rates about the fit within a window: a crystal that wanders by 6 ppm per hour, 0.05 ppm in half a
+/// minute.
 const SHAPE: f64 = 0.05e-6;
-/// Residuals of delays are never judged finer than this, µs.
+/// Lower bound of the scale of delays, µs.
 const FLOOR_US: f64 = 20.0;
-/// Rounds of a search that each leave a hundredth at most: no clock is off by more.
+/// Iterations of a search, each with at most a hundredth of the previous error: no clock is off by more.
 const ROUNDS: usize = 9;
 
 /// The map.
@@ -36,11 +36,11 @@ const ROUNDS: usize = 9;
 pub struct HostFromBox {
     /// Box times between which the map is nearly straight, ascending, µs.
     pub knots_us: Vec<f64>,
-    /// The fit behind it, which is moved into the bounds where it leaves them.
-    pub fit: Smooth,
+    /// The fit, which is clamped to the bounds where it exceeds them.
+    pub fit: SmoothMap,
     /// Box times of the exchanges, ascending, µs.
     pub ties_us: Vec<f64>,
-    /// False when exchanges contradict each other: the clock jumped, or an exchange is wrong.
+    /// False if exchanges contradict each other: the clock jumped, or an exchange is wrong.
     pub consistent: bool,
     points: Vec<Point>,
     bounds: Bounds,
@@ -50,7 +50,7 @@ impl HostFromBox {
     /// From exchanges in order of box time; `None` below 3 or without spread in time.
     pub fn new(ties: &[Tie]) -> Option<Self> {
         let points = quickest(ties);
-        let fit = Smooth::fit(&points, STEP_US, FLOOR_US)?;
+        let fit = SmoothMap::fit(&points, STEP_US, FLOOR_US)?;
         let (first, last) = (ties.first()?.box_us, ties.last()?.box_us);
         let (bounds, consistent) = Bounds::new(ties, &fit);
         let steps = ((last - first) / STEP_US).ceil().max(1.0) as usize;
@@ -72,13 +72,13 @@ impl HostFromBox {
         self.fit.value(box_us) + self.moved_us(box_us)
     }
 
-    /// How far the map is moved into the bounds, µs: what is certain goes before what is likely.
+    /// Shift of the map into the bounds, µs: certainty takes precedence over likelihood.
     fn moved_us(&self, box_us: f64) -> f64 {
         let (low, high) = self.bounds.at(box_us);
         0.0f64.max(low).min(high.max(low))
     }
 
-    /// Box time of a host time, µs. Both clocks go nearly at one rate, and so does what is left of the way at each round.
+    /// Box time of a host time, µs. Both clocks have nearly the same rate, so the iteration converges fast.
     pub fn box_us(&self, host_us: f64) -> f64 {
         let mut box_us = host_us - self.host_us(0.0);
         for _ in 0..ROUNDS {
@@ -87,7 +87,7 @@ impl HostFromBox {
         box_us
     }
 
-    /// Host time of a box time, with its statistical error: that of the delays, both ways taking equally long on average.
+    /// Host time of a box time, with its random error: that of the delays, if both directions take equally long on average.
     pub fn at(&self, box_us: f64) -> Figure {
         Figure {
             value: self.host_us(box_us),
@@ -96,29 +96,30 @@ impl HostFromBox {
         }
     }
 
-    /// Mean rate of host over box time, less 1, between two box times, µs, with its statistical error.
+    /// Mean rate of host over box time, minus 1, between two box times, µs, with its random error.
     pub fn drift(&self, between_us: (f64, f64)) -> Option<Figure> {
-        let fit = Smooth::fit_with_drift(&self.points, STEP_US, FLOOR_US, Some(between_us))?;
+        let fit = SmoothMap::fit_with_drift(&self.points, STEP_US, FLOOR_US, Some(between_us))?;
         Some(fit.drift)
     }
 
-    /// Half width of the interval about [`Self::host_us`] that certainly holds the host time of a box time, µs.
+    /// Half width of the interval about [`Self::host_us`] that certainly contains the host time of a box time, µs.
     pub fn bound_us(&self, box_us: f64) -> f64 {
         let (low, high) = self.bounds.at(box_us);
         let by = self.moved_us(box_us);
-        // Beyond the exchanges nothing bounds the rate but what a crystal does.
+        // Beyond the exchanges only the tolerance of crystals bounds the rate.
         (by - low).abs().max((high - by).abs()) + WANDER * beyond_us(&self.ties_us, box_us)
     }
 
-    /// From a box time to that of the nearest exchange, µs.
+    /// Distance from a box time to the nearest exchange, µs.
     pub fn tie_distance_us(&self, box_us: f64) -> f64 {
         distance_us(&self.ties_us, box_us)
     }
 }
 
-/// The middle of the quickest of each so many exchanges.
+/// Midpoint of the fastest exchange in each group.
 ///
-/// As many in each, so that all are as good: the quickest of few is slow, and a last point that is, has the greatest say in the rate.
+/// All groups have the same size, so that all points are equally good: the fastest of a small group is slow, and a slow last
+/// point dominates the rate.
 fn quickest(ties: &[Tie]) -> Vec<Point> {
     let delays: Vec<f64> = ties.iter().map(|t| t.received_us - t.sent_us).collect();
     let span = ties.last().map_or(0.0, |t| t.box_us) - ties.first().map_or(0.0, |t| t.box_us);
@@ -137,7 +138,7 @@ fn quickest(ties: &[Tie]) -> Vec<Point> {
     .collect()
 }
 
-/// How far delays about the `k`-th scatter above their least, µs. Where a host or a line is busy, even the quickest are slow.
+/// Scatter of delays about the `k`-th above their minimum, µs. On a busy host or line even the fastest are slow.
 fn scatter_us(delays: &[f64], k: usize) -> f64 {
     let from = k
         .saturating_sub(NEAR / 2)
@@ -147,7 +148,7 @@ fn scatter_us(delays: &[f64], k: usize) -> f64 {
     (near[near.len() / 3] - near[0]).max(TICK_US)
 }
 
-/// What one exchange says of how far the host's clock is from the fit, µs.
+/// Bounds from one exchange on the host's deviation from the fit, µs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Bound {
     box_us: f64,
@@ -155,20 +156,20 @@ struct Bound {
     high: f64,
 }
 
-/// What all exchanges say together: they hold away from themselves too, less what the rate may be wrong by on the way.
+/// Bounds from all exchanges, extended in time by the rate error.
 #[derive(Debug, Clone, PartialEq)]
 struct Bounds {
-    /// At each exchange, by those up to it, and by those from it on.
+    /// At each exchange, from those up to it, and from those after it.
     before: Vec<Bound>,
     after: Vec<Bound>,
-    /// What the rate of the fit may be wrong by.
+    /// Rate error of the fit.
     rate: f64,
 }
 
 impl Bounds {
-    /// Also whether the exchanges agree.
-    fn new(ties: &[Tie], fit: &Smooth) -> (Self, bool) {
-        // The box's clock shows whole µs: what it showed lasts one.
+    /// Also returns whether the exchanges agree.
+    fn new(ties: &[Tie], fit: &SmoothMap) -> (Self, bool) {
+        // The box's clock has a resolution of 1 µs, so a value lasts 1 µs.
         let each: Vec<Bound> = ties
             .iter()
             .map(|t| Bound {
@@ -223,14 +224,13 @@ impl Bounds {
     }
 }
 
-/// What the rate of the fit may be wrong by: the steepest line that passes between all bounds of any window; `None` when there is
-/// none in some window.
+/// Rate error of the fit: slope of the steepest line between all bounds of any window; `None` if some window has none.
 fn rate(bounds: &[Bound]) -> Option<f64> {
     let (first, last) = (bounds.first()?.box_us, bounds.last()?.box_us);
     let windows = ((last - first) / WINDOW_US).floor().max(1.0);
     let part_us = ((last - first) / windows / PARTS as f64).max(1.0);
     let part = |b: &Bound| ((b.box_us - first) / part_us).floor();
-    // Of each part the tightest bounds, where they are.
+    // Tightest bounds of each part, and their times.
     let tightest: Vec<(Bound, Bound)> = bounds
         .chunk_by(|a, b| part(a) == part(b))
         .filter_map(|of| {
@@ -253,7 +253,7 @@ fn rate(bounds: &[Bound]) -> Option<f64> {
         if least > largest {
             return None;
         }
-        // A last window may be too short to say anything.
+        // A last window may be too short to be informative.
         let steepest = largest.abs().max(least.abs());
         most = most.max(if steepest.is_finite() { steepest } else { 0.0 });
     }

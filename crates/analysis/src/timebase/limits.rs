@@ -1,17 +1,17 @@
-//! Limits of the certificate: presses that no clock times, and figures beyond what the settings allow, in words.
+//! Checks the limits of the certificate: untimed presses, and values beyond the settings.
 
 use skinrig_model::{AlignmentSettings, HostTime};
 
-use super::base::{Ties, TimeBase};
+use super::base::{TimeBase, TimeBaseInput};
 use super::drifting::{drifting, drifts};
 use crate::leg::{leg_at, recorded_of};
 use crate::result::{Alignment, MapName};
 
-/// Coverage is judged from this many held-out points on: of fewer, two misses are no evidence.
-const LEAST_HELD_OUT: u32 = 40;
+/// Minimum number of held-out points to check coverage: with fewer, two misses are not evidence.
+const MIN_HELD_OUT: u32 = 40;
 
 impl TimeBase {
-    /// The instants that no clock is too far from to time them.
+    /// Instants that are close enough to ties of every clock.
     pub(super) fn timed(&self, used_at_us: &[f64], limits: &AlignmentSettings) -> Vec<f64> {
         let far = |k: usize, at: f64| self.is_untimed(k, at, limits);
         let each = used_at_us.iter().copied();
@@ -23,12 +23,12 @@ impl TimeBase {
         tie.is_some_and(|(_, distance)| distance > limits.max_tie_distance_us)
     }
 
-    /// Warns of contacts and releases that the clock of camera `k` does not time. Too many while it was recording make the session
-    /// invalid; that it was not recording is no fault of a clock.
+    /// Warns about contacts and releases that the clock of camera `k` does not time. Too many while it was recording make
+    /// the session invalid; a camera that was not recording is not a clock fault.
     pub(super) fn judge_untimed(
         &self,
         k: usize,
-        ties: &Ties<'_>,
+        ties: &TimeBaseInput<'_>,
         limits: &AlignmentSettings,
         warnings: &mut Vec<String>,
         violations: &mut Vec<String>,
@@ -48,8 +48,8 @@ impl TimeBase {
         let all = ties.used_at_us.len();
         let limit_s = limits.max_tie_distance_us * 1e-6;
         warnings.push(format!(
-            "camera {}: {} of {all} contacts and releases are more than {limit_s} s from the nearest train that it saw or the nearest \
-             exchange with the box: their presses are not timed",
+            "camera {}: {} of {all} contacts and releases are more than {limit_s} s from the nearest train seen or the \
+             nearest exchange with the box; their presses are not timed",
             k + 1,
             far.len()
         ));
@@ -64,7 +64,7 @@ impl TimeBase {
         }
     }
 
-    /// What is beyond its limit, in words.
+    /// Exceeded limits, as text.
     pub(super) fn beyond(&self, alignment: &Alignment, limits: &AlignmentSettings) -> Vec<String> {
         let off_line = [0, 1].map(|k| self.off_line(k));
         let drifts = [0, 1].map(|k| drifts(k, off_line[k], alignment, limits));
@@ -94,13 +94,13 @@ impl TimeBase {
                 }
                 if let (Some((_, noise)), Some((_, bound))) = (map.interval_us, map.bound_us) {
                     judge(
-                        format!("{name}, 95 % interval at the presses and the bound on top of it"),
+                        format!("{name}, 95 % interval at the presses plus systematic bound"),
                         limits.max_camera_interval_us,
                         noise + bound,
                         "µs",
                     );
                 }
-                if let Some(share) = map.coverage.filter(|_| map.coverage_n >= LEAST_HELD_OUT) {
+                if let Some(share) = map.coverage.filter(|_| map.coverage_n >= MIN_HELD_OUT) {
                     // Chance alone leaves some outside.
                     let least = limits.min_coverage;
                     let error = (least * (1.0 - least) / f64::from(map.coverage_n)).sqrt();
@@ -133,7 +133,7 @@ impl TimeBase {
         }
         for (k, line) in alignment.lines.iter().enumerate() {
             let camera = format!("camera {}, trigger input", k + 1);
-            // What came away from the line is neither lost nor spurious.
+            // Trains away from the line are neither lost nor spurious.
             if drifts[k] {
                 continue;
             }

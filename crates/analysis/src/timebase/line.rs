@@ -1,15 +1,15 @@
-//! One line through camera over host time, and the mean rate that is its slope.
+//! One line of camera time over host time, and the mean rate that is its slope.
 
-use super::piece::Piece;
+use super::epoch_maps::EpochMaps;
 use super::smooth::Figure;
 use crate::clock::line::{self, Pair};
 use crate::leg::LegLine;
 use crate::result::{ClockFit, ClockMethod};
 
-/// One line through camera over host time at all trains. Its slope is the mean rate from the first train to the last, of the leg in which
-/// it is known best.
+/// One line of camera time over host time at all trains. Its slope is the mean rate from the first train to the last, from
+/// the best-known leg.
 pub(super) fn clock<'a>(
-    pieces: impl Iterator<Item = &'a Piece> + Clone,
+    pieces: impl Iterator<Item = &'a EpochMaps> + Clone,
     k: usize,
 ) -> Option<LegLine> {
     let reference_us = pieces
@@ -57,9 +57,12 @@ pub(super) fn clock<'a>(
     })
 }
 
-/// The mean rate of camera over host time, of the leg in which it is known best.
-pub(super) fn best_drift<'a>(pieces: impl Iterator<Item = &'a Piece>, k: usize) -> Option<Figure> {
-    let mut legs: Vec<Vec<&Piece>> = Vec::new();
+/// Mean rate of camera over host time, from the best-known leg.
+pub(super) fn best_drift<'a>(
+    pieces: impl Iterator<Item = &'a EpochMaps>,
+    k: usize,
+) -> Option<Figure> {
+    let mut legs: Vec<Vec<&EpochMaps>> = Vec::new();
     for piece in pieces.filter(|p| p.cameras[k].is_some()) {
         match legs.last_mut().filter(|of| of[0].leg == piece.leg) {
             Some(of) => of.push(piece),
@@ -70,9 +73,9 @@ pub(super) fn best_drift<'a>(pieces: impl Iterator<Item = &'a Piece>, k: usize) 
     drifts.min_by(|a, b| a.stated_se().total_cmp(&b.stated_se()))
 }
 
-/// Mean rate of camera over host time in a leg, from the first train to the last. What the host's slope may be wrong by is most of it; a
-/// delay that is longer one way than the other shifts both ends alike.
-pub(super) fn drift(leg: &[&Piece], k: usize) -> Option<Figure> {
+/// Mean rate of camera over host time in a leg, from the first train to the last. Its error is mostly that of the host's
+/// slope; an asymmetric delay shifts both ends alike.
+pub(super) fn drift(leg: &[&EpochMaps], k: usize) -> Option<Figure> {
     let (first, last) = (leg.first()?, leg.last()?);
     let (from, to) = (first.cameras[k].as_ref()?, last.cameras[k].as_ref()?);
     let (x0, x1) = (from.map.span_us().0, to.map.span_us().1);
@@ -86,7 +89,7 @@ pub(super) fn drift(leg: &[&Piece], k: usize) -> Option<Figure> {
     let both = if leg.len() == 1 {
         from.map.drift.less(first.host.drift((x0, x1))?)
     } else {
-        // Each end errs by itself.
+        // The errors of the two ends are independent.
         let ends = from.at(x0).less(first.host.at(x0));
         let ends = ends.less(to.at(x1).less(last.host.at(x1)));
         Figure {

@@ -1,22 +1,22 @@
-//! What one clock showed when another showed something, and how surely.
+//! A time on one clock for a time on another, with its uncertainty.
 
 use super::smooth::Figure;
 use crate::distributions::{student_cdf, student_quantile};
 
-/// A time on one clock, read off another.
+/// A time on one clock, converted from another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
     /// The time, µs.
     pub us: f64,
-    /// Its standard error by the noise of what ties the clocks, µs.
+    /// Standard error from the noise of the ties, µs.
     pub se_us: f64,
     /// Degrees of freedom of that error.
     pub free: f64,
-    /// What comes on top, at most, µs: what no number of ties averages out.
+    /// Systematic bound, µs: not reduced by more ties.
     pub bound_us: f64,
 }
 
-/// Mean rate of one clock over another, less 1.
+/// Mean rate of one clock over another, minus 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drift {
     /// The rate difference, ppm.
@@ -36,7 +36,7 @@ impl Drift {
         }
     }
 
-    /// Half width of the interval that holds with this probability (0..1), ppm.
+    /// Half width of the interval with this coverage (0..1), ppm.
     #[must_use]
     pub fn half_width_ppm(&self, level: f64) -> f64 {
         self.se_ppm * student_quantile(0.5 * (1.0 + level), self.free)
@@ -60,19 +60,19 @@ impl Reading {
         }
     }
 
-    /// Half width of the interval by the noise alone that holds with this probability (0..1), µs.
+    /// Half width of the interval for random error with this coverage (0..1), µs.
     #[must_use]
     pub fn half_width_us(&self, level: f64) -> f64 {
         self.se_us * student_quantile(0.5 * (1.0 + level), self.free)
     }
 
-    /// How large an error by the noise this reading takes to be how rare: the probability of a smaller one, 0.5 for none.
+    /// Probability of a smaller random error than this, 0.5 for none.
     #[must_use]
     pub fn rank(&self, error_us: f64) -> f64 {
         student_cdf(error_us / self.se_us, self.free)
     }
 
-    /// Half width of everything together, µs: the 95 % interval and the bound on top of it.
+    /// Total half width, µs: the 95 % interval plus the systematic bound.
     #[must_use]
     pub fn within_us(&self) -> f64 {
         self.half_width_us(0.95) + self.bound_us

@@ -1,17 +1,17 @@
-//! What each map leaves of its points, thinned so that it can be drawn.
+//! Residuals of each map, thinned for drawing.
 
 use super::base::TimeBase;
-use super::piece::Piece;
+use super::epoch_maps::EpochMaps;
 use crate::result::{ClockResidual, ClockResiduals, MapName};
-use crate::timebase::smooth::Smooth;
+use crate::timebase::smooth::SmoothMap;
 
-/// Points of one map, at most.
+/// Maximum number of points per map.
 const MOST: usize = 600;
 
 impl TimeBase {
-    /// Of every fitted map, in the order of the certificate.
+    /// Residuals of every fitted map, in the order of the certificate.
     pub(super) fn residuals(&self) -> Vec<ClockResiduals> {
-        let of_host = |p: &Piece| left(p, &p.host.fit, |at| at);
+        let of_host = |p: &EpochMaps| left(p, &p.host.fit, |at| at);
         let of_camera = |k: usize| {
             let each = self.pieces.iter();
             each.filter_map(move |p| Some(left(p, &p.cameras[k].as_ref()?.map, |at| at)))
@@ -40,12 +40,12 @@ impl TimeBase {
             .collect()
     }
 
-    /// The trains of camera `k` about the one line through all of them.
+    /// Trains of camera `k` relative to one line through all of them.
     fn of_line(&self, k: usize) -> Vec<ClockResidual> {
         let Some(line) = self.clocks[k] else {
             return Vec::new();
         };
-        let of = |p: &Piece| {
+        let of = |p: &EpochMaps| {
             let Some(camera) = &p.cameras[k] else {
                 return Vec::new();
             };
@@ -62,8 +62,8 @@ impl TimeBase {
     }
 }
 
-/// The residuals of a fit over box time; `box_us` finds it from the fit's own clock.
-fn left(piece: &Piece, fit: &Smooth, box_us: impl Fn(f64) -> f64) -> Vec<ClockResidual> {
+/// Residuals of a fit over box time; `box_us` converts from the fit's own clock.
+fn left(piece: &EpochMaps, fit: &SmoothMap, box_us: impl Fn(f64) -> f64) -> Vec<ClockResidual> {
     let points = fit.residuals.iter().zip(&fit.used);
     points
         .map(|((at, residual_us), used)| ClockResidual {
@@ -75,15 +75,15 @@ fn left(piece: &Piece, fit: &Smooth, box_us: impl Fn(f64) -> f64) -> Vec<ClockRe
 }
 
 /// Camera 2 over camera 1 at the trains that both saw.
-fn of_cameras(piece: &Piece) -> Vec<ClockResidual> {
+fn of_cameras(piece: &EpochMaps) -> Vec<ClockResidual> {
     let (Some(fit), Some(one)) = (&piece.between, &piece.cameras[0]) else {
         return Vec::new();
     };
-    // To the accuracy of a drawing: the deviation is nearly the same at both times.
+    // Accurate enough for drawing: the deviation is nearly the same at both times.
     left(piece, fit, |at| at - (one.map.value(at) - at))
 }
 
-/// Every n-th of the points used with the largest of them, and every n-th of those left out, in order of time.
+/// Every n-th and the largest of the used points, and every n-th of the rejected ones, in time order.
 fn thinned(points: Vec<ClockResidual>) -> Vec<ClockResidual> {
     let (used, left_out): (Vec<ClockResidual>, Vec<ClockResidual>) =
         points.into_iter().partition(|p| p.used);

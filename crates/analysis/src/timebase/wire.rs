@@ -1,4 +1,4 @@
-//! What came through the trigger line of one camera, pulse by pulse, of what a trigger box told that it had sent.
+//! Evaluates the trigger line of one camera pulse by pulse, against the reports of the trigger box.
 
 use skinrig_model::{BoxReport, Label, TriggerEdge};
 
@@ -9,37 +9,37 @@ use crate::result::LineCounts;
 /// Pulses of a train.
 const PULSES: u32 = skinrig_model::pulse::PULSES_PER_TRAIN as u32;
 
-/// The trigger line of one camera while a box sent trains.
+/// Trigger line of one camera while a box sent trains.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wire {
     /// Every train of the box in time order.
     pub trains: Vec<WireTrain>,
     /// Edges of all trains.
     pub counts: LineCounts,
-    /// Standard deviation of the rising edges about their own train's mean, µs, and how many edges it stands on.
+    /// Standard deviation of the rising edges about their own train's mean, µs, and the number of edges.
     pub jitter: Option<(f64, u64)>,
 }
 
 /// A train that the box sent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WireTrain {
-    /// What it says.
+    /// Label of the train.
     pub label: Label,
-    /// Its instant on the box's clock, µs.
+    /// Instant on the box's clock, µs.
     pub box_us: u64,
-    /// Pulses of it that did not come through whole.
+    /// Pulses that did not arrive completely.
     pub lost_pulses: u32,
 }
 
-/// Looks for every pulse that the box sent among the `edges` of `channel`. Of several runs of the box's clock (it was reset in
-/// between) the one with the most trains counts.
+/// Searches every sent pulse among the `edges` of `channel`. If the box's clock was reset, the run with the most trains is
+/// used.
 ///
 /// # Errors
-/// Says why the box's clock cannot be laid on the camera's: no trains, or fewer than three that can be told apart.
+/// Why the box's clock cannot be aligned with the camera's: no trains, or fewer than three identifiable ones.
 pub fn wire(reports: &[BoxReport], edges: &[TriggerEdge], channel: u8) -> Result<Wire, String> {
     let epochs = epochs(reports, &[]);
     let Some(epoch) = epochs.iter().max_by_key(|e| e.trains.len()) else {
-        return Err("the box told of no train".to_owned());
+        return Err("the box reported no train".to_owned());
     };
     let found = Edges::new(edges, channel).map(epoch, &[])?;
     let trains = epoch.trains.iter().zip(&found.whole_pulses);
@@ -94,13 +94,13 @@ mod tests {
         assert!(clean.trains.iter().all(|t| t.lost_pulses == 0), "{clean:?}");
         assert_eq!((clean.counts.doubled, clean.counts.spurious), (0, 0));
         assert_eq!(clean.trains[1].box_us, 5_040_000);
-        // 0 and 2 µs in turn: a standard deviation of 1 µs, and what rounding to whole µs adds.
+        // 0 and 2 µs alternately: a standard deviation of 1 µs, plus rounding to whole µs.
         let (jitter_us, n) = clean.jitter.unwrap();
         assert!(
             (0.9..1.3).contains(&jitter_us) && n == 6 * 32,
             "{jitter_us}"
         );
-        // Both edges of one pulse in the second train, one of another in the third; one that nobody sent.
+        // Both edges of one pulse in the second train, one of another in the third; one that was never sent.
         edges.remove(2 * 64 + 11);
         edges.drain(64 + 20..64 + 22);
         let at = edges[200].t_us + 31;
@@ -116,7 +116,7 @@ mod tests {
         let lost: Vec<u32> = worn.trains.iter().map(|t| t.lost_pulses).collect();
         assert_eq!(lost, [0, 1, 1, 0, 0, 0]);
         assert_eq!((worn.counts.doubled, worn.counts.spurious), (0, 1));
-        // The train after the last one that was told of, as early as the box can send it.
+        // The train after the last reported one, as early as the box can send it.
         let (reports, mut edges) = sent(6);
         let next_us = 77_000 + ((5.0 * 40_000.0 + PulseTrain::DURATION_US as f64) * 1.0003) as u64;
         edges.push(TriggerEdge {

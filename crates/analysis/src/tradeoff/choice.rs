@@ -1,4 +1,4 @@
-//! What a user can trade, and which combinations are tried.
+//! Owns the options that trade speed for accuracy, and the combinations to try.
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::{AnalysisSettings, CalibrationModel, CentroidRule, Estimator, Precision};
@@ -7,20 +7,20 @@ use skinrig_model::{AnalysisSettings, CalibrationModel, CentroidRule, Estimator,
 const FACTORS: [u32; 11] = [1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024];
 /// Sides of bins, px.
 const SIDES_PX: [u16; 5] = [1, 2, 4, 8, 16];
-/// Ends of the window after the contact, ms.
+/// Ends of the window after contact, ms.
 const WINDOWS_MS: [f64; 5] = [10.0, 20.0, 50.0, 100.0, 200.0];
-/// Longer than any press: the window that only the release ends.
+/// Longer than any press: a window that ends only with the release.
 pub(crate) const WHOLE_PRESS_MS: f64 = 60_000.0;
 
-/// How much of the kept rows is read.
+/// Part of the cropped rows to read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Region {
     /// The rows of the session's settings.
     Full,
-    /// The half of them where the calibrating presses are.
+    /// The half with the calibration presses.
     Half,
-    /// The quarter.
+    /// The quarter with the calibration presses.
     Quarter,
 }
 
@@ -29,21 +29,21 @@ pub enum Region {
 pub struct Choice {
     /// Estimator.
     pub estimator: Estimator,
-    /// Which clusters make the centroid; of no account without clustering.
+    /// Clusters behind the centroid; irrelevant without clustering.
     pub centroid: CentroidRule,
-    /// Width of its numbers; of no account for estimators that count in whole numbers.
+    /// Number width; irrelevant for estimators with integers.
     pub precision: Precision,
     /// One event in this many is used.
     pub thinning: u32,
     /// Side of a bin, px.
     pub bin_px: u16,
-    /// The window ends this long after the contact, ms; `None`: with the press.
+    /// End of the window after contact, ms; `None`: with the press.
     pub window_ms: Option<f64>,
-    /// Rows that are read.
+    /// Rows to read.
     pub region: Region,
 }
 
-/// Estimators with the variants that differ: (estimator, clusters, precision).
+/// Distinct variants of the estimators: (estimator, clusters, precision).
 const ESTIMATORS: [(Estimator, CentroidRule, Precision); 7] = {
     use {CentroidRule as C, Estimator as E, Precision as P};
     [
@@ -58,7 +58,7 @@ const ESTIMATORS: [(Estimator, CentroidRule, Precision); 7] = {
 };
 
 impl Choice {
-    /// What the session's settings choose.
+    /// The choice in the session's settings.
     #[must_use]
     pub fn of(settings: &AnalysisSettings) -> Self {
         let window = settings.window_after_contact_ms;
@@ -83,7 +83,7 @@ impl Choice {
         }
     }
 
-    /// What is of no account at its default, so that equal choices are equal.
+    /// Sets irrelevant options to their defaults, so that equal choices compare equal.
     fn plain(self) -> Self {
         let clusters = self.estimator == Estimator::Dbscan;
         let whole = clusters || self.estimator == Estimator::ColumnMedian;
@@ -102,8 +102,8 @@ impl Choice {
         }
     }
 
-    /// The settings of this choice: those of the session but for what is traded. `rows` are the rows of the region;
-    /// the calibration is one named model for all choices.
+    /// Settings of this choice: those of the session except for the traded options. `rows` are the rows of the region; the
+    /// calibration is one named model for all choices.
     #[must_use]
     pub fn settings(
         &self,
@@ -118,7 +118,7 @@ impl Choice {
             thinning: self.thinning,
             bin_px: self.bin_px,
             window_after_contact_ms: match (self.window_ms, session.window_after_contact_ms) {
-                // What a session cuts, an override can only cut later.
+                // An override can only shorten what a session already truncates.
                 (None, Some(_)) => Some(WHOLE_PRESS_MS),
                 (own, _) => own,
             },
@@ -129,7 +129,7 @@ impl Choice {
     }
 }
 
-/// The choices to try, the session's own first, each once.
+/// Distinct choices to try, the session's own first.
 #[must_use]
 pub fn sweep(session: Choice, full: bool) -> Vec<Choice> {
     let mut all = vec![session];
@@ -177,8 +177,8 @@ pub fn sweep(session: Choice, full: bool) -> Vec<Choice> {
     fresh
 }
 
-/// Combinations that save in several ways at once: cheap estimators with short windows and thinned events, and
-/// clusters on coarse bins.
+/// Combinations that save in several ways at once: cheap estimators with short windows and thinned events, and clusters on
+/// coarse bins.
 fn promising(session: Choice) -> Vec<Choice> {
     let mut all = Vec::new();
     for (estimator, precision) in [
@@ -211,7 +211,7 @@ fn promising(session: Choice) -> Vec<Choice> {
     all
 }
 
-/// The overrides (`analysis.key`, value) that turn the settings `from` into `to`, in the words of a protocol.
+/// Overrides (`analysis.key`, value) that turn the settings `from` into `to`, as in a protocol.
 #[must_use]
 pub fn overrides(from: &AnalysisSettings, to: &AnalysisSettings) -> Vec<(String, String)> {
     let mut out = Vec::new();
@@ -223,13 +223,17 @@ pub fn overrides(from: &AnalysisSettings, to: &AnalysisSettings) -> Vec<(String,
     put(
         from.estimator != to.estimator,
         "estimator",
-        word(&to.estimator),
+        variant_name(&to.estimator),
     );
-    put(from.centroid != to.centroid, "centroid", word(&to.centroid));
+    put(
+        from.centroid != to.centroid,
+        "centroid",
+        variant_name(&to.centroid),
+    );
     put(
         from.precision != to.precision,
         "precision",
-        word(&to.precision),
+        variant_name(&to.precision),
     );
     put(
         from.thinning != to.thinning,
@@ -252,13 +256,13 @@ pub fn overrides(from: &AnalysisSettings, to: &AnalysisSettings) -> Vec<(String,
     put(
         from.calibration != to.calibration,
         "calibration",
-        word(&to.calibration),
+        variant_name(&to.calibration),
     );
     out
 }
 
-/// A unit variant as settings and protocols write it.
-fn word<T: Serialize>(value: &T) -> String {
+/// Serialised name of a unit variant.
+fn variant_name<T: Serialize>(value: &T) -> String {
     match serde_json::to_value(value) {
         Ok(serde_json::Value::String(word)) => word,
         _ => String::new(),

@@ -1,10 +1,10 @@
-//! Which rows are worth having, and which one to take.
+//! Pareto fronts and selection of a row.
 
 use serde::{Deserialize, Serialize};
 
 use super::{Row, Tradeoff};
 
-/// What accuracy is traded for.
+/// A cost to trade for accuracy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cost {
@@ -12,15 +12,15 @@ pub enum Cost {
     Cpu,
     /// Bytes per second.
     Bytes,
-    /// Time from the contact to the estimate.
+    /// Time from contact to the estimate.
     Delay,
 }
 
 impl Cost {
-    /// All of them.
+    /// All costs.
     pub const ALL: [Self; 3] = [Self::Cpu, Self::Bytes, Self::Delay];
 
-    /// What a row costs.
+    /// Value of this cost in a row.
     #[must_use]
     pub const fn of(self, row: &Row) -> f64 {
         match self {
@@ -31,8 +31,8 @@ impl Cost {
     }
 }
 
-/// For points (error, cost), true for those that no other one dominates: none is as good in both and better in one.
-/// `None` competes with nobody.
+/// For points (error, cost), true if no other point dominates: none is as good in both and better in one. `None` does not
+/// compete.
 #[must_use]
 pub fn pareto(points: &[Option<(f64, f64)>]) -> Vec<bool> {
     let mut order: Vec<(usize, f64, f64)> = points
@@ -53,8 +53,8 @@ pub fn pareto(points: &[Option<(f64, f64)>]) -> Vec<bool> {
     out
 }
 
-/// Marks what competes and what is on each front.
-pub(super) fn mark(result: &mut Tradeoff) {
+/// Marks competing rows and rows on each front.
+pub(super) fn mark_fronts(result: &mut Tradeoff) {
     for row in &mut result.rows {
         let located = row.located_rate.value.unwrap_or(0.0);
         row.competes = row.rmse_mm.value.is_some() && located >= result.least_located;
@@ -79,8 +79,8 @@ pub(super) fn mark(result: &mut Tradeoff) {
 }
 
 impl Tradeoff {
-    /// The cheapest row that competes and the upper end of whose 95 % interval of the RMSE is at most `target_mm`; of
-    /// equally cheap ones the most accurate.
+    /// Cheapest competing row whose upper end of the 95 % interval of the RMSE is at most `target_mm`; ties go to the most
+    /// accurate.
     #[must_use]
     pub fn cheapest(&self, target_mm: f64, cost: Cost) -> Option<&Row> {
         let meets = |r: &&Row| r.competes && r.rmse_mm.high.is_some_and(|high| high <= target_mm);
@@ -91,7 +91,7 @@ impl Tradeoff {
             .min_by(|a, b| order(rank(a), rank(b)))
     }
 
-    /// The row with the smallest RMSE among those that compete and cost at most `budget`; of equal ones the cheapest.
+    /// Competing row with the smallest RMSE at a cost of at most `budget`; ties go to the cheapest.
     #[must_use]
     pub fn most_accurate(&self, budget: f64, cost: Cost) -> Option<&Row> {
         let fits = |r: &&Row| r.competes && cost.of(r) <= budget;

@@ -1,9 +1,9 @@
-//! Speed against accuracy: the same presses located in many ways, each with its error and its costs.
+//! Speed against accuracy: the same presses located in many ways, each with its error and costs.
 //!
-//! A session is read once. Then every [`Choice`] is judged as an analysis with its settings would judge it: windows,
-//! estimates, rules, a calibration of its own on the calibrating presses, metrics on the scored ones. Presses that a
-//! choice cannot locate lower its located rate. A choice *competes* when it locates at least the share
-//! [`Tradeoff::least_located`] of the presses; the fronts are made of what competes, by RMSE and one cost each.
+//! A session is read once. Then every [`Choice`] is evaluated as an analysis with its settings would be: windows, estimates,
+//! rules, its own calibration on the calibration presses, metrics on the scored ones. Presses that a choice cannot locate
+//! lower its located rate. A choice *competes* if it locates at least the share [`Tradeoff::least_located`] of the presses;
+//! the fronts consist of competing choices, by RMSE and one cost each.
 
 mod choice;
 mod front;
@@ -20,62 +20,62 @@ use skinrig_model::{AnalysisSettings, CalibrationModel, PressRole, ReductionSett
 
 use crate::error::AnalysisError;
 use crate::input::{EventSource, SessionInput};
-use crate::kept::Keep;
+use crate::press_events::Retention;
 use crate::result::Estimate;
 use replay::Replay;
 use timing::Candidate;
 
-/// A choice that locates fewer presses than the session's own by more than this share does not compete.
+/// A choice does not compete if it locates fewer presses than the session's own by more than this share.
 const LOCATED_MARGIN: f64 = 0.01;
 
-/// What to try.
+/// Choices to try.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plan {
-    /// Every combination instead of one change at a time and promising combinations.
+    /// Try every combination instead of single changes and promising combinations.
     pub full: bool,
     /// Timed runs per choice, at least 1.
     pub repeats: u32,
-    /// Smallest located rate that competes, 0..=1; `None`: that of the session's own settings less 1 %.
+    /// Minimum located rate to compete, 0..=1; `None`: that of the session's own settings minus 1 %.
     pub least_located: Option<f64>,
 }
 
-/// The measured trade.
+/// Measured tradeoff.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Tradeoff {
     /// The session's settings.
     pub settings: AnalysisSettings,
-    /// The calibration of all choices: the one that the session's analysis chose.
+    /// Calibration model of all choices: the one chosen in the session's analysis.
     pub model: CalibrationModel,
-    /// Presses that calibrate: used, and attempted in the session.
+    /// Calibration presses: used, and attempted in the session.
     pub calibrating: (u32, u32),
-    /// Presses that score: used, and attempted in the session.
+    /// Scored presses: used, and attempted in the session.
     pub scored: (u32, u32),
-    /// Located rate from which a choice competes.
+    /// Minimum located rate to compete.
     pub least_located: f64,
-    /// Presses that were timed.
+    /// Number of timed presses.
     pub timed_presses: u32,
     /// Timed runs per choice.
     pub repeats: u32,
-    /// Mean length of a press with its margins, s: what bytes per second are over.
+    /// Mean length of a press with its margins, s: the time base of bytes per second.
     pub press_s: f64,
     /// One row per choice, the session's own first.
     pub rows: Vec<Row>,
 }
 
-/// One choice and what it gives.
+/// One choice with its results.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// The choice.
     pub choice: Choice,
-    /// Rows of each camera that are read, both ends included.
+    /// Rows of each camera that are read, inclusive.
     pub rows: [(u16, u16); 2],
-    /// What selects it: (key, value) below `analysis` of a protocol that differ from the session's.
+    /// Protocol settings that select it: (key, value) below `analysis` that differ from the session's.
     pub overrides: Vec<(String, String)>,
-    /// RMSE of the presses that count, mm.
+    /// RMSE of the counting presses, mm.
     pub rmse_mm: Estimate,
-    /// The same with every failed press at the penalty.
+    /// RMSE with every failed press at the penalty.
     pub penalised_rmse_mm: Estimate,
-    /// Share of the attempted presses that count; of all or none the interval is exact, see [`Estimate`].
+    /// Share of the attempted presses that count; for all or none the interval is exact, see [`Estimate`].
     pub located_rate: Estimate,
     /// Share within `within_mm`; likewise.
     pub within_rate: Estimate,
@@ -83,22 +83,22 @@ pub struct Row {
     pub events_per_press: f64,
     /// Bytes per second of both cameras during a press.
     pub bytes_per_s: f64,
-    /// From the contact to the end of the window, ms.
+    /// Time from contact to the end of the window, ms.
     pub delay_ms: f64,
     /// CPU time from the events to the location, median over the repeats, µs per press.
     pub cpu_us: f64,
     /// Lowest and highest of the repeats, µs.
     pub cpu_range_us: (f64, f64),
-    /// Locates enough presses.
+    /// True if it locates enough presses.
     pub competes: bool,
-    /// The costs whose front it is on.
+    /// Costs on whose fronts it is.
     pub fronts: Vec<Cost>,
 }
 
-/// Reads the session once and measures every choice of the plan. `stopwatch` gives the CPU time of this thread, s.
+/// Reads the session once and measures every choice of the plan. `stopwatch` returns the CPU time of this thread, s.
 ///
 /// # Errors
-/// Those of [`crate::analyze`], [`AnalysisError::Invalid`] and [`AnalysisError::NothingToCompare`].
+/// Errors of [`crate::analyze`], [`AnalysisError::Invalid`] and [`AnalysisError::NothingToCompare`].
 pub fn measure(
     input: &SessionInput,
     source: &dyn EventSource,
@@ -106,7 +106,7 @@ pub fn measure(
     stopwatch: &mut dyn FnMut() -> f64,
 ) -> Result<Tradeoff, AnalysisError> {
     let session = &input.settings;
-    // Whole presses are kept, and no study of the analysis is wanted.
+    // Keep whole presses, and skip the studies of the analysis.
     let mut reading = input.clone();
     reading.settings = AnalysisSettings {
         window_after_contact_ms: None,
@@ -117,7 +117,7 @@ pub fn measure(
         },
         ..session.clone()
     };
-    let (analysis, kept) = crate::analyze_and_keep(&reading, source, Keep::All)?;
+    let (analysis, kept) = crate::analyze_with_events(&reading, source, Retention::All)?;
     if !analysis.is_valid() {
         return Err(AnalysisError::Invalid(
             analysis.invalid_because().join("; "),
@@ -155,7 +155,7 @@ pub fn measure(
         });
         candidates.push(Candidate {
             settings,
-            geometry: outcome.judged.calibrated.geometry,
+            geometry: outcome.located.calibrated.geometry,
         });
     }
     let outline = &input.rig.outline;
@@ -178,11 +178,11 @@ pub fn measure(
         press_s,
         rows,
     };
-    front::mark(&mut result);
+    front::mark_fronts(&mut result);
     Ok(result)
 }
 
-/// Bits per event of the settings; a bin address is shorter than a pixel's by one bit per halving of columns and rows.
+/// Bits per event of the settings; halving columns or rows shortens a pixel address by one bit.
 fn bits_per_event(settings: &AnalysisSettings) -> f64 {
     let saved = 2 * u32::from(settings.bin_px).trailing_zeros();
     (settings.bits_per_event - f64::from(saved)).max(1.0)

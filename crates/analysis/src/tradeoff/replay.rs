@@ -1,15 +1,15 @@
-//! The kept presses seen again under other settings.
+//! Replays the retained presses under other settings.
 
 use skinrig_model::{AnalysisSettings, CameraId, PressOutcome, PressRole};
 
 use super::choice::Region;
-use crate::accumulate::{Tally, press_view};
+use crate::accumulate::{EventCounts, press_view};
 use crate::analyze::{by_row, lost_rows};
 use crate::estimators::{PressEstimator, Thinning};
 use crate::input::SessionInput;
-use crate::judge::{Judged, Seen, judge};
-use crate::kept::{Kept, KeptEvent, KeptPress, KeptView};
+use crate::locate_presses::{CameraObservations, LocatedPresses, locate_presses};
 use crate::metrics::{Exclusions, metrics, penalised};
+use crate::press_events::{EventView, PackedEvent, RetainedPress, RetainedPresses};
 use crate::press_spans::timings;
 use crate::result::{Analysis, ClockFit, Metrics, Penalised, PressView};
 use crate::segment::{Window, windows};
@@ -19,29 +19,33 @@ use crate::untimed::{self, Untimed};
 /// A session whose presses can be located in many ways.
 pub(crate) struct Replay<'a> {
     input: &'a SessionInput,
-    kept: &'a Kept,
+    kept: &'a RetainedPresses,
     clocks: [ClockFit; 2],
-    /// Rows of the plan that take part.
+    /// Participating rows of the plan.
     rows: Vec<usize>,
-    /// Of all rows of the plan, those that a camera's clock does not time.
+    /// For all rows of the plan: why a camera's clock does not time them.
     untimed: [Vec<Option<Untimed>>; 2],
 }
 
-/// What one way of locating gave.
+/// Result of one way of locating.
 pub struct Outcome {
     pub metrics: Metrics,
     pub penalised: Penalised,
-    pub judged: Judged,
-    /// Events of both cameras in the window, mean over the scored presses that were kept.
+    pub located: LocatedPresses,
+    /// Events of both cameras in the window, mean over the retained scored presses.
     pub events_per_press: f64,
-    /// From the contact to the end of the window, ms, mean over the same.
+    /// Time from contact to the end of the window, ms, mean over the same presses.
     pub delay_ms: f64,
 }
 
 impl<'a> Replay<'a> {
-    /// `None` when no scored press was kept or a camera has no clock. Presses with measured times that were not kept
-    /// take no part; if there are any, presses without times take none either.
-    pub fn new(input: &'a SessionInput, analysis: &Analysis, kept: &'a Kept) -> Option<Self> {
+    /// `None` if no scored press was retained or a camera has no clock. Presses with measured times that were not retained
+    /// do not participate; if there are any, presses without times do not either.
+    pub fn new(
+        input: &'a SessionInput,
+        analysis: &Analysis,
+        kept: &'a RetainedPresses,
+    ) -> Option<Self> {
         let [Some(one), Some(two)] = analysis.clocks else {
             return None;
         };
@@ -58,7 +62,7 @@ impl<'a> Replay<'a> {
             .into_iter()
             .filter(|row| whole || is_kept(*row))
             .collect();
-        let scored = |k: &KeptPress| input.planned[k.row].role == PressRole::Score;
+        let scored = |k: &RetainedPress| input.planned[k.row].role == PressRole::Score;
         kept.presses.iter().any(scored).then_some(Self {
             input,
             kept,
@@ -68,7 +72,7 @@ impl<'a> Replay<'a> {
         })
     }
 
-    /// Presses of this role that take part, and how many of the plan's were attempted.
+    /// Participating presses of this role, and the number of attempted ones in the plan.
     pub fn counts(&self, role: PressRole) -> (u32, u32) {
         let of = |row: &usize| self.input.planned[*row].role == role;
         let attempted = |row: &usize| of(row) && self.input.outcomes[*row].is_some();
@@ -79,8 +83,8 @@ impl<'a> Replay<'a> {
         )
     }
 
-    /// Kept presses of a role.
-    pub fn presses(&self, role: PressRole) -> impl Iterator<Item = &'a KeptPress> {
+    /// Retained presses of a role.
+    pub fn presses(&self, role: PressRole) -> impl Iterator<Item = &'a RetainedPress> {
         let input = self.input;
         self.kept
             .presses
@@ -93,7 +97,7 @@ impl<'a> Replay<'a> {
         windows(timings(self.input), &self.input.earlier, clock, settings)
     }
 
-    /// The windows of the rows that have one.
+    /// Windows of the rows that have one.
     pub(crate) fn windows_by_row(
         &self,
         camera: CameraId,
@@ -113,11 +117,11 @@ impl<'a> Replay<'a> {
             .presses(PressRole::Score)
             .filter_map(|p| Some(windows[p.row]?.length_s()))
             .collect();
-        // A window of no length holds no events.
+        // An empty window contains no events.
         (lengths.iter().sum::<f64>() / lengths.len().max(1) as f64).max(1e-6)
     }
 
-    /// Locates and judges all presses under `settings`.
+    /// Locates and evaluates all presses under `settings`.
     pub fn run(&self, settings: &AnalysisSettings) -> Outcome {
         let n = self.input.planned.len();
         let mut views: [Vec<Option<PressView>>; 2] = [Vec::new(), Vec::new()];
@@ -151,14 +155,14 @@ impl<'a> Replay<'a> {
         let views = views.map(|of| self.of_rows(&of));
         let lost = lost.map(|of| self.of_rows(&of));
         let untimed = [0, 1].map(|k| self.of_rows(&self.untimed[k]));
-        let seen = [0, 1].map(|k| Seen {
+        let seen = [0, 1].map(|k| CameraObservations {
             has_clock: true,
             views: &views[k],
             data_lost: &lost[k],
             untimed: &untimed[k],
         });
-        let judged = judge(&input, seen, &mut Vec::new());
-        let scores = ScoreSet::from_presses(&judged.presses, &input.outcomes);
+        let located = locate_presses(&input, seen, &mut Vec::new());
+        let scores = ScoreSet::from_presses(&located.presses, &input.outcomes);
         Outcome {
             metrics: metrics(
                 &scores,
@@ -174,18 +178,18 @@ impl<'a> Replay<'a> {
                 settings.bootstrap_resamples,
                 settings.seed,
             ),
-            judged,
+            located,
             events_per_press,
             delay_ms,
         }
     }
 
-    /// What holds for the rows that take part, out of what holds for all.
+    /// Selects the entries of participating rows.
     fn of_rows<T: Copy>(&self, all: &[T]) -> Vec<T> {
         self.rows.iter().map(|row| all[*row]).collect()
     }
 
-    /// The rows that take part, as a session of their own.
+    /// Participating rows as a session of their own.
     fn part(&self, settings: &AnalysisSettings) -> SessionInput {
         let outcome = |row: &usize| -> Option<PressOutcome> { self.input.outcomes[*row].clone() };
         SessionInput {
@@ -217,20 +221,20 @@ impl<'a> Replay<'a> {
             };
             let view = &press.views[k];
             filter.window(view, &window, &mut events);
-            let tally = Tally {
+            let tally = EventCounts {
                 events: events.len() as u32,
                 on: events.iter().filter(|e| e.is_on()).count() as u32,
                 idle: filter.idle(view, &window),
                 width_u: None,
             };
-            let sighting = estimator.sight(&events, after(view, window.start_us));
+            let sighting = estimator.estimate(&events, after(view, window.start_us));
             out.push((press.row, press_view(&window, tally, &sighting)));
         }
         out
     }
 
-    /// The rows of a region, per camera: those next to each other that hold most of what the calibrating presses
-    /// add to the idle rate; of equal ones the first. The whole crop without calibrating presses.
+    /// Rows of a region per camera: the adjacent ones with most of the events that the calibration presses add to the idle
+    /// rate; ties go to the first. The whole crop without calibration presses.
     pub(crate) fn region_rows(
         &self,
         settings: &AnalysisSettings,
@@ -280,12 +284,12 @@ impl<'a> Replay<'a> {
     }
 }
 
-/// A time of the camera's clock in a view's, µs.
-pub fn after(view: &KeptView, camera_us: u64) -> u32 {
+/// Converts a time of the camera's clock to time in a view, µs.
+pub fn after(view: &EventView, camera_us: u64) -> u32 {
     u32::try_from(camera_us.saturating_sub(view.start_us)).unwrap_or(u32::MAX)
 }
 
-/// Which events reach the estimator.
+/// Selects the events that reach the estimator.
 pub struct Filter {
     thinning: Thinning,
     rows: (u16, u16),
@@ -299,7 +303,7 @@ impl Filter {
         }
     }
 
-    fn passes(&self, view: &KeptView, event: KeptEvent) -> bool {
+    fn passes(&self, view: &EventView, event: PackedEvent) -> bool {
         let (x, y) = (event.x(), event.y());
         (self.rows.0..=self.rows.1).contains(&y)
             && self
@@ -307,15 +311,15 @@ impl Filter {
                 .keeps_at(view.start_us + u64::from(event.t_us()), x, y, event.is_on())
     }
 
-    /// The events of a window.
-    pub fn window(&self, view: &KeptView, window: &Window, out: &mut Vec<KeptEvent>) {
+    /// Collects the events of a window.
+    pub fn window(&self, view: &EventView, window: &Window, out: &mut Vec<PackedEvent>) {
         let events = view.between(after(view, window.start_us), after(view, window.end_us));
         out.clear();
         out.extend(events.iter().filter(|e| self.passes(view, **e)));
     }
 
-    /// How many there are in the idle time before it.
-    fn idle(&self, view: &KeptView, window: &Window) -> u64 {
+    /// Number of events in the idle time before it.
+    fn idle(&self, view: &EventView, window: &Window) -> u64 {
         let events = view.between(
             after(view, window.idle_start_us),
             after(view, window.start_us),

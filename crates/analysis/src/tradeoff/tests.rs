@@ -1,4 +1,4 @@
-//! Laws of the fronts and of the selection, and of the choices that are tried.
+//! Properties of the fronts, of the selection, and of the choices to try.
 
 use proptest::prelude::*;
 use skinrig_model::CalibrationModel;
@@ -42,11 +42,11 @@ fn tradeoff(rows: Vec<Row>) -> Tradeoff {
         press_s: 0.5,
         rows,
     };
-    front::mark(&mut result);
+    front::mark_fronts(&mut result);
     result
 }
 
-/// Few different numbers, so that many are equal.
+/// Few distinct numbers, so that many are equal.
 fn rows() -> impl Strategy<Value = Vec<Row>> {
     let one = (proptest::option::weighted(0.9, 1u8..8), 1u8..8, 0u8..=10);
     proptest::collection::vec(one, 0..30).prop_map(|all| {

@@ -4,16 +4,16 @@ use skinrig_model::{CameraId, PressRole, StereoGeometry};
 
 use super::replay::{Filter, Replay, after};
 use crate::estimators::PressEstimator;
-use crate::kept::{KeptEvent, KeptPress};
 use crate::metrics::quantile;
+use crate::press_events::{PackedEvent, RetainedPress};
 use crate::segment::Window;
 use crate::triangulate::locate;
 use skinrig_model::{AnalysisSettings, SkinOutline};
 
-/// Most presses that are timed.
-const MOST_PRESSES: usize = 24;
+/// Maximum number of timed presses.
+const MAX_PRESSES: usize = 24;
 
-/// One way of locating, ready to be timed.
+/// One way of locating, ready for timing.
 pub(crate) struct Candidate {
     pub settings: AnalysisSettings,
     pub geometry: StereoGeometry,
@@ -25,14 +25,14 @@ pub struct Time {
     pub range_us: (f64, f64),
 }
 
-/// What the timed part reads: per press and camera the events and the start of the window.
-type Prepared = Vec<[(Vec<KeptEvent>, u32); 2]>;
+/// Input of the timed part: per press and camera the events and the start of the window.
+type Prepared = Vec<[(Vec<PackedEvent>, u32); 2]>;
 
-/// Times each candidate `repeats` times after one run that does not count. Within a repeat every candidate runs once, so
-/// that a slow moment of the machine meets all. The stopwatch gives seconds of CPU time of this thread.
+/// Times each candidate `repeats` times after one warm-up run. Within a repeat every candidate runs once, so that a slow
+/// moment of the machine affects all. The stopwatch returns CPU seconds of this thread.
 ///
-/// Timed is what a computer beside the skin would do with the events that reach it: counting them, the estimate in both
-/// cameras, the intersection. What is dropped before it (thinning, rows, time window) costs nothing here.
+/// The timed part is what a computer at the skin would do with the events that reach it: counting, the estimate in both
+/// cameras, the intersection. Events dropped before (thinning, rows, time window) cost nothing here.
 pub fn run(
     replay: &Replay<'_>,
     outline: &SkinOutline,
@@ -40,9 +40,9 @@ pub fn run(
     repeats: u32,
     stopwatch: &mut dyn FnMut() -> f64,
 ) -> (Vec<Time>, u32) {
-    let scored: Vec<&KeptPress> = replay.presses(PressRole::Score).collect();
-    let count = scored.len().min(MOST_PRESSES);
-    let presses: Vec<&KeptPress> = (0..count)
+    let scored: Vec<&RetainedPress> = replay.presses(PressRole::Score).collect();
+    let count = scored.len().min(MAX_PRESSES);
+    let presses: Vec<&RetainedPress> = (0..count)
         .map(|i| scored[i * scored.len() / count])
         .collect();
     let mut times = vec![Vec::with_capacity(repeats as usize); candidates.len()];
@@ -57,7 +57,7 @@ pub fn run(
             for views in &prepared {
                 let columns = [0, 1].map(|k| {
                     let (events, from_us) = &views[k];
-                    estimators[k].sight(events, *from_us).column
+                    estimators[k].estimate(events, *from_us).column
                 });
                 std::hint::black_box(locate(&candidate.geometry, outline, columns));
             }
@@ -77,10 +77,14 @@ pub fn run(
     (times.into_iter().map(summary).collect(), count as u32)
 }
 
-fn prepare(replay: &Replay<'_>, presses: &[&KeptPress], settings: &AnalysisSettings) -> Prepared {
+fn prepare(
+    replay: &Replay<'_>,
+    presses: &[&RetainedPress],
+    settings: &AnalysisSettings,
+) -> Prepared {
     let windows = CameraId::ALL.map(|camera| replay.windows_by_row(camera, settings));
     let filters = CameraId::ALL.map(|camera| Filter::new(camera, settings));
-    let of = |press: &KeptPress, k: usize, window: Option<Window>| {
+    let of = |press: &RetainedPress, k: usize, window: Option<Window>| {
         let mut events = Vec::new();
         let view = &press.views[k];
         let Some(window) = window else {

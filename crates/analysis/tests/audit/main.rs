@@ -1,4 +1,4 @@
-//! The plausibility audit: silent on sound sessions of many rigs, and right about planted faults.
+//! The plausibility audit: silent on valid sessions of many rigs, and correct about planted faults.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -18,10 +18,10 @@ fn named(findings: &[Finding]) -> Vec<Fault> {
     findings.iter().map(|f| f.fault).collect()
 }
 
-/// Sessions with a fault that are tried.
+/// Number of sessions tried per fault.
 const SEEDS: u64 = 40;
 
-/// At least 95 % of the seeds lead with `fault`, and name nothing else in 90 %.
+/// The audit must lead with `fault` in 95 % of the seeds, and report nothing else in 90 %.
 fn names(fault: Fault, plant: impl Fn(u64) -> Session + Sync) {
     let all: Vec<Vec<Finding>> = (0..SEEDS)
         .into_par_iter()
@@ -85,7 +85,7 @@ fn exchanged_cameras() {
 
 #[test]
 fn exchanged_cameras_on_a_single_line() {
-    // Along y both cameras of the first rig order the presses alike: only the angles tell them apart.
+    // Along y both cameras of the first rig see the presses in the same order: only the angles distinguish them.
     let line = Wishes {
         rig: Some(0),
         line_of: 10,
@@ -133,7 +133,7 @@ fn a_shifted_press_list() {
     });
 }
 
-/// The positions stand `by` rows too early; the rows without a neighbour keep their own.
+/// Shifts positions `by` rows earlier; rows without a neighbour keep their own.
 fn shift(input: &mut SessionInput, by: i32, also_planned: bool) {
     let planned: Vec<Point2> = input.planned.iter().map(|p| p.at).collect();
     let there = |i: usize| usize::try_from(i as i64 + i64::from(by)).ok();
@@ -173,7 +173,7 @@ fn a_clock_that_is_no_crystals() {
         ..fast
     };
     names(Fault::ClockWrong, |seed| session(seed, with_line));
-    // By the presses alone a drift shows in long sessions only.
+    // From the presses alone a drift shows only in long sessions.
     let long = Wishes {
         line: Some(false),
         places: 20,
@@ -209,7 +209,7 @@ fn missing_data() {
             positions(input, false, |p| Point2::new(p.x_mm, no_number));
         })
     });
-    // Half the presses were never made; or made, and the recording ended before.
+    // Half the presses were never executed; or executed after the recording ended.
     names(Fault::PressesMissing, |seed| {
         edit(seed, Wishes::default(), |input| {
             let half = input.outcomes.len() / 2;
@@ -229,7 +229,7 @@ fn a_camera_that_does_not_see_the_presses() {
         line: Some(true),
         ..Wishes::default()
     };
-    // Its events come at any time.
+    // Its events occur at random times.
     names(Fault::CameraBlind, |seed| {
         let mut s = session(seed, line);
         let events = &mut s.events.events[(seed % 2) as usize];
@@ -242,7 +242,7 @@ fn a_camera_that_does_not_see_the_presses() {
         s
     });
 
-    // It goes dark half-way: not even noise.
+    // It goes dark half-way, without even noise.
     let dark = Wishes {
         dark_from: Some(0.6),
         ..line
@@ -324,7 +324,7 @@ fn a_journal_that_contradicts_itself() {
     journal(&|input| timings(input, &|_| HostTime(0)));
     journal(&|input| timings(input, &|t| HostTime(t.0 - 3_600_000_000_000)));
     journal(&|input| timings(input, &|t| HostTime(-t.0)));
-    // Every press takes as long as four.
+    // Every press lasts as long as four.
     journal(&|input| {
         for outcome in input.outcomes.iter_mut().flatten() {
             let t = outcome.timing.as_mut().unwrap();
@@ -332,7 +332,7 @@ fn a_journal_that_contradicts_itself() {
             t.clear = HostTime(t.clear.0 + 4_000_000_000);
         }
     });
-    // A press stands twice in plan and journal.
+    // A press is twice in plan and journal.
     journal(&|input| {
         input.planned.push(*input.planned.last().unwrap());
         input.outcomes.push(input.outcomes.last().unwrap().clone());
@@ -341,7 +341,7 @@ fn a_journal_that_contradicts_itself() {
 
 #[test]
 fn sessions_too_small_to_judge_are_not_accused() {
-    // One press and its sync presses: sound, as far as anybody can tell.
+    // One press and its sync presses: valid, as far as the data show.
     for seed in 0..20 {
         let one = edit(seed, Wishes::default(), |input| {
             input.planned.truncate(4);

@@ -1,4 +1,4 @@
-//! Small sound sessions of many rigs, drawn from a seed: geometry, path, repetitions, clocks, strength, noise.
+//! Small valid sessions of many rigs, drawn from a seed: geometry, path, repetitions, clocks, signal strength, noise.
 
 use skinrig_analysis::SessionInput;
 use skinrig_model::{
@@ -8,7 +8,7 @@ use skinrig_model::{
 pub use skinrig_planted::Memory;
 use skinrig_planted::{Touch, mark, press, timing};
 
-/// A session and what it was made of.
+/// A session with its parameters.
 pub struct Session {
     pub input: SessionInput,
     pub events: Memory,
@@ -44,30 +44,30 @@ impl Random {
     }
 }
 
-/// What is planted into a session on top of its seed.
+/// Modifications of a seeded session.
 #[derive(Clone, Copy, Default)]
 pub struct Wishes {
-    /// Which rig (`None`: the seed decides).
+    /// Index of the rig (`None`: from the seed).
     pub rig: Option<usize>,
-    /// This many places along y instead of a path (0: a path).
+    /// Number of locations along y instead of a path (0: a path).
     pub line_of: usize,
-    /// With a trigger line (`None`: the seed decides).
+    /// With a trigger line (`None`: from the seed).
     pub line: Option<bool>,
     /// Clock drift of camera 1, ppm (`None`: within ±50).
     pub drift_ppm: Option<f64>,
-    /// At least this many places.
+    /// Minimum number of locations.
     pub places: usize,
-    /// This many repetitions (0: the seed decides).
+    /// Number of repetitions (0: from the seed).
     pub repetitions: u32,
-    /// Columns of camera 2 move by this much in the second repetition, px.
+    /// Shift of camera 2's columns in the second repetition, px.
     pub move_px: f64,
-    /// Camera 2 sends no events while the share of the session from this on runs.
+    /// Camera 2 sends no events after this share of the session.
     pub dark_from: Option<f64>,
-    /// Neither camera sends events from this share of the session on.
+    /// Neither camera sends events after this share of the session.
     pub end_at: Option<f64>,
 }
 
-/// Camera positions of the rigs, each looking at the skin's centre.
+/// Camera positions of the rigs; each camera aims at the skin's centre.
 const RIGS: [[(f64, f64); 2]; 4] = [
     [(45.0, -38.0), (45.0, 42.0)],
     [(52.0, -46.0), (50.0, 50.0)],
@@ -87,7 +87,7 @@ fn camera(at: (f64, f64), skew_deg: f64, w: f64) -> skinrig_model::CameraModel {
     }
 }
 
-/// A meander of `n` x `n` places or as many on two circles, about the skin's centre.
+/// A meander of `n` x `n` locations, or as many on two circles, about the skin's centre.
 fn path(random: &mut Random, least: usize) -> Vec<Point2> {
     let kinds = [3usize, 4, 5];
     let n = kinds[random.below(3)];
@@ -116,12 +116,12 @@ fn path(random: &mut Random, least: usize) -> Vec<Point2> {
     (0..n * n).map(at).collect()
 }
 
-/// The sound session of this seed.
+/// The valid session of this seed.
 pub fn sound(seed: u64) -> Session {
     session(seed, Wishes::default())
 }
 
-/// The session of this seed with `wishes`.
+/// The session of this seed with modifications.
 pub fn session(seed: u64, wishes: Wishes) -> Session {
     let mut random = Random::new(seed);
     let drawn = random.below(4);
@@ -283,7 +283,7 @@ pub fn session(seed: u64, wishes: Wishes) -> Session {
     }
 }
 
-/// The press as it came out: a little late, a little beside its place.
+/// The executed press: slightly late, slightly off its location.
 fn touch(planned: Touch, contact: f64, random: &mut Random) -> Touch {
     let late = 0.005 * random.unit();
     let at = planned.at;

@@ -1,4 +1,4 @@
-//! Clock fits: from trigger marks with everything that happens to them, and from the presses themselves.
+//! Clock fits: from trigger marks with all their faults, and from the presses themselves.
 
 #![expect(clippy::print_stdout, reason = "the table of the documentation")]
 #![expect(clippy::unwrap_used, reason = "tests")]
@@ -11,7 +11,7 @@ use skinrig_analysis::rates::RateHistogram;
 use skinrig_analysis::result::ClockFit;
 use skinrig_model::{HostTime, Mark, MarkKind, PressId, PulseTrain, SentMark, TriggerEdge};
 
-/// A camera clock that is planted: camera = offset + (1 + ppm) host, in whole µs, with jitter.
+/// A planted camera clock: camera = offset + (1 + ppm) host, in whole µs, with jitter.
 struct Planted {
     offset_us: f64,
     ppm: f64,
@@ -109,8 +109,8 @@ fn lost_doubled_late_and_foreign_pulses_do_no_harm() {
     };
     edges.extend(edges_of(&[again], &planted, 0.0));
     sent.push(again);
-    // One train loses the end of its start pulse, one arrives 3 ms late, a foreign pulse and another channel's edges
-    // lie between.
+    // One train loses the end of its start pulse, one arrives 3 ms late; between them a foreign pulse and another channel's
+    // edges.
     for edge in &mut edges[64 * 20..64 * 21] {
         edge.t_us += 3_000;
     }
@@ -181,8 +181,8 @@ fn histogram(bytes: &[u8]) -> RateHistogram {
 
 #[test]
 fn presses_of_a_recording_give_its_clock() {
-    // Expected: drift and start from the mean times of the OFF events of each press burst, fitted over 288 presses
-    // by another program; the first touch is 93 ms before the burst's mean in both cameras.
+    // Expected: drift and start from the mean times of the OFF events of each press burst, fitted over 288 presses by
+    // another program; the first contact is 93 ms before the burst's mean in both cameras.
     for (bytes, contact_s, drift_ppm) in [
         (
             include_bytes!("../fixtures/rates_camera1.u8").as_slice(),
@@ -227,7 +227,7 @@ fn a_recording_that_begins_late_or_ends_early_is_still_aligned() {
     }
 }
 
-/// A long recording: presses of very different strength, every seventh hardly visible, slow decay after each.
+/// A long recording: presses of very different strength, every seventh barely visible, slow decay after each.
 fn long_recording(presses: &[PressSpan], clock: &Planted) -> RateHistogram {
     let mut h = RateHistogram::new(10_000);
     let end = clock.camera_us(presses[presses.len() - 1].release_us) + 8e6;
@@ -272,7 +272,7 @@ fn drift_over_hours_is_followed() {
 
 #[test]
 fn a_train_without_landmarks_has_no_odds() {
-    // Equal steps, and the camera saw neither the beginning nor the end: every whole shift looks the same.
+    // Equal steps, and the camera saw neither the beginning nor the end: all whole shifts look alike.
     let presses: Vec<PressSpan> = rhythm(103).split_off(3);
     let planted = Planted {
         offset_us: 31e6,

@@ -1,28 +1,28 @@
-//! The alignment by event rates against everything that may be off by whole presses: never wrong with good odds.
+//! Alignment by event rates with all kinds of whole-press offsets: never wrong with good odds.
 
 use skinrig_analysis::result::RatesEvidence;
 
 use super::simulated::World;
 
-/// The default of `analysis.alignment.min_log_odds`.
+/// Default of `analysis.alignment.min_log_odds`.
 const LEAST: f64 = 7.0;
-/// An alignment that errs by more is wrong, s.
+/// An alignment with a larger error is wrong, s.
 const WRONG_S: f64 = 0.25;
 
-/// What may be expected of a situation.
+/// Expected result in a situation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Expected {
-    /// Always right and sure.
+    /// Always right and certain.
     Sure,
     /// Right, or refused.
     RightOrRefused,
-    /// Nothing tells: always refused.
+    /// Undecidable: always refused.
     Refused,
 }
 
 use Expected::{Refused, RightOrRefused, Sure};
 
-/// A name, what is expected, and how it comes about.
+/// Name, expected result, and how to create the situation.
 type Situation = (&'static str, Expected, fn(&mut World, usize));
 
 fn some(world: &mut World, low: f64, high: f64, n: usize) -> usize {
@@ -227,7 +227,7 @@ const SITUATIONS: &[Situation] = &[
     }),
 ];
 
-/// What came of the recordings of one situation.
+/// Results for the recordings of one situation.
 #[derive(Debug, Default, Clone, Copy)]
 struct Counts {
     sure: u32,
@@ -237,7 +237,7 @@ struct Counts {
     wrong: u32,
 }
 
-/// The log-odds, none where too little is explained (`analysis.alignment.min_explained`).
+/// Log-odds; none where too little is explained (`analysis.alignment.min_explained`).
 fn odds(evidence: RatesEvidence) -> f64 {
     let explained = evidence
         .cameras
@@ -300,7 +300,7 @@ fn battery(each: u64, presses: fn(u64) -> usize) -> Vec<(Situation, Counts)> {
     all
 }
 
-/// Fails for anything that must not be.
+/// Fails for any forbidden result.
 fn judge(found: &[(Situation, Counts)], refused_at_most: f64) {
     for ((name, expected, _), counts) in found {
         assert_eq!(counts.wrong, 0, "{name}: {counts:?}");

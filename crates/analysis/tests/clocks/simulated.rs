@@ -1,11 +1,11 @@
-//! Recordings made by numbers: event rates of two cameras over a plan of presses, with everything that happens to them.
+//! Simulated recordings: event rates of two cameras over a plan of presses, with all kinds of deviations.
 
 use skinrig_analysis::clock::{PressSpan, RatesAlignment, align_by_rates};
 use skinrig_analysis::rates::RateHistogram;
 
 const BIN_US: u64 = 10_000;
 
-/// Seeded dice (splitmix64).
+/// Seeded random numbers (splitmix64).
 pub struct Dice(u64);
 
 impl Dice {
@@ -56,19 +56,19 @@ impl Dice {
     }
 }
 
-/// Something that cameras saw: a press, planned or not, or a burst of noise.
+/// Something that cameras saw: a press, planned or not, or a noise burst.
 #[derive(Clone, Copy)]
 struct Burst {
     at_s: f64,
-    /// Events per bin at its height, per camera.
+    /// Peak events per bin, per camera.
     strength: [f64; 2],
     is_press: bool,
 }
 
-/// What one camera recorded and how its clock runs.
+/// Recording of one camera and its clock.
 #[derive(Clone, Copy, Debug)]
 struct Recording {
-    /// On the host's clock.
+    /// On the host clock.
     from_s: f64,
     to_s: f64,
     offset_s: f64,
@@ -83,22 +83,22 @@ impl Recording {
     }
 }
 
-/// A rig at work, a plan of what it did, and what the cameras recorded.
+/// A simulated rig, its plan, and the recordings of the cameras.
 pub struct World {
     pub dice: Dice,
-    /// As the schedule has it: contact, and whether it is a sync press.
+    /// From the schedule: contact, and whether it is a sync press.
     pub plan: Vec<(f64, bool)>,
     bursts: Vec<Burst>,
     cameras: [Recording; 2],
     period_s: f64,
 }
 
-/// Between the last sync press and the first of the path.
+/// Time from the last sync press to the first of the path.
 const PAUSE_S: f64 = 3.0;
 const SPAN_S: f64 = 0.55;
 
 impl World {
-    /// An ordinary recording of `presses` presses after three sync presses, planned as they were made.
+    /// An ordinary recording of `presses` presses after three sync presses, planned as executed.
     pub fn new(seed: u64, presses: usize) -> Self {
         let mut dice = Dice::new(seed);
         let period_s = [3.0 + 1.0 / 289.0, 3.0 + 1.0 / 289.0, 1.5, 2.2][dice.below(4)];
@@ -140,7 +140,7 @@ impl World {
         self.plan.iter().filter(|p| !p.1).count()
     }
 
-    /// The plan has only so many presses of the path, from press `first` on.
+    /// Limits the plan to `presses` presses of the path, from press `first` on.
     pub fn plan_only(&mut self, first: usize, presses: usize) {
         let mut i = 0;
         self.plan.retain(|p| {
@@ -150,7 +150,7 @@ impl World {
         });
     }
 
-    /// The plan has more presses than were made.
+    /// The plan has more presses than were executed.
     pub fn plan_more(&mut self, presses: usize) {
         let last_s = self.plan.last().map_or(0.0, |p| p.0);
         let period_s = self.period_s;
@@ -158,7 +158,7 @@ impl World {
             .extend((1..=presses).map(|i| (last_s + i as f64 * period_s, false)));
     }
 
-    /// Another repetition of the path after a pause, unplanned.
+    /// Adds an unplanned repetition of the path after a pause.
     pub fn repeat(&mut self, pause_s: f64) {
         let path: Vec<Burst> = self.bursts[3..3 + self.path()].to_vec();
         let last_s = self.bursts.iter().map(|b| b.at_s).fold(0.0, f64::max);
@@ -177,14 +177,14 @@ impl World {
         self.bursts.drain(..3);
     }
 
-    /// The sync presses were made, and no camera saw them.
+    /// The sync presses were executed, but no camera saw them.
     pub fn blind_sync(&mut self) {
         self.bursts[..3]
             .iter_mut()
             .for_each(|b| b.strength = [0.0; 2]);
     }
 
-    /// The plan says another interval between the sync presses than was kept.
+    /// The plan has another interval between the sync presses than was executed.
     pub fn sync_interval(&mut self, planned_s: f64, made_s: f64) {
         for i in 0..3 {
             let before = (2 - i) as f64;
@@ -193,7 +193,7 @@ impl World {
         }
     }
 
-    /// One more sync press before the others.
+    /// Adds a sync press before the others.
     pub fn fourth_sync(&mut self) {
         let first = self.bursts[0];
         self.bursts.push(Burst {
@@ -222,7 +222,7 @@ impl World {
         }
     }
 
-    /// A share of the path's presses was not made, or no camera or only one saw it.
+    /// A share of the path's presses was not executed, or was seen by no camera or only one.
     pub fn miss(&mut self, share: f64) {
         for i in 3..self.bursts.len() {
             if self.dice.chance(share) {
@@ -235,7 +235,7 @@ impl World {
         }
     }
 
-    /// A share of the presses was made twice, the second time 0.8 to 1 s later.
+    /// A share of the presses was executed twice, the second time 0.8 to 1 s later.
     pub fn double(&mut self, share: f64) {
         for i in 3..self.bursts.len() {
             if self.dice.chance(share) {
@@ -249,7 +249,7 @@ impl World {
         }
     }
 
-    /// Bursts at any time, in one camera or in both.
+    /// Noise bursts at random times, in one camera or both.
     pub fn noise(&mut self, count: usize) {
         let to_s = self.cameras[0].to_s;
         for _ in 0..count {
@@ -263,7 +263,7 @@ impl World {
         }
     }
 
-    /// The plan is that of another recording.
+    /// Replaces the plan by that of another recording.
     pub fn foreign_plan(&mut self) {
         let stretch = self.dice.between(1.1, 1.9);
         self.plan.iter_mut().for_each(|p| p.0 *= stretch);
@@ -280,7 +280,7 @@ impl World {
             .collect()
     }
 
-    /// What camera `k` recorded.
+    /// Recording of camera `k`.
     pub fn rates(&mut self, k: usize) -> RateHistogram {
         let r = self.cameras[k];
         let bin_s = BIN_US as f64 * 1e-6;
@@ -327,7 +327,7 @@ impl World {
         align_by_rates([Some(&rates[0]), Some(&rates[1])], &self.presses())
     }
 
-    /// Largest error of the clocks found, in the middle of what each camera recorded of the plan, s; `None` without a clock.
+    /// Largest error of the clocks found, in the middle of each camera's recording of the plan, s; `None` without a clock.
     pub fn error_s(&self, found: &RatesAlignment) -> Option<f64> {
         let mut worst = 0.0f64;
         for (r, fit) in self.cameras.iter().zip(&found.cameras) {

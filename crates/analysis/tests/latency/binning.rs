@@ -40,8 +40,8 @@ fn clock(drift_ppm: f64) -> ClockFit {
 
 #[test]
 fn every_event_is_in_the_bin_of_its_host_time_and_in_one_only() {
-    // The edges of bins and a µs beside them, at the contact and far from it; the second clock runs 1000 ppm fast, so
-    // that a host time that is not its own whole µs is rounded.
+    // The edges of bins and a µs beside them, at the contact and far from it; the second clock runs 1000 ppm fast, so host
+    // times are rounded to whole µs.
     for (drift, second) in [(0.0, 200.0), (1000.0, 201.0)] {
         let after = [
             -850_000.0, -200.0, -1.0, 0.0, 199.0, second, 800_000.0, 849_999.0,
@@ -49,7 +49,7 @@ fn every_event_is_in_the_bin_of_its_host_time_and_in_one_only() {
         let bins = [-4250, -1, -1, 0, 0, 1, 4000, 4249];
         let clock = clock(drift);
         let view = view(&clock, 5e6, &after);
-        let sight = Sight::new(&view, &clock, 0.0);
+        let sight = HostTimeView::new(&view, &clock, 0.0);
         let grid = Grid::within(-850_000.0, 850_000.0, 200.0);
         let count = |grid: Grid| {
             let mut counts = vec![0; grid.len];
@@ -66,7 +66,7 @@ fn every_event_is_in_the_bin_of_its_host_time_and_in_one_only() {
                 "drift {drift}, bin {bin}"
             );
         }
-        // Cut anywhere, the parts hold what the whole holds.
+        // Split anywhere, the parts contain what the whole contains.
         for cut in [-4250, -1, 0, 1, 4249] {
             let before = count(Grid {
                 first: -4250,
@@ -94,13 +94,13 @@ fn thinning_keeps_the_rounded_share_and_every_event_alike() {
         (2560, 1024, 2),
         (7, 1, 7),
     ] {
-        let picks = chosen(n, factor, &mut rng);
+        let picks = choose_events(n, factor, &mut rng);
         assert_eq!(picks.len(), kept, "{n} / {factor}");
         assert!(picks.windows(2).all(|w| w[0] < w[1]) && picks.iter().all(|i| *i < n));
     }
     let mut times = [0u32; 40];
     for _ in 0..4000 {
-        for i in chosen(40, 4, &mut rng) {
+        for i in choose_events(40, 4, &mut rng) {
             times[i] += 1;
         }
     }

@@ -1,8 +1,8 @@
-//! The detector: its kernel, its path against a slow reference, its threshold, its false alarms.
+//! The detector: its kernel, its path compared with a slow reference, its threshold, its false alarms.
 
 use super::*;
 
-/// The whole detector for one threshold, as one would write it down from the paper: index of the onset.
+/// Index of the onset from a direct implementation of the paper for one threshold.
 fn slow_onset(detector: &Detector, counts: &[u32], rate_per_s: f64, h: f64) -> Option<usize> {
     let path = slow_path(detector, counts, rate_per_s);
     let run = detector.consecutive as usize;
@@ -58,7 +58,7 @@ fn the_kernel_is_the_published_one_and_keeps_a_constant() {
 
 #[test]
 fn a_background_has_a_rate_whatever_is_in_it() {
-    // 0 and 1 events (public code: 0.001 per second), 2 events 1 µs apart (2e6), 2 at one instant (2e9): all over 0.9 s.
+    // 0 and 1 events (public code: 0.001 per second), 2 events 1 µs apart (2e6), 2 simultaneous ones (2e9): all over 0.9 s.
     for (events, rate) in [
         (0, 0.5 / 0.9),
         (1, 1.0 / 0.9),
@@ -67,7 +67,7 @@ fn a_background_has_a_rate_whatever_is_in_it() {
     ] {
         assert!((background_rate_per_s(events, 0.9) / rate - 1.0).abs() < 1e-12);
     }
-    // A touch is found behind each of the four, and a single event is none.
+    // A press is found after each of the four, and a single event is not a press.
     let detector = detector();
     let quiet = vec![0; 4500];
     let mut touch = vec![0; 8500];
@@ -75,12 +75,12 @@ fn a_background_has_a_rate_whatever_is_in_it() {
     for (bin, events) in [(0, 0), (2000, 1), (2000, 2), (4499, 2)] {
         let mut background = quiet.clone();
         background[bin] = events;
-        let trial = look(&detector, -4250, &touch, &background);
+        let trial = run(&detector, -4250, &touch, &background);
         let onset = onsets_ms(&trial)[9].unwrap();
         assert!((-2.0..=0.2).contains(&onset), "{events} events: {onset} ms");
         let mut single = vec![0; 8500];
         single[100] = 1;
-        let none = look(&detector, -4250, &single, &background);
+        let none = run(&detector, -4250, &single, &background);
         assert!(onsets_ms(&none)[4..].iter().all(Option::is_none));
     }
 }
@@ -90,17 +90,17 @@ fn trials_without_an_answer_are_answered_with_none() {
     let detector = detector();
     // No event; fewer bins than taps; a single bin; no bin.
     for counts in [vec![0; 8500], vec![0, 1, 0, 0, 1, 0], vec![1], vec![]] {
-        let trial = look(&detector, 0, &counts, &[1, 0, 0, 1, 0]);
+        let trial = run(&detector, 0, &counts, &[1, 0, 0, 1, 0]);
         assert!(
             onsets_ms(&trial).iter().all(Option::is_none),
             "{} bins",
             counts.len()
         );
     }
-    // All events at one instant: a burst like any other.
+    // All events simultaneous: a burst like any other.
     let mut instant = vec![0; 8500];
     instant[4250] = 10_000_000;
-    let trial = look(&detector, -4250, &instant, &[0; 2000]);
+    let trial = run(&detector, -4250, &instant, &[0; 2000]);
     assert!(
         onsets_ms(&trial)
             .iter()
@@ -108,12 +108,12 @@ fn trials_without_an_answer_are_answered_with_none() {
     );
     // 5e7 events per second throughout are background, four times as many are not.
     let flood = vec![10_000; 8500];
-    let trial = look(&detector, -4250, &flood, &flood[..2000]);
+    let trial = run(&detector, -4250, &flood, &flood[..2000]);
     assert!(onsets_ms(&trial).iter().all(Option::is_none));
     let more: Vec<u32> = (0..8500)
         .map(|i| if i < 4250 { 10_000 } else { 40_000 })
         .collect();
-    let trial = look(&detector, -4250, &more, &flood[..2000]);
+    let trial = run(&detector, -4250, &more, &flood[..2000]);
     assert!(
         onsets_ms(&trial)
             .iter()
@@ -140,7 +140,7 @@ fn a_planted_step_is_found_in_its_bin() {
         let counts = random.counts(rate, 8500);
         let background = random.counts(|_| 500.0, 2250);
         // Twenty events per bin against a threshold of ten: the first bin decides.
-        let onset = |d: &Detector| onsets_ms(&look(d, -4250, &counts, &background))[9].unwrap();
+        let onset = |d: &Detector| onsets_ms(&run(d, -4250, &counts, &background))[9].unwrap();
         let begins_ms = planted as f64 * 0.2;
         assert!((onset(&sharp) - begins_ms - 0.1).abs() < 1e-9, "{planted}");
         let early = onset(&smooth) - begins_ms;
@@ -151,8 +151,8 @@ fn a_planted_step_is_found_in_its_bin() {
 #[test]
 fn false_alarms_on_pure_background_are_as_rare_as_theory_says() {
     // Lorden 1971: the mean time between false alarms of an unsmoothed CUSUM is at least exp(h) bins. For Poisson counts the
-    // sum jumps in steps of ln 4, so the true rate lies below, within the overshoot of about one such step and the share
-    // of excursions that a run of one bin asks for.
+    // sum jumps in steps of ln 4, so the true rate is lower, by the overshoot of about one such step and the share of
+    // excursions that a run of one bin requires.
     let rate = 2000.0;
     let mut random = Random(5);
     let detector = Detector {
@@ -166,7 +166,7 @@ fn false_alarms_on_pure_background_are_as_rare_as_theory_says() {
     let background = random.counts(|_| rate, 100_000);
     let trials: Vec<Trial> = (0..400)
         .map(|_| {
-            look(
+            run(
                 &detector,
                 -2500,
                 &random.counts(|_| rate, 2500),
@@ -190,7 +190,7 @@ fn false_alarms_on_pure_background_are_as_rare_as_theory_says() {
 
 #[test]
 fn a_trip_before_the_contact_ends_the_search() {
-    // 0.85 s before the contact to 0.85 s after it; a touch of 20 ms from 10 ms on.
+    // 0.85 s before the contact to 0.85 s after it; a press of 20 ms from 10 ms on.
     let detector = Detector {
         earliest_ms: -3.0,
         ..detector()
@@ -202,7 +202,7 @@ fn a_trip_before_the_contact_ends_the_search() {
             let at = (4250.0 + ms * 5.0) as usize;
             counts[at..at + 10].fill(10);
         }
-        look(&detector, -4250, &counts, &[0; 2500]).searches[9]
+        run(&detector, -4250, &counts, &[0; 2500]).searches[9]
     };
     let quiet = trial(None);
     assert!((quiet.onset_ms().unwrap() - 10.0).abs() < 2.1);
@@ -223,29 +223,29 @@ fn a_trip_before_the_contact_ends_the_search() {
 
 #[test]
 fn onsets_count_about_their_median() {
-    let hits = Hits::of(vec![10.0, 500.0, 12.0, 11.0, 111.0], 99.0);
+    let hits = OnsetStatistics::of(vec![10.0, 500.0, 12.0, 11.0, 111.0], 99.0);
     assert_eq!(
         (hits.onsets, hits.median_ms, hits.count),
         (5, Some(12.0), 4)
     );
     // Linear between order statistics: 10 + 0.15 and 12 + 0.85 * 99.
     assert!((hits.width_ms.unwrap() - (12.0 + 0.85 * 99.0 - 10.15)).abs() < 1e-9);
-    // Nothing detected; one; two that lie further apart than two windows.
-    let none = Hits {
+    // Nothing detected; one onset; two that are further apart than two windows.
+    let none = OnsetStatistics {
         onsets: 0,
         median_ms: None,
         count: 0,
         width_ms: None,
     };
-    assert_eq!(Hits::of(vec![], 100.0), none);
-    assert_eq!(Hits::of(vec![3.0], 100.0).width_ms, Some(0.0));
-    let apart = Hits {
+    assert_eq!(OnsetStatistics::of(vec![], 100.0), none);
+    assert_eq!(OnsetStatistics::of(vec![3.0], 100.0).width_ms, Some(0.0));
+    let apart = OnsetStatistics {
         onsets: 2,
         median_ms: Some(150.0),
         count: 0,
         width_ms: None,
     };
-    assert_eq!(Hits::of(vec![0.0, 300.0], 100.0), apart);
+    assert_eq!(OnsetStatistics::of(vec![0.0, 300.0], 100.0), apart);
 }
 
 #[test]
@@ -263,7 +263,7 @@ fn the_threshold_has_the_fewest_false_alarms_among_those_that_detect_enough() {
         };
         list.iter().enumerate().map(row).collect()
     };
-    // The share of detections need not fall with the threshold.
+    // The detection rate need not fall with the threshold.
     let all = rows(&[
         (0.96, 9.0),
         (0.2, 0.0),
@@ -278,9 +278,9 @@ fn the_threshold_has_the_fewest_false_alarms_among_those_that_detect_enough() {
     assert_eq!(choose(&rows(&[(0.0, 3.0), (0.0, 2.0)]), 0.95), None);
     assert_eq!(choose(&rows(&[(0.0, 3.0)]), 0.0), None);
     assert_eq!(choose(&[], 0.95), None);
-    // Trials in which nothing is found: a share of 0, no width, no choice.
+    // Trials without detections: a share of 0, no width, no choice.
     let detector = detector();
-    let silent = vec![look(&detector, 0, &[0; 100], &[1; 100]); 3];
+    let silent = vec![run(&detector, 0, &[0; 100], &[1; 100]); 3];
     let found = sweep(&silent, &detector, 100.0);
     assert!(
         found
@@ -310,7 +310,7 @@ fn the_threshold_has_the_fewest_false_alarms_among_those_that_detect_enough() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// One sweep for all thresholds finds what a search for each finds.
+    /// A single pass for all thresholds gives the same result as separate searches.
     #[test]
     fn onsets_are_those_of_straight_loops(
         seed in 1u64.., rate in 0.0f64..50_000.0, step in 0.0f64..10.0, bins in 0usize..700, padded in any::<bool>(),
@@ -326,7 +326,7 @@ proptest! {
             thresholds: (0..20).map(|i| 0.7 + 1.013 * f64::from(i)).collect(),
             ..detector()
         };
-        let trial = look(&detector, -300, &counts, &background);
+        let trial = run(&detector, -300, &counts, &background);
         let events: u32 = background.iter().sum();
         let rate = f64::from(events).max(0.5) / 0.1;
         for (h, onset) in detector.thresholds.iter().zip(&onsets_ms(&trial)) {
@@ -336,7 +336,7 @@ proptest! {
         }
     }
 
-    /// A false alarm is the onset in a trial that is before the contact, and the time at risk ends with it.
+    /// A false alarm is an onset before contact, and the time at risk ends with it.
     #[test]
     fn searches_are_onsets_cut_at_the_contact(
         seed in 1u64.., rate in 100.0f64..30_000.0, h in 0.5f64..6.0, first in -900i64..0, margin_ms in 0.0f64..20.0,
@@ -345,8 +345,8 @@ proptest! {
         let background = Random(seed ^ 1).counts(|_| rate, 500);
         let anywhere = Detector { thresholds: vec![h], ..detector() };
         let cut = Detector { earliest_ms: -margin_ms, ..anywhere.clone() };
-        let onset = onsets_ms(&look(&anywhere, first, &counts, &background))[0];
-        let search = look(&cut, first, &counts, &background).searches[0];
+        let onset = onsets_ms(&run(&anywhere, first, &counts, &background))[0];
+        let search = run(&cut, first, &counts, &background).searches[0];
         let early = onset.filter(|t| *t < -margin_ms);
         prop_assert_eq!(search.false_alarm_ms(), early);
         prop_assert_eq!(search.onset_ms(), onset.filter(|_| early.is_none()));

@@ -1,4 +1,4 @@
-//! The detection-latency study: its parts against slow references, planted onsets, inputs without an answer.
+//! The detection-latency study: its parts compared with slow references, planted onsets, inputs without a result.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -11,15 +11,15 @@ mod support;
 
 use proptest::prelude::*;
 use skinrig_analysis::analyze;
-use skinrig_analysis::kept::{Kept, KeptEvent, KeptPress, KeptView};
-use skinrig_analysis::latency::bins::{Grid, Sight};
+use skinrig_analysis::latency::bins::{Grid, HostTimeView};
 use skinrig_analysis::latency::cusum::background_rate_per_s;
 use skinrig_analysis::latency::interval::{Outcome, Plan};
 use skinrig_analysis::latency::smooth::{Edges, Kernel};
 use skinrig_analysis::latency::study;
-use skinrig_analysis::latency::sweep::{Hits, choose, sweep, thresholds};
-use skinrig_analysis::latency::thin::chosen;
+use skinrig_analysis::latency::sweep::{OnsetStatistics, choose, sweep, thresholds};
+use skinrig_analysis::latency::thin::choose_events;
 use skinrig_analysis::latency::trial::{Detector, Label, Trial};
+use skinrig_analysis::press_events::{EventView, PackedEvent, RetainedPress, RetainedPresses};
 use skinrig_analysis::result::{Analysis, ClockFit, ClockMethod, Latency, ThresholdRow};
 use skinrig_model::{
     Background, CdEvent, HostDuration, LatencySettings, Polarity, PressId, PressRole,
@@ -29,7 +29,7 @@ use support::Random;
 const BIN_S: f64 = 2e-4;
 
 impl Random {
-    /// Poisson counts by the times between events: slow, and right for any rate.
+    /// Poisson counts from the times between events: slow, and correct for any rate.
     fn counts(&mut self, per_s: impl Fn(usize) -> f64, bins: usize) -> Vec<u32> {
         (0..bins)
             .map(|bin| {
@@ -76,20 +76,20 @@ fn onsets_ms(trial: &Trial) -> Vec<Option<f64>> {
 }
 
 /// Bins from `first` to `first + counts.len()`.
-fn look(detector: &Detector, first: i64, counts: &[u32], background: &[u32]) -> Trial {
+fn run(detector: &Detector, first: i64, counts: &[u32], background: &[u32]) -> Trial {
     let grid = Grid {
         first,
         len: counts.len(),
     };
-    detector.look(label(0), grid, counts, background)
+    detector.run(label(0), grid, counts, background)
 }
 
 /// A camera's view that begins 1 s before the contact, with events at these host times after the contact, µs.
-fn view(clock: &ClockFit, contact_us: f64, after_us: &[f64]) -> KeptView {
+fn view(clock: &ClockFit, contact_us: f64, after_us: &[f64]) -> EventView {
     let rate = 1.0 + clock.drift_ppm * 1e-6;
     let start_us = (contact_us - 1e6).floor().max(0.0) as u64;
     let contact_us = contact_us - start_us as f64;
-    let mut events: Vec<KeptEvent> = after_us
+    let mut events: Vec<PackedEvent> = after_us
         .iter()
         .map(|after| {
             let t_us = start_us + (contact_us + after * rate).round() as u64;
@@ -99,11 +99,11 @@ fn view(clock: &ClockFit, contact_us: f64, after_us: &[f64]) -> KeptView {
                 y: 200,
                 polarity: Polarity::On,
             };
-            KeptEvent::pack(&event, start_us).unwrap()
+            PackedEvent::pack(&event, start_us).unwrap()
         })
         .collect();
     events.sort_unstable();
-    KeptView {
+    EventView {
         start_us,
         length_us: 3_000_000,
         window_us: ((contact_us - 5e4).ceil() as u32, (contact_us + 5e5) as u32),

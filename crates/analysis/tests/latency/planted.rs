@@ -1,10 +1,11 @@
-//! The study on planted sessions: latencies come back with their uncertainty, and what is no trial is counted apart.
+//! The study on planted sessions: recovers latencies with their uncertainty, and counts non-trials separately.
 
 use super::*;
+use skinrig_analysis::rule::Rule;
 
-/// The planted session's results with events of another kind: background at 400 per second and camera, and a burst
-/// of 20 000 per second and camera that begins `latency_us(press)` after the contact.
-fn planted(latency_us: impl Fn(usize) -> Option<f64>) -> (Analysis, Kept) {
+/// The planted session's results with other events: background at 400 per second and camera, and a burst of 20 000 per
+/// second and camera that begins `latency_us(press)` after contact.
+fn planted(latency_us: impl Fn(usize) -> Option<f64>) -> (Analysis, RetainedPresses) {
     let (input, memory) = support::session();
     let analysis = analyze(&input, &memory).unwrap();
     let mut random = Random(21);
@@ -25,7 +26,7 @@ fn planted(latency_us: impl Fn(usize) -> Option<f64>) -> (Analysis, Kept) {
                 }
                 view(&clock, clock.camera_us_of_host(contact), &after)
             });
-            KeptPress {
+            RetainedPress {
                 row,
                 press: press.press,
                 views,
@@ -34,14 +35,14 @@ fn planted(latency_us: impl Fn(usize) -> Option<f64>) -> (Analysis, Kept) {
         .collect();
     (
         analysis,
-        Kept {
+        RetainedPresses {
             presses,
             left_out: 0,
         },
     )
 }
 
-fn studied(analysis: &Analysis, kept: &Kept) -> Latency {
+fn studied(analysis: &Analysis, kept: &RetainedPresses) -> Latency {
     study(analysis, kept).unwrap()
 }
 
@@ -89,7 +90,7 @@ fn planted_latencies_come_back_with_their_uncertainty() {
     assert!((found.decision_delay_ms - 2.5).abs() < 1e-12);
     let reduced = found.reduced.unwrap();
     assert_eq!((reduced.factor, reduced.detected_rate.n), (1024, 25));
-    // The course rises where the touches begin, and has one bin per 2 ms.
+    // The course rises at the onset of the presses, and has one bin per 2 ms.
     let course = &found.course;
     assert_eq!((course.start_ms, course.bin_ms), (-850.0, 2.0));
     assert!(course.press_per_s.iter().all(|c| c.len() == 850));
@@ -101,7 +102,7 @@ fn planted_latencies_come_back_with_their_uncertainty() {
     );
 }
 
-/// The law of the false alarms: what is listed is what is counted, over exactly the time that was looked at.
+/// Law of the false alarms: those listed are those counted, over exactly the time searched.
 fn assert_counts_are_listed(found: &Latency) {
     let listed: Vec<PressId> = found.false_detections.iter().map(|f| f.0).collect();
     let alarmed = found.backgrounds.iter().filter(|b| b.alarms > 0);
@@ -173,7 +174,7 @@ fn what_is_before_the_contact_or_never_comes_is_counted_apart() {
         assert_eq!(*press, kept.presses[n].press);
         assert!((at - planted).abs() < 2.5, "{at}");
     }
-    // 23 trials look for 0.85 s, two only until they trip, less half a kernel and the contact's uncertainty.
+    // 23 trials search for 0.85 s, two only until their false alarm, minus half a kernel and the contact's uncertainty.
     let looked = 23.0 * (0.85 + found.earliest_ms * 1e-3) + 0.07 + 0.22;
     assert!(
         (found.at_risk_s - looked).abs() < 0.01,
@@ -222,8 +223,8 @@ fn what_was_left_out_by_hand_is_no_trial_and_what_the_skin_missed_is() {
         (5, "no cluster (camera 1)"),
     ] {
         let press = &mut analysis.presses[kept.presses[n].row];
-        press.verdict = "excluded".to_owned();
-        press.rule = Some(rule.to_owned());
+        press.verdict = skinrig_model::Verdict::Excluded;
+        press.rule = Some(Rule::from(rule.to_owned()));
     }
     let found = studied(&analysis, &kept);
     assert_eq!((found.trials, found.unusable), (23, 2));

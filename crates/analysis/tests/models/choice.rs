@@ -1,9 +1,9 @@
-//! The automatic choice on simulated calibrations: the model that the data need is taken, a larger one rarely, and the
-//! error at presses that no fit has seen is that of the best contender, with and without a tenth of outliers.
+//! The automatic choice on simulated calibrations: it selects the model that the data require, rarely a larger one, and the
+//! held-out error is that of the best candidate, with and without a tenth of outliers.
 
 use super::*;
 use skinrig_analysis::calibrate::parameter_count;
-use skinrig_analysis::sets::Sight;
+use skinrig_analysis::sets::CalibrationPress;
 
 const MODELS: [CalibrationModel; 4] = [
     CalibrationModel::Positions,
@@ -12,19 +12,19 @@ const MODELS: [CalibrationModel; 4] = [
     CalibrationModel::FullScale,
 ];
 
-/// A rig, where it is pressed, and how badly its centroids are known.
+/// A rig, its pressed locations, and the noise of its centroids.
 #[derive(Clone, Copy)]
 struct Scene {
     name: &'static str,
     /// Skews, distortions and half field of view; the drawn rig has 0, 0, 0, 0 and 60 degrees.
     rest: [f64; 4],
     half_fov_deg: f64,
-    /// Smallest model that holds the planted rig.
+    /// Smallest model that contains the planted rig.
     needed: CalibrationModel,
-    /// Places along each side.
+    /// Locations along each side.
     side: u32,
     noise_px: f64,
-    /// One press in this many has a column of its own; 0: none.
+    /// One press in this many has a random column; 0: none.
     outlier_in: usize,
 }
 
@@ -125,8 +125,9 @@ fn run(scene: &Scene, seed: u64) -> Run {
     // Bounded as the choice bounds them: near the line through both cameras a press can err by any amount.
     let errors = MODELS.map(|model| {
         let geometry = calibrate(&set, &DRAWN, model, seed).map_or(DRAWN, |(geometry, _)| geometry);
-        let one =
-            |s: &Sight| skinrig_analysis::calibrate::rmse_mm(std::slice::from_ref(s), &geometry);
+        let one = |s: &CalibrationPress| {
+            skinrig_analysis::calibrate::rmse_mm(std::slice::from_ref(s), &geometry)
+        };
         fresh.sights().iter().map(one).collect::<Vec<f64>>()
     });
     let median = |errors: &Vec<f64>| {

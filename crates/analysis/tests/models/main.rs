@@ -7,12 +7,12 @@ mod choice;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
-use skinrig_analysis::calibrate::{Chosen, calibrate, choose};
+use skinrig_analysis::calibrate::{ModelChoice, calibrate, choose};
 use skinrig_analysis::result::{LocationOutcome, PressResult, PressView};
 use skinrig_analysis::sets::CalibrationSet;
 use skinrig_model::{
     AnalysisSettings, CalibrationModel, LensKind, LensModel, LocationId, Point2, PressId,
-    PressRole, RepetitionId, StereoGeometry,
+    PressRole, RepetitionId, StereoGeometry, Verdict,
 };
 
 /// The drawn rig: where calibrations start.
@@ -72,7 +72,7 @@ fn presses(
                 planned: *at,
                 depth_mm: 2.0,
                 truth: Some(*at),
-                verdict: "valid".to_owned(),
+                verdict: Verdict::Valid,
                 reason: None,
                 rule: None,
                 timing: None,
@@ -106,7 +106,7 @@ fn settings(calibration: CalibrationModel, seed: u64) -> AnalysisSettings {
     }
 }
 
-fn auto(set: &CalibrationSet, seed: u64) -> Chosen {
+fn auto(set: &CalibrationSet, seed: u64) -> ModelChoice {
     choose(set, &DRAWN, &settings(CalibrationModel::Auto, seed))
 }
 
@@ -222,7 +222,7 @@ fn a_named_model_is_used_compared_and_called_out() {
     assert!(
         named.warnings.len() == 1
             && named.warnings[0]
-                .starts_with("the calibration `positions` is clearly worse than `full`: "),
+                .starts_with("the calibration `positions` is significantly worse than `full`: "),
         "{:?}",
         named.warnings
     );
@@ -262,7 +262,7 @@ fn too_few_places_take_the_largest_model_they_bear_and_say_so() {
         (CalibrationModel::Positions, 0)
     );
     assert!(
-        four.warnings[0].contains("too few calibrating places (4)"),
+        four.warnings[0].contains("too few calibration locations (4)"),
         "{:?}",
         four.warnings
     );
@@ -281,7 +281,7 @@ fn too_few_places_take_the_largest_model_they_bear_and_say_so() {
     assert_eq!(
         two.warnings,
         [
-            "2 calibrating places are too few for any calibration: the nominal camera geometry is used"
+            "2 calibration locations are too few for any calibration: using the nominal camera geometry"
         ]
     );
 }
@@ -307,10 +307,10 @@ fn a_fit_that_fails_falls_to_the_next_smaller_model_and_says_so() {
             assert_eq!(used, expected);
             let said = |words: &str| chosen.warnings.iter().any(|w| w.contains(words));
             assert_eq!(
-                said("found no plausible geometry: `"),
+                said("found no plausible geometry: using `"),
                 used.is_some() && used != Some(model)
             );
-            assert_eq!(said("the nominal camera geometry is used"), used.is_none());
+            assert_eq!(said("using the nominal camera geometry"), used.is_none());
             fallen += u32::from(used.is_some() && used != Some(model));
         }
     }
@@ -337,7 +337,7 @@ fn what_the_data_leave_open_is_reported() {
     assert!(result.correlation[0].iter().all(Option::is_none));
     assert!(
         chosen.warnings[0].starts_with(
-            "the calibrating presses determine 6 of the 8 parameters of the calibration `full`"
+            "the calibration presses determine 6 of the 8 parameters of the calibration `full`"
         ),
         "{:?}",
         chosen.warnings

@@ -9,11 +9,13 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use proptest::prelude::*;
 use skinrig_analysis::result::LocationOutcome;
+use skinrig_analysis::rule::Rule;
 use skinrig_analysis::{
-    AnalysisError, EventSource, Keep, SessionInput, analyze, analyze_and_keep, results_hash,
+    AnalysisError, EventSource, Retention, SessionInput, analyze, analyze_with_events, results_hash,
 };
 use skinrig_model::{
     CalibrationModel, CameraId, CdEvent, Point2, Polarity, PressRole, PressVerdict, StereoGeometry,
+    Verdict,
 };
 
 use support::{CLOCKS, Memory, PLANTED, camera_us, plan, session};
@@ -135,7 +137,7 @@ fn held_events_give_what_a_second_reading_gives() {
     input.marks.clear();
     let passes = |source: &Memory| {
         let counted = Counted(source, Default::default());
-        let found = analyze_and_keep(&input, &counted, Keep::All).unwrap();
+        let found = analyze_with_events(&input, &counted, Retention::All).unwrap();
         (found, counted.1.map(AtomicU32::into_inner))
     };
     let ((held, kept), once) = passes(&source);
@@ -236,32 +238,32 @@ fn whatever_goes_wrong_has_its_own_row_and_reason() {
     let a = analyze(&input, &source).unwrap();
     let reason = |row: usize| {
         (
-            a.presses[row].verdict.clone(),
+            a.presses[row].verdict,
             a.presses[row].reason.clone().unwrap(),
         )
     };
-    let said = |v: &str, r: &str| (v.to_owned(), r.to_owned());
-    assert_eq!(reason(52), said("missed", "never attempted"));
-    assert_eq!(reason(51), said("missed", "run stopped"));
-    assert_eq!(reason(50), said("invalid", "force limit"));
-    assert_eq!(reason(49), said("excluded", "operator"));
-    assert_eq!(reason(48), said("invalid", "no measured position"));
-    assert_eq!(reason(47), said("invalid", "no measured times"));
+    let said = |v: Verdict, r: &str| (v, r.to_owned());
+    assert_eq!(reason(52), said(Verdict::Missed, "never attempted"));
+    assert_eq!(reason(51), said(Verdict::Missed, "run stopped"));
+    assert_eq!(reason(50), said(Verdict::Invalid, "force limit"));
+    assert_eq!(reason(49), said(Verdict::Excluded, "operator"));
+    assert_eq!(reason(48), said(Verdict::Invalid, "no measured position"));
+    assert_eq!(reason(47), said(Verdict::Invalid, "no measured times"));
     assert_eq!(
         reason(46),
-        said("invalid", "data lost in window (camera 2)")
+        said(Verdict::Invalid, "data lost in window (camera 2)")
     );
-    assert_eq!(reason(45), said("excluded", "no cluster (camera 2)"));
+    assert_eq!(reason(45), said(Verdict::Excluded, "no cluster (camera 2)"));
     let (v, r) = reason(44);
     assert!(
-        v == "excluded"
+        v == Verdict::Excluded
             && r.starts_with("too few cluster events: 1")
             && r.ends_with(" < 20 (camera 2)"),
         "{r}"
     );
     let (v, r) = reason(43);
     assert!(
-        v == "excluded" && r == "outside the skin outline",
+        v == Verdict::Excluded && r == "outside the skin outline",
         "{v}: {r}"
     );
     assert!(a.counts.add_up());
@@ -361,7 +363,10 @@ fn broken_times_neither_panic_nor_pass_unseen() {
         said.contains("camera 1: 1 events are more than 10 ms out of order"),
         "{said}"
     );
-    assert!(said.contains("camera 1: 1 events lie days away"), "{said}");
+    assert!(
+        said.contains("camera 1: 1 events have timestamps days away"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -408,7 +413,7 @@ fn contradictions_are_refused_with_their_place() {
     ];
     let wanted = [
         "expected one outcome slot per planned press (53), found 52",
-        "expected the outcome of press 5 in its row of the journal, found that of press 6",
+        "expected the outcome of press 5 in its journal row, found that of press 6",
         "`eps`, found NaN px",
         "`min_samples`, found 0",
         "`crop`, found 300 px to 480 px",
@@ -474,10 +479,10 @@ proptest! {
         prop_assert!(a.counts.add_up());
         prop_assert_eq!(a.counts.planned + a.counts.sync, 53);
         for p in &a.presses {
-            prop_assert_eq!(p.verdict == "valid", p.reason.is_none());
+            prop_assert_eq!(p.verdict == Verdict::Valid, p.reason.is_none());
             prop_assert!(p.reason.as_ref().is_none_or(|r| !r.is_empty()));
         }
-        let valid_scored = a.presses.iter().filter(|p| p.role == PressRole::Score && p.verdict == "valid");
+        let valid_scored = a.presses.iter().filter(|p| p.role == PressRole::Score && p.verdict == Verdict::Valid);
         prop_assert_eq!(a.scored.rmse_mm.n as usize, valid_scored.count());
         prop_assert!(a.scored.rmse_mm.n <= a.scored.located_rate.n);
         prop_assert!(a.scored.rmse_mm.n <= a.scored_without_exclusions.rmse_mm.n);
@@ -500,14 +505,14 @@ fn a_rule_groups_what_the_reason_tells_apart() {
     }
     let a = analyze(&input, &source).unwrap();
     let (p, q) = (&a.presses[40], &a.presses[41]);
-    assert_eq!(p.verdict, "excluded", "{:?}", p.reason);
+    assert_eq!(p.verdict, Verdict::Excluded, "{:?}", p.reason);
     assert_ne!(p.reason, q.reason);
-    assert!(p.rule.as_deref().unwrap().ends_with("(camera 2)"));
+    assert_eq!(p.rule, Some(Rule::FewClusterEvents(CameraId::Two)));
     assert_eq!(p.rule, q.rule);
     assert!(
         a.presses
             .iter()
-            .all(|p| p.rule.is_some() == (p.verdict != "valid"))
+            .all(|p| p.rule.is_some() == (p.verdict != Verdict::Valid))
     );
 }
 
@@ -569,13 +574,14 @@ fn pictures_are_spread_over_the_places() {
 fn kept_events_are_those_of_the_presses_chosen() {
     let (mut input, source) = session();
     input.settings.study_presses = 10;
-    let (a, scored) = analyze_and_keep(&input, &source, Keep::Scored).unwrap();
-    let (_, all) = analyze_and_keep(&input, &source, Keep::All).unwrap();
+    let (a, scored) = analyze_with_events(&input, &source, Retention::Scored).unwrap();
+    let (_, all) = analyze_with_events(&input, &source, Retention::All).unwrap();
     assert_eq!((scored.presses.len(), all.presses.len()), (10, 20));
     assert_eq!((scored.left_out, all.left_out), (0, 0));
     assert!(all.presses.is_sorted_by_key(|k| k.row));
-    let of_scored =
-        |k: &&skinrig_analysis::kept::KeptPress| a.presses[k.row].role == PressRole::Score;
+    let of_scored = |k: &&skinrig_analysis::press_events::RetainedPress| {
+        a.presses[k.row].role == PressRole::Score
+    };
     assert!(all.presses.iter().filter(of_scored).eq(&scored.presses));
     for kept in &all.presses {
         let press = &a.presses[kept.row];
@@ -608,8 +614,8 @@ fn presses_named_by_hand_are_rows_with_that_rule() {
     let a = analyze(&input, &source).unwrap();
     assert_eq!((a.counts.valid, a.counts.excluded), (49, 1));
     assert_eq!(
-        a.presses[scored.id.index() as usize].rule.as_deref(),
-        Some("by hand")
+        a.presses[scored.id.index() as usize].rule,
+        Some(Rule::ByHand)
     );
     assert_eq!(a.scored.rmse_mm.n, 24);
     // It was attempted, so it is a failure.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use skinrig_analysis::timebase::{Ties, TimeBase};
+use skinrig_analysis::timebase::{TimeBase, TimeBaseInput};
 use skinrig_model::{
     AlignmentSettings, BoxReport, BoxTime, HostTime, Label, Mark, MarkKind, PressId, PulseTrain,
     TriggerEdge,
@@ -348,7 +348,7 @@ pub fn run(mut r: Random, boxed: Clock, cameras: [Clock; 2], c: &Conditions) -> 
 
 impl Bench {
     pub fn align(&self, limits: &AlignmentSettings) -> TimeBase {
-        let ties = Ties {
+        let ties = TimeBaseInput {
             reports: &self.reports,
             edges: [&self.edges[0], &self.edges[1]],
             channel: 0,

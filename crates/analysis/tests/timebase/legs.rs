@@ -4,7 +4,7 @@ use skinrig_analysis::LegStart;
 use skinrig_analysis::SessionInput;
 use skinrig_analysis::legs::align;
 use skinrig_analysis::result::AlignmentStatus;
-use skinrig_analysis::timebase::{Ties, TimeBase};
+use skinrig_analysis::timebase::{TimeBase, TimeBaseInput};
 use skinrig_model::{
     AlignmentSettings, AnalysisSettings, BoxReport, HostTime, RigGeometry, SkinOutline,
     StereoGeometry, TriggerEdge,
@@ -112,7 +112,7 @@ fn trains_of_one_leg_are_never_looked_for_in_another() {
         let mut aligned = input(&s);
         align(&mut aligned);
         let base = TimeBase::new(
-            &Ties {
+            &TimeBaseInput {
                 reports: &aligned.box_reports,
                 edges: [&aligned.edges[0], &aligned.edges[1]],
                 channel: 0,
@@ -199,7 +199,7 @@ fn a_leg_that_holds_nothing_changes_nothing() {
     assert_eq!(with.gaps, without.gaps);
     assert_eq!(with.legs[1].moved_us, without.legs[0].moved_us);
     let base = |input: &SessionInput| {
-        let ties = Ties {
+        let ties = TimeBaseInput {
             reports: &input.box_reports,
             edges: [&input.edges[0], &input.edges[1]],
             channel: 0,

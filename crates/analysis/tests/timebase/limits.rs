@@ -1,7 +1,7 @@
 //! Limits of the certificate: what makes a session invalid, and what the violation says.
 
 use skinrig_analysis::result::AlignmentStatus;
-use skinrig_analysis::timebase::{Ties, TimeBase};
+use skinrig_analysis::timebase::{TimeBase, TimeBaseInput};
 use skinrig_model::{AlignmentSettings, BoxReport, HostTime};
 
 use crate::bench::{Bench, CLEAN, Clock, Conditions, NOISY, Random, bench, run};
@@ -152,7 +152,7 @@ fn nothing_is_certified_without_a_press_and_nothing_is_said_without_a_box() {
         status(&b, &AlignmentSettings::default()).0,
         AlignmentStatus::NotCertified
     );
-    let ties = Ties {
+    let ties = TimeBaseInput {
         reports: &[],
         edges: [&[], &[]],
         channel: 0,

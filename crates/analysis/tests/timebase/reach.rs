@@ -1,11 +1,12 @@
 //! Reach of a map: cut wires, cameras that did not record, exchanges that end, and presses that no tie times.
 
 use skinrig_analysis::result::{AlignmentStatus, MapName};
+use skinrig_analysis::rule::Rule;
 use skinrig_analysis::timebase::Tie;
 use skinrig_analysis::{EventSource, SessionInput, analyze};
 use skinrig_model::{
     AlignmentSettings, AnalysisSettings, BoxReport, CameraId, CdEvent, HostTime, Point2, PressRole,
-    RigGeometry, SentMark, SkinOutline, StereoGeometry,
+    RigGeometry, SentMark, SkinOutline, StereoGeometry, Verdict,
 };
 use skinrig_planted as planted;
 
@@ -191,10 +192,10 @@ fn a_press_that_no_clock_reaches_is_refused_by_a_rule_that_names_itself() {
         for (press, at) in a.presses.iter().zip(&b.presses) {
             let reason = press.reason.as_deref().unwrap();
             if *at + 5e5 > 33.5e6 {
-                assert_eq!(press.verdict, "invalid");
-                assert_eq!(press.rule.as_deref(), Some("not timed (camera 2)"));
+                assert_eq!(press.verdict, Verdict::Invalid);
+                assert_eq!(press.rule, Some(Rule::NotTimed(CameraId::Two)));
                 assert!(
-                    reason.starts_with(&format!("not timed: the nearest {said} that it saw is "))
+                    reason.starts_with(&format!("not timed: the nearest {said} seen is "))
                         && reason.ends_with(" s away, expected at most 2.5 s (camera 2)"),
                     "{reason}"
                 );

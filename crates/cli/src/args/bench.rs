@@ -6,7 +6,7 @@ use clap::Args;
 use skinrig_protocol::PlantedFault;
 
 use super::values::{length_mm, limit_mm, probability, share, time_s};
-use crate::remote::What;
+use crate::remote::RunRequest;
 
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
@@ -23,11 +23,11 @@ pub struct PlanArgs {
     #[arg(long, conflicts_with = "detect")]
     pub steps: bool,
 
-    /// Draw the path, numbered, as SVG.
+    /// Draw the numbered path as SVG.
     #[arg(long, value_name = "FILE", conflicts_with = "detect")]
     pub svg: Option<PathBuf>,
 
-    /// What to press to find a difference.
+    /// Power analysis: what to press to find a difference.
     #[command(flatten)]
     pub detect: DetectArgs,
 }
@@ -35,23 +35,23 @@ pub struct PlanArgs {
 /// What to press on two skins to find a difference between them.
 #[derive(Debug, Args)]
 pub struct DetectArgs {
-    /// Propose locations x repetitions that show a difference this large between the RMSE of two skins, for example "1 mm".
+    /// Propose the locations and repetitions that would show an RMSE difference this large between two skins, for example "1 mm".
     #[arg(long, value_name = "LENGTH", value_parser = length_mm, requires = "from")]
     pub detect: Option<f64>,
 
-    /// The session whose variance is taken.
+    /// The session from which the variance is estimated.
     #[arg(long, value_name = "SESSION", requires = "detect")]
     pub from: Option<PathBuf>,
 
-    /// Probability of finding the difference.
+    /// Power: probability of detecting the difference.
     #[arg(long, value_name = "SHARE", default_value = "0.8", value_parser = probability)]
     pub power: f64,
 
-    /// Probability of claiming a difference when there is none.
+    /// Significance level: probability of claiming a difference when there is none.
     #[arg(long, value_name = "SHARE", default_value = "0.05", value_parser = probability)]
     pub alpha: f64,
 
-    /// Share of the variance between locations that the two skins have in common, from 0 (not known) to 1.
+    /// Share of the between-location variance that the two skins have in common, from 0 (unknown) to 1.
     #[arg(long, value_name = "SHARE", default_value = "0", value_parser = share)]
     pub common: f64,
 }
@@ -67,45 +67,45 @@ pub struct RunArgs {
     #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with = "replay")]
     pub overrides: Vec<String>,
 
-    /// Serve this recorded session through the device interfaces instead of a rig.
+    /// Replay this recorded session through the device interfaces instead of driving a rig.
     #[arg(long, value_name = "SESSION")]
     pub replay: Option<PathBuf>,
 
-    /// The rig file of a bench; the simulated rig when absent.
+    /// The rig file of a bench [default: the simulated rig].
     #[arg(long, value_name = "FILE", conflicts_with_all = ["replay", "level", "real_time"])]
     pub rig: Option<PathBuf>,
 
-    /// Let mismatches of the cameras of `--rig` pass (status bytes, resets, transfers, registers that read back differently), and tell the
-    /// keys of the rig file that accept them. The session says that it was recorded so.
+    /// Accept mismatches of the rig's cameras (status bytes, resets, transfers, register read-backs), and print the rig file keys that
+    /// accept them for good. The session records it.
     #[arg(long, requires = "rig")]
     pub tolerant: bool,
 
-    /// Seed of the run and of the simulated rig; the protocol's seed when absent.
+    /// Seed of the run and of the simulated rig [default: the protocol's seed].
     #[arg(long, conflicts_with = "replay")]
     pub seed: Option<u64>,
 
-    /// Simulation level (kinematic, geometric, optical); the cheapest that the protocol's scene needs when absent.
+    /// Simulation level: kinematic, geometric or optical [default: the cheapest that the protocol's scene needs].
     #[arg(long, conflicts_with = "replay")]
     pub level: Option<String>,
 
-    /// Run the simulated rig at the speed of a real one.
+    /// Run the simulated rig in real time.
     #[arg(long, conflicts_with = "replay")]
     pub real_time: bool,
 
-    /// Make this fault on purpose, for rehearsals on the simulated rig, such as camera1-stalled@hold:3 (docs/reference/runs.md lists
-    /// them). Can be given several times.
+    /// Inject this fault, to rehearse on the simulated rig: for example camera1-stalled@hold:3 (docs/reference/runs.md lists them).
+    /// Can be given several times.
     #[arg(long = "fault", value_name = "FAULT", conflicts_with = "replay")]
     pub faults: Vec<PlantedFault>,
 
-    /// Folder for the session file, its results and its report.
+    /// Folder for the session file, results and report.
     #[arg(long, value_name = "DIR", default_value = "sessions")]
     pub sessions: PathBuf,
 
-    /// Record only.
+    /// Record only; skip the analysis.
     #[arg(long)]
     pub no_analysis: bool,
 
-    /// Fail (exit code 4) when the scored RMSE is above this, in mm.
+    /// Fail (exit code 4) when the scored RMSE exceeds this, in mm.
     #[arg(long, value_name = "MM", value_parser = limit_mm)]
     pub max_rmse: Option<f64>,
 }
@@ -116,28 +116,28 @@ pub struct ResumeArgs {
     /// The session file.
     pub session: PathBuf,
 
-    /// The rig file of the bench; that of the session, where it was, when absent.
+    /// The rig file of the bench [default: the one the session was recorded with].
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
 
-    /// As `run --tolerant`, for this leg, on a bench: it is noted with the leg.
+    /// Accept camera mismatches for this leg, as `run --tolerant` does; the leg records it.
     #[arg(long, conflicts_with = "real_time")]
     pub tolerant: bool,
 
-    /// Run the simulated rig at the speed of a real one.
+    /// Run the simulated rig in real time.
     #[arg(long, conflicts_with = "rig")]
     pub real_time: bool,
 
-    /// Record only.
+    /// Record only; skip the analysis.
     #[arg(long)]
     pub no_analysis: bool,
 
-    /// Accept a robot or camera with another serial number than the session's; it is recorded.
+    /// Accept a robot or camera whose serial number differs from the session's; the leg records it.
     #[arg(long)]
     pub allow_other_device: bool,
 
-    /// Make this fault on purpose, for rehearsals on the simulated rig, such as camera1-stalled@hold:3 (docs/reference/runs.md lists
-    /// them). Can be given several times.
+    /// Inject this fault, to rehearse on the simulated rig: for example camera1-stalled@hold:3 (docs/reference/runs.md lists them).
+    /// Can be given several times.
     #[arg(long = "fault", value_name = "FAULT")]
     pub faults: Vec<PlantedFault>,
 }
@@ -145,7 +145,7 @@ pub struct ResumeArgs {
 /// Arguments of `status`.
 #[derive(Debug, Args)]
 pub struct StatusArgs {
-    /// The session file; of a folder the session that is being written, else the newest.
+    /// The session file, or a folder: its running session, or else its newest.
     #[arg(default_value = "sessions")]
     pub session: PathBuf,
 }
@@ -153,14 +153,14 @@ pub struct StatusArgs {
 /// Arguments of `control`.
 #[derive(Debug, Args)]
 pub struct ControlArgs {
-    /// The session file, or a folder in which one session is being written.
+    /// The session file, or a folder with one running session.
     pub session: PathBuf,
 
-    /// What the run is to do.
+    /// What the run should do.
     #[arg(value_enum)]
-    pub what: What,
+    pub what: RunRequest,
 
-    /// Come back only when it is done (paused, running again, ended), at most after this time (exit code 4).
+    /// Wait until the run has done it (paused, resumed, ended), but no longer than this (then exit code 4).
     #[arg(long, value_name = "TIME", value_parser = time_s)]
     pub wait: Option<f64>,
 }
@@ -168,14 +168,14 @@ pub struct ControlArgs {
 /// Arguments of `note`.
 #[derive(Debug, Args)]
 pub struct NoteArgs {
-    /// The session file, or a folder in which one session is being written.
+    /// The session file, or a folder with one running session.
     pub session: PathBuf,
 
-    /// The note.
+    /// The text of the note.
     #[arg(required = true)]
     pub text: Vec<String>,
 
-    /// Who says so; the name under which you are logged in when absent.
+    /// Author [default: your login name].
     #[arg(long, value_name = "NAME")]
     pub by: Option<String>,
 }
@@ -183,7 +183,7 @@ pub struct NoteArgs {
 /// Arguments of `devices`.
 #[derive(Debug, Args)]
 pub struct DevicesArgs {
-    /// Also ask what this rig file names: its robot library and its trigger box's port.
+    /// Also query what this rig file names: the robot library and the trigger box's port.
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
 }
@@ -191,11 +191,11 @@ pub struct DevicesArgs {
 /// Arguments of `jog`.
 #[derive(Debug, Args)]
 pub struct JogArgs {
-    /// The rig file of a bench; the simulated rig when absent.
+    /// The rig file of a bench [default: the simulated rig].
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
 
-    /// Where everything is logged; a new file in `sessions/` when absent.
+    /// The log file [default: a new file in `sessions/`].
     #[arg(long, value_name = "FILE")]
     pub log: Option<PathBuf>,
 
@@ -204,7 +204,7 @@ pub struct JogArgs {
     #[arg(long)]
     pub beyond_frame: bool,
 
-    /// Hold, rise, disarm and end after this long without a typed line.
+    /// After this long without input, hold, retract, disarm and exit.
     #[arg(long, value_name = "TIME", default_value = "5 min", value_parser = time_s)]
     pub idle: f64,
 }
@@ -212,15 +212,15 @@ pub struct JogArgs {
 /// Arguments of `watch`.
 #[derive(Debug, Args)]
 pub struct WatchArgs {
-    /// The session file; of a folder the session that is being written, else the newest. It need not be there yet.
+    /// The session file, or a folder: its running session, or else its newest. It does not have to exist yet.
     #[arg(default_value = "sessions")]
     pub session: PathBuf,
 
-    /// Show it once and end.
+    /// Print one frame and exit.
     #[arg(long)]
     pub once: bool,
 
-    /// How often to look.
+    /// How often to refresh.
     #[arg(long, value_name = "TIME", default_value = "1 s", value_parser = time_s)]
     pub every: f64,
 }

@@ -7,7 +7,7 @@ use clap::Args;
 /// Arguments of `doctor`.
 #[derive(Debug, Args)]
 pub struct DoctorArgs {
-    /// Also hold what this rig file says against what is there.
+    /// Also compare this rig file with the hardware that is connected.
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
 

@@ -18,7 +18,7 @@ pub struct AnalyzeArgs {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
 
-    /// Name of the variant; by what it changes when absent.
+    /// Name of the variant [default: what it changes].
     #[arg(long, value_name = "NAME", value_parser = crate::analyses::parse)]
     pub name: Option<String>,
 
@@ -27,11 +27,11 @@ pub struct AnalyzeArgs {
     #[arg(long)]
     pub reference_code: bool,
 
-    /// Where to write the results; beside the session when absent.
+    /// Where to write the results [default: beside the session].
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 
-    /// Fail (exit code 4) when the scored RMSE is above this, in mm.
+    /// Fail (exit code 4) when the scored RMSE exceeds this, in mm.
     #[arg(long, value_name = "MM", value_parser = limit_mm)]
     pub max_rmse: Option<f64>,
 }
@@ -39,15 +39,15 @@ pub struct AnalyzeArgs {
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub struct CompareArgs {
-    /// Two skins or more: session files, folders of sessions, or names of prototypes (all their sessions in `--sessions`).
+    /// Two or more skins: session files, folders of sessions, or names of prototypes (all of their sessions in `--sessions`).
     #[arg(required = true, num_args = 2.., value_name = "SKIN")]
     pub skins: Vec<String>,
 
-    /// Where sessions of prototypes are looked for.
+    /// Folder in which to look for the prototypes' sessions.
     #[arg(long, value_name = "DIR", default_value = "sessions")]
     pub sessions: PathBuf,
 
-    /// The file of limits: what counts as a difference. `limits.yaml` where skinrig is started, when that is there.
+    /// The limits file, which says what counts as a difference [default: `limits.yaml` in the current folder, if it exists].
     #[arg(long, value_name = "FILE")]
     pub limits: Option<PathBuf>,
 
@@ -56,31 +56,31 @@ pub struct CompareArgs {
     #[arg(long = "margin", value_name = "METRIC=MARGIN", value_parser = Margin::parse)]
     pub margins: Vec<Margin>,
 
-    /// The error that the pass rate asks about; that of the limits, else of the first skin's analysis, when absent.
+    /// Error threshold of the pass rate [default: from the limits file, or else from the first skin's analysis].
     #[arg(long, value_name = "LENGTH", value_parser = length_mm)]
     pub within: Option<f64>,
 
-    /// Compare in spite of a blocking difference with this key. Can be given several times.
+    /// Compare despite the blocking difference with this key. Can be given several times.
     #[arg(long, value_name = "KEY")]
     pub despite: Vec<String>,
 
-    /// Compare the variant of this name (`skinrig analyze --name`) of every session; the official analyses when absent.
+    /// Compare this named variant (`skinrig analyze --name`) of every session [default: the official analyses].
     #[arg(long, value_name = "NAME", value_parser = crate::analyses::parse)]
     pub analysis: Option<String>,
 
-    /// Where to write the page, and beside it the results as JSON; beside the first session when absent.
+    /// Where to write the page, with its results as JSON beside it [default: beside the first session].
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }
 
-/// What accuracy is traded for.
+/// What accuracy is traded against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum CostKind {
     /// CPU time per press.
     Cpu,
     /// Bytes per second.
     Bytes,
-    /// Time from the contact to the estimate.
+    /// Time from contact to estimate.
     Delay,
 }
 
@@ -90,23 +90,23 @@ pub struct TradeoffArgs {
     /// The session file.
     pub session: PathBuf,
 
-    /// Override one analysis setting of the session's protocol before anything is traded.
+    /// Override one analysis setting of the session's protocol first.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
 
-    /// Name the cheapest choice whose RMSE is at most this at the upper end of its 95 % interval, for example `6mm`.
+    /// Recommend the cheapest choice whose RMSE stays within this, at the upper end of its 95 % interval, for example `6mm`.
     #[arg(long, value_name = "LENGTH", value_parser = length_mm)]
     pub target_rmse: Option<f64>,
 
-    /// What is cheap with `--target-rmse`.
+    /// The cost that `--target-rmse` minimises.
     #[arg(long, value_enum, default_value = "cpu")]
     pub cost: CostKind,
 
-    /// Name the most accurate choice within this CPU time per press, for example `100us`.
+    /// Recommend the most accurate choice within this CPU time per press, for example `100us`.
     #[arg(long, value_name = "TIME", value_parser = time_s)]
     pub budget: Option<f64>,
 
-    /// Smallest share of located presses that competes; that of the session's own settings less 1 % when absent.
+    /// Smallest share of located presses for a choice to qualify [default: that of the session's own settings less 1 %].
     #[arg(long, value_name = "PERCENT", value_parser = percent)]
     pub min_located: Option<f64>,
 
@@ -114,11 +114,11 @@ pub struct TradeoffArgs {
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeats: u32,
 
-    /// Try every combination (thousands) instead of one change at a time and promising combinations.
+    /// Try every combination (thousands) instead of single changes and promising combinations.
     #[arg(long)]
     pub full: bool,
 
-    /// Where to write the page, and beside it the results as JSON; beside the session when absent.
+    /// Where to write the page, with its results as JSON beside it [default: beside the session].
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }
@@ -129,11 +129,11 @@ pub struct ReportArgs {
     /// The session file.
     pub session: PathBuf,
 
-    /// The variant of this name (`skinrig analyze --name`); the official analysis when absent.
+    /// Report this named variant (`skinrig analyze --name`) [default: the official analysis].
     #[arg(long, value_name = "NAME", value_parser = crate::analyses::parse)]
     pub analysis: Option<String>,
 
-    /// Where to write the page; beside the session when absent.
+    /// Where to write the page [default: beside the session].
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }

@@ -7,15 +7,15 @@ use clap::{Args, ValueEnum};
 /// Arguments of `sessions`.
 #[derive(Debug, Args)]
 pub struct SessionsArgs {
-    /// The folder.
+    /// The folder of sessions.
     #[arg(default_value = "sessions")]
     pub folder: PathBuf,
 
-    /// Only sessions of this prototype.
+    /// List only sessions of this prototype.
     #[arg(long)]
     pub prototype: Option<String>,
 
-    /// Only sessions with this tag. Can be given several times: with all of them.
+    /// List only sessions with this tag. Given several times, a session needs all of them.
     #[arg(long = "tag", value_name = "TAG")]
     pub tags: Vec<String>,
 }
@@ -23,15 +23,15 @@ pub struct SessionsArgs {
 /// Arguments of `prototypes`.
 #[derive(Debug, Args)]
 pub struct PrototypesArgs {
-    /// The folder.
+    /// The folder of sessions.
     #[arg(default_value = "sessions")]
     pub folder: PathBuf,
 
-    /// Only this prototype, with every session of it.
+    /// Show only this prototype, with each of its sessions.
     #[arg(long)]
     pub prototype: Option<String>,
 
-    /// List the variant of this name (`skinrig analyze --name`) of each session; the official analyses when absent.
+    /// List this named variant (`skinrig analyze --name`) of each session [default: the official analyses].
     #[arg(long, value_name = "NAME", value_parser = crate::analyses::parse)]
     pub analysis: Option<String>,
 }
@@ -42,19 +42,19 @@ pub struct TagArgs {
     /// The session file.
     pub session: PathBuf,
 
-    /// Tags to give, and with a `-` before them tags to take away.
+    /// Tags to add; a leading `-` removes a tag.
     #[arg(value_name = "TAG|-TAG")]
     pub tags: Vec<String>,
 
-    /// A tag to take away: the same as `-TAG`.
+    /// Remove this tag: the same as `-TAG`.
     #[arg(long, value_name = "TAG")]
     pub remove: Vec<String>,
 
-    /// A remark.
+    /// Add a remark.
     #[arg(long, value_name = "TEXT")]
     pub note: Option<String>,
 
-    /// Who says so; the name under which you are logged in when absent.
+    /// Author [default: your login name].
     #[arg(long, value_name = "NAME")]
     pub by: Option<String>,
 }
@@ -85,11 +85,11 @@ pub struct ImportArgs {
     #[arg(long, value_name = "FILE")]
     pub camera2: PathBuf,
 
-    /// Press positions, CSV with a header naming at least x and y.
+    /// Press positions: a CSV file whose header names at least x and y.
     #[arg(long, value_name = "CSV")]
     pub presses: PathBuf,
 
-    /// How the recording was made.
+    /// The schedule: how the recording was made.
     #[arg(long, value_name = "YAML")]
     pub schedule: PathBuf,
 
@@ -97,39 +97,39 @@ pub struct ImportArgs {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
 
-    /// Which event stream to take from a file that holds several, for example `data/left/dvs`.
+    /// Event stream to read from a file that holds several, for example `data/left/dvs`.
     #[arg(long, value_name = "NAME")]
     pub stream1: Option<String>,
 
-    /// The same for camera 2.
+    /// Likewise for camera 2.
     #[arg(long, value_name = "NAME")]
     pub stream2: Option<String>,
 
-    /// Folder for the session file, its results and its report.
+    /// Folder for the session file, results and report.
     #[arg(long, value_name = "DIR", default_value = "sessions")]
     pub sessions: PathBuf,
 
-    /// Import only; analyse later.
+    /// Import only; skip the analysis.
     #[arg(long)]
     pub no_analysis: bool,
 }
 
-/// In which formats `export` can write.
+/// Formats that `export` can write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ExportKind {
     /// Tables as Parquet, one file each.
     Parquet,
-    /// Tables as one numpy archive of structured arrays.
+    /// Tables as one NumPy archive of structured arrays.
     Npz,
     /// Tables as CSV, one file each.
     Csv,
-    /// One Prophesee RAW file per camera, bytes as recorded.
+    /// One Prophesee RAW file per camera, with the bytes as recorded.
     Raw,
     /// One bimvee HDF5 file per camera.
     Hdf5,
-    /// A folder with the session, results, report, RAW files and tables, that `skinrig verify` proves elsewhere.
+    /// A folder with the session, results, report, RAW files and tables, which `skinrig verify` can check anywhere.
     Bundle,
-    /// All of them but a bundle.
+    /// All formats except the bundle.
     All,
 }
 
@@ -144,13 +144,13 @@ impl ExportKind {
 /// Which tables `export` writes; docs/reference/exports.md describes their columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ExportTable {
-    /// One row per press, with what both cameras saw and where the skin says it was touched.
+    /// One row per press: what both cameras saw and where the skin was estimated to be touched.
     Presses,
     /// One row per metric.
     Results,
-    /// One row per sample of the robot's path.
+    /// One row per robot pose.
     Pose,
-    /// One row per event, a table for each camera.
+    /// One row per event, one table per camera.
     Events,
 }
 
@@ -160,19 +160,19 @@ pub struct ExportArgs {
     /// The session file.
     pub session: PathBuf,
 
-    /// The format. Can be given several times.
+    /// Output format. Can be given several times.
     #[arg(long = "to", value_enum, required = true)]
     pub kinds: Vec<ExportKind>,
 
-    /// Only these tables, in the formats that hold tables; all of them when absent. Can be given several times.
+    /// Write only these tables, in the formats that hold tables [default: all]. Can be given several times.
     #[arg(long, value_enum)]
     pub only: Vec<ExportTable>,
 
-    /// Folder to write into, and nowhere else; `NAME.export` (or `NAME.bundle`) beside the session when absent.
+    /// Folder to write into [default: `NAME.export`, or `NAME.bundle`, beside the session].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 
-    /// Replace files of an earlier export.
+    /// Overwrite the files of an earlier export.
     #[arg(long)]
     pub overwrite: bool,
 }
@@ -188,7 +188,7 @@ pub struct InspectArgs {
     pub gap: f64,
 }
 
-/// Which schema.
+/// The schema to print.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum SchemaKind {
     /// Protocols (`run`, `check`, `plan`).
@@ -206,7 +206,7 @@ pub enum SchemaKind {
 /// Arguments of `schema`.
 #[derive(Debug, Args)]
 pub struct SchemaArgs {
-    /// Which schema.
+    /// The schema to print.
     #[arg(value_enum, default_value = "protocol")]
     pub kind: SchemaKind,
 }
@@ -214,10 +214,10 @@ pub struct SchemaArgs {
 /// `salvage`.
 #[derive(Debug, Args)]
 pub struct SalvageArgs {
-    /// The damaged session file; its log (`-wal`) is read too when it lies beside it.
+    /// The damaged session file; its write-ahead log (`-wal`) is also read if it is beside it.
     pub session: PathBuf,
 
-    /// The new file (default: NAME.salvaged.session.sqlite beside it).
+    /// The new file [default: NAME.salvaged.session.sqlite beside it].
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }

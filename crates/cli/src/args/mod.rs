@@ -4,6 +4,7 @@ mod bench;
 mod doctor;
 mod evaluate;
 mod files;
+mod groups;
 mod values;
 
 use std::path::PathBuf;
@@ -20,6 +21,7 @@ pub use self::files::{
     ExportArgs, ExportKind, ExportTable, ImportArgs, InspectArgs, PrototypesArgs, SalvageArgs,
     SchemaArgs, SchemaKind, SessionsArgs, ShowArgs, TagArgs,
 };
+pub use self::groups::parse;
 use crate::exit::Exit;
 use crate::hil::args::{HilArgs, HoldArmArgs};
 
@@ -31,7 +33,7 @@ pub struct Cli {
     #[arg(long, global = true)]
     pub json: bool,
 
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -39,11 +41,11 @@ pub struct Cli {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Check a protocol and every motion it would make; touch nothing.
+    /// Check a protocol and every motion it would make, without moving anything.
     #[command(after_help = "Example:\n  skinrig check protocols/demo.yaml")]
     Check(ProtocolArgs),
 
-    /// Compile a protocol into steps; print them, or draw the path.
+    /// Compile a protocol into steps; print them or draw the path.
     #[command(
         after_help = "Examples:\n  skinrig plan protocols/paper-meander.yaml --svg path.svg\n  \
         skinrig plan protocols/demo.yaml --set path.meander.pitch=6mm --steps\n  \
@@ -51,7 +53,7 @@ pub enum Command {
     )]
     Plan(PlanArgs),
 
-    /// Run a protocol (on the simulated rig, or on the bench of a rig file), record, analyse, report.
+    /// Run a protocol on the simulated rig or a bench: record, analyse and report.
     #[command(after_help = "Examples:\n  skinrig run protocols/demo.yaml\n  \
         skinrig run protocols/demo.yaml --level optical --seed 7\n  \
         skinrig run protocols/quick-check.yaml --rig hil/rigs/NAME.yaml\n  \
@@ -60,16 +62,16 @@ pub enum Command {
         three times switches the motors off where the tip is. The session is closed and stays readable.")]
     Run(RunArgs),
 
-    /// Go on with a session that was cut off, stopped or ended by a fault, or in which the rig spoiled presses.
+    /// Continue a session that was interrupted, stopped or ended by a fault, or retake presses that a rig fault cost.
     #[command(
         after_help = "Examples:\n  skinrig resume sessions/NAME.session.sqlite\n  \
         skinrig resume sessions/NAME.session.sqlite --rig hil/rigs/NAME.yaml\n\n\
-        The rig is checked and the sync presses are made again; then every press without an outcome is taken, one that was\n\
-        cut off as a new attempt. A valid press is never pressed again."
+        The rig is checked and the sync presses are repeated. Then every press without an outcome is made; one that was\n\
+        interrupted becomes a new attempt. A valid press is never repeated."
     )]
     Resume(ResumeArgs),
 
-    /// Tell how a run is going, or how it ended; reads only.
+    /// Show how a run is going, or how it ended (read-only).
     #[command(after_help = "Examples:\n  skinrig status\n  \
         skinrig status sessions/NAME.session.sqlite --json")]
     Status(StatusArgs),
@@ -77,36 +79,36 @@ pub enum Command {
     /// Pause, resume, stop, abort or halt a run from another terminal.
     #[command(after_help = "Examples:\n  skinrig control sessions/ pause\n  \
         skinrig control sessions/NAME.session.sqlite pause-now --wait 30s\n\n\
-        Comes back when the run has heard it, and tells the run's state. Only the user of the run (and root) is heard.")]
+        Returns when the run has acknowledged the request, with the run's state. Only the run's own user and root may control it.")]
     Control(ControlArgs),
 
-    /// Write a note into the session of a run, with its time and your name.
+    /// Add a note to a running session, with the time and your name.
     #[command(after_help = "Example:\n  skinrig note sessions/ \"the lamp flickers\"")]
     Note(NoteArgs),
 
-    /// List what is connected: robot, cameras, trigger box; and what keeps it from being used.
+    /// List the connected robot, cameras and trigger box, and what prevents their use.
     #[command(
         after_help = "Examples:\n  skinrig devices\n  skinrig devices --rig hil/rigs/NAME.yaml"
     )]
     Devices(DevicesArgs),
 
-    /// Say whether this machine is fit for the bench: permissions, cables, versions, disk, real-time limits, clock; and what to do.
+    /// Check that this computer is ready for the bench (permissions, cables, versions, disk, real-time limits, clock) and say what to fix.
     #[command(
         after_help = "Examples:\n  skinrig doctor\n  skinrig doctor --rig hil/rigs/NAME.yaml --sessions sessions/\n\n\
         Nothing moves. Opening the trigger box's port resets the box. Exit code 3 when there is a problem."
     )]
     Doctor(DoctorArgs),
 
-    /// Move the robot by hand under the limits of the rig file, and record touched points; lines from standard input.
+    /// Move the robot with typed commands, within the rig file's limits, and record touched points.
     #[command(after_help = "Examples:\n  skinrig jog --rig hil/rigs/NAME.yaml\n  \
         printf 'z +5mm\\ntouch 20mm\\npoint nw at -30 40 0 mm\\n' | skinrig jog\n\n\
-        ctrl-C holds, rises and disarms; three times switches the motors off where the tip is. Coordinates are the robot's own. `help` lists what can be typed.")]
+        ctrl-C holds, retracts and disarms; pressed three times, it cuts the motors where the tip is. Coordinates are in the robot's frame. Type `help` for the commands.")]
     Jog(JogArgs),
 
-    /// Check a bench: every night, before a campaign, or after something was changed on it.
+    /// Run hardware-in-the-loop checks of a bench: nightly, before a campaign, or after a change.
     Hil(HilArgs),
 
-    /// Follow a run in the terminal until it ends; reads only, and cannot hold the run up.
+    /// Follow a run in the terminal until it ends (read-only; it cannot slow the run down).
     #[command(after_help = "Examples:\n  skinrig watch\n  \
         skinrig watch sessions/NAME.session.sqlite --once")]
     Watch(WatchArgs),
@@ -116,24 +118,24 @@ pub enum Command {
         skinrig sessions --prototype \"skin 7\" --tag good-skin")]
     Sessions(SessionsArgs),
 
-    /// List the prototypes of a folder: sessions, best and last RMSE, trend over time.
+    /// List the prototypes in a folder: sessions, best and latest RMSE, trend over time.
     #[command(after_help = "Examples:\n  skinrig prototypes\n  \
         skinrig prototypes sessions/ --prototype \"skin 7\"")]
     Prototypes(PrototypesArgs),
 
-    /// Give a session tags, take tags away, or remark something after the fact; the session itself stays as it is.
+    /// Add or remove tags and remarks on a session; the session file itself does not change.
     #[command(
         after_help = "Examples:\n  skinrig tag sessions/NAME.session.sqlite good-skin -bad\n  \
         skinrig tag sessions/NAME.session.sqlite --note \"the lamp had been replaced\"\n\n\
-        Without tags and note: what was said of it so far. A tag has 1 to 40 of a-z, 0-9, `.`, `_`, `-`."
+        Without tags and notes, prints those the session has. A tag has 1 to 40 of a-z, 0-9, `.`, `_`, `-`."
     )]
     Tag(TagArgs),
 
-    /// Describe one session: protocol, rig, devices, presses, losses.
+    /// Describe one session: protocol, rig, devices, presses and losses.
     #[command(after_help = "Example:\n  skinrig show sessions/NAME.session.sqlite --presses")]
     Show(ShowArgs),
 
-    /// Analyse a session; write its results beside it and print them.
+    /// Analyse a session, write the results beside it and print them.
     #[command(
         after_help = "Examples:\n  skinrig analyze sessions/NAME.session.sqlite\n  \
         skinrig analyze sessions/NAME.session.sqlite --set analysis.centroid=all_clusters --out other.json\n  \
@@ -141,49 +143,49 @@ pub enum Command {
     )]
     Analyze(AnalyzeArgs),
 
-    /// Write the HTML report of a session (analysing it first when needed).
+    /// Write a session's HTML report, analysing the session first if needed.
     #[command(
         after_help = "Example:\n  skinrig report sessions/NAME.session.sqlite --out report.html"
     )]
     Report(ReportArgs),
 
-    /// Say whether one skin is better than another: may they be compared, which is better at what, where, and why.
+    /// Compare skins: whether they are comparable, which one is better, at what, where and why.
     #[command(
         after_help = "Examples:\n  skinrig compare sessions/OLD.session.sqlite sessions/NEW.session.sqlite --margin rmse=0.5mm\n  \
         skinrig compare \"mold 3\" \"mold 4\" \"mold 5\" --sessions sessions/ --limits protocols/comparison.limits.yaml\n\n\
-        Each skin is compared with the first, place by place. Skins that may not be compared end with exit code 2 and the reason;\n\
-        --despite KEY goes on in spite of it, and the table and the page say so. docs/reference/comparison.md has the rules."
+        Each skin is compared with the first, location by location. Skins that are not comparable end with exit code 2 and the reason;\n\
+        --despite KEY overrides it, and the table and the page say so. docs/reference/comparison.md has the rules."
     )]
     Compare(CompareArgs),
 
-    /// Measure speed against accuracy on a session: estimators, windows, thinning, bins, rows.
+    /// Measure the trade of speed for accuracy on a session: estimators, windows, thinning, bins, rows.
     #[command(
         after_help = "Examples:\n  skinrig tradeoff sessions/NAME.session.sqlite\n  \
         skinrig tradeoff sessions/NAME.session.sqlite --target-rmse 6mm --budget 100us"
     )]
     Tradeoff(TradeoffArgs),
 
-    /// Recompute every checksum, count and hash of a session, or of a bundle made by `export`.
+    /// Verify every checksum, count and hash of a session or of a bundle made by `export`.
     #[command(
         after_help = "Examples:\n  skinrig verify sessions/NAME.session.sqlite\n  skinrig verify NAME.bundle"
     )]
     Verify(SessionArg),
 
-    /// Copy what is whole of a damaged session into a new file; list what is lost.
+    /// Copy the intact part of a damaged session into a new file, and list what was lost.
     #[command(
         after_help = "Example:\n  skinrig salvage sessions/NAME.session.sqlite\n\n\
-        The damaged file is only read. Exit code 4 when something is known to be lost."
+        The damaged file is only read. Exit code 4 if something is known to be lost."
     )]
     Salvage(SalvageArgs),
 
-    /// Make a session from the published dataset's files.
+    /// Import the published dataset's files as a session.
     #[command(
         after_help = "Example:\n  skinrig import --camera1 camera1.hdf5 --camera2 camera2.hdf5 \\\n    \
         --presses press_positions.csv --schedule protocols/paper-recording.schedule.yaml"
     )]
     Import(ImportArgs),
 
-    /// Write a session's data in other programs' formats.
+    /// Export a session's data to other programs' formats.
     #[command(
         after_help = "Examples:\n  skinrig export sessions/NAME.session.sqlite --to parquet --out export/\n  \
         skinrig export sessions/NAME.session.sqlite --to csv --only presses --only results\n  \
@@ -191,19 +193,19 @@ pub enum Command {
     )]
     Export(ExportArgs),
 
-    /// Print what is in a RAW, HDF5 or session file.
+    /// Print what a RAW, HDF5 or session file contains.
     #[command(after_help = "Example:\n  skinrig inspect recording.raw")]
     Inspect(InspectArgs),
 
-    /// Print the JSON Schema of protocols, schedules, rig files or limits, for editors.
+    /// Print the JSON Schema of protocols, schedules, rig files, suites or limits, for editors.
     #[command(after_help = "Example:\n  skinrig schema > skinrig.schema.json")]
     Schema(SchemaArgs),
 
-    /// Brake the robot's arm when the program that started this one dies.
+    /// Brake the robot's arm if the program that started this one dies.
     #[command(hide = true)]
     SuperviseArm,
 
-    /// Hold the arm in free air as long as the program that started this one lives.
+    /// Hold the arm in free air while the program that started this one is running.
     #[command(hide = true)]
     HoldArm(HoldArmArgs),
 }

@@ -10,7 +10,7 @@ use skinrig_protocol::Protocol;
 use skinrig_recorder::SessionReader;
 
 use crate::exit::Failure;
-use skinrig_results::RigDocument;
+use skinrig_results::{Origin, RigDocument};
 
 /// Keys of a protocol that are compared elsewhere, or that name it only.
 const NOT_OF_PROTOCOL: [&str; 10] = [
@@ -75,7 +75,8 @@ pub(super) fn facts(
     let mut flat = Vec::new();
     flatten("protocol", &protocol(header), &mut flat);
     let rig: Option<RigDocument> = serde_json::from_str(&header.rig_json).ok();
-    let kind = if header.rig_kind == "simulated" {
+    let origin = Origin::of(header);
+    let kind = if origin == Some(Origin::Simulated) {
         "simulation"
     } else {
         "bench"
@@ -91,6 +92,7 @@ pub(super) fn facts(
         prototype: header.prototype.clone(),
         started: header.started_at.clone(),
         rig_kind: header.rig_kind.clone(),
+        origin: origin.map(|origin| origin.name().to_owned()),
         rig_name: header.rig_name.clone(),
         values,
     })

@@ -19,13 +19,13 @@ use crate::sessions::{copies, originals};
 const MOST: usize = 8;
 
 /// A skin and the files of its sessions.
-pub(super) struct Found {
+pub(super) struct SkinSessions {
     pub subject: Subject,
     pub paths: Vec<PathBuf>,
 }
 
 /// Every skin that was asked for.
-pub(super) fn subjects(args: &CompareArgs) -> Result<Vec<Found>, Failure> {
+pub(super) fn subjects(args: &CompareArgs) -> Result<Vec<SkinSessions>, Failure> {
     if args.skins.len() > MOST {
         return Err(Failure::input(format!(
             "expected at most {MOST} skins, found {}\n  next: compare them in groups with a common first one",
@@ -39,7 +39,12 @@ pub(super) fn subjects(args: &CompareArgs) -> Result<Vec<Found>, Failure> {
         .collect()
 }
 
-fn one(text: &str, letter: char, folder: &Path, analysis: Option<&str>) -> Result<Found, Failure> {
+fn one(
+    text: &str,
+    letter: char,
+    folder: &Path,
+    analysis: Option<&str>,
+) -> Result<SkinSessions, Failure> {
     let place = Path::new(text);
     let (name, paths) = if place.is_dir() {
         (None, readable(place, None)?)
@@ -73,7 +78,7 @@ fn one(text: &str, letter: char, folder: &Path, analysis: Option<&str>) -> Resul
     if let Some(analysis) = analysis {
         name = format!("{name} ({})", changes(&paths, analysis)?);
     }
-    Ok(Found {
+    Ok(SkinSessions {
         subject: Subject {
             letter,
             name,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use skinrig_compare::{Choices, Metric};
+use skinrig_compare::{ComparisonOptions, Metric};
 use skinrig_protocol::Limits;
 
 use crate::args::CompareArgs;
@@ -12,7 +12,7 @@ use crate::exit::Failure;
 const FILE: &str = "limits.yaml";
 
 /// What the command line asks for.
-pub(super) fn choices(args: &CompareArgs) -> Result<Choices, Failure> {
+pub(super) fn choices(args: &CompareArgs) -> Result<ComparisonOptions, Failure> {
     let named = args.limits.as_deref();
     let file = named.or_else(|| Some(Path::new(FILE)).filter(|p| p.is_file()));
     let read = file.map(|path| {
@@ -38,11 +38,11 @@ pub(super) fn choices(args: &CompareArgs) -> Result<Choices, Failure> {
         let found = limits.margins.iter().find(|m| m.metric == metric.key())?;
         Some((metric, metric.margin(found.value)))
     });
-    Ok(Choices {
+    Ok(ComparisonOptions {
         margins: margins.collect(),
         limits: (!limits.name.is_empty()).then(|| limits.name.clone()),
         within_mm: args.within.or(limits.within_mm),
-        despite: args.despite.clone(),
-        ..Choices::default()
+        overrides: args.despite.clone(),
+        ..ComparisonOptions::default()
     })
 }

@@ -8,7 +8,7 @@ use std::io::IsTerminal;
 use std::path::PathBuf;
 
 use skinrig_analysis::{Analysis, AnalysisError};
-use skinrig_compare::{Comparison, Exchanged, Session, Subject, compare as compare_skins};
+use skinrig_compare::{Comparison, Reanalyses, Session, Subject, compare as compare_skins};
 use skinrig_model::AnalysisSettings;
 use skinrig_report::compare as report;
 
@@ -29,8 +29,8 @@ pub fn compare(args: &CompareArgs, json: bool) -> Outcome {
     let found = inputs::subjects(args)?;
     let subjects: Vec<Subject> = found.iter().map(|f| f.subject.clone()).collect();
     // Without their right to be compared nothing is analysed again.
-    let allowed = skinrig_compare::differences(&subjects, &choices.despite);
-    let may = allowed.iter().all(|d| d.next.is_none() || d.lifted);
+    let allowed = skinrig_compare::differences(&subjects, &choices.overrides);
+    let may = allowed.iter().all(|d| d.next.is_none() || d.overridden);
     let exchanged = if may { exchanged(&found)? } else { Vec::new() };
     let result = compare_skins(&subjects, &exchanged, &choices);
     let blocked = refusal(&result, args);
@@ -63,7 +63,7 @@ pub fn compare(args: &CompareArgs, json: bool) -> Outcome {
 }
 
 /// Beside the first session.
-fn beside(found: &[inputs::Found]) -> PathBuf {
+fn beside(found: &[inputs::SkinSessions]) -> PathBuf {
     let folder = found
         .first()
         .and_then(|f| f.paths.first())
@@ -111,11 +111,11 @@ fn refusal(result: &Comparison, args: &CompareArgs) -> Option<String> {
 }
 
 /// Each skin but the first, analysed with the settings of the first, and the first with its; where they differ.
-fn exchanged(found: &[inputs::Found]) -> Result<Exchanged, Failure> {
+fn exchanged(found: &[inputs::SkinSessions]) -> Result<Reanalyses, Failure> {
     let Some((first, others)) = found.split_first() else {
         return Ok(Vec::new());
     };
-    let own = |f: &inputs::Found| settings_of(&f.subject);
+    let own = |f: &inputs::SkinSessions| settings_of(&f.subject);
     others
         .iter()
         .map(|other| match (own(first), own(other)) {
@@ -162,7 +162,7 @@ fn only_locating(settings: AnalysisSettings) -> AnalysisSettings {
 }
 
 /// The sessions of a skin, analysed with other settings; studies are left out.
-fn again(found: &inputs::Found, settings: &AnalysisSettings) -> Result<Subject, Failure> {
+fn again(found: &inputs::SkinSessions, settings: &AnalysisSettings) -> Result<Subject, Failure> {
     let mut subject = found.subject.clone();
     for (session, path) in subject.sessions.iter_mut().zip(&found.paths) {
         let (aligned, _) = open(path, Choices::default())?;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use skinrig_hil::lease::{self, Standing};
+use skinrig_hil::lease::{self, LeaseState};
 use skinrig_omega3::enumerate::USB_VENDOR;
 use skinrig_recorder::writer_of;
 
@@ -37,20 +37,20 @@ pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
 
 /// Whether somebody holds the lease at `path` at this moment.
 pub(super) fn is_held(path: &Path) -> bool {
-    matches!(lease::look(path), Ok(Standing::Held { .. }))
+    matches!(lease::inspect(path), Ok(LeaseState::Held { .. }))
 }
 
 fn leased(path: &Path) -> Finding {
     let check = check(AREA, "lease", "held by nobody");
-    match lease::look(path) {
+    match lease::inspect(path) {
         Err(e) => check.not_checked(format!("cannot read {}: {e}", path.display())),
-        Ok(Standing::Free { last: None }) => check.ok("free; nobody ever took it"),
-        Ok(Standing::Free { last: Some(last) }) => check.ok(format!("free; last: {last}")),
-        Ok(Standing::Held { owner, .. }) => check.problem(
+        Ok(LeaseState::Free { last: None }) => check.ok("free; nobody ever took it"),
+        Ok(LeaseState::Free { last: Some(last) }) => check.ok(format!("free; last: {last}")),
+        Ok(LeaseState::Held { owner, .. }) => check.problem(
             owner.map_or_else(|| "somebody is just taking it".to_owned(), |o| o.to_string()),
             "let it end: `skinrig hil lease` shows who it is, `skinrig status` how a run is going",
         ),
-        Ok(Standing::Left { owner, beat_at }) => check.warning(
+        Ok(LeaseState::Abandoned { owner, beat_at }) => check.warning(
             format!("{owner} ended without releasing it, or runs on another computer; last sign of life {beat_at}"),
             "look at the arm before it is moved again; whoever takes the bench next takes it over",
         ),

@@ -35,7 +35,7 @@ fn space(case: &Case<'_>, folder: &Path) -> Finding {
             size(rate_b_s)
         ),
     );
-    let next = "make room, or give another folder with --sessions";
+    let next = "free some space, or choose another folder with --sessions";
     match (case.machine.free_b)(folder) {
         Err(why) => check.not_checked(why),
         Ok(free_b) if free_b < keep_b => check.problem(size(free_b), next),

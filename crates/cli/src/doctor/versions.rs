@@ -1,6 +1,6 @@
 //! Versions of library and firmwares against the rig file, and against what this build was written for.
 
-use skinrig_controller::says_version;
+use skinrig_controller::contains_version;
 use skinrig_protocol::rig::RigFile;
 use skinrig_trigger_box::protocol::{FIRMWARE_VERSION, PROTOCOL_VERSION};
 
@@ -34,7 +34,9 @@ fn library(case: &Case<'_>) -> Finding {
     );
     let check = check(AREA, "robot library", expected);
     match &case.survey.library {
-        Library::Loaded { version, .. } if wanted.is_some_and(|w| !says_version(version, w)) => {
+        Library::Loaded { version, .. }
+            if wanted.is_some_and(|w| !contains_version(version, w)) =>
+        {
             check.problem(format!("SDK {version}"), ACCEPT)
         }
         Library::Loaded {
@@ -102,7 +104,7 @@ fn firmware(
     let check = check(AREA, role, expected);
     match line_of(case, role).and_then(|l| l.firmware.as_deref()) {
         None => check.not_checked("it was not asked"),
-        Some(found) if wanted.is_none_or(|w| says_version(found, &w)) => check.ok(found),
+        Some(found) if wanted.is_none_or(|w| contains_version(found, &w)) => check.ok(found),
         Some(found) => check.problem(found, ACCEPT),
     }
 }

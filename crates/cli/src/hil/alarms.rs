@@ -12,7 +12,7 @@ use super::folder;
 
 /// The files of an alarm.
 #[derive(Debug)]
-pub struct Kept {
+pub struct AlarmEvidence {
     /// The folder of the history.
     home: PathBuf,
     /// The page of the night that raised it.
@@ -22,7 +22,7 @@ pub struct Kept {
 }
 
 /// Keeps the session of every alarm in `alarms/NIGHT/` beside the history, once; one entry per alarm.
-pub fn keep(history: &Path, report: &Report) -> Vec<Kept> {
+pub fn keep(history: &Path, report: &Report) -> Vec<AlarmEvidence> {
     let one = |alarm: &Alarm| {
         let night = &report.nights[alarm.raised];
         let home = history::folder_of(history, &night.folder);
@@ -32,7 +32,7 @@ pub fn keep(history: &Path, report: &Report) -> Vec<Kept> {
             Some(golden) => copy(&home.join(golden), &kept),
             None => Err("that night has no golden session".to_owned()),
         };
-        Kept {
+        AlarmEvidence {
             home: history::folder_of(history, ""),
             page: page.is_file().then_some(page),
             session,
@@ -74,7 +74,7 @@ fn plain(id: &str) -> String {
     name.trim_start_matches('.').to_owned()
 }
 
-impl Kept {
+impl AlarmEvidence {
     /// As links of a page in `folder`; `None`: of no page.
     pub fn links(&self, folder: Option<&Path>) -> Links {
         let session = self.session.as_ref().ok();

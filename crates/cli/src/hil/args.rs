@@ -7,7 +7,7 @@ use clap::{Args, Subcommand};
 /// Arguments of `hil`.
 #[derive(Debug, Args)]
 pub struct HilArgs {
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub command: HilCommand,
 }
@@ -15,7 +15,7 @@ pub struct HilArgs {
 /// The commands of `hil`.
 #[derive(Debug, Subcommand)]
 pub enum HilCommand {
-    /// Make the checks of a suite on a bench, with limits that were stated before; tell rig, skin and software apart.
+    /// Run a suite's checks on a bench against limits stated in advance, and tell rig, skin and software causes apart.
     #[command(
         after_help = "Examples:\n  skinrig hil run hil/nightly.yaml --rig hil/rigs/NAME.yaml\n  \
         skinrig hil run hil/nightly.yaml --rig hil/rigs/NAME.yaml --only identity,trigger_loopback\n\n\
@@ -29,13 +29,13 @@ pub enum HilCommand {
     )]
     Run(HilRunArgs),
 
-    /// Show who holds a bench: a suite, a run or a jog, each alone.
+    /// Show what holds a bench: one suite, run or jog at a time.
     #[command(
         after_help = "Examples:\n  skinrig hil lease\n  skinrig hil lease --rig hil/rigs/NAME.yaml"
     )]
     Lease(HilLeaseArgs),
 
-    /// What moved over the nights, since when, and whether rig, skin or software moved it, probably.
+    /// Show what changed over the nights, since when, and whether rig, skin or software is the likely cause.
     #[command(
         after_help = "Examples:\n  skinrig hil trend\n  skinrig hil trend nights/history.sqlite --series golden --html trends.html\n  \
         skinrig hil trend --rebuild nights/\n\n\
@@ -47,7 +47,7 @@ pub enum HilCommand {
     )]
     Trend(HilTrendArgs),
 
-    /// Take a change as it is: a new skin, a new baseline of the software. From that night on the series is learnt anew.
+    /// Accept a change, such as a new skin or software baseline: from that night on, the series starts a new baseline.
     #[command(
         after_help = "Examples:\n  skinrig hil accept golden/skin/press_events --night 2026-11-20T02-00-00Z-nightly --reason 'new lamp'\n  \
         skinrig hil accept --all --night 2026-11-20T02-00-00Z-nightly --reason 'new golden skin'"
@@ -58,7 +58,7 @@ pub enum HilCommand {
 /// Arguments of `hil lease`.
 #[derive(Debug, Args)]
 pub struct HilLeaseArgs {
-    /// The rig file of the bench; all leases of this computer when absent.
+    /// The rig file of the bench [default: all leases on this computer].
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
 }
@@ -81,19 +81,19 @@ pub struct HilRunArgs {
     #[arg(long, value_name = "FILE")]
     pub rig: PathBuf,
 
-    /// As `run --tolerant`, for every check and the golden campaign. What is let pass counts as a difference of the check `settings`.
+    /// Accept camera mismatches in every check and the golden campaign, as `run --tolerant` does. Accepted mismatches count as differences in the check `settings`.
     #[arg(long)]
     pub tolerant: bool,
 
-    /// Folder in which the night gets a folder of its own, with its results, its page and its golden session.
+    /// Folder in which the night gets its own folder for results, page and golden session.
     #[arg(long, value_name = "DIR", default_value = "nights")]
     pub out: PathBuf,
 
-    /// Only these checks; the others are SKIPPED.
+    /// Run only these checks; the others are SKIPPED.
     #[arg(long, value_name = "CHECK", value_delimiter = ',')]
     pub only: Option<Vec<String>>,
 
-    /// The history of nights that this one is added to; its page then says what moved over them.
+    /// The history to which this night is added; the page then shows the changes over the nights.
     #[arg(long, value_name = "FILE")]
     pub history: Option<PathBuf>,
 }
@@ -105,31 +105,31 @@ pub struct HilTrendArgs {
     #[arg(default_value = "nights/history.sqlite")]
     pub history: PathBuf,
 
-    /// Only series whose name has this in it, or that match it as a whole when it has a `*`. All are judged all the same.
+    /// Show only series whose name contains this, or matches it entirely if it has a `*`. All series are still judged.
     #[arg(long, value_name = "PATTERN")]
     pub series: Option<String>,
 
-    /// How many nights the charts in the terminal go back. All are judged all the same.
+    /// How many nights the terminal charts go back. All nights are still judged.
     #[arg(long, value_name = "N", default_value_t = 60)]
     pub nights: usize,
 
-    /// Write a page with all charts.
+    /// Write a page with every chart.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
 
-    /// The bench; without it that of the newest night.
+    /// The bench [default: that of the newest night].
     #[arg(long, value_name = "NAME")]
     pub rig: Option<String>,
 
-    /// The suite; without it that of the newest night.
+    /// The suite [default: that of the newest night].
     #[arg(long, value_name = "NAME")]
     pub suite: Option<String>,
 
-    /// First add the nights of this folder that the history does not have, from their results: makes a lost history again.
+    /// First add this folder's nights that are missing from the history, from their results; this rebuilds a lost history.
     #[arg(long, value_name = "DIR")]
     pub rebuild: Option<PathBuf>,
 
-    /// Draw with ASCII characters alone.
+    /// Draw with ASCII characters only.
     #[arg(long)]
     pub ascii: bool,
 }
@@ -141,7 +141,7 @@ pub struct HilAcceptArgs {
     #[arg(required_unless_present = "all", conflicts_with = "all")]
     pub series: Option<String>,
 
-    /// All series of the bench.
+    /// Every series of the bench.
     #[arg(long)]
     pub all: bool,
 
@@ -149,11 +149,11 @@ pub struct HilAcceptArgs {
     #[arg(long, value_name = "ID")]
     pub night: String,
 
-    /// Why.
+    /// The reason.
     #[arg(long, value_name = "TEXT")]
     pub reason: String,
 
-    /// Who says so; without it who is logged in.
+    /// Author [default: your login name].
     #[arg(long, value_name = "NAME")]
     pub by: Option<String>,
 
@@ -161,11 +161,11 @@ pub struct HilAcceptArgs {
     #[arg(long, value_name = "FILE", default_value = "nights/history.sqlite")]
     pub history: PathBuf,
 
-    /// The bench; without it that of the newest night.
+    /// The bench [default: that of the newest night].
     #[arg(long, value_name = "NAME")]
     pub rig: Option<String>,
 
-    /// The suite; without it that of the newest night.
+    /// The suite [default: that of the newest night].
     #[arg(long, value_name = "NAME")]
     pub suite: Option<String>,
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use skinrig_controller::ControlHandle;
 use skinrig_device::CameraSettings;
 use skinrig_hil::lease::Lease;
-use skinrig_hil::{Bench, Devices, Drilled, GoldenRun, Trouble};
+use skinrig_hil::{Bench, Devices, DrillResult, GoldenRun, Problem};
 use skinrig_model::{CameraId, HostDuration};
 use skinrig_nightly::{Evidence, EvidenceKind};
 use skinrig_protocol::CameraRequest;
@@ -86,7 +86,7 @@ impl Bench for RealBench {
         self.devices = None;
     }
 
-    fn camera_settings(&self, camera: CameraId) -> Result<CameraSettings, Trouble> {
+    fn camera_settings(&self, camera: CameraId) -> Result<CameraSettings, Problem> {
         let setup = &self.rig.cameras[camera.index()];
         bench::camera_settings(setup, &CameraRequest::default()).map_err(|failure| {
             let what = failure.message;
@@ -98,7 +98,7 @@ impl Bench for RealBench {
         })
     }
 
-    fn light(&mut self, light: Light) -> Result<bool, Trouble> {
+    fn set_light(&mut self, light: Light) -> Result<bool, Problem> {
         let Some(lamps) = &self.rig.hil.lamps else {
             return Ok(false);
         };
@@ -117,12 +117,12 @@ impl Bench for RealBench {
         self.rig.kind == RigKind::Emulated || self.rig.hil.drills.contains(&drill)
     }
 
-    fn watchdog_drill(&mut self) -> Result<Drilled, Trouble> {
+    fn watchdog_drill(&mut self) -> Result<DrillResult, Problem> {
         self.close();
         drill::watchdog(self)
     }
 
-    fn golden(&mut self, protocol: &Path) -> Result<GoldenRun, Trouble> {
+    fn run_golden(&mut self, protocol: &Path) -> Result<GoldenRun, Problem> {
         self.close();
         golden::golden(self, protocol)
     }
@@ -135,13 +135,13 @@ impl Bench for RealBench {
         self.firmware.clone()
     }
 
-    fn stopping(&self) -> Box<dyn Fn() -> bool> {
+    fn stop_signal(&self) -> Box<dyn Fn() -> bool> {
         let operator = self.operator.clone();
         let lost = self.lease.as_ref().map(Lease::watch);
         Box::new(move || operator.asked() || lost.as_ref().is_some_and(|lost| lost()))
     }
 
-    fn stop_asked(&self) -> bool {
+    fn stop_requested(&self) -> bool {
         self.operator.asked() || self.lease_is_lost()
     }
 
@@ -153,7 +153,7 @@ impl Bench for RealBench {
         self.lease.as_ref().is_some_and(Lease::is_lost)
     }
 
-    fn patience(&self) -> HostDuration {
+    fn timing_slack(&self) -> HostDuration {
         patience(self.rig.kind)
     }
 }

@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
 use skinrig_device::{Indenter, RealClock};
-use skinrig_hil::{Bench, Drilled, Trouble};
+use skinrig_hil::{Bench, DrillResult, Problem};
 use skinrig_model::{Point3, Robot};
 use skinrig_nightly::{Evidence, EvidenceKind};
 use skinrig_omega3::{Omega, Remark};
@@ -33,8 +33,8 @@ const SEEN_WITHIN: Duration = Duration::from_secs(2);
 /// Lets another process hold the arm, kills it, and opens the robot again to see what became of it. Every device is closed.
 ///
 /// # Errors
-/// [`Trouble`] when it could not be done.
-pub fn watchdog(bench: &mut RealBench) -> Result<Drilled, Trouble> {
+/// [`Problem`] when it could not be done.
+pub fn watchdog(bench: &mut RealBench) -> Result<DrillResult, Problem> {
     let mut holder = Holder::start(&bench.rig().file_name)?;
     let held = holder.holds(bench)?;
     let killed = Instant::now();
@@ -47,7 +47,7 @@ pub fn watchdog(bench: &mut RealBench) -> Result<Drilled, Trouble> {
     let why = why.filter(|r| matches!(r, Remark::MotorsWentOff(_)));
     let note = why.map(ToString::to_string).next();
     let at = place(&mut omega)?;
-    Ok(Drilled {
+    Ok(DrillResult {
         braked_within_s: (!live).then_some(after.as_secs_f64()),
         drop_mm: at.distance_mm(held),
         note,
@@ -61,7 +61,7 @@ struct Holder {
 }
 
 impl Holder {
-    fn start(rig: &str) -> Result<Self, Trouble> {
+    fn start(rig: &str) -> Result<Self, Problem> {
         let program = std::env::current_exe().map_err(|e| software(&e))?;
         let mut command = Command::new(program);
         command
@@ -90,7 +90,7 @@ impl Holder {
     }
 
     /// Waits until it says where it holds the arm.
-    fn holds(&mut self, bench: &RealBench) -> Result<Point3<Robot>, Trouble> {
+    fn holds(&mut self, bench: &RealBench) -> Result<Point3<Robot>, Problem> {
         let until = Instant::now() + HOLDS_WITHIN;
         loop {
             match self.lines.recv_timeout(LOOK_EVERY) {
@@ -110,7 +110,7 @@ impl Holder {
                     ));
                 }
             }
-            if bench.stop_asked() {
+            if bench.stop_requested() {
                 return Err(robot(
                     EvidenceKind::Stopped,
                     "broken off: everything is to end".to_owned(),
@@ -126,7 +126,7 @@ impl Holder {
     }
 
     /// As the system does it: no way to let go of anything.
-    fn kill(mut self) -> Result<(), Trouble> {
+    fn kill(mut self) -> Result<(), Problem> {
         self.child.kill().map_err(|e| software(&e))?;
         self.child.wait().map(drop).map_err(|e| software(&e))
     }
@@ -149,7 +149,7 @@ impl Drop for Holder {
 const LETS_GO_WITHIN: Duration = Duration::from_secs(5);
 
 /// Opens the robot as soon as it lets itself be opened; gives how long after `killed` that was.
-fn reopen(bench: &RealBench, killed: Instant) -> Result<(Omega, Duration), Trouble> {
+fn reopen(bench: &RealBench, killed: Instant) -> Result<(Omega, Duration), Problem> {
     let rig = bench.rig();
     loop {
         let config = bench::omega_config(rig).map_err(|f| software(&f.message))?;
@@ -163,13 +163,13 @@ fn reopen(bench: &RealBench, killed: Instant) -> Result<(Omega, Duration), Troub
 }
 
 /// Where the braked tip is.
-fn place(omega: &mut Omega) -> Result<Point3<Robot>, Trouble> {
+fn place(omega: &mut Omega) -> Result<Point3<Robot>, Problem> {
     let until = Instant::now() + SEEN_WITHIN;
     let mut seen = Vec::new();
     while Instant::now() < until {
         omega
             .poll(&mut seen)
-            .map_err(|e| skinrig_hil::trouble::of(&e))?;
+            .map_err(|e| skinrig_hil::device_evidence::from_error(&e))?;
         if let Some(sample) = seen.first() {
             return Ok(sample.measured);
         }
@@ -188,13 +188,13 @@ fn point(words: &str) -> Option<Point3<Robot>> {
     Some(Point3::new(next()?, next()?, next()?))
 }
 
-fn robot(kind: EvidenceKind, what: String) -> Trouble {
+fn robot(kind: EvidenceKind, what: String) -> Problem {
     Box::new(
         Evidence::new(kind, "robot", what)
             .next("see what the holder said above; then `skinrig doctor`"),
     )
 }
 
-fn software(why: &dyn std::fmt::Display) -> Trouble {
+fn software(why: &dyn std::fmt::Display) -> Problem {
     robot(EvidenceKind::Software, format!("watchdog drill: {why}"))
 }

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
-use skinrig_hil::cause;
 use skinrig_hil::findings::Findings;
-use skinrig_hil::{Bench, GoldenRun, Trouble};
+use skinrig_hil::run_evidence;
+use skinrig_hil::{Bench, GoldenRun, Problem};
 use skinrig_model::RunEnd;
 use skinrig_nightly::{Evidence, EvidenceKind, Golden};
 use skinrig_protocol::{Plan, Protocol};
@@ -20,8 +20,8 @@ use crate::{check, run};
 /// Closes every device and runs the golden campaign.
 ///
 /// # Errors
-/// [`Trouble`] when there is no session to speak of.
-pub fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Trouble> {
+/// [`Problem`] when there is no session to speak of.
+pub fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Problem> {
     let (protocol, plan) = protocol(bench, file)?;
     let folder = bench.folder().to_owned();
     let rig = bench.take_rig(&protocol)?;
@@ -39,9 +39,9 @@ pub fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Trouble> 
     .map_err(|f| trouble(EvidenceKind::Disk, "computer", &f))?;
     let mut findings = Findings::default();
     if let RunEnd::Stopped(why) = &report.end {
-        findings.saw(EvidenceKind::TimeOut, "robot", why.as_str());
+        findings.add_evidence(EvidenceKind::TimeOut, "robot", why.as_str());
     }
-    findings.evidence.extend(cause::of_run(&report));
+    findings.evidence.extend(run_evidence::from_report(&report));
     let mut golden = GoldenRun {
         files: Golden {
             session: name(&session),
@@ -72,7 +72,7 @@ pub fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Trouble> 
 }
 
 /// The protocol within what the bench bears, and its plan.
-fn protocol(bench: &RealBench, file: &Path) -> Result<(Protocol, Plan), Trouble> {
+fn protocol(bench: &RealBench, file: &Path) -> Result<(Protocol, Plan), Problem> {
     let refused = |f: Failure| trouble(EvidenceKind::Refused, "skin", &f);
     let mut protocol = check::load(file, &[]).map_err(refused)?.protocol;
     bench::tighten(&mut protocol, bench.rig());
@@ -99,6 +99,6 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
-fn trouble(kind: EvidenceKind, subject: &str, failure: &Failure) -> Trouble {
+fn trouble(kind: EvidenceKind, subject: &str, failure: &Failure) -> Problem {
     Box::new(Evidence::new(kind, subject, failure.message.as_str()))
 }

@@ -50,7 +50,7 @@ pub fn numbers(analysis: &Analysis, lost_bytes: [u64; 2], found: &mut Findings) 
         None => {
             found
                 .unmeasured(SKIN, "latency")
-                .noting("the contacts are not timed by a clock of their own");
+                .with_note("the contacts are not timed by a clock of their own");
         }
     }
     rates(analysis, found);
@@ -73,24 +73,24 @@ fn valid(analysis: &Analysis, found: &mut Findings) {
     let share = f64::from(counts.valid) / f64::from(counts.planned);
     found
         .value(SKIN, "valid", 100.0 * share)
-        .of(counts.planned as usize, PRESSES);
+        .with_samples(counts.planned as usize, PRESSES);
 }
 
 fn evidence(analysis: &Analysis, lost_bytes: [u64; 2], found: &mut Findings) {
     for violation in &analysis.alignment.violations {
         let what = format!("the clocks of the session are not aligned: {violation}");
-        found.saw(EvidenceKind::TriggerFault, "trigger box", what);
+        found.add_evidence(EvidenceKind::TriggerFault, "trigger box", what);
     }
     for finding in &analysis.findings {
         let what = format!("{}; {}", finding.evidence, finding.advice);
         let camera = finding.camera.map(|c| ["camera1", "camera2"][c.index()]);
         let (kind, subject) = witness(finding.fault, camera.unwrap_or("camera1"));
-        found.saw(kind, subject, what);
+        found.add_evidence(kind, subject, what);
     }
     for (camera, lost) in ["camera1", "camera2"].into_iter().zip(lost_bytes) {
         if lost > 0 {
             let what = format!("expected no lost data, found {lost} bytes lost");
-            found.saw(EvidenceKind::DataLost, camera, what);
+            found.add_evidence(EvidenceKind::DataLost, camera, what);
         }
     }
 }
@@ -130,7 +130,7 @@ fn estimate(found: &mut Findings, metric: &'static str, e: Estimate, unit: f64, 
         Some(value) => found.value(SKIN, metric, unit * value),
         None => found.unmeasured(SKIN, metric),
     };
-    value.of(e.n as usize, needs);
+    value.with_samples(e.n as usize, needs);
     value.interval = e
         .low
         .zip(e.high)
@@ -140,7 +140,10 @@ fn estimate(found: &mut Findings, metric: &'static str, e: Estimate, unit: f64, 
 /// Both cameras together, over the presses that are valid.
 fn rates(analysis: &Analysis, found: &mut Findings) {
     let both = |of: fn(&PressResult, usize) -> Option<f64>| -> Vec<f64> {
-        let valid = analysis.presses.iter().filter(|p| p.verdict == "valid");
+        let valid = analysis
+            .presses
+            .iter()
+            .filter(|p| p.verdict == skinrig_model::Verdict::Valid);
         let sums = valid.map(|p| Some(of(p, 0)? + of(p, 1)?));
         sums.flatten().collect()
     };
@@ -153,7 +156,9 @@ fn rates(analysis: &Analysis, found: &mut Findings) {
         let n = rates.len();
         match Sample::of(&rates) {
             Some(sample) => {
-                let value = found.value(SKIN, metric, sample.mean).of(n, PRESSES);
+                let value = found
+                    .value(SKIN, metric, sample.mean)
+                    .with_samples(n, PRESSES);
                 value.interval = sample.interval();
             }
             None => {
@@ -197,7 +202,7 @@ fn shift(start: &[&PressResult], end: &[&PressResult], found: &mut Findings) {
     let Some(axes) = axes else {
         found
             .unmeasured(SKIN, "reference_shift")
-            .of(few, REFERENCES);
+            .with_samples(few, REFERENCES);
         return;
     };
     let square: f64 = axes.iter().map(|(a, b)| (b.mean - a.mean).powi(2)).sum();
@@ -205,7 +210,7 @@ fn shift(start: &[&PressResult], end: &[&PressResult], found: &mut Findings) {
     let variance: f64 = axes.iter().map(|(a, b)| a.of_mean() + b.of_mean()).sum();
     let value = found
         .value(SKIN, "reference_shift", shift_mm)
-        .of(few, REFERENCES);
+        .with_samples(few, REFERENCES);
     if variance.is_finite() {
         let half = Z * variance.sqrt();
         value.interval = Some([(shift_mm - half).max(0.0), shift_mm + half]);
@@ -229,7 +234,7 @@ fn events(start: &[&PressResult], end: &[&PressResult], found: &mut Findings) {
     let Some((a, b)) = ratio else {
         found
             .unmeasured(SKIN, "reference_events")
-            .of(few, REFERENCES);
+            .with_samples(few, REFERENCES);
         return;
     };
     let share = b.mean / a.mean;
@@ -237,7 +242,7 @@ fn events(start: &[&PressResult], end: &[&PressResult], found: &mut Findings) {
     let relative = a.of_mean() / a.mean.powi(2) + b.of_mean() / b.mean.powi(2);
     let value = found
         .value(SKIN, "reference_events", 100.0 * share)
-        .of(few, REFERENCES);
+        .with_samples(few, REFERENCES);
     if relative.is_finite() {
         let half = Z * share * relative.sqrt();
         value.interval = Some([100.0 * (share - half), 100.0 * (share + half)]);
@@ -305,7 +310,7 @@ mod tests {
         for (fault, device) in faults {
             let (kind, subject) = witness(fault, "camera2");
             assert_eq!(subject, device, "{fault:?}");
-            let rule = RULES.iter().find(|r| r.seen.contains(&kind));
+            let rule = RULES.iter().find(|r| r.kinds.contains(&kind));
             assert_eq!(rule.and_then(|r| r.cause), Some(Cause::Rig), "{fault:?}");
         }
     }

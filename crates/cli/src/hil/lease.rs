@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use sha2::{Digest, Sha256};
-use skinrig_hil::lease::{self, Lease, Owner, Pace, Standing};
+use skinrig_hil::lease::{self, Lease, LeaseState, LeaseTiming, Owner};
 use skinrig_protocol::rig::{RigFile, RigKind};
 
 use super::args::HilLeaseArgs;
@@ -17,7 +17,7 @@ use crate::rig::bench;
 /// [`Failure::rig`] (3) when somebody else holds it: who, since when, and what to do.
 pub fn take(rig: &RigFile, what: &str) -> Result<Lease, Failure> {
     let owner = Owner::this_process(user(), host_name(), what.to_owned());
-    let lease = Lease::take(&path(rig), owner, Pace::default()).map_err(Failure::rig)?;
+    let lease = Lease::take(&path(rig), owner, LeaseTiming::default()).map_err(Failure::rig)?;
     if let Some(note) = lease.note() {
         errln!("note: the bench was {note}");
     }
@@ -61,7 +61,7 @@ pub fn lease(args: &HilLeaseArgs, json: bool) -> Outcome {
     };
     let mut shown = Vec::new();
     for path in &paths {
-        let standing = lease::look(path)
+        let standing = lease::inspect(path)
             .map_err(|e| Failure::rig(format!("{}: cannot be read: {e}", path.display())))?;
         if json {
             shown.push(described(path, &standing));
@@ -101,18 +101,18 @@ pub(crate) fn holder_of(owner: Option<&Owner>) -> String {
     )
 }
 
-fn words(standing: &Standing) -> String {
+fn words(standing: &LeaseState) -> String {
     match standing {
-        Standing::Free { last: None } => "free; nobody ever took it".to_owned(),
-        Standing::Free { last: Some(last) } => format!("free; last: {last}"),
-        Standing::Held { owner, beat_at } => {
+        LeaseState::Free { last: None } => "free; nobody ever took it".to_owned(),
+        LeaseState::Free { last: Some(last) } => format!("free; last: {last}"),
+        LeaseState::Held { owner, beat_at } => {
             let who = holder_of(owner.as_deref());
             let beat = beat_at.as_ref();
             let beat = beat.map_or(String::new(), |b| format!("; last sign of life {b}"));
             format!("held by {who}{beat}")
         }
-        Standing::Left { owner, beat_at } => {
-            let end = match owner.lives(&host_name()) {
+        LeaseState::Abandoned { owner, beat_at } => {
+            let end = match owner.is_running(&host_name()) {
                 Some(false) => "which died without releasing it",
                 _ => "whose lock is not seen here; who takes it watches for a sign of life first",
             };
@@ -121,11 +121,11 @@ fn words(standing: &Standing) -> String {
     }
 }
 
-fn described(path: &std::path::Path, standing: &Standing) -> serde_json::Value {
+fn described(path: &std::path::Path, standing: &LeaseState) -> serde_json::Value {
     let (state, owner, beat_at) = match standing {
-        Standing::Free { last } => ("free", last.as_ref(), None),
-        Standing::Held { owner, beat_at } => ("held", owner.as_ref(), beat_at.as_ref()),
-        Standing::Left { owner, beat_at } => ("left", Some(owner), Some(beat_at)),
+        LeaseState::Free { last } => ("free", last.as_ref(), None),
+        LeaseState::Held { owner, beat_at } => ("held", owner.as_ref(), beat_at.as_ref()),
+        LeaseState::Abandoned { owner, beat_at } => ("left", Some(owner), Some(beat_at)),
     };
     serde_json::json!({ "path": path, "state": state, "owner": owner, "beat_at": beat_at })
 }

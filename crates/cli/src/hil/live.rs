@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use skinrig_hil::Onlooker;
+use skinrig_hil::NightObserver;
 use skinrig_nightly::Night;
 use skinrig_protocol::suite::{Check, Suite};
 use skinrig_report::night::{self, Colour};
@@ -86,8 +86,8 @@ pub fn colour(terminal: bool) -> Colour {
     }
 }
 
-impl Onlooker for Live {
-    fn begins(&mut self, _night: &Night, check: &Check, attempt: usize) {
+impl NightObserver for Live {
+    fn attempt_started(&mut self, _night: &Night, check: &Check, attempt: usize) {
         let again = match attempt {
             1 => String::new(),
             n => format!(", attempt {n}"),
@@ -99,7 +99,7 @@ impl Onlooker for Live {
         }
     }
 
-    fn made(&mut self, night: &Night) {
+    fn check_finished(&mut self, night: &Night) {
         if let Err(e) = folder::write_json(&self.folder, night) {
             self.unwritten.get_or_insert_with(|| e.to_string());
         }

@@ -3,11 +3,11 @@
 use super::trouble;
 use crate::exit::Failure;
 use crate::rig::bench;
-use crate::rig::tolerated::Tolerated;
+use crate::rig::tolerated::ToleratedMismatches;
 use crate::signals::Operator;
 use skinrig_device::{CameraSettings, EventCamera, RealClock, Rig};
 use skinrig_hil::lease::Lease;
-use skinrig_hil::{Bench, Devices, Slot, Trouble};
+use skinrig_hil::{Bench, Devices, Problem, Slot};
 use skinrig_model::{CameraId, HostDuration};
 use skinrig_nightly::{Evidence, EvidenceKind};
 use skinrig_protocol::Protocol;
@@ -22,7 +22,7 @@ pub(crate) struct RealBench {
     pub(super) command_line: String,
     pub(super) clock: RealClock,
     pub(super) devices: Option<Devices>,
-    pub(super) tolerated: Tolerated,
+    pub(super) tolerated: ToleratedMismatches,
     pub(super) firmware: Vec<(String, String)>,
     // Last, so that it is released when every device is closed.
     pub(super) lease: Option<Lease>,
@@ -39,7 +39,7 @@ impl RealBench {
             command_line: command_line.to_owned(),
             clock: RealClock::start(),
             devices: None,
-            tolerated: Tolerated::default(),
+            tolerated: ToleratedMismatches::default(),
             firmware: Vec::new(),
             lease: None,
         }
@@ -76,7 +76,7 @@ impl RealBench {
     ///
     /// # Errors
     /// Why the first of them could not be opened.
-    pub(crate) fn take_rig(&mut self, protocol: &Protocol) -> Result<Rig, Trouble> {
+    pub(crate) fn take_rig(&mut self, protocol: &Protocol) -> Result<Rig, Problem> {
         self.close();
         self.clock = RealClock::start();
         let mut settings = Vec::new();
@@ -119,7 +119,7 @@ impl RealBench {
                 Ok(evk1) => {
                     self.tolerated.add(camera, evk1.tolerated());
                     bench::detached_camera(Box::new(evk1), self.rig.kind, self.clock)
-                        .map_err(|e| skinrig_hil::trouble::of(&e))
+                        .map_err(|e| skinrig_hil::device_evidence::from_error(&e))
                 }
                 Err(e) => Err(trouble::camera(&e, subject, held)),
             };
@@ -149,12 +149,12 @@ pub(super) fn subject(camera: CameraId) -> &'static str {
 }
 
 /// A slot of which nobody has asked yet.
-pub(super) fn closed(subject: &str) -> Trouble {
+pub(super) fn closed(subject: &str) -> Problem {
     Box::new(Evidence::new(EvidenceKind::State, subject, "not opened"))
 }
 
 /// What is wrong with this program.
-pub(super) fn software(subject: &str, failure: &Failure) -> Trouble {
+pub(super) fn software(subject: &str, failure: &Failure) -> Problem {
     Box::new(Evidence::new(
         EvidenceKind::Software,
         subject,

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use chrono::{SecondsFormat, Utc};
 use skinrig_device::RealClock;
-use skinrig_hil::runner::plan::Known;
-use skinrig_hil::{Bench as _, Tonight};
+use skinrig_hil::runner::plan::PlanInputs;
+use skinrig_hil::{Bench as _, SuiteRunner};
 use skinrig_model::HostDuration;
 use skinrig_nightly::night::NIGHT_VERSION;
 use skinrig_nightly::{Night, NightExit, Verdict, Versions};
@@ -42,12 +42,12 @@ pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
     inputs::check(&rig)?;
     known_checks(&suite, args.only.as_deref())?;
     let clock = RealClock::start();
-    let tonight = Tonight {
+    let runner = SuiteRunner {
         only: args.only.as_deref(),
-        known: known(&suite, &rig, args.only.as_deref())?,
-        ..Tonight::new(&suite, &clock)
+        inputs: plan_inputs(&suite, &rig, args.only.as_deref())?,
+        ..SuiteRunner::new(&suite, &clock)
     };
-    let planned = tonight.planned_from(0);
+    let planned = runner.planned_from(0);
     if planned > suite.budget {
         return Err(Failure::input(format!(
             "{}: budget: expected a plan of at most {}, found one of about {}\n  \
@@ -75,7 +75,7 @@ pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
     night.lease_note = lease.note().map(str::to_owned);
     let mut live = Live::new(folder.clone(), &suite);
     let mut bench = RealBench::new(rig, folder.clone(), operator, command_line).holding(lease);
-    let night = tonight.run(night, &mut bench, &mut live);
+    let night = runner.run(night, &mut bench, &mut live);
     let unwritten = live.finish();
     // Nothing is open any more.
     bench.close();
@@ -100,7 +100,7 @@ pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
                 }
                 Ok(_) => {}
                 Err(why) => errln!(
-                    "warning: no trends tonight: --history: {why}\n  \
+                    "warning: no trends for this night: --history: {why}\n  \
                      next: once that is mended, `skinrig hil trend HISTORY --rebuild {}` adds this night",
                     args.out.display()
                 ),
@@ -108,17 +108,17 @@ pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
             Ok(Exit::Night(night.exit))
         }
         Err(why) => Err(Failure::rig(format!(
-            "{}: {why}\n  next: make room or choose another folder with --out; what was measured is above",
+            "{}: {why}\n  next: free some space, or choose another folder with --out; what was measured is above",
             folder.display()
         ))),
     }
 }
 
 /// What the trends say, when they were asked for, or why they say nothing.
-type Told = Option<Result<After, String>>;
+type TrendOutcome = Option<Result<After, String>>;
 
 /// Writes the finished night in its other forms, and adds it to the history.
-fn keep(night: &Night, folder: &Path, history: Option<&Path>) -> Result<Told, String> {
+fn keep(night: &Night, folder: &Path, history: Option<&Path>) -> Result<TrendOutcome, String> {
     let write = |name: &str, text: &str| {
         folder::write(folder, name, text).map_err(|e| format!("{name}: {e}"))
     };
@@ -131,22 +131,24 @@ fn keep(night: &Night, folder: &Path, history: Option<&Path>) -> Result<Told, St
         &skinrig_nightly::junit::junit(night, &host_name()),
     )?;
     let Some(history) = history else {
-        page(Trends::NotKept)?;
+        page(Trends::NotRequested)?;
         return Ok(None);
     };
     // There before the history is touched: whatever is wrong with that, the night has its page.
-    page(Trends::Untold("the program ended before it had read them"))?;
+    page(Trends::Unavailable(
+        "the program ended before it had read them",
+    ))?;
     let after = trend::after(history, night, folder).map_err(|e| e.to_string());
     match &after {
         Ok(after) => {
             write(folder::TRENDS, &after.page().map_err(|e| e.to_string())?)?;
-            page(Trends::Told {
+            page(Trends::Available {
                 report: &after.report,
                 links: &after.links,
                 page: folder::TRENDS,
             })?;
         }
-        Err(why) => page(Trends::Untold(why))?,
+        Err(why) => page(Trends::Unavailable(why))?,
     }
     Ok(Some(after))
 }
@@ -173,9 +175,13 @@ fn known_checks(suite: &Suite, only: Option<&[String]>) -> Result<(), Failure> {
 }
 
 /// What the plan of the night relies on; reads and checks the golden protocol.
-fn known(suite: &Suite, rig: &RigFile, only: Option<&[String]>) -> Result<Known, Failure> {
+fn plan_inputs(
+    suite: &Suite,
+    rig: &RigFile,
+    only: Option<&[String]>,
+) -> Result<PlanInputs, Failure> {
     let wanted = |name: &str| only.is_none_or(|o| o.iter().any(|w| w == name));
-    let mut known = Known {
+    let mut inputs = PlanInputs {
         golden: None,
         touch_points: rig.frame.touch_off.as_ref().map(|t| t.points.len()),
     };
@@ -185,12 +191,12 @@ fn known(suite: &Suite, rig: &RigFile, only: Option<&[String]>) -> Result<Known,
             && wanted(c.name)
         {
             let checked = check::load(protocol, &[])?;
-            known.golden = Some(HostDuration::from_secs_f64(
+            inputs.golden = Some(HostDuration::from_secs_f64(
                 checked.plan.summary().duration_s,
             ));
         }
     }
-    Ok(known)
+    Ok(inputs)
 }
 
 /// A night of which nothing is known but who and when.

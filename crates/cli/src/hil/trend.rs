@@ -3,7 +3,7 @@
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
-use skinrig_hil::history::{self, Appended, Filter, HistoryError};
+use skinrig_hil::history::{self, AppendOutcome, Filter, HistoryError};
 use skinrig_nightly::trend::{Acceptance, History, Report, judge};
 use skinrig_nightly::{Night, NightExit};
 use skinrig_report::ReportError;
@@ -89,9 +89,11 @@ fn rebuild(path: &Path, nights: &Path) -> Result<(), Failure> {
         let night = history::read_night(json);
         let home = json.parent().unwrap_or(nights);
         match night.and_then(|night| history::append(path, &night, home)) {
-            Ok(Appended::New) => new += 1,
-            Ok(Appended::Known) => known += 1,
-            Err(e @ (HistoryError::NoNight { .. } | HistoryError::OtherNight { .. })) => {
+            Ok(AppendOutcome::Added) => new += 1,
+            Ok(AppendOutcome::AlreadyPresent) => known += 1,
+            Err(
+                e @ (HistoryError::InvalidNight { .. } | HistoryError::ConflictingNight { .. }),
+            ) => {
                 left += 1;
                 errln!("warning: left out: {e}");
             }

@@ -3,31 +3,31 @@
 
 use skinrig_device::DeviceError;
 use skinrig_evk1::{Evk1Error, FoundState, UsbError};
-use skinrig_hil::Trouble;
+use skinrig_hil::Problem;
 use skinrig_nightly::{Evidence, EvidenceKind};
 use skinrig_omega3::OmegaError;
 use skinrig_omega3::enumerate::Availability;
 use skinrig_protocol::rig::{BoxSetup, RigFile};
-use skinrig_trigger_box::serial::SerialDial;
-use skinrig_trigger_box::{Dial, OpenError};
+use skinrig_trigger_box::serial::SerialConnector;
+use skinrig_trigger_box::{Connector, OpenError};
 
 const DEVICES: &str = "`skinrig devices` shows what is connected, and docs/how-to/bench.md how";
 
-fn trouble(kind: EvidenceKind, subject: &str, what: &dyn std::fmt::Display) -> Trouble {
+fn trouble(kind: EvidenceKind, subject: &str, what: &dyn std::fmt::Display) -> Problem {
     Box::new(Evidence::new(kind, subject, what.to_string()).next(DEVICES))
 }
 
 /// Why the robot could not be opened.
-pub fn robot(error: &OmegaError, rig: &RigFile) -> Trouble {
+pub fn robot(error: &OmegaError, rig: &RigFile) -> Problem {
     let kind = match error {
         OmegaError::Load(_) | OmegaError::Thread(_) | OmegaError::Supervisor(_) => {
             EvidenceKind::Absent
         }
         OmegaError::NotFound { .. } => robot_not_found(rig),
         OmegaError::Config(_) => EvidenceKind::Refused,
-        OmegaError::Unfit { .. } => EvidenceKind::State,
+        OmegaError::Unsuitable { .. } => EvidenceKind::State,
         OmegaError::ReadBack { .. } => EvidenceKind::ReadBack,
-        OmegaError::Call { .. } | OmegaError::Late { .. } => EvidenceKind::DeviceLost,
+        OmegaError::Call { .. } | OmegaError::TimedOut { .. } => EvidenceKind::DeviceLost,
     };
     trouble(kind, "robot", error)
 }
@@ -51,7 +51,7 @@ fn robot_not_found(rig: &RigFile) -> EvidenceKind {
 }
 
 /// Why a camera, called `subject` in results, could not be opened.
-pub fn camera(error: &Evk1Error, subject: &str, held: usize) -> Trouble {
+pub fn camera(error: &Evk1Error, subject: &str, held: usize) -> Problem {
     let kind = match error {
         Evk1Error::NotFound { .. } => camera_not_found(held),
         Evk1Error::NotEvk1 { .. } => EvidenceKind::OtherDevice,
@@ -89,9 +89,9 @@ fn camera_not_found(held: usize) -> EvidenceKind {
 }
 
 /// Why the trigger box could not be opened.
-pub fn trigger_box(error: &DeviceError, setup: &BoxSetup) -> Trouble {
+pub fn trigger_box(error: &DeviceError, setup: &BoxSetup) -> Problem {
     let kind = match error {
-        DeviceError::Lost { .. } => match SerialDial::new(&setup.port).dial() {
+        DeviceError::Lost { .. } => match SerialConnector::new(&setup.port).connect() {
             Err(OpenError::Absent(_)) => EvidenceKind::Absent,
             Err(OpenError::Busy(_)) => EvidenceKind::Busy,
             Err(OpenError::NotPermitted(_)) => EvidenceKind::NotPermitted,

@@ -225,7 +225,7 @@ impl FileCamera {
     fn ended(&self, until_us: Option<u64>) -> Result<(), DeviceError> {
         match until_us {
             Some(now_us) if now_us > self.reached_us + LATE_START_US => Err(self.lost(format!(
-                "the recording ends after {:.0} s, but the schedule still presses at {:.0} s: expected a \
+                "the recording ends after {:.0} s, but the schedule has presses until {:.0} s: expected a \
                  recording as long as its schedule; is it the schedule of this recording?",
                 self.reached_us as f64 * 1e-6,
                 now_us as f64 * 1e-6

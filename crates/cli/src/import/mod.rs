@@ -29,7 +29,7 @@ use crate::args::ImportArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::run::{Intent, conclude, record};
 use crate::signals::Operator;
-use crate::sink::Foreknowledge;
+use crate::sink::ReplayExpectations;
 use camera::{ChunkFeed, FileCamera};
 use indenter::ScheduledIndenter;
 
@@ -57,7 +57,7 @@ pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
         .iter()
         .filter(|p| !schedule.is_used(p))
         .map(|p| (p.id, unused.clone()));
-    let known = Foreknowledge {
+    let known = ReplayExpectations {
         scheduled: true,
         timings: presses
             .iter()

@@ -13,7 +13,8 @@ use std::time::{Duration, Instant};
 
 use chrono::Utc;
 use skinrig_controller::{
-    ControlHandle, ControllerError, ControllerSettings, Floor, GuardError, Jog, Moved, Touched,
+    ControlHandle, ControllerError, ControllerSettings, Floor, GuardError, Jog, MoveOutcome,
+    TouchOutcome,
 };
 use skinrig_device::{Clock, Indenter, MotionLimits, RealClock};
 use skinrig_hil::lease::Lease;
@@ -201,7 +202,7 @@ pub fn jog(args: &JogArgs) -> Outcome {
     };
     let identity = table.jog.identity();
     outln!(
-        "{}: {} {}; coordinates of the robot; `help` tells what can be typed, ctrl-C holds, rises and disarms,\n\
+        "{}: {} {}; coordinates in the robot's frame; `help` lists the commands; ctrl-C holds, retracts and disarms;\n\
          as do {} s without a typed line (--idle)\nlog       {}",
         bench.name,
         identity.model,
@@ -235,7 +236,7 @@ pub fn jog(args: &JogArgs) -> Outcome {
     }
     match &ended {
         Ok(at) => {
-            let place = at.map_or_else(|| "nowhere seen".to_owned(), |p| words(&p));
+            let place = at.map_or_else(|| "no known pose".to_owned(), |p| words(&p));
             log.line(t, "end", &format!("disarmed at {place}"));
             outln!("disarmed at {place}");
         }
@@ -298,9 +299,11 @@ impl Table {
                     if heard.elapsed() < self.idle {
                         continue;
                     }
-                    let why = format!("nothing typed for {} s", self.idle.as_secs_f64());
+                    let why = format!("no input for {} s", self.idle.as_secs_f64());
                     log.line(self.jog.now(), "idle", &why);
-                    outln!("{why}: holds, rises and disarms; start `skinrig jog` again to go on");
+                    outln!(
+                        "{why}: holding, retracting and disarming; start `skinrig jog` again to continue"
+                    );
                     return Ok(Exit::Ok);
                 }
             };
@@ -364,8 +367,8 @@ impl Table {
         let [x, y, z] = target;
         let moved = self.jog.go(Point3::new(x, y, z), self.speed_mm_s, stop)?;
         Ok(match moved {
-            Moved::Arrived(at) => format!("at {}", words(&at)),
-            Moved::Stopped(at) => format!("stopped at {}", words(&at)),
+            MoveOutcome::Arrived(at) => format!("at {}", words(&at)),
+            MoveOutcome::Stopped(at) => format!("stopped at {}", words(&at)),
         })
     }
 
@@ -381,13 +384,13 @@ impl Table {
 
     fn touch(&mut self, way_mm: f64, stop: &dyn Fn() -> bool) -> Result<String, Refusal> {
         Ok(match self.jog.touch(self.search, way_mm, stop)? {
-            Touched::At(found) => {
+            TouchOutcome::At(found) => {
                 let [x, y, z] = found.measured.to_array();
                 self.last_touch = Some(Point3::new(x, y, z));
                 format!("touched at {}; `point NAME` records it", words(&found))
             }
-            Touched::Nothing(at) => format!("nothing touched down to {}", words(&at)),
-            Touched::Stopped(at) => format!("stopped at {}", words(&at)),
+            TouchOutcome::NotFound(at) => format!("no contact down to {}", words(&at)),
+            TouchOutcome::Stopped(at) => format!("stopped at {}", words(&at)),
         })
     }
 
@@ -426,7 +429,7 @@ impl From<ControllerError> for Refusal {
                 GuardError::StalePose { .. } | GuardError::NotArmed | GuardError::Tripped { .. },
             ) => Self::Rig(e),
             ControllerError::Guard(e @ GuardError::Floor { .. }) => Self::Input(format!(
-                "{e}\n  next: look where the skin is; when it does lie lower than the rig file's frame says, start `skinrig jog` \
+                "{e}\n  next: check where the skin is; if it lies lower than the rig file's frame says, start `skinrig jog` \
                  with --beyond-frame"
             )),
             ControllerError::Guard(e) => Self::Input(e.to_string()),

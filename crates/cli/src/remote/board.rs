@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use skinrig_controller::{ControlHandle, Progress, State};
 
 use super::server::Server;
-use super::wire::{Live, Reply, Request, What};
+use super::wire::{Live, Reply, Request, RunRequest};
 
 /// How often bulk data renew what is shown.
 const RENEW_EVERY: Duration = Duration::from_millis(100);
@@ -42,14 +42,14 @@ impl Board {
             }
             Request::Control(what) => {
                 match what {
-                    What::Pause => self.control.pause(),
-                    What::PauseNow => self.control.pause_now(),
-                    What::Resume => self.control.resume(),
-                    What::Stop => self.control.stop(),
-                    What::Abort => self.control.abort(),
-                    What::Halt => self.control.halt(),
+                    RunRequest::Pause => self.control.pause(),
+                    RunRequest::PauseNow => self.control.pause_now(),
+                    RunRequest::Resume => self.control.resume(),
+                    RunRequest::Stop => self.control.stop(),
+                    RunRequest::Abort => self.control.abort(),
+                    RunRequest::Halt => self.control.halt(),
                 }
-                Reply::Handed(self.control.asked())
+                Reply::Handed(self.control.requests_made())
             }
             Request::Note { by, text } => match self.control.note(format!("{by}: {text}")) {
                 Ok(number) => Reply::Handed(number),
@@ -61,11 +61,16 @@ impl Board {
     fn live(&self) -> Live {
         let c = &self.control;
         // What was heard first: a state that is read later is at least as new.
-        let counts = [c.heard(), c.noted()];
+        let counts = [c.requests_acknowledged(), c.notes_recorded()];
         let [heard, noted] = counts;
         let progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
         let waited_s = self.began.elapsed().as_secs_f64();
-        Live::of(&progress, c.state(), [c.asked(), heard, noted], waited_s)
+        Live::of(
+            &progress,
+            c.state(),
+            [c.requests_made(), heard, noted],
+            waited_s,
+        )
     }
 }
 
@@ -113,10 +118,13 @@ mod tests {
         let control = ControlHandle::new();
         let board = Board::new(control.clone());
         assert_eq!(
-            board.answer(Request::Control(What::Pause)),
+            board.answer(Request::Control(RunRequest::Pause)),
             Reply::Handed(1)
         );
-        assert_eq!(board.answer(Request::Control(What::Halt)), Reply::Handed(2));
+        assert_eq!(
+            board.answer(Request::Control(RunRequest::Halt)),
+            Reply::Handed(2)
+        );
         let note = Request::Note {
             by: "Ann".into(),
             text: "warm".into(),

@@ -1,34 +1,34 @@
-//! The other terminal: asks the run that writes a session.
+//! The client side: queries the run that is writing a session.
 
 use std::path::Path;
 
 use super::wire::{Reply, Request};
 
-/// Why there is no answer.
+/// Why a run gave no answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Silence {
-    /// Nobody listens: no run, or one that was killed.
-    Nobody,
-    /// Somebody does, but something went wrong.
-    Trouble(String),
+pub enum RemoteError {
+    /// No program is listening: there is no run, or it was killed.
+    NotListening,
+    /// A program is listening, but the exchange failed.
+    Failed(String),
 }
 
 /// Asks the run that writes the session at `session`.
 ///
 /// # Errors
-/// [`Silence`].
+/// [`RemoteError`].
 #[cfg(unix)]
-pub fn ask(session: &Path, request: &Request) -> Result<Reply, Silence> {
+pub fn ask(session: &Path, request: &Request) -> Result<Reply, RemoteError> {
     use std::io::ErrorKind;
     use std::os::unix::net::UnixStream;
 
-    let trouble = |e: std::io::Error| Silence::Trouble(e.to_string());
+    let trouble = |e: std::io::Error| RemoteError::Failed(e.to_string());
     for place in super::place::places(session).map_err(trouble)? {
         match UnixStream::connect(&place) {
             Ok(stream) => return talk(stream, request),
             Err(e) => match e.kind() {
                 ErrorKind::PermissionDenied => {
-                    return Err(Silence::Trouble(format!(
+                    return Err(RemoteError::Failed(format!(
                         "{}: the run belongs to another user",
                         place.display()
                     )));
@@ -38,25 +38,25 @@ pub fn ask(session: &Path, request: &Request) -> Result<Reply, Silence> {
             },
         }
     }
-    Err(Silence::Nobody)
+    Err(RemoteError::NotListening)
 }
 
 /// # Errors
 /// Always.
 #[cfg(not(unix))]
-pub fn ask(_session: &Path, _request: &Request) -> Result<Reply, Silence> {
-    Err(Silence::Nobody)
+pub fn ask(_session: &Path, _request: &Request) -> Result<Reply, RemoteError> {
+    Err(RemoteError::NotListening)
 }
 
 #[cfg(unix)]
-fn talk(stream: std::os::unix::net::UnixStream, request: &Request) -> Result<Reply, Silence> {
+fn talk(stream: std::os::unix::net::UnixStream, request: &Request) -> Result<Reply, RemoteError> {
     use std::io::{ErrorKind, Read, Write};
     use std::time::Duration;
 
     /// Longest wait for an answer: others may be before us.
     const ANSWER_WITHIN: Duration = Duration::from_secs(5);
 
-    super::place::check_peer(&stream, super::place::may_answer).map_err(Silence::Trouble)?;
+    super::place::check_peer(&stream, super::place::may_answer).map_err(RemoteError::Failed)?;
     let mut said = Vec::new();
     let mut talked = || -> std::io::Result<()> {
         let mut stream = &stream;
@@ -72,11 +72,11 @@ fn talk(stream: std::os::unix::net::UnixStream, request: &Request) -> Result<Rep
     match talked() {
         // The run ended while we asked.
         Err(e) if matches!(e.kind(), ErrorKind::BrokenPipe | ErrorKind::ConnectionReset) => {
-            Err(Silence::Nobody)
+            Err(RemoteError::NotListening)
         }
-        Err(e) => Err(Silence::Trouble(format!("no answer from the run: {e}"))),
-        Ok(()) if said.is_empty() => Err(Silence::Nobody),
+        Err(e) => Err(RemoteError::Failed(format!("no answer from the run: {e}"))),
+        Ok(()) if said.is_empty() => Err(RemoteError::NotListening),
         Ok(()) => serde_json::from_slice(&said)
-            .map_err(|e| Silence::Trouble(format!("an answer that makes no sense: {e}"))),
+            .map_err(|e| RemoteError::Failed(format!("an unreadable answer: {e}"))),
     }
 }

@@ -13,8 +13,8 @@ mod server;
 mod wire;
 
 pub use board::{Board, Remote};
-pub use client::{Silence, ask};
-pub use wire::{Live, MOST_NAME_CHARS, Reply, Request, What};
+pub use client::{RemoteError, ask};
+pub use wire::{Live, MOST_NAME_CHARS, Reply, Request, RunRequest};
 
 /// No sockets of the file system here.
 #[cfg(not(unix))]

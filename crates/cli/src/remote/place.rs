@@ -61,7 +61,7 @@ pub(crate) fn check_peer(stream: &UnixStream, may: fn(u32, u32) -> bool) -> Resu
     #[cfg(target_os = "linux")]
     {
         let peer = rustix::net::sockopt::socket_peercred(stream)
-            .map_err(|e| format!("cannot tell who is at the other end: {e}"))?
+            .map_err(|e| format!("cannot identify the other end: {e}"))?
             .uid
             .as_raw();
         let me = me();

@@ -181,8 +181,8 @@ fn hear(stream: &mut UnixStream) -> io::Result<Result<Request, String>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::client::{Silence, ask};
-    use super::super::wire::What;
+    use super::super::client::{RemoteError, ask};
+    use super::super::wire::RunRequest;
     use super::*;
 
     fn session() -> (tempfile::TempDir, PathBuf) {
@@ -194,13 +194,13 @@ mod tests {
 
     fn server(session: &Path) -> Server {
         Server::open(session, |request| match request {
-            Request::Control(What::Pause) => Reply::Handed(7),
+            Request::Control(RunRequest::Pause) => Reply::Handed(7),
             other => Reply::Refused(format!("{other:?}")),
         })
         .unwrap()
     }
 
-    const PAUSE: Request = Request::Control(What::Pause);
+    const PAUSE: Request = Request::Control(RunRequest::Pause);
 
     #[test]
     fn a_socket_that_was_left_over_is_replaced_and_the_own_one_removed() {
@@ -208,12 +208,18 @@ mod tests {
         let place = &place::places(&session).unwrap()[0];
         // A process that was killed leaves the socket, and nobody behind it.
         drop(UnixListener::bind(place).unwrap());
-        assert!(matches!(ask(&session, &PAUSE), Err(Silence::Nobody)));
+        assert!(matches!(
+            ask(&session, &PAUSE),
+            Err(RemoteError::NotListening)
+        ));
         let running = server(&session);
         assert_eq!(fs::metadata(place).unwrap().mode() & 0o777, 0o600);
         assert_eq!(ask(&session, &PAUSE), Ok(Reply::Handed(7)));
         drop(running);
-        assert!(matches!(ask(&session, &PAUSE), Err(Silence::Nobody)));
+        assert!(matches!(
+            ask(&session, &PAUSE),
+            Err(RemoteError::NotListening)
+        ));
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 

@@ -14,17 +14,17 @@ pub const MOST_NOTE_CHARS: usize = 2_000;
 /// Longest name of an operator, characters.
 pub const MOST_NAME_CHARS: usize = 64;
 
-/// What the operator wants of the run; `docs/reference/runs.md` says what each does.
+/// What the operator asks of the run; `docs/reference/runs.md` says what each does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "snake_case")]
-pub enum What {
-    /// Wait after the present press.
+pub enum RunRequest {
+    /// Wait after the current press.
     Pause,
-    /// Break the present press off, leave the skin, and wait.
+    /// Abort the current press, leave the skin, and wait.
     PauseNow,
-    /// Go on after a pause.
+    /// Continue after a pause.
     Resume,
-    /// End after the present press.
+    /// End after the current press.
     Stop,
     /// Leave the skin now, disarm, keep the data.
     Abort,
@@ -36,13 +36,13 @@ pub enum What {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Request {
-    /// How is it going?
+    /// Ask for the state of the run.
     Status,
-    /// Do this.
-    Control(What),
-    /// Write this down.
+    /// Control the run.
+    Control(RunRequest),
+    /// Add a note.
     Note {
-        /// Who says so.
+        /// Its author.
         by: String,
         /// The remark.
         text: String,
@@ -53,15 +53,15 @@ pub enum Request {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reply {
-    /// How it is going.
+    /// The state of the run.
     Live(Box<Live>),
-    /// Handed on, as the so manieth request or remark.
+    /// Accepted; the number of the request or remark.
     Handed(u64),
-    /// Not done, and why.
+    /// Refused, with the reason.
     Refused(String),
 }
 
-/// A run at one instant, as the run itself tells it.
+/// A run at one instant, as reported by the run itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Live {
     /// Name of its [`State`].
@@ -212,7 +212,7 @@ mod tests {
         };
         for request in [
             Request::Status,
-            Request::Control(What::PauseNow),
+            Request::Control(RunRequest::PauseNow),
             note("Ann", "the lamp flickers: \"40 %\""),
         ] {
             let line = serde_json::to_vec(&request).unwrap();

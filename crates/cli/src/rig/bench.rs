@@ -6,7 +6,7 @@ use std::time::Duration;
 use skinrig_controller::ControllerSettings;
 use skinrig_device::{
     CameraSettings, DetachedBox, DetachedCamera, DeviceError, EventCamera, Indenter, NoiseFilter,
-    Patience, RealClock, Rig, Roi, SyncMode, TriggerBox,
+    RealClock, Rig, Roi, SyncMode, Timeouts, TriggerBox,
 };
 use skinrig_evk1::biases::parse_bias_file;
 use skinrig_evk1::{Evk1, Evk1Config, Evk1Error, Tolerance};
@@ -21,7 +21,7 @@ use skinrig_protocol::rig::{
 };
 use skinrig_trigger_box::{SerialTriggerBox, TriggerBoxConfig};
 
-use super::tolerated::Tolerated;
+use super::tolerated::ToleratedMismatches;
 use super::{evt3_camera, requests};
 use crate::exit::Failure;
 
@@ -59,7 +59,7 @@ pub(crate) fn tighten(protocol: &mut Protocol, rig: &RigFile) {
 /// # Errors
 /// [`Failure::input`] when the file says that the sample is off: a run presses it, and an arm that lost its power must not
 /// sweep through it. [`Failure::rig`] naming the device that could not be opened and the next step.
-pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<(Rig, Tolerated), Failure> {
+pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<(Rig, ToleratedMismatches), Failure> {
     refuse_without_sample(rig)?;
     let clock = RealClock::start();
     // Settings first: a bad bias file is no reason to have opened a device.
@@ -68,7 +68,7 @@ pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<(Rig, Tolerated), Fail
         camera_settings(&rig.cameras[1], &protocol.cameras[1])?,
     ];
     let indenter = open_robot(rig, clock)?;
-    let mut tolerated = Tolerated::default();
+    let mut tolerated = ToleratedMismatches::default();
     let mut open_one = |camera: CameraId| {
         let setup = &rig.cameras[camera.index()];
         open_camera(setup, rig.kind, camera, clock, &mut tolerated)
@@ -271,14 +271,14 @@ const fn axis(of: DeviceAxis) -> Axis {
 }
 
 /// How long a device of a rig of this kind may take to answer before it counts as silent.
-const fn patience(kind: RigKind) -> Patience {
+const fn timeouts(kind: RigKind) -> Timeouts {
     match kind {
         // Stand-ins share the processors of this computer; beyond the time limit of the emulated box.
-        RigKind::Emulated => Patience {
+        RigKind::Emulated => Timeouts {
             running: HostDuration::from_millis(12_000),
             set_up: HostDuration::from_millis(60_000),
         },
-        RigKind::Bench => Patience::BENCH,
+        RigKind::Bench => Timeouts::BENCH,
     }
 }
 
@@ -291,7 +291,7 @@ pub(crate) fn detached_camera(
     kind: RigKind,
     clock: RealClock,
 ) -> Result<Box<dyn EventCamera>, DeviceError> {
-    let detached = DetachedCamera::new(device, Box::new(clock), patience(kind))?;
+    let detached = DetachedCamera::new(device, Box::new(clock), timeouts(kind))?;
     Ok(Box::new(detached))
 }
 
@@ -304,7 +304,7 @@ pub(crate) fn detached_box(
     kind: RigKind,
     clock: RealClock,
 ) -> Result<Box<dyn TriggerBox>, DeviceError> {
-    let detached = DetachedBox::new(device, Box::new(clock), patience(kind))?;
+    let detached = DetachedBox::new(device, Box::new(clock), timeouts(kind))?;
     Ok(Box::new(detached))
 }
 
@@ -313,7 +313,7 @@ pub(crate) fn open_camera(
     kind: RigKind,
     camera: CameraId,
     clock: RealClock,
-    tolerated: &mut Tolerated,
+    tolerated: &mut ToleratedMismatches,
 ) -> Result<Box<dyn EventCamera>, Failure> {
     let device = match setup.model {
         CameraKind::Evk1 => {
@@ -455,7 +455,7 @@ mod tests {
         let rig = RigFile::parse("rig.yaml", text.as_bytes(), &|_| None).ok();
         let camera = rig.as_ref().map(|r| &r.cameras[1]);
         let refused = camera.map(|c| {
-            let mut tolerated = Tolerated::default();
+            let mut tolerated = ToleratedMismatches::default();
             let clock = RealClock::start();
             open_camera(c, RigKind::Bench, CameraId::Two, clock, &mut tolerated).err()
         });

@@ -21,7 +21,7 @@ pub fn open(
     _clock: RealClock,
 ) -> Result<Box<dyn EventCamera>, Failure> {
     Err(Failure::input(format!(
-        "{camera}: expected `model: evk1`, found `{}`, which this build does not drive\n  next: build with `{BUILD}`",
+        "{camera}: expected `model: evk1`, found `{}`, which this build does not support\n  next: build with `{BUILD}`",
         setup.model
     )))
 }

@@ -29,18 +29,18 @@ pub(crate) fn of_bench(file: &RigFile, rig: &Rig, folder: &Path, expected_s: f64
         RigKind::Emulated => vec![PreflightCheck::skipped(
             "frame",
             "touched points",
-            "the stand-in's skin lies where the file says",
+            "the emulated skin lies where the rig file says",
         )],
     });
     if file.cameras.iter().any(|c| c.tolerant) {
         made.push(PreflightCheck::skipped(
             "mismatches",
-            "every mismatch of a camera refused",
+            "every camera mismatch refused",
             "--tolerant: they are let pass; the devices' settings name each with the key that accepts it",
         ));
     }
     Preflight {
-        made,
+        caller_checks: made,
         expected: ExpectedDevice::of_rig(file),
         clocks_within: Some(limits.clocks_within),
         loopback: loopback(rig, limits.loopback_within),
@@ -52,7 +52,7 @@ pub(crate) fn of_bench(file: &RigFile, rig: &Rig, folder: &Path, expected_s: f64
 pub fn of_simulated(rig: &Rig, folder: &Path, expected_b: f64) -> Preflight {
     let size_b = SIMULATED_ROOM * expected_b;
     Preflight {
-        made: vec![
+        caller_checks: vec![
             disk(folder, size_b, SIMULATED_RESERVE_B),
             PreflightCheck::skipped(
                 "frame",
@@ -97,7 +97,7 @@ fn disk(folder: &Path, session_b: f64, reserve_b: f64) -> PreflightCheck {
         size(session_b),
         size(reserve_b)
     );
-    let next = "make room, or give another folder with --sessions";
+    let next = "free some space, or choose another folder with --sessions";
     // The folder may have to be made first.
     let there = folder
         .ancestors()

@@ -34,7 +34,7 @@ pub fn all(rig: &RigFile) -> Vec<Input> {
                 found: read
                     .map(|_| file.display().to_string())
                     .map_err(|failure| failure.message),
-                next: "correct the path, which is relative to the rig file, or leave the key out"
+                next: "correct the path, which is relative to the rig file, or remove the key"
                     .to_owned(),
             });
         }
@@ -46,7 +46,7 @@ pub fn all(rig: &RigFile) -> Vec<Input> {
                 expected: "a program that this user may run".to_owned(),
                 found: program(words, std::env::var_os("PATH").as_deref())
                     .map(|path| path.display().to_string()),
-                next: "name a program that is there, by its path or by a name in PATH, or leave `hil.light` out"
+                next: "give an existing program, by its path or by a name in PATH, or remove `hil.light`"
                     .to_owned(),
             });
         }
@@ -86,7 +86,7 @@ fn program(words: &[String], path: Option<&std::ffi::OsStr>) -> Result<PathBuf, 
         return runnable(&file).map(|()| file);
     }
     let folders = path.map(std::env::split_paths).into_iter().flatten();
-    let mut why = format!("`{name}`, which is in no folder of PATH");
+    let mut why = format!("`{name}`, which is not in PATH");
     for folder in folders {
         let file = folder.join(name);
         match runnable(&file) {
@@ -105,7 +105,7 @@ fn runnable(file: &Path) -> Result<(), String> {
     let name = file.display();
     match std::fs::metadata(file) {
         Err(e) => Err(format!("`{name}`: {e}")),
-        Ok(there) if !there.is_file() => Err(format!("`{name}`, which is no file")),
+        Ok(there) if !there.is_file() => Err(format!("`{name}`, which is not a file")),
         Ok(_) => access(file, Access::EXEC_OK).map_err(|e| format!("`{name}`: {e}")),
     }
 }
@@ -114,7 +114,7 @@ fn runnable(file: &Path) -> Result<(), String> {
 fn runnable(file: &Path) -> Result<(), String> {
     match file.is_file() {
         true => Ok(()),
-        false => Err(format!("`{}`, which is no file", file.display())),
+        false => Err(format!("`{}`, which is not a file", file.display())),
     }
 }
 
@@ -152,7 +152,7 @@ mod tests {
         assert!(
             program(&words(&here), path)
                 .unwrap_err()
-                .contains("no file")
+                .contains("not a file")
         );
         assert!(program(&[], path).is_err());
     }

@@ -3,7 +3,7 @@
 use skinrig_device::Rig;
 use skinrig_model::HostTime;
 use skinrig_protocol::{FaultKind, FaultPhase, FaultTime, PlantedFault};
-use skinrig_sim::{Fault, MarkFate, Moment, When};
+use skinrig_sim::{Fault, FaultTrigger, MarkFault, MotionPhase};
 
 use crate::exit::Failure;
 
@@ -42,9 +42,9 @@ fn of_device(fault: &PlantedFault) -> Option<Fault> {
             by_us: CLOCK_STEP_US,
         },
         FaultKind::CameraHot(camera) => Fault::CameraHot { camera, when },
-        FaultKind::TriggerLost => mark(MarkFate::Lost),
-        FaultKind::TriggerDoubled => mark(MarkFate::Doubled),
-        FaultKind::TriggerDelayed => mark(MarkFate::Delayed),
+        FaultKind::TriggerLost => mark(MarkFault::Lost),
+        FaultKind::TriggerDoubled => mark(MarkFault::Doubled),
+        FaultKind::TriggerDelayed => mark(MarkFault::Delayed),
         FaultKind::BoxSilent => Fault::TriggerBoxLost(when),
         FaultKind::BoxNoisy => Fault::TriggerBoxNoisy(when),
         FaultKind::RobotLost => Fault::IndenterLost(when),
@@ -72,22 +72,22 @@ fn of_device(fault: &PlantedFault) -> Option<Fault> {
 }
 
 /// Numbers count from 1 for people, from 0 there.
-fn when(time: FaultTime) -> Option<When> {
+fn when(time: FaultTime) -> Option<FaultTrigger> {
     Some(match time {
-        FaultTime::Preflight => When::At(HostTime::ZERO),
-        FaultTime::Arming => When::Moment(Moment::Arming, 0),
-        FaultTime::Time(after) => When::At(HostTime::ZERO + after),
+        FaultTime::Preflight => FaultTrigger::At(HostTime::ZERO),
+        FaultTime::Arming => FaultTrigger::Moment(MotionPhase::Arming, 0),
+        FaultTime::Time(after) => FaultTrigger::At(HostTime::ZERO + after),
         FaultTime::Nth(phase, n) => {
             let moment = match phase {
-                FaultPhase::Travel => Moment::Travel,
-                FaultPhase::Press => Moment::Approach,
-                FaultPhase::Contact => return Some(When::Contact(n.checked_sub(1)?)),
-                FaultPhase::Hold => Moment::Hold,
-                FaultPhase::Retract => Moment::Retract,
-                FaultPhase::Between => Moment::Between,
+                FaultPhase::Travel => MotionPhase::Travel,
+                FaultPhase::Press => MotionPhase::Approach,
+                FaultPhase::Contact => return Some(FaultTrigger::Contact(n.checked_sub(1)?)),
+                FaultPhase::Hold => MotionPhase::Hold,
+                FaultPhase::Retract => MotionPhase::Retract,
+                FaultPhase::Between => MotionPhase::Between,
                 FaultPhase::Record | FaultPhase::Journal => return None,
             };
-            When::Moment(moment, n.checked_sub(1)?)
+            FaultTrigger::Moment(moment, n.checked_sub(1)?)
         }
         FaultTime::Seal => return None,
     })

@@ -8,9 +8,9 @@ use skinrig_protocol::rig::{CameraSetup, RigFile};
 
 /// What was let pass so far; goes on growing while the cameras run.
 #[derive(Debug, Clone, Default)]
-pub struct Tolerated(Vec<(CameraId, Mismatches)>);
+pub struct ToleratedMismatches(Vec<(CameraId, Mismatches)>);
 
-impl Tolerated {
+impl ToleratedMismatches {
     /// Also what this camera shows.
     pub(crate) fn add(&mut self, camera: CameraId, seen: Mismatches) {
         self.0.push((camera, seen));
@@ -20,7 +20,7 @@ impl Tolerated {
     pub(crate) fn propose(&self, rig: &RigFile) {
         if let Some(lines) = self.lines(rig) {
             errln!(
-                "warning: mismatches of cameras were let pass. What is right for your cameras goes into {}; then run without --tolerant:\n{lines}",
+                "warning: camera mismatches were accepted. Add what is right for your cameras to {}, then run without --tolerant:\n{lines}",
                 rig.file_name
             );
         }

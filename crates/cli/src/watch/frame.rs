@@ -11,7 +11,7 @@ use skinrig_recorder::{AttemptRow, PressTally, RecorderError, SessionReader};
 
 use super::signal::{Signal, signals};
 use crate::paths;
-use crate::remote::{Live, Reply, Request, Silence, ask};
+use crate::remote::{Live, RemoteError, Reply, Request, ask};
 use crate::rig::gates;
 
 /// So many of the latest presses are shown.
@@ -109,14 +109,14 @@ impl Frame {
 pub struct Follower {
     session: PathBuf,
     /// What never changes: read once.
-    head: Option<Head>,
+    head: Option<SessionInfo>,
     /// What was found of attempts before.
     signals: BTreeMap<AttemptId, [Option<Signal>; 2]>,
     /// Since when somebody writes the session whose run does not answer, or has ended.
     silent: Option<Instant>,
 }
 
-struct Head {
+struct SessionInfo {
     prototype: String,
     protocol: String,
     rig: String,
@@ -160,7 +160,7 @@ impl Follower {
     ) -> Result<Option<Frame>, RecorderError> {
         let live = match ask(&self.session, &Request::Status) {
             Ok(Reply::Live(live)) => Some(live),
-            Ok(_) | Err(Silence::Nobody | Silence::Trouble(_)) => None,
+            Ok(_) | Err(RemoteError::NotListening | RemoteError::Failed(_)) => None,
         };
         if self.leaves_alone(live.as_deref(), writer) && patience {
             return Ok(None);
@@ -207,8 +207,9 @@ impl Follower {
             kind: i.kind.name().to_owned(),
             reason: i.reason,
         });
-        let of =
-            |text: fn(&Head) -> &String| self.head.as_ref().map(text).cloned().unwrap_or_default();
+        let of = |text: fn(&SessionInfo) -> &String| {
+            self.head.as_ref().map(text).cloned().unwrap_or_default()
+        };
         Ok(Some(Frame {
             state: state(live.as_deref(), writer, end.as_ref(), sealed),
             writer: writer.map(str::to_owned),
@@ -231,9 +232,9 @@ impl Follower {
     }
 }
 
-fn head(reader: &SessionReader) -> Result<Head, RecorderError> {
+fn head(reader: &SessionReader) -> Result<SessionInfo, RecorderError> {
     let header = reader.header()?;
-    Ok(Head {
+    Ok(SessionInfo {
         prototype: header.prototype,
         protocol: header.protocol_name,
         rig: header.rig_name,
@@ -246,11 +247,11 @@ fn state(live: Option<&Live>, writer: Option<&str>, end: Option<&RunEnd>, sealed
     match (live, writer, end) {
         _ if sealed => end.map_or("sealed", RunEnd::name).to_owned(),
         (Some(live), ..) => live.state.clone(),
-        (None, Some(by), None) => format!("written by {by}, which does not answer"),
+        (None, Some(by), None) => format!("written by {by}, which does not respond"),
         (None, Some(_), Some(end)) => format!("{}, being sealed", end.name()),
         (None, None, Some(end)) => format!("{}, not sealed", end.name()),
         (None, None, None) => {
-            "cut off: nobody runs it; `skinrig resume` goes on with it".to_owned()
+            "cut off: no program is running it; `skinrig resume` continues it".to_owned()
         }
     }
 }

@@ -48,14 +48,14 @@ pub fn watch(args: &WatchArgs, json: bool) -> Outcome {
             }
             None if args.once => {
                 return Err(Failure::input(format!(
-                    "{}: expected a session, found none yet\n  next: without --once it is waited for",
+                    "{}: expected a session, found none yet\n  next: leave out --once to wait for it",
                     args.session.display()
                 )));
             }
             None if !told && follower.is_none() => {
                 told = true;
                 errln!(
-                    "{}: no session there yet; waiting for a run to begin (ctrl-C ends)",
+                    "{}: no session yet; waiting for a run to start (ctrl-C quits)",
                     args.session.display()
                 );
             }

@@ -65,7 +65,7 @@ fn a_bundle_proves_itself_elsewhere_and_finds_any_change() {
         std::fs::write(&path, good).unwrap();
     }
     std::fs::write(moved.join("more"), "x").unwrap();
-    assert!(verify().code(4).out.contains("no such file"));
+    assert!(verify().code(4).out.contains("not listed in the manifest"));
     std::fs::remove_file(moved.join("more")).unwrap();
     verify().code(0);
 

@@ -107,7 +107,7 @@ fn what_may_not_be_compared_is_refused_and_can_be_lifted_by_name() {
     assert_eq!(json["blocked"], true);
     assert_eq!(json["table"].as_array().unwrap().len(), 0);
     let same = skinrig(&["compare", &a, &a]).code(2);
-    same.complains(&["same-session", "one session stands on both sides"]);
+    same.complains(&["same-session", "is on both sides"]);
     let lifted = skinrig(&["compare", &a, &a, "--despite", "same-session"]).code(0);
     assert!(lifted.out.contains("despite   session"), "{lifted:?}");
     let page = std::fs::read_to_string(only(&lab.path("a"), "comparison.html")).unwrap();
@@ -131,7 +131,7 @@ fn other_places_are_blocking_and_then_independent() {
     let b = record(&lab, "b", "2", &["--set", places]);
     skinrig(&["compare", &a, &b])
         .code(2)
-        .complains(&["fewer than two places are shared", "--despite locations"]);
+        .complains(&["fewer than two locations are shared", "--despite locations"]);
     let json = skinrig(&["--json", "compare", &a, &b, "--despite", "locations"])
         .code(0)
         .json();

@@ -45,8 +45,8 @@ fn harmed(harm: impl FnOnce(&Lab, &Path), found: &str, kept: impl FnOnce(&Lab, &
     let kept = text(&kept(&lab, &session));
     for part in [
         found,
-        &format!("the session up to there is kept: {kept}\n"),
-        &format!("go on with `skinrig resume {kept}`"),
+        &format!("everything recorded so far is kept: {kept}\n"),
+        &format!("continue with `skinrig resume {kept}`"),
     ] {
         assert!(said.contains(part), "expected {part:?} in {said}");
     }
@@ -74,7 +74,7 @@ fn rescued(folder: &Path, session: &Path) -> PathBuf {
 fn the_file_is_renamed() {
     harmed(
         |lab, session| std::fs::rename(session, lab.path("b.session.sqlite")).unwrap(),
-        "found it moved to",
+        "it was moved to",
         |lab, _| lab.path("b.session.sqlite"),
     );
 }
@@ -83,7 +83,7 @@ fn the_file_is_renamed() {
 fn the_file_is_removed() {
     harmed(
         |_, session| std::fs::remove_file(session).unwrap(),
-        "found it removed",
+        "it was removed",
         |lab, session| rescued(&lab.path("sessions"), session),
     );
 }
@@ -92,7 +92,7 @@ fn the_file_is_removed() {
 fn the_folder_is_renamed() {
     harmed(
         |lab, _| std::fs::rename(lab.path("sessions"), lab.path("other")).unwrap(),
-        "found it moved to",
+        "it was moved to",
         |lab, session| lab.path("other").join(session.file_name().unwrap()),
     );
 }
@@ -101,7 +101,7 @@ fn the_folder_is_renamed() {
 fn the_folder_is_removed() {
     harmed(
         |lab, _| std::fs::remove_dir_all(lab.path("sessions")).unwrap(),
-        "found it removed",
+        "it was removed",
         |lab, session| rescued(lab.path("").as_path(), session),
     );
 }
@@ -110,7 +110,7 @@ fn the_folder_is_removed() {
 fn the_log_is_removed() {
     harmed(
         |_, session| std::fs::remove_file(beside(session, "-wal")).unwrap(),
-        "-wal: expected the file that this run writes, found it removed",
+        "-wal: the file of the current run is missing: it was removed",
         |_, session| session.to_owned(),
     );
 }
@@ -122,7 +122,7 @@ fn another_file_takes_its_place() {
             std::fs::write(lab.path("other"), "not a session").unwrap();
             std::fs::rename(lab.path("other"), session).unwrap();
         },
-        "found another file in its place, and its own removed",
+        "another file in its place; the original was removed",
         |lab, session| rescued(&lab.path("sessions"), session),
     );
 }
@@ -139,9 +139,9 @@ fn the_lock_file_is_removed_or_replaced() {
             std::fs::write(&lock, "").unwrap();
         }
         let path = text(&session);
-        skinrig(&["resume", &path]).code(2).complains(&[
-            "expected a session that nobody writes, found another process writing it",
-        ]);
+        skinrig(&["resume", &path])
+            .code(2)
+            .complains(&["session is in use: another process is writing it"]);
         // Under another name, where no lock file was ever.
         let link = lab.path("link.session.sqlite");
         std::fs::hard_link(&session, &link).unwrap();
@@ -163,7 +163,7 @@ fn a_paused_run_notices_it() {
             skinrig(&["control", &text(session), "pause", "--wait", "30s"]).code(0);
             std::fs::rename(session, lab.path("b.session.sqlite")).unwrap();
         },
-        "found it moved to",
+        "it was moved to",
         |lab, _| lab.path("b.session.sqlite"),
     );
 }

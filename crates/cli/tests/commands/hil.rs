@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde_json::Value;
-use skinrig_hil::lease::{Lease, Owner, Pace};
+use skinrig_hil::lease::{Lease, LeaseTiming, Owner};
 
 use crate::support::{Lab, Said, files, program, said, text};
 
@@ -133,7 +133,7 @@ fn a_bench_has_one_holder_whichever_command_asks() {
     assert_eq!(lease["state"], "free");
     let path = lease["path"].as_str().unwrap().to_owned();
     let owner = Owner::this_process("maria".into(), "lab-2".into(), "hil run nightly".into());
-    let held = Lease::take(Path::new(&path), owner, Pace::default()).unwrap();
+    let held = Lease::take(Path::new(&path), owner, LeaseTiming::default()).unwrap();
 
     let small = suite(&lab, "10 min", IDENTITY);
     let (out, log) = (lab.text("out"), lab.text("jog.log"));

@@ -258,7 +258,7 @@ fn a_killed_run_leaves_a_session_that_opens() {
     assert!(shown["totals"]["cd_events"].as_u64().unwrap() > 0);
     let words = skinrig(&["show", &text(&session)]).code(0).out;
     assert!(
-        words.contains("cut off; `skinrig resume` goes on") && words.contains("NOT SEALED"),
+        words.contains("cut off; `skinrig resume` continues it") && words.contains("NOT SEALED"),
         "{words}"
     );
     let verified = skinrig(&["verify", &text(&session)]).code(0).out;
@@ -304,7 +304,7 @@ fn a_disk_that_fills_up_stops_the_run_which_can_be_resumed() {
         // The disk was full before the header: an empty session says so.
         let header = skinrig(&["show", &text(&session)]);
         if header.code != Some(0) {
-            header.code(2).complains(&["without a record in it"]);
+            header.code(2).complains(&["without records"]);
             continue;
         }
         let shown = show(&session);

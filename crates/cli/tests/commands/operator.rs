@@ -114,7 +114,7 @@ fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
         ["note", &text(&session), "late"],
     ] {
         let refused = skinrig(&arguments).code(2);
-        refused.complains(&["sealed session, which never changes"]);
+        refused.complains(&["sealed one, which never changes"]);
     }
     assert_eq!(sha256(&std::fs::read(&session).unwrap()), before);
     let left = files(&lab.path("s"), "-control");
@@ -135,13 +135,16 @@ fn a_killed_run_is_told_from_a_running_one_and_its_socket_is_replaced() {
         (&Value::Null, &Value::Null)
     );
     let words = skinrig(&["status", &text(&session)]).code(0).out;
-    assert!(words.contains("cut off: nobody runs it"), "{words}");
+    assert!(
+        words.contains("cut off: no program is running it"),
+        "{words}"
+    );
     for arguments in [
         ["control", &text(&session), "abort"],
         ["note", &text(&session), "why?"],
     ] {
         let refused = skinrig(&arguments).code(2);
-        refused.complains(&["nobody runs", "skinrig resume"]);
+        refused.complains(&["no program is running", "skinrig resume"]);
     }
 
     // The next leg listens again, and says so.

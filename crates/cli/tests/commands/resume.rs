@@ -49,7 +49,7 @@ fn a_resumed_session_gives_the_results_of_one_that_was_never_cut_off() {
         ": cut off\n",
         "leg 2 ",
         ": completed\n",
-        "1 attempt at 1 press made again",
+        "1 attempt at 1 press retaken",
         &told,
     ] {
         assert!(said.contains(line), "expected {line:?} in {said}");

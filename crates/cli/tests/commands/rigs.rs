@@ -401,7 +401,7 @@ fn a_jog_that_nobody_uses_disarms() {
     drop(input);
     for words in [
         "0.2 s without a typed line",
-        "nothing typed for 0.2 s",
+        "no input for 0.2 s",
         "disarmed at",
     ] {
         assert!(said.contains(words), "{words}: {said}");

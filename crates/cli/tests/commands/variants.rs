@@ -149,7 +149,7 @@ fn a_copy_of_a_session_is_not_counted_again() {
     );
     skinrig(&["compare", &session, &copy])
         .code(2)
-        .complains(&["perhaps as a copy"]);
+        .complains(&["or a copy of it"]);
 }
 
 #[test]
@@ -170,7 +170,7 @@ fn an_export_made_again_is_done() {
     std::fs::write(&csv, "mine").unwrap();
     skinrig(&tables)
         .code(1)
-        .complains(&["found another", "--overwrite"]);
+        .complains(&["another file exists", "--overwrite"]);
     assert_eq!(std::fs::read_to_string(&csv).unwrap(), "mine");
 
     // An edited table whose manifest was written anew is not what the sealed session gives.

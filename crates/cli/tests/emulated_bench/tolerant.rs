@@ -5,8 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
+use serde_json::Value;
 use skinrig_emulated_bench::{CAMERA_SERIALS, EmulatedBench, Order};
-use skinrig_model::Setting;
+use skinrig_model::{PressOutcome, PressVerdict, Setting};
 use skinrig_recorder::SessionReader;
 
 use super::{said, start, the_only, top};
@@ -42,6 +43,17 @@ fn skinrig(bench: &EmulatedBench, arguments: &[&str]) -> Output {
     let mut command = bench.command(SKINRIG).unwrap();
     command.current_dir(top()).args(arguments);
     command.output().unwrap()
+}
+
+/// True once a press of the session that is being written in `sessions` has ended.
+fn has_an_outcome(sessions: &Path) -> bool {
+    let files = fs::read_dir(sessions).into_iter().flatten().flatten();
+    let named = files.map(|file| file.path());
+    let mut session = named.filter(|path| path.to_string_lossy().ends_with(".session.sqlite"));
+    let outcomes = session
+        .next()
+        .and_then(|path| SessionReader::open(path).ok()?.last_outcomes().ok());
+    outcomes.is_some_and(|outcomes| outcomes.iter().any(Option::is_some))
 }
 
 #[test]
@@ -121,6 +133,63 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
         "{}",
         said(&shown)
     );
+
+    // A later leg needs leave of its own: without it the session is refused, with it the presses that are open are made.
+    let sessions = folder.join("killed");
+    let mut command = bench.command(SKINRIG).unwrap();
+    command
+        .current_dir(top())
+        .args(["run", "--tolerant", "--no-analysis"]);
+    command.args([one_press.as_os_str(), "--rig".as_ref(), strict.as_os_str()]);
+    let mut killed = command.arg("--sessions").arg(&sessions).spawn().unwrap();
+    while !has_an_outcome(&sessions) {
+        assert!(killed.try_wait().unwrap().is_none(), "it ended by itself");
+        std::thread::yield_now();
+    }
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    let session = the_only(&sessions, ".session.sqlite");
+    let resume = |more: &[&str]| {
+        let mut arguments = vec!["resume", session.to_str().unwrap(), "--no-analysis"];
+        arguments.extend(more);
+        skinrig(&bench, &arguments)
+    };
+    let refused = resume(&[]);
+    assert_eq!(refused.status.code(), Some(3), "{}", said(&refused));
+    assert!(said(&refused).contains("--tolerant"), "{}", said(&refused));
+    let resumed = resume(&["--tolerant"]);
+    assert!(resumed.status.success(), "{}", said(&resumed));
+    let verified = skinrig(&bench, &["verify", session.to_str().unwrap()]);
+    assert!(verified.status.success(), "{}", said(&verified));
+    let outcomes = SessionReader::open(&session)
+        .unwrap()
+        .last_outcomes()
+        .unwrap();
+    let valid =
+        |o: &Option<PressOutcome>| o.as_ref().is_some_and(|o| o.verdict == PressVerdict::Valid);
+    assert!(outcomes.iter().all(valid), "{outcomes:?}");
+
+    // At night every check opens the cameras, and what was accepted is a difference that `settings` counts: never a good night.
+    let nights = folder.join("nights");
+    let mut arguments = vec![
+        "hil",
+        "run",
+        "--json",
+        "hil/nightly.yaml",
+        "--only",
+        "settings",
+    ];
+    arguments.extend(["--rig", strict.to_str().unwrap()]);
+    arguments.extend(["--out", nights.to_str().unwrap(), "--tolerant"]);
+    let night = skinrig(&bench, &arguments);
+    let result: Value = serde_json::from_slice(&night.stdout).unwrap_or_default();
+    let checks = result["checks"].as_array().cloned().unwrap_or_default();
+    let settings = checks.iter().find(|c| c["name"] == "settings").unwrap();
+    assert_eq!(settings["verdict"], "INVALID", "{settings:#}");
+    assert_eq!(settings["cause"], "rig", "{settings:#}");
+    let camera2 = &settings["attempts"][0]["parts"][1]["measurements"][0];
+    assert_eq!(camera2["value"], 3.0, "{settings:#}");
+    assert_ne!(night.status.code(), Some(0), "{}", said(&night));
 
     // The lines in the rig file: opened without a word, transfers that fail included.
     let accepting = rig(folder, &lines);

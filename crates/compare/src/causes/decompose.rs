@@ -1,15 +1,15 @@
-//! Owns the arithmetic of the causes: parts of a mean square error, and the change of each.
+//! Splits a mean square error into parts and attributes the change of each part to factors.
 
 use super::factor::Factor;
-use super::presses::{One, Pressed};
+use super::presses::{PressFactors, SkinPresses};
 
-/// A change of the logarithm of the clusters' excess that is none.
-const LEAST_EXCESS: f64 = 0.05;
+/// Smaller changes of ln(cluster excess) count as no change.
+const MIN_EXCESS: f64 = 0.05;
 
-/// A bias smaller than this share of what is left is not told from none.
-const LEAST_BIAS: f64 = 0.05;
+/// A bias below this share of scatter + bias is indistinguishable from zero.
+const MIN_BIAS: f64 = 0.05;
 
-/// In the order of [`Parts::of`].
+/// Same order as [`ChangeParts::by_factor`].
 pub(super) const FACTORS: [Factor; 7] = [
     Factor::Settings,
     Factor::Calibration,
@@ -20,61 +20,66 @@ pub(super) const FACTORS: [Factor; 7] = [
     Factor::Skin,
 ];
 
-/// The change of a mean square error, and what carries it, mm².
+/// Change of the mean square error and its parts, mm².
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Parts {
+pub(super) struct ChangeParts {
     pub mse: [f64; 2],
     pub change: f64,
-    /// By factor; adds up to `change`.
-    pub of: [f64; FACTORS.len()],
+    /// Indexed like [`FACTORS`]; adds up to `change`.
+    pub by_factor: [f64; FACTORS.len()],
 }
 
-/// One skin in one world.
+/// Error budget of one skin under one set of analysis settings, mm² unless stated.
 #[derive(Debug, Clone, Copy)]
-struct Taken {
+struct ErrorBudget {
     mse: f64,
     calibration: f64,
     robot: f64,
-    /// What is left between repetitions at one place, and what stays at a place.
+    /// Variance between repetitions at one location, and the error that all repetitions at a location share.
     scatter: f64,
     bias: f64,
-    /// Logarithms of 1 / n, w², q and of the noise.
+    /// Natural logarithms of 1 / n, w², q and the idle event rate.
     per_event: f64,
     width2: f64,
     excess: f64,
     idle: f64,
 }
 
-/// What carries the change from the first to the second skin. With two worlds (the settings of the first, those of the
-/// second) the mean of both counts, and what is left is the settings'.
-pub(super) fn contributions(worlds: &[[Pressed; 2]], places: &[usize]) -> Parts {
-    let taken: Vec<[Taken; 2]> = worlds
+/// Attributes the change from the first to the second skin to factors. With two variants (settings of the first skin,
+/// settings of the second) both are averaged, and the remainder is the contribution of the settings.
+pub(super) fn contributions(variants: &[[SkinPresses; 2]], locations: &[usize]) -> ChangeParts {
+    let budgets: Vec<[ErrorBudget; 2]> = variants
         .iter()
-        .map(|pair| [take(&pair[0], places), take(&pair[1], places)])
+        .map(|pair| {
+            [
+                error_budget(&pair[0], locations),
+                error_budget(&pair[1], locations),
+            ]
+        })
         .collect();
-    let mse = [taken[0][0].mse, taken[taken.len() - 1][1].mse];
-    let mut parts = Parts {
+    let mse = [budgets[0][0].mse, budgets[budgets.len() - 1][1].mse];
+    let mut parts = ChangeParts {
         mse,
         change: mse[1] - mse[0],
-        ..Parts::default()
+        ..ChangeParts::default()
     };
-    for pair in &taken {
-        for (sum, part) in parts.of.iter_mut().zip(change(pair)) {
-            *sum += part / taken.len() as f64;
+    for pair in &budgets {
+        for (sum, part) in parts.by_factor.iter_mut().zip(split_change(pair)) {
+            *sum += part / budgets.len() as f64;
         }
     }
-    parts.of[0] = parts.change - parts.of.iter().skip(1).sum::<f64>();
-    if taken.len() == 1 {
-        // Nothing but rounding is left.
-        parts.of[0] = 0.0;
+    parts.by_factor[0] = parts.change - parts.by_factor.iter().skip(1).sum::<f64>();
+    if budgets.len() == 1 {
+        // Only rounding errors remain.
+        parts.by_factor[0] = 0.0;
     }
     parts
 }
 
-fn take(of: &Pressed, places: &[usize]) -> Taken {
-    let presses: Vec<&One> = places.iter().flat_map(|i| of.at(*i)).collect();
+fn error_budget(of: &SkinPresses, locations: &[usize]) -> ErrorBudget {
+    let presses: Vec<&PressFactors> = locations.iter().flat_map(|i| of.at(*i)).collect();
     let n = presses.len() as f64;
-    let mean = |value: &dyn Fn(&One) -> f64| {
+    let mean = |value: &dyn Fn(&PressFactors) -> f64| {
         let values = presses.iter().map(|o| value(o)).filter(|v| v.is_finite());
         let (sum, count) = values.fold((0.0, 0.0), |(s, c), v| (s + v, c + 1.0));
         sum / count
@@ -82,7 +87,7 @@ fn take(of: &Pressed, places: &[usize]) -> Taken {
     let square = |v: [f64; 2]| v[0] * v[0] + v[1] * v[1];
     let mse = mean(&|o| square(o.used));
     let fitted = mean(&|o| square(o.fitted));
-    let centre = |of: fn(&One) -> [f64; 2]| [mean(&|o| of(o)[0]), mean(&|o| of(o)[1])];
+    let centre = |of: fn(&PressFactors) -> [f64; 2]| [mean(&|o| of(o)[0]), mean(&|o| of(o)[1])];
     let (error, off) = (centre(|o| o.fitted), centre(|o| o.off_plan));
     let (mut together, mut alone) = (0.0, 0.0);
     for o in &presses {
@@ -93,23 +98,23 @@ fn take(of: &Pressed, places: &[usize]) -> Taken {
         }
     }
     let slope = if alone > 0.0 { together / alone } else { 0.0 };
-    // A truth that errs pulls errors the other way: a slope above 0 is chance.
+    // An error of the ground truth pulls position errors the other way: a positive slope is chance.
     let slope = slope.min(0.0);
     let robot = slope * slope * alone / n;
-    let left = |o: &One| [0, 1].map(|k| o.fitted[k] - slope * (o.off_plan[k] - off[k]));
-    let scatter = scatter(of, places, left);
+    let left = |o: &PressFactors| [0, 1].map(|k| o.fitted[k] - slope * (o.off_plan[k] - off[k]));
+    let scatter = scatter(of, locations, left);
     let (per_event, width2, cluster) = (
         mean(&|o| o.per_event),
         mean(&|o| o.width2),
         mean(&|o| o.cluster),
     );
-    // What the scatter of the calibrating presses costs a fit is the scatter's.
+    // The scatter of calibration presses propagates into the fit; count that share as scatter.
     let calibration = mse - fitted;
     let by_scatter = (of.calibration_cost() * scatter).min(calibration).max(0.0);
     let bias = fitted - robot - scatter;
     let scatter = scatter + by_scatter;
     let calibration = calibration - by_scatter;
-    Taken {
+    ErrorBudget {
         mse,
         calibration,
         robot,
@@ -122,10 +127,14 @@ fn take(of: &Pressed, places: &[usize]) -> Taken {
     }
 }
 
-/// Variance of errors between repetitions at one place, both axes together, pooled over places; 0 where nothing was repeated.
-fn scatter(of: &Pressed, places: &[usize], error: impl Fn(&One) -> [f64; 2]) -> f64 {
+/// Pooled variance of errors between repetitions at one location, summed over both axes; 0 without repetitions.
+fn scatter(
+    of: &SkinPresses,
+    locations: &[usize],
+    error: impl Fn(&PressFactors) -> [f64; 2],
+) -> f64 {
     let (mut sum, mut freedom) = (0.0, 0.0);
-    for presses in places.iter().map(|i| of.at(*i)).filter(|p| p.len() > 1) {
+    for presses in locations.iter().map(|i| of.at(*i)).filter(|p| p.len() > 1) {
         let n = presses.len() as f64;
         freedom += n - 1.0;
         for k in 0..2 {
@@ -139,9 +148,9 @@ fn scatter(of: &Pressed, places: &[usize], error: impl Fn(&One) -> [f64; 2]) -> 
     if freedom > 0.0 { sum / freedom } else { 0.0 }
 }
 
-fn change(pair: &[Taken; 2]) -> [f64; FACTORS.len()] {
+fn split_change(pair: &[ErrorBudget; 2]) -> [f64; FACTORS.len()] {
     let [a, b] = pair;
-    let logs = Logs::between(a, b);
+    let logs = LogChanges::between(a, b);
     let parts = |from: f64, to: f64, logs: [f64; 3]| {
         let known = from > 0.0 && to > 0.0;
         logs.map(|log| {
@@ -163,11 +172,11 @@ fn change(pair: &[Taken; 2]) -> [f64; FACTORS.len()] {
         logs.width,
     ];
     let over = (b.scatter / a.scatter).ln() - direct.iter().sum::<f64>();
-    let more = carried(over, &reach, 1.0);
+    let more = attribute(over, &reach, 1.0);
     let of_scatter = parts(a.scatter, b.scatter, [0, 1, 2].map(|i| direct[i] + more[i]));
-    let bias = [a, b].map(|t| t.bias.max(LEAST_BIAS * (t.scatter + t.bias)));
+    let bias = [a, b].map(|t| t.bias.max(MIN_BIAS * (t.scatter + t.bias)));
     let log = (bias[1] / bias[0]).ln();
-    let of_bias = carried(log, &reach, 2.0).map(|part| {
+    let of_bias = attribute(log, &reach, 2.0).map(|part| {
         let share = if log.abs() > 1e-9 { part / log } else { 0.0 };
         share * (b.bias - a.bias)
     });
@@ -184,31 +193,32 @@ fn change(pair: &[Taken; 2]) -> [f64; FACTORS.len()] {
     ]
 }
 
-/// Changes of logarithms; 0 for what was not measured.
-struct Logs {
-    /// Of 1 / events.
+/// Changes of logarithms between two skins; 0 for a quantity that was not measured.
+struct LogChanges {
+    /// Change of ln(1 / events).
     events: f64,
-    /// Of the squared width.
+    /// Change of ln(width²).
     width: f64,
-    /// Of the excess of the clusters, by who changed the noise per event.
+    /// Change of ln(cluster excess), split by what changed the noise per event.
     excess_by_signal: f64,
     excess_by_noise: f64,
-    /// Of the noise per event, by who changed it, where it joins the clusters.
+    /// Change of ln(noise per event), split by what changed it; 0 where noise does not join clusters.
     pull_by_signal: f64,
     pull_by_noise: f64,
 }
 
-impl Logs {
-    fn between(a: &Taken, b: &Taken) -> Self {
+impl LogChanges {
+    fn between(a: &ErrorBudget, b: &ErrorBudget) -> Self {
         let known = |v: f64| if v.is_finite() { v } else { 0.0 };
         let events = known(b.per_event - a.per_event);
         let idle = known(b.idle - a.idle);
         let excess = known(b.excess - a.excess);
-        // The excess follows the noise per event: who changed that carries it. What goes against it carries none.
+        // The excess follows the noise per event, so the factor that changed the noise per event gets it. A factor that
+        // moved the other way gets none.
         let ratio = events + idle;
         let share = |part: f64| (part * ratio).max(0.0);
         let all = share(events) + share(idle);
-        let joins = all > 0.0 && excess * ratio > 0.0 && excess.abs() > LEAST_EXCESS;
+        let joins = all > 0.0 && excess * ratio > 0.0 && excess.abs() > MIN_EXCESS;
         let of = |whole: f64, part: f64| {
             if joins {
                 whole * share(part) / all
@@ -227,9 +237,9 @@ impl Logs {
     }
 }
 
-/// What of a change of a logarithm factors carry that changed by `reach`: those that go its way, in proportion, altogether at
-/// most so many times their reach.
-fn carried(log: f64, reach: &[f64; 3], times: f64) -> [f64; 3] {
+/// Splits a change of a logarithm among the factors with the same sign, in proportion to their own change `reach`. In total
+/// they get at most `times` their reach.
+fn attribute(log: f64, reach: &[f64; 3], times: f64) -> [f64; 3] {
     let along = reach.map(|r| if r * log > 0.0 { r } else { 0.0 });
     let all: f64 = along.iter().sum();
     if all == 0.0 || !log.is_finite() {
@@ -239,7 +249,7 @@ fn carried(log: f64, reach: &[f64; 3], times: f64) -> [f64; 3] {
     along.map(|r| share * r)
 }
 
-/// (a - b) / ln(a / b); a where they are equal.
+/// (a - b) / ln(a / b); `a` when both are equal.
 fn logarithmic_mean(a: f64, b: f64) -> f64 {
     let ratio = (b / a).ln();
     if ratio.abs() < 1e-9 {
@@ -249,7 +259,7 @@ fn logarithmic_mean(a: f64, b: f64) -> f64 {
     }
 }
 
-/// Seeded draws of `n` places with replacement.
+/// Seeded bootstrap draws of `n` locations with replacement.
 pub(super) fn draws(n: usize, resamples: u32, seed: u64) -> impl Iterator<Item = Vec<usize>> {
     // SplitMix64 (Steele, Lea and Flood 2014).
     let mut state = seed;

@@ -1,32 +1,32 @@
-//! What may carry a change between two skins, and what was measured of it.
+//! Possible causes of a difference between two skins, and measurements that support them.
 
 use serde::{Deserialize, Serialize};
 
 use crate::statistics::Interval;
 use crate::subject::Subject;
 
-/// What may carry a change.
+/// Possible cause of a change in mean square error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Factor {
-    /// Settings of the analysis.
+    /// Analysis settings.
     Settings,
-    /// Where the cameras are thought to be.
+    /// Calibrated camera geometry.
     Calibration,
-    /// Where the robot says it pressed.
+    /// Ground truth: measured robot position.
     Robot,
-    /// Events that a press adds.
+    /// Events added by a press.
     Signal,
-    /// Events without a press.
+    /// Background events.
     Noise,
-    /// Width of a touch in the picture.
+    /// Width of a press in the image.
     Spread,
-    /// Bias that depends on the place on the skin, and what nothing above explains.
+    /// Bias that varies over the skin, and everything that the other factors leave unexplained.
     Skin,
 }
 
 impl Factor {
-    /// In a few words.
+    /// Short name for reports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -35,37 +35,37 @@ impl Factor {
             Self::Robot => "repetition accuracy of the robot",
             Self::Signal => "events per press",
             Self::Noise => "noise",
-            Self::Spread => "width of a touch",
+            Self::Spread => "width of a press",
             Self::Skin => "bias over the skin, and the rest",
         }
     }
 }
 
-/// What one factor carries.
+/// Contribution of one factor to the change.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Contribution {
-    /// Which.
+    /// The factor.
     pub factor: Factor,
-    /// Of the change of the mean square error, mm², with its 95 % interval over places.
+    /// Contribution to the change of the mean square error, mm², with a 95 % bootstrap interval over locations.
     pub mm2: Interval,
 }
 
-/// Something measured directly in both skins.
+/// A quantity measured in both skins, shown as evidence beside the contributions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Measured {
-    /// What.
+pub struct FactorMeasurement {
+    /// Name for reports.
     pub what: &'static str,
-    /// Its unit.
+    /// Unit of the values.
     pub unit: &'static str,
-    /// Of the first and of the other skin.
+    /// Value of the first and of the other skin.
     pub values: [Option<f64>; 2],
 }
 
-/// A skin analysed again with the settings of the other one.
+/// Both skins reanalysed, each with the settings of the other.
 #[derive(Debug, Clone, Copy)]
-pub struct Again<'a> {
-    /// The first skin with the settings of the second.
+pub struct Reanalysis<'a> {
+    /// First skin with the settings of the second.
     pub first: &'a Subject,
-    /// The second with those of the first.
+    /// Second skin with the settings of the first.
     pub second: &'a Subject,
 }

@@ -1,60 +1,60 @@
-//! Owns what the causes look at: the scored presses of a skin that count, with the error that a better geometry leaves.
+//! Owns the inputs of the decomposition: counting scored presses, with the error under the used and a refitted geometry.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use skinrig_analysis::calibrate::{affordable_model, calibrate, parameter_count};
+use skinrig_analysis::calibrate::{calibrate, largest_supported_model, parameter_count};
 use skinrig_analysis::result::{PressResult, PressView};
 use skinrig_analysis::sets::CalibrationSet;
 use skinrig_analysis::triangulate::locate;
 use skinrig_model::{CalibrationModel, PressRole, StereoGeometry};
 
-use super::factor::Measured;
-use crate::places::{Attempt, Places};
+use super::factor::FactorMeasurement;
+use crate::locations::{Attempt, Locations};
 use crate::subject::{Session, Subject};
 
-/// One press.
+/// Quantities of one press that the decomposition uses.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct One {
-    /// Error with the geometry that was used, mm.
+pub(super) struct PressFactors {
+    /// Error with the session's geometry, mm.
     pub used: [f64; 2],
     /// Error with a geometry fitted to the scored presses, mm.
     pub fitted: [f64; 2],
-    /// Measured position less planned one, mm.
+    /// FactorMeasurement minus planned position, mm.
     pub off_plan: [f64; 2],
-    /// Mean over cameras: 1 / events that the press added.
+    /// Mean over cameras of 1 / (events added by the press).
     pub per_event: f64,
-    /// Mean over cameras: squared width of the touch, px².
+    /// Mean over cameras of the squared width of the press, px².
     pub width2: f64,
-    /// Mean over cameras: squared spread of the clustered columns over their number, px².
+    /// Mean over cameras of the squared spread of clustered columns divided by their number, px².
     pub cluster: f64,
-    /// Events per second between presses, both cameras.
+    /// Idle events per second, both cameras together.
     pub idle_per_s: f64,
 }
 
-/// The presses of a skin by place.
+/// Presses of one skin, grouped by location.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Pressed {
-    by_place: BTreeMap<u32, Vec<One>>,
+pub(super) struct SkinPresses {
+    by_place: BTreeMap<u32, Vec<PressFactors>>,
     calibration_cost: f64,
 }
 
-/// A fit of `p` parameters to `n` calibrating presses adds `p / 2n` of their scatter on average; twice that is chance.
+/// Fitting `p` parameters to `n` calibration presses adds `p / 2n` of their scatter on average; up to twice that is chance.
 const CHANCE: f64 = 2.0;
 
-impl Pressed {
-    pub fn of(subject: &Subject, places: &Places, shared: &BTreeSet<u32>) -> Self {
-        let mut all: BTreeMap<u32, Vec<One>> = BTreeMap::new();
+impl SkinPresses {
+    pub fn of(subject: &Subject, locations: &Locations, shared: &BTreeSet<u32>) -> Self {
+        let mut all: BTreeMap<u32, Vec<PressFactors>> = BTreeMap::new();
         for session in &subject.sessions {
             let id = session.facts.session_id.as_str();
             let of_session = |p: &Attempt<'_>| p.session.facts.session_id == id;
-            let attempts: Vec<Attempt<'_>> = places
+            let attempts: Vec<Attempt<'_>> = locations
                 .attempts(subject)
-                .filter(|p| of_session(p) && shared.contains(&p.place) && p.error().is_some())
+                .filter(|p| of_session(p) && shared.contains(&p.location) && p.error().is_some())
                 .collect();
-            let fitted = fitted(session, &attempts);
+            let refitted = refit_geometry(session, &attempts);
             for attempt in &attempts {
-                if let Some(one) = one(attempt, &fitted) {
-                    all.entry(attempt.place).or_default().push(one);
+                if let Some(factors) = press_factors(attempt, &refitted) {
+                    all.entry(attempt.location).or_default().push(factors);
                 }
             }
         }
@@ -69,20 +69,21 @@ impl Pressed {
         }
     }
 
-    pub fn places(&self) -> impl Iterator<Item = u32> {
+    pub fn locations(&self) -> impl Iterator<Item = u32> {
         self.by_place.keys().copied()
     }
 
-    pub fn has(&self, place: u32) -> bool {
-        self.by_place.contains_key(&place)
+    pub fn has(&self, location: u32) -> bool {
+        self.by_place.contains_key(&location)
     }
 
-    /// Leaves only these places.
-    pub fn keep(&mut self, places: &[u32]) {
-        self.by_place.retain(|place, _| places.contains(place));
+    /// Drops all other locations.
+    pub fn keep(&mut self, locations: &[u32]) {
+        self.by_place
+            .retain(|location, _| locations.contains(location));
     }
 
-    /// What a calibration costs by the scatter of its presses alone, as a share of that scatter.
+    /// Error added by the calibration fit, as a share of the scatter of its presses.
     pub(crate) const fn calibration_cost(&self) -> f64 {
         self.calibration_cost
     }
@@ -91,12 +92,12 @@ impl Pressed {
         self.by_place.values().map(Vec::len).sum::<usize>() as u32
     }
 
-    /// The presses of the i-th place.
-    pub fn at(&self, i: usize) -> &[One] {
+    /// Presses at the i-th location.
+    pub fn at(&self, i: usize) -> &[PressFactors] {
         self.by_place.values().nth(i).map_or(&[], Vec::as_slice)
     }
 
-    fn mean(&self, of: impl Fn(&One) -> f64) -> Option<f64> {
+    fn mean(&self, of: impl Fn(&PressFactors) -> f64) -> Option<f64> {
         let values: Vec<f64> = self
             .by_place
             .values()
@@ -108,16 +109,16 @@ impl Pressed {
     }
 }
 
-/// A geometry, and what errors under it are multiplied by.
-struct Fitted {
+/// A geometry and the correction factor for errors evaluated with it.
+struct RefittedGeometry {
     geometry: StereoGeometry,
     inflation: f64,
 }
 
-/// The geometry that the scored presses themselves ask for, as if they calibrated: a diagnosis of the calibration, never a
-/// score. Errors of `n` presses, two numbers each, under `p` parameters fitted to them are too small by
-/// `sqrt(1 - p / 2n)`: they are scaled up by it. The geometry that was used where the presses are too few to ask.
-fn fitted(session: &Session, attempts: &[Attempt<'_>]) -> Fitted {
+/// Fits a geometry to the scored presses as if they were calibration presses: a diagnosis of the calibration, never a score.
+/// Residuals of `n` presses (two numbers each) under `p` fitted parameters are too small by `sqrt(1 - p / 2n)`; the
+/// inflation corrects this. Falls back to the session's geometry with too few presses.
+fn refit_geometry(session: &Session, attempts: &[Attempt<'_>]) -> RefittedGeometry {
     let used = session.analysis.geometry;
     let presses: Vec<PressResult> = attempts
         .iter()
@@ -127,38 +128,39 @@ fn fitted(session: &Session, attempts: &[Attempt<'_>]) -> Fitted {
         })
         .collect();
     let set = CalibrationSet::from_presses(&presses);
-    let model = affordable_model(&set, CalibrationModel::Full);
+    let model = largest_supported_model(&set, CalibrationModel::Full);
     let numbers = 2.0 * set.sights().len() as f64;
     let free = numbers - parameter_count(model) as f64;
     match calibrate(&set, &used, model, session.analysis.settings.seed) {
-        Some((geometry, _)) if free > 0.0 => Fitted {
+        Some((geometry, _)) if free > 0.0 => RefittedGeometry {
             geometry,
             inflation: (numbers / free).sqrt(),
         },
-        _ => Fitted {
+        _ => RefittedGeometry {
             geometry: used,
             inflation: 1.0,
         },
     }
 }
 
-fn one(attempt: &Attempt<'_>, fitted: &Fitted) -> Option<One> {
+fn press_factors(attempt: &Attempt<'_>, refitted: &RefittedGeometry) -> Option<PressFactors> {
     let press = attempt.press;
     let views = [press.views[0]?, press.views[1]?];
     let truth = press.truth?;
     let (x, y) = attempt.error()?;
     let columns = [views[0].centroid_u, views[1].centroid_u];
     let outline = &attempt.session.analysis.rig.outline;
-    let again = locate(&fitted.geometry, outline, columns).estimate()?;
+    let estimate = locate(&refitted.geometry, outline, columns).estimate()?;
     let mean = |of: fn(&PressView) -> f64| 0.5 * (of(&views[0]) + of(&views[1]));
-    Some(One {
+    Some(PressFactors {
         used: [x, y],
-        fitted: [again.x_mm - truth.x_mm, again.y_mm - truth.y_mm].map(|e| e * fitted.inflation),
+        fitted: [estimate.x_mm - truth.x_mm, estimate.y_mm - truth.y_mm]
+            .map(|e| e * refitted.inflation),
         off_plan: [
             truth.x_mm - press.planned.x_mm,
             truth.y_mm - press.planned.y_mm,
         ],
-        per_event: mean(|v| 1.0 / added(v).max(1.0)),
+        per_event: mean(|v| 1.0 / added_events(v).max(1.0)),
         width2: mean(|v| v.width_u.map_or(f64::NAN, |w| w * w)),
         cluster: mean(|v| {
             let spread = v.spread_u.map_or(f64::NAN, |s| s * s);
@@ -168,8 +170,8 @@ fn one(attempt: &Attempt<'_>, fitted: &Fitted) -> Option<One> {
     })
 }
 
-/// Events that a press added to those that the idle rate makes of its window.
-fn added(view: &PressView) -> f64 {
+/// Events in the window minus those expected from the idle rate.
+fn added_events(view: &PressView) -> f64 {
     let events = f64::from(view.events);
     if view.rate_per_s > 0.0 {
         events - view.idle_rate_per_s * events / view.rate_per_s
@@ -178,14 +180,14 @@ fn added(view: &PressView) -> f64 {
     }
 }
 
-/// What is shown beside the contributions.
-pub(super) fn measured(of: [&Pressed; 2]) -> Vec<Measured> {
-    let row = |what, unit, value: &dyn Fn(&Pressed) -> Option<f64>| Measured {
+/// Supporting measurements shown beside the contributions.
+pub(super) fn measurements(of: [&SkinPresses; 2]) -> Vec<FactorMeasurement> {
+    let row = |what, unit, value: &dyn Fn(&SkinPresses) -> Option<f64>| FactorMeasurement {
         what,
         unit,
         values: of.map(value),
     };
-    let rms = |p: &Pressed, of: fn(&One) -> [f64; 2]| {
+    let rms = |p: &SkinPresses, of: fn(&PressFactors) -> [f64; 2]| {
         let squares = p.mean(|o| of(o)[0].powi(2) + of(o)[1].powi(2));
         squares.map(f64::sqrt)
     };
@@ -205,20 +207,20 @@ pub(super) fn measured(of: [&Pressed; 2]) -> Vec<Measured> {
             },
         ),
         row(
-            "events that a press adds, per camera (harmonic mean)",
+            "events added by a press, per camera (harmonic mean)",
             "events",
             &|p| p.mean(|o| o.per_event).map(|v| 1.0 / v),
         ),
-        row("events between presses, both cameras", "events/s", &|p| {
+        row("idle events, both cameras", "events/s", &|p| {
             p.mean(|o| o.idle_per_s)
         }),
         row(
-            "width of a touch: columns with half of its events",
+            "width of a press: columns with half of its events",
             "px",
             &|p| p.mean(|o| o.width2).map(f64::sqrt),
         ),
         row(
-            "spread of clustered columns over their root number",
+            "standard error of the centroid: column spread / sqrt(events)",
             "px",
             &|p| p.mean(|o| o.cluster).map(f64::sqrt),
         ),

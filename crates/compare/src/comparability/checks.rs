@@ -1,43 +1,43 @@
-//! Owns the checks that no single fact decides: shared places and depths, alignment, results, doubles.
+//! Owns checks that need more than one fact: shared locations and depths, alignment, results, duplicate sessions.
 
 use std::collections::BTreeSet;
 
 use skinrig_analysis::result::AlignmentStatus;
 
-use super::difference::{Difference, Weight, difference};
-use super::sights::{ambient, cameras};
-use crate::places::Places;
-use crate::subject::{Session, Subject, joined};
+use super::camera_checks::{ambient, cameras};
+use super::difference::{Difference, Severity, difference};
+use crate::locations::Locations;
+use crate::subject::{Session, Subject, join_values};
 
-pub(super) fn all(subjects: &[Subject], places: &Places) -> Vec<Difference> {
+pub(super) fn all(subjects: &[Subject], locations: &Locations) -> Vec<Difference> {
     let mut found = Vec::new();
-    found.extend(alignment(subjects));
-    found.extend(results(subjects, places));
-    found.extend(depths(subjects, places));
-    found.extend(locations(subjects, places));
-    found.extend(doubles(subjects));
-    found.extend(seeds(subjects));
-    found.extend(unsealed(subjects));
-    found.extend(plausible(subjects));
-    found.extend(ambient(subjects, places));
+    found.extend(check_alignment(subjects));
+    found.extend(check_results(subjects, locations));
+    found.extend(check_depths(subjects, locations));
+    found.extend(check_locations(subjects, locations));
+    found.extend(check_duplicates(subjects));
+    found.extend(check_seeds(subjects));
+    found.extend(check_unsealed(subjects));
+    found.extend(check_plausible(subjects));
+    found.extend(ambient(subjects, locations));
     found.extend(cameras(subjects));
     found
 }
 
-fn blocked(mut by: Difference, next: &str) -> Difference {
-    by.weight = Weight::Blocking;
-    by.next = Some(next.to_owned());
-    by
+fn as_blocking(mut difference: Difference, next: &str) -> Difference {
+    difference.severity = Severity::Blocking;
+    difference.next = Some(next.to_owned());
+    difference
 }
 
 fn each(subjects: &[Subject], of: impl Fn(&Session) -> String) -> Vec<String> {
     subjects
         .iter()
-        .map(|s| joined(&s.fact(|x| Some(of(x)))))
+        .map(|s| join_values(&s.fact(|x| Some(of(x)))))
         .collect()
 }
 
-fn alignment(subjects: &[Subject]) -> Option<Difference> {
+fn check_alignment(subjects: &[Subject]) -> Option<Difference> {
     let status = |s: &Session| match s.analysis.alignment.status {
         _ if !s.analysis.is_valid() => {
             format!("INVALID: {}", s.analysis.invalid_because().join("; "))
@@ -48,51 +48,56 @@ fn alignment(subjects: &[Subject]) -> Option<Difference> {
     let values = each(subjects, status);
     let is_invalid = |s: &Subject| s.sessions.iter().any(|x| !x.analysis.is_valid());
     if subjects.iter().any(is_invalid) {
-        let reason = "a session is INVALID: none of its numbers is to be used";
-        return Some(blocked(
+        let reason = "a session is INVALID; its numbers must not be used";
+        return Some(as_blocking(
             difference(
                 "alignment",
                 "alignment of the clocks",
-                Weight::Blocking,
+                Severity::Blocking,
                 values,
                 reason,
             ),
-            "mend what the session's report names and analyse it again, or record again",
+            "fix what the session's report names and analyse it again, or record again",
         ));
     }
     let differ = values.iter().any(|v| *v != values[0]);
-    let reason = "latencies of a session without a certificate have no stated clock error";
+    let reason = "without a certificate the clock error of latencies is unknown";
     differ.then(|| {
         difference(
             "certificate",
             "alignment of the clocks",
-            Weight::Confounding,
+            Severity::Confounding,
             values,
             reason,
         )
     })
 }
 
-fn results(subjects: &[Subject], places: &Places) -> Option<Difference> {
-    let counted = |s: &Subject| places.attempts(s).filter(|p| p.error().is_some()).count();
+fn check_results(subjects: &[Subject], locations: &Locations) -> Option<Difference> {
+    let counted = |s: &Subject| {
+        locations
+            .attempts(s)
+            .filter(|p| p.error().is_some())
+            .count()
+    };
     let counts: Vec<usize> = subjects.iter().map(counted).collect();
-    // Without a shared depth nothing is counted: that is said by itself.
-    let none = counts.contains(&0) && places.shared_depths() > 0;
+    // Without a shared depth no press counts; `depths` reports that.
+    let none = counts.contains(&0) && locations.shared_depths() > 0;
     none.then(|| {
-        blocked(
+        as_blocking(
             difference(
                 "no-results",
                 "scored presses that count",
-                Weight::Blocking,
+                Severity::Blocking,
                 counts.iter().map(ToString::to_string).collect(),
                 "a skin without a located press has no error to compare",
             ),
-            "`skinrig analyze` says why its presses do not count",
+            "`skinrig analyze` lists why presses do not count",
         )
     })
 }
 
-fn depths(subjects: &[Subject], places: &Places) -> Option<Difference> {
+fn check_depths(subjects: &[Subject], locations: &Locations) -> Option<Difference> {
     let of = |s: &Subject| -> BTreeSet<String> {
         let presses = s.sessions.iter().flat_map(|s| &s.analysis.presses);
         let scored = presses.filter(|p| p.role == skinrig_model::PressRole::Score);
@@ -102,68 +107,68 @@ fn depths(subjects: &[Subject], places: &Places) -> Option<Difference> {
     if sets.iter().all(|s| *s == sets[0]) {
         return None;
     }
-    let values = sets.iter().map(joined).collect();
-    if places.shared_depths() == 0 {
-        let reason = "deeper presses make more events: no depth is shared";
-        return Some(blocked(
-            difference("depths", "depths", Weight::Blocking, values, reason),
+    let values = sets.iter().map(join_values).collect();
+    if locations.shared_depths() == 0 {
+        let reason = "deeper presses generate more events, and no depth is shared";
+        return Some(as_blocking(
+            difference("depths", "depths", Severity::Blocking, values, reason),
             "press both skins to the same depth",
         ));
     }
-    let reason = "only the shared depths are compared";
+    let reason = "only shared depths are compared";
     Some(difference(
         "depths",
         "depths",
-        Weight::Harmless,
+        Severity::Harmless,
         values,
         reason,
     ))
 }
 
-fn locations(subjects: &[Subject], places: &Places) -> Option<Difference> {
+fn check_locations(subjects: &[Subject], locations: &Locations) -> Option<Difference> {
     let first = subjects.first()?;
     let own = |s: &Subject| {
-        places
+        locations
             .attempts(s)
-            .map(|p| p.place)
+            .map(|p| p.location)
             .collect::<BTreeSet<u32>>()
     };
     let sets: Vec<_> = subjects.iter().map(own).collect();
-    if places.shared_depths() == 0 || sets.iter().all(|s| *s == sets[0]) {
+    if locations.shared_depths() == 0 || sets.iter().all(|s| *s == sets[0]) {
         return None;
     }
     let shared: Vec<usize> = subjects
         .iter()
-        .map(|s| places.shared([first, s]).len())
+        .map(|s| locations.shared([first, s]).len())
         .collect();
     let values = sets
         .iter()
         .zip(&shared)
-        .map(|(own, shared)| format!("{} places, {shared} of them also of A", own.len()));
+        .map(|(own, shared)| format!("{} locations, {shared} shared with A", own.len()));
     let values: Vec<String> = values.collect();
-    // Any skin without results has no places either: that is said by itself.
+    // A skin without results has no locations either; `results` reports that.
     if shared
         .iter()
         .zip(&sets)
         .any(|(n, own)| *n < 2 && !own.is_empty())
     {
-        let reason = "errors differ from place to place: fewer than two places are shared";
-        return Some(blocked(
-            difference("locations", "locations", Weight::Blocking, values, reason),
-            "press the same path on both skins; --despite locations compares them as independent samples",
+        let reason = "errors vary over the skin, and fewer than two locations are shared";
+        return Some(as_blocking(
+            difference("locations", "locations", Severity::Blocking, values, reason),
+            "press the same path on both skins, or compare them as independent samples with --despite locations",
         ));
     }
-    let reason = "only the shared places are compared";
+    let reason = "only shared locations are compared";
     Some(difference(
         "locations",
         "locations",
-        Weight::Harmless,
+        Severity::Harmless,
         values,
         reason,
     ))
 }
 
-fn doubles(subjects: &[Subject]) -> Option<Difference> {
+fn check_duplicates(subjects: &[Subject]) -> Option<Difference> {
     let ids: Vec<&str> = subjects
         .iter()
         .flat_map(|s| s.sessions.iter().map(|s| s.facts.session_id.as_str()))
@@ -176,18 +181,24 @@ fn doubles(subjects: &[Subject]) -> Option<Difference> {
             subjects.iter().filter(has).count()
         };
         let reason = if different.iter().any(|id| sides(id) > 1) {
-            "one session stands on both sides, perhaps as a copy: its noise is not new"
+            "the same session, or a copy of it, is on both sides: its noise is not independent"
         } else {
-            "one session stands twice on one side, perhaps as a copy: its noise is not new"
+            "the same session, or a copy of it, is twice on one side: its noise is not independent"
         };
-        blocked(
-            difference("same-session", "session", Weight::Blocking, values, reason),
-            "name different sessions",
+        as_blocking(
+            difference(
+                "same-session",
+                "session",
+                Severity::Blocking,
+                values,
+                reason,
+            ),
+            "name each session once",
         )
     })
 }
 
-fn seeds(subjects: &[Subject]) -> Option<Difference> {
+fn check_seeds(subjects: &[Subject]) -> Option<Difference> {
     let seed = |s: &Session| s.facts.values.get("simulation.seed").cloned();
     let all: Vec<String> = subjects
         .iter()
@@ -196,31 +207,31 @@ fn seeds(subjects: &[Subject]) -> Option<Difference> {
     let different: BTreeSet<&String> = all.iter().collect();
     (different.len() < all.len()).then(|| {
         let values = each(subjects, |s| seed(s).unwrap_or_else(|| "none".to_owned()));
-        let reason = "simulated with the same seed: noise is the same, intervals do not hold";
+        let reason = "simulated with the same seed: the noise is identical, so intervals are wrong";
         difference(
             "same-seed",
             "seed of the simulation",
-            Weight::Confounding,
+            Severity::Confounding,
             values,
             reason,
         )
     })
 }
 
-/// Unsealed sessions on all sides do not differ, and block all the same.
-fn unsealed(subjects: &[Subject]) -> Option<Difference> {
+/// Fires when all skins are unsealed: equal values are no difference for the rules.
+fn check_unsealed(subjects: &[Subject]) -> Option<Difference> {
     let sealed = |s: &Session| s.facts.values.get("session.sealed").cloned();
     let all = subjects
         .iter()
         .all(|s| s.fact(sealed) == BTreeSet::from(["false".to_owned()]));
     all.then(|| {
         let values = each(subjects, |_| "false".to_owned());
-        let reason = "a session that is not sealed may still change";
-        blocked(
+        let reason = "an unsealed session may still change";
+        as_blocking(
             difference(
                 "unsealed",
                 "session.sealed",
-                Weight::Blocking,
+                Severity::Blocking,
                 values,
                 reason,
             ),
@@ -229,7 +240,7 @@ fn unsealed(subjects: &[Subject]) -> Option<Difference> {
     })
 }
 
-fn plausible(subjects: &[Subject]) -> Option<Difference> {
+fn check_plausible(subjects: &[Subject]) -> Option<Difference> {
     let broken = |s: &Session| s.analysis.findings.len();
     let any = subjects
         .iter()
@@ -237,12 +248,11 @@ fn plausible(subjects: &[Subject]) -> Option<Difference> {
         .any(|s| broken(s) > 0);
     any.then(|| {
         let values = each(subjects, |s| format!("{} broken", broken(s)));
-        let reason =
-            "a session that breaks a law that any sane session obeys: see its report first";
+        let reason = "a session breaks plausibility laws; see its report first";
         difference(
             "findings",
-            "laws of a sane session",
-            Weight::Confounding,
+            "plausibility findings",
+            Severity::Confounding,
             values,
             reason,
         )

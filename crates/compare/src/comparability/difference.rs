@@ -1,20 +1,20 @@
-//! One thing in which skins differ, and what it is worth.
+//! One difference between skins, and how severe it is.
 
 use serde::{Deserialize, Serialize};
 
-/// What a difference is worth.
+/// Consequence of a difference for the comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Weight {
-    /// No comparison.
+pub enum Severity {
+    /// Prevents the comparison unless overridden.
     Blocking,
-    /// A comparison whose outcome this may explain.
+    /// May explain the result.
     Confounding,
-    /// Nothing.
+    /// Does not affect the result.
     Harmless,
 }
 
-impl Weight {
+impl Severity {
     /// `blocking`, `confounding` or `harmless`.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -26,30 +26,32 @@ impl Weight {
     }
 }
 
-/// One thing in which the skins differ.
+/// A fact with different values among the skins.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Difference {
-    /// Names the rule; what lifts a blocking one.
+    /// Key of the rule; `--despite` takes it to override a blocking difference.
     pub key: &'static str,
-    /// Which fact.
+    /// Name or path of the fact.
     pub what: String,
-    /// Its value in each skin.
+    /// Value per skin.
     pub values: Vec<String>,
-    /// What it is worth.
-    pub weight: Weight,
-    /// Why.
+    /// Severity of the difference.
+    #[serde(rename = "weight")]
+    pub severity: Severity,
+    /// Why it has this severity.
     pub reason: String,
-    /// What to do about a blocking one.
+    /// What the user can do about a blocking difference.
     pub next: Option<String>,
-    /// True for a blocking one that the user has lifted.
-    pub lifted: bool,
+    /// True for a blocking difference that the user has overridden.
+    #[serde(rename = "lifted")]
+    pub overridden: bool,
 }
 
-/// A difference of this weight, without a next step.
+/// A difference without a next step.
 pub(super) fn difference(
     key: &'static str,
     what: &str,
-    weight: Weight,
+    severity: Severity,
     values: Vec<String>,
     reason: &str,
 ) -> Difference {
@@ -57,9 +59,9 @@ pub(super) fn difference(
         key,
         what: what.to_owned(),
         values,
-        weight,
+        severity,
         reason: reason.to_owned(),
         next: None,
-        lifted: false,
+        overridden: false,
     }
 }

@@ -1,26 +1,26 @@
-//! Owns the question before all others: may these skins be compared at all.
+//! Decides whether skins may be compared at all.
 //!
-//! Every fact in which the skins differ is a [`Difference`] with what it is worth: harmless, confounding (the difference of
-//! the skins may be its doing), or blocking (no comparison unless it is lifted by name). `rules` says which fact is which;
-//! `checks` looks at what cannot be told from single facts.
+//! Every fact in which the skins differ is a [`Difference`] with a severity: harmless, confounding (it may cause the
+//! result), or blocking (no comparison unless overridden by key). `rules` classifies single facts; `checks` covers what
+//! needs more than one fact.
 
+mod camera_checks;
 mod checks;
 mod difference;
 mod rules;
-mod sights;
 
 use std::collections::BTreeSet;
 
-use crate::places::Places;
-use crate::subject::{Session, Subject, joined};
-pub use difference::{Difference, Weight};
+use crate::locations::Locations;
+use crate::subject::{Session, Subject, join_values};
+pub use difference::{Difference, Severity};
 pub use rules::{RULES, Rule};
 
-/// Everything in which the skins differ, the gravest first. `lifted`: keys of blocking ones to go on in spite of.
+/// All differences between the skins, most severe first. `overrides`: keys of blocking differences to ignore.
 #[must_use]
-pub fn differences(subjects: &[Subject], lifted: &[String]) -> Vec<Difference> {
-    let places = Places::of(subjects);
-    let mut found = checks::all(subjects, &places);
+pub fn differences(subjects: &[Subject], overrides: &[String]) -> Vec<Difference> {
+    let locations = Locations::of(subjects);
+    let mut found = checks::all(subjects, &locations);
     let mut names: BTreeSet<String> = BTreeSet::new();
     for session in subjects.iter().flat_map(|s| &s.sessions) {
         names.extend(session.facts.values.keys().cloned());
@@ -38,18 +38,18 @@ pub fn differences(subjects: &[Subject], lifted: &[String]) -> Vec<Difference> {
         found.push(Difference {
             key: rule.key,
             what: name.clone(),
-            values: values.iter().map(joined).collect(),
-            weight: rule.weight,
+            values: values.iter().map(join_values).collect(),
+            severity: rule.severity,
             reason: rule.reason.to_owned(),
             next: rule.next.map(str::to_owned),
-            lifted: false,
+            overridden: false,
         });
     }
     for difference in &mut found {
-        difference.lifted =
-            difference.weight == Weight::Blocking && lifted.iter().any(|k| k == difference.key);
+        difference.overridden = difference.severity == Severity::Blocking
+            && overrides.iter().any(|k| k == difference.key);
     }
-    found.sort_by(|a, b| (a.weight, a.key, &a.what).cmp(&(b.weight, b.key, &b.what)));
+    found.sort_by(|a, b| (a.severity, a.key, &a.what).cmp(&(b.severity, b.key, &b.what)));
     found
 }
 
@@ -63,19 +63,25 @@ fn fact(session: &Session, name: &str) -> Option<String> {
         .or_else(|| of_settings().map(|(_, value)| value))
 }
 
-/// The settings of a session's analysis and what became of its calibration, as facts.
+/// Analysis settings and calibration of a session, as facts.
 fn settings_of(session: &Session) -> Vec<(String, String)> {
     let analysis = &session.analysis;
     let mut facts = Vec::new();
     if let Ok(settings) = serde_json::to_value(&analysis.settings) {
-        crate::flat::flatten("analysis", &settings, &mut facts);
+        crate::flatten::flatten("analysis", &settings, &mut facts);
     }
     let calibration = analysis.calibration.as_ref();
-    let origin = calibration.map_or("the drawn geometry", |_| "the session's own presses");
+    let origin = calibration.map_or("nominal geometry", |_| "the session's own presses");
     facts.push(("calibration.origin".to_owned(), origin.to_owned()));
     if let Some(c) = calibration {
-        facts.push(("calibration.model".to_owned(), crate::flat::word(&c.model)));
-        facts.push(("calibration.lens".to_owned(), crate::flat::word(&c.lens)));
+        facts.push((
+            "calibration.model".to_owned(),
+            crate::flatten::variant_name(&c.model),
+        ));
+        facts.push((
+            "calibration.lens".to_owned(),
+            crate::flatten::variant_name(&c.lens),
+        ));
     }
     facts
 }

@@ -1,32 +1,32 @@
-//! Owns the table of rules: which fact is worth what, and why. The first rule whose prefix fits a fact's path holds.
+//! Owns the rules that classify facts by path prefix. The first matching prefix wins.
 
-use super::difference::Weight::{self, Blocking, Confounding, Harmless};
+use super::difference::Severity::{self, Blocking, Confounding, Harmless};
 
-/// What a difference of a kind of fact is worth.
+/// Severity of differences in one kind of fact.
 #[derive(Debug, Clone, Copy)]
 pub struct Rule {
-    /// Of the fact's path.
+    /// Prefix of the fact's path.
     pub prefix: &'static str,
-    /// Names the rule.
+    /// Key for users, as in `--despite KEY`.
     pub key: &'static str,
-    /// What it is worth.
-    pub weight: Weight,
+    /// Severity of a difference.
+    pub severity: Severity,
     /// Why.
     pub reason: &'static str,
-    /// What to do.
+    /// What to do about a blocking difference.
     pub next: Option<&'static str>,
 }
 
 const fn rule(
     prefix: &'static str,
     key: &'static str,
-    weight: Weight,
+    severity: Severity,
     reason: &'static str,
 ) -> Rule {
     Rule {
         prefix,
         key,
-        weight,
+        severity,
         reason,
         next: None,
     }
@@ -41,216 +41,206 @@ const fn blocking(
     Rule {
         prefix,
         key,
-        weight: Blocking,
+        severity: Blocking,
         reason,
         next: Some(next),
     }
 }
 
-const SAME_RIG: &str = "compare sessions of one kind of rig";
+const SAME_RIG: &str = "compare sessions from the same kind of rig";
 const SAME_TIP: &str = "press both skins with the same tip";
 const NO_FAULT: &str = "record without --fault";
 
-/// The rules. `docs/reference/comparison.md` shows them to users.
+/// All rules, in order of precedence. `docs/reference/comparison.md` documents them.
 pub const RULES: &[Rule] = &[
     blocking(
         "rig.kind",
         "rig-kind",
-        "numbers of different kinds of rig have different causes",
+        "different kinds of rig have different error sources",
         SAME_RIG,
     ),
     blocking(
         "rig.level",
         "sim-level",
-        "levels of the simulation leave different errors out",
-        "simulate both at one --level",
+        "simulation levels omit different errors",
+        "simulate both skins at the same --level",
     ),
     rule("rig.", "rig", Harmless, "a name"),
     blocking(
         "protocol.prototype.tip",
         "tip",
-        "another tip touches another area",
+        "another tip has another contact area",
         SAME_TIP,
     ),
     blocking(
         "bench.tip",
         "tip",
-        "another tip touches another area",
+        "another tip has another contact area",
         SAME_TIP,
     ),
     blocking(
         "simulation.tip",
         "tip",
-        "another tip touches another area",
+        "another tip has another contact area",
         SAME_TIP,
     ),
     blocking(
         "protocol.faults",
         "planted-fault",
-        "a fault was made on purpose",
+        "a fault was injected",
         NO_FAULT,
     ),
     blocking(
         "simulation.faults",
         "planted-fault",
-        "a fault was made on purpose",
+        "a fault was injected",
         NO_FAULT,
     ),
     rule(
         "protocol.motion",
         "motion",
         Confounding,
-        "faster or longer presses make other events",
+        "speed and duration of presses change the events",
     ),
     rule(
         "protocol.surface",
         "surface",
         Confounding,
-        "depths count from another surface",
+        "depths are measured from another surface",
     ),
     rule(
         "protocol.roles",
         "evaluation",
         Confounding,
-        "other repetitions calibrate or score",
+        "different repetitions calibrate or score",
     ),
     rule(
         "protocol.cameras",
         "camera-settings",
         Confounding,
-        "the cameras were set to see otherwise",
+        "cameras were configured differently",
     ),
     rule(
         "protocol.surroundings.outline",
         "outline",
         Confounding,
-        "another outline leaves other estimates out",
+        "another outline rejects other estimates",
     ),
     rule(
         "protocol.",
         "protocol",
         Harmless,
-        "does not touch the presses that are compared",
+        "does not affect the compared presses",
     ),
     rule(
         "bias.",
         "biases",
         Confounding,
-        "another bias is another sensitivity of the camera, not of the skin",
+        "biases change the sensitivity of the camera, not of the skin",
     ),
     rule(
         "device.camera1.model",
         "camera-model",
         Confounding,
-        "another sensor sees otherwise",
+        "another sensor has another response",
     ),
     rule(
         "device.camera2.model",
         "camera-model",
         Confounding,
-        "another sensor sees otherwise",
+        "another sensor has another response",
     ),
     rule(
         "device.indenter.model",
         "robot-model",
         Confounding,
-        "another robot repeats otherwise",
+        "another robot has another repeatability",
     ),
     rule(
         "device.",
         "device",
         Harmless,
-        "the same model; its own noise is measured before each press",
+        "same model; idle noise is measured before each press",
     ),
     rule(
         "simulation.motion",
         "simulated-robot",
         Confounding,
-        "the simulated robot moves otherwise",
+        "the simulated robot moves differently",
     ),
     rule(
         "simulation.true_cameras",
-        "camera-places",
+        "camera-locations",
         Harmless,
-        "each session's own calibration takes it up",
+        "each session's own calibration absorbs it",
     ),
     rule(
         "simulation.",
         "simulated-skin",
         Harmless,
-        "the skin that was simulated: what is compared",
+        "the simulated skin itself, which is what is compared",
     ),
     rule(
         "bench.",
         "bench",
         Harmless,
-        "of the bench, not of the presses",
+        "describes the bench, not the presses",
     ),
     rule(
         "analysis.bootstrap_resamples",
         "intervals",
         Harmless,
-        "only of the session's own intervals",
+        "affects only the session's own intervals",
     ),
     rule(
         "analysis.seed",
         "intervals",
         Harmless,
-        "only of the session's own intervals",
+        "affects only the session's own intervals",
     ),
     rule(
         "analysis.study_presses",
         "studies",
         Confounding,
-        "latencies stand on other presses",
+        "latencies come from different presses",
     ),
     rule(
         "analysis.latency",
         "latency-settings",
         Confounding,
-        "another detector has other latencies",
+        "another detector gives other latencies",
     ),
     rule(
         "analysis.within_mm",
         "within",
         Harmless,
-        "one X is asked of all",
+        "the comparison uses one limit for all",
     ),
     rule(
         "analysis.failure_penalty_mm",
         "penalty",
         Harmless,
-        "not part of a comparison",
+        "not compared",
     ),
-    rule(
-        "analysis.reduction",
-        "studies",
-        Harmless,
-        "not part of a comparison",
-    ),
-    rule(
-        "analysis.cmre",
-        "studies",
-        Harmless,
-        "not part of a comparison",
-    ),
+    rule("analysis.reduction", "studies", Harmless, "not compared"),
+    rule("analysis.cmre", "studies", Harmless, "not compared"),
     rule(
         "analysis.alignment",
         "alignment-limits",
         Harmless,
-        "limits of the clocks, not of the presses",
+        "limits for clocks, not for presses",
     ),
     rule(
         "analysis.bits_per_event",
         "bits-per-event",
         Confounding,
-        "bytes are counted otherwise",
+        "bytes are counted differently",
     ),
     rule(
         "analysis.",
         "settings",
         Confounding,
-        "the difference may be the analysis's: see the causes",
+        "the analysis may cause the difference; see the causes",
     ),
     rule(
         "calibration.origin",
@@ -262,35 +252,35 @@ pub const RULES: &[Rule] = &[
         "calibration.",
         "calibration",
         Confounding,
-        "another camera model leaves another bias",
+        "another camera model leaves another bias behind",
     ),
     rule(
         "software.recorded",
         "software",
         Harmless,
-        "all are analysed by this version",
+        "this version analyses all sessions",
     ),
     rule(
         "session.end",
         "incomplete",
         Confounding,
-        "presses are missing, and not at random places",
+        "presses are missing, and not at random locations",
     ),
     blocking(
         "session.sealed",
         "unsealed",
-        "a session that is not sealed may still change",
+        "an unsealed session may still change",
         "wait for the run, or `skinrig resume` it",
     ),
     rule(
         "session.lost_bytes",
         "losses",
         Confounding,
-        "presses with lost data are invalid, whatever the skin",
+        "lost data invalidate presses, whatever the skin",
     ),
 ];
 
-/// The rule for the fact with this path; `None` for one that no rule speaks of.
+/// First rule that matches this path.
 pub(super) fn rule_of(path: &str) -> Option<&'static Rule> {
     RULES.iter().find(|r| path.starts_with(r.prefix))
 }

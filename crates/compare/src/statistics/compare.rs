@@ -1,25 +1,25 @@
 //! Compares two samples.
 
 use super::comparison::{Comparison, Design, Interval, Tost, Verdict, direction};
+use super::error::{ComparisonError, Side};
 use super::inference::Inference;
 use super::influence::Measure;
 use super::measure::measure;
 use super::question::{Better, Pairing, Question, Settings};
-use super::refusal::{Refusal, Side};
 use super::sample::{Data, Kind, Sample};
-use super::spread::Repeats;
-use super::{components, needed, notes};
+use super::spread::RepeatEstimator;
+use super::{components, notes, presses_needed};
 
-/// The value of one sample over all its locations, with its interval.
+/// Value of one sample over all its locations, with its interval.
 ///
 /// # Errors
-/// [`Refusal`].
-pub fn estimate(sample: &Sample, settings: &Settings) -> Result<Interval, Refusal> {
+/// [`ComparisonError`].
+pub fn estimate(sample: &Sample, settings: &Settings) -> Result<Interval, ComparisonError> {
     settings.check()?;
-    let of = measure(sample.data(), Repeats::All, Side::A, |_| true)?;
+    let of = measure(sample.data(), RepeatEstimator::All, Side::A, |_| true)?;
     let locations = of.locations() as u32;
     if locations < 2 {
-        return Err(Refusal::TooFewLocations { locations });
+        return Err(ComparisonError::TooFewLocations { locations });
     }
     Ok(Inference::alone(&of, settings).interval(settings.alpha))
 }
@@ -27,25 +27,25 @@ pub fn estimate(sample: &Sample, settings: &Settings) -> Result<Interval, Refusa
 /// Compares B with A. Differences are B - A.
 ///
 /// # Errors
-/// [`Refusal`].
+/// [`ComparisonError`].
 pub fn compare(
     a: &Sample,
     b: &Sample,
     question: &Question,
     settings: &Settings,
-) -> Result<Comparison, Refusal> {
+) -> Result<Comparison, ComparisonError> {
     settings.check()?;
     question.check()?;
     if a.kind() != b.kind() {
         let (a, b) = (a.kind(), b.kind());
-        return Err(Refusal::Kinds { a, b });
+        return Err(ComparisonError::Kinds { a, b });
     }
     let data = [a.data(), b.data()];
     let (of, left_out) = measured(data, settings.pairing)?;
     let difference = Inference::difference(&of[0], &of[1], 1.0, settings);
     let whole = difference.interval(settings.alpha);
     if whole.low.is_some() && whole.low == whole.high {
-        return Err(Refusal::NoSpread {
+        return Err(ComparisonError::NoSpread {
             a: of[0].value,
             b: of[1].value,
             locations: of[0].locations() as u32,
@@ -85,13 +85,13 @@ pub fn compare(
             presses: of.each_ref().map(Measure::presses),
             left_out,
         },
-        needed: needed::needed(verdict, question, &components, &of, settings),
+        needed: presses_needed::presses_needed(verdict, question, &components, &of, settings),
         components,
         notes: notes::notes(data, &of),
     })
 }
 
-/// The verdict by p values.
+/// Derives the verdict from p values; equivalence takes precedence.
 pub(super) fn verdict(
     [a, b]: [f64; 2],
     p_difference: f64,
@@ -108,8 +108,8 @@ pub(super) fn verdict(
     }
 }
 
-/// Two-sided p value of two numbers being equally far from zero, from their difference and their sum: one is nearer when
-/// both have the same sign, so both must be shown (an intersection-union test: Berger 1982).
+/// Two-sided p value for `|a| = |b|`, from their difference and their sum. "Nearer to zero" requires both to have the same
+/// sign (intersection-union test: Berger 1982).
 fn p_of_distance(difference: &Inference, sum: &Inference) -> f64 {
     let [above, below] = [difference.p_above(0.0), difference.p_below(0.0)];
     let [positive, negative] = [sum.p_above(0.0), sum.p_below(0.0)];
@@ -118,35 +118,38 @@ fn p_of_distance(difference: &Inference, sum: &Inference) -> f64 {
     2.0 * further.min(nearer)
 }
 
-/// What is compared of both, and how many locations of each are left out.
-fn measured(data: [&Data; 2], pairing: Pairing) -> Result<([Measure; 2], [u32; 2]), Refusal> {
-    let repeats = Repeats::fair(data);
-    let places = data.map(Data::locations);
-    for (side, places) in [Side::A, Side::B].into_iter().zip(&places) {
-        if places.is_empty() {
-            return Err(Refusal::Empty { side });
+/// Measures both samples, and counts the locations that each leaves out.
+fn measured(
+    data: [&Data; 2],
+    pairing: Pairing,
+) -> Result<([Measure; 2], [u32; 2]), ComparisonError> {
+    let estimator = RepeatEstimator::for_samples(data);
+    let sets = data.map(Data::locations);
+    for (side, set) in [Side::A, Side::B].into_iter().zip(&sets) {
+        if set.is_empty() {
+            return Err(ComparisonError::Empty { side });
         }
     }
-    let total = places.each_ref().map(|p| p.len() as u32);
-    let shared = places[0].intersection(&places[1]).count() as u32;
+    let total = sets.each_ref().map(|p| p.len() as u32);
+    let shared = sets[0].intersection(&sets[1]).count() as u32;
     let (locations, left_out) = match pairing {
         Pairing::SharedLocations => (shared, total.map(|t| t - shared)),
         Pairing::Independent => (total[0].min(total[1]), [0, 0]),
     };
     if locations == 0 {
         let [a, b] = total;
-        return Err(Refusal::NoSharedLocation { a, b });
+        return Err(ComparisonError::NoSharedLocation { a, b });
     }
     if locations < 2 {
-        return Err(Refusal::TooFewLocations { locations });
+        return Err(ComparisonError::TooFewLocations { locations });
     }
     let keep = |other: usize| {
-        let places = &places;
-        move |k: u32| pairing == Pairing::Independent || places[other].contains(&k)
+        let sets = &sets;
+        move |k: u32| pairing == Pairing::Independent || sets[other].contains(&k)
     };
     let of = [
-        measure(data[0], repeats, Side::A, keep(1))?,
-        measure(data[1], repeats, Side::B, keep(0))?,
+        measure(data[0], estimator, Side::A, keep(1))?,
+        measure(data[1], estimator, Side::B, keep(0))?,
     ];
     Ok((of, left_out))
 }

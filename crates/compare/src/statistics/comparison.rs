@@ -1,155 +1,155 @@
-//! Owns the answer: values, difference, tests, verdict, and what would decide.
+//! Owns the result of comparing two samples: values, difference, tests, verdict and required presses.
 
 use serde::{Deserialize, Serialize};
 
 use super::question::{Better, Pairing};
 use super::{Kind, Side};
 
-/// A number with its interval (1 - alpha).
+/// A value with its 1 - alpha interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
-    /// The number.
+    /// Point estimate.
     pub value: f64,
-    /// Lower end; `None` when there is none (misses reach into it).
+    /// Lower end; `None` when open, for instance because misses reach into it.
     pub low: Option<f64>,
-    /// Upper end; `None` when there is none.
+    /// Upper end; `None` when open.
     pub high: Option<f64>,
 }
 
-/// What the data say.
+/// Conclusion of a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// The two differ by less than the margin, whether or not they differ at all.
+    /// The skins differ by less than the margin; they may still differ significantly.
     Equivalent,
     /// B is better than A.
     Better,
     /// B is worse than A.
     Worse,
-    /// None of these can be claimed.
+    /// None of these is supported.
     Undecided,
 }
 
 /// Two one-sided tests of equivalence (Schuirmann 1987).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Tost {
-    /// Differences up to this are equivalent.
+    /// Differences up to this size are equivalent.
     pub margin: f64,
-    /// The difference with an interval of 1 - 2 alpha: equivalent when it lies between -margin and +margin.
+    /// Difference with its 1 - 2 alpha interval: equivalent if it lies within ± margin.
     pub interval: Interval,
     /// The larger of the two one-sided p values.
     pub p: f64,
 }
 
-/// Which data a comparison stands on.
+/// Data that a comparison uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Design {
     /// Shared or independent locations.
     pub pairing: Pairing,
-    /// Locations of A and of B that are compared.
+    /// Compared locations of A and B.
     pub locations: [u32; 2],
-    /// Presses (trials, exposures) of A and of B there.
+    /// Presses (trials, exposures) of A and B at these locations.
     pub presses: [u32; 2],
-    /// Locations of A and of B that the other has no value at: not compared.
+    /// Locations of A and B without a value in the other skin, not compared.
     pub left_out: [u32; 2],
 }
 
-/// Where the variance of a difference comes from, in squared units of the metric. With `k` locations pressed `r` times
-/// each by both, the difference has variance `between / k + (within[0] + within[1]) / (k r)`.
+/// Variance components of a difference, in squared units of the metric. With `k` locations pressed `r` times each by both,
+/// the difference has variance `between / k + (within[0] + within[1]) / (k r)`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Components {
-    /// Of the difference between locations, beyond what repetitions explain; with all of it where nothing was repeated.
+    /// Between locations, beyond what repetitions explain; includes everything when nothing was repeated.
     pub between: f64,
-    /// Of A and of B between repetitions at one location; `None` when one of them was nowhere pressed twice.
+    /// Between repetitions at one location, of A and B; `None` without repetitions in one of them.
     pub within: Option<[f64; 2]>,
-    /// Repetitions per location on average (harmonic mean) of A and of B.
+    /// Harmonic mean of repetitions per location, of A and B.
     pub repetitions: [f64; 2],
 }
 
-/// How many presses would decide, if the difference is what it seems.
+/// Presses required for a decision, assuming that the measured difference is the true one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "status", rename_all = "snake_case")]
-pub enum Needed {
-    /// It is decided.
+pub enum PressesNeeded {
+    /// The comparison is decided.
     Nothing,
-    /// This would, with the power of the settings.
-    More(Enough),
-    /// The difference is so close to the border that no sensible number of presses decides.
+    /// This design would decide with the power of the settings.
+    More(RequiredDesign),
+    /// The difference is too close to the border for any practical number of presses.
     OutOfReach,
 }
 
-/// What would be enough, each in total and for each of the two.
+/// A design that would decide. Counts are per skin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Enough {
-    /// What it would be enough for.
+pub struct RequiredDesign {
+    /// Verdict that it would reach.
     pub towards: Verdict,
-    /// Locations, with as many repetitions as now.
+    /// Total locations, with the present number of repetitions.
     pub locations: u32,
-    /// Repetitions at the locations of now; `None` when repetitions alone cannot decide.
+    /// Total repetitions at the present locations; `None` if repetitions alone cannot decide.
     pub repetitions: Option<u32>,
-    /// Presses more than now with further locations.
+    /// Additional presses when adding locations.
     pub more_presses_by_locations: u32,
-    /// Presses more than now with further repetitions.
+    /// Additional presses when adding repetitions.
     pub more_presses_by_repetitions: Option<u32>,
 }
 
-/// Something that a reader must know.
+/// A caveat for the reader.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "note", rename_all = "snake_case")]
 pub enum Note {
-    /// So few locations that the interval leans on a normal distribution.
+    /// Too few locations for the bootstrap: the interval assumes a normal distribution.
     FewLocations {
-        /// How many.
+        /// Number of locations.
         locations: u32,
     },
-    /// Standard deviations of few repetitions are too small on average; the two have different numbers.
+    /// The skins have different numbers of repetitions, and the std of few repetitions is biased low.
     UnequalRepetitions,
-    /// Trials were missed; they count as later than every time.
+    /// Some trials were missed; they count as later than every time.
     Missed {
-        /// Whose.
+        /// Side with misses.
         side: Side,
-        /// How many.
+        /// Missed trials.
         missed: u32,
-        /// Of how many.
+        /// All trials.
         trials: u32,
     },
-    /// A share of 0 or 1, or a count of 0: its interval counts each location (or the whole exposure) once.
+    /// A share of 0 or 1, or a count of 0: the interval counts each location (or the whole exposure) once.
     AtTheBorder {
-        /// Whose.
+        /// Side at the border.
         side: Side,
     },
 }
 
-/// Two samples compared. Differences are B - A.
+/// Result of comparing two samples. Differences are B - A.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
-    /// Of what.
+    /// Kind of both samples.
     pub kind: Kind,
-    /// A, over the locations compared.
+    /// Value of A over the compared locations.
     pub a: Interval,
-    /// B, over the locations compared.
+    /// Value of B over the compared locations.
     pub b: Interval,
     /// B - A.
     pub difference: Interval,
     /// Two-sided p value of no difference.
     pub p_difference: f64,
-    /// The test of equivalence, when there is a margin.
+    /// Equivalence test; `None` without a margin.
     pub tost: Option<Tost>,
-    /// The verdict on B.
+    /// Verdict on B.
     pub verdict: Verdict,
-    /// True when the whole interval of the difference lies beyond the margin.
+    /// True if the whole interval of the difference lies beyond the margin.
     pub beyond_margin: bool,
-    /// What it stands on.
+    /// Data behind the comparison.
     pub design: Design,
-    /// Where the variance comes from.
+    /// Variance components of the difference.
     pub components: Components,
-    /// What would decide.
-    pub needed: Needed,
-    /// What to keep in mind.
+    /// Presses required for a decision.
+    pub needed: PressesNeeded,
+    /// Caveats.
     pub notes: Vec<Note>,
 }
 
-/// Better or worse by the values alone.
+/// [`Verdict::Better`] or [`Verdict::Worse`] by the values alone.
 pub(super) fn direction(a: f64, b: f64, better: Better) -> Verdict {
     let gain = match better {
         Better::Lower => a - b,

@@ -1,11 +1,11 @@
-//! Where the variance of a difference comes from: between locations, and between repetitions at one location.
+//! Variance components of a difference: between locations, and between repetitions at one location.
 
 use super::comparison::Components;
 use super::influence::Measure;
 use super::question::Pairing;
 
-/// Components by the method of moments (analysis of variance with locations as groups; Searle, Casella and McCulloch
-/// 1992). A negative estimate between locations counts 0.
+/// Variance components by the method of moments (analysis of variance with locations as groups; Searle, Casella and
+/// McCulloch 1992). A negative estimate between locations becomes 0.
 pub(super) fn of(samples: &[Measure; 2], pairing: Pairing) -> Components {
     let within = [within(&samples[0]), within(&samples[1])];
     let inverse = [0, 1].map(|i| inverse_repetitions(&samples[i]));
@@ -30,14 +30,14 @@ pub(super) fn of(samples: &[Measure; 2], pairing: Pairing) -> Components {
 }
 
 fn means(of: &Measure) -> Vec<f64> {
-    of.places.iter().map(|(_, u)| mean(u)).collect()
+    of.by_location.iter().map(|(_, u)| mean(u)).collect()
 }
 
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Sample variance; 0 of fewer than two.
+/// Sample variance; 0 for fewer than two values.
 pub(super) fn variance(values: &[f64]) -> f64 {
     if values.len() < 2 {
         return 0.0;
@@ -47,10 +47,10 @@ pub(super) fn variance(values: &[f64]) -> f64 {
     squares / (values.len() as f64 - 1.0)
 }
 
-/// Pooled variance at one location.
+/// Pooled variance between repetitions; `None` without repetitions.
 fn within(of: &Measure) -> Option<f64> {
     let (mut squares, mut free) = (0.0, 0usize);
-    for (_, values) in &of.places {
+    for (_, values) in &of.by_location {
         let centre = mean(values);
         squares += values.iter().map(|v| (v - centre).powi(2)).sum::<f64>();
         free += values.len() - 1;
@@ -58,10 +58,10 @@ fn within(of: &Measure) -> Option<f64> {
     (free > 0).then(|| squares / free as f64)
 }
 
-/// Mean of one over the presses at a location.
+/// Mean over locations of 1 / presses.
 fn inverse_repetitions(of: &Measure) -> f64 {
-    let each = of.places.iter().map(|(_, u)| 1.0 / u.len() as f64);
-    each.sum::<f64>() / of.places.len() as f64
+    let each = of.by_location.iter().map(|(_, u)| 1.0 / u.len() as f64);
+    each.sum::<f64>() / of.by_location.len() as f64
 }
 
 /// Variance of one sample between and within locations.

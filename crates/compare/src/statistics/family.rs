@@ -1,20 +1,20 @@
-//! Several prototypes: all pairs, or each against a reference, with what their number costs.
+//! Compares several prototypes, all pairs or each against a reference, with correction for multiple comparisons.
 
 use serde::{Deserialize, Serialize};
 
 use super::compare::verdict;
 use super::comparison::{Comparison, Interval, Verdict};
+use super::error::ComparisonError;
 use super::question::{Question, Settings};
-use super::refusal::Refusal;
 use super::sample::Sample;
 
-/// Which pairs are compared.
+/// Pairs to compare.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Against {
-    /// Each with each.
-    Each,
-    /// Each other one with this one, by its index.
+pub enum PairSelection {
+    /// All pairs.
+    All,
+    /// Each sample against the one with this index.
     Reference(usize),
 }
 
@@ -25,50 +25,50 @@ pub struct Pair {
     pub a: usize,
     /// Index of B.
     pub b: usize,
-    /// The two compared as if alone, or why they cannot be.
-    pub alone: Result<Comparison, Refusal>,
-    /// The same among the others; `None` without a comparison.
+    /// Uncorrected comparison, or why there is none.
+    pub alone: Result<Comparison, ComparisonError>,
+    /// Corrected for the size of the family; `None` without a comparison.
     pub adjusted: Option<Adjusted>,
 }
 
-/// A comparison among several: the chance of any false claim in the family stays within alpha.
+/// A comparison corrected for its family: the probability of any false claim in the family stays below alpha.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Adjusted {
-    /// Comparisons in the family.
+    /// Number of comparisons in the family.
     pub family: u32,
-    /// p value of no difference after Holm (1979).
+    /// p value of no difference, Holm-corrected (1979).
     pub p_difference: f64,
-    /// p value of the test of equivalence after Holm.
+    /// p value of the equivalence test, Holm-corrected.
     pub p_tost: Option<f64>,
-    /// The difference with an interval that holds for all pairs at once (Bonferroni: 1 - alpha / family).
+    /// Difference with a simultaneous interval (Bonferroni: 1 - alpha / family).
     pub simultaneous: Interval,
-    /// The verdict by the adjusted p values.
+    /// Verdict by the corrected p values.
     pub verdict: Verdict,
 }
 
 /// Compares several samples of one metric.
 ///
 /// # Errors
-/// [`Refusal::Setting`] when the reference is none of them, or there are fewer than two.
+/// [`ComparisonError::Setting`] for an invalid reference, or fewer than two samples.
 pub fn compare_all(
     samples: &[Sample],
-    against: Against,
+    against: PairSelection,
     question: &Question,
     settings: &Settings,
-) -> Result<Vec<Pair>, Refusal> {
-    let setting = |name, expected, found| Refusal::setting(name, expected, found as f64);
+) -> Result<Vec<Pair>, ComparisonError> {
+    let setting = |name, expected, found| ComparisonError::setting(name, expected, found as f64);
     if samples.len() < 2 {
-        return Err(setting("samples", "2 at the least", samples.len()));
+        return Err(setting("samples", "at least 2", samples.len()));
     }
     let pairs: Vec<(usize, usize)> = match against {
-        Against::Reference(r) if r >= samples.len() => {
+        PairSelection::Reference(r) if r >= samples.len() => {
             return Err(setting("reference", "the index of a sample", r));
         }
-        Against::Reference(r) => (0..samples.len())
+        PairSelection::Reference(r) => (0..samples.len())
             .filter(|b| *b != r)
             .map(|b| (r, b))
             .collect(),
-        Against::Each => (0..samples.len())
+        PairSelection::All => (0..samples.len())
             .flat_map(|b| (0..b).map(move |a| (a, b)))
             .collect(),
     };
@@ -116,7 +116,7 @@ pub fn compare_all(
         .collect())
 }
 
-/// p values after Holm (1979): step down, never decreasing, at most 1.
+/// Holm (1979) correction: step down, monotone, at most 1.
 fn holm(p: &[Option<f64>]) -> Vec<Option<f64>> {
     let mut order: Vec<usize> = (0..p.len()).filter(|i| p[*i].is_some()).collect();
     let value = |i: usize| p[i].unwrap_or(1.0);

@@ -1,71 +1,71 @@
-//! From an estimate to its interval and its one-sided p values, each the other's inverse.
+//! Derives the interval and the one-sided p values of an estimate; each is the inverse of the other.
 
 use super::bootstrap;
 use super::comparison::Interval;
 use super::influence::{BOOTSTRAP_FROM, Measure, Ratio, Shape, correlation, error};
-use super::mover::{Limits, recovered};
+use super::mover::{Limits, mover_limits};
 use super::question::{Pairing, Settings};
 use skinrig_analysis::distributions::{student_cdf, student_quantile};
 
-/// An estimate and how it errs.
+/// An estimate with its error model.
 pub(super) struct Inference {
     value: f64,
-    how: How,
+    method: IntervalMethod,
 }
 
-enum How {
-    /// By its standard error times Student's t.
+enum IntervalMethod {
+    /// Student's t times the standard error.
     Student { error: f64, df: f64 },
-    /// By its standard error times what the draws erred by, or Student's t if that is more.
-    Drawn {
+    /// Bootstrap-t interval, never narrower than Student's t.
+    BootstrapT {
         error: f64,
         df: f64,
         draws: Vec<f64>,
     },
-    /// As the limits of what it is made of do, at quantiles of Student's t.
-    Limits { of: Box<Made>, df: f64 },
+    /// Limits of the components, combined, at quantiles of Student's t.
+    Limits { of: Box<LimitSource>, df: f64 },
 }
 
-enum Made {
-    One(Limits),
-    /// The second less the first; their correlation; the standard error of their difference, where limits nearer than
-    /// that many times it are not to be trusted (0 where they are).
-    Two([(f64, Limits); 2], f64, f64),
+enum LimitSource {
+    Single(Limits),
+    /// Second minus first: both values with limits, their correlation, and the standard error of the difference that sets
+    /// the minimum width (0: no minimum).
+    Difference([(f64, Limits); 2], f64, f64),
 }
 
 impl Inference {
-    /// Of one sample alone, or of the larger design that it is part of.
+    /// Inference for one sample.
     pub fn alone(of: &Measure, settings: &Settings) -> Self {
         let totals = of.totals();
         let (error, df) = (error(&totals), totals.len() as f64 - 1.0);
-        let how = match of.shape.ratio() {
-            Some(_) if totals.len() < BOOTSTRAP_FROM => How::Student { error, df },
-            Some(ratio) => How::Drawn {
+        let method = match of.shape.ratio() {
+            Some(_) if totals.len() < BOOTSTRAP_FROM => IntervalMethod::Student { error, df },
+            Some(ratio) => IntervalMethod::BootstrapT {
                 error,
                 df,
                 draws: bootstrap::paired(None, ratio, settings.resamples, settings.seed),
             },
-            None => How::Limits {
-                of: Box::new(Made::One(Limits::of(of, None))),
+            None => IntervalMethod::Limits {
+                of: Box::new(LimitSource::Single(Limits::of(of, None))),
                 df,
             },
         };
         let value = of.value;
-        Self { value, how }
+        Self { value, method }
     }
 
-    /// Of `b - sign * a`; `sign` is 1 or, for ratios only, -1.
+    /// Inference for `b - sign * a`; `sign` is 1 or, for ratios only, -1.
     pub fn difference(a: &Measure, b: &Measure, sign: f64, settings: &Settings) -> Self {
         let totals = [a.totals(), b.totals()];
         let value = b.value - sign * a.value;
         let (error, df) = spread(&totals, sign, settings.pairing);
-        let how = match (a.shape.ratio(), b.shape.ratio()) {
+        let method = match (a.shape.ratio(), b.shape.ratio()) {
             (Some(a), Some(b)) => {
                 if totals[0].len().min(totals[1].len()) < BOOTSTRAP_FROM {
-                    How::Student { error, df }
+                    IntervalMethod::Student { error, df }
                 } else {
                     let draws = draws(a, b, sign, settings);
-                    How::Drawn { error, df, draws }
+                    IntervalMethod::BootstrapT { error, df, draws }
                 }
             }
             _ => {
@@ -81,26 +81,26 @@ impl Inference {
                     Shape::Share(_) | Shape::Counts(..) => error,
                     _ => 0.0,
                 };
-                How::Limits {
-                    of: Box::new(Made::Two(parts, together, least)),
+                IntervalMethod::Limits {
+                    of: Box::new(LimitSource::Difference(parts, together, least)),
                     df,
                 }
             }
         };
-        Self { value, how }
+        Self { value, method }
     }
 
-    /// The interval that leaves `alpha` outside, half on each side.
+    /// Two-sided interval with coverage 1 - `alpha`.
     pub fn interval(&self, alpha: f64) -> Interval {
-        let (low, high) = match &self.how {
-            How::Student { error, df } => {
+        let (low, high) = match &self.method {
+            IntervalMethod::Student { error, df } => {
                 let half = student_quantile(1.0 - 0.5 * alpha, *df) * error;
                 (self.value - half, self.value + half)
             }
-            How::Drawn { error, df, draws } => {
+            IntervalMethod::BootstrapT { error, df, draws } => {
                 let t = student_quantile(1.0 - 0.5 * alpha, *df);
                 let outside = 0.5 * alpha * (draws.len() as f64 + 1.0);
-                // A share such as 0.05 has no exact binary form: a whole number stays whole.
+                // 0.05 has no exact binary form; the offset keeps whole numbers whole.
                 let outside = ((outside + 1e-9).floor() as usize).clamp(1, draws.len());
                 let (least, most) = (
                     draws[outside - 1].min(-t),
@@ -108,7 +108,9 @@ impl Inference {
                 );
                 (self.value - most * error, self.value - least * error)
             }
-            How::Limits { df, .. } => self.limits(student_quantile(1.0 - 0.5 * alpha, *df)),
+            IntervalMethod::Limits { df, .. } => {
+                self.limits(student_quantile(1.0 - 0.5 * alpha, *df))
+            }
         };
         let finite = |v: f64| v.is_finite().then_some(v);
         Interval {
@@ -118,52 +120,60 @@ impl Inference {
         }
     }
 
-    /// p value of the truth being at most `border`: small when it is above.
+    /// One-sided p value against `truth <= border`.
     pub(crate) fn p_above(&self, border: f64) -> f64 {
-        match &self.how {
-            How::Student { error, df } => 1.0 - student_cdf((self.value - border) / error, *df),
-            How::Drawn { error, df, draws } => {
+        match &self.method {
+            IntervalMethod::Student { error, df } => {
+                1.0 - student_cdf((self.value - border) / error, *df)
+            }
+            IntervalMethod::BootstrapT { error, df, draws } => {
                 let t = (self.value - border) / error;
                 let as_far = draws.len() - draws.partition_point(|d| *d < t);
                 let drawn = (as_far as f64 + 1.0) / (draws.len() as f64 + 1.0);
                 drawn.max(1.0 - student_cdf(t, *df))
             }
-            How::Limits { df, .. } => 1.0 - student_cdf(self.reach(border), *df),
+            IntervalMethod::Limits { df, .. } => {
+                1.0 - student_cdf(self.standard_errors_above(border), *df)
+            }
         }
     }
 
-    /// p value of the truth being at least `border`: small when it is below.
+    /// One-sided p value against `truth >= border`.
     pub(crate) fn p_below(&self, border: f64) -> f64 {
-        match &self.how {
-            How::Student { error, df } => student_cdf((self.value - border) / error, *df),
-            How::Drawn { error, df, draws } => {
+        match &self.method {
+            IntervalMethod::Student { error, df } => {
+                student_cdf((self.value - border) / error, *df)
+            }
+            IntervalMethod::BootstrapT { error, df, draws } => {
                 let t = (self.value - border) / error;
                 let as_far = draws.partition_point(|d| *d <= t);
                 let drawn = (as_far as f64 + 1.0) / (draws.len() as f64 + 1.0);
                 drawn.max(student_cdf(t, *df))
             }
-            How::Limits { df, .. } => student_cdf(self.reach(border), *df),
+            IntervalMethod::Limits { df, .. } => {
+                student_cdf(self.standard_errors_above(border), *df)
+            }
         }
     }
 
     fn limits(&self, c: f64) -> (f64, f64) {
-        match &self.how {
-            How::Limits { of, .. } => match of.as_ref() {
-                Made::One(limits) => limits.at(c),
-                Made::Two([a, b], together, least) => {
-                    let (low, high) = recovered((a.0, a.1.at(c)), (b.0, b.1.at(c)), *together);
+        match &self.method {
+            IntervalMethod::Limits { of, .. } => match of.as_ref() {
+                LimitSource::Single(limits) => limits.at(c),
+                LimitSource::Difference([a, b], together, least) => {
+                    let (low, high) = mover_limits((a.0, a.1.at(c)), (b.0, b.1.at(c)), *together);
                     let half = c * least;
                     (low.min(self.value - half), high.max(self.value + half))
                 }
             },
-            How::Student { error, .. } | How::Drawn { error, .. } => {
+            IntervalMethod::Student { error, .. } | IntervalMethod::BootstrapT { error, .. } => {
                 (self.value - c * error, self.value + c * error)
             }
         }
     }
 
-    /// How many standard errors the value lies above `border`: where a limit passes it.
-    fn reach(&self, border: f64) -> f64 {
+    /// Signed distance of the value above `border`, in standard errors, by bisection on the limits.
+    fn standard_errors_above(&self, border: f64) -> f64 {
         let above = border <= self.value;
         let passed = |c: f64| {
             let (low, high) = self.limits(c);
@@ -185,7 +195,7 @@ impl Inference {
     }
 }
 
-/// The standard error of `b - sign * a` and its degrees of freedom (Welch 1947 for independent samples).
+/// Standard error of `b - sign * a` and its degrees of freedom (Welch 1947 for independent samples).
 fn spread(totals: &[Vec<f64>; 2], sign: f64, pairing: Pairing) -> (f64, f64) {
     let free = |i: usize| totals[i].len() as f64 - 1.0;
     match pairing {
@@ -212,7 +222,7 @@ fn draws(a: &Ratio, b: &Ratio, sign: f64, settings: &Settings) -> Vec<f64> {
     if settings.pairing == Pairing::SharedLocations {
         return bootstrap::paired(Some((a, sign)), b, resamples, seed);
     }
-    // The smaller ratio draws first, so that exchanging the two mirrors the draws.
+    // The smaller ratio draws first, so that swapping the samples mirrors the draws.
     if a.ratio <= b.ratio {
         return bootstrap::independent((a, sign), b, resamples, seed);
     }

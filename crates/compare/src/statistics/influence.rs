@@ -1,45 +1,44 @@
-//! What each press contributes to a metric, to first order, and what its inference needs besides.
+//! Influence of each press on a metric, to first order, and the data that inference needs besides.
 //!
-//! Every metric here is, near its value, its value plus the mean of one number per press. That number (the empirical
-//! influence function: Hampel 1974; for surveys the linearised variable: Deville 1999) gives standard errors over
-//! locations and variance components alike for all kinds.
+//! Near its value, every metric equals its value plus the mean of one number per press. That number (the empirical influence
+//! function: Hampel 1974; in surveys the linearised variable: Deville 1999) gives standard errors over locations and
+//! variance components for all kinds of metric.
 
-use super::ranked::Ranked;
+use super::percentile::Percentile;
 
-/// Fewer locations than this leave too few different draws: Student's distribution serves instead.
+/// Below this many locations there are too few distinct draws, and Student's t is used.
 pub(super) const BOOTSTRAP_FROM: usize = 8;
 
-/// By location, ascending: a number per press.
-pub(super) type ByPlace = Vec<(u32, Vec<f64>)>;
+/// One number per press, grouped by location number, ascending.
+pub(super) type ByLocation = Vec<(u32, Vec<f64>)>;
 
-/// A metric's value, the influence of its presses, and its shape.
+/// Value of a metric, influence of its presses, and data for inference.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Measure {
-    /// The metric's value.
     pub value: f64,
-    /// The influence of each press; their mean over all presses is 0.
-    pub places: ByPlace,
-    /// What it is besides.
+    /// Influence of each press; the mean over all presses is 0.
+    pub by_location: ByLocation,
+    /// Data for inference.
     pub shape: Shape,
 }
 
-/// What the inference of a metric stands on besides influences.
+/// Data for inference besides influences.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Shape {
-    /// A function of a ratio of sums over locations.
+    /// Function of a ratio of sums over locations.
     Ratio(Ratio),
-    /// A share of so many trials.
+    /// Share of this many trials.
     Share(u32),
-    /// Events during an exposure, and their ratio.
+    /// Events, exposure, and their ratio.
     Counts(u32, f64, Ratio),
-    /// A rank among times.
-    Ranked(Ranked),
-    /// The distance between two ranks, low and high, and the correlation of their estimates.
-    Width(Ranked, Ranked, f64),
+    /// Percentile of times.
+    Percentile(Percentile),
+    /// Distance between two percentiles, low and high, and the correlation of their estimates.
+    Width(Percentile, Percentile, f64),
 }
 
 impl Shape {
-    /// What a bootstrap can draw from: a ratio that enough locations say something about.
+    /// Ratio for the bootstrap; `None` if too few locations contribute.
     pub fn ratio(&self) -> Option<&Ratio> {
         match self {
             Self::Ratio(ratio) => Some(ratio),
@@ -54,30 +53,29 @@ impl Shape {
     }
 }
 
-/// A ratio of sums over locations and what is made of it.
+/// Ratio of sums over locations, and its mapping to the metric.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Ratio {
-    /// The ratio.
     pub ratio: f64,
-    /// (sum - ratio * weight, weight) of each location, in the order of the places.
+    /// (sum - ratio * weight, weight) of each location, in ascending order of location number.
     pub terms: Vec<(f64, f64)>,
-    /// What it is mapped to.
+    /// Mapping from ratio to metric.
     pub scale: Scale,
 }
 
-/// From a ratio to the metric.
+/// Mapping from a ratio to the metric.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Scale {
-    /// The ratio itself.
+    /// Identity.
     Same,
-    /// Its square root.
+    /// Square root.
     Root,
-    /// An area in circles of that mean square radius.
+    /// Number of circles with this mean square radius in the area, mm².
     Circles(f64),
 }
 
 impl Scale {
-    /// The metric and its derivative by the ratio; the derivative at an end of the range is 0.
+    /// Metric and its derivative with respect to the ratio; the derivative is 0 at the end of the range.
     pub fn of(self, ratio: f64) -> (f64, f64) {
         match self {
             Self::Same => (ratio, 1.0),
@@ -92,32 +90,32 @@ impl Scale {
 }
 
 impl Measure {
-    /// Presses.
+    /// Number of presses.
     pub fn presses(&self) -> u32 {
-        self.places.iter().map(|p| p.1.len() as u32).sum()
+        self.by_location.iter().map(|p| p.1.len() as u32).sum()
     }
 
-    /// Locations.
+    /// Number of locations.
     pub fn locations(&self) -> usize {
-        self.places.len()
+        self.by_location.len()
     }
 
-    /// What each location contributes to the error of the value.
+    /// Contribution of each location to the error of the value.
     pub fn totals(&self) -> Vec<f64> {
         let n = f64::from(self.presses());
-        let sums = self.places.iter().map(|p| p.1.iter().sum::<f64>());
+        let sums = self.by_location.iter().map(|p| p.1.iter().sum::<f64>());
         sums.map(|s| s / n).collect()
     }
 }
 
-/// Standard error of a sum over locations whose terms add up to 0 (Taylor linearisation with locations as primary
-/// units: Cochran 1977, chapter 9A).
+/// Standard error of a sum over locations whose terms add up to 0 (Taylor linearisation with locations as primary units:
+/// Cochran 1977, chapter 9A).
 pub(super) fn error(totals: &[f64]) -> f64 {
     let k = totals.len() as f64;
     (k / (k - 1.0) * totals.iter().map(|e| e * e).sum::<f64>()).sqrt()
 }
 
-/// Correlation of two sums over the same locations; 0 where one does not vary.
+/// Correlation of two sums over the same locations; 0 if one of them does not vary.
 pub(super) fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let size = (product(a, a) * product(b, b)).sqrt();
@@ -128,9 +126,9 @@ pub(super) fn correlation(a: &[f64], b: &[f64]) -> f64 {
     }
 }
 
-/// From (sum, weight) of each press; `None` without any.
-pub(super) fn from_terms(places: Vec<(u32, Vec<(f64, f64)>)>, scale: Scale) -> Option<Measure> {
-    let all = || places.iter().flat_map(|(_, v)| v);
+/// Computes the ratio of sums from (value, weight) of each press; `None` without presses.
+pub(super) fn from_terms(locations: Vec<(u32, Vec<(f64, f64)>)>, scale: Scale) -> Option<Measure> {
+    let all = || locations.iter().flat_map(|(_, v)| v);
     let n = all().count();
     if n == 0 {
         return None;
@@ -148,13 +146,13 @@ pub(super) fn from_terms(places: Vec<(u32, Vec<(f64, f64)>)>, scale: Scale) -> O
         let residuals = v.iter().map(residual).sum();
         (residuals, v.iter().map(|t| t.1).sum())
     };
-    let terms = places.iter().map(|(_, v)| total(v)).collect();
-    let places = places
+    let terms = locations.iter().map(|(_, v)| total(v)).collect();
+    let locations = locations
         .iter()
         .map(|(k, v)| (*k, v.iter().map(|t| each * residual(t)).collect()));
     Some(Measure {
         value,
-        places: places.collect(),
+        by_location: locations.collect(),
         shape: Shape::Ratio(Ratio {
             ratio,
             terms,

@@ -1,33 +1,33 @@
-//! The value of a metric, and what its presses contribute to it, from a sample's data.
+//! Computes the value of a metric and the influence of its presses from a sample.
 
+use super::error::{ComparisonError, Side};
 use super::influence::{Measure, Scale, Shape, from_terms};
 use super::quantiles;
-use super::refusal::{Refusal, Side};
 use super::sample::{Clusters, Count, Data};
-use super::spread::{self, Repeats};
+use super::spread::{self, RepeatEstimator};
 
-/// Measures the values at the locations that `keep` keeps.
+/// Measures the locations for which `keep` returns true.
 ///
 /// # Errors
-/// [`Refusal::Empty`], and what keeps the metric from having a value.
+/// [`ComparisonError::Empty`], or the reason why the metric has no value.
 pub(super) fn measure(
     data: &Data,
-    repeats: Repeats,
+    estimator: RepeatEstimator,
     side: Side,
     keep: impl Fn(u32) -> bool,
-) -> Result<Measure, Refusal> {
-    let empty = Refusal::Empty { side };
+) -> Result<Measure, ComparisonError> {
+    let empty = ComparisonError::Empty { side };
     let found = match data {
         Data::Mean(c) => ratio(c, &keep, Scale::Same, |v| (*v, 1.0)),
         Data::Rms(c) => ratio(c, &keep, Scale::Root, |v| (v * v, 1.0)),
         Data::Taxels(area_mm2, c) => {
             let found = ratio(c, &keep, Scale::Circles(*area_mm2), |v| (v * v, 1.0));
             if found.as_ref().is_some_and(|m| !m.value.is_finite()) {
-                return Err(Refusal::NoError { side });
+                return Err(ComparisonError::NoError { side });
             }
             found
         }
-        Data::RepeatStd(c) => spread::repeat_std(c, repeats, &keep),
+        Data::RepeatStd(c) => spread::repeat_std(c, estimator, &keep),
         Data::Share(c) => {
             let share = ratio(c, &keep, Scale::Same, |v| (f64::from(u8::from(*v)), 1.0));
             share.map(|m| Measure {
@@ -63,6 +63,6 @@ fn ratio<T>(
     term: impl Fn(&T) -> (f64, f64),
 ) -> Option<Measure> {
     let kept = clusters.iter().filter(|(k, _)| keep(**k));
-    let places = kept.map(|(k, v)| (*k, v.iter().map(&term).collect()));
-    from_terms(places.collect(), scale)
+    let locations = kept.map(|(k, v)| (*k, v.iter().map(&term).collect()));
+    from_terms(locations.collect(), scale)
 }

@@ -1,38 +1,38 @@
-//! The statistics of comparing skins: intervals, tests, verdicts and sample sizes, with locations as clusters.
+//! Statistics for comparing skins: intervals, tests, verdicts and sample sizes, with locations as clusters.
 //!
-//! Presses at one location share its error and are not independent: whatever is computed here draws, or counts, whole
-//! locations. `docs/explanation/comparison.md` says which interval and which test serves which kind of metric, why, and how they
-//! behave on simulated skins.
+//! Presses at one location share an error and are not independent, so everything here resamples or counts whole locations.
+//! `docs/explanation/comparison.md` explains which interval and test serves which kind of metric, and how they perform on
+//! simulated skins.
 //!
-//! A [`Sample`] is what one prototype contributes for one metric. [`estimate`] gives its value, [`compare`] the
-//! difference between two, [`compare_all`] the differences between several, corrected for their number, and
-//! [`power::plan`] what to press to find a difference of a given size.
+//! A [`Sample`] holds the data of one prototype for one metric. [`estimate`] gives its value, [`compare`] the difference
+//! between two samples, [`compare_all`] the corrected differences between several, and [`power::plan`] the presses needed to
+//! detect a given difference.
 
 mod bootstrap;
 mod compare;
 mod comparison;
 mod components;
+mod error;
 mod family;
 mod inference;
 mod influence;
 mod measure;
 mod mover;
-mod needed;
 mod notes;
+mod percentile;
 pub mod power;
+mod presses_needed;
 mod quantiles;
 mod question;
-mod ranked;
-mod refusal;
 mod sample;
 mod scores;
 mod spread;
 
 pub use compare::{compare, estimate};
 pub use comparison::{
-    Comparison, Components, Design, Enough, Interval, Needed, Note, Tost, Verdict,
+    Comparison, Components, Design, Interval, Note, PressesNeeded, RequiredDesign, Tost, Verdict,
 };
-pub use family::{Adjusted, Against, Pair, compare_all};
+pub use error::{ComparisonError, Side};
+pub use family::{Adjusted, Pair, PairSelection, compare_all};
 pub use question::{Better, Pairing, Question, Settings};
-pub use refusal::{Refusal, Side};
 pub use sample::{Count, Kind, Position, Sample, SampleFault};

@@ -1,25 +1,25 @@
-//! Limits of a difference from the limits of its parts.
+//! Limits of a difference from the limits of its parts (MOVER).
 
 use super::influence::{Measure, Shape, error};
-use super::ranked::Ranked;
+use super::percentile::Percentile;
 use super::scores;
 
-/// Limits of one metric at so many standard errors.
+/// Confidence limits of one metric at a given number of standard errors.
 pub(super) enum Limits {
-    /// A share, and the independent trials it is worth.
+    /// Share and effective number of independent trials.
     Share(f64, f64),
-    /// Events and exposure of a Poisson process that is as uncertain.
+    /// Events and exposure of a Poisson process with the same uncertainty.
     Rate(f64, f64),
-    /// A percentile.
-    Ranked(Ranked),
-    /// The distance between two, and the correlation of their estimates.
-    Width(Ranked, Ranked, f64),
-    /// A value and its standard error.
+    /// Percentile of times.
+    Percentile(Percentile),
+    /// Distance between two percentiles, and the correlation of their estimates.
+    Width(Percentile, Percentile, f64),
+    /// Value and standard error.
     Plain(f64, f64),
 }
 
 impl Limits {
-    /// Of a measure; where it counted no event, it is as overdispersed as `other`.
+    /// Limits of `measure`; without any event it takes the overdispersion of `other`.
     pub fn of(measure: &Measure, other: Option<&Measure>) -> Self {
         let error_of = |of: &Measure| error(&of.totals());
         match &measure.shape {
@@ -39,18 +39,18 @@ impl Limits {
                 let effect = effect(measure).or_else(|| effect(other?)).unwrap_or(1.0);
                 Self::Rate(f64::from(*events) / effect, exposure / effect)
             }
-            Shape::Ranked(at) => Self::Ranked(at.clone()),
+            Shape::Percentile(at) => Self::Percentile(at.clone()),
             Shape::Width(low, high, together) => Self::Width(low.clone(), high.clone(), *together),
         }
     }
 
-    /// The limits at `c` standard errors; infinite where there is none.
+    /// Limits at `c` standard errors; infinite where open.
     pub fn at(&self, c: f64) -> (f64, f64) {
         match self {
             Self::Share(p, trials) => scores::wilson(*p, *trials, c),
             Self::Rate(events, exposure) => scores::poisson(*events, *exposure, c),
-            Self::Ranked(at) => at.limits(c),
-            Self::Width(low, high, together) => recovered(
+            Self::Percentile(at) => at.limits(c),
+            Self::Width(low, high, together) => mover_limits(
                 (low.value, low.limits(c)),
                 (high.value, high.limits(c)),
                 *together,
@@ -60,10 +60,9 @@ impl Limits {
     }
 }
 
-/// Limits of `b - a` from (value, limits) of each: the distances to them stand for standard errors (method of variance
-/// estimates recovery, Zou and Donner 2008; of two shares it is the hybrid score method of Newcombe 1998, of paired ones
-/// with their correlation).
-pub(super) fn recovered(
+/// Limits of `b - a` from (value, limits) of each (MOVER, method of variance estimates recovery, Zou and Donner 2008). For
+/// two shares this is the hybrid score method of Newcombe 1998; for paired ones, with their correlation.
+pub(super) fn mover_limits(
     a: (f64, (f64, f64)),
     b: (f64, (f64, f64)),
     correlation: f64,
@@ -88,7 +87,7 @@ mod tests {
     fn two_shares_get_the_hybrid_score_interval() {
         // Newcombe 1998 (Stat Med 17:873), method 10: 56/70 - 48/80 gives 0.0524 to 0.3339.
         let limits = |r: f64, n: f64| (r / n, scores::wilson(r / n, n, 1.959_964));
-        let (low, high) = recovered(limits(48.0, 80.0), limits(56.0, 70.0), 0.0);
+        let (low, high) = mover_limits(limits(48.0, 80.0), limits(56.0, 70.0), 0.0);
         assert!(
             (low - 0.0524).abs() < 5e-5 && (high - 0.3339).abs() < 5e-5,
             "{low} {high}"

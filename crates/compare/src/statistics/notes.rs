@@ -1,12 +1,12 @@
-//! What a reader of a comparison must keep in mind.
+//! Caveats of a comparison.
 
 use super::comparison::Note;
+use super::error::Side;
 use super::influence::{BOOTSTRAP_FROM, Measure, Shape};
-use super::refusal::Side;
 use super::sample::Data;
-use super::spread::Repeats;
+use super::spread::RepeatEstimator;
 
-/// Of what was compared.
+/// Collects the caveats of a comparison.
 pub(super) fn notes(data: [&Data; 2], of: &[Measure; 2]) -> Vec<Note> {
     let mut notes = Vec::new();
     let locations = of.iter().map(Measure::locations).min().unwrap_or(0);
@@ -14,12 +14,12 @@ pub(super) fn notes(data: [&Data; 2], of: &[Measure; 2]) -> Vec<Note> {
         let locations = locations as u32;
         notes.push(Note::FewLocations { locations });
     }
-    if Repeats::fair(data) == Repeats::Pairs {
+    if RepeatEstimator::for_samples(data) == RepeatEstimator::Pairs {
         notes.push(Note::UnequalRepetitions);
     }
     for (side, of) in [Side::A, Side::B].into_iter().zip(of) {
         match &of.shape {
-            Shape::Ranked(at) | Shape::Width(at, ..) if at.missed() > 0 => {
+            Shape::Percentile(at) | Shape::Width(at, ..) if at.missed() > 0 => {
                 notes.push(Note::Missed {
                     side,
                     missed: at.missed(),

@@ -1,88 +1,88 @@
-//! What to press to find a difference of a given size: locations x repetitions from measured variance.
+//! Sample size planning: locations and repetitions that detect a given difference, from measured variance.
 
 use serde::{Deserialize, Serialize};
 
-use super::measure::measure as measured;
-use super::refusal::{Refusal, Side};
+use super::error::{ComparisonError, Side};
+use super::measure::measure as measure_sample;
 use super::sample::Sample;
-use super::spread::Repeats;
+use super::spread::RepeatEstimator;
 use skinrig_analysis::distributions::student_quantile;
 
-/// Where the variance of one skin's metric comes from. With `k` locations pressed `r` times each its value has variance
-/// `between / k + within / (k r)`.
+/// Variance components of one skin's metric. With `k` locations pressed `r` times each, the value has variance `between / k
+/// + within / (k r)`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Measured {
-    /// Its value.
+pub struct MetricVariance {
+    /// Value of the metric.
     pub value: f64,
-    /// Variance between locations beyond what repetitions explain.
+    /// Variance between locations, beyond what repetitions explain.
     pub between: f64,
-    /// Variance between repetitions at one location; `None` when nothing was pressed twice.
+    /// Variance between repetitions at one location; `None` without repetitions.
     pub within: Option<f64>,
-    /// Locations that this stands on.
+    /// Number of locations measured.
     pub locations: u32,
 }
 
-/// What is to be found, and how sure.
+/// Difference to detect, and with which certainty.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Target {
     /// Difference to detect, in the unit of the metric.
     pub difference: f64,
-    /// Probability of detecting it.
+    /// Probability of detecting the difference.
     pub power: f64,
-    /// Probability of claiming one when there is none.
+    /// Probability of claiming a difference when there is none.
     pub alpha: f64,
-    /// Share of the variance between locations that two skins have in common, 0..1: 0 when nothing is known, which asks
-    /// for the most.
+    /// Share of the variance between locations that both skins have in common, 0..1. Use 0 when unknown; it requires the
+    /// most presses.
     pub common: f64,
-    /// Time of one press, s; with it proposals have a duration.
+    /// Time per press, s; gives proposals a duration.
     pub seconds_per_press: Option<f64>,
 }
 
-/// One way to press.
+/// A sampling design: locations and repetitions.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Proposal {
     /// Locations.
     pub locations: u32,
-    /// Repetitions at each.
+    /// Repetitions at each location.
     pub repetitions: u32,
-    /// Presses of one skin.
+    /// Presses per skin.
     pub presses: u32,
     /// Expected half width of the interval of the difference.
     pub half_width: f64,
-    /// Time for one skin, s.
+    /// Time per skin, s.
     pub seconds: Option<f64>,
 }
 
-/// Ways to press, by repetitions.
+/// Proposed designs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PowerPlan {
-    /// What it was made for.
+    /// What the proposals must detect.
     pub target: Target,
-    /// What it was made from.
-    pub measured: Measured,
-    /// Proposals, fewest repetitions first.
+    /// Variance components behind the proposals.
+    pub measured: MetricVariance,
+    /// Ascending by repetitions.
     pub proposals: Vec<Proposal>,
-    /// Index of the one with the fewest presses.
+    /// Index of the proposal with the fewest presses.
     pub cheapest: usize,
 }
 
-/// Repetitions that are proposed.
+/// Repetitions considered.
 const REPETITIONS: [u32; 6] = [1, 2, 3, 5, 10, 20];
-/// More locations than anybody presses.
-const MOST: u32 = 100_000;
+/// Upper limit of the search for locations.
+const MAX_LOCATIONS: u32 = 100_000;
 
-/// The variance of a sample, taken apart.
+/// Estimates the variance components of a sample.
 ///
 /// # Errors
-/// [`Refusal`].
-pub fn measure(sample: &Sample) -> Result<Measured, Refusal> {
-    let of = measured(sample.data(), Repeats::All, Side::A, |_| true)?;
-    let locations = of.places.len() as u32;
+/// [`ComparisonError`].
+pub fn measure(sample: &Sample) -> Result<MetricVariance, ComparisonError> {
+    let of = measure_sample(sample.data(), RepeatEstimator::All, Side::A, |_| true)?;
+    let locations = of.by_location.len() as u32;
     if locations < 2 {
-        return Err(Refusal::TooFewLocations { locations });
+        return Err(ComparisonError::TooFewLocations { locations });
     }
     let (between, within) = super::components::alone(&of);
-    Ok(Measured {
+    Ok(MetricVariance {
         value: of.value,
         between,
         within,
@@ -90,12 +90,11 @@ pub fn measure(sample: &Sample) -> Result<Measured, Refusal> {
     })
 }
 
-/// Locations x repetitions that detect `target.difference` between two skins like the one measured, pressed at the same
-/// locations.
+/// Proposes designs that detect `target.difference` between two skins like the measured one, pressed at the same locations.
 ///
 /// # Errors
-/// [`Refusal::Setting`] for a target out of range.
-pub fn plan(measured: &Measured, target: &Target) -> Result<PowerPlan, Refusal> {
+/// [`ComparisonError::Setting`] for a target out of range.
+pub fn plan(measured: &MetricVariance, target: &Target) -> Result<PowerPlan, ComparisonError> {
     let share = |v: f64| v > 0.0 && v < 1.0;
     let above_zero = |v: f64| v > 0.0 && v.is_finite();
     for (name, found, expected, good) in [
@@ -125,7 +124,7 @@ pub fn plan(measured: &Measured, target: &Target) -> Result<PowerPlan, Refusal> 
         ),
     ] {
         if !good {
-            return Err(Refusal::setting(name, expected, found));
+            return Err(ComparisonError::setting(name, expected, found));
         }
     }
     let between = 2.0 * (1.0 - target.common) * measured.between;
@@ -143,8 +142,8 @@ pub fn plan(measured: &Measured, target: &Target) -> Result<PowerPlan, Refusal> 
         .collect();
     let cheapest = (0..proposals.len()).min_by_key(|i| proposals[*i].presses);
     let cheapest = cheapest.ok_or_else(|| {
-        let expected = format!("one that {MOST} locations can show");
-        Refusal::setting("difference", &expected, target.difference)
+        let expected = format!("a difference that {MAX_LOCATIONS} locations can detect");
+        ComparisonError::setting("difference", &expected, target.difference)
     })?;
     Ok(PowerPlan {
         target: *target,
@@ -162,10 +161,10 @@ fn proposal(variance: f64, repetitions: u32, target: &Target) -> Option<Proposal
     };
     let error = |k: u32| (variance / f64::from(k)).sqrt();
     let enough = |k: u32| quantiles(k).1 * error(k) <= target.difference;
-    if !enough(MOST) {
+    if !enough(MAX_LOCATIONS) {
         return None;
     }
-    let (mut low, mut high) = (2, MOST);
+    let (mut low, mut high) = (2, MAX_LOCATIONS);
     while low < high {
         let middle = low.midpoint(high);
         if enough(middle) {

@@ -1,59 +1,59 @@
-//! Owns what is asked of two samples: which direction is better, the margin, and how sure the answer must be.
+//! Owns the parameters of a comparison: direction, margin and certainty.
 
 use serde::{Deserialize, Serialize};
 
-use super::refusal::Refusal;
+use super::error::ComparisonError;
 
-/// Which direction of a metric is better.
+/// Direction in which a metric improves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Better {
-    /// The lower the better: errors, latencies, false alarms, bytes.
+    /// Lower is better: errors, latencies, false alarms, bytes.
     Lower,
-    /// The higher the better: rates of success, taxels, response.
+    /// Higher is better: success rates, taxels, response.
     Higher,
-    /// The nearer to zero the better: bias.
+    /// Nearer to zero is better: bias.
     NearerZero,
 }
 
-/// What is asked of one metric.
+/// Parameters of the comparison of one metric.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Question {
-    /// Which direction is better.
+    /// Direction in which the metric improves.
     pub better: Better,
-    /// Differences smaller than this do not matter, in the unit of the metric; `None`: never equivalent.
+    /// Equivalence margin in the unit of the metric; `None`: never equivalent.
     pub margin: Option<f64>,
 }
 
-/// Which locations of two samples are compared.
+/// Which locations are compared, and how.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Pairing {
-    /// Those that both have, each against itself.
+    /// Shared locations, pairwise.
     #[default]
     SharedLocations,
-    /// All of each, as independent draws: for skins that cannot be pressed at the same places.
+    /// All locations of each skin, as independent samples: for skins that cannot be pressed at the same locations.
     Independent,
 }
 
-/// How sure, and how.
+/// Statistical settings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
-    /// Probability of a false claim that is put up with: of a difference when there is none, and of equivalence when the
-    /// difference is as large as the margin. Intervals cover 1 - alpha.
+    /// Accepted probability of a false claim: of a difference when there is none, and of equivalence when the difference
+    /// equals the margin. Intervals cover 1 - alpha.
     pub alpha: f64,
-    /// Power that [`super::Needed`] asks for.
+    /// Power for [`super::PressesNeeded`].
     pub power: f64,
-    /// Which locations.
+    /// Which locations are compared.
     pub pairing: Pairing,
-    /// Draws of the bootstrap, where one is used.
+    /// Bootstrap draws.
     pub resamples: u32,
-    /// Its seed.
+    /// Seed of the bootstrap.
     pub seed: u64,
 }
 
 impl Default for Settings {
-    /// 5 %, a power of 80 %, shared locations, 3999 draws, seed 1.
+    /// Alpha 5 %, power 80 %, shared locations, 3999 draws, seed 1.
     fn default() -> Self {
         Self {
             alpha: 0.05,
@@ -66,30 +66,32 @@ impl Default for Settings {
 }
 
 impl Question {
-    pub(super) fn check(&self) -> Result<(), Refusal> {
+    pub(super) fn check(&self) -> Result<(), ComparisonError> {
         match self.margin {
-            Some(margin) if !(margin > 0.0 && margin.is_finite()) => {
-                Err(Refusal::setting("margin", "a number above 0", margin))
-            }
+            Some(margin) if !(margin > 0.0 && margin.is_finite()) => Err(ComparisonError::setting(
+                "margin",
+                "a number above 0",
+                margin,
+            )),
             _ => Ok(()),
         }
     }
 }
 
 impl Settings {
-    pub(super) fn check(&self) -> Result<(), Refusal> {
+    pub(super) fn check(&self) -> Result<(), ComparisonError> {
         if !(self.alpha > 0.0 && self.alpha < 0.5) {
             let expected = "a probability between 0 and 0.5";
-            return Err(Refusal::setting("alpha", expected, self.alpha));
+            return Err(ComparisonError::setting("alpha", expected, self.alpha));
         }
         if !(self.power > 0.0 && self.power < 1.0) {
             let expected = "a probability between 0 and 1";
-            return Err(Refusal::setting("power", expected, self.power));
+            return Err(ComparisonError::setting("power", expected, self.power));
         }
-        // An interval leaves at least one draw outside on each side.
+        // At least one draw must lie outside the interval on each side.
         if (f64::from(self.resamples) + 1.0) * 0.5 * self.alpha < 1.0 {
-            let expected = format!("{:.0} at the least", (2.0 / self.alpha).ceil());
-            return Err(Refusal::setting(
+            let expected = format!("at least {:.0}", (2.0 / self.alpha).ceil());
+            return Err(ComparisonError::setting(
                 "resamples",
                 &expected,
                 f64::from(self.resamples),

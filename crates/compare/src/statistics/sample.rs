@@ -1,11 +1,11 @@
-//! Owns [`Sample`]: what one prototype contributes for one metric, by location.
+//! Owns [`Sample`]: the data of one prototype for one metric, by location.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::LocationId;
 
-/// What a metric is made of: how values of presses become one number.
+/// How values of presses become one number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
@@ -19,18 +19,18 @@ pub enum Kind {
     RepeatStd,
     /// Share of trials that succeeded: located rate, pass rate.
     Share,
-    /// Median of times, a miss being later than every time.
+    /// Median of times; a miss is later than every time.
     Median,
-    /// 95th minus 5th percentile of times, a miss being later than every time.
+    /// 95th minus 5th percentile of times; a miss is later than every time.
     Width,
     /// Counts per unit of exposure: false alarms per second.
     CountRate,
 }
 
-/// Where one press was felt.
+/// Estimated position of one press, skin frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Position {
-    /// What was repeated: presses of one location with the same series (the same depth, say) are repetitions.
+    /// Presses at one location with the same series (for example the same depth) are repetitions.
     pub series: u32,
     /// Along x, mm.
     pub x_mm: f64,
@@ -41,47 +41,47 @@ pub struct Position {
 /// Events counted during an exposure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Count {
-    /// How many.
+    /// Number of events.
     pub events: u32,
-    /// During how long, s (or any other unit of exposure, the same in all samples).
+    /// Duration in s, or any other unit of exposure common to all samples.
     pub exposure: f64,
 }
 
-/// Values that make no sample.
+/// Values that cannot form a sample.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SampleFault {
-    /// A value that is no number.
+    /// A value is NaN or infinite.
     #[error("expected finite values, found {found} at {location}")]
     NotFinite {
-        /// Where.
+        /// Location of the value.
         location: LocationId,
-        /// What.
+        /// The value.
         found: f64,
     },
-    /// An exposure that is none.
+    /// An exposure is not positive.
     #[error("expected exposures above 0, found {found} at {location}")]
     Exposure {
-        /// Where.
+        /// Location of the exposure.
         location: LocationId,
-        /// What.
+        /// The exposure.
         found: f64,
     },
-    /// An area that is none.
+    /// The area is not positive.
     #[error("expected an area above 0 mm², found {0}")]
     Area(f64),
 }
 
-/// Values of presses by location. Locations are keyed by numbers that the samples of a comparison share: the same
-/// number is the same place. Neither the order of presses nor that of locations matters.
+/// Values of presses by location. Location numbers are common to all samples of a comparison. The order of presses and
+/// locations does not matter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
     data: Data,
 }
 
-/// Values by location, each location's in a fixed order whatever order they came in.
+/// Values by location, sorted within each location so that input order does not matter.
 pub(super) type Clusters<T> = BTreeMap<u32, Vec<T>>;
 
-/// What a sample holds.
+/// Values of a sample, by kind.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Data {
     Mean(Clusters<f64>),
@@ -95,7 +95,7 @@ pub(super) enum Data {
 }
 
 impl Data {
-    /// The locations with a value.
+    /// Locations with a value.
     pub(super) fn locations(&self) -> BTreeSet<u32> {
         match self {
             Self::Mean(c) | Self::Rms(c) | Self::Taxels(_, c) => c.keys().copied().collect(),
@@ -108,7 +108,7 @@ impl Data {
 }
 
 impl Sample {
-    /// (location, value) of each press whose mean is asked for.
+    /// Sample for a mean, from (location, value) of each press.
     ///
     /// # Errors
     /// [`SampleFault::NotFinite`].
@@ -118,8 +118,8 @@ impl Sample {
         })
     }
 
-    /// (location, error) of each press whose root mean square is asked for: the length of the error for the RMSE, a
-    /// component for that along an axis.
+    /// Sample for a root mean square, from (location, error) of each press. The error is its length for the RMSE, or a
+    /// component along an axis.
     ///
     /// # Errors
     /// [`SampleFault::NotFinite`].
@@ -127,7 +127,7 @@ impl Sample {
         finite(values).map(|v| Self { data: Data::Rms(v) })
     }
 
-    /// (location, length of the error in mm) of each press, and the area that the taxels are to fill, mm².
+    /// Sample for taxels, from (location, error length in mm) of each press and the area that the taxels cover, mm².
     ///
     /// # Errors
     /// [`SampleFault::NotFinite`], [`SampleFault::Area`].
@@ -143,7 +143,8 @@ impl Sample {
         })
     }
 
-    /// (location, estimated position) of each located press. Series with one repetition say nothing and are left out.
+    /// Sample for the std of repetitions, from (location, estimated position) of each located press. Drops series with one
+    /// repetition.
     ///
     /// # Errors
     /// [`SampleFault::NotFinite`].
@@ -154,22 +155,22 @@ impl Sample {
             check(location, at.x_mm)?;
             check(location, at.y_mm)
         })?;
-        for places in clusters.values_mut() {
-            places.sort_by(|a, b| {
+        for positions in clusters.values_mut() {
+            positions.sort_by(|a, b| {
                 let by = a.series.cmp(&b.series);
                 by.then(a.x_mm.total_cmp(&b.x_mm))
                     .then(a.y_mm.total_cmp(&b.y_mm))
             });
-            let series = places.chunk_by(|a, b| a.series == b.series);
-            *places = series.filter(|s| s.len() > 1).flatten().copied().collect();
+            let series = positions.chunk_by(|a, b| a.series == b.series);
+            *positions = series.filter(|s| s.len() > 1).flatten().copied().collect();
         }
-        clusters.retain(|_, places| !places.is_empty());
+        clusters.retain(|_, positions| !positions.is_empty());
         Ok(Self {
             data: Data::RepeatStd(clusters),
         })
     }
 
-    /// (location, success) of each attempted press.
+    /// Sample for a success rate, from (location, success) of each attempted press.
     #[must_use]
     pub fn share(trials: impl IntoIterator<Item = (u32, bool)>) -> Self {
         let mut clusters: Clusters<bool> = BTreeMap::new();
@@ -182,7 +183,7 @@ impl Sample {
         }
     }
 
-    /// (location, time or `None` when it was never detected) of each trial whose median is asked for.
+    /// Sample for a median time, from (location, time) of each trial; `None` for a trial that was never detected.
     ///
     /// # Errors
     /// [`SampleFault::NotFinite`].
@@ -194,7 +195,7 @@ impl Sample {
         })
     }
 
-    /// (location, time or `None` when it was never detected) of each trial whose 5-95 % width is asked for.
+    /// Sample for a 5-95 % width, from (location, time) of each trial; `None` for a trial that was never detected.
     ///
     /// # Errors
     /// [`SampleFault::NotFinite`].
@@ -204,7 +205,7 @@ impl Sample {
         })
     }
 
-    /// (location, count) of each exposure.
+    /// Sample for a count rate, from (location, count) of each exposure.
     ///
     /// # Errors
     /// [`SampleFault::Exposure`].
@@ -228,7 +229,7 @@ impl Sample {
         })
     }
 
-    /// What the sample is of.
+    /// Kind of the sample.
     #[must_use]
     pub const fn kind(&self) -> Kind {
         match self.data {
@@ -289,7 +290,7 @@ fn censored(
     Ok(clusters)
 }
 
-/// A time that sorts a miss behind every time.
+/// Time for sorting: a miss is infinite.
 pub(super) fn late(time: Option<f64>) -> f64 {
     time.unwrap_or(f64::INFINITY)
 }

@@ -1,7 +1,7 @@
-//! Score limits of shares and of rates of counts, for as many independent trials as clustered ones are worth.
+//! Score limits of shares and count rates, for the effective number of independent trials.
 //!
-//! Trials of one location tend to fail together. Dividing their number by the design effect (Rao and Scott 1992; Korn and
-//! Graubard 1998) gives the number of independent trials whose share would be as uncertain.
+//! Trials at one location tend to fail together. Dividing their number by the design effect (Rao and Scott 1992; Korn and
+//! Graubard 1998) gives the number of independent trials with the same uncertainty.
 
 /// Limits of a share `p` of `n` trials at `c` standard errors (Wilson 1927).
 pub(super) fn wilson(p: f64, n: f64, c: f64) -> (f64, f64) {
@@ -12,8 +12,8 @@ pub(super) fn wilson(p: f64, n: f64, c: f64) -> (f64, f64) {
     (end(centre - half), end(centre + half))
 }
 
-/// Independent trials that `n` clustered ones are worth: those whose share `p` has this standard error, and never more than
-/// there are. A share of 0 or 1 shows no spread: every location counts once.
+/// Effective number of independent trials: those whose share `p` has this standard error, at most `n`. A share of 0 or 1 has
+/// no spread, so each location counts once.
 pub(super) fn effective(p: f64, n: f64, error: f64, locations: usize) -> f64 {
     if p <= 0.0 || p >= 1.0 {
         return (locations as f64).min(n);
@@ -25,8 +25,8 @@ pub(super) fn effective(p: f64, n: f64, error: f64, locations: usize) -> f64 {
     (p * (1.0 - p) / variance).max(1.0)
 }
 
-/// Limits of a rate of `events` per unit of `exposure` at `c` standard errors: the score interval of a Poisson mean
-/// (Rao 1948; compared by Barker 2002).
+/// Limits of a rate of `events` per unit of `exposure` at `c` standard errors: score interval of a Poisson mean (Rao 1948;
+/// compared by Barker 2002).
 pub(super) fn poisson(events: f64, exposure: f64, c: f64) -> (f64, f64) {
     let centre = events + 0.5 * c * c;
     let half = c * (events + 0.25 * c * c).sqrt();
@@ -36,7 +36,7 @@ pub(super) fn poisson(events: f64, exposure: f64, c: f64) -> (f64, f64) {
     )
 }
 
-/// By how much counts vary more than those of a Poisson process: the design effect, at least 1; `None` of no event.
+/// Overdispersion of counts relative to a Poisson process (design effect), at least 1; `None` without events.
 pub(super) fn overdispersion(events: u32, exposure: f64, error: f64) -> Option<f64> {
     let variance = f64::from(events) / (exposure * exposure);
     (events > 0).then(|| (error * error / variance).max(1.0))
@@ -64,7 +64,7 @@ mod tests {
 
     #[test]
     fn clustered_trials_are_worth_less() {
-        // Ten locations of five trials, half of them all right and half all wrong.
+        // Ten locations with five trials each: five all successful, five all failed.
         let totals: Vec<f64> = (0..10)
             .map(|i| if i % 2 == 0 { 0.05 } else { -0.05 })
             .collect();

@@ -1,27 +1,27 @@
-//! The standard deviation between repetitions, mean over series.
+//! Standard deviation between repetitions, averaged over series.
 
 use super::influence::{Measure, Scale, from_terms};
 use super::sample::{Clusters, Data, Position};
 
-/// How the standard deviation of a series is made.
+/// Estimator of the standard deviation of a series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Repeats {
-    /// Of all its repetitions.
+pub(super) enum RepeatEstimator {
+    /// Over all repetitions.
     All,
-    /// Of each two of them, on average: what two repetitions would have given, whatever their number. The standard deviation
-    /// of few repetitions is too small on average, that of fewer more so.
+    /// Mean over all pairs of repetitions: the expected result of two repetitions, whatever their number. The std of few
+    /// repetitions is biased low; this makes series of different length comparable.
     Pairs,
 }
 
-impl Repeats {
-    /// The way that does justice to samples whose series differ in length.
-    pub fn fair<'a>(samples: impl IntoIterator<Item = &'a Data>) -> Self {
+impl RepeatEstimator {
+    /// Estimator that is unbiased between samples with series of different length.
+    pub fn for_samples<'a>(samples: impl IntoIterator<Item = &'a Data>) -> Self {
         let clusters = samples.into_iter().filter_map(|data| match data {
             Data::RepeatStd(clusters) => Some(clusters),
             _ => None,
         });
-        let mut lengths = clusters.flat_map(Clusters::values).flat_map(|places| {
-            let series = places.chunk_by(|a, b| a.series == b.series);
+        let mut lengths = clusters.flat_map(Clusters::values).flat_map(|positions| {
+            let series = positions.chunk_by(|a, b| a.series == b.series);
             series.map(<[Position]>::len)
         });
         let first = lengths.next();
@@ -33,7 +33,7 @@ impl Repeats {
     }
 }
 
-/// Sample standard deviation of positions about their mean (Euclid), mm.
+/// Sample standard deviation of positions about their mean (Euclidean), mm.
 fn of_all(series: &[Position], without: Option<usize>) -> f64 {
     let kept = || {
         let all = series.iter().enumerate();
@@ -46,7 +46,7 @@ fn of_all(series: &[Position], without: Option<usize>) -> f64 {
     (squares.sum::<f64>() / (n - 1.0)).sqrt()
 }
 
-/// Mean of [`of_all`] over all pairs: half the diagonal of each.
+/// Mean of [`of_all`] over all pairs.
 fn of_pairs(series: &[Position], without: Option<usize>) -> f64 {
     let (mut sum, mut pairs) = (0.0, 0u32);
     for (i, a) in series.iter().enumerate() {
@@ -60,8 +60,7 @@ fn of_pairs(series: &[Position], without: Option<usize>) -> f64 {
     sum * std::f64::consts::FRAC_1_SQRT_2 / f64::from(pairs)
 }
 
-/// What each repetition adds to the spread of its series: pseudo-values of the jackknife (Tukey 1958), centred on the
-/// spread. Two repetitions share one spread.
+/// Jackknife pseudo-values (Tukey 1958) of the spread of a series, centred on the spread. Two repetitions share one spread.
 fn pseudo_values(series: &[Position], spread: fn(&[Position], Option<usize>) -> f64) -> Vec<f64> {
     let whole = spread(series, None);
     let n = series.len();
@@ -74,19 +73,19 @@ fn pseudo_values(series: &[Position], spread: fn(&[Position], Option<usize>) -> 
     values.iter().map(|v| v + shift).collect()
 }
 
-/// The mean over series of their spread; each series counts alike, however often it was repeated.
+/// Mean spread over series; each series has equal weight, however many repetitions it has.
 pub(super) fn repeat_std(
     clusters: &Clusters<Position>,
-    repeats: Repeats,
+    estimator: RepeatEstimator,
     keep: impl Fn(u32) -> bool,
 ) -> Option<Measure> {
-    let spread = match repeats {
-        Repeats::All => of_all,
-        Repeats::Pairs => of_pairs,
+    let spread = match estimator {
+        RepeatEstimator::All => of_all,
+        RepeatEstimator::Pairs => of_pairs,
     };
     let kept = clusters.iter().filter(|(k, _)| keep(**k));
-    let terms = |places: &[Position]| {
-        let series = places.chunk_by(|a, b| a.series == b.series);
+    let terms = |positions: &[Position]| {
+        let series = positions.chunk_by(|a, b| a.series == b.series);
         let one = |series: &[Position]| {
             let weight = 1.0 / series.len() as f64;
             let values = pseudo_values(series, spread).into_iter();
@@ -94,6 +93,6 @@ pub(super) fn repeat_std(
         };
         series.flat_map(one).collect()
     };
-    let places = kept.map(|(k, v)| (*k, terms(v)));
-    from_terms(places.collect(), Scale::Same)
+    let positions = kept.map(|(k, v)| (*k, terms(v)));
+    from_terms(positions.collect(), Scale::Same)
 }

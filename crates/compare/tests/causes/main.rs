@@ -1,41 +1,43 @@
-//! One planted cause in a simulated pair: it is named, and nothing is where nothing was planted.
+//! A planted cause in a simulated pair is identified, and without a planted cause none is reported.
 #![expect(clippy::unwrap_used, reason = "tests")]
 #![expect(clippy::print_stdout, reason = "a pair that is named wrongly is shown")]
 
 mod planted;
 
-use planted::{Plant, record};
+use planted::{PlantedCause, record};
 use skinrig_compare::causes::causes;
 use skinrig_compare::statistics::Verdict;
-use skinrig_compare::{Again, Choices, Factor, Metric, compare};
+use skinrig_compare::{ComparisonOptions, Factor, Metric, Reanalysis, compare};
 
-/// What is planted and what must be named.
-const PLANTS: [(Plant, Factor); 6] = [
-    (Plant::Camera(1.0, 1.5), Factor::Calibration),
-    (Plant::Signal(0.12), Factor::Signal),
-    (Plant::Noise(10.0), Factor::Noise),
-    (Plant::Spread(9.0), Factor::Spread),
-    (Plant::Robot(0.8), Factor::Robot),
-    (Plant::Settings(10), Factor::Settings),
+/// Planted causes, and the factor that must be reported.
+const PLANTS: [(PlantedCause, Factor); 6] = [
+    (PlantedCause::Camera(1.0, 1.5), Factor::Calibration),
+    (PlantedCause::Signal(0.12), Factor::Signal),
+    (PlantedCause::Noise(10.0), Factor::Noise),
+    (PlantedCause::Spread(9.0), Factor::Spread),
+    (PlantedCause::Robot(0.8), Factor::Robot),
+    (PlantedCause::Settings(10), Factor::Settings),
 ];
 
-/// What is named for each plant of the seeds, and how often it is right.
-fn named(seeds: std::ops::Range<u64>) -> [u32; PLANTS.len()] {
+/// Number of correct reports for each planted cause over the seeds.
+fn count_correct(seeds: std::ops::Range<u64>) -> [u32; PLANTS.len()] {
     let mut right = [0; PLANTS.len()];
     for seed in seeds {
-        let first = record(2 * seed, Plant::Nothing);
+        let first = record(2 * seed, PlantedCause::Nothing);
         let a = first.skin('A', None);
         for ((plant, factor), right) in PLANTS.iter().zip(&mut right) {
             let second = record(2 * seed + 1, *plant);
             let b = second.skin('B', None);
             let others = match plant {
-                Plant::Settings(n) => Some([first.skin('A', Some(*n)), second.skin('B', Some(1))]),
+                PlantedCause::Settings(n) => {
+                    Some([first.skin('A', Some(*n)), second.skin('B', Some(1))])
+                }
                 _ => None,
             };
-            let again = others
+            let reanalysis = others
                 .as_ref()
-                .map(|[first, second]| Again { first, second });
-            let found = causes(&a, &b, again, 200, 1).unwrap();
+                .map(|[first, second]| Reanalysis { first, second });
+            let found = causes(&a, &b, reanalysis, 200, 1).unwrap();
             let sum: f64 = found.contributions.iter().map(|c| c.mm2.value).sum();
             assert!((sum - found.change_mm2.value).abs() < 1e-9, "{found:#?}");
             if found.carried_by == Some(*factor) {
@@ -57,13 +59,13 @@ fn named(seeds: std::ops::Range<u64>) -> [u32; PLANTS.len()] {
 
 #[test]
 fn the_planted_cause_is_named() {
-    assert_eq!(named(0..3), [3; PLANTS.len()]);
+    assert_eq!(count_correct(0..3), [3; PLANTS.len()]);
 }
 
 #[test]
 #[ignore = "200 seeds take minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig-compare --test causes -- --ignored"]
 fn the_planted_cause_is_named_in_95_of_100_pairs() {
-    let right = named(1_000..1_200);
+    let right = count_correct(1_000..1_200);
     println!("right of 200, in the order of the plants: {right:?}");
     assert!(right.iter().all(|n| *n >= 190), "{right:?}");
 }
@@ -72,10 +74,10 @@ fn the_planted_cause_is_named_in_95_of_100_pairs() {
 fn where_nothing_was_planted_nothing_is_named() {
     for seed in 500..504 {
         let [a, b] = [(0, 'A'), (1, 'B')]
-            .map(|(k, letter)| record(2 * seed + k, Plant::Nothing).skin(letter, None));
+            .map(|(k, letter)| record(2 * seed + k, PlantedCause::Nothing).skin(letter, None));
         let found = causes(&a, &b, None, 200, 1).unwrap();
         let [a, b] = found.mse_mm2.map(f64::sqrt);
-        // Calibrations on 25 presses and hot pixels differ from session to session, but not by much.
+        // Calibrations on 25 presses and hot pixels vary a little from session to session.
         assert!((b - a).abs() < 0.06, "{a} {b}");
         let planted = [Factor::Signal, Factor::Noise, Factor::Spread, Factor::Robot];
         assert!(!planted.map(Some).contains(&found.carried_by), "{found:#?}");
@@ -85,14 +87,14 @@ fn where_nothing_was_planted_nothing_is_named() {
 #[test]
 fn a_worse_skin_is_worse_and_another_session_of_the_same_is_not_better() {
     let skin = |seed, plant, letter| record(seed, plant).skin(letter, None);
-    let choices = Choices {
+    let choices = ComparisonOptions {
         margins: vec![(Metric::Rmse, 0.06)],
-        ..Choices::default()
+        ..ComparisonOptions::default()
     };
     let subjects = [
-        skin(1, Plant::Nothing, 'A'),
-        skin(2, Plant::Nothing, 'B'),
-        skin(3, Plant::Spread(9.0), 'C'),
+        skin(1, PlantedCause::Nothing, 'A'),
+        skin(2, PlantedCause::Nothing, 'B'),
+        skin(3, PlantedCause::Spread(9.0), 'C'),
     ];
     let result = compare(&subjects, &Vec::new(), &choices);
     assert_eq!(result.blocking().count(), 0, "{:?}", result.differences);

@@ -11,36 +11,36 @@ use skinrig_sim::SimConfig;
 use skinrig_sim::geometric::GeometricModel;
 use skinrig_sim::scene::{GRID_NS, PixelModel, TipSample};
 
-/// From press to press, ms.
+/// Period of the presses, ms.
 const PERIOD_MS: i64 = 1_400;
 /// The first press, ms; the tip then goes down for 100 ms, stays for 100 ms and comes up for 100 ms.
 const FIRST_MS: i64 = 600;
 const SIDE: u32 = 5;
 const DEPTH_MM: f64 = 2.0;
 
-/// What is wrong with a skin, its cameras or its robot.
+/// Planted defect of a skin, its cameras or its robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Plant {
+pub enum PlantedCause {
     /// Nothing.
     Nothing,
-    /// Camera 1 was pushed after the calibration: this far along x (mm) and turned (degrees).
+    /// Camera 1 was moved after the calibration: along x (mm) and rotated (degrees).
     Camera(f64, f64),
-    /// So many times the events per mm of travel.
+    /// Factor on the events per mm of travel.
     Signal(f64),
-    /// So many times the background events.
+    /// Factor on the background events.
     Noise(f64),
     /// Standard deviation of the halo about the tip, mm.
     Spread(f64),
     /// Standard deviation of the robot's position about the measured one, per axis, mm.
     Robot(f64),
-    /// One event in so many is used by the analysis.
+    /// The analysis uses one event in this many.
     Settings(u32),
 }
 
-/// Seeded and roughly normal.
-pub struct Dice(pub u64);
+/// Seeded, approximately normal numbers.
+pub struct NoiseSource(pub u64);
 
-impl Dice {
+impl NoiseSource {
     fn unit(&mut self) -> f64 {
         self.0 = self
             .0
@@ -54,18 +54,18 @@ impl Dice {
     }
 }
 
-/// What a session is made from, so that it can be analysed again.
-pub struct Recorded {
+/// A simulated session that can be analysed repeatedly.
+pub struct SimulatedSession {
     input: SessionInput,
     events: Memory,
     facts: Facts,
 }
 
-/// Records a session: one repetition that calibrates, two that score.
-pub fn record(seed: u64, plant: Plant) -> Recorded {
+/// Records a session: one calibration repetition, two scored ones.
+pub fn record(seed: u64, plant: PlantedCause) -> SimulatedSession {
     let mut config = SimConfig::new(seed, SimLevel::Geometric);
     let g = &mut config.geometric;
-    // Half of the published events, soon over: quicker, and what was pressed before leaves less.
+    // Half of the published events with a shorter decay: faster, and with less carry-over between presses.
     g.relax_s = 0.2;
     for rate in [
         &mut g.press_per_mm,
@@ -73,23 +73,23 @@ pub fn record(seed: u64, plant: Plant) -> Recorded {
         &mut g.relax_per_mm,
     ] {
         *rate /= 2.0;
-        if let Plant::Signal(times) = plant {
+        if let PlantedCause::Signal(times) = plant {
             *rate *= times;
         }
     }
     g.dead_share = 0.0;
     match plant {
-        Plant::Noise(times) => g.background_hz *= times,
-        Plant::Spread(halo_mm) => g.halo_mm = halo_mm,
+        PlantedCause::Noise(times) => g.background_hz *= times,
+        PlantedCause::Spread(halo_mm) => g.halo_mm = halo_mm,
         _ => {}
     }
     let truth = config.true_geometry();
     let mut moved = truth;
-    if let Plant::Camera(mm, deg) = plant {
+    if let PlantedCause::Camera(mm, deg) = plant {
         moved.cameras[0].position.x_mm += mm;
         moved.cameras[0].skew_deg += deg;
     }
-    let mut dice = Dice(seed ^ 0x5eed);
+    let mut noise = NoiseSource(seed ^ 0x5eed);
     let mut input = input(&config, plant);
     let mut pressed = Vec::new();
     for i in 0..3 * SIDE * SIDE {
@@ -98,21 +98,21 @@ pub fn record(seed: u64, plant: Plant) -> Recorded {
             -14.0 + 11.0 * f64::from(place / SIDE),
             -20.0 + 11.0 * f64::from(place % SIDE),
         );
-        // The robot goes where it was told, but for what it does not know itself.
-        let scatter = if let Plant::Robot(mm) = plant {
+        // The robot goes to its target except for the unmeasured scatter.
+        let scatter = if let PlantedCause::Robot(mm) = plant {
             mm
         } else {
             0.0
         };
         let measured = Point2::new(
-            at.x_mm + 0.02 * dice.normal() + scatter * dice.normal(),
-            at.y_mm + 0.02 * dice.normal() + scatter * dice.normal(),
+            at.x_mm + 0.02 * noise.normal() + scatter * noise.normal(),
+            at.y_mm + 0.02 * noise.normal() + scatter * noise.normal(),
         );
         pressed.push(at);
         add(&mut input, i, at, measured);
     }
     let events = [0, 1].map(|k| events(&config, [&truth, &moved], &pressed, k));
-    Recorded {
+    SimulatedSession {
         input,
         events: Memory {
             events,
@@ -123,14 +123,15 @@ pub fn record(seed: u64, plant: Plant) -> Recorded {
             session_id: format!("{seed:032x}"),
             prototype: format!("{plant:?}"),
             rig_kind: "simulated".into(),
+            origin: Some("simulated".into()),
             rig_name: "simulated (geometric)".into(),
             ..Facts::default()
         },
     }
 }
 
-impl Recorded {
-    /// As a skin, analysed with its own settings or another thinning.
+impl SimulatedSession {
+    /// Analyses it as a skin, with its own settings or another thinning.
     pub fn skin(&self, letter: char, thinning: Option<u32>) -> Subject {
         let mut input = self.input.clone();
         input.settings.thinning = thinning.unwrap_or(input.settings.thinning);
@@ -147,7 +148,7 @@ impl Recorded {
     }
 }
 
-fn input(config: &SimConfig, plant: Plant) -> SessionInput {
+fn input(config: &SimConfig, plant: PlantedCause) -> SessionInput {
     let rig = RigGeometry {
         outline: config.outline,
         nominal: config.nominal,
@@ -158,7 +159,11 @@ fn input(config: &SimConfig, plant: Plant) -> SessionInput {
         bootstrap_resamples: 2,
         study_presses: 0,
         calibration: CalibrationModel::Full,
-        thinning: if let Plant::Settings(n) = plant { n } else { 1 },
+        thinning: if let PlantedCause::Settings(n) = plant {
+            n
+        } else {
+            1
+        },
         ..AnalysisSettings::default()
     };
     skinrig_planted::session(rig, settings)
@@ -200,7 +205,7 @@ fn add(input: &mut SessionInput, number: u32, at: Point2, measured: Point2) {
     }
 }
 
-/// The events of camera `k`: before the camera was moved, and after.
+/// Events of camera `k`, before and after the camera moved.
 fn events(
     config: &SimConfig,
     geometry: [&StereoGeometry; 2],

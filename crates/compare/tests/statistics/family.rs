@@ -1,7 +1,7 @@
-//! Several prototypes at once.
+//! Comparing several prototypes at once.
 
 use skinrig_compare::statistics::{
-    Against, Better, Pair, Question, Refusal, Sample, Settings, Verdict, compare_all,
+    Better, ComparisonError, Pair, PairSelection, Question, Sample, Settings, Verdict, compare_all,
 };
 
 use crate::populations::Draws;
@@ -52,7 +52,7 @@ fn a_false_claim_among_many_pairs_stays_rare() {
     for seed in 0..families {
         let pairs = compare_all(
             &skins(seed.into(), &[0.0; 4]),
-            Against::Each,
+            PairSelection::All,
             &QUESTION,
             &settings(),
         )
@@ -79,7 +79,7 @@ fn a_false_claim_among_many_pairs_stays_rare() {
 fn a_family_against_a_reference_finds_the_worse_one() {
     let pairs = compare_all(
         &skins(1, &[0.0, 0.0, 3.0]),
-        Against::Reference(0),
+        PairSelection::Reference(0),
         &QUESTION,
         &settings(),
     )
@@ -99,14 +99,17 @@ fn a_family_against_a_reference_finds_the_worse_one() {
 fn what_cannot_be_compared_takes_no_part() {
     let mut skins = skins(1, &[0.0, 3.0]);
     skins.push(Sample::mean([]).unwrap());
-    let pairs = compare_all(&skins, Against::Each, &QUESTION, &settings()).unwrap();
+    let pairs = compare_all(&skins, PairSelection::All, &QUESTION, &settings()).unwrap();
     assert_eq!(pairs[0].adjusted.unwrap().family, 1);
     for pair in &pairs[1..] {
-        assert!(matches!(pair.alone, Err(Refusal::Empty { .. })), "{pair:?}");
+        assert!(
+            matches!(pair.alone, Err(ComparisonError::Empty { .. })),
+            "{pair:?}"
+        );
         assert_eq!(pair.adjusted, None);
     }
-    let one = compare_all(&skins[..1], Against::Each, &QUESTION, &settings());
-    assert!(matches!(one, Err(Refusal::Setting { .. })));
-    let nobody = compare_all(&skins, Against::Reference(3), &QUESTION, &settings());
-    assert!(matches!(nobody, Err(Refusal::Setting { .. })));
+    let one = compare_all(&skins[..1], PairSelection::All, &QUESTION, &settings());
+    assert!(matches!(one, Err(ComparisonError::Setting { .. })));
+    let nobody = compare_all(&skins, PairSelection::Reference(3), &QUESTION, &settings());
+    assert!(matches!(nobody, Err(ComparisonError::Setting { .. })));
 }

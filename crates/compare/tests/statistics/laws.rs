@@ -1,4 +1,4 @@
-//! What holds for all samples: exchanging them mirrors the answer, order does not matter, units carry through.
+//! Properties of all samples: swapping them mirrors the result, order does not matter, units carry through.
 
 use proptest::prelude::*;
 use skinrig_compare::statistics::{
@@ -6,7 +6,7 @@ use skinrig_compare::statistics::{
     compare, estimate,
 };
 
-use crate::populations::{Draws, World};
+use crate::populations::{Draws, SimulatedPair};
 
 const KINDS: [Kind; 8] = [
     Kind::Mean,
@@ -93,10 +93,10 @@ proptest! {
         independent in any::<bool>(),
         shifted in any::<bool>(),
     ) {
-        let world = if shifted { World::new(kind).shifted() } else { World::new(kind) };
-        let [a, b] = world.draw(&mut Draws::new(seed, 1), false);
+        let pair = if shifted { SimulatedPair::new(kind).shifted() } else { SimulatedPair::new(kind) };
+        let [a, b] = pair.draw(&mut Draws::new(seed, 1), false);
         let pairing = if independent { Pairing::Independent } else { Pairing::SharedLocations };
-        let question = Question { better: world.better(), margin: Some(0.3) };
+        let question = Question { better: pair.better(), margin: Some(0.3) };
         let there = compare(&a, &b, &question, &settings(pairing));
         let back = compare(&b, &a, &question, &settings(pairing));
         if let (Ok(there), Ok(back)) = (&there, &back) {
@@ -166,7 +166,7 @@ fn a_clear_difference_is_found_and_a_skin_equals_its_like() {
     };
     let verdict = |shift: f64| {
         let [a, _] = lines(3, 0.0);
-        // Repetitions of B at the places of A: the same skin but for noise and a shift.
+        // Repetitions of B at the locations of A: the same skin except for noise and a shift.
         let mut draws = Draws::new(4, 0);
         let b: Vec<_> = a
             .iter()

@@ -1,10 +1,10 @@
-//! How often intervals cover and tests err on simulated skins, and that presses taken as independent fail the same checks.
+//! Coverage of intervals and error rates of tests on simulated skins; treating presses as independent fails the same checks.
 
 use skinrig_compare::statistics::{Kind, Pairing, Question, Settings, Verdict, compare};
 
-use crate::populations::{Draws, World};
+use crate::populations::{Draws, SimulatedPair};
 
-/// Shares of the populations that could be compared.
+/// Shares among the populations that could be compared.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct Rates {
     /// The interval of the difference covers the truth.
@@ -13,25 +13,25 @@ pub struct Rates {
     pub differ: f64,
     /// Claimed to be equivalent.
     pub equivalent: f64,
-    /// Nothing could be compared, of all populations.
+    /// Share of all populations that could not be compared.
     pub refused: f64,
 }
 
 /// How populations are drawn and compared.
 #[derive(Debug, Clone, Copy)]
 pub struct Trial {
-    pub world: World,
+    pub pair: SimulatedPair,
     pub populations: u32,
-    /// As if presses were independent.
+    /// Treats presses as independent.
     pub naive: bool,
     pub pairing: Pairing,
     pub resamples: u32,
 }
 
 impl Trial {
-    pub fn new(world: World) -> Self {
+    pub fn new(pair: SimulatedPair) -> Self {
         Self {
-            world,
+            pair,
             populations: 300,
             naive: false,
             pairing: Pairing::SharedLocations,
@@ -39,12 +39,12 @@ impl Trial {
         }
     }
 
-    /// Compares pairs of skins. The margin is what they differ by, or (without a difference) nothing.
+    /// Compares pairs of skins. The margin equals the true difference, if there is one.
     pub fn rates(&self) -> Rates {
-        let [a, b] = self.world.truth();
+        let [a, b] = self.pair.truth();
         let truth = b - a;
         let question = Question {
-            better: self.world.better(),
+            better: self.pair.better(),
             margin: (truth != 0.0).then_some(truth.abs()),
         };
         let settings = Settings {
@@ -55,9 +55,9 @@ impl Trial {
         let (mut rates, mut compared) = (Rates::default(), 0.0);
         for population in 0..self.populations {
             let mut draws = Draws::new(7, u64::from(population));
-            let [a, mut b] = self.world.draw(&mut draws, self.naive);
+            let [a, mut b] = self.pair.draw(&mut draws, self.naive);
             if self.pairing == Pairing::Independent {
-                [_, b] = self.world.draw(&mut draws, self.naive);
+                [_, b] = self.pair.draw(&mut draws, self.naive);
             }
             let Ok(found) = compare(&a, &b, &question, &settings) else {
                 rates.refused += 1.0 / f64::from(self.populations);
@@ -85,7 +85,7 @@ impl Trial {
         3.0 * (0.05 * 0.95 / f64::from(self.populations)).sqrt()
     }
 
-    /// Whether the levels are what they are said to be: without a difference, and with one as large as the margin.
+    /// True if all error rates are nominal: without a difference, and with a difference as large as the margin.
     fn holds(&self, none: Rates, border: Rates) -> bool {
         let most = 0.05 + self.band();
         none.refused.max(border.refused) < 0.02
@@ -98,17 +98,17 @@ impl Trial {
 
 fn levels_hold(trial: Trial) {
     let levels = |trial: Trial| {
-        let world = trial.world.shifted();
-        (trial.rates(), Trial { world, ..trial }.rates())
+        let pair = trial.pair.shifted();
+        (trial.rates(), Trial { pair, ..trial }.rates())
     };
     let (none, border) = levels(trial);
     assert!(trial.holds(none, border), "{trial:?}\n{none:?}\n{border:?}");
-    // Nor by never claiming anything.
+    // Nor may it pass by never claiming anything.
     assert!(
         none.covered < 0.995 && border.differ > 0.1,
         "{none:?}\n{border:?}"
     );
-    // The first of the same populations are enough to show it.
+    // Half of the same populations suffice to show it.
     let naive = Trial {
         naive: true,
         populations: trial.populations / 2,
@@ -123,19 +123,19 @@ fn levels_hold(trial: Trial) {
 
 #[test]
 fn of_a_mean() {
-    levels_hold(Trial::new(World::new(Kind::Mean)));
+    levels_hold(Trial::new(SimulatedPair::new(Kind::Mean)));
 }
 
 #[test]
 fn of_an_rmse() {
-    levels_hold(Trial::new(World::new(Kind::Rms)));
+    levels_hold(Trial::new(SimulatedPair::new(Kind::Rms)));
 }
 
 #[test]
 fn of_an_rmse_at_a_handful_of_locations() {
-    levels_hold(Trial::new(World {
+    levels_hold(Trial::new(SimulatedPair {
         locations: 7,
-        ..World::new(Kind::Rms)
+        ..SimulatedPair::new(Kind::Rms)
     }));
 }
 
@@ -143,56 +143,56 @@ fn of_an_rmse_at_a_handful_of_locations() {
 fn of_an_rmse_at_different_places() {
     levels_hold(Trial {
         pairing: Pairing::Independent,
-        ..Trial::new(World::new(Kind::Rms))
+        ..Trial::new(SimulatedPair::new(Kind::Rms))
     });
 }
 
 #[test]
 fn of_taxels() {
-    levels_hold(Trial::new(World::new(Kind::Taxels)));
+    levels_hold(Trial::new(SimulatedPair::new(Kind::Taxels)));
 }
 
 #[test]
 fn of_the_std_between_repetitions() {
-    levels_hold(Trial::new(World::new(Kind::RepeatStd)));
+    levels_hold(Trial::new(SimulatedPair::new(Kind::RepeatStd)));
 }
 
 #[test]
 fn of_a_share() {
-    levels_hold(Trial::new(World::new(Kind::Share)));
+    levels_hold(Trial::new(SimulatedPair::new(Kind::Share)));
 }
 
 #[test]
 fn of_a_share_at_different_places() {
     levels_hold(Trial {
         pairing: Pairing::Independent,
-        ..Trial::new(World::new(Kind::Share))
+        ..Trial::new(SimulatedPair::new(Kind::Share))
     });
 }
 
 #[test]
 fn of_a_median_latency() {
-    levels_hold(Trial::new(World::new(Kind::Median)));
+    levels_hold(Trial::new(SimulatedPair::new(Kind::Median)));
 }
 
 #[test]
 fn of_the_width_of_latencies() {
-    levels_hold(Trial::new(World {
+    levels_hold(Trial::new(SimulatedPair {
         locations: 40,
-        ..World::new(Kind::Width)
+        ..SimulatedPair::new(Kind::Width)
     }));
 }
 
 #[test]
 fn of_a_rate_of_counts() {
-    levels_hold(Trial::new(World::new(Kind::CountRate)));
+    levels_hold(Trial::new(SimulatedPair::new(Kind::CountRate)));
 }
 
 #[test]
 fn of_a_rate_of_hardly_any_counts() {
-    let trial = Trial::new(World {
+    let trial = Trial::new(SimulatedPair {
         rate_per_s: 0.02,
-        ..World::new(Kind::CountRate)
+        ..SimulatedPair::new(Kind::CountRate)
     });
     let none = trial.rates();
     assert!(none.differ < 0.05 + trial.band(), "{none:?}");
@@ -218,17 +218,17 @@ fn table_of_levels() {
         (Kind::CountRate, "count rate"),
     ] {
         for locations in [8, 24, 60] {
-            let world = World {
+            let pair = SimulatedPair {
                 locations,
-                ..World::new(kind)
+                ..SimulatedPair::new(kind)
             };
             let trial = Trial {
                 populations: 1000,
-                ..Trial::new(world)
+                ..Trial::new(pair)
             };
             let none = trial.rates();
             let border = Trial {
-                world: world.shifted(),
+                pair: pair.shifted(),
                 ..trial
             }
             .rates();

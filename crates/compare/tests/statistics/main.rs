@@ -1,4 +1,4 @@
-//! The statistics of comparing skins, on skins whose truth is known.
+//! Statistics of the comparison, on skins with a known truth.
 #![expect(clippy::unwrap_used, reason = "a test that cannot compare must fail")]
 
 mod family;

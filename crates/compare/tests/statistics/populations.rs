@@ -1,9 +1,9 @@
-//! Simulated skins: locations with errors of their own, repetitions with noise, and a truth that is known.
+//! Simulated skins: locations with their own errors, repetitions with noise, and a known truth.
 
 use skinrig_analysis::seeded;
 use skinrig_compare::statistics::{Better, Count, Kind, Position, Sample};
 
-/// Numbers drawn from a seed.
+/// Seeded random numbers.
 pub struct Draws(Box<dyn FnMut() -> f64>);
 
 impl Draws {
@@ -34,20 +34,20 @@ impl Draws {
     }
 }
 
-/// Two skins, one metric.
+/// Two skins and one metric.
 #[derive(Debug, Clone, Copy)]
-pub struct World {
+pub struct SimulatedPair {
     pub kind: Kind,
     /// Locations, and repetitions at each.
     pub locations: u32,
     pub repetitions: u32,
-    /// What B has more than A of what the metric measures: see [`World::truth`].
+    /// Difference of B from A in the measured quantity: see [`SimulatedPair::truth`].
     pub shift: f64,
     /// Events per second of A, for counts.
     pub rate_per_s: f64,
 }
 
-/// Standard deviation of what a location adds, shared by both skins and own to each, and of the noise of a press.
+/// Standard deviations: location effect shared by both skins, location effect of each skin, and press noise.
 pub const SHARED: f64 = 0.6;
 pub const OWN: f64 = 0.8;
 pub const NOISE: f64 = 0.5;
@@ -59,17 +59,17 @@ const AREA_MM2: f64 = 2000.0;
 /// Series at a location, for the standard deviation between repetitions.
 const SERIES: u32 = 3;
 
-/// One location's press on both skins before it becomes a metric.
+/// A press on both skins at one location, before conversion to a metric.
 struct Press {
     location: u32,
     repetition: u32,
-    /// What the location adds along two axes.
+    /// Location effect along two axes.
     place: [f64; 2],
     noise: [f64; 2],
     uniform: f64,
 }
 
-impl World {
+impl SimulatedPair {
     pub fn new(kind: Kind) -> Self {
         Self {
             kind,
@@ -80,7 +80,7 @@ impl World {
         }
     }
 
-    /// A difference that is as large as a margin would be.
+    /// With a difference as large as a typical margin.
     pub fn shifted(self) -> Self {
         let shift = match self.kind {
             Kind::Share => 0.9,
@@ -100,7 +100,7 @@ impl World {
         }
     }
 
-    /// A pair of samples. With `naive` every press is a location of its own, as if presses were independent.
+    /// Draws a pair of samples. With `naive` every press is its own location, as if presses were independent.
     pub fn draw(&self, draws: &mut Draws, naive: bool) -> [Sample; 2] {
         let mut presses: [Vec<Press>; 2] = [Vec::new(), Vec::new()];
         for location in 0..self.locations {
@@ -169,7 +169,7 @@ impl World {
             Kind::Median => Sample::median(presses.iter().map(|p| (key(p), time(p)))).unwrap(),
             Kind::Width => Sample::width(presses.iter().map(|p| (key(p), time(p)))).unwrap(),
             Kind::RepeatStd => Sample::repeat_std(presses.iter().map(|p| {
-                // Some places are noisier than others.
+                // Some locations are noisier than others.
                 let noise = (1.0 + shift) * libm::exp(0.5 * p.place[0]);
                 let [x_mm, y_mm] = p.noise.map(|n| noise * n);
                 let series = p.repetition / self.repetitions;
@@ -186,13 +186,13 @@ impl World {
         }
     }
 
-    /// What the metric is over all locations and presses that there could be, of A and of B.
+    /// Population value of the metric, of A and of B.
     pub fn truth(&self) -> [f64; 2] {
         [0.0, self.shift].map(|shift| {
             let place = SHARED * SHARED + OWN * OWN;
             let press = place + NOISE * NOISE;
             let square = (1.0 + shift).powi(2) + 2.0 * press;
-            // Misses come after every time.
+            // Misses are later than every time.
             let rank = |q: f64| press.sqrt() * quantile(q / (1.0 - MISSED));
             match self.kind {
                 Kind::Mean => 1.0 + shift,
@@ -217,7 +217,7 @@ fn normal(z: f64) -> f64 {
     0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
-/// Of the standard normal distribution, by bisection.
+/// Quantile of the standard normal distribution, by bisection.
 fn quantile(p: f64) -> f64 {
     let (mut low, mut high) = (-9.0, 9.0);
     for _ in 0..60 {

@@ -1,20 +1,20 @@
-//! That what is proposed finds what it was proposed for, as often as was asked.
+//! Proposed designs have the requested power.
 
 use skinrig_compare::statistics::power::{Target, measure, plan};
 use skinrig_compare::statistics::{
-    Better, Kind, Needed, Question, Refusal, Sample, Settings, Verdict, compare,
+    Better, ComparisonError, Kind, PressesNeeded, Question, Sample, Settings, Verdict, compare,
 };
 
 use crate::levels::Trial;
-use crate::populations::{Draws, NOISE, OWN, SHARED, World};
+use crate::populations::{Draws, NOISE, OWN, SHARED, SimulatedPair};
 
-/// A session of so many locations that its variances are known.
+/// A session with so many locations that its variances are known.
 fn pilot(kind: Kind) -> Sample {
-    let world = World {
+    let pair = SimulatedPair {
         locations: 2000,
-        ..World::new(kind)
+        ..SimulatedPair::new(kind)
     };
-    let [a, _] = world.draw(&mut Draws::new(5, 0), false);
+    let [a, _] = pair.draw(&mut Draws::new(5, 0), false);
     a
 }
 
@@ -40,16 +40,16 @@ fn variances_are_taken_apart() {
 #[test]
 fn a_plan_has_the_power_it_was_asked_for() {
     for kind in [Kind::Mean, Kind::Rms] {
-        let world = World::new(kind).shifted();
-        let [a, b] = world.truth();
+        let pair = SimulatedPair::new(kind).shifted();
+        let [a, b] = pair.truth();
         let plan = plan(&measure(&pilot(kind)).unwrap(), &target((b - a).abs())).unwrap();
-        // B errs more and scatters more in the square: what was measured on A is a little too little for it.
+        // B has larger errors and more scatter, so the variance of A underestimates slightly.
         let slack = if kind == Kind::Rms { 0.05 } else { 0.0 };
         for proposal in [plan.proposals[plan.cheapest], plan.proposals[3]] {
-            let trial = Trial::new(World {
+            let trial = Trial::new(SimulatedPair {
                 locations: proposal.locations,
                 repetitions: proposal.repetitions,
-                ..world
+                ..pair
             });
             let power = trial.rates().differ;
             let band = 3.0 * (0.8 * 0.2 / f64::from(trial.populations)).sqrt();
@@ -69,7 +69,7 @@ fn proposals_trade_locations_for_repetitions() {
         assert!(pair[0].repetitions < pair[1].repetitions);
         assert!(pair[0].locations >= pair[1].locations && pair[0].presses < pair[1].presses);
     }
-    // Another press at a new place always tells more than one more at the same.
+    // A press at a new location always adds more information than a repetition.
     assert_eq!(found.cheapest, 0);
     let one = found.proposals[0];
     assert_eq!(one.seconds, Some(7.0 * f64::from(one.presses)));
@@ -101,11 +101,14 @@ fn a_target_out_of_range_is_refused() {
         target(1e-6),
     ] {
         let found = plan(&measured, &wrong);
-        assert!(matches!(found, Err(Refusal::Setting { .. })), "{found:?}");
+        assert!(
+            matches!(found, Err(ComparisonError::Setting { .. })),
+            "{found:?}"
+        );
     }
 }
 
-/// `copies` of the same 10 locations: the same difference and variance, known better.
+/// `copies` of the same 10 locations: the same difference and variance, known more precisely.
 fn copies(copies: u32, shift: f64) -> [Sample; 2] {
     let mut sides: [Vec<(u32, f64)>; 2] = [Vec::new(), Vec::new()];
     for copy in 0..copies {
@@ -135,7 +138,7 @@ fn what_is_said_to_decide_decides() {
         };
         let now = ask(1);
         assert_eq!(now.verdict, Verdict::Undecided, "{now:?}");
-        let Needed::More(enough) = now.needed else {
+        let PressesNeeded::More(enough) = now.needed else {
             panic!("{now:?}");
         };
         assert!(enough.locations > 10);
@@ -145,6 +148,6 @@ fn what_is_said_to_decide_decides() {
         );
         let then = ask(enough.locations.div_ceil(10));
         assert_eq!(then.verdict, enough.towards, "{enough:?} {then:?}");
-        assert_eq!(then.needed, Needed::Nothing);
+        assert_eq!(then.needed, PressesNeeded::Nothing);
     }
 }

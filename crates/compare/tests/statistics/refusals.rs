@@ -1,8 +1,8 @@
-//! Why two samples may say nothing about each other: each reason has its type and its words, and none is a NaN.
+//! Samples that cannot be compared: each reason has its own type and message, and no result is NaN.
 
 use skinrig_compare::statistics::{
-    Better, Count, Note, Pairing, Position, Question, Refusal, Sample, SampleFault, Settings,
-    compare, estimate,
+    Better, ComparisonError, Count, Note, Pairing, Position, Question, Sample, SampleFault,
+    Settings, compare, estimate,
 };
 
 const LOWER: Question = Question {
@@ -10,13 +10,13 @@ const LOWER: Question = Question {
     margin: Some(0.5),
 };
 
-/// Errors at `places`, 3 repetitions each, no two alike.
+/// Errors at `places`, 3 repetitions each, all different.
 fn errors(places: std::ops::Range<u32>) -> Sample {
     let value = |i: u32, r: u32| 2.0 + 0.05 * f64::from((7 * i * i + 3 * r) % 11);
     Sample::rms(places.flat_map(|i| (0..3).map(move |r| (i, value(i, r))))).unwrap()
 }
 
-fn refusal(a: &Sample, b: &Sample) -> Refusal {
+fn refusal(a: &Sample, b: &Sample) -> ComparisonError {
     compare(a, b, &LOWER, &Settings::default()).unwrap_err()
 }
 
@@ -31,23 +31,23 @@ fn nothing_to_compare_has_its_reason() {
     let found = refusal(&errors(0..9), &empty);
     assert_eq!(
         found.to_string(),
-        "B has no value of this metric: no press of it gave one"
+        "B has no value of this metric: none of its presses yields one"
     );
     let found = refusal(&errors(0..9), &errors(9..15));
     assert!(
-        matches!(found, Refusal::NoSharedLocation { a: 9, b: 6 }),
+        matches!(found, ComparisonError::NoSharedLocation { a: 9, b: 6 }),
         "{found}"
     );
     let found = refusal(&errors(0..9), &errors(8..15));
     assert!(
-        matches!(found, Refusal::TooFewLocations { locations: 1 }),
+        matches!(found, ComparisonError::TooFewLocations { locations: 1 }),
         "{found}"
     );
     let found = refusal(&errors(0..9), &times(0));
-    assert!(matches!(found, Refusal::Kinds { .. }), "{found}");
+    assert!(matches!(found, ComparisonError::Kinds { .. }), "{found}");
     let alone = estimate(&errors(0..1), &Settings::default()).unwrap_err();
     assert!(
-        matches!(alone, Refusal::TooFewLocations { locations: 1 }),
+        matches!(alone, ComparisonError::TooFewLocations { locations: 1 }),
         "{alone}"
     );
 }
@@ -56,14 +56,14 @@ fn nothing_to_compare_has_its_reason() {
 fn no_spread_is_no_interval() {
     let found = refusal(&errors(0..9), &errors(0..9));
     assert!(
-        matches!(found, Refusal::NoSpread { locations: 9, .. }),
+        matches!(found, ComparisonError::NoSpread { locations: 9, .. }),
         "{found}"
     );
     let all = |v: f64| Sample::mean((0..9).map(|i| (i, v))).unwrap();
     let found = refusal(&all(1.0), &all(2.0));
     assert_eq!(
         found,
-        Refusal::NoSpread {
+        ComparisonError::NoSpread {
             a: 1.0,
             b: 2.0,
             locations: 9
@@ -79,12 +79,12 @@ fn no_spread_is_no_interval() {
     };
     assert!(matches!(
         refusal(&still(1.0), &still(2.0)),
-        Refusal::NoSpread { .. }
+        ComparisonError::NoSpread { .. }
     ));
     let perfect = Sample::taxels(2000.0, (0..9).map(|i| (i, 0.0))).unwrap();
     assert!(matches!(
         refusal(&perfect, &perfect),
-        Refusal::NoError { .. }
+        ComparisonError::NoError { .. }
     ));
 }
 
@@ -115,7 +115,7 @@ fn a_median_among_misses_is_beyond_the_window() {
     let found = refusal(&times(3), &times(11));
     let expected = "the 50 % percentile of B lies beyond the window: 11 of 20 trials were missed";
     assert!(found.to_string().starts_with(expected), "{found}");
-    // Fewer than half: a median, though the misses count.
+    // Fewer than half are missed: there is a median, although the misses count.
     let found = compare(&times(0), &times(6), &LOWER, &Settings::default()).unwrap();
     assert!(found.b.value > found.a.value, "{found:?}");
     assert!(matches!(
@@ -126,7 +126,7 @@ fn a_median_among_misses_is_beyond_the_window() {
             ..
         }]
     ));
-    // Misses reach into the interval: it has no upper end.
+    // Misses extend into the interval: it has no upper end.
     let late = estimate(&times(9), &Settings::default()).unwrap();
     assert!(late.low.is_some() && late.high.is_none(), "{late:?}");
 }
@@ -214,7 +214,7 @@ fn settings_out_of_range_are_refused() {
     ] {
         let found = compare(&errors(0..9), &errors(0..8), &LOWER, &settings).unwrap_err();
         assert!(
-            matches!(&found, Refusal::Setting { name: n, .. } if n == name),
+            matches!(&found, ComparisonError::Setting { name: n, .. } if n == name),
             "{found}"
         );
     }
@@ -224,7 +224,7 @@ fn settings_out_of_range_are_refused() {
     };
     let found = compare(&errors(0..9), &errors(0..9), &margin, &usual).unwrap_err();
     assert!(
-        matches!(&found, Refusal::Setting { name, .. } if name == "margin"),
+        matches!(&found, ComparisonError::Setting { name, .. } if name == "margin"),
         "{found}"
     );
     let few = Settings {

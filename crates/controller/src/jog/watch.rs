@@ -1,4 +1,4 @@
-//! Moves that are looked at while they go on: every sample of them, not their end alone.
+//! Moves whose samples are all observed, not only their end.
 
 use skinrig_device::MotionLimits;
 use skinrig_model::{HostDuration, HostTime, Point3, PoseSample, Setting, Skin};
@@ -7,16 +7,16 @@ use super::Jog;
 use crate::error::ControllerError;
 
 impl Jog<'_> {
-    /// Hands other limits to the robot, as [`start`](Self::start) did. The guard keeps its own.
+    /// Configures new limits of the robot, as [`start`](Self::start) did. The guard keeps its own.
     ///
     /// # Errors
-    /// What the robot answers.
+    /// The error of the robot.
     pub fn limit(&mut self, robot_limits: &MotionLimits) -> Result<Vec<Setting>, ControllerError> {
         self.indenter.configure(robot_limits)
     }
 
-    /// Starts a move to `target` and returns as soon as the robot has taken it, with the time of that. It goes on while
-    /// somebody [watches](Self::watch).
+    /// Starts a move to `target` and returns the time at which the robot accepted it. The move continues while
+    /// [`watch`](Self::watch) is called.
     ///
     /// # Errors
     /// As [`go`](Self::go).
@@ -30,8 +30,8 @@ impl Jog<'_> {
         self.command(target, speed_mm_s)
     }
 
-    /// Appends every sample of so long a time to `seen`, those before a fault included; of less when `enough` says so of
-    /// one. Force and stream are watched as ever.
+    /// Appends every sample of this duration to `seen`, including those before a fault; stops early when `enough` returns true for
+    /// a sample. Monitors force and pose stream.
     ///
     /// # Errors
     /// As [`look`](Self::look).
@@ -53,20 +53,20 @@ impl Jog<'_> {
         Ok(())
     }
 
-    /// Brings the tip to rest where it is, with live motors. Gives when that was ordered.
+    /// Stops the tip with the motors on. Returns the time of the command.
     ///
     /// # Errors
-    /// What the robot answers.
+    /// The error of the robot.
     pub fn hold(&mut self) -> Result<HostTime, ControllerError> {
         let t = self.clock.now();
         self.indenter.hold()?;
         Ok(t)
     }
 
-    /// Motors off now, wherever the tip is; nothing moves any more. Gives when that was ordered.
+    /// Switches the motors off, wherever the tip is. Returns the time of the command.
     ///
     /// # Errors
-    /// What the robot answers.
+    /// The error of the robot.
     pub fn halt(&mut self) -> Result<HostTime, ControllerError> {
         let t = self.clock.now();
         self.indenter.disarm()?;

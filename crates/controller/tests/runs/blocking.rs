@@ -23,7 +23,7 @@ const LONG_MS: i64 = 10_000;
 /// And one that never comes back.
 const FOR_EVER_MS: i64 = i64::MAX / MS;
 
-const PATIENCE: Patience = Patience {
+const TIMEOUTS: Timeouts = Timeouts {
     running: HostDuration::from_millis(2_000),
     set_up: HostDuration::from_millis(3_000),
 };
@@ -309,14 +309,14 @@ fn run(site: Option<(Site, i64)>, detached: bool) -> Told {
         for camera in CameraId::ALL {
             let b = blocking(DeviceRole::of_camera(camera));
             let device = BlockingCamera(MockCamera(world.clone(), camera), b.clone());
-            let device = DetachedCamera::new(Box::new(device), Box::new(clock.clone()), PATIENCE);
+            let device = DetachedCamera::new(Box::new(device), Box::new(clock.clone()), TIMEOUTS);
             let device = device.expect("a thread");
             told(device.calls(), &b);
             rig.cameras[camera.index()] = Box::new(device);
         }
         let b = blocking(DeviceRole::TriggerBox);
         let device = BlockingBox(MockTriggerBox(world.clone()), b.clone());
-        let device = DetachedBox::new(Box::new(device), Box::new(clock.clone()), PATIENCE);
+        let device = DetachedBox::new(Box::new(device), Box::new(clock.clone()), TIMEOUTS);
         let device = device.expect("a thread");
         told(device.calls(), &b);
         rig.trigger_box = Some(Box::new(device));
@@ -363,7 +363,7 @@ fn no_call_that_blocks_holds_up_the_loop() {
                     assert!(report.retracted, "{case}: {report:?}");
                     // In the first press: found silent after 2 s of a hold of 4 s, and off the skin at once.
                     assert_eq!([report.valid, report.invalid], [0, 1], "{case}: {report:?}");
-                    let block = told.ended_ms - PATIENCE.running.0 / MS;
+                    let block = told.ended_ms - TIMEOUTS.running.0 / MS;
                     assert!(block < 2_500, "{case}: ended at {} ms", told.ended_ms);
                 }
                 // Nothing was powered.

@@ -89,7 +89,7 @@ proptest! {
     #[test]
     fn nothing_forbidden_reaches_the_robot(acts in prop::collection::vec(act(), 1..80)) {
         let (world, guard) = guarded();
-        let mut guard = guard.within(Some(around()));
+        let mut guard = guard.with_surroundings(Some(around()));
         let mut poses = Vec::new();
         // Where the tip went down below clearance height.
         let mut foot: Option<[f64; 2]> = None;

@@ -14,7 +14,7 @@ use crate::simulated::paced_plan;
 
 fn full() -> Preflight {
     Preflight {
-        made: vec![PreflightCheck::new("disk", "1 GB", "2 GB", true, "")],
+        caller_checks: vec![PreflightCheck::new("disk", "1 GB", "2 GB", true, "")],
         expected: Vec::new(),
         clocks_within: Some(HostDuration::from_millis(500)),
         loopback: Some(Loopback {
@@ -168,7 +168,7 @@ fn another_device_and_another_version_are_refused() {
 #[test]
 fn what_the_caller_found_and_what_a_device_refuses_end_it_too() {
     let mut preflight = full();
-    preflight.made = vec![PreflightCheck::new(
+    preflight.caller_checks = vec![PreflightCheck::new(
         "disk",
         "9 GB",
         "1 GB",

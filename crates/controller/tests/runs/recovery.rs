@@ -1,6 +1,8 @@
 //! A robot that was braked in contact rises first, whatever a pose in contact looks like; and only straight up, and no deeper.
 
-use skinrig_controller::{ControllerError, ControllerSettings, Trip, WatchLimits, Watchdog};
+use skinrig_controller::{
+    ControllerError, ControllerSettings, WatchLimits, Watchdog, WatchdogTrip,
+};
 use skinrig_model::{HostTime, Point3, PoseSample, RunEnd};
 use skinrig_protocol::plan::OnTrip;
 
@@ -52,8 +54,9 @@ fn a_braked_arm_in_contact_rises_before_anything_else() {
 fn a_tip_that_goes_deeper_than_it_was_found_trips() {
     for start_mm in [-3.04, -3.4] {
         let told = from([10.0, 2.0, start_mm], 0.08, OnTrip::Retract);
-        let depth =
-            |e: &ControllerError| matches!(e, ControllerError::Watchdog(Trip::Depth { .. }));
+        let depth = |e: &ControllerError| {
+            matches!(e, ControllerError::Watchdog(WatchdogTrip::Depth { .. }))
+        };
         assert!(
             told.report.causes.iter().any(depth),
             "{:?}",
@@ -66,11 +69,11 @@ fn a_tip_that_goes_deeper_than_it_was_found_trips() {
 /// Once it was clear the whole limit holds again.
 #[test]
 fn the_slack_ends_at_clearance_height() {
-    let mut dog = Watchdog::new(WatchLimits::of(&LIMITS, &ControllerSettings::default()));
-    dog.start();
+    let mut watchdog = Watchdog::new(WatchLimits::of(&LIMITS, &ControllerSettings::default()));
+    watchdog.start();
     let mut see = |s: i64, z_mm: f64| {
         let at = Point3::new(10.0, 2.0, z_mm);
-        dog.see(&PoseSample {
+        watchdog.check_sample(&PoseSample {
             t: HostTime(s * 1000 * MS),
             commanded: at,
             measured: at,
@@ -81,7 +84,7 @@ fn the_slack_ends_at_clearance_height() {
         assert_eq!(see(s, z_mm), Ok(()), "at {s} s");
     }
     let limit = match see(6, -3.06) {
-        Err(Trip::Depth { limit_mm, .. }) => limit_mm,
+        Err(WatchdogTrip::Depth { limit_mm, .. }) => limit_mm,
         other => panic!("{other:?}"),
     };
     assert_eq!(limit, 3.05);

@@ -4,7 +4,7 @@ use skinrig_controller::{ControlHandle, RunReport, execute};
 use skinrig_model::*;
 use skinrig_protocol::plan::Plan;
 use skinrig_sim::config::SimConfig;
-use skinrig_sim::faults::{Fault, When};
+use skinrig_sim::faults::{Fault, FaultTrigger};
 use skinrig_sim::rig::simulated_rig;
 
 use crate::mock::{MS, Sink, header};
@@ -93,22 +93,22 @@ fn too_much_force_ends_at_clearance_height() {
 }
 
 /// Instants in a good run, named: within the travel, and within each phase of two presses.
-fn instants(plan: &Plan, seed: u64) -> Vec<(String, When)> {
+fn instants(plan: &Plan, seed: u64) -> Vec<(String, FaultTrigger)> {
     let good = run(plan, &SimConfig::new(seed, SimLevel::Kinematic));
     assert_eq!(good.report.end, RunEnd::Completed, "{:?}", good.report);
     let mut all = vec![
-        ("before arming".to_owned(), When::At(HostTime(0))),
-        ("travel".to_owned(), When::At(HostTime(200 * MS))),
+        ("before arming".to_owned(), FaultTrigger::At(HostTime(0))),
+        ("travel".to_owned(), FaultTrigger::At(HostTime(200 * MS))),
     ];
     for record in &good.records {
         let Record::Outcome(o) = record else { continue };
         let Some(t) = o.timing.filter(|_| o.attempt.press.index() < 2) else {
             continue;
         };
-        let middle = |a: HostTime, b: HostTime| When::At(HostTime(i64::midpoint(a.0, b.0)));
+        let middle = |a: HostTime, b: HostTime| FaultTrigger::At(HostTime(i64::midpoint(a.0, b.0)));
         for (phase, when) in [
             ("approach", middle(t.approach, t.contact)),
-            ("contact", When::Contact(o.attempt.press.index())),
+            ("contact", FaultTrigger::Contact(o.attempt.press.index())),
             ("indentation", middle(t.contact, t.at_depth)),
             ("hold", middle(t.at_depth, t.retract)),
             ("retraction", middle(t.retract, t.release)),

@@ -1,7 +1,7 @@
 //! Suspensions: no chatter, one row each way, and an end to the waiting.
 
 use proptest::prelude::*;
-use skinrig_controller::suspend::{Hysteresis, Turn};
+use skinrig_controller::suspend::{Hysteresis, Transition};
 use skinrig_controller::{RecordSink, SinkFault, execute};
 use skinrig_model::{HostDuration, HostTime, InterruptionKind, Record, RunEnd};
 use skinrig_protocol::{Suspend, Threshold, UnderWay};
@@ -25,18 +25,18 @@ proptest! {
     ), hold in 1usize..12) {
         let mut follow = Hysteresis::new(STORM, RESUME_AFTER);
         let values: Vec<f64> = values.into_iter().flat_map(|v| std::iter::repeat_n(v, hold)).collect();
-        let mut last: Option<(usize, Turn)> = None;
+        let mut last: Option<(usize, Transition)> = None;
         for (i, value) in values.iter().enumerate() {
             let t = HostTime(i as i64 * 100 * MS);
             let Some(turn) = follow.feed(t, *value) else { continue };
             let (span, side): (usize, fn(f64) -> bool) = match turn {
-                Turn::Tripped => (3, |v| v > 100.0),
-                Turn::Cleared => (5, |v| v <= 60.0),
+                Transition::Tripped => (3, |v| v > 100.0),
+                Transition::Cleared => (5, |v| v <= 60.0),
             };
             prop_assert!(i >= span && values[i - span..=i].iter().all(|v| side(*v)), "{turn:?} at {i}");
-            prop_assert_eq!(follow.is_tripped(), turn == Turn::Tripped);
+            prop_assert_eq!(follow.is_tripped(), turn == Transition::Tripped);
             let expected = last.is_none_or(|(_, before)| before != turn);
-            prop_assert!(expected && (last.is_some() || turn == Turn::Tripped));
+            prop_assert!(expected && (last.is_some() || turn == Transition::Tripped));
             prop_assert!(last.is_none_or(|(before, _)| i - before > span), "chatter");
             last = Some((i, turn));
         }
@@ -69,7 +69,13 @@ fn small_values_may_be_the_bad_ones() {
     let turns = [7.0, 5.0, 4.9, 5.5, 6.0].map(|v| follow.feed(HostTime(0), v));
     assert_eq!(
         turns,
-        [None, None, Some(Turn::Tripped), None, Some(Turn::Cleared)]
+        [
+            None,
+            None,
+            Some(Transition::Tripped),
+            None,
+            Some(Transition::Cleared)
+        ]
     );
 }
 
@@ -228,9 +234,7 @@ fn a_hot_camera_suspends_until_it_is_cool() {
     );
     assert_eq!(
         notes,
-        [
-            "suspend.temperature: expected camera 2 to tell its temperature, found one that cannot: not watched"
-        ]
+        ["suspend.temperature: camera 2 cannot measure its temperature: not monitored"]
     );
     let world = lock(&told.world);
     let seconds = u32::try_from(world.t / (1_000 * MS)).unwrap();

@@ -77,7 +77,10 @@ fn the_depth_counts_from_the_touched_surface() {
 
 #[test]
 fn a_surface_outside_its_band_is_refused_and_the_run_goes_on() {
-    for (off_mm, words) in [(1.5, "found a touch at once"), (-1.5, "found none down to")] {
+    for (off_mm, words) in [
+        (1.5, "found contact immediately"),
+        (-1.5, "found none down to"),
+    ] {
         let (end, outcomes, poses) = run(off_mm, &touching_plan());
         assert_eq!(end, RunEnd::Completed);
         assert_eq!(outcomes.len(), 3);
@@ -171,7 +174,7 @@ fn a_surface_that_moved_ends_the_run_before_any_press() {
         (-0.6, "-0."),
         (0.8, "0.5"),
         (-3.0, "found none"),
-        (1.5, "at once"),
+        (1.5, "immediately"),
     ] {
         let (end, records) = checked(off_mm, false);
         let RunEnd::Faulted(reason) = &end else {
@@ -182,7 +185,7 @@ fn a_surface_that_moved_ends_the_run_before_any_press() {
             "(9, 3) mm",
             "(12, 2) mm",
             "0 +- 0.4 mm",
-            "touch it off again",
+            "touch off again",
         ] {
             assert!(reason.contains(words), "{off_mm}: {words} in {reason}");
         }
@@ -284,7 +287,7 @@ fn invalid_presses_in_a_row_end_the_run() {
         panic!("{end:?}");
     };
     assert!(reason.contains("fewer than 2 in a row"), "{reason}");
-    assert!(reason.contains("found a touch at once"), "{reason}");
+    assert!(reason.contains("found contact immediately"), "{reason}");
     assert_eq!(outcomes.len(), 2);
 }
 

@@ -24,7 +24,7 @@ impl RecordSink for Vanishing {
         if ms < self.gone_ms {
             return Ok(());
         }
-        Err(SinkFault::Refused("the file is gone".into()))
+        Err(SinkFault::Rejected("the file is gone".into()))
     }
 }
 
@@ -65,7 +65,7 @@ fn what_is_gone_is_noticed_within_half_a_second() {
         for gone_ms in (0..end_ms - WITHIN_MS).step_by(20) {
             let (sink, report) = run(gone_ms, operator);
             let case = format!("gone at {gone_ms} ms, {operator:?}");
-            let fault = SinkFault::Refused("the file is gone".into());
+            let fault = SinkFault::Rejected("the file is gone".into());
             assert_eq!(report.causes, [ControllerError::Sink(fault)], "{case}");
             assert!(report.retracted && report.disarmed, "{case}: {report:?}");
             // One failed answer ends it; the end is written all the same.

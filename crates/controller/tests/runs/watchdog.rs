@@ -1,7 +1,7 @@
 //! The watchdog, alone and in a run: every cause trips within two ticks of rig time, and nothing else does.
 
 use proptest::prelude::*;
-use skinrig_controller::{ControllerSettings, Trip, WatchLimits, Watchdog};
+use skinrig_controller::{ControllerSettings, WatchLimits, Watchdog, WatchdogTrip};
 use skinrig_model::{HostTime, Point3, PoseSample, Record, RunEnd};
 use skinrig_protocol::plan::OnTrip;
 
@@ -24,13 +24,13 @@ fn sample(ms: i64, at: [f64; 3], force_n: f64) -> PoseSample {
 }
 
 /// The trip of samples 1 ms apart, looked at after each.
-fn trip_of(samples: impl IntoIterator<Item = ([f64; 3], f64)>) -> Option<(i64, Trip)> {
-    let mut dog = Watchdog::new(limits());
-    dog.start();
+fn trip_of(samples: impl IntoIterator<Item = ([f64; 3], f64)>) -> Option<(i64, WatchdogTrip)> {
+    let mut watchdog = Watchdog::new(limits());
+    watchdog.start();
     for (i, (at, force_n)) in samples.into_iter().enumerate() {
         let ms = i as i64 + 1;
-        let seen = dog.see(&sample(ms, at, force_n));
-        if let Err(trip) = seen.and_then(|()| dog.look(HostTime(ms * MS))) {
+        let seen = watchdog.check_sample(&sample(ms, at, force_n));
+        if let Err(trip) = seen.and_then(|()| watchdog.check_poll(HostTime(ms * MS))) {
             return Some((ms, trip));
         }
     }
@@ -73,9 +73,9 @@ proptest! {
         let at = found.as_ref().map(|(ms, _)| *ms);
         prop_assert_eq!(at, Some(calm as i64 + 1), "{:?}", found);
         let right = match found.map(|(_, trip)| trip) {
-            Some(Trip::Force { .. }) => which == 0,
-            Some(Trip::Depth { .. }) => which == 1,
-            Some(Trip::Speed { .. }) => which == 2,
+            Some(WatchdogTrip::Force { .. }) => which == 0,
+            Some(WatchdogTrip::Depth { .. }) => which == 1,
+            Some(WatchdogTrip::Speed { .. }) => which == 2,
             _ => false,
         };
         prop_assert!(right);
@@ -87,45 +87,60 @@ fn a_slow_creep_is_no_speed_and_a_sustained_one_is() {
     // 180 mm/s: each step stays within what two samples may differ by, five of them do not.
     let creep = |step_mm: f64| trip_of((0..50).map(|i| ([step_mm * f64::from(i), 0.0, 10.0], 0.0)));
     assert_eq!(creep(0.1), None);
-    assert!(matches!(creep(0.16), Some((_, Trip::Speed { .. }))));
+    assert!(matches!(creep(0.16), Some((_, WatchdogTrip::Speed { .. }))));
 }
 
 #[test]
 fn ages_gaps_and_forms() {
-    let mut dog = Watchdog::new(limits());
-    dog.start();
+    let mut watchdog = Watchdog::new(limits());
+    watchdog.start();
     let at = |z| [0.0, 0.0, z];
     let ms = |t: i64| HostTime(t * MS);
-    assert_eq!(dog.look(ms(5000)), Ok(())); // nothing is known yet
-    assert_eq!(dog.see(&sample(5001, at(-2.0), 0.0)), Ok(()));
-    assert_eq!(dog.look(ms(5101)), Ok(()));
-    assert!(matches!(dog.look(ms(5102)), Err(Trip::Stale { .. })));
-    // The way out is open, but not to the blind.
-    assert_eq!(dog.see(&sample(5103, at(-2.0), 99.0)), Ok(()));
-    assert_eq!(dog.look(ms(5104)), Ok(()));
+    assert_eq!(watchdog.check_poll(ms(5000)), Ok(())); // nothing is known yet
+    assert_eq!(watchdog.check_sample(&sample(5001, at(-2.0), 0.0)), Ok(()));
+    assert_eq!(watchdog.check_poll(ms(5101)), Ok(()));
     assert!(matches!(
-        dog.see(&sample(5103, at(1.0), 0.0)),
-        Err(Trip::Feedback { .. })
+        watchdog.check_poll(ms(5102)),
+        Err(WatchdogTrip::Stale { .. })
+    ));
+    // The way out is open, but not to the blind.
+    assert_eq!(watchdog.check_sample(&sample(5103, at(-2.0), 99.0)), Ok(()));
+    assert_eq!(watchdog.check_poll(ms(5104)), Ok(()));
+    assert!(matches!(
+        watchdog.check_sample(&sample(5103, at(1.0), 0.0)),
+        Err(WatchdogTrip::Feedback { .. })
     ));
     let mut bad = sample(5200, at(1.0), 0.0);
     bad.commanded = Point3::new(f64::NAN, 0.0, 0.0);
-    assert!(matches!(dog.see(&bad), Err(Trip::Feedback { .. })));
-    assert_eq!(dog.last().map(|s| s.t), Some(ms(5103)));
+    assert!(matches!(
+        watchdog.check_sample(&bad),
+        Err(WatchdogTrip::Feedback { .. })
+    ));
+    assert_eq!(watchdog.last().map(|s| s.t), Some(ms(5103)));
 
-    dog.start();
-    assert_eq!(dog.see(&sample(6000, at(-2.0), 0.0)), Ok(()));
-    assert_eq!(dog.look(ms(6000)), Ok(()));
-    assert_eq!(dog.see(&sample(7001, at(-2.0), 0.0)), Ok(()));
-    assert!(matches!(dog.look(ms(7001)), Err(Trip::Late { .. })));
+    watchdog.start();
+    assert_eq!(watchdog.check_sample(&sample(6000, at(-2.0), 0.0)), Ok(()));
+    assert_eq!(watchdog.check_poll(ms(6000)), Ok(()));
+    assert_eq!(watchdog.check_sample(&sample(7001, at(-2.0), 0.0)), Ok(()));
+    assert!(matches!(
+        watchdog.check_poll(ms(7001)),
+        Err(WatchdogTrip::Late { .. })
+    ));
     // At clearance height nobody is in danger.
-    dog.start();
-    assert_eq!(dog.see(&sample(8000, at(5.0), 0.0)), Ok(()));
-    assert_eq!(dog.look(ms(8000)), Ok(()));
-    assert_eq!(dog.see(&sample(9900, at(5.0), 0.0)), Ok(()));
-    assert_eq!(dog.look(ms(9900)), Ok(()));
+    watchdog.start();
+    assert_eq!(watchdog.check_sample(&sample(8000, at(5.0), 0.0)), Ok(()));
+    assert_eq!(watchdog.check_poll(ms(8000)), Ok(()));
+    assert_eq!(watchdog.check_sample(&sample(9900, at(5.0), 0.0)), Ok(()));
+    assert_eq!(watchdog.check_poll(ms(9900)), Ok(()));
     // A sample from the future would stay fresh for ever.
-    assert_eq!(dog.see(&sample(9_999_999, at(5.0), 0.0)), Ok(()));
-    assert!(matches!(dog.look(ms(10_000)), Err(Trip::Feedback { .. })));
+    assert_eq!(
+        watchdog.check_sample(&sample(9_999_999, at(5.0), 0.0)),
+        Ok(())
+    );
+    assert!(matches!(
+        watchdog.check_poll(ms(10_000)),
+        Err(WatchdogTrip::Feedback { .. })
+    ));
 }
 
 #[test]
@@ -147,7 +162,10 @@ fn every_cause_ends_the_press_within_two_ticks() {
             Strike::Silence,
             "pose stream: expected a pose sample no older",
         ),
-        (Strike::Late, "loop: expected a look at the robot every"),
+        (
+            Strike::Late,
+            "loop: expected a poll of the robot at least every",
+        ),
     ];
     for (strike, words) in causes {
         for on_trip in [OnTrip::Retract, OnTrip::Brake] {

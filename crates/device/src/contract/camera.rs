@@ -1,12 +1,11 @@
-//! What every event camera must do.
+//! Contract of event cameras.
 
 use skinrig_model::{HostDuration, HostTime, RawChunk};
 
 use super::{answered, pass};
 use crate::{CameraSettings, Clock, DeviceError, EventCamera, Roi, TestPattern};
 
-/// The promises of [`EventCamera`]. `make` gives a fresh, stopped camera and its clock; `settings` are what
-/// the rig writes to it.
+/// Verifies the contract of [`EventCamera`]. `make` returns a new, stopped camera and its clock; `settings` are those of the rig.
 pub fn event_camera(
     make: &mut dyn FnMut() -> (Box<dyn EventCamera>, Box<dyn Clock>),
     settings: &CameraSettings,
@@ -110,7 +109,7 @@ fn camera_stream(
         answered(clock.as_mut(), || camera.flush(&mut all)).expect("camera: flush");
         let (after, at) = (all.len(), clock.now());
         answered(clock.as_mut(), || camera.flush(&mut all)).expect("camera: flush again");
-        // On a clock that does not stand still, bytes arrive between any two calls.
+        // On a real clock, bytes arrive between any two calls.
         assert!(
             all.len() == after || clock.now() > at,
             "camera: a second flush at the same time must be empty (round {round})"
@@ -129,7 +128,7 @@ fn camera_stream(
     check_chunks(camera.as_ref(), &all, clock.now());
 }
 
-/// A camera either makes a pattern, and gives its pixels back, or refuses it.
+/// A camera either generates a test pattern and restores its pixels, or rejects it.
 fn camera_pattern(
     make: &mut dyn FnMut() -> (Box<dyn EventCamera>, Box<dyn Clock>),
     settings: &CameraSettings,

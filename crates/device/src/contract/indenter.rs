@@ -1,11 +1,11 @@
-//! What every robot must do.
+//! Contract of robots.
 
 use skinrig_model::{HostDuration, HostTime, Point3, Robot};
 
 use super::{TICK, pass};
 use crate::{Clock, DeviceError, Indenter, MotionLimits, RobotSample};
 
-/// What [`indenter`] may do with the robot.
+/// Test parameters of [`indenter`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IndenterContract {
     /// Limits within the robot's capabilities.
@@ -16,17 +16,15 @@ pub struct IndenterContract {
     pub outside: Point3<Robot>,
     /// Speed of all moves, mm/s.
     pub speed_mm_s: f64,
-    /// How close to its target a move must come, mm.
+    /// Distance to the target that counts as arrived, mm.
     pub tolerance_mm: f64,
-    /// Time after which every move has ended.
-    pub patience: HostDuration,
-    /// Share of the promised samples that must arrive: close to 1 where the clock waits for the robot, less where a
-    /// real clock goes on while a busy machine runs something else.
+    /// Time within which every move ends.
+    pub move_timeout: HostDuration,
+    /// Share of the promised samples that must arrive: close to 1 on a simulated clock, less on a real clock with a busy machine.
     pub rate_share: f64,
 }
 
-/// Asserts that the samples are finite, in time order without duplicates, after `after`, and none is later
-/// than `now`.
+/// Asserts that the samples are finite, later than `after`, not later than `now`, in time order and without duplicates.
 fn check_samples(samples: &[RobotSample], after: Option<HostTime>, now: HostTime) {
     let mut last = after;
     for s in samples {
@@ -44,7 +42,7 @@ fn check_samples(samples: &[RobotSample], after: Option<HostTime>, now: HostTime
     }
 }
 
-/// The promises of [`Indenter`]. `make` gives a fresh, disarmed robot and its clock.
+/// Verifies the contract of [`Indenter`]. `make` returns a new, disarmed robot and its clock.
 pub fn indenter(
     make: &mut dyn FnMut() -> (Box<dyn Indenter>, Box<dyn Clock>),
     options: &IndenterContract,
@@ -166,7 +164,7 @@ fn indenter_refusals(
         );
     }
 
-    // A refused command leaves the present motion as it is.
+    // A refused command does not affect the current motion.
     let [target, other] = options.targets;
     let speed = options.speed_mm_s;
     robot
@@ -195,7 +193,7 @@ fn indenter_refusals(
             format!("indenter: {what} must be refused")
         );
     }
-    pass(clock.as_mut(), options.patience, || {});
+    pass(clock.as_mut(), options.move_timeout, || {});
     robot.poll(&mut samples).expect("indenter: poll");
     let last = samples.last().expect("indenter: expected pose samples");
     let off = last.measured.distance_mm(target);
@@ -218,7 +216,7 @@ fn indenter_moves(
             .expect("indenter: a good command");
         let mut samples = Vec::new();
         let mut fresh = Vec::new();
-        let end = clock.now() + options.patience;
+        let end = clock.now() + options.move_timeout;
         let mut polled_at = clock.now();
         while clock.now() < end {
             let next = clock.now() + TICK;
@@ -232,13 +230,13 @@ fn indenter_moves(
         }
         robot.poll(&mut fresh).expect("indenter: poll again");
         check_samples(&fresh, last, clock.now());
-        // On a real clock time went on between the two polls.
+        // On a real clock time passes between the two polls.
         assert!(
             fresh.is_empty() || clock.now() > polled_at,
             "indenter: a second poll at the same time must be empty"
         );
         last = fresh.last().map(|s| s.t).or(last);
-        let seconds = options.patience.as_secs_f64();
+        let seconds = options.move_timeout.as_secs_f64();
         assert!(
             samples.len() as f64 >= options.rate_share * seconds * rate,
             "indenter: expected {} samples or more in {seconds} s, found {}",

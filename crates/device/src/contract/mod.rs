@@ -1,16 +1,15 @@
-//! The contract suite: what every implementation of a device trait must do, simulated, replayed or real.
+//! Contract tests that every implementation of a device trait must pass: simulated, replayed or real.
 //!
-//! Each function drives fresh devices through one trait's promises and panics with a clear message at the first
-//! broken one. Call them from tests. They work on any clock and touch nothing but the devices they are given.
+//! Each function tests new devices against one trait and panics with a clear message at the first violation. They work with any clock
+//! and touch only the given devices.
 //!
-//! Positions are in the robot frame; whoever runs [`indenter`] on a real robot clears the space between the
-//! targets first.
+//! Positions are in the robot frame. Before running [`indenter`] on a real robot, clear the space between the targets.
 
 use skinrig_model::{HostDuration, HostTime};
 
 use crate::{Clock, DeviceError};
 
-/// Asserts that `answer` is an error of the kind named by `pattern`.
+/// Asserts that `answer` is an error of the kind `pattern`.
 macro_rules! expect_error {
     ($answer:expr, $pattern:pat, $what:expr) => {
         match $answer {
@@ -20,10 +19,10 @@ macro_rules! expect_error {
     };
 }
 
-/// A step of waiting; short against everything that a robot does.
+/// Polling interval; short compared with any robot motion.
 const TICK: HostDuration = HostDuration::from_millis(5);
 
-/// Lets `span` pass on `clock`, looking in between.
+/// Waits for `span` on `clock` and polls meanwhile.
 fn pass(clock: &mut dyn Clock, span: HostDuration, mut look: impl FnMut()) {
     let end = clock.now() + span;
     while clock.now() < end {
@@ -33,7 +32,7 @@ fn pass(clock: &mut dyn Clock, span: HostDuration, mut look: impl FnMut()) {
     }
 }
 
-/// Asks until the device has answered.
+/// Repeats a call until it is no longer pending.
 fn answered<T>(
     clock: &mut dyn Clock,
     mut ask: impl FnMut() -> Result<T, DeviceError>,
@@ -54,7 +53,7 @@ pub use camera::event_camera;
 pub use indenter::{IndenterContract, indenter};
 pub use trigger::trigger_box;
 
-/// The promises of [`Clock`]: never back, and a wait reaches its end.
+/// Verifies the contract of [`Clock`]: monotonic, and waits reach their end.
 pub fn clock(clock: &mut dyn Clock) {
     let start = clock.now();
     clock.wait_until(HostTime(start.0 - 1_000_000));
@@ -64,7 +63,7 @@ pub fn clock(clock: &mut dyn Clock) {
     );
     let end = start + HostDuration::from_millis(20);
     let mut last = start;
-    // A replayed clock may end a wait early; waiting again goes on.
+    // A replayed clock may return early; waiting again continues.
     for _ in 0..1_000_000 {
         clock.wait_until(end);
         let now = clock.now();

@@ -1,12 +1,12 @@
-//! What every trigger box must do.
+//! Contract of trigger boxes.
 
 use skinrig_model::{HostDuration, HostTime, Mark, PressId, SentMark};
 
 use super::{TICK, answered, pass};
 use crate::{Clock, DeviceError, TriggerBox};
 
-/// The promises of [`TriggerBox`]. `make` gives a fresh box and its clock; `marks` are at least two different
-/// marks in the order in which they are sent.
+/// Verifies the contract of [`TriggerBox`]. `make` returns a new box and its clock; `marks` are at least two different marks in the order
+/// of sending.
 pub fn trigger_box(
     make: &mut dyn FnMut() -> (Box<dyn TriggerBox>, Box<dyn Clock>),
     marks: &[Mark],
@@ -52,7 +52,7 @@ pub fn trigger_box(
         let mut free = over_for_certain(sent, train);
         match answered(clock.as_mut(), || device.send(mark)) {
             Err(DeviceError::State { .. }) => {}
-            // On a real clock the train may be over before the question reaches the box.
+            // On a real clock the train may end before the request reaches the box.
             Ok(again) if clock.now() >= sent.t + train + HostDuration(-sent.uncertainty_ns) => {
                 last = Some(again.t);
                 free = over_for_certain(again, train);
@@ -66,7 +66,7 @@ pub fn trigger_box(
     }
 }
 
-/// When the train of `sent` is over, at the latest.
+/// Latest end of the train of `sent`.
 fn over_for_certain(sent: SentMark, train: HostDuration) -> HostTime {
     sent.t + train + HostDuration(sent.uncertainty_ns)
 }

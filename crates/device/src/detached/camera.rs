@@ -1,10 +1,10 @@
-//! A camera on a thread of its own.
+//! A camera on a separate thread.
 
 use std::sync::mpsc::{self, Receiver, Sender};
 
 use skinrig_model::{CameraId, DeviceIdentity, DeviceRole, RawChunk, Setting};
 
-use super::{Call, Calls, Patience, Worker};
+use super::{Call, Calls, Timeouts, Worker};
 use crate::{
     CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera, PatternScan, TestPattern,
 };
@@ -12,12 +12,12 @@ use crate::{
 type Device = Box<dyn EventCamera>;
 type Answer<T> = Result<T, DeviceError>;
 
-/// An [`EventCamera`] whose calls are carried out on a thread of its own. Chunks come at the look after the one that asked for them.
+/// An [`EventCamera`] whose calls run on a separate thread. Each poll returns the chunks fetched by the previous one.
 pub struct DetachedCamera {
     camera: CameraId,
     capabilities: CameraCapabilities,
     worker: Worker<Device>,
-    /// What calls handed over, in order.
+    /// Chunks fetched by calls, in order.
     chunks: Receiver<RawChunk>,
     hand_over: Sender<RawChunk>,
     poll: Option<Call<Answer<()>>>,
@@ -27,18 +27,18 @@ pub struct DetachedCamera {
 }
 
 impl DetachedCamera {
-    /// Takes a stopped camera to a thread of its own.
+    /// Moves a stopped camera to a separate thread.
     ///
     /// # Errors
-    /// [`DeviceError::Lost`] when there is no thread to be had.
+    /// [`DeviceError::Lost`] when the thread cannot be started.
     pub fn new(
         device: Device,
         clock: Box<dyn Clock>,
-        patience: Patience,
+        timeouts: Timeouts,
     ) -> Result<Self, DeviceError> {
         let (camera, capabilities) = (device.camera(), device.capabilities());
         let role = DeviceRole::of_camera(camera);
-        let worker = Worker::start(role, device.identity(), device, clock, patience)?;
+        let worker = Worker::start(role, device.identity(), device, clock, timeouts)?;
         let (hand_over, chunks) = mpsc::channel();
         Ok(Self {
             camera,
@@ -53,13 +53,13 @@ impl DetachedCamera {
         })
     }
 
-    /// The calls that it has not answered.
+    /// Number of unfinished calls.
     #[must_use]
     pub fn calls(&self) -> Calls {
         self.worker.calls.clone()
     }
 
-    /// A call of `fetch`, which hands over chunks.
+    /// A call of `fetch` that forwards the chunks.
     fn fetching(
         &self,
         fetch: fn(&mut dyn EventCamera, &mut Vec<RawChunk>) -> Answer<()>,
@@ -69,7 +69,7 @@ impl DetachedCamera {
             let mut chunks = Vec::new();
             let answer = fetch(device.as_mut(), &mut chunks);
             for chunk in chunks {
-                // Nobody is left to take it when this fails.
+                // Sending fails only if the receiver is gone.
                 let _ = hand_over.send(chunk);
             }
             answer
@@ -102,12 +102,12 @@ impl EventCamera for DetachedCamera {
 
     fn poll(&mut self, chunks: &mut Vec<RawChunk>) -> Answer<()> {
         let answer = self.worker.answer(&mut self.poll);
-        // Also what came before a call failed.
+        // Chunks fetched before a call failed are valid too.
         chunks.extend(self.chunks.try_iter());
         let answer = answer?;
         if self.poll.is_none() {
             let fetch = self.fetching(|d, chunks| d.poll(chunks));
-            let within = self.worker.patience.running;
+            let within = self.worker.timeouts.running;
             self.poll = Some(self.worker.ask("poll", within, fetch)?);
         }
         answer.unwrap_or(Ok(()))
@@ -116,7 +116,7 @@ impl EventCamera for DetachedCamera {
     fn flush(&mut self, chunks: &mut Vec<RawChunk>) -> Answer<()> {
         if self.flush.is_none() {
             let fetch = self.fetching(|d, chunks| d.flush(chunks));
-            let within = self.worker.patience.running;
+            let within = self.worker.timeouts.running;
             self.flush = Some(self.worker.ask("flush", within, fetch)?);
         }
         let answer = self.worker.answer(&mut self.flush);
@@ -138,21 +138,21 @@ impl EventCamera for DetachedCamera {
         chunks.extend(self.chunks.try_iter());
         let (answer, notes) = stopped?;
         self.notes.extend(notes);
-        // They were answered before: their chunks are among those that came.
+        // Earlier calls have finished: their chunks are included.
         (self.poll, self.flush) = (None, None);
         answer
     }
 
-    /// What was noticed up to the last stop.
+    /// Notes up to the last stop.
     fn take_notes(&mut self, notes: &mut Vec<String>) {
         notes.append(&mut self.notes);
     }
 
-    /// The answer to the call before, at most as old as that.
+    /// Result of the previous call.
     fn temperature_c(&mut self) -> Answer<Option<f64>> {
         let answer = self.worker.answer(&mut self.temperature)?;
         if self.temperature.is_none() {
-            let within = self.worker.patience.running;
+            let within = self.worker.timeouts.running;
             let call = |d: &mut Device| d.temperature_c();
             self.temperature = Some(self.worker.ask("temperature", within, call)?);
         }

@@ -1,9 +1,8 @@
-//! Devices on threads of their own: calls are asked and answered, so that none of them holds up whoever controls the robot.
+//! Devices on separate threads, so that a blocking call never delays the control of the robot.
 //!
-//! A driver's call may block: a serial line that takes no bytes, a control transfer that never completes. Around such a driver,
-//! [`DetachedCamera`] and [`DetachedBox`] keep the promise that verbs return at once. What is asked goes to the device's thread; what
-//! is not answered yet is [`DeviceError::Pending`], and what is not answered within its [`Patience`] is
-//! [`DeviceError::Silent`]. Simulated and replayed devices answer at once and need neither.
+//! A driver's call may block: a serial line that accepts no bytes, a control transfer that never completes. [`DetachedCamera`] and
+//! [`DetachedBox`] wrap such a driver so that calls return at once. Calls run on the device's thread; an unfinished call returns
+//! [`DeviceError::Pending`], and after its [`Timeouts`] [`DeviceError::Silent`]. Simulated and replayed devices do not need this.
 
 mod camera;
 mod trigger;
@@ -20,43 +19,42 @@ use crate::{Clock, DeviceError};
 pub use camera::DetachedCamera;
 pub use trigger::DetachedBox;
 
-/// From one look for an answer that is waited for to the next.
+/// Polling interval while waiting for a reply.
 const LOOK: HostDuration = HostDuration::from_millis(1);
 
-/// How long a device that still answers may take to close itself, on the operating system's clock.
+/// Time limit for closing a responsive device, on the operating system's clock.
 const CLOSE_WITHIN: Duration = Duration::from_secs(5);
 
-/// How long a device may take to answer, by the rig's clock.
+/// Time limits of a device's calls, on the rig's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Patience {
-    /// A call that is made while the robot moves: nobody waits for it, and later than this it is a fault.
+pub struct Timeouts {
+    /// For calls during robot motion. The caller does not wait; exceeding this is a fault.
     pub running: HostDuration,
-    /// A call that is waited for: settings, start and stop, all outside motions.
+    /// For blocking calls outside motion: settings, start and stop.
     pub set_up: HostDuration,
 }
 
-impl Patience {
-    /// For hardware. Beyond the drivers' own time limits of one second for each request, so that what they say comes first. Our own
-    /// choice.
+impl Timeouts {
+    /// For hardware: longer than the drivers' own limit of one second per request, so that their errors come first. Our own choice.
     pub const BENCH: Self = Self {
         running: HostDuration::from_millis(2_000),
         set_up: HostDuration::from_millis(10_000),
     };
 }
 
-/// Counts the calls that a device has not answered. Clones share the count.
+/// Number of unfinished calls of a device. Clones share the counter.
 #[derive(Debug, Clone, Default)]
 pub struct Calls(Arc<AtomicUsize>);
 
 impl Calls {
-    /// Calls under way or waiting.
+    /// Number of calls that are queued or in progress.
     #[must_use]
     pub fn under_way(&self) -> usize {
         self.0.load(Ordering::Acquire)
     }
 }
 
-/// One call under way; counted until it is dropped.
+/// Guard of one unfinished call; counted until dropped.
 struct Counted(Calls);
 
 impl Counted {
@@ -74,7 +72,7 @@ impl Drop for Counted {
 
 type Job<D> = Box<dyn FnOnce(&mut D) + Send>;
 
-/// A call that was asked.
+/// An unfinished call.
 struct Call<T> {
     reply: Receiver<T>,
     doing: &'static str,
@@ -82,16 +80,16 @@ struct Call<T> {
     due: skinrig_model::HostTime,
 }
 
-/// The thread that owns a device, seen from outside.
+/// Handle of the thread that owns a device.
 struct Worker<D> {
     role: DeviceRole,
     identity: DeviceIdentity,
     clock: Box<dyn Clock>,
-    patience: Patience,
+    timeouts: Timeouts,
     jobs: Option<Sender<Job<D>>>,
     ended: Receiver<()>,
     calls: Calls,
-    /// A call is overdue.
+    /// Whether a call has exceeded its time limit.
     silent: bool,
 }
 
@@ -101,12 +99,12 @@ impl<D: Send + 'static> Worker<D> {
         identity: DeviceIdentity,
         device: D,
         clock: Box<dyn Clock>,
-        patience: Patience,
+        timeouts: Timeouts,
     ) -> Result<Self, DeviceError> {
         let (jobs, inbox) = mpsc::channel::<Job<D>>();
         let (tell_ended, ended) = mpsc::channel::<()>();
         let body = move || {
-            // Dropped last, when the device is closed: whoever waits is woken.
+            // Dropped last, after the device is closed, which wakes waiting threads.
             let _ended = tell_ended;
             let mut device = device;
             for job in inbox {
@@ -119,13 +117,13 @@ impl<D: Send + 'static> Worker<D> {
             .map_err(|e| DeviceError::Lost {
                 role,
                 serial: identity.serial.clone(),
-                detail: format!("no thread to be had: {e}"),
+                detail: format!("cannot start a thread: {e}"),
             })?;
         Ok(Self {
             role,
             identity,
             clock,
-            patience,
+            timeouts,
             jobs: Some(jobs),
             ended,
             calls: Calls::default(),
@@ -141,7 +139,7 @@ impl<D: Send + 'static> Worker<D> {
         }
     }
 
-    /// Asks the device, and does not wait.
+    /// Sends a call without waiting.
     fn ask<T: Send + 'static>(
         &self,
         doing: &'static str,
@@ -151,7 +149,7 @@ impl<D: Send + 'static> Worker<D> {
         let (tell, reply) = mpsc::channel();
         let counted = Counted::new(&self.calls);
         let job: Job<D> = Box::new(move |device| {
-            // Nobody may be left to hear it.
+            // Sending fails if the caller is gone.
             let _ = tell.send(call(device));
             drop(counted);
         });
@@ -165,7 +163,7 @@ impl<D: Send + 'static> Worker<D> {
         })
     }
 
-    /// The answer, if it is there; the call stays asked otherwise.
+    /// Takes the reply if it is available; otherwise the call stays pending.
     fn answer<T>(&mut self, asked: &mut Option<Call<T>>) -> Result<Option<T>, DeviceError> {
         let Some(call) = asked else { return Ok(None) };
         match call.reply.try_recv() {
@@ -188,7 +186,7 @@ impl<D: Send + 'static> Worker<D> {
         }
     }
 
-    /// Asks, and waits for the answer. A device that has not answered an earlier call is not waited for again.
+    /// Sends a call and waits for the reply. Fails at once if an earlier call is overdue.
     fn wait<T: Send + 'static>(
         &mut self,
         doing: &'static str,
@@ -196,7 +194,7 @@ impl<D: Send + 'static> Worker<D> {
     ) -> Result<T, DeviceError> {
         let within = match self.silent && self.calls.under_way() > 0 {
             true => HostDuration::ZERO,
-            false => self.patience.set_up,
+            false => self.timeouts.set_up,
         };
         let mut asked = Some(self.ask(doing, within, call)?);
         loop {
@@ -218,14 +216,14 @@ impl<D: Send + 'static> Worker<D> {
 }
 
 impl<D> Drop for Worker<D> {
-    /// Lets the thread close the device, and waits for it, so that the device can be opened again at once. A thread that is held in a
-    /// call is left to end with the process.
+    /// Waits until the thread has closed the device, so that it can be reopened at once. Does not wait for a thread that hangs in a
+    /// call.
     fn drop(&mut self) {
         self.jobs = None;
         if self.silent && self.calls.under_way() > 0 {
             return;
         }
-        // Whether it closed in time is told by whoever opens it next.
+        // If it did not close in time, reopening it will fail and report that.
         let _: Result<(), RecvTimeoutError> = self.ended.recv_timeout(CLOSE_WITHIN);
     }
 }

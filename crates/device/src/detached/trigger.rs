@@ -1,14 +1,14 @@
-//! A trigger box on a thread of its own.
+//! A trigger box on a separate thread.
 
 use skinrig_model::{BoxReport, DeviceIdentity, DeviceRole, Mark, SentMark};
 
-use super::{Call, Calls, Patience, Worker};
+use super::{Call, Calls, Timeouts, Worker};
 use crate::{Clock, DeviceError, TriggerBox, TriggerCapabilities};
 
 type Device = Box<dyn TriggerBox>;
 type Answer<T> = Result<T, DeviceError>;
 
-/// A [`TriggerBox`] whose calls are carried out on a thread of its own. Reports come at the look after the one that asked for them.
+/// A [`TriggerBox`] whose calls run on a separate thread. Each poll returns the reports fetched by the previous one.
 pub struct DetachedBox {
     capabilities: TriggerCapabilities,
     worker: Worker<Device>,
@@ -17,25 +17,25 @@ pub struct DetachedBox {
 }
 
 impl DetachedBox {
-    /// Takes a box to a thread of its own.
+    /// Moves a box to a separate thread.
     ///
     /// # Errors
-    /// [`DeviceError::Lost`] when there is no thread to be had.
+    /// [`DeviceError::Lost`] when the thread cannot be started.
     pub fn new(
         device: Device,
         clock: Box<dyn Clock>,
-        patience: Patience,
+        timeouts: Timeouts,
     ) -> Result<Self, DeviceError> {
         let (role, identity) = (DeviceRole::TriggerBox, device.identity());
         Ok(Self {
             capabilities: device.capabilities(),
-            worker: Worker::start(role, identity, device, clock, patience)?,
+            worker: Worker::start(role, identity, device, clock, timeouts)?,
             sending: None,
             poll: None,
         })
     }
 
-    /// The calls that it has not answered.
+    /// Number of unfinished calls.
     #[must_use]
     pub fn calls(&self) -> Calls {
         self.worker.calls.clone()
@@ -54,11 +54,11 @@ impl TriggerBox for DetachedBox {
     fn send(&mut self, mark: Mark) -> Answer<SentMark> {
         match self.worker.answer(&mut self.sending)? {
             Some((asked, answer)) if asked == mark => return answer,
-            // The answer for a mark that was given up; the box reports that train all the same.
+            // The reply to a mark whose caller gave up; the box reports that train anyway.
             Some(_) | None => {}
         }
         if self.sending.is_none() {
-            let within = self.worker.patience.running;
+            let within = self.worker.timeouts.running;
             let call = move |d: &mut Device| (mark, d.send(mark));
             self.sending = Some(self.worker.ask("send", within, call)?);
         }
@@ -68,7 +68,7 @@ impl TriggerBox for DetachedBox {
     fn poll(&mut self, reports: &mut Vec<BoxReport>) -> Answer<()> {
         let answer = self.worker.answer(&mut self.poll)?;
         if self.poll.is_none() {
-            let within = self.worker.patience.running;
+            let within = self.worker.timeouts.running;
             let call = |d: &mut Device| {
                 let mut reports = Vec::new();
                 let answer = d.poll(&mut reports);

@@ -1,50 +1,50 @@
-//! Numbers of the interface.
+//! Constants of the interface.
 
 pub use crate::table::NEVER_USED;
 
-/// How a device is named in a call: its place in the enumeration, as `drdOpenID` takes and returns it.
+/// Device ID in calls: its index in the enumeration, as `drdOpenID` takes and returns it.
 pub type DeviceId = i8;
 
-/// The default device: the one opened last.
+/// The default device: the one opened most recently.
 pub const DEFAULT_DEVICE: DeviceId = -1;
 
 /// Type number of the omega.3.
 pub const DEVICE_OMEGA3: i32 = 33;
 /// Type number of the first generation of the omega, no longer supported.
 pub const DEVICE_OMEGA: i32 = 32;
-/// Unlisted type number that one public library also takes for an omega.3.
+/// Unlisted type number that one public library also accepts as an omega.3.
 pub const DEVICE_OMEGA3_UNLISTED: i32 = 110;
 
-/// Success with a cached reading: the device was asked again too soon.
+/// Success with a cached reading: the function was called again too soon.
 pub const TIMEGUARD: i32 = 1;
-/// Success with a clipped motor: the force keeps its direction and loses strength.
+/// Success with a saturated motor: the force keeps its direction but is weaker.
 pub const MOTOR_SATURATED: i32 = 2;
 
 /// Communication modes: synchronous USB.
 pub const COM_MODE_SYNC: i32 = 0;
 /// Communication modes: asynchronous USB, the default.
 pub const COM_MODE_ASYNC: i32 = 1;
-/// Communication modes: a simulator of the vendor's, no device.
+/// Communication modes: the vendor's simulator, no device.
 pub const COM_MODE_VIRTUAL: i32 = 3;
-/// Communication modes: a device behind the network.
+/// Communication modes: a device on the network.
 pub const COM_MODE_NETWORK: i32 = 4;
 
-/// Unit of the controller's watchdog, us.
+/// Unit of the controller's watchdog, µs.
 pub const WATCHDOG_UNIT_US: u32 = 125;
-/// Serial number of a device that has none to tell.
+/// Serial number of a device that does not report one.
 pub const SERIAL_UNKNOWN: u16 = 65535;
-/// USB vendor id of Force Dimension. Match on it alone: the product id differs between omegas.
+/// USB vendor ID of Force Dimension. Match it alone: product IDs vary between omegas.
 pub const USB_VENDOR_ID: u16 = 0x1451;
 /// Largest translational force of the omega.3, N.
 pub const OMEGA3_MAX_FORCE_N: f64 = 12.0;
 
-/// Whether a result means success: anything but a negative number.
+/// Whether a result means success: any number that is not negative.
 #[must_use]
 pub const fn succeeded(result: i32) -> bool {
     result >= 0
 }
 
-/// A C++ `bool` that came back: true for every byte but 0.
+/// Converts a returned C++ `bool`: true for every byte except 0.
 #[must_use]
 pub const fn is_true(byte: u8) -> bool {
     byte != 0

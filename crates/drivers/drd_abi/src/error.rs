@@ -2,22 +2,22 @@
 
 use std::fmt;
 
-/// An error code as the library keeps it per thread.
+/// An error code, which the library keeps per thread.
 ///
-/// Which call sets which code is hardly documented: treat every code as possible everywhere.
+/// The documentation rarely says which call sets which code: expect any code from any call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ErrorCode(pub i32);
 
-/// Declares the codes and their words.
+/// Declares the codes and their descriptions.
 macro_rules! codes {
     ($($(#[$doc:meta])* $name:ident = $code:literal, $text:literal;)*) => {
         impl ErrorCode {
             $($(#[$doc])* pub const $name: Self = Self($code);)*
 
-            /// Every code that SDK 3.17.5 declares.
+            /// All codes declared by SDK 3.17.5.
             pub const ALL: &'static [Self] = &[$(Self::$name),*];
 
-            /// The code's name without the vendor's prefix; `None` for a code that we do not know.
+            /// Name of the code without the vendor's prefix; `None` for an unknown code.
             #[must_use]
             pub const fn name(self) -> Option<&'static str> {
                 match self.0 {
@@ -26,12 +26,12 @@ macro_rules! codes {
                 }
             }
 
-            /// What the code means, in our words.
+            /// Description of the code.
             #[must_use]
             pub const fn meaning(self) -> &'static str {
                 match self.0 {
                     $($code => $text,)*
-                    _ => "a code that this driver does not know",
+                    _ => "an error code unknown to this driver",
                 }
             }
         }
@@ -39,37 +39,37 @@ macro_rules! codes {
 }
 
 codes! {
-    /// Nothing failed.
+    /// No failure.
     NO_ERROR = 0, "no error";
-    /// Not told.
+    /// Unspecified.
     UNDOCUMENTED = 1, "an error that the library does not explain";
-    /// The link to the device broke: unplugged, powered off, or a USB fault.
-    COM = 2, "the link to the device broke";
-    /// The controller has no time for this now.
+    /// The connection to the device failed: unplugged, powered off, or a USB fault.
+    COM = 2, "the connection to the device failed";
+    /// The controller is busy.
     DHC_BUSY = 3, "the device's controller is busy";
     /// No USB driver, or no permission.
     NO_DRIVER_FOUND = 4, "no usable USB driver, or no permission to use the device";
     /// No device is connected.
     NO_DEVICE_FOUND = 5, "no device found";
-    /// This device cannot do that.
-    NOT_AVAILABLE = 6, "this device cannot do that";
-    /// It took too long.
-    TIMEOUT = 7, "it took too long";
-    /// The target cannot be reached.
+    /// The device does not support this.
+    NOT_AVAILABLE = 6, "the device does not support this";
+    /// The operation timed out.
+    TIMEOUT = 7, "the operation timed out";
+    /// The target is out of reach.
     GEOMETRY = 8, "the target is out of reach";
-    /// A guarded call without expert mode.
+    /// A protected call without expert mode.
     EXPERT_MODE_DISABLED = 9, "expert mode is off";
-    /// The library lacks it.
-    NOT_IMPLEMENTED = 10, "the library does not implement that";
-    /// No memory.
+    /// The library does not implement this.
+    NOT_IMPLEMENTED = 10, "the library does not implement this";
+    /// Out of memory.
     OUT_OF_MEMORY = 11, "out of memory";
     /// The device is not calibrated.
     DEVICE_NOT_READY = 12, "the device is not ready: not initialised or in reset";
     /// A file is missing.
     FILE_NOT_FOUND = 13, "a file was not found";
-    /// The controller's memory does not hold what it should.
+    /// The controller's memory is damaged.
     CONFIGURATION = 14, "the device's configuration is damaged";
-    /// An index beyond its range.
+    /// An index is out of range.
     INVALID_INDEX = 15, "an index is out of range";
     /// No longer supported.
     DEPRECATED = 16, "the library no longer supports this device or call";
@@ -77,13 +77,13 @@ codes! {
     NULL_ARGUMENT = 17, "an argument is NULL or invalid";
     /// The redundant encoders disagree.
     REDUNDANT_FAIL = 18, "the redundant encoders disagree";
-    /// The feature is off.
-    NOT_ENABLED = 19, "the feature is off";
-    /// Another process holds the device.
-    DEVICE_IN_USE = 20, "another process holds the device";
-    /// A parameter out of range.
+    /// The feature is disabled.
+    NOT_ENABLED = 19, "the feature is disabled";
+    /// Another process has the device open.
+    DEVICE_IN_USE = 20, "another process uses the device";
+    /// A parameter is out of range.
     INVALID = 21, "a parameter is out of range";
-    /// The regulation thread does not run (since 3.10).
+    /// The regulation thread is not running (since 3.10).
     NO_REGULATION = 22, "regulation is not running";
 }
 

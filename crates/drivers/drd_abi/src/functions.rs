@@ -1,4 +1,4 @@
-//! What the table becomes: function types, the list of symbols, and the struct of resolved functions.
+//! Code generated from the table: function types, the list of symbols, and the struct of resolved functions.
 
 use std::ffi::{CStr, c_void};
 use std::fmt;
@@ -6,14 +6,14 @@ use std::ptr::NonNull;
 
 use crate::drd_symbols;
 
-/// What a function is for.
+/// Purpose of a function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Group {
     /// Errors, version, time.
     Library,
     /// Finding, opening, closing.
     Open,
-    /// Which device it is.
+    /// Identity of a device.
     Identify,
     /// Calibration.
     Initialise,
@@ -23,35 +23,35 @@ pub enum Group {
     Regulation,
     /// Pose, force, status, rates.
     Read,
-    /// Taking the power off.
+    /// Switching the power off.
     Emergency,
-    /// What the library guards behind its expert mode.
+    /// Functions that require expert mode.
     Expert,
 }
 
-/// Whether the driver can do without a function.
+/// Whether the driver needs a function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Need {
-    /// Absent: the library is refused.
+    /// If missing, the library is rejected.
     Required,
-    /// Absent: the driver goes on without.
+    /// If missing, the driver works without it.
     Optional,
 }
 
-/// One line of the table.
+/// An entry of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Symbol {
     /// Exported name.
     pub name: &'static str,
-    /// What it is for.
+    /// Purpose.
     pub group: Group,
-    /// Whether we can do without.
+    /// Whether the driver needs it.
     pub need: Need,
     /// Arguments and result as Rust types.
     pub signature: &'static str,
 }
 
-/// The required functions that a library lacks, in the order of the table.
+/// Required functions missing in a library, in the order of the table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Missing(pub Vec<&'static str>);
 
@@ -63,7 +63,7 @@ impl fmt::Display for Missing {
 
 impl std::error::Error for Missing {}
 
-/// The word of the table as a [`Need`].
+/// Converts the table's keyword to a [`Need`].
 macro_rules! need {
     (required) => {
         Need::Required
@@ -87,7 +87,7 @@ macro_rules! declare {
             )*)*
         }
 
-        /// Every function that we use, in the order of the table.
+        /// All functions in use, in the order of the table.
         pub const SYMBOLS: &[Symbol] = &[$($(
             Symbol {
                 name: stringify!($name),
@@ -110,7 +110,7 @@ macro_rules! struct_of {
         struct_of! { [$($req)*] [$($opt)* $($body)*] $($rest)* }
     };
     ([$($(#[$rdoc:meta])* $req:ident;)*] [$($(#[$odoc:meta])* $opt:ident;)*]) => {
-        /// The functions of one loaded library. Good for as long as the library stays loaded.
+        /// Functions of a loaded library. Valid as long as the library stays loaded.
         #[derive(Debug, Clone, Copy)]
         #[expect(non_snake_case, reason = "the names of the C interface")]
         pub struct Functions {
@@ -120,10 +120,10 @@ macro_rules! struct_of {
 
         #[expect(non_snake_case, reason = "the names of the C interface")]
         impl Functions {
-            /// Looks every function of the table up.
+            /// Looks up all functions of the table.
             ///
             /// # Errors
-            /// [`Missing`] with all the required functions for which `lookup` gave `None`.
+            /// [`Missing`] with all required functions for which `lookup` returned `None`.
             ///
             /// # Safety
             /// Each address that `lookup` returns must be that of a function of the name asked for, of an
@@ -138,15 +138,15 @@ macro_rules! struct_of {
                     missing.push(stringify!($req));
                 })*
                 $(let $opt = lookup(c_name(concat!(stringify!($opt), "\0")));)*
-                // One refutable pattern for all the required ones: present, or told together.
+                // One refutable pattern for all required functions: all present, or all missing ones reported together.
                 let ($(Some($req),)*) = ($($req,)*) else {
                     return Err(Missing(missing));
                 };
                 Ok(Self {
-                    // SAFETY: by this function's contract the address is that of this very function.
+                    // SAFETY: by this function's contract the address is that of this function.
                     $($req: unsafe { std::mem::transmute::<NonNull<c_void>, fns::$req>($req) },)*
                     $($opt: $opt.map(|address| {
-                        // SAFETY: by this function's contract the address is that of this very function.
+                        // SAFETY: by this function's contract the address is that of this function.
                         unsafe { std::mem::transmute::<NonNull<c_void>, fns::$opt>(address) }
                     }),)*
                 })
@@ -155,7 +155,7 @@ macro_rules! struct_of {
     };
 }
 
-/// A literal that ends with its NUL, as a C string.
+/// A NUL-terminated literal as a C string.
 const fn c_name(with_nul: &'static str) -> &'static CStr {
     match CStr::from_bytes_with_nul(with_nul.as_bytes()) {
         Ok(name) => name,

@@ -1,22 +1,22 @@
 //! The status vector.
 
-/// Words of the buffer for the status vector: more than any known SDK writes (15 to 17).
+/// Buffer size of the status vector in words: more than any known SDK writes (15 to 17).
 pub const STATUS_CAPACITY: usize = 32;
 
-/// Fills the places that the library did not write.
+/// Marks words that the library did not write.
 const ABSENT: i32 = i32::MIN;
 
-/// What a word of the status vector tells. 1 for yes, 0 for no, -1 for "the device has no such thing".
+/// Words of the status vector. 1 is yes, 0 is no, -1 means that the device has no such feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(usize)]
 pub enum StatusField {
-    /// The controller has power.
+    /// The controller is powered.
     Power = 0,
-    /// The controller answers.
+    /// The controller responds.
     Connected = 1,
     /// The controller runs.
     Started = 2,
-    /// The device asks for calibration.
+    /// The device requires calibration.
     Reset = 3,
     /// No motor current, no brake.
     Idle = 4,
@@ -24,9 +24,9 @@ pub enum StatusField {
     Force = 5,
     /// Electromagnetic brake: viscous, holds nothing.
     Brake = 6,
-    /// Torques of a wrist are live.
+    /// The wrist torques are live.
     Torque = 7,
-    /// A wrist is there.
+    /// A wrist is installed.
     WristDetected = 8,
     /// The controller reports a fault.
     Error = 9,
@@ -36,34 +36,34 @@ pub enum StatusField {
     TimeGuard = 11,
     /// The wrist is initialised.
     WristInit = 12,
-    /// 1: redundant encoders agree; 0: they do not, or there are none; -1 on some devices: there are none.
+    /// 1: redundant encoders agree; 0: they disagree, or there are none; -1 on some devices: there are none.
     Redundancy = 13,
-    /// Why forces went off last, see [`ForceOffCause`].
+    /// Why forces last went off, see [`ForceOffCause`].
     ForceOffCause = 14,
     /// Mechanical locks (since 3.7.1).
     Locks = 15,
-    /// Axes whose end stops were checked, one bit each (after 3.10).
+    /// Axes with checked end stops, one bit each (after 3.10).
     AxisChecked = 16,
 }
 
-/// Why the controller took the force off the last time.
+/// Why the controller last switched the force off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ForceOffCause {
-    /// It did not.
+    /// Never switched off.
     None,
     /// The force button on the base.
     Button,
-    /// An axis was faster than the velocity threshold.
+    /// An axis exceeded the velocity threshold.
     Velocity,
     /// No command arrived in time.
     Watchdog,
-    /// A program asked for it.
+    /// A program's request.
     Software,
     /// USB was unplugged.
     UsbDisconnect,
     /// The dead-man's switch opened.
     Deadman,
-    /// A cause that we do not know.
+    /// Unknown cause.
     Unknown(i32),
 }
 
@@ -82,7 +82,7 @@ impl From<i32> for ForceOffCause {
     }
 }
 
-/// The status vector with room for every version of the SDK; what it did not write is absent.
+/// The status vector with space for every SDK version. Unwritten words are absent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StatusVector {
     words: [i32; STATUS_CAPACITY],
@@ -97,13 +97,13 @@ impl Default for StatusVector {
 }
 
 impl StatusVector {
-    /// A vector in which every word is absent.
+    /// A vector without any words.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// A vector that holds `words` (at most [`STATUS_CAPACITY`]), the others absent.
+    /// A vector with `words` (at most [`STATUS_CAPACITY`]); the others are absent.
     #[must_use]
     pub fn from_words(words: &[i32]) -> Self {
         let mut vector = Self::new();
@@ -113,7 +113,7 @@ impl StatusVector {
         vector
     }
 
-    /// Where `dhdGetStatus` writes; good for [`STATUS_CAPACITY`] words.
+    /// Buffer for `dhdGetStatus`, of [`STATUS_CAPACITY`] words.
     pub fn as_mut_ptr(&mut self) -> *mut i32 {
         self.words.as_mut_ptr()
     }
@@ -124,20 +124,20 @@ impl StatusVector {
         Some(self.words[field as usize]).filter(|word| *word != ABSENT)
     }
 
-    /// Whether a word is there and is 1.
+    /// Whether a word is present and 1.
     #[must_use]
     pub fn is(&self, field: StatusField) -> bool {
         self.get(field) == Some(1)
     }
 
-    /// Why forces went off the last time, `None` if this version does not tell.
+    /// Why forces last went off; `None` if this version does not report it.
     #[must_use]
     pub fn force_off_cause(&self) -> Option<ForceOffCause> {
         self.get(StatusField::ForceOffCause)
             .map(ForceOffCause::from)
     }
 
-    /// The words that were written, up to the last one present.
+    /// The written words, up to the last present one.
     #[must_use]
     pub fn words(&self) -> &[i32] {
         let len = self

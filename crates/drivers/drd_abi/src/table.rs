@@ -1,13 +1,13 @@
-//! The table of every function of libdrd that we use, and of those that we never touch.
+//! The table of libdrd functions in use, and of those never used.
 
-/// Hands the table of functions to the macro `$callback`, after the tokens in `[...]`.
+/// Passes the table of functions to the macro `$callback`, after the tokens in `[...]`.
 ///
 /// The table is a sequence of blocks `Group required|optional { /** doc */ name(arg: Type, ...) -> Type; ... }`.
-/// *Required*: in every SDK since 3.7.1, and the arm cannot be driven safely without it. *Optional*: came
-/// after 3.7.1, or serves only some rigs.
+/// *Required*: exists in every SDK since 3.7.1 and is needed to control the arm safely. *Optional*: newer than 3.7.1, or needed only by
+/// some rigs.
 ///
-/// Lengths are metres, angles as the name says, forces newtons, masses kilograms, times seconds, unless
-/// told. `id` is the device's [`DeviceId`](crate::DeviceId). "0/-1" stands for success or failure.
+/// Units are metres, newtons, kilograms and seconds unless stated otherwise; angles as in the name. `id` is the device's
+/// [`DeviceId`](crate::DeviceId). "0/-1" means success or failure.
 #[macro_export]
 macro_rules! drd_symbols {
     ($callback:ident [$($prefix:tt)*]) => { $callback! { $($prefix)*
@@ -17,24 +17,24 @@ Library required {
     dhdErrorGetLast() -> i32;
     /// The library's text for an error code.
     dhdErrorGetStr(code: i32) -> *const ::core::ffi::c_char;
-    /// The version of the SDK. Has the same form in every version: call it before anything else.
+    /// Version of the SDK. Has the same signature in every version: call it first.
     dhdGetSDKVersion(major: *mut i32, minor: *mut i32, release: *mut i32, revision: *mut i32) -> ();
     /// Monotonic time of unspecified epoch, s.
     dhdGetTime() -> f64;
 }
 Library optional {
-    /// The version of the SDK as a text (after 3.10).
+    /// Version of the SDK as a string (after 3.10).
     dhdGetSDKVersionStr() -> *const ::core::ffi::c_char;
 }
 
 Open required {
-    /// Number of connected devices, including those that other processes hold; -1 on failure.
+    /// Number of connected devices, including those open in other processes; -1 on failure.
     dhdGetDeviceCount() -> i32;
-    /// Number of connected devices that no other process holds; -1 on failure.
+    /// Number of connected devices not open in other processes; -1 on failure.
     dhdGetAvailableCount() -> i32;
-    /// Opens the first device and makes it the default; its id, or -1.
+    /// Opens the first device and makes it the default. Returns its ID, or -1.
     drdOpen() -> i32;
-    /// Opens the device of that place in the enumeration; its id (the same one if open already), or -1.
+    /// Opens the device with this index in the enumeration. Returns its ID (the same if already open), or -1.
     drdOpenID(id: i8) -> i32;
     /// Closes a device. 0/-1.
     drdClose(id: i8) -> i32;
@@ -49,11 +49,11 @@ Identify required {
     dhdGetSerialNumber(serial: *mut u16, id: i8) -> i32;
     /// Version of the controller's firmware as a decimal number. 0/-1.
     dhdGetVersion(version: *mut f64, id: i8) -> i32;
-    /// How the library speaks to the device ([`COM_MODE_ASYNC`](crate::COM_MODE_ASYNC) ...), or -1.
+    /// Communication mode of the device ([`COM_MODE_ASYNC`](crate::COM_MODE_ASYNC) ...), or -1.
     dhdGetComMode(id: i8) -> i32;
 }
 Identify optional {
-    /// Version of the controller's firmware as a text in `buffer` of `size` bytes (after 3.10). 0/-1.
+    /// Version of the controller's firmware as a string in `buffer` of `size` bytes (after 3.10). 0/-1.
     dhdGetVersionStr(buffer: *mut ::core::ffi::c_char, size: usize, id: i8) -> i32;
     /// Revision of the device's model (after 3.10), or -1.
     dhdGetSystemRev(id: i8) -> i32;
@@ -65,7 +65,7 @@ Identify optional {
 Initialise required {
     /// Whether the library has regulation gains for this model. A C++ `bool`.
     drdIsSupported(id: i8) -> u8;
-    /// Whether the device is calibrated since power-up. A C++ `bool`.
+    /// Whether the device has been calibrated since power-up. A C++ `bool`.
     drdIsInitialized(id: i8) -> u8;
     /// Calibrates. **Moves the arm**, blocks, and leaves regulation running. 0/-1.
     drdAutoInit(id: i8) -> i32;
@@ -96,8 +96,7 @@ Settings optional {
     dhdSetBaseAngleZDeg(angle_deg: f64, id: i8) -> i32;
     /// Largest force of the haptic calls, N, negative for none (after 3.7.1); -1 on failure.
     dhdGetMaxForce(id: i8) -> f64;
-    /// Sets the largest force of the haptic calls, N (after 3.7.1). Whether regulation obeys it is not
-    /// documented. 0/-1.
+    /// Sets the largest force of the haptic calls, N (after 3.7.1). It is not documented whether regulation respects it. 0/-1.
     dhdSetMaxForce(force_n: f64, id: i8) -> i32;
 }
 
@@ -106,9 +105,9 @@ Regulation required {
     drdStart(id: i8) -> i32;
     /// Stops the regulation thread; then brakes, or stays powered when `keep_force`. 0/-1.
     drdStop(keep_force: bool, id: i8) -> i32;
-    /// Whether the regulation thread lives. A C++ `bool`.
+    /// Whether the regulation thread is running. A C++ `bool`.
     drdIsRunning(id: i8) -> u8;
-    /// Whether a move or a tracked target is still under way. A C++ `bool`.
+    /// Whether a move or a tracked target is in progress. A C++ `bool`.
     drdIsMoving(id: i8) -> u8;
     /// Whether the filter of tracked targets is on. A C++ `bool`.
     drdIsFiltering(id: i8) -> u8;
@@ -120,19 +119,19 @@ Regulation required {
     drdRegulateRot(on: bool, id: i8) -> i32;
     /// Regulates the gripper or leaves it free. 0/-1.
     drdRegulateGrip(on: bool, id: i8) -> i32;
-    /// Drops any motion and holds here. 0/-1.
+    /// Stops any motion and holds the position. 0/-1.
     drdHold(id: i8) -> i32;
-    /// Straight smooth line to a position, m. With `block` it returns on arrival only. 0/-1.
+    /// Moves in a straight, smooth line to a position, m. With `block`, returns only on arrival. 0/-1.
     drdMoveToPos(x_m: f64, y_m: f64, z_m: f64, block: bool, id: i8) -> i32;
-    /// Follows a target position, m, each axis through the filter; may be called at any rate. 0/-1.
+    /// Tracks a target position, m, each axis through the filter; may be called at any rate. 0/-1.
     drdTrackPos(x_m: f64, y_m: f64, z_m: f64, id: i8) -> i32;
     /// Acceleration, speed and jerk of moves: m/s^2, m/s, m/s^3, in this order. 0/-1.
     drdGetPosMoveParam(amax: *mut f64, vmax: *mut f64, jerk: *mut f64, id: i8) -> i32;
-    /// Sets acceleration, speed and jerk of moves: m/s^2, m/s, m/s^3. The library starts with (1, 1, 1). 0/-1.
+    /// Sets acceleration, speed and jerk of moves: m/s^2, m/s, m/s^3. The library's default is (1, 1, 1). 0/-1.
     drdSetPosMoveParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> i32;
     /// Acceleration, speed and jerk of tracking: m/s^2, m/s, m/s^3, in this order. 0/-1.
     drdGetPosTrackParam(amax: *mut f64, vmax: *mut f64, jerk: *mut f64, id: i8) -> i32;
-    /// Sets acceleration, speed and jerk of tracking: m/s^2, m/s, m/s^3. The library starts with (1, 1, 1). 0/-1.
+    /// Sets acceleration, speed and jerk of tracking: m/s^2, m/s, m/s^3. The library's default is (1, 1, 1). 0/-1.
     drdSetPosTrackParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> i32;
     /// Largest fraction of each joint's torque that regulation may use, 0 to 1; negative on failure.
     drdGetMotRatioMax(id: i8) -> f64;
@@ -144,7 +143,7 @@ Regulation required {
     drdSetEncPGain(gain: f64, id: i8) -> i32;
     /// Integral gain of the base's joints; negative on failure. Units are not documented.
     drdGetEncIGain(id: i8) -> f64;
-    /// Sets the integral gain of the base's joints; 0 stops force from ramping up on an obstacle. 0/-1.
+    /// Sets the integral gain of the base's joints; 0 prevents the force on an obstacle from growing. 0/-1.
     drdSetEncIGain(gain: f64, id: i8) -> i32;
     /// Derivative gain of the base's joints; negative on failure. Units are not documented.
     drdGetEncDGain(id: i8) -> f64;
@@ -170,9 +169,9 @@ Read required {
         vx_m_s: *mut f64, vy_m_s: *mut f64, vz_m_s: *mut f64, wx_rad_s: *mut f64, wy_rad_s: *mut f64,
         wz_rad_s: *mut f64, gap_m_s: *mut f64, id: i8
     ) -> i32;
-    /// Mean rate of the regulation loop since the previous call, kHz; -1 on failure. Ask from one place only.
+    /// Mean rate of the regulation loop since the previous call, kHz; -1 on failure. Call it from one place only.
     drdGetCtrlFreq(id: i8) -> f64;
-    /// Position, m, asked from the device (works without regulation). 0/1/-1.
+    /// Position, m, read from the device (works without regulation). 0/1/-1.
     dhdGetPosition(x_m: *mut f64, y_m: *mut f64, z_m: *mut f64, id: i8) -> i32;
     /// Commanded motor force without the gravity term, N; there is no force sensor. 0/-1.
     dhdGetForce(fx_n: *mut f64, fy_n: *mut f64, fz_n: *mut f64, id: i8) -> i32;
@@ -196,43 +195,43 @@ Emergency required {
 }
 
 Expert required {
-    /// Allows the calls of this group, for the whole process. 0/-1.
+    /// Enables the calls of this group for the whole process. 0/-1.
     dhdEnableExpertMode() -> i32;
-    /// Forbids the calls of this group again. 0/-1.
+    /// Disables the calls of this group. 0/-1.
     dhdDisableExpertMode() -> i32;
     /// The controller's watchdog in units of [`WATCHDOG_UNIT_US`](crate::WATCHDOG_UNIT_US), 0 for off. 0/-1.
     dhdGetWatchdog(units: *mut u8, id: i8) -> i32;
-    /// Sets the controller's watchdog in units of [`WATCHDOG_UNIT_US`](crate::WATCHDOG_UNIT_US), 0 for off:
-    /// without a command for that long it drops force and brakes. 0/-1.
+    /// Sets the controller's watchdog in units of [`WATCHDOG_UNIT_US`](crate::WATCHDOG_UNIT_US), 0 for off: without a command for this time
+    /// it switches the force off and brakes. 0/-1.
     dhdSetWatchdog(units: u8, id: i8) -> i32;
-    /// The controller's velocity threshold in units of its own. 0/-1.
+    /// The controller's velocity threshold in device units. 0/-1.
     dhdGetVelocityThreshold(threshold: *mut u32, id: i8) -> i32;
 }
 
     } };
 }
 
-/// Functions of libdrd that are never looked up, and why.
+/// Functions of libdrd that are never used, and why.
 pub const NEVER_USED: &[(&str, &str)] = &[
     (
         "dhdEnableSimulator",
-        "lets a network device pass for the arm",
+        "would accept a network device as the arm",
     ),
-    ("dhdSetForce", "fights the regulation thread"),
+    ("dhdSetForce", "interferes with the regulation thread"),
     (
         "dhdSetForceAndTorqueAndGripperForce",
-        "fights the regulation thread",
+        "interferes with the regulation thread",
     ),
     (
         "dhdSetVelocityThreshold",
-        "the vendor advises to leave it alone",
+        "the vendor advises against changing it",
     ),
-    ("dhdSetTimeGuard", "changes what a cached reading means"),
+    ("dhdSetTimeGuard", "changes the meaning of cached readings"),
     ("dhdPreset", "overwrites the calibration"),
-    ("dhdReset", "loses the calibration"),
-    ("dhdStartThread", "threads are ours to start"),
+    ("dhdReset", "discards the calibration"),
+    ("dhdStartThread", "this program starts its own threads"),
     ("dhdKbHit", "changes the terminal's mode"),
     ("drdPrecisionInit", "sweeps every axis, slowly"),
     ("drdLock", "the omega.3 has no locks"),
-    ("drdMoveTo", "moves axes that the omega.3 has not"),
+    ("drdMoveTo", "moves axes that the omega.3 does not have"),
 ];

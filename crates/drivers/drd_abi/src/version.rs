@@ -16,9 +16,9 @@ pub struct SdkVersion {
 }
 
 impl SdkVersion {
-    /// The oldest that is not refused: below it some functions take other arguments under the same names.
+    /// Oldest accepted version: earlier ones have functions with other arguments under the same names.
     pub const OLDEST: Self = Self::new(3, 7, 1);
-    /// The oldest that is advised: it tells apart why a move was refused
+    /// Oldest recommended version: it distinguishes why a move was rejected
     /// ([`ErrorCode::NO_REGULATION`](crate::ErrorCode::NO_REGULATION)).
     pub const ADVISED: Self = Self::new(3, 10, 0);
 
@@ -33,7 +33,7 @@ impl SdkVersion {
         }
     }
 
-    /// Asks a library for its version.
+    /// Reads the version of a library.
     ///
     /// # Safety
     /// `get` must be the `dhdGetSDKVersion` of a loaded library.
@@ -46,7 +46,7 @@ impl SdkVersion {
             release,
             revision,
         } = &mut version;
-        // SAFETY: the function has this signature in every SDK; the four places live through the call.
+        // SAFETY: the function has this signature in every SDK; the four places outlive the call.
         unsafe { get(major, minor, release, revision) };
         version
     }

@@ -121,10 +121,10 @@ fn codes_have_the_numbers_of_the_headers() {
     assert_eq!(ErrorCode::NO_REGULATION.0, 22);
     assert_eq!(
         ErrorCode::DEVICE_IN_USE.to_string(),
-        "another process holds the device (code 20 DEVICE_IN_USE)"
+        "another process uses the device (code 20 DEVICE_IN_USE)"
     );
     assert_eq!(
         ErrorCode(77).to_string(),
-        "a code that this driver does not know (code 77)"
+        "an error code unknown to this driver (code 77)"
     );
 }

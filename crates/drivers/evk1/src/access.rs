@@ -1,4 +1,4 @@
-//! Reading and writing registers: every field is changed by reading, modifying and writing, and every write is read back.
+//! Register access: fields are changed by read-modify-write, and every write is read back.
 
 use crate::error::{Evk1Error, UsbError};
 use crate::registers::{Field, Register};
@@ -6,7 +6,7 @@ use crate::requests;
 use crate::tolerance::{Accept, Mismatches, Tolerance};
 use crate::usb::Transport;
 
-/// The registers of one camera. It borrows the transport, so nothing comes between a read and its write.
+/// The registers of one camera. Borrows the transport, so that nothing interrupts a read-modify-write.
 pub struct Registers<'a> {
     transport: &'a mut dyn Transport,
     exceptions: &'a [u32],
@@ -15,7 +15,7 @@ pub struct Registers<'a> {
 }
 
 impl<'a> Registers<'a> {
-    /// The registers behind `transport`. Writes to the addresses `exceptions` need not read back.
+    /// Registers behind `transport`. Writes to the addresses in `exceptions` need not read back.
     pub fn new(transport: &'a mut dyn Transport, exceptions: &'a [u32]) -> Self {
         Self {
             transport,
@@ -25,7 +25,7 @@ impl<'a> Registers<'a> {
         }
     }
 
-    /// The same, letting pass what `tolerance` accepts; what is only tolerated goes to `seen`.
+    /// Accepts mismatches allowed by `tolerance`; mismatches that are only tolerated go to `seen`.
     #[must_use]
     pub(crate) fn tolerating(self, tolerance: &Tolerance, seen: &Mismatches) -> Self {
         Self {
@@ -35,18 +35,18 @@ impl<'a> Registers<'a> {
         }
     }
 
-    /// The transport itself, for what is no register.
+    /// The transport, for requests other than register access.
     pub fn transport(&mut self) -> &mut dyn Transport {
         self.transport
     }
 
-    /// True for a register that is known to read differently.
+    /// Whether a register is known to read back differently.
     #[must_use]
     pub(crate) fn excuses(&self, register: Register) -> bool {
         self.exceptions.contains(&register.address) || self.tolerance.everything
     }
 
-    /// Whether a read that came with this status byte counts.
+    /// Whether a read with this status byte is valid.
     fn accepts(&self, status: u8) -> bool {
         if status == requests::READ_OK || self.tolerance.read_status.contains(&status) {
             return true;
@@ -87,7 +87,7 @@ impl<'a> Registers<'a> {
         Ok(u32::from_be_bytes([a, b, c, d]))
     }
 
-    /// Reads a register of a part that may be without power: `None` when it does not answer, whatever the status byte.
+    /// Reads a register of a part that may be unpowered: `None` if it does not respond, whatever the status byte.
     ///
     /// # Errors
     /// [`Evk1Error::Usb`].
@@ -110,7 +110,7 @@ impl<'a> Registers<'a> {
         Ok(field.of(self.read(field.register)?))
     }
 
-    /// Writes a whole register without reading it first, and reads it back.
+    /// Writes a whole register without reading it first, then reads it back.
     ///
     /// # Errors
     /// As [`Self::read`]; [`Evk1Error::ReadBack`] when a stable bit differs.
@@ -136,7 +136,7 @@ impl<'a> Registers<'a> {
         Ok(())
     }
 
-    /// Sets a field and leaves the register's other bits as they are; reads back.
+    /// Sets a field, keeps the register's other bits, and reads back.
     ///
     /// # Errors
     /// As [`Self::write`].
@@ -145,8 +145,8 @@ impl<'a> Registers<'a> {
         self.write(field.register, field.put(word, value))
     }
 
-    /// Like [`Self::set`], without reading back: for a part that may be without power or clock. What it does not tell counts as the
-    /// register's nominal default.
+    /// Like [`Self::set`] without reading back, for a part that may be unpowered or without clock. An unreadable register counts as its
+    /// nominal default.
     ///
     /// # Errors
     /// [`Evk1Error::Usb`].
@@ -156,7 +156,7 @@ impl<'a> Registers<'a> {
         self.write_blind(field.register, field.put(word, value))
     }
 
-    /// Writes a whole register and does not look at the result.
+    /// Writes a whole register without reading back.
     ///
     /// # Errors
     /// [`Evk1Error::Usb`].
@@ -173,7 +173,7 @@ impl<'a> Registers<'a> {
     }
 }
 
-/// wValue and wIndex of an address.
+/// The wValue and wIndex of an address.
 fn halves(address: u32) -> (u16, u16) {
     (address as u16, (address >> 16) as u16)
 }

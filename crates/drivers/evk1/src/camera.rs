@@ -1,4 +1,4 @@
-//! An EVK1 as an event camera.
+//! The EVK1 as an `EventCamera`.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -27,32 +27,32 @@ use crate::triggers::{self, CHANNELS, TriggerOut};
 use crate::usb::Transport;
 use crate::{noise_filter, pattern, sequences, sync};
 
-/// A Prophesee EVK1 Gen3.1, initialised. It is powered down when it is dropped.
+/// An initialised Prophesee EVK1 Gen3.1. Powered down on drop.
 pub struct Evk1 {
     camera: CameraId,
     identity: Identity,
     config: Evk1Config,
-    /// What was tolerated.
+    /// Tolerated mismatches.
     seen: Mismatches,
     transport: Box<dyn Transport>,
     clock: Box<dyn Clock>,
     settings: Option<Checked>,
-    /// The pattern generator may be on.
+    /// Whether the pattern generator may be on.
     pattern: bool,
     stream: Option<Stream>,
     chunker: Chunker,
     report: StreamReport,
     notes: Vec<String>,
-    /// It was started before.
+    /// Whether it was started before.
     used: bool,
     gone: bool,
     closed: bool,
 }
 
-/// Begins the name of a port, which stands for a serial number that cannot be read.
+/// Prefix of a port name, which can replace an unreadable serial number.
 const BY_PORT: &str = "usb-";
 
-/// The registers of a camera that is driven by `config`.
+/// The registers with the exceptions of `config`.
 fn registers_of<'a>(
     transport: &'a mut dyn Transport,
     config: &'a Evk1Config,
@@ -81,40 +81,39 @@ fn reset(
     }
 }
 
-/// What exists only while streaming.
+/// State that exists only while streaming.
 struct Stream {
     inbox: Arc<Inbox>,
-    /// The overflow counter before the start.
+    /// Overflow counter before the start.
     overflow_hits: u16,
     overflow: Overflow,
 }
 
-/// What the camera's overflow counter said last.
+/// Last reading of the camera's overflow counter.
 #[derive(Debug, Clone, Copy)]
 struct Overflow {
     hits: u16,
     read_at: HostTime,
-    /// The camera's time that had come by then, µs.
+    /// Latest camera time at that reading, µs.
     good_us: Option<u64>,
 }
 
 impl Overflow {
-    /// Whether something may have been lost since, now that the counter says `hits`. At its end it cannot tell.
+    /// Whether data may have been lost since, given the counter value `hits`. A saturated counter cannot tell.
     const fn lost(self, hits: u16) -> bool {
         hits != self.hits || hits == u16::MAX
     }
 }
 
-/// How often the overflow counter is read while streaming; whoever flushes, as before a verdict on what was recorded, has it read at
-/// once.
+/// Interval at which the overflow counter is read while streaming. A flush, as before judging a recording, reads it at once.
 const OVERFLOW_PERIOD: HostDuration = HostDuration::from_millis(1_000);
 
 impl Evk1 {
-    /// Opens the camera with this serial number (8 hexadecimal digits), or at this port (`usb-BUS-PORT.PORT`), through libusb. What it
-    /// sends is stamped on `clock`.
+    /// Opens the camera with this serial number (8 hexadecimal digits) or at this port (`usb-BUS-PORT.PORT`) through libusb. Data are stamped
+    /// with `clock`.
     ///
     /// # Errors
-    /// [`Evk1Error::NotFound`] says what is there instead; otherwise as [`Self::open`].
+    /// [`Evk1Error::NotFound`] lists the connected cameras; otherwise as [`Self::open`].
     pub fn open_serial(
         serial: &str,
         camera: CameraId,
@@ -131,12 +130,11 @@ impl Evk1 {
         Ok(opened)
     }
 
-    /// Identifies and initialises the camera behind `transport`. Waits, such as the half second of a start, are taken
-    /// on `clock`.
+    /// Identifies and initialises the camera behind `transport`. Waits, such as half a second at each start, use `clock`.
     ///
     /// # Errors
-    /// [`Evk1Error::NotEvk1`] before anything was written; [`Evk1Error::Refused`] for a configuration that does not go
-    /// together; [`Evk1Error::NotBooted`], [`Evk1Error::ReadBack`], [`Evk1Error::Usb`].
+    /// [`Evk1Error::NotEvk1`] before anything is written; [`Evk1Error::Refused`] for an inconsistent configuration;
+    /// [`Evk1Error::NotBooted`], [`Evk1Error::ReadBack`], [`Evk1Error::Usb`].
     pub fn open(
         mut transport: Box<dyn Transport>,
         camera: CameraId,
@@ -147,7 +145,7 @@ impl Evk1 {
         let seen = Mismatches::default();
         let identity =
             identify_tolerating(transport.as_mut(), clock.as_mut(), &config.tolerance, &seen)?;
-        // What an earlier program left in the buffers would come first, with times of its own.
+        // Data left by an earlier program would come first, with other times.
         reset(transport.as_mut(), &config.tolerance, &seen)?;
         let mut registers = registers_of(transport.as_mut(), &config, &seen);
         // Its value says nothing, and the sensor may be without power.
@@ -174,36 +172,35 @@ impl Evk1 {
         })
     }
 
-    /// What was tolerated so far, each with the key that accepts it.
+    /// Mismatches tolerated so far, each with the key that accepts it.
     #[must_use]
     pub fn mismatches(&self) -> Vec<Mismatch> {
         self.seen.all()
     }
 
-    /// The list itself, which goes on growing while the camera runs.
+    /// Shared list of mismatches, which grows while the camera runs.
     #[must_use]
     pub fn tolerated(&self) -> Mismatches {
         self.seen.clone()
     }
 
-    /// What happened to the stream that runs, or to the last one.
+    /// Report of the current or last stream.
     #[must_use]
     pub fn report(&self) -> &StreamReport {
         &self.report
     }
 
-    /// True while the stream carries a time that counts; a slave's does not until its master's clock arrives.
+    /// Whether the stream has valid times; a slave's does not until its master's clock arrives.
     #[must_use]
     pub fn time_runs(&self) -> bool {
         self.stream.is_some() && self.chunker.time_runs()
     }
 
-    /// Switches the trigger output on, or off. With input channel 6 enabled the camera sees its own pulses, without a
-    /// wire.
+    /// Switches the trigger output on or off. With input channel 6 enabled, the camera receives its own pulses without a wire.
     ///
     /// # Errors
-    /// [`Evk1Error::Refused`] on a master, whose output line carries the sync clock, before FPGA version 3.0.0, and for
-    /// pulses out of range; [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
+    /// [`Evk1Error::Refused`] on a master, whose output line carries the sync clock, with an FPGA version before 3.0.0, and for pulses out of
+    /// range; [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
     pub fn set_trigger_out(&mut self, pulses: Option<TriggerOut>) -> Result<(), Evk1Error> {
         if let Some(pulses) = pulses {
             pulses.check()?;
@@ -222,11 +219,11 @@ impl Evk1 {
         triggers::write_out(&mut self.registers(), pulses)
     }
 
-    /// Stops, powers the camera down, empties its buffers and gives it free. Every step is taken whatever became of those
-    /// before. Bytes of a running stream are let go.
+    /// Stops the stream, powers the camera down, empties its buffers and releases it. Continues after a failed step. Discards the bytes of
+    /// a running stream.
     ///
     /// # Errors
-    /// The first of [`Evk1Error::Usb`], [`Evk1Error::ReadBack`]; the camera is given free all the same.
+    /// The first [`Evk1Error::Usb`] or [`Evk1Error::ReadBack`]; the camera is released anyway.
     pub fn close(mut self) -> Result<(), Evk1Error> {
         self.shut()
     }
@@ -240,7 +237,7 @@ impl Evk1 {
         if self.gone {
             return Ok(());
         }
-        // Whatever failed, the sensor must not stay under power.
+        // The sensor must never stay powered, whatever failed.
         let mut done = FirstError::default();
         done.after(back.map_err(|e| e.during("stopping the stream")));
         let mut registers = registers_of(self.transport.as_mut(), &self.config, &self.seen);
@@ -258,7 +255,7 @@ impl Evk1 {
         registers_of(self.transport.as_mut(), &self.config, &self.seen)
     }
 
-    /// The error as the rig sees it; remembers a camera that is gone.
+    /// Converts to an error of the device trait, and remembers that the camera is disconnected.
     fn fault(&mut self, error: Evk1Error) -> DeviceError {
         let cause = |e: &Evk1Error| match e {
             Evk1Error::Usb { cause, .. } => Some(cause.clone()),
@@ -370,7 +367,7 @@ impl Evk1 {
                 sequences::clear_left_over(&mut registers, self.clock.as_ref())?;
         }
         if !channels.is_empty() {
-            // By the public driver's contract they are off after a stop.
+            // As in the public driver, they are off after a stop.
             triggers::write(&mut registers, &channels)?;
         }
         let overflow_hits = registers.read(OVERFLOW_HITCOUNT)? as u16;
@@ -394,7 +391,7 @@ impl Evk1 {
             self.undo_start();
             return Err(error);
         }
-        // What the start itself made overflow is not lost: nothing of it was awaited.
+        // Overflows during the start are not losses: that data is discarded anyway.
         let hits = match registers.read(OVERFLOW_HITCOUNT) {
             Ok(hits) => hits as u16,
             Err(error) => {
@@ -414,9 +411,8 @@ impl Evk1 {
         Ok(())
     }
 
-    /// Takes back a start that failed on its way: transfers, the running time base, and the noise filter, which drops
-    /// everything and which the next start would take for the setting. The error that led here says more than one of
-    /// the way back.
+    /// Reverts a failed start: transfers, time base, and the noise filter, which would drop everything and be taken for the configured
+    /// setting at the next start. Ignores further errors, because the first one is more informative.
     fn undo_start(&mut self) {
         let filter = self.settings.as_ref().and_then(Checked::noise_filter);
         let _ = self.transport.stop_stream();
@@ -425,7 +421,7 @@ impl Evk1 {
         let _ = noise_filter::write(&mut registers, filter);
     }
 
-    /// Turns what was taken out of the inbox into chunks, and then tells what ended the stream.
+    /// Converts received blocks to chunks, then returns the error that ended the stream, if any.
     fn hand_over(&mut self, taken: Taken, chunks: &mut Vec<RawChunk>) -> Result<(), Evk1Error> {
         for block in taken.blocks {
             self.chunker.take(block, &mut self.report, chunks);
@@ -436,7 +432,7 @@ impl Evk1 {
         }
     }
 
-    /// Hands over what has come, and a loss that the camera itself counted.
+    /// Returns received data, and losses counted by the camera.
     fn try_take(&mut self, all: bool, chunks: &mut Vec<RawChunk>) -> Result<(), Evk1Error> {
         let Some(mut stream) = self.stream.take() else {
             return Ok(());
@@ -444,7 +440,7 @@ impl Evk1 {
         let now = self.clock.now();
         let due = self.config.overflow_is_loss
             && (all || now - stream.overflow.read_at >= OVERFLOW_PERIOD);
-        // Read before the bytes are taken: what it counts was lost among those that have come, or is about to be missed.
+        // Read before taking the bytes: counted losses lie before or within them.
         let hits = match due {
             true => self.registers().read(OVERFLOW_HITCOUNT).map(|w| w as u16),
             false => Ok(stream.overflow.hits),
@@ -466,7 +462,7 @@ impl Evk1 {
         received
     }
 
-    /// The overflow counter is `hits` at `now`.
+    /// Processes the overflow counter `hits` at `now`.
     fn follow_overflow(
         &mut self,
         last: &mut Overflow,
@@ -580,7 +576,7 @@ impl EventCamera for Evk1 {
         notes.append(&mut self.notes);
     }
 
-    /// Of the board's own sensor, in steps of 1/4096 °C (OpenEB 3.1.2, `gen31_monitoring.cpp`).
+    /// Temperature of the board's sensor, in steps of 1/4096 °C (OpenEB 3.1.2, `gen31_monitoring.cpp`).
     fn temperature_c(&mut self) -> Result<Option<f64>, DeviceError> {
         let read = self.registers().get(TEMPERATURE);
         let steps = read.map_err(|e| self.fault(e))?;
@@ -590,7 +586,7 @@ impl EventCamera for Evk1 {
 
 impl Drop for Evk1 {
     fn drop(&mut self) {
-        // Nobody is left to hear what went wrong; `close` tells.
+        // Errors cannot be returned here; `close` returns them.
         let _ = self.shut();
     }
 }

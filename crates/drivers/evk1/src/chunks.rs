@@ -1,4 +1,4 @@
-//! From blocks of arrived bytes to the chunks of a recording, with their facts.
+//! Converts received blocks to the chunks of a recording, with their facts.
 
 use skinrig_formats::Scanner;
 use skinrig_model::{CameraId, HostTime, RawChunk, StreamFormat};
@@ -7,8 +7,7 @@ use crate::inbox::{Block, WORD};
 use crate::report::StreamReport;
 use crate::time_base::{Gate, Watch};
 
-/// Turns blocks into chunks; lives as long as the camera, so that chunk numbers and unwrapped time go on through stop
-/// and start.
+/// Converts blocks to chunks. It lives as long as the camera, so that chunk numbers and unwrapped time continue through stop and start.
 #[derive(Debug)]
 pub(crate) struct Chunker {
     camera: CameraId,
@@ -17,7 +16,7 @@ pub(crate) struct Chunker {
     gate: Gate,
     after_loss: bool,
     watch: Watch,
-    /// Nothing of this stream has a time yet.
+    /// Whether this stream has no time yet.
     fresh: bool,
     /// The first time of this stream.
     began_us: Option<u64>,
@@ -27,8 +26,7 @@ pub(crate) struct Chunker {
 }
 
 impl Chunker {
-    /// A chunker of a stream that has not begun. A step of the time base above `max_step_us` counts as a loss of at least one
-    /// word.
+    /// For a stream that has not started. A time base step above `max_step_us` counts as a loss of at least one word.
     #[must_use]
     pub fn new(camera: CameraId, max_step_us: Option<u64>) -> Self {
         Self {
@@ -46,7 +44,7 @@ impl Chunker {
         }
     }
 
-    /// A stream begins. That of a slave has no time until its master's clock arrives.
+    /// Starts a stream. A slave's has no time until its master's clock arrives.
     pub fn start(&mut self, slave: bool) {
         self.gate = if slave {
             Gate::AwaitAdvance { standing: None }
@@ -59,14 +57,14 @@ impl Chunker {
         self.watch.reset();
     }
 
-    /// The last time of this stream, µs.
+    /// Latest time of this stream, µs.
     #[must_use]
     pub fn reached_us(&self) -> Option<u64> {
         (!self.fresh).then_some(self.last_us)
     }
 
-    /// The camera told at `at` that it lost words since its time was `good_us`, or since the stream began: how many, and where among
-    /// those that came since, nobody knows.
+    /// Handles an overflow that the camera reported at `at`. An unknown number of words was lost at an unknown place since camera time
+    /// `good_us`, or since the start.
     pub(crate) fn overflowed(
         &mut self,
         at: HostTime,
@@ -89,13 +87,13 @@ impl Chunker {
         }
     }
 
-    /// True once words carry a time that counts.
+    /// Whether words have valid times.
     #[must_use]
     pub fn time_runs(&self) -> bool {
         self.gate == Gate::Open
     }
 
-    /// Takes the next block. One chunk comes out at most, and one more for each gap in its time base.
+    /// Converts the next block: at most one chunk, plus one per gap in its time base.
     pub fn take(&mut self, block: Block, report: &mut StreamReport, chunks: &mut Vec<RawChunk>) {
         let Block {
             mut bytes,
@@ -134,11 +132,11 @@ impl Chunker {
                 self.hand_over(before, arrived, lost, report, chunks);
                 lost = 0;
             }
-            // How many words the camera lost nobody knows: one at least.
+            // The camera lost an unknown number of words: count at least one.
             lost += WORD as u64;
             report.lost_bytes += WORD as u64;
             report.time_gaps += 1;
-            // The step is told once; what follows starts from its end.
+            // The step is reported once; continue from its end.
             let step = &bytes[..WORD];
             self.watch.look(step, arrived, |jump| report.add_jump(jump));
         }

@@ -1,34 +1,34 @@
-//! What can be chosen about the way a camera is driven; what it shall see is in `CameraSettings`.
+//! Configuration of the driver; the camera's own settings are in `CameraSettings`.
 
 use std::time::Duration;
 
 use crate::error::Evk1Error;
 use crate::tolerance::Tolerance;
 
-/// How a camera is driven.
+/// Configuration of the driver.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Evk1Config {
-    /// Bytes after which a chunk is closed; at least one transfer.
+    /// Chunk size, bytes; at least one transfer.
     pub chunk_bytes: usize,
-    /// Bytes that may wait for [`poll`](skinrig_device::EventCamera::poll). What comes on top is lost, and counted.
-    /// 256 MiB are 1.3 s at the highest rate of the sensor.
+    /// Capacity of the queue until [`poll`](skinrig_device::EventCamera::poll), bytes. Data beyond it is lost and counted. 256 MiB are 1.3 s
+    /// at the sensor's highest rate.
     pub backlog_bytes: usize,
-    /// Transfers in flight; 20 are 13 ms at the highest rate of the sensor.
+    /// Number of transfers in flight; 20 cover 13 ms at the sensor's highest rate.
     pub transfers: usize,
-    /// Bytes of a transfer; a multiple of the packet size 1024.
+    /// Size of a transfer, bytes; a multiple of the packet size 1024.
     pub transfer_bytes: usize,
-    /// After this long a transfer comes back with what it has.
+    /// Time after which a transfer completes with partial data.
     pub transfer_timeout: Duration,
-    /// Addresses of registers whose writes need not read back. Empty unless a real camera has shown that a register
-    /// reads differently: what each register of an EVK1 reads back is not public.
+    /// Addresses of registers whose writes need not read back. Empty unless a real camera has shown a difference: the behaviour of an
+    /// EVK1's registers is not published.
     pub read_back_exceptions: Vec<u32>,
-    /// Longest step of the time base, µs, that is no loss. `None`: steps are noted and nothing more, because how often
-    /// an EVK1 sends its time base is not public.
+    /// Largest step of the time base that is not a loss, µs. `None`: steps only become notes, because the interval of an EVK1's time base
+    /// words is not published.
     pub max_time_step_us: Option<u64>,
-    /// Whether a step of the camera's overflow counter is a loss of at least one word. False: it is noted at the end and nothing
-    /// more, because what the counter of a real EVK1 counts is not public.
+    /// Whether a step of the camera's overflow counter counts as a loss of at least one word. False: it only becomes a note, because the
+    /// meaning of the counter is not published.
     pub overflow_is_loss: bool,
-    /// What is accepted although a camera is not expected to do it.
+    /// Accepted deviations of the camera.
     pub tolerance: Tolerance,
 }
 
@@ -49,10 +49,10 @@ impl Default for Evk1Config {
 }
 
 impl Evk1Config {
-    /// Checks that the numbers go together.
+    /// Checks that the values are consistent.
     ///
     /// # Errors
-    /// [`Evk1Error::Refused`] naming the first that does not.
+    /// [`Evk1Error::Refused`] for the first inconsistent value.
     pub fn check(&self) -> Result<(), Evk1Error> {
         let rules = [
             (

@@ -1,85 +1,85 @@
-//! What can go wrong with an EVK1, from the USB bus up to a line of a bias file.
+//! Errors of an EVK1, from the USB bus to a line of a bias file.
 
 use crate::registers::Register;
 
-/// What to do when a user may not open the camera.
+/// Next step when a user has no permission to open the camera.
 pub const UDEV_STEP: &str =
-    "install hil/udev/70-skinrig.rules (hil/README.md), then plug the camera in again";
+    "install hil/udev/70-skinrig.rules (hil/README.md), then reconnect the camera";
 
 /// A transfer or a request to the USB stack failed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum UsbError {
-    /// This machine has no USB that a program may use.
+    /// This computer has no accessible USB.
     #[error(
-        "no USB on this machine ({0}): is /dev/bus/usb there, and visible from this container?"
+        "no USB on this computer ({0}): does /dev/bus/usb exist, and is it visible in this container?"
     )]
     NoUsb(String),
-    /// The device left the bus.
-    #[error("the device is gone from the bus: check cable and power")]
+    /// The device was disconnected.
+    #[error("the device is no longer on the bus: check cable and power")]
     Gone,
-    /// Another program holds the device.
-    #[error("another program holds the device: end it, or unplug and plug in again")]
+    /// Another program has the device open.
+    #[error("another program uses the device: end it, or reconnect the device")]
     Busy,
-    /// The operating system does not let this user open the device.
+    /// The operating system denies this user access.
     #[error("no permission to open the device: {}", UDEV_STEP)]
     NoPermission,
-    /// The endpoint answered with a stall.
+    /// The endpoint stalled.
     #[error("the endpoint stalled")]
     Stall,
-    /// No answer within the time limit.
-    #[error("no answer within the time limit")]
+    /// No reply within the time limit.
+    #[error("no reply within the time limit")]
     Timeout,
-    /// Fewer bytes were transferred than a request needs.
+    /// A request transferred too few bytes.
     #[error("expected {expected} bytes, transferred {found}")]
     Short {
-        /// Bytes needed.
+        /// Required number of bytes.
         expected: usize,
-        /// Bytes transferred.
+        /// Transferred number of bytes.
         found: usize,
     },
-    /// Transfers could not be taken back in time; their memory is kept until the program ends.
-    #[error("expected all transfers back within {limit_ms} ms, found {left} still under way")]
+    /// Cancelled transfers did not return in time; their memory is kept until the program ends.
+    #[error("expected all transfers to return within {limit_ms} ms, found {left} still in flight")]
     Stuck {
         /// The time limit, ms.
         limit_ms: u64,
-        /// Transfers not taken back.
+        /// Number of transfers in flight.
         left: usize,
     },
-    /// Anything else, in the words of the USB stack.
+    /// Another error, with the message of the USB stack.
     #[error("{0}")]
     Other(String),
 }
 
-/// An EVK1 could not do what was asked.
+/// An EVK1 failed or rejected a request.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Evk1Error {
     /// USB failed.
     #[error("{doing}: {cause}")]
     Usb {
-        /// What was being done.
+        /// The failed operation.
         doing: String,
-        /// What happened.
+        /// The USB error.
         cause: UsbError,
     },
-    /// Whatever it is, it is not an EVK1 Gen3.1 that can stream.
+    /// The device is not an EVK1 Gen3.1 that can stream.
     #[error("{place}: not an EVK1 Gen3.1: expected {expected}, found {found}")]
     NotEvk1 {
-        /// Where it is plugged in.
+        /// Bus and port.
         place: String,
-        /// What an EVK1 Gen3.1 shows.
+        /// Expected property.
         expected: String,
-        /// What this device shows.
+        /// Found property.
         found: String,
     },
-    /// No camera with this serial number answers.
+    /// No camera with this serial number.
     #[error("expected an EVK1 with serial {serial}, found {found}")]
     NotFound {
-        /// The serial number looked for.
+        /// Requested serial number.
         serial: String,
-        /// What is there instead.
+        /// Connected devices.
         found: String,
     },
-    /// The FPGA is not configured.
+    /// The FPGA did not load its configuration.
     #[error(
         "expected the FPGA to be configured within {limit_s} s, found it still booting: power the camera off and on"
     )]
@@ -87,7 +87,7 @@ pub enum Evk1Error {
         /// The time limit, s.
         limit_s: u64,
     },
-    /// The device did not accept a read of a register.
+    /// A register read failed.
     #[error("reading {name} ({address:#06x}): expected status 0x40, found {status:#04x}")]
     Status {
         /// Name of the register.
@@ -97,80 +97,80 @@ pub enum Evk1Error {
         /// The status byte.
         status: u8,
     },
-    /// A register did not read back as written.
+    /// A register read back with another value than was written.
     #[error(
         "{name} ({address:#06x}): expected {expected:#010x} after writing, found {found:#010x}: power the camera off and \
-         on; an address at which every camera of this kind reads differently goes into `read_back_exceptions`"
+         on; if every camera of this model reads differently at this address, add it to `read_back_exceptions`"
     )]
     ReadBack {
         /// Name of the register.
         name: &'static str,
         /// Its address.
         address: u32,
-        /// What was written.
+        /// Written value.
         expected: u32,
-        /// What was read.
+        /// Value read back.
         found: u32,
     },
-    /// A setting did not read back as written.
+    /// A setting read back with another value than was written.
     #[error("{name}: expected {expected} after writing, found {found}")]
     Setting {
-        /// Which setting.
+        /// Name of the setting.
         name: String,
-        /// What was written.
+        /// Written value.
         expected: String,
-        /// What was read.
+        /// Value read back.
         found: String,
     },
-    /// Outside what the camera can or may do. Nothing was written.
+    /// A request beyond the camera's capabilities. Nothing was written.
     #[error("expected {expected}, found {found}")]
     Refused {
-        /// What would have been accepted.
+        /// Acceptable requests.
         expected: String,
-        /// What was asked for.
+        /// The request.
         found: String,
     },
-    /// The camera is in a state in which it cannot do this.
+    /// The camera is in the wrong state.
     #[error("expected to be {expected}, is {found}")]
     State {
-        /// The state that the request needs.
+        /// Required state.
         expected: &'static str,
-        /// The state it is in.
+        /// Actual state.
         found: &'static str,
     },
-    /// It was stopped and sends all the same.
+    /// The stopped camera continues to send.
     #[error(
-        "expected the stopped camera to fall silent, found it still sending after {bytes} bytes: power it off and on"
+        "expected the stopped camera to stop sending, found it still sending after {bytes} bytes: power-cycle it"
     )]
     StillSending {
-        /// Bytes that came since it should have been silent.
+        /// Bytes received after the stop.
         bytes: u64,
     },
-    /// A line of a bias file.
+    /// A malformed line of a bias file.
     #[error("bias file, line {line}: expected {expected}, found {found}")]
     BiasFile {
-        /// 1 for the first line; the line after the last for something missing.
+        /// Line number, from 1; one past the last line if something is missing.
         line: usize,
-        /// What would have been accepted.
+        /// Acceptable content.
         expected: String,
-        /// What is there.
+        /// Actual content.
         found: String,
     },
 }
 
-/// What became of steps that are all taken, whatever became of those before: the first error.
+/// Collects the first error of a sequence of steps that all run.
 #[derive(Debug, Default)]
 pub(crate) struct FirstError(Option<Evk1Error>);
 
 impl FirstError {
-    /// A step was taken.
+    /// Adds the result of a step.
     pub(crate) fn after(&mut self, step: Result<(), Evk1Error>) {
         if let Err(error) = step {
             self.0.get_or_insert(error);
         }
     }
 
-    /// What became of all of them.
+    /// The first error, if any.
     pub(crate) fn outcome(self) -> Result<(), Evk1Error> {
         self.0.map_or(Ok(()), Err)
     }
@@ -195,7 +195,7 @@ impl Evk1Error {
 }
 
 impl UsbError {
-    /// The error with what was being done.
+    /// Adds the failed operation.
     pub(crate) fn during(self, doing: impl Into<String>) -> Evk1Error {
         Evk1Error::Usb {
             doing: doing.into(),

@@ -1,5 +1,5 @@
-//! Which of the devices on the bus are EVK1 Gen3.1 cameras. Other cameras share their USB IDs and must not receive
-//! EVK1 requests, so the descriptors are read first.
+//! Identifies EVK1 Gen3.1 cameras on the bus. Other cameras share their USB IDs and must not receive EVK1 requests, so descriptors are
+//! read first.
 
 use std::fmt;
 use std::time::Duration;
@@ -14,24 +14,24 @@ use crate::requests;
 use crate::tolerance::{Mismatches, Tolerance};
 use crate::usb::{Access, LibUsb, Slot, Transport, bus};
 
-/// The FPGA loads its configuration within this time.
+/// Time within which the FPGA loads its configuration.
 const BOOT_LIMIT: HostDuration = HostDuration::from_millis(10_000);
-/// Between two looks at whether it has.
+/// Polling interval meanwhile.
 const BOOT_LOOK: HostDuration = HostDuration::from_millis(20);
 
-/// Who a camera says it is.
+/// Identity of a camera.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Identity {
     /// 8 lower-case hexadecimal digits.
     pub serial: String,
     /// FPGA version: major in bits 23:16, minor in 15:8, micro in 7:0.
     pub fpga_version: u32,
-    /// Version of the FX3's firmware, laid out likewise.
+    /// Version of the FX3 firmware, in the same format.
     pub fx3_version: u32,
 }
 
 impl Identity {
-    /// Both versions, for people and for comparison with what a rig expects.
+    /// Both versions, for display and for comparison with the rig file.
     #[must_use]
     pub fn firmware(&self) -> String {
         format!(
@@ -50,56 +50,56 @@ fn dotted(version: u32) -> String {
 /// A device that may be an EVK1.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Found {
-    /// Where it is plugged in, and how fast.
+    /// Bus, port and speed.
     pub place: String,
-    /// Its bus, and its address on it.
+    /// Bus number and device address.
     pub address: (u8, u8),
-    /// Its port, `usb-BUS-PORT.PORT`, which may stand for a serial number that cannot be read.
+    /// Port as `usb-BUS-PORT.PORT`, which can replace an unreadable serial number.
     pub port: Option<String>,
-    /// What came of asking it.
+    /// State of the device.
     pub state: FoundState,
 }
 
-/// What came of asking a device.
+/// State of a device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FoundState {
-    /// An EVK1 Gen3.1 that can be opened.
+    /// A usable EVK1 Gen3.1.
     Ready(Identity),
-    /// Held by another program; not asked.
+    /// In use by another program; not queried.
     Busy,
-    /// May not be opened by this user; not asked.
+    /// This user has no permission; not queried.
     NoPermission,
-    /// Another camera that shares the USB IDs, or an EVK1 that cannot stream.
+    /// Another camera with the same USB IDs, or an EVK1 that cannot stream.
     NotEvk1(String),
-    /// It did not answer as it should.
+    /// It did not respond as expected.
     Faulty(String),
 }
 
 impl Found {
-    /// What to do next, if there is anything to do.
+    /// What to do next, if anything.
     #[must_use]
     pub fn next_step(&self) -> Option<String> {
         match &self.state {
             FoundState::Ready(_) | FoundState::NotEvk1(_) => None,
             FoundState::Busy => Some(
-                "end the program that uses the camera (another skinrig, a viewer), or unplug it and plug it in again"
+                "end the program that uses the camera (another skinrig, a viewer), or reconnect it"
                     .to_owned(),
             ),
             FoundState::NoPermission => Some(UDEV_STEP.to_owned()),
             FoundState::Faulty(_) => Some(format!(
-                "unplug the camera, wait 5 s, plug it in again; one that always answers so may be opened by `skinrig run --tolerant`{}",
+                "unplug the camera, wait 5 s, reconnect it; a camera that always responds like this may be opened by `skinrig run --tolerant`{}",
                 self.port.as_ref().map_or_else(String::new, |port| format!(
-                    ", with `serial: {port}` in the rig file when it does not tell its number"
+                    ", with `serial: {port}` in the rig file if it does not report its serial number"
                 ))
             )),
         }
     }
 }
 
-/// Every device on the bus with the USB IDs of an EVK1, asked as far as it may be asked. Nothing is changed on them.
+/// Lists all devices with the USB IDs of an EVK1 and queries them as far as permitted. Changes nothing on them.
 ///
 /// # Errors
-/// [`UsbError::NoUsb`] on a machine without USB.
+/// [`UsbError::NoUsb`] on a computer without USB.
 pub fn enumerate() -> Result<Vec<Found>, UsbError> {
     let clock = RealClock::start();
     let strict = Tolerance::default();
@@ -107,11 +107,11 @@ pub fn enumerate() -> Result<Vec<Found>, UsbError> {
     Ok(bus()?.iter().map(ask).collect())
 }
 
-/// Asks one device, and hands over the camera that it may be.
+/// Queries one device; also returns the claimed camera if it is one.
 fn ask_slot(slot: &Slot, clock: RealClock, tolerance: &Tolerance) -> (Found, Option<LibUsb>) {
     let (state, camera) = match slot.open(clock) {
         Ok(Access::Open(mut usb)) => {
-            // What is tolerated here is told when the camera is opened.
+            // Mismatches tolerated here are reported when the camera is opened.
             let seen = Mismatches::default();
             match identify_tolerating(&mut usb, &mut clock.clone(), tolerance, &seen) {
                 Ok(identity) => (FoundState::Ready(identity), Some(usb)),
@@ -153,10 +153,10 @@ impl fmt::Display for FoundState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Ready(id) => write!(f, "EVK1 Gen3.1, serial {}, {}", id.serial, id.firmware()),
-            Self::Busy => write!(f, "held by another program"),
+            Self::Busy => write!(f, "in use by another program"),
             Self::NoPermission => write!(f, "no permission to open it"),
             Self::NotEvk1(what) => write!(f, "not an EVK1 Gen3.1: {what}"),
-            Self::Faulty(what) => write!(f, "does not answer as it should: {what}"),
+            Self::Faulty(what) => write!(f, "unexpected response: {what}"),
         }
     }
 }
@@ -171,10 +171,10 @@ impl fmt::Display for Found {
     }
 }
 
-/// The camera with this serial number, claimed; others are left as they are.
+/// Opens and claims the camera with this serial number; does not touch the others.
 ///
 /// # Errors
-/// [`Evk1Error::NotFound`] says what is there instead; [`Evk1Error::Usb`] without USB.
+/// [`Evk1Error::NotFound`] lists the connected cameras; [`Evk1Error::Usb`] without USB.
 pub(crate) fn open_serial(
     serial: &str,
     clock: RealClock,
@@ -205,8 +205,7 @@ pub(crate) fn open_serial(
     })
 }
 
-/// Asks a claimed device who it is, in the order of OpenEB 3.1.2, up to and including the system ID. Nothing is
-/// written.
+/// Queries the identity of a claimed device in the order of OpenEB 3.1.2, up to the system ID. Writes nothing.
 ///
 /// # Errors
 /// [`Evk1Error::NotEvk1`], [`Evk1Error::NotBooted`], [`Evk1Error::Usb`].
@@ -218,7 +217,7 @@ pub fn identify(
     identify_tolerating(transport, clock, &Tolerance::default(), &seen)
 }
 
-/// As [`identify`], letting pass what `tolerance` accepts.
+/// Like [`identify`], but accepts mismatches allowed by `tolerance`.
 pub(crate) fn identify_tolerating(
     transport: &mut dyn Transport,
     clock: &mut dyn Clock,
@@ -234,7 +233,7 @@ pub(crate) fn identify_tolerating(
     match ask16(
         transport,
         requests::BOARD_VERSION,
-        "asking for the board version",
+        "reading the board version",
     ) {
         Ok(requests::BOARD_EVK1) => {}
         Ok(other) => {
@@ -249,26 +248,26 @@ pub(crate) fn identify_tolerating(
         }) => {
             return Err(not_evk1(
                 "board version 2",
-                "a device that knows no board version".to_owned(),
+                "a device that reports no board version".to_owned(),
             ));
         }
         Err(e) => return Err(e),
     }
     await_fpga(transport, clock)?;
     let mut registers = Registers::new(transport, &[]).tolerating(tolerance, seen);
-    registers.read_unpowered(ATIS_CONTROL)?; // The first read after power-up is not to be relied on.
+    registers.read_unpowered(ATIS_CONTROL)?; // The first read after power-up is unreliable.
     let serial = registers.read(SERIAL_MSB)?;
-    let system = ask16(transport, requests::SYSTEM_ID, "asking for the system ID")?;
+    let system = ask16(transport, requests::SYSTEM_ID, "reading the system ID")?;
     if system != requests::SYSTEM_GEN31 {
         let what = match system {
             requests::SYSTEM_GOLDEN => {
-                "the rescue image of the FPGA: the camera's flash needs the maker's update"
+                "the rescue image of the FPGA: update the camera's flash with the manufacturer's tool"
                     .to_owned()
             }
             0x14 => "an EVK1 Gen2".to_owned(),
             0x15 => "an EVK1 Gen3.0".to_owned(),
             0x1a => "an EVK1 Gen4".to_owned(),
-            _ => "a system that is not known".to_owned(),
+            _ => "an unknown system".to_owned(),
         };
         return Err(not_evk1("system ID 0x1c", format!("{system:#04x}, {what}")));
     }
@@ -277,7 +276,7 @@ pub(crate) fn identify_tolerating(
         transport,
         requests::FX3_VERSION,
         &mut answer,
-        "asking for the FX3 version",
+        "reading the FX3 version",
     )?;
     let [a, b, c, d, ..] = answer;
     let fx3_version = u32::from_le_bytes([a, b, c, d]);
@@ -296,7 +295,7 @@ fn await_fpga(transport: &mut dyn Transport, clock: &mut dyn Clock) -> Result<()
     while ask16(
         transport,
         requests::FPGA_BOOT_STATE,
-        "asking whether the FPGA is configured",
+        "reading whether the FPGA is configured",
     )? == 0
     {
         let now = clock.now();

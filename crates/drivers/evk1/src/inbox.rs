@@ -1,4 +1,4 @@
-//! Where arriving bytes wait: filled by the USB event thread, emptied by the driver. Bounded, and never in the way.
+//! Bounded queue of received bytes: filled by the USB event thread, emptied by the driver. The producer never blocks.
 
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -7,36 +7,35 @@ use skinrig_model::HostTime;
 
 use crate::error::UsbError;
 
-/// Bytes of one word; blocks begin and end between words.
+/// Bytes per word; blocks begin and end at word boundaries.
 pub const WORD: usize = 4;
 
-/// Bytes that arrived one after the other, in whole words.
+/// Contiguous received bytes, in whole words.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Block {
-    /// The bytes; none when a loss is all that there is to say.
+    /// The bytes; empty if the block only reports a loss.
     pub bytes: Vec<u8>,
-    /// When the last of them arrived, or was lost.
+    /// Arrival of the last byte, or time of the loss.
     pub arrived: HostTime,
-    /// What was lost just before them.
+    /// Loss just before these bytes.
     pub lost_before: Option<Loss>,
 }
 
-/// Bytes that arrived and could not be kept.
+/// Received bytes that were dropped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Loss {
-    /// How many.
+    /// Number of bytes.
     pub bytes: u64,
-    /// When the last bytes before the loss arrived, kept or told as lost; when the first lost ones did if there were
-    /// none.
+    /// Arrival of the last bytes before the loss, kept or already reported as lost; otherwise arrival of the first lost ones.
     pub since: HostTime,
-    /// When the last lost ones arrived.
+    /// Arrival of the last lost bytes.
     pub until: HostTime,
 }
 
-/// The meeting point of the USB event thread and the driver.
+/// The queue between the USB event thread and the driver.
 ///
-/// Its producer never waits: when the driver lags by more than the backlog allows, further bytes are counted and let
-/// go, until the driver has taken half of what waits.
+/// Its producer never blocks: if the driver is too slow and the backlog is full, further bytes are counted and dropped until the driver
+/// has taken half of the backlog.
 #[derive(Debug)]
 pub struct Inbox {
     chunk_bytes: usize,
@@ -51,30 +50,30 @@ struct State {
     waiting: usize,
     /// The block being filled; may end within a word.
     open: Vec<u8>,
-    /// When the last bytes arrived, kept or lost.
+    /// Arrival of the last bytes, kept or dropped.
     last_arrival: Option<HostTime>,
-    /// What was lost before `open`, or is being lost.
+    /// Loss before `open`, possibly continuing.
     loss: Option<Loss>,
-    /// Bytes are being let go.
+    /// Whether bytes are being dropped.
     losing: bool,
-    /// Bytes since the start, modulo the size of a word, kept or not.
+    /// Bytes since the start modulo the word size, kept or dropped.
     phase: usize,
     error: Option<UsbError>,
-    /// Transfers that failed and were counted as a loss.
+    /// Failed transfers that were counted as losses.
     failed_transfers: u64,
 }
 
-/// What the driver took out.
+/// Data taken from the queue.
 #[derive(Debug, Default)]
 pub struct Taken {
-    /// Blocks in the order of arrival.
+    /// Blocks in order of arrival.
     pub blocks: VecDeque<Block>,
-    /// What ended the stream. Everything that came before is in `blocks`.
+    /// Error that ended the stream. All data before it is in `blocks`.
     pub error: Option<UsbError>,
 }
 
 impl Inbox {
-    /// An empty inbox that closes blocks at `chunk_bytes` and keeps up to about `backlog_bytes`.
+    /// An empty queue with blocks of `chunk_bytes` and a capacity of about `backlog_bytes`.
     #[must_use]
     pub fn new(chunk_bytes: usize, backlog_bytes: usize) -> Self {
         Self {
@@ -84,12 +83,12 @@ impl Inbox {
         }
     }
 
-    /// A poisoned lock only says that a thread panicked; the state is valid after every statement.
+    /// Ignores poisoning: the state is valid after every statement.
     fn state(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes what arrived at `at`.
+    /// Adds bytes that arrived at `at`.
     pub fn push(&self, bytes: &[u8], at: HostTime) {
         if bytes.is_empty() {
             return;
@@ -103,7 +102,7 @@ impl Inbox {
         }
     }
 
-    /// A transfer failed and something was lost at `at`, nobody knows how much: it counts as one word, and what comes next begins a word.
+    /// Counts a failed transfer at `at` as a loss of one word, because the amount is unknown. The next byte begins a word.
     pub fn lose_some(&self, at: HostTime) {
         let mut state = self.state();
         state.close();
@@ -112,18 +111,18 @@ impl Inbox {
         state.failed_transfers += 1;
     }
 
-    /// How often a transfer failed and something was lost with it.
+    /// Number of failed transfers with losses.
     #[must_use]
     pub fn failed_transfers(&self) -> u64 {
         self.state().failed_transfers
     }
 
-    /// Notes what ended the stream; the first one counts.
+    /// Records the error that ended the stream; the first one stays.
     pub fn fail(&self, error: UsbError) {
         self.state().error.get_or_insert(error);
     }
 
-    /// Takes the blocks that are full.
+    /// Takes the complete blocks.
     #[must_use]
     pub fn take_full(&self) -> Taken {
         let mut state = self.state();
@@ -133,7 +132,7 @@ impl Inbox {
         state.take()
     }
 
-    /// Takes everything in whole words; the beginning of a word stays.
+    /// Takes all whole words; an incomplete word stays.
     #[must_use]
     pub fn take_all(&self) -> Taken {
         let mut state = self.state();
@@ -141,7 +140,7 @@ impl Inbox {
         state.take()
     }
 
-    /// Takes everything at the end of a stream: the beginning of a word whose end never came is lost.
+    /// Takes everything at the end of a stream; an incomplete word counts as lost.
     #[must_use]
     pub fn finish(&self) -> Taken {
         let mut state = self.state();
@@ -174,7 +173,7 @@ impl State {
     }
 
     fn keep(&mut self, bytes: &[u8], at: HostTime, chunk_bytes: usize) {
-        // After a loss, the rest of a word whose beginning is lost is lost as well.
+        // After a loss, also drop the rest of a word whose beginning was lost.
         let cut = match self.open.len() {
             0 => (WORD - self.phase) % WORD,
             _ => 0,
@@ -191,12 +190,12 @@ impl State {
         self.last_arrival = Some(at);
     }
 
-    /// Lets `n` bytes go, and with them the word that they tear.
+    /// Drops `n` bytes, and the word that they split.
     fn lose(&mut self, n: usize, at: HostTime) {
         let torn = std::mem::take(&mut self.open).len();
         self.phase = (self.phase + n) % WORD;
         self.add_loss(torn + n, at);
-        // A loss that goes on after it was told begins where the told one ended.
+        // A loss that continues after being reported starts where the reported one ended.
         self.last_arrival = Some(at);
     }
 
@@ -211,7 +210,7 @@ impl State {
         loss.until = at;
     }
 
-    /// Closes the open block, if there is anything to say. The beginning of a word moves on to the next.
+    /// Closes the open block if it has content. An incomplete word moves to the next block.
     fn close(&mut self) {
         let whole = self.open.len() - self.open.len() % WORD;
         let arrived = match (whole, self.loss) {

@@ -1,13 +1,12 @@
-//! The Prophesee EVK1 Gen3.1 as an event camera: registers and streaming over libusb.
+//! Driver of the Prophesee EVK1 Gen3.1 event camera: registers and streaming over libusb.
 //!
-//! From the wire up: [`usb`] moves requests and bytes, [`inbox`] holds what arrived, [`access`] reads and writes
-//! [`registers`], [`sequences`] and the settings' modules know what to write in which order, [`chunks`] makes the
-//! recording's chunks, and [`Evk1`] is the [`EventCamera`](skinrig_device::EventCamera) over all of it. [`enumerate`]
-//! lists what is plugged in.
+//! From the bottom up: [`usb`] transfers requests and data, [`inbox`] queues received bytes, [`access`] reads and writes [`registers`],
+//! [`sequences`] and the settings modules define what is written in which order, [`chunks`] creates the chunks of a recording, and
+//! [`Evk1`] implements [`EventCamera`](skinrig_device::EventCamera). [`enumerate`] lists the connected cameras.
 //!
-//! Facts about the camera come from the public driver OpenEB 3.1.2, the last one that knew it; each module names its
-//! source file. What is not public stays a question: nothing here relies on the reset values of registers, and which
-//! registers read back differently is a matter of configuration ([`Evk1Config::read_back_exceptions`]).
+//! Facts about the camera come from the public driver OpenEB 3.1.2, the last one that supported it; each module names its source file.
+//! Unpublished facts are never assumed: the driver does not rely on reset values of registers, and registers that read back
+//! differently are configured ([`Evk1Config::read_back_exceptions`]).
 
 pub mod access;
 pub mod biases;

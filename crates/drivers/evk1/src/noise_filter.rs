@@ -1,4 +1,4 @@
-//! The sensor's noise filter: drops everything while the rate of the whole sensor is below a threshold.
+//! The sensor's noise filter, which drops all events while the sensor's total rate is below a threshold.
 
 use skinrig_device::NoiseFilter;
 
@@ -6,12 +6,12 @@ use crate::access::Registers;
 use crate::error::Evk1Error;
 use crate::registers::{NFL_EN, NFL_EVT_THRESH, NFL_PERIOD_CNT_THRESH, NFL_THRESH};
 
-/// Rates that the filter accepts, events per second (OpenEB 3.1.2, `gen31_event_rate_noise_filter_module`).
+/// Thresholds that the filter accepts, events per second (OpenEB 3.1.2, `gen31_event_rate_noise_filter_module`).
 pub(crate) const RATES_EV_S: std::ops::RangeInclusive<u32> = 10_000..=10_000_000;
-/// The period over which events are counted, µs.
+/// Counting period, µs.
 const PERIOD_US: u32 = 1023;
 
-/// Threshold in events per period and the period in µs; those of the device without a filter.
+/// Threshold in events per period, and period in µs; the device's values without a filter.
 fn thresholds(filter: Option<NoiseFilter>) -> (u32, u32) {
     match filter {
         Some(f) => {
@@ -39,7 +39,7 @@ pub fn check(filter: Option<NoiseFilter>) -> Result<(), Evk1Error> {
     }
 }
 
-/// Sets the filter.
+/// Writes the filter.
 ///
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
@@ -50,14 +50,14 @@ pub fn write(registers: &mut Registers<'_>, filter: Option<NoiseFilter>) -> Resu
     registers.set(NFL_EN, filter.is_some().into())
 }
 
-/// The setting in words.
+/// Describes a setting.
 #[must_use]
 pub fn describe(filter: Option<NoiseFilter>) -> String {
     let (events, period_us) = thresholds(filter);
     words(filter.is_some(), events, period_us)
 }
 
-/// What is set, in words.
+/// Reads and describes the setting.
 ///
 /// # Errors
 /// [`Evk1Error::Usb`].

@@ -1,8 +1,8 @@
-//! The FPGA's pattern generator: events in a known order at a known rate, without a scene and without the sensor.
+//! The FPGA's pattern generator: events in a known order at a known rate, independent of scene and sensor.
 //!
-//! Source: OpenEB 3.1.2, `gen31_pattern_generator` and the register map of its bank. Up to one event in each clock cycle of 10 ns;
-//! `VALID_RATIO` of 1024 cycles have one. The scan's geometry is the one that the public checker of the pattern expects. That rows
-//! beyond the sensor pass only without the field-of-view filter is inferred; nothing of this was seen on a camera.
+//! Source: OpenEB 3.1.2, `gen31_pattern_generator` and the register map of its bank. One event is possible per clock cycle of 10 ns, and
+//! `VALID_RATIO` of 1024 cycles have one. The scan has the geometry of the public pattern checker. That rows beyond the sensor pass only
+//! without the field-of-view filter is inferred; none of this was verified on a camera.
 
 use skinrig_device::{PatternScan, TestPattern};
 
@@ -15,17 +15,17 @@ pub const COLUMNS: u16 = 512;
 /// Rows of the scan.
 pub const ROWS: u16 = 1024;
 
-/// Events per second when every cycle has one.
+/// Event rate when every cycle has an event, events per second.
 const EVERY_CYCLE_EV_S: f64 = 100e6;
-/// Cycles to which `VALID_RATIO` relates.
+/// Number of cycles to which `VALID_RATIO` refers.
 const CYCLES: f64 = 1024.0;
-/// `LENGTH` of both periods: the public driver's. They are alike, so that it does not matter.
+/// `LENGTH` of both periods, as in the public driver. They are equal, so the value does not matter.
 const LENGTH: u32 = 30_720;
 
-/// `VALID_RATIO` for the rate that is nearest to the one wanted.
+/// `VALID_RATIO` for the rate nearest to the requested one.
 ///
 /// # Errors
-/// [`Evk1Error::Refused`] for a rate that the generator cannot make.
+/// [`Evk1Error::Refused`] for an unsupported rate.
 fn ratio(pattern: TestPattern) -> Result<u32, Evk1Error> {
     let wanted = (pattern.rate_ev_s / EVERY_CYCLE_EV_S * CYCLES).round();
     let most = f64::from(r::pattern_valid_ratio(r::TEST_PATTERN_N_PERIOD).max());
@@ -38,7 +38,7 @@ fn ratio(pattern: TestPattern) -> Result<u32, Evk1Error> {
     ))
 }
 
-/// Sets the generator up and switches it on; the camera is stopped.
+/// Configures the generator and switches it on. The camera must be stopped.
 ///
 /// # Errors
 /// [`Evk1Error::Refused`] before anything is written; [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
@@ -61,7 +61,7 @@ pub fn on(registers: &mut Registers<'_>, pattern: TestPattern) -> Result<Pattern
     })
 }
 
-/// Gives the sensor its place back, and the field-of-view filter.
+/// Switches back to the sensor and restores the field-of-view filter.
 ///
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
@@ -72,7 +72,7 @@ pub fn off(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
     done.outcome()
 }
 
-/// Switches off what a program that was cut off may have left on: whether the reset of an initialisation does so is not public.
+/// Switches off a generator that an interrupted program may have left on: it is not published whether initialisation does so.
 ///
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].

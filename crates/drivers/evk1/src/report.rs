@@ -1,44 +1,43 @@
-//! What happened to a stream that its bytes do not say.
+//! Report of a stream: events that its bytes do not show.
 
 use skinrig_model::HostDuration;
 
 use crate::inbox::Loss;
 use crate::time_base::TimeJump;
 
-/// How many jumps and losses are kept one by one; all are counted.
+/// Number of jumps and losses stored individually; all are counted.
 const KEPT: usize = 16;
 
-/// What happened to the bytes between one start and the stop that followed.
+/// Report of a stream from one start to the next stop.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct StreamReport {
-    /// Bytes at the start that had no time: before the first TIME_HIGH word, and, on a slave, before its time advanced.
+    /// Bytes at the start without a time: before the first TIME_HIGH word, and on a slave before its time advanced.
     pub discarded_bytes: u64,
-    /// Bytes that the stream before had left in the camera's buffers, let go before this one began.
+    /// Bytes left over from the previous stream and discarded before this one.
     pub left_over_bytes: u64,
-    /// Bytes lost since, which `lost_before` of the chunks says as well.
+    /// Lost bytes, also counted in `lost_before` of the chunks.
     pub lost_bytes: u64,
-    /// How often bytes were lost.
+    /// Number of losses.
     pub loss_count: u64,
-    /// Transfers that failed, each a loss; told when the stream stops.
+    /// Failed transfers, each a loss; set when the stream stops.
     pub failed_transfers: u64,
-    /// Host time over which they were lost, together.
+    /// Total host time of the losses.
     pub lost_time: HostDuration,
     /// The first losses.
     pub losses: Vec<Loss>,
-    /// How often it made a step that counts as a loss, see [`crate::Evk1Config::max_time_step_us`]; each is a word in
-    /// `lost_bytes`, for how many it was is not known.
+    /// Time base steps that count as losses, see [`crate::Evk1Config::max_time_step_us`]. Each adds one word to `lost_bytes`, because the
+    /// amount is unknown.
     pub time_gaps: u64,
-    /// How often the overflow counter was found to have counted on, which counts as a loss, see
-    /// [`crate::Evk1Config::overflow_is_loss`]; each is a word in `lost_bytes`, for how many it was is not known.
+    /// Increments of the overflow counter that count as losses, see [`crate::Evk1Config::overflow_is_loss`]. Each adds one word to
+    /// `lost_bytes`, because the amount is unknown.
     pub overflow_gaps: u64,
-    /// How often the time base jumped by more than one count, or back: the camera itself has lost something.
+    /// Jumps of the time base by more than one count, or backward: the camera itself lost data.
     pub jump_count: u64,
     /// The first jumps.
     pub jumps: Vec<TimeJump>,
-    /// The last time of the stream before and the first of this one, µs, when time began again at the start.
+    /// Last time of the previous stream and first time of this one, µs, if time restarted.
     pub restarted: Option<(u64, u64)>,
-    /// OVERFLOW_HITCOUNT at start and at stop, as read; its meaning is not public. `None` while streaming, and when the
-    /// camera was gone.
+    /// OVERFLOW_HITCOUNT at start and stop; its meaning is not published. `None` while streaming, and after a disconnection.
     pub overflow_hits: Option<(u16, u16)>,
 }
 
@@ -59,7 +58,7 @@ impl StreamReport {
         }
     }
 
-    /// The report in sentences; none when nothing happened.
+    /// The report as sentences; empty if there is nothing to report.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
@@ -71,31 +70,31 @@ impl StreamReport {
         }
         if self.left_over_bytes > 0 {
             notes.push(format!(
-                "{} bytes left over from the stream before were let go",
+                "{} bytes left over from the previous stream were discarded",
                 self.left_over_bytes
             ));
         }
         if self.loss_count > 0 {
             notes.push(format!(
-                "{} bytes were lost on the host in {} gaps of {} together",
+                "{} bytes were lost on the host in {} gaps of {} in total",
                 self.lost_bytes, self.loss_count, self.lost_time
             ));
         }
         if self.failed_transfers > 0 {
             notes.push(format!(
-                "{} transfers failed, and what they held is lost: how much is not known",
+                "{} transfers failed with an unknown loss of data",
                 self.failed_transfers
             ));
         }
         if self.time_gaps > 0 {
             notes.push(format!(
-                "{} steps of the time base were longer than allowed: the camera lost events, how many is not known",
+                "{} time base steps were longer than allowed: the camera lost an unknown number of events",
                 self.time_gaps
             ));
         }
         if self.overflow_gaps > 0 {
             notes.push(format!(
-                "the camera's overflow counter was seen to count on {} times: the camera lost events, how many is not known",
+                "the camera's overflow counter increased {} times: the camera lost an unknown number of events",
                 self.overflow_gaps
             ));
         }
@@ -107,7 +106,7 @@ impl StreamReport {
         }
         if let Some((last, first)) = self.restarted {
             notes.push(format!(
-                "the time base began again: {first} µs after {last} µs of the stream before"
+                "the time base restarted: {first} µs after {last} µs of the previous stream"
             ));
         }
         if let Some((before, after)) = self.overflow_hits

@@ -1,14 +1,14 @@
-//! The time base of an EVT2 stream: when it begins to count, and where it jumps.
+//! The time base of an EVT2 stream: its start and its jumps.
 
 use skinrig_model::HostTime;
 
 use crate::inbox::WORD;
 
-/// Words looked at together in search of a rare one.
+/// Words examined together when searching for a rare word.
 const GROUP: usize = 16;
-/// Values of TIME_HIGH.
+/// Number of TIME_HIGH values.
 const RANGE: u32 = 1 << 28;
-/// µs of one count of TIME_HIGH.
+/// Duration of one TIME_HIGH count, µs.
 const COUNT_US: u64 = 64;
 
 /// The counter of a TIME_HIGH word; `None` for other words.
@@ -17,24 +17,23 @@ fn time_high(word: [u8; WORD]) -> Option<u32> {
     (w >> 28 == 8).then_some(w & (RANGE - 1))
 }
 
-/// Holds back what has no time yet.
+/// Holds back data without a time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Gate {
-    /// Up to the first TIME_HIGH word: at a start, and after a loss, where the words that follow would carry a time
-    /// from before it.
+    /// Until the first TIME_HIGH word: at a start, and after a loss, where events would otherwise get a time from before the loss.
     AwaitTime,
-    /// Up to the first TIME_HIGH word that differs from the first one. A Gen3.1 slave streams at once, with a time that
-    /// stands still at 0 until the master's clock arrives.
+    /// Until the first TIME_HIGH word that differs from the first one. A Gen3.1 slave streams immediately, with a constant time of 0 until
+    /// the master's clock arrives.
     AwaitAdvance {
-        /// The counter that stands still.
+        /// The constant counter.
         standing: Option<u32>,
     },
-    /// Everything passes.
+    /// Passes everything.
     Open,
 }
 
 impl Gate {
-    /// Returns how many of the leading bytes are held back, and opens when time has come.
+    /// Returns the number of leading bytes to hold back; opens at the first valid time.
     pub fn pass(&mut self, bytes: &[u8]) -> usize {
         if *self == Self::Open {
             return 0;
@@ -60,19 +59,19 @@ impl Gate {
     }
 }
 
-/// A step of the time base that is more than one count, or back.
+/// A time base step of more than one count, or backward.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TimeJump {
     /// Time base before the step, µs, as sent (34 bits).
     pub from_us: u64,
     /// Time base after it, µs, as sent.
     pub to_us: u64,
-    /// When its bytes had arrived.
+    /// Arrival of its bytes.
     pub arrived: HostTime,
 }
 
 impl TimeJump {
-    /// True for a step back that is no wrap.
+    /// Whether this is a backward step that is not a wrap.
     #[must_use]
     pub const fn backwards(self) -> bool {
         let range_us = RANGE as u64 * COUNT_US;
@@ -80,20 +79,19 @@ impl TimeJump {
     }
 }
 
-/// Follows the time base: it counts in steps of 0 or 1.
+/// Checks the time base, which must advance in steps of 0 or 1.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Watch {
     last: Option<u32>,
 }
 
 impl Watch {
-    /// Forgets what came before: at a start, and after a loss.
+    /// Resets the state: at a start, and after a loss.
     pub fn reset(&mut self) {
         self.last = None;
     }
 
-    /// Where in these whole words, in bytes, the time base makes a step of more than `most_us`, or back; the first such
-    /// place. Remembers nothing.
+    /// Byte position of the first step of more than `most_us`, or backward, in these whole words. Does not change the state.
     #[must_use]
     pub fn gap(&self, bytes: &[u8], most_us: u64) -> Option<usize> {
         let mut last = self.last;
@@ -110,7 +108,7 @@ impl Watch {
         None
     }
 
-    /// Looks at whole words, which had arrived at `arrived`, and hands over the jumps.
+    /// Examines whole words received at `arrived`, and reports jumps.
     pub fn look(&mut self, bytes: &[u8], arrived: HostTime, mut on_jump: impl FnMut(TimeJump)) {
         let (words, _) = bytes.as_chunks::<WORD>();
         for group in words.chunks(GROUP) {

@@ -1,40 +1,40 @@
-//! What is let pass although an EVK1 is not expected to do it, and the keys of a rig file that accept it.
+//! Accepted deviations of a camera, and the rig file keys that accept them.
 //!
-//! The public driver only logs a status byte other than 0x40, a reset that fails and a transfer that fails (OpenEB 3.1.2,
-//! `psee_libusb_board_command.cpp`). Nobody has seen which of them a healthy camera shows, so each is refused until a rig file
-//! accepts it; with everything tolerated all pass once, and are told.
+//! The public driver only logs a status byte other than 0x40, a failed reset and a failed transfer (OpenEB 3.1.2,
+//! `psee_libusb_board_command.cpp`). It is unknown which of these a healthy camera shows, so each is an error until a rig file accepts
+//! it. With everything tolerated, each passes and is reported.
 
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What is accepted of a camera.
+/// Accepted deviations.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Tolerance {
-    /// Status bytes of register reads, besides 0x40, with which the value counts.
+    /// Additional status bytes of valid register reads, besides 0x40.
     pub read_status: Vec<u8>,
-    /// A reset on the bus may fail.
+    /// Whether a reset on the bus may fail.
     pub failed_reset: bool,
-    /// A transfer that fails is a loss; otherwise it ends the stream. A stall, and a device that is gone, end it in any case.
+    /// Whether a failed transfer is a loss; otherwise it ends the stream. A stall or disconnection always ends it.
     pub failed_transfers: bool,
-    /// Everything above, and registers that read back differently. Each is told as a [`Mismatch`].
+    /// Accepts all of the above, and registers that read back differently. Each is reported as a [`Mismatch`].
     pub everything: bool,
 }
 
-/// A key of a camera in a rig file, with the value that accepts a mismatch.
+/// A camera key of the rig file that accepts a mismatch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Accept {
-    /// Register reads may come with this status byte.
+    /// Accepts register reads with this status byte.
     ReadStatus(u8),
-    /// A reset on the bus may fail.
+    /// Accepts a failed reset on the bus.
     FailedReset,
-    /// A transfer that fails is a loss.
+    /// Counts failed transfers as losses.
     FailedTransfers,
-    /// This register may read back differently.
+    /// Accepts that this register reads back differently.
     ReadBack(u32),
 }
 
 impl fmt::Display for Accept {
-    /// As in a rig file.
+    /// Formats the key as in a rig file.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::ReadStatus(status) => write!(f, "read_status: [\"{status:#04x}\"]"),
@@ -45,12 +45,12 @@ impl fmt::Display for Accept {
     }
 }
 
-/// Something that was tolerated, and what accepts it.
+/// A tolerated mismatch.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mismatch {
-    /// What accepts it.
+    /// The key that accepts it.
     pub key: Accept,
-    /// What was expected and found.
+    /// Expected and found values.
     pub what: String,
 }
 
@@ -60,7 +60,7 @@ impl fmt::Display for Mismatch {
     }
 }
 
-/// Everything that was tolerated, each once. Clones share it.
+/// All tolerated mismatches without duplicates. Clones share the list.
 #[derive(Debug, Clone, Default)]
 pub struct Mismatches(Arc<Mutex<Vec<Mismatch>>>);
 
@@ -69,7 +69,7 @@ impl Mismatches {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// All of them so far.
+    /// The mismatches so far.
     #[must_use]
     pub fn all(&self) -> Vec<Mismatch> {
         self.lock().clone()

@@ -1,4 +1,4 @@
-//! A camera of one of the models as an event camera.
+//! Adapter from a link to an `EventCamera`.
 
 use std::mem;
 
@@ -10,9 +10,9 @@ use skinrig_model::{
 
 use crate::link::{Link, LinkError, Packets};
 use crate::model::Model;
-use crate::wanted::Wanted;
+use crate::stream_settings::StreamSettings;
 
-/// A full chunk, bytes.
+/// Chunk size, bytes.
 const CHUNK_BYTES: usize = 1 << 20;
 
 /// A camera that sends EVT3 words.
@@ -22,25 +22,25 @@ pub struct Evt3Camera {
     serial: String,
     link: Box<dyn Link>,
     clock: Box<dyn Clock>,
-    wanted: Wanted,
+    settings: StreamSettings,
     stream: Option<Box<dyn Packets>>,
     scanner: Scanner,
     filling: Filling,
 }
 
-/// The chunk under way.
+/// The current chunk.
 #[derive(Default)]
 struct Filling {
     seq: u64,
     bytes: Vec<u8>,
     arrived: HostTime,
     lost_before: u64,
-    /// Packets dropped that have been counted.
+    /// Dropped packets already counted.
     dropped: u64,
 }
 
 impl Evt3Camera {
-    /// The camera of this model and serial number behind `link`; it is opened at every start. What it sends is stamped on `clock`.
+    /// The camera with this model and serial number behind `link`; it is opened at every start. Data is stamped with `clock`.
     #[must_use]
     pub fn new(
         model: Model,
@@ -55,7 +55,7 @@ impl Evt3Camera {
             serial: serial.to_owned(),
             link,
             clock,
-            wanted: Wanted::default(),
+            settings: StreamSettings::default(),
             stream: None,
             scanner: Scanner::with_geometry(StreamFormat::Evt3, model.geometry()),
             filling: Filling::default(),
@@ -87,7 +87,7 @@ impl Evt3Camera {
         })
     }
 
-    /// Takes every packet that is there.
+    /// Takes all available packets.
     fn catch_up(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
         let Some(mut stream) = self.stream.take() else {
             return Ok(());
@@ -109,17 +109,17 @@ impl Evt3Camera {
                 Ok(false) => break,
                 Err(error) => {
                     self.close(chunks);
-                    self.tell_last_loss(stream.dropped(), chunks);
+                    self.report_last_loss(stream.dropped(), chunks);
                     return Err(self.lost(&error));
                 }
             }
             if after_loss {
                 self.close(chunks);
-                let fresh = self.freshly_dropped(stream.dropped()).max(1);
-                // At most: how many bytes they held is not known.
+                let fresh = self.newly_dropped(stream.dropped()).max(1);
+                // An upper bound: the size of dropped packets is unknown.
                 self.filling.lost_before = fresh * most;
             }
-            // Two packets may be stamped in the same moment, never back.
+            // Packets may have the same time stamp, but never an earlier one.
             self.filling.arrived = self.filling.arrived.max(arrived);
             self.filling.bytes.append(&mut bytes);
             if self.filling.bytes.len() >= CHUNK_BYTES {
@@ -130,16 +130,15 @@ impl Evt3Camera {
         Ok(())
     }
 
-    /// How many of the `dropped` packets have not been counted yet; counts them.
-    fn freshly_dropped(&mut self, dropped: u64) -> u64 {
+    /// Number of the `dropped` packets that were not counted yet; counts them.
+    fn newly_dropped(&mut self, dropped: u64) -> u64 {
         let counted = mem::replace(&mut self.filling.dropped, dropped);
         dropped.saturating_sub(counted)
     }
 
-    /// At the end of a stream, of which `dropped` packets were dropped: those after the last one that arrived are told
-    /// by a chunk without bytes.
-    fn tell_last_loss(&mut self, dropped: u64, chunks: &mut Vec<RawChunk>) {
-        let fresh = self.freshly_dropped(dropped);
+    /// At the end of a stream with `dropped` dropped packets: reports those after the last received one in a chunk without bytes.
+    fn report_last_loss(&mut self, dropped: u64, chunks: &mut Vec<RawChunk>) {
+        let fresh = self.newly_dropped(dropped);
         if fresh > 0 {
             self.filling.lost_before = fresh * self.link.packet_bytes() as u64;
             self.filling.arrived = self.filling.arrived.max(self.clock.now());
@@ -147,7 +146,7 @@ impl Evt3Camera {
         }
     }
 
-    /// Closes the chunk under way, when there is anything to say.
+    /// Closes the current chunk if it has content.
     fn close(&mut self, chunks: &mut Vec<RawChunk>) {
         if self.filling.bytes.is_empty() && self.filling.lost_before == 0 {
             return;
@@ -178,7 +177,7 @@ impl EventCamera for Evt3Camera {
         DeviceIdentity {
             model: self.model.name().into(),
             serial: self.serial.clone(),
-            firmware: "unknown: the driver crate does not tell".into(),
+            firmware: "unknown: not reported by the driver crate".into(),
         }
     }
 
@@ -196,21 +195,21 @@ impl EventCamera for Evt3Camera {
 
     fn configure(&mut self, settings: &CameraSettings) -> Result<Vec<Setting>, DeviceError> {
         self.expect_stopped()?;
-        let wanted = Wanted::new(self.model, settings);
-        self.wanted = wanted.map_err(|(expected, found)| DeviceError::Refused {
+        let settings = StreamSettings::new(self.model, settings);
+        self.settings = settings.map_err(|e| DeviceError::Refused {
             role: self.role(),
             serial: self.serial.clone(),
-            expected,
-            found,
+            expected: e.expected,
+            found: e.found,
         })?;
-        Ok(self.wanted.settings())
+        Ok(self.settings.settings())
     }
 
     fn start(&mut self) -> Result<(), DeviceError> {
         self.expect_stopped()?;
-        let opened = self.link.stream(&self.wanted);
+        let opened = self.link.stream(&self.settings);
         self.stream = Some(opened.map_err(|e| self.lost(&e))?);
-        // A new stream: its words do not continue those of the last one, and its time begins anew.
+        // A new stream does not continue the words of the previous one, and its time restarts.
         self.scanner = Scanner::with_geometry(StreamFormat::Evt3, self.model.geometry());
         self.filling.dropped = 0;
         Ok(())
@@ -229,7 +228,7 @@ impl EventCamera for Evt3Camera {
     fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
         let flushed = self.flush(chunks);
         if let Some(stream) = self.stream.take() {
-            self.tell_last_loss(stream.dropped(), chunks);
+            self.report_last_loss(stream.dropped(), chunks);
         }
         flushed
     }

@@ -1,45 +1,45 @@
-//! The seam below the adapter: a camera that can be opened with settings and then gives packets.
+//! Interface below the adapter: a camera that is opened with settings and then returns packets.
 
 use std::time::Duration;
 
-use crate::wanted::Wanted;
+use crate::stream_settings::StreamSettings;
 
-/// The camera cannot be reached, or not any more; in the words of whoever tried.
+/// The camera cannot be reached; contains the error of the implementation.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct LinkError(pub String);
 
-/// Bytes that arrived together.
+/// Bytes received together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Packet<'a> {
     /// EVT3 words.
     pub bytes: &'a [u8],
-    /// How long ago they arrived.
+    /// Age of the packet on arrival here.
     pub age: Duration,
-    /// Packets were dropped just before this one.
+    /// Whether packets were dropped just before this one.
     pub after_loss: bool,
 }
 
-/// A camera that streams; it stops when this is dropped.
+/// A streaming camera; dropping it stops the stream.
 pub trait Packets: Send {
-    /// Hands the next packet to `take`, if there is one; never waits.
+    /// Passes the next packet to `take`, if there is one; never blocks.
     ///
     /// # Errors
-    /// When the stream has ended. Packets that came before are handed over first.
+    /// When the stream has ended. Earlier packets are passed on first.
     fn next(&mut self, take: &mut dyn FnMut(Packet<'_>)) -> Result<bool, LinkError>;
 
-    /// Packets dropped since the stream began.
+    /// Packets dropped since the start of the stream.
     fn dropped(&self) -> u64;
 }
 
-/// A camera of a known serial number.
+/// A camera with a known serial number.
 pub trait Link: Send {
-    /// The most bytes that a packet holds.
+    /// Maximum size of a packet, bytes.
     fn packet_bytes(&self) -> usize;
 
-    /// Opens it with these settings and lets it stream.
+    /// Opens it with these settings and starts the stream.
     ///
     /// # Errors
-    /// When it is not there, busy, or does not answer as it should.
-    fn stream(&mut self, wanted: &Wanted) -> Result<Box<dyn Packets>, LinkError>;
+    /// When it is missing, busy, or does not respond as expected.
+    fn stream(&mut self, settings: &StreamSettings) -> Result<Box<dyn Packets>, LinkError>;
 }

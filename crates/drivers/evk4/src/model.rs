@@ -1,10 +1,10 @@
-//! The cameras that neuromorphic-drivers opens over USB and that send EVT3 words, and what it offers of each.
+//! Cameras with EVT3 words that neuromorphic-drivers supports over USB, and the features it offers for each.
 
 use std::ops::RangeInclusive;
 
 use skinrig_formats::Geometry;
 
-/// A camera model. What is said of each is what neuromorphic-drivers 0.18 offers, not what the camera could do.
+/// A camera model. Features are those of neuromorphic-drivers 0.18, not those of the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Model {
     /// Prophesee EVK4 (IMX636): biases, trigger input, shared time base.
@@ -19,7 +19,7 @@ impl Model {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Evk4, Self::Evk3Hd, Self::SilkyVga];
 
-    /// The word that stands for it in a rig file.
+    /// Its name in a rig file.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -29,13 +29,13 @@ impl Model {
         }
     }
 
-    /// The model of this [word](Self::word).
+    /// The model with this [name in a rig file](Self::word).
     #[must_use]
     pub fn of_word(word: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|m| m.word() == word)
     }
 
-    /// Maker and name.
+    /// Manufacturer and name.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -45,7 +45,7 @@ impl Model {
         }
     }
 
-    /// Columns and rows of its sensor.
+    /// Size of its sensor.
     #[must_use]
     pub const fn geometry(self) -> Geometry {
         let (width, height) = match self {
@@ -55,8 +55,8 @@ impl Model {
         Geometry { width, height }
     }
 
-    /// Biases by name. Two more of an EVK4 have no name; those of a SilkyEvCam VGA are left alone, because neither their unit
-    /// nor what the sensor bears is stated anywhere.
+    /// Bias names. Two more of an EVK4 have no name; those of a SilkyEvCam VGA are not offered, because neither their unit nor the sensor's
+    /// limits are documented.
     #[must_use]
     pub const fn biases(self) -> &'static [&'static str] {
         match self {
@@ -80,8 +80,8 @@ impl Model {
         }
     }
 
-    /// What a bias may be: for an EVK4 an offset from the value in the sensor's memory (a register of eight bits holds both
-    /// together), for an EVK3 HD the register's value.
+    /// Bias range: for an EVK4 an offset from the value in the sensor's memory (an 8-bit register holds the sum), for an EVK3 HD the register
+    /// value.
     #[must_use]
     pub(crate) const fn bias_range(self) -> RangeInclusive<i16> {
         match self {
@@ -90,8 +90,7 @@ impl Model {
         }
     }
 
-    /// The trigger inputs that can be switched on (metavision_driver, `config/trigger_pins.yaml`, gives the main input of
-    /// every model as channel 0).
+    /// Available trigger inputs (metavision_driver, `config/trigger_pins.yaml`, lists the main input of every model as channel 0).
     #[must_use]
     pub const fn trigger_channels(self) -> &'static [u8] {
         match self {
@@ -100,7 +99,7 @@ impl Model {
         }
     }
 
-    /// Whether it can give its time base to another camera, or take another's.
+    /// Whether it can share its time base with another camera.
     #[must_use]
     pub(crate) const fn shares_time_base(self) -> bool {
         matches!(self, Self::Evk4)

@@ -1,4 +1,4 @@
-//! The real cameras, by neuromorphic-drivers.
+//! Links to real cameras, based on neuromorphic-drivers.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,9 +11,9 @@ use neuromorphic_drivers::{
 
 use crate::link::{Link, LinkError, Packet, Packets};
 use crate::model::Model;
-use crate::wanted::{TimeBase, Wanted};
+use crate::stream_settings::{StreamSettings, TimeBase};
 
-/// The camera of one model and serial number.
+/// A camera by model and serial number.
 #[derive(Debug, Clone)]
 pub struct Neuromorphic {
     model: Model,
@@ -21,7 +21,7 @@ pub struct Neuromorphic {
 }
 
 impl Neuromorphic {
-    /// The camera with this serial number, as [`enumerate`] tells it: eight upper-case hexadecimal digits.
+    /// The camera with this serial number, as returned by [`enumerate`]: eight upper-case hexadecimal digits.
     #[must_use]
     pub fn new(model: Model, serial: &str) -> Self {
         Self {
@@ -41,11 +41,11 @@ impl Link for Neuromorphic {
         ring.buffer_length
     }
 
-    fn stream(&mut self, wanted: &Wanted) -> Result<Box<dyn Packets>, LinkError> {
+    fn stream(&mut self, settings: &StreamSettings) -> Result<Box<dyn Packets>, LinkError> {
         let serial = &self.serial;
         match self.model {
-            Model::Evk4 => open::<prophesee_evk4::Device>(serial, evk4(wanted)),
-            Model::Evk3Hd => open::<prophesee_evk3_hd::Device>(serial, evk3_hd(wanted)),
+            Model::Evk4 => open::<prophesee_evk4::Device>(serial, evk4(settings)),
+            Model::Evk3Hd => open::<prophesee_evk3_hd::Device>(serial, evk3_hd(settings)),
             Model::SilkyVga => {
                 open::<centuryarks_vga::Device>(serial, centuryarks_vga::DEFAULT_CONFIGURATION)
             }
@@ -59,7 +59,7 @@ where
     D::Error: std::fmt::Display,
     Error: From<D::Error>,
 {
-    let (flag, event_loop) = flag_and_event_loop().map_err(told)?;
+    let (flag, event_loop) = flag_and_event_loop().map_err(link_error)?;
     let device = D::open(
         Identifier::Serial(serial),
         configuration,
@@ -67,7 +67,7 @@ where
         Arc::clone(&event_loop),
         flag.clone(),
     )
-    .map_err(told)?;
+    .map_err(link_error)?;
     Ok(Box::new(Stream {
         device,
         flag,
@@ -78,7 +78,7 @@ where
 struct Stream<D> {
     device: D,
     flag: Flag<Error, UsbOverflow>,
-    /// Moves the transfers; ends after the device.
+    /// Runs the transfers; dropped after the device.
     _event_loop: Arc<UsbEventLoop>,
 }
 
@@ -92,7 +92,7 @@ impl<D: UsbDevice + Send> Packets for Stream<D> {
             });
             return Ok(true);
         }
-        self.flag.load_error().map(|()| false).map_err(told)
+        self.flag.load_error().map(|()| false).map_err(link_error)
     }
 
     fn dropped(&self) -> u64 {
@@ -100,11 +100,11 @@ impl<D: UsbDevice + Send> Packets for Stream<D> {
     }
 }
 
-fn told(error: impl std::fmt::Display) -> LinkError {
+fn link_error(error: impl std::fmt::Display) -> LinkError {
     LinkError(error.to_string())
 }
 
-fn evk4(wanted: &Wanted) -> prophesee_evk4::Configuration {
+fn evk4(settings: &StreamSettings) -> prophesee_evk4::Configuration {
     use prophesee_evk4::Clock;
     let mut all = prophesee_evk4::DEFAULT_CONFIGURATION;
     let biases = &mut all.biases;
@@ -121,20 +121,20 @@ fn evk4(wanted: &Wanted) -> prophesee_evk4::Configuration {
         ("reqpuy", &mut biases.reqpuy),
         ("sendreqpdy", &mut biases.sendreqpdy),
     ] {
-        if let Some(offset) = wanted.biases.get(name) {
+        if let Some(offset) = settings.biases.get(name) {
             *to = *offset;
         }
     }
-    all.enable_external_trigger = wanted.trigger;
-    all.clock = match wanted.time_base {
-        TimeBase::Own => Clock::Internal,
-        TimeBase::Given => Clock::InternalWithOutputEnabled,
-        TimeBase::Taken => Clock::External,
+    all.enable_external_trigger = settings.trigger;
+    all.clock = match settings.time_base {
+        TimeBase::Standalone => Clock::Internal,
+        TimeBase::Master => Clock::InternalWithOutputEnabled,
+        TimeBase::Slave => Clock::External,
     };
     all
 }
 
-fn evk3_hd(wanted: &Wanted) -> prophesee_evk3_hd::Configuration {
+fn evk3_hd(settings: &StreamSettings) -> prophesee_evk3_hd::Configuration {
     let mut all = prophesee_evk3_hd::DEFAULT_CONFIGURATION;
     let biases = &mut all.biases;
     for (name, to) in [
@@ -149,47 +149,50 @@ fn evk3_hd(wanted: &Wanted) -> prophesee_evk3_hd::Configuration {
         ("refr", &mut biases.refr),
         ("reqpuy", &mut biases.reqpuy),
     ] {
-        // In range: `Wanted` was checked.
-        if let Some(value) = wanted.biases.get(name).and_then(|v| u8::try_from(*v).ok()) {
+        // In range: `StreamSettings` was checked.
+        if let Some(value) = settings
+            .biases
+            .get(name)
+            .and_then(|v| u8::try_from(*v).ok())
+        {
             *to = value;
         }
     }
     all
 }
 
-/// A device with the USB numbers of one of the models.
+/// A device with the USB IDs of one of the models.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Found {
-    /// Bus and address, as `lsusb` shows them.
+    /// Bus and address, as shown by `lsusb`.
     pub place: (u8, u8),
-    /// What came of asking it.
+    /// State of the device.
     pub state: FoundState,
 }
 
-/// What came of asking a device.
+/// State of a device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FoundState {
-    /// A camera that can be opened, with its serial number.
+    /// A usable camera with its serial number.
     Ready(Model, String),
-    /// Held by another program; not asked.
+    /// In use by another program; not queried.
     Busy,
-    /// May not be opened by this user; not asked.
+    /// This user has no permission; not queried.
     NoPermission,
-    /// None of the models.
+    /// Not one of the models.
     Other,
-    /// It did not answer as it should.
+    /// It did not respond as expected.
     Faulty(String),
 }
 
-/// Every device on the bus with the USB numbers of one of the models, but for those at the places `known` (bus, address),
-/// which are not touched.
+/// Lists all devices with the USB IDs of one of the models, except those at the addresses `known` (bus, address), which are not touched.
 ///
 /// # Errors
-/// On a machine without USB.
+/// On a computer without USB.
 pub fn enumerate(known: &[(u8, u8)]) -> Result<Vec<Found>, LinkError> {
-    let context = rusb::Context::new().map_err(told)?;
+    let context = rusb::Context::new().map_err(link_error)?;
     let mut found = Vec::new();
-    for device in context.devices().map_err(told)?.iter() {
+    for device in context.devices().map_err(link_error)?.iter() {
         let place = (device.bus_number(), device.address());
         let Ok(descriptor) = device.device_descriptor() else {
             continue;
@@ -239,24 +242,24 @@ mod tests {
 
     #[test]
     fn every_bias_and_mode_has_its_place_in_the_configuration() {
-        let defaults = Wanted::default();
+        let defaults = StreamSettings::default();
         for model in Model::ALL {
             for name in model.biases() {
-                let mut wanted = Wanted::default();
-                wanted.biases.insert((*name).to_owned(), 7);
+                let mut settings = StreamSettings::default();
+                settings.biases.insert((*name).to_owned(), 7);
                 let (before, said) = match model {
-                    Model::Evk4 => (evk4(&defaults).biases, evk4(&wanted).biases).said(),
-                    _ => (evk3_hd(&defaults).biases, evk3_hd(&wanted).biases).said(),
+                    Model::Evk4 => (evk4(&defaults).biases, evk4(&settings).biases).said(),
+                    _ => (evk3_hd(&defaults).biases, evk3_hd(&settings).biases).said(),
                 };
                 assert_ne!(before, said, "{name}");
                 assert!(said.contains(&format!(" {name}: 7")), "{name} in {said}");
             }
         }
         assert!(!evk4(&defaults).enable_external_trigger);
-        let slave = Wanted {
+        let slave = StreamSettings {
             trigger: true,
-            time_base: TimeBase::Taken,
-            ..Wanted::default()
+            time_base: TimeBase::Slave,
+            ..StreamSettings::default()
         };
         let slave = evk4(&slave);
         assert!(slave.enable_external_trigger);
@@ -278,7 +281,7 @@ mod tests {
         for model in Model::ALL {
             assert_eq!(stated(model), sensor(model), "{}", model.word());
             let mut link = Neuromorphic::new(model, "FFFFFFFF");
-            assert!(link.stream(&Wanted::default()).is_err());
+            assert!(link.stream(&StreamSettings::default()).is_err());
         }
     }
 

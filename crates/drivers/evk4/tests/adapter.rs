@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
 
 use skinrig_device::{CameraSettings, Clock, DeviceError, EventCamera, SyncMode};
-use skinrig_evk4::{Evt3Camera, Link, LinkError, Model, Packet, Packets, TimeBase, Wanted};
+use skinrig_evk4::{Evt3Camera, Link, LinkError, Model, Packet, Packets, StreamSettings, TimeBase};
 use skinrig_model::{CameraId, HostTime, RawChunk};
 
 const PACKET: usize = 128 << 10;
@@ -13,9 +13,9 @@ const MS: i64 = 1_000_000;
 
 /// A clock that jumps.
 #[derive(Clone, Default)]
-struct Jumping(Arc<AtomicI64>);
+struct JumpingClock(Arc<AtomicI64>);
 
-impl Clock for Jumping {
+impl Clock for JumpingClock {
     fn now(&self) -> HostTime {
         HostTime(self.0.load(Ordering::Relaxed))
     }
@@ -28,7 +28,7 @@ impl Clock for Jumping {
 /// A camera that sends a packet every millisecond: a time, a row, an event and a trigger edge. Its time goes on.
 #[derive(Clone, Default)]
 struct Script {
-    clock: Jumping,
+    clock: JumpingClock,
     /// Packets from this one to the next are dropped.
     drops: Option<(i64, i64)>,
     /// From this packet on, all are dropped.
@@ -48,8 +48,8 @@ impl Link for Script {
         PACKET
     }
 
-    fn stream(&mut self, wanted: &Wanted) -> Result<Box<dyn Packets>, LinkError> {
-        assert_eq!(wanted.trigger, wanted.time_base == TimeBase::Given);
+    fn stream(&mut self, settings: &StreamSettings) -> Result<Box<dyn Packets>, LinkError> {
+        assert_eq!(settings.trigger, settings.time_base == TimeBase::Master);
         Ok(Box::new(Running {
             next_ms: self.clock.now().0 / MS,
             script: self.clone(),
@@ -163,7 +163,7 @@ fn what_a_model_lacks_is_refused_in_its_own_words() {
     let refused = |model: Model, spoil: &dyn Fn(&mut CameraSettings)| {
         let mut all = settings(model);
         spoil(&mut all);
-        Wanted::new(model, &all).unwrap_err().0
+        StreamSettings::new(model, &all).unwrap_err().expected
     };
     let trigger = |s: &mut CameraSettings| s.trigger_channels = vec![0];
     let slave = |s: &mut CameraSettings| s.sync = SyncMode::Slave;
@@ -176,7 +176,7 @@ fn what_a_model_lacks_is_refused_in_its_own_words() {
     }
     assert_eq!(refused(Model::Evk3Hd, &bias), "diff_on in 0..=255");
     assert!(refused(Model::SilkyVga, &bias).contains("keep their defaults"));
-    assert!(Wanted::new(Model::Evk4, &settings(Model::Evk4)).is_ok());
+    assert!(StreamSettings::new(Model::Evk4, &settings(Model::Evk4)).is_ok());
 }
 
 #[test]

@@ -1,8 +1,8 @@
-//! The robot frame's axes on the device's: a right-handed permutation with signs.
+//! Mapping between the axes of the robot frame and of the device: a right-handed signed permutation.
 
 use skinrig_model::{Point3, Robot};
 
-/// One axis of the device: x out of the base toward the operator, y to the operator's right, z up.
+/// An axis of the device: x out of the base toward the operator, y to the operator's right, z up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Axis {
     /// Along +x.
@@ -32,17 +32,17 @@ impl Axis {
     }
 }
 
-/// Which axis of the device each axis of the robot frame is. Robot +z points away from the sample: pressing is -z.
+/// Device axis of each robot axis. Robot +z points away from the sample, so pressing is -z.
 ///
 /// An omega.3 that stands on the table and presses down has the identity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Axes([Axis; 3]);
 
 impl Axes {
-    /// The robot frame is the device's.
+    /// Robot frame and device frame agree.
     pub const IDENTITY: Self = Self([Axis::PlusX, Axis::PlusY, Axis::PlusZ]);
 
-    /// The device axes that robot x, y and z are; `None` unless they are different and right-handed.
+    /// The device axes of robot x, y and z; `None` unless they are distinct and right-handed.
     #[must_use]
     pub fn new(axes: [Axis; 3]) -> Option<Self> {
         let mut m = [[0.0; 3]; 3];
@@ -56,7 +56,7 @@ impl Axes {
         (det > 0.5).then_some(Self(axes))
     }
 
-    /// A vector of the device in the robot frame.
+    /// Converts a device vector to the robot frame.
     #[must_use]
     pub(crate) fn robot_from_device(self, v: [f64; 3]) -> [f64; 3] {
         self.0.map(|axis| {
@@ -65,7 +65,7 @@ impl Axes {
         })
     }
 
-    /// A vector of the robot frame on the device's axes.
+    /// Converts a robot vector to the device axes.
     #[must_use]
     pub(crate) fn device_from_robot(self, v: [f64; 3]) -> [f64; 3] {
         let mut out = [0.0; 3];
@@ -76,14 +76,14 @@ impl Axes {
         out
     }
 
-    /// A position of the device, m, as a point of the robot frame, mm.
+    /// Converts a device position, m, to a point of the robot frame, mm.
     #[must_use]
     pub(crate) fn point_from_metres(self, position_m: [f64; 3]) -> Point3<Robot> {
         let [x, y, z] = self.robot_from_device(position_m).map(|c| c * 1e3);
         Point3::new(x, y, z)
     }
 
-    /// A point of the robot frame, mm, as a position of the device, m.
+    /// Converts a point of the robot frame, mm, to a device position, m.
     #[must_use]
     pub(crate) fn metres_from_point(self, point: Point3<Robot>) -> [f64; 3] {
         self.device_from_robot(point.to_array()).map(|c| c * 1e-3)
@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_right_handed_frames_exist_and_they_go_there_and_back() {
+    fn only_right_handed_mappings_exist_and_they_round_trip() {
         let all = [
             Axis::PlusX,
             Axis::MinusX,

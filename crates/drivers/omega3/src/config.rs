@@ -1,39 +1,39 @@
-//! What the driver is told about one robot: plain data, every value with its unit, its default and where that came from.
+//! Configuration of one robot: plain data with units, defaults and their sources.
 
 use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::axes::Axes;
 
-/// Everything the driver has to be told. The defaults are cautious; nothing in here comes from the device.
+/// Complete configuration. The defaults are cautious; no value comes from the device.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OmegaConfig {
-    /// The vendor's library. `None`: environment and usual places, see [`crate::load::places`].
+    /// Path of the vendor's library. `None`: searched, see [`crate::load::search_paths`].
     pub library: Option<PathBuf>,
-    /// Serial number of the robot of this bench; any other is refused. `None` takes the only free robot.
+    /// Serial number of this bench's robot; any other is rejected. `None` accepts the only free robot.
     pub serial: Option<u16>,
-    /// Further type numbers to accept besides 33 (omega.3); legacy firmware is said to report 110.
+    /// Type numbers to accept besides 33 (omega.3); legacy firmware is said to report 110.
     pub also_accept_types: Vec<i32>,
-    /// How the robot stands and what hangs on it.
+    /// Mounting of the robot and its effector.
     pub mount: Mount,
-    /// Where it may go and how hard it may push.
+    /// Limits of position, speed and force.
     pub envelope: Envelope,
-    /// How its set point moves.
+    /// Motion of the set point.
     pub motion: Motion,
-    /// The gains of the vendor's position regulation.
+    /// Gains of the vendor's position regulation.
     pub gains: Gains,
-    /// When the driver stops the robot by itself.
+    /// Limits at which the driver stops the robot.
     pub trips: Trips,
-    /// The device's own watchdog.
+    /// The device's watchdog.
     pub watchdog: Watchdog,
     /// Whether the robot may initialise itself, which moves the arm through its workspace.
     pub initialise: Initialise,
-    /// What a robot must report of redundant encoders.
+    /// Requirement on the redundant encoders.
     pub redundant_encoders: RedundantEncoders,
-    /// The process that brakes the arm when this one dies.
+    /// Process that brakes the arm if this one dies.
     pub supervisor: Option<SupervisorCommand>,
-    /// How long calls and procedures may take.
-    pub patience: Patience,
+    /// Time limits of calls and procedures.
+    pub timeouts: Timeouts,
 }
 
 impl Default for OmegaConfig {
@@ -51,24 +51,23 @@ impl Default for OmegaConfig {
             initialise: Initialise::Never,
             redundant_encoders: RedundantEncoders::Reported,
             supervisor: None,
-            patience: Patience::default(),
+            timeouts: Timeouts::default(),
         }
     }
 }
 
-/// How the robot stands and what hangs on it.
+/// Mounting of the robot and its effector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mount {
-    /// Rotation of the base about its inverted y axis, degrees: 0 upright, 90 with the plate lying flat. A wrong
-    /// value makes gravity compensation push the arm away.
+    /// Rotation of the base about its inverted y axis, degrees: 0 upright, 90 with the plate lying flat. A wrong value makes gravity
+    /// compensation push the arm away.
     pub device_angle_deg: f64,
-    /// Mass at the end of the arm, kg. `None` keeps what the device reports: its default is not published, and too
-    /// large a value lifts the arm.
+    /// Mass at the end of the arm, kg. `None` keeps the device's value. Its default is not published; too large a value lifts the arm.
     pub effector_mass_kg: Option<f64>,
-    /// Which axes of the device the robot frame's axes are.
+    /// Device axes of the robot frame.
     pub axes: Axes,
-    /// +1 when the library reports the force with which the motors push the tip, -1 when it reports the force with
-    /// which the tip pushes back. Public sources say the former; to be checked against a load cell.
+    /// +1 if the library reports the force of the motors on the tip, -1 if it reports the force of the tip on the motors. Public sources
+    /// state the former; check it with a load cell.
     pub reported_force_sign: f64,
 }
 
@@ -83,30 +82,30 @@ impl Default for Mount {
     }
 }
 
-/// Where the robot may go and how hard it may push, whatever a run asks for.
+/// Limits that hold whatever a run requests.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Envelope {
     /// Smallest coordinates, robot frame, mm.
     pub min_mm: [f64; 3],
     /// Largest coordinates, robot frame, mm.
     pub max_mm: [f64; 3],
-    /// Fastest set point, mm/s.
+    /// Largest speed of the set point, mm/s.
     pub max_speed_mm_s: f64,
-    /// Largest force, N; an omega.3 exerts 12.
+    /// Largest force, N; the maximum of an omega.3 is 12.
     pub max_force_n: f64,
-    /// Tip force per unit of motor ratio, N. Naively the full 12 N; the true factor depends on the pose: take the
-    /// largest force divided by its ratio that a scale showed anywhere in the workspace.
+    /// Tip force per unit of motor ratio, N. Nominally the full 12 N; the true factor depends on the pose. Measure force divided by ratio
+    /// with a scale in several places and use the largest value.
     pub n_per_ratio: f64,
-    /// Largest motor ratio, whatever force a run allows.
+    /// Largest motor ratio, whatever force a run requests.
     pub max_ratio: f64,
-    /// Share of the motor ratio that gravity compensation takes; 0 until measured.
+    /// Share of the motor ratio that gravity compensation needs; 0 until measured.
     pub gravity_ratio: f64,
-    /// Smallest motor ratio with which the arm still carries itself; to be measured.
+    /// Smallest motor ratio at which the motors still carry the arm; to be measured.
     pub least_ratio: f64,
 }
 
 impl Default for Envelope {
-    /// The vendor's public examples keep within ±40 mm of (20, 0, 0) mm.
+    /// The vendor's public examples stay within ±40 mm of (20, 0, 0) mm.
     fn default() -> Self {
         Self {
             min_mm: [-20.0, -40.0, -40.0],
@@ -122,34 +121,34 @@ impl Default for Envelope {
 }
 
 impl Envelope {
-    /// Motor ratio that caps the tip at `force_n`: `gravity_ratio + force_n / n_per_ratio`, at most `max_ratio`.
+    /// Motor ratio that limits the tip force to `force_n`: `gravity_ratio + force_n / n_per_ratio`, at most `max_ratio`.
     #[must_use]
     pub(crate) fn ratio_of(&self, force_n: f64) -> f64 {
         (self.gravity_ratio + force_n / self.n_per_ratio).min(self.max_ratio)
     }
 }
 
-/// How the set point moves: along straight lines, streamed to the regulation.
+/// Motion of the set point along straight lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
     /// Largest acceleration, mm/s².
     pub acceleration_mm_s2: f64,
     /// Largest change of acceleration, mm/s³.
     pub jerk_mm_s3: f64,
-    /// Set points and samples per second; the device's loop runs at about 4 kHz, and samples are promised at half
-    /// of this rate because an operating system without real time sometimes comes late.
+    /// Set points and samples per second. The device's loop runs at about 4 kHz. The driver promises samples at half this rate, because
+    /// cycles can be late without a real-time operating system.
     pub cycle_hz: f64,
-    /// Samples per second while the arm is braked; each costs an exchange on USB.
+    /// Samples per second while the arm is braked; each costs a USB transfer.
     pub parked_hz: f64,
     /// Largest step of the set point, mm.
     pub max_step_mm: f64,
-    /// Largest distance of the set point ahead of the measured tip, mm. Set point times stiffness is force.
+    /// Largest distance between set point and measured tip, mm. This lead times the stiffness is the force.
     pub max_lead_mm: f64,
-    /// Rate at which a resting set point is moved on until the tip itself is there, 1/s; 0: not at all, and the tip
-    /// stops short by force divided by stiffness. Must be slow against the regulation.
+    /// Rate at which a resting set point is corrected until the tip arrives, 1/s. With 0 the tip stops short by force divided by stiffness.
+    /// Must be slow compared with the regulation.
     pub correction_per_s: f64,
-    /// The regulation's own filter is given this many times our speed, acceleration and jerk, so that it rounds but
-    /// does not delay. Never the library's defaults, which reach 1 m/s.
+    /// Limits of the regulation's own filter as a multiple of ours, so that it smooths without delay. The library's defaults allow 1 m/s
+    /// and are never used.
     pub filter_headroom: f64,
 }
 
@@ -168,14 +167,14 @@ impl Default for Motion {
     }
 }
 
-/// Gains of the encoder-space regulation. Units and defaults are not published.
+/// Gains of the regulation in encoder space. Units and defaults are not published.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gains {
-    /// Proportional gain; `None` keeps the library's.
+    /// Proportional gain; `None` keeps the library's value.
     pub p: Option<f64>,
-    /// Integral gain. With 0 a blocked tip is held by proportional force alone instead of a force that ramps up.
+    /// Integral gain. With 0, a blocked tip is held by proportional force instead of a growing force.
     pub i: Option<f64>,
-    /// Derivative gain; `None` keeps the library's.
+    /// Derivative gain; `None` keeps the library's value.
     pub d: Option<f64>,
 }
 
@@ -189,32 +188,31 @@ impl Default for Gains {
     }
 }
 
-/// When the driver brakes the arm by itself.
+/// Limits at which the driver brakes the arm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trips {
-    /// Brakes at this multiple of the run's force limit; at the limit itself the tip stops and may only rise.
+    /// Brake at this multiple of the run's force limit. At the limit itself the tip stops and may only rise.
     pub hard_force_factor: f64,
-    /// Largest force with which the arm may hang still when armed, N: more means that it touches something.
+    /// Largest force at rest when arming, N. A larger force means that the arm touches something.
     pub max_tare_n: f64,
-    /// How long the force is averaged while the arm hangs still after arming, to be subtracted from then on.
+    /// Averaging time of the force at rest, which is subtracted from later readings.
     pub tare: Duration,
-    /// Largest spread of the force, per axis, in that time, N: more means that the arm is not still yet.
+    /// Largest spread of the force per axis in that time, N. A larger spread means that the arm still moves.
     pub max_tare_spread_n: f64,
     /// Largest credible speed of the tip between two samples, mm/s.
     pub max_tip_speed_mm_s: f64,
-    /// Largest credible jump between two samples beyond that, mm.
+    /// Largest credible jump between two samples in addition to that, mm.
     pub max_jump_mm: f64,
-    /// Distance from the set point at which the arm is braked, mm; above [`Motion::max_lead_mm`].
+    /// Distance between tip and set point that brakes the arm, mm; above [`Motion::max_lead_mm`].
     pub max_deviation_mm: f64,
     /// Longest time without a new reading.
     pub max_silence: Duration,
-    /// Slowest regulation loop, kHz.
+    /// Smallest rate of the regulation loop, kHz.
     pub min_control_khz: f64,
-    /// How far outside the run's box the tip may be measured, mm.
+    /// Tolerated distance of the tip outside the run's box, mm.
     pub box_margin_mm: f64,
-    /// Longest time without a poll or a command while the motors are live: whoever drives the arm may hang while the
-    /// regulation goes on pushing. 2 s is far above the milliseconds between two polls, and bounds how long the skin
-    /// is pressed unseen.
+    /// Longest time without a poll or a command while the motors are live: the controlling program may hang while the regulation keeps
+    /// pushing. 2 s is far above the milliseconds between two polls, and limits how long the skin is pressed unsupervised.
     pub max_unwatched: Duration,
 }
 
@@ -236,61 +234,61 @@ impl Default for Trips {
     }
 }
 
-/// The device's own watchdog: without a command for this long it switches its motors off and brakes.
+/// The device's watchdog: without a command for this long it switches its motors off and brakes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Watchdog {
-    /// Armed with this time, ms: at most 31.875, in steps of 0.125.
+    /// Timeout, ms: at most 31.875, in steps of 0.125.
     ArmMilliseconds(f64),
-    /// Switched off. Only with a supervisor.
+    /// Off. Allowed only with a supervisor.
     Off,
 }
 
 /// Whether the robot may initialise itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Initialise {
-    /// Never: an uninitialised robot is refused, and the operator told what to do.
+    /// Never: a robot that is not initialised is rejected.
     Never,
-    /// The sample and the tools are off the bench, hands are clear: the arm may move through its whole workspace.
+    /// Allowed: the sample and tools are off the bench and hands are clear, because the arm may move through its whole workspace.
     SampleIsOff,
 }
 
-/// What a robot must report of redundant encoders (word 13 of the status vector). By public texts derived from the vendor's, 0 means
-/// that their check failed *or that there are none*; some devices report -1 for none. An omega.3 is not documented to have any.
+/// Requirement on redundant encoders (word 13 of the status vector). According to public sources, 0 means that their check failed *or
+/// that there are none*; some devices report -1 for none. No source says that an omega.3 has them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RedundantEncoders {
-    /// Whatever it reports is accepted and recorded; 0 also becomes a remark.
+    /// Accept and record any value; 0 also becomes a remark.
     Reported,
-    /// 1 is required: for a robot that is known to have them.
+    /// Require 1, for a robot that is known to have them.
     Required,
 }
 
-/// The command that runs [`crate::supervisor::supervise`] on its standard input.
+/// Command that runs [`crate::supervisor::supervise`] on its standard input.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SupervisorCommand {
-    /// The program, mostly this one.
+    /// Program, usually this one.
     pub program: PathBuf,
     /// Its arguments.
     pub arguments: Vec<String>,
 }
 
-/// How long calls and procedures may take.
+/// Time limits of calls and procedures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Patience {
-    /// A request to the thread that owns the library.
+pub struct Timeouts {
+    /// Reply of the thread that owns the library.
     pub reply: Duration,
     /// Opening without initialisation.
     pub open: Duration,
-    /// Initialisation; its duration is not published.
+    /// Initialisation; its usual duration is not published.
     pub initialise: Duration,
-    /// From the start of the regulation to its loop at full rate.
+    /// From starting the regulation until its loop runs at full rate.
     pub regulation: Duration,
     /// Pause between attempts to brake.
     pub brake_retry: Duration,
-    /// Attempts to brake.
+    /// Maximum number of attempts to brake.
     pub brake_attempts: u32,
 }
 
-impl Default for Patience {
+impl Default for Timeouts {
     fn default() -> Self {
         Self {
             reply: Duration::from_secs(2),
@@ -304,10 +302,10 @@ impl Default for Patience {
 }
 
 impl OmegaConfig {
-    /// Checks every value.
+    /// Validates all values.
     ///
     /// # Errors
-    /// The first value that makes no sense: name, what was expected, what was found.
+    /// The first invalid value: name, expected and found.
     pub fn check(&self) -> Result<(), BadValue> {
         let positive = |name, value: f64| {
             let good = value > 0.0 && value.is_finite();
@@ -369,7 +367,7 @@ impl OmegaConfig {
             "1 or -1",
             sign,
         )?;
-        // The step limit holds at full speed, with a cycle twice as long as it should be.
+        // The step limit must hold at full speed even if a cycle takes twice as long.
         let fastest = m.max_step_mm * m.cycle_hz / 2.0;
         within("envelope.max_speed_mm_s", e.max_speed_mm_s, 0.0, fastest)?;
         let lead = m.max_lead_mm;
@@ -398,7 +396,7 @@ impl OmegaConfig {
             Watchdog::Off => bad_unless(
                 self.supervisor.is_some(),
                 "watchdog",
-                "armed, or a supervisor process to stand in for it",
+                "armed, or a supervisor process as a substitute",
                 f64::NAN,
             )?,
         }
@@ -406,18 +404,18 @@ impl OmegaConfig {
     }
 }
 
-/// Force of an omega.3, N (chai3d and the ROS 2 driver, both public, use this figure).
+/// Largest force of an omega.3, N (used by chai3d and the ROS 2 driver, both public).
 const DEVICE_MAX_N: f64 = 12.0;
 
-/// A value of the configuration that makes no sense.
+/// An invalid configuration value.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("omega.3 configuration: {name}: expected {expected}, found {found}")]
 pub struct BadValue {
-    /// Which value.
+    /// Name of the value.
     pub name: &'static str,
-    /// What is possible.
+    /// Allowed values.
     pub expected: String,
-    /// What was given.
+    /// Configured value.
     pub found: String,
 }
 
@@ -437,7 +435,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_defaults_are_sound_and_nonsense_is_named() {
+    fn the_defaults_are_valid_and_invalid_values_are_named() {
         assert_eq!(OmegaConfig::default().check(), Ok(()));
         type Spoil = fn(&mut OmegaConfig);
         let spoilt: [(&str, Spoil); 11] = [
@@ -469,7 +467,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ratio_caps_the_force() {
+    fn the_motor_ratio_limits_the_force() {
         let envelope = Envelope {
             n_per_ratio: 10.0,
             gravity_ratio: 0.1,

@@ -1,13 +1,13 @@
-//! What is added to the set point so that the tip itself arrives.
+//! Offset on the set point that makes the tip itself arrive.
 //!
-//! A regulation without integral gain stops short of its target by force divided by stiffness; with it, the force on a
-//! blocked tip grows without a bound of ours. So the error is integrated here, where lead, step and force are bounded:
-//! slowly, while the set point rests, and forgotten at the same rate while it moves.
+//! Without integral gain the regulation stops short of its target by force divided by stiffness; with it, the force on a blocked tip
+//! grows without a limit of ours. So the driver integrates the error itself, with limits on lead, step and force: slowly while the set
+//! point rests; the offset decays at the same rate while it moves.
 
 use crate::config::Motion;
 use crate::trajectory::distance;
 
-/// The offset.
+/// The offset and its state.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Correction {
     limits: Motion,
@@ -16,7 +16,7 @@ pub(crate) struct Correction {
 }
 
 impl Correction {
-    /// None yet; the last target was `sent_mm`.
+    /// No offset yet; the last target was `sent_mm`.
     pub(crate) const fn none(limits: Motion, sent_mm: [f64; 3]) -> Self {
         Self {
             limits,
@@ -25,13 +25,13 @@ impl Correction {
         }
     }
 
-    /// The tip as it would be without the offset: what the lead of the set point is measured from.
-    pub(crate) fn without(&self, tip_mm: [f64; 3]) -> [f64; 3] {
+    /// The tip without the offset, as the reference for the lead of the set point.
+    pub(crate) fn uncorrected_tip(&self, tip_mm: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|i| tip_mm[i] - self.offset_mm[i])
     }
 
-    /// The next target: `set_point_mm` and the offset, at most one step from the last one. `resting` says whether the
-    /// set point rests, and may be corrected.
+    /// The next target: `set_point_mm` plus the offset, at most one step from the previous target. `resting`: whether the set point rests
+    /// and may be corrected; `None` freezes the offset.
     pub(crate) fn target(
         &mut self,
         set_point_mm: [f64; 3],
@@ -51,12 +51,12 @@ impl Correction {
         if far <= self.limits.max_lead_mm || far <= lead(add(self.offset_mm)) {
             self.offset_mm = next;
         }
-        let wanted: [f64; 3] = add(self.offset_mm);
-        let step = distance(wanted, self.sent_mm);
+        let requested: [f64; 3] = add(self.offset_mm);
+        let step = distance(requested, self.sent_mm);
         let share = (self.limits.max_step_mm / step).min(1.0);
         if step > 0.0 {
-            for (sent, wanted) in self.sent_mm.iter_mut().zip(wanted) {
-                *sent += share * (wanted - *sent);
+            for (sent, requested) in self.sent_mm.iter_mut().zip(requested) {
+                *sent += share * (requested - *sent);
             }
         }
         self.sent_mm
@@ -70,10 +70,10 @@ mod tests {
     const DT: f64 = 0.000_5;
 
     #[test]
-    fn a_tip_held_back_by_a_spring_arrives_and_is_let_go_again() {
+    fn a_tip_held_back_by_a_spring_arrives_and_the_offset_decays_again() {
         let limits = Motion::default();
         let mut correction = Correction::none(limits, [0.0; 3]);
-        // The tip goes two thirds of the way.
+        // The tip covers two thirds of the distance.
         let mut tip = [0.0; 3];
         for _ in 0..6000 {
             let target = correction.target([0.0, 0.0, -0.8], tip, Some(true), DT);
@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn a_blocked_tip_is_led_no_further_than_allowed_in_steps_no_longer_than_allowed() {
+    fn a_blocked_tip_stays_within_the_lead_and_step_limits() {
         let limits = Motion::default();
         let mut correction = Correction::none(limits, [0.0; 3]);
         let mut last = [0.0; 3];

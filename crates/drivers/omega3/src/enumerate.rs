@@ -1,4 +1,4 @@
-//! What is connected, without moving anything: for lists, and to find the robot of a bench.
+//! Enumerates connected devices without moving anything.
 
 use std::fmt;
 
@@ -6,24 +6,24 @@ pub use skinrig_drd_abi::SERIAL_UNKNOWN;
 use skinrig_drd_abi::{DEVICE_OMEGA3, DeviceId, ErrorCode};
 
 use crate::error::next_step;
-use crate::sdk::{Answer, CallError, Sdk};
+use crate::sdk::{CallError, CallResult, Sdk};
 
-/// USB vendor of Force Dimension. Product numbers differ among omega.3 (0402, 0301), so rules and lists name the vendor alone
-/// (udev rules of chai3d and yarp-omega3).
+/// USB vendor ID of Force Dimension. Product IDs of the omega.3 vary (0402, 0301), so rules and lists use the vendor ID alone (udev
+/// rules of chai3d and yarp-omega3).
 pub const USB_VENDOR: u16 = 0x1451;
 
-/// A connected device of Force Dimension.
+/// A connected Force Dimension device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Found {
-    /// Its place in the library's enumeration.
+    /// Index in the library's enumeration.
     pub index: i8,
-    /// Its model, when it could be asked.
+    /// Model, if readable.
     pub model: Option<String>,
-    /// Its type number, when it could be asked.
+    /// Type number, if readable.
     pub type_number: Option<i32>,
-    /// Its serial number, when it could be asked and has one.
+    /// Serial number, if readable and set.
     pub serial: Option<u16>,
-    /// Version of its controller's firmware, when it could be asked.
+    /// Firmware version of the controller, if readable.
     pub firmware: Option<String>,
     /// Whether it can be used.
     pub availability: Availability,
@@ -32,15 +32,15 @@ pub struct Found {
 /// Whether a device can be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Availability {
-    /// Yes.
+    /// Usable.
     Free,
-    /// Another program holds it.
+    /// In use by another program.
     Busy,
-    /// The operating system does not let us.
+    /// The operating system denies access.
     NotPermitted,
     /// It does not report the type number of an omega.3.
     OtherModel,
-    /// Something else is wrong.
+    /// Another error.
     Failed(CallError),
 }
 
@@ -55,7 +55,7 @@ impl From<CallError> for Availability {
 }
 
 impl Found {
-    /// What to do before it can be used; `None` when nothing.
+    /// What to do before it can be used; `None` if it is free.
     #[must_use]
     pub fn next_step(&self) -> Option<String> {
         Some(match &self.availability {
@@ -73,11 +73,11 @@ impl fmt::Display for Found {
         let model = self.model.as_deref().unwrap_or("Force Dimension device");
         match self.serial {
             Some(serial) => write!(f, "{model}, serial {serial}")?,
-            None => write!(f, "{model} without a known serial, place {}", self.index)?,
+            None => write!(f, "{model} without a known serial, index {}", self.index)?,
         }
         match &self.availability {
             Availability::Free => write!(f, ": free"),
-            Availability::Busy => write!(f, ": busy, another program holds it"),
+            Availability::Busy => write!(f, ": busy, in use by another program"),
             Availability::NotPermitted => write!(f, ": found, but access is not permitted"),
             Availability::OtherModel => write!(f, ": not an omega.3"),
             Availability::Failed(e) => write!(f, ": {e}"),
@@ -85,17 +85,17 @@ impl fmt::Display for Found {
     }
 }
 
-/// Lists the connected devices. Opens each for a moment and closes it again; no motor is touched.
+/// Lists the connected devices. Opens and closes each; does not touch the motors.
 ///
 /// # Errors
-/// When the library cannot even count them.
-pub fn list(sdk: &dyn Sdk) -> Answer<Vec<Found>> {
+/// When the devices cannot be counted.
+pub fn list(sdk: &dyn Sdk) -> CallResult<Vec<Found>> {
     let count = sdk.device_count()?;
     Ok((0..count)
         .map(|index| match sdk.open(index) {
-            Err(e) => unknown(index, e),
+            Err(e) => unopened(index, e),
             Ok(id) => {
-                let mut found = look(sdk, index, id);
+                let mut found = identify(sdk, index, id);
                 if let Err(e) = sdk.close(id) {
                     found.availability = Availability::Failed(e);
                 }
@@ -105,8 +105,8 @@ pub fn list(sdk: &dyn Sdk) -> Answer<Vec<Found>> {
         .collect())
 }
 
-/// A device that could not be opened.
-pub(crate) fn unknown(index: i8, error: CallError) -> Found {
+/// Entry of a device that could not be opened.
+pub(crate) fn unopened(index: i8, error: CallError) -> Found {
     Found {
         index,
         model: None,
@@ -117,13 +117,13 @@ pub(crate) fn unknown(index: i8, error: CallError) -> Found {
     }
 }
 
-/// As short as the number can be told: 3.0, not 3.00, and 3.123 in full.
+/// Shortest exact form: 3.0 rather than 3.00, and 3.123 in full.
 pub(crate) fn firmware_text(version: f64) -> String {
     format!("{version:?}")
 }
 
-/// Looks at an open device.
-pub(crate) fn look(sdk: &dyn Sdk, index: i8, id: DeviceId) -> Found {
+/// Reads the identity of an open device.
+pub(crate) fn identify(sdk: &dyn Sdk, index: i8, id: DeviceId) -> Found {
     let type_number = sdk.system_type(id);
     let availability = match &type_number {
         Ok(DEVICE_OMEGA3) => Availability::Free,

@@ -1,4 +1,4 @@
-//! What can go wrong with the robot before it serves as an indenter, each with the next step.
+//! Errors while opening the robot, each with the next step.
 
 use std::time::Duration;
 
@@ -10,81 +10,81 @@ use crate::config::BadValue;
 use crate::load::LoadError;
 use crate::sdk::CallError;
 
-/// The robot cannot be opened, or not be used as asked.
+/// The robot cannot be opened or configured.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum OmegaError {
-    /// A value of the configuration makes no sense.
+    /// Invalid configuration.
     #[error(transparent)]
     Config(#[from] BadValue),
     /// No usable library.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// The robot of the configuration is not among the connected ones, or not free.
+    /// The configured robot is not connected or not free.
     #[error("omega.3: expected {expected}, found {found}; {next}")]
     NotFound {
-        /// Which robot was looked for.
+        /// The robot that was searched for.
         expected: String,
-        /// What is connected.
+        /// Connected devices.
         found: String,
-        /// What to do.
+        /// Next step.
         next: String,
     },
-    /// A call failed.
+    /// A library call failed.
     #[error("omega.3 {serial}: {step}: {cause}; {}", next_step(cause.code))]
     Call {
-        /// Which robot.
+        /// Serial number of the robot.
         serial: String,
-        /// Part of the procedure.
+        /// Step of the procedure.
         step: &'static str,
-        /// The call and its error.
+        /// The failed call.
         cause: CallError,
     },
-    /// The robot is not as it has to be.
+    /// The robot is not in a usable state.
     #[error("omega.3 {serial}: expected {expected}, found {found}; {next}")]
-    Unfit {
-        /// Which robot.
+    Unsuitable {
+        /// Serial number of the robot.
         serial: String,
-        /// What it has to be.
+        /// Required state.
         expected: String,
-        /// What it is.
+        /// Actual state.
         found: String,
-        /// What to do.
+        /// Next step.
         next: String,
     },
-    /// A setting did not read back as written.
+    /// A setting read back with another value than was written.
     #[error("omega.3 {serial}: {name}: expected {expected} after writing, found {found}")]
     ReadBack {
-        /// Which robot.
+        /// Serial number of the robot.
         serial: String,
-        /// Which setting.
+        /// Name of the setting.
         name: String,
-        /// What was written.
+        /// Written value.
         expected: String,
-        /// What was read.
+        /// Value read back.
         found: String,
     },
-    /// The library did not return.
+    /// A library call did not return in time.
     #[error(
-        "omega.3: {what}: expected an end within {waited:?}, found none; the arm was told to brake: look at it, and press the force button on its base"
+        "omega.3: {what} did not finish within {waited:?}; the driver tried to brake the arm: check it, and press the force button on its base"
     )]
-    Late {
-        /// What was under way.
+    TimedOut {
+        /// The unfinished operation.
         what: &'static str,
-        /// How long was waited.
+        /// The time limit.
         waited: Duration,
     },
-    /// The operating system gave no thread.
+    /// The operating system could not start a thread.
     #[error("omega.3: cannot start a thread: {0}")]
     Thread(String),
-    /// The process that brakes the arm when this one dies does not run.
+    /// The supervisor process is not running.
     #[error(
-        "omega.3: supervisor process: {0}; without it nothing brakes the arm when this program dies"
+        "omega.3: supervisor process: {0}; without it nothing brakes the arm if this program dies"
     )]
     Supervisor(String),
 }
 
 impl OmegaError {
-    /// As an error of the trait.
+    /// Converts to an error of the device trait.
     #[must_use]
     pub fn into_device(self, serial: &str) -> DeviceError {
         let role = DeviceRole::Indenter;
@@ -99,9 +99,9 @@ impl OmegaError {
                 role,
                 serial,
                 expected: format!("able to {step}"),
-                found: format!("not: {cause}; {}", next_step(cause.code)),
+                found: format!("failed: {cause}; {}", next_step(cause.code)),
             },
-            Self::Unfit {
+            Self::Unsuitable {
                 expected,
                 found,
                 next,
@@ -133,28 +133,30 @@ impl OmegaError {
     }
 }
 
-/// Whether the code means that the device is gone.
+/// Whether the code means that the device is disconnected.
 #[must_use]
 pub(crate) const fn is_loss(code: ErrorCode) -> bool {
     matches!(code, ErrorCode::COM | ErrorCode::NO_DEVICE_FOUND)
 }
 
-/// What the operator does about an error code.
+/// Next step of the operator after an error code.
 #[must_use]
 pub const fn next_step(code: ErrorCode) -> &'static str {
     match code {
         ErrorCode::COM => "check power and USB cable, then start again",
         ErrorCode::NO_DRIVER_FOUND => {
-            "give yourself access: install hil/udev/70-skinrig.rules (hil/README.md), then plug the robot in again"
+            "give yourself access: install hil/udev/70-skinrig.rules (hil/README.md), then reconnect the robot"
         }
-        ErrorCode::NO_DEVICE_FOUND => "plug the robot in and switch it on",
-        ErrorCode::DEVICE_IN_USE => "end the other program that holds the robot",
-        ErrorCode::DEVICE_NOT_READY => "initialise the robot with the sample taken off",
+        ErrorCode::NO_DEVICE_FOUND => "connect the robot and switch it on",
+        ErrorCode::DEVICE_IN_USE => "end the other program that uses the robot",
+        ErrorCode::DEVICE_NOT_READY => "remove the sample and initialise the robot",
         ErrorCode::CONFIGURATION | ErrorCode::REDUNDANT_FAIL => {
-            "have the robot serviced: its memory or its encoders are damaged"
+            "self-test failed (encoders or memory): contact Force Dimension support"
         }
-        ErrorCode::DHC_BUSY | ErrorCode::TIMEOUT => "try again; if it stays, power-cycle the robot",
+        ErrorCode::DHC_BUSY | ErrorCode::TIMEOUT => {
+            "try again; if it persists, power-cycle the robot"
+        }
         ErrorCode::NO_REGULATION => "disarm and arm again",
-        _ => "see the bench guide",
+        _ => "see docs/how-to/bench.md",
     }
 }

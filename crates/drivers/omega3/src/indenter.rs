@@ -1,4 +1,4 @@
-//! The omega.3 behind the `Indenter` trait.
+//! The omega.3 as an `Indenter`.
 
 use std::sync::Arc;
 
@@ -10,13 +10,13 @@ use skinrig_model::{DeviceIdentity, DeviceRole, Point3, Robot, Setting};
 use crate::config::OmegaConfig;
 use crate::error::OmegaError;
 use crate::load;
-use crate::open::seen;
+use crate::open::observed_setting;
 use crate::owner::Owner;
 use crate::remark::Remark;
 use crate::sdk::Sdk;
 use crate::stream::{CAPACITY, Stream};
 
-/// An open omega.3. Dropped, it brakes the arm and closes the device.
+/// An open omega.3. Dropping it brakes the arm and closes the device.
 pub struct Omega {
     owner: Owner,
     stream: Arc<Stream>,
@@ -27,34 +27,33 @@ pub struct Omega {
 }
 
 impl Omega {
-    /// Loads the library, opens the robot, checks it, and leaves it braked. Nothing moves, unless the configuration
-    /// allows initialisation and the robot needs it. Samples carry the time of `clock`.
+    /// Loads the library, opens and checks the robot, and leaves it braked. The arm moves only if the robot needs initialisation and the
+    /// configuration allows it. Samples have the time of `clock`.
     ///
     /// # Errors
     /// [`OmegaError`], with the next step.
     pub fn open(config: OmegaConfig, clock: RealClock) -> Result<Self, OmegaError> {
         config.check()?;
         let loaded = load::load(config.library.as_deref())?;
-        let words = loaded.to_string();
+        let description = loaded.to_string();
         let advice = loaded.advice.clone();
         let mut omega = Self::with_sdk(
             Arc::new(loaded.library),
             config,
-            loaded.asked,
-            &words,
+            loaded.requested,
+            &description,
             clock,
         )?;
         omega.remarks.extend(advice.map(Remark::Library));
         Ok(omega)
     }
 
-    /// Opens the robot behind any implementation of the calls; `library` is what a supervisor loads, `words` tells
-    /// people about it.
+    /// Opens a robot through any `Sdk`. `library` is the path that the supervisor loads, `description` appears in the identity.
     pub(crate) fn with_sdk(
         sdk: Arc<dyn Sdk>,
         config: OmegaConfig,
         library: std::path::PathBuf,
-        words: &str,
+        description: &str,
         clock: RealClock,
     ) -> Result<Self, OmegaError> {
         let config = Arc::new(config);
@@ -72,7 +71,7 @@ impl Omega {
             identity: DeviceIdentity {
                 model: format!("Force Dimension {}", opened.model),
                 serial: opened.serial,
-                firmware: format!("{}, {words}", opened.firmware),
+                firmware: format!("{}, {description}", opened.firmware),
             },
             capabilities: capabilities(&config),
             config,
@@ -80,14 +79,14 @@ impl Omega {
         })
     }
 
-    /// What the operator should know about this robot and this library.
+    /// Remarks about this robot and its library.
     #[must_use]
     pub fn remarks(&self) -> &[Remark] {
         &self.remarks
     }
 }
 
-/// What a robot of this configuration can do.
+/// Capabilities of a robot with this configuration.
 pub(crate) fn capabilities(config: &OmegaConfig) -> IndenterCapabilities {
     let e = &config.envelope;
     IndenterCapabilities {
@@ -102,22 +101,22 @@ pub(crate) fn capabilities(config: &OmegaConfig) -> IndenterCapabilities {
 }
 
 /// Checks the limits of a run.
-pub(crate) fn check_wanted(
+pub(crate) fn check_limits_of_run(
     serial: &str,
     config: &OmegaConfig,
-    wanted: &MotionLimits,
+    requested: &MotionLimits,
 ) -> Result<(), DeviceError> {
-    limits::check_limits(serial, &capabilities(config), wanted)?;
+    limits::check_limits(serial, &capabilities(config), requested)?;
     let e = &config.envelope;
-    if e.ratio_of(wanted.max_force_n) < e.least_ratio {
+    if e.ratio_of(requested.max_force_n) < e.least_ratio {
         let least_n = (e.least_ratio - e.gravity_ratio) * e.n_per_ratio;
         let expected = format!(
-            "max_force_n of at least {least_n:.2}, below which the arm may not carry itself"
+            "max_force_n of at least {least_n:.2}: with less, the motors may not carry the arm"
         );
         return Err(limits::refused(
             serial,
             expected,
-            wanted.max_force_n.to_string(),
+            requested.max_force_n.to_string(),
         ));
     }
     Ok(())
@@ -132,11 +131,15 @@ impl Indenter for Omega {
         self.capabilities.clone()
     }
 
-    fn configure(&mut self, wanted: &MotionLimits) -> Result<Vec<Setting>, DeviceError> {
-        check_wanted(&self.identity.serial, &self.config, wanted)?;
-        let mut settings = self.owner.configure(*wanted)?;
-        // What the operator was told belongs to the record of the session.
-        settings.extend(self.remarks.iter().map(|remark| seen("remark", remark)));
+    fn configure(&mut self, requested: &MotionLimits) -> Result<Vec<Setting>, DeviceError> {
+        check_limits_of_run(&self.identity.serial, &self.config, requested)?;
+        let mut settings = self.owner.configure(*requested)?;
+        // Remarks belong to the session record.
+        settings.extend(
+            self.remarks
+                .iter()
+                .map(|remark| observed_setting("remark", remark)),
+        );
         Ok(settings)
     }
 
@@ -158,7 +161,7 @@ impl Indenter for Omega {
                 role: DeviceRole::Indenter,
                 serial: self.identity.serial.clone(),
                 detail: format!(
-                    "pose stream: expected to be polled before {CAPACITY} samples waited, {dropped} found no room"
+                    "pose stream: expected a poll before {CAPACITY} samples were queued; {dropped} samples were dropped"
                 ),
             });
         }

@@ -1,15 +1,15 @@
-//! The Force Dimension omega.3 as an indenter: libdrd loaded at run time, owned by one thread.
+//! Driver of the Force Dimension omega.3 as an indenter. It loads libdrd at run time and calls it from one thread.
 //!
-//! [`Omega::open`] loads the vendor's library, finds the robot, checks it and leaves it braked; from then on it is an
-//! [`Indenter`](skinrig_device::Indenter). One thread (`owner`) makes every call; its cycle (`engine`) reads the pose,
-//! checks the limits, moves the set point along a straight line and hands it to the vendor's regulation.
+//! [`Omega::open`] loads the vendor's library, finds and checks the robot, and leaves it braked; after that it is an
+//! [`Indenter`](skinrig_device::Indenter). One thread (`owner`) makes all calls. Each cycle (`engine`) reads the pose, checks the
+//! limits, moves the set point along a straight line and sends it to the vendor's regulation.
 //!
-//! Force is limited on several levels, because the library has no force limit of its own: a cap on the motor ratio,
-//! integral gain off, a bounded lead of the set point, a soft limit that stops and a hard limit that brakes, all on
-//! *commanded* motor force: an omega.3 has no force sensor. None of it replaces the force button on the base.
+//! libdrd has no force limit of its own, so the driver limits force on several levels: a cap on the motor ratio, no integral gain, a
+//! bounded lead of the set point, a soft limit that stops the motion and a hard limit that brakes. All of them use the *commanded*
+//! motor force: an omega.3 has no force sensor. None of them replaces the force button on the base.
 //!
-//! `force_n` of a sample is the force with which the world pushes the tip along robot z, positive upwards: minus the
-//! motors' commanded force, minus its mean while the arm hung still after arming; NaN while that is taken.
+//! `force_n` of a sample is the force of the environment on the tip along robot z, positive upward: the negative commanded motor
+//! force minus its mean at rest after arming (tare). It is NaN while the tare is measured.
 
 pub mod axes;
 pub mod brake;
@@ -31,8 +31,8 @@ pub mod sdk;
 mod span;
 mod stream;
 pub mod supervisor;
+mod tare;
 pub mod trajectory;
-mod weighing;
 
 pub use config::OmegaConfig;
 pub use error::OmegaError;

@@ -1,4 +1,4 @@
-//! Finding and loading the vendor's library.
+//! Finds and loads the vendor's library.
 #![expect(unsafe_code, reason = "loads a foreign library")]
 
 use std::ffi::{OsString, c_void};
@@ -10,13 +10,13 @@ use skinrig_drd_abi::{Functions, Missing, SdkVersion, fns};
 
 use crate::library::Library;
 
-/// Environment variable with the path of the library itself.
+/// Environment variable with the path of the library.
 pub const LIBRARY_VARIABLE: &str = "SKINRIG_LIBDRD";
 
-/// Environment variables with the root of an unpacked SDK, the first one first.
+/// Environment variables with the root of an unpacked SDK, by precedence.
 pub(crate) const SDK_VARIABLES: [&str; 2] = ["FDSDK", "FORCEDIM_SDK"];
 
-/// The library's file names, the one that names its interface first.
+/// File names of the library, the one with the interface version first.
 const NAMES: &[&str] = if cfg!(target_os = "windows") {
     &["drd64.dll"]
 } else if cfg!(target_os = "macos") {
@@ -25,57 +25,57 @@ const NAMES: &[&str] = if cfg!(target_os = "windows") {
     &["libdrd.so.3", "libdrd.so"]
 };
 
-/// A loaded library and where it came from.
+/// A loaded library and its origin.
 #[derive(Debug, Clone)]
 pub struct Loaded {
     /// The calls.
     pub library: Library,
-    /// What was asked of the system: a path, or a name that the system looked up.
-    pub asked: PathBuf,
-    /// The file, where the system tells; else as asked.
+    /// Requested path, or name that the system resolved.
+    pub requested: PathBuf,
+    /// File that was loaded, if the system reports it; otherwise as requested.
     pub path: PathBuf,
     /// Its version.
     pub version: SdkVersion,
-    /// What the operator should know about that version.
+    /// Recommendation about that version for the operator.
     pub advice: Option<String>,
 }
 
-/// One attempt.
+/// A failed attempt to load a library.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Attempt {
     /// Path or name.
     pub path: PathBuf,
-    /// What the system said.
+    /// Error of the loader.
     pub error: String,
 }
 
 /// No usable library.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LoadError {
-    /// Nothing could be loaded.
-    #[error("expected Force Dimension's libdrd, found none; tried{}; install the SDK, then name its libdrd in the rig file or in {LIBRARY_VARIABLE}, or its directory in FDSDK", list(.0))]
+    /// No candidate could be loaded.
+    #[error("expected Force Dimension's libdrd, found none; tried{}; install the SDK, then set the path of libdrd in the rig file or in {LIBRARY_VARIABLE}, or the SDK directory in FDSDK", list(.0))]
     Absent(Vec<Attempt>),
-    /// A version whose functions take other arguments under the same names.
-    #[error("{}: expected SDK {} or newer, found {found}: install a newer SDK ({} or newer is advised)", path.display(), SdkVersion::OLDEST, SdkVersion::ADVISED)]
+    /// The SDK is too old: its functions have the same names but other arguments.
+    #[error("{}: expected SDK {} or newer, found {found}: install a newer SDK ({} or newer is recommended)", path.display(), SdkVersion::OLDEST, SdkVersion::ADVISED)]
     TooOld {
         /// The file.
         path: PathBuf,
         /// Its version.
         found: SdkVersion,
     },
-    /// Not the whole library.
+    /// Functions are missing.
     #[error("{}: SDK {found}: {missing}: expected a complete libdrd", path.display())]
     Incomplete {
         /// The file.
         path: PathBuf,
         /// Its version.
         found: SdkVersion,
-        /// What it lacks.
+        /// The missing function.
         missing: Missing,
     },
-    /// A library of another kind.
+    /// Another library.
     #[error("{}: expected Force Dimension's libdrd, found a library without dhdGetSDKVersion", path.display())]
-    Stranger {
+    NotLibdrd {
         /// The file.
         path: PathBuf,
     },
@@ -88,11 +88,11 @@ fn list(attempts: &[Attempt]) -> String {
         .collect()
 }
 
-/// Where the library is looked for, in order. A path given explicitly (`configured`, then `SKINRIG_LIBDRD`) is the
-/// only place: what is loaded must not depend on what else lies around. Else the SDK directories of the environment,
-/// the usual directories, and what the system finds by name.
+/// Candidate paths in order. An explicit path (`configured`, then `SKINRIG_LIBDRD`) is the only candidate, so that the result does not
+/// depend on other installed files. Otherwise: SDK directories from the environment, common directories, and names for the system's
+/// own search.
 #[must_use]
-pub fn places(
+pub fn search_paths(
     configured: Option<&Path>,
     variable: impl Fn(&str) -> Option<OsString>,
 ) -> Vec<PathBuf> {
@@ -119,7 +119,7 @@ pub fn places(
         .collect()
 }
 
-/// Where an unpacked SDK keeps its libraries: `lib/release/<system>-<machine>-<compiler>`.
+/// Library directories of an unpacked SDK: `lib/release/<system>-<machine>-<compiler>`.
 fn sdk_directories(root: &Path) -> Vec<PathBuf> {
     let machine = match std::env::consts::ARCH {
         "aarch64" if cfg!(target_os = "macos") => "arm64",
@@ -138,49 +138,49 @@ fn sdk_directories(root: &Path) -> Vec<PathBuf> {
         .to_vec()
 }
 
-/// Loads the first library found in [`places`]. It is never unloaded.
+/// Loads the first library in [`search_paths`]. It is never unloaded.
 ///
 /// # Errors
-/// [`LoadError`]; a library that was found but cannot be used ends the search, so that no other version slips in.
+/// [`LoadError`]. A library that exists but cannot be used ends the search, so that no other version is loaded by accident.
 pub fn load(configured: Option<&Path>) -> Result<Loaded, LoadError> {
-    load_from(places(configured, |name| std::env::var_os(name)))
+    load_from(search_paths(configured, |name| std::env::var_os(name)))
 }
 
-fn load_from(places: Vec<PathBuf>) -> Result<Loaded, LoadError> {
+fn load_from(paths: Vec<PathBuf>) -> Result<Loaded, LoadError> {
     let mut attempts = Vec::new();
-    for path in places {
-        // SAFETY: the operator chose the library; its initialisers are those of the vendor's library.
+    for path in paths {
+        // SAFETY: the operator chose the library; its initialisers are the vendor's.
         match unsafe { libloading::Library::new(&path) } {
-            Ok(library) => return check(path, library),
+            Ok(library) => return check_library(path, library),
             Err(e) => attempts.push(Attempt {
                 path,
-                error: with_causes(&e),
+                error: with_sources(&e),
             }),
         }
     }
     Err(LoadError::Absent(attempts))
 }
 
-/// The error and what lies beneath: the loader's own words are only there.
-fn with_causes(error: &dyn std::error::Error) -> String {
-    let mut words = error.to_string();
+/// The error with all its sources: only they contain the loader's message.
+fn with_sources(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
     let mut cause = error.source();
     while let Some(next) = cause {
-        words = format!("{words}: {next}");
+        text = format!("{text}: {next}");
         cause = next.source();
     }
-    words
+    text
 }
 
-fn check(asked: PathBuf, library: libloading::Library) -> Result<Loaded, LoadError> {
-    let path = loaded_file(&asked);
+fn check_library(requested: PathBuf, library: libloading::Library) -> Result<Loaded, LoadError> {
+    let path = loaded_file(&requested);
     // SAFETY: the name has this type in every version of the SDK.
     let version = match unsafe { library.get::<fns::dhdGetSDKVersion>("dhdGetSDKVersion") } {
         // SAFETY: found in a loaded library under its own name.
         Ok(ask) => unsafe { SdkVersion::ask(*ask) },
-        Err(_) => return Err(LoadError::Stranger { path }),
+        Err(_) => return Err(LoadError::NotLibdrd { path }),
     };
-    // From here on its code may have started threads of its own: it is never unloaded.
+    // Its code may have started threads by now: never unload it.
     let library: &'static libloading::Library = Box::leak(Box::new(library));
     if version < SdkVersion::OLDEST {
         return Err(LoadError::TooOld {
@@ -203,22 +203,22 @@ fn check(asked: PathBuf, library: libloading::Library) -> Result<Loaded, LoadErr
     })?;
     let advice = (version < SdkVersion::ADVISED).then(|| {
         format!(
-            "SDK {version} works, but {} or newer tells more about its failures",
+            "SDK {version} works, but {} or newer reports failures in more detail",
             SdkVersion::ADVISED
         )
     });
     Ok(Loaded {
         library: Library::new(functions, version),
-        asked,
+        requested,
         path,
         version,
         advice,
     })
 }
 
-/// The file behind a name that the system looked up, as far as the system tells (Linux: the process's maps).
-fn loaded_file(asked: &Path) -> PathBuf {
-    let by_name = asked.components().count() == 1;
+/// Resolves a name that the system looked up to a file, where possible (Linux: /proc/self/maps).
+fn loaded_file(requested: &Path) -> PathBuf {
+    let by_name = requested.components().count() == 1;
     let maps = by_name
         .then(|| std::fs::read_to_string("/proc/self/maps").ok())
         .flatten();
@@ -227,11 +227,11 @@ fn loaded_file(asked: &Path) -> PathBuf {
             .filter_map(|line| line.find('/').map(|at| Path::new(&line[at..])))
             .find(|file| {
                 let name = file.file_name().map(|n| n.to_string_lossy().into_owned());
-                name.is_some_and(|n| n.starts_with(&*asked.to_string_lossy()))
+                name.is_some_and(|n| n.starts_with(&*requested.to_string_lossy()))
             })
             .map(Path::to_owned)
     });
-    found.unwrap_or_else(|| asked.to_owned())
+    found.unwrap_or_else(|| requested.to_owned())
 }
 
 impl fmt::Display for Loaded {
@@ -254,18 +254,18 @@ mod tests {
     }
 
     #[test]
-    fn what_is_named_is_the_only_place() {
+    fn an_explicit_path_is_the_only_candidate() {
         let all = [(LIBRARY_VARIABLE, "/v/libdrd.so"), ("FDSDK", "/sdk")];
-        let named = places(Some(Path::new("/c/libdrd.so")), environment(&all));
+        let named = search_paths(Some(Path::new("/c/libdrd.so")), environment(&all));
         assert_eq!(named, [PathBuf::from("/c/libdrd.so")]);
-        let named = places(None, environment(&all));
+        let named = search_paths(None, environment(&all));
         assert_eq!(named, [PathBuf::from("/v/libdrd.so")]);
     }
 
     #[test]
     #[cfg(target_os = "linux")]
-    fn else_the_sdk_then_the_usual_places_then_names() {
-        let found = places(
+    fn otherwise_the_sdk_then_common_directories_then_names() {
+        let found = search_paths(
             None,
             environment(&[("FORCEDIM_SDK", "/sdk"), ("HOME", "/h")]),
         );
@@ -280,27 +280,27 @@ mod tests {
     }
 
     #[test]
-    fn a_failure_names_every_place_and_the_loaders_words() {
+    fn a_failure_lists_every_candidate_with_the_loaders_message() {
         let directory = tempfile::tempdir().unwrap();
         let torn = directory.path().join("libdrd.so");
         std::fs::write(&torn, b"not a library").unwrap();
         let absent = directory.path().join("absent.so");
         let error = load_from(vec![torn.clone(), absent.clone()]).unwrap_err();
-        let words = error.to_string();
+        let text = error.to_string();
         for part in [
             torn.to_str().unwrap(),
             absent.to_str().unwrap(),
             LIBRARY_VARIABLE,
         ] {
-            assert!(words.contains(part), "{part} is not in {words}");
+            assert!(text.contains(part), "{part} is not in {text}");
         }
         let LoadError::Absent(attempts) = error else {
-            panic!("{words}")
+            panic!("{text}")
         };
         let cause = attempts[1].error.strip_prefix("dlopen failed: ");
         assert!(
             cfg!(not(unix)) || cause.is_some_and(|c| !c.is_empty()),
-            "{words}"
+            "{text}"
         );
     }
 }

@@ -1,4 +1,4 @@
-//! What the driver watches every cycle while the motors are live, and why it brakes.
+//! Checks of every cycle while the motors are live, and the trips that brake the arm.
 
 use std::fmt;
 use std::time::Duration;
@@ -9,53 +9,54 @@ use skinrig_model::HostTime;
 
 use crate::config::Trips;
 use crate::error::{is_loss, next_step};
-use crate::open::cause_words;
+use crate::remark::describe_cause;
 use crate::sdk::CallError;
+use crate::supervisor::SupervisorFault;
 use crate::trajectory::{distance, norm};
 
 /// Why the arm was braked.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Trip {
-    /// The vendor's regulation thread ended, by its own account because of jitter.
+    /// The vendor's regulation thread ended; it gives jitter as the reason.
     RegulationEnded,
-    /// The regulation loop delivers no new reading.
+    /// The regulation loop delivered no new reading.
     Silent {
-        /// Since when, at most.
+        /// Time limit.
         limit: Duration,
     },
     /// The regulation loop is too slow, kHz.
     RegulationSlow {
         /// Limit.
         expected_khz: f64,
-        /// Mean since the last look.
+        /// Mean since the last check.
         found_khz: f64,
     },
-    /// Nobody polled or commanded the robot.
+    /// The program neither polled nor commanded the robot.
     Unwatched {
-        /// For how long.
+        /// Time limit.
         limit: Duration,
     },
-    /// The controller took the motors' power away.
+    /// The controller switched the motors off.
     ForceOff(ForceOffCause),
-    /// The motors' power is away, and the controller names the cause that it already named before arming.
+    /// The motors are off, and the controller reports the same cause as before arming.
     ForceOffAgain(ForceOffCause),
-    /// The robot did not confirm its brake.
-    NotBraked(String),
+    /// The robot did not confirm the brake.
+    BrakeFailed(String),
     /// The force is above the hard limit, N.
     Force {
         /// Hard limit.
         limit_n: f64,
-        /// Length of the force vector without its tare.
+        /// Magnitude of the force without tare.
         found_n: f64,
     },
-    /// The arm does not hang free when armed, N.
+    /// The arm did not hang free when arming, N.
     Tare {
-        /// Largest force at rest.
+        /// Largest allowed force at rest.
         limit_n: f64,
         /// Mean force.
         found_n: f64,
     },
-    /// The tip is far from its set point, mm.
+    /// The tip is too far from its set point, mm.
     Deviation {
         /// Limit.
         limit_mm: f64,
@@ -64,28 +65,28 @@ pub enum Trip {
     },
     /// The tip jumped, mm.
     Jump {
-        /// Limit over the time since the sample before.
+        /// Limit for the time since the previous sample.
         limit_mm: f64,
         /// Distance.
         found_mm: f64,
     },
-    /// A position or force that is no number.
+    /// A position or force is not finite.
     NotFinite,
-    /// The tip left the box of the run, mm.
+    /// The tip left the run's box, mm.
     OutsideBox {
-        /// How far outside is tolerated.
+        /// Tolerated distance outside.
         limit_mm: f64,
-        /// How far outside it is.
+        /// Distance outside.
         found_mm: f64,
     },
-    /// The process that brakes the arm when this one dies ended.
-    Supervisor(String),
-    /// A call failed.
+    /// The supervisor process ended.
+    Supervisor(SupervisorFault),
+    /// A library call failed.
     Call(CallError),
 }
 
 impl Trip {
-    /// True when the device is gone; only opening it again helps.
+    /// Whether the device is disconnected and must be reopened.
     #[must_use]
     pub(crate) const fn is_loss(&self) -> bool {
         match self {
@@ -120,24 +121,24 @@ impl fmt::Display for Trip {
             ),
             Self::Unwatched { limit } => write!(
                 f,
-                "nobody looked at the live arm for {limit:?}: the program that drives it hangs or its disk stalls; \
-                 see that the recording keeps up, then disarm and arm again"
+                "the live arm was not polled for {limit:?}: the controlling program hangs or its disk stalls; make sure that the \
+                recording keeps up, then disarm and arm again"
             ),
-            Self::ForceOff(cause) => write!(f, "motors went off: {}", cause_words(*cause)),
+            Self::ForceOff(cause) => write!(f, "motors went off: {}", describe_cause(*cause)),
             Self::ForceOffAgain(cause) => write!(
                 f,
-                "motors went off without a new cause; the one told before arming was {}",
-                cause_words(*cause)
+                "motors went off without a new cause; the cause reported before arming was {}",
+                describe_cause(*cause)
             ),
-            Self::NotBraked(why) => write!(f, "{why}"),
+            Self::BrakeFailed(why) => write!(f, "{why}"),
             Self::Force { limit_n, found_n } => write!(
                 f,
                 "force: expected at most {limit_n:.2} N, found {found_n:.2} N"
             ),
             Self::Tare { limit_n, found_n } => write!(
                 f,
-                "the arm does not hang free: expected at most {limit_n:.2} N at rest, found {found_n:.2} N; \
-                 check that the tip touches nothing, the effector's mass and the base's angle"
+                "the arm does not hang free: expected at most {limit_n:.2} N at rest, found {found_n:.2} N; check that the tip touches \
+                nothing, the effector mass and the base angle"
             ),
             Self::Deviation { limit_mm, found_mm } => write!(
                 f,
@@ -145,15 +146,15 @@ impl fmt::Display for Trip {
             ),
             Self::Jump { limit_mm, found_mm } => write!(
                 f,
-                "the tip jumped: expected at most {limit_mm:.2} mm since the last sample, found {found_mm:.2} mm"
+                "the tip jumped: expected at most {limit_mm:.2} mm since the previous sample, found {found_mm:.2} mm"
             ),
             Self::NotFinite => write!(
                 f,
-                "expected finite positions and forces, found one that is not"
+                "expected finite positions and forces, found NaN or infinity"
             ),
             Self::OutsideBox { limit_mm, found_mm } => write!(
                 f,
-                "the tip left the box of the run: expected at most {limit_mm:.2} mm outside, found {found_mm:.2} mm"
+                "the tip left the run's box: expected at most {limit_mm:.2} mm outside, found {found_mm:.2} mm"
             ),
             Self::Supervisor(why) => write!(f, "the supervisor process ended: {why}"),
             Self::Call(e) => write!(f, "{e}; {}", next_step(e.code)),
@@ -161,7 +162,7 @@ impl fmt::Display for Trip {
     }
 }
 
-/// Watches one armed phase.
+/// Monitors one armed phase.
 #[derive(Debug, Clone)]
 pub(crate) struct Monitor {
     trips: Trips,
@@ -171,7 +172,7 @@ pub(crate) struct Monitor {
 }
 
 impl Monitor {
-    /// Begins with the tip at `tip_mm`; one that starts outside the box may come in, but go no further out.
+    /// Starts with the tip at `tip_mm`. A tip that starts outside the box may move inward but not further out.
     pub(crate) fn new(trips: Trips, limits: MotionLimits, now: HostTime, tip_mm: [f64; 3]) -> Self {
         Self {
             trips,
@@ -181,13 +182,13 @@ impl Monitor {
         }
     }
 
-    /// New limits for the same phase.
+    /// Changes the limits of the current phase.
     pub(crate) fn set_limits(&mut self, limits: MotionLimits) {
         self.limits = limits;
         self.outside_mm = outside(&limits, self.last.1);
     }
 
-    /// Checks a measured tip and its set point, mm.
+    /// Checks the measured tip against its set point and the limits, mm.
     pub(crate) fn position(
         &mut self,
         now: HostTime,
@@ -218,7 +219,7 @@ impl Monitor {
         Ok(())
     }
 
-    /// Checks the motors' force without its tare, N. Gives whether it is above the limit of the run.
+    /// Checks the motors' force without tare, N. Returns whether it exceeds the run's limit.
     pub(crate) fn force(&self, force_n: [f64; 3]) -> Result<bool, Trip> {
         let found_n = norm(force_n);
         if !found_n.is_finite() {
@@ -254,7 +255,7 @@ impl Monitor {
     }
 }
 
-/// How far a point lies outside the box, mm; 0 inside.
+/// Distance of a point outside the box, mm; 0 inside.
 fn outside(limits: &MotionLimits, p: [f64; 3]) -> f64 {
     norm(std::array::from_fn(|i| {
         (limits.min_mm[i] - p[i])
@@ -263,10 +264,10 @@ fn outside(limits: &MotionLimits, p: [f64; 3]) -> f64 {
     }))
 }
 
-/// Tells new readings from repeated ones.
+/// Distinguishes new readings from repeated ones.
 ///
-/// A reading that equals the one before counts as new only when the regulation loop must have turned since: a tip at
-/// rest stays where it is, but a loop that is asked twice within one turn repeats itself.
+/// A reading equal to the previous one counts as new only if the regulation loop must have completed a turn in between: a tip at rest
+/// keeps its position, and a loop that is read twice within one turn repeats itself.
 #[derive(Debug, Clone)]
 pub(crate) struct Freshness {
     period_s: f64,
@@ -274,7 +275,7 @@ pub(crate) struct Freshness {
 }
 
 impl Freshness {
-    /// With the slowest loop that is tolerated.
+    /// Starts with the smallest tolerated loop rate.
     pub(crate) fn new(khz: f64) -> Self {
         Self {
             period_s: 1e-3 / khz,
@@ -282,14 +283,14 @@ impl Freshness {
         }
     }
 
-    /// The loop's measured rate.
+    /// Sets the measured loop rate.
     pub(crate) fn set_rate(&mut self, khz: f64) {
         if khz > 0.0 {
             self.period_s = 1e-3 / khz;
         }
     }
 
-    /// Whether a reading taken at `now` is new.
+    /// Whether a reading at `now` is new.
     pub(crate) fn is_new(&mut self, now: HostTime, position_m: [f64; 3], cached: bool) -> bool {
         let bits = position_m.map(f64::to_bits);
         let new = match self.last {
@@ -322,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn each_limit_trips_by_its_own_name() {
+    fn each_limit_has_its_own_trip() {
         let trips = Trips::default();
         let home = [0.0; 3];
         let new = || Monitor::new(trips, LIMITS, at(0), home);
@@ -335,7 +336,7 @@ mod tests {
         let lag = new().position(at(500), home, [0.0, 0.0, -5.1]);
         assert!(matches!(lag, Err(Trip::Deviation { .. })), "{lag:?}");
         let mut m = Monitor::new(trips, LIMITS, at(0), [11.0, 0.0, 0.0]);
-        // It began 1 mm outside: it may come in, and not go out again.
+        // It started 1 mm outside: it may move inward, but not out again.
         assert_eq!(
             m.position(at(1000), [12.9, 0.0, 0.0], far),
             Err(Trip::Deviation {
@@ -356,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn a_repeated_reading_is_no_sample_and_a_tip_at_rest_is_one() {
+    fn a_repeated_reading_is_not_a_sample_but_a_tip_at_rest_is() {
         let mut fresh = Freshness::new(1.0);
         let p = [0.01, 0.0, 0.0];
         assert!(fresh.is_new(at(0), p, false));
@@ -364,10 +365,13 @@ mod tests {
             !fresh.is_new(at(500), p, false),
             "within one turn of the loop"
         );
-        assert!(fresh.is_new(at(1000), p, false), "the loop has turned");
+        assert!(
+            fresh.is_new(at(1000), p, false),
+            "the loop has completed a turn"
+        );
         assert!(
             !fresh.is_new(at(3000), p, true),
-            "the library repeats itself"
+            "a reading repeated by the library"
         );
         assert!(fresh.is_new(at(3100), [0.02, 0.0, 0.0], false));
         assert!(

@@ -1,5 +1,5 @@
-//! From a loaded library to a checked, braked robot. Every step is checked; nothing moves unless the configuration
-//! says that the sample is off.
+//! Opens a robot: from a loaded library to a checked, braked robot. The arm moves only if the configuration states that the sample is
+//! off.
 
 use skinrig_drd_abi::{
     DEVICE_OMEGA3, DEVICE_OMEGA3_UNLISTED, DeviceId, ErrorCode, ForceOffCause, StatusField,
@@ -8,36 +8,36 @@ use skinrig_drd_abi::{
 use skinrig_model::Setting;
 
 use crate::brake::brake;
-use crate::config::{Initialise, OmegaConfig, Patience, RedundantEncoders, Watchdog};
+use crate::config::{Initialise, OmegaConfig, RedundantEncoders, Timeouts, Watchdog};
 use crate::enumerate::{self, Found};
 use crate::error::OmegaError;
 use crate::remark::Remark;
-use crate::sdk::{Answer, CallError, Quantity, Sdk};
+use crate::sdk::{CallError, CallResult, Quantity, Sdk};
 
-/// An open robot. Its motors are off.
+/// An open robot with its motors off.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Opened {
-    /// Its id in calls.
+    /// Device ID in library calls.
     pub id: DeviceId,
-    /// Its serial number as text; 65535, as the library has it, for one that does not tell it.
+    /// Serial number; 65535, as in the library, if the robot does not report one.
     pub serial: String,
-    /// Its model.
+    /// Model name.
     pub model: String,
-    /// Version of its controller's firmware.
+    /// Firmware version of the controller.
     pub firmware: String,
-    /// Mass that gravity compensation carries, kg; `None` when the library does not tell it.
+    /// Mass for gravity compensation, kg; `None` if the library does not report it.
     pub effector_mass_kg: Option<f64>,
-    /// What was set or read, for the record of the session.
+    /// Settings that were written or read, for the session record.
     pub settings: Vec<Setting>,
-    /// What the operator should know.
+    /// Remarks for the operator.
     pub remarks: Vec<Remark>,
 }
 
-/// Opens the robot of `config` and brings it to a known, braked state. `guard` is called with its serial number before
-/// anything may move: it sees to it that somebody else brakes the arm if this process dies.
+/// Opens the robot of `config` and leaves it braked in a known state. Calls `guard` with the serial number before anything may move:
+/// it must make sure that another process brakes the arm if this one dies.
 ///
 /// # Errors
-/// [`OmegaError`], also of `guard`; the robot is then braked and closed again.
+/// [`OmegaError`], also from `guard`; the robot is then braked and closed.
 pub fn open(
     sdk: &dyn Sdk,
     config: &OmegaConfig,
@@ -48,7 +48,7 @@ pub fn open(
         .serial
         .unwrap_or(enumerate::SERIAL_UNKNOWN)
         .to_string();
-    let procedure = Procedure {
+    let procedure = OpenProcedure {
         sdk,
         id,
         serial: &serial,
@@ -63,17 +63,17 @@ pub fn open(
         settings: Vec::new(),
         remarks: Vec::new(),
     };
-    let answer = procedure
+    let result = procedure
         .check(&mut opened, found.type_number)
         .and_then(|()| guard(found.serial))
         .and_then(|()| procedure.initialise(&mut opened));
-    match answer {
+    match result {
         Ok(()) => Ok(opened),
         Err(e) => {
-            // Best effort: the first error is the one to tell.
-            let once = Patience {
+            // Best effort: report the first error.
+            let once = Timeouts {
                 brake_attempts: 1,
-                ..config.patience
+                ..config.timeouts
             };
             let _ = brake(sdk, id, &once, |_| ());
             let _ = sdk.close(id);
@@ -82,7 +82,7 @@ pub fn open(
     }
 }
 
-/// Opens devices one after the other until the one with the wanted serial number is there.
+/// Opens devices one by one until the one with the configured serial number is found.
 fn find(sdk: &dyn Sdk, config: &OmegaConfig) -> Result<(DeviceId, Found), OmegaError> {
     let expected = config.serial.map_or_else(
         || "one free robot".to_owned(),
@@ -93,45 +93,44 @@ fn find(sdk: &dyn Sdk, config: &OmegaConfig) -> Result<(DeviceId, Found), OmegaE
         step: "count the connected devices",
         cause,
     })?;
-    let mut seen: Vec<Found> = Vec::new();
-    let mut taken: Option<(DeviceId, Found)> = None;
+    let mut devices: Vec<Found> = Vec::new();
+    let mut candidate: Option<(DeviceId, Found)> = None;
     for index in 0..count {
         let found = match sdk.open(index) {
-            Err(e) => enumerate::unknown(index, e),
+            Err(e) => enumerate::unopened(index, e),
             Ok(id) => {
-                let found = enumerate::look(sdk, index, id);
+                let found = enumerate::identify(sdk, index, id);
                 if config.serial.is_some() && found.serial == config.serial {
                     return Ok((id, found));
                 }
-                if config.serial.is_none() && taken.is_none() {
-                    seen.push(found.clone());
-                    taken = Some((id, found));
+                if config.serial.is_none() && candidate.is_none() {
+                    devices.push(found.clone());
+                    candidate = Some((id, found));
                     continue;
                 }
                 let _ = sdk.close(id);
                 found
             }
         };
-        seen.push(found);
+        devices.push(found);
     }
-    match taken {
-        Some((id, found)) if seen.len() == 1 => return Ok((id, found)),
+    match candidate {
+        Some((id, found)) if devices.len() == 1 => return Ok((id, found)),
         Some((id, _)) => {
             let _ = sdk.close(id);
         }
         None => {}
     }
-    let next =
-        match seen.as_slice() {
-            [] => "plug the robot in, switch it on, and check your rights (`skinrig doctor`)"
-                .to_owned(),
-            [only] => only.next_step().unwrap_or_else(|| {
-                "correct the serial in the rig file, or connect that robot".to_owned()
-            }),
-            _ => "name the serial of this bench's robot in the rig file, and free that robot"
-                .to_owned(),
-        };
-    let list: Vec<String> = seen.iter().map(Found::to_string).collect();
+    let next = match devices.as_slice() {
+        [] => "connect the robot, switch it on, and check your permissions (`skinrig doctor`)"
+            .to_owned(),
+        [only] => only.next_step().unwrap_or_else(|| {
+            "correct the serial number in the rig file, or connect that robot".to_owned()
+        }),
+        _ => "add the serial number of this bench's robot to the rig file, and free that robot"
+            .to_owned(),
+    };
+    let list: Vec<String> = devices.iter().map(Found::to_string).collect();
     Err(OmegaError::NotFound {
         expected,
         found: if list.is_empty() {
@@ -143,16 +142,16 @@ fn find(sdk: &dyn Sdk, config: &OmegaConfig) -> Result<(DeviceId, Found), OmegaE
     })
 }
 
-/// The steps between an open device and a known state.
-struct Procedure<'a> {
+/// Steps from an open device to a known state.
+struct OpenProcedure<'a> {
     sdk: &'a dyn Sdk,
     id: DeviceId,
     serial: &'a str,
     config: &'a OmegaConfig,
 }
 
-impl Procedure<'_> {
-    /// Everything before the arm may move.
+impl OpenProcedure<'_> {
+    /// All steps before the arm may move.
     fn check(&self, opened: &mut Opened, type_number: Option<i32>) -> Result<(), OmegaError> {
         self.identify(opened, type_number)?;
         self.check_status(opened)?;
@@ -161,21 +160,21 @@ impl Procedure<'_> {
         self.allow_initialisation()
     }
 
-    fn call<T>(&self, step: &'static str, answer: Answer<T>) -> Result<T, OmegaError> {
-        answer.map_err(|cause| OmegaError::Call {
+    fn call<T>(&self, step: &'static str, result: CallResult<T>) -> Result<T, OmegaError> {
+        result.map_err(|cause| OmegaError::Call {
             serial: self.serial.to_owned(),
             step,
             cause,
         })
     }
 
-    fn unfit<T>(
+    fn unsuitable<T>(
         &self,
         expected: impl Into<String>,
         found: impl Into<String>,
         next: impl Into<String>,
     ) -> Result<T, OmegaError> {
-        Err(OmegaError::Unfit {
+        Err(OmegaError::Unsuitable {
             serial: self.serial.to_owned(),
             expected: expected.into(),
             found: found.into(),
@@ -186,17 +185,17 @@ impl Procedure<'_> {
     fn identify(&self, opened: &mut Opened, type_number: Option<i32>) -> Result<(), OmegaError> {
         let number = match type_number {
             Some(number) => number,
-            None => self.call("ask for its type", self.sdk.system_type(self.id))?,
+            None => self.call("read its type", self.sdk.system_type(self.id))?,
         };
         if number != DEVICE_OMEGA3 {
             if !self.config.also_accept_types.contains(&number) {
                 let next = if number == DEVICE_OMEGA3_UNLISTED {
-                    "this type is refused, although old firmware is said to report it for an omega.3: ask Force \
-                     Dimension for a firmware that reports type 33"
+                    "this type is refused although old firmware may report it for an omega.3: ask Force Dimension for firmware that \
+                    reports type 33"
                 } else {
-                    "connect an omega.3: other types are refused"
+                    "connect an omega.3: other types are not supported"
                 };
-                return self.unfit(
+                return self.unsuitable(
                     format!("an omega.3 (type {DEVICE_OMEGA3})"),
                     format!("{} (type {number})", opened.model),
                     next,
@@ -204,19 +203,19 @@ impl Procedure<'_> {
             }
             opened.remarks.push(Remark::OtherType(number));
         }
-        let firmware = self.call("ask for its firmware", self.sdk.firmware(self.id))?;
+        let firmware = self.call("read its firmware version", self.sdk.firmware(self.id))?;
         opened.firmware = enumerate::firmware_text(firmware);
         match self.sdk.check_memory(self.id) {
-            Some(answer) => self.call("check its controller's memory", answer)?,
+            Some(result) => self.call("check its controller's memory", result)?,
             None => opened.remarks.push(Remark::MemoryNotChecked),
         }
-        let mode = self.call("ask how it is connected", self.sdk.com_mode(self.id))?;
-        opened.settings.push(seen("com_mode", mode));
+        let mode = self.call("read its communication mode", self.sdk.com_mode(self.id))?;
+        opened.settings.push(observed_setting("com_mode", mode));
         if !self.sdk.is_supported(self.id) {
-            return self.unfit(
-                "a model that the library can regulate",
-                "one that it cannot",
-                "use another SDK version",
+            return self.unsuitable(
+                "a model that the library can control",
+                "a model that it cannot control",
+                "use another version of the SDK",
             );
         }
         Ok(())
@@ -225,21 +224,22 @@ impl Procedure<'_> {
     fn check_status(&self, opened: &mut Opened) -> Result<(), OmegaError> {
         let status = self.call("read its status", self.sdk.status(self.id))?;
         let words = format!("{:?}", status.words());
-        opened.settings.push(seen("status", words));
+        opened.settings.push(observed_setting("status", words));
         if status.get(StatusField::Power) == Some(0) {
-            return self.unfit("power", "none", "switch the robot on");
+            return self.unsuitable("power", "none", "switch the robot on");
         }
         if status.is(StatusField::Error) {
-            let next = "power-cycle the robot; if it stays, have it serviced";
-            return self.unfit("no fault", "its controller reports one", next);
+            let next =
+                "power-cycle the robot; if the fault persists, contact Force Dimension support";
+            return self.unsuitable("no fault", "a fault reported by its controller", next);
         }
         self.check_redundancy(opened, &status)?;
         if status.is(StatusField::Force) {
-            // Left behind by a program that died.
+            // Left live by a program that died.
             let wait = std::thread::sleep;
-            if let Err(live) = brake(self.sdk, self.id, &self.config.patience, wait) {
+            if let Err(live) = brake(self.sdk, self.id, &self.config.timeouts, wait) {
                 let next = "press the force button on its base or switch it off at the mains";
-                return self.unfit("motors off", live.to_string(), next);
+                return self.unsuitable("motors off", live.to_string(), next);
             }
             opened.remarks.push(Remark::MotorsWereLive);
         }
@@ -252,8 +252,7 @@ impl Procedure<'_> {
         Ok(())
     }
 
-    /// 0 does not tell encoders that disagree from a robot without redundant ones: only a robot that is known to have them
-    /// is refused for it.
+    /// A 0 means either encoders that disagree or no redundant encoders: it is an error only if the robot is known to have them.
     fn check_redundancy(
         &self,
         opened: &mut Opened,
@@ -261,13 +260,15 @@ impl Procedure<'_> {
     ) -> Result<(), OmegaError> {
         let word = status.get(StatusField::Redundancy);
         let found = word.map_or_else(|| "not reported".to_owned(), |word| word.to_string());
-        opened.settings.push(seen("redundant_encoders", &found));
+        opened
+            .settings
+            .push(observed_setting("redundant_encoders", &found));
         match (self.config.redundant_encoders, word) {
             (RedundantEncoders::Required, Some(1)) => Ok(()),
-            (RedundantEncoders::Required, _) => self.unfit(
-                "redundant encoders that agree (status word 13: 1)",
+            (RedundantEncoders::Required, _) => self.unsuitable(
+                "agreeing redundant encoders (status word 13: 1)",
                 format!("status word 13: {found}"),
-                "have the robot serviced; a robot that never reported 1 has none: write `redundant_encoders: reported` in the rig file",
+                "contact Force Dimension support; a robot that never reported 1 has no redundant encoders: set `redundant_encoders: reported` in the rig file",
             ),
             (RedundantEncoders::Reported, Some(0)) => {
                 opened.remarks.push(Remark::NoRedundantEncoders);
@@ -289,16 +290,16 @@ impl Procedure<'_> {
                 .extend(self.set(Quantity::EffectorMassKg, mass)?),
             None => {
                 if let Some(mass) = self.sdk.get(self.id, Quantity::EffectorMassKg) {
-                    let mass = self.call("read its effector's mass", mass)?;
+                    let mass = self.call("read its effector mass", mass)?;
                     opened.effector_mass_kg = Some(mass);
                     opened
                         .settings
-                        .push(seen(Quantity::EffectorMassKg.name(), mass));
+                        .push(observed_setting(Quantity::EffectorMassKg.name(), mass));
                 }
             }
         }
-        let answer = self.sdk.compensate_gravity(self.id);
-        self.call("compensate gravity", answer)?;
+        let result = self.sdk.compensate_gravity(self.id);
+        self.call("switch gravity compensation on", result)?;
         let status = self.call("read its status", self.sdk.status(self.id))?;
         if status.get(StatusField::Gravity) == Some(0) {
             return Err(OmegaError::ReadBack {
@@ -308,7 +309,9 @@ impl Procedure<'_> {
                 found: "off".to_owned(),
             });
         }
-        opened.settings.push(seen("gravity_compensation", "on"));
+        opened
+            .settings
+            .push(observed_setting("gravity_compensation", "on"));
         let most = self.config.envelope.max_force_n;
         opened.settings.extend(self.set(Quantity::MaxForceN, most)?);
         Ok(())
@@ -318,75 +321,83 @@ impl Procedure<'_> {
         set_and_read_back(self.sdk, self.id, quantity, value).map_err(|e| e.into_omega(self.serial))
     }
 
-    /// Arms the device's own watchdog. A device without one is accepted when a supervisor stands in.
+    /// Arms the device's watchdog. A device without one is accepted if a supervisor is configured.
     fn watchdog(&self, opened: &mut Opened) -> Result<(), OmegaError> {
-        let answer = self.sdk.enable_expert_mode();
-        self.call("enable expert mode", answer)?;
+        let result = self.sdk.enable_expert_mode();
+        self.call("enable expert mode", result)?;
         let before = self.sdk.watchdog(self.id).ok();
         match arm_watchdog(self.sdk, self.id, self.config) {
             Ok(setting) => {
-                let before = before.map(|units| seen("watchdog_found_125us", units));
+                let before = before.map(|units| observed_setting("watchdog_found_125us", units));
                 opened.settings.extend(before);
                 opened.settings.push(setting);
             }
-            Err(NotSet::Call(e)) if has_no_watchdog(&e) && self.config.supervisor.is_some() => {
+            Err(SettingError::Call(e))
+                if has_no_watchdog(&e) && self.config.supervisor.is_some() =>
+            {
                 opened.remarks.push(Remark::NoWatchdog);
             }
-            Err(NotSet::Call(e)) if has_no_watchdog(&e) => {
-                return self.unfit(
+            Err(SettingError::Call(e)) if has_no_watchdog(&e) => {
+                return self.unsuitable(
                     "a watchdog in the device",
                     format!("none ({e})"),
                     "configure a supervisor process",
                 );
             }
-            Err(NotSet::Call(cause)) => return self.call("arm its watchdog", Err(cause)),
-            Err(differs) => return Err(differs.into_omega(self.serial)),
+            Err(SettingError::Call(cause)) => return self.call("arm its watchdog", Err(cause)),
+            Err(mismatch) => return Err(mismatch.into_omega(self.serial)),
         }
         let threshold = self.sdk.velocity_threshold(self.id);
         let threshold = self.call("read its velocity threshold", threshold)?;
-        opened.settings.push(seen("velocity_threshold", threshold));
+        opened
+            .settings
+            .push(observed_setting("velocity_threshold", threshold));
         if threshold == 0 {
             opened.remarks.push(Remark::NoVelocityTrip);
         }
         Ok(())
     }
 
-    /// Refuses a robot that is not initialised and may not initialise itself.
+    /// Rejects a robot that is not initialised, unless it may initialise itself.
     fn allow_initialisation(&self) -> Result<(), OmegaError> {
         if self.sdk.is_initialized(self.id) || self.config.initialise == Initialise::SampleIsOff {
             return Ok(());
         }
-        self.unfit(
+        self.unsuitable(
             "a robot initialised since power-up",
-            "one that is not (its LED blinks)",
-            "take the sample and tools off, keep hands clear, and start once with `auto_init: true` and \
-             `sample_is_off: true` in the rig file; or put the calibration pole into the pit by hand",
+            "a robot that is not (its LED blinks)",
+            "remove the sample and tools, keep hands clear, and start once with `auto_init: true` and `sample_is_off: true` in the rig file; \
+            or put the calibration pole into the pit by hand",
         )
     }
 
-    /// Lets the robot initialise itself, which moves the arm, when it has not yet.
+    /// Lets the robot initialise itself if needed. This moves the arm.
     fn initialise(&self, opened: &mut Opened) -> Result<(), OmegaError> {
         if self.sdk.is_initialized(self.id) {
             return Ok(());
         }
-        let answer = self.sdk.auto_init(self.id);
-        self.call("initialise itself", answer)?;
-        // It leaves the regulation running.
+        let result = self.sdk.auto_init(self.id);
+        self.call("initialise itself", result)?;
+        // Initialisation leaves the regulation running.
         let wait = std::thread::sleep;
-        if let Err(live) = brake(self.sdk, self.id, &self.config.patience, wait) {
+        if let Err(live) = brake(self.sdk, self.id, &self.config.timeouts, wait) {
             let next = "press the force button on its base or switch it off at the mains";
-            return self.unfit("motors off after initialisation", live.to_string(), next);
+            return self.unsuitable("motors off after initialisation", live.to_string(), next);
         }
         if !self.sdk.is_initialized(self.id) {
             let next = "power-cycle the robot and try again";
-            return self.unfit("an initialised robot", "one that is still not", next);
+            return self.unsuitable(
+                "an initialised robot",
+                "a robot that is still not initialised",
+                next,
+            );
         }
         opened.remarks.push(Remark::InitialisedItself);
         Ok(())
     }
 }
 
-/// True when the device has no watchdog at all.
+/// Whether the error means that the device has no watchdog.
 pub(crate) const fn has_no_watchdog(error: &CallError) -> bool {
     matches!(
         error.code,
@@ -394,22 +405,22 @@ pub(crate) const fn has_no_watchdog(error: &CallError) -> bool {
     )
 }
 
-/// Sets the device's own watchdog and reads it back. Needs expert mode.
+/// Sets the device's watchdog and reads it back. Needs expert mode.
 pub(crate) fn arm_watchdog(
     sdk: &dyn Sdk,
     id: DeviceId,
     config: &OmegaConfig,
-) -> Result<Setting, NotSet> {
+) -> Result<Setting, SettingError> {
     let units = match config.watchdog {
-        // Within 1..=255: the configuration was checked.
+        // 1 to 255, because the configuration was checked.
         Watchdog::ArmMilliseconds(ms) => (ms * 1e3 / f64::from(WATCHDOG_UNIT_US)).round() as u8,
         Watchdog::Off => 0,
     };
-    sdk.set_watchdog(id, units).map_err(NotSet::Call)?;
-    let found = sdk.watchdog(id).map_err(NotSet::Call)?;
+    sdk.set_watchdog(id, units).map_err(SettingError::Call)?;
+    let found = sdk.watchdog(id).map_err(SettingError::Call)?;
     let (name, expected, found) = ("watchdog_125us", units.to_string(), found.to_string());
     if found != expected {
-        return Err(NotSet::Differs {
+        return Err(SettingError::Mismatch {
             name,
             expected,
             found,
@@ -422,8 +433,8 @@ pub(crate) fn arm_watchdog(
     })
 }
 
-/// A value that was only read.
-pub(crate) fn seen(name: &str, value: impl ToString) -> Setting {
+/// A setting that was only read.
+pub(crate) fn observed_setting(name: &str, value: impl ToString) -> Setting {
     Setting {
         name: name.to_owned(),
         requested: Setting::AS_FOUND.to_owned(),
@@ -431,19 +442,19 @@ pub(crate) fn seen(name: &str, value: impl ToString) -> Setting {
     }
 }
 
-/// A quantity did not take.
-pub(crate) enum NotSet {
+/// A setting could not be written.
+pub(crate) enum SettingError {
     /// A call failed.
     Call(CallError),
-    /// Another value came back.
-    Differs {
+    /// It read back with another value.
+    Mismatch {
         name: &'static str,
         expected: String,
         found: String,
     },
 }
 
-impl NotSet {
+impl SettingError {
     pub(crate) fn into_omega(self, serial: &str) -> OmegaError {
         let serial = serial.to_owned();
         match self {
@@ -452,7 +463,7 @@ impl NotSet {
                 step: "take a setting",
                 cause,
             },
-            Self::Differs {
+            Self::Mismatch {
                 name,
                 expected,
                 found,
@@ -466,31 +477,31 @@ impl NotSet {
     }
 }
 
-/// Largest relative difference between written and read: a device may keep single precision.
-const READ_BACK: f64 = 1e-4;
+/// Largest relative difference between written and read value: a device may use single precision.
+const READ_BACK_TOLERANCE: f64 = 1e-4;
 
-/// True when `found` is `wanted` as far as a device can keep it.
-pub(crate) fn agrees(wanted: f64, found: f64) -> bool {
-    (wanted - found).abs() <= READ_BACK * wanted.abs().max(1e-3)
+/// Whether `found` equals `requested` within the precision of a device.
+pub(crate) fn agrees(requested: f64, found: f64) -> bool {
+    (requested - found).abs() <= READ_BACK_TOLERANCE * requested.abs().max(1e-3)
 }
 
-/// Sets a quantity and compares what comes back. `None`: this version of the library lacks it.
+/// Writes a quantity and compares the value read back. `None`: not supported by this version of the library.
 pub(crate) fn set_and_read_back(
     sdk: &dyn Sdk,
     id: DeviceId,
     quantity: Quantity,
     value: f64,
-) -> Result<Option<Setting>, NotSet> {
-    let Some(answer) = sdk.set(id, quantity, value) else {
+) -> Result<Option<Setting>, SettingError> {
+    let Some(result) = sdk.set(id, quantity, value) else {
         return Ok(None);
     };
-    answer.map_err(NotSet::Call)?;
-    let Some(answer) = sdk.get(id, quantity) else {
+    result.map_err(SettingError::Call)?;
+    let Some(result) = sdk.get(id, quantity) else {
         return Ok(None);
     };
-    let found = answer.map_err(NotSet::Call)?;
+    let found = result.map_err(SettingError::Call)?;
     if !agrees(value, found) {
-        return Err(NotSet::Differs {
+        return Err(SettingError::Mismatch {
             name: quantity.name(),
             expected: value.to_string(),
             found: found.to_string(),
@@ -499,29 +510,14 @@ pub(crate) fn set_and_read_back(
     Ok(Some(Setting {
         name: quantity.name().to_owned(),
         requested: value.to_string(),
-        read_back: told(value, found),
+        read_back: format_read_back(value, found),
     }))
 }
 
-/// What is told of a number that was read back: the written text when both are the same number in single precision,
-/// which a device may keep; else what was read.
-pub(crate) fn told(wanted: f64, found: f64) -> String {
-    if wanted as f32 == found as f32 {
-        return wanted.to_string();
+/// Formats a number that was read back: as `requested` if both are equal in single precision, otherwise as `found`.
+pub(crate) fn format_read_back(requested: f64, found: f64) -> String {
+    if requested as f32 == found as f32 {
+        return requested.to_string();
     }
     found.to_string()
-}
-
-/// Why motors went off, for people.
-pub(crate) fn cause_words(cause: ForceOffCause) -> String {
-    match cause {
-        ForceOffCause::None => "no cause told".to_owned(),
-        ForceOffCause::Button => "the force button on the base".to_owned(),
-        ForceOffCause::Velocity => "the velocity trip: an axis was too fast".to_owned(),
-        ForceOffCause::Watchdog => "the watchdog: no command arrived in time".to_owned(),
-        ForceOffCause::Software => "a program".to_owned(),
-        ForceOffCause::UsbDisconnect => "USB: unplugged".to_owned(),
-        ForceOffCause::Deadman => "the dead-man's switch".to_owned(),
-        ForceOffCause::Unknown(code) => format!("a cause with the unknown number {code}"),
-    }
 }

@@ -1,4 +1,4 @@
-//! The one thread that calls the library, and how the rest of the program talks to it.
+//! The thread that makes all library calls, and the requests to it.
 
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, SyncSender, TrySendError};
@@ -9,7 +9,7 @@ use skinrig_drd_abi::DeviceId;
 use skinrig_model::{DeviceRole, Point3, Robot, Setting};
 
 use crate::brake::brake;
-use crate::config::{OmegaConfig, Patience};
+use crate::config::{OmegaConfig, Timeouts};
 use crate::engine::Engine;
 use crate::error::OmegaError;
 use crate::open::{self, Opened};
@@ -17,12 +17,12 @@ use crate::sdk::Sdk;
 use crate::stream::Stream;
 use crate::supervisor::Supervisor;
 
-/// Requests that may wait; each caller waits for its reply, so one is the rule.
+/// Capacity of the request queue. Each caller waits for its reply, so usually one entry is used.
 const QUEUE: usize = 8;
 
 type Reply<T> = SyncSender<Result<T, DeviceError>>;
 
-/// What the thread is asked to do.
+/// A request to the thread.
 enum Request {
     Configure(MotionLimits, Reply<Vec<Setting>>),
     Arm(Reply<()>),
@@ -31,21 +31,21 @@ enum Request {
     Disarm(Reply<()>),
 }
 
-/// The thread, seen from outside.
+/// Handle of the thread.
 pub(crate) struct Owner {
     requests: Option<SyncSender<Request>>,
     ended: Receiver<()>,
     sdk: Arc<dyn Sdk>,
     id: DeviceId,
     serial: String,
-    patience: Patience,
+    timeouts: Timeouts,
     arm_within: Duration,
-    /// Why nothing can be asked any more.
-    dead: Option<String>,
+    /// Why no more requests are accepted.
+    failure: Option<String>,
 }
 
 impl Owner {
-    /// Starts the thread, which opens the robot, and waits until it is open.
+    /// Starts the thread and waits until it has opened the robot.
     pub(crate) fn start(
         sdk: Arc<dyn Sdk>,
         config: Arc<OmegaConfig>,
@@ -53,35 +53,35 @@ impl Owner {
         clock: RealClock,
         stream: Arc<Stream>,
     ) -> Result<(Self, Opened), OmegaError> {
-        let patience = config.patience;
+        let timeouts = config.timeouts;
         let (requests, inbox) = mpsc::sync_channel(QUEUE);
-        let (tell_opened, opened) = mpsc::sync_channel(1);
-        let (tell_ended, ended) = mpsc::sync_channel::<()>(1);
+        let (opened_sender, opened) = mpsc::sync_channel(1);
+        let (ended_sender, ended) = mpsc::sync_channel::<()>(1);
         let thread_sdk = Arc::clone(&sdk);
         let thread_config = Arc::clone(&config);
         let body = move || {
             let (sdk, config) = (thread_sdk, thread_config);
-            // Dropped last, when the device is closed: whoever waits is woken.
-            let _ended = tell_ended;
+            // Dropped last, after the device is closed, which wakes waiting threads.
+            let _ended = ended_sender;
             let mut supervisor = None;
             let opened = open::open(&*sdk, &config, |serial| {
                 if let Some(command) = &config.supervisor {
-                    let started = Supervisor::start(command, &library, serial, patience.open)?;
+                    let started = Supervisor::start(command, &library, serial, timeouts.open)?;
                     supervisor = Some(started);
                 }
                 Ok(())
             });
             match opened {
                 Err(e) => {
-                    // Not dismissed: it makes sure that an arm whose initialisation failed is braked.
+                    // Without dismissal it makes sure that an arm whose initialisation failed is braked.
                     drop(supervisor);
-                    let _ = tell_opened.send(Err(e));
+                    let _ = opened_sender.send(Err(e));
                 }
                 Ok(opened) => {
-                    let news = opened.clone();
+                    let info = opened.clone();
                     let engine = Engine::new(sdk, config, opened, clock, stream, supervisor);
-                    // Nobody waits any more: the engine's end closes the device.
-                    if tell_opened.send(Ok(news)).is_ok() {
+                    // If the receiver is gone, dropping the engine closes the device.
+                    if opened_sender.send(Ok(info)).is_ok() {
                         serve(engine, clock, &inbox);
                     }
                 }
@@ -91,16 +91,16 @@ impl Owner {
             .name("omega3".to_owned())
             .spawn(body)
             .map_err(|e| OmegaError::Thread(e.to_string()))?;
-        let mut within = patience.open;
+        let mut within = timeouts.open;
         if config.initialise == crate::config::Initialise::SampleIsOff {
-            within += patience.initialise;
+            within += timeouts.initialise;
         }
         let opened = match opened.recv_timeout(within) {
             Ok(answer) => answer?,
             Err(_) => {
-                // It hangs in a call, perhaps while the arm initialises itself: every device is told to brake.
-                emergency(Arc::clone(&sdk), skinrig_drd_abi::DEFAULT_DEVICE, patience);
-                return Err(OmegaError::Late {
+                // A call hangs, perhaps while the arm initialises itself: brake every device.
+                emergency_brake(Arc::clone(&sdk), skinrig_drd_abi::DEFAULT_DEVICE, timeouts);
+                return Err(OmegaError::TimedOut {
                     what: "opening the robot",
                     waited: within,
                 });
@@ -112,35 +112,35 @@ impl Owner {
             sdk,
             id: opened.id,
             serial: opened.serial.clone(),
-            patience,
-            arm_within: patience.regulation * 2 + config.trips.tare,
-            dead: None,
+            timeouts,
+            arm_within: timeouts.regulation * 2 + config.trips.tare,
+            failure: None,
         };
         Ok((owner, opened))
     }
 
     pub(crate) fn configure(&mut self, limits: MotionLimits) -> Result<Vec<Setting>, DeviceError> {
-        self.ask("configuring", Duration::ZERO, |reply| {
+        self.request("configuring", Duration::ZERO, |reply| {
             Request::Configure(limits, reply)
         })
     }
 
     pub(crate) fn arm(&mut self) -> Result<(), DeviceError> {
-        self.ask("arming", self.arm_within, Request::Arm)
+        self.request("arming", self.arm_within, Request::Arm)
     }
 
     pub(crate) fn go(&mut self, target: Point3<Robot>, speed_mm_s: f64) -> Result<(), DeviceError> {
-        self.ask("a motion command", Duration::ZERO, |reply| {
+        self.request("a motion command", Duration::ZERO, |reply| {
             Request::Go(target, speed_mm_s, reply)
         })
     }
 
     pub(crate) fn hold(&mut self) -> Result<(), DeviceError> {
-        self.ask("holding", Duration::ZERO, Request::Hold)
+        self.request("holding", Duration::ZERO, Request::Hold)
     }
 
     pub(crate) fn disarm(&mut self) -> Result<(), DeviceError> {
-        self.ask("disarming", Duration::ZERO, Request::Disarm)
+        self.request("disarming", Duration::ZERO, Request::Disarm)
     }
 
     fn lost(&self, detail: String) -> DeviceError {
@@ -151,25 +151,25 @@ impl Owner {
         }
     }
 
-    /// Sends a request and waits for its answer. A library that does not return within the time is given up: the arm
-    /// is told to brake from another thread, and nothing can be asked any more.
-    fn ask<T>(
+    /// Sends a request and waits for its reply. If the library does not return in time, brakes the arm from another thread and accepts no
+    /// further requests.
+    fn request<T>(
         &mut self,
         what: &'static str,
-        beyond: Duration,
+        extra: Duration,
         request: impl FnOnce(Reply<T>) -> Request,
     ) -> Result<T, DeviceError> {
-        if let Some(why) = &self.dead {
-            return Err(self.lost(why.clone()));
+        if let Some(reason) = &self.failure {
+            return Err(self.lost(reason.clone()));
         }
-        // A fault may be braking, with all its attempts, before the request is heard.
-        let within = self.patience.reply + braking(&self.patience) + beyond;
+        // The thread may first brake after a fault, with all attempts.
+        let within = self.timeouts.reply + total_brake_time(&self.timeouts) + extra;
         let (reply, answer) = mpsc::sync_channel(1);
         let sent = match &self.requests {
             Some(requests) => requests.try_send(request(reply)),
             None => return Err(self.lost("closed".to_owned())),
         };
-        let why = match sent {
+        let reason = match sent {
             Ok(()) => match answer.recv_timeout(within) {
                 Ok(answer) => return answer,
                 Err(RecvTimeoutError::Timeout) => {
@@ -179,82 +179,82 @@ impl Owner {
                     format!("{what}: the thread that owns the library ended")
                 }
             },
-            Err(TrySendError::Full(_)) => format!("{what}: requests are not heard"),
+            Err(TrySendError::Full(_)) => format!("{what}: the request queue is full"),
             Err(TrySendError::Disconnected(_)) => {
                 format!("{what}: the thread that owns the library ended")
             }
         };
-        let braked = emergency(Arc::clone(&self.sdk), self.id, self.patience);
+        let braked = emergency_brake(Arc::clone(&self.sdk), self.id, self.timeouts);
         let outcome = if braked {
             "the arm was braked from another thread"
         } else {
             "the arm may be live: press the force button on its base or switch it off at the mains"
         };
-        let why = format!("{why}; {outcome}");
-        self.dead = Some(why.clone());
-        Err(self.lost(why))
+        let reason = format!("{reason}; {outcome}");
+        self.failure = Some(reason.clone());
+        Err(self.lost(reason))
     }
 }
 
-/// Time that all attempts to brake take.
-fn braking(patience: &Patience) -> Duration {
-    patience.brake_retry * patience.brake_attempts
+/// Duration of all attempts to brake.
+fn total_brake_time(timeouts: &Timeouts) -> Duration {
+    timeouts.brake_retry * timeouts.brake_attempts
 }
 
 impl Drop for Owner {
-    /// Brakes, closes, and waits for it, so that the robot can be opened again at once.
+    /// Brakes, closes the device and waits for that, so that the robot can be reopened at once.
     fn drop(&mut self) {
         drop(self.requests.take());
-        let within = self.patience.reply + braking(&self.patience);
+        let within = self.timeouts.reply + total_brake_time(&self.timeouts);
         let ended = matches!(
             self.ended.recv_timeout(within),
             Err(RecvTimeoutError::Disconnected)
         );
-        if !ended && self.dead.is_none() {
-            emergency(Arc::clone(&self.sdk), self.id, self.patience);
+        if !ended && self.failure.is_none() {
+            emergency_brake(Arc::clone(&self.sdk), self.id, self.timeouts);
         }
     }
 }
 
-/// Brakes from a thread of its own while the owner hangs in a call: the library's documentation says that its calls
-/// may come from any thread. True when the robot confirmed.
-fn emergency(sdk: Arc<dyn Sdk>, id: DeviceId, patience: Patience) -> bool {
-    let (tell, hear) = mpsc::sync_channel(1);
+/// Brakes from a separate thread while the owner hangs in a call. The library's documentation allows calls from any thread. Returns
+/// whether the robot confirmed.
+fn emergency_brake(sdk: Arc<dyn Sdk>, id: DeviceId, timeouts: Timeouts) -> bool {
+    let (sender, receiver) = mpsc::sync_channel(1);
     let body = move || {
-        let braked = brake(&*sdk, id, &patience, std::thread::sleep).is_ok();
-        let _ = tell.send(braked);
+        let braked = brake(&*sdk, id, &timeouts, std::thread::sleep).is_ok();
+        let _ = sender.send(braked);
     };
     let started = std::thread::Builder::new()
         .name("omega3-emergency".to_owned())
         .spawn(body);
     started.is_ok()
-        && hear
-            .recv_timeout(patience.reply + braking(&patience))
+        && receiver
+            .recv_timeout(timeouts.reply + total_brake_time(&timeouts))
             .unwrap_or(false)
 }
 
-/// Serves requests and cycles until nobody asks any more.
+/// Handles requests and runs cycles until all handles are gone.
 fn serve(mut engine: Engine<RealClock>, clock: RealClock, inbox: &Receiver<Request>) {
     let mut next = clock.now();
     loop {
         let left = next - clock.now();
         let wait = Duration::from_nanos(u64::try_from(left.0).unwrap_or(0));
         match inbox.recv_timeout(wait) {
-            Ok(request) => answer(&mut engine, request),
+            Ok(request) => handle(&mut engine, request),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => return,
         }
         let now = clock.now();
         if now >= next {
             engine.tick();
-            // A late cycle is not made up for: the set point waits, see the engine.
+            // Late cycles are not caught up: the set point waits, see the engine.
             next = (next + engine.period()).max(now);
         }
     }
 }
 
-/// Answers one request. Whoever asked may have given up: then the answer is dropped.
-fn answer(engine: &mut Engine<RealClock>, request: Request) {
+/// Handles one request. The reply is dropped if the caller no longer waits.
+fn handle(engine: &mut Engine<RealClock>, request: Request) {
     match request {
         Request::Configure(limits, reply) => {
             let _ = reply.send(engine.configure(&limits));

@@ -1,21 +1,23 @@
-//! The settings of the vendor's position regulation, written and read back. Whether a start resets them is not
-//! documented, so they are written after every start.
+//! Settings of the vendor's position regulation, written and read back. They are written after every start, because it is not
+//! documented whether a start resets them.
 
 use skinrig_device::MotionLimits;
 use skinrig_drd_abi::{DeviceId, ErrorCode};
 use skinrig_model::Setting;
 
 use crate::config::OmegaConfig;
-use crate::open::{NotSet, agrees, arm_watchdog, has_no_watchdog, set_and_read_back, told};
-use crate::sdk::{CallError, Generator, Pace, Quantity, Sdk};
+use crate::open::{
+    SettingError, agrees, arm_watchdog, format_read_back, has_no_watchdog, set_and_read_back,
+};
+use crate::sdk::{CallError, Generator, GeneratorLimits, Quantity, Sdk};
 
-/// Writes gains, the motor ratio that caps the force, and the limits of both trajectory generators.
+/// Writes the gains, the motor ratio that limits the force, and the limits of both trajectory generators.
 pub(crate) fn apply(
     sdk: &dyn Sdk,
     id: DeviceId,
     config: &OmegaConfig,
     limits: &MotionLimits,
-) -> Result<Vec<Setting>, NotSet> {
+) -> Result<Vec<Setting>, SettingError> {
     let mut settings = Vec::new();
     let ratio = config.envelope.ratio_of(limits.max_force_n);
     settings.extend(set_and_read_back(sdk, id, Quantity::MotorRatio, ratio)?);
@@ -36,81 +38,84 @@ pub(crate) fn apply(
     }
     let m = &config.motion;
     let metres = 1e-3 * m.filter_headroom;
-    let pace = Pace {
+    let limits = GeneratorLimits {
         acceleration_m_s2: limits.max_acceleration_mm_s2 * metres,
         speed_m_s: limits.max_speed_mm_s * metres,
         jerk_m_s3: m.jerk_mm_s3 * metres,
     };
     for generator in [Generator::Move, Generator::Track] {
-        settings.extend(set_pace(sdk, id, generator, pace)?);
+        settings.extend(set_generator_limits(sdk, id, generator, limits)?);
     }
     Ok(settings)
 }
 
-/// One setting for each number: what is compared later is a number and not a sentence.
-fn set_pace(
+/// Writes generator limits. Each number becomes a separate setting, so that later comparisons work on numbers.
+fn set_generator_limits(
     sdk: &dyn Sdk,
     id: DeviceId,
     generator: Generator,
-    pace: Pace,
-) -> Result<[Setting; 3], NotSet> {
-    sdk.set_pace(id, generator, pace).map_err(NotSet::Call)?;
-    let found = sdk.pace(id, generator).map_err(NotSet::Call)?;
-    let same = agrees(pace.acceleration_m_s2, found.acceleration_m_s2)
-        && agrees(pace.speed_m_s, found.speed_m_s)
-        && agrees(pace.jerk_m_s3, found.jerk_m_s3);
+    limits: GeneratorLimits,
+) -> Result<[Setting; 3], SettingError> {
+    sdk.set_generator_limits(id, generator, limits)
+        .map_err(SettingError::Call)?;
+    let found = sdk
+        .generator_limits(id, generator)
+        .map_err(SettingError::Call)?;
+    let same = agrees(limits.acceleration_m_s2, found.acceleration_m_s2)
+        && agrees(limits.speed_m_s, found.speed_m_s)
+        && agrees(limits.jerk_m_s3, found.jerk_m_s3);
     if !same {
-        return Err(NotSet::Differs {
+        return Err(SettingError::Mismatch {
             name: generator.name(),
-            expected: pace.to_string(),
+            expected: limits.to_string(),
             found: found.to_string(),
         });
     }
-    let setting = |quantity: &str, wanted: f64, found: f64| Setting {
+    let setting = |quantity: &str, requested: f64, found: f64| Setting {
         name: format!("{}_{quantity}", generator.name()),
-        requested: wanted.to_string(),
-        read_back: told(wanted, found),
+        requested: requested.to_string(),
+        read_back: format_read_back(requested, found),
     };
     Ok([
         setting(
             "acceleration_m_s2",
-            pace.acceleration_m_s2,
+            limits.acceleration_m_s2,
             found.acceleration_m_s2,
         ),
-        setting("speed_m_s", pace.speed_m_s, found.speed_m_s),
-        setting("jerk_m_s3", pace.jerk_m_s3, found.jerk_m_s3),
+        setting("speed_m_s", limits.speed_m_s, found.speed_m_s),
+        setting("jerk_m_s3", limits.jerk_m_s3, found.jerk_m_s3),
     ])
 }
 
-/// Starts the regulation, which holds where the arm is, writes its settings and the watchdog's, and turns position
-/// control and the track filter on. Gives what read back.
+/// Starts the regulation at the current position, writes its settings and the watchdog, and switches position control and the track
+/// filter on. Returns the values read back.
 pub(crate) fn start(
     sdk: &dyn Sdk,
     id: DeviceId,
     config: &OmegaConfig,
     limits: &MotionLimits,
-) -> Result<Vec<Setting>, NotSet> {
-    sdk.start(id).map_err(NotSet::Call)?;
+) -> Result<Vec<Setting>, SettingError> {
+    sdk.start(id).map_err(SettingError::Call)?;
     let mut settings = apply(sdk, id, config, limits)?;
     match arm_watchdog(sdk, id, config) {
         Ok(setting) => settings.push(setting),
-        // Opening accepted that.
-        Err(NotSet::Call(e)) if has_no_watchdog(&e) && config.supervisor.is_some() => {}
+        // Accepted when the robot was opened.
+        Err(SettingError::Call(e)) if has_no_watchdog(&e) && config.supervisor.is_some() => {}
         Err(e) => return Err(e),
     }
-    sdk.regulate_position(id).map_err(NotSet::Call)?;
-    sdk.enable_filter(id).map_err(NotSet::Call)?;
+    sdk.regulate_position(id).map_err(SettingError::Call)?;
+    sdk.enable_filter(id).map_err(SettingError::Call)?;
     if sdk.is_filtering(id) {
         return Ok(settings);
     }
-    Err(NotSet::Differs {
+    Err(SettingError::Mismatch {
         name: "track_filter",
         expected: "on".to_owned(),
         found: "off".to_owned(),
     })
 }
 
-/// True when the library takes a setting only while the regulation runs: it is then checked at arming.
+/// Whether the library accepts a setting only while the regulation runs; arming then checks it.
 pub(crate) const fn needs_regulation(error: &CallError) -> bool {
     matches!(error.code, ErrorCode::NO_REGULATION)
 }

@@ -1,19 +1,19 @@
-//! What the driver asks of the vendor's library: one method per call, safe, each failure with its cause.
+//! The `Sdk` trait: the library's calls as safe methods with typed errors.
 //!
-//! This is the driver's lower seam. [`crate::library::Library`] implements it over a loaded libdrd; tests script it.
+//! [`crate::library::Library`] implements it with a loaded libdrd; tests use a scripted implementation.
 
 use std::fmt;
 
 use skinrig_drd_abi::{DeviceId, ErrorCode, SdkVersion, StatusVector};
 
-/// A call failed.
+/// A failed library call.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CallError {
-    /// The function.
+    /// Name of the function.
     pub call: &'static str,
-    /// The code that the library kept for the calling thread.
+    /// Error code that the library keeps for the calling thread.
     pub code: ErrorCode,
-    /// The library's own words.
+    /// The library's message.
     pub text: String,
 }
 
@@ -23,32 +23,32 @@ impl fmt::Display for CallError {
         if self.text.is_empty() {
             return Ok(());
         }
-        write!(f, ", the library says \"{}\"", self.text)
+        write!(f, ", library message \"{}\"", self.text)
     }
 }
 
 impl std::error::Error for CallError {}
 
-/// The answer to a call.
-pub type Answer<T> = Result<T, CallError>;
+/// Result of a call.
+pub type CallResult<T> = Result<T, CallError>;
 
-/// A position as the library gave it.
+/// A position reported by the library.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
     /// On the device's axes, m.
     pub position_m: [f64; 3],
-    /// True when the library repeats an earlier reading because it was asked again too soon.
+    /// Whether the library repeats an earlier reading because it was called again too soon.
     pub cached: bool,
 }
 
-/// A quantity that can be set and read back.
+/// A quantity that can be written and read back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// Tilt of the base, degrees.
     DeviceAngleDeg,
     /// Mass at the end of the arm, kg.
     EffectorMassKg,
-    /// Ceiling of the haptic force calls, N. Optional; whether regulation obeys it is not documented.
+    /// Limit of the haptic force calls, N. Optional; it is not documented whether regulation respects it.
     MaxForceN,
     /// Proportional gain.
     GainP,
@@ -56,12 +56,12 @@ pub enum Quantity {
     GainI,
     /// Derivative gain.
     GainD,
-    /// Share of each joint's torque that regulation may use.
+    /// Share of each joint's torque available to regulation.
     MotorRatio,
 }
 
 impl Quantity {
-    /// Name for settings and messages.
+    /// Name in settings and messages.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -76,17 +76,17 @@ impl Quantity {
     }
 }
 
-/// Which trajectory generator of the library.
+/// A trajectory generator of the library.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Generator {
-    /// Of moves; we never move by it, and limit it all the same.
+    /// For moves. The driver never uses it but limits it anyway.
     Move,
-    /// Of tracked targets.
+    /// For tracked targets.
     Track,
 }
 
 impl Generator {
-    /// Name for settings and messages.
+    /// Name in settings and messages.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -98,7 +98,7 @@ impl Generator {
 
 /// Limits of a trajectory generator.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pace {
+pub struct GeneratorLimits {
     /// m/s².
     pub acceleration_m_s2: f64,
     /// m/s.
@@ -107,7 +107,7 @@ pub struct Pace {
     pub jerk_m_s3: f64,
 }
 
-impl fmt::Display for Pace {
+impl fmt::Display for GeneratorLimits {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
@@ -117,85 +117,90 @@ impl fmt::Display for Pace {
     }
 }
 
-/// The calls. Each failure carries the code of the calling thread, read at once.
+/// Library calls. Each failure contains the error code of the calling thread, read immediately.
 ///
-/// `None` from an optional function: this version of the library lacks it.
+/// `None` from an optional function: not available in this version of the library.
 pub trait Sdk: Send + Sync {
     /// Version of the library.
     fn version(&self) -> SdkVersion;
-    /// Connected devices, also those that other processes hold.
-    fn device_count(&self) -> Answer<i8>;
-    /// Opens the device at this place of the enumeration.
-    fn open(&self, index: i8) -> Answer<DeviceId>;
+    /// Number of connected devices, including those in use by other processes.
+    fn device_count(&self) -> CallResult<i8>;
+    /// Opens the device with this index in the enumeration.
+    fn open(&self, index: i8) -> CallResult<DeviceId>;
     /// Closes a device.
-    fn close(&self, id: DeviceId) -> Answer<()>;
+    fn close(&self, id: DeviceId) -> CallResult<()>;
 
     /// Type number.
-    fn system_type(&self, id: DeviceId) -> Answer<i32>;
+    fn system_type(&self, id: DeviceId) -> CallResult<i32>;
     /// Name of the model.
     fn system_name(&self, id: DeviceId) -> Option<String>;
     /// Serial number.
-    fn serial(&self, id: DeviceId) -> Answer<u16>;
-    /// Version of the controller's firmware.
-    fn firmware(&self, id: DeviceId) -> Answer<f64>;
-    /// How the library speaks to the device.
-    fn com_mode(&self, id: DeviceId) -> Answer<i32>;
+    fn serial(&self, id: DeviceId) -> CallResult<u16>;
+    /// Firmware version of the controller.
+    fn firmware(&self, id: DeviceId) -> CallResult<f64>;
+    /// Communication mode.
+    fn com_mode(&self, id: DeviceId) -> CallResult<i32>;
     /// Tests the controller's memory.
-    fn check_memory(&self, id: DeviceId) -> Option<Answer<()>>;
+    fn check_memory(&self, id: DeviceId) -> Option<CallResult<()>>;
     /// The status vector.
-    fn status(&self, id: DeviceId) -> Answer<StatusVector>;
+    fn status(&self, id: DeviceId) -> CallResult<StatusVector>;
     /// Whether the library can regulate this model.
     fn is_supported(&self, id: DeviceId) -> bool;
-    /// Whether the device is calibrated since power-up.
+    /// Whether the device has been calibrated since power-up.
     fn is_initialized(&self, id: DeviceId) -> bool;
-    /// Calibrates: moves the arm, blocks.
-    fn auto_init(&self, id: DeviceId) -> Answer<()>;
+    /// Calibrates the device. Moves the arm and blocks.
+    fn auto_init(&self, id: DeviceId) -> CallResult<()>;
 
-    /// Sets a quantity.
-    fn set(&self, id: DeviceId, quantity: Quantity, value: f64) -> Option<Answer<()>>;
+    /// Writes a quantity.
+    fn set(&self, id: DeviceId, quantity: Quantity, value: f64) -> Option<CallResult<()>>;
     /// Reads a quantity.
-    fn get(&self, id: DeviceId, quantity: Quantity) -> Option<Answer<f64>>;
-    /// Gravity compensation on.
-    fn compensate_gravity(&self, id: DeviceId) -> Answer<()>;
-    /// Allows the watchdog to be set.
-    fn enable_expert_mode(&self) -> Answer<()>;
-    /// Watchdog time in units of 125 us, 0 for off.
-    fn watchdog(&self, id: DeviceId) -> Answer<u8>;
-    /// Sets the watchdog time.
-    fn set_watchdog(&self, id: DeviceId, units: u8) -> Answer<()>;
-    /// Velocity threshold in units of the device.
-    fn velocity_threshold(&self, id: DeviceId) -> Answer<u32>;
+    fn get(&self, id: DeviceId, quantity: Quantity) -> Option<CallResult<f64>>;
+    /// Switches gravity compensation on.
+    fn compensate_gravity(&self, id: DeviceId) -> CallResult<()>;
+    /// Enables expert mode, which is needed for the watchdog.
+    fn enable_expert_mode(&self) -> CallResult<()>;
+    /// Watchdog timeout in units of 125 µs; 0 means off.
+    fn watchdog(&self, id: DeviceId) -> CallResult<u8>;
+    /// Sets the watchdog timeout.
+    fn set_watchdog(&self, id: DeviceId, units: u8) -> CallResult<()>;
+    /// Velocity threshold in device units.
+    fn velocity_threshold(&self, id: DeviceId) -> CallResult<u32>;
 
     /// Starts the regulation.
-    fn start(&self, id: DeviceId) -> Answer<()>;
+    fn start(&self, id: DeviceId) -> CallResult<()>;
     /// Stops the regulation and brakes.
-    fn stop(&self, id: DeviceId) -> Answer<()>;
-    /// Whether the regulation lives.
+    fn stop(&self, id: DeviceId) -> CallResult<()>;
+    /// Whether the regulation is running.
     fn is_running(&self, id: DeviceId) -> bool;
     /// Mean rate of the regulation since the last call, kHz.
-    fn control_khz(&self, id: DeviceId) -> Answer<f64>;
-    /// Regulates the translations.
-    fn regulate_position(&self, id: DeviceId) -> Answer<()>;
-    /// Turns the filter of tracked targets on.
-    fn enable_filter(&self, id: DeviceId) -> Answer<()>;
+    fn control_khz(&self, id: DeviceId) -> CallResult<f64>;
+    /// Switches position regulation on.
+    fn regulate_position(&self, id: DeviceId) -> CallResult<()>;
+    /// Switches the filter of tracked targets on.
+    fn enable_filter(&self, id: DeviceId) -> CallResult<()>;
     /// Whether that filter is on.
     fn is_filtering(&self, id: DeviceId) -> bool;
     /// Sets the limits of a trajectory generator.
-    fn set_pace(&self, id: DeviceId, generator: Generator, pace: Pace) -> Answer<()>;
+    fn set_generator_limits(
+        &self,
+        id: DeviceId,
+        generator: Generator,
+        limits: GeneratorLimits,
+    ) -> CallResult<()>;
     /// Reads the limits of a trajectory generator.
-    fn pace(&self, id: DeviceId, generator: Generator) -> Answer<Pace>;
-    /// Sends the regulation a target, m.
-    fn track(&self, id: DeviceId, target_m: [f64; 3]) -> Answer<()>;
+    fn generator_limits(&self, id: DeviceId, generator: Generator) -> CallResult<GeneratorLimits>;
+    /// Sends a target to the regulation, m.
+    fn track(&self, id: DeviceId, target_m: [f64; 3]) -> CallResult<()>;
 
     /// Position in the regulation's buffer.
-    fn regulated_position(&self, id: DeviceId) -> Answer<Reading>;
-    /// Position, asked from the device.
-    fn position(&self, id: DeviceId) -> Answer<Reading>;
-    /// Commanded motor force without gravity, N.
-    fn force(&self, id: DeviceId) -> Answer<[f64; 3]>;
+    fn regulated_position(&self, id: DeviceId) -> CallResult<Reading>;
+    /// Position read from the device.
+    fn position(&self, id: DeviceId) -> CallResult<Reading>;
+    /// Commanded motor force without gravity compensation, N.
+    fn force(&self, id: DeviceId) -> CallResult<[f64; 3]>;
 
     /// Motors off, brake on.
-    fn emergency_stop(&self, id: DeviceId) -> Answer<()>;
+    fn emergency_stop(&self, id: DeviceId) -> CallResult<()>;
     /// Motor power off.
-    fn force_off(&self, id: DeviceId) -> Answer<()>;
+    fn force_off(&self, id: DeviceId) -> CallResult<()>;
 }

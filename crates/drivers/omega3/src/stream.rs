@@ -1,59 +1,59 @@
-//! Samples on their way from the thread that owns the library to whoever polls, bounded and never lost in silence.
+//! Bounded queue of samples from the owner thread to the polling program. Dropped samples are counted.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use skinrig_device::{DeviceError, RobotSample};
 
-/// Samples kept between two polls: eight seconds at 2 kHz.
+/// Samples queued between two polls: eight seconds at 2 kHz.
 pub(crate) const CAPACITY: usize = 16_384;
 
-/// The stream.
+/// The queue with failure and notes.
 #[derive(Debug, Default)]
 pub(crate) struct Stream {
-    inside: Mutex<Inside>,
+    inner: Mutex<Inner>,
 }
 
 #[derive(Debug, Default)]
-struct Inside {
+struct Inner {
     samples: Vec<RobotSample>,
     dropped: u64,
     failure: Option<DeviceError>,
-    watched: bool,
+    is_active: bool,
     notes: Vec<String>,
 }
 
 impl Stream {
-    fn lock(&self) -> MutexGuard<'_, Inside> {
-        // Every change is complete at once: what a panicking thread left behind is whole.
-        self.inside.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, Inner> {
+        // Every update is complete under one lock, so a poisoned lock has consistent data.
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Adds a sample; one that finds no room is counted.
+    /// Adds a sample, or counts it as dropped if the queue is full.
     pub(crate) fn push(&self, sample: RobotSample) {
-        let mut inside = self.lock();
-        if inside.samples.len() < CAPACITY {
-            inside.samples.push(sample);
+        let mut inner = self.lock();
+        if inner.samples.len() < CAPACITY {
+            inner.samples.push(sample);
         } else {
-            inside.dropped += 1;
+            inner.dropped += 1;
         }
     }
 
-    /// Every poll gives this error from now on.
+    /// Sets the failure that every poll returns from now on. The first one stays.
     pub(crate) fn fail(&self, error: DeviceError) {
         self.lock().failure.get_or_insert(error);
     }
 
-    /// Forgets the failure.
-    pub(crate) fn heal(&self) {
+    /// Clears the failure.
+    pub(crate) fn clear_failure(&self) {
         self.lock().failure = None;
     }
 
-    /// The failure.
+    /// The current failure.
     pub(crate) fn failure(&self) -> Option<DeviceError> {
         self.lock().failure.clone()
     }
 
-    /// Something that the operator should know.
+    /// Adds a note for the operator.
     pub(crate) fn note(&self, note: String) {
         self.lock().notes.push(note);
     }
@@ -63,21 +63,21 @@ impl Stream {
         into.append(&mut self.lock().notes);
     }
 
-    /// Somebody looks after the robot.
-    pub(crate) fn watch(&self) {
-        self.lock().watched = true;
+    /// Marks the robot as polled or commanded.
+    pub(crate) fn mark_active(&self) {
+        self.lock().is_active = true;
     }
 
-    /// Whether somebody did since the last call; taking samples counts.
-    pub(crate) fn was_watched(&self) -> bool {
-        std::mem::take(&mut self.lock().watched)
+    /// Whether the robot was polled or commanded since the last call.
+    pub(crate) fn take_activity(&self) -> bool {
+        std::mem::take(&mut self.lock().is_active)
     }
 
-    /// Moves all samples to the end of `into`; gives how many found no room since the last call.
+    /// Moves all samples to the end of `into`. Returns the number dropped since the last call.
     pub(crate) fn take(&self, into: &mut Vec<RobotSample>) -> u64 {
-        let mut inside = self.lock();
-        inside.watched = true;
-        into.append(&mut inside.samples);
-        std::mem::take(&mut inside.dropped)
+        let mut inner = self.lock();
+        inner.is_active = true;
+        into.append(&mut inner.samples);
+        std::mem::take(&mut inner.dropped)
     }
 }

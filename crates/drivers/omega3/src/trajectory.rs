@@ -1,17 +1,17 @@
-//! The set point: along straight lines, with limited speed, acceleration and jerk, never far ahead of the tip.
+//! The set point: moves along straight lines with limited speed, acceleration and jerk, and never far ahead of the tip.
 
 use skinrig_model::{Point3, Robot};
 
 use crate::config::Motion;
-use crate::profile::{Pacing, Profile};
+use crate::profile::{Profile, ProfileLimits};
 
-/// A turn by less than this distance between the lines goes on without stopping, mm.
-const STRAIGHT_ON_MM: f64 = 1e-3;
+/// A change of direction below this distance between the lines does not need a stop, mm.
+const COLLINEAR_MM: f64 = 1e-3;
 
-/// Share of the longest step that is used: speeds are kept to within rounding.
+/// Share of the longest step that is used, as a margin for rounding.
 const STEP_SHARE: f64 = 0.99;
 
-/// A line under way.
+/// A line in progress.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Line {
     from: [f64; 3],
@@ -20,11 +20,11 @@ struct Line {
 }
 
 impl Line {
-    fn new(from: [f64; 3], to: [f64; 3], pacing: Pacing) -> Self {
+    fn new(from: [f64; 3], to: [f64; 3], limits: ProfileLimits) -> Self {
         Self {
             from,
             to,
-            profile: Profile::at_rest(distance(from, to), pacing),
+            profile: Profile::at_rest(distance(from, to), limits),
         }
     }
 
@@ -49,7 +49,7 @@ pub(crate) struct Trajectory {
 }
 
 impl Trajectory {
-    /// At rest.
+    /// At rest at a point.
     #[must_use]
     pub const fn at_rest(limits: Motion, at: Point3<Robot>) -> Self {
         Self {
@@ -60,26 +60,26 @@ impl Trajectory {
         }
     }
 
-    /// From the next move on accelerates by at most this much, mm/s².
+    /// Sets the acceleration limit from the next move on, mm/s².
     pub const fn set_acceleration(&mut self, acceleration_mm_s2: f64) {
         self.limits.acceleration_mm_s2 = acceleration_mm_s2;
     }
 
-    /// Where the set point is.
+    /// Position of the set point.
     #[must_use]
     pub const fn set_point(&self) -> Point3<Robot> {
         let [x, y, z] = self.set_point;
         Point3::new(x, y, z)
     }
 
-    /// True when nothing is left to do.
+    /// Whether no motion is left.
     #[must_use]
     pub(crate) const fn is_still(&self) -> bool {
         self.line.is_none() && self.next.is_none()
     }
 
-    /// Goes to `target` in a straight line. A running move that leads there goes on without a stop; any other
-    /// stops first, on its own line.
+    /// Moves to `target` in a straight line. A running move in that direction continues without a stop; any other first stops on its
+    /// own line.
     pub fn go(&mut self, target: Point3<Robot>, speed_mm_s: f64) {
         let target = target.to_array();
         self.next = None;
@@ -87,44 +87,48 @@ impl Trajectory {
             self.begin(target, speed_mm_s);
             return;
         };
-        let straight_on = distance_from_ray(target, self.set_point, line.to) <= STRAIGHT_ON_MM;
-        let onto = line.profile.onto(
+        let is_collinear = distance_from_ray(target, self.set_point, line.to) <= COLLINEAR_MM;
+        let continued = line.profile.continue_on(
             distance(self.set_point, target),
-            pacing(&self.limits, speed_mm_s),
+            profile_limits(&self.limits, speed_mm_s),
         );
-        if straight_on && onto.can_stop_at(distance(self.set_point, target)) {
+        if is_collinear && continued.can_stop_at(distance(self.set_point, target)) {
             *line = Line {
                 from: self.set_point,
                 to: target,
-                profile: onto,
+                profile: continued,
             };
         } else {
-            line.profile.cut_short();
+            line.profile.stop_early();
             self.next = Some((target, speed_mm_s));
         }
     }
 
-    /// Comes to rest as soon as the limits allow.
+    /// Stops as soon as the limits allow.
     pub fn hold(&mut self) {
         self.next = None;
         if let Some(line) = &mut self.line {
-            line.profile.cut_short();
+            line.profile.stop_early();
         }
     }
 
-    /// Comes to rest at once.
+    /// Stops immediately.
     pub const fn halt(&mut self) {
         self.next = None;
         self.line = None;
     }
 
     fn begin(&mut self, target: [f64; 3], speed_mm_s: f64) {
-        let line = Line::new(self.set_point, target, pacing(&self.limits, speed_mm_s));
+        let line = Line::new(
+            self.set_point,
+            target,
+            profile_limits(&self.limits, speed_mm_s),
+        );
         self.line = (!line.profile.is_done()).then_some(line);
     }
 
-    /// Goes on for `dt_s` seconds, unless that would lead further from `measured` than the lead allows: then the
-    /// set point waits, and starts again from rest. Steps are never longer than allowed.
+    /// Advances by `dt_s` seconds. If that would exceed the allowed lead over `measured`, the set point waits and restarts from rest.
+    /// Steps never exceed the limit.
     pub fn step(&mut self, dt_s: f64, measured: Point3<Robot>) {
         if self.line.is_none()
             && let Some((target, speed)) = self.next.take()
@@ -148,8 +152,8 @@ impl Trajectory {
     }
 }
 
-const fn pacing(limits: &Motion, speed_mm_s: f64) -> Pacing {
-    Pacing {
+const fn profile_limits(limits: &Motion, speed_mm_s: f64) -> ProfileLimits {
+    ProfileLimits {
         speed: speed_mm_s,
         acceleration: limits.acceleration_mm_s2,
         jerk: limits.jerk_mm_s3,
@@ -255,7 +259,7 @@ mod tests {
             assert!(t.set_point().distance_mm(stuck) <= limits.max_lead_mm);
         }
         assert!(t.set_point().z_mm < -0.9 * limits.max_lead_mm && !t.is_still());
-        // Freed, it arrives.
+        // Once released, it arrives.
         for _ in 0..20_000 {
             t.step(DT, t.set_point());
         }
@@ -263,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn going_deeper_along_the_same_line_does_not_stop() {
+    fn a_deeper_target_on_the_same_line_needs_no_stop() {
         let mut t = Trajectory::at_rest(Motion::default(), point([1.0, 2.0, 5.0]));
         t.go(point([1.0, 2.0, 0.0]), 10.0);
         let mut slowest = f64::INFINITY;

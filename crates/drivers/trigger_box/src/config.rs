@@ -1,34 +1,33 @@
-//! How to find and use one trigger box.
+//! Configuration of one trigger box.
 
 use std::time::Duration;
 
 /// Settings of the driver.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TriggerBoxConfig {
-    /// Path of the serial port, best one under `/dev/serial/by-id`.
+    /// Path of the serial port, preferably one under `/dev/serial/by-id`.
     pub port: String,
-    /// The serial number that the box must have; `None` takes any.
+    /// Required serial number of the box; `None` accepts any.
     pub serial: Option<String>,
-    /// The box forbids itself to pulse when it has heard nothing from the host for so long; 0 is never. ms.
+    /// The box disarms itself after this time without a request from the host, ms; 0 means never.
     pub silence_ms: u16,
-    /// How fast or slow the box's clock may be against the host's, ppm. The Arduino Uno has a ceramic resonator of
-    /// 0.5 %; a board with a crystal allows 100.
+    /// Largest rate difference between the clocks of box and host, ppm. The Arduino Uno has a ceramic resonator with 0.5 %; 100 is enough
+    /// for a board with a crystal.
     pub max_drift_ppm: f64,
-    /// From one exchange of time to the next.
+    /// Interval of time exchanges.
     pub exchange_interval: Duration,
-    /// From one look at the box's events to the next.
+    /// Interval of event requests.
     pub events_interval: Duration,
-    /// Before an unanswered request is sent again.
+    /// Time before an unanswered request is repeated.
     pub reply_timeout: Duration,
-    /// Before an unanswered command is given up, and a line without any answer counts as lost.
+    /// Time before a command without a reply fails, and a line without any reply counts as lost.
     pub command_timeout: Duration,
-    /// How long a box may take to say hello after its port was opened: opening resets an Arduino, and its boot loader
-    /// waits for about two seconds.
+    /// Time limit for the first reply after opening the port: opening resets an Arduino, and its boot loader waits for about two seconds.
     pub hello_timeout: Duration,
 }
 
 impl TriggerBoxConfig {
-    /// The box at this port, with the usual times.
+    /// A box at this port, with default times.
     #[must_use]
     pub fn new(port: impl Into<String>) -> Self {
         Self {

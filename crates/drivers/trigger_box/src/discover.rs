@@ -1,4 +1,4 @@
-//! Which of the configured ports lead to a trigger box, and what to do about the others.
+//! Checks which of the configured ports have a trigger box.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -7,32 +7,32 @@ use std::{fmt, io};
 use skinrig_device::RealClock;
 use skinrig_model::DeviceIdentity;
 
-use crate::greeting::{GreetingError, greet};
+use crate::handshake::{HandshakeError, shake_hands};
 use crate::link::Link;
-use crate::serial::SerialDial;
-use crate::wire::{OpenError, dial_patiently};
+use crate::serial::SerialConnector;
+use crate::wire::{OpenError, connect_when_free};
 
-/// How long a port may be busy before that is told.
-const BUSY_PATIENCE: Duration = Duration::from_millis(500);
+/// How long to wait for a busy port.
+const BUSY_TIMEOUT: Duration = Duration::from_millis(500);
 
-/// A port and what is behind it.
+/// A port and its state.
 #[derive(Debug)]
 pub struct FoundPort {
-    /// Its path.
+    /// Path.
     pub port: String,
-    /// What was found.
+    /// State.
     pub state: PortState,
 }
 
-/// What is behind a port. Displays as a fragment with the next step.
+/// State of a port. Displays with the next step.
 #[derive(Debug)]
 pub enum PortState {
-    /// A box that this driver can use.
+    /// A usable box.
     Ready(DeviceIdentity),
     /// The port cannot be opened: absent, busy, not permitted.
     Closed(OpenError),
-    /// It opened, and there is no box that this driver can use.
-    Unusable(GreetingError),
+    /// The port opened, but there is no usable box.
+    Unusable(HandshakeError),
 }
 
 impl fmt::Display for PortState {
@@ -49,45 +49,45 @@ impl fmt::Display for PortState {
     }
 }
 
-/// Looks behind each of `ports`, in order. Ports are never guessed: bytes sent to a stranger may move something.
+/// Checks each of `ports` in order. Never guesses ports: bytes sent to another device may make it move.
 ///
-/// Opening a port resets an Arduino, and a silent port takes `hello_timeout`. A box that is found is left disarmed.
+/// Opening a port resets an Arduino; a silent port takes `hello_timeout`. A box that is found is left disarmed.
 #[must_use]
 pub fn enumerate(ports: &[String], hello_timeout: Duration) -> Vec<FoundPort> {
     ports
         .iter()
         .map(|port| FoundPort {
             port: port.clone(),
-            state: look(port, hello_timeout),
+            state: check_port(port, hello_timeout),
         })
         .collect()
 }
 
-fn look(port: &str, hello_timeout: Duration) -> PortState {
-    let wire = match dial_patiently(&mut SerialDial::new(port), BUSY_PATIENCE) {
+fn check_port(port: &str, hello_timeout: Duration) -> PortState {
+    let wire = match connect_when_free(&mut SerialConnector::new(port), BUSY_TIMEOUT) {
         Ok(wire) => wire,
         Err(e) => return PortState::Closed(e),
     };
     let mut link = Link::new(wire, RealClock::start());
-    match greet(&mut link, port, None, hello_timeout) {
-        Ok(greeted) => PortState::Ready(greeted.identity),
+    match shake_hands(&mut link, port, None, hello_timeout) {
+        Ok(handshake) => PortState::Ready(handshake.identity),
         Err(e) => PortState::Unusable(e),
     }
 }
 
-/// Where Linux keeps a name for each serial adapter that stays the same across unplugging.
+/// Directory in which Linux keeps a stable name for each serial adapter.
 pub const BY_ID: &str = "/dev/serial/by-id";
 
-/// The port in `by_id` (see [`BY_ID`]) whose USB adapter has this serial number, `None` when there is none.
+/// The port in `by_id` (see [`BY_ID`]) whose USB adapter has this serial number, if any.
 ///
-/// The names there end in `_SERIAL-ifNN`, followed by `-portN` for adapters with several ports (systemd's
-/// `60-serial.rules`); of several ports the first one is taken.
+/// Names in this directory end with `_SERIAL-ifNN`, followed by `-portN` for adapters with several ports (systemd's `60-serial.rules`).
+/// Of several ports the first one is returned.
 ///
 /// # Errors
-/// When the directory is there and cannot be read.
+/// When the directory exists but cannot be read.
 pub fn port_of_adapter(by_id: &Path, serial: &str) -> io::Result<Option<PathBuf>> {
     let entries = match std::fs::read_dir(by_id) {
-        // Made when the first adapter is plugged in.
+        // The directory appears with the first adapter.
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
         other => other?,
     };
@@ -126,7 +126,7 @@ mod tests {
         );
         assert_eq!(find("A50285BI"), Some(dir.path().join(names[1])));
         assert_eq!(find("FT7"), Some(dir.path().join(names[3])));
-        // A part of a serial number is another one.
+        // A substring is a different serial number.
         assert_eq!(find("0285BI"), None);
         let absent = port_of_adapter(&dir.path().join("absent"), "A50285BI");
         assert_eq!(absent.unwrap(), None);

@@ -1,4 +1,4 @@
-//! The trigger box as the controller sees it.
+//! The trigger box as a `TriggerBox` device.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
@@ -12,61 +12,61 @@ use skinrig_model::{
 };
 
 use crate::config::TriggerBoxConfig;
-use crate::greeting::greet;
+use crate::handshake::shake_hands;
 use crate::link::Link;
-use crate::notes::{Losses, note};
+use crate::notes::{Losses, describe_losses};
 use crate::protocol::{Counters, MAX_SERIAL, MIN_SYNC_PERIOD_MS, SelfTest};
-use crate::serial::SerialDial;
+use crate::serial::SerialConnector;
 use crate::shared::{Shared, lock};
-use crate::wire::{Dial, OpenError, dial_patiently};
-use crate::worker::{Command, Done, Job, Worker};
+use crate::wire::{Connector, OpenError, connect_when_free};
+use crate::worker::{Command, CommandResult, Job, Worker};
 
-/// Beyond its deadline a command may still be on the line for one more try or one hello.
-const GRACE: Duration = Duration::from_secs(2);
+/// Extra time after a command's deadline, for one more try or handshake.
+const REPLY_GRACE: Duration = Duration::from_secs(2);
 
-/// No clock drifts by more than a tenth.
+/// Upper limit of the configurable drift: 10 %.
 const MAX_DRIFT_PPM: f64 = 100_000.0;
 
-/// A trigger box over a line that a thread of its own keeps.
+/// A trigger box on a serial line that is owned by a separate thread.
 ///
-/// After opening it is disarmed: [`SerialTriggerBox::arm`] first. Dropping it disarms the box.
+/// It is disarmed after opening: call [`SerialTriggerBox::arm`] first. Dropping it disarms the box.
 pub struct SerialTriggerBox {
     identity: DeviceIdentity,
     command_timeout: Duration,
     jobs: Option<SyncSender<Job>>,
     shared: Arc<Mutex<Shared>>,
     thread: Option<JoinHandle<()>>,
-    told: Told,
+    reported: ReportedCounters,
 }
 
-/// What notes need not tell (again).
+/// Counters that notes have already reported.
 #[derive(Default)]
-struct Told {
-    /// What the box had counted; `None` before it was armed, or when it did not say.
+struct ReportedCounters {
+    /// Counters at that time; `None` before arming, or if they could not be read.
     losses: Option<Losses>,
-    /// Resets until then: after another one the box counts from 0.
+    /// Number of resets at that time: a reset restarts the box's counters at 0.
     resets: u64,
     contradictions: u64,
 }
 
 impl SerialTriggerBox {
-    /// Opens the serial port and waits for the box to say hello.
+    /// Opens the serial port and waits for the box's handshake.
     ///
     /// # Errors
-    /// [`DeviceError::Lost`] when the port cannot be opened (with the reason and what to do) or nobody answers,
+    /// [`DeviceError::Lost`] when the port cannot be opened (with the reason and the next step) or the box does not reply,
     /// [`DeviceError::Refused`] for another device, firmware or serial number.
     pub fn open(config: TriggerBoxConfig, clock: RealClock) -> Result<Self, DeviceError> {
-        let dial = SerialDial::new(config.port.clone());
-        Self::open_with(config, Box::new(dial), clock)
+        let connector = SerialConnector::new(config.port.clone());
+        Self::open_with(config, Box::new(connector), clock)
     }
 
-    /// As [`SerialTriggerBox::open`], over any line.
+    /// Like [`SerialTriggerBox::open`], with any connector.
     ///
     /// # Errors
-    /// As there.
+    /// As [`SerialTriggerBox::open`].
     pub fn open_with(
         config: TriggerBoxConfig,
-        mut dial: Box<dyn Dial>,
+        mut connector: Box<dyn Connector>,
         clock: RealClock,
     ) -> Result<Self, DeviceError> {
         let named = config.serial.clone().unwrap_or_else(|| config.port.clone());
@@ -78,68 +78,75 @@ impl SerialTriggerBox {
                 found: format!("{} ppm", config.max_drift_ppm),
             });
         }
-        let wire = dial_patiently(dial.as_mut(), config.hello_timeout)
+        let wire = connect_when_free(connector.as_mut(), config.hello_timeout)
             .map_err(|e| open_failed(&e, &named))?;
         let mut link = Link::new(wire, clock);
-        let greeted = greet(
+        let handshake = shake_hands(
             &mut link,
-            dial.target(),
+            connector.target(),
             config.serial.as_deref(),
             config.hello_timeout,
         )
         .map_err(|e| e.into_device_error(&named))?;
         let shared = Arc::new(Mutex::new(Shared::default()));
         let command_timeout = config.command_timeout;
-        let mut worker = Worker::new(config, dial, clock, link, &greeted, Arc::clone(&shared));
+        let mut worker = Worker::new(
+            config,
+            connector,
+            clock,
+            link,
+            &handshake,
+            Arc::clone(&shared),
+        );
         worker.begin()?;
         let (jobs, inbox): (_, Receiver<Job>) = sync_channel(8);
         let thread = std::thread::Builder::new()
             .name("trigger-box".to_owned())
             .spawn(move || worker.run(&inbox))
-            .map_err(|e| lost(&named, format!("no thread to be had: {e}")))?;
+            .map_err(|e| lost(&named, format!("cannot start a thread: {e}")))?;
         Ok(Self {
-            identity: greeted.identity,
+            identity: handshake.identity,
             command_timeout,
             jobs: Some(jobs),
             shared,
             thread: Some(thread),
-            told: Told::default(),
+            reported: ReportedCounters::default(),
         })
     }
 
-    /// Allows pulses, and starts the sync trains if a period was set. After a reset of the box both are put back.
+    /// Enables pulses, and starts the sync trains if a period is set. The driver restores both after a reset of the box.
     ///
     /// # Errors
     /// [`DeviceError::Lost`].
     pub fn arm(&mut self) -> Result<(), DeviceError> {
-        self.ask(Command::Arm)?;
-        // Only for the notes: a box that does not say is armed all the same, and they tell what it counted since its reset.
+        self.execute(Command::Arm)?;
+        // The counters are for notes only: if they cannot be read, notes report the counts since the reset.
         let losses = self.counters().ok().map(Losses::from);
-        self.told = self.told_until_now(losses);
+        self.reported = self.current_counters(losses);
         Ok(())
     }
 
-    fn told_until_now(&self, losses: Option<Losses>) -> Told {
+    fn current_counters(&self, losses: Option<Losses>) -> ReportedCounters {
         let shared = lock(&self.shared);
-        Told {
+        ReportedCounters {
             losses,
             resets: shared.resets,
             contradictions: shared.contradictions,
         }
     }
 
-    /// Forbids pulses and ends the sync trains.
+    /// Disables pulses and stops the sync trains.
     ///
     /// # Errors
     /// [`DeviceError::Lost`].
     pub fn disarm(&mut self) -> Result<(), DeviceError> {
-        self.ask(Command::Disarm).map(|_| ())
+        self.execute(Command::Disarm).map(|_| ())
     }
 
-    /// Sync trains with this period in ms while the box is armed; `None` ends them.
+    /// Sets the period of sync trains while the box is armed, ms; `None` stops them.
     ///
     /// # Errors
-    /// [`DeviceError::Refused`] for a period below twice a train (`MIN_SYNC_PERIOD_MS`), [`DeviceError::Lost`].
+    /// [`DeviceError::Refused`] for a period below twice the duration of a train (`MIN_SYNC_PERIOD_MS`), [`DeviceError::Lost`].
     pub fn set_sync(&mut self, period_ms: Option<u16>) -> Result<(), DeviceError> {
         if let Some(found) = period_ms.filter(|&ms| ms < MIN_SYNC_PERIOD_MS) {
             return Err(self.refused(
@@ -147,18 +154,18 @@ impl SerialTriggerBox {
                 format!("{found} ms"),
             ));
         }
-        self.ask(Command::Sync(period_ms.unwrap_or(0))).map(|_| ())
+        self.execute(Command::Sync(period_ms.unwrap_or(0)))
+            .map(|_| ())
     }
 
-    /// Raises and lowers all outputs once. Not during a train, and not while anything is recorded: the pulse belongs to
-    /// no train.
+    /// Raises and lowers all outputs once. Do not call it during a recording: the pulse belongs to no train.
     ///
     /// # Errors
-    /// [`DeviceError::State`] while disarmed or busy, [`DeviceError::Lost`].
+    /// [`DeviceError::State`] while disarmed or during a train, [`DeviceError::Lost`].
     pub fn self_test(&mut self) -> Result<SelfTest, DeviceError> {
-        match self.ask(Command::SelfTest)? {
-            Done::SelfTest(test) => Ok(test),
-            other => Err(self.mixed_up(&other)),
+        match self.execute(Command::SelfTest)? {
+            CommandResult::SelfTest(test) => Ok(test),
+            other => Err(self.unexpected_result(&other)),
         }
     }
 
@@ -167,19 +174,19 @@ impl SerialTriggerBox {
     /// # Errors
     /// [`DeviceError::Lost`].
     pub fn counters(&mut self) -> Result<Counters, DeviceError> {
-        match self.ask(Command::Counters)? {
-            Done::Counters(counters) => Ok(counters),
-            other => Err(self.mixed_up(&other)),
+        match self.execute(Command::Counters)? {
+            CommandResult::Counters(counters) => Ok(counters),
+            other => Err(self.unexpected_result(&other)),
         }
     }
 
-    /// How often exchanges of time excluded each other: above 0 the box's clock drifts by more than the configured limit.
+    /// Number of contradictions between time exchanges. If positive, the box's clock drifts by more than the configured limit.
     #[must_use]
     pub fn clock_contradictions(&self) -> u64 {
         lock(&self.shared).contradictions
     }
 
-    /// Gives the box a serial number that it keeps without power: 1 to 16 printable ASCII characters without blanks.
+    /// Stores a serial number in the box's non-volatile memory: 1 to 16 printable ASCII characters without blanks.
     ///
     /// # Errors
     /// [`DeviceError::Refused`] for another text, [`DeviceError::State`] while armed, [`DeviceError::Lost`].
@@ -191,28 +198,29 @@ impl SerialTriggerBox {
                 format!("{serial:?}"),
             ));
         }
-        self.ask(Command::SetSerial(serial.to_owned()))?;
+        self.execute(Command::SetSerial(serial.to_owned()))?;
         self.identity.serial = serial.to_owned();
         Ok(())
     }
 
-    fn ask(&mut self, command: Command) -> Result<Done, DeviceError> {
+    fn execute(&mut self, command: Command) -> Result<CommandResult, DeviceError> {
         let (reply, answer) = sync_channel(1);
         let job = Job {
             command,
             reply,
             deadline: Instant::now() + self.command_timeout,
         };
-        let gone = || lost(&self.identity.serial, "its thread ended".to_owned());
-        let jobs = self.jobs.as_ref().ok_or_else(gone)?;
-        jobs.try_send(job).map_err(|_| gone())?;
-        // Queued, then carried out, each for at most the timeout.
-        match answer.recv_timeout(2 * self.command_timeout + GRACE) {
+        let ended = || lost(&self.identity.serial, "its thread ended".to_owned());
+        let jobs = self.jobs.as_ref().ok_or_else(ended)?;
+        jobs.try_send(job).map_err(|_| ended())?;
+        // Up to one timeout in the queue and one for the execution.
+        match answer.recv_timeout(2 * self.command_timeout + REPLY_GRACE) {
             Ok(done) => done,
-            Err(RecvTimeoutError::Disconnected) => Err(gone()),
+            Err(RecvTimeoutError::Disconnected) => Err(ended()),
             Err(RecvTimeoutError::Timeout) => Err(lost(
                 &self.identity.serial,
-                "the driver's thread did not answer in time; what was asked may still be carried out".to_owned(),
+                "the driver's thread did not reply in time; the command may still be executed"
+                    .to_owned(),
             )),
         }
     }
@@ -226,10 +234,10 @@ impl SerialTriggerBox {
         }
     }
 
-    fn mixed_up(&self, found: &Done) -> DeviceError {
+    fn unexpected_result(&self, found: &CommandResult) -> DeviceError {
         lost(
             &self.identity.serial,
-            format!("the driver's thread answered another question: {found:?}"),
+            format!("the driver's thread returned an unexpected result: {found:?}"),
         )
     }
 }
@@ -245,20 +253,19 @@ impl TriggerBox for SerialTriggerBox {
         }
     }
 
-    /// The edge rose when this returns, but during a sync train: then the mark's train begins right after it, at
-    /// the instant that is told.
+    /// The edge has risen when this returns, except during a sync train: then the mark's train follows it, at the returned time.
     fn send(&mut self, mark: Mark) -> Result<SentMark, DeviceError> {
         if PulseTrain::new(mark).is_none() {
             return Err(self.refused(format!("up to {LAST_MARKED_PRESS}"), mark.press.to_string()));
         }
-        match self.ask(Command::Send(mark))? {
-            Done::Sent(sent) => Ok(sent),
-            other => Err(self.mixed_up(&other)),
+        match self.execute(Command::Send(mark))? {
+            CommandResult::Sent(sent) => Ok(sent),
+            other => Err(self.unexpected_result(&other)),
         }
     }
 
     /// # Errors
-    /// Besides those of the trait: [`DeviceError::State`] once when the box disarmed itself or lost events.
+    /// Also [`DeviceError::State`], once, when the box disarmed itself or dropped events.
     fn poll(&mut self, reports: &mut Vec<BoxReport>) -> Result<(), DeviceError> {
         let mut shared = lock(&self.shared);
         reports.append(&mut shared.reports);
@@ -270,33 +277,33 @@ impl TriggerBox for SerialTriggerBox {
 
     fn take_notes(&mut self) -> Vec<String> {
         let counters = self.counters();
-        let now = self.told_until_now(counters.as_ref().ok().map(|&c| c.into()));
-        let before = std::mem::replace(&mut self.told, now);
-        let contradictions = self.told.contradictions - before.contradictions;
+        let now = self.current_counters(counters.as_ref().ok().map(|&c| c.into()));
+        let before = std::mem::replace(&mut self.reported, now);
+        let contradictions = self.reported.contradictions - before.contradictions;
         let (since, losses) = match before.losses {
-            Some(losses) if before.resets == self.told.resets => {
-                ("it was armed or last asked", losses)
+            Some(losses) if before.resets == self.reported.resets => {
+                ("it was armed or last queried", losses)
             }
             _ => ("its reset", Losses::default()),
         };
         let mut notes = Vec::new();
         if let Err(e) = counters {
             notes.push(format!(
-                "what it lost is not known, because its counters could not be read ({e}): look at the alignment certificate"
+                "losses are unknown because the counters could not be read ({e}): check the alignment certificate"
             ));
         }
-        let now = *self.told.losses.get_or_insert(losses);
-        notes.extend(note(since, losses, now, contradictions));
+        let now = *self.reported.losses.get_or_insert(losses);
+        notes.extend(describe_losses(since, losses, now, contradictions));
         notes
     }
 }
 
 impl Drop for SerialTriggerBox {
     fn drop(&mut self) {
-        // Ends the thread, which disarms the box; every wait of it has an end.
+        // Ends the thread, which disarms the box; all its waits have time limits.
         self.jobs = None;
         if let Some(thread) = self.thread.take() {
-            // A panic over there has been told by its own message.
+            // A panic has already printed its message.
             let _ = thread.join();
         }
     }

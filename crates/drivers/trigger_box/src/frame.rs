@@ -1,17 +1,17 @@
-//! Frames on the serial line: zero-delimited by COBS (Cheshire and Baker, "Consistent Overhead Byte Stuffing",
-//! SIGCOMM 1997), each closed by the CRC-32 of its body.
+//! Frames on the serial line: COBS with zero as the delimiter (Cheshire and Baker, "Consistent Overhead Byte Stuffing", SIGCOMM 1997),
+//! and the CRC-32 of the body.
 //!
-//! The delimiter occurs nowhere else, so a spoiled byte costs the frame it hit and the next one is read again.
+//! The delimiter occurs nowhere else, so a damaged byte costs only its own frame.
 
-/// The longest body of a frame, bytes.
+/// Maximum length of a body, bytes.
 pub const MAX_BODY: usize = 112;
 const CHECKSUM: usize = 4;
-/// COBS adds one byte to contents of at most 254.
+/// COBS adds one byte to content of up to 254 bytes.
 const MAX_STUFFED: usize = MAX_BODY + CHECKSUM + 1;
 
-/// A frame around `body`, delimiters included.
+/// Encodes `body` as a frame with delimiters.
 ///
-/// `None` when the body is empty or longer than [`MAX_BODY`].
+/// `None` if the body is empty or longer than [`MAX_BODY`].
 #[must_use]
 pub fn encode(body: &[u8]) -> Option<Vec<u8>> {
     if body.is_empty() || body.len() > MAX_BODY {
@@ -22,7 +22,7 @@ pub fn encode(body: &[u8]) -> Option<Vec<u8>> {
     let mut frame = Vec::with_capacity(content.len() + 3);
     frame.push(0);
     for block in content.split(|&byte| byte == 0) {
-        // At most MAX_BODY + 4 bytes, below 255.
+        // Block lengths are at most MAX_BODY + 4, below 255.
         frame.push(block.len() as u8 + 1);
         frame.extend_from_slice(block);
     }
@@ -30,7 +30,7 @@ pub fn encode(body: &[u8]) -> Option<Vec<u8>> {
     Some(frame)
 }
 
-/// Takes bytes as they come and gives the bodies of good frames.
+/// Decodes a stream of bytes into the bodies of valid frames.
 #[derive(Debug, Default)]
 pub struct FrameReader {
     stuffed: Vec<u8>,
@@ -39,7 +39,7 @@ pub struct FrameReader {
 }
 
 impl FrameReader {
-    /// Takes one byte; the body of the frame that it completed.
+    /// Adds one byte; returns the body of the frame that it completes.
     pub fn push(&mut self, byte: u8) -> Option<Vec<u8>> {
         if byte != 0 {
             if self.stuffed.len() < MAX_STUFFED {
@@ -52,7 +52,7 @@ impl FrameReader {
         let stuffed = std::mem::take(&mut self.stuffed);
         let too_long = std::mem::take(&mut self.too_long);
         if stuffed.is_empty() {
-            return None; // two delimiters in a row are no frame
+            return None; // consecutive delimiters are not a frame
         }
         let body = if too_long { None } else { open(&stuffed) };
         if body.is_none() {
@@ -61,14 +61,14 @@ impl FrameReader {
         body
     }
 
-    /// Frames that were spoiled on the way so far.
+    /// Number of damaged frames so far.
     #[must_use]
     pub fn bad_frames(&self) -> u64 {
         self.bad_frames
     }
 }
 
-/// The body of a stuffed frame, when its code and its checksum are right.
+/// Decodes a stuffed frame; `None` if its code or checksum is wrong.
 fn open(stuffed: &[u8]) -> Option<Vec<u8>> {
     let mut content = Vec::with_capacity(stuffed.len());
     let mut rest = stuffed;
@@ -104,14 +104,14 @@ mod tests {
         }
 
         #[test]
-        fn a_delimiter_is_at_both_ends_only(body in prop::collection::vec(any::<u8>(), 1..=MAX_BODY)) {
+        fn delimiters_are_at_both_ends_only(body in prop::collection::vec(any::<u8>(), 1..=MAX_BODY)) {
             let frame = encode(&body).unwrap();
             let zeros: Vec<usize> = (0..frame.len()).filter(|&i| frame[i] == 0).collect();
             prop_assert_eq!(zeros, vec![0, frame.len() - 1]);
         }
 
         #[test]
-        fn garbage_never_panics_nor_spoils_the_next_frame(garbage in prop::collection::vec(any::<u8>(), 0..600),
+        fn garbage_never_panics_nor_damages_the_next_frame(garbage in prop::collection::vec(any::<u8>(), 0..600),
                                                           body in prop::collection::vec(any::<u8>(), 1..=MAX_BODY)) {
             let mut line = garbage;
             line.extend(encode(&body).unwrap());
@@ -119,25 +119,25 @@ mod tests {
         }
 
         #[test]
-        fn a_spoiled_byte_is_noticed(body in prop::collection::vec(any::<u8>(), 1..=MAX_BODY),
+        fn a_damaged_byte_is_detected(body in prop::collection::vec(any::<u8>(), 1..=MAX_BODY),
                                      at in any::<prop::sample::Index>(), flip in 1u8..) {
             let mut line = encode(&body).unwrap();
             let at = at.index(line.len());
             line[at] ^= flip;
-            // A spoiled delimiter may leave the frame whole; a spoiled body never passes.
+            // A damaged delimiter may leave the frame intact; a damaged body never passes.
             prop_assert!(read(&line).0.iter().all(|b| *b == body));
         }
     }
 
     #[test]
-    fn bodies_that_fit_no_frame_are_refused() {
+    fn empty_and_too_long_bodies_are_rejected() {
         assert_eq!(encode(&[]), None);
         assert_eq!(encode(&[1; MAX_BODY + 1]), None);
     }
 
     #[test]
-    fn the_checksum_is_the_one_of_ieee_802_3() {
-        // The check value of CRC-32 for the digits 1 to 9, as in the catalogue of Cook.
+    fn the_checksum_is_that_of_ieee_802_3() {
+        // Check value of CRC-32 for the digits 1 to 9, from Cook's catalogue.
         let frame = encode(b"123456789").unwrap();
         assert_eq!(frame[11..15], 0xcbf4_3926_u32.to_le_bytes());
     }

@@ -1,7 +1,7 @@
-//! One request, one reply: over a line that may spoil, lose or delay either.
+//! One request and its reply on a line that may damage, lose or delay both.
 //!
-//! A request is repeated with the same number until its reply comes, which is safe because the box carries out no
-//! command twice that must not be: a mark has a number of its own.
+//! A request is repeated with the same number until its reply arrives. This is safe: each mark has its own number, and the box executes
+//! it only once.
 
 use std::io;
 use std::time::{Duration, Instant};
@@ -13,61 +13,61 @@ use crate::frame::{self, FrameReader};
 use crate::protocol::{Reply, Request};
 use crate::wire::Wire;
 
-/// How long to wait for a reply. A reply to any of the tries counts, so that a slow machine is slow and not deaf.
+/// Time limits of a request. A reply to any try counts, so that a slow machine does not fail.
 #[derive(Debug, Clone, Copy)]
-pub struct Patience {
-    /// Before the request is sent again.
+pub struct RequestTimeouts {
+    /// Time before the request is sent again.
     pub per_try: Duration,
-    /// Before it is given up.
+    /// Time before the request fails.
     pub total: Duration,
 }
 
-/// A reply and the instants of the host around it.
+/// A reply with the host times around it.
 #[derive(Debug, Clone)]
-pub struct Answer {
+pub struct TimedReply {
     /// The reply.
     pub reply: Reply,
-    /// Before the first byte of the first try left.
+    /// Time before the first byte of the first try.
     pub sent: HostTime,
-    /// After the last byte of the reply came.
+    /// Time after the last byte of the reply.
     pub received: HostTime,
 }
 
-/// Why there is no answer.
+/// Why a request failed.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
-    /// The line is gone.
+    /// The line is disconnected.
     #[error("the line broke: {0}")]
-    Gone(#[from] io::Error),
+    Disconnected(#[from] io::Error),
     /// No reply in time.
     #[error(
-        "no answer to `{request}` in {} ms ({tries} tries, {bad_frames} spoiled frames came)",
+        "no reply to `{request}` in {} ms ({tries} tries, {bad_frames} damaged frames received)",
         waited.as_millis()
     )]
-    Silent {
-        /// What was asked.
+    NoReply {
+        /// Name of the request.
         request: &'static str,
-        /// How often.
+        /// Number of tries.
         tries: u32,
-        /// How long.
+        /// Waiting time.
         waited: Duration,
-        /// Frames that came and were no replies.
+        /// Damaged frames received meanwhile.
         bad_frames: u64,
     },
 }
 
-/// An open line with its numbering of requests.
+/// An open line with numbered requests.
 pub struct Link {
     wire: Box<dyn Wire>,
     reader: FrameReader,
-    /// Bytes that were read and not yet looked at, last first.
+    /// Received bytes that were not yet decoded, last first.
     unread: Vec<u8>,
     next_id: u16,
     clock: RealClock,
 }
 
 impl Link {
-    /// Over an open line.
+    /// Wraps an open line.
     #[must_use]
     pub fn new(wire: Box<dyn Wire>, clock: RealClock) -> Self {
         Self {
@@ -82,26 +82,33 @@ impl Link {
     /// Sends a request and waits for its reply.
     ///
     /// # Errors
-    /// [`LinkError`]; after [`LinkError::Silent`] it is unknown whether the box carried the request out.
-    pub fn ask(&mut self, request: &Request, patience: Patience) -> Result<Answer, LinkError> {
+    /// [`LinkError`]; after [`LinkError::NoReply`] it is unknown whether the box executed the request.
+    pub fn request(
+        &mut self,
+        request: &Request,
+        timeouts: RequestTimeouts,
+    ) -> Result<TimedReply, LinkError> {
         let id = self.next_id;
         self.next_id = self.next_id.wrapping_add(1);
         let frame = frame::encode(&request.encode(id)).ok_or_else(|| {
-            io::Error::new(io::ErrorKind::InvalidInput, "a request fits no frame")
+            io::Error::new(
+                io::ErrorKind::InvalidInput,
+                "the request does not fit into a frame",
+            )
         })?;
         let began = Instant::now();
         let sent = self.clock.now();
         let bad_before = self.reader.bad_frames();
         let mut tries = 0;
-        while tries == 0 || began.elapsed() < patience.total {
+        while tries == 0 || began.elapsed() < timeouts.total {
             tries += 1;
             self.wire.write(&frame)?;
-            let end = Instant::now() + patience.per_try;
+            let end = Instant::now() + timeouts.per_try;
             while let Some(reply) = self.next_reply(end)? {
-                // Late replies to requests that were given up, and second replies to repeated ones, pass by.
-                if reply.answers(request, id) {
+                // Skip late replies to failed requests, and second replies to repeated ones.
+                if reply.is_reply_to(request, id) {
                     let received = self.clock.now();
-                    return Ok(Answer {
+                    return Ok(TimedReply {
                         reply,
                         sent,
                         received,
@@ -109,7 +116,7 @@ impl Link {
                 }
             }
         }
-        Err(LinkError::Silent {
+        Err(LinkError::NoReply {
             request: request.name(),
             tries,
             waited: began.elapsed(),
@@ -117,7 +124,7 @@ impl Link {
         })
     }
 
-    /// The next reply of any request, or `None` when the time is over.
+    /// The next reply to any request; `None` on timeout.
     fn next_reply(&mut self, end: Instant) -> io::Result<Option<Reply>> {
         let mut buffer = [0; 256];
         loop {

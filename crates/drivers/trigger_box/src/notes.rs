@@ -1,8 +1,8 @@
-//! What the box's counters say about a run, in a sentence with what to do.
+//! Notes about the losses that the box counted, with the next step.
 
 use crate::protocol::Counters;
 
-/// The counters that stand for something lost, as they were at some instant.
+/// The box's counters of lost or damaged data at some time.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Losses {
     late_edges: u16,
@@ -30,9 +30,9 @@ impl From<Counters> for Losses {
     }
 }
 
-/// What was counted from `before` to `now`, and the contradictions of the clocks in the meantime; `None` when nothing was.
-/// `since` says when `before` was.
-pub(crate) fn note(
+/// Describes losses between `before` and `now`, and contradictions between the clocks; `None` if there were none. `since` describes the
+/// time of `before`.
+pub(crate) fn describe_losses(
     since: &str,
     before: Losses,
     now: Losses,
@@ -42,7 +42,7 @@ pub(crate) fn note(
     let mut part = |before: u16, now: u16, what: &str| {
         let n = now.saturating_sub(before);
         if n > 0 {
-            // The box's counters stop at their end.
+            // The box's counters saturate.
             let at_least = if now == u16::MAX { "at least " } else { "" };
             parts.push(format!("{at_least}{n} {what}"));
         }
@@ -50,47 +50,47 @@ pub(crate) fn note(
     part(
         before.late_edges,
         now.late_edges,
-        "edges of trains were late (times of marks may be off by up to 4.1 ms: look at the alignment certificate)",
+        "train edges were late (mark times may be off by up to 4.1 ms: check the alignment certificate)",
     );
     part(
         before.input_glitches,
         now.input_glitches,
-        "pulses at its input were too short to be stamped (check the input's wiring and shield)",
+        "input pulses were too short for a time stamp (check the wiring and shield of the input)",
     );
     part(
         before.dropped_events,
         now.dropped_events,
-        "events found its memory full (the host was too slow, or the usb cable is bad)",
+        "events were dropped because the box's memory was full (the host was too slow, or the USB cable is bad)",
     );
     part(
         before.ignored_edges,
         now.ignored_edges,
-        "edges of its input were ignored to leave memory to marks (does the contact bounce without end?)",
+        "input edges were ignored to keep memory for marks (does the contact bounce permanently?)",
     );
     part(
         before.input_mutes,
         now.input_mutes,
-        "times its input changed so often that it was not looked at for up to 4 ms (check the input's wiring and shield)",
+        "times the input changed so often that it was ignored for up to 4 ms (check the wiring and shield of the input)",
     );
     part(
         before.bad_checksums,
         now.bad_checksums,
-        "requests came with a wrong checksum (they were repeated: check the usb cable)",
+        "requests had a wrong checksum (they were repeated: check the USB cable)",
     );
     part(
         before.bad_frames,
         now.bad_frames,
-        "requests came damaged (they were repeated: check the usb cable)",
+        "requests were damaged (they were repeated: check the USB cable)",
     );
     part(
         before.overruns,
         now.overruns,
-        "bytes from the host were lost (requests were repeated: check the usb cable)",
+        "bytes from the host were lost (requests were repeated: check the USB cable)",
     );
     if contradictions > 0 {
         parts.push(format!(
-            "{contradictions} exchanges of time excluded the earlier ones (its clock drifts by more than \
-             `max_drift_ppm`: raise it in the rig file)"
+            "{contradictions} time exchanges contradicted earlier ones (the clock drifts by more than `max_drift_ppm`: increase it \
+            in the rig file)"
         ));
     }
     (!parts.is_empty()).then(|| format!("since {since}: {}", parts.join("; ")))
@@ -101,33 +101,33 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_was_counted_since_is_told() {
+    fn only_losses_since_the_given_time_are_reported() {
         let before = Losses {
             input_glitches: 4,
             bad_frames: 9,
             ..Losses::default()
         };
-        assert_eq!(note("it was armed", before, before, 0), None);
+        assert_eq!(describe_losses("it was armed", before, before, 0), None);
         let now = Losses {
             late_edges: 2,
             bad_frames: u16::MAX,
             ..before
         };
-        let text = note("it was armed", before, now, 0).unwrap_or_default();
+        let text = describe_losses("it was armed", before, now, 0).unwrap_or_default();
         assert!(
-            text.starts_with("since it was armed: 2 edges of trains were late"),
+            text.starts_with("since it was armed: 2 train edges were late"),
             "{text}"
         );
         assert!(
-            text.contains("4.1 ms: look at the alignment certificate"),
+            text.contains("4.1 ms: check the alignment certificate"),
             "{text}"
         );
         assert!(
-            text.contains("at least 65526 requests came damaged"),
+            text.contains("at least 65526 requests were damaged"),
             "{text}"
         );
         assert!(!text.contains("input"), "{text}");
-        let drift = note("it was armed", now, now, 3).unwrap_or_default();
-        assert!(drift.contains("3 exchanges of time"), "{drift}");
+        let drift = describe_losses("it was armed", now, now, 3).unwrap_or_default();
+        assert!(drift.contains("3 time exchanges"), "{drift}");
     }
 }

@@ -1,9 +1,8 @@
-//! The host's time of an instant of the box, from exchanges of time: bounds that certainly hold.
+//! Converts box times to host times with guaranteed bounds, from time exchanges.
 //!
-//! Each exchange says that the box's clock read `at` at some instant between `sent` and `received` of the host. With
-//! the rate of the box's clock known within a tolerance, an exchange bounds the host's time of every other instant of
-//! the box, the looser the further away. The bounds of all recent exchanges hold at once, so the tightest counts
-//! (Cristian, "Probabilistic clock synchronization", Distributed Computing 3, 1989).
+//! In each exchange the box's clock had the value `at` at some time between `sent` and `received` of the host. With a bound on the rate
+//! of the box's clock, an exchange bounds the host time of any box time; the bounds widen with the distance. The bounds of all recent
+//! exchanges hold together, so the tightest ones apply (Cristian, "Probabilistic clock synchronization", Distributed Computing 3, 1989).
 
 use std::collections::VecDeque;
 
@@ -11,31 +10,31 @@ use skinrig_model::HostTime;
 
 use crate::protocol::{TICKS_PER_US, Ticks};
 
-/// Exchanges that are kept.
+/// Number of recent exchanges in use.
 const WINDOW: usize = 32;
 
-/// `sent <= host time of at <= received`.
+/// One exchange: `sent <= host time of at <= received`.
 #[derive(Debug, Clone, Copy)]
 pub struct Exchange {
-    /// Before the request left.
+    /// Before the request was sent.
     pub sent: HostTime,
-    /// After the reply came.
+    /// After the reply was received.
     pub received: HostTime,
-    /// The box's clock in between.
+    /// Value of the box's clock in between.
     pub at: Ticks,
 }
 
-/// An interval of the host's time.
+/// An interval of host time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bounds {
-    /// Not before.
+    /// Lower bound.
     pub low: HostTime,
-    /// Not after.
+    /// Upper bound.
     pub high: HostTime,
 }
 
 impl Bounds {
-    /// The middle and half the width, rounded up, ns.
+    /// Middle and half width, rounded up, ns.
     #[must_use]
     pub fn middle(self) -> (HostTime, i64) {
         let width = self.high.0 - self.low.0;
@@ -46,7 +45,7 @@ impl Bounds {
     }
 }
 
-/// The recent exchanges with a box since its reset.
+/// Recent exchanges since the box's reset.
 #[derive(Debug)]
 pub struct HostFromBox {
     recent: VecDeque<Exchange>,
@@ -55,7 +54,7 @@ pub struct HostFromBox {
 }
 
 impl HostFromBox {
-    /// For a box whose clock is at most `max_drift_ppm` fast or slow against the host's.
+    /// For a box whose clock deviates by at most `max_drift_ppm` from the host's.
     #[must_use]
     pub fn new(max_drift_ppm: f64) -> Self {
         Self {
@@ -65,18 +64,18 @@ impl HostFromBox {
         }
     }
 
-    /// Forgets all: the box's clock began anew.
+    /// Removes all exchanges: the box's clock was reset.
     pub fn clear(&mut self) {
         self.recent.clear();
     }
 
-    /// Times at which the exchanges excluded each other: the clock drifts more than was said.
+    /// Number of contradictions between exchanges: the clock drifts more than configured.
     #[must_use]
     pub(crate) fn contradictions(&self) -> u64 {
         self.contradictions
     }
 
-    /// Takes an exchange into account.
+    /// Adds an exchange.
     pub fn add(&mut self, exchange: Exchange) {
         if self.recent.len() == WINDOW {
             self.recent.pop_front();
@@ -84,9 +83,9 @@ impl HostFromBox {
         self.recent.push_back(exchange);
     }
 
-    /// The host's time of the instant `at` of the box, from `own`, the exchange that told it, and the recent ones.
+    /// Bounds of the host time of box time `at`, from the exchange `own` that reported it and the recent ones.
     ///
-    /// When they exclude each other, `own` alone counts, the others are forgotten, and the contradiction is counted.
+    /// On a contradiction `own` alone counts: the others are removed, and the contradiction is counted.
     pub fn bounds(&mut self, own: Exchange, at: Ticks) -> Bounds {
         let own_bounds = self.bounds_from(own, at);
         let all = self.recent.iter().fold(own_bounds, |b, &exchange| {
@@ -107,7 +106,7 @@ impl HostFromBox {
     fn bounds_from(&self, e: Exchange, at: Ticks) -> Bounds {
         let ticks = at.0 as f64 - e.at.0 as f64;
         let ns = ticks * (1_000.0 / TICKS_PER_US as f64);
-        // A span of the box's clock is 1 / (1 +- drift) of it on the host's: that is 1 +- drift / (1 - drift) at the most.
+        // A duration of the box's clock is 1 / (1 ± drift) of it on the host's, which is at most 1 ± drift / (1 - drift).
         let drift = self.max_drift_ppm * 1e-6;
         let slack = ns.abs() * drift / (1.0 - drift);
         Bounds {
@@ -123,7 +122,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Any clock within the tolerance, any delays: the truth is always inside, and no wider than the own exchange.
+        /// For any clock within the tolerance and any delays the truth is inside the bounds, which are never wider than the exchange itself.
         #[test]
         fn the_truth_is_inside(
             ppm in -5_000.0..5_000.0f64, start_ns in 0i64..1 << 40,
@@ -154,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tight_exchange_serves_a_loose_one() {
+    fn a_tight_exchange_narrows_a_loose_one() {
         let mut map = HostFromBox::new(100.0);
         let tight = Exchange {
             sent: HostTime(1_000_000),
@@ -175,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn a_contradiction_leaves_the_latest_word() {
+    fn on_a_contradiction_the_latest_exchange_counts() {
         let mut map = HostFromBox::new(100.0);
         map.add(Exchange {
             sent: HostTime(0),

@@ -1,25 +1,25 @@
-//! What host and box say to each other. Twin of `hil/trigger_box/protocol.h`; the table is in `hil/trigger_box/README.md`.
+//! Protocol between host and box. Mirrors `hil/trigger_box/protocol.h`; documented in `hil/trigger_box/README.md`.
 
 use skinrig_model::pulse::{MAX_MARKED_PRESS, SYNC_CODE};
 use skinrig_model::{BoxTime, Mark, MarkKind, PressId, PulseTrain};
 
-/// The version of the protocol that this driver speaks.
+/// Protocol version of this driver.
 pub const PROTOCOL_VERSION: u8 = 2;
-/// The firmware that this driver was written for.
+/// Firmware version for which this driver was written.
 pub const FIRMWARE_VERSION: Firmware = Firmware {
     major: 1,
     minor: 1,
     patch: 1,
 };
-/// How a box names itself.
+/// Device name in the handshake.
 pub(crate) const BOX_NAME: &str = "skinrig-trigger-box";
-/// Speed of the serial line, bit/s: exact with the box's 16 MHz.
+/// Baud rate of the serial line: exact with the box's 16 MHz clock.
 pub(crate) const BAUD_RATE: u32 = 250_000;
-/// The box's clock: ticks of 62.5 ns.
+/// Resolution of the box's clock: ticks of 62.5 ns.
 pub(crate) const TICKS_PER_US: u64 = 16;
-/// The longest serial number, characters.
+/// Maximum length of a serial number, characters.
 pub(crate) const MAX_SERIAL: usize = 16;
-/// The shortest period of sync trains, ms: twice a train, so that marks find room between them.
+/// Minimum period of sync trains, ms: twice the duration of a train, so that marks fit in between.
 pub(crate) const MIN_SYNC_PERIOD_MS: u16 = (2 * PulseTrain::DURATION_US).div_ceil(1_000) as u16;
 
 const REPLY: u8 = 0x80;
@@ -28,11 +28,11 @@ const HELLO: u8 = 0x01;
 /// A version of the firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Firmware {
-    /// Changes of meaning.
+    /// Incompatible changes.
     pub major: u8,
-    /// Additions.
+    /// Compatible additions.
     pub minor: u8,
-    /// Repairs.
+    /// Corrections.
     pub patch: u8,
 }
 
@@ -45,46 +45,46 @@ impl std::fmt::Display for Firmware {
 /// A request to the box.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Request {
-    /// Who are you? Disarms, ends the sync trains, and begins the numbers of marks anew.
+    /// Handshake. Disarms the box, stops the sync trains, and restarts the numbering of marks.
     Hello,
-    /// Allow pulses, until disarmed or until nothing was heard from the host for so long (0: for ever).
+    /// Enables pulses until disarmed, or until the host has been silent for this time (0: forever).
     Arm {
         /// ms.
         silence_ms: u16,
     },
-    /// Forbid pulses.
+    /// Disables pulses.
     Disarm,
-    /// Send the train of a mark. A number that was answered already is answered again, without a second train.
+    /// Sends the train of a mark. A repeated number is answered again without a second train.
     Mark {
-        /// One more than the last mark's, beginning with 1 after [`Request::Hello`].
+        /// The previous mark's number plus one; 1 after [`Request::Hello`].
         number: u32,
-        /// Which mark.
+        /// The mark to send.
         mark: Mark,
     },
-    /// Send sync trains by itself.
+    /// Sets up periodic sync trains.
     Sync {
-        /// ms; 0 ends them, else at least `MIN_SYNC_PERIOD_MS`.
+        /// Period, ms; 0 stops them, otherwise at least `MIN_SYNC_PERIOD_MS`.
         period_ms: u16,
-        /// The count that the next train carries.
+        /// Count of the first train.
         first: u32,
     },
-    /// Forget the events before this number and tell those after it.
+    /// Drops events before this number and reads those from it on.
     Events {
-        /// Number of the first event that is still wanted.
+        /// Number of the first requested event.
         from: u32,
     },
-    /// Tell the counters.
+    /// Reads the counters.
     Status,
-    /// Raise and lower all outputs once and look at the pins.
+    /// Raises and lowers all outputs once and reads the pins.
     SelfTest,
-    /// Tell the clock.
+    /// Reads the clock.
     Time,
-    /// Keep this serial number.
+    /// Stores a serial number.
     SetSerial(String),
 }
 
 impl Request {
-    /// What to call it in messages.
+    /// Name in messages.
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
@@ -116,7 +116,7 @@ impl Request {
         }
     }
 
-    /// The body of the request's frame.
+    /// Encodes the body of the request's frame.
     #[must_use]
     pub fn encode(&self, id: u16) -> Vec<u8> {
         let mut body = vec![PROTOCOL_VERSION, self.command()];
@@ -140,12 +140,12 @@ impl Request {
     }
 }
 
-/// An instant of the box's clock, in ticks of 62.5 ns since its reset.
+/// A time of the box's clock, in ticks of 62.5 ns since its reset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Ticks(pub u64);
 
 impl Ticks {
-    /// The whole microseconds of it.
+    /// Converts to whole microseconds, rounded down.
     #[must_use]
     pub(crate) fn to_box_time(self) -> BoxTime {
         BoxTime {
@@ -154,26 +154,26 @@ impl Ticks {
     }
 }
 
-/// How the box took a request.
+/// Result of a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// Carried out.
+    /// Executed.
     Done,
-    /// It does not know the command.
+    /// Unknown command.
     UnknownCommand,
-    /// It does not accept the arguments.
+    /// Invalid argument.
     BadArgument,
-    /// Not while it is disarmed.
+    /// Not allowed while disarmed.
     NotArmed,
-    /// Not while a train is under way.
+    /// Not allowed during a train.
     Busy,
-    /// Neither the last mark again nor the next.
+    /// The mark's number is neither the previous one nor the next.
     OutOfOrder,
-    /// It speaks another version of the protocol.
+    /// The box has another protocol version.
     BadVersion,
-    /// Not while it is armed.
+    /// Not allowed while armed.
     Armed,
-    /// A code that this driver does not know.
+    /// A code unknown to this driver.
     Unknown(u8),
 }
 
@@ -193,32 +193,32 @@ impl From<u8> for Outcome {
     }
 }
 
-/// The state that comes with every reply.
+/// State flags in every reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Flags(pub u8);
 
 impl Flags {
-    /// Pulses are allowed.
+    /// Whether pulses are enabled.
     #[must_use]
     pub fn armed(self) -> bool {
         self.0 & 1 != 0
     }
-    /// Sync trains are being sent.
+    /// Whether sync trains are enabled.
     #[must_use]
     pub fn syncing(self) -> bool {
         self.0 & 2 != 0
     }
-    /// A train is under way.
+    /// Whether a train is being sent.
     #[must_use]
     pub fn train(self) -> bool {
         self.0 & 4 != 0
     }
-    /// It disarmed itself because the host was silent.
+    /// Whether the box disarmed itself because the host was silent.
     #[must_use]
     pub fn disarmed_by_silence(self) -> bool {
         self.0 & 8 != 0
     }
-    /// The input's level.
+    /// Level of the input.
     #[must_use]
     pub fn input_high(self) -> bool {
         self.0 & 16 != 0
@@ -228,25 +228,25 @@ impl Flags {
 /// A reply of the box.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reply {
-    /// The protocol that the box speaks.
+    /// Protocol version of the box.
     pub version: u8,
-    /// The command that it answers.
+    /// Command of the request.
     pub command: u8,
-    /// The request that it answers.
+    /// Number of the request.
     pub id: u16,
-    /// How it went.
+    /// Result.
     pub outcome: Outcome,
-    /// The state of the box.
+    /// State of the box.
     pub flags: Flags,
-    /// How often the box was reset in its life, modulo 2^16.
+    /// Number of resets of the box, modulo 2^16.
     pub boot: u16,
-    /// The box's clock when it took the request.
+    /// Box time when the request was executed.
     pub at: Ticks,
-    /// What the command asked for.
-    pub answers: Vec<u8>,
+    /// Result data of the command.
+    pub data: Vec<u8>,
 }
 
-/// Takes little-endian numbers from the front of some bytes.
+/// Reads little-endian numbers from a slice.
 struct Cursor<'a>(&'a [u8]);
 
 impl Cursor<'_> {
@@ -267,7 +267,7 @@ impl Cursor<'_> {
     fn u64(&mut self) -> Option<u64> {
         self.take().map(u64::from_le_bytes)
     }
-    /// A text with its length in front.
+    /// A length-prefixed string.
     fn text(&mut self) -> Option<String> {
         let n = usize::from(self.u8()?);
         let bytes = self.0.get(..n)?;
@@ -280,7 +280,7 @@ impl Cursor<'_> {
 }
 
 impl Reply {
-    /// Reads the body of a frame; `None` when it is no reply.
+    /// Parses the body of a frame; `None` if it is not a reply.
     #[must_use]
     pub fn parse(body: &[u8]) -> Option<Self> {
         let mut c = Cursor(body);
@@ -297,37 +297,37 @@ impl Reply {
             flags: Flags(c.u8()?),
             boot: c.u16()?,
             at: Ticks(c.u64()?),
-            answers: c.0.to_vec(),
+            data: c.0.to_vec(),
         })
     }
 
-    /// Does it answer this request with this number?
+    /// Whether this is the reply to `request` with number `id`.
     #[must_use]
-    pub fn answers(&self, request: &Request, id: u16) -> bool {
+    pub fn is_reply_to(&self, request: &Request, id: u16) -> bool {
         self.command == request.command()
             && self.id == id
             && (self.version == PROTOCOL_VERSION || self.command == HELLO)
     }
 }
 
-/// Who the box is.
+/// Identity of the box.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Hello {
-    /// Its firmware.
+    /// Firmware version.
     pub firmware: Firmware,
-    /// Ticks of its clock per microsecond.
+    /// Clock ticks per microsecond.
     pub ticks_per_us: u8,
-    /// Its serial number; empty when it was never given one.
+    /// Serial number; empty if never set.
     pub serial: String,
-    /// `BOX_NAME`.
+    /// Device name; `BOX_NAME` for a trigger box.
     pub name: String,
 }
 
 impl Hello {
-    /// Reads the answers to [`Request::Hello`].
+    /// Parses the data of a reply to [`Request::Hello`].
     #[must_use]
-    pub fn parse(answers: &[u8]) -> Option<Self> {
-        let mut c = Cursor(answers);
+    pub fn parse(data: &[u8]) -> Option<Self> {
+        let mut c = Cursor(data);
         Some(Self {
             firmware: Firmware {
                 major: c.u8()?,
@@ -341,56 +341,56 @@ impl Hello {
     }
 }
 
-/// Reads the answer to [`Request::Mark`]: when the start pulse rises, which may be later than the reply.
+/// Parses the data of a reply to [`Request::Mark`]: rise of the start pulse, which may be after the reply.
 #[must_use]
-pub fn parse_mark(answers: &[u8]) -> Option<Ticks> {
-    let mut c = Cursor(answers);
+pub fn parse_mark(data: &[u8]) -> Option<Ticks> {
+    let mut c = Cursor(data);
     let start = Ticks(c.u64()?);
     c.end()?;
     Some(start)
 }
 
-/// Something that happened at the box.
+/// Kind of an event at the box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EventKind {
-    /// The train of this mark began.
+    /// The train of this mark started.
     Mark(Mark),
-    /// The sync train with this count began.
+    /// The sync train with this count started.
     Sync(u32),
     /// An edge of the input.
     Input {
-        /// True for a rising edge.
+        /// Whether it is a rising edge.
         rising: bool,
     },
 }
 
-/// An event with its instant.
+/// An event with its time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Event {
-    /// What.
+    /// Kind.
     pub kind: EventKind,
-    /// When.
+    /// Time.
     pub at: Ticks,
 }
 
-/// The answer to [`Request::Events`].
+/// Data of a reply to [`Request::Events`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Events {
-    /// Events that found the box's memory full, since its reset.
+    /// Events dropped since the reset because the box's memory was full.
     pub dropped: u16,
-    /// Number of the event that comes next.
+    /// Number of the next event.
     pub next: u32,
-    /// Number of the first of `events`.
+    /// Number of the first event in `events`.
     pub first: u32,
-    /// The oldest events that the box keeps, in order; not all of them.
+    /// The oldest stored events in order, possibly not all of them.
     pub events: Vec<Event>,
 }
 
 impl Events {
-    /// Reads the answers; `None` also for an event of a kind that does not exist.
+    /// Parses reply data; `None` also for an unknown kind of event.
     #[must_use]
-    pub fn parse(answers: &[u8]) -> Option<Self> {
-        let mut c = Cursor(answers);
+    pub fn parse(data: &[u8]) -> Option<Self> {
+        let mut c = Cursor(data);
         let (dropped, next, first, n) = (c.u16()?, c.u32()?, c.u32()?, c.u8()?);
         let mut events = Vec::with_capacity(usize::from(n));
         for _ in 0..n {
@@ -419,7 +419,7 @@ impl Events {
     }
 }
 
-/// Why the box began anew: the processor's register MCUSR (ATmega328P data sheet DS40002061B, section 11.9.1).
+/// Cause of the last reset: the processor's register MCUSR (ATmega328P data sheet DS40002061B, section 11.9.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ResetCause(pub u8);
 
@@ -444,40 +444,40 @@ impl std::fmt::Display for ResetCause {
     }
 }
 
-/// The box's counters, each since its reset. Those of 16 bits stop at 65,535.
+/// Counters since the reset. The 16-bit counters saturate at 65,535.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counters {
-    /// Why it was reset.
+    /// Cause of the reset.
     pub reset_cause: ResetCause,
-    /// Trains of marks that began.
+    /// Mark trains started.
     pub marks: u32,
-    /// Sync trains that began.
+    /// Sync trains started.
     pub syncs: u32,
-    /// Edges of the input that were stamped.
+    /// Time-stamped input edges.
     pub input_edges: u32,
-    /// Edges of trains that came too late.
+    /// Train edges that were late.
     pub late_edges: u16,
-    /// Pulses at the input too short to be stamped.
+    /// Input pulses too short for a time stamp.
     pub input_glitches: u16,
-    /// Events that found the memory full.
+    /// Events dropped because the memory was full.
     pub dropped_events: u16,
     /// Frames with a wrong checksum.
     pub bad_checksums: u16,
-    /// Frames that were none.
+    /// Malformed frames.
     pub bad_frames: u16,
-    /// Bytes that were lost because nobody took them in time.
+    /// Bytes lost by receiver overruns.
     pub overruns: u16,
-    /// Edges of the input that found its share of the memory taken.
+    /// Input edges ignored because their share of the memory was full.
     pub ignored_edges: u16,
-    /// Times that the input changed too often and was not looked at for the rest of a turn of the clock, 4 ms at most.
+    /// Times the input changed so often that it was ignored for the rest of a clock turn, at most 4 ms.
     pub input_mutes: u16,
 }
 
 impl Counters {
-    /// Reads the answers to [`Request::Status`].
+    /// Parses the data of a reply to [`Request::Status`].
     #[must_use]
-    pub fn parse(answers: &[u8]) -> Option<Self> {
-        let mut c = Cursor(answers);
+    pub fn parse(data: &[u8]) -> Option<Self> {
+        let mut c = Cursor(data);
         let counters = Self {
             reset_cause: ResetCause(c.u8()?),
             marks: c.u32()?,
@@ -497,22 +497,22 @@ impl Counters {
     }
 }
 
-/// What the box saw of its own outputs.
+/// Result of the self-test of the outputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SelfTest {
     /// All outputs rose.
     pub rose: bool,
     /// All outputs fell.
     pub fell: bool,
-    /// The input followed: the spare output is wired to it.
+    /// The input followed, so the spare output is wired to it.
     pub input_followed: bool,
 }
 
 impl SelfTest {
-    /// Reads the answer to [`Request::SelfTest`].
+    /// Parses the data of a reply to [`Request::SelfTest`].
     #[must_use]
-    pub fn parse(answers: &[u8]) -> Option<Self> {
-        let mut c = Cursor(answers);
+    pub fn parse(data: &[u8]) -> Option<Self> {
+        let mut c = Cursor(data);
         let flags = c.u8()?;
         c.end()?;
         Some(Self {
@@ -523,7 +523,7 @@ impl SelfTest {
     }
 }
 
-/// The code of sync trains is beyond those of marks, so that neither can be taken for the other.
+/// The code of sync trains lies above those of marks, so that they are never confused.
 const _: () = assert!(SYNC_CODE > 5);
 
 #[cfg(test)]
@@ -533,16 +533,16 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_are_read_without_panic(body in prop::collection::vec(any::<u8>(), 0..120)) {
+        fn parsers_never_panic(body in prop::collection::vec(any::<u8>(), 0..120)) {
             if let Some(reply) = Reply::parse(&body) {
-                let a = &reply.answers;
+                let a = &reply.data;
                 let _ = (Hello::parse(a), Events::parse(a), Counters::parse(a), SelfTest::parse(a), parse_mark(a));
             }
             let _ = (Hello::parse(&body), Events::parse(&body), Counters::parse(&body));
         }
 
         #[test]
-        fn requests_carry_their_number_and_fit_a_frame(id in any::<u16>(), number in any::<u32>(), press in 0..=MAX_MARKED_PRESS) {
+        fn requests_contain_their_number_and_fit_a_frame(id in any::<u16>(), number in any::<u32>(), press in 0..=MAX_MARKED_PRESS) {
             let mark = Mark { kind: MarkKind::Release, press: PressId::from_index(press) };
             let body = Request::Mark { number, mark }.encode(id);
             prop_assert_eq!(&body[..2], &[PROTOCOL_VERSION, 4]);
@@ -555,7 +555,7 @@ mod tests {
     }
 
     #[test]
-    fn both_sides_agree_on_the_versions() {
+    fn driver_and_firmware_have_the_same_constants() {
         let header = include_str!("../../../../hil/trigger_box/protocol.h");
         let value = |name: &str| {
             let line = header

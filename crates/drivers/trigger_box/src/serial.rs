@@ -1,4 +1,4 @@
-//! The line as a serial port.
+//! The line over a serial port.
 
 use std::io::{self, Read, Write};
 use std::path::Path;
@@ -7,42 +7,42 @@ use std::time::Duration;
 use serialport::{ClearBuffer, SerialPort};
 
 use crate::protocol::BAUD_RATE;
-use crate::wire::{Dial, OpenError, Wire};
+use crate::wire::{Connector, OpenError, Wire};
 
-/// How long a write may wait for room in the system's buffer.
-const WRITE_PATIENCE: Duration = Duration::from_millis(200);
+/// How long a write may wait for space in the system's buffer.
+const WRITE_TIMEOUT: Duration = Duration::from_millis(200);
 
-/// Opens a serial port by its path; a path under `/dev/serial/by-id` stays the same across unplugging.
+/// Opens a serial port by path. A path under `/dev/serial/by-id` stays valid across reconnections.
 #[derive(Debug, Clone)]
-pub struct SerialDial {
+pub struct SerialConnector {
     path: String,
 }
 
-impl SerialDial {
-    /// The port at this path.
+impl SerialConnector {
+    /// For the port at `path`.
     #[must_use]
     pub fn new(path: impl Into<String>) -> Self {
         Self { path: path.into() }
     }
 }
 
-impl Dial for SerialDial {
+impl Connector for SerialConnector {
     fn target(&self) -> &str {
         &self.path
     }
 
-    fn dial(&mut self) -> Result<Box<dyn Wire>, OpenError> {
+    fn connect(&mut self) -> Result<Box<dyn Wire>, OpenError> {
         let port = serialport::new(&self.path, BAUD_RATE)
-            .timeout(WRITE_PATIENCE)
+            .timeout(WRITE_TIMEOUT)
             .open()
             .map_err(|e| self.explain(&e))?;
-        // What the system kept for somebody before us. A port that cannot forget it only costs us bad frames.
+        // Discards data buffered for a previous program. Failure only costs some bad frames.
         let _ = port.clear(ClearBuffer::All);
         Ok(Box::new(SerialWire { port }))
     }
 }
 
-impl SerialDial {
+impl SerialConnector {
     fn explain(&self, error: &serialport::Error) -> OpenError {
         let port = self.path.clone();
         match error.kind() {
@@ -50,7 +50,7 @@ impl SerialDial {
             serialport::ErrorKind::Io(io::ErrorKind::PermissionDenied) => {
                 OpenError::NotPermitted(port)
             }
-            // Both of the port's locks are reported like this, and so is a missing port on some systems.
+            // Both kinds of port locks are reported like this, and on some systems a missing port too.
             serialport::ErrorKind::NoDevice if Path::new(&self.path).exists() => {
                 OpenError::Busy(port)
             }
@@ -69,13 +69,13 @@ struct SerialWire {
 
 impl Wire for SerialWire {
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
-        // The port's timeout guards the wait for room only; a frame is so short that it then fits at once.
-        self.port.set_timeout(WRITE_PATIENCE)?;
+        // The port's timeout covers the wait for space only; a frame is short enough to fit then.
+        self.port.set_timeout(WRITE_TIMEOUT)?;
         self.port.write_all(bytes)
     }
 
-    fn read(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
-        self.port.set_timeout(patience)?;
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        self.port.set_timeout(timeout)?;
         match self.port.read(buffer) {
             Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
             Ok(n) => Ok(n),

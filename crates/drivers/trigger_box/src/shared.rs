@@ -1,37 +1,37 @@
-//! What the thread that owns the port leaves for whoever polls.
+//! State shared between the thread that owns the port and the polling program.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use skinrig_device::DeviceError;
 use skinrig_model::{BoxReport, DeviceRole};
 
-/// Reports that are kept for [`skinrig_device::TriggerBox::poll`]: an hour of exchanges and sync trains.
+/// Capacity for reports until [`skinrig_device::TriggerBox::poll`]: an hour of exchanges and sync trains.
 const MAX_REPORTS: usize = 65_536;
-/// Faults that are kept for it: whoever does not ask learns of the first ones.
+/// Capacity for faults; later ones are dropped.
 const MAX_FAULTS: usize = 64;
 
-/// What the thread tells without being asked.
+/// Data for the next poll.
 #[derive(Default)]
 pub(crate) struct Shared {
     pub reports: Vec<BoxReport>,
-    /// Reports that found no room since this was last told.
+    /// Reports dropped since the last poll reported them.
     lost_reports: u64,
-    /// Each is told once.
+    /// Faults that were not yet reported; each is reported once.
     faults: Vec<DeviceError>,
-    /// Why the line is down, if it is.
+    /// Why the line is down; `None` if it is up.
     pub down: Option<String>,
     pub contradictions: u64,
-    /// Resets of the box that were noticed.
+    /// Number of resets of the box.
     pub resets: u64,
 }
 
 pub(crate) fn lock(shared: &Mutex<Shared>) -> MutexGuard<'_, Shared> {
-    // What is in there stays whole whatever panicked.
+    // Every update is complete under the lock, so a poisoned lock has consistent data.
     shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Shared {
-    /// Keeps a report for the next poll, or counts it as lost.
+    /// Queues a report for the next poll, or counts it as dropped.
     pub(crate) fn report(&mut self, report: BoxReport) {
         if self.reports.len() < MAX_REPORTS {
             self.reports.push(report);
@@ -40,23 +40,23 @@ impl Shared {
         }
     }
 
-    /// Keeps a fault for the next poll.
-    pub(crate) fn remember(&mut self, fault: DeviceError) {
+    /// Queues a fault for the next poll.
+    pub(crate) fn add_fault(&mut self, fault: DeviceError) {
         if self.faults.len() < MAX_FAULTS && !self.faults.contains(&fault) {
             self.faults.push(fault);
         }
     }
 
-    /// The next thing that went wrong at the box `serial`, told once.
+    /// Takes the next fault of the box `serial`; each is returned once.
     pub(crate) fn next_fault(&mut self, serial: &str) -> Option<DeviceError> {
         let lost = std::mem::take(&mut self.lost_reports);
         if lost > 0 {
             return Some(DeviceError::State {
                 role: DeviceRole::TriggerBox,
                 serial: serial.to_owned(),
-                expected: "asked for its reports".to_owned(),
+                expected: "polled regularly".to_owned(),
                 found: format!(
-                    "left alone until {MAX_REPORTS} of them were waiting; {lost} later ones are lost"
+                    "not polled until {MAX_REPORTS} reports were queued; {lost} later ones are lost"
                 ),
             });
         }
@@ -70,7 +70,7 @@ mod tests {
     use skinrig_model::HostTime;
 
     #[test]
-    fn reports_that_found_no_room_are_counted_and_told_once() {
+    fn dropped_reports_are_counted_and_reported_once() {
         let mut shared = Shared::default();
         let noticed = HostTime(0);
         for _ in 0..MAX_REPORTS + 3 {

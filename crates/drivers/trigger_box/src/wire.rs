@@ -1,50 +1,50 @@
-//! The seam below the driver: bytes to and from a box, over a serial port or a script.
+//! Byte stream to a box: a trait for serial ports and scripted tests.
 
 use std::io;
 use std::time::{Duration, Instant};
 
 /// An open line to a box.
 pub trait Wire: Send {
-    /// Writes all of a short frame.
+    /// Writes a short frame completely.
     ///
     /// # Errors
-    /// Anything that the line says; the line is then given up.
+    /// Any error of the line, which is then closed.
     fn write(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Reads what has come, waiting for `patience` at most; 0 when nothing came.
+    /// Reads available bytes, waiting up to `timeout`; 0 on timeout.
     ///
     /// # Errors
     /// As for [`Wire::write`].
-    fn read(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize>;
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize>;
 }
 
-/// Opens lines to one box, again and again.
-pub trait Dial: Send {
-    /// Where the line goes, for messages.
+/// Opens lines to one box, repeatedly.
+pub trait Connector: Send {
+    /// Name of the target, for messages.
     fn target(&self) -> &str;
 
     /// Opens the line.
     ///
     /// # Errors
     /// [`OpenError`].
-    fn dial(&mut self) -> Result<Box<dyn Wire>, OpenError>;
+    fn connect(&mut self) -> Result<Box<dyn Wire>, OpenError>;
 }
 
-/// From one attempt to open a busy line to the next.
+/// Interval of attempts to open a busy line.
 const BUSY_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Opens a line, and waits for `patience` while another program has it: whatever looks at new serial ports (a modem
-/// manager) does so for a moment, and a port is released only when the last process that inherited it lets go.
+/// Opens a line and waits up to `timeout` while another program has it open: modem managers probe new serial ports for a moment, and a
+/// port stays open until the last process that inherited it closes it.
 ///
 /// # Errors
 /// [`OpenError`].
-pub(crate) fn dial_patiently(
-    dial: &mut dyn Dial,
-    patience: Duration,
+pub(crate) fn connect_when_free(
+    connector: &mut dyn Connector,
+    timeout: Duration,
 ) -> Result<Box<dyn Wire>, OpenError> {
-    let end = Instant::now() + patience;
+    let end = Instant::now() + timeout;
     loop {
-        match dial.dial() {
+        match connector.connect() {
             Err(OpenError::Busy(_)) if Instant::now() < end => std::thread::sleep(BUSY_INTERVAL),
             other => return other,
         }
@@ -54,25 +54,25 @@ pub(crate) fn dial_patiently(
 /// Why a line could not be opened.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum OpenError {
-    /// No such port.
+    /// The port does not exist.
     #[error(
-        "{0}: no such port: plug the box in, and look for its name under /dev/serial/by-id or with `dmesg`"
+        "{0}: no such port: connect the box, and look for its name under /dev/serial/by-id or with `dmesg`"
     )]
     Absent(String),
-    /// Another program has it.
+    /// Another program has it open.
     #[error("{0}: busy: another program has opened it; end that program (`fuser -v {0}` names it)")]
     Busy(String),
-    /// The user may not open it.
+    /// The operating system denies access.
     #[error(
         "{0}: not permitted: join the group that owns it (`sudo usermod -aG dialout $USER`, then log in again)"
     )]
     NotPermitted(String),
-    /// Anything else.
+    /// Another error.
     #[error("{port}: cannot be opened: {detail}")]
     Other {
-        /// Which port.
+        /// Path of the port.
         port: String,
-        /// What the system said.
+        /// Error of the operating system.
         detail: String,
     },
 }

@@ -1,5 +1,5 @@
-//! The thread that owns the port: carries out commands one at a time, and in between keeps the ties of the clocks, fetches
-//! the box's events, and brings a lost line back.
+//! The thread that owns the port: executes commands one at a time; in between it exchanges times, fetches the box's events, and
+//! reconnects a lost line.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
 use std::sync::{Arc, Mutex};
@@ -10,22 +10,22 @@ use skinrig_model::pulse::MAX_MARKED_PRESS;
 use skinrig_model::{BoxReport, DeviceRole, Mark, SentMark};
 
 use crate::config::TriggerBoxConfig;
-use crate::greeting::{Greeted, GreetingError, greet};
-use crate::link::{Answer, Link, LinkError, Patience};
+use crate::handshake::{Handshake, HandshakeError, shake_hands};
+use crate::link::{Link, LinkError, RequestTimeouts, TimedReply};
 use crate::offset::{Exchange, HostFromBox};
 use crate::protocol::{Counters, Event, EventKind, Events, Outcome, Request, SelfTest, parse_mark};
 use crate::shared::{Shared, lock};
-use crate::wire::Dial;
+use crate::wire::{Connector, OpenError};
 
-/// From one attempt to open a lost line to the next.
-const DIAL_INTERVAL: Duration = Duration::from_millis(100);
-/// How long a hello may take on a line that came back, before commands are looked at again.
-const GREETING_SLICE: Duration = Duration::from_millis(450);
-/// How many counts of sync trains are passed over whenever the box is told anew where to begin, besides those that it may
-/// have used since its last word: no count may mean two trains.
+/// Interval of attempts to reopen a lost line.
+const RECONNECT_INTERVAL: Duration = Duration::from_millis(100);
+/// Time limit of one handshake attempt on a reopened line, after which commands are checked again.
+const HANDSHAKE_TIMEOUT: Duration = Duration::from_millis(450);
+/// Additional sync counts that are skipped whenever the sync trains are set up again, besides those that the box may have used since
+/// its last report: no count may denote two trains.
 const SYNC_GAP: u32 = 64;
 
-/// What a caller may ask of the thread.
+/// A command for the thread.
 pub(crate) enum Command {
     Send(Mark),
     Arm,
@@ -37,9 +37,9 @@ pub(crate) enum Command {
     SetSerial(String),
 }
 
-/// What the thread answers.
+/// Result of a command.
 #[derive(Debug)]
-pub(crate) enum Done {
+pub(crate) enum CommandResult {
     Nothing,
     Sent(SentMark),
     SelfTest(SelfTest),
@@ -48,179 +48,188 @@ pub(crate) enum Done {
 
 pub(crate) struct Job {
     pub command: Command,
-    pub reply: SyncSender<Result<Done, DeviceError>>,
-    /// Not begun later than this.
+    pub reply: SyncSender<Result<CommandResult, DeviceError>>,
+    /// Latest start of the execution.
     pub deadline: Instant,
 }
 
-/// What the box should be doing: put back after each reset.
+/// DesiredState state of the box, restored after each reset.
 #[derive(Default)]
-struct Desired {
+struct DesiredState {
     armed: bool,
     sync_ms: u16,
     next_sync: u32,
-    /// Period of the trains that the box was last told to send, ms, whether it still does or not.
-    told_sync_ms: u16,
+    /// Period of the sync trains last sent to the box, ms, whether they still run or not.
+    sent_sync_ms: u16,
 }
 
-impl Desired {
-    /// The train with this count began. One that is told late, after the box was given a later count, changes nothing.
-    fn saw_sync(&mut self, count: u32) {
+impl DesiredState {
+    /// Records that the train with this count started. A late report, after a later count was sent, has no effect.
+    fn record_sync(&mut self, count: u32) {
         let next = count.wrapping_add(1);
         if next.wrapping_sub(self.next_sync) & MAX_MARKED_PRESS <= MAX_MARKED_PRESS / 2 {
             self.next_sync = next & MAX_MARKED_PRESS;
         }
     }
 
-    /// Before the box is told where to begin: the host may have missed as many trains as fit into the silence that the
-    /// box bears, and a few more that were not fetched yet.
-    fn pass_over_used_counts(&mut self, silence_ms: u16) {
-        if let Some(missed) = silence_ms.checked_div(self.told_sync_ms) {
+    /// Skips counts that the box may have used: as many trains as fit into the silence after which it disarms itself, plus some that were
+    /// not fetched yet.
+    fn skip_used_counts(&mut self, silence_ms: u16) {
+        if let Some(missed) = silence_ms.checked_div(self.sent_sync_ms) {
             self.next_sync = (self.next_sync + u32::from(missed) + SYNC_GAP) & MAX_MARKED_PRESS;
         }
-        self.told_sync_ms = self.sync_ms;
+        self.sent_sync_ms = self.sync_ms;
     }
+}
+
+/// Why an attempt to reconnect failed.
+#[derive(Debug, thiserror::Error)]
+enum ReconnectError {
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    #[error(transparent)]
+    Handshake(#[from] HandshakeError),
 }
 
 pub(crate) struct Worker {
     config: TriggerBoxConfig,
-    dial: Box<dyn Dial>,
+    connector: Box<dyn Connector>,
     clock: RealClock,
     shared: Arc<Mutex<Shared>>,
     serial: String,
-    /// The line on which the box said hello.
+    /// A line after a successful handshake.
     link: Option<Link>,
-    /// A line on which it must do so again.
-    doubtful: Option<Link>,
+    /// A line that needs a new handshake.
+    unverified: Option<Link>,
     boot: u16,
-    desired: Desired,
+    desired: DesiredState,
     mark_number: u32,
     next_event: u32,
     dropped: u16,
     host_from_box: HostFromBox,
-    heard: Instant,
+    last_reply: Instant,
     opened: Instant,
     next_exchange: Instant,
     next_events: Instant,
-    next_dial: Instant,
+    next_reconnect: Instant,
 }
 
 impl Worker {
-    /// Takes over a line on which the box has said hello.
+    /// Takes over a line after a successful handshake.
     pub(crate) fn new(
         config: TriggerBoxConfig,
-        dial: Box<dyn Dial>,
+        connector: Box<dyn Connector>,
         clock: RealClock,
         link: Link,
-        greeted: &Greeted,
+        handshake: &Handshake,
         shared: Arc<Mutex<Shared>>,
     ) -> Self {
         let now = Instant::now();
         Self {
             host_from_box: HostFromBox::new(config.max_drift_ppm),
             config,
-            dial,
+            connector,
             clock,
             shared,
-            serial: greeted.identity.serial.clone(),
+            serial: handshake.identity.serial.clone(),
             link: Some(link),
-            doubtful: None,
-            boot: greeted.boot,
-            desired: Desired::default(),
+            unverified: None,
+            boot: handshake.boot,
+            desired: DesiredState::default(),
             mark_number: 0,
             next_event: 0,
             dropped: 0,
-            heard: now,
+            last_reply: now,
             opened: now,
             next_exchange: now,
             next_events: now,
-            next_dial: now,
+            next_reconnect: now,
         }
     }
 
-    /// Forgets what the box did before this session.
+    /// Skips events from before this session.
     pub(crate) fn begin(&mut self) -> Result<(), DeviceError> {
-        let answer = self.ask(&Request::Events { from: 0 }, self.patience())?;
-        let events = self.expect_events(&answer)?;
+        let reply = self.request(&Request::Events { from: 0 }, self.timeouts())?;
+        let events = self.expect_events(&reply)?;
         self.next_event = events.next;
         self.dropped = events.dropped;
         Ok(())
     }
 
-    /// Until all callers are gone; then disarms the box.
+    /// Runs until all callers are gone, then disarms the box.
     pub(crate) fn run(mut self, jobs: &Receiver<Job>) {
         loop {
             let next = if self.link.is_some() {
                 self.next_exchange.min(self.next_events)
             } else {
-                self.next_dial
+                self.next_reconnect
             };
             let wait = next.saturating_duration_since(Instant::now());
             if wait.is_zero() {
-                self.keep_house();
+                self.run_due_tasks();
             }
             match jobs.recv_timeout(wait) {
-                Ok(job) => self.take(job),
+                Ok(job) => self.handle(job),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => break,
             }
         }
         if let Some(link) = &mut self.link {
-            // On a line that is failing, the box's own watch for silence does it.
-            let patience = Patience {
+            // If the line fails, the box's silence timeout disarms it.
+            let timeouts = RequestTimeouts {
                 per_try: self.config.reply_timeout,
                 total: self.config.reply_timeout * 3,
             };
-            let _ = link.ask(&Request::Disarm, patience);
+            let _ = link.request(&Request::Disarm, timeouts);
         }
     }
 
-    fn take(&mut self, job: Job) {
-        let answer = if Instant::now() > job.deadline {
+    fn handle(&mut self, job: Job) {
+        let reply = if Instant::now() > job.deadline {
             Err(self.lost("the driver was busy for too long; nothing was sent".to_owned()))
         } else {
-            self.carry_out(job.command)
+            self.execute(job.command)
         };
-        // A caller that no longer waits has been told so.
-        let _ = job.reply.try_send(answer);
+        // The caller may have given up waiting.
+        let _ = job.reply.try_send(reply);
     }
 
-    fn carry_out(&mut self, command: Command) -> Result<Done, DeviceError> {
+    fn execute(&mut self, command: Command) -> Result<CommandResult, DeviceError> {
         match command {
-            Command::Send(mark) => self.send(mark).map(Done::Sent),
+            Command::Send(mark) => self.send(mark).map(CommandResult::Sent),
             Command::Arm => {
                 self.desired.armed = true;
-                self.restore().map(|()| Done::Nothing)
+                self.restore().map(|()| CommandResult::Nothing)
             }
             Command::Disarm => {
                 self.desired.armed = false;
-                let answer = self.ask(&Request::Disarm, self.patience())?;
-                self.expect_done("disarm", &answer)
+                let reply = self.request(&Request::Disarm, self.timeouts())?;
+                self.expect_done("disarm", &reply)
             }
             Command::Sync(period_ms) => {
                 self.desired.sync_ms = period_ms;
-                self.restore().map(|()| Done::Nothing)
+                self.restore().map(|()| CommandResult::Nothing)
             }
             Command::SelfTest => {
-                let answer = self.ask(&Request::SelfTest, self.patience())?;
-                self.expect_done("self test", &answer)?;
-                let test = SelfTest::parse(&answer.reply.answers);
-                test.map(Done::SelfTest)
-                    .ok_or_else(|| self.misunderstood("the result of a self test"))
+                let reply = self.request(&Request::SelfTest, self.timeouts())?;
+                self.expect_done("self test", &reply)?;
+                let test = SelfTest::parse(&reply.reply.data);
+                test.map(CommandResult::SelfTest)
+                    .ok_or_else(|| self.malformed("the result of a self test"))
             }
             Command::Counters => {
-                let answer = self.ask(&Request::Status, self.patience())?;
-                self.expect_done("status", &answer)?;
-                let counters = Counters::parse(&answer.reply.answers);
+                let reply = self.request(&Request::Status, self.timeouts())?;
+                self.expect_done("status", &reply)?;
+                let counters = Counters::parse(&reply.reply.data);
                 counters
-                    .map(Done::Counters)
-                    .ok_or_else(|| self.misunderstood("counters"))
+                    .map(CommandResult::Counters)
+                    .ok_or_else(|| self.malformed("counters"))
             }
             Command::SetSerial(serial) => {
-                let answer = self.ask(&Request::SetSerial(serial.clone()), self.patience())?;
-                self.expect_done("set serial", &answer)?;
+                let reply = self.request(&Request::SetSerial(serial.clone()), self.timeouts())?;
+                self.expect_done("set serial", &reply)?;
                 self.serial = serial;
-                Ok(Done::Nothing)
+                Ok(CommandResult::Nothing)
             }
         }
     }
@@ -228,21 +237,21 @@ impl Worker {
     fn send(&mut self, mark: Mark) -> Result<SentMark, DeviceError> {
         let number = self.mark_number + 1;
         let request = Request::Mark { number, mark };
-        let answer = match self.ask(&request, self.patience()) {
+        let reply = match self.request(&request, self.timeouts()) {
             Err(e @ DeviceError::Lost { .. }) if self.link.is_some() => {
-                // Whether the box counted this mark is unknown: begin the numbers anew.
-                self.give_up("a mark was not answered");
+                // It is unknown whether the box executed this mark: restart the numbering.
+                self.drop_link("a mark got no reply");
                 return Err(e);
             }
             other => other?,
         };
-        self.expect_done("mark", &answer)?;
-        let Some(start) = parse_mark(&answer.reply.answers) else {
-            self.give_up("the answer to a mark was not understood");
-            return Err(self.misunderstood("the start of a train"));
+        self.expect_done("mark", &reply)?;
+        let Some(start) = parse_mark(&reply.reply.data) else {
+            self.drop_link("the reply to a mark was malformed");
+            return Err(self.malformed("the start of a train"));
         };
         self.mark_number = number;
-        let own = exchange(&answer);
+        let own = exchange(&reply);
         let (t, uncertainty_ns) = self.host_from_box.bounds(own, start).middle();
         lock(&self.shared).contradictions = self.host_from_box.contradictions();
         Ok(SentMark {
@@ -252,11 +261,11 @@ impl Worker {
         })
     }
 
-    /// What is due without being asked.
-    fn keep_house(&mut self) {
+    /// Runs periodic tasks that are due.
+    fn run_due_tasks(&mut self) {
         let now = Instant::now();
         if self.link.is_none() {
-            self.redial();
+            self.reconnect();
         } else if now >= self.next_exchange {
             self.next_exchange = now + self.config.exchange_interval;
             self.exchange_time();
@@ -264,16 +273,16 @@ impl Worker {
             self.next_events = now + self.config.events_interval;
             self.fetch_events();
         }
-        let silent = self.heard.elapsed() > self.config.command_timeout;
+        let silent = self.last_reply.elapsed() > self.config.command_timeout;
         if self.link.is_some() && silent {
-            let ms = self.heard.elapsed().as_millis();
-            self.give_up(&format!("no answer for {ms} ms"));
+            let ms = self.last_reply.elapsed().as_millis();
+            self.drop_link(&format!("no reply for {ms} ms"));
         }
     }
 
     fn exchange_time(&mut self) {
-        if let Ok(answer) = self.ask(&Request::Time, self.patience()) {
-            let own = exchange(&answer);
+        if let Ok(reply) = self.request(&Request::Time, self.timeouts()) {
+            let own = exchange(&reply);
             self.host_from_box.add(own);
             self.report(BoxReport::Exchange {
                 sent: own.sent,
@@ -285,25 +294,25 @@ impl Worker {
 
     fn fetch_events(&mut self) {
         let from = self.next_event;
-        let Ok(answer) = self.ask(&Request::Events { from }, self.patience()) else {
-            return; // asked again for the same ones soon
+        let Ok(reply) = self.request(&Request::Events { from }, self.timeouts()) else {
+            return; // requested again soon
         };
-        let events = match self.expect_events(&answer) {
+        let events = match self.expect_events(&reply) {
             Ok(events) => events,
-            Err(fault) => return self.remember(fault),
+            Err(fault) => return self.add_fault(fault),
         };
         if events.dropped != self.dropped {
             let lost = events.dropped.wrapping_sub(self.dropped);
             self.dropped = events.dropped;
             self.fault(
-                "telling every event",
+                "complete events",
                 format!(
-                    "missing {lost}: its memory was full (is the input wired to a source of noise?)"
+                    "{lost} dropped events: its memory was full (is the input connected to a noise source?)"
                 ),
             );
         }
         for event in &events.events {
-            self.tell(*event);
+            self.report_event(*event);
         }
         self.next_event = events.first.wrapping_add(events.events.len() as u32);
         if self.next_event != events.next {
@@ -311,12 +320,12 @@ impl Worker {
         }
     }
 
-    fn tell(&mut self, event: Event) {
+    fn report_event(&mut self, event: Event) {
         let at = event.at.to_box_time();
         let report = match event.kind {
             EventKind::Mark(mark) => BoxReport::Mark { mark, at },
             EventKind::Sync(count) => {
-                self.desired.saw_sync(count);
+                self.desired.record_sync(count);
                 BoxReport::Sync { count, at }
             }
             EventKind::Input { rising } => BoxReport::Input { rising, at },
@@ -329,103 +338,111 @@ impl Worker {
     }
 
     fn fault(&self, expected: &str, found: String) {
-        self.remember(self.state(expected, found));
+        self.add_fault(self.state(expected, found));
     }
 
-    /// Keeps a fault for the next poll.
-    fn remember(&self, fault: DeviceError) {
-        lock(&self.shared).remember(fault);
+    /// Queues a fault for the next poll.
+    fn add_fault(&self, fault: DeviceError) {
+        lock(&self.shared).add_fault(fault);
     }
 
-    /// Asks the box, and notices on the way that it was reset or has disarmed itself.
-    fn ask(&mut self, request: &Request, patience: Patience) -> Result<Answer, DeviceError> {
+    /// Sends a request. Detects resets of the box, and rearms a box that disarmed itself.
+    fn request(
+        &mut self,
+        request: &Request,
+        timeouts: RequestTimeouts,
+    ) -> Result<TimedReply, DeviceError> {
         let Some(link) = &mut self.link else {
-            let why = lock(&self.shared).down.clone().unwrap_or_default();
-            return Err(self.lost(why));
+            let reason = lock(&self.shared).down.clone().unwrap_or_default();
+            return Err(self.lost(reason));
         };
-        let answer = match link.ask(request, patience) {
-            Ok(answer) => answer,
-            Err(e @ LinkError::Gone(_)) => {
-                let why = e.to_string();
-                self.give_up(&why);
-                self.doubtful = None;
-                return Err(self.lost(why));
+        let reply = match link.request(request, timeouts) {
+            Ok(reply) => reply,
+            Err(e @ LinkError::Disconnected(_)) => {
+                let reason = e.to_string();
+                self.drop_link(&reason);
+                self.unverified = None;
+                return Err(self.lost(reason));
             }
-            Err(e @ LinkError::Silent { .. }) => return Err(self.lost(e.to_string())),
+            Err(e @ LinkError::NoReply { .. }) => return Err(self.lost(e.to_string())),
         };
-        self.heard = Instant::now();
-        if answer.reply.boot != self.boot {
-            self.give_up("the box was reset");
+        self.last_reply = Instant::now();
+        if reply.reply.boot != self.boot {
+            self.drop_link("the box was reset");
             return Err(self.lost(format!(
-                "the box was reset; its last `{}` may or may not have been carried out",
+                "the box was reset; its last `{}` may or may not have been executed",
                 request.name()
             )));
         }
-        if self.desired.armed && answer.reply.flags.disarmed_by_silence() {
+        if self.desired.armed && reply.reply.flags.disarmed_by_silence() {
             let restored = self.restore_on_line();
             self.fault(
                 "armed",
                 format!(
-                    "disarmed: it heard nothing from the host for {} ms; armed again",
+                    "disarmed after {} ms without a request from the host; armed again",
                     self.config.silence_ms
                 ),
             );
             restored?;
         }
-        Ok(answer)
+        Ok(reply)
     }
 
-    /// The line is of no use until the box has said hello on it again.
-    fn give_up(&mut self, why: &str) {
-        // Not opened anew if it need not be: that would reset an Arduino.
-        self.doubtful = self.link.take();
-        self.next_dial = Instant::now();
-        lock(&self.shared).down = Some(why.to_owned());
+    /// Stops using the line until the next successful handshake.
+    fn drop_link(&mut self, reason: &str) {
+        // Keep it open if possible: reopening would reset an Arduino.
+        self.unverified = self.link.take();
+        self.next_reconnect = Instant::now();
+        lock(&self.shared).down = Some(reason.to_owned());
     }
 
-    /// One attempt to hear a hello, on the line that there is or else on a new one.
-    fn redial(&mut self) {
-        let why = match self.try_line() {
-            Ok((link, greeted)) => {
-                self.welcome_back(link, &greeted);
+    /// Tries one handshake, on the existing line or a new one.
+    fn reconnect(&mut self) {
+        let error = match self.try_line() {
+            Ok((link, handshake)) => {
+                self.resume(link, &handshake);
                 return;
             }
-            Err(why) => why,
+            Err(error) => error,
         };
-        self.next_dial = Instant::now() + DIAL_INTERVAL;
-        lock(&self.shared).down = Some(why);
+        self.next_reconnect = Instant::now() + RECONNECT_INTERVAL;
+        lock(&self.shared).down = Some(error.to_string());
     }
 
-    fn try_line(&mut self) -> Result<(Link, Greeted), String> {
-        let mut link = match self.doubtful.take() {
+    fn try_line(&mut self) -> Result<(Link, Handshake), ReconnectError> {
+        let mut link = match self.unverified.take() {
             Some(link) => link,
             None => {
-                let wire = self.dial.dial().map_err(|e| e.to_string())?;
+                let wire = self.connector.connect()?;
                 self.opened = Instant::now();
                 Link::new(wire, self.clock)
             }
         };
         let serial = Some(self.serial.as_str());
-        match greet(&mut link, self.dial.target(), serial, GREETING_SLICE) {
-            Ok(greeted) => Ok((link, greeted)),
+        match shake_hands(
+            &mut link,
+            self.connector.target(),
+            serial,
+            HANDSHAKE_TIMEOUT,
+        ) {
+            Ok(handshake) => Ok((link, handshake)),
             Err(e) => {
-                let why = e.to_string();
-                let silent = matches!(e, GreetingError::Link(LinkError::Silent { .. }));
-                let last_heard = self.heard.max(self.opened);
-                if silent && last_heard.elapsed() < self.config.hello_timeout {
-                    self.doubtful = Some(link); // it may still be starting
+                let silent = matches!(e, HandshakeError::Link(LinkError::NoReply { .. }));
+                let last_activity = self.last_reply.max(self.opened);
+                if silent && last_activity.elapsed() < self.config.hello_timeout {
+                    self.unverified = Some(link); // the box may still be starting
                 }
-                Err(why)
+                Err(e.into())
             }
         }
     }
 
-    fn welcome_back(&mut self, link: Link, greeted: &Greeted) {
+    fn resume(&mut self, link: Link, handshake: &Handshake) {
         self.link = Some(link);
-        self.heard = Instant::now();
+        self.last_reply = Instant::now();
         self.mark_number = 0;
-        if greeted.boot != self.boot {
-            self.boot = greeted.boot;
+        if handshake.boot != self.boot {
+            self.boot = handshake.boot;
             self.next_event = 0;
             self.dropped = 0;
             self.host_from_box.clear();
@@ -435,16 +452,16 @@ impl Worker {
             });
         }
         if let Err(e) = self.restore() {
-            self.give_up(&e.to_string());
+            self.drop_link(&e.to_string());
             return;
         }
         lock(&self.shared).down = None;
     }
 
-    /// Makes the box do what it should be doing.
+    /// Restores the desired state of the box.
     fn restore(&mut self) -> Result<(), DeviceError> {
         if self.link.is_none() {
-            return self.ask(&Request::Time, self.patience()).map(|_| ());
+            return self.request(&Request::Time, self.timeouts()).map(|_| ());
         }
         self.restore_on_line()
     }
@@ -453,7 +470,7 @@ impl Worker {
         if !self.desired.armed {
             return Ok(());
         }
-        self.desired.pass_over_used_counts(self.config.silence_ms);
+        self.desired.skip_used_counts(self.config.silence_ms);
         let arm = Request::Arm {
             silence_ms: self.config.silence_ms,
         };
@@ -462,30 +479,30 @@ impl Worker {
             first: self.desired.next_sync,
         };
         for request in [arm, sync] {
-            let patience = self.patience();
+            let timeouts = self.timeouts();
             let Some(link) = &mut self.link else { break };
-            let answer = link.ask(&request, patience);
-            let answer = answer.map_err(|e| self.lost(e.to_string()))?;
-            self.expect_done(request.name(), &answer)?;
+            let reply = link.request(&request, timeouts);
+            let reply = reply.map_err(|e| self.lost(e.to_string()))?;
+            self.expect_done(request.name(), &reply)?;
         }
         Ok(())
     }
 
-    fn patience(&self) -> Patience {
-        Patience {
+    fn timeouts(&self) -> RequestTimeouts {
+        RequestTimeouts {
             per_try: self.config.reply_timeout,
             total: self.config.command_timeout,
         }
     }
 
-    fn expect_events(&self, answer: &Answer) -> Result<Events, DeviceError> {
-        self.expect_done("events", answer)?;
-        Events::parse(&answer.reply.answers).ok_or_else(|| self.misunderstood("events"))
+    fn expect_events(&self, reply: &TimedReply) -> Result<Events, DeviceError> {
+        self.expect_done("events", reply)?;
+        Events::parse(&reply.reply.data).ok_or_else(|| self.malformed("events"))
     }
 
-    fn expect_done(&self, what: &str, answer: &Answer) -> Result<Done, DeviceError> {
-        match answer.reply.outcome {
-            Outcome::Done => Ok(Done::Nothing),
+    fn expect_done(&self, what: &str, reply: &TimedReply) -> Result<CommandResult, DeviceError> {
+        match reply.reply.outcome {
+            Outcome::Done => Ok(CommandResult::Nothing),
             Outcome::Busy => Err(self.state("idle", "busy with a train".to_owned())),
             Outcome::NotArmed => Err(self.state("armed", "disarmed".to_owned())),
             Outcome::Armed => Err(self.state("disarmed", "armed".to_owned())),
@@ -493,16 +510,14 @@ impl Worker {
                 role: DeviceRole::TriggerBox,
                 serial: self.serial.clone(),
                 expected: format!("arguments of `{what}` that the box accepts"),
-                found: "others".to_owned(),
+                found: "rejected arguments".to_owned(),
             }),
-            other => Err(self.lost(format!("answered `{what}` with {other:?}"))),
+            other => Err(self.lost(format!("replied to `{what}` with {other:?}"))),
         }
     }
 
-    fn misunderstood(&self, what: &str) -> DeviceError {
-        self.lost(format!(
-            "expected {what}, found an answer of another layout"
-        ))
+    fn malformed(&self, what: &str) -> DeviceError {
+        self.lost(format!("expected {what}, found a malformed reply"))
     }
 
     fn lost(&self, detail: String) -> DeviceError {
@@ -523,11 +538,11 @@ impl Worker {
     }
 }
 
-fn exchange(answer: &Answer) -> Exchange {
+fn exchange(reply: &TimedReply) -> Exchange {
     Exchange {
-        sent: answer.sent,
-        received: answer.received,
-        at: answer.reply.at,
+        sent: reply.sent,
+        received: reply.received,
+        at: reply.reply.at,
     }
 }
 
@@ -536,19 +551,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_train_that_is_told_late_does_not_bring_its_count_back() {
-        let mut desired = Desired {
+    fn a_late_report_of_a_sync_train_does_not_reuse_its_count() {
+        let mut desired = DesiredState {
             sync_ms: 100,
-            told_sync_ms: 100,
+            sent_sync_ms: 100,
             next_sync: MAX_MARKED_PRESS - 20,
-            ..Desired::default()
+            ..DesiredState::default()
         };
-        desired.pass_over_used_counts(5_000);
-        // 50 trains in the silence and 64 more, beyond the 17 bits.
+        desired.skip_used_counts(5_000);
+        // 50 trains during the silence plus 64, beyond the 17 bits.
         assert_eq!(desired.next_sync, 93);
-        desired.saw_sync(MAX_MARKED_PRESS - 20);
+        desired.record_sync(MAX_MARKED_PRESS - 20);
         assert_eq!(desired.next_sync, 93);
-        desired.saw_sync(93);
+        desired.record_sync(93);
         assert_eq!(desired.next_sync, 94);
     }
 }

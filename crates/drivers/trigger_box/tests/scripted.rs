@@ -1,4 +1,4 @@
-//! The driver's ways out of trouble, against a scripted box behind the seam of bytes.
+//! Error handling of the driver, with a scripted box behind the byte stream.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::io;
@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 use skinrig_device::{DeviceError, RealClock, TriggerBox};
 use skinrig_model::{BoxReport, Mark, MarkKind, PressId};
 use skinrig_trigger_box::frame::{self, FrameReader};
-use skinrig_trigger_box::{Dial, OpenError, SerialTriggerBox, TriggerBoxConfig, Wire};
+use skinrig_trigger_box::{Connector, OpenError, SerialTriggerBox, TriggerBoxConfig, Wire};
 
-const PATIENCE: Duration = Duration::from_secs(60);
+const TIMEOUT: Duration = Duration::from_secs(60);
 const HELLO: u8 = 1;
 const ARM: u8 = 2;
 const DISARM: u8 = 3;
@@ -18,38 +18,38 @@ const MARK: u8 = 4;
 const SYNC: u8 = 5;
 const EVENTS: u8 = 6;
 
-/// A box that does what the script says.
+/// A scripted box.
 struct Script {
-    // what it is
+    // identity
     firmware: [u8; 3],
     protocol: u8,
     name: &'static str,
     boot: u16,
-    // what it does
+    // behaviour
     armed: bool,
     arms: u32,
     last_mark: u32,
     trains: Vec<u32>,
-    /// First counts of the sync trains that it was told to send.
+    /// First counts in the sync requests received.
     firsts: Vec<u32>,
     dropped: u16,
-    // what goes wrong
-    /// Swallows requests of this command, so many times.
+    // faults
+    /// Drops this many requests of this command.
     deaf_to: Option<(u8, u32)>,
-    /// Carries these out and loses the reply, so many times.
+    /// Executes this many requests of this command but loses the reply.
     mute_after: Option<(u8, u32)>,
     /// Sends each reply twice, as after a request that was repeated too early.
     doubled: bool,
-    /// Each reply is so late.
+    /// Delay of each reply.
     slow: Duration,
     ready: Instant,
-    /// Is reset when it takes a mark.
+    /// Resets when it receives a mark.
     reset_at_mark: bool,
     always_busy: bool,
     silent_disarm: bool,
     strange_event: bool,
     broken: bool,
-    /// Dialling fails so many times.
+    /// Number of connection attempts that fail.
     absent: u32,
     began: Instant,
     to_host: Vec<u8>,
@@ -87,7 +87,7 @@ impl Default for Script {
     }
 }
 
-/// Counts a fault down; true when it strikes.
+/// Counts a fault down; returns whether it applies.
 fn strikes(fault: &mut Option<(u8, u32)>, command: u8) -> bool {
     match fault {
         Some((which, left)) if *which == command && *left > 0 => {
@@ -203,8 +203,8 @@ impl Wire for Line {
         Ok(())
     }
 
-    fn read(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
-        let end = Instant::now() + patience;
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        let end = Instant::now() + timeout;
         loop {
             let mut script = self.script();
             if script.broken {
@@ -227,12 +227,12 @@ impl Wire for Line {
     }
 }
 
-impl Dial for Line {
+impl Connector for Line {
     fn target(&self) -> &str {
         "/dev/script"
     }
 
-    fn dial(&mut self) -> Result<Box<dyn Wire>, OpenError> {
+    fn connect(&mut self) -> Result<Box<dyn Wire>, OpenError> {
         let mut script = self.script();
         if script.absent > 0 {
             script.absent -= 1;
@@ -247,8 +247,8 @@ impl Dial for Line {
 fn config() -> TriggerBoxConfig {
     TriggerBoxConfig {
         reply_timeout: Duration::from_millis(5),
-        command_timeout: PATIENCE,
-        hello_timeout: PATIENCE,
+        command_timeout: TIMEOUT,
+        hello_timeout: TIMEOUT,
         events_interval: Duration::from_millis(5),
         exchange_interval: Duration::from_millis(5),
         ..TriggerBoxConfig::new("/dev/script")
@@ -282,12 +282,12 @@ fn payload(press: u32) -> u32 {
     2 << 17 | press
 }
 
-/// Polls until an error comes that is not `Lost`.
+/// Polls until an error other than `Lost`.
 fn next_fault(device: &mut SerialTriggerBox) -> DeviceError {
-    let end = Instant::now() + PATIENCE;
+    let end = Instant::now() + TIMEOUT;
     loop {
         match device.poll(&mut Vec::new()) {
-            Ok(()) => assert!(Instant::now() < end, "no fault was told"),
+            Ok(()) => assert!(Instant::now() < end, "no fault was reported"),
             Err(fault) => return fault,
         }
         std::thread::yield_now();
@@ -295,7 +295,7 @@ fn next_fault(device: &mut SerialTriggerBox) -> DeviceError {
 }
 
 fn poll_until_well(device: &mut SerialTriggerBox) -> Vec<BoxReport> {
-    let end = Instant::now() + PATIENCE;
+    let end = Instant::now() + TIMEOUT;
     let mut reports = Vec::new();
     while device.poll(&mut reports).is_err() {
         assert!(Instant::now() < end, "it did not recover");
@@ -312,7 +312,7 @@ fn resets(reports: &[BoxReport]) -> usize {
 }
 
 #[test]
-fn another_firmware_is_refused_with_the_command_that_flashes_it() {
+fn another_firmware_is_rejected_with_the_flash_command() {
     let old = Script {
         firmware: [0, 9, 2],
         ..Script::default()
@@ -332,7 +332,7 @@ fn another_firmware_is_refused_with_the_command_that_flashes_it() {
 }
 
 #[test]
-fn a_drift_that_no_clock_has_is_refused() {
+fn an_impossible_drift_is_rejected() {
     for max_drift_ppm in [-1.0, 1e6, f64::NAN] {
         let bad = TriggerBoxConfig {
             max_drift_ppm,
@@ -344,7 +344,7 @@ fn a_drift_that_no_clock_has_is_refused() {
 }
 
 #[test]
-fn strangers_and_silence_are_told_apart() {
+fn other_devices_and_silence_are_distinguished() {
     let stranger = Script {
         name: "toaster",
         ..Script::default()
@@ -366,7 +366,7 @@ fn strangers_and_silence_are_told_apart() {
         ..Script::default()
     };
     let lost = try_open(absent, config()).1.err().unwrap();
-    assert!(lost.to_string().contains("plug the box in"), "{lost}");
+    assert!(lost.to_string().contains("connect the box"), "{lost}");
 }
 
 #[test]
@@ -381,16 +381,16 @@ fn a_lost_request_and_a_lost_reply_both_end_in_one_train() {
 }
 
 #[test]
-fn a_slow_box_is_slow_and_not_lost() {
+fn a_slow_box_is_not_lost() {
     let (line, mut device) = open();
-    // Ten times the patience of one try.
+    // Ten times the time limit of one try.
     line.script().slow = Duration::from_millis(50);
     device.send(mark(1)).unwrap();
-    let end = Instant::now() + PATIENCE;
+    let end = Instant::now() + TIMEOUT;
     let mut reports = Vec::new();
     while reports.len() < 3 {
         device.poll(&mut reports).unwrap();
-        assert!(Instant::now() < end, "no exchange of time came through");
+        assert!(Instant::now() < end, "no time exchange succeeded");
         std::thread::yield_now();
     }
     device.send(mark(2)).unwrap();
@@ -398,13 +398,13 @@ fn a_slow_box_is_slow_and_not_lost() {
 }
 
 #[test]
-fn replies_that_come_again_pass_by() {
+fn duplicate_replies_are_ignored() {
     let (line, mut device) = open();
     line.script().doubled = true;
     let mut reports = Vec::new();
     for press in 1..=5 {
         device.send(mark(press)).unwrap();
-        device.counters().unwrap_err(); // the script keeps none
+        device.counters().unwrap_err(); // the script has none
         device.poll(&mut reports).unwrap();
     }
     assert_eq!(
@@ -414,7 +414,7 @@ fn replies_that_come_again_pass_by() {
 }
 
 #[test]
-fn a_mark_without_any_answer_is_lost_and_the_next_one_is_not_taken_for_it() {
+fn a_mark_without_a_reply_is_lost_and_not_confused_with_the_next_one() {
     for carried_out in [false, true] {
         let (line, device) = try_open(
             Script::default(),
@@ -432,7 +432,7 @@ fn a_mark_without_any_answer_is_lost_and_the_next_one_is_not_taken_for_it() {
             line.script().deaf_to = fault;
         }
         let lost = device.send(mark(1)).unwrap_err();
-        assert!(lost.to_string().contains("no answer to `mark`"), "{lost}");
+        assert!(lost.to_string().contains("no reply to `mark`"), "{lost}");
         (line.script().mute_after, line.script().deaf_to) = (None, None);
         poll_until_well(&mut device);
         device.send(mark(2)).unwrap();
@@ -446,7 +446,7 @@ fn a_mark_without_any_answer_is_lost_and_the_next_one_is_not_taken_for_it() {
 }
 
 #[test]
-fn a_reset_during_a_mark_is_named_and_reported_and_mended() {
+fn a_reset_during_a_mark_is_reported_and_recovered() {
     let (line, mut device) = open();
     line.script().reset_at_mark = true;
     let lost = device.send(mark(1)).unwrap_err();
@@ -458,7 +458,7 @@ fn a_reset_during_a_mark_is_named_and_reported_and_mended() {
 }
 
 #[test]
-fn a_line_that_breaks_is_dialled_until_it_is_there_again() {
+fn a_broken_line_is_reconnected() {
     let (line, mut device) = open();
     {
         let mut script = line.script();
@@ -468,7 +468,7 @@ fn a_line_that_breaks_is_dialled_until_it_is_there_again() {
     assert!(matches!(lost, DeviceError::Lost { .. }), "{lost}");
     line.script().absent = 3;
     let reports = poll_until_well(&mut device);
-    // The box kept its power: its clock goes on.
+    // The box kept its power, so its clock continues.
     assert_eq!(resets(&reports), 0, "{reports:?}");
     device.send(mark(2)).unwrap();
     assert_eq!(line.script().trains, [payload(2)]);
@@ -498,19 +498,19 @@ fn busy_and_disarmed_are_states() {
 }
 
 #[test]
-fn what_went_wrong_at_the_box_is_told_once() {
+fn each_fault_of_the_box_is_reported_once() {
     let (line, mut device) = open();
     {
         let mut script = line.script();
         (script.armed, script.silent_disarm) = (false, true);
     }
     let fault = next_fault(&mut device);
-    assert!(fault.to_string().contains("heard nothing"), "{fault}");
-    assert_eq!(line.script().arms, 2, "armed again");
+    assert!(fault.to_string().contains("without a request"), "{fault}");
+    assert_eq!(line.script().arms, 2, "rearmed");
     poll_until_well(&mut device);
     line.script().dropped = 12;
     let fault = next_fault(&mut device);
-    assert!(fault.to_string().contains("missing 12"), "{fault}");
+    assert!(fault.to_string().contains("12 dropped events"), "{fault}");
     poll_until_well(&mut device);
     line.script().strange_event = true;
     let fault = next_fault(&mut device);
@@ -518,7 +518,7 @@ fn what_went_wrong_at_the_box_is_told_once() {
 }
 
 #[test]
-fn no_count_of_a_sync_train_comes_again_however_the_box_came_back() {
+fn sync_counts_are_never_reused_after_a_reset_or_reconnection() {
     let (line, mut device) = open();
     line.script().firsts.clear();
     device.set_sync(Some(28)).unwrap();
@@ -538,7 +538,7 @@ fn no_count_of_a_sync_train_comes_again_however_the_box_came_back() {
     line.script().absent = 0;
     poll_until_well(&mut device);
     device.arm().unwrap();
-    // Within a silence of 5 s, the box sends 178 trains that the host may never hear of.
+    // During a silence of 5 s the box sends 178 trains that the host may never learn about.
     let firsts: Vec<u32> = (0..5).map(|k| k * (178 + 64)).collect();
     let mut script = line.script();
     script.firsts.dedup(); // a request may be repeated

@@ -1,4 +1,4 @@
-//! One column of whole numbers of a dvs dictionary, of whatever type and width the file has.
+//! A column of whole numbers in a dvs dictionary, of any type and width.
 
 use std::path::Path;
 
@@ -26,7 +26,7 @@ macro_rules! buffers {
             }
 
             /// Reads `rows` values from `start` on and stores them in `out`; what does not fit becomes
-            /// `u16::MAX`, which no valid value has. Gives the first row whose value is no whole number.
+            /// `u16::MAX`, which no valid value has. Gives the first row with a value that is no whole number.
             fn read(
                 &mut self,
                 dataset: &H5Dataset,
@@ -122,7 +122,7 @@ buffers! {
 }
 
 impl IntColumn {
-    /// Takes an opened dataset of integers, of an enumeration (h5py's booleans), or of floating-point numbers, which must
+    /// Accepts an open dataset of integers, of an enumeration (h5py's booleans), or of floating-point numbers, which must
     /// be whole.
     pub fn new(dataset: H5Dataset, name: &str, path: &Path) -> Result<Self, FormatsError> {
         let wrong = |found: String| FormatsError::Dataset {

@@ -116,7 +116,7 @@ impl Container {
         &self.entries
     }
 
-    /// What wrote the file, for people: `hickle 5.0.3`.
+    /// Program that wrote the file, for display: `hickle 5.0.3`.
     #[must_use]
     pub fn written_by(&self) -> &str {
         &self.writer
@@ -188,7 +188,7 @@ pub(super) fn open_followed(
     }
 }
 
-/// The dataset, when its chunks are no larger than this file can fill: a reader makes room for a whole one before it looks into it.
+/// The dataset, when its chunks are no larger than this file can fill: a reader allocates a whole chunk before reading it.
 fn holdable(opened: H5Dataset, path: &Path, dataset: &str) -> Result<H5Dataset, FormatsError> {
     let file_bytes = std::fs::metadata(path)
         .map_err(FormatsError::io(path))?
@@ -265,7 +265,7 @@ fn display_name(parent: &str) -> String {
     links.collect::<Vec<_>>().join("/")
 }
 
-/// Says what a file without a dvs dictionary is.
+/// Error that describes a file without a dvs dictionary.
 fn explain(
     path: &Path,
     names: &[String],

@@ -1,4 +1,4 @@
-//! The text header of a RAW file, and what its keys mean.
+//! The text header of a RAW file.
 
 use std::path::Path;
 
@@ -7,11 +7,11 @@ use skinrig_model::StreamFormat;
 use crate::error::FormatsError;
 use crate::stream::Geometry;
 
-/// No header line is longer, bytes; a longer one is not a header.
+/// Longest header line, bytes.
 const MAX_LINE: usize = 1024;
-/// No header has more lines.
+/// Most header lines.
 const MAX_LINES: usize = 255;
-/// No header is longer, bytes.
+/// Longest header, bytes.
 pub(super) const MAX_HEADER: usize = (MAX_LINES + 1) * (MAX_LINE + 2);
 
 /// A parsed header.
@@ -29,7 +29,7 @@ pub struct RawHeader {
     pub geometry: Option<Geometry>,
 }
 
-/// What a header says besides its entries, while it is being read.
+/// State while reading a header.
 #[derive(Default)]
 struct Meaning {
     format: Option<String>,

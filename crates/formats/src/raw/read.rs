@@ -9,10 +9,10 @@ use crate::error::FormatsError;
 use crate::regular;
 use crate::stream::{Decoder, Geometry};
 
-/// Bytes that are read at once.
+/// Bytes per read.
 const CHUNK: usize = 256 * 1024;
 
-/// An open RAW file, at some place among its words.
+/// An open RAW file.
 #[derive(Debug)]
 pub struct RawReader {
     path: PathBuf,
@@ -50,7 +50,7 @@ impl RawReader {
         &self.header
     }
 
-    /// A decoder for the file's words; without a stated geometry it takes every coordinate.
+    /// A decoder for the file's words; without a stated geometry it accepts every coordinate.
     #[must_use]
     pub fn decoder(&self) -> Decoder {
         let geometry = self.header.geometry.unwrap_or(Geometry::ANY);

@@ -9,7 +9,7 @@ use skinrig_model::StreamFormat;
 use crate::error::FormatsError;
 use crate::stream::Geometry;
 
-/// What a header states.
+/// Values of a header.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RawMetadata {
     /// How the words encode events.
@@ -124,7 +124,7 @@ impl RawWriter {
             .map_err(FormatsError::io(&self.path))
     }
 
-    /// Writes out what is buffered.
+    /// Flushes the buffer.
     ///
     /// # Errors
     /// [`FormatsError::Io`].

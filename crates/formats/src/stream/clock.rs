@@ -2,7 +2,7 @@
 
 use super::stats::Discontinuity;
 
-/// What a new time base word means.
+/// Meaning of a new time base word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Step {
     /// Progress, or the first word.
@@ -19,12 +19,12 @@ pub(super) struct TimeBase<const BITS: u32, const SHIFT: u32> {
     high: u32,
     epoch_us: u64,
     known: bool,
-    /// Words were lost: the counter goes on from here, but where it stands now the next time base word tells.
+    /// Words were lost: the counter continues, but its value is unknown until the next time base word.
     stale: bool,
 }
 
 impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
-    /// Half of the range: the largest step that is taken at its word.
+    /// Half of the range: the largest step that is accepted as progress.
     pub(crate) const HALF: u32 = 1 << (BITS - 1);
     const RANGE_US: u64 = 1 << (BITS + SHIFT);
 
@@ -68,7 +68,7 @@ impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
         self.high = high;
     }
 
-    /// Takes the next counter value (below `2^BITS`).
+    /// Processes the next counter value (below `2^BITS`).
     pub fn set(&mut self, high: u32) -> Step {
         let from_us = self.base_us();
         let previous = self.high;

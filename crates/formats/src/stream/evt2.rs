@@ -1,4 +1,4 @@
-//! EVT2: 32-bit words; what an EVK1 Gen3.1 sends.
+//! EVT2: 32-bit words, the format of the EVK1 Gen3.1.
 //!
 //! Layout (EVK1 reference, section 4.1; Prophesee's published EVT 2.0 format): type in bits 31:28. CD_OFF 0x0
 //! and CD_ON 0x1 carry t\[5:0\] in 27:22, x in 21:11, y in 10:0. TIME_HIGH 0x8 carries t\[33:6\]. EXT_TRIGGER
@@ -280,7 +280,7 @@ impl Words {
         (words * 4, full)
     }
 
-    /// Books a run that used `bytes`.
+    /// Accounts for a run that used `bytes`.
     fn finish_run<const KEEP: bool>(&mut self, bytes: &[u8], run: &Run, output: &mut Output) {
         let (words, _) = bytes.as_chunks();
         let (Some(first), Some(last)) = (words.first(), words.last()) else {

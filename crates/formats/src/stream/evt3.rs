@@ -26,7 +26,7 @@ pub const RANGE_US: u64 = 1 << 24;
 pub(super) struct Words {
     base: TimeBase<TIME_HIGH_BITS, 12>,
     low: u16,
-    /// Words were lost, and no TIME_LOW came behind a TIME_HIGH since: whether that one had changed nobody knows.
+    /// Words were lost, and no TIME_LOW came behind a TIME_HIGH since: whether that one had changed is unknown.
     low_is_lost: bool,
     y: Option<u16>,
     /// Column and polarity of the next vector.
@@ -189,7 +189,7 @@ impl Words {
         }
     }
 
-    /// Takes a continuation: the next bits of an OTHERS payload, low part first, 28 bits in all.
+    /// Processes a continuation: the next bits of an OTHERS payload, low part first, 28 bits in all.
     fn continued(
         &mut self,
         data: u16,

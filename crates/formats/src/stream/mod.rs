@@ -20,8 +20,8 @@ use output::Output;
 
 /// An incremental decoder: bytes in, events out, in stream order.
 ///
-/// The bytes may be split anywhere, also inside a word; the result does not depend on the splits. Where some are missing,
-/// [`Self::lost`] must be told. Times are
+/// The bytes may be split anywhere, also inside a word; the result does not depend on the splits. After a loss, call
+/// [`Self::lost`]. Times are
 /// camera times in µs, unwrapped, with the origin of the stream (nothing is shifted to zero). Events before
 /// the first time base word have no time and are counted in [`StreamStats::dropped_before_time`].
 ///
@@ -58,7 +58,7 @@ impl Words {
         }
     }
 
-    /// Forgets the stream so far.
+    /// Resets the state.
     fn restart(&mut self, origin_us: u64) {
         match self {
             Self::Evt2(w) => w.restart(origin_us),
@@ -111,8 +111,8 @@ impl Decoder {
         }
     }
 
-    /// The bytes so far end here, and others follow: of a device that was started anew. Nothing of the state carries over; times
-    /// count from `origin_us`, which the caller chooses so that they go on behind those before. Counts go on.
+    /// Starts a new stream, as after a restart of the device. No state carries over; times
+    /// count from `origin_us`, which the caller chooses after the earlier times. Counts continue.
     pub fn restart(&mut self, origin_us: u64) {
         self.output.stats.trailing_bytes += self.partial_len as u64;
         (self.partial_len, self.torn_len) = (0, 0);
@@ -162,7 +162,7 @@ impl Decoder {
         self.push(bytes, &mut sink::Collect { events, triggers });
     }
 
-    /// What was seen since the start. Bytes of an unfinished word are in [`StreamStats::trailing_bytes`].
+    /// Statistics since the start. Bytes of an unfinished word are in [`StreamStats::trailing_bytes`].
     #[must_use]
     pub fn stats(&self) -> StreamStats {
         StreamStats {

@@ -1,4 +1,4 @@
-//! The decoder's way out: a small reused buffer of events, and the counts.
+//! Output of the decoder: a small reused buffer of events, and the counts.
 
 use skinrig_model::{CdEvent, Polarity, TriggerEdge};
 
@@ -39,19 +39,19 @@ impl Output {
         }
     }
 
-    /// Forgets when the current chunk began.
+    /// Resets the start of the current chunk.
     pub(crate) fn begin_chunk(&mut self) {
         self.chunk_first_us = None;
     }
 
-    /// Notes the time of a timed word.
+    /// Records the time of a timed word.
     #[inline]
     pub fn timed(&mut self, t_us: u64) {
         self.last_us = Some(t_us);
         self.chunk_first_us.get_or_insert(t_us);
     }
 
-    /// Hands over what is buffered.
+    /// Delivers the buffered events.
     pub fn flush(&mut self, sink: &mut impl EventSink) {
         if self.len > 0 {
             sink.on_cd(&self.buffer[..self.len]);
@@ -59,7 +59,7 @@ impl Output {
         }
     }
 
-    /// Takes one CD event, checked against the sensor.
+    /// Adds one CD event, checked against the sensor.
     #[inline]
     pub fn cd<const KEEP: bool>(&mut self, event: CdEvent, sink: &mut impl EventSink) {
         self.timed(event.t_us);
@@ -80,7 +80,7 @@ impl Output {
         }
     }
 
-    /// Takes one trigger edge.
+    /// Adds one trigger edge.
     pub fn trigger(&mut self, edge: TriggerEdge, sink: &mut impl EventSink) {
         self.timed(edge.t_us);
         self.stats.triggers[usize::from(edge.channel & 31)] += 1;
@@ -88,13 +88,13 @@ impl Output {
         sink.on_trigger(edge);
     }
 
-    /// Takes one complete monitoring message.
+    /// Adds one complete monitoring message.
     pub fn monitoring(&mut self, monitoring: Monitoring, sink: &mut impl EventSink) {
         self.flush(sink);
         sink.on_monitoring(monitoring);
     }
 
-    /// Takes one time base word, which led to `now_us` when that is known.
+    /// Adds one time base word, which set the time `now_us` if that is known.
     pub fn time_high(&mut self, step: Step, now_us: Option<u64>, sink: &mut impl EventSink) {
         self.stats.time_high += 1;
         if let Some(now_us) = now_us {

@@ -6,7 +6,7 @@ use super::Decoder;
 use super::sink::EventSink;
 use super::stats::{Geometry, StreamStats};
 
-/// Follows a stream chunk by chunk and says what each chunk contains. It is a [`Decoder`] that keeps no
+/// Scans a stream chunk by chunk and reports the content of each. It is a [`Decoder`] that keeps no
 /// events, and therefore faster; its counts are those of the decoder.
 #[derive(Debug, Clone)]
 pub struct Scanner {
@@ -37,12 +37,12 @@ impl Scanner {
         }
     }
 
-    /// Bytes were lost before those that follow: see [`Decoder::lost`].
+    /// Reports lost bytes before the next ones: see [`Decoder::lost`].
     pub fn lost(&mut self, bytes: u64) {
         self.decoder.lost(bytes);
     }
 
-    /// Other bytes follow, of a device that was started anew: see [`Decoder::restart`].
+    /// Starts a new stream, as after a restart of the device: see [`Decoder::restart`].
     pub fn restart(&mut self, origin_us: u64) {
         self.decoder.restart(origin_us);
     }

@@ -1,10 +1,10 @@
-//! Where decoded events go.
+//! Receivers of decoded events.
 
 use skinrig_model::{CdEvent, TriggerEdge};
 
 use super::stats::Discontinuity;
 
-/// A word of the camera about itself (EVT2 OTHER with CONTINUED, EVT2.1 OTHERS, EVT3 OTHERS).
+/// A status word of the camera (EVT2 OTHER with CONTINUED, EVT2.1 OTHERS, EVT3 OTHERS).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Monitoring {
     /// Camera time, µs.
@@ -15,19 +15,19 @@ pub struct Monitoring {
     pub payload: u32,
 }
 
-/// Receives what a decoder finds, in stream order.
+/// Receives the output of a decoder, in stream order.
 pub trait EventSink {
     /// One or more CD events. Their times need not be sorted: a sensor is not bound to it.
     fn on_cd(&mut self, events: &[CdEvent]);
     /// An edge on a trigger input.
     fn on_trigger(&mut self, edge: TriggerEdge);
-    /// A word of the camera about itself.
+    /// A status word of the camera.
     fn on_monitoring(&mut self, _monitoring: Monitoring) {}
-    /// The time base stepped in a way that is neither progress nor a wrap.
+    /// A discontinuity of the time base.
     fn on_discontinuity(&mut self, _step: Discontinuity) {}
 }
 
-/// Hands CD events to a closure and lets the rest go.
+/// Passes CD events to a closure and drops the rest.
 pub(super) struct CdSlices<F>(pub F);
 
 impl<F: FnMut(&[CdEvent])> EventSink for CdSlices<F> {

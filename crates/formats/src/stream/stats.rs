@@ -1,4 +1,4 @@
-//! Counts of everything that a decoder met.
+//! Statistics of a decoder.
 
 use skinrig_model::{SENSOR_HEIGHT, SENSOR_WIDTH};
 
@@ -39,7 +39,7 @@ pub struct Discontinuity {
     pub to_us: u64,
 }
 
-/// What a decoder met since the start of a stream. Every word and every event is in one of the counts.
+/// Statistics of a decoder since the start of a stream. They cover every word and every event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StreamStats {
     /// Delivered CD events of polarity ON.

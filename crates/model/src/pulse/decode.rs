@@ -1,4 +1,4 @@
-//! Reading trains from the edges of a line on which edges are lost, doubled and invented.
+//! Decodes trains on a noisy line with lost, doubled and spurious edges.
 
 use super::{
     CHECK_BITS, DATA_BITS, Label, ONE_WIDTH_US, PULSE_PERIOD_US, PULSES_PER_TRAIN, PulseTrain,

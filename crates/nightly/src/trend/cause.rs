@@ -1,26 +1,26 @@
-//! What probably moved the series of an alarm: rules over what changed that night and which series moved, first that applies.
+//! Attributes an alarm to a probable cause: the first matching rule over version changes and affected series.
 
 use serde::Serialize;
 
 use super::history::NightHead;
 use crate::cause::Cause;
 
-/// What is said of an alarm.
+/// Probable cause of an alarm.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct Attribution {
-    /// Where to look; `None`: the rules do not tell.
+    /// Where to look; `None`: the rules do not decide.
     pub cause: Option<Cause>,
-    /// The rule that said so.
+    /// Name of the applied rule.
     pub rule: &'static str,
-    /// For people.
+    /// Explanation for the reader.
     pub reason: String,
-    /// What is not as it was before: `software 0.1.0 (a) -> 0.1.0 (b)`.
+    /// Version changes at that time: `software 0.1.0 (a) -> 0.1.0 (b)`.
     pub changed: Vec<String>,
 }
 
-/// A kind of thing that can change between two nights.
+/// A part of the setup whose version can change between two nights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Part {
+enum Component {
     Software,
     Suite,
     Firmware,
@@ -28,9 +28,9 @@ enum Part {
     Skin,
 }
 
-/// What a series is about, told by its check.
+/// What a series describes, according to its check.
 #[must_use]
-pub fn about(series: &str) -> Cause {
+pub fn series_cause(series: &str) -> Cause {
     let mut parts = series.split('/');
     match (parts.next().unwrap_or_default(), parts.next()) {
         ("golden", _) | ("derived", Some("skin")) => Cause::Skin,
@@ -39,48 +39,48 @@ pub fn about(series: &str) -> Cause {
     }
 }
 
-/// What moved `series` between the nights `before` and `after`.
+/// Attributes a change of `series` between the nights `before` and `after`.
 pub(super) fn attribute(before: &NightHead, after: &NightHead, series: &[&str]) -> Attribution {
     let changes = changes(before, after);
     let changed: Vec<String> = changes.iter().map(|(_, text)| text.clone()).collect();
     let has = |part| changes.iter().any(|(p, _)| *p == part);
-    let all = |cause| series.iter().all(|s| about(s) == cause);
-    let any = |cause| series.iter().any(|s| about(s) == cause);
-    let (cause, rule, reason) = if has(Part::Skin) && all(Cause::Skin) {
+    let all = |cause| series.iter().all(|s| series_cause(s) == cause);
+    let any = |cause| series.iter().any(|s| series_cause(s) == cause);
+    let (cause, rule, reason) = if has(Component::Skin) && all(Cause::Skin) {
         (
             Some(Cause::Skin),
             "another-skin",
-            "another skin was put on, and only series of the skin moved",
+            "the skin was replaced, and only series of the skin moved",
         )
-    } else if has(Part::Software) {
+    } else if has(Component::Software) {
         (
             Some(Cause::Software),
             "software-changed",
             "the software changed at that time",
         )
-    } else if has(Part::Suite) {
+    } else if has(Component::Suite) {
         (
             Some(Cause::Software),
             "suite-changed",
-            "the suite changed at that time: what is measured is not what was",
+            "the suite changed at that time, so the measurements differ",
         )
-    } else if has(Part::Firmware) {
+    } else if has(Component::Firmware) {
         (
             Some(Cause::Rig),
             "firmware-changed",
             "firmware changed at that time",
         )
-    } else if has(Part::RigFile) {
+    } else if has(Component::RigFile) {
         (
             Some(Cause::Rig),
             "rig-file-changed",
             "the rig file changed at that time",
         )
-    } else if has(Part::Skin) {
+    } else if has(Component::Skin) {
         (
             Some(Cause::Skin),
             "skin-among-others",
-            "another skin was put on at that time; series of the rig moved too",
+            "the skin was replaced at that time; series of the rig moved too",
         )
     } else if all(Cause::Infrastructure) {
         (
@@ -104,7 +104,7 @@ pub(super) fn attribute(before: &NightHead, after: &NightHead, series: &[&str]) 
         (
             None,
             "mixed",
-            "no version changed, and series of different things moved",
+            "no version changed, and unrelated series moved",
         )
     };
     Attribution {
@@ -115,7 +115,7 @@ pub(super) fn attribute(before: &NightHead, after: &NightHead, series: &[&str]) 
     }
 }
 
-fn changes(before: &NightHead, after: &NightHead) -> Vec<(Part, String)> {
+fn changes(before: &NightHead, after: &NightHead) -> Vec<(Component, String)> {
     let mut found = Vec::new();
     let mut differ = |part, what: &str, a: &str, b: &str| {
         if a != b {
@@ -123,34 +123,39 @@ fn changes(before: &NightHead, after: &NightHead) -> Vec<(Part, String)> {
         }
     };
     let (a, b) = (&before.versions, &after.versions);
-    differ(Part::Software, "software", &a.software, &b.software);
+    differ(Component::Software, "software", &a.software, &b.software);
     let (old, new) = (a.analysis.to_string(), b.analysis.to_string());
-    differ(Part::Software, "analysis", &old, &new);
+    differ(Component::Software, "analysis", &old, &new);
     differ(
-        Part::Suite,
+        Component::Suite,
         "suite",
         short(&before.suite_sha256),
         short(&after.suite_sha256),
     );
     for (device, new) in &b.firmware {
-        // A device that did not answer has no firmware that night, which is no change of it.
+        // A device that did not respond has no firmware entry that night; that is not a firmware change.
         if let Some((_, old)) = a.firmware.iter().find(|(d, _)| d == device) {
-            differ(Part::Firmware, &format!("firmware of {device}"), old, new);
+            differ(
+                Component::Firmware,
+                &format!("firmware of {device}"),
+                old,
+                new,
+            );
         }
     }
     differ(
-        Part::RigFile,
+        Component::RigFile,
         "rig file",
         short(&before.rig_sha256),
         short(&after.rig_sha256),
     );
     if let (Some(old), Some(new)) = (&a.skin, &b.skin) {
-        differ(Part::Skin, "skin", old, new);
+        differ(Component::Skin, "skin", old, new);
     }
     found
 }
 
-/// The beginning of a digest.
+/// First digits of a digest.
 fn short(digest: &str) -> &str {
     digest.get(..8).unwrap_or(digest)
 }

@@ -1,52 +1,52 @@
-//! In which night a series began to be off.
+//! Estimates the night of a change.
 
 use serde::Serialize;
 
-use super::chart::{Charted, Way};
+use super::chart::{ChartPoint, Direction};
 
-/// How far back a change is sought, nights with a score.
-const BACK: usize = 120;
-/// A score counts for no more than this: one odd night is no change.
-const MOST: f64 = 4.0;
-/// Half the 95 % point of chi-squared with one degree of freedom: what the likelihood may fall short of its largest.
-const SHORT: f64 = 1.92;
+/// Maximum number of scored nights to search.
+const MAX_LOOKBACK: usize = 120;
+/// Scores are clamped to this, so that a single outlier is not a change.
+const MAX_SCORE: f64 = 4.0;
+/// Half the 95 % quantile of chi-squared with one degree of freedom: likelihood drop that bounds the interval.
+const LIKELIHOOD_DROP: f64 = 1.92;
 
-/// A change, and between which nights it lies.
+/// Estimated first night of a change, with its interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Between {
-    /// The first night that was off, most likely.
+pub struct ChangeWindow {
+    /// The most likely first night.
     pub likeliest: usize,
-    /// The earliest and the latest night that may have been the first.
+    /// The earliest and the latest plausible first night.
     pub nights: [usize; 2],
 }
 
-/// The likeliest first night of a stay on this side, over the scores of `nights` to the last one: normal scores about zero before it
-/// and about their own mean from it on. The log-likelihood gained over no change is then half the number of nights times the square
-/// of the mean (D. V. Hinkley, Biometrika 57 (1970) 1-17).
-pub(super) fn locate(nights: &[Charted], way: Way) -> Between {
-    let sign = if way == Way::Up { 1.0 } else { -1.0 };
+/// Estimates the first night of a change toward `way` that lasts until the end of `nights`. Model: scores are normal about zero
+/// before the change and about their own mean after it. The gain in log-likelihood over no change is half the number of nights after
+/// the change times the square of their mean (D. V. Hinkley, Biometrika 57 (1970) 1-17).
+pub(super) fn locate(nights: &[ChartPoint], way: Direction) -> ChangeWindow {
+    let sign = if way == Direction::Up { 1.0 } else { -1.0 };
     let mut found: Vec<(usize, f64)> = Vec::new();
     let (mut sum, mut n) = (0.0, 0.0);
-    for night in nights.iter().rev().take(BACK) {
+    for night in nights.iter().rev().take(MAX_LOOKBACK) {
         let Some(score) = night.score else { break };
-        sum += sign * score.clamp(-MOST, MOST);
+        sum += sign * score.clamp(-MAX_SCORE, MAX_SCORE);
         n += 1.0;
-        let gained = if sum > 0.0 {
+        let gain = if sum > 0.0 {
             sum * sum / (2.0 * n)
         } else {
             0.0
         };
-        found.push((night.night, gained));
+        found.push((night.night, gain));
     }
     let best = found.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1));
     let (likeliest, most) = best.unwrap_or_default();
-    let may = |f: &&(usize, f64)| f.1 >= most - SHORT;
-    let may = || found.iter().filter(may).map(|f| f.0);
-    Between {
+    let plausible = |f: &&(usize, f64)| f.1 >= most - LIKELIHOOD_DROP;
+    let plausible = || found.iter().filter(plausible).map(|f| f.0);
+    ChangeWindow {
         likeliest,
         nights: [
-            may().min().unwrap_or(likeliest),
-            may().max().unwrap_or(likeliest),
+            plausible().min().unwrap_or(likeliest),
+            plausible().max().unwrap_or(likeliest),
         ],
     }
 }

@@ -1,54 +1,54 @@
-//! The control chart of one series: every night scored against the reference stretch, and runs of nights that are off.
+//! Control chart of one series: scores every night against the reference nights and detects runs of outliers.
 
 use serde::Serialize;
 
-use super::change::{self, Between};
+use super::change::{self, ChangeWindow};
 use super::history::{Acceptance, NightHead, Point, Series};
-use super::reference::{FEWEST, MOST, Reference, Sample};
+use super::reference::{MAX_NIGHTS, MIN_NIGHTS, Reference, Sample};
 use super::run_length::Rule;
 
-/// Nights that a value waits before it may join the reference: when it began a change, that is known by then.
-const JOINS_AFTER: usize = 5;
-/// So many nights in a row that are not off end an excursion.
-const BACK: usize = 5;
+/// Nights that a value waits before it joins the reference; a change that started with it is detected by then.
+const REFERENCE_DELAY: usize = 5;
+/// Consecutive nights within the limits that end an excursion.
+const RECOVERY_NIGHTS: usize = 5;
 
-/// A series with its chart.
+/// A series with its control chart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Chart {
-    /// The series.
+    /// The charted series.
     pub series: Series,
-    /// One per usable value, oldest first.
-    pub nights: Vec<Charted>,
-    /// The reference by which the newest nights are judged; `None`: it is being learnt.
+    /// One point per usable value, oldest first.
+    pub nights: Vec<ChartPoint>,
+    /// Reference for the newest nights; `None` while there are too few nights.
     pub reference: Option<Reference>,
-    /// Times at which it was off, oldest first.
+    /// Excursions, oldest first.
     pub excursions: Vec<Excursion>,
-    /// Nights from which on it was learnt anew.
+    /// Indices of nights from which on the reference was learnt anew.
     pub accepted: Vec<usize>,
 }
 
-/// A value on its chart.
+/// A point of the chart.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Charted {
-    /// Which of the nights.
+pub struct ChartPoint {
+    /// Index of the night.
     pub night: usize,
     /// The value.
     pub value: f64,
-    /// Standard deviations of a new night from the centre; `None`: learnt from.
+    /// Distance from the centre in standard deviations of a new night; `None` for nights that only train the reference.
     pub score: Option<f64>,
 }
 
-/// Which way a series went.
+/// Direction of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Way {
+pub enum Direction {
     /// Higher.
     Up,
     /// Lower.
     Down,
 }
 
-impl Way {
+impl Direction {
     /// 1 for up, -1 for down.
     #[must_use]
     pub const fn sign(self) -> f64 {
@@ -66,38 +66,38 @@ impl Way {
     }
 }
 
-/// A time at which a series was off.
+/// A period in which a series was off its reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Excursion {
-    /// Which way.
-    pub way: Way,
-    /// The night that raised the alarm.
+    /// Direction of the change.
+    pub way: Direction,
+    /// Index of the night that raised the alarm.
     pub raised: usize,
-    /// The night after which it was back, or was accepted; `None`: it is still off.
+    /// Last night of the excursion, by return or acceptance; `None`: still open.
     pub ended: Option<usize>,
-    /// The first night that was off: the likeliest, and between which ones.
-    pub change: Between,
+    /// When the change began.
+    pub change: ChangeWindow,
     /// Centre of the reference.
     pub before: f64,
-    /// Median of the nights from the change on.
+    /// Median of the nights after the change.
     pub after: f64,
 }
 
-/// What a chart knows while it goes through the nights.
-struct Walk {
-    counts: bool,
+/// State while the nights are processed in order.
+struct ChartBuilder {
+    is_count: bool,
     rules: [Rule; 2],
     learnt: Vec<Sample>,
     waiting: Vec<Sample>,
     reference: Option<Reference>,
-    /// Scores against the present reference, oldest first.
+    /// Scores against the current reference, oldest first.
     scores: Vec<f64>,
     open: Option<usize>,
-    /// Where the nights of the present reference begin.
+    /// Index in the chart of the first night scored against the current reference.
     from: usize,
 }
 
-/// The chart of `series` over `nights` under these rules.
+/// Builds the control chart of `series` over `nights`.
 #[must_use]
 pub fn chart(
     series: &Series,
@@ -106,8 +106,8 @@ pub fn chart(
     rules: [Rule; 2],
 ) -> Chart {
     let whole = |p: &Point| p.value.is_none_or(|v| v >= 0.0 && v.fract() == 0.0);
-    let mut walk = Walk {
-        counts: series.unit.is_empty() && series.points.iter().all(whole),
+    let mut builder = ChartBuilder {
+        is_count: series.unit.is_empty() && series.points.iter().all(whole),
         rules,
         learnt: Vec::new(),
         waiting: Vec::new(),
@@ -126,18 +126,18 @@ pub fn chart(
     let mut restarts = chart.accepted.clone().into_iter().peekable();
     for point in &series.points {
         while restarts.next_if(|night| *night <= point.night).is_some() {
-            walk.restart(&mut chart);
+            builder.restart(&mut chart);
         }
         if let Some(value) = point.usable() {
-            walk.night(&mut chart, point, value);
+            builder.add_night(&mut chart, point, value);
         }
     }
-    chart.reference = walk.reference;
-    walk.finish(&mut chart);
+    chart.reference = builder.reference;
+    builder.finish(&mut chart);
     chart
 }
 
-/// The nights from which on the series is learnt anew, oldest first.
+/// Nights from which on the series is learnt anew, oldest first.
 fn restarts(series: &str, nights: &[NightHead], accepted: &[Acceptance]) -> Vec<usize> {
     let concerns = |a: &&Acceptance| a.series.as_deref().is_none_or(|s| s == series);
     let place = |a: &Acceptance| nights.iter().position(|n| n.id == a.night);
@@ -147,7 +147,7 @@ fn restarts(series: &str, nights: &[NightHead], accepted: &[Acceptance]) -> Vec<
     all
 }
 
-impl Walk {
+impl ChartBuilder {
     fn restart(&mut self, chart: &mut Chart) {
         self.close(chart);
         self.learnt.clear();
@@ -157,15 +157,15 @@ impl Walk {
         self.from = chart.nights.len();
     }
 
-    fn night(&mut self, chart: &mut Chart, point: &Point, value: f64) {
+    fn add_night(&mut self, chart: &mut Chart, point: &Point, value: f64) {
         let sample = Sample {
             value,
             half_interval: point.interval.map(|[low, high]| (high - low) / 2.0),
-            of: point.n.filter(|_| chart.series.unit == "%"),
+            trials: point.n.filter(|_| chart.series.unit == "%"),
         };
         let score = self.reference.map(|reference| reference.score(value));
         self.scores.extend(score);
-        chart.nights.push(Charted {
+        chart.nights.push(ChartPoint {
             night: point.night,
             value,
             score,
@@ -174,27 +174,28 @@ impl Walk {
         self.learn(sample);
     }
 
-    /// Raises and ends alarms.
+    /// Opens and closes excursions.
     fn judge(&mut self, chart: &mut Chart) {
         let Some(reference) = self.reference else {
             return;
         };
         let rules = self.rules;
-        let speaks = |scores: &[f64], way: Way| rules.iter().any(|r| r.speaks(scores, way.sign()));
+        let fires =
+            |scores: &[f64], way: Direction| rules.iter().any(|r| r.fires(scores, way.sign()));
         if let Some(at) = self.open {
             let way = chart.excursions[at].way;
             let limit = rules[0].limit.min(rules[1].limit);
-            let mut recent = self.scores.iter().rev().take(BACK);
+            let mut recent = self.scores.iter().rev().take(RECOVERY_NIGHTS);
             let back = recent.all(|z| way.sign() * z <= limit);
-            // Back, or gone over to the other side.
-            if !back && !speaks(&self.scores, way.other()) {
+            // Back within the limits, or beyond the opposite one.
+            if !back && !fires(&self.scores, way.other()) {
                 return;
             }
             self.close(chart);
         }
-        let Some(way) = [Way::Up, Way::Down]
+        let Some(way) = [Direction::Up, Direction::Down]
             .into_iter()
-            .find(|way| speaks(&self.scores, *way))
+            .find(|way| fires(&self.scores, *way))
         else {
             return;
         };
@@ -210,45 +211,45 @@ impl Walk {
         });
     }
 
-    /// A value joins the reference when it has waited and nothing is off.
+    /// Adds a value to the reference once it has waited long enough and no excursion is open.
     fn learn(&mut self, sample: Sample) {
-        if self.learnt.len() < FEWEST {
+        if self.learnt.len() < MIN_NIGHTS {
             self.learnt.push(sample);
-        } else if self.learnt.len() < MOST && self.open.is_none() {
+        } else if self.learnt.len() < MAX_NIGHTS && self.open.is_none() {
             self.waiting.push(sample);
-            if self.waiting.len() <= JOINS_AFTER {
+            if self.waiting.len() <= REFERENCE_DELAY {
                 return;
             }
             self.learnt.push(self.waiting.remove(0));
         } else {
             return;
         }
-        self.reference = Reference::of(&self.learnt, self.counts);
+        self.reference = Reference::of(&self.learnt, self.is_count);
     }
 
-    /// The series is back, or another reference begins.
+    /// Closes the open excursion.
     fn close(&mut self, chart: &mut Chart) {
         if let Some(at) = self.open.take() {
             let last = chart.nights.last().map(|n| n.night);
             chart.excursions[at].ended = last;
-            level(chart, at);
+            set_level_after(chart, at);
         }
     }
 
-    /// What all nights say of an excursion that is still open.
+    /// Re-estimates the open excursion from all nights.
     fn finish(&self, chart: &mut Chart) {
         if let Some(at) = self.open {
             chart.excursions[at].change =
                 change::locate(&chart.nights[self.from..], chart.excursions[at].way);
-            level(chart, at);
+            set_level_after(chart, at);
         }
     }
 }
 
-/// Fills in the level since the change.
-fn level(chart: &mut Chart, at: usize) {
+/// Computes the level after the change.
+fn set_level_after(chart: &mut Chart, at: usize) {
     let excursion = &mut chart.excursions[at];
-    let within = |n: &&Charted| {
+    let within = |n: &&ChartPoint| {
         n.night >= excursion.change.likeliest && excursion.ended.is_none_or(|end| n.night <= end)
     };
     let mut values: Vec<f64> = chart
@@ -262,9 +263,9 @@ fn level(chart: &mut Chart, at: usize) {
 }
 
 impl Chart {
-    /// The excursion that is still open.
+    /// The open excursion, if any.
     #[must_use]
-    pub fn off(&self) -> Option<&Excursion> {
+    pub fn open_excursion(&self) -> Option<&Excursion> {
         self.excursions.last().filter(|e| e.ended.is_none())
     }
 }

@@ -1,4 +1,4 @@
-//! Ratios of values of one night: what moves both alike, as the lamp, the temperature and the age of the skin do, leaves them alone.
+//! Ratios of two metrics of the same night. Influences common to both (lamp, temperature, age of the skin) cancel.
 
 use super::history::{History, Point, Series};
 use crate::verdict::Verdict;
@@ -6,70 +6,70 @@ use crate::verdict::Verdict;
 /// Unit of a ratio.
 pub(crate) const RATIO: &str = "ratio";
 
-/// A ratio that is charted.
+/// A charted ratio.
 #[derive(Debug, Clone, Copy)]
 pub struct Ratio {
-    /// Its name: `derived/subject/metric`.
+    /// Series name: `derived/subject/metric`.
     pub name: &'static str,
-    /// The series above the line.
-    pub over: &'static str,
-    /// The series below it.
-    pub under: &'static str,
-    /// What leaves it alone, and what it shows.
-    pub why: &'static str,
+    /// Series of the numerator.
+    pub numerator: &'static str,
+    /// Series of the denominator.
+    pub denominator: &'static str,
+    /// Which influences cancel, and what moves the ratio.
+    pub rationale: &'static str,
 }
 
-/// The ratios that are charted where both of their series are there.
+/// The ratios; each is charted if both of its series exist.
 pub const RATIOS: &[Ratio] = &[
     Ratio {
         name: "derived/skin/press_over_idle",
-        over: "golden/skin/press_events",
-        under: "golden/skin/idle_events",
-        why: "a weaker lamp lowers both; a skin that gives less, or a sensor that makes more of its own, moves it",
+        numerator: "golden/skin/press_events",
+        denominator: "golden/skin/idle_events",
+        rationale: "a weaker lamp lowers both; a less sensitive skin or a noisier sensor moves the ratio",
     },
     Ratio {
         name: "derived/skin/rmse_over_repeat_std",
-        over: "golden/skin/rmse",
-        under: "golden/skin/repeat_std",
-        why: "noise raises both; a skin or a frame that shifted moves the error alone",
+        numerator: "golden/skin/rmse",
+        denominator: "golden/skin/repeat_std",
+        rationale: "noise raises both; a shifted skin or frame moves the error alone",
     },
     Ratio {
         name: "derived/skin/rmse_over_reference_shift",
-        over: "golden/skin/rmse",
-        under: "golden/skin/reference_shift",
-        why: "the error of the campaign against what its own reference presses did meanwhile",
+        numerator: "golden/skin/rmse",
+        denominator: "golden/skin/reference_shift",
+        rationale: "error of the campaign relative to the shift of its own reference presses",
     },
     Ratio {
         name: "derived/cameras/noise_dark",
-        over: "noise_dark/camera1/rate",
-        under: "noise_dark/camera2/rate",
-        why: "a warm night raises both cameras; one camera that changed moves it",
+        numerator: "noise_dark/camera1/rate",
+        denominator: "noise_dark/camera2/rate",
+        rationale: "a warm night raises both cameras; a change of one camera moves the ratio",
     },
     Ratio {
         name: "derived/cameras/noise_lit",
-        over: "noise_lit/camera1/rate",
-        under: "noise_lit/camera2/rate",
-        why: "the lamp and a warm night move both cameras; one camera or its lens moves it",
+        numerator: "noise_lit/camera1/rate",
+        denominator: "noise_lit/camera2/rate",
+        rationale: "lamp and temperature move both cameras; a change of one camera or its lens moves the ratio",
     },
     Ratio {
         name: "derived/cameras/data_rate",
-        over: "idle/camera1/data_rate",
-        under: "idle/camera2/data_rate",
-        why: "the room moves both cameras; one camera moves it",
+        numerator: "idle/camera1/data_rate",
+        denominator: "idle/camera2/data_rate",
+        rationale: "the room moves both cameras; a change of one camera moves the ratio",
     },
     Ratio {
         name: "derived/cameras/jitter",
-        over: "trigger_loopback/camera1/jitter",
-        under: "trigger_loopback/camera2/jitter",
-        why: "the trigger box moves both cameras; one cable or camera moves it",
+        numerator: "trigger_loopback/camera1/jitter",
+        denominator: "trigger_loopback/camera2/jitter",
+        rationale: "the trigger box moves both cameras; a change of one cable or camera moves the ratio",
     },
 ];
 
-/// The ratios of `history`, as series of their own. A night has one when both values speak and the lower one is above zero.
+/// The ratios of `history` as series. A night has a value when both metrics are usable and the denominator is positive.
 #[must_use]
 pub fn ratios(history: &History) -> Vec<Series> {
     let find = |name| history.series.iter().find(|s| s.name == name);
-    let both = |r: &Ratio| Some((*r, find(r.over)?, find(r.under)?));
+    let both = |r: &Ratio| Some((*r, find(r.numerator)?, find(r.denominator)?));
     RATIOS
         .iter()
         .filter_map(both)

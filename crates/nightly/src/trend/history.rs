@@ -1,4 +1,4 @@
-//! What the trends are read from: nights in their order, and the values of each metric over them.
+//! Input of the trends: nights in order, and the values of each metric over them.
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::Limit;
@@ -6,23 +6,23 @@ use skinrig_model::Limit;
 use crate::night::{Night, Versions};
 use crate::verdict::Verdict;
 
-/// The nights of one suite on one bench, oldest first, and what was measured in them.
+/// Nights of one suite on one bench with their measurements.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct History {
     /// Oldest first.
     pub nights: Vec<NightHead>,
-    /// One per metric, by name.
+    /// One series per metric, sorted by name.
     pub series: Vec<Series>,
-    /// Changes that somebody knows of.
+    /// Accepted changes.
     pub accepted: Vec<Acceptance>,
 }
 
-/// A night without its measurements.
+/// Metadata of a night.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NightHead {
     /// As in [`Night::id`].
     pub id: String,
-    /// When it began, RFC 3339, UTC.
+    /// Start time, RFC 3339, UTC.
     pub started: String,
     /// Name of the suite.
     pub suite: String,
@@ -34,65 +34,65 @@ pub struct NightHead {
     pub rig_kind: String,
     /// SHA-256 of the rig file's text.
     pub rig_sha256: String,
-    /// What ran.
+    /// Versions in use.
     pub versions: Versions,
-    /// The night's.
+    /// Verdict of the night.
     pub verdict: Verdict,
-    /// Its folder.
+    /// Folder of the night.
     pub folder: String,
     /// The golden session, relative to the folder.
     pub golden: Option<String>,
 }
 
-/// One metric of one device over the nights.
+/// Values of one metric of one device over the nights.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Series {
     /// `check/subject/metric`.
     pub name: String,
     /// Unit of the values; empty for counts.
     pub unit: String,
-    /// Oldest first; nights in which it was not asked for have none.
+    /// Oldest first; without a point for nights that did not request the metric.
     pub points: Vec<Point>,
 }
 
-/// A night's value of a metric: that of the last attempt.
+/// Value of a metric in one night, from the last attempt.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Point {
-    /// Which of [`History::nights`].
+    /// Index into [`History::nights`].
     pub night: usize,
     /// `None`: not measured.
     pub value: Option<f64>,
-    /// 95 % interval, when there is one.
+    /// 95 % interval, if known.
     pub interval: Option<[f64; 2]>,
-    /// Samples behind it.
+    /// Number of samples behind the value.
     pub n: Option<u64>,
-    /// What was stated before.
+    /// Limit stated in advance.
     pub limit: Option<Limit>,
-    /// Of the measurement.
+    /// Verdict on the measurement.
     pub verdict: Verdict,
-    /// Of the device's part of the check: INVALID when the device was at fault.
+    /// Verdict on the device's part of the check: INVALID when the device was faulty.
     pub part: Verdict,
-    /// How often the check was made.
+    /// Number of attempts at the check.
     pub attempts: u32,
 }
 
-/// A change that somebody knows of and takes as it is.
+/// A known change that an operator accepted.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Acceptance {
-    /// The series; `None`: all.
+    /// The series; `None`: all series.
     pub series: Option<String>,
-    /// From this night on things are learnt anew.
+    /// ID of the night from which on the reference is learnt anew.
     pub night: String,
     /// Why.
     pub reason: String,
-    /// Who said so.
+    /// Name of the operator.
     pub by: String,
-    /// When, RFC 3339.
+    /// Time of the acceptance, RFC 3339.
     pub at: String,
 }
 
 impl NightHead {
-    /// The head of a night whose files are in `folder`.
+    /// Metadata of `night`, whose files are in `folder`.
     #[must_use]
     pub fn of(night: &Night, folder: impl Into<String>) -> Self {
         Self {
@@ -112,23 +112,23 @@ impl NightHead {
 }
 
 impl Point {
-    /// The value, when it speaks of what it is a metric of: measured, from enough samples, and with a rig that was not at fault.
-    /// A value beyond its limit does.
+    /// The value, if it describes its subject: measured, from enough samples, with a rig that was not faulty. It may be beyond its limit.
     #[must_use]
     pub fn usable(&self) -> Option<f64> {
-        let speaks = |verdict| {
+        let describes_subject = |verdict| {
             !matches!(
                 verdict,
                 Verdict::Invalid | Verdict::Inconclusive | Verdict::Skipped
             )
         };
-        self.value
-            .filter(|v| v.is_finite() && speaks(self.verdict) && speaks(self.part))
+        self.value.filter(|v| {
+            v.is_finite() && describes_subject(self.verdict) && describes_subject(self.part)
+        })
     }
 }
 
 impl History {
-    /// Puts a night at the end.
+    /// Appends a night.
     pub fn push(&mut self, night: &Night, folder: impl Into<String>) {
         let at = self.nights.len();
         self.nights.push(NightHead::of(night, folder));
@@ -154,7 +154,7 @@ impl History {
         }
     }
 
-    /// Adds a point to the series of this name, which begins with it when there is none.
+    /// Appends a point to the series with this name, creating the series if needed.
     pub fn add(&mut self, name: &str, unit: &str, point: Point) {
         let at = self.series.binary_search_by(|s| s.name.as_str().cmp(name));
         let at = at.unwrap_or_else(|at| {

@@ -1,8 +1,8 @@
-//! Trends: what moved over the nights, since when, and what probably moved it.
+//! Trends: which metrics moved over the nights, since when, and the probable cause.
 //!
-//! Never one night against the last: each series has a reference stretch ([`Reference`]), every night is scored against it, and two
-//! sums gather what stays off ([`chart()`]). [`judge`] makes the charts of a whole [`History`], sized so that all of them together
-//! raise few false alarms ([`run_length`]), and says what changed in the night in which they moved ([`cause`]).
+//! Single nights are never compared with each other: each series has a reference ([`Reference`]), every night is scored against it,
+//! and runs of outliers raise an alarm ([`chart()`]). [`judge`] charts all series of a [`History`] with limits that keep the rate of
+//! false alarms low over all of them ([`run_length`]), and attributes each alarm to what changed in that night ([`cause`]).
 
 pub mod cause;
 pub mod change;
@@ -13,9 +13,9 @@ pub mod reference;
 pub mod report;
 pub mod run_length;
 
-pub use cause::{Attribution, about};
-pub use change::Between;
-pub use chart::{Chart, Charted, Excursion, Way, chart};
+pub use cause::{Attribution, series_cause};
+pub use change::ChangeWindow;
+pub use chart::{Chart, ChartPoint, Direction, Excursion, chart};
 pub use history::{Acceptance, History, NightHead, Point, Series};
 pub use reference::Reference;
 pub use report::{Alarm, Report, judge};

@@ -1,56 +1,55 @@
-//! What a series does when all is well: centre and spread of its reference stretch, robust against odd nights.
+//! Reference of a series: robust centre and spread of its normal nights.
 
 use serde::Serialize;
 
-/// A reference of fewer nights says nothing: the series is being learnt.
-pub(crate) const FEWEST: usize = 12;
-/// A reference of so many nights takes no more: what comes later is judged by it, however slowly it creeps.
-pub const MOST: usize = 100;
+/// Minimum number of nights of a reference.
+pub(crate) const MIN_NIGHTS: usize = 12;
+/// Maximum number of nights of a reference. Later nights are only compared with it, so that a slow drift is detected.
+pub const MAX_NIGHTS: usize = 100;
 
-/// A spread below this share of the centre is no spread worth an alarm: metrics that hardly vary would call for changes that matter
-/// to nobody.
-const LEAST_SHARE: f64 = 0.005;
-/// The share of a normal variable that lies below [`TAIL_AT`] standard deviations.
+/// Smallest spread as a share of the centre: without it, metrics that hardly vary would raise irrelevant alarms.
+const MIN_RELATIVE_SPREAD: f64 = 0.005;
+/// Quantile used for the spread of the tails, and its position in standard deviations of a normal variable.
 const TAIL: f64 = 0.95;
 const TAIL_AT: f64 = 1.644_853_627;
-/// Standard deviation of a normal variable over its median absolute deviation.
+/// Standard deviation of a normal variable divided by its median absolute deviation.
 const PER_MAD: f64 = 1.482_602_218_5;
-/// The correlation from night to night that is reckoned with, at most.
-const MOST_CORRELATED: f64 = 0.7;
+/// Upper bound of the assumed correlation between consecutive nights.
+const MAX_CORRELATION: f64 = 0.7;
 
-/// A value as the reference takes it.
+/// A value for the reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
     /// The value.
     pub value: f64,
-    /// Half its 95 % interval, when there is one.
+    /// Half its 95 % interval, if known.
     pub half_interval: Option<f64>,
-    /// Samples behind it, when it is a share of them.
-    pub of: Option<u64>,
+    /// Number of trials, if the value is a share of them.
+    pub trials: Option<u64>,
 }
 
-/// What a series does when all is well.
+/// Centre and spread of a series in normal nights.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Reference {
-    /// Nights that it is made of.
+    /// Number of nights.
     pub nights: usize,
-    /// Median of them.
+    /// Median.
     pub centre: f64,
     /// Spread below the centre, as a standard deviation.
     pub below: f64,
     /// Spread above it.
     pub above: f64,
-    /// Correlation from night to night.
+    /// Correlation between consecutive nights.
     pub correlation: f64,
 }
 
 impl Reference {
-    /// The reference made of `samples`, in the order of the nights; `None` for fewer than `FEWEST`. `counts`: the values are
-    /// counts of events that come one by one.
+    /// Builds a reference from `samples` in order of the nights; `None` for fewer than `MIN_NIGHTS`. `counts`: the values are counts of
+    /// independent events.
     #[must_use]
     pub fn of(samples: &[Sample], counts: bool) -> Option<Self> {
         let nights = samples.len();
-        if nights < FEWEST {
+        if nights < MIN_NIGHTS {
             return None;
         }
         let mut sorted: Vec<f64> = samples.iter().map(|s| s.value).collect();
@@ -59,7 +58,7 @@ impl Reference {
         let mut distances: Vec<f64> = sorted.iter().map(|v| (v - centre).abs()).collect();
         distances.sort_by(f64::total_cmp);
         let middle = PER_MAD * quantile(&distances, 0.5);
-        let floor = floor(samples, centre, counts);
+        let floor = spread_floor(samples, centre, counts);
         let side = |tail: f64| middle.max(tail / TAIL_AT).max(floor);
         let below = side(centre - quantile(&sorted, 1.0 - TAIL));
         let above = side(quantile(&sorted, TAIL) - centre);
@@ -77,16 +76,16 @@ impl Reference {
         })
     }
 
-    /// How far off `value` is, in standard deviations of a new night: those of the reference, of the centre itself, and of nights
-    /// that resemble their neighbours.
+    /// Distance of `value` from the centre in standard deviations of a new night, which include the uncertainty of the centre and the
+    /// correlation between nights.
     #[must_use]
     pub fn score(&self, value: f64) -> f64 {
         let n = self.nights as f64;
-        // Three nights in a row decide: the variance of their mean, over that of nights that know nothing of each other.
+        // Three consecutive nights decide: variance of their mean relative to that of independent nights.
         let r = self.correlation;
         let alike = (3.0 + 4.0 * r + 2.0 * r * r) / 3.0;
-        // Centre and spread are estimated, and the worse the fewer nights there are. Of the variance of a new night's score, 1.6/n is
-        // the median's; the rest makes up for spreads that came out too small (simulated: `docs/reference/nightly.md`).
+        // Centre and spread are estimates, less certain with fewer nights. 1.6/n of a new score's variance comes from the median; the rest
+        // compensates for underestimated spreads (simulated: `docs/reference/nightly.md`).
         let estimated = 1.0 + 8.0 / n;
         self.raw(value) / (alike * estimated).sqrt()
     }
@@ -98,12 +97,12 @@ impl Reference {
     }
 }
 
-/// The smallest spread that is believed, from what is known besides the values.
-fn floor(samples: &[Sample], centre: f64, counts: bool) -> f64 {
+/// Lower bound of the spread from prior knowledge.
+fn spread_floor(samples: &[Sample], centre: f64, counts: bool) -> f64 {
     let n = samples.len() as f64;
-    let mut floor = LEAST_SHARE * centre.abs();
+    let mut floor = MIN_RELATIVE_SPREAD * centre.abs();
     if counts {
-        // A Poisson variable's, its mean at the upper end of what so few nights allow: when none was seen in n nights, 3/n at 95 %.
+        // Poisson: with the mean at its upper limit. Zero events in n nights allow a mean of 3/n at 95 %.
         let sum: f64 = samples.iter().map(|s| s.value).sum();
         floor = floor.max(((sum + 3.0) / n).sqrt());
     }
@@ -113,17 +112,17 @@ fn floor(samples: &[Sample], centre: f64, counts: bool) -> f64 {
         floor = floor.max(quantile(&halves, 0.5) / 1.96);
     }
     let share = centre / 100.0;
-    let of = samples.iter().filter_map(|s| s.of).max();
-    if let Some(of) = of.filter(|of| *of > 0 && (0.0..=1.0).contains(&share)) {
-        // A binomial share's, drawn away from 0 and 1 (A. Agresti and B. A. Coull, The American Statistician 52 (1998) 119-126).
-        let of = of as f64;
-        let share = (share * of + 1.0) / (of + 2.0);
-        floor = floor.max(100.0 * (share * (1.0 - share) / of).sqrt());
+    let trials = samples.iter().filter_map(|s| s.trials).max();
+    if let Some(trials) = trials.filter(|n| *n > 0 && (0.0..=1.0).contains(&share)) {
+        // Binomial, shrunk away from 0 and 1 (A. Agresti and B. A. Coull, The American Statistician 52 (1998) 119-126).
+        let trials = trials as f64;
+        let share = (share * trials + 1.0) / (trials + 2.0);
+        floor = floor.max(100.0 * (share * (1.0 - share) / trials).sqrt());
     }
     floor
 }
 
-/// Correlation of neighbours, from clipped scores: one odd night makes none. Of few nights it comes out too low by about 1/n.
+/// Lag-1 correlation of clipped scores, so that one outlier has little effect. Adds 1/n to correct the bias of short series.
 fn correlation(scores: impl Iterator<Item = f64>) -> f64 {
     let scores: Vec<f64> = scores.map(|z| z.clamp(-2.5, 2.5)).collect();
     let n = scores.len() as f64;
@@ -135,10 +134,10 @@ fn correlation(scores: impl Iterator<Item = f64>) -> f64 {
     let pairs = scores.windows(2);
     let product: f64 = pairs.map(|w| (w[0] - mean) * (w[1] - mean)).sum();
     let unbiased = product / square + 1.0 / n;
-    unbiased.clamp(0.0, MOST_CORRELATED)
+    unbiased.clamp(0.0, MAX_CORRELATION)
 }
 
-/// The quantile of sorted values, between two of them linearly.
+/// Quantile of sorted values with linear interpolation.
 pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
     let place = share * sorted.len().saturating_sub(1) as f64;
     let (low, high) = (place.floor() as usize, place.ceil() as usize);
@@ -156,14 +155,14 @@ mod tests {
         let one = |value| Sample {
             value,
             half_interval: None,
-            of: None,
+            trials: None,
         };
         values.into_iter().map(one).collect()
     }
 
     #[test]
     fn odd_nights_move_neither_centre_nor_spread_and_constants_have_a_floor() {
-        // One odd night on each side of 21: the percentiles of the tails are the second values from the ends.
+        // One outlier on each side of 21: the tail percentiles are the second values from the ends.
         let plain: Vec<f64> = (0..21)
             .map(|i| 98.0 + 0.2 * f64::from(i * 8 % 21))
             .collect();
@@ -181,7 +180,7 @@ mod tests {
         let none = Reference::of(&samples([0.0; 12]), true).unwrap();
         assert_eq!((none.above, none.score(0.0)), (0.5, 0.0));
         assert!(none.score(1.0) < 2.0 && none.score(4.0) > 6.0);
-        // Bytes that were never lost: anything is far off, and no number is divided by nothing.
+        // A metric that has always been zero: any other value is far off, and nothing divides by zero.
         assert_eq!(of(&[0.0; 12]).score(4096.0), f64::INFINITY);
     }
 

@@ -1,65 +1,65 @@
-//! All series of a bench judged together: which moved, since when, and why, probably.
+//! Trend report of a bench: which series moved, since when, and the probable cause.
 
 use serde::Serialize;
 
 use super::cause::{self, Attribution};
-use super::chart::{Chart, Excursion, Way, chart};
+use super::chart::{Chart, Direction, Excursion, chart};
 use super::derived::ratios;
 use super::history::{History, NightHead};
-use super::reference::FEWEST;
+use super::reference::MIN_NIGHTS;
 use super::run_length::{Rule, rules};
 use crate::cause::Cause;
 
-/// Nights between two false alarms of all series together, were references known, scores normal and nights strangers to each other.
-/// None of it holds: what comes out is one in more than 100 nights (`docs/reference/nightly.md`).
+/// Design value of the nights between two false alarms over all series, for known references and independent normal scores. Real
+/// series deviate from that: the measured rate is about one in more than 100 nights (`docs/reference/nightly.md`).
 pub const NIGHTS_PER_FALSE_ALARM: f64 = 1200.0;
 
-/// Metrics without a level to stay at: free space falls from night to night by design, and has its limit.
+/// Metrics without a stable level: free disk space shrinks by design and has its own limit.
 const NOT_CHARTED: &[&str] = &["free"];
 
-/// What the trends of a bench say.
+/// Trend report of a bench.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
-    /// In one sentence.
+    /// Summary in one sentence.
     pub headline: String,
-    /// What moved and is still off, the most series first.
+    /// Open alarms, those with the most series first.
     pub alarms: Vec<Alarm>,
-    /// What was off once and is back, or was accepted; the newest first.
+    /// Alarms that have ended by return or acceptance, newest first.
     pub past: Vec<Alarm>,
-    /// One per series, those of the alarms first.
+    /// One chart per series, those of open alarms first.
     pub charts: Vec<Chart>,
     /// The nights, oldest first.
     pub nights: Vec<NightHead>,
-    /// What raises an alarm.
+    /// Rules that raise alarms.
     pub rules: [Rule; 2],
 }
 
-/// Series that moved in the same night, as far as can be told.
+/// Series that moved in the same night, within the uncertainty.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Alarm {
-    /// Names it: the night that raised it.
+    /// ID: that of the night that raised the alarm.
     pub id: String,
-    /// Which of the charts.
+    /// Indices into [`Report::charts`].
     pub charts: Vec<usize>,
-    /// The night after which all were back; `None`: one is still off.
+    /// Night after which all series were back; `None` while one is still off.
     pub ended: Option<usize>,
-    /// The night that raised it first.
+    /// Index of the night that raised the alarm.
     pub raised: usize,
-    /// The first night that was off: the earliest and the latest that it may have been.
+    /// The earliest and the latest plausible first night of the change.
     pub since: [usize; 2],
-    /// Why, probably.
+    /// Probable cause.
     pub attribution: Attribution,
 }
 
 impl Report {
-    /// Whether there are too few nights to say anything of any series.
+    /// Whether no series has a reference yet.
     #[must_use]
     pub fn is_learning(&self) -> bool {
         self.charts.iter().all(|c| c.reference.is_none())
     }
 }
 
-/// Judges all series of `history`, and the ratios derived from them.
+/// Judges all series of `history` and the ratios derived from them.
 #[must_use]
 pub fn judge(history: &History) -> Report {
     let charted = |name: &str| {
@@ -78,10 +78,15 @@ pub fn judge(history: &History) -> Report {
         .iter()
         .map(|s| chart(s, &history.nights, &history.accepted, rules))
         .collect();
-    // What is off first, the farthest first; the others by name.
+    // Open excursions first, the largest first; the others by name.
     charts.sort_by(|a, b| {
-        let off = |c: &Chart| c.off().is_some();
-        let far = |c: &Chart| c.off().and_then(relative).unwrap_or(f64::INFINITY).abs();
+        let off = |c: &Chart| c.open_excursion().is_some();
+        let far = |c: &Chart| {
+            c.open_excursion()
+                .and_then(relative)
+                .unwrap_or(f64::INFINITY)
+                .abs()
+        };
         let both = off(b).cmp(&off(a));
         let farther = if off(a) && off(b) {
             far(b).total_cmp(&far(a))
@@ -102,7 +107,7 @@ pub fn judge(history: &History) -> Report {
     }
 }
 
-/// Excursions whose changes may have been in the same night, together: those that are not over, and those that are.
+/// Groups excursions whose changes may have started in the same night into alarms: open ones and past ones.
 fn alarms(charts: &[Chart], nights: &[NightHead]) -> (Vec<Alarm>, Vec<Alarm>) {
     let each = charts.iter().enumerate();
     let mut all: Vec<(usize, &Excursion)> = each
@@ -144,20 +149,20 @@ fn alarms(charts: &[Chart], nights: &[NightHead]) -> (Vec<Alarm>, Vec<Alarm>) {
     (open, past)
 }
 
-/// The change relative to the level before; `None` when that was zero.
+/// Relative change; `None` if the level before was zero.
 #[must_use]
 pub fn relative(excursion: &Excursion) -> Option<f64> {
     let ratio = (excursion.after - excursion.before) / excursion.before.abs();
     ratio.is_finite().then_some(ratio)
 }
 
-/// By how much, for people: `-15 %`, `0 -> 4`.
+/// Size of the change for display: `-15 %`, `up from 0 to 4`.
 #[must_use]
-pub fn moved_by(excursion: &Excursion, unit: &str) -> String {
+pub fn format_change(excursion: &Excursion, unit: &str) -> String {
     match relative(excursion).map(|r| r * 100.0) {
         Some(percent) if percent.abs() < 1000.0 && unit != "%" => format!("{percent:+.0} %"),
         _ => {
-            let way = if excursion.way == Way::Up {
+            let way = if excursion.way == Direction::Up {
                 "up"
             } else {
                 "down"
@@ -169,16 +174,16 @@ pub fn moved_by(excursion: &Excursion, unit: &str) -> String {
             };
             format!(
                 "{way} from {} to {}{unit}",
-                figure(excursion.before),
-                figure(excursion.after)
+                format_number(excursion.before),
+                format_number(excursion.after)
             )
         }
     }
 }
 
-/// A number with four significant figures; with an exponent from 10,000 up and below 0.001.
+/// Formats a number with four significant digits, in exponent notation from 10,000 up and below 0.001.
 #[must_use]
-pub fn figure(value: f64) -> String {
+pub fn format_number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
     }
@@ -194,21 +199,21 @@ pub fn figure(value: f64) -> String {
     }
 }
 
-/// The day of a night, for people.
+/// Date of a night.
 #[must_use]
 pub fn day(night: &NightHead) -> &str {
     night.started.get(..10).unwrap_or(&night.started)
 }
 
-/// What moved, as people call it.
+/// Display name of a probable cause.
 #[must_use]
-pub const fn name(cause: Option<Cause>) -> &'static str {
+pub const fn cause_name(cause: Option<Cause>) -> &'static str {
     match cause {
         Some(Cause::Software) => "the software",
         Some(Cause::Rig) => "the rig",
         Some(Cause::Skin) => "the skin",
         Some(Cause::Infrastructure) => "the computer",
-        None => "not told by the rules",
+        None => "undetermined",
     }
 }
 
@@ -216,15 +221,15 @@ fn headline(charts: &[Chart], alarms: &[Alarm], nights: &[NightHead]) -> String 
     let Some(alarm) = alarms.first() else {
         let learning = charts.iter().filter(|c| c.reference.is_none()).count();
         return if charts.is_empty() {
-            "no trends: no night has a value yet".to_owned()
+            "no trends: no night has a usable value yet".to_owned()
         } else if learning == charts.len() {
             format!(
-                "too few nights to say what moved: {} of the {FEWEST} that a reference needs",
+                "too few nights for trends: {} of the {MIN_NIGHTS} that a reference needs",
                 most_nights(charts)
             )
         } else if learning > 0 {
             format!(
-                "nothing moved in {} nights; {learning} of {} series are still being learnt",
+                "nothing moved in {} nights; {learning} of {} series are still learning their reference",
                 nights.len(),
                 charts.len()
             )
@@ -238,8 +243,8 @@ fn headline(charts: &[Chart], alarms: &[Alarm], nights: &[NightHead]) -> String 
     };
     let first = &charts[alarm.charts[0]];
     let by = first
-        .off()
-        .map(|e| moved_by(e, &first.series.unit))
+        .open_excursion()
+        .map(|e| format_change(e, &first.series.unit))
         .unwrap_or_default();
     let others = match alarm.charts.len() - 1 {
         0 => String::new(),
@@ -260,12 +265,12 @@ fn headline(charts: &[Chart], alarms: &[Alarm], nights: &[NightHead]) -> String 
     format!(
         "{} moved ({by}){others} {when}; probable cause: {} ({}){further}",
         first.series.name,
-        name(alarm.attribution.cause),
+        cause_name(alarm.attribution.cause),
         alarm.attribution.reason,
     )
 }
 
-/// Nights that were learnt from, of the series that has most.
+/// Number of reference nights of the series that has the most.
 fn most_nights(charts: &[Chart]) -> usize {
     let learnt = |c: &Chart| {
         let from = c.accepted.last().copied().unwrap_or(0);

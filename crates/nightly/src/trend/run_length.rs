@@ -1,26 +1,26 @@
-//! The test behind the charts: so many nights in a row on one side of a limit, and how long it runs before it raises a false alarm.
+//! Run rule of the control charts: a number of consecutive scores beyond a limit, and its mean run length to a false alarm.
 //!
-//! The run is what makes it hold: however heavy the tail of a metric, one odd night or two raise nothing. Its mean run length has a
-//! closed form: W. Feller, An Introduction to Probability Theory and Its Applications, volume 1, third edition, section XIII.7.
+//! Runs are robust: one or two outliers never raise an alarm, whatever the tails of a metric. The mean run length has a closed form:
+//! W. Feller, An Introduction to Probability Theory and Its Applications, volume 1, third edition, section XIII.7.
 
 use serde::Serialize;
 
-/// Nights in a row that make a large change: it is found in as many.
+/// Run that detects a large change.
 pub const QUICK: usize = 3;
-/// Nights in a row that make a smaller one.
+/// Run that detects a smaller change.
 pub(crate) const SLOW: usize = 9;
 
-/// So many nights in a row beyond a limit raise an alarm.
+/// Raises an alarm after a number of consecutive scores beyond a limit on the same side.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Rule {
-    /// In a row.
+    /// Length of the run.
     pub nights: usize,
-    /// Scores beyond this count, on one side.
+    /// Scores beyond this limit count.
     pub limit: f64,
 }
 
 impl Rule {
-    /// The rule that raises one false alarm in `every` nights when `series` charts with two sides each follow it, all together.
+    /// The rule with one false alarm per `every` nights when `series` two-sided charts use it together.
     #[must_use]
     pub fn of(nights: usize, series: usize, every: f64) -> Self {
         let wanted = every * 2.0 * series.max(1) as f64;
@@ -39,8 +39,7 @@ impl Rule {
         }
     }
 
-    /// Mean number of nights until it raises an alarm on one side, when scores are normal about `shift` and know nothing of each
-    /// other.
+    /// Mean number of nights until an alarm on one side, for independent normal scores about `shift`.
     #[must_use]
     pub fn mean_run_length(self, shift: f64) -> f64 {
         let beyond = 0.5 * libm::erfc((self.limit - shift) / std::f64::consts::SQRT_2);
@@ -51,9 +50,9 @@ impl Rule {
         (1.0 - all) / ((1.0 - beyond) * all)
     }
 
-    /// Whether the last of `scores` make an alarm above the centre (`sign` 1) or below it (-1).
+    /// Whether the last scores raise an alarm above the centre (`sign` 1) or below it (-1).
     #[must_use]
-    pub fn speaks(self, scores: &[f64], sign: f64) -> bool {
+    pub fn fires(self, scores: &[f64], sign: f64) -> bool {
         let last = scores
             .len()
             .checked_sub(self.nights)
@@ -62,8 +61,8 @@ impl Rule {
     }
 }
 
-/// The rules of a bench with so many series: the quick one raises one false alarm in `every` nights. The slow one has a hundredth of
-/// that, for nights resemble their neighbours, and what does so makes long runs by itself.
+/// Rules for `series` charts: the quick one with one false alarm per `every` nights, the slow one with a hundredth of that, because
+/// correlated nights produce long runs.
 #[must_use]
 pub fn rules(series: usize, every: f64) -> [Rule; 2] {
     [
@@ -78,7 +77,7 @@ mod tests {
 
     #[test]
     fn run_lengths_are_those_of_runs_of_heads() {
-        // A fair coin: three heads in a row take 14 throws in the mean, nine take 1022.
+        // Fair coin: the mean wait for three heads in a row is 14 tosses, for nine 1022.
         let coin = |nights| Rule { nights, limit: 0.0 };
         assert!((coin(3).mean_run_length(0.0) - 14.0).abs() < 1e-9);
         assert!((coin(9).mean_run_length(0.0) - 1022.0).abs() < 1e-6);
@@ -86,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rule_gives_the_run_length_it_was_asked_for_and_nothing_less_than_all_nights_speak() {
+    fn a_rule_has_the_requested_run_length_and_needs_a_complete_run() {
         for series in [1, 80] {
             for (rule, every) in rules(series, 1000.0).into_iter().zip([1e3, 1e5]) {
                 let run = rule.mean_run_length(0.0) / (2 * series) as f64;
@@ -97,8 +96,8 @@ mod tests {
             nights: 3,
             limit: 2.0,
         };
-        assert!(rule.speaks(&[0.0, 2.1, 9.0, 2.1], 1.0));
-        assert!(!rule.speaks(&[0.0, 9.0, 9.0], 1.0) && !rule.speaks(&[9.0, 9.0], 1.0));
-        assert!(rule.speaks(&[-3.0; 3], -1.0) && !rule.speaks(&[-3.0; 3], 1.0));
+        assert!(rule.fires(&[0.0, 2.1, 9.0, 2.1], 1.0));
+        assert!(!rule.fires(&[0.0, 9.0, 9.0], 1.0) && !rule.fires(&[9.0, 9.0], 1.0));
+        assert!(rule.fires(&[-3.0; 3], -1.0) && !rule.fires(&[-3.0; 3], 1.0));
     }
 }

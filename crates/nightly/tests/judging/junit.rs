@@ -1,4 +1,4 @@
-//! The JUnit document of a night: whole as XML, in the order that its readers want, with counts that add up.
+//! The JUnit document of a night: well-formed XML, elements in the order that readers require, counts that add up.
 
 use skinrig_model::Limit;
 use skinrig_nightly::junit::{Outcome, junit};
@@ -6,8 +6,8 @@ use skinrig_nightly::{Cause, Evidence, EvidenceKind, Night, Verdict};
 
 use super::support::{attempts, check, measured, night, part};
 
-/// A night with one of everything, and with text that XML must not take as its own.
-fn one_of_everything() -> Night {
+/// A night with every verdict and cause, and with text that must be escaped in XML.
+fn night_with_every_verdict() -> Night {
     let mut checks = vec![
         check("identity", Verdict::Pass, None),
         check("settings", Verdict::Marginal, None),
@@ -40,7 +40,7 @@ fn one_of_everything() -> Night {
     night(checks)
 }
 
-/// One element as it is met, or its end.
+/// Start or end of one element.
 #[derive(Debug, PartialEq)]
 enum Tag {
     Open(String, Vec<(String, String)>),
@@ -51,12 +51,12 @@ enum Tag {
 fn elements(text: &str) -> Vec<Tag> {
     let mut rest = text
         .strip_prefix("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n")
-        .expect("a declaration");
+        .expect("expected an XML declaration");
     let mut tags = Vec::new();
     let mut open: Vec<String> = Vec::new();
     while let Some(at) = rest.find('<') {
         plain(&rest[..at]);
-        let end = rest[at..].find('>').expect("an end of a tag") + at;
+        let end = rest[at..].find('>').expect("expected the end of a tag") + at;
         let tag = &rest[at + 1..end];
         rest = &rest[end + 1..];
         if let Some(name) = tag.strip_prefix('/') {
@@ -68,7 +68,9 @@ fn elements(text: &str) -> Vec<Tag> {
         let (name, mut list) = tag.split_once(' ').unwrap_or((tag, ""));
         let mut attributes = Vec::new();
         while let Some((key, after)) = list.trim_start().split_once("=\"") {
-            let (value, after) = after.split_once('"').expect("an end of an attribute");
+            let (value, after) = after
+                .split_once('"')
+                .expect("expected the end of an attribute");
             plain(value);
             attributes.push((key.to_owned(), value.to_owned()));
             list = after;
@@ -86,7 +88,7 @@ fn elements(text: &str) -> Vec<Tag> {
     tags
 }
 
-/// Text without anything that XML takes as its own, or forbids.
+/// Asserts that the text needs no escaping and has no character that XML forbids.
 fn plain(text: &str) {
     for (at, _) in text.match_indices('&') {
         let entity = text[at + 1..].split(';').next().unwrap_or_default();
@@ -97,8 +99,8 @@ fn plain(text: &str) {
 }
 
 #[test]
-fn the_document_is_whole_and_its_counts_add_up() {
-    let text = junit(&one_of_everything(), "bench-1");
+fn document_is_well_formed_and_counts_add_up() {
+    let text = junit(&night_with_every_verdict(), "bench-1");
     let tags = elements(&text);
     let named = |name: &str| -> Vec<&Vec<(String, String)>> {
         let opened = tags.iter().filter_map(|tag| match tag {
@@ -131,7 +133,7 @@ fn the_document_is_whole_and_its_counts_add_up() {
         value(named("skipped")[0], "message"),
         "not &quot;here&quot; &amp; &lt;now&gt;"
     );
-    // Dates without a zone, as the readers want them.
+    // Dates without a zone, as readers require.
     assert_eq!(
         value(named("testsuite")[0], "timestamp"),
         "2026-11-20T02:00:00"
@@ -139,7 +141,7 @@ fn the_document_is_whole_and_its_counts_add_up() {
 }
 
 #[test]
-fn infrastructure_is_an_error_and_what_is_measured_a_failure() {
+fn infrastructure_is_an_error_and_a_measured_excess_a_failure() {
     for (verdict, cause, outcome) in [
         (Verdict::Pass, None, Outcome::Passed),
         (Verdict::Marginal, None, Outcome::Passed),
@@ -163,22 +165,23 @@ fn infrastructure_is_an_error_and_what_is_measured_a_failure() {
     }
 }
 
-/// Against the schema, by a validator that is not ours; CI has it.
+/// Validates against the JUnit schema with lxml; runs in CI only.
 #[test]
-fn the_document_is_valid_by_the_schema() {
+fn document_is_valid_against_the_schema() {
     let Some(python) = std::env::var_os("SKINRIG_PYTHON") else {
-        eprintln!("skipped: no SKINRIG_PYTHON with lxml; the structure is checked all the same");
+        eprintln!("skipped: set SKINRIG_PYTHON to a Python with lxml");
         return;
     };
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/judging");
     let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("junit.xml");
-    std::fs::write(&file, junit(&one_of_everything(), "bench-1")).expect("a temporary file");
+    std::fs::write(&file, junit(&night_with_every_verdict(), "bench-1"))
+        .expect("write a temporary file");
     let done = std::process::Command::new(python)
         .arg(folder.join("validate.py"))
         .arg(folder.join("junit.xsd"))
         .arg(&file)
         .output()
-        .expect("a Python that starts");
+        .expect("start Python");
     let said = String::from_utf8_lossy(&done.stderr);
     assert!(done.status.success(), "{said}");
 }

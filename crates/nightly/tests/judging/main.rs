@@ -1,12 +1,15 @@
-//! Rules over evidence, attempts and repeats: what each kind of evidence means, and laws that hold for all of it.
+//! Rules over evidence, attempts and repeats: verdict and cause of each kind of evidence, and properties that always hold.
 
 mod junit;
 mod support;
 
 use proptest::prelude::*;
 use skinrig_model::Limit;
-use skinrig_nightly::judge::{RepeatRule, attempt};
-use skinrig_nightly::rules::{ACROSS, Case, GOLDEN_ON_A_BAD_RIG, RULES, WITNESSES, across, rule};
+use skinrig_nightly::judge::{RepeatRule, judge_attempt};
+use skinrig_nightly::rules::{
+    CROSS_CHECK_RULES, Case, GOLDEN_ON_A_BAD_RIG, RULES, WITNESSES, apply_cross_check_rules,
+    apply_rules,
+};
 use skinrig_nightly::{Cause, Evidence, EvidenceKind, NightExit, Verdict};
 
 use support::{attempts, check, measured, part};
@@ -18,13 +21,13 @@ const CAUSES: [Cause; 4] = [
     Cause::Software,
 ];
 
-fn seen(kind: EvidenceKind, subject: &str) -> Evidence {
+fn evidence(kind: EvidenceKind, subject: &str) -> Evidence {
     Evidence::new(kind, subject, "something")
 }
 
-/// What a limit that was broken on a check about the skin becomes with one piece of evidence.
+/// Verdict and cause of an exceeded limit of a skin check, with one piece of evidence.
 #[test]
-fn every_kind_of_evidence_has_its_meaning() {
+fn each_evidence_kind_gives_its_verdict_and_cause() {
     use EvidenceKind::*;
     use Verdict::{Fail, Inconclusive, Invalid};
     let infrastructure = Cause::Infrastructure;
@@ -51,24 +54,24 @@ fn every_kind_of_evidence_has_its_meaning() {
     ];
     assert_eq!(rows.map(|r| r.0), EvidenceKind::ALL);
     for (kind, verdict, cause) in rows {
-        let evidence = seen(kind, "skin");
+        let evidence = evidence(kind, "skin");
         let unmeasured = Case {
             verdict: Fail,
-            broken: false,
-            about: Cause::Skin,
+            exceeds_limit: false,
+            default_cause: Cause::Skin,
             evidence: &[&evidence],
         };
-        let ruling = rule(&unmeasured);
+        let ruling = apply_rules(&unmeasured);
         assert_eq!(
             (ruling.verdict, ruling.cause),
             (verdict, Some(cause)),
             "{kind:?}"
         );
         let named = RULES.iter().find(|r| Some(r.name) == ruling.rule);
-        assert!(named.is_some_and(|r| r.seen.contains(&kind)), "{kind:?}");
-        // What explains why too little was measured does not excuse what was measured beyond its limit.
+        assert!(named.is_some_and(|r| r.kinds.contains(&kind)), "{kind:?}");
+        // Evidence that explains missing samples does not excuse a value beyond its limit.
         let broken = Case {
-            broken: true,
+            exceeds_limit: true,
             ..unmeasured
         };
         let expected = if verdict == Inconclusive {
@@ -76,7 +79,7 @@ fn every_kind_of_evidence_has_its_meaning() {
         } else {
             (verdict, Some(cause), ruling.rule)
         };
-        let ruling = rule(&broken);
+        let ruling = apply_rules(&broken);
         assert_eq!(
             (ruling.verdict, ruling.cause, ruling.rule),
             expected,
@@ -86,7 +89,7 @@ fn every_kind_of_evidence_has_its_meaning() {
 }
 
 #[test]
-fn what_is_seen_of_one_camera_excuses_neither_the_other_nor_itself_twice() {
+fn evidence_on_one_camera_does_not_excuse_the_other() {
     let limit = Limit::at_most(1.0);
     let parts = || {
         vec![
@@ -94,25 +97,25 @@ fn what_is_seen_of_one_camera_excuses_neither_the_other_nor_itself_twice() {
             part("camera2", vec![measured("jitter", Some(9.0), limit)]),
         ]
     };
-    // Camera 1 is not there; camera 2 is, and jitters.
-    let absent = vec![seen(EvidenceKind::Absent, "camera1")];
-    let judged = attempt((0.0, 1.0), parts(), absent, Cause::Rig);
+    // Camera 1 is absent; camera 2 is present and jitters.
+    let absent = vec![evidence(EvidenceKind::Absent, "camera1")];
+    let judged = judge_attempt((0.0, 1.0), parts(), absent, Cause::Rig);
     assert_eq!(
         (judged.verdict, judged.cause),
         (Verdict::Fail, Some(Cause::Rig))
     );
     assert_eq!(judged.rule, None);
-    // What has no part of its own concerns all.
-    let no_box = vec![seen(EvidenceKind::Absent, "trigger box")];
-    let judged = attempt((0.0, 1.0), parts(), no_box, Cause::Rig);
+    // Evidence on a device without a part of its own applies to all parts.
+    let no_box = vec![evidence(EvidenceKind::Absent, "trigger box")];
+    let judged = judge_attempt((0.0, 1.0), parts(), no_box, Cause::Rig);
     assert_eq!(judged.cause, Some(Cause::Infrastructure));
-    // What was only not measured may have needed the other.
+    // A value that was not measured may have needed the other camera.
     let both = vec![
         part("camera1", vec![measured("offset", None, limit)]),
         part("camera2", vec![measured("drift", None, limit)]),
     ];
-    let absent = vec![seen(EvidenceKind::Absent, "camera2")];
-    let judged = attempt((0.0, 1.0), both, absent, Cause::Rig);
+    let absent = vec![evidence(EvidenceKind::Absent, "camera2")];
+    let judged = judge_attempt((0.0, 1.0), both, absent, Cause::Rig);
     assert_eq!(
         (judged.verdict, judged.cause),
         (Verdict::Fail, Some(Cause::Infrastructure))
@@ -120,9 +123,9 @@ fn what_is_seen_of_one_camera_excuses_neither_the_other_nor_itself_twice() {
 }
 
 #[test]
-fn only_the_rigs_witnesses_speak_against_the_golden_skin() {
+fn only_rig_witnesses_invalidate_the_golden_skin() {
     let golden = || check("golden", Verdict::Fail, Some(Cause::Skin));
-    for (name, cause, turns) in [
+    for (name, cause, expect_change) in [
         ("robot_state", Cause::Rig, true),
         ("noise_lit", Cause::Rig, true),
         ("robot_state", Cause::Infrastructure, false),
@@ -130,16 +133,20 @@ fn only_the_rigs_witnesses_speak_against_the_golden_skin() {
         ("disk", Cause::Infrastructure, false),
     ] {
         let mut checks = [check(name, Verdict::Invalid, Some(cause)), golden()];
-        across(&mut checks);
-        let turned = checks[1].rule.as_deref() == Some(GOLDEN_ON_A_BAD_RIG.name);
-        assert_eq!(turned, turns, "{name} {cause:?}");
-        assert_eq!(checks[1].verdict == Verdict::Invalid, turns, "{name}");
-        // Twice is as once.
+        apply_cross_check_rules(&mut checks);
+        let changed = checks[1].rule.as_deref() == Some(GOLDEN_ON_A_BAD_RIG.name);
+        assert_eq!(changed, expect_change, "{name} {cause:?}");
+        assert_eq!(
+            checks[1].verdict == Verdict::Invalid,
+            expect_change,
+            "{name}"
+        );
+        // Applying the rules twice changes nothing.
         let once = checks.clone();
-        across(&mut checks);
+        apply_cross_check_rules(&mut checks);
         assert_eq!(checks, once);
     }
-    // A good golden skin stays good, a marginal witness is none, and what explains the golden skin itself holds.
+    // Unchanged: a good golden skin, a marginal witness, a golden skin with its own explanation.
     let untouched = [
         [
             check("idle", Verdict::Invalid, Some(Cause::Rig)),
@@ -153,7 +160,7 @@ fn only_the_rigs_witnesses_speak_against_the_golden_skin() {
     ];
     for before in untouched {
         let mut checks = before.clone();
-        across(&mut checks);
+        apply_cross_check_rules(&mut checks);
         assert_eq!(checks, before);
     }
     assert!(!WITNESSES.contains(&"golden"));
@@ -161,8 +168,8 @@ fn only_the_rigs_witnesses_speak_against_the_golden_skin() {
 
 /// Friction shifts the force at which a touch is detected: a good depth check beside it is not evidence of a good frame.
 #[test]
-fn touches_of_an_arm_that_moves_badly_are_inconclusive() {
-    for (name, verdict, cause, turns) in [
+fn touches_with_a_faulty_arm_are_inconclusive() {
+    for (name, verdict, cause, expect_change) in [
         ("step_response", Verdict::Fail, Cause::Rig, true),
         ("repeatability", Verdict::Invalid, Cause::Rig, true),
         ("step_response", Verdict::Fail, Cause::Infrastructure, false),
@@ -171,33 +178,33 @@ fn touches_of_an_arm_that_moves_badly_are_inconclusive() {
     ] {
         let arm = check(name, verdict, Some(cause));
         let mut checks = [arm, check("depth", Verdict::Pass, None)];
-        across(&mut checks);
-        let expected = if turns {
+        apply_cross_check_rules(&mut checks);
+        let expected = if expect_change {
             (Verdict::Inconclusive, Some(Cause::Rig))
         } else {
             (Verdict::Pass, None)
         };
         assert_eq!((checks[1].verdict, checks[1].cause), expected, "{name}");
-        assert_eq!(checks[1].witnesses.is_empty(), !turns);
+        assert_eq!(checks[1].witnesses.is_empty(), !expect_change);
     }
-    // A broken limit stays broken, and force_ceiling asks about the motors alone.
+    // An exceeded limit stays a failure, and force_ceiling depends on the motors only.
     let arm = || check("step_response", Verdict::Fail, Some(Cause::Rig));
     for other in [
         check("depth", Verdict::Fail, Some(Cause::Rig)),
         check("force_ceiling", Verdict::Pass, None),
     ] {
         let mut checks = [arm(), other.clone()];
-        across(&mut checks);
+        apply_cross_check_rules(&mut checks);
         assert_eq!(checks[1], other);
     }
 }
 
-/// The tables of the rules are in the documentation, word for word.
+/// docs/reference/nightly.md has the rule tables, word for word.
 #[test]
-fn the_documentation_has_the_rules() {
+fn documentation_lists_the_rules() {
     let docs = include_str!("../../../../docs/reference/nightly.md");
-    for r in RULES.iter().chain(ACROSS) {
-        let kinds: Vec<&str> = r.seen.iter().map(|k| k.name()).collect();
+    for r in RULES.iter().chain(CROSS_CHECK_RULES) {
+        let kinds: Vec<&str> = r.kinds.iter().map(|k| k.name()).collect();
         let seen = if kinds.is_empty() {
             "other checks".to_owned()
         } else {
@@ -224,31 +231,31 @@ fn any_verdict() -> impl Strategy<Value = Verdict> {
 fn any_evidence() -> impl Strategy<Value = Evidence> {
     let kind = prop::sample::select(EvidenceKind::ALL.to_vec());
     let subject = prop::sample::select(vec!["camera1", "camera2", "robot", "computer"]);
-    (kind, subject).prop_map(|(kind, subject)| seen(kind, subject))
+    (kind, subject).prop_map(|(kind, subject)| evidence(kind, subject))
 }
 
 proptest! {
-    /// Evidence explains; it makes nothing good that is bad, nothing bad that is good, and nothing that is measured beyond its
-    /// limit less than a failure.
+    /// Evidence never makes a bad verdict good or a good one bad, and a value beyond its limit stays
+    /// a failure.
     #[test]
     fn evidence_never_turns_a_verdict(
         verdict in any_verdict(),
-        broken in any::<bool>(),
-        about in prop::sample::select(CAUSES.to_vec()),
+        exceeds_limit in any::<bool>(),
+        default_cause in prop::sample::select(CAUSES.to_vec()),
         evidence in prop::collection::vec(any_evidence(), 0..6),
     ) {
         let near: Vec<&Evidence> = evidence.iter().collect();
-        let ruling = rule(&Case { verdict, broken, about, evidence: &near });
+        let ruling = apply_rules(&Case { verdict, exceeds_limit, default_cause, evidence: &near });
         prop_assert_eq!(ruling.verdict.is_good(), verdict.is_good());
         prop_assert_eq!(ruling.cause.is_some(), !verdict.is_good());
-        if verdict == Verdict::Fail && broken {
+        if verdict == Verdict::Fail && exceeds_limit {
             prop_assert!(ruling.verdict >= Verdict::Fail);
         }
     }
 
     /// More evidence on an attempt never makes it good, and an attempt is good only when all its parts are.
     #[test]
-    fn an_attempt_is_good_only_when_everything_is(
+    fn an_attempt_is_good_only_when_all_its_parts_are(
         values in prop::collection::vec(prop::option::of(0.0..2.0f64), 1..5),
         evidence in prop::collection::vec(any_evidence(), 0..5),
         more in any_evidence(),
@@ -260,13 +267,13 @@ proptest! {
             .map(|(name, v)| part(name, vec![measured("jitter", *v, Limit::at_most(1.0))]))
             .collect();
         let good = parts.iter().all(|p| p.verdict.is_good());
-        let judged = attempt((0.0, 0.0), parts.clone(), evidence.clone(), Cause::Rig);
+        let judged = judge_attempt((0.0, 0.0), parts.clone(), evidence.clone(), Cause::Rig);
         prop_assert_eq!(judged.verdict.is_good(), good);
-        let with = attempt((0.0, 0.0), parts, [evidence, vec![more]].concat(), Cause::Rig);
+        let with = judge_attempt((0.0, 0.0), parts, [evidence, vec![more]].concat(), Cause::Rig);
         prop_assert_eq!(with.verdict.is_good(), good);
     }
 
-    /// After a failure nothing is PASS any more; MARGINAL only after enough in a row; all attempts that were made are needed.
+    /// A check that failed once never becomes PASS, and MARGINAL only after enough passes in a row; no attempt is superfluous.
     #[test]
     fn repeats_never_hide_a_failure(
         verdicts in prop::collection::vec(any_verdict(), 1..6),
@@ -275,29 +282,29 @@ proptest! {
     ) {
         let rule = RepeatRule { at_most, must_pass };
         let mut made = 1;
-        while made < verdicts.len() && rule.goes_on(&attempts(&verdicts[..made])) {
+        while made < verdicts.len() && rule.should_repeat(&attempts(&verdicts[..made])) {
             made += 1;
         }
         prop_assert!(made <= 1 + at_most as usize);
         let verdicts = &verdicts[..made];
-        let together = rule.together(&attempts(verdicts));
+        let together = rule.combine(&attempts(verdicts));
         let failed = verdicts.iter().any(|v| !v.is_good());
         if failed {
             let row = verdicts.iter().rev().take_while(|v| v.is_good()).count();
-            let turned = row >= must_pass as usize;
-            prop_assert_eq!(together.verdict == Verdict::Marginal, turned);
-            prop_assert!(turned || !together.verdict.is_good());
-            prop_assert_eq!(together.words.is_some(), made > 1);
+            let changed = row >= must_pass as usize;
+            prop_assert_eq!(together.verdict == Verdict::Marginal, changed);
+            prop_assert!(changed || !together.verdict.is_good());
+            prop_assert_eq!(together.explanation.is_some(), made > 1);
         } else {
             prop_assert_eq!(made, 1);
             prop_assert_eq!(together.verdict, verdicts[0]);
-            prop_assert_eq!(together.words, None);
+            prop_assert_eq!(together.explanation, None);
         }
     }
 
-    /// A night's code is 0 only when every check that was made is good, and 3 only when nothing but the computer is named.
+    /// The exit code is 0 only when every check that ran is good, and 3 only when all causes are infrastructure.
     #[test]
-    fn the_code_follows_from_the_checks(
+    fn exit_code_follows_from_the_checks(
         checks in prop::collection::vec((any_verdict(), prop::sample::select(CAUSES.to_vec())), 0..8),
     ) {
         let exit = NightExit::of(checks.iter().map(|(v, c)| (*v, Some(*c))));

@@ -1,4 +1,4 @@
-//! Nights, parts and attempts as tests write them.
+//! Builders of nights, parts and attempts for tests.
 
 use skinrig_model::Limit;
 use skinrig_nightly::{
@@ -14,7 +14,7 @@ pub fn measured(metric: &str, value: Option<f64>, limit: Limit) -> Measurement {
         n: None,
         needs: 0,
         limit: Some(limit),
-        verdict: Verdict::on(value, None, 0, Some(&limit)),
+        verdict: Verdict::of_measurement(value, None, 0, Some(&limit)),
         note: None,
     }
 }
@@ -83,6 +83,6 @@ pub fn night(checks: Vec<CheckResult>) -> Night {
         verdict: Verdict::Fail,
         exit: NightExit::Fail,
     };
-    night.conclude();
+    night.update_verdict();
     night
 }

@@ -1,10 +1,10 @@
-//! What the trends promise, on simulated benches: few false alarms of all series together, a loss found within three nights, and who
-//! did it.
+//! Trends on simulated benches: rate of false alarms over all series, losses found within three nights, and the
+//! attribution of a change.
 //!
 //!     cargo test --release -p skinrig-nightly --test trend -- --ignored --nocapture
 //!
 //! prints the tables of `docs/reference/nightly.md`.
-#![expect(clippy::unwrap_used, reason = "a test that fails must say so")]
+#![expect(clippy::unwrap_used, reason = "a failing test may panic")]
 
 mod nights;
 
@@ -17,7 +17,7 @@ use skinrig_nightly::trend::{Acceptance, Chart, History, Report, judge};
 const EVENTS: &str = "golden/skin/press_events";
 const LOCATED: &str = "golden/skin/located";
 
-/// The alarms that 500 nights of a bench that is well raise.
+/// Number of alarms in 500 nights of an unchanged bench.
 fn false_alarms(seed: u64) -> usize {
     let report = judge(&Bench::new(seed).history(500));
     report.alarms.len() + report.past.len()
@@ -28,7 +28,7 @@ fn chart<'a>(report: &'a Report, series: &str) -> &'a Chart {
     report.charts.iter().find(named).unwrap()
 }
 
-/// How many nights with a value were made from the loss on until the chart of `series` raised an alarm; `None` after twenty.
+/// Number of nights with a value from the loss until the chart of `series` raised an alarm; `None` after twenty.
 fn delay(seed: u64, series: &'static str, spread: f64, from: usize, factor: f64) -> Option<usize> {
     let mut bench = Bench::new(seed).spread(series, spread);
     bench.planted.push(Planted {
@@ -46,20 +46,20 @@ fn delay(seed: u64, series: &'static str, spread: f64, from: usize, factor: f64)
     Some(made.filter(|n| (first..=raised).contains(&n.night)).count())
 }
 
-/// Which night of the history is the first one of the calendar's `day` or later.
+/// Index of the first night of the history on or after the calendar's `day`.
 fn first_from(history: &History, day: usize) -> usize {
     let id = nights::head(day).id;
     history.nights.iter().position(|n| n.id >= id).unwrap()
 }
 
-/// Share of benches, %, on which the loss was found within so many nights.
+/// Share of benches, %, on which the loss was found within `within` nights.
 fn found(seeds: u64, within: usize, one: impl Fn(u64) -> Option<usize>) -> f64 {
     let hits = (0..seeds).filter(|seed| one(*seed).is_some_and(|d| d <= within));
     100.0 * hits.count() as f64 / seeds as f64
 }
 
 #[test]
-fn benches_that_are_well_raise_at_most_one_alarm_in_100_nights() {
+fn unchanged_benches_raise_at_most_one_alarm_in_100_nights() {
     let counts: Vec<usize> = (0..6).map(false_alarms).collect();
     assert!(
         counts.iter().all(|c| *c <= 5),
@@ -76,7 +76,7 @@ fn a_loss_of_15_percent_is_found_within_three_nights() {
     assert!(located > 90.0, "{located} %");
 }
 
-/// 80 nights without gaps; from night 60 on these series are a quarter lower.
+/// 80 nights without gaps; from night 60 on these series are 25 % lower.
 fn quarter_off(planted: &[&'static str]) -> History {
     let mut bench = Bench::new(3);
     bench.gaps = [0, 0];
@@ -91,7 +91,7 @@ fn quarter_off(planted: &[&'static str]) -> History {
 }
 
 #[test]
-fn the_change_is_found_in_the_calendar_and_told_by_what_else_changed() {
+fn change_is_dated_and_attributed_by_simultaneous_changes() {
     let skin = quarter_off(&[EVENTS, LOCATED]);
     let report = judge(&skin);
     assert_eq!(report.alarms.len(), 1, "{}", report.headline);
@@ -113,7 +113,7 @@ fn the_change_is_found_in_the_calendar_and_told_by_what_else_changed() {
     assert_eq!(report.alarms[0].attribution.cause, Some(Cause::Software));
     let changed = &report.alarms[0].attribution.changed;
     assert_eq!(changed, &["software 0.1.0 (aaaaaaa) -> 0.1.0 (bbbbbbb)"]);
-    // A version that changed at another time has nothing to do with it.
+    // A version that changed at another time is not named.
     let mut earlier = skin;
     for night in &mut earlier.nights[40..] {
         night.versions.software = "0.1.0 (bbbbbbb)".to_owned();
@@ -126,7 +126,7 @@ fn the_change_is_found_in_the_calendar_and_told_by_what_else_changed() {
 }
 
 #[test]
-fn what_was_accepted_is_learnt_anew() {
+fn an_accepted_change_starts_a_new_reference() {
     let mut history = quarter_off(&[EVENTS]);
     history.accepted.push(Acceptance {
         series: None,
@@ -153,7 +153,7 @@ fn what_was_accepted_is_learnt_anew() {
 }
 
 #[test]
-fn few_nights_are_learnt_from_and_invalid_ones_are_not() {
+fn reference_needs_enough_nights_and_skips_invalid_ones() {
     let mut bench = Bench::new(1);
     bench.gaps = [0, 0];
     bench.planted.push(Planted {
@@ -164,7 +164,7 @@ fn few_nights_are_learnt_from_and_invalid_ones_are_not() {
     let report = judge(&bench.history(11));
     assert!(report.alarms.is_empty());
     assert!(
-        report.headline.contains("what moved: 11 of the 12"),
+        report.headline.contains("trends: 11 of the 12"),
         "{}",
         report.headline
     );
@@ -179,7 +179,7 @@ fn few_nights_are_learnt_from_and_invalid_ones_are_not() {
 
 #[test]
 #[ignore = "the tables of docs/reference/nightly.md take minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig-nightly --test trend -- --ignored --nocapture"]
-fn the_trade() {
+fn false_alarm_and_delay_table() {
     let counts: Vec<usize> = (0..200).map(false_alarms).collect();
     let total: usize = counts.iter().sum();
     let most = counts.iter().filter(|c| **c > 5).count();

@@ -1,24 +1,24 @@
-//! Nights of a bench that is well, and of one that is not: numbers as a suite gives them, from a seed.
+//! Simulated nights of a bench, unchanged or with planted changes: values like those of a suite, from a seed.
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use skinrig_nightly::trend::{History, NightHead, Point};
 use skinrig_nightly::{Verdict, Versions};
 
-/// How a metric of a bench that is well spreads from night to night.
+/// Distribution of a metric of an unchanged bench.
 #[derive(Debug, Clone, Copy)]
 pub enum Kind {
     /// Always this value.
     Always(f64),
-    /// Counts of events that come one by one, with this mean.
+    /// Poisson counts with this mean.
     Count(f64),
-    /// Normal: mean, spread over the mean, correlation from night to night, how much of the spread is the temperature's.
+    /// Normal: mean, spread over the mean, correlation from night to night, share of the spread due to temperature.
     Normal(f64, f64, f64, f64),
     /// Student's t with three degrees of freedom: mean, scale over the mean, correlation from night to night.
     Heavy(f64, f64, f64),
-    /// The logarithm is normal: median, its spread.
+    /// Log-normal: median, spread of the logarithm.
     Skewed(f64, f64),
-    /// Percent of so many.
+    /// Percent: mean, number of trials.
     Share(f64, u32),
 }
 
@@ -170,25 +170,25 @@ const OTHERS: &[(&str, &str, &str, &str, Kind)] = &[
     ("stop_drill", "robot", "distance", "mm", Skewed(1.2, 0.1)),
 ];
 
-/// Something that happens to a bench.
+/// A planted change of a bench.
 #[derive(Debug, Clone)]
 pub struct Planted {
-    /// Series that begin so.
+    /// Prefix of the names of the affected series.
     pub series: &'static str,
-    /// From this night on.
+    /// First affected night.
     pub from: usize,
-    /// Their values times this.
+    /// Factor on their values.
     pub factor: f64,
 }
 
-/// A bench whose nights are drawn one after the other.
+/// A bench whose nights are drawn in order.
 pub struct Bench {
     random: Xoshiro256PlusPlus,
     metrics: Vec<Metric>,
     temperature: f64,
-    /// What happens to it.
+    /// Planted changes.
     pub planted: Vec<Planted>,
-    /// One night in so many is not made; one in so many is INVALID, with odd values. 0: never.
+    /// One night in `gaps[0]` is missing; one in `gaps[1]` is INVALID, with wrong values. 0: never.
     pub gaps: [u64; 2],
 }
 
@@ -199,7 +199,7 @@ struct Metric {
     memory: f64,
 }
 
-/// A value of a night.
+/// A drawn value of a night.
 pub struct Drawn<'a> {
     pub name: &'a str,
     pub unit: &'static str,
@@ -209,7 +209,7 @@ pub struct Drawn<'a> {
 }
 
 impl Bench {
-    /// A bench that is well.
+    /// An unchanged bench.
     pub fn new(seed: u64) -> Self {
         let mut metrics = Vec::new();
         for camera in ["camera1", "camera2"] {
@@ -235,7 +235,7 @@ impl Bench {
         }
     }
 
-    /// With another spread of one metric, over its mean.
+    /// Sets the spread of one metric, relative to its mean.
     pub fn spread(mut self, series: &str, spread: f64) -> Self {
         for metric in self.metrics.iter_mut().filter(|m| m.name == series) {
             if let Normal(mean, _, r, t) = metric.kind {
@@ -245,7 +245,7 @@ impl Bench {
         self
     }
 
-    /// The values of night number `at`; `None`: it was not made.
+    /// The values of night number `at`; `None`: the night is missing.
     pub fn night(&mut self, at: usize) -> Option<Vec<Drawn<'_>>> {
         let Self {
             random,
@@ -263,7 +263,7 @@ impl Bench {
             for p in planted.iter().filter(hit) {
                 value *= p.factor;
             }
-            // The lamps were off: what was measured says nothing.
+            // The lamps were off: the values are meaningless.
             let odd = invalid && metric.name.starts_with("golden");
             Drawn {
                 name: &metric.name,
@@ -280,7 +280,7 @@ impl Bench {
         (!missing).then_some(drawn)
     }
 
-    /// `nights` nights.
+    /// History of `nights` nights.
     pub fn history(mut self, nights: usize) -> History {
         let mut history = History::default();
         for at in 0..nights {
@@ -307,7 +307,7 @@ impl Bench {
     }
 }
 
-/// The head of night number `at`: its place in the calendar is in its name.
+/// Head of night number `at`; the number is in its name.
 pub fn head(at: usize) -> NightHead {
     NightHead {
         id: format!("night-{at:04}"),
@@ -329,7 +329,7 @@ pub fn head(at: usize) -> NightHead {
     }
 }
 
-/// Two in the morning, so many days after the first of January 2025.
+/// 02:00 UTC, `at` days after 2025-01-01.
 pub fn date(at: usize) -> String {
     const DAYS: [usize; 12] = [31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
     let (year, mut day) = (2025 + at / 365, at % 365);
@@ -366,7 +366,7 @@ impl Metric {
         }
     }
 
-    /// An autoregressive series of order one with the variance of its steps' draws.
+    /// An autoregressive series of order one with the variance of the drawn steps.
     fn remember(&mut self, r: f64, step: f64) -> f64 {
         self.memory = r * self.memory + (1.0 - r * r).sqrt() * step;
         self.memory

@@ -1,4 +1,4 @@
-//! Keys of cameras: what is written to them, and where they stand.
+//! Keys of cameras: settings and geometry.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ pub(crate) struct Cameras {
 }
 
 impl Cameras {
-    /// What is asked of camera 1 and camera 2.
+    /// Requested settings of camera 1 and camera 2.
     pub(crate) fn requests(self) -> [CameraRequest; 2] {
         [self.camera1, self.camera2].map(|keys| {
             let keys = keys.unwrap_or_default();
@@ -29,7 +29,7 @@ impl Cameras {
     }
 }
 
-/// Settings of one camera; everything absent keeps the device's default.
+/// Settings of one camera; missing ones keep the device's default.
 #[derive(Settings)]
 #[settings(name = "camera")]
 pub(crate) struct CameraKeys {

@@ -7,9 +7,9 @@ use skinrig_settings::{Collector, Field, Numbers, Settings};
 #[derive(Settings)]
 #[settings(parts = EvaluationParts)]
 pub(crate) struct Evaluation {
-    /// Repetitions whose truth may be used to fit the camera geometry. The first repetition is 1.
+    /// Repetitions whose ground truth may be used to fit the camera geometry. The first repetition is 1.
     calibrate: Numbers,
-    /// Repetitions whose truth is used only to score. The first repetition is 1; `2-10` is a span.
+    /// Repetitions whose ground truth is used only for scoring. The first repetition is 1; `2-10` is a span.
     score: Numbers,
 }
 

@@ -6,7 +6,7 @@ use skinrig_settings::{Collector, Field, Setting, Settings};
 use super::ranges::{DEPTH_MM, LENGTH_MM, POSITIVE_LENGTH_MM, POSITIVE_SPAN_S, SPAN_S};
 use crate::area::{Area, KeepOut, Surroundings};
 
-/// The skin's outline and what must not be touched.
+/// The skin's outline and keep-outs.
 #[derive(Settings)]
 pub(crate) struct Frame {
     /// The skin's outline.
@@ -53,7 +53,7 @@ pub(crate) struct KeepOutKeys {
     /// Height of the obstacle above the surface; travel at or above it may pass over. Without it nothing passes over.
     #[setting(range = LENGTH_MM)]
     height_mm: Option<f64>,
-    /// What stands there, for messages and pictures.
+    /// Name of the obstacle, for messages and pictures.
     name: Option<String>,
 }
 

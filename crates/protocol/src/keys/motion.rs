@@ -72,7 +72,7 @@ impl Setting for Pace {
     }
 }
 
-/// What must never happen.
+/// Safety limits.
 #[derive(Settings)]
 #[settings(name = "limits", parts = LimitParts)]
 pub(crate) struct LimitKeys {
@@ -87,13 +87,13 @@ pub(crate) struct LimitKeys {
     /// A measured force above this ends the run. At most 12 N, what the Omega.3 can exert.
     #[setting(above = 0.0, max = 12.0)]
     pub max_force_n: f64,
-    /// Largest acceleration of the robot's set point; what the robot is set up for when absent.
+    /// Largest acceleration of the robot's set point; absent: that of the robot's setup.
     #[setting(above = 0.0, max = 10_000.0)]
     pub max_acceleration_mm_s2: Option<f64>,
     /// This many invalid presses in a row end the run: something is wrong that more presses do not mend. 0: no limit.
     #[setting(default = "5", max = 100_000)]
     pub max_consecutive_invalid: u32,
-    /// What the robot does when a measured limit is broken.
+    /// Reaction of the robot to an exceeded limit.
     #[setting(default = "retract")]
     pub on_trip: OnTrip,
 }

@@ -17,7 +17,7 @@ use crate::surface::Surface;
 use crate::surface_check::SurfaceCheck;
 use crate::suspend::Suspend;
 
-/// A skinrig protocol: where, how deep and how often the skin is pressed, and what the presses are for.
+/// A skinrig protocol: where, how deep and how often to press the skin, and the role of each press.
 #[derive(Settings)]
 #[settings(name = "protocol", parts = ProtocolParts, exactly_one("depth", "depths"))]
 pub(crate) struct ProtocolKeys {
@@ -26,16 +26,16 @@ pub(crate) struct ProtocolKeys {
     pub skinrig: u32,
     /// Short name of the experiment.
     pub name: String,
-    /// What the experiment is for, in a few sentences.
+    /// Purpose of the experiment, in a few sentences.
     pub description: Option<String>,
-    /// Who runs it. Stored with the session.
+    /// Operator. Stored with the session.
     pub operator: String,
-    /// Which skin is pressed. Stored with the session.
+    /// The skin under test. Stored with the session.
     pub prototype: Prototype,
     /// Seed of everything random in the run that has no seed of its own. Stored with the session.
     #[setting(default = "1")]
     pub seed: u64,
-    /// What a simulated rig must be good for. A real bench ignores it.
+    /// Requirements for a simulated rig. A real bench ignores them.
     pub scene: SceneKeys,
     /// The skin in its own frame: mm, z out of the surface, z = 0 at the touched surface.
     #[setting(default)]
@@ -59,17 +59,17 @@ pub(crate) struct ProtocolKeys {
     /// How the robot moves.
     #[setting(default)]
     pub motion: MotionKeys,
-    /// What must never happen. Checked for every segment of motion before a device is opened, and enforced while running.
+    /// Safety limits. Checked for every segment of motion before a device is opened, and enforced during the run.
     pub limits: LimitKeys,
-    /// How presses find the surface; absent: as the rig file says, at z = 0 of the frame when it says nothing.
+    /// How presses find the surface; absent: as set in the rig file, otherwise at z = 0 of the frame.
     pub press: Option<Surface>,
-    /// Touches the surface at some points before the first press and ends the run when it is not where the frame says; no check
+    /// Touches the surface at some points before the first press, and ends the run if it is not where the frame puts it; no check
     /// when absent.
     pub surface_check: Option<SurfaceCheck>,
-    /// How often a press is taken again because its data were lost or it came too late.
+    /// Immediate retakes of presses whose data were lost or that were too late.
     #[setting(default)]
     pub retakes: Retakes,
-    /// When the run waits by itself until a disturbance is over.
+    /// Conditions that suspend the run until a disturbance is over.
     #[setting(default)]
     pub suspend: Suspend,
     /// The trigger line to the cameras.
@@ -83,7 +83,7 @@ pub(crate) struct ProtocolKeys {
     /// Settings written to the cameras before the run and read back.
     #[setting(default)]
     pub cameras: Cameras,
-    /// Faults made on purpose, each KIND@WHEN such as camera1-stalled@hold:3 (docs/reference/runs.md). On the simulated rig only.
+    /// Injected faults, each KIND@WHEN such as camera1-stalled@hold:3 (docs/reference/runs.md). Simulated rig only.
     #[setting(shape = faults::SHAPE, read = faults::faults)]
     pub faults: Option<Vec<PlantedFault>>,
 }

@@ -5,7 +5,7 @@ use skinrig_settings::{Collector, Field, Settings};
 
 use crate::protocol::Scene;
 
-/// What a simulated rig must be good for; give `needs`, `level` or both. The cheapest sufficient level is used.
+/// Requirements for a simulated rig; set `needs`, `level` or both. The cheapest sufficient level is used.
 #[derive(Settings)]
 #[settings(name = "scene", no_default, finish = Self::sufficient)]
 pub(crate) struct SceneKeys {
@@ -42,7 +42,7 @@ impl SceneKeys {
             && let Some(need) = needs.iter().find(|n| n.level() > level)
         {
             let at = field.at("level");
-            out.error(at.span, "scene.level", "the level does not give what the scene needs")
+            out.error(at.span, "scene.level", "the level does not meet the needs of the scene")
                 .expected(format!("`{enough}`, because of the need `{}`", need.name()))
                 .found(format!("`{level}`"))
                 .help(format!(

@@ -21,7 +21,7 @@ pub(crate) struct ScheduleKeys {
     pub name: String,
     /// What was recorded, in a few sentences.
     pub description: Option<String>,
-    /// Who recorded it.
+    /// Operator of the recording.
     pub operator: String,
     /// Which skin was pressed.
     pub prototype: Prototype,

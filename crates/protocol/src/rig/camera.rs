@@ -16,7 +16,7 @@ const EVK1_INPUTS: [u8; 3] = [0, 6, AUXILIARY];
 /// The trigger input that the EVK1's sync line uses when it is a slave.
 const AUXILIARY: u8 = 7;
 
-/// One event camera. What is absent keeps the device's default; a protocol may override biases and region.
+/// One event camera. Missing keys keep the device's default; a protocol may override biases and region.
 #[derive(Debug, Clone, PartialEq, Serialize, Settings)]
 #[settings(
     name = "rig_camera",
@@ -28,12 +28,12 @@ pub struct CameraSetup {
     /// Which camera.
     #[setting(default = "evk1")]
     pub model: CameraKind,
-    /// Its serial number, as `skinrig devices` shows it; for an EVK1 without one the port, as `usb-BUS-PORT.PORT`.
+    /// Serial number as shown by `skinrig devices`; for an EVK1 without one its port, such as `usb-BUS-PORT.PORT`.
     #[setting(example = "\"00000815\"")]
     pub serial: String,
-    /// Expected FPGA version; another one fails the preflight.
+    /// Expected FPGA version; any other fails the preflight.
     pub fpga: Option<String>,
-    /// Bias values by name, in the device's own unit (EVK1: mV). They win over those of `bias_file`.
+    /// Bias values by name, in the device's own unit (EVK1: mV). They override those of `bias_file`.
     #[setting(default)]
     pub biases: BTreeMap<String, i64>,
     /// A `.bias` file, relative to this one; `${NAME}` stands for an environment variable.
@@ -42,22 +42,22 @@ pub struct CameraSetup {
     /// Pixels that stay on (x, y, width, height); all when absent.
     #[setting(shape = Roi::SHAPE, read = Roi::read)]
     pub roi: Option<[u16; 4]>,
-    /// The sensor's activity gate: nothing passes while its total rate is below this. Off when absent.
+    /// The sensor's activity gate: suppresses all events while the total rate is below this. Absent: off.
     #[setting(min = 10_000, max = 10_000_000)]
     pub noise_filter_ev_s: Option<u32>,
-    /// EVK1: a longer step of the camera's time base counts as lost data, and spoils the press. Absent: steps are noted at the end,
-    /// because how often a real camera sends its time base is not published.
+    /// EVK1: a longer step of the camera's time base counts as lost data and makes the press invalid. Absent: steps are only noted
+    /// at the end, because the vendor does not publish how often a camera sends its time base.
     #[setting(min = 64, max = 10e6)]
     pub max_time_high_gap_us: Option<u64>,
-    /// EVK1: how a step of the camera's overflow counter is handled. What a real camera counts there is not published; choose `note`
-    /// for one that counts without a loss, or presses are spoilt for nothing.
+    /// EVK1: how a step of the camera's overflow counter is handled. The vendor does not publish what it counts. Choose `note` for a
+    /// camera that counts without losses, to keep valid presses from becoming invalid.
     #[setting(key = "overflow_counter", default = "loss", through = OverflowRule)]
     pub overflow_is_loss: bool,
-    /// Addresses of registers, such as `"0x0204"`, that a real camera was seen to read back differently: which do is not published.
+    /// Addresses of registers, such as `"0x0204"`, that your camera reads back differently; the vendor does not publish which do.
     #[setting(default = "[]", shape = ADDRESSES, read = addresses)]
     pub read_back_exceptions: Vec<u32>,
-    /// EVK1: status bytes of register reads, such as `"0x00"`, with which the value counts as well as with 0x40. `--tolerant` shows
-    /// which your camera sends.
+    /// EVK1: further valid status bytes of register reads, such as `"0x00"`, besides 0x40. `--tolerant` shows which your camera
+    /// sends.
     #[setting(default = "[]", shape = ADDRESSES, read = bytes)]
     pub read_status: Vec<u8>,
     /// EVK1: how a bus reset that fails before a run is handled.
@@ -66,20 +66,20 @@ pub struct CameraSetup {
     /// EVK1: how a failed transfer of the event stream is handled. A stall and a lost device end the stream in any case.
     #[setting(key = "failed_transfers", default = "end", through = TransferRule)]
     pub failed_transfer_is_loss: bool,
-    /// Every mismatch with the documented behaviour is accepted and reported. The command line's `--tolerant`, not a key.
+    /// Accepts and reports every deviation from the documented behaviour. Set by `--tolerant`, not by a key.
     #[setting(skip)]
     pub tolerant: bool,
-    /// Whose time base the camera follows.
+    /// Time base that the camera follows.
     #[setting(default = "standalone")]
     pub sync: SyncRole,
     /// The trigger input that the box is wired to (EVK1: 0 main, 7 auxiliary, 6 loop-back of its own output).
     #[setting(default = "0", max = 31)]
     pub trigger_channel: u8,
-    /// How long after an edge at its trigger input the camera stamps it, in whole microseconds: not published, to be measured on your
-    /// bench. Analyses subtract it from the camera's edges; the session keeps them as they came.
+    /// Delay from an edge at the trigger input to its time stamp, in whole microseconds. Not published: measure it on your bench.
+    /// Analyses subtract it from the camera's edges; the session keeps the raw times.
     #[setting(default = "0 us", max = 1000)]
     pub trigger_delay_us: u16,
-    /// Where the camera stands, as drawn or measured: where calibration starts.
+    /// Nominal position of the camera, drawn or measured: the start of the calibration.
     #[setting(shape = NominalCamera::SHAPE, read = geometry, example = GEOMETRY)]
     pub geometry: CameraModel,
 }
@@ -124,7 +124,7 @@ impl fmt::Display for CameraKind {
     }
 }
 
-/// Whose time base a camera follows.
+/// Time base that a camera follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum SyncRole {
@@ -140,7 +140,7 @@ pub enum SyncRole {
 enum ResetRule {
     /// The camera is not opened.
     Refused,
-    /// The run goes on without a note.
+    /// The run continues without a note.
     Accepted,
 }
 
@@ -154,7 +154,7 @@ impl From<ResetRule> for bool {
 enum TransferRule {
     /// The run ends.
     End,
-    /// Lost data: a gap in the session, and the press is spoilt.
+    /// Lost data: a gap in the session and an invalid press.
     Loss,
 }
 
@@ -166,7 +166,7 @@ impl From<TransferRule> for bool {
 
 #[derive(Clone, Copy, Choice)]
 enum OverflowRule {
-    /// Lost data: a gap in the session, and the press is spoilt.
+    /// Lost data: a gap in the session and an invalid press.
     Loss,
     /// A note at the end of the session.
     Note,
@@ -219,9 +219,9 @@ fn bytes(list: &Field, out: &mut Collector) -> Option<Vec<u8>> {
 fn geometry(f: &Field, out: &mut Collector) -> Option<CameraModel> {
     if f.get("aim").is_none() {
         out.error(f.span, f.path.as_str(), "where the camera aims is missing")
-            .expected("`aim`: a rig file knows no outline whose centre could stand for it")
+            .expected("`aim`: a rig file has no outline with a centre to aim at")
             .found("no such key")
-            .help("add `aim: [10 mm, 2 mm]`, the point that the camera's axis goes through");
+            .help("add `aim: [10 mm, 2 mm]`, a point on the camera's axis");
         return None;
     }
     let camera = NominalCamera::from_field(f, out)?;
@@ -235,7 +235,7 @@ impl CameraSetup {
         self.model.has_trigger()
     }
 
-    /// What is wrong with a trigger input, and what is expected.
+    /// Fault of a trigger input: message and expectation.
     fn input_fault(
         model: CameraKind,
         sync: SyncRole,

@@ -17,7 +17,7 @@ use super::variables::{self, Environment};
 use crate::file::hex;
 use crate::surface::Surface;
 
-/// A skinrig rig file: which device plays which role, where the skin lies, and what must never happen on this bench.
+/// A skinrig rig file: the devices of a bench, the position of the skin and the bench's limits.
 #[derive(Debug, Clone, PartialEq, Serialize, Settings)]
 #[settings(
     name = "rig",
@@ -41,28 +41,28 @@ pub struct RigFile {
     pub name: String,
     /// Whether the drivers control hardware. Stored with every session.
     pub kind: RigKind,
-    /// Anything worth keeping about the bench.
+    /// Free text about the bench.
     pub description: Option<String>,
-    /// Where the skin lies in the robot's frame: given, or fitted to touched points.
+    /// Pose of the skin in the robot's frame: given, or fitted to touched points.
     pub frame: Frame,
-    /// What the robot presses with.
+    /// The indenter's tip.
     pub tip: Tip,
-    /// What this bench bears, whatever a protocol asks for.
+    /// Limits of this bench, for every protocol.
     pub limits: BenchLimits,
     /// The robot that presses.
     pub robot: RobotSetup,
     /// The two event cameras.
     #[setting(shape = camera::CAMERAS, read = camera::cameras)]
     pub cameras: [CameraSetup; 2],
-    /// The box that pulses the cameras' trigger inputs; absent: none is connected.
+    /// The trigger box, which pulses the cameras' trigger inputs; absent: not connected.
     pub trigger_box: Option<BoxSetup>,
-    /// What must hold before anything is armed.
+    /// Checks before arming.
     #[setting(default)]
     pub preflight: PreflightLimits,
-    /// How the surface is found, when the protocol does not say; absent: the frame is trusted.
+    /// How presses find the surface if the protocol does not set it; absent: the frame is trusted.
     #[setting(key = "press")]
     pub surface: Option<Surface>,
-    /// What a suite of checks may do on this bench.
+    /// Permissions for suites of checks on this bench.
     #[setting(default)]
     pub hil: HilSetup,
 }
@@ -158,11 +158,11 @@ impl RigFile {
             return;
         };
         if let Some(camera) = cameras.iter().find(|c| !c.has_trigger()) {
-            let message = "a camera cannot see the trigger box";
+            let message = "a camera has no input for the trigger box";
             out.error(trigger_box.span, trigger_box.path.as_str(), message)
                 .expected("two cameras whose driver offers a trigger input: `evk1` or `evk4`")
                 .found(format!("`model: {}`", camera.model))
-                .help("leave `trigger_box` out: the cameras' times are then tied to nothing, and sessions cannot be labelled by marks");
+                .help("remove `trigger_box`: camera times are then not synchronised, and marks cannot label sessions");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Where the skin lies: given, or fitted to touched points.
+//! The pose of the skin: given, or fitted to touched points.
 
 use serde::Serialize;
 use skinrig_model::{Point3, RigidTransform, Robot, Skin};
@@ -16,7 +16,7 @@ const LEAST_SPREAD_MM: f64 = 10.0;
 /// The skin's normal must be within this angle of the robot's z axis, along which the force is measured.
 const MOST_TILT_DEG: f64 = 45.0;
 
-/// Where the skin lies in the robot's frame, and how that is known.
+/// Pose of the skin in the robot's frame, and its source.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Frame {
     /// The transform.
@@ -27,7 +27,7 @@ pub struct Frame {
     pub touch_off: Option<TouchOff>,
 }
 
-/// Touched points and how well they fit.
+/// Touched points and the quality of their fit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TouchOff {
     /// At least three.
@@ -36,24 +36,24 @@ pub struct TouchOff {
     pub rms_mm: f64,
     /// Largest of them, mm.
     pub worst_mm: f64,
-    /// Largest that is allowed, mm.
+    /// Largest allowed, mm.
     pub max_residual_mm: f64,
 }
 
 /// A touched point.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TouchedPoint {
-    /// For messages.
+    /// Name for messages.
     pub name: String,
-    /// Where it is on the skin.
+    /// Position on the skin.
     pub skin: Point3<Skin>,
-    /// Where the tip was.
+    /// Measured position of the tip.
     pub robot: Point3<Robot>,
-    /// Distance of the tip from where the fit puts the point, mm.
+    /// Distance of the tip from the fitted point, mm.
     pub residual_mm: f64,
 }
 
-/// Where the skin lies in the robot's frame. Skin: z out of the surface, z = 0 at the surface. Robot: z away from the sample
+/// Pose of the skin in the robot's frame. Skin: z out of the surface, z = 0 at the surface. Robot: z away from the sample
 /// (`robot.axes`).
 #[derive(Settings)]
 #[settings(
@@ -62,7 +62,7 @@ pub struct TouchedPoint {
     builds(Frame, FrameKeys::frame)
 )]
 struct FrameKeys {
-    /// The skin's place as measured by other means.
+    /// Pose of the skin, measured by other means.
     given: Option<GivenKeys>,
     /// Points that were touched with the tip: `skinrig jog` prints this block.
     touch_off: Option<TouchOffKeys>,
@@ -75,13 +75,13 @@ struct GivenKeys {
     /// The skin's origin in the robot's frame.
     #[setting(range = COORDINATE, example = "[0 mm, 0 mm, -20 mm]")]
     origin_mm: [f64; 3],
-    /// Turn about the robot's z, applied last.
+    /// Rotation about the robot's z, applied last.
     #[setting(default = "0 deg", range = TURN)]
     yaw_deg: f64,
-    /// Turn about y.
+    /// Rotation about y.
     #[setting(default = "0 deg", range = TURN)]
     pitch_deg: f64,
-    /// Turn about x, applied first.
+    /// Rotation about x, applied first.
     #[setting(default = "0 deg", range = TURN)]
     roll_deg: f64,
     /// Date of the measurement: year-month-day, for example `2026-11-20`.
@@ -112,12 +112,12 @@ const THREE_POINTS: &str = "[{skin: [0 mm, 0 mm, 0 mm], robot: [0 mm, 0 mm, -20 
 #[derive(Settings)]
 #[settings(name = "touched_point")]
 struct TouchedKeys {
-    /// For messages.
+    /// Name for messages.
     name: Option<String>,
-    /// Where it is on the skin.
+    /// Position on the skin.
     #[setting(range = COORDINATE)]
     skin_mm: [f64; 3],
-    /// Where the robot's tip was when it touched.
+    /// Position of the robot's tip at the touch.
     #[setting(range = COORDINATE)]
     robot_mm: [f64; 3],
 }
@@ -133,7 +133,7 @@ impl FrameKeys {
         let tilt = up.acos().to_degrees();
         if tilt > MOST_TILT_DEG {
             let help = if tilt > 135.0 {
-                "the skin would face down: are the points mirrored, or x and y exchanged?"
+                "the skin would face down: check whether the points are mirrored or x and y are swapped"
             } else {
                 "mount the skin facing up: the force is measured along the robot's z axis"
             };
@@ -209,7 +209,7 @@ impl TouchOffKeys {
 }
 
 impl TouchOff {
-    /// Whether every point is near enough to the fit; `list` is where the points stand.
+    /// Whether every point is close enough to the fit; `list` is the mapping of the points.
     fn fits(&self, list: &Field, out: &mut Collector) -> bool {
         let worst = self
             .points

@@ -1,11 +1,11 @@
-//! What a suite of checks may do on a bench.
+//! Permissions for suites of checks on a bench.
 
 use serde::Serialize;
 use skinrig_settings::{Choice, Settings};
 
 use super::variables;
 
-/// What a suite of checks (`skinrig hil run`) may do on this bench.
+/// Permissions for suites of checks (`skinrig hil run`) on this bench.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Settings)]
 #[settings(name = "hil")]
 pub struct HilSetup {
@@ -21,13 +21,13 @@ pub struct HilSetup {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum Drill {
-    /// The program that holds the arm in free air is killed.
+    /// Kills the program that holds the arm in free air.
     Watchdog,
-    /// The arm is stopped in the middle of a move in free air.
+    /// Stops the arm in the middle of a move in free air.
     Stop,
 }
 
-/// Programs that switch the lamps. Each runs without a shell, must exit with 0 within 10 s, and leaves the lamps as its name says.
+/// Programs that switch the lamps. Each runs without a shell and must exit with 0 within 10 s.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Settings)]
 #[settings(name = "light")]
 pub struct Lamps {

@@ -1,4 +1,4 @@
-//! What a bench bears, and what must hold before a run on it.
+//! Limits of a bench, and checks before a run on it.
 
 use serde::Serialize;
 use skinrig_model::HostDuration;
@@ -6,11 +6,11 @@ use skinrig_settings::{Collector, Field, Settings};
 
 use super::frame::COORDINATE;
 
-/// What this bench bears. The tighter of these and of the protocol's limits holds.
+/// Limits of this bench. The tighter of these and the protocol's limits applies.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Settings)]
 #[settings(name = "rig_limits")]
 pub struct BenchLimits {
-    /// The box that the tip never leaves, robot frame. The robot's true workspace shrinks away from its axes.
+    /// Box that the tip never leaves, robot frame. The robot's true workspace is narrower away from its axes.
     #[serde(flatten)]
     pub workspace: Workspace,
     /// Fastest motion. The omega.3's driver commands set points at 2 kHz, at most 0.1 mm apart even when every other one is lost.
@@ -62,7 +62,7 @@ impl Workspace {
     }
 }
 
-/// What must hold before anything is armed. A check that fails ends the run before the robot is powered.
+/// Checks before arming. A failed check ends the run before the robot is powered.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Settings)]
 #[settings(name = "preflight")]
 pub struct PreflightLimits {

@@ -1,4 +1,4 @@
-//! A rig file: which device plays which role on a bench, where the skin lies, and what the bench bears.
+//! Rig files: the devices of a bench, the position of the skin and the bench's limits.
 
 mod camera;
 mod date;

@@ -21,42 +21,42 @@ pub struct RobotSetup {
     /// Which robot.
     #[setting(default = "omega3")]
     pub model: RobotKind,
-    /// Its serial number, as `skinrig devices` shows it. The library reports 65535 for a robot without one; here 65535 takes the only
-    /// robot that is connected.
+    /// Its serial number, as `skinrig devices` shows it. The library reports 65535 for a robot without one; 65535 here selects the
+    /// only connected robot.
     #[setting(example = "12345")]
     pub serial: u16,
-    /// Expected firmware version; another one fails the preflight.
+    /// Expected firmware version; any other fails the preflight.
     pub firmware: Option<String>,
-    /// Path of the vendor's libdrd, relative to this file; `${NAME}` stands for an environment variable. Absent: the usual places.
+    /// Path of the vendor's libdrd, relative to this file; `${NAME}` stands for an environment variable. Absent: the standard locations.
     #[setting(read = variables::path)]
     pub library: Option<PathBuf>,
-    /// Expected version of the library; another one fails the preflight.
+    /// Expected version of the library; any other fails the preflight.
     pub library_version: Option<String>,
-    /// How the base is mounted: 0 deg upright, 90 deg lying flat. Wrong values push the arm off.
+    /// How the base is mounted: 0 deg upright, 90 deg lying flat. A wrong value makes the arm drift.
     #[setting(default = "0 deg", min = -180, max = 180)]
     pub device_angle_deg: f64,
-    /// Which axes of the device the robot frame's x, y and z are: z points away from the sample. Right-handed.
+    /// Device axes that form the robot frame's x, y and z: z points away from the sample. Right-handed.
     #[setting(default = "[+x, +y, +z]", value = [DeviceAxis::PlusX, DeviceAxis::PlusY, DeviceAxis::PlusZ])]
     pub axes: [DeviceAxis; 3],
-    /// Mass that gravity compensation carries; absent: the device's own value. At most 1 kg: a larger mass would lift the arm.
+    /// Mass for gravity compensation; absent: the device's own value. At most 1 kg: a larger mass would lift the arm.
     #[setting(above = 0, max = 1)]
     pub effector_mass_kg: Option<f64>,
-    /// The controller drops forces when no command came for this long; a multiple of 125 us.
+    /// The controller releases the forces if no command arrives for this long; a multiple of 125 us.
     #[setting(key = "watchdog", default = "10 ms", value = 80, shape = WATCHDOG, read = watchdog)]
     pub watchdog_steps: u8,
-    /// Expected velocity threshold in the device's own unit. Never written; another one fails the preflight.
+    /// Expected velocity threshold in the device's own unit. Never written; any other fails the preflight.
     #[setting(min = 1, max = u32::MAX)]
     pub velocity_threshold: Option<u32>,
-    /// Whether skinrig may let the arm initialise itself. The arm then moves on its own: needs `sample_is_off`.
+    /// Whether skinrig may initialise the arm. The arm then moves on its own: needs `sample_is_off`.
     #[setting(default = "false")]
     pub auto_init: bool,
-    /// Your word that sample, hands and tools are out of the arm's whole reach.
+    /// Your confirmation that sample, hands and tools are out of the arm's reach.
     #[setting(default = "false")]
     pub sample_is_off: bool,
-    /// What the robot must report of redundant encoders: the library reports 0 when their check failed and also when there are none.
+    /// Required report about redundant encoders: the library reports 0 if their check failed, and also if there are none.
     #[setting(key = "redundant_encoders", default = "reported", through = EncoderRule)]
     pub needs_redundant_encoders: bool,
-    /// How a cap on the motors' torque bounds the force at the tip; settle it with a scale.
+    /// How a cap on the motors' torque limits the force at the tip; measure it with a scale.
     #[serde(flatten)]
     #[setting(default)]
     pub motor_force: MotorForce,
@@ -75,7 +75,7 @@ pub struct RobotSetup {
     /// Largest jerk of moves.
     #[setting(default = "4000 mm/s3", above = 0, max = 1e6)]
     pub jerk_mm_s3: f64,
-    /// Whether a second process brakes the arm when this one dies.
+    /// Whether a second process brakes the arm if this one crashes.
     #[setting(default = "true")]
     pub supervisor: bool,
 }
@@ -155,18 +155,18 @@ impl From<EncoderRule> for bool {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Settings)]
 #[settings(name = "motor_force")]
 pub struct MotorForce {
-    /// Largest force over all poses that was measured on a scale, by ratio. The default is the device's nominal force; the true one
+    /// Largest force over all poses measured on a scale, per ratio. The default is the device's nominal force; the true one
     /// depends on the pose.
     #[serde(rename = "force_per_ratio_n")]
     #[setting(default = "12 N", above = 0, max = 50)]
     pub per_ratio_n: f64,
-    /// Share that carries the arm itself.
+    /// Share that supports the arm itself.
     #[setting(default = "0", max = 0.9)]
     pub gravity_ratio: f64,
-    /// Smallest share with which the arm does not sink.
+    /// Smallest share that keeps the arm from sinking.
     #[setting(default = "0.05", max = 1)]
     pub least_ratio: f64,
-    /// Which force the library reports; settle it with a load cell.
+    /// Force that the library reports; determine it with a load cell.
     #[setting(key = "reported", default = "by_motors", through = ReportedForce)]
     pub reports_sample_force: bool,
 }
@@ -211,11 +211,11 @@ impl RobotSetup {
     fn may_initialise(auto_init: &bool, is_off: &bool, field: &Field, out: &mut Collector) {
         if *auto_init && !is_off {
             let at = field.at("auto_init");
-            let message = "the arm would sweep through the sample";
+            let message = "the arm could hit the sample";
             out.error(at.span, at.path.as_str(), message)
                 .expected("`sample_is_off: true` beside it")
                 .found("`sample_is_off: false`")
-                .help("take the sample off and say so, or initialise the arm by hand and write `auto_init: false`");
+                .help("remove the sample and set `sample_is_off: true`, or initialise the arm by hand and set `auto_init: false`");
         }
     }
 

@@ -1,4 +1,4 @@
-//! The tip that the robot presses with.
+//! The indenter's tip.
 
 use serde::Serialize;
 use skinrig_settings::{Choice, Collector, Field, Settings, ValueRange};
@@ -6,7 +6,7 @@ use skinrig_settings::{Choice, Collector, Field, Settings, ValueRange};
 /// The indenter's tip.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Tip {
-    /// Shape of the end that touches.
+    /// Shape of the contact end.
     pub shape: TipShape,
     /// Side of a cube, diameter of the others, mm.
     pub size_mm: f64,
@@ -14,7 +14,7 @@ pub struct Tip {
     pub mass_kg: Option<f64>,
 }
 
-/// Shape of the end that touches.
+/// Shape of the contact end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum TipShape {
@@ -36,7 +36,7 @@ const SIZE: ValueRange = ValueRange::above_zero(1000.0);
     builds(Tip, TipKeys::tip)
 )]
 struct TipKeys {
-    /// Shape of the end that touches.
+    /// Shape of the contact end.
     shape: TipShape,
     /// Side of a cube.
     #[setting(range = SIZE, example = "10 mm")]

@@ -9,21 +9,21 @@ use super::variables;
 #[derive(Debug, Clone, PartialEq, Serialize, Settings)]
 #[settings(name = "trigger_box")]
 pub struct BoxSetup {
-    /// Serial port, best one under `/dev/serial/by-id`; `${NAME}` stands for an environment variable. Ports are never guessed.
+    /// Serial port, preferably one under `/dev/serial/by-id`; `${NAME}` stands for an environment variable. Ports are never guessed.
     #[setting(read = variables::text, example = "/dev/serial/by-id/usb-Arduino_Uno-if00")]
     pub port: String,
-    /// The box's own serial number, as `skinrig devices --rig` shows it; absent: any.
+    /// Serial number of the box as shown by `skinrig devices --rig`; absent: any.
     pub serial: Option<String>,
-    /// Expected firmware version; absent: what this build of skinrig was written for.
+    /// Expected firmware version; absent: the version that this build of skinrig supports.
     pub firmware: Option<String>,
-    /// Where each line of the box goes.
+    /// Connections of the box's lines.
     #[serde(flatten)]
     #[setting(default)]
     pub wiring: Wiring,
-    /// From one coded sync train to the next, in whole milliseconds.
+    /// Period of the coded sync trains, in whole milliseconds.
     #[setting(default = "100 ms", min = 18, max = 65_000)]
     pub sync_period_ms: u16,
-    /// How fast or slow the box's clock may be, parts per million: an Arduino Uno has a ceramic resonator of 5000, a board with a
+    /// Largest error of the box's clock, parts per million: an Arduino Uno has a ceramic resonator of 5000, a board with a
     /// crystal 100.
     #[setting(
         default = "5000",
@@ -35,7 +35,7 @@ pub struct BoxSetup {
     pub max_drift_ppm: f64,
 }
 
-/// Where the lines of a trigger box go.
+/// Connections of a trigger box's lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Wiring {
     /// Outputs 1, 2 and 3.
@@ -44,7 +44,7 @@ pub struct Wiring {
     pub input: BoxInput,
 }
 
-/// Where an output of the box goes.
+/// Connection of an output of the box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum BoxOutput {
@@ -72,7 +72,7 @@ pub enum BoxInput {
     None,
 }
 
-/// Where each line of the box goes. All outputs rise in the same cycle.
+/// Connections of the box's lines. All outputs rise in the same cycle.
 #[derive(Settings)]
 #[settings(name = "wiring", builds(Wiring, WiringKeys::wiring))]
 struct WiringKeys {

@@ -1,4 +1,4 @@
-//! The checks there are: what each needs to know, what it measures and in which unit.
+//! All checks: parameters, metrics and units.
 
 use std::path::PathBuf;
 
@@ -34,7 +34,7 @@ macro_rules! checks {
                     )]
                     $metric: Option<Limit>,
                 )+
-                /// Why the check does not run for now. It is SKIPPED with this reason, and its limits stay in the file.
+                /// Reason to skip the check for now. It is reported as SKIPPED, and its limits stay in the file.
                 skip: Option<String>,
             }
 
@@ -89,23 +89,23 @@ macro_rules! checks {
 checks! {
     /// Model, serial number and firmware of every device, as the rig file expects them.
     CheckIdentity: identity = "identity and firmware" => Identity {} {
-        /// Answers that differ from the rig file's, per device.
+        /// Differences from the rig file, per device.
         differences: Count,
     }
 
     /// Biases, region and inputs of the cameras, written as for a run and read back.
     CheckSettings: settings = "settings read back" => Settings {} {
-        /// Settings that read back with another value, per camera.
+        /// Settings that read back a different value, per camera.
         differences: Count,
     }
 
-    /// A file is written where sessions go, synchronised, read back and removed.
+    /// Writes a file to the session folder, flushes it, reads it back and deletes it.
     CheckDisk: disk = "disk" => Disk {
         /// Amount of data written.
         #[setting(default = "200 MB", min = 1e6, max = 1e11)]
         amount_b: f64,
     } {
-        /// Bytes per second, the last synchronisation included.
+        /// Bytes per second, including the final flush.
         write_rate: DataRate,
         /// Free space.
         free: Data,
@@ -117,11 +117,11 @@ checks! {
         #[setting(default = "20", min = 1, max = 10_000)]
         trains: u32,
     } {
-        /// Pulses sent and not seen, per camera.
+        /// Pulses sent but not received, per camera.
         lost_pulses: Count,
-        /// Edges seen that nobody sent, per camera.
+        /// Edges received but not sent, per camera.
         extra_pulses: Count,
-        /// Trains that do not read back under their own name, per camera.
+        /// Trains decoded wrongly, per camera.
         unread_trains: Count,
         /// Standard deviation of the edges' times about the trains' own, per camera.
         jitter: Time,
@@ -129,21 +129,21 @@ checks! {
 
     /// The cameras' clocks against the trigger box's.
     CheckClocks: clocks = "camera clocks" => Clocks {
-        /// How long the check measures.
+        /// Duration of the measurement.
         #[setting(default = "10 s", above = 0, max = 3600)]
         duration: HostDuration,
     } {
-        /// How much faster than the trigger box's, per camera.
+        /// Rate relative to the trigger box's clock, per camera.
         drift: Drift,
         /// Root mean square of the trains' distances from a straight line, per camera.
         residual: Time,
-        /// Time of camera 1 minus that of camera 2 at one and the same pulse: how far apart they started.
+        /// Time of camera 1 minus that of camera 2 at the same pulse: the offset of their starts.
         offset: Time,
     }
 
     /// Data rate and loss with nothing moving.
     CheckIdle: idle = "stream at rest" => Idle {
-        /// How long the check measures.
+        /// Duration of the measurement.
         #[setting(default = "5 s", above = 0, max = 3600)]
         duration: HostDuration,
     } {
@@ -157,7 +157,7 @@ checks! {
 
     /// Noise floor and hot pixels with the lamps off.
     CheckNoiseDark: noise_dark = "noise in the dark" => Noise[light: Light::Dark] {
-        /// How long the check measures.
+        /// Duration of the measurement.
         #[setting(default = "5 s", above = 0, max = 3600)]
         duration: HostDuration,
         /// A pixel above this rate is hot.
@@ -174,7 +174,7 @@ checks! {
 
     /// Noise floor and hot pixels with the lamps on.
     CheckNoiseLit: noise_lit = "noise in the light" => Noise[light: Light::Lit] {
-        /// How long the check measures.
+        /// Duration of the measurement.
         #[setting(default = "5 s", above = 0, max = 3600)]
         duration: HostDuration,
         /// A pixel above this rate is hot.
@@ -191,14 +191,14 @@ checks! {
 
     /// Data rate and loss while the cameras generate events themselves.
     CheckTestPattern: test_pattern = "built-in test pattern" => TestPattern {
-        /// How long the check measures.
+        /// Duration of the measurement.
         #[setting(default = "3 s", above = 0, max = 3600)]
         duration: HostDuration,
         /// Event rate that the pattern is set to.
         #[setting(default = "1 Mev/s", above = 0, max = 5e7)]
         rate_ev_s: f64,
     } {
-        /// Events received, of those that the pattern makes, per camera.
+        /// Share of the pattern's events received, per camera.
         received: Share,
         /// Bytes known to be lost, per camera.
         lost: Data,
@@ -206,15 +206,15 @@ checks! {
         gaps: Count,
     }
 
-    /// Whether the robot is initialised, takes its limits, powers up and stays where it is.
+    /// Whether the robot is initialised, accepts its limits, powers up and holds its position.
     CheckRobotState: robot_state = "robot state" => RobotState {} {
-        /// Faults of the robot: not initialised, limits that do not read back, motors that do not start.
+        /// Faults of the robot: not initialised, limits read back differently, motors do not start.
         faults: Count,
         /// How far the tip moves within a second of holding still.
         creep: Length,
     }
 
-    /// Five points in free air, approached again and again from different sides.
+    /// Approaches five points in free air repeatedly from different sides.
     CheckRepeatability: repeatability = "robot repeatability" => Repeatability {
         /// Approaches of each point.
         #[setting(default = "5", min = 2, max = 100)]
@@ -223,9 +223,9 @@ checks! {
         #[setting(default = "40 mm/s", above = 0, max = 100)]
         speed_mm_s: f64,
     } {
-        /// Standard deviation of the tip's place about each point's mean, all points together.
+        /// Standard deviation of the tip position about each point's mean, over all points.
         spread: Length,
-        /// Mean distance of the tip from where it was sent.
+        /// Mean distance of the tip from its target.
         error: Length,
     }
 
@@ -246,7 +246,7 @@ checks! {
         error: Length,
     }
 
-    /// Presses near the points of the touch-off: where the tip touches, and how deep it goes.
+    /// Presses near the touch-off points: height of contact and depth.
     CheckDepth: depth = "depth against touch-off" => Depth {
         /// Depth of the presses.
         #[setting(default = "1 mm", above = 0, max = 10)]
@@ -261,7 +261,7 @@ checks! {
         error: Length,
     }
 
-    /// The tip is sent into the skin deeper than the limit of its force allows.
+    /// Commands the tip deeper into the skin than its force limit allows.
     CheckForceCeiling: force_ceiling = "commanded-force ceiling" => ForceCeiling {
         /// The force limit that is set.
         #[setting(default = "1 N", above = 0, max = 12)]
@@ -270,9 +270,9 @@ checks! {
         #[setting(default = "2 mm", above = 0, max = 10)]
         depth_mm: f64,
     } {
-        /// Largest force that the robot reports.
+        /// Largest reported force.
         peak: Force,
-        /// Times that the limit took the power off, per press: 0 when the force is only bounded.
+        /// Power-offs by the limit, per press: 0 if the limit only bounds the force.
         trips: Count,
     }
 
@@ -284,7 +284,7 @@ checks! {
     } {
         /// RMSE of the localisation.
         rmse: Length,
-        /// Mean standard deviation between repetitions of a place.
+        /// Mean standard deviation between repetitions of a location.
         repeat_std: Length,
         /// Median time from contact to detection.
         latency: Time,
@@ -292,31 +292,31 @@ checks! {
         press_events: EventRate,
         /// Events per second between presses, both cameras together.
         idle_events: EventRate,
-        /// Presses that were located, of those planned.
+        /// Share of planned presses that were located.
         located: Share,
-        /// Presses that were recorded without a fault, of those planned.
+        /// Share of planned presses recorded without a fault.
         valid: Share,
-        /// How far the estimates of the reference presses moved from the start to the end.
+        /// Shift of the reference presses' estimates from start to end.
         reference_shift: Length,
-        /// Events of the reference presses at the end, of those at the start.
+        /// Events of the reference presses at the end, relative to the start.
         reference_events: Share,
         /// Bytes known to be lost, both cameras together.
         lost: Data,
     }
 
-    /// The program that holds the arm in free air is killed; the arm must brake by itself.
+    /// Kills the program that holds the arm in free air; the arm must brake without it.
     CheckWatchdogDrill: watchdog_drill = "watchdog drill" => WatchdogDrill {} {
-        /// From the kill until the motors are known to be off.
+        /// Time from the kill until the motors are known to be off.
         braked_within: Time,
-        /// How far the tip moved until it was looked at again.
+        /// Motion of the tip until it was measured again.
         drop: Length,
     }
 
-    /// The arm is stopped in the middle of a move in free air.
+    /// Stops the arm in the middle of a move in free air.
     CheckStopDrill: stop_drill = "emergency stop drill" => StopDrill {} {
-        /// From the order until the tip rests.
+        /// Time from the command until the tip rests.
         stopped_within: Time,
-        /// How far it moved meanwhile.
+        /// Motion of the tip meanwhile.
         distance: Length,
     }
 }

@@ -1,4 +1,4 @@
-//! A check of a suite: what it measures, and its limits.
+//! A check of a suite: measurement and limits.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -11,24 +11,24 @@ use skinrig_model::{HostDuration, Limit};
 pub struct Check {
     /// As typed: the key under `checks`.
     pub name: &'static str,
-    /// What it is, for people.
+    /// Title for display.
     pub title: &'static str,
-    /// What is measured, and how.
+    /// Measurement and its parameters.
     pub measure: Measure,
-    /// Why it does not run for now, when the suite says so.
+    /// Reason to skip it, if the suite has one.
     pub skip: Option<String>,
-    /// The metrics that it can have limits for, in the order in which people should see them.
+    /// Metrics that can have limits, in display order.
     pub metrics: &'static [Metric],
     /// Limits by metric; at least one.
     pub limits: BTreeMap<&'static str, Limit>,
 }
 
-/// Something that a check measures.
+/// A metric of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Metric {
     /// As typed: the key of its limit.
     pub name: &'static str,
-    /// What it is, for people.
+    /// Title for display.
     pub title: &'static str,
     /// Its unit; empty for counts.
     pub unit: &'static str,
@@ -44,7 +44,7 @@ pub enum Light {
     Lit,
 }
 
-/// What a check measures, with its parameters.
+/// Measurement of a check, with its parameters.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Measure {
@@ -59,33 +59,33 @@ pub enum Measure {
     },
     /// The cameras' clocks against the trigger box.
     Clocks {
-        /// How long the check measures.
+        /// Duration of the measurement.
         duration: HostDuration,
     },
     /// Data rate and loss with nothing moving.
     Idle {
-        /// How long the check measures.
+        /// Duration of the measurement.
         duration: HostDuration,
     },
     /// Noise floor and hot pixels.
     Noise {
         /// Lamps on or off.
         light: Light,
-        /// How long the check measures.
+        /// Duration of the measurement.
         duration: HostDuration,
         /// A pixel above this rate is hot, events per second.
         hot_above_ev_s: f64,
     },
     /// Data rate and loss under the cameras' built-in test pattern.
     TestPattern {
-        /// How long the check measures.
+        /// Duration of the measurement.
         duration: HostDuration,
         /// Event rate that the pattern is set to, events per second.
         rate_ev_s: f64,
     },
     /// Whether the robot is initialised, powered and without faults.
     RobotState,
-    /// Five points in free air, approached again and again.
+    /// Approaches five points in free air repeatedly.
     Repeatability {
         /// Approaches of each point.
         approaches: u32,
@@ -106,14 +106,14 @@ pub enum Measure {
         /// Presses at each point.
         presses: u32,
     },
-    /// A press that the limit of the force must stop.
+    /// A press that the force limit must stop.
     ForceCeiling {
         /// The force limit that is set, N.
         force_n: f64,
         /// Commanded depth, mm.
         depth_mm: f64,
     },
-    /// Writing where sessions go.
+    /// Writing to the session folder.
     Disk {
         /// Bytes.
         amount_b: f64,
@@ -123,8 +123,8 @@ pub enum Measure {
         /// Its protocol, relative to the suite's folder.
         protocol: PathBuf,
     },
-    /// The program that holds the arm is killed.
+    /// Kills the program that holds the arm.
     WatchdogDrill,
-    /// The arm is stopped in the middle of a move.
+    /// Stops the arm in the middle of a move.
     StopDrill,
 }

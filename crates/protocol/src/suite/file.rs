@@ -11,7 +11,7 @@ use super::catalogue;
 use super::check::{Check, Measure};
 use crate::file::hex;
 
-/// A skinrig suite: what is checked on a bench, with limits that are stated before anything is measured.
+/// A skinrig suite: checks of a bench, with limits set before the measurement.
 #[derive(Debug, Clone, PartialEq, Serialize, Settings)]
 #[settings(name = "suite", version = "skinrig_suite")]
 pub struct Suite {
@@ -27,12 +27,12 @@ pub struct Suite {
     /// Name of the suite. Every result shows it.
     #[setting(example = "nightly")]
     pub name: String,
-    /// Anything worth keeping about it.
+    /// Free text about the suite.
     pub description: Option<String>,
-    /// How long the whole suite may take, repeats included. A check that no longer fits is not started.
+    /// Time limit of the whole suite, repeats included. A check that no longer fits is not started.
     #[setting(above = 0, max = 86_400, example = "20 min")]
     pub budget: HostDuration,
-    /// When a check is repeated.
+    /// Rules for repeating a check.
     #[setting(default)]
     pub repeats: Repeats,
     /// The checks, each with its limits.
@@ -40,13 +40,13 @@ pub struct Suite {
     pub checks: Vec<Check>,
 }
 
-/// When a check that did not pass is repeated, and when that changes its verdict. Every attempt stays in the result.
+/// Rules for repeating a failed check, and for the resulting verdict. The result keeps every attempt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Settings)]
 pub struct Repeats {
-    /// How often a check that did not pass is repeated; 0: never.
+    /// Most repeats of a failed check; 0: never.
     #[setting(default = "2", max = 10)]
     pub at_most: u32,
-    /// Attempts in a row that must pass before a check counts as passed after a failure, and then as MARGINAL.
+    /// Consecutive passes after which a failed check counts as MARGINAL.
     #[setting(default = "2", min = 1, max = 10)]
     pub must_pass: u32,
 }

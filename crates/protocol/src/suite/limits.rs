@@ -18,13 +18,13 @@ macro_rules! limit {
             /// The smallest good value.
             #[setting(unit = $unit, range = WIDE, at_least_one)]
             at_least: Option<f64>,
-            /// A good value nearer to a limit than this is MARGINAL.
+            /// A good value closer to a limit than this is MARGINAL.
             #[setting(unit = $unit, range = POSITIVE)]
             margin: Option<f64>,
         }
 
         impl $name {
-            /// As people write it; empty for counts.
+            /// Unit for display; empty for counts.
             pub(super) const UNIT: &str = $unit;
             /// A limit as it could be typed.
             pub(super) const EXAMPLE: &str = concat!("{at_most: ", $example, "}");
@@ -51,7 +51,7 @@ limit!(DataRate, "limit_data_rate", "B/s", "20 MB/s");
 limit!(Share, "limit_share", "%", "5 %");
 limit!(Drift, "limit_drift", "ppm", "100 ppm");
 
-/// Whether some value is good.
+/// Checks that at least one value is within the limits.
 fn in_order(
     at_least: Option<f64>,
     at_most: Option<f64>,
@@ -62,9 +62,13 @@ fn in_order(
         return true;
     };
     if least > most {
-        out.error(field.span, field.path.as_str(), "no value is good")
-            .expected(format!("at_least not above at_most ({most})"))
-            .found(format!("{least}"));
+        out.error(
+            field.span,
+            field.path.as_str(),
+            "no value is within the limits",
+        )
+        .expected(format!("at_least not above at_most ({most})"))
+        .found(format!("{least}"));
     }
     least <= most
 }

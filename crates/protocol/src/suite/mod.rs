@@ -1,4 +1,4 @@
-//! A suite of checks for a bench: what is measured every night, and the limits that were stated before.
+//! Suites of checks for a bench, with limits set before the measurement.
 
 mod catalogue;
 mod check;

@@ -136,7 +136,7 @@ fn impossible_values_across_keys() {
         "needs: [event_rates, localisation, optical_error]",
         "needs: [latency]\n  level: geometric",
         "scene.level",
-        "the level does not give what the scene needs",
+        "the level does not meet the needs of the scene",
         "`optical`",
     );
     finding(

@@ -209,7 +209,7 @@ fn every_kind_of_damage_is_found() {
     });
     assert!(
         away.iter()
-            .any(|v| v.segment == Segment::Approach && v.message.contains("away from its place"))
+            .any(|v| v.segment == Segment::Approach && v.message.contains("away from its location"))
     );
     let low = damaged(|p| {
         for step in &mut p.steps {

@@ -70,6 +70,6 @@ fn a_margin_on_the_command_line_takes_the_place_of_the_files() {
         ("taxels=NaN", "more than 0"),
     ] {
         let error = Margin::parse(text).unwrap_err();
-        assert!(error.contains(said), "{text}: {error}");
+        assert!(error.to_string().contains(said), "{text}: {error}");
     }
 }

@@ -176,7 +176,7 @@ fn what_cannot_be_is_named() {
         "auto_init: false ",
         "auto_init: true ",
         "robot.auto_init",
-        "the arm would sweep through the sample",
+        "the arm could hit the sample",
         "sample_is_off: true",
     );
     finding(
@@ -260,7 +260,7 @@ fn what_cannot_be_is_named() {
         "serial: \"00001754\"",
         "serial: \"00001754\"\n    model: silky_vga",
         "trigger_box",
-        "a camera cannot see the trigger box",
+        "a camera has no input for the trigger box",
         "`model: silky_vga`",
     );
     finding(

@@ -53,7 +53,7 @@ fn a_check_stays_on_the_skin_and_within_the_search() {
     assert!(error.contains("surface_check.points"), "{error}");
     let wide = with("surface_check: {points: [[0 mm, 0 mm]], tolerance: 1 mm}");
     let error = wide.unwrap_err().to_string();
-    assert!(error.contains("would not be found"), "{error}");
+    assert!(error.contains("the search would miss a surface"), "{error}");
     let none = with("surface_check: {points: []}").unwrap_err().to_string();
     assert!(none.contains("surface_check.points"), "{none}");
 }

@@ -1,4 +1,4 @@
-//! What happened: presses and their attempts, commands, marks, remarks, the end.
+//! Reading the journal: presses and attempts, commands, marks, notes and the end of the run.
 
 use skinrig_model::{
     BoxReport, CheckKind, CheckVerdict, HostTime, InterruptionKind, Mark, MarkKind, MotionCommand,
@@ -9,21 +9,21 @@ use super::SessionReader;
 use crate::box_row::report_from;
 use crate::error::RecorderError;
 use crate::from_row::{attempt_from, planned_from};
-use crate::query::{self, Fault, has_table, int, named, num, opt_text, real, text};
+use crate::query::{self, Fault, enum_value, has_table, int, num, opt_text, real, text};
 use crate::rows::{AttemptRow, CommandRow, InterruptionRow, NoteRow};
 
 impl SessionReader {
     /// Every planned press in plan order, each with its attempts in order.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn presses(&self) -> Result<Vec<(PlannedPress, Vec<AttemptRow>)>, RecorderError> {
         const DOING: &str = "reading presses";
         let mut presses: Vec<(PlannedPress, Vec<AttemptRow>)> =
-            self.all(DOING, "SELECT * FROM press ORDER BY id", |row| {
+            self.query_all(DOING, "SELECT * FROM press ORDER BY id", |row| {
                 Ok((planned_from(row)?, Vec::new()))
             })?;
-        let attempts = self.all(
+        let attempts = self.query_all(
             DOING,
             "SELECT * FROM attempt ORDER BY press, number",
             attempt_from,
@@ -40,11 +40,11 @@ impl SessionReader {
         Ok(presses)
     }
 
-    /// The outcome of the last attempt at each planned press, in plan order; `None` without a verdict. A press
-    /// that was recorded as missed has an outcome with that verdict.
+    /// Outcome of the last attempt at each planned press, in plan order; `None` without a verdict. A missed press
+    /// has an outcome with that verdict.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn last_outcomes(&self) -> Result<Vec<Option<PressOutcome>>, RecorderError> {
         let presses = self.presses()?;
         Ok(presses
@@ -53,22 +53,22 @@ impl SessionReader {
             .collect())
     }
 
-    /// What was checked before the run was armed, in order; nothing for a session of an older schema.
+    /// Checks before the run was armed, in order; empty in sessions of an older schema.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn preflight(&self) -> Result<Vec<PreflightCheck>, RecorderError> {
         const DOING: &str = "reading the preflight";
-        if !self.ask(DOING, async |conn| has_table(conn, "preflight").await)? {
+        if !self.query(DOING, async |conn| has_table(conn, "preflight").await)? {
             return Ok(Vec::new());
         }
-        self.all(DOING, "SELECT * FROM preflight ORDER BY id", |row| {
+        self.query_all(DOING, "SELECT * FROM preflight ORDER BY id", |row| {
             Ok(PreflightCheck {
                 kind: CheckKind::Other,
                 check: text(row, "name")?,
                 expected: text(row, "expected")?,
                 found: text(row, "found")?,
-                verdict: named(row, "verdict", &CheckVerdict::ALL, CheckVerdict::name)?,
+                verdict: enum_value(row, "verdict", &CheckVerdict::ALL, CheckVerdict::name)?,
                 next_step: opt_text(row, "next_step")?.unwrap_or_default(),
             })
         })
@@ -77,9 +77,9 @@ impl SessionReader {
     /// Every motion command, in order.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn commands(&self) -> Result<Vec<CommandRow>, RecorderError> {
-        self.all(
+        self.query_all(
             "reading commands",
             "SELECT * FROM command ORDER BY id",
             |row| {
@@ -98,15 +98,15 @@ impl SessionReader {
         )
     }
 
-    /// The marks that the trigger box sent, in order.
+    /// Marks that the trigger box sent, in order.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn marks_sent(&self) -> Result<Vec<SentMark>, RecorderError> {
-        self.all("reading marks", "SELECT * FROM mark ORDER BY id", |row| {
+        self.query_all("reading marks", "SELECT * FROM mark ORDER BY id", |row| {
             Ok(SentMark {
                 mark: Mark {
-                    kind: named(row, "kind", &MarkKind::ALL, MarkKind::name)?,
+                    kind: enum_value(row, "kind", &MarkKind::ALL, MarkKind::name)?,
                     press: PressId::from_index(num(row, "press")?),
                 },
                 t: HostTime(int(row, "t_ns")?),
@@ -115,43 +115,43 @@ impl SessionReader {
         })
     }
 
-    /// What the trigger box reported on its own clock, in order, each with the instant at which it was taken. Nothing in
-    /// sessions from before it was recorded (schema 1).
+    /// Reports of the trigger box on its own clock, in order, each with the host time of its arrival. Empty in
+    /// sessions of schema 1.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn box_reports(&self) -> Result<Vec<(HostTime, BoxReport)>, RecorderError> {
         const DOING: &str = "reading box reports";
-        if self.ask(DOING, query::schema_version)? < 2 {
+        if self.query(DOING, query::schema_version)? < 2 {
             return Ok(Vec::new());
         }
-        self.all(DOING, "SELECT * FROM box_report ORDER BY id", report_from)
+        self.query_all(DOING, "SELECT * FROM box_report ORDER BY id", report_from)
     }
 
-    /// Everything that broke the normal course, in order.
+    /// All deviations from the planned course, in order.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn interruptions(&self) -> Result<Vec<InterruptionRow>, RecorderError> {
-        self.all(
+        self.query_all(
             "reading interruptions",
             "SELECT * FROM interruption ORDER BY id",
             |row| {
                 Ok(InterruptionRow {
                     t: HostTime(int(row, "t_ns")?),
-                    kind: named(row, "kind", &InterruptionKind::ALL, InterruptionKind::name)?,
+                    kind: enum_value(row, "kind", &InterruptionKind::ALL, InterruptionKind::name)?,
                     reason: text(row, "reason")?,
                 })
             },
         )
     }
 
-    /// Every remark, in order.
+    /// All operator notes, in order.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn notes(&self) -> Result<Vec<NoteRow>, RecorderError> {
-        self.all("reading notes", "SELECT * FROM note ORDER BY id", |row| {
+        self.query_all("reading notes", "SELECT * FROM note ORDER BY id", |row| {
             Ok(NoteRow {
                 t: HostTime(int(row, "t_ns")?),
                 text: text(row, "text")?,
@@ -159,12 +159,12 @@ impl SessionReader {
         })
     }
 
-    /// When and how the run ended; `None` for a run under way or cut off.
+    /// Time and kind of the run's end; `None` for a run in progress or a crashed one.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn end(&self) -> Result<Option<(HostTime, RunEnd)>, RecorderError> {
-        let ends = self.all("reading its end", "SELECT * FROM run_end", |row| {
+        let ends = self.query_all("reading its end", "SELECT * FROM run_end", |row| {
             let reason = opt_text(row, "reason")?.unwrap_or_default();
             let end = match text(row, "status")?.as_str() {
                 "completed" => RunEnd::Completed,

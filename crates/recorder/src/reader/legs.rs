@@ -1,4 +1,4 @@
-//! The legs of a session, and where a further one would go on.
+//! Reading the legs of a session, and the press history that a further leg continues.
 
 use std::collections::BTreeMap;
 
@@ -13,11 +13,11 @@ impl SessionReader {
     /// Every leg in order; at least one.
     ///
     /// # Errors
-    /// When the file is damaged, or its header is not yet written.
+    /// If the file is damaged or its header is not yet written.
     pub fn legs(&self) -> Result<Vec<LegRow>, RecorderError> {
         const DOING: &str = "reading legs";
         let first = "SELECT operator, started_at, host, software, command_line FROM session";
-        let mut legs = self.all(DOING, first, |row| {
+        let mut legs = self.query_all(DOING, first, |row| {
             Ok(LegRow {
                 number: 1,
                 began: began_from(row)?,
@@ -31,11 +31,11 @@ impl SessionReader {
             })
         })?;
         let mut last = legs.pop().ok_or_else(|| self.no_header())?;
-        if self.ask(DOING, async |conn| has_table(conn, "leg").await)? {
+        if self.query(DOING, async |conn| has_table(conn, "leg").await)? {
             for (leg, (end, tree_sha256)) in
-                self.all(DOING, "SELECT * FROM leg ORDER BY number", further_from)?
+                self.query_all(DOING, "SELECT * FROM leg ORDER BY number", further_from)?
             {
-                // What a row says of the leg before belongs to that.
+                // The row of a leg describes the end of the previous one.
                 (last.end, last.tree_sha256) = (end, tree_sha256);
                 legs.push(std::mem::replace(&mut last, leg));
             }
@@ -46,10 +46,10 @@ impl SessionReader {
         Ok(legs)
     }
 
-    /// What is known of each planned press, in plan order: where a further leg goes on.
+    /// History of each planned press, in plan order: the starting point of a further leg.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn history(&self) -> Result<Vec<PressHistory>, RecorderError> {
         let ends = self.legs()?.into_iter().map(|leg| leg.end);
         let plan_done = ends
@@ -58,7 +58,7 @@ impl SessionReader {
         let known = |attempts: Vec<crate::rows::AttemptRow>| {
             let last = attempts.last()?;
             let verdict = last.outcome.as_ref().map(|o| o.verdict.clone());
-            // An attempt without an outcome was cut off, one without kinds is of an older schema: its cause is not known.
+            // Without an outcome, the attempt was interrupted. Without fault kinds, it is of an older schema and its cause is unknown.
             let spends = |a: &&crate::rows::AttemptRow| match &a.outcome {
                 Some(o) if matches!(o.verdict, PressVerdict::Invalid(_)) => {
                     !o.verdict.is_cut_off()
@@ -82,10 +82,10 @@ impl SessionReader {
             .collect())
     }
 
-    /// The chunks of `camera` at which its decoder starts anew, each with the origin of its times, µs.
+    /// Chunks of `camera` at which its decoder restarts, each with the origin of its times, µs.
     pub(crate) fn restarts(&self, camera: CameraId) -> Result<BTreeMap<u64, u64>, RecorderError> {
         const DOING: &str = "reading legs";
-        if !self.ask(DOING, async |conn| has_table(conn, "leg").await)? {
+        if !self.query(DOING, async |conn| has_table(conn, "leg").await)? {
             return Ok(BTreeMap::new());
         }
         let sql = match camera {
@@ -96,10 +96,10 @@ impl SessionReader {
                 "SELECT first_seq_2 AS seq, camera2_origin_us AS origin_us FROM leg ORDER BY number"
             }
         };
-        let restarts = self.all(DOING, sql, |row| {
+        let restarts = self.query_all(DOING, sql, |row| {
             Ok((num(row, "seq")?, num(row, "origin_us")?))
         })?;
-        // Of legs that begin with the same chunk all but the last have none.
+        // If several legs begin with the same chunk, only the last has chunks.
         Ok(restarts.into_iter().collect())
     }
 }
@@ -116,7 +116,7 @@ fn began_from(row: &sqlx::sqlite::SqliteRow) -> Result<ResumeHeader, Fault> {
 
 type Before = (Option<(HostTime, RunEnd)>, Option<[u8; 32]>);
 
-/// A row of `leg`, and what it says of the leg before.
+/// A row of `leg`, and the end and tree hash of the previous leg.
 fn further_from(row: &sqlx::sqlite::SqliteRow) -> Result<(LegRow, Before), Fault> {
     let leg = LegRow {
         number: num(row, "number")?,
@@ -151,7 +151,7 @@ fn further_from(row: &sqlx::sqlite::SqliteRow) -> Result<(LegRow, Before), Fault
             return Err(Fault::bad(
                 "leg",
                 "an end with its time or none",
-                "half of it",
+                "only one of them",
             ));
         }
     };

@@ -1,4 +1,4 @@
-//! The path of the robot.
+//! Reading the measured path of the robot.
 
 use skinrig_model::{HostTime, PoseSample};
 
@@ -7,19 +7,19 @@ use crate::error::RecorderError;
 use crate::from_row::pose_block_from;
 use crate::query::num;
 
-/// Found by the index over the blocks' ends: a session has a block every few seconds of a night, between the chunks.
+/// Uses the index over the blocks' end times: a long session has thousands of blocks between its chunks.
 const BLOCK_ENDING_AFTER: &str = EXPLAINED.split_at(EXPLAIN.len()).1;
-/// The same, for the test that it is found so: a statement is a literal.
+/// The same with EXPLAIN, for the test of the index: a statement must be a literal.
 const EXPLAINED: &str = "EXPLAIN QUERY PLAN SELECT id, first_ns, last_ns, samples, sha256, data FROM pose_block
      WHERE id = (SELECT id FROM pose_block WHERE last_ns >= ?1 AND (last_ns > ?1 OR id > ?2) ORDER BY last_ns, id LIMIT 1)
      AND first_ns <= ?3";
 const EXPLAIN: &str = "EXPLAIN QUERY PLAN ";
 
 impl SessionReader {
-    /// Calls `each` with the pose samples of `from <= t <= to` in time order, a block at a time.
+    /// Calls `each` with the pose samples of `from <= t <= to` in time order, one block at a time.
     ///
     /// # Errors
-    /// At the first damaged block; samples before it have been handed over.
+    /// At the first damaged block, after passing on all earlier samples.
     pub fn for_each_pose_block(
         &self,
         from: HostTime,
@@ -41,14 +41,14 @@ impl SessionReader {
         Ok(())
     }
 
-    /// The first pose block that ends at an instant or later, past the block of this id when both end in the same one; checked.
-    /// `None` when that block begins after `to`: blocks are in order of time.
+    /// The first pose block that ends at `from` or later, after block `id` if both end at the same time; checked.
+    /// `None` if it begins after `to`. Blocks are in time order.
     fn pose_block_ending_after(
         &self,
         (end, id): (HostTime, i64),
         to: HostTime,
     ) -> Result<Option<(i64, Vec<PoseSample>)>, RecorderError> {
-        self.ask("reading poses", async |conn| {
+        self.query("reading poses", async |conn| {
             let row = sqlx::query(BLOCK_ENDING_AFTER)
                 .bind(end.0)
                 .bind(id)
@@ -59,12 +59,12 @@ impl SessionReader {
         })
     }
 
-    /// How many samples there are.
+    /// Number of pose samples.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn pose_samples(&self) -> Result<u64, RecorderError> {
-        self.ask("counting poses", async |conn| {
+        self.query("counting poses", async |conn| {
             let sql = "SELECT coalesce(sum(samples), 0) AS n FROM pose_block";
             let row = sqlx::query(sql).fetch_one(conn).await?;
             num(&row, "n")
@@ -76,7 +76,7 @@ impl SessionReader {
         &self,
         after: i64,
     ) -> Result<Option<(i64, Vec<PoseSample>)>, RecorderError> {
-        self.ask("reading poses", async |conn| {
+        self.query("reading poses", async |conn| {
             let row = sqlx::query(
                 "SELECT id, first_ns, last_ns, samples, sha256, data FROM pose_block
                  WHERE id > ? ORDER BY id LIMIT 1",
@@ -88,11 +88,11 @@ impl SessionReader {
         })
     }
 
-    /// The pose samples of `from <= t <= to`, in time order. For spans of some seconds; see
+    /// Pose samples of `from <= t <= to`, in time order. For spans of seconds; use
     /// [`for_each_pose_block`](Self::for_each_pose_block) for long ones.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn poses(&self, from: HostTime, to: HostTime) -> Result<Vec<PoseSample>, RecorderError> {
         let mut poses = Vec::new();
         self.for_each_pose_block(from, to, |block| poses.extend_from_slice(block))?;
@@ -108,7 +108,7 @@ mod tests {
     use crate::migrations::MIGRATOR;
 
     #[test]
-    fn a_block_is_found_without_a_walk_over_the_others() {
+    fn finding_a_block_does_not_scan_the_others() {
         let plan = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()

@@ -1,4 +1,4 @@
-//! Camera bytes, chunk by chunk, and what is known about them.
+//! Reading camera bytes and their metadata, chunk by chunk.
 
 use std::collections::BTreeMap;
 
@@ -11,30 +11,30 @@ use crate::from_row::chunk_from;
 use crate::query::{blob, each_row, has_table, int, num, opt_num};
 use crate::rows::{ChunkMeta, Loss};
 
-/// What is known about a chunk, then how many bytes are stored of it.
+/// Metadata of all chunks, with their stored size.
 const INDEX: &str = "SELECT camera, seq, host_ns, lost_before, codec, raw_bytes, raw_crc32, first_us, last_us, cd_events,
        on_events, trigger_edges, length(stored) AS stored_bytes
      FROM chunk WHERE camera = ? ORDER BY seq";
 
-/// The same of the last chunks.
+/// The same for the last chunks.
 const TAIL: &str = "SELECT camera, seq, host_ns, lost_before, codec, raw_bytes, raw_crc32, first_us, last_us, cd_events,
        on_events, trigger_edges, length(stored) AS stored_bytes
      FROM chunk WHERE camera = ? ORDER BY seq DESC LIMIT ?";
 
-/// The same of one chunk, and what is stored of it.
+/// The same for one chunk, with its stored bytes.
 const NEXT: &str = "SELECT camera, seq, host_ns, lost_before, codec, raw_bytes, raw_crc32, first_us, last_us, cd_events,
        on_events, trigger_edges, length(stored) AS stored_bytes, stored
      FROM chunk WHERE camera = ? AND seq >= ? ORDER BY seq LIMIT 1";
 
 impl SessionReader {
-    /// Every chunk of `camera` without its bytes, in stream order.
+    /// Metadata of every chunk of `camera`, in stream order.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn chunk_index(&self, camera: CameraId) -> Result<Vec<ChunkMeta>, RecorderError> {
         let restarts = self.restarts(camera)?;
         let lost = self.lost_times(camera)?;
-        self.ask("reading the chunk index", async |conn| {
+        self.query("reading the chunk index", async |conn| {
             let query = sqlx::query(INDEX).bind(camera.number());
             let mut index = Vec::new();
             each_row(query, conn, |row| {
@@ -49,17 +49,17 @@ impl SessionReader {
         })
     }
 
-    /// The last `most` chunks of `camera` without their bytes, in stream order: reads no others, however many there are.
+    /// Metadata of the last `most` chunks of `camera`, in stream order. Reads no other chunks.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn last_chunks(
         &self,
         camera: CameraId,
         most: u32,
     ) -> Result<Vec<ChunkMeta>, RecorderError> {
         let restarts = self.restarts(camera)?;
-        self.ask("reading the chunk index", async |conn| {
+        self.query("reading the chunk index", async |conn| {
             let query = sqlx::query(TAIL).bind(camera.number()).bind(most);
             let mut last = Vec::new();
             each_row(query, conn, |row| {
@@ -74,22 +74,22 @@ impl SessionReader {
         })
     }
 
-    /// The bytes of one chunk as they came, checked against their checksum.
+    /// Raw bytes of one chunk, verified by checksum.
     ///
     /// # Errors
-    /// [`RecorderError::NotThere`] for a number beyond the last chunk; [`RecorderError::Damaged`].
+    /// [`RecorderError::NotFound`] beyond the last chunk; [`RecorderError::Damaged`].
     pub fn chunk_bytes(&self, camera: CameraId, seq: u64) -> Result<Vec<u8>, RecorderError> {
         match self.chunk_at_or_after(camera, seq)? {
             Some((meta, bytes)) if meta.seq == seq => Ok(bytes),
-            _ => Err(RecorderError::NotThere {
+            _ => Err(RecorderError::NotFound {
                 path: self.path.clone(),
-                wanted: format!("{camera} chunk {seq}"),
+                expected: format!("{camera} chunk {seq}"),
             }),
         }
     }
 
-    /// The first chunk from `seq` on, with its bytes as they came, checked; whether it begins a leg, and
-    /// what time was lost before it, is left to the caller.
+    /// The first chunk from `seq` on, with its verified raw bytes. The caller fills in whether it begins a leg and
+    /// which time was lost before it.
     pub(crate) fn chunk_at_or_after(
         &self,
         camera: CameraId,
@@ -98,7 +98,7 @@ impl SessionReader {
         let Ok(from) = i64::try_from(seq) else {
             return Ok(None);
         };
-        let found = self.ask("reading a chunk", async |conn| {
+        let found = self.query("reading a chunk", async |conn| {
             let query = sqlx::query(NEXT).bind(camera.number()).bind(from);
             let row = query.fetch_optional(conn).await?;
             row.map(|row| Ok((chunk_from(&row)?, blob(&row, "stored")?)))
@@ -111,7 +111,7 @@ impl SessionReader {
         let bytes = match meta.codec {
             Codec::None => stored,
             Codec::TimeHighRuns => codec::unfold(&stored, meta.raw_bytes as usize)
-                .map_err(|e| self.damaged(place(), "bytes that unfold", e.to_string()))?,
+                .map_err(|e| self.damaged(place(), "bytes that can be unfolded", e.to_string()))?,
         };
         if bytes.len() as u64 != meta.raw_bytes {
             let expected = format!("{} bytes", meta.raw_bytes);
@@ -125,11 +125,11 @@ impl SessionReader {
         Ok(Some((meta, bytes)))
     }
 
-    /// Calls `each` with every chunk of `camera` from number `from_seq` on, in stream order, with its bytes as
-    /// they came. One chunk is in memory at a time; `each` may use this reader.
+    /// Calls `each` with every chunk of `camera` from number `from_seq` on, in stream order, with its raw bytes.
+    /// One chunk is in memory at a time. `each` may use this reader.
     ///
     /// # Errors
-    /// At the first damaged chunk; those before it have been handed over.
+    /// At the first damaged chunk, after passing on all earlier ones.
     pub fn for_each_chunk(
         &self,
         camera: CameraId,
@@ -148,9 +148,9 @@ impl SessionReader {
         Ok(())
     }
 
-    /// What the table of gaps says, by chunk; nothing in a session of a schema before it.
+    /// Contents of the gap table by chunk; empty before schema 6.
     fn lost_times(&self, camera: CameraId) -> Result<BTreeMap<u64, LostTime>, RecorderError> {
-        self.ask("reading the gaps", async |conn| {
+        self.query("reading the gaps", async |conn| {
             let mut times = BTreeMap::new();
             if !has_table(conn, "gap").await? {
                 return Ok(times);
@@ -170,11 +170,11 @@ impl SessionReader {
         })
     }
 
-    /// What `camera` lost, in stream order: from the last time that is good to the first time after, over the ends of legs too.
-    /// Losses between which no time came are one.
+    /// Losses of `camera` in stream order, also across legs: from the last valid time before to the first time after.
+    /// Losses with no time between them are merged.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn losses(&self, camera: CameraId) -> Result<Vec<Loss>, RecorderError> {
         let mut losses = Vec::new();
         let (mut last_us, mut open) = (None, None::<Loss>);
@@ -190,7 +190,7 @@ impl SessionReader {
                     },
                 });
                 loss.bytes = loss.bytes.saturating_add(chunk.lost_before);
-                // A device may know that it began earlier.
+                // A device may report an earlier start of the loss.
                 let from_us = [loss.time.from_us, told_us];
                 loss.time.from_us = from_us.into_iter().flatten().min();
             }
@@ -206,22 +206,22 @@ impl SessionReader {
         Ok(losses)
     }
 
-    /// Camera-time intervals `(from_us, to_us)` in which bytes of `camera` were lost, as [`Self::losses`]; 0 and `u64::MAX` where an
-    /// end is not known.
+    /// Camera-time intervals `(from_us, to_us)` of lost bytes of `camera`, like [`Self::losses`]; 0 and `u64::MAX` for an
+    /// unknown end.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn gaps(&self, camera: CameraId) -> Result<Vec<(u64, u64)>, RecorderError> {
         let losses = self.losses(camera)?;
         Ok(losses.iter().map(|loss| loss.time.bounds_us()).collect())
     }
 
-    /// Camera-time intervals `(from_us, to_us)` in which `camera` was recording: for each leg from the first time in its stream to
-    /// the last.
+    /// Camera-time intervals `(from_us, to_us)` in which `camera` was recording: one per leg, from the first to the last time in
+    /// its stream.
     ///
     /// # Errors
-    /// When the file is damaged.
-    pub fn recorded(&self, camera: CameraId) -> Result<Vec<(u64, u64)>, RecorderError> {
+    /// If the file is damaged.
+    pub fn recorded_intervals(&self, camera: CameraId) -> Result<Vec<(u64, u64)>, RecorderError> {
         let mut spans: Vec<(u64, u64)> = Vec::new();
         let mut is_new = true;
         for chunk in self.chunk_index(camera)? {
@@ -240,7 +240,7 @@ impl SessionReader {
     /// The trigger edges of `camera`, in stream order, all channels.
     ///
     /// # Errors
-    /// When the file is damaged.
+    /// If the file is damaged.
     pub fn trigger_edges(&self, camera: CameraId) -> Result<Vec<TriggerEdge>, RecorderError> {
         self.edges(camera, 0, i64::MAX)
     }
@@ -252,7 +252,7 @@ impl SessionReader {
         from_seq: i64,
         to_seq: i64,
     ) -> Result<Vec<TriggerEdge>, RecorderError> {
-        self.ask("reading trigger edges", async |conn| {
+        self.query("reading trigger edges", async |conn| {
             let query = sqlx::query(
                 "SELECT t_us, channel, rising FROM trigger_edge
                  WHERE camera = ? AND seq BETWEEN ? AND ? ORDER BY seq, position",

@@ -1,4 +1,4 @@
-//! From a page to the rows on it: cells, records, values. Total: any bytes give rows or nothing.
+//! Parses a page into cells, records and values. Total: any bytes yield rows or nothing.
 //!
 //! Layout: sqlite.org/fileformat.html, sections 1.6 and 2.
 
@@ -7,14 +7,14 @@ use std::io;
 
 use super::pages::{Image, Pages};
 
-/// No row of a session is longer: a chunk has at most 64 MiB, a protocol and its plan a few.
-const MOST_BYTES: u64 = 256 << 20;
-/// SQLite knows no smaller page.
-const LEAST_PAGE: usize = 512;
-/// How many times its own size the rows of a page may have: they lie beside each other, but where each begins may be damaged.
-const OVERLAP: usize = 4;
+/// Longest row of a session, bytes: a chunk has at most 64 MiB, protocol and plan a few.
+const MAX_BYTES: u64 = 256 << 20;
+/// Smallest page size that SQLite supports.
+const MIN_PAGE_BYTES: usize = 512;
+/// Most bytes of rows on a page, relative to its size. TableRows do not overlap, but damaged offsets may.
+const MAX_OVERLAP: usize = 4;
 
-/// A value as it is stored.
+/// A stored value.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
     Null,
@@ -22,28 +22,28 @@ pub enum Value {
     Real(f64),
     Text(String),
     Blob(Vec<u8>),
-    /// Text that is none.
-    Broken,
+    /// Text that is not UTF-8.
+    InvalidText,
 }
 
-/// Where one row lies.
+/// Location of one row.
 #[derive(Debug, Clone, Copy)]
 pub struct Cell {
-    /// Of a table's rows; `None` on pages of rows that are kept in key order.
+    /// Row id in a table; `None` on index pages and in tables without row ids.
     pub rowid: Option<i64>,
     at: usize,
-    /// All bytes of the row, and those on its own page.
+    /// Bytes of the whole row, and of its part on this page.
     payload: u64,
     local: usize,
 }
 
-/// The rows of a page, when it is one that holds rows.
+/// Cells of a page; empty if it holds no rows.
 pub fn cells(image: Image, page: &[u8]) -> Vec<Cell> {
     let start = if image.page == 1 { 100 } else { 0 };
-    if page.len() < LEAST_PAGE {
+    if page.len() < MIN_PAGE_BYTES {
         return Vec::new();
     }
-    // Leaf of a table; leaf and inner page of rows in key order.
+    // Table leaf; index leaf and index interior page.
     let (keyed, header, child) = match page.get(start) {
         Some(0x0D) => (false, 8, 0),
         Some(0x0A) => (true, 8, 0),
@@ -75,12 +75,12 @@ pub fn cells(image: Image, page: &[u8]) -> Vec<Cell> {
             rowid = Some(id as i64);
             at += n;
         }
-        if !(2..=MOST_BYTES).contains(&payload) {
+        if !(2..=MAX_BYTES).contains(&payload) {
             continue;
         }
         let local = local_bytes(page.len(), payload as usize, keyed);
         filled += local;
-        if filled > OVERLAP * page.len() {
+        if filled > MAX_OVERLAP * page.len() {
             break;
         }
         out.push(Cell {
@@ -94,13 +94,13 @@ pub fn cells(image: Image, page: &[u8]) -> Vec<Cell> {
 }
 
 impl Cell {
-    /// Whether it is too long to be kept in memory.
+    /// Whether the row is too long to be kept in memory.
     pub(crate) const fn is_long(&self) -> bool {
         self.payload > 64 << 10
     }
 
-    /// All bytes of the row, from its page and those on which it goes on; `None` when they do not hang together. `most` cuts
-    /// long rows off: their first bytes tell what they are.
+    /// Bytes of the row, from its page and its overflow pages; `None` if the chain is broken. Stops after `most` bytes: the first
+    /// bytes suffice to identify a long row.
     pub fn payload(
         &self,
         page: &[u8],
@@ -118,7 +118,7 @@ impl Cell {
         let mut next = number(page, self.at + self.local);
         let (mut image, mut seen) = (Vec::new(), HashSet::new());
         while bytes.len() < wanted {
-            // A row never comes by a page twice.
+            // A valid overflow chain never visits a page twice.
             let Some(n) = next.filter(|n| *n > 1 && seen.insert(*n)) else {
                 return Ok(None);
             };
@@ -133,7 +133,7 @@ impl Cell {
     }
 }
 
-/// Bytes of a row that lie on its own page (section 1.6, "cell payload overflow").
+/// Bytes of a row stored on its own page (section 1.6, "cell payload overflow").
 fn local_bytes(usable: usize, payload: usize, keyed: bool) -> usize {
     let most = if keyed {
         (usable - 12) * 64 / 255 - 23
@@ -168,7 +168,7 @@ fn varint(bytes: &[u8], at: usize) -> Option<(u64, usize)> {
     None
 }
 
-/// The serial types of a row: what its head says of its values (section 2.1), and where the first one begins.
+/// Serial types from the header of a record (section 2.1), and the offset of the first value.
 pub(crate) fn serial_types(payload: &[u8]) -> Option<(Vec<u64>, usize)> {
     let (head, mut at) = varint(payload, 0)?;
     let head = usize::try_from(head).ok().filter(|h| *h <= payload.len())?;
@@ -184,7 +184,7 @@ pub(crate) fn serial_types(payload: &[u8]) -> Option<(Vec<u64>, usize)> {
     (at == head).then_some((types, head))
 }
 
-/// The values of a row; `None` when its bytes do not hold what its head says.
+/// Values of a record; `None` if its length contradicts its header.
 pub fn values(payload: &[u8]) -> Option<Vec<Value>> {
     let (types, head) = serial_types(payload)?;
     let content = types
@@ -194,7 +194,7 @@ pub fn values(payload: &[u8]) -> Option<Vec<Value>> {
     whole.then(|| leading(payload, usize::MAX)).flatten()
 }
 
-/// The first `most` values of a row, as far as `payload`, which may be only its beginning, holds them.
+/// The first `most` values of a record, as far as the possibly truncated `payload` contains them.
 pub fn leading(payload: &[u8], most: usize) -> Option<Vec<Value>> {
     let (types, mut at) = serial_types(payload)?;
     let mut out = Vec::new();
@@ -219,7 +219,7 @@ fn value(serial: u64, content: &[u8]) -> Option<Value> {
         9 => Value::Int(1),
         1..=6 => Value::Int(integer(content)),
         n if n % 2 == 0 => Value::Blob(content.to_vec()),
-        _ => String::from_utf8(content.to_vec()).map_or(Value::Broken, Value::Text),
+        _ => String::from_utf8(content.to_vec()).map_or(Value::InvalidText, Value::Text),
     })
 }
 
@@ -273,7 +273,7 @@ mod tests {
         #[test]
         fn any_bytes_give_rows_or_nothing(bytes: Vec<u8>, page in 1u32..3, kind in 0usize..4) {
             let mut bytes = bytes;
-            bytes.resize(LEAST_PAGE, 0xFF);
+            bytes.resize(MIN_PAGE_BYTES, 0xFF);
             let start = if page == 1 { 100 } else { 0 };
             if let Some(first) = bytes.get_mut(start) {
                 *first = [0x0D, 0x0A, 0x02, 0x05][kind];

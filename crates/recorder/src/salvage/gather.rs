@@ -1,33 +1,33 @@
-//! Gathers the rows of a damaged session from every page that still holds any.
+//! Gathers the rows of a damaged session from every readable page.
 
 use std::collections::BTreeMap;
 use std::io;
 
 use super::cells::{self, Cell, Value};
 use super::pages::{Image, Pages};
-use super::shapes::{Part, Shape};
+use super::shapes::{KeyPart, TableShape};
 
-/// A row that was found.
+/// A recovered row.
 #[derive(Debug, Clone)]
-pub enum Found {
-    /// As it is.
-    Row(Vec<Value>),
-    /// Where it lies: it is long, and read again when it is written.
-    Place(Image, Cell),
+pub enum FoundRow {
+    /// The values.
+    Values(Vec<Value>),
+    /// The location of a long row, which is read again when it is written.
+    Location(Image, Cell),
 }
 
-/// The rows of one table, by what names them.
+/// Recovered rows of one table, by key.
 #[derive(Debug, Default)]
-pub struct Rows {
-    pub rows: BTreeMap<Vec<Part>, Found>,
-    /// Rows that are there in part: their page goes on where nothing is any more.
+pub struct TableRows {
+    pub rows: BTreeMap<Vec<KeyPart>, FoundRow>,
+    /// Number of rows whose overflow pages are missing.
     pub torn: u64,
 }
 
-/// Every row of every shape, in the order of `shapes`. An image of a page that was written later supersedes those before it, row by row: rows are added and
-/// completed, and but for the end and the seal of a session that goes on never taken away.
-pub fn gather(pages: &mut Pages, shapes: &[Shape]) -> io::Result<Vec<Rows>> {
-    let mut out: Vec<Rows> = shapes.iter().map(|_| Rows::default()).collect();
+/// Gathers all rows of every table, in the order of `shapes`. A later image of a page supersedes earlier ones row by row: rows are
+/// added and completed but never deleted, except for the end and the seal of a resumed session.
+pub fn gather(pages: &mut Pages, shapes: &[TableShape]) -> io::Result<Vec<TableRows>> {
+    let mut out: Vec<TableRows> = shapes.iter().map(|_| TableRows::default()).collect();
     let mut page = Vec::new();
     for image in pages.images() {
         pages.read(image, &mut page)?;
@@ -39,8 +39,8 @@ pub fn gather(pages: &mut Pages, shapes: &[Shape]) -> io::Result<Vec<Rows>> {
                 continue;
             };
             let keyed = cell.rowid.is_none();
-            let fitting = |shape: &&(usize, &Shape)| shape.1.takes(&types, keyed);
-            let fitting: Vec<(usize, &Shape)> =
+            let fitting = |shape: &&(usize, &TableShape)| shape.1.matches_types(&types, keyed);
+            let fitting: Vec<(usize, &TableShape)> =
                 shapes.iter().enumerate().filter(|s| fitting(&s)).collect();
             let Some(&(first, shape)) = fitting.first() else {
                 continue;
@@ -48,7 +48,7 @@ pub fn gather(pages: &mut Pages, shapes: &[Shape]) -> io::Result<Vec<Rows>> {
             if shape.kind.hashed.is_some() {
                 let row = cells::leading(&head, types.len()).map(|v| shape.row(v, cell.rowid));
                 if let Some(key) = row.and_then(|row| shape.key(&row)) {
-                    out[first].rows.insert(key, Found::Place(image, cell));
+                    out[first].rows.insert(key, FoundRow::Location(image, cell));
                 }
                 continue;
             }
@@ -57,10 +57,10 @@ pub fn gather(pages: &mut Pages, shapes: &[Shape]) -> io::Result<Vec<Rows>> {
                 out[first].torn += 1;
                 continue;
             };
-            let Some(&(i, shape)) = fitting.iter().find(|(_, s)| s.says(&values)) else {
+            let Some(&(i, shape)) = fitting.iter().find(|(_, s)| s.matches_values(&values)) else {
                 continue;
             };
-            // A further leg takes these away: older copies of their page say nothing.
+            // A further leg deletes these rows, so older copies of the page are obsolete.
             let taken_away = matches!(shape.kind.name, "run_end" | "table_digest");
             if taken_away && pages.latest(image.page) != Some(image) {
                 continue;
@@ -70,15 +70,15 @@ pub fn gather(pages: &mut Pages, shapes: &[Shape]) -> io::Result<Vec<Rows>> {
                 continue;
             };
             let rows = &mut out[i].rows;
-            // An attempt whose end is known is never undone by an older copy of its page.
+            // A completed attempt never becomes open again, so an older copy does not replace it.
             let undone = shape.kind.name == "attempt"
-                && matches!(rows.get(&key), Some(Found::Row(old)) if old[VERDICT] != Value::Null)
+                && matches!(rows.get(&key), Some(FoundRow::Values(old)) if old[VERDICT] != Value::Null)
                 && row[VERDICT] == Value::Null;
             if !undone {
                 let found = if cell.is_long() {
-                    Found::Place(image, cell)
+                    FoundRow::Location(image, cell)
                 } else {
-                    Found::Row(row)
+                    FoundRow::Values(row)
                 };
                 rows.insert(key, found);
             }
@@ -90,11 +90,15 @@ pub fn gather(pages: &mut Pages, shapes: &[Shape]) -> io::Result<Vec<Rows>> {
 /// The column `verdict` of `attempt`.
 const VERDICT: usize = 4;
 
-/// The columns of a row that was found; `None` when it does not hang together any more.
-pub fn read(pages: &mut Pages, shape: &Shape, found: &Found) -> io::Result<Option<Vec<Value>>> {
+/// Columns of a recovered row; `None` if its overflow chain is broken.
+pub fn read(
+    pages: &mut Pages,
+    shape: &TableShape,
+    found: &FoundRow,
+) -> io::Result<Option<Vec<Value>>> {
     let (image, cell) = match found {
-        Found::Row(row) => return Ok(Some(row.clone())),
-        Found::Place(image, cell) => (image, cell),
+        FoundRow::Values(row) => return Ok(Some(row.clone())),
+        FoundRow::Location(image, cell) => (image, cell),
     };
     let mut page = Vec::new();
     pages.read(*image, &mut page)?;
@@ -103,9 +107,13 @@ pub fn read(pages: &mut Pages, shape: &Shape, found: &Found) -> io::Result<Optio
     Ok(values.map(|values| shape.row(values, cell.rowid)))
 }
 
-/// The columns of a long row as far as its own page holds them; the others null.
-pub fn beginning(pages: &mut Pages, shape: &Shape, found: &Found) -> io::Result<Vec<Value>> {
-    let Found::Place(image, cell) = found else {
+/// Columns of a long row that its own page contains; the others are null.
+pub fn read_leading(
+    pages: &mut Pages,
+    shape: &TableShape,
+    found: &FoundRow,
+) -> io::Result<Vec<Value>> {
+    let FoundRow::Location(image, cell) = found else {
         return Ok(Vec::new());
     };
     let mut page = Vec::new();

@@ -1,15 +1,15 @@
-//! What did not come back: held against the seal and against what other rows say, and told in the new file.
+//! Lists missing rows, by comparison with the seal and with other rows, and documents them in the new file.
 
 use super::cells::Value;
-use super::fill::{Failed, Filling};
-use super::gather::Found;
-use super::shapes::Part;
-use crate::chain::{self, Link};
+use super::gather::FoundRow;
+use super::shapes::KeyPart;
+use super::writer::{SalvageError, SalvageWriter};
+use crate::chain::{self, PreviousSeal};
 use crate::digest;
 
-impl Filling<'_> {
-    /// Compares each table with the digest that it was sealed with, when that came back.
-    pub(super) async fn compare_with_seal(&mut self) -> Result<(), Failed> {
+impl SalvageWriter<'_> {
+    /// Compares each table with its digest in the seal, if that was recovered.
+    pub(super) async fn compare_with_seal(&mut self) -> Result<(), SalvageError> {
         let sealed = self
             .shapes
             .iter()
@@ -19,8 +19,8 @@ impl Filling<'_> {
             return Ok(());
         };
         for digest in digest::digest_tables(self.conn).await? {
-            let key = vec![Part::Text(digest.name.clone())];
-            let Some(Found::Row(row)) = sealed.rows.get(&key) else {
+            let key = vec![KeyPart::Text(digest.name.clone())];
+            let Some(FoundRow::Values(row)) = sealed.rows.get(&key) else {
                 continue;
             };
             if row.get(2) == Some(&Value::Blob(digest.sha256.to_vec())) {
@@ -31,17 +31,19 @@ impl Filling<'_> {
                 _ => "unknown".to_owned(),
             };
             self.report.findings.push(format!(
-                "table {}: expected the {rows} rows that were sealed, found {} rows or other values",
+                "table {}: expected the {rows} rows that were sealed, found {} rows or different values",
                 digest.name, digest.rows
             ));
         }
         Ok(())
     }
 
-    /// A seal before a leg whose rows did not all come back proves nothing any more, and is left out.
-    pub(super) async fn drop_broken_links(&mut self) -> Result<(), Failed> {
+    /// Drops the seals of earlier legs whose rows are incomplete: they prove nothing any more.
+    pub(super) async fn drop_unprovable_seals(&mut self) -> Result<(), SalvageError> {
         for (leg, link) in chain::check(self.conn).await? {
-            let Link::Broken(_) = link else { continue };
+            let PreviousSeal::Mismatch(_) = link else {
+                continue;
+            };
             for drop in [
                 "DELETE FROM previous_table_digest WHERE leg = ?",
                 "DELETE FROM previous_seal WHERE leg = ?",
@@ -50,15 +52,15 @@ impl Filling<'_> {
                 sqlx::query(drop).bind(leg).execute(&mut *self.conn).await?;
             }
             self.report.findings.push(format!(
-                "leg {leg}: expected the rows that the seal before it covers, found others; that seal was left out"
+                "leg {leg}: expected the rows under the previous seal, found different ones; that seal was dropped"
             ));
         }
         Ok(())
     }
 
-    /// What rows that came back say of rows that did not: an unsealed session has no digests to hold against.
-    pub(super) async fn compare_with_each_other(&mut self) -> Result<(), Failed> {
-        for (missing, what) in ABSENT {
+    /// Finds rows that other rows refer to. An unsealed session has no digests to compare with.
+    pub(super) async fn compare_with_each_other(&mut self) -> Result<(), SalvageError> {
+        for (missing, what) in MISSING_ROW_QUERIES {
             let count: i64 = sqlx::query_scalar(missing)
                 .fetch_one(&mut *self.conn)
                 .await?;
@@ -67,22 +69,22 @@ impl Filling<'_> {
             }
         }
         if self.pages.is_exhausted() {
-            self.report.findings.push(
-                "rows go on to the same pages over and over: not all of them were read".to_owned(),
-            );
+            self.report
+                .findings
+                .push("rows share overflow pages: not all of them were read".to_owned());
         }
         Ok(())
     }
 
-    /// The new file tells where it comes from.
-    pub(super) async fn note(&mut self, name: &str) -> Result<(), Failed> {
+    /// Adds a note about the origin of the new file.
+    pub(super) async fn note(&mut self, name: &str) -> Result<(), SalvageError> {
         let lost = self.report.tables.iter().filter(|t| t.missing > 0);
         let mut lost: Vec<String> = lost
             .map(|t| format!("{} row(s) of {}", t.missing, t.name))
             .collect();
         lost.extend(self.report.findings.iter().cloned());
         let lost = if lost.is_empty() {
-            "nothing known to be lost".to_owned()
+            "no known losses".to_owned()
         } else {
             format!("lost: {}", lost.join("; "))
         };
@@ -100,15 +102,15 @@ impl Filling<'_> {
     }
 }
 
-/// Counts what must be there and is not, each with its words.
-const ABSENT: [(&str, &str); 6] = [
+/// Queries that count missing rows, each with its message.
+const MISSING_ROW_QUERIES: [(&str, &str); 6] = [
     (
         "SELECT 1 - count(*) FROM session",
-        "row of session missing: what the session is",
+        "row of session missing: the header of the session",
     ),
     (
         "SELECT 3 - count(*) FROM robot_from_skin",
-        "row(s) of robot_from_skin missing: where the skin lies",
+        "row(s) of robot_from_skin missing: the pose of the skin",
     ),
     (
         "SELECT coalesce(max(json_array_length(plan_json, '$.presses')), 0) - (SELECT count(*) FROM press) FROM session",
@@ -116,14 +118,14 @@ const ABSENT: [(&str, &str); 6] = [
     ),
     (
         "SELECT count(*) FROM (SELECT press FROM attempt UNION SELECT press FROM mark) WHERE press NOT IN (SELECT id FROM press)",
-        "press(es) missing that an attempt or a mark names",
+        "press(es) missing to which an attempt or a mark refers",
     ),
     (
         "SELECT count(DISTINCT press) FROM mark WHERE press NOT IN (SELECT press FROM attempt)",
-        "press(es) with a mark and without an attempt",
+        "press(es) with a mark but no attempt",
     ),
     (
         "SELECT count(*) FROM (SELECT press FROM attempt GROUP BY press HAVING max(number) <> count(*))",
-        "press(es) of which an earlier attempt is missing",
+        "press(es) with a missing earlier attempt",
     ),
 ];

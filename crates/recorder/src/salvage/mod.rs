@@ -1,59 +1,59 @@
-//! Brings back what a damaged session file still holds: every row whose bytes are whole, into a new file.
+//! Salvage: copies every intact row of a damaged session into a new file.
 //!
-//! SQLite gives up on a file of which one page is damaged. Here every page of the file and of its log is looked at for itself:
-//! a row is known by its shape, and camera bytes and poses by the SHA-256 beside them, so that neither the tree that leads to a
-//! page nor the schema is needed. What does not come back is told, and lost camera bytes become gaps in the stream, so that an
-//! analysis leaves out the presses that they touch.
+//! SQLite rejects a file with a single damaged page. So the salvage examines each page of the file and of its log separately. It
+//! identifies rows by their shape, and camera bytes and poses by the SHA-256 beside them, without using the page tree or the stored
+//! schema. It lists all losses; lost camera bytes become gaps in the stream, so that the analysis excludes the affected
+//! presses.
 
 mod cells;
-mod fill;
 mod gather;
 mod missing;
 mod pages;
 mod report;
 mod shapes;
+mod writer;
 
 use std::io::Read;
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
-use crate::beside::{beside, refuse_special_files};
 use crate::error::RecorderError;
 use crate::hex::hex;
 use crate::query::Fault;
 use crate::schema;
+use crate::sidecar::{reject_special_files, sidecar_path};
 
-use self::fill::Filling;
 use self::pages::Pages;
 use self::report::io;
 pub use self::report::{LostBytes, SalvageReport, SalvagedTable};
+use self::writer::SalvageWriter;
 
-/// Copies all that is whole of the session `from`, and of the log beside it, into the new file `to`, which is left unsealed. `from` is
+/// Copies all intact rows of the session `from` and its log into the new file `to`, which stays unsealed. `from` is
 /// only read.
 ///
 /// # Errors
-/// [`RecorderError::Exists`] when there is a file `to`; [`RecorderError::NotASession`] when nothing of a session is found;
-/// [`RecorderError::Io`] when a file cannot be read or written.
+/// [`RecorderError::Exists`] if `to` exists; [`RecorderError::NotASession`] if no row of a session is found;
+/// [`RecorderError::Io`] if a file cannot be read or written.
 pub fn salvage(from: &Path, to: &Path) -> Result<SalvageReport, RecorderError> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .build()
         .map_err(|source| io(from, "starting to read it", source))?;
-    refuse_special_files(from)?;
-    let log = beside(from, "-wal");
+    reject_special_files(from)?;
+    let log = sidecar_path(from, "-wal");
     let source_sha256 = sha256_of(from)?;
     let mut pages = Pages::open(from, &log).map_err(|e| io(from, "reading it", e))?;
     runtime.block_on(async {
         let mut conn = schema::create(to).await?;
-        let fault = |e: Fault| e.at(to, "writing what was salvaged");
+        let fault = |e: Fault| e.at(to, "writing the salvaged rows");
         let shapes = shapes::shapes(&mut conn).await.map_err(fault)?;
         let rows = gather::gather(&mut pages, &shapes).map_err(|e| io(from, "reading it", e))?;
         if rows.iter().all(|r| r.rows.is_empty()) {
             drop(conn);
             for file in [
                 to.to_owned(),
-                beside(to, "-wal"),
-                beside(to, "-shm"),
+                sidecar_path(to, "-wal"),
+                sidecar_path(to, "-shm"),
             ] {
                 let _ = std::fs::remove_file(file);
             }
@@ -70,7 +70,7 @@ pub fn salvage(from: &Path, to: &Path) -> Result<SalvageReport, RecorderError> {
         if pages.damaged_frames > 0 {
             let n = pages.damaged_frames;
             report.findings.push(format!(
-                "the log: {n} page(s) with a wrong checksum, damaged or left of a transaction that was never committed"
+                "the log: {n} page(s) with a wrong checksum: damaged, or from a transaction that was never committed"
             ));
         }
         if pages.cut_bytes > 0 {
@@ -79,7 +79,7 @@ pub fn salvage(from: &Path, to: &Path) -> Result<SalvageReport, RecorderError> {
                 pages.cut_bytes
             ));
         }
-        let mut filling = Filling {
+        let mut filling = SalvageWriter {
             conn: &mut conn,
             pages: &mut pages,
             shapes: &shapes,

@@ -1,4 +1,4 @@
-//! The pages of a session file and of its log, read without SQLite and whatever state they are in.
+//! Page images of a session file and its log, read without SQLite whatever their state.
 //!
 //! Layout of both files: sqlite.org/fileformat.html, sections 1.2 to 1.5 and 4.
 
@@ -7,19 +7,19 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Bytes of a page, when the first page no longer tells: what every session is made with.
+/// Page size if the first page is unreadable: the size that skinrig uses, in bytes.
 const PAGE_BYTES: u64 = 65536;
-/// Bytes before the first frame of a log, and before the page of each frame.
+/// Bytes of the log's header, and of the header of each frame.
 const LOG_HEADER: u64 = 32;
 const FRAME_HEADER: u64 = 24;
-/// How often, on average, a page is read because a row goes on there. Twice is usual; a file made to keep its reader busy
-/// has all its rows go on to the same pages.
-const FOLLOWED: u64 = 32;
+/// Most overflow reads per page, on average. Two are usual; a malicious file could chain all its rows through the same
+/// pages.
+const OVERFLOW_READS_PER_PAGE: u64 = 32;
 
-/// Where one image of a page lies. Later ones supersede earlier ones.
+/// Location of one image of a page. Later images supersede earlier ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Image {
-    /// Which page, from 1.
+    /// Page number, from 1.
     pub page: u32,
     in_log: bool,
     at: u64,
@@ -27,7 +27,7 @@ pub struct Image {
 
 #[cfg(test)]
 impl Image {
-    /// The image of a page in the file itself.
+    /// Image of a page in the file itself.
     pub const fn in_file(page: u32) -> Self {
         Self {
             page,
@@ -37,23 +37,23 @@ impl Image {
     }
 }
 
-/// Every image of every page that can be told: those of the file, then those of the log.
+/// All page images: those of the file, then those of the log.
 pub struct Pages {
     file: File,
     log: Option<File>,
     size: usize,
     images: Vec<Image>,
     latest: HashMap<u32, usize>,
-    /// Frames of the log whose checksum is wrong.
+    /// Frames of the log with a wrong checksum.
     pub damaged_frames: u64,
     /// Bytes after the last whole page of the file, and after the last whole frame of the log.
     pub cut_bytes: u64,
-    /// Pages that rows may still go on to.
+    /// Remaining budget of overflow reads.
     follow: u64,
 }
 
 impl Pages {
-    /// Looks at the file and at the log beside it.
+    /// Examines the file and the log beside it.
     pub fn open(path: &Path, log: &Path) -> io::Result<Self> {
         let mut file = File::open(path)?;
         let bytes = file.metadata()?.len();
@@ -76,14 +76,14 @@ impl Pages {
             cut_bytes: bytes % size,
             follow: 0,
         };
-        // A page that was cut off may still hold whole rows.
+        // A truncated page may still contain whole rows.
         for n in 0..bytes.div_ceil(size) {
             pages.add(n as u32 + 1, false, n * size);
         }
         if let Ok(file) = File::open(log) {
             pages.read_log(file)?;
         }
-        pages.follow = FOLLOWED * pages.images.len() as u64;
+        pages.follow = OVERFLOW_READS_PER_PAGE * pages.images.len() as u64;
         Ok(pages)
     }
 
@@ -92,10 +92,10 @@ impl Pages {
         self.images.push(Image { page, in_log, at });
     }
 
-    /// Takes the frames of every transaction that was committed. A frame is chained to the one before by the sum stored there, so
-    /// that it can be judged although the page before it is damaged. What no commit follows was never part of the session:
-    /// SQLite writes pages of a large transaction ahead of its commit, and a later life of the process writes over
-    /// the beginning of what such a one left only.
+    /// Adds the frames of every committed transaction. Each frame's checksum continues the stored one of the frame before, so it can
+    /// be checked even if that frame is damaged. Frames without a later commit were never part of the session: SQLite
+    /// writes pages of a large transaction ahead of its commit, and a restarted process overwrites only the beginning
+    /// of such a remainder.
     fn read_log(&mut self, mut log: File) -> io::Result<()> {
         let bytes = log.metadata()?.len();
         let mut head = [0u8; LOG_HEADER as usize];
@@ -107,7 +107,7 @@ impl Pages {
         let salts = self.salts(&mut log, &head, bytes)?;
         let mut big_endian = word(&head, 0) & 1 == 1;
         let first = checksum(big_endian, [0, 0], &head[..24]);
-        // The sums that the next frame may go on from: as stored and as computed, for either may be damaged.
+        // Checksums that the next frame may continue: the stored and the computed one, either of which may be damaged.
         let mut sums = [[word(&head, 24), word(&head, 28)], first];
         let mut frame = vec![0u8; stride as usize];
         let mut uncommitted = Vec::new();
@@ -120,7 +120,7 @@ impl Pages {
                 checksum(big_endian, sum, &frame[FRAME_HEADER as usize..])
             };
             let mut computed = stored;
-            // Frames of an earlier turn of the log have other salts: they are in the file already.
+            // Frames of an earlier generation of the log have other salts; their pages are already in the file.
             if [word(&frame, 8), word(&frame, 12)] != salts {
                 self.damaged_frames += u64::from(is_damaged(&frame[8..16], salts));
             } else if let Some(order) = [big_endian, !big_endian]
@@ -147,8 +147,8 @@ impl Pages {
         Ok(())
     }
 
-    /// What marks the frames of the log's last turn: as its header says, when the header is whole, else as the first two frames
-    /// in a row that agree say.
+    /// Salts of the log's current generation: from an intact header, otherwise from the first two consecutive frames that
+    /// agree.
     fn salts(&self, log: &mut File, head: &[u8], bytes: u64) -> io::Result<[u32; 2]> {
         let stored = [word(head, 24), word(head, 28)];
         let is_whole = [false, true]
@@ -176,17 +176,17 @@ impl Pages {
         Ok(salts)
     }
 
-    /// Bytes of a page. SQLite uses all of them: sessions are made with none reserved.
+    /// Usable bytes of a page: all of them, since sessions reserve none.
     pub(crate) const fn page_bytes(&self) -> usize {
         self.size
     }
 
-    /// No row is longer than all pages together.
+    /// Upper bound of a row's length: all pages together.
     pub const fn most_bytes(&self) -> u64 {
         self.size as u64 * self.images.len() as u64
     }
 
-    /// Reads the page on which a row goes on; false when there is none, or rows went on to more pages than those of a session do.
+    /// Reads an overflow page; false if it does not exist or the budget of overflow reads is used up.
     pub fn follow(&mut self, page: u32, bytes: &mut Vec<u8>) -> io::Result<bool> {
         let Some(image) = self.latest(page).filter(|_| self.follow > 0) else {
             return Ok(false);
@@ -196,22 +196,22 @@ impl Pages {
         Ok(true)
     }
 
-    /// Whether some row was not read to its end because rows went on to too many pages.
+    /// Whether the budget of overflow reads is used up, so that some rows were not read to their end.
     pub(crate) const fn is_exhausted(&self) -> bool {
         self.follow == 0
     }
 
-    /// Every image, earlier ones first.
+    /// All images, oldest first.
     pub fn images(&self) -> Vec<Image> {
         self.images.clone()
     }
 
-    /// The latest image of a page.
+    /// Latest image of a page.
     pub fn latest(&self, page: u32) -> Option<Image> {
         self.latest.get(&page).map(|i| self.images[*i])
     }
 
-    /// The bytes of an image; what was cut off is zero.
+    /// Bytes of an image; a truncated part is zero.
     pub fn read(&mut self, image: Image, page: &mut Vec<u8>) -> io::Result<()> {
         page.clear();
         page.resize(self.size, 0);
@@ -242,12 +242,12 @@ fn word(bytes: &[u8], at: usize) -> u32 {
     u32::from_be_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
 }
 
-/// Whether foreign salts are damage: an earlier turn differs in both, a flipped byte in one.
+/// Whether foreign salts mean damage: an earlier generation differs in both, a flipped byte in one.
 fn is_damaged(found: &[u8], salts: [u32; 2]) -> bool {
     found[..4] == salts[0].to_be_bytes() || found[4..] == salts[1].to_be_bytes()
 }
 
-/// The log's checksum over `bytes`, going on from `sum` (sqlite.org/fileformat.html section 4.2).
+/// The log's checksum over `bytes`, continuing from `sum` (sqlite.org/fileformat.html section 4.2).
 fn checksum(big_endian: bool, sum: [u32; 2], bytes: &[u8]) -> [u32; 2] {
     let [mut a, mut b] = sum;
     for pair in bytes.chunks_exact(8) {

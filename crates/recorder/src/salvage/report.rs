@@ -1,4 +1,4 @@
-//! What a salvage brought back.
+//! Result of a salvage.
 
 use std::path::Path;
 
@@ -7,45 +7,45 @@ use skinrig_model::CameraId;
 
 use crate::error::RecorderError;
 
-/// What came back.
+/// Result of a salvage.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct SalvageReport {
-    /// Rows by table, in the order of the schema; tables of which nothing is known are absent.
+    /// Row counts by table, in schema order, without tables of which nothing is known.
     pub tables: Vec<SalvagedTable>,
-    /// Camera bytes that did not come back.
+    /// Lost camera bytes.
     pub lost: Vec<LostBytes>,
-    /// What else is wrong with the file, in words.
+    /// Other damage.
     pub findings: Vec<String>,
-    /// Lower-case hex SHA-256 of the damaged file as it was read.
+    /// Lower-case hex SHA-256 of the damaged file.
     pub source_sha256: String,
 }
 
-/// The rows of one table.
+/// Row counts of one table.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SalvagedTable {
-    /// Its name.
+    /// Name of the table.
     pub name: String,
-    /// Rows that are in the new file.
+    /// TableRows in the new file.
     pub rows: u64,
-    /// Rows that are known to be missing from it; more may be.
+    /// TableRows known to be missing; more may be.
     pub missing: u64,
 }
 
-/// Chunks of a camera that did not come back.
+/// Consecutive lost chunks of a camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct LostBytes {
-    /// Whose.
+    /// Camera of the chunks.
     pub camera: CameraId,
-    /// The first of them.
+    /// Number of the first lost chunk.
     pub first_seq: u64,
-    /// The last of them.
+    /// Number of the last lost chunk.
     pub last_seq: u64,
-    /// How many bytes, when every one of them still tells.
+    /// Bytes lost, if the size of every chunk is known.
     pub bytes: Option<u64>,
 }
 
 impl SalvageReport {
-    /// True when nothing is known to be lost.
+    /// True if no loss is known.
     #[must_use]
     pub fn is_whole(&self) -> bool {
         self.lost.is_empty()
@@ -54,7 +54,7 @@ impl SalvageReport {
     }
 }
 
-/// The operating system refused.
+/// Error of an operating system call.
 pub(super) fn io(path: &Path, doing: &'static str, source: std::io::Error) -> RecorderError {
     RecorderError::Io {
         path: path.to_owned(),

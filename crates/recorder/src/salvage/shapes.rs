@@ -1,25 +1,25 @@
-//! The tables of a session as a row without a name is told by them: how many values of which kinds, and what names the row.
+//! Shapes of the session tables: number and types of columns and the key, by which a row without context is identified.
 
 use sqlx::sqlite::SqliteConnection;
 
 use super::cells::Value;
 use crate::query::{Fault, each_row, int, text};
 
-/// A table whose rows are brought back, and the statement that does it. A test holds the list against the schema.
+/// A table to salvage, with its insert statement. A test compares the list with the schema.
 #[derive(Debug, Clone, Copy)]
-pub struct Kind {
+pub struct TableSpec {
     pub name: &'static str,
     pub insert: &'static str,
-    /// Columns that every row has: older rows lack those that were added later.
+    /// Fewest columns of a row; later schemas added the others.
     pub least: usize,
-    /// Tells rows of the same shape apart: a column that holds one of these words.
+    /// Distinguishes rows of the same shape: a column, and the values that it may have.
     pub words: Option<(usize, &'static [&'static str])>,
-    /// Rows that may be long, are many, and carry a SHA-256 of their own: (its column, the column that it is over).
+    /// For tables with many long rows: the column with the SHA-256, and the column that it covers.
     pub hashed: Option<(usize, usize)>,
 }
 
-const fn kind(name: &'static str, least: usize, insert: &'static str) -> Kind {
-    Kind {
+const fn table(name: &'static str, least: usize, insert: &'static str) -> TableSpec {
+    TableSpec {
         name,
         insert,
         least,
@@ -28,86 +28,86 @@ const fn kind(name: &'static str, least: usize, insert: &'static str) -> Kind {
     }
 }
 
-/// In the order in which rows refer to one another.
-pub const KINDS: [Kind; 21] = [
-    kind(
+/// All tables, parents before children.
+pub const TABLES: [TableSpec; 21] = [
+    table(
         "session",
         20,
         "INSERT INTO session VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     ),
-    kind(
+    table(
         "robot_from_skin",
         5,
         "INSERT INTO robot_from_skin VALUES (?, ?, ?, ?, ?)",
     ),
-    kind("device", 5, "INSERT INTO device VALUES (?, ?, ?, ?, ?)"),
-    kind("setting", 5, "INSERT INTO setting VALUES (?, ?, ?, ?, ?)"),
-    kind(
+    table("device", 5, "INSERT INTO device VALUES (?, ?, ?, ?, ?)"),
+    table("setting", 5, "INSERT INTO setting VALUES (?, ?, ?, ?, ?)"),
+    table(
         "preflight",
         6,
         "INSERT INTO preflight VALUES (?, ?, ?, ?, ?, ?)",
     ),
-    kind("press", 7, "INSERT INTO press VALUES (?, ?, ?, ?, ?, ?, ?)"),
-    kind(
+    table("press", 7, "INSERT INTO press VALUES (?, ?, ?, ?, ?, ?, ?)"),
+    table(
         "leg",
         17,
         "INSERT INTO leg VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     ),
-    kind(
+    table(
         "attempt",
         17,
         "INSERT INTO attempt VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     ),
-    kind(
+    table(
         "command",
         6,
         "INSERT INTO command VALUES (?, ?, ?, ?, ?, ?)",
     ),
-    Kind {
+    TableSpec {
         hashed: Some((4, 5)),
-        ..kind(
+        ..table(
             "pose_block",
             6,
             "INSERT INTO pose_block VALUES (?, ?, ?, ?, ?, ?)",
         )
     },
-    kind("mark", 5, "INSERT INTO mark VALUES (?, ?, ?, ?, ?)"),
-    kind(
+    table("mark", 5, "INSERT INTO mark VALUES (?, ?, ?, ?, ?)"),
+    table(
         "box_report",
         10,
         "INSERT INTO box_report VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     ),
-    Kind {
+    TableSpec {
         hashed: Some((7, 13)),
-        ..kind(
+        ..table(
             "chunk",
             14,
             "INSERT INTO chunk VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         )
     },
-    kind("gap", 4, "INSERT INTO gap VALUES (?, ?, ?, ?)"),
-    kind(
+    table("gap", 4, "INSERT INTO gap VALUES (?, ?, ?, ?)"),
+    table(
         "trigger_edge",
         6,
         "INSERT INTO trigger_edge VALUES (?, ?, ?, ?, ?, ?)",
     ),
-    Kind {
+    TableSpec {
         words: Some((2, &["completed", "stopped", "faulted"])),
-        ..kind("run_end", 4, "INSERT INTO run_end VALUES (?, ?, ?, ?)")
+        ..table("run_end", 4, "INSERT INTO run_end VALUES (?, ?, ?, ?)")
     },
-    kind(
+    table(
         "interruption",
         4,
         "INSERT INTO interruption VALUES (?, ?, ?, ?)",
     ),
-    kind("note", 3, "INSERT INTO note VALUES (?, ?, ?)"),
-    kind("table_digest", 3, ""),
-    kind(
+    table("note", 3, "INSERT INTO note VALUES (?, ?, ?)"),
+    table("table_digest", 3, ""),
+    table(
         "previous_seal",
         21,
         "INSERT INTO previous_seal VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     ),
-    kind(
+    table(
         "previous_table_digest",
         4,
         "INSERT INTO previous_table_digest VALUES (?, ?, ?, ?)",
@@ -119,7 +119,7 @@ pub const KINDS: [Kind; 21] = [
 struct Column {
     kind: ColumnKind,
     nullable: bool,
-    /// Its place in the key, from 1; 0: no part of it.
+    /// Position in the key, from 1; 0 if it is not part of it.
     key: i64,
 }
 
@@ -129,30 +129,30 @@ enum ColumnKind {
     Real,
     Text,
     Blob,
-    /// Stands beside the row, not in it.
+    /// The row id, stored outside of the record.
     RowId,
 }
 
-/// A table's rows.
+/// Row format of a table.
 #[derive(Debug, Clone)]
-pub struct Shape {
-    pub kind: Kind,
+pub struct TableShape {
+    pub kind: TableSpec,
     columns: Vec<Column>,
-    /// Rows lie in key order and have no row id.
+    /// Whether rows are stored in key order without a row id.
     keyed: bool,
 }
 
-/// What names a row within its table.
+/// KeyPart of a row's key.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Part {
+pub enum KeyPart {
     Int(i64),
     Text(String),
 }
 
-/// The shapes of all kinds, from the schema of a new file.
-pub async fn shapes(conn: &mut SqliteConnection) -> Result<Vec<Shape>, Fault> {
+/// Shapes of all tables, from the schema of a new file.
+pub async fn shapes(conn: &mut SqliteConnection) -> Result<Vec<TableShape>, Fault> {
     let mut out = Vec::new();
-    for kind in KINDS {
+    for kind in TABLES {
         let mut keyed = false;
         let sql = sqlx::query("SELECT wr FROM pragma_table_list WHERE name = ?").bind(kind.name);
         each_row(sql, conn, |row| {
@@ -183,7 +183,7 @@ pub async fn shapes(conn: &mut SqliteConnection) -> Result<Vec<Shape>, Fault> {
         if let (false, 1, Some(first)) = (keyed, keys, columns.first_mut()) {
             first.kind = ColumnKind::RowId;
         }
-        out.push(Shape {
+        out.push(TableShape {
             kind,
             columns,
             keyed,
@@ -192,9 +192,9 @@ pub async fn shapes(conn: &mut SqliteConnection) -> Result<Vec<Shape>, Fault> {
     Ok(out)
 }
 
-impl Shape {
-    /// Whether a row with these serial types may be one of this table.
-    pub fn takes(&self, types: &[u64], keyed: bool) -> bool {
+impl TableShape {
+    /// Whether a record with these serial types may be a row of this table.
+    pub fn matches_types(&self, types: &[u64], keyed: bool) -> bool {
         keyed == self.keyed
             && (self.kind.least..=self.columns.len()).contains(&types.len())
             && types.iter().zip(&self.columns).all(|(serial, column)| {
@@ -209,14 +209,14 @@ impl Shape {
             })
     }
 
-    /// Whether the words that tell rows of one shape apart say that it is of this table.
-    pub fn says(&self, values: &[Value]) -> bool {
+    /// Whether the distinguishing column, if any, has one of this table's values.
+    pub fn matches_values(&self, values: &[Value]) -> bool {
         self.kind.words.is_none_or(|(column, words)| {
             matches!(values.get(column), Some(Value::Text(word)) if words.contains(&word.as_str()))
         })
     }
 
-    /// The values as columns: the row id in its place, columns that came later null.
+    /// The values as columns, with the row id inserted and missing later columns as null.
     pub fn row(&self, mut values: Vec<Value>, rowid: Option<i64>) -> Vec<Value> {
         values.resize(self.columns.len(), Value::Null);
         if let (ColumnKind::RowId, Some(rowid)) = (self.columns[0].kind, rowid) {
@@ -225,13 +225,13 @@ impl Shape {
         values
     }
 
-    /// What names the row; `None` for a row that no table could hold.
-    pub fn key(&self, row: &[Value]) -> Option<Vec<Part>> {
-        let mut parts: Vec<(i64, Part)> = Vec::new();
+    /// Key of the row; `None` if a key column has an impossible type.
+    pub fn key(&self, row: &[Value]) -> Option<Vec<KeyPart>> {
+        let mut parts: Vec<(i64, KeyPart)> = Vec::new();
         for (column, value) in self.columns.iter().zip(row).filter(|(c, _)| c.key > 0) {
             let part = match value {
-                Value::Int(n) => Part::Int(*n),
-                Value::Text(text) => Part::Text(text.clone()),
+                Value::Int(n) => KeyPart::Int(*n),
+                Value::Text(text) => KeyPart::Text(text.clone()),
                 _ => return None,
             };
             parts.push((column.key, part));
@@ -246,9 +246,9 @@ mod tests {
     use super::*;
     use crate::schema;
 
-    /// A table that is added to the schema and not here would be lost by a salvage.
+    /// The salvage would lose a table that is in the schema but not in this list.
     #[test]
-    fn every_table_of_the_schema_is_brought_back_whole() {
+    fn every_table_of_the_schema_is_salvaged() {
         let folder = tempfile::tempdir().unwrap();
         let runtime = tokio::runtime::Builder::new_current_thread()
             .build()
@@ -264,9 +264,9 @@ mod tests {
             })
             .await
             .unwrap();
-            // What sealing writes, and what the migrations keep.
+            // Except for the tables that sealing and the migrations write.
             names.retain(|n| n != "seal" && n != "_sqlx_migrations" && !n.starts_with("sqlite_"));
-            let mut known: Vec<_> = KINDS.iter().map(|k| k.name.to_owned()).collect();
+            let mut known: Vec<_> = TABLES.iter().map(|k| k.name.to_owned()).collect();
             known.sort();
             assert_eq!(names, known);
             for shape in shapes(&mut conn).await.unwrap() {

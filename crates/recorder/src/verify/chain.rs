@@ -1,22 +1,22 @@
-//! The seals that further legs took off, held against the rows that they covered.
+//! Verification of the seals that further legs removed.
 
 use super::report::VerifyReport;
-use crate::chain::{self, Link};
+use crate::chain::{self, PreviousSeal};
 use crate::reader::SessionReader;
 
-/// Checks every leg that took a seal off.
+/// Verifies every leg that removed a seal.
 pub fn check(reader: &SessionReader, report: &mut VerifyReport) {
-    let links = reader.ask("checking the seals before its legs", async |conn| {
+    let links = reader.query("checking the seals before its legs", async |conn| {
         chain::check(conn).await
     });
-    for (leg, link) in report.take(links).unwrap_or_default() {
+    for (leg, link) in report.ok_or_add(links).unwrap_or_default() {
         match link {
-            Link::Proven => {}
-            Link::Unprovable => report.remarks.push(format!(
-                "leg {leg}: the seal before it was taken off by a version of skinrig that kept only its tree hash, which cannot be \
-                 held against the rows"
+            PreviousSeal::Verified => {}
+            PreviousSeal::Unverifiable => report.remarks.push(format!(
+                "leg {leg}: the previous seal was removed by a version of skinrig that kept only its tree hash, which cannot be \
+                 compared with the rows"
             )),
-            Link::Broken(differences) => {
+            PreviousSeal::Mismatch(differences) => {
                 for difference in differences {
                     report.add(format!("leg {leg}: {difference}"));
                 }

@@ -1,15 +1,15 @@
-//! The time that was lost, held against the times of the chunks around it.
+//! Verification of lost time against the times of the surrounding chunks.
 
 use skinrig_model::CameraId;
 
 use super::report::VerifyReport;
 use crate::rows::ChunkMeta;
 
-/// A gap belongs to a chunk after lost bytes, begins with the last time before it or earlier, and ends with the first time after it in
-/// its leg. What a salvage took out may widen what lies around it, never narrow it.
+/// Checks gaps: each belongs to a chunk after lost bytes, begins at the last time before it or earlier, and ends at the first time after
+/// it in its leg. Missing chunks in a salvaged file may widen surrounding gaps but never narrow them.
 pub fn check(camera: CameraId, index: &[ChunkMeta], report: &mut VerifyReport) {
     let mut after_us = None;
-    // From the end: the first time at or after each chunk, within its leg.
+    // Backwards: the first time at or after each chunk, within its leg.
     for (n, meta) in index.iter().enumerate().rev() {
         after_us = meta.facts.first_us.or(after_us);
         if let Some(time) = meta.lost_time {
@@ -55,7 +55,7 @@ pub fn check(camera: CameraId, index: &[ChunkMeta], report: &mut VerifyReport) {
     }
 }
 
-/// The last time of these chunks, the latest first, up to the beginning of their leg.
+/// Last time in these chunks, which come latest first, within the current leg.
 fn last_time<'a>(chunks: impl Iterator<Item = &'a ChunkMeta>) -> Option<u64> {
     for chunk in chunks {
         if chunk.facts.last_us.is_some() || chunk.restart_us.is_some() {

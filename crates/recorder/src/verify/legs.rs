@@ -1,4 +1,4 @@
-//! The legs of a session: each behind the one before on every clock, nothing of a leg outside of it.
+//! Verification of legs: each starts after the previous one on every clock and contains only its own records.
 
 use skinrig_model::{BoxReport, CameraId, HostTime};
 
@@ -7,9 +7,9 @@ use crate::error::RecorderError;
 use crate::reader::SessionReader;
 use crate::rows::LegRow;
 
-/// Checks the order of the legs, and that attempts and chunks lie within theirs.
+/// Checks the order of the legs, and that attempts and chunks lie within their leg.
 pub fn check(reader: &SessionReader, report: &mut VerifyReport) {
-    // A missing header is told elsewhere.
+    // Another check reports a missing header.
     let Ok(legs) = reader.legs() else { return };
     if legs.len() == 1 {
         return;
@@ -18,14 +18,14 @@ pub fn check(reader: &SessionReader, report: &mut VerifyReport) {
         .and_then(|()| chunks(reader, &legs, report))
         .and_then(|()| attempts(reader, &legs, report))
         .and_then(|()| resets(reader, &legs, report));
-    report.take(told);
+    report.ok_or_add(told);
 }
 
 fn order(legs: &[LegRow], report: &mut VerifyReport) -> Result<(), RecorderError> {
     for (number, pair) in (2u32..).zip(legs.windows(2)) {
         let [before, leg] = pair else { continue };
         let place = format!("leg {}", leg.number);
-        report.equal("leg", &number, &leg.number);
+        report.expect_equal("leg", &number, &leg.number);
         let end = before.end.as_ref().map_or(before.origin, |(t, _)| *t);
         if leg.origin <= end.max(before.origin) {
             report.add(format!(
@@ -40,7 +40,7 @@ fn order(legs: &[LegRow], report: &mut VerifyReport) -> Result<(), RecorderError
             || before.preflight_before > leg.preflight_before
         {
             report.add(format!(
-                "{place}: expected origins from those of the leg before, found earlier ones"
+                "{place}: expected origins at or after those of the previous leg, found earlier ones"
             ));
         }
     }
@@ -70,7 +70,7 @@ fn chunks(
                 });
             if !host || !camera_time {
                 report.add(format!(
-                    "{camera} chunk {}: expected the times of leg {}, found others",
+                    "{camera} chunk {}: expected times within leg {}, found times outside",
                     meta.seq, leg.number
                 ));
             }
@@ -79,7 +79,7 @@ fn chunks(
     Ok(())
 }
 
-/// An attempt belongs to one leg, and each to a later or the same one as the attempt before.
+/// Each attempt belongs to one leg, which is never earlier than that of the previous attempt.
 fn attempts(
     reader: &SessionReader,
     legs: &[LegRow],
@@ -94,14 +94,14 @@ fn attempts(
                 && leg_at(intent) != leg_at(timing.clear)
             {
                 report.add(format!(
-                    "{}: expected moments of leg {}, found others",
+                    "{}: expected phase times within leg {}, found times outside",
                     attempt.id,
                     leg_at(intent)
                 ));
             }
             if attempt.intent < last && attempt.intent.is_some() {
                 report.add(format!(
-                    "{}: expected to begin after the attempt before, found earlier",
+                    "{}: expected to begin after the previous attempt, found earlier",
                     attempt.id
                 ));
             }
@@ -111,7 +111,7 @@ fn attempts(
     Ok(())
 }
 
-/// The box's clock of a leg is not that of the leg before: without a reset between them the time base would join the two.
+/// The box's clock restarts with each leg. Without a reset between legs, the time base would join the two clocks.
 fn resets(
     reader: &SessionReader,
     legs: &[LegRow],

@@ -1,26 +1,26 @@
-//! What a check of a session found.
+//! Result of a verification.
 
 use crate::error::RecorderError;
 use crate::rows::SessionTotals;
 
-/// Problems that are told in full; more are only counted.
-const TOLD: usize = 100;
+/// Most problems listed in full; further ones are only counted.
+const MAX_LISTED: usize = 100;
 
-/// What [`verify`](super::verify) found.
+/// Result of [`verify`](super::verify).
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct VerifyReport {
-    /// Whether the file has a seal. Without one, hashes over the whole were not checked.
+    /// Whether the file has a seal. Without one, there are no hashes over the whole file to check.
     pub sealed: bool,
-    /// What is wrong, in words: nothing for a sound session.
+    /// Problems found; empty for a sound session.
     pub problems: Vec<String>,
-    /// Problems found beyond those told in `problems`.
+    /// Number of problems beyond those in `problems`.
     pub more_problems: u64,
-    /// What is worth knowing and no problem, in words.
+    /// Remarks that are not problems.
     pub remarks: Vec<String>,
-    /// Counts and sizes, from the rows; `None` when they cannot be read.
+    /// Counts and sizes computed from the rows; `None` if they cannot be read.
     pub totals: Option<SessionTotals>,
-    /// The first thing that the machine, not the file, kept from being read.
-    pub(super) unread: Option<String>,
+    /// First read failure caused by the system rather than by the file.
+    pub(super) system_failure: Option<String>,
 }
 
 impl VerifyReport {
@@ -31,28 +31,28 @@ impl VerifyReport {
     }
 
     pub(super) fn add(&mut self, problem: impl ToString) {
-        if self.problems.len() < TOLD {
+        if self.problems.len() < MAX_LISTED {
             self.problems.push(problem.to_string());
         } else {
             self.more_problems += 1;
         }
     }
 
-    /// Keeps the value, or tells the error.
-    pub(super) fn take<T>(&mut self, result: Result<T, RecorderError>) -> Option<T> {
+    /// The value, or `None` after adding the error to the report.
+    pub(super) fn ok_or_add<T>(&mut self, result: Result<T, RecorderError>) -> Option<T> {
         result.map_err(|e| self.add_error(e)).ok()
     }
 
-    /// An error of the machine says nothing of the file.
+    /// Adds an error. A system failure is kept apart, because it is no problem of the file.
     pub(super) fn add_error(&mut self, error: RecorderError) {
-        if error.is_of_the_machine() {
-            self.unread.get_or_insert(error.to_string());
+        if error.is_system_failure() {
+            self.system_failure.get_or_insert(error.to_string());
         } else {
             self.add(error);
         }
     }
 
-    pub(super) fn equal<T: PartialEq + std::fmt::Debug>(
+    pub(super) fn expect_equal<T: PartialEq + std::fmt::Debug>(
         &mut self,
         what: &str,
         expected: &T,

@@ -107,7 +107,7 @@ fn earlier_legs_cannot_be_rewritten() {
         ),
         (
             "UPDATE attempt SET verdict = 'invalid', reason = 'x' WHERE press = 1 AND number = 1",
-            "counts of the seal before",
+            "counts of the previous seal",
         ),
         ("UPDATE attempt SET leg = 2 WHERE press = 1 AND number = 1", "attempt"),
         ("UPDATE note SET text = 'tip not cleaned' WHERE id = 1", "note"),
@@ -117,16 +117,16 @@ fn earlier_legs_cannot_be_rewritten() {
         ),
         (
             "UPDATE leg SET previous_tree_sha256 = NULL WHERE number = 2",
-            "in previous_seal alone",
+            "only in previous_seal",
         ),
         (
             "UPDATE leg SET previous_reason = 'another' WHERE number = 2",
             "run_end",
         ),
-        ("DELETE FROM previous_seal", "in its row alone"),
+        ("DELETE FROM previous_seal", "only in its row"),
         (
             "UPDATE previous_seal SET valid = valid - 1, invalid = invalid + 1",
-            "counts of the seal before",
+            "counts of the previous seal",
         ),
         (
             "UPDATE previous_table_digest SET rows = rows + 1 WHERE name = 'device'",
@@ -214,7 +214,7 @@ fn a_sealed_file_that_can_be_written_is_protected() {
     writable(&path);
     let report = verify(&path, &mut Evt2::default()).unwrap();
     assert!(report.is_sound() && report.sealed, "{report:?}");
-    assert!(report.remarks[0].contains("made read-only"), "{report:?}");
+    assert!(report.remarks[0].contains("is read-only now"), "{report:?}");
     assert!(std::fs::metadata(&path).unwrap().permissions().readonly());
     let report = verify(&path, &mut Evt2::default()).unwrap();
     assert!(report.remarks.is_empty(), "{report:?}");
@@ -245,8 +245,8 @@ fn a_torn_file_hash_is_an_unfinished_seal() {
         std::fs::write(&torn, bytes).unwrap();
         let report = verify(&torn, &mut Evt2::default()).unwrap();
         assert!(report.is_sound() && !report.sealed, "{written}: {report:?}");
-        assert!(report.remarks[0].contains("cut off"), "{report:?}");
-        let again = SessionWriter::ended(&torn, &mut Evt2::default()).unwrap();
+        assert!(report.remarks[0].contains("interrupted"), "{report:?}");
+        let again = SessionWriter::open_ended(&torn, &mut Evt2::default()).unwrap();
         assert_eq!(again.finish().unwrap().tree_sha256, whole.tree_sha256);
         let report = verify(&torn, &mut Evt2::default()).unwrap();
         assert!(report.is_sound() && report.sealed, "{report:?}");
@@ -273,7 +273,7 @@ fn a_session_without_a_header_is_empty() {
         for refused in refused {
             let refused = refused.unwrap_err();
             assert!(matches!(refused, RecorderError::Empty { .. }), "{refused}");
-            assert!(refused.to_string().contains("remove it"), "{refused}");
+            assert!(refused.to_string().contains("delete the file"), "{refused}");
         }
     }
     let listed = skinrig_recorder::list(folder.path()).unwrap();

@@ -70,7 +70,7 @@ fn planned_presses_are_those_of_the_plan_even_without_a_seal() {
     assert_eq!(verify_with(0.0), Vec::<String>::new());
     let problems = verify_with(5.0);
     assert_eq!(problems.len(), 1, "{problems:?}");
-    assert!(problems[0].starts_with("press 2: expected what the stored plan says"));
+    assert!(problems[0].starts_with("press 2: expected the press of the stored plan"));
 }
 
 #[test]
@@ -97,7 +97,7 @@ fn a_sync_press_made_validly_twice_within_one_leg_is_found() {
     let problems = verify(&path, &mut Evt2::default()).unwrap().problems;
     assert_eq!(problems.len(), 1, "{problems:?}");
     assert!(
-        problems[0].contains("found the press made twice"),
+        problems[0].contains("found one after a valid or excluded attempt"),
         "{problems:?}"
     );
 }

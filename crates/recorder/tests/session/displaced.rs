@@ -60,7 +60,7 @@ impl Run {
         }
         let kept = match self.writer.finish() {
             Err(RecorderError::Rescued { to, displaced }) => {
-                assert_eq!(displaced, told.to_string());
+                assert_eq!(displaced.to_string(), told.to_string());
                 to
             }
             other => panic!("{other:?}"),
@@ -104,7 +104,7 @@ fn a_removed_file_is_copied() {
     let run = begin();
     std::fs::remove_file(&run.path).unwrap();
     let expected = run.folder().join("a.rescued.session.sqlite");
-    let (_root, kept) = run.into_rescued("found it removed");
+    let (_root, kept) = run.into_rescued("it was removed");
     assert_eq!(kept, expected);
 }
 
@@ -123,7 +123,7 @@ fn a_renamed_folder_is_followed() {
 fn out_of_a_removed_folder_a_copy_is_made_above_it() {
     let run = begin();
     std::fs::remove_dir_all(run.folder()).unwrap();
-    let (root, kept) = run.into_rescued("found it removed");
+    let (root, kept) = run.into_rescued("it was removed");
     assert_eq!(kept, root.path().join("a.rescued.session.sqlite"));
 }
 
@@ -134,7 +134,7 @@ fn a_removed_log_loses_nothing() {
         std::fs::remove_file(beside(&run.path, ending)).unwrap();
         let path = run.path.clone();
         let (_root, kept) =
-            run.into_rescued(&format!("{ending}: expected the file that this run writes"));
+            run.into_rescued(&format!("{ending}: the file of the current run is missing"));
         assert_eq!(kept, path);
     }
 }
@@ -193,7 +193,7 @@ fn without_the_lock_file_nobody_else_gets_in() {
         }
         for refused in [
             SessionWriter::resume(&run.path, &mut Evt2::default()),
-            SessionWriter::ended(&run.path, &mut Evt2::default()),
+            SessionWriter::open_ended(&run.path, &mut Evt2::default()),
         ] {
             assert!(
                 matches!(refused, Err(RecorderError::InUse { .. })),

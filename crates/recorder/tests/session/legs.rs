@@ -173,7 +173,7 @@ fn a_stopped_and_sealed_session_goes_on() {
         });
     assert!(resets.count() >= 1);
     match SessionWriter::resume(&path, &mut Evt2::default()) {
-        Err(RecorderError::Completed { .. }) => {}
+        Err(RecorderError::AlreadyCompleted { .. }) => {}
         other => panic!("{other:?}"),
     }
 }
@@ -246,19 +246,19 @@ fn a_session_that_ended_without_its_seal_is_sealed() {
         writer.accept(record).unwrap();
     }
     assert!(matches!(
-        SessionWriter::ended(&path, &mut Evt2::default()),
+        SessionWriter::open_ended(&path, &mut Evt2::default()),
         Err(RecorderError::InUse { .. })
     ));
     drop(writer);
     sound(&path, false);
-    SessionWriter::ended(&path, &mut Evt2::default())
+    SessionWriter::open_ended(&path, &mut Evt2::default())
         .unwrap()
         .finish()
         .unwrap();
     sound(&path, true);
     assert!(matches!(
-        SessionWriter::ended(&path, &mut Evt2::default()),
-        Err(RecorderError::Completed { .. })
+        SessionWriter::open_ended(&path, &mut Evt2::default()),
+        Err(RecorderError::AlreadyCompleted { .. })
     ));
 }
 
@@ -285,10 +285,10 @@ fn a_seal_that_is_half_written_is_found_and_written_again() {
         report
             .remarks
             .iter()
-            .any(|r| r.contains("sealing was cut off")),
+            .any(|r| r.contains("sealing was interrupted")),
         "{report:?}"
     );
-    SessionWriter::ended(&path, &mut Evt2::default())
+    SessionWriter::open_ended(&path, &mut Evt2::default())
         .unwrap()
         .finish()
         .unwrap();
@@ -374,7 +374,7 @@ fn older_schema_goes_on(was_sealed: bool) {
         .await;
     });
     if was_sealed {
-        let ended = SessionWriter::ended(&path, &mut Evt2::default()).unwrap();
+        let ended = SessionWriter::open_ended(&path, &mut Evt2::default()).unwrap();
         ended.finish().unwrap();
     }
     sound(&path, was_sealed);

@@ -77,7 +77,7 @@ fn eight_readers_read_a_whole_session_and_none_meets_a_lock() {
     // With no instant between two readers the seal has to wait for the last of them.
     if let Err(refused) = sealed {
         assert_refusal_says_what_to_do(&refused);
-        SessionWriter::ended(&path, &mut Evt2::default())
+        SessionWriter::open_ended(&path, &mut Evt2::default())
             .unwrap()
             .finish()
             .unwrap();
@@ -90,7 +90,7 @@ fn assert_refusal_says_what_to_do(refused: &RecorderError) {
     let said = refused.to_string();
     for part in [
         "complete, but not sealed",
-        "every other program",
+        "another program kept it open",
         "skinrig resume",
     ] {
         assert!(said.contains(part), "{said}");
@@ -112,9 +112,9 @@ fn a_reader_that_stays_puts_the_seal_off_and_no_more() {
         writer.accept(record).unwrap();
     }
     // How long it waits is a setting; 60 s for a run.
-    writer.seal_within(std::time::Duration::from_millis(100));
+    writer.set_seal_timeout(std::time::Duration::from_millis(100));
     let mut told = 0;
-    let refused = writer.finish_or_tell(|| told += 1).unwrap_err();
+    let refused = writer.finish_with_notice(|| told += 1).unwrap_err();
     assert_refusal_says_what_to_do(&refused);
     assert_eq!(told, 1);
     // It reads on what is all there, and so does everybody else.
@@ -122,7 +122,7 @@ fn a_reader_that_stays_puts_the_seal_off_and_no_more() {
     read_everything(&path).unwrap();
     assert!(reader.end().unwrap().is_some() && reader.seal().unwrap().is_none());
     drop(reader);
-    SessionWriter::ended(&path, &mut Evt2::default())
+    SessionWriter::open_ended(&path, &mut Evt2::default())
         .unwrap()
         .finish()
         .unwrap();

@@ -3,7 +3,7 @@
 use crate::common::{Evt2, header, records, sealed};
 use skinrig_model::*;
 use skinrig_recorder::{
-    Codec, RecorderError, SessionReader, SessionState, SessionWriter, list, verify,
+    Codec, RecorderError, SessionReader, SessionState, SessionWriter, WriteFailure, list, verify,
 };
 
 #[test]
@@ -238,14 +238,17 @@ fn wrong_order_is_refused_and_a_failed_write_stays_failed() {
     let orphan = Record::Outcome(crate::common::outcome(id, 0, PressVerdict::Valid));
     let failed = writer.accept(orphan).unwrap_err();
     assert!(
-        matches!(&failed, RecorderError::Failed(d) if d.contains("press 2 (attempt 1)") && !d.contains("damaged")),
+        matches!(&failed, RecorderError::WriteFailed(WriteFailure::InvalidRecord { place, .. }) if place == "press 2 (attempt 1)"),
         "{failed}"
     );
     assert!(matches!(
         writer.accept(note()),
-        Err(RecorderError::Failed(_))
+        Err(RecorderError::WriteFailed(_))
     ));
-    assert!(matches!(writer.finish(), Err(RecorderError::Failed(_))));
+    assert!(matches!(
+        writer.finish(),
+        Err(RecorderError::WriteFailed(_))
+    ));
     assert_eq!(
         SessionReader::open(&path).unwrap().header().unwrap(),
         header(3)
@@ -294,7 +297,7 @@ fn lost_chunks_and_nan_positions_are_never_taken() {
         };
         assert!(matches!(
             writer.accept(intent),
-            Err(RecorderError::Failed(_))
+            Err(RecorderError::WriteFailed(_))
         ));
         drop(writer);
         if is_chunk {

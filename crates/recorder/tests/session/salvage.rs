@@ -180,11 +180,7 @@ fn a_sound_session_comes_back_whole() {
     );
     let notes = SessionReader::open(&to).unwrap().notes().unwrap();
     assert!(
-        notes
-            .last()
-            .unwrap()
-            .text
-            .ends_with("nothing known to be lost"),
+        notes.last().unwrap().text.ends_with("no known losses"),
         "{notes:?}"
     );
     // Nothing is overwritten.
@@ -466,15 +462,15 @@ fn rows_that_others_speak_of_are_told_to_be_missing() {
         ),
         (
             "DELETE FROM press WHERE id = 4",
-            "1 press(es) missing that an attempt or a mark names",
+            "1 press(es) missing to which an attempt or a mark refers",
         ),
         (
             "DELETE FROM attempt WHERE press = 2",
-            "1 press(es) with a mark and without an attempt",
+            "1 press(es) with a mark but no attempt",
         ),
         (
             "DELETE FROM attempt WHERE press = 3 AND number = 1",
-            "1 press(es) of which an earlier attempt",
+            "1 press(es) with a missing earlier attempt",
         ),
         (
             "UPDATE chunk SET seq = 9999999999 WHERE seq = 4",
@@ -598,7 +594,10 @@ fn rows_that_go_on_without_an_end_are_left_out() {
     shared.extend((1..=31).map(|i| goes_on(pages + 101 + i)));
     let (report, _) = last_note(shared);
     assert!(
-        report.findings.iter().any(|f| f.contains("over and over")),
+        report
+            .findings
+            .iter()
+            .any(|f| f.contains("share overflow pages")),
         "{report:?}"
     );
 }

@@ -1,5 +1,5 @@
-// What the page's scripts share: the data tables, helpers, and which presses the filter lets through. Stands after the
-// script of all pages. No dependencies.
+// Common to the page's scripts: data tables, helpers, and the filter of presses. Runs after the script of all pages.
+// No dependencies.
 const report = (() => {
   const $ = (q, from = document) => from.querySelector(q);
   const $$ = (q, from = document) => [...from.querySelectorAll(q)];

@@ -1,4 +1,4 @@
-// Downloads: every figure as SVG, its data as CSV; what the filter leaves out is left out there too.
+// Downloads: every figure as SVG, its data as CSV, both without presses that the filter hides.
 (() => {
   const { $, $$, data, table, rowOf, filter } = report;
   const save = (name, type, content) => {

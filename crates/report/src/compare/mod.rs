@@ -1,10 +1,10 @@
-//! Owns the presentation of a comparison of skins: table for the terminal, JSON, page with its figures.
+//! Owns the presentation of a skin comparison: terminal table, JSON, HTML page with figures.
 
 mod figures;
 mod page;
 mod tables;
 mod terminal;
-mod words;
+mod text;
 
 pub use page::html;
 pub use terminal::terminal_table;
@@ -17,8 +17,8 @@ pub const JSON_FORMAT: &str = "skinrig-comparison";
 /// Version of the document's layout.
 pub const JSON_VERSION: u32 = 1;
 
-/// The comparison as JSON for programs: `format`, `format_version`, and the fields of [`Comparison`]. Where there is no
-/// value, a field is `null`.
+/// The comparison as JSON for programs: `format`, `format_version`, and the fields of [`Comparison`]. Absent values are
+/// `null`.
 #[must_use]
 pub fn json(result: &Comparison) -> Value {
     let mut document = serde_json::to_value(result).unwrap_or(Value::Null);

@@ -1,13 +1,13 @@
-//! Owns the page of a comparison: what its template and its script receive.
+//! Owns the HTML page of a comparison: inputs of its template and script.
 
 use minijinja::value::Serde;
 use minijinja::{Value, context};
 use serde::Serialize;
 use skinrig_compare::statistics::Verdict;
-use skinrig_compare::{Comparison, Weight};
+use skinrig_compare::{Comparison, Severity};
 
-use super::figures::{self, Drawn};
-use super::{tables, words};
+use super::figures::{self, RenderedFigure};
+use super::{tables, text};
 use crate::error::ReportError;
 use crate::format::number;
 use crate::frame::{Frame, safe};
@@ -18,9 +18,9 @@ const TEMPLATE: &str = include_str!("../../assets/compare/page.html");
 const CSS: &str = include_str!("../../assets/compare/page.css");
 const SCRIPT: &str = include_str!("../../assets/compare/page.js");
 
-/// A skin against the first, as the template takes it.
+/// A skin against the first, for the template.
 #[derive(Serialize)]
-struct Versus {
+struct SkinCard {
     letter: char,
     name: String,
     verdict: &'static str,
@@ -28,13 +28,13 @@ struct Versus {
     beyond: bool,
     margin: Option<String>,
     needed: Option<String>,
-    rows: Vec<Line>,
+    rows: Vec<MetricLine>,
     figures: Vec<Value>,
-    causes: Option<Why>,
+    causes: Option<CausesCard>,
 }
 
 #[derive(Serialize)]
-struct Line {
+struct MetricLine {
     name: String,
     a: String,
     b: String,
@@ -47,7 +47,7 @@ struct Line {
 }
 
 #[derive(Serialize)]
-struct Why {
+struct CausesCard {
     carried_by: Option<&'static str>,
     measured: Vec<[String; 3]>,
     exchanged: Vec<[String; 4]>,
@@ -55,27 +55,29 @@ struct Why {
     presses: [u32; 2],
 }
 
-/// The comparison as one HTML page that needs no network and no other file.
+/// The comparison as a self-contained HTML page.
 ///
 /// # Errors
-/// [`ReportError`] when the template or the script data cannot be written; no input is known to cause it.
+/// [`ReportError`] when rendering fails; no known input causes this.
 pub fn html(result: &Comparison) -> Result<String, ReportError> {
-    let versus: Vec<Versus> = (1..result.skins.len()).map(|k| versus(result, k)).collect();
-    let of = |weight: Weight| {
+    let cards: Vec<SkinCard> = (1..result.skins.len())
+        .map(|k| skin_card(result, k))
+        .collect();
+    let of = |severity: Severity| {
         let rows = result
             .differences
             .iter()
-            .filter(move |d| d.weight == weight);
+            .filter(move |d| d.severity == severity);
         rows.map(|d| {
             context! {
-                key => d.key, what => d.what.clone(), reason => d.reason.clone(), lifted => d.lifted,
+                key => d.key, what => d.what.clone(), reason => d.reason.clone(), overridden => d.overridden,
                 values => result.skins.iter().zip(&d.values)
                     .map(|(s, v)| (s.letter.to_string(), v.clone())).collect::<Vec<_>>(),
             }
         })
         .collect::<Vec<Value>>()
     };
-    let heading = match versus.as_slice() {
+    let heading = match cards.as_slice() {
         [one] => format!("{} against {}", one.name, result.skins[0].name),
         many => format!("{} skins against {}", many.len(), result.skins[0].name),
     };
@@ -89,50 +91,48 @@ pub fn html(result: &Comparison) -> Result<String, ReportError> {
         plain_css => safe(&plain_css()),
         data => safe(&script_json(&data)?),
         heading,
-        stand_in => words::stand_in(result),
+        stand_in => text::stand_in(result),
         limits => result.limits.clone(),
         margins => result.table.iter().any(|r| r.margin.is_some()),
         alone => result.skins.iter().all(|s| s.sessions.len() == 1),
         several => result.skins.len() > 2,
         skins => result.skins.iter().map(|s| context! {
-            letter => s.letter.to_string(), name => s.name.clone(), text => words::skin(s),
+            letter => s.letter.to_string(), name => s.name.clone(), text => text::skin(s),
             sessions => s.sessions.iter().map(|f| context! {
                 file => f.file.clone(), id => f.session_id.clone(), started => f.started.clone(), rig => f.rig_name.clone(),
             }).collect::<Vec<_>>(),
         }).collect::<Vec<_>>(),
-        blocking => of(Weight::Blocking),
-        confounding => of(Weight::Confounding),
-        harmless => of(Weight::Harmless),
-        versus => Value::from(Serde(versus)),
+        blocking => of(Severity::Blocking),
+        confounding => of(Severity::Confounding),
+        harmless => of(Severity::Harmless),
+        versus => Value::from(Serde(cards)),
     })
 }
 
-fn versus(result: &Comparison, k: usize) -> Versus {
+fn skin_card(result: &Comparison, k: usize) -> SkinCard {
     let skin = &result.skins[k];
     let row = result.headline();
     let found = row.and_then(|r| r.against_first.iter().find(|a| a.subject == k));
     let compared = found.and_then(|f| f.comparison.as_ref());
-    let margin = row.and_then(|r| Some(format!("{} mm", words::value(r, Some(r.margin?)))));
-    let why = result.causes.get(k - 1).and_then(Option::as_ref);
-    let drawn = [
+    let margin = row.and_then(|r| Some(format!("{} mm", text::value(r, Some(r.margin?)))));
+    let causes = result.causes.get(k - 1).and_then(Option::as_ref);
+    let figures = [
         figures::maps(result, k),
         figures::margins(result, k),
         figures::locations(result, k),
-        why.map(|of| figures::causes(result, k, of)),
+        causes.map(|of| figures::causes(result, k, of)),
     ];
-    Versus {
+    SkinCard {
         letter: skin.letter,
         name: skin.name.clone(),
-        verdict: words::verdict(found.and_then(|f| f.verdict)),
-        headline: found
-            .map(|f| words::headline(result, f))
-            .unwrap_or_default(),
+        verdict: text::verdict(found.and_then(|f| f.verdict)),
+        headline: found.map(|f| text::headline(result, f)).unwrap_or_default(),
         beyond: compared.is_some_and(|c| c.beyond_margin),
         margin,
-        needed: compared.and_then(words::needed),
+        needed: compared.and_then(text::needed),
         rows: lines(result, k),
-        figures: drawn.into_iter().map(figure).collect(),
-        causes: why.map(|of| Why {
+        figures: figures.into_iter().map(figure).collect(),
+        causes: causes.map(|of| CausesCard {
             carried_by: of.carried_by.map(skinrig_compare::Factor::name),
             measured: of
                 .measured
@@ -164,15 +164,15 @@ fn versus(result: &Comparison, k: usize) -> Versus {
                     ]
                 })
                 .collect(),
-            places: of.places,
+            places: of.locations,
             presses: of.presses,
         }),
     }
 }
 
-/// For the template; nothing for a figure without data.
-fn figure(drawn: Option<Drawn>) -> Value {
-    drawn.map_or(Value::from(()), |f| {
+/// Template value of a figure; none for a figure without data.
+fn figure(figure: Option<RenderedFigure>) -> Value {
+    figure.map_or(Value::from(()), |f| {
         context! {
             id => f.id, title => f.title, caption => f.caption, svg => Value::from_safe_string(f.svg),
             table => f.table, interaction => f.interaction,
@@ -180,34 +180,34 @@ fn figure(drawn: Option<Drawn>) -> Value {
     })
 }
 
-fn lines(result: &Comparison, k: usize) -> Vec<Line> {
+fn lines(result: &Comparison, k: usize) -> Vec<MetricLine> {
     let line = |row: &skinrig_compare::Row| {
         let found = row.against_first.iter().find(|a| a.subject == k)?;
         let c = found.comparison.as_ref();
         let own = |i: usize| row.values.get(i).and_then(|v| v.value).map(|v| v.value);
-        let sure = matches!(found.verdict, Some(Verdict::Undecided) | None);
-        Some(Line {
-            name: words::heading(row),
-            a: words::value(row, c.map(|c| c.a.value).or(own(0))),
-            b: words::value(row, c.map(|c| c.b.value).or(own(k))),
+        let is_undecided = matches!(found.verdict, Some(Verdict::Undecided) | None);
+        Some(MetricLine {
+            name: text::heading(row),
+            a: text::value(row, c.map(|c| c.a.value).or(own(0))),
+            b: text::value(row, c.map(|c| c.b.value).or(own(k))),
             difference: c.map_or_else(
                 || crate::format::NONE.to_owned(),
-                |c| words::signed(row, c.difference.value),
+                |c| text::signed(row, c.difference.value),
             ),
             interval: c.map_or_else(
                 || crate::format::NONE.to_owned(),
-                |c| words::interval(row, &c.difference),
+                |c| text::interval(row, &c.difference),
             ),
             margin: row.margin.map_or_else(
                 || crate::format::NONE.to_owned(),
-                |m| format!("± {}", words::value(row, Some(m))),
+                |m| format!("± {}", text::value(row, Some(m))),
             ),
-            verdict: words::verdict(found.verdict),
+            verdict: text::verdict(found.verdict),
             key: row.metric.key(),
-            note: match (c, &found.refused) {
+            note: match (c, &found.error) {
                 (_, Some(why)) => why.clone(),
-                (Some(c), None) if sure && row.margin.is_some() => {
-                    words::needed(c).unwrap_or_default()
+                (Some(c), None) if is_undecided && row.margin.is_some() => {
+                    text::needed(c).unwrap_or_default()
                 }
                 _ => String::new(),
             },

@@ -1,9 +1,9 @@
-//! Owns the data behind the figures of a comparison, as its script gets them for CSV files.
+//! Owns the data behind the figures of a comparison, for the page's CSV downloads.
 
 use serde_json::{Value, json};
 use skinrig_compare::Comparison;
 
-/// Named tables: columns and column-wise data.
+/// Named tables in column-wise layout.
 pub(super) fn script_data(result: &Comparison) -> Value {
     json!({
         "session": "comparison",

@@ -1,26 +1,26 @@
-//! Owns the table of a comparison for a terminal.
+//! Owns the terminal table of a comparison.
 
 use std::fmt::Write as _;
 
 use skinrig_compare::statistics::Verdict;
-use skinrig_compare::{Causes, Comparison, Difference, Weight};
+use skinrig_compare::{Causes, Comparison, Difference, Severity};
 
-use super::words;
+use super::text;
 use crate::format::{NONE, number};
 use crate::terminal::{Paint, plain, wrap};
 
-/// Harmless differences with a line of their own; the page lists all.
-const MOST_HARMLESS: usize = 4;
+/// Harmless differences with their own line; the page lists all.
+const MAX_HARMLESS: usize = 4;
 
-/// The table: at most 80 columns, ends with a newline. `color` adds ANSI escapes, nothing that changes the layout.
+/// At most 80 columns, ends with a newline. `color` adds ANSI escapes without changing the layout.
 #[must_use]
 pub fn terminal_table(result: &Comparison, color: bool) -> String {
     let paint = Paint(color);
     let mut out = String::new();
     for skin in &result.skins {
-        out += &wrap(&format!("{:<10}", skin.letter), &plain(&words::skin(skin)));
+        out += &wrap(&format!("{:<10}", skin.letter), &plain(&text::skin(skin)));
     }
-    if let Some(word) = words::stand_in(result) {
+    if let Some(word) = text::stand_in(result) {
         let text = format!("{}, not measured on hardware", word.to_uppercase());
         out += &paint.warn(&wrap("rig       ", &text));
     }
@@ -32,7 +32,7 @@ pub fn terminal_table(result: &Comparison, color: bool) -> String {
     for (k, skin) in result.skins.iter().enumerate().skip(1) {
         out += &against(result, k, skin.letter, &paint);
         if let Some(Some(causes)) = result.causes.get(k - 1) {
-            out += &why(causes, skin.letter, &paint);
+            out += &causes_block(causes, skin.letter, &paint);
         }
     }
     out
@@ -40,35 +40,35 @@ pub fn terminal_table(result: &Comparison, color: bool) -> String {
 
 fn comparability(result: &Comparison, paint: &Paint) -> String {
     let mut out = String::new();
-    let of = |weight: Weight| {
+    let of = |severity: Severity| {
         result
             .differences
             .iter()
-            .filter(move |d| d.weight == weight)
+            .filter(move |d| d.severity == severity)
     };
-    for difference in of(Weight::Blocking) {
-        let first = if difference.lifted {
+    for difference in of(Severity::Blocking) {
+        let first = if difference.overridden {
             "despite   "
         } else {
             "BLOCKING  "
         };
         out += &paint.warn(&wrap(first, &plain(&line(result, difference))));
     }
-    for difference in of(Weight::Confounding) {
+    for difference in of(Severity::Confounding) {
         out += &paint.warn(&wrap("confounds ", &plain(&line(result, difference))));
     }
-    let harmless: Vec<&Difference> = of(Weight::Harmless).collect();
-    for difference in harmless.iter().take(MOST_HARMLESS) {
+    let harmless: Vec<&Difference> = of(Severity::Harmless).collect();
+    for difference in harmless.iter().take(MAX_HARMLESS) {
         out += &wrap("harmless  ", &plain(&line(result, difference)));
     }
-    if let Some(more) = harmless.len().checked_sub(MOST_HARMLESS).filter(|n| *n > 0) {
+    if let Some(more) = harmless.len().checked_sub(MAX_HARMLESS).filter(|n| *n > 0) {
         out += &wrap(
             "          ",
             &format!("and {more} more harmless differences"),
         );
     }
     if out.is_empty() {
-        out += "differ    in nothing that is recorded but the skin\n";
+        out += "differ    no recorded difference besides the skin\n";
     }
     out.push('\n');
     out
@@ -107,9 +107,9 @@ fn against(result: &Comparison, k: usize, letter: char, paint: &Paint) -> String
         let Some(c) = &found.comparison else {
             let own = |i: usize| {
                 let value = row.values.get(i).and_then(|v| v.value);
-                words::value(row, value.map(|v| v.value))
+                text::value(row, value.map(|v| v.value))
             };
-            let name = words::heading(row);
+            let name = text::heading(row);
             let _ = writeln!(
                 out,
                 "{name:<26}{:>7}{:>8}{NONE:>9}{NONE:>18}  no verdict",
@@ -120,12 +120,12 @@ fn against(result: &Comparison, k: usize, letter: char, paint: &Paint) -> String
         };
         let text = format!(
             "{:<26}{:>7}{:>8}{:>9}{:>18}  {}",
-            words::heading(row),
-            words::value(row, Some(c.a.value)),
-            words::value(row, Some(c.b.value)),
-            words::signed(row, c.difference.value),
-            words::interval(row, &c.difference),
-            words::verdict(found.verdict),
+            text::heading(row),
+            text::value(row, Some(c.a.value)),
+            text::value(row, Some(c.b.value)),
+            text::signed(row, c.difference.value),
+            text::interval(row, &c.difference),
+            text::verdict(found.verdict),
         );
         let text = match found.verdict {
             Some(Verdict::Worse) => paint.warn(&text),
@@ -135,7 +135,7 @@ fn against(result: &Comparison, k: usize, letter: char, paint: &Paint) -> String
         let _ = writeln!(out, "{text}");
         if found.verdict == Some(Verdict::Undecided)
             && row.margin.is_some()
-            && let Some(needed) = words::needed(c)
+            && let Some(needed) = text::needed(c)
         {
             undecided.push((row.name.clone(), needed));
         }
@@ -153,11 +153,11 @@ fn against(result: &Comparison, k: usize, letter: char, paint: &Paint) -> String
     out
 }
 
-fn why(causes: &Causes, letter: char, paint: &Paint) -> String {
+fn causes_block(causes: &Causes, letter: char, paint: &Paint) -> String {
     let mm2 = |v: Option<f64>| number(v, 3);
     let head = match causes.carried_by {
-        Some(factor) => format!("the change is carried by: {}", factor.name()),
-        None => "no single factor carries a change that is one".to_owned(),
+        Some(factor) => format!("main cause: {}", factor.name()),
+        None => "no single cause explains the difference".to_owned(),
     };
     let mut out = paint.bold(&wrap(&format!("why {letter}     "), &head));
     let _ = writeln!(

@@ -1,4 +1,4 @@
-//! Owns the picture of accumulated pixel activity: events per pixel over the whole recording.
+//! Owns the image of accumulated pixel activity: events per pixel over the whole recording.
 
 use skinrig_analysis::result::Activity;
 
@@ -9,13 +9,13 @@ use crate::colour::viridis_rgb;
 use crate::input::ReportInput;
 use crate::svg::{Px, Svg};
 
-/// Colours of the scale; more would only swell the file.
+/// Number of colours; more would only enlarge the file.
 const LEVELS: u8 = 64;
-/// Size of a picture in the figure, px.
+/// Size of an image in the figure, px.
 const PICTURE: (f64, f64) = (540.0, 405.0);
 
-/// Events per pixel of each camera over the recording on a logarithmic colour scale, with the crop (the paper's
-/// figure of event data, panel A with its yellow box). `None` without any events.
+/// Events per pixel of each camera over the recording on a logarithmic colour scale, with the crop (panel A with its yellow
+/// box in the paper's figure of event data). `None` without events.
 #[must_use]
 pub fn activity(input: &ReportInput<'_>) -> Option<Figure> {
     let pictures = &input.analysis.activity;
@@ -25,9 +25,9 @@ pub fn activity(input: &ReportInput<'_>) -> Option<Figure> {
     }
     let cell = pictures.iter().map(|p| p.cell_px).max().unwrap_or(1);
     let caption = format!(
-        "Accumulated pixel activity: events over the whole recording, whole sensor, per square of {cell} x {cell} pixels. \
-         Colour: number of events, logarithmic, one scale for both cameras; places without an event are blank. Box: \
-         the rows that are analysed."
+        "Accumulated pixel activity: events over the whole recording and the whole sensor, per square of {cell} x \
+         {cell} pixels. Colour: number of events, logarithmic, one scale for both cameras; squares without events are \
+         blank. Box: rows that are analysed."
     );
     let mut canvas = Canvas::new(
         input,
@@ -101,7 +101,7 @@ fn panel(canvas: &mut Canvas<'_>, picture: &Activity, most: u64, (left, top): (f
     svg.text((left + 8.0, y0 - 6.0), "crop-name", "start", &text);
 }
 
-/// The level of a count: 0 without events, else 1 ..= LEVELS - 1 on a logarithmic scale.
+/// Level of a count: 0 without events, else 1 ..= LEVELS - 1 on a logarithmic scale.
 fn level(count: u64, most: u64) -> u8 {
     if count == 0 {
         return 0;
@@ -110,7 +110,7 @@ fn level(count: u64, most: u64) -> u8 {
     1 + (share * f64::from(LEVELS - 2)).round() as u8
 }
 
-/// The picture as a PNG with a palette; level 0 is transparent. `None` when the counts do not fill the picture.
+/// PNG with a palette; level 0 is transparent. `None` if the counts do not fill the image.
 fn png(picture: &Activity, most: u64) -> Option<Vec<u8>> {
     let size = (u32::from(picture.width), u32::from(picture.height));
     let levels: Vec<u8> = picture.counts.iter().map(|c| level(*c, most)).collect();
@@ -122,7 +122,7 @@ fn png(picture: &Activity, most: u64) -> Option<Vec<u8>> {
     indexed_png(size, &levels, &palette)
 }
 
-/// The colour scale with decades, at the right edge.
+/// Colour scale with decades, at the right edge.
 fn scale(svg: &mut Svg, most: u64) {
     let (x, top, height) = (1186.0, 60.0, 357.0);
     let steps = u32::from(LEVELS) - 1;
@@ -169,7 +169,7 @@ fn power_of_ten(power: i32) -> String {
 mod tests {
     use super::*;
 
-    /// Decoded, the picture is the counts' levels, and only places without events are see-through.
+    /// The decoded image equals the levels of the counts, and only squares without events are transparent.
     #[test]
     fn the_picture_holds_the_level_of_every_cell() {
         let picture = Activity {

@@ -1,4 +1,4 @@
-//! A figure, and what all of them are drawn on.
+//! Owns [`Figure`] and the canvas that all figures are drawn on.
 
 use skinrig_model::PressId;
 
@@ -11,20 +11,20 @@ use crate::svg::{Attributes, Px, Svg, plain_css, polyline};
 pub struct Figure {
     /// Identifier, unique in a page; also the stem of downloaded files.
     pub id: &'static str,
-    /// Headline, plain text.
+    /// Title, plain text.
     pub title: &'static str,
-    /// What is drawn and how to read it, plain text.
+    /// What the figure shows and how to read it, plain text.
     pub caption: String,
     /// The `<svg>` element, without style (see [`Figure::standalone`]).
     pub svg: String,
     /// Name of the data table behind the figure in the page's script data.
     pub table: &'static str,
-    /// What the figure lets its reader do: `select` (presses), `zoom` (time axis) or nothing.
+    /// Interaction in the page: `select` (presses), `zoom` (time axis) or empty.
     pub interaction: &'static str,
 }
 
 impl Figure {
-    /// The figure as a file of its own: with XML declaration and style.
+    /// The figure as a stand-alone file, with XML declaration and style.
     #[must_use]
     pub fn standalone(&self) -> String {
         let styled = self.svg.replacen(
@@ -36,7 +36,7 @@ impl Figure {
     }
 }
 
-/// Session, and what stands in for hardware: the foot line of every figure.
+/// Footer of every figure: session, and `simulated` or `emulated`.
 pub(super) fn foot(input: &ReportInput<'_>) -> String {
     let p = &input.provenance;
     let stand_in = p
@@ -54,7 +54,7 @@ pub(super) fn foot(input: &ReportInput<'_>) -> String {
     )
 }
 
-/// A figure being drawn.
+/// A figure under construction.
 pub(super) struct Canvas<'a> {
     pub(super) svg: Svg,
     pub(super) id: &'static str,
@@ -100,13 +100,13 @@ impl<'a> Canvas<'a> {
         }
     }
 
-    /// Says in the middle of the figure why it is empty.
+    /// Writes the reason for an empty figure into its middle.
     pub(super) fn empty(&mut self, why: &str) {
         let (w, h) = self.size;
         self.svg.text((w / 2.0, h / 2.0), "empty", "middle", why);
     }
 
-    /// Writes the foot line (session, simulated or not, n) and closes.
+    /// Writes the footer (session, simulated or not, n) and closes the figure.
     pub(super) fn finish(
         mut self,
         n: &str,
@@ -128,10 +128,10 @@ impl<'a> Canvas<'a> {
     }
 }
 
-/// Attribute of an `<svg>` whose drawing follows the page's filter.
+/// Attribute of an `<svg>` that follows the page's filter.
 pub(super) const LINKED: (&str, &dyn std::fmt::Display) = ("data-linked", &"");
 
-/// A path with one piece (`M...`) for each of these presses, which the page's filter can take out.
+/// A path with one segment (`M...`) per press, which the page's filter can hide.
 pub(super) fn press_path(svg: &mut Svg, class: &str, data: &str, presses: &[PressId]) {
     if data.is_empty() {
         return;
@@ -152,7 +152,7 @@ pub(super) fn press_path(svg: &mut Svg, class: &str, data: &str, presses: &[Pres
     );
 }
 
-/// The smallest of 1, 1.5, 2, 3, 4, 5, 6, 8, 10 times a power of ten that is not below `value`.
+/// Smallest of 1, 1.5, 2, 3, 4, 5, 6, 8, 10 times a power of ten that is at least `value`.
 pub(crate) fn nice_above(value: f64) -> f64 {
     if !(value.is_finite() && value > 0.0) {
         return 1.0;
@@ -165,7 +165,7 @@ pub(crate) fn nice_above(value: f64) -> f64 {
         .unwrap_or(10.0 * power)
 }
 
-/// Path data of the area between two lines: x with the y of both.
+/// Path of the area between two lines, from x and the y of both.
 pub(super) fn band(points: impl IntoIterator<Item = (f64, (f64, f64))>) -> String {
     let points: Vec<_> = points.into_iter().collect();
     let forth = points.iter().map(|(x, (low, _))| (*x, *low));

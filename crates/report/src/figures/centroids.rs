@@ -5,10 +5,10 @@ use crate::axes::{Axes, Scale};
 use crate::input::ReportInput;
 use crate::svg::dots;
 use skinrig_analysis::result::PressResult;
-use skinrig_model::{PressId, SENSOR_WIDTH};
+use skinrig_model::{PressId, SENSOR_WIDTH, Verdict};
 
-/// Centroid column of every press against its number, one panel per camera (as the paper's figure
-/// "centroids", panels A and B).
+/// Centroid column of every press against its number, one panel per camera (panels A and B of the paper's figure
+/// "centroids").
 #[must_use]
 pub fn centroid_tracks(input: &ReportInput<'_>) -> Figure {
     let presses = &input.analysis.presses;
@@ -64,7 +64,7 @@ pub fn centroid_tracks(input: &ReportInput<'_>) -> Figure {
         let px = |p: u32, u: f64| (axes.x.at(f64::from(p)), axes.y.at(u));
         let class = format!("dots c{}", camera + 1);
         let (valid, others): (Vec<_>, Vec<_>) =
-            seen(camera).partition(|(p, _)| p.verdict == "valid");
+            seen(camera).partition(|(p, _)| p.verdict == Verdict::Valid);
         let numbers = |of: &[(&PressResult, f64)]| of.iter().map(|(p, _)| p.press).collect();
         let points = valid.iter().map(|(p, u)| px(p.press.number(), *u));
         let all: Vec<PressId> = numbers(&valid);

@@ -1,4 +1,4 @@
-//! Owns the figure of the clocks: what every fitted map leaves of its points, over the session.
+//! Owns the figure of clock fits: residuals of every fitted map over the session.
 
 use skinrig_analysis::result::{ClockMap, ClockResiduals};
 
@@ -11,7 +11,7 @@ use crate::svg::{Px, dots};
 /// Height of a row of panels, px.
 const ROW: f64 = 232.0;
 
-/// One panel per clock map that is fitted: residuals against the host's time. `None` without any.
+/// One panel per fitted clock map: residuals against host time. `None` without any.
 #[must_use]
 pub fn clock_residuals(input: &ReportInput<'_>) -> Option<Figure> {
     let alignment = &input.analysis.alignment;
@@ -19,10 +19,10 @@ pub fn clock_residuals(input: &ReportInput<'_>) -> Option<Figure> {
     if maps.is_empty() {
         return None;
     }
-    let caption = "What each map between two clocks leaves of the points that it is fitted to: observed minus mapped time, against the time of \
-         the session. Dots: points that the fit uses; open squares at the edge: points that it leaves out, wherever they lie. Of more than 600 \
-         points every n-th is drawn, and the largest. The last two panels show the one line through all \
-         trains: what bends there is the wander of the rates, which the piecewise maps above follow."
+    let caption = "Residuals of each map between two clocks: observed minus mapped time, against session time. Dots: \
+        points used by the fit; open squares at the edge: rejected points, wherever they lie. Above 600 points every \
+        n-th is drawn, and the largest. The last two panels show one line through all trains: its curvature is the \
+        wander of the clock rates, which the piecewise maps above follow."
         .to_owned();
     let rows = maps.len().div_ceil(2);
     let size = (1240.0, ROW * rows as f64 + 40.0);
@@ -66,7 +66,7 @@ pub fn clock_residuals(input: &ReportInput<'_>) -> Option<Figure> {
     ))
 }
 
-/// About zero, a round number beyond the points that are used.
+/// Symmetric about zero, to a round number beyond the points used.
 fn limits(map: &ClockResiduals, top: f64) -> Scale {
     let used = map.points.iter().filter(|p| p.used);
     let most = used.map(|p| p.residual_us.abs()).filter(|r| r.is_finite());

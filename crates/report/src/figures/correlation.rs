@@ -1,11 +1,11 @@
-//! Owns the picture of the calibration's correlation matrix.
+//! Owns the heat map of the calibration's correlation matrix.
 
 use super::canvas::{Canvas, Figure};
 use crate::format::number;
 use crate::input::ReportInput;
 use crate::svg::{Px, Svg};
 
-/// Correlation of each pair of calibrated parameters as a small heat map. `None` without a calibration that has one.
+/// Correlation of each pair of calibrated parameters. `None` without a correlation matrix.
 #[must_use]
 pub fn correlation(input: &ReportInput<'_>) -> Option<Figure> {
     let fit = input.analysis.calibration.as_ref()?;
@@ -15,12 +15,11 @@ pub fn correlation(input: &ReportInput<'_>) -> Option<Figure> {
     }
     let undetermined = (0..n).filter(|i| fit.correlation[*i][*i].is_none()).count();
     let mut caption = String::from(
-        "Correlation of the calibrated parameters. Blue: positive, orange: negative, the stronger the darker. Strongly \
-         correlated parameters can replace each other: their standard errors are large although the fit is good.",
+        "Correlation of the calibrated parameters. Blue: positive, orange: negative; darker is stronger. Strongly \
+         correlated parameters can compensate each other: their standard errors are large although the fit is good.",
     );
     if undetermined > 0 {
-        caption +=
-            &format!(" Dash: {undetermined} of {n} parameters are not determined by the data.");
+        caption += &format!(" Dash: the data do not determine {undetermined} of {n} parameters.");
     }
     let mut canvas = Canvas::new(
         input,

@@ -94,7 +94,7 @@ pub fn error_distribution(input: &ReportInput<'_>) -> Figure {
     canvas.finish(&format!("n = {} presses", errors.len()), "errors", "")
 }
 
-/// Vertical lines with labels above the plot, moved apart where they would overlap.
+/// Vertical lines with labels above the plot, shifted where they would overlap.
 fn references(svg: &mut Svg, x: Scale, marks: &[(&str, Option<f64>, &str)]) {
     let mut free_from = f64::NEG_INFINITY;
     for (name, value, class) in marks {
@@ -131,7 +131,7 @@ fn ecdf(errors: &[f64], axes: &Axes) -> String {
     d
 }
 
-/// Counts per bin over 0..=end, and the width of a bin: 20 to 50 bins of a round width.
+/// Counts per bin over 0..=end, and the bin width: 20 to 50 bins of a round width.
 fn histogram(errors: &[f64], end: f64) -> (Vec<u32>, f64) {
     let width = nice_above(end / 41.0);
     let mut bins = vec![0u32; ((end / width).ceil() as usize).max(1)];
@@ -145,7 +145,11 @@ fn histogram(errors: &[f64], end: f64) -> (Vec<u32>, f64) {
 /// The error vectors: y against x, with the bias and a circle of radius RMSE.
 #[must_use]
 pub fn error_scatter(input: &ReportInput<'_>) -> Figure {
-    let counted = input.analysis.presses.iter().filter(|p| derive::counts(p));
+    let counted = input
+        .analysis
+        .presses
+        .iter()
+        .filter(|p| derive::is_counted(p));
     let (numbers, errors): (Vec<_>, Vec<_>) = counted
         .filter_map(|p| Some((p.press, p.error_mm()?)))
         .unzip();
@@ -214,7 +218,7 @@ pub fn error_scatter(input: &ReportInput<'_>) -> Figure {
     canvas.finish(&format!("n = {} presses", errors.len()), "presses", "")
 }
 
-/// Three digits of a bin's width, without trailing zeros.
+/// Three digits of a bin width, without trailing zeros.
 fn bin_width(width: f64) -> String {
     let text = tick_label(width, width * 0.01);
     let text = if text.contains('.') {

@@ -1,4 +1,4 @@
-//! Owns the figure of event rates about the contact: percentiles of presses and background.
+//! Owns the figure of event rates around the contact: percentiles of presses and background.
 
 use skinrig_analysis::result::Latency;
 
@@ -10,9 +10,9 @@ use crate::format::number;
 use crate::input::ReportInput;
 use crate::svg::{Px, Svg, polyline};
 
-/// Percentiles of the event rate over trials against the time since contact, with those of the background and dashed
-/// lines at the 5-95 % onsets (the paper's figure "event rate latency"): the whole trial, and the onset in close-up.
-/// `None` without the study.
+/// Percentiles of the event rate over trials against time since contact, with those of the background and dashed lines at
+/// the 5-95 % onsets (the paper's figure "event rate latency"): the whole trial, and a close-up of the onset. `None` without
+/// the study.
 #[must_use]
 pub fn latency_course(input: &ReportInput<'_>) -> Option<Figure> {
     let study = input.analysis.latency.as_ref()?;
@@ -22,9 +22,9 @@ pub fn latency_course(input: &ReportInput<'_>) -> Option<Figure> {
     }
     let onsets = derive::onset_percentiles(study);
     let caption = format!(
-        "Event rate of both cameras about the {}, percentiles over {} presses: median (line) and 5 to 95 % (band). \
+        "Event rate of both cameras around the {}, percentiles over {} presses: median (line) and 5 to 95 % (band). \
          Horizontal: the same percentiles of the background (median {} events per second). Dashed: 5th and 95th \
-         percentile of the detected onsets, {} ms apart. A: the whole trial, B: the onset. Counts in bins of {} ms.",
+         percentile of the detected onsets, {} ms apart. A: whole trial, B: onset. Counts in bins of {} ms.",
         contact(study),
         study.trials,
         number(Some(study.background_rate_per_s), 0),
@@ -34,7 +34,7 @@ pub fn latency_course(input: &ReportInput<'_>) -> Option<Figure> {
     let mut canvas = Canvas::new(
         input,
         "latency-course",
-        "Detection: event rates about the contact",
+        "Detection: event rates around the contact",
         caption,
         (1240.0, 420.0),
         &[],
@@ -84,7 +84,7 @@ pub fn latency_course(input: &ReportInput<'_>) -> Option<Figure> {
     Some(canvas.finish(&n, "latency_course", ""))
 }
 
-/// What the time axis starts from.
+/// Zero of the time axis.
 fn contact(study: &Latency) -> &'static str {
     if study.from_contact.is_some() {
         "measured contact"

@@ -7,7 +7,7 @@ use crate::format::number;
 use crate::input::ReportInput;
 use crate::svg::Px;
 
-/// How long after the contact presses are detected, at the chosen threshold. `None` without the study or any onset.
+/// Time from contact to detection at the chosen threshold. `None` without the study or any onset.
 #[must_use]
 pub fn latency_onsets(input: &ReportInput<'_>) -> Option<Figure> {
     let study = input.analysis.latency.as_ref()?;
@@ -18,9 +18,9 @@ pub fn latency_onsets(input: &ReportInput<'_>) -> Option<Figure> {
     let missed = undetected.saturating_sub(early);
     let far = study.onsets.len() - undetected - counted.len();
     let caption = format!(
-        "Detected onsets after the contact, {} presses within {} ms of the median onset. Lines: 5th percentile {} ms, \
-         median {} ms, 95th percentile {} ms. Not drawn: {far} onsets further from the median, {early} presses whose \
-         detector tripped before the contact (false alarms), {missed} presses never detected.",
+        "Detected onsets after contact, {} presses within {} ms of the median onset. Lines: 5th percentile {} ms, \
+         median {} ms, 95th percentile {} ms. Not shown: {far} onsets further from the median, {early} presses whose \
+         detector fired before contact (false alarms), {missed} presses never detected.",
         counted.len(),
         number(Some(study.settings.window_ms), 0),
         number(Some(low), 1),

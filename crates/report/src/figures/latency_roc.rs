@@ -1,4 +1,4 @@
-//! Owns the figure of the detector's thresholds: detected trials against false alarms.
+//! Owns the figure of the detector's thresholds: detection rate against false alarms.
 
 use super::canvas::{Canvas, Figure};
 use super::legend::{self, Sample, diamond};
@@ -8,8 +8,8 @@ use crate::input::ReportInput;
 use crate::published;
 use crate::svg::{Px, dots, polyline};
 
-/// Share of trials detected against false alarms per second, a dot per threshold, the chosen one marked. `None`
-/// without the study or without thresholds.
+/// Share of trials detected against false alarms per second, one dot per threshold, the chosen one marked. `None` without
+/// the study or without thresholds.
 #[must_use]
 pub fn latency_roc(input: &ReportInput<'_>) -> Option<Figure> {
     let study = input.analysis.latency.as_ref()?;
@@ -26,17 +26,17 @@ pub fn latency_roc(input: &ReportInput<'_>) -> Option<Figure> {
         || "No threshold detects anything.".to_owned(),
         |r| {
             format!(
-                "Ring: the one chosen (h = {}), with the fewest false alarms among those that detect at least {} % \
-                 (dashed).",
+                "Ring: the chosen threshold (h = {}), with the fewest false alarms among those that detect at least {} \
+                 % (dashed).",
                 number(Some(r.threshold), 2),
                 number(Some(100.0 * study.settings.target_rate), 0)
             )
         },
     );
     let caption = format!(
-        "Choice of the detector's threshold: share of {} trials with an onset within {} ms of the median onset, against \
-         false alarms per second: trips before the contact over the time in which there can be one, up to the contact or \
-         the trip. A dot for each of {} thresholds, some in one place. {choice}",
+        "Choice of the detector's threshold: share of {} trials with an onset within {} ms of the median onset, \
+         against false alarms per second, counted from the start of a trial to its contact or to the first alarm. One \
+         dot per threshold ({}); some coincide. {choice}",
         study.trials,
         number(Some(study.settings.window_ms), 0),
         rows.len(),
@@ -49,7 +49,7 @@ pub fn latency_roc(input: &ReportInput<'_>) -> Option<Figure> {
         (620.0, 440.0),
         &[],
     );
-    // Decades; a threshold without false alarms stands at the left edge.
+    // Decades; thresholds without false alarms are at the left edge.
     let published = published::FALSE_ALARMS_PER_S.0;
     let positive = || {
         let found = rows.iter().map(|r| r.false_alarms_per_s);
@@ -101,7 +101,7 @@ pub fn latency_roc(input: &ReportInput<'_>) -> Option<Figure> {
         .filter(|(row, _)| Some(row.threshold) != named)
     {
         let text = format!("h = {}", number(Some(row.threshold), 1));
-        // Above the line, the chosen one is named below it; within the plot: to the right of a point at the left edge, else to its left.
+        // The label goes above the line or below it, and to the right of points at the left edge.
         let (dx, anchor) = if x < 130.0 {
             (10.0, "start")
         } else {
@@ -137,7 +137,7 @@ pub fn latency_roc(input: &ReportInput<'_>) -> Option<Figure> {
         (66.0, 18.0),
         &[
             (Sample::Dot("dots strong c1"), "thresholds"),
-            (Sample::Line("ref2"), "share asked for"),
+            (Sample::Line("ref2"), "target rate"),
             (Sample::Published, "published, another recording"),
         ],
     );

@@ -1,8 +1,8 @@
-//! Owns the legends of figures: rows or a line of samples with their names.
+//! Owns the legends of figures: samples with names, in rows or in one line.
 
 use crate::svg::{Px, Svg, dots};
 
-/// How a legend shows one class of marks.
+/// Sample of one class of marks in a legend.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Sample {
     /// A line with this class.
@@ -44,7 +44,7 @@ fn sample(svg: &mut Svg, kind: Sample, (x, y): (f64, f64)) {
     }
 }
 
-/// A line of samples from `at` to the right, each as wide as its name needs.
+/// A line of samples starting at `at`, each as wide as its name needs.
 pub(super) fn line(svg: &mut Svg, at: (f64, f64), rows: &[(Sample, &str)]) {
     let mut x = at.0;
     for (kind, name) in rows {
@@ -54,7 +54,7 @@ pub(super) fn line(svg: &mut Svg, at: (f64, f64), rows: &[(Sample, &str)]) {
     }
 }
 
-/// The mark of a published value: a diamond about `at`.
+/// Mark of a published value: a diamond around `at`.
 pub(super) fn diamond((x, y): (f64, f64)) -> String {
     format!("M{} {}l5 5l-5 5l-5 -5Z", Px(x), Px(y - 5.0))
 }

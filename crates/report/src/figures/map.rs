@@ -1,4 +1,4 @@
-//! Owns the maps of the skin: localisation errors and spread between repetitions, per location.
+//! Owns the maps of the skin: localisation errors, and spread between repetitions, per location.
 
 use skinrig_analysis::result::PressResult;
 use skinrig_model::{Point2, PressRole};
@@ -12,7 +12,7 @@ use crate::svg::{Px, Svg, dots, polyline};
 
 const SIZE: (f64, f64) = (900.0, 700.0);
 
-/// End of the colour scale: a round number above 98 % of the values.
+/// End of the colour scale: round number above 98 % of the values.
 fn scale_end(mut values: Vec<f64>) -> f64 {
     values.retain(|v| v.is_finite());
     values.sort_by(f64::total_cmp);
@@ -68,8 +68,8 @@ fn attributes(layout: &Layout) -> [String; 3] {
     .map(|v| format!("{v:.4}"))
 }
 
-/// The skin with both cameras, their fields of view, the press path, the mean error at every location and a
-/// vector from truth to estimate for every scored press that counts.
+/// The skin with both cameras, their fields of view, the press path, the mean error at every location, and a vector from
+/// truth to estimate for every counting press.
 #[must_use]
 pub fn skin_map(input: &ReportInput<'_>) -> Figure {
     let layout = Layout::new(input);
@@ -78,20 +78,21 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
         .analysis
         .presses
         .iter()
-        .filter(|p| derive::counts(p))
+        .filter(|p| derive::is_counted(p))
         .collect();
     let others: Vec<_> = input
         .analysis
         .presses
         .iter()
-        .filter(|p| p.role == PressRole::Score && !derive::counts(p))
+        .filter(|p| p.role == PressRole::Score && !derive::is_counted(p))
         .collect();
     let caption = format!(
-        "Localisation error over the skin. Discs: scored locations, coloured by the mean Euclidean error of \
-         their presses. Lines run from each measured position (truth) to its estimate, which ends in a dot \
-         ({} presses at {} locations). Open squares: scored presses that do not count ({}; those never done are drawn \
-         only at places without a disc). Thin grey line: press path of the first repetition. Tinted: fields of view of camera 1 and camera 2; dotted: their \
-         overlap, where a press can be located. Grey edge: the probed area, one square cell about each location.",
+        "Localisation error over the skin. Discs: scored locations, coloured by the mean Euclidean error of their \
+         presses. Lines run from each measured position (truth) to its estimate, which ends in a dot ({} presses at {} \
+         locations). Open squares: scored presses that do not count ({}; missed presses appear only at locations \
+         without a disc). Thin grey line: press path of the first repetition. Tinted: fields of view of camera 1 and \
+         camera 2; dotted: their overlap, where a press can be located. Grey edge: probed area, one square cell per \
+         location.",
         counted.len(),
         locations.len(),
         others.len()
@@ -215,7 +216,7 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
     )
 }
 
-/// The edge of the area that the probed locations stand for, within the outline.
+/// Edge of the probed area: one cell per location, clipped to the outline.
 fn cells(svg: &mut Svg, layout: &Layout, places: &[Point2], cell_mm: f64) {
     let side = cell_mm * layout.axes.x.per_unit();
     let mut data = String::new();
@@ -294,7 +295,7 @@ fn legend(svg: &mut Svg) {
     });
 }
 
-/// The standard deviation between repetitions at every location.
+/// Standard deviation between repetitions at every location.
 #[must_use]
 pub fn repeat_map(input: &ReportInput<'_>) -> Figure {
     let layout = Layout::new(input);

@@ -44,7 +44,7 @@ pub use threshold::threshold;
 
 use crate::input::ReportInput;
 
-/// All figures in the order of the page. Figures without any data are left out where they are optional.
+/// All figures in page order. Optional figures without data are left out.
 #[must_use]
 pub fn all(input: &ReportInput<'_>) -> Vec<Figure> {
     let mut figures = vec![
@@ -76,10 +76,10 @@ pub fn all(input: &ReportInput<'_>) -> Vec<Figure> {
     figures
 }
 
-/// Error against cost, when a tradeoff was measured on the session.
+/// Error against cost, if a tradeoff was measured on the session.
 #[must_use]
 pub(crate) fn speed_accuracy(input: &ReportInput<'_>) -> Option<Figure> {
     let result = input.tradeoff.as_ref()?.as_ref().ok()?;
-    let rig = "CPU times are those of the machine that measured them.";
+    let rig = "CPU times depend on the machine.";
     Some(tradeoff::fronts(result, rig, &canvas::foot(input)))
 }

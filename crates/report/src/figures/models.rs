@@ -9,7 +9,7 @@ use crate::format::number;
 use crate::input::ReportInput;
 use crate::svg::{Px, dots};
 
-/// A model's name for people.
+/// Display name of a model.
 pub(crate) const fn model_name(model: CalibrationModel) -> &'static str {
     match model {
         CalibrationModel::None => "nominal geometry",
@@ -21,18 +21,18 @@ pub(crate) const fn model_name(model: CalibrationModel) -> &'static str {
     }
 }
 
-/// Cross-validated RMSE of the nested models with its interval, beside it the bounded one that they are compared by and the
-/// error on the fitted presses. `None` where no models were compared.
+/// Cross-validated RMSE of the nested models with interval, the bounded RMSE used to compare them, and the error on the
+/// fitted presses. `None` without a comparison.
 #[must_use]
 pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
     let rows = &input.analysis.calibration.as_ref()?.compared;
     if rows.is_empty() {
         return None;
     }
-    let caption = "Choice of the calibration model. Dots: RMSE on locations left out of the fit, with its 95 % interval \
-                   over locations; bars: the same with the longest errors bounded, by which the models are compared, \
-                   paired by location (the table below gives the differences). Small dots: RMSE on the presses that were \
-                   fitted, always more optimistic. Ring: the one used."
+    let caption = "Choice of the calibration model. Dots: RMSE on held-out locations, with its 95 % interval over \
+        locations; bars: the same with the longest errors bounded, which is the criterion for choosing (paired by \
+        location; the table below gives the differences). Small dots: RMSE on the fitted presses, always more \
+        optimistic. Ring: the model used."
         .to_owned();
     let mut canvas = Canvas::new(
         input,
@@ -63,7 +63,7 @@ pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
             model_name(row.model).replace(" (paper)", ""),
             row.parameters
         );
-        // Neighbouring names on two heights: five do not fit beside each other.
+        // Alternate label heights: five names do not fit side by side.
         svg.text((x, 407.0 + 14.0 * (i % 2) as f64), "tick", "middle", &name);
         if let (Some(low), Some(high)) = (finite(row.rmse_mm.low), finite(row.rmse_mm.high)) {
             svg.line("whisker c1", (x, axes.y.at(low)), (x, axes.y.at(high)));
@@ -106,9 +106,9 @@ pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
         svg,
         (66.0, 18.0),
         &[
-            (Sample::Dot("dots strong c1"), "locations left out"),
+            (Sample::Dot("dots strong c1"), "held-out locations"),
             (Sample::Dot("dots mid c2"), "fitted presses"),
-            (Sample::Line("ref"), "left out, bounded"),
+            (Sample::Line("ref"), "held out, bounded"),
         ],
     );
     let n = rows.iter().map(|r| r.rmse_mm.n).max().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! Owns the figures of the robot: its path against its commands, over the session and during single presses.
+//! Owns the figures of robot motion: measured against commanded path, over the session and during single presses.
 
 use skinrig_analysis::result::{Motion, PressMotion};
 
@@ -8,7 +8,7 @@ use crate::format::{grouped, number};
 use crate::input::ReportInput;
 use crate::svg::polyline;
 
-/// The distance between commanded and measured position over the session. `None` without poses.
+/// Distance between commanded and measured position over the session. `None` without poses.
 #[must_use]
 pub fn pose_course(input: &ReportInput<'_>) -> Option<Figure> {
     let motion = input.analysis.motion.as_ref()?;
@@ -21,9 +21,9 @@ pub fn pose_course(input: &ReportInput<'_>) -> Option<Figure> {
         String::new()
     };
     let caption = format!(
-        "Distance of the tip from its commanded position, Euclidean, in bins of {} s. Strong line: root mean square; light line: the largest. \
-         Over all {} samples: {} mm root mean square, {} mm at most.{broken} The command is the set point of that instant: while the tip moves, \
-         most of the distance is its lag.",
+        "Euclidean distance of the tip from its commanded position, in bins of {} s. Strong line: root mean square; \
+         light line: maximum. Over all {} samples: {} mm root mean square, {} mm at most.{broken} The command is the \
+         set point at that instant, so most of the distance during motion is lag.",
         number(Some(motion.bin_s), 2),
         grouped(motion.samples),
         number(Some(motion.rms_mm), 3),
@@ -78,8 +78,9 @@ pub fn pose_presses(input: &ReportInput<'_>) -> Option<Figure> {
         .motion
         .as_ref()
         .filter(|m| !m.presses.is_empty())?;
-    let caption = "The tip during single presses, against the time since the measured contact. Above: height over the skin, commanded (dashed) and \
-         measured. Below: measured minus commanded position along each axis. Negative heights lie below the surface."
+    let caption = "The tip during single presses, against time since measured contact. Above: height over the skin, \
+        commanded (dashed) and measured. Below: measured minus commanded position along each axis. Negative heights \
+        are below the surface."
         .to_owned();
     let mut canvas = Canvas::new(
         input,
@@ -174,7 +175,7 @@ fn span(press: &PressMotion) -> (f64, f64) {
     (at(press.samples.first()), at(press.samples.last()))
 }
 
-/// Lowest and highest height of all, with room.
+/// Lowest and highest height of all presses, with padding.
 fn heights(motion: &Motion) -> (f64, f64) {
     let samples = motion.presses.iter().flat_map(|p| &p.samples);
     let all = samples.flat_map(|s| [s.commanded_mm[2], s.measured_mm[2]]);
@@ -185,7 +186,7 @@ fn heights(motion: &Motion) -> (f64, f64) {
     (low - room, high + room)
 }
 
-/// The largest distance along one axis, rounded up.
+/// Largest distance along one axis, rounded up.
 fn off_axis(motion: &Motion) -> f64 {
     let samples = motion.presses.iter().flat_map(|p| &p.samples);
     let off = samples.flat_map(|s| [0, 1, 2].map(|k| (s.measured_mm[k] - s.commanded_mm[k]).abs()));

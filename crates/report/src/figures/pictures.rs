@@ -1,4 +1,4 @@
-//! Owns the pictures of single presses: pixels with events, by polarity.
+//! Owns the images of single presses: pixels with events, by polarity.
 
 use skinrig_analysis::result::{PressPicture, PressView};
 use skinrig_model::SENSOR_WIDTH;
@@ -9,8 +9,9 @@ use crate::axes::tick_label;
 use crate::input::ReportInput;
 use crate::svg::Px;
 
-/// Colours of a picture: no event, then ON and OFF outside the cluster, then ON and OFF in it. A picture cannot follow the
-/// page's theme, so they are read on light and on dark; those of `.pictured-on` and `.pictured-off` in the figure's style.
+/// Colours of an image: no event, then ON and OFF outside the cluster, then ON and OFF inside it. An image cannot follow the
+/// page's theme, so these colours work on light and dark; they match `.pictured-on` and `.pictured-off` in the figure's
+/// style.
 const PALETTE: [[u8; 4]; 5] = [
     [0, 0, 0, 0],
     [0x10, 0xa5, 0x7c, 90],
@@ -19,8 +20,8 @@ const PALETTE: [[u8; 4]; 5] = [
     [0xc4, 0x62, 0x9c, 255],
 ];
 
-/// Pixels that saw mostly ON or mostly OFF events, one strip per press and camera; pixels outside the
-/// cluster are pale. `None` without any picture.
+/// Pixels with mostly ON or mostly OFF events, one strip per press and camera; pixels outside the cluster are pale. `None`
+/// without images.
 #[must_use]
 pub fn press_pictures(input: &ReportInput<'_>) -> Option<Figure> {
     let pictures = &input.analysis.pictures;
@@ -32,14 +33,13 @@ pub fn press_pictures(input: &ReportInput<'_>) -> Option<Figure> {
         .iter()
         .map(|p| f64::from(rows(p)))
         .fold(1.0, f64::max);
-    // Two strips beside each other; a pixel of the sensor is `k` wide and high.
+    // Two strips side by side; a sensor pixel is `k` px wide and high.
     let k = 570.0 / f64::from(SENSOR_WIDTH);
     let row_height = tallest * k + 56.0;
     let size = (1240.0, 46.0 + row_height * presses.len() as f64 + 26.0);
     let caption = "Pixels with events during single presses, cropped rows of the sensor, camera 1 left, camera 2 \
-         right. Colour: the polarity that the pixel saw more often. Pale pixels are not part of the cluster. \
-         Cross: centroid of the cluster; triangles: its \
-         column, the only coordinate that locates."
+        right. Colour: majority polarity of the pixel. Pale pixels are outside the cluster. Cross: centroid of the \
+        cluster; triangles: its column, the only coordinate used for localisation."
         .to_owned();
     let mut canvas = Canvas::new(
         input,
@@ -162,7 +162,7 @@ fn strip(
     }
 }
 
-/// The picture as a PNG, a pixel of the sensor each; pixels outside the rows or the sensor are left out.
+/// The image as a PNG, one px per sensor pixel. Ignores pixels outside the rows or the sensor.
 fn png(p: &PressPicture) -> Option<Vec<u8>> {
     let size = (u32::from(SENSOR_WIDTH), rows(p));
     let mut indices = vec![0u8; (size.0 * size.1) as usize];
@@ -180,7 +180,7 @@ mod tests {
 
     use super::*;
 
-    /// Decoded, every pixel has its polarity and its cluster; what lies outside the rows is not drawn elsewhere.
+    /// In the decoded image every pixel has its polarity and cluster, and nothing outside the rows is drawn.
     #[test]
     fn the_picture_holds_every_pixel_within_its_rows() {
         let pixel = |u, v, on, off, clustered| PicturePixel {

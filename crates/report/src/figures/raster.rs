@@ -1,4 +1,4 @@
-//! Owns pictures of pixels within a figure: PNG with a palette, embedded in the SVG.
+//! Owns raster images inside a figure: PNG with a palette, embedded in the SVG.
 
 use std::fmt::Display;
 
@@ -7,11 +7,11 @@ use base64::engine::general_purpose::STANDARD;
 
 use crate::svg::{Px, Svg};
 
-/// A place in a figure: left, top, width, height, px.
-pub(super) type Frame = (f64, f64, f64, f64);
+/// Rectangle in a figure: left, top, width, height, px.
+pub(super) type Rectangle = (f64, f64, f64, f64);
 
-/// A PNG of indices into a palette of (red, green, blue, alpha). `None` when the indices do not fill the size or point
-/// beyond the palette.
+/// PNG of indices into a palette of (red, green, blue, alpha). `None` if the indices do not fill the size or exceed the
+/// palette.
 pub(super) fn indexed_png(
     (width, height): (u32, u32),
     indices: &[u8],
@@ -43,7 +43,7 @@ pub(super) fn indexed_png(
 }
 
 /// Draws a PNG over the whole frame.
-pub(super) fn image(svg: &mut Svg, class: &str, frame: Frame, png: &[u8]) {
+pub(super) fn image(svg: &mut Svg, class: &str, frame: Rectangle, png: &[u8]) {
     let data = format!("data:image/png;base64,{}", STANDARD.encode(png));
     let attributes: [(&str, &dyn Display); 7] = [
         ("class", &class),

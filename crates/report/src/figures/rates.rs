@@ -1,4 +1,4 @@
-//! Owns the event-rate figures: the whole session, and single presses in fine bins.
+//! Owns the event-rate figures: whole session, and single presses in fine bins.
 
 use std::fmt::Write as _;
 
@@ -11,7 +11,7 @@ use crate::format::number;
 use crate::input::ReportInput;
 use crate::svg::{Px, polyline};
 
-/// A readable unit for rates up to `most` events per second: divisor and name.
+/// Unit for rates up to `most` events per second: divisor and name.
 fn unit(most: f64) -> (f64, &'static str) {
     if most >= 1e6 {
         (1e6, "Mev/s")
@@ -30,7 +30,7 @@ fn highest<'a>(values: impl IntoIterator<Item = &'a f32>) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Stairs through the bins. Runs of equal height become one stroke; a bin without a number breaks the line.
+/// Step line through the bins. Runs of equal height become one stroke; a missing value breaks the line.
 fn stairs(start: f64, width: f64, values: &[f32], axes: &Axes, divisor: f64) -> String {
     let mut d = String::new();
     let mut level: Option<String> = None;
@@ -57,10 +57,10 @@ fn stairs(start: f64, width: f64, values: &[f32], axes: &Axes, divisor: f64) -> 
     d
 }
 
-/// The event rate of both cameras over the session, with a mark at the contact of each press.
+/// Event rate of both cameras over the session, with a mark at the contact of each press.
 #[must_use]
 pub fn event_rates(input: &ReportInput<'_>) -> Figure {
-    // Without a fit a camera's times are its own: they are drawn from 0 on, and the panel says so.
+    // Without a clock fit the time axis is the camera's own, starting from 0, and the panel says so.
     let aligned = input.analysis.clocks.map(|c| c.is_some());
     let mut series = input.analysis.rates.clone();
     for (s, _) in series.iter_mut().zip(aligned).filter(|(_, a)| !a) {
@@ -84,9 +84,9 @@ pub fn event_rates(input: &ReportInput<'_>) -> Figure {
         }
     };
     let caption = format!(
-        "Event rates over the session (rows of the crop). A: camera 1, bins of {}; B: camera 2, bins of {}. \
-         Strong line: mean in a bin; light line: highest fine bin within it. Ticks between the panels: \
-         measured contacts ({}). Zoom with the buttons or the keys + and -, move by dragging or with the arrow keys.",
+        "Event rates over the session (rows of the crop). A: camera 1, bins of {}; B: camera 2, bins of {}. Strong \
+         line: mean per bin; light line: highest fine bin within it. Ticks between the panels: measured contacts ({}). \
+         Zoom with the buttons or the keys + and -; pan by dragging or with the arrow keys.",
         bin(&series[0]),
         bin(&series[1]),
         contacts.len()
@@ -194,8 +194,8 @@ pub fn press_rates(input: &ReportInput<'_>) -> Option<Figure> {
     if presses.is_empty() {
         return None;
     }
-    let caption = "Event rates around single presses, ON and OFF events apart, against the time since the measured \
-         contact. Dashed lines: contact and release. One column per press, camera 1 above, camera 2 below."
+    let caption = "Event rates around single presses, ON and OFF events separately, against time since measured \
+        contact. Dashed lines: contact and release. One column per press, camera 1 above, camera 2 below."
         .to_owned();
     let size = (1240.0, 480.0);
     let mut canvas = Canvas::new(

@@ -10,19 +10,19 @@ use crate::input::ReportInput;
 use crate::published;
 use crate::svg::{Svg, dots, polyline};
 
-/// What one panel shows.
+/// Content of one panel.
 struct Panel {
     name: &'static str,
     label: String,
     value: fn(&ReductionRow) -> Estimate,
-    /// From the unit of the value to the one drawn.
+    /// Factor from stored to displayed unit.
     scale: f64,
-    /// Published values at 1 and 1024, in the unit drawn.
+    /// Published values at factors 1 and 1024, in the displayed unit.
     published: Option<(f64, f64)>,
 }
 
-/// RMSE, pass rate, within-X rate and located rate against the factor on a log2 axis, both kinds of thinning, with
-/// 95 % bands (the paper's figure "pass rate reduction" is panel B). `None` without the study.
+/// RMSE, pass rate, within-X rate and located rate against the factor on a log2 axis, for both kinds of thinning, with 95 %
+/// bands (panel B is the paper's figure "pass rate reduction"). `None` without the study.
 #[must_use]
 pub fn reduction(input: &ReportInput<'_>) -> Option<Figure> {
     let study = input.analysis.reduction.as_ref()?;
@@ -92,11 +92,12 @@ pub fn reduction(input: &ReportInput<'_>) -> Option<Figure> {
 
 fn caption(study: &Reduction) -> String {
     let mut caption = format!(
-        "Data reduction: what is left of the localisation when only one event in k is kept. One clustering setting at \
-         all factors (radius {} px, core threshold {} events). Values are means over {} seeds, bands 95 % \
-         intervals over locations (bootstrap; exact where a share is 0 or 100 %), {} presses. A press without an estimate fails in B, C and D. The pass threshold is \
-         the 95th percentile of the errors at factor 1 ({} mm), so B begins at about 95 % by construction; C asks for an error \
-         of at most {} mm. Small figures above the plots: kB/s of both cameras during a press.",
+        "Data reduction: localisation when only one event in k is kept, with one clustering setting at all factors \
+         (radius {} px, core threshold {} events). Values are means over {} seeds, bands 95 % intervals over locations \
+         (bootstrap; exact where a share is 0 or 100 %), {} presses. A press without an estimate fails in B, C and D. \
+         The pass threshold is the 95th percentile of the errors at factor 1 ({} mm), so B begins at about 95 % by \
+         construction; C requires an error of at most {} mm. Small figures above the plots: kB/s of both cameras \
+         during a press.",
         number(Some(study.eps_px), 1),
         study.min_samples,
         study.seeds,
@@ -106,8 +107,9 @@ fn caption(study: &Reduction) -> String {
     );
     if let Some((best, all)) = better_with_less(study) {
         caption += &format!(
-            " A is lowest at k = {} ({} mm, with all events {} mm): the core threshold is a number of events, so fewer \
-             events ask for denser neighbourhoods, and a cluster of all events takes in more of its surroundings.",
+            "A has its minimum at k = {} ({} mm; with all events {} mm). The core threshold is a number of events, so \
+             fewer events require denser neighbourhoods, while a cluster of all events includes more of its \
+             surroundings.",
             best.factor,
             number(best.rmse_mm.value, 2),
             number(all.rmse_mm.value, 2),
@@ -116,7 +118,7 @@ fn caption(study: &Reduction) -> String {
     caption
 }
 
-/// The factor with the least error and factor 1, when thinning makes the error lower beyond both intervals.
+/// Best factor and factor 1, if thinning lowers the error beyond both intervals.
 fn better_with_less(study: &Reduction) -> Option<(&ReductionRow, &ReductionRow)> {
     let rows = &study.curves.first()?.rows;
     let all = rows.iter().find(|r| r.factor == 1)?;
@@ -146,7 +148,7 @@ fn axes(study: &Reduction, panel: &Panel, (left, top): (f64, f64)) -> Axes {
     let high = drawn.iter().copied().fold(0.0, f64::max);
     let low = drawn.iter().copied().fold(f64::INFINITY, f64::min);
     let y = if panel.scale > 1.0 {
-        // A share: from a round number below the lowest up to 100 %.
+        // Shares: from a round number below the minimum to 100 %.
         (((low - 4.0) / 10.0).floor().clamp(0.0, 9.0) * 10.0, 101.0)
     } else {
         (0.0, nice_above(high * 1.02))
@@ -155,7 +157,7 @@ fn axes(study: &Reduction, panel: &Panel, (left, top): (f64, f64)) -> Axes {
     Axes {
         x: Scale::new((-0.35, last + 0.35), (left, left + 540.0)),
         y: Scale::new(y, (top + 208.0, top)),
-        x_label: "one event kept of k".into(),
+        x_label: "one event in k kept".into(),
         y_label: panel.label.clone(),
         tick_count: (0, 5),
     }
@@ -214,7 +216,7 @@ fn draw(svg: &mut Svg, study: &Reduction, panel: &Panel, at: (f64, f64), with_by
     }
 }
 
-/// Says where no press is located any more, so that no line there is no riddle.
+/// Notes where no press is located any more, so that the missing line is explained.
 fn nothing_located(svg: &mut Svg, study: &Reduction, axes: &Axes) {
     let rows = || study.curves.iter().flat_map(|c| &c.rows);
     let last = rows()
@@ -231,9 +233,9 @@ fn nothing_located(svg: &mut Svg, study: &Reduction, axes: &Axes) {
 }
 
 /// x, y of the value, y of both ends of the interval.
-type Drawn = (f64, Option<f64>, Option<(f64, f64)>);
+type PlotPoint = (f64, Option<f64>, Option<(f64, f64)>);
 
-fn points(curve: &ReductionCurve, panel: &Panel, axes: &Axes) -> Vec<Drawn> {
+fn points(curve: &ReductionCurve, panel: &Panel, axes: &Axes) -> Vec<PlotPoint> {
     let y = |v: Option<f64>| {
         v.filter(|v| v.is_finite())
             .map(|v| axes.y.at(v * panel.scale))
@@ -245,7 +247,7 @@ fn points(curve: &ReductionCurve, panel: &Panel, axes: &Axes) -> Vec<Drawn> {
     curve.rows.iter().map(drawn).collect()
 }
 
-/// Bytes per second during a press above the plot, as a second scale.
+/// Second scale above the plot: bytes per second during a press.
 fn bytes(svg: &mut Svg, study: &Reduction, axes: &Axes, top: f64) {
     let Some(curve) = study.curves.first() else {
         return;

@@ -1,4 +1,4 @@
-//! Owns the figure of the calibration's residuals, before and after.
+//! Owns the figure of calibration residuals, before and after.
 
 use skinrig_model::Point2;
 
@@ -9,11 +9,11 @@ use crate::format::number;
 use crate::input::ReportInput;
 use crate::svg::{dots, polyline};
 
-/// Which estimate of a press is drawn.
+/// Selects the estimate to draw.
 type Estimate = fn(&Residual) -> Option<Point2>;
 
-/// Vectors from truth to estimate of the calibrating presses, before and after the calibration, on one scale. `None`
-/// without a calibration.
+/// Vectors from truth to estimate of the calibration presses, before and after calibration, on one scale. `None` without a
+/// calibration.
 #[must_use]
 pub fn residuals(input: &ReportInput<'_>) -> Option<Figure> {
     let fit = input.analysis.calibration.as_ref()?;
@@ -22,10 +22,10 @@ pub fn residuals(input: &ReportInput<'_>) -> Option<Figure> {
         return None;
     }
     let caption = format!(
-        "Residuals of the calibrating presses: from the measured position (dot) to the estimate (end of the line). A: \
-         with the geometry that the calibration started from (RMSE {} mm); B: with the calibrated one (RMSE {} mm over \
-         the {} presses fitted, {} of them at less than half of their weight). A pattern that is left in B is what the \
-         model cannot describe.",
+        "Residuals of the calibration presses, from measured position (dot) to estimate (end of the line). A: with the \
+         geometry before calibration (RMSE {} mm); B: with the calibrated geometry (RMSE {} mm over the {} fitted \
+         presses, {} of them with less than half weight). Patterns that remain in B are what the model cannot \
+         describe.",
         number(Some(fit.rmse_before_mm), 2),
         number(Some(fit.rmse_after_mm), 2),
         fit.n,
@@ -74,6 +74,6 @@ pub fn residuals(input: &ReportInput<'_>) -> Option<Figure> {
         svg.close();
         layout.cameras(svg, input);
     }
-    let n = format!("n = {} calibrating presses", rows.len());
+    let n = format!("n = {} calibration presses", rows.len());
     Some(canvas.finish(&n, "residuals", ""))
 }

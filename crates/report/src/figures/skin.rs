@@ -1,4 +1,4 @@
-//! Owns what the maps share: where the skin lies in a figure, cameras, fields of view, colour bar.
+//! Owns the layout common to all maps: position of the skin, cameras, fields of view, colour bar.
 
 use skinrig_model::{CameraModel, Point2, SENSOR_WIDTH};
 
@@ -8,7 +8,7 @@ use crate::derive::LocationSummary;
 use crate::input::ReportInput;
 use crate::svg::{Px, Svg, polyline};
 
-/// Where the skin lies in the figure.
+/// Position and scale of the skin in the figure.
 pub(super) struct Layout {
     pub(super) axes: Axes,
     outline: Vec<Point2>,
@@ -19,7 +19,7 @@ impl Layout {
         Self::within(input, (66.0, 18.0), (660.0, 610.0))
     }
 
-    /// The skin and the cameras as large as they fit into the box at `(left, top)`.
+    /// Fits the skin and the cameras into the box at `(left, top)`.
     pub(super) fn within(
         input: &ReportInput<'_>,
         (left, top): (f64, f64),
@@ -81,7 +81,7 @@ impl Layout {
         (0.42 * nearest * self.axes.x.per_unit()).clamp(3.0, 8.0)
     }
 
-    /// Part of the plane that `camera` sees: from it along the rays of columns 0 to 640.
+    /// Field of view of `camera` in the plane, along the rays of columns 0 to 640.
     pub(super) fn field_of_view(&self, camera: &CameraModel) -> String {
         const REACH_MM: f64 = 400.0; // beyond any skin; the outline clips it
         let width = f64::from(SENSOR_WIDTH);
@@ -101,8 +101,8 @@ impl Layout {
         )
     }
 
-    /// Strokes the outer edge of shapes that touch or overlap as if they were one: a mask hides the strokes within.
-    /// `id` must be unique in the page.
+    /// Strokes the outer edge of touching or overlapping shapes as if they were one; a mask hides the inner strokes. `id`
+    /// must be unique in the page.
     pub(super) fn union_edge(&self, svg: &mut Svg, id: &str, class: &str, shapes: &str) {
         let (x, y) = (self.axes.x.px, self.axes.y.px);
         let (left, top) = (x.0.min(x.1), y.0.min(y.1));
@@ -118,7 +118,7 @@ impl Layout {
                 ("fill", &"#fff"),
             ],
         );
-        // The thin stroke closes the seam between shapes that touch.
+        // The thin stroke closes the seam between touching shapes.
         svg.leaf(
             "path",
             &[
@@ -165,7 +165,7 @@ impl Layout {
     }
 }
 
-/// A colour bar in mm with its title, at the right edge; says when locations lie above its end.
+/// Colour bar in mm with title, at the right edge, with the number of locations above its end.
 pub(super) fn colour_bar(svg: &mut Svg, title: &str, top_mm: f64, beyond: usize) {
     const STEPS: u32 = 48;
     let (x, top, height, width) = (786.0, 70.0, 260.0, 18.0);

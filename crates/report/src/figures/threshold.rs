@@ -1,4 +1,4 @@
-//! Owns the figure of the threshold's choice.
+//! Owns the figure of the threshold choice.
 
 use super::canvas::{Canvas, Figure, nice_above};
 use crate::axes::{Axes, Scale};
@@ -6,8 +6,8 @@ use crate::format::number;
 use crate::input::ReportInput;
 use crate::svg::{Px, dots, polyline};
 
-/// Root mean square cost of each candidate for the least number of cluster events, the chosen one marked. `None`
-/// where it was not chosen.
+/// Root mean square cost of each candidate for the minimum number of cluster events, the chosen one marked. `None` if the
+/// threshold was not chosen automatically.
 #[must_use]
 pub fn threshold(input: &ReportInput<'_>) -> Option<Figure> {
     let choice = input.analysis.threshold.as_ref()?;
@@ -22,9 +22,10 @@ pub fn threshold(input: &ReportInput<'_>) -> Option<Figure> {
     }
     let floor = choice.candidates.first().map(|(events, _)| *events) == Some(choice.events);
     let mut caption = format!(
-        "Choice of the least number of cluster events, on the {} calibrating presses alone. Cost of a threshold: root \
-         mean square over presses of the error, where a press left out counts {} mm, the error of an answer that knows \
-         nothing, and a kept one at most sqrt(2) times as much. Ring: the threshold chosen, {} events in the weaker camera; it leaves out {} of them.",
+        "Choice of the minimum number of cluster events, on the {} calibration presses alone. Cost of a threshold: \
+         root mean square error over presses, where a rejected press counts {} mm (the error of a blind guess) and a \
+         kept one at most sqrt(2) times as much. Ring: the chosen threshold, {} events in the weaker camera; it \
+         rejects {} presses.",
         choice.n,
         number(Some(choice.penalty_mm), 1),
         choice.events,
@@ -32,18 +33,18 @@ pub fn threshold(input: &ReportInput<'_>) -> Option<Figure> {
     );
     if floor {
         caption += &choice.chance.map_or_else(
-            || " It is the least one tried: no higher one costs less.".to_owned(),
+            || " It is the smallest candidate: no larger one costs less.".to_owned(),
             |p| {
                 let p = number(Some(p), 3);
                 format!(
-                    " It is the least one tried: what a higher one gains is no more than chance gives (p = {p}), or stands \
-                     on one location."
+                    "It is the smallest candidate: the gain of a larger one could be chance (p = {p}), or depends on a \
+                     single location."
                 )
             },
         );
     } else if let Some(p) = choice.chance {
         let p = number(Some(p), 3);
-        caption += &format!(" Chance gives as large a gain with p = {p} (permutation test).");
+        caption += &format!(" A gain this large by chance has p = {p} (permutation test).");
     }
     let mut canvas = Canvas::new(
         input,
@@ -63,8 +64,8 @@ pub fn threshold(input: &ReportInput<'_>) -> Option<Figure> {
     let axes = Axes {
         x: Scale::new((low - margin, high + margin), (66.0, 604.0)),
         y: Scale::new((0.0, nice_above(most * 1.05)), (412.0, 30.0)),
-        x_label: "least number of cluster events".into(),
-        y_label: "cost on calibrating presses (mm)".into(),
+        x_label: "minimum number of cluster events".into(),
+        y_label: "cost on calibration presses (mm)".into(),
         tick_count: (0, 6),
     };
     let marks: Vec<_> = (0..=9)
@@ -105,9 +106,9 @@ pub fn threshold(input: &ReportInput<'_>) -> Option<Figure> {
                 ("r", &"8"),
             ],
         );
-        let least = if floor { ", the least tried" } else { "" };
+        let least = if floor { ", smallest candidate" } else { "" };
         let text = format!("{} events{least}", choice.events);
-        // To the side where there is room.
+        // On the side with more space.
         let (dx, anchor) = if x < 400.0 {
             (4.0, "start")
         } else {

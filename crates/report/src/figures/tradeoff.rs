@@ -1,4 +1,4 @@
-//! Owns the figure of a tradeoff: RMSE against each cost, with the fronts.
+//! Owns the figure of a tradeoff: RMSE against each cost, with Pareto fronts.
 
 use skinrig_analysis::tradeoff::{Cost, Row, Tradeoff};
 use skinrig_model::Estimator;
@@ -13,7 +13,7 @@ const TOP: f64 = 64.0;
 const BOTTOM: f64 = 532.0;
 const WIDTH: f64 = 352.0;
 
-/// What a cost is called.
+/// Short name of a cost.
 pub(crate) const fn name(cost: Cost) -> &'static str {
     match cost {
         Cost::Cpu => "CPU",
@@ -37,7 +37,8 @@ fn value(cost: Cost, row: &Row) -> f64 {
     }
 }
 
-/// `foot` names the session. The three panels. Points are choices, one mark per estimator; hollow ones locate too few presses to compete.
+/// Three panels, one per cost. Points are choices, one mark per estimator; hollow ones locate too few presses. `foot` names
+/// the session.
 #[must_use]
 pub fn fronts(result: &Tradeoff, rig: &str, foot: &str) -> Figure {
     let shown = result.rows.iter().filter_map(|r| r.rmse_mm.value);
@@ -45,7 +46,7 @@ pub fn fronts(result: &Tradeoff, rig: &str, foot: &str) -> Figure {
     let (low, high) = shown
         .iter()
         .fold((f64::INFINITY, 0.0f64), |(l, h), e| (l.min(*e), h.max(*e)));
-    // Room below for the names of the choices on a front.
+    // Space below for the labels of choices on a front.
     let exponents = if low <= high {
         ((low / 2.6).log10(), (high * 1.15).log10())
     } else {
@@ -53,9 +54,10 @@ pub fn fronts(result: &Tradeoff, rig: &str, foot: &str) -> Figure {
     };
     let title = "Error against cost";
     let caption = format!(
-        "RMSE of {} ways to locate the same {} attempted scoring presses (those that count in each), against CPU time, data sent and delay, all logarithmic. \
-         Lines: the fronts, what no other choice beats in both; bars: 95 % intervals over locations. Hollow: fewer than \
-         {} % of the presses located, out of competition. The ring is the session's own choice. {rig}",
+        "RMSE of {} ways to locate the same {} attempted scoring presses (those that count in each), against CPU time, \
+         data sent and delay, all logarithmic. Lines: Pareto fronts, where no other choice is better in both; bars: 95 \
+         % intervals over locations. Hollow: not on any front, because fewer than {} % of the presses were located. \
+         Ring: the session's own choice. {rig}",
         result.rows.len(),
         result.scored.0,
         crate::format::number(Some(100.0 * result.least_located), 1),
@@ -183,7 +185,7 @@ fn panel(svg: &mut Svg, result: &Tradeoff, cost: Cost, left: f64, y: Scale, firs
     svg.path("ref2", &crate::svg::polyline(steps, false));
     for row in result.rows.iter().filter(|r| !r.fronts.contains(&cost)) {
         if let Some(at) = place(row) {
-            mark(svg, row.choice.estimator, at, row.competes, &told(row));
+            mark(svg, row.choice.estimator, at, row.competes, &tooltip(row));
         }
     }
     for row in &front {
@@ -197,7 +199,7 @@ fn panel(svg: &mut Svg, result: &Tradeoff, cost: Cost, left: f64, y: Scale, firs
             row.choice.estimator,
             (px, py),
             row.competes,
-            &told(row),
+            &tooltip(row),
         );
     }
     if let Some((px, py)) = result.rows.first().and_then(place) {
@@ -214,7 +216,7 @@ fn panel(svg: &mut Svg, result: &Tradeoff, cost: Cost, left: f64, y: Scale, firs
     labels(svg, &front, place, (left, right));
 }
 
-/// Names of the choices on a front, below their points where the line leaves room, each only where it covers no other.
+/// Labels of the choices on a front, below their points where the line leaves room, unless they would overlap.
 fn labels(
     svg: &mut Svg,
     front: &[&Row],
@@ -250,7 +252,7 @@ fn labels(
     }
 }
 
-fn told(row: &Row) -> String {
+fn tooltip(row: &Row) -> String {
     format!(
         "{}: RMSE {} mm, located {} %, {} µs, {} kB/s, {} ms",
         label(&row.choice),
@@ -297,8 +299,8 @@ fn axes(svg: &mut Svg, x: Scale, y: Scale, cost: Cost, first: bool) {
     }
 }
 
-/// Ticks of a logarithmic axis over these exponents of ten: 1, 2 and 5 of each power, the powers alone over more than
-/// three of them.
+/// Ticks of a logarithmic axis over these exponents of ten: 1, 2 and 5 of each power, or only the powers over more than
+/// three decades.
 fn decades(exponents: (f64, f64)) -> Vec<(f64, String)> {
     let wide = exponents.1 - exponents.0 > 3.0;
     let powers = exponents.0.floor() as i32..=exponents.1.ceil() as i32;

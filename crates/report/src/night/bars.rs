@@ -1,18 +1,18 @@
-//! Owns the small bars of a night's page: a value between its limits, as a drawing without words.
+//! Owns the bars on a night's page: a value between its limits, drawn without text.
 
 use skinrig_model::Limit;
 use skinrig_nightly::{Measurement, Verdict};
 
 use crate::svg::{Px, Svg};
 
-/// Width of a bar in its own units; it is stretched to its cell.
+/// Width of a bar in its own units; the page stretches it to its cell.
 const WIDTH: f64 = 120.0;
 const HEIGHT: f64 = 12.0;
-/// Beyond a limit the scale goes on by this share, so that a broken one is seen.
+/// Extension of the scale beyond a limit, so that a violation is visible.
 const BEYOND: f64 = 0.25;
 
-/// A value on the scale of its limits: what is good, what is near a limit, what is not good, and where the value is. `None` for
-/// what was not measured or has no limit.
+/// A value on the scale of its limits: good, marginal and bad ranges, and the value. `None` if not measured or without a
+/// limit.
 pub(super) fn bar(m: &Measurement) -> Option<String> {
     let (value, limit) = (m.value?, m.limit.as_ref()?);
     let (from, to) = scale(value, limit);
@@ -73,11 +73,11 @@ pub(super) fn bar(m: &Measurement) -> Option<String> {
     Some(svg.finish())
 }
 
-/// First and last value of the scale: zero where that is near, the limits, the value, and a piece beyond both.
+/// First and last value of the scale: zero if near, limits, value, and padding.
 fn scale(value: f64, limit: &Limit) -> (f64, f64) {
     let named = [limit.at_least, limit.at_most, Some(value), Some(0.0)];
     let named = || named.iter().flatten().copied();
-    // Zero belongs to a scale with one limit; one with two stands for itself.
+    // A scale with one limit starts at zero; one with two limits does not.
     let both = limit.at_least.is_some() && limit.at_most.is_some();
     let wanted = || named().take(if both { 3 } else { 4 });
     let low = wanted().fold(f64::INFINITY, f64::min);

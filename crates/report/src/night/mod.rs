@@ -1,12 +1,12 @@
-//! Owns the presentation of a night of checks: the tree on a terminal, and the page for the morning.
+//! Owns the presentation of a nightly run: terminal tree and HTML page.
 
 mod bars;
 mod page;
+mod text;
 mod tree;
 mod trends;
-mod words;
 
 pub use page::html;
+pub use text::span;
 pub use tree::{Colour, line, tree};
 pub use trends::Trends;
-pub use words::span;

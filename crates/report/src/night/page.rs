@@ -1,4 +1,4 @@
-//! Owns the page of a night: what its template receives.
+//! Owns the HTML page of a night: inputs of its template.
 
 use minijinja::value::Serde;
 use minijinja::{Value, context};
@@ -6,7 +6,7 @@ use serde::Serialize;
 use skinrig_nightly::{Attempt, Cause, CheckResult, Measurement, Night, Verdict};
 
 use super::trends::Trends;
-use super::{bars, words};
+use super::{bars, text};
 use crate::error::ReportError;
 use crate::frame::Frame;
 use crate::trend::{ALARM_CSS, ALARM_TEMPLATE};
@@ -15,26 +15,26 @@ const TEMPLATE: &str = include_str!("../../assets/night/page.html");
 const CSS: &str = include_str!("../../assets/night/page.css");
 const SCRIPT: &str = include_str!("../../assets/night/page.js");
 
-/// One of the four places to look at.
+/// One of the four possible causes, as a card.
 #[derive(Serialize)]
-struct Place {
+struct CauseCard {
     name: &'static str,
     state: &'static str,
-    words: String,
+    status: String,
     moved: Option<bool>,
     trend: Option<String>,
-    checks: Vec<Named>,
+    checks: Vec<CheckLink>,
 }
 
-/// A check by its title, with a link.
+/// Link to a check.
 #[derive(Serialize)]
-struct Named {
+struct CheckLink {
     id: String,
     title: String,
 }
 
 #[derive(Serialize)]
-struct Check {
+struct CheckCard {
     id: String,
     title: String,
     verdict: &'static str,
@@ -45,16 +45,16 @@ struct Check {
     took: String,
     planned: String,
     share: f64,
-    attempts: Vec<Tried>,
+    attempts: Vec<AttemptCard>,
 }
 
 #[derive(Serialize)]
-struct Tried {
+struct AttemptCard {
     number: usize,
     verdict: &'static str,
     took: String,
     rows: Vec<Row>,
-    seen: Vec<Seen>,
+    evidence: Vec<EvidenceItem>,
 }
 
 #[derive(Serialize)]
@@ -70,26 +70,30 @@ struct Row {
 }
 
 #[derive(Serialize)]
-struct Seen {
+struct EvidenceItem {
     subject: String,
     kind: &'static str,
     what: String,
     next: Option<String>,
 }
 
-/// The night, and what the nights before make of it, as one HTML page that needs no network; the golden session's report and the
-/// page of the trends are other files, and linked.
+/// The night and its trends as a self-contained HTML page. It links to the golden session's report and to the page of the
+/// trends.
 ///
 /// # Errors
-/// [`ReportError`] when the template cannot be written; no input is known to cause it.
+/// [`ReportError`] when rendering fails; no known input causes this.
 pub fn html(night: &Night, trends: Trends<'_>) -> Result<String, ReportError> {
     let frame = Frame {
         templates: &[("night.html", TEMPLATE), ("alarm.html", ALARM_TEMPLATE)],
         styles: &[ALARM_CSS, CSS],
         script: SCRIPT,
     };
-    let longest = night.checks.iter().map(words::took_s).fold(0.0, f64::max);
-    let checks: Vec<Check> = night.checks.iter().map(|c| check(c, longest)).collect();
+    let longest = night.checks.iter().map(text::took_s).fold(0.0, f64::max);
+    let checks: Vec<CheckCard> = night
+        .checks
+        .iter()
+        .map(|c| check_card(c, longest))
+        .collect();
     let share = |seconds: f64| (100.0 * seconds / night.budget_s.max(1e-9)).clamp(0.0, 100.0);
     frame.render(context! {
         headline => trends.headline(night),
@@ -105,11 +109,11 @@ pub fn html(night: &Night, trends: Trends<'_>) -> Result<String, ReportError> {
         finished => night.finished,
         ended_early => night.ended_early.clone(),
         lease_note => night.lease_note.clone(),
-        tally => words::tally(night),
-        places => Value::from(Serde(places(night, trends))),
-        took => words::span(night.took_s),
-        planned => words::span(night.planned_s),
-        budget => words::span(night.budget_s),
+        tally => text::tally(night),
+        causes => Value::from(Serde(cause_cards(night, trends))),
+        took => text::span(night.took_s),
+        planned => text::span(night.planned_s),
+        budget => text::span(night.budget_s),
         took_share => share(night.took_s),
         planned_share => share(night.planned_s),
         checks => Value::from(Serde(checks)),
@@ -125,9 +129,9 @@ pub fn html(night: &Night, trends: Trends<'_>) -> Result<String, ReportError> {
     })
 }
 
-/// The four places that may have to be looked at, and what the night says of each.
-fn places(night: &Night, trends: Trends<'_>) -> Vec<Place> {
-    let named = words::causes(night);
+/// Status of the four possible causes.
+fn cause_cards(night: &Night, trends: Trends<'_>) -> Vec<CauseCard> {
+    let named = text::causes(night);
     [
         (Cause::Rig, "Rig"),
         (Cause::Skin, "Skin"),
@@ -137,23 +141,23 @@ fn places(night: &Night, trends: Trends<'_>) -> Vec<Place> {
     .into_iter()
     .map(|(cause, name)| {
         let at_fault = named.iter().find(|(c, _)| *c == cause);
-        let checks: Vec<Named> = at_fault
-            .map(|(_, checks)| checks.iter().map(|c| name_of(c)).collect())
+        let checks: Vec<CheckLink> = at_fault
+            .map(|(_, checks)| checks.iter().map(|c| check_link(c)).collect())
             .unwrap_or_default();
-        let (state, words) = if !checks.is_empty() {
+        let (state, status) = if !checks.is_empty() {
             ("bad", "look here".to_owned())
         } else if cause == Cause::Skin {
-            skin(night)
+            skin_status(night)
         } else if cause == Cause::Rig && night.checks.iter().all(|c| c.attempts.is_empty()) {
             ("unknown", "not checked".to_owned())
         } else {
             ("ok", "nothing found".to_owned())
         };
         let (moved, trend) = trends.of(cause).unzip();
-        Place {
+        CauseCard {
             name,
             state,
-            words,
+            status,
             moved,
             trend,
             checks,
@@ -162,63 +166,66 @@ fn places(night: &Night, trends: Trends<'_>) -> Vec<Place> {
     .collect()
 }
 
-/// What a night says of the skin when nothing names it.
-fn skin(night: &Night) -> (&'static str, String) {
+/// Status of the skin if no check blames it.
+fn skin_status(night: &Night) -> (&'static str, String) {
     let golden = night.checks.iter().find(|c| c.name == "golden");
     match golden {
         None => ("unknown", "not part of this suite".to_owned()),
         Some(c) if c.verdict == Verdict::Skipped => ("unknown", "not checked".to_owned()),
-        Some(c) if c.verdict.is_good() => ("ok", "as it should be".to_owned()),
+        Some(c) if c.verdict.is_good() => ("ok", "within limits".to_owned()),
         Some(_) => (
             "unknown",
-            "not known: its campaign says nothing tonight".to_owned(),
+            "unknown: its campaign is not usable tonight".to_owned(),
         ),
     }
 }
 
-fn name_of(check: &CheckResult) -> Named {
-    Named {
+fn check_link(check: &CheckResult) -> CheckLink {
+    CheckLink {
         id: check.name.clone(),
         title: check.title.clone(),
     }
 }
 
-fn check(c: &CheckResult, longest_s: f64) -> Check {
-    let took_s = words::took_s(c);
-    Check {
+fn check_card(c: &CheckResult, longest_s: f64) -> CheckCard {
+    let took_s = text::took_s(c);
+    CheckCard {
         id: c.name.clone(),
         title: c.title.clone(),
         verdict: c.verdict.name(),
         open: !matches!(c.verdict, Verdict::Pass | Verdict::Skipped),
-        why: words::why(c),
+        why: text::why(c),
         repeats: c.repeats.clone(),
         skipped: c.skipped.clone(),
         took: if c.attempts.is_empty() {
             String::new()
         } else {
-            words::span(took_s)
+            text::span(took_s)
         },
-        planned: words::span(c.planned_s),
+        planned: text::span(c.planned_s),
         share: 100.0 * took_s / longest_s.max(1e-9),
-        attempts: (1..).zip(&c.attempts).map(|(n, a)| tried(n, a)).collect(),
+        attempts: (1..)
+            .zip(&c.attempts)
+            .map(|(n, a)| attempt_card(n, a))
+            .collect(),
     }
 }
 
-fn tried(number: usize, attempt: &Attempt) -> Tried {
+fn attempt_card(number: usize, attempt: &Attempt) -> AttemptCard {
     let rows = attempt.parts.iter().flat_map(|part| {
         let subject = part.subject.clone();
         let of = move |m| row(&subject, m);
         part.measurements.iter().map(of)
     });
-    Tried {
+    AttemptCard {
         number,
         verdict: attempt.verdict.name(),
-        took: words::span(attempt.took_s),
+        took: text::span(attempt.took_s),
         rows: rows.collect(),
-        seen: attempt
+        evidence: attempt
             .evidence
             .iter()
-            .map(|e| Seen {
+            .map(|e| EvidenceItem {
                 subject: e.subject.clone(),
                 kind: e.kind.name(),
                 what: e.what.clone(),
@@ -240,17 +247,17 @@ fn row(subject: &str, m: &Measurement) -> Row {
         subject: subject.to_owned(),
         metric: m.metric.replace('_', " "),
         value: match m.value {
-            Some(_) => words::amount(m.value, &m.unit),
+            Some(_) => text::amount(m.value, &m.unit),
             None => "not measured".to_owned(),
         },
         interval: m.interval.map_or(String::new(), |[low, high]| {
-            let of = |v| words::amount(Some(v), &m.unit);
+            let of = |v| text::amount(Some(v), &m.unit);
             format!("{} to {}", of(low), of(high))
         }),
         limit: m
             .limit
             .as_ref()
-            .map_or_else(|| "for the record".to_owned(), |l| words::limit(l, &m.unit)),
+            .map_or_else(|| "no limit".to_owned(), |l| text::limit(l, &m.unit)),
         bar: bars::bar(m),
         verdict: if m.limit.is_some() {
             m.verdict.name()

@@ -1,25 +1,25 @@
-//! Owns the tree of a night on a terminal: every check with what was measured, and of those that are not good, why and what next.
+//! Owns the terminal tree of a night: every check with its measurements, and why a check failed and what to do next.
 
 use skinrig_nightly::{Attempt, CheckResult, Measurement, Night, Part, Verdict};
 
-use super::words;
+use super::text;
 
 const WIDTH: usize = 80;
-/// Where titles begin.
+/// Column of titles.
 const INDENT: usize = 15;
-/// Where the words about a device begin.
+/// Column of the text about a device.
 const DEEP: usize = 28;
 
-/// Whether a terminal shows colours.
+/// Whether to write ANSI colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Colour {
-    /// It does.
+    /// With ANSI colours.
     On,
-    /// It does not.
+    /// Plain text.
     Off,
 }
 
-/// The night as a tree.
+/// Formats a night as a tree.
 #[must_use]
 pub fn tree(night: &Night, colour: Colour) -> String {
     let mut out = Lines {
@@ -37,24 +37,24 @@ pub fn tree(night: &Night, colour: Colour) -> String {
     let verdict = out.painted(night.verdict, night.verdict.name());
     out.text.push_str(&format!(
         "{verdict}  {} (exit {})\n",
-        words::headline(night),
+        text::headline(night),
         night.exit as u8
     ));
-    out.wrapped(0, &words::tally(night));
+    out.wrapped(0, &text::tally(night));
     out.wrapped(
         0,
         &format!(
             "took {} of {}, planned {} without repeats",
-            words::span(night.took_s),
-            words::span(night.budget_s),
-            words::span(night.planned_s)
+            text::span(night.took_s),
+            text::span(night.budget_s),
+            text::span(night.planned_s)
         ),
     );
     if let Some(why) = &night.ended_early {
         out.wrapped(0, &format!("ended early: {why}"));
     }
     if !night.finished {
-        out.wrapped(0, "unfinished: it is under way, or its program died");
+        out.wrapped(0, "unfinished: still running, or its process died");
     }
     if let Some(note) = &night.lease_note {
         out.wrapped(0, &format!("lease: {note}"));
@@ -62,7 +62,7 @@ pub fn tree(night: &Night, colour: Colour) -> String {
     out.text
 }
 
-/// The line of one check.
+/// Formats the line of one check.
 #[must_use]
 pub fn line(check: &CheckResult, colour: Colour) -> String {
     let lines = Lines {
@@ -81,8 +81,8 @@ impl Lines {
     fn head(&self, check: &CheckResult) -> String {
         let took = match check.attempts.len() {
             0 => String::new(),
-            1 => words::span(words::took_s(check)),
-            n => format!("{n} attempts, {}", words::span(words::took_s(check))),
+            1 => text::span(text::took_s(check)),
+            n => format!("{n} attempts, {}", text::span(text::took_s(check))),
         };
         let name = format!("{:<12}", check.verdict.name());
         let room = WIDTH - INDENT;
@@ -103,7 +103,7 @@ impl Lines {
         if let Some(reason) = &check.skipped {
             self.wrapped(INDENT, reason);
         }
-        if let Some(why) = words::why(check) {
+        if let Some(why) = text::why(check) {
             self.wrapped(INDENT, &why);
         }
         if let Some(repeats) = &check.repeats {
@@ -130,7 +130,7 @@ impl Lines {
         for e in &attempt.evidence {
             let what = format!("{}: {}", e.kind.name(), e.what);
             self.labelled(None, &e.subject, &what);
-            // One step for several of a kind is told once.
+            // Do not repeat a next step for several items of a kind.
             if let Some(next) = e.next.as_ref().filter(|n| last != Some(*n)) {
                 self.labelled(None, "next", next);
                 last = Some(next);
@@ -145,19 +145,19 @@ impl Lines {
             .partition(|m| m.verdict == Verdict::Pass);
         let mut subject = part.subject.as_str();
         for m in bad {
-            self.labelled(Some(m.verdict), subject, &words::against(m));
+            self.labelled(Some(m.verdict), subject, &text::against(m));
             subject = "";
         }
         if !good.is_empty() {
             let all: Vec<String> = good
                 .iter()
-                .map(|m| format!("{} {}", m.metric, words::amount(m.value, &m.unit)))
+                .map(|m| format!("{} {}", m.metric, text::amount(m.value, &m.unit)))
                 .collect();
             self.labelled(None, subject, &all.join(", "));
         }
     }
 
-    /// A device's words behind its name, and the verdict before it.
+    /// Text with a label, and the verdict before it.
     fn labelled(&mut self, verdict: Option<Verdict>, label: &str, text: &str) {
         let (first, rest) = fold(text, WIDTH - DEEP);
         let name = verdict.map_or("", Verdict::name);
@@ -197,7 +197,7 @@ impl Lines {
     }
 }
 
-/// `text` in lines of at most `width` characters; a longer word stands alone. What would move the cursor is left out.
+/// Wraps `text` at `width` characters; a longer word gets its own line. Drops control characters.
 fn fold(text: &str, width: usize) -> (String, Vec<String>) {
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {

@@ -1,31 +1,31 @@
-//! Owns what the page of a night says of the nights before it.
+//! Owns the trends section of a night's page.
 
 use minijinja::value::Serde;
 use minijinja::{Value, context};
 use skinrig_nightly::trend::Report;
-use skinrig_nightly::trend::report::name;
+use skinrig_nightly::trend::report::cause_name;
 use skinrig_nightly::{Cause, Night};
 
-use super::words;
-use crate::trend::{Links, since, told};
+use super::text;
+use crate::trend::{Links, alarm_cards, since};
 
-/// Series of an alarm that are named; of the others it is said how many they are.
-const MOST_NAMED: usize = 4;
+/// Series listed per alarm; the others are counted.
+const MAX_LISTED: usize = 4;
 
-/// What is known of the nights before, and of this one among them.
+/// Trends over previous nights, including this one.
 #[derive(Debug, Clone, Copy)]
 pub enum Trends<'a> {
-    /// Nobody asked for them: the night is added to no history.
-    NotKept,
-    /// Why they could not be told.
-    Untold(&'a str),
-    /// What they say.
-    Told {
-        /// All series judged, this night among the nights.
+    /// Not requested: the night is not added to a history.
+    NotRequested,
+    /// Could not be computed, with the reason.
+    Unavailable(&'a str),
+    /// Computed.
+    Available {
+        /// All series with their state.
         report: &'a Report,
         /// One per alarm.
         links: &'a [Links],
-        /// The page of the trends, as a link of this page.
+        /// Link to the page of the trends.
         page: &'a str,
     },
 }
@@ -33,14 +33,14 @@ pub enum Trends<'a> {
 impl<'a> Trends<'a> {
     fn report(self) -> Option<&'a Report> {
         match self {
-            Self::Told { report, .. } => Some(report),
-            Self::NotKept | Self::Untold(_) => None,
+            Self::Available { report, .. } => Some(report),
+            Self::NotRequested | Self::Unavailable(_) => None,
         }
     }
 
-    /// The first thing to know in the morning: where limits were broken, and what moved.
+    /// Headline: violated limits, and what drifted.
     pub(super) fn headline(self, night: &Night) -> String {
-        let limits = words::headline(night);
+        let limits = text::headline(night);
         let alarms = self.report().map_or(&[][..], |r| &r.alarms);
         if alarms.is_empty() {
             return limits;
@@ -48,21 +48,21 @@ impl<'a> Trends<'a> {
         let mut causes: Vec<&str> = Vec::new();
         for alarm in alarms {
             let cause = alarm.attribution.cause;
-            let moved = cause.map_or("something", |cause| name(Some(cause)));
+            let moved = cause.map_or("something", |cause| cause_name(Some(cause)));
             if !causes.contains(&moved) {
                 causes.push(moved);
             }
         }
         let causes: Vec<String> = causes.into_iter().map(str::to_owned).collect();
-        let moved = format!("{} probably moved", words::listed(&causes));
-        if night.verdict.is_good() && words::causes(night).is_empty() && words::was_made(night) {
+        let moved = format!("{} probably moved", text::listed(&causes));
+        if night.verdict.is_good() && text::causes(night).is_empty() && text::was_made(night) {
             format!("{limits}, but {moved}")
         } else {
             format!("{limits}; {moved}")
         }
     }
 
-    /// What the trends say of one of the places to look at; nothing where they say nothing.
+    /// Trend of one possible cause; `None` if unknown.
     pub(super) fn of(self, cause: Cause) -> Option<(bool, String)> {
         let report = self.report()?;
         let mut alarms = report.alarms.iter();
@@ -74,19 +74,18 @@ impl<'a> Trends<'a> {
         }
     }
 
-    /// For the template.
+    /// Template value.
     pub(super) fn value(self) -> Value {
         let (report, links, page) = match self {
-            Self::NotKept => {
-                let text = "No trends: this night was added to no history (--history FILE).";
-                return context! { state => "not-kept", tone => "", text };
+            Self::NotRequested => {
+                let text = "No trends: this night is not part of a history (--history FILE).";
+                return context! { state => "not-requested", tone => "", text };
             }
-            Self::Untold(why) => {
-                let text =
-                    format!("No trends tonight: {why}. The limits were judged all the same.");
-                return context! { state => "untold", tone => "warn", text };
+            Self::Unavailable(why) => {
+                let text = format!("No trends tonight: {why}. Limits were checked nevertheless.");
+                return context! { state => "unavailable", tone => "warn", text };
             }
-            Self::Told {
+            Self::Available {
                 report,
                 links,
                 page,
@@ -99,14 +98,14 @@ impl<'a> Trends<'a> {
         } else {
             ("steady", "ok")
         };
-        let alarms = told(report, links).into_iter().map(|mut alarm| {
-            let others = alarm.series.len().saturating_sub(MOST_NAMED);
-            alarm.series.truncate(MOST_NAMED);
-            context! { told => Value::from(Serde(alarm)), others }
+        let alarms = alarm_cards(report, links).into_iter().map(|mut alarm| {
+            let others = alarm.series.len().saturating_sub(MAX_LISTED);
+            alarm.series.truncate(MAX_LISTED);
+            context! { card => Value::from(Serde(alarm)), others }
         });
         context! {
             state, tone, page,
-            text => format!("Over the nights: {}.", report.headline),
+            text => format!("Trend: {}.", report.headline),
             alarms => alarms.collect::<Vec<_>>(),
         }
     }

@@ -15,12 +15,12 @@ pub(super) fn maps(a: &Analysis) -> Option<Grid> {
         "alignment",
         "Alignment certificate",
         &[
-            "Clock on clock",
+            "Clock map",
             "#drift (ppm)",
             "#residual, rms (µs)",
             "#largest (µs)",
             "#95 % interval at presses (µs)",
-            "#bound on top (µs)",
+            "#systematic bound (µs)",
             "#held-out coverage (%)",
             "#points (left out)",
             "#pieces",
@@ -49,11 +49,12 @@ pub(super) fn maps(a: &Analysis) -> Option<Grid> {
         grid.note(sentence(warning));
     }
     grid.note(
-        "The 95 % interval is what the noise of trains and exchanges leaves open, with both ways of an exchange taking equally long on \
-         average. The bound comes on top: of host from box it is certain, whatever share of a delay is on the way there or back, since the box's clock was read between \
-         two instants of the host; of the cameras it is the unknown mean delay of an edge, the whole µs of both clocks and what a rate \
-         may change by beyond the trains. Robot from host is the identity with a stated delay. A constant delay of the trigger \
-         inputs cannot be seen here.",
+        "The 95 % interval covers the random error of trains and exchanges, assuming that both directions of an \
+         exchange take equally long on average. The bound is in addition and covers systematic error. For host from \
+         box it is certain, however a delay divides between the two directions, because the box reads its clock \
+         between two host timestamps. For the cameras it covers the unknown mean delay of an edge, the 1 µs resolution \
+         of both clocks, and possible rate changes outside the trains. Robot from host is the identity with a stated \
+         delay. A constant delay of the trigger inputs cannot be detected here.",
     );
     Some(grid)
 }
@@ -68,7 +69,7 @@ fn half_widths(of: Option<(f64, f64)>, digits: usize) -> String {
     })
 }
 
-/// One row per camera: what became of the edges.
+/// One row per camera: edges sent, lost, doubled and spurious.
 pub(super) fn lines(a: &Analysis) -> Option<Grid> {
     let lines = &a.alignment.lines;
     if lines.is_empty() {
@@ -99,7 +100,7 @@ pub(super) fn lines(a: &Analysis) -> Option<Grid> {
             share(line.spurious),
         ]);
     }
-    grid.note("Counted are all trains that the box sent while the camera was recording.");
+    grid.note("All trains that the box sent while the camera was recording are counted.");
     for (k, line) in lines.iter().enumerate() {
         if line.trains_unrecorded > 0 {
             grid.note(format!(

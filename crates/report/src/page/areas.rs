@@ -73,15 +73,16 @@ pub(super) fn coverage(a: &Analysis) -> Option<Grid> {
         )
     });
     grid.note(format!(
-        "Taxels: circles of radius RMSE that fill the area. The RMSE was measured in the probed area only{cell}: the number \
-         for the whole skin supposes that it holds everywhere, which nothing here shows."
+        "Taxels: circles of radius RMSE that fill the area. The RMSE was measured in the probed area only{cell}; the \
+         number for the whole skin assumes the same RMSE everywhere, which was not tested."
     ));
-    grid.note("The published taxels need a radius of 5.31 mm, not the published RMSE of 4.66 mm, and over 64 x 64 mm, not 4620 mm².");
+    grid.note("The published number of taxels requires a radius of 5.31 mm instead of the published RMSE of 4.66 mm, \
+        and an area of 64 x 64 mm instead of 4620 mm².");
     grid.download("coverage");
     Some(grid)
 }
 
-/// The contact map reconstruction error with its parameters.
+/// Contact map reconstruction error with its parameters.
 pub(super) fn cmre(a: &Analysis) -> Option<Grid> {
     let c = a.cmre.as_ref()?;
     let mut grid = Grid::new(
@@ -103,13 +104,13 @@ pub(super) fn cmre(a: &Analysis) -> Option<Grid> {
     ]);
     if c.percent.value.is_some_and(|v| v < 0.0) {
         grid.note(
-            "Below 0: the public code's formula falls below 0 for an estimate between the true cell and the next one. It \
-             is a score of cells, not a share; the share of the diagonal is one.",
+            "Below 0: the public code's formula goes below 0 for an estimate between the true cell and the next one. \
+             It is a score of cells, not a share; the share of the diagonal is a true share.",
         );
     }
     grid.note(format!(
         "Parameters: {} x {} cells of {} mm, Gaussian of {} mm, SR of {} mm. None of them is published, so this number \
-         cannot be compared with the published 3.75 %; that one equals the share of the diagonal that an RMSE of 5.30 mm is.",
+         is not comparable with the published 3.75 %, which equals an RMSE of 5.30 mm as a share of the diagonal.",
         c.cells.0,
         c.cells.1,
         number(Some(c.settings.cell_mm), 1),
@@ -118,7 +119,7 @@ pub(super) fn cmre(a: &Analysis) -> Option<Grid> {
     ));
     if c.without_score > 0 {
         grid.note(format!(
-            "{} presses lie outside the map and have no score.",
+            "{} presses are outside the map and have no score.",
             c.without_score
         ));
     }
@@ -126,7 +127,7 @@ pub(super) fn cmre(a: &Analysis) -> Option<Grid> {
     Some(grid)
 }
 
-/// What one millimetre is of the skin's diagonal, %.
+/// One millimetre as a share of the skin's diagonal, %.
 fn percent_per_mm(a: &Analysis) -> f64 {
     100.0 / a.rig.outline.diagonal_mm()
 }
@@ -166,8 +167,8 @@ pub(super) fn bit_rates(a: &Analysis) -> Option<Grid> {
         "0.55",
     ));
     grid.note(format!(
-        "Events in the rows of the crop; bytes at {} bits per event. The published event rates follow from the published \
-         bytes at 21 bits.",
+        "Events in the rows of the crop; bytes at {} bits per event. The published event rates are derived from the \
+         published bytes at 21 bits.",
         number(Some(r.bits_per_event), 0)
     ));
     grid.download("bit_rates");

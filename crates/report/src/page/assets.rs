@@ -1,6 +1,6 @@
-//! Owns what the page is made of beside the frame of all pages: templates and script.
+//! Owns the page's templates and script, besides the common frame.
 
-/// The templates: the page, and one file per section.
+/// Templates: the page, and one file per section.
 pub(super) const TEMPLATES: [(&str, &str); 14] = [
     ("page.html", include_str!("../../assets/page.html")),
     (
@@ -56,7 +56,7 @@ pub(super) const TEMPLATES: [(&str, &str); 14] = [
         include_str!("../../assets/sections/presses.html"),
     ),
 ];
-/// One script: each part but the first stands in a function of its own.
+/// One script: each part but the first is wrapped in its own function.
 pub(super) const SCRIPT: &str = concat!(
     include_str!("../../assets/script/core.js"),
     include_str!("../../assets/script/filter.js"),

@@ -18,7 +18,7 @@ pub(super) fn models(a: &Analysis) -> Option<Grid> {
         &[
             "Model",
             "#parameters",
-            "#RMSE, locations left out (mm)",
+            "#RMSE, held-out locations (mm)",
             "#95 % interval",
             "#bounded RMSE (mm)",
             "against",
@@ -58,40 +58,41 @@ pub(super) fn models(a: &Analysis) -> Option<Grid> {
     Some(grid)
 }
 
-/// Why the model is the one used.
+/// Why this model was used.
 fn why(a: &Analysis, c: &CalibrationResult) -> String {
     use skinrig_model::CalibrationModel::Auto;
     let used = match a.settings.calibration {
-        Auto => "the last model that replaced the one in hand".to_owned(),
-        named if named == c.model => format!("{}, as the settings say", model_name(named)),
+        Auto => "the last accepted model".to_owned(),
+        named if named == c.model => format!("{}, as configured", model_name(named)),
         named => format!(
-            "{}; the settings say {}, whose fit failed or needs more places",
+            "{}; the configured {} failed to fit or needs more locations",
             model_name(c.model),
             model_name(named)
         ),
     };
     format!(
-        "Used: {used}. The smallest model is taken in hand; each larger one in turn replaces it if its error on left-out \
-         locations is lower by at least the needed number of standard errors. Gain: bounded RMSE of the model in hand less \
-         its own, with the standard error of the paired differences over locations. Errors above {} mm count as that.",
+        "Used: {used}. Starting from the smallest model, each larger one is accepted if it lowers the error on \
+         held-out locations by at least the required number of standard errors. Gain: bounded RMSE of the current \
+         model minus that of the larger one, with the standard error of the paired differences over locations. Errors \
+         above {} mm count as that.",
         number(c.bound_mm, 1),
     )
 }
 
-/// How well the fit is determined.
+/// How well the data determine the fit.
 pub(super) fn fit(a: &Analysis) -> Option<Grid> {
     let c = a.calibration.as_ref()?;
-    let mut grid = Grid::new("fit-table", "The fit", &["Quantity", "#Value"]);
+    let mut grid = Grid::new("fit-table", "Fit", &["Quantity", "#Value"]);
     let mut row = |name: &str, value: String| {
         grid.row([name.to_owned(), value]);
     };
     row("model", model_name(c.model).to_owned());
     row("lens", words(&c.lens));
-    row("calibrating presses", c.n.to_string());
+    row("calibration presses", c.n.to_string());
     row("RMSE before (mm)", number(Some(c.rmse_before_mm), 3));
     row("RMSE after (mm)", number(Some(c.rmse_after_mm), 3));
     row(
-        "directions determined, of parameters",
+        "rank, of parameters",
         format!("{} of {}", c.rank, c.names.len()),
     );
     row(
@@ -101,16 +102,16 @@ pub(super) fn fit(a: &Analysis) -> Option<Grid> {
             |v| number(Some(v), if v < 100.0 { 1 } else { 0 }),
         ),
     );
-    row("presses at less than half weight", c.outliers.to_string());
+    row("presses with less than half weight", c.outliers.to_string());
     row(
-        "starts in the best optimum",
+        "starts that reach the best optimum",
         format!("{} of {}", c.starts_agreeing, c.starts),
     );
     if !c.termination.is_empty() {
-        grid.note(format!("The optimiser stopped: {}.", c.termination));
+        grid.note(format!("The optimiser stopped with: {}.", c.termination));
     }
     if (c.rank as usize) < c.names.len() {
-        grid.note("The data do not determine all parameters: see the correlation and the standard errors.");
+        grid.note("The data do not determine all parameters; see the correlation and the standard errors.");
     }
     Some(grid)
 }

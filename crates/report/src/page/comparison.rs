@@ -1,4 +1,4 @@
-//! Owns the tables that set the session beside published skins, and beside the public code's way of judging.
+//! Owns the tables that compare the session with published skins, and with the public code's evaluation.
 
 use skinrig_analysis::result::{Analysis, Thinning};
 
@@ -23,7 +23,7 @@ fn digits(metric: Metric, value: Option<f64>) -> usize {
     }
 }
 
-/// A cell as text: value and interval.
+/// Value and interval of a cell.
 pub(crate) fn text(cell: &Cell, metric: Metric) -> String {
     match cell {
         Cell::Missing => NONE.to_owned(),
@@ -39,7 +39,7 @@ pub(crate) fn text(cell: &Cell, metric: Metric) -> String {
     }
 }
 
-/// The comparison with MSOWS.
+/// Comparison with MSOWS.
 pub(super) fn msows(input: &ReportInput<'_>) -> Grid {
     let session = format!("#{}", own_name(input));
     let mut grid = Grid::new(
@@ -67,9 +67,9 @@ pub(super) fn msows(input: &ReportInput<'_>) -> Grid {
         ]);
     }
     grid.note(
-        "Paper: Koolani et al., An Event-Based Opto-Tactile Skin. MSOWS: Lo Preti et al. 2022, as the paper gives it. This \
-         session in brackets: 95 % intervals over locations. At 1/1024: one event in 1024 kept at random (exact count, as \
-         in the public code), emulated on the recording; RMSE and rates there are those of the reduction study.",
+        "Paper: Koolani et al., An Event-Based Opto-Tactile Skin. MSOWS: Lo Preti et al. 2022, as quoted in the paper. \
+         Brackets: 95 % intervals over locations, this session. At 1/1024: one event in 1024 kept at random (exact \
+         count, as in the public code), emulated on the recording; RMSE and rates come from the reduction study.",
     );
     for f in &published::FOOTNOTES {
         grid.note(format!("{}: {}", f.mark, f.text));
@@ -78,7 +78,7 @@ pub(super) fn msows(input: &ReportInput<'_>) -> Grid {
     grid
 }
 
-/// What this session adds to the lists of skins and sensors: its RMSE with n.
+/// Row of this session in the lists of skins and sensors: RMSE with n.
 fn own(input: &ReportInput<'_>) -> String {
     let e = &input.analysis.scored.rmse_mm;
     if e.value.is_none() {
@@ -138,7 +138,7 @@ pub(super) fn skins(input: &ReportInput<'_>) -> Grid {
         ],
         true,
     );
-    grid.note("All rows but the last: as published, collected by the paper. Areas, loads and ways of judging differ: not a ranking.");
+    grid.note("All rows but the last are published values collected by the paper. Areas, loads and evaluation methods differ: not a ranking.");
     grid
 }
 
@@ -173,11 +173,11 @@ pub(super) fn sensors(input: &ReportInput<'_>) -> Grid {
         ],
         true,
     );
-    grid.note("All rows but the last: as published, collected by the paper. Most measure something else: not a ranking.");
+    grid.note("All rows but the last are published values collected by the paper. Most measure something else: not a ranking.");
     grid
 }
 
-/// The public code's way of judging beside ours. `None` outside the reference-code mode.
+/// The public code's evaluation beside ours. `None` outside reference-code mode.
 pub(super) fn reference(a: &Analysis) -> Option<Grid> {
     let r = a.reference.as_ref()?;
     let mut grid = Grid::new(
@@ -185,7 +185,7 @@ pub(super) fn reference(a: &Analysis) -> Option<Grid> {
         "In-sample, as published, beside held-out",
         &[
             "Quantity",
-            "#public code's way, in-sample",
+            "#public code, in-sample",
             "#this report, held-out",
             "#Published",
         ],
@@ -253,13 +253,13 @@ pub(super) fn reference(a: &Analysis) -> Option<Grid> {
         ]);
     }
     grid.note(
-        "In-sample: the presses that calibrated are the ones judged, and those outside the enclosing square are left out. \
-         It favours what was fitted. Held-out: presses that did not calibrate.",
+        "In-sample: evaluated on the calibration presses, without those outside the enclosing square, which favours \
+         whatever was fitted. Held-out: evaluated on presses that did not calibrate.",
     );
     if !r.calibrated {
         grid.note(
-            "These presses determine no plausible calibration under the public code's choices: the nominal camera geometry \
-             judges, and the in-sample numbers say nothing about the skin.",
+            "These presses determine no plausible calibration with the public code's choices. The nominal camera \
+             geometry was used instead, so the in-sample numbers do not describe the skin.",
         );
     }
     Some(grid)
@@ -273,13 +273,13 @@ pub(super) fn reference_reduction(a: &Analysis) -> Option<Grid> {
     }
     let mut grid = Grid::new(
         "reference-reduction",
-        "Data reduction, the public code's way",
+        "Data reduction as in the public code",
         &[
             "k",
-            "#RMSE, its way (mm)",
+            "#RMSE, public code (mm)",
             "#RMSE, this report (mm)",
-            "#pass rate, its way (%)",
-            "#with failures failing (%)",
+            "#pass rate, public code (%)",
+            "#pass rate, failures counted as failed (%)",
             "#pass rate, this report (%)",
         ],
     );
@@ -301,7 +301,7 @@ pub(super) fn reference_reduction(a: &Analysis) -> Option<Grid> {
         ]);
     }
     grid.note(
-        "Its way: a press without an estimate counts with the largest error found, which can pass.",
+        "In the public code a press without an estimate counts with the largest error found, which can pass.",
     );
     grid.download("reference_reduction");
     Some(grid)

@@ -5,16 +5,16 @@ use skinrig_analysis::result::Finding;
 
 use crate::format::words;
 
-/// The law that is broken, in a sentence's words.
+/// The violated law, as a statement that should hold.
 pub(crate) fn law(finding: &Finding) -> &'static str {
     use skinrig_analysis::result::Law;
     match finding.law {
         Law::BurstWithMotion => "events burst while the tip moves in the skin",
         Law::CentroidFollowsPosition => "the centroid follows the position of the press",
-        Law::RepetitionsAgree => "repetitions at one place agree",
-        Law::AsCommanded => "depth, speed and position are as commanded",
+        Law::RepetitionsAgree => "repetitions at one location agree",
+        Law::AsCommanded => "depth, speed and position match the commands",
         Law::ClockDrift => "a camera's clock drifts no more than a crystal",
-        Law::Complete => "the data of such a session are there",
+        Law::Complete => "the data of the session are complete",
     }
 }
 

@@ -1,17 +1,17 @@
-//! Owns the small tables of the page's sections: what the template's `grid` macro writes.
+//! Owns the small tables in the page's sections, written by the template's `grid` macro.
 
 use serde::Serialize;
 
 /// A table.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Grid {
-    /// Test id, and stem of the downloaded file.
+    /// Test ID, and stem of the downloaded file.
     id: &'static str,
     title: &'static str,
     columns: Vec<Column>,
     rows: Vec<Row>,
     notes: Vec<String>,
-    /// Name of the table in the script data that is downloaded.
+    /// Table in the script data to download.
     table: Option<&'static str>,
 }
 
@@ -24,12 +24,12 @@ struct Column {
 #[derive(Debug, Clone, Serialize)]
 struct Row {
     cells: Vec<String>,
-    /// True for the row that stands out: chosen, or the session's own.
+    /// True for a highlighted row: chosen, or the session's own.
     marked: bool,
 }
 
 impl Grid {
-    /// An empty table. A name that begins with `#` is a column of numbers.
+    /// An empty table. Names with a leading `#` are columns of numbers.
     pub(super) fn new(id: &'static str, title: &'static str, columns: &[&str]) -> Self {
         let column = |name: &&str| Column {
             name: name.trim_start_matches('#').to_owned(),
@@ -45,12 +45,12 @@ impl Grid {
         }
     }
 
-    /// Adds a row; its first cell heads it.
+    /// Adds a row; its first cell is the row header.
     pub(super) fn row(&mut self, cells: impl IntoIterator<Item = String>) -> &mut Self {
         self.marked_row(cells, false)
     }
 
-    /// Adds a row that stands out when `marked`.
+    /// Adds a row, highlighted if `marked`.
     pub(super) fn marked_row(
         &mut self,
         cells: impl IntoIterator<Item = String>,
@@ -63,7 +63,7 @@ impl Grid {
         self
     }
 
-    /// Adds a remark below.
+    /// Adds a note below the table.
     pub(super) fn note(&mut self, text: impl Into<String>) -> &mut Self {
         self.notes.push(text.into());
         self

@@ -5,7 +5,7 @@ use skinrig_analysis::result::{Analysis, Estimate, Latency};
 use super::grid::Grid;
 use crate::format::{NONE, interval, number};
 
-/// What was detected and when, beside the published numbers.
+/// Detection rates and times beside the published numbers.
 pub(super) fn latency(a: &Analysis) -> Option<Grid> {
     let l = a.latency.as_ref()?;
     let mut grid = Grid::new(
@@ -92,8 +92,8 @@ fn notes(grid: &mut Grid, l: &Latency) {
     let s = &l.settings;
     grid.note(format!(
         "One-sided CUSUM on counts of both cameras: bins of {} ms, Gaussian of {} ms, tuned to a rate {} times the \
-         background, {} bins in a row; background from {} the press ({} s in all, median {} events per second). {} trials, \
-         {} presses unusable, {} trials shortened.",
+         background, {} bins in a row; background from {} the press ({} s in total, median {} events per second). {} \
+         trials, {} presses unusable, {} trials shortened.",
         number(Some(s.bin_ms), 2),
         number(Some(s.sigma_ms), 2),
         number(Some(s.alpha), 1),
@@ -107,8 +107,8 @@ fn notes(grid: &mut Grid, l: &Latency) {
     ));
     if l.at_risk_s > 0.0 {
         grid.note(format!(
-            "False alarms: {} trips more than {} ms before the contact, in {} s from the start of each trial to its contact \
-             or to the trip, which ends the search. The interval is the exact Poisson one.",
+            "False alarms: {} alarms more than {} ms before contact, in {} s from the start of each trial to its \
+             contact or to the alarm, which ends the search. The interval is the exact Poisson interval.",
             l.false_detections.len(),
             number(Some(-l.earliest_ms), 1),
             number(Some(l.at_risk_s), 1),
@@ -116,19 +116,19 @@ fn notes(grid: &mut Grid, l: &Latency) {
     }
     if let Some(list) = crate::detector::false_detections(l) {
         grid.note(format!(
-            "Tripped before the contact, and so not detected: {list}."
+            "Fired before contact, and therefore not detected: {list}."
         ));
     }
     for remark in crate::detector::remarks(l) {
         grid.note(crate::format::sentence(&remark));
     }
     grid.note(format!(
-        "A detector that runs live would know an onset {} ms after its reported time.",
+        "A live detector would report an onset {} ms after its time.",
         number(Some(l.decision_delay_ms), 1)
     ));
 }
 
-/// Latency from the hardware-timestamped contact with what its uncertainty is made of.
+/// Latency from the hardware-timestamped contact with its uncertainty budget.
 pub(super) fn from_contact(a: &Analysis) -> Option<Grid> {
     let c = a.latency.as_ref()?.from_contact.as_ref()?;
     let mut grid = Grid::new(
@@ -159,13 +159,15 @@ pub(super) fn from_contact(a: &Analysis) -> Option<Grid> {
         "standard uncertainty of one latency",
         c.uncertainty_ms,
     ));
-    grid.row(part("of it: width of a bin", c.from_bins_ms));
-    grid.row(part("of it: clocks of the cameras", c.from_clocks_ms));
-    grid.row(part("of it: resolution of the contact", c.from_contact_ms));
+    grid.row(part("from the bin width", c.from_bins_ms));
+    grid.row(part("from the camera clocks", c.from_clocks_ms));
+    grid.row(part(
+        "from the resolution of the contact",
+        c.from_contact_ms,
+    ));
     grid.note(format!(
-        "{} presses whose detector tripped before the contact (false alarms) and {} presses never detected are not part of \
-         the percentiles. Where \
-         the surface is taken to be shifts all contacts alike and is not in the budget.",
+        "The percentiles exclude {} presses whose detector fired before contact (false alarms) and {} presses never \
+         detected. An error of the assumed surface height shifts all contacts alike and is not in the budget.",
         c.before_contact, c.missed
     ));
     grid.download("latency_onsets");

@@ -1,8 +1,8 @@
-//! Owns the HTML page: what the template and the script receive.
+//! Owns the HTML page: inputs of its template and script.
 //!
-//! The template is `assets/page.html` with `assets/sections/*.html` (minijinja, auto-escaped) in the frame of all pages
-//! (`assets/frame/`), the script `assets/script/*.js`. The script gets one JSON value with named tables
-//! (columns and column-wise data): the press table, tooltips and CSV downloads all read it.
+//! The template is `assets/page.html` with `assets/sections/*.html` (minijinja, auto-escaped) in the common frame
+//! (`assets/frame/`); the script is `assets/script/*.js`. The script gets one JSON value with named column-wise tables:
+//! press table, tooltips and CSV downloads all read it.
 
 mod alignment;
 mod areas;
@@ -34,11 +34,11 @@ use crate::svg::{FIGURE_CSS, plain_css};
 use crate::tables;
 use crate::terminal::{clock_method, metric_rows};
 
-/// JSON that may stand inside `<script>`: `<`, `>`, `&` and the line separators of JavaScript are written as
-/// escapes, so no text can end the element or open a comment.
+/// JSON that is safe inside `<script>`: escapes `<`, `>`, `&` and JavaScript's line separators, so no text can end the
+/// element or open a comment.
 ///
 /// # Errors
-/// When `value` has no JSON form (a map with keys that are not strings).
+/// When `value` has no JSON form (a map with non-string keys).
 pub(crate) fn script_json<T: Serialize>(value: &T) -> Result<String, serde_json::Error> {
     let mut value = serde_json::to_value(value)?;
     show_all(&mut value);
@@ -57,7 +57,7 @@ pub(crate) fn script_json<T: Serialize>(value: &T) -> Result<String, serde_json:
     Ok(out)
 }
 
-/// Writes out, in every text of `value`, what acts instead of showing.
+/// Escapes control characters in every text of `value`.
 fn show_all(value: &mut serde_json::Value) {
     use serde_json::Value as Json;
     match value {
@@ -177,7 +177,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
     })
 }
 
-/// The tables of the sections, by name; those without data are missing.
+/// Tables of the sections by name; tables without data are absent.
 fn grids(input: &ReportInput<'_>) -> BTreeMap<&'static str, Value> {
     let a = input.analysis;
     [
@@ -198,7 +198,7 @@ fn grids(input: &ReportInput<'_>) -> BTreeMap<&'static str, Value> {
         ("reference_reduction", comparison::reference_reduction(a)),
     ]
     .into_iter()
-    // Of an invalid session only what says why.
+    // For an invalid session, only tables that explain why.
     .filter(|(name, _)| {
         a.is_valid() || ["alignment", "trigger_lines", "msows", "skins", "sensors"].contains(name)
     })
@@ -206,7 +206,7 @@ fn grids(input: &ReportInput<'_>) -> BTreeMap<&'static str, Value> {
     .collect()
 }
 
-/// The sections in their order: anchor and name.
+/// Sections in page order: anchor and name.
 fn contents(input: &ReportInput<'_>) -> Vec<(&'static str, &'static str)> {
     let a = input.analysis;
     let single = !a.pictures.is_empty() || !a.zooms.is_empty();
@@ -231,7 +231,7 @@ fn contents(input: &ReportInput<'_>) -> Vec<(&'static str, &'static str)> {
     .collect()
 }
 
-/// The RMSE with failures counted, when there are any.
+/// RMSE with failures counted, if there are any.
 fn penalised(a: &Analysis) -> Option<Value> {
     let p = &a.penalised;
     (p.failures > 0 && p.rmse_mm.value.is_some()).then(|| {
@@ -242,11 +242,12 @@ fn penalised(a: &Analysis) -> Option<Value> {
     })
 }
 
-/// Where the least number of cluster events comes from.
+/// Origin of the minimum number of cluster events.
 fn threshold_note(a: &Analysis) -> Option<String> {
     let t = a.threshold.as_ref()?;
     Some(format!(
-        "A press needs {} cluster events in each camera: chosen on the {} calibrating presses alone, of which it leaves out {}.",
+        "A press needs {} cluster events in each camera. This threshold was chosen on the {} calibration presses alone \
+         and rejects {} of them.",
         t.events, t.n, t.left_out
     ))
 }
@@ -264,11 +265,11 @@ fn figure_value(f: Figure) -> Value {
 
 fn rejections(a: &Analysis, sync: bool) -> Vec<Value> {
     let rows = derive::rejections(a, sync).into_iter();
-    rows.map(|r| context! { verdict => r.verdict, rule => r.rule, example => r.example, n => r.n })
+    rows.map(|r| context! { verdict => r.verdict.name(), rule => r.rule, example => r.example, n => r.n })
         .collect()
 }
 
-/// The protocol's name without folder and ending.
+/// Name of the protocol without folder and suffix.
 fn heading(protocol: &str) -> String {
     let file = protocol.rsplit(['/', '\\']).next().unwrap_or(protocol);
     let stem = file
@@ -300,7 +301,7 @@ fn metrics(input: &ReportInput<'_>) -> Vec<Value> {
 
 fn provenance_rows(p: &Provenance, analysis_version: u32) -> Vec<Value> {
     let row = |key: &str, value: &str, code: bool| {
-        // The first characters of a digest name it among others; the whole stands in its title and is printed.
+        // The first characters of a digest identify it; the full value is in the title and in print.
         let digest = value.len() == 64 && value.bytes().all(|b| b.is_ascii_hexdigit());
         let short = digest.then(|| &value[..12]);
         context! { key, value => or_missing(value), code, short }

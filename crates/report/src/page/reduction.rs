@@ -5,7 +5,7 @@ use skinrig_analysis::result::{Analysis, Estimate, Thinning};
 use super::grid::Grid;
 use crate::format::{NONE, grouped, interval, number};
 
-/// A kind of thinning for people.
+/// Display name of a kind of thinning.
 pub(crate) const fn thinning(kind: Thinning) -> &'static str {
     match kind {
         Thinning::Exact => "exact count",
@@ -74,9 +74,8 @@ pub(super) fn reduction(a: &Analysis) -> Option<Grid> {
         }
     }
     grid.note(format!(
-        "n = {} presses, means over {} seeds, in brackets 95 % intervals: from a bootstrap over locations, \
-         exact ones where a share is 0 or 100 %. Events: per press and camera. Marked: \
-         the published factor.",
+        "n = {} presses, means over {} seeds. Brackets: 95 % intervals from a bootstrap over locations, exact where a \
+         share is 0 or 100 %. Events are per press and camera. Highlighted: the published factor.",
         study.presses, study.seeds
     ));
     grid.download("reduction");

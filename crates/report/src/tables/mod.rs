@@ -1,5 +1,4 @@
-//! Owns the data tables of the page (press table, tooltips, CSV downloads) and the small tables of settings
-//! and calibration.
+//! Owns the data tables of the page (press table, tooltips, CSV downloads) and the small tables of settings and calibration.
 
 mod packing;
 mod studies;
@@ -15,7 +14,7 @@ use crate::derive;
 use crate::input::ReportInput;
 use table::{Table, rounded};
 
-/// Everything the script needs: session id and the named tables.
+/// Data for the script: session ID and named tables.
 pub(crate) fn script_data(input: &ReportInput<'_>) -> Value {
     let a = input.analysis;
     let mut tables = Map::new();
@@ -127,7 +126,7 @@ fn presses(a: &Analysis) -> Table {
     table
         .column(
             "counted",
-            rows.iter().map(|p| json!(u8::from(derive::counts(p)))),
+            rows.iter().map(|p| json!(u8::from(derive::is_counted(p)))),
         )
         .column("rule", rows.iter().map(|p| json!(p.rule)))
         .column("reason", rows.iter().map(|p| json!(p.reason)))
@@ -135,7 +134,7 @@ fn presses(a: &Analysis) -> Table {
 
 /// The errors behind the distribution, ascending.
 fn errors(a: &Analysis) -> Table {
-    let counted = a.presses.iter().filter(|p| derive::counts(p));
+    let counted = a.presses.iter().filter(|p| derive::is_counted(p));
     let mut rows: Vec<(f64, PressId)> = counted
         .filter_map(|p| Some((derive::error_norm_mm(p)?, p.press)))
         .collect();
@@ -203,7 +202,7 @@ fn press_rates(a: &Analysis) -> Table {
         .column("off_events_per_s", bins().map(|(z, k)| at(&z.off_per_s, k)))
 }
 
-/// Presses shown as pictures, at most.
+/// Maximum number of presses shown as images.
 pub(crate) const PICTURED_PRESSES: usize = 6;
 
 fn pictures(a: &Analysis) -> Table {
@@ -227,7 +226,7 @@ fn pictures(a: &Analysis) -> Table {
         )
 }
 
-/// The first presses (by number) that have pictures.
+/// The first presses (by number) with images.
 pub(crate) fn pictured(a: &Analysis) -> Vec<PressId> {
     let mut presses: Vec<PressId> = a.pictures.iter().map(|p| p.press).collect();
     presses.sort_unstable();
@@ -270,7 +269,7 @@ fn clocks(a: &Analysis) -> Table {
         .column("rejected", fits().map(|(_, c)| json!(c.rejected)))
 }
 
-/// One calibrated parameter.
+/// A calibrated parameter.
 pub(crate) struct ParameterRow {
     pub(crate) name: String,
     pub(crate) before: Option<f64>,
@@ -280,7 +279,7 @@ pub(crate) struct ParameterRow {
     pub(crate) interval: Option<(f64, f64)>,
 }
 
-/// The calibrated parameters with the values they started from.
+/// Calibrated parameters with their start values.
 pub(crate) fn calibration(c: &CalibrationResult) -> Vec<ParameterRow> {
     let row = |(i, name): (usize, &String)| {
         let after = c.values.get(i).copied();
@@ -298,7 +297,7 @@ pub(crate) fn calibration(c: &CalibrationResult) -> Vec<ParameterRow> {
     c.names.iter().enumerate().map(row).collect()
 }
 
-/// The settings of the analysis as (key, value as typed in a protocol, meaning).
+/// Analysis settings as (key, value as in a protocol, meaning).
 pub(crate) fn settings(a: &Analysis) -> Vec<(String, String, &'static str)> {
     let given = a.settings.rows().into_iter();
     let given = given.filter(|row| !row.value.is_empty());

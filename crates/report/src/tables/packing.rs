@@ -1,15 +1,15 @@
-//! Owns how a column of a table stands in the page: as it is, or in a shorter form that the script unpacks.
+//! Owns the compression of table columns, which the page's script unpacks.
 
 use serde_json::{Value, json};
 
-/// Denominators under which a column may be whole numbers.
+/// Denominators for which a column may consist of whole numbers.
 const UNITS: [f64; 5] = [1.0, 10.0, 100.0, 1e3, 1e4];
-/// Above this a whole number has no exact place in a double.
+/// Whole numbers above this are not exact in a double.
 const EXACT: f64 = 9e15;
 
-/// The shortest of three forms: the cells; `{"runs": [value, count, ...]}`, runs of equal cells; and for numbers
-/// `{"steps": column, "per": n}`, the first cell and the steps from cell to cell in units of 1 / n, themselves as cells or as runs.
-/// Unpacked every cell is the same double again: a sum of whole numbers is exact, and so is the rounding of their quotient.
+/// The shortest of three forms: the cells; `{"runs": [value, count, ...]}`, runs of equal cells; and for numbers `{"steps":
+/// column, "per": n}`, the first cell and the differences in units of 1 / n, as cells or runs. Unpacking restores every
+/// double exactly: sums of whole numbers are exact, and so is the rounding of their quotient.
 pub(super) fn packed(cells: Vec<Value>) -> Value {
     let steps = steps(&cells).map(|(steps, per)| json!({ "steps": in_runs(steps), "per": per }));
     let plain = in_runs(cells);
@@ -32,7 +32,7 @@ fn in_runs(cells: Vec<Value>) -> Value {
     json!({ "runs": pairs.collect::<Vec<_>>() })
 }
 
-/// `None` where a cell is no number, or has more decimals than the page gives.
+/// `None` if a cell is not a number, or has more decimals than the page gives.
 fn steps(cells: &[Value]) -> Option<(Vec<Value>, u32)> {
     let numbers: Vec<f64> = cells.iter().map(Value::as_f64).collect::<Option<_>>()?;
     let whole = |unit: f64| {
@@ -56,7 +56,7 @@ fn steps(cells: &[Value]) -> Option<(Vec<Value>, u32)> {
 pub(super) mod tests {
     use super::*;
 
-    /// What the script does.
+    /// Same algorithm as the page's script.
     fn unpacked(column: &Value) -> Vec<Value> {
         if let Some(cells) = column.as_array() {
             return cells.clone();

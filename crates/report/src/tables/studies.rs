@@ -1,4 +1,4 @@
-//! Owns the data tables of the studies: what their figures and tables offer for download.
+//! Owns the data tables of the studies, for download from figures and tables.
 
 use serde_json::{Value, json};
 use skinrig_analysis::result::{
@@ -9,7 +9,7 @@ use skinrig_analysis::result::{
 use super::table::{Table, rounded};
 use crate::{comparison, derive};
 
-/// All that the analysis has, by name.
+/// All tables of the analysis, by name.
 pub(super) fn all(a: &Analysis) -> Vec<(&'static str, Table)> {
     let latency = a.latency.as_ref();
     let calibration = a.calibration.as_ref();
@@ -36,7 +36,7 @@ pub(super) fn all(a: &Analysis) -> Vec<(&'static str, Table)> {
     there.filter_map(|(name, t)| Some((name, t?))).collect()
 }
 
-/// A column per end of an estimate.
+/// One column per end of an estimate.
 fn estimates<'a>(
     table: Table,
     names: [&'static str; 3],
@@ -50,7 +50,7 @@ fn estimates<'a>(
         .column(high, rows.map(|e| rounded(e.high, digits)))
 }
 
-/// One of the estimates of a row.
+/// Selects an estimate of a row.
 type Part = fn(&ReductionRow) -> &Estimate;
 
 fn reduction(study: &Reduction) -> Table {
@@ -247,7 +247,7 @@ fn threshold(t: &skinrig_analysis::result::ThresholdChoice) -> Table {
         )
 }
 
-/// Quantities with value and interval, a row each.
+/// One row per quantity, with value and interval.
 fn quantities(rows: &[(&'static str, Estimate)]) -> Table {
     let table = Table::new().column("quantity", rows.iter().map(|(name, _)| json!(name)));
     estimates(
@@ -332,8 +332,8 @@ fn reference(rows: &[ReferenceReduction]) -> Table {
         )
 }
 
-/// Rows of the sensor, summed over the columns of the crop's picture: the whole picture is the figure itself, and
-/// tens of thousands of cells would outweigh the page.
+/// Sums per sensor row over the columns of the crop. The figure itself holds the full image; tens of thousands of cells
+/// would outweigh the page.
 fn activity(a: &Analysis) -> Table {
     let rows = || {
         a.activity.iter().flat_map(|p| {

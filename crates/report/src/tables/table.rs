@@ -1,17 +1,17 @@
-//! A table of the page's script data.
+//! Owns a table of the page's script data.
 
 use serde_json::{Value, json};
 
 use super::packing::packed;
 
-/// A number rounded to `digits` decimals; missing or non-finite ones are null.
+/// A number rounded to `digits` decimals; null if missing or non-finite.
 pub(super) fn rounded(value: Option<f64>, digits: i32) -> Value {
     let Some(v) = value.filter(|v| v.is_finite()) else {
         return Value::Null;
     };
     let power = 10f64.powi(digits);
     let r = (v * power).round() / power;
-    // Whole numbers without ".0": they are most of the page's data.
+    // Write whole numbers without ".0": they are most of the page's data.
     if r == r.trunc() && r.abs() < 1e15 {
         json!(r as i64)
     } else {

@@ -1,4 +1,4 @@
-//! Owns the data tables of clocks, robot and tradeoff: what their figures offer for download.
+//! Owns the data tables of clocks, robot and tradeoff, for download from their figures.
 
 use serde_json::{Value, json};
 use skinrig_analysis::result::{ClockResiduals, Motion};
@@ -8,7 +8,7 @@ use super::table::{Table, rounded};
 use crate::choices::label;
 use crate::input::ReportInput;
 
-/// All that there are, by name.
+/// All tables, by name.
 pub(super) fn all(input: &ReportInput<'_>) -> Vec<(&'static str, Table)> {
     let a = input.analysis;
     let clocks = &a.alignment.residuals;

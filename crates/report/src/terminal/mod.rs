@@ -1,4 +1,4 @@
-//! Owns the results table for a terminal: findings, headline, presses, clocks; the studies are in [`studies`].
+//! Owns the terminal table of results: findings, headline, presses, clocks; the studies are in [`studies`].
 
 mod studies;
 mod text;
@@ -14,7 +14,7 @@ pub(crate) use self::text::{Paint, plain, wrap};
 use crate::format::{digits_of_error, grouped, interval, number, or_missing};
 use crate::input::ReportInput;
 
-/// A metric ready to be written: name, value, unit, interval, n.
+/// A formatted metric.
 pub(crate) struct MetricRow {
     pub(crate) key: &'static str,
     pub(crate) name: String,
@@ -25,7 +25,7 @@ pub(crate) struct MetricRow {
     pub(crate) what_n: &'static str,
 }
 
-/// The metrics in the order in which they are read.
+/// Metrics in display order.
 pub(crate) fn metric_rows(a: &Analysis) -> Vec<MetricRow> {
     let m = &a.scored;
     let rows = vec_of_metrics(a, m);
@@ -185,7 +185,7 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
         let _ = writeln!(
             out,
             "{:<24}{:>8} mm  {:^20}{:>7} presses",
-            "RMSE, nothing excluded",
+            "RMSE, no exclusions",
             number(e.value, 2),
             interval(e, 1.0, 2),
             e.n
@@ -276,17 +276,17 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     if let Some(text) = crate::course::retaken(p) {
         out += &wrap("retaken   ", &text);
         let reasons = crate::course::reasons(p);
-        for reason in reasons.iter().take(MOST_RULES) {
+        for reason in reasons.iter().take(MAX_RULES) {
             out += &wrap("          ", &plain(reason));
         }
-        if let Some(more) = reasons.len().checked_sub(MOST_RULES + 1) {
-            let text = format!("and for {} other reasons", more + 1);
+        if let Some(more) = reasons.len().checked_sub(MAX_RULES + 1) {
+            let text = format!("and {} other reasons", more + 1);
             out += &wrap("          ", &text);
         }
     }
     for row in &p.interruptions {
         let mut text = format!("{} at {} s", row.kind, number(Some(row.t_s), 1));
-        // What ended the run is said above.
+        // The reason for the end of the run is shown above.
         if !p.ended_by(row) {
             let _ = write!(text, ": {}", row.reason);
         }
@@ -305,30 +305,30 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     out
 }
 
-/// What the audit found: before every number.
+/// Audit findings, shown before all numbers.
 fn findings(a: &Analysis) -> String {
     use crate::page::findings::{fault, law};
     let mut out = String::new();
     for f in &a.findings {
-        let text = format!("{}. Broken: {}. {}", fault(f), law(f), f.evidence);
+        let text = format!("{}. Violated: {}. {}", fault(f), law(f), f.evidence);
         out += &wrap("fault     ", &plain(&text));
         out += &wrap("          ", &plain(&format!("do: {}", f.advice)));
     }
     out
 }
 
-/// Rules with lines of their own in the table; the page lists all.
-const MOST_RULES: usize = 6;
+/// Rules with their own line; the page lists all.
+const MAX_RULES: usize = 6;
 
-/// What the rules left out, a line each.
+/// Rejected presses, one line per rule.
 fn left_out(a: &Analysis, sync: bool) -> String {
     let rows = crate::derive::rejections(a, sync);
     let first = if sync { "sync      " } else { "left out  " };
     let indent = " ".repeat(first.len());
     let mut out = String::new();
-    for (i, r) in rows.iter().take(MOST_RULES).enumerate() {
+    for (i, r) in rows.iter().take(MAX_RULES).enumerate() {
         let text = plain(&format!("{} {}: {}", r.n, r.verdict, r.rule));
-        // One line each: the run's end and the page say the rest.
+        // One line each; the run's end and the page give the details.
         let room = WIDTH - first.len();
         let text = if text.chars().count() > room {
             let cut: String = text.chars().take(room - 1).collect();
@@ -338,17 +338,17 @@ fn left_out(a: &Analysis, sync: bool) -> String {
         };
         out += &wrap(if i == 0 { first } else { &indent }, &text);
     }
-    if rows.len() > MOST_RULES {
-        let more: u32 = rows[MOST_RULES..].iter().map(|r| r.n).sum();
+    if rows.len() > MAX_RULES {
+        let more: u32 = rows[MAX_RULES..].iter().map(|r| r.n).sum();
         out += &wrap(
             &indent,
-            &format!("{more} by {} other rules", rows.len() - MOST_RULES),
+            &format!("{more} by {} other rules", rows.len() - MAX_RULES),
         );
     }
     out
 }
 
-/// The alignment certificate in a line or two.
+/// The alignment certificate in one or two lines.
 fn alignment_lines(certificate: &Alignment) -> String {
     let mut parts = Vec::new();
     for (name, what) in [
@@ -358,7 +358,7 @@ fn alignment_lines(certificate: &Alignment) -> String {
         let both = (certificate.interval_us(name), certificate.bound_us(name));
         if let (Some(noise_us), Some(bound_us)) = both {
             parts.push(format!(
-                "{what} ± {} µs (95 %) and at most {} µs besides",
+                "{what} ± {} µs (95 %), systematic error at most {} µs",
                 number(Some(noise_us), 2),
                 number(Some(bound_us), 1)
             ));
@@ -366,7 +366,7 @@ fn alignment_lines(certificate: &Alignment) -> String {
     }
     if let Some(bound_us) = certificate.bound_us(MapName::HostFromBox) {
         parts.push(format!(
-            "host within {} µs for certain",
+            "host certainly within {} µs",
             number(Some(bound_us), 1)
         ));
     }

@@ -1,4 +1,4 @@
-//! Owns the studies in the results table for a terminal: a few lines each.
+//! Owns the studies in the terminal table: a few lines each.
 
 use std::fmt::Write as _;
 
@@ -10,16 +10,16 @@ use super::text::{plain, wrap};
 use crate::figures::model_name;
 use crate::format::{interval, number};
 
-/// Factors with a line of their own; the page has all.
+/// Factors with their own line; the page lists all.
 const FACTORS: [u32; 4] = [1, 16, 256, 1024];
 
-/// The calibration: error, model and why, how well it is determined.
+/// The calibration: error, model, reason, and how well it is determined.
 pub(super) fn calibration(a: &Analysis) -> String {
     let Some(c) = &a.calibration else {
         return String::new();
     };
     let mut text = format!(
-        "RMSE {} -> {} mm over {} calibrating presses; model {}, {} of {} parameters determined, {} of {} starts agree",
+        "RMSE {} -> {} mm over {} calibration presses; model {}, {} of {} parameters determined, {} of {} starts agree",
         number(Some(c.rmse_before_mm), 2),
         number(Some(c.rmse_after_mm), 2),
         c.n,
@@ -32,7 +32,7 @@ pub(super) fn calibration(a: &Analysis) -> String {
     if let Some(chosen) = c.compared.iter().find(|m| m.chosen) {
         let _ = write!(
             text,
-            "; {} mm {} on left-out locations, {} models compared",
+            "; {} mm {} on held-out locations, {} models compared",
             number(chosen.rmse_mm.value, 2),
             interval(&chosen.rmse_mm, 1.0, 2),
             c.compared.len()
@@ -41,7 +41,7 @@ pub(super) fn calibration(a: &Analysis) -> String {
     wrap("fit       ", &plain(&text))
 }
 
-/// All studies that were made.
+/// All studies that were run.
 pub(super) fn all(a: &Analysis) -> String {
     let mut out = String::new();
     out += &areas(a);
@@ -67,7 +67,7 @@ fn areas(a: &Analysis) -> String {
     let mut out = String::new();
     if let Some(t) = &a.threshold {
         let text = format!(
-            "{} cluster events, chosen on {} calibrating presses, leaves out {} of them",
+            "{} cluster events, chosen on {} calibration presses, rejects {} of them",
             t.events, t.n, t.left_out
         );
         out += &wrap("threshold ", &text);
@@ -82,7 +82,7 @@ fn areas(a: &Analysis) -> String {
         );
         out += &wrap("area      ", &text);
         let text = format!(
-            "{} in the probed area; {} if the RMSE held over the skin",
+            "{} in the probed area; {} if the RMSE holds over the whole skin",
             with(&c.taxels_probed, 1.0, 1),
             with(&c.taxels_skin, 1.0, 1)
         );
@@ -127,13 +127,13 @@ fn latency(l: &Latency) -> String {
     );
     let mut out = wrap("detection ", &text);
     if let Some(list) = crate::detector::false_detections(l) {
-        let text = format!("tripped before the contact, and so not detected: {list}");
+        let text = format!("fired before contact, and therefore not detected: {list}");
         out += &wrap("          ", &text);
     }
     out += &match &l.from_contact {
         Some(c) => {
             let text = format!(
-                "median {} ms after the measured contact, ± {} ms each; 5 % {} ms, 95 % {} ms; {} before contact, {} missed",
+                "median {} ms after measured contact, ± {} ms each; 5 % {} ms, 95 % {} ms; {} before contact, {} missed",
                 with(&c.median_ms, 1.0, 1),
                 number(Some(c.uncertainty_ms), 2),
                 number(c.p5_ms.value, 1),
@@ -145,7 +145,7 @@ fn latency(l: &Latency) -> String {
         }
         None => wrap(
             "latency   ",
-            "not from contact: the contacts were not measured on a clock of their own",
+            "not from contact: contacts were not measured on an independent clock",
         ),
     };
     if let Some(r) = &l.reduced {
@@ -205,8 +205,8 @@ fn reduction_line(kind: &str, row: &ReductionRow) -> String {
 
 fn reference(r: &ReferenceCode) -> String {
     let text = format!(
-        "RMSE {} mm (x {}, y {}) in-sample, {} of {} presses inside the square: the public code's way, not comparable \
-         with the numbers above",
+        "RMSE {} mm (x {}, y {}) in-sample, {} of {} presses inside the square: evaluated as in the public code, not \
+         comparable with the numbers above",
         number(r.rmse_mm, 2),
         number(r.rmse_x_mm, 2),
         number(r.rmse_y_mm, 2),
@@ -217,7 +217,7 @@ fn reference(r: &ReferenceCode) -> String {
     if !r.calibrated {
         out += &wrap(
             "          ",
-            "nominal camera geometry: these presses determine no plausible calibration under the public code's choices",
+            "nominal camera geometry: these presses determine no plausible calibration with the public code's choices",
         );
     }
     if !r.parameters.is_empty() {
@@ -237,7 +237,9 @@ fn reference(r: &ReferenceCode) -> String {
     });
     let rates = rates.collect::<Vec<_>>().join(", ");
     if !rates.is_empty() {
-        let text = format!("pass rate in %, its way (missing presses failing): {rates}");
+        let text = format!(
+            "pass rate in % as in the public code (missing presses counted as failed): {rates}"
+        );
         out += &wrap("          ", &text);
     }
     out

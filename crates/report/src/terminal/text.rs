@@ -1,13 +1,13 @@
-//! Text in the columns of a terminal.
+//! Formats text for terminals.
 
 use std::fmt::Write as _;
 
 use skinrig_model::text::visible;
 
-/// Columns.
+/// Columns per line.
 pub(crate) const WIDTH: usize = 80;
 
-/// User text on one line, with what a terminal would obey written out.
+/// User text on one line, with control characters spelled out.
 pub(crate) fn plain(text: &str) -> String {
     visible(&text.replace(['\n', '\t'], " ")).into_owned()
 }
@@ -31,8 +31,8 @@ impl Paint {
     }
 }
 
-/// Words of `text` in lines of at most `WIDTH` columns; the first begins with `first`, the others with as
-/// many spaces. Words longer than a line are cut.
+/// Wraps `text` at `WIDTH` columns; the first line begins with `first`, the others are indented as far. Cuts words longer
+/// than a line.
 pub(crate) fn wrap(first: &str, text: &str) -> String {
     let indent = " ".repeat(first.chars().count());
     let room = WIDTH - indent.len();

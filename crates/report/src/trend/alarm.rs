@@ -1,4 +1,4 @@
-//! Owns how an alarm is told on a page: that of the trends, and that of a night.
+//! Owns the presentation of an alarm on a page, for trends and nights.
 
 use serde::Serialize;
 use skinrig_nightly::Cause;
@@ -6,9 +6,9 @@ use skinrig_nightly::trend::{Alarm, Report};
 
 use super::{Links, cause, moved, since};
 
-/// An alarm as the macro in `assets/trend/alarm.html` takes it.
+/// An alarm for the macro in `assets/trend/alarm.html`.
 #[derive(Debug, Serialize)]
-pub(crate) struct Told {
+pub(crate) struct AlarmCard {
     pub id: String,
     pub title: String,
     /// `warn` or `bad`.
@@ -19,34 +19,36 @@ pub(crate) struct Told {
     pub session: Option<String>,
     pub commands: Vec<String>,
     pub missing: Option<String>,
-    pub series: Vec<Moved>,
+    pub series: Vec<DriftedSeries>,
 }
 
 /// A series of an alarm.
 #[derive(Debug, Serialize)]
-pub(crate) struct Moved {
+pub(crate) struct DriftedSeries {
     pub name: String,
     pub by: String,
-    /// Which of the report's charts.
+    /// Index of its chart in the report.
     #[serde(skip)]
     pub chart: usize,
 }
 
-/// The alarms of `report`, with what `links` has of each.
-pub(crate) fn told(report: &Report, links: &[Links]) -> Vec<Told> {
+/// Presents the alarms of `report`, with their links.
+pub(crate) fn alarm_cards(report: &Report, links: &[Links]) -> Vec<AlarmCard> {
     let none = Links::default();
     let links = links.iter().chain(std::iter::repeat(&none));
     let alarms = report.alarms.iter().zip(links);
-    alarms.map(|(alarm, l)| one(report, alarm, l)).collect()
+    alarms
+        .map(|(alarm, l)| alarm_card(report, alarm, l))
+        .collect()
 }
 
-fn one(report: &Report, alarm: &Alarm, links: &Links) -> Told {
-    let series = |at: &usize| Moved {
+fn alarm_card(report: &Report, alarm: &Alarm, links: &Links) -> AlarmCard {
+    let series = |at: &usize| DriftedSeries {
         name: report.charts[*at].series.name.clone(),
         by: moved(&report.charts[*at]),
         chart: *at,
     };
-    Told {
+    AlarmCard {
         id: alarm.id.clone(),
         title: format!(
             "{} series moved, {}",
@@ -64,7 +66,7 @@ fn one(report: &Report, alarm: &Alarm, links: &Links) -> Told {
     }
 }
 
-/// A class for the colour of a cause.
+/// CSS class for the colour of a cause.
 const fn tone(cause: Option<Cause>) -> &'static str {
     match cause {
         Some(Cause::Infrastructure) => "warn",

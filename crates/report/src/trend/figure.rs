@@ -1,25 +1,25 @@
 //! Owns the drawing of one control chart.
 
-use skinrig_nightly::trend::report::{day, figure as number};
+use skinrig_nightly::trend::report::{day, format_number as number};
 use skinrig_nightly::trend::{Chart, Report};
 
 use crate::axes::{Axes, Scale};
 use crate::svg::{Px, Svg, dots, polyline};
 
-/// Size of a chart of an alarm and of a chart in the table, px.
+/// Sizes of a chart in an alarm and in the table, px.
 const LARGE: (f64, f64) = (860.0, 250.0);
 const SMALL: (f64, f64) = (330.0, 46.0);
-/// Around the large one: left, right, top, bottom.
+/// Margins of the large chart: left, right, top, bottom.
 const MARGINS: (f64, f64, f64, f64) = (84.0, 36.0, 14.0, 46.0);
 
-/// The values that must be seen, and a little room.
+/// Range of the values, with padding.
 fn range(chart: &Chart, limits: bool) -> (f64, f64) {
     let values = chart.nights.iter().map(|n| n.value);
     let reference = chart.reference.iter();
     let around = reference.flat_map(|r| [r.centre - 3.0 * r.below, r.centre + 3.0 * r.above]);
     let mut all: Vec<f64> = values.chain(around).collect();
     let (low, high) = ends(&all);
-    // A limit that is far away would press everything else into a line.
+    // A distant limit would flatten everything else.
     let near = |v: &f64| limits && (*v - low).abs().min((*v - high).abs()) <= high - low;
     let last = chart.series.points.iter().rev().find_map(|p| p.limit);
     let stated = last.into_iter().flat_map(|l| [l.at_least, l.at_most]);
@@ -39,7 +39,7 @@ fn ends(values: &[f64]) -> (f64, f64) {
     }
 }
 
-/// The chart of a series that moved, over all nights.
+/// Chart of a drifted series over all nights.
 pub(super) fn large(report: &Report, chart: &Chart) -> String {
     let (width, height) = LARGE;
     let (left, right, top, bottom) = MARGINS;
@@ -66,7 +66,7 @@ pub(super) fn large(report: &Report, chart: &Chart) -> String {
     svg.finish()
 }
 
-/// The chart in the table: no axes.
+/// Chart in the table: no axes.
 pub(super) fn small(report: &Report, chart: &Chart) -> String {
     let (width, height) = SMALL;
     let x = Scale::new((-0.5, report.nights.len() as f64 - 0.5), (2.0, width - 2.0));
@@ -104,11 +104,11 @@ fn begin(chart: &Chart, (width, height): (f64, f64)) -> Svg {
     svg
 }
 
-/// Band of the reference, limits, changes, values.
+/// Reference band, limits, change point, values.
 fn marks(svg: &mut Svg, chart: &Chart, x: Scale, y: Scale, large: bool) {
     let (left, right) = (x.px.0, x.px.1);
     if let Some(r) = chart.reference {
-        // Two standard deviations of a new night: about where three nights in a row raise an alarm.
+        // Two standard deviations of a new night: roughly where three nights in a row raise an alarm.
         let per = 2.0 / r.score(r.centre + r.above).max(1e-9);
         let (high, low) = (
             y.at(r.centre + per * r.above),
@@ -150,7 +150,7 @@ fn marks(svg: &mut Svg, chart: &Chart, x: Scale, y: Scale, large: bool) {
         let at = x.at(e.change.likeliest as f64 - 0.5);
         svg.line("ref", (at, y.px.0), (at, y.px.1));
     }
-    let place = |n: &skinrig_nightly::trend::Charted| (x.at(n.night as f64), y.at(n.value));
+    let place = |n: &skinrig_nightly::trend::ChartPoint| (x.at(n.night as f64), y.at(n.value));
     let off = |night: usize| {
         chart
             .excursions

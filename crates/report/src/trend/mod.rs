@@ -1,35 +1,35 @@
-//! Owns the presentation of trends: charts for the terminal, page with alarms first.
+//! Owns the presentation of trends: terminal charts, and page with alarms first.
 
 mod alarm;
 mod figure;
 mod page;
 mod terminal;
 
-use skinrig_nightly::trend::report::{day, figure as number, moved_by, name};
+use skinrig_nightly::trend::report::{cause_name, day, format_change, format_number as number};
 use skinrig_nightly::trend::{Alarm, Chart, Report};
 
-pub(crate) use alarm::told;
+pub(crate) use alarm::alarm_cards;
 pub use page::page;
 pub use terminal::{Style, sentence, terminal};
 
-/// How an alarm is told, on every page that does, and its style.
+/// Alarm macro common to all pages, and its style.
 pub(crate) const ALARM_TEMPLATE: &str = include_str!("../../assets/trend/alarm.html");
 pub(crate) const ALARM_CSS: &str = include_str!("../../assets/trend/alarm.css");
 
-/// Where an alarm's files are, as links of the page that is written.
+/// Files of an alarm, as links relative to the written page.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Links {
-    /// The page of the night that raised it.
+    /// Page of the night that raised the alarm.
     pub night: Option<String>,
-    /// The session that shows it.
+    /// Session that shows the drift.
     pub session: Option<String>,
-    /// The commands that replay and recheck it.
+    /// Commands that replay and recheck the session.
     pub commands: Vec<String>,
-    /// Why there is no session, when there is none.
+    /// Why there is no session.
     pub missing: Option<String>,
 }
 
-/// When an alarm began, for people.
+/// Start of an alarm.
 pub(crate) fn since(report: &Report, alarm: &Alarm) -> String {
     let [from, to] = alarm.since.map(|n| &report.nights[n]);
     if alarm.since[0] == alarm.since[1] {
@@ -39,18 +39,18 @@ pub(crate) fn since(report: &Report, alarm: &Alarm) -> String {
     }
 }
 
-/// What moved it, in a line.
+/// Cause of an alarm, in one line.
 fn cause(alarm: &Alarm) -> String {
     let a = &alarm.attribution;
     match a.cause {
-        None => format!("not told by the rules: {}", a.reason),
-        Some(cause) => format!("{}: {}", name(Some(cause)), a.reason),
+        None => format!("unknown: {}", a.reason),
+        Some(cause) => format!("{}: {}", cause_name(Some(cause)), a.reason),
     }
 }
 
-/// One word for the state of a series.
+/// State of a series, in one word.
 fn state(chart: &Chart) -> &'static str {
-    match (chart.off(), chart.reference) {
+    match (chart.open_excursion(), chart.reference) {
         (Some(_), _) => "moved",
         (None, None) => "learning",
         (None, Some(_)) => "steady",
@@ -66,9 +66,9 @@ fn with_unit(value: f64, unit: &str) -> String {
     }
 }
 
-/// By how much a series that is off moved.
+/// Size of the drift.
 fn moved(chart: &Chart) -> String {
-    let off = chart.off();
-    off.map(|e| moved_by(e, &chart.series.unit))
+    let off = chart.open_excursion();
+    off.map(|e| format_change(e, &chart.series.unit))
         .unwrap_or_default()
 }

@@ -1,12 +1,12 @@
-//! Owns the page of the trends: what its template receives.
+//! Owns the page of the trends: inputs of its template.
 
 use minijinja::value::Serde;
 use minijinja::{Value, context};
 use serde::Serialize;
-use skinrig_nightly::trend::report::{day, figure as number};
+use skinrig_nightly::trend::report::{day, format_number as number};
 use skinrig_nightly::trend::{Acceptance, Alarm, Chart, Report};
 
-use super::alarm::{self, Told};
+use super::alarm::{self, AlarmCard};
 use super::{ALARM_CSS, ALARM_TEMPLATE, Links, cause, figure, moved, state, with_unit};
 use crate::error::ReportError;
 use crate::frame::Frame;
@@ -17,14 +17,14 @@ const CSS: &str = include_str!("../../assets/trend/page.css");
 
 /// An alarm with its charts.
 #[derive(Serialize)]
-struct Raised {
-    told: Told,
-    charts: Vec<Drawn>,
+struct AlarmSection {
+    card: AlarmCard,
+    charts: Vec<ChartCard>,
 }
 
-/// The chart of a series that moved.
+/// Chart of a drifted series.
 #[derive(Serialize)]
-struct Drawn {
+struct ChartCard {
     name: String,
     by: String,
     svg: String,
@@ -41,20 +41,20 @@ struct Row {
     by: String,
 }
 
-/// An alarm that is over.
+/// A past alarm.
 #[derive(Serialize)]
-struct Past {
+struct PastAlarm {
     id: String,
     series: String,
     cause: String,
     until: String,
 }
 
-/// The page: alarms first, then every series; needs no network and no other file. `links`: one per alarm. `accepted`: what
-/// somebody took as it is.
+/// A self-contained page: alarms first, then every series. `links`: one per alarm. `accepted`: changes accepted by an
+/// operator.
 ///
 /// # Errors
-/// [`ReportError`] when the template cannot be written; no input is known to cause it.
+/// [`ReportError`] when rendering fails; no known input causes this.
 pub fn page(
     report: &Report,
     links: &[Links],
@@ -65,10 +65,10 @@ pub fn page(
         styles: &[FIGURE_CSS, ALARM_CSS, CSS],
         script: "",
     };
-    let told = alarm::told(report, links).into_iter();
-    let alarms: Vec<Raised> = told.map(|told| raised(report, told)).collect();
+    let cards = alarm::alarm_cards(report, links).into_iter();
+    let alarms: Vec<AlarmSection> = cards.map(|card| alarm_section(report, card)).collect();
     let rows: Vec<Row> = report.charts.iter().map(|c| row(report, c)).collect();
-    let past: Vec<Past> = report.past.iter().map(|a| past(report, a)).collect();
+    let past: Vec<PastAlarm> = report.past.iter().map(|a| past_alarm(report, a)).collect();
     let (first, last) = (report.nights.first(), report.nights.last());
     frame.render(context! {
         headline => report.headline.clone(),
@@ -94,15 +94,15 @@ pub fn page(
     })
 }
 
-fn raised(report: &Report, told: Told) -> Raised {
-    let charts = told.series.iter().map(|s| Drawn {
+fn alarm_section(report: &Report, card: AlarmCard) -> AlarmSection {
+    let charts = card.series.iter().map(|s| ChartCard {
         name: s.name.clone(),
         by: s.by.clone(),
         svg: figure::large(report, &report.charts[s.chart]),
     });
-    Raised {
+    AlarmSection {
         charts: charts.collect(),
-        told,
+        card,
     }
 }
 
@@ -126,10 +126,10 @@ fn row(report: &Report, chart: &Chart) -> Row {
     }
 }
 
-fn past(report: &Report, alarm: &Alarm) -> Past {
+fn past_alarm(report: &Report, alarm: &Alarm) -> PastAlarm {
     let series = alarm.charts.iter().map(|c| &*report.charts[*c].series.name);
     let until = alarm.ended.map(|n| day(&report.nights[n]).to_owned());
-    Past {
+    PastAlarm {
         id: alarm.id.clone(),
         series: series.collect::<Vec<_>>().join(", "),
         cause: cause(alarm),

@@ -1,36 +1,36 @@
-//! Owns the trends for a terminal: 80 columns, one line per series, a chart per series that moved.
+//! Owns the trends for a terminal: 80 columns, one line per series, a chart per drifted series.
 
 use std::fmt::Write as _;
 
-use skinrig_nightly::trend::report::figure as number;
+use skinrig_nightly::trend::report::format_number as number;
 use skinrig_nightly::trend::{Chart, Report};
 
 use super::{Links, cause, moved, since, state, with_unit};
 use crate::terminal::plain;
 
 const WIDTH: usize = 80;
-/// Nights of a line of blocks.
+/// Nights in a sparkline.
 const SPARK: usize = 20;
 /// Columns and rows of a chart.
 const PLOT: (usize, usize) = (66, 9);
-/// Columns before it.
+/// Left margin of a chart, columns.
 const MARGIN: usize = 12;
-/// Series of one alarm that get a chart; the others have their lines.
-const MOST_CHARTS: usize = 4;
+/// Series per alarm with a chart; the others have their lines.
+const MAX_CHARTS: usize = 4;
 
-/// How it is drawn.
+/// Capabilities of the terminal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Style {
-    /// The terminal shows more than ASCII.
+    /// True if the terminal shows Unicode.
     pub unicode: bool,
-    /// It shows colours.
+    /// True if the terminal shows colours.
     pub color: bool,
-    /// Nights that are shown, at most.
+    /// Maximum number of nights.
     pub nights: usize,
 }
 
-/// The trends of `report`: headline, alarms with charts of what moved, one line for each series whose name `shown` accepts. `links`:
-/// one per alarm.
+/// Formats the trends of `report`: headline, alarms with charts of drifted series, one line per series whose name `shown`
+/// accepts. `links`: one per alarm.
 #[must_use]
 pub fn terminal(
     report: &Report,
@@ -66,7 +66,7 @@ pub fn terminal(
         if let Some(missing) = &links.missing {
             let _ = writeln!(out, "  no session: {}", plain(missing));
         }
-        for at in alarm.charts.iter().take(MOST_CHARTS) {
+        for at in alarm.charts.iter().take(MAX_CHARTS) {
             out.push('\n');
             plot(&mut out, report, &report.charts[*at], style);
         }
@@ -88,7 +88,7 @@ pub fn terminal(
     out
 }
 
-/// The trends of `report` in one sentence, in lines of 80 columns.
+/// Trends of `report` in one sentence, wrapped at 80 columns.
 #[must_use]
 pub fn sentence(report: &Report) -> String {
     wrapped(&format!("trend: {}", report.headline), 0).join("\n")
@@ -101,7 +101,7 @@ fn line(out: &mut String, report: &Report, chart: &Chart, style: Style) {
         || "-".to_owned(),
         |n| with_unit(n.value, &chart.series.unit),
     );
-    let (bold, end) = if style.color && chart.off().is_some() {
+    let (bold, end) = if style.color && chart.open_excursion().is_some() {
         ("\u{1b}[1m", "\u{1b}[0m")
     } else {
         ("", "")
@@ -114,7 +114,7 @@ fn line(out: &mut String, report: &Report, chart: &Chart, style: Style) {
     );
 }
 
-/// A block per night, the centre of the reference in the middle; a space for a night without a value.
+/// Sparkline: one block per night, the centre of the reference in the middle; a space for a night without a value.
 fn spark(report: &Report, chart: &Chart, style: Style) -> String {
     let blocks: Vec<char> = if style.unicode {
         "▁▂▃▄▅▆▇█"
@@ -137,7 +137,7 @@ fn spark(report: &Report, chart: &Chart, style: Style) -> String {
         .collect()
 }
 
-/// A chart of one series: values, the centre of its reference, the night of the change.
+/// Chart of one series: values, centre of the reference, change point.
 fn plot(out: &mut String, report: &Report, chart: &Chart, style: Style) {
     let (columns, rows) = PLOT;
     let (dot, centre, change) = if style.unicode {
@@ -165,7 +165,7 @@ fn plot(out: &mut String, report: &Report, chart: &Chart, style: Style) {
         cells[row(middle)].fill(centre);
     }
     if let Some(at) = chart
-        .off()
+        .open_excursion()
         .and_then(|e| e.change.likeliest.checked_sub(first))
     {
         for cells in &mut cells {
@@ -188,7 +188,7 @@ fn plot(out: &mut String, report: &Report, chart: &Chart, style: Style) {
     }
 }
 
-/// Lines of at most 80 columns, broken between words.
+/// Wraps text at 80 columns.
 fn wrapped(text: &str, indent: usize) -> Vec<String> {
     let mut lines = vec![" ".repeat(indent)];
     for word in plain(text).split(' ') {

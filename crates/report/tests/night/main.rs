@@ -1,10 +1,10 @@
-//! A night on a terminal and as a page: what is said first, what of each check, and that nothing escapes its place.
+//! A night on a terminal and as a page: order, content of each check, and escaping.
 
 mod trends;
 
 use skinrig_model::Limit;
-use skinrig_nightly::judge::{RepeatRule, attempt};
-use skinrig_nightly::rules::across;
+use skinrig_nightly::judge::{RepeatRule, judge_attempt};
+use skinrig_nightly::rules::apply_cross_check_rules;
 use skinrig_nightly::{
     Cause, CheckResult, Evidence, EvidenceKind, Golden, Measurement, Night, NightExit, Part,
     Verdict, Versions,
@@ -20,7 +20,7 @@ fn measured(metric: &str, value: Option<f64>, unit: &str, limit: Option<Limit>) 
         n: Some(20),
         needs: 5,
         limit,
-        verdict: Verdict::on(value, Some(20), 5, limit.as_ref()),
+        verdict: Verdict::of_measurement(value, Some(20), 5, limit.as_ref()),
         note: None,
     }
 }
@@ -33,7 +33,7 @@ fn part(subject: &str, measurements: Vec<Measurement>) -> Part {
     }
 }
 
-/// A check of which each attempt found these parts and this evidence.
+/// A check with the parts and evidence of each attempt.
 fn check(name: &str, about: Cause, found: Vec<(Vec<Part>, Vec<Evidence>)>) -> CheckResult {
     let rule = RepeatRule {
         at_most: 2,
@@ -41,18 +41,18 @@ fn check(name: &str, about: Cause, found: Vec<(Vec<Part>, Vec<Evidence>)>) -> Ch
     };
     let attempts: Vec<_> = found
         .into_iter()
-        .map(|(parts, evidence)| attempt((0.0, 4.2), parts, evidence, about))
+        .map(|(parts, evidence)| judge_attempt((0.0, 4.2), parts, evidence, about))
         .collect();
-    let together = rule.together(&attempts);
+    let combined = rule.combine(&attempts);
     CheckResult {
         name: name.to_owned(),
         title: name.replace('_', " "),
         planned_s: 5.0,
         skipped: None,
-        verdict: together.verdict,
-        repeats: together.words,
-        cause: together.cause,
-        rule: together.rule,
+        verdict: combined.verdict,
+        repeats: combined.explanation,
+        cause: combined.cause,
+        rule: combined.rule,
         attempts,
         witnesses: Vec::new(),
     }
@@ -108,8 +108,8 @@ fn night(checks: Vec<CheckResult>) -> Night {
         verdict: Verdict::Fail,
         exit: NightExit::Fail,
     };
-    across(&mut night.checks);
-    night.conclude();
+    apply_cross_check_rules(&mut night.checks);
+    night.update_verdict();
     night
 }
 
@@ -217,13 +217,13 @@ fn what_a_device_says_neither_moves_the_cursor_nor_becomes_markup() {
     let mut night = bad_night();
     night.checks[1].attempts[0].evidence[0].what = "\u{1b}[2J<b>x</b> \u{7}".to_owned();
     assert!(!tree(&night, Colour::Off).contains(['\u{1b}', '\u{7}']));
-    let page = html(&night, Trends::NotKept).unwrap_or_default();
+    let page = html(&night, Trends::NotRequested).unwrap_or_default();
     assert!(page.contains("&lt;b&gt;x"), "{page}");
     assert!(!page.contains("<b>x</b>"));
     assert!(!page.contains("<script>alert"));
 }
 
-/// What the page says of the four places: `rig bad, skin unknown, ...`.
+/// States of the four causes on the page: `rig bad, skin unknown, ...`.
 fn places(page: &str) -> Vec<&str> {
     let after = page.split("class=\"card place ").skip(1);
     after.filter_map(|p| p.split('"').next()).collect()
@@ -231,24 +231,24 @@ fn places(page: &str) -> Vec<&str> {
 
 #[test]
 fn the_page_says_first_where_to_look() {
-    let bad = html(&bad_night(), Trends::NotKept).unwrap_or_default();
+    let bad = html(&bad_night(), Trends::NotRequested).unwrap_or_default();
     assert!(bad.contains("<h1 data-testid=\"headline\">Look at the rig</h1>"));
-    // The skin: its campaign says nothing, for the rig was at fault.
+    // Skin: its campaign is unusable because the rig was at fault.
     assert_eq!(places(&bad), ["bad", "unknown", "ok", "ok"]);
     assert!(bad.contains("href=\"golden.report.html\""));
     assert!(bad.contains("data-testid=\"emulated\""));
-    let good = html(&good_night(), Trends::NotKept).unwrap_or_default();
+    let good = html(&good_night(), Trends::NotRequested).unwrap_or_default();
     assert!(good.contains(">All within limits</h1>"));
     assert_eq!(places(&good), ["ok", "unknown", "ok", "ok"]);
     let mut unfinished = good_night();
     unfinished.finished = false;
-    let page = html(&unfinished, Trends::NotKept).unwrap_or_default();
+    let page = html(&unfinished, Trends::NotRequested).unwrap_or_default();
     assert!(page.contains("data-testid=\"unfinished\""));
 }
 
 #[test]
 fn the_page_loads_nothing_and_runs_only_its_own_script() {
-    let page = html(&bad_night(), Trends::NotKept).unwrap_or_default();
+    let page = html(&bad_night(), Trends::NotRequested).unwrap_or_default();
     assert!(page.contains("default-src 'none'"));
     assert!(page.contains("script-src 'sha256-"));
     for foreign in ["http://", "https://", "src=\"", "@import", "<link"] {

@@ -1,4 +1,4 @@
-//! What the page of a night says of the nights before it: what moved comes first, and names stay text.
+//! Trends on the page of a night: drift comes first, and names are escaped.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 
 use skinrig_nightly::trend::{History, NightHead, Point, Report, judge};
@@ -10,7 +10,7 @@ use crate::{bad_night, good_night};
 
 const HOSTILE: &str = "golden/<b>\u{1b}[2J/press_events";
 
-/// So many nights of two series of this check, of which those from `change` on gave a fifth less.
+/// Nights of two series of this check; those from `change` on are lower by a fifth.
 fn report(series: &[&str], nights: usize, change: usize) -> Report {
     let mut history = History::default();
     for at in 0..nights {
@@ -44,7 +44,7 @@ fn page(night: &Night, report: &Report) -> String {
         };
         report.alarms.len()
     ];
-    let trends = Trends::Told {
+    let trends = Trends::Available {
         report,
         links: &links,
         page: "trends.html",
@@ -90,11 +90,11 @@ fn nothing_is_said_to_have_stood_still_before_there_is_a_reference() {
     let steady = page(&good_night(), &report(&[HOSTILE], 30, 30));
     assert_eq!(headline(&steady), "All within limits");
     assert_eq!(steady.matches("has not moved").count(), 4);
-    assert!(steady.contains("Over the nights: nothing moved in 30 nights (1 series)."));
+    assert!(steady.contains("Trend: nothing moved in 30 nights (1 series)."));
     let young = page(&good_night(), &report(&[HOSTILE], 11, 11));
-    assert!(young.contains("too few nights to say what moved: 11 of the 12"));
+    assert!(young.contains("too few nights for trends: 11 of the 12"));
     assert!(!young.contains("has not moved"));
-    let untold = html(&good_night(), Trends::Untold("<i>no</i> history")).unwrap();
-    assert!(untold.contains("No trends tonight: &lt;i&gt;no"));
-    assert!(!untold.contains("has not moved"));
+    let unavailable = html(&good_night(), Trends::Unavailable("<i>no</i> history")).unwrap();
+    assert!(unavailable.contains("No trends tonight: &lt;i&gt;no"));
+    assert!(!unavailable.contains("has not moved"));
 }

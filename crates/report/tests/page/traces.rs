@@ -1,11 +1,11 @@
-//! Clocks, robot and tradeoff in the page, and how columns of data stand in it.
+//! Clocks, robot and tradeoff in the page, and packed data columns.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use skinrig_report::html;
 
 use crate::{input, support};
 
-/// What cannot be shown is said, and why.
+/// Missing figures are explained.
 #[test]
 fn clocks_robot_and_tradeoff_are_drawn_or_their_absence_is_told() {
     let mut analysis = support::analysis(4, 3);
@@ -15,7 +15,7 @@ fn clocks_robot_and_tradeoff_are_drawn_or_their_absence_is_told() {
     assert!(page.contains("data-testid=\"tradeoff-unreadable\""));
     assert!(page.contains("expected &lt;a&gt; result") && !page.contains("\"no-tradeoff\""));
     let clocks = skinrig_report::figures::clock_residuals(&with_reason).unwrap();
-    // One panel per map; the point that each leaves out is drawn at the edge, and does not stretch the axis.
+    // One panel per map; a rejected point is drawn at the edge and does not stretch the axis.
     for panel in ["host from box", "camera 1 from box", "camera 2 from box"] {
         assert!(clocks.svg.contains(panel), "{panel}");
     }
@@ -44,7 +44,7 @@ fn clocks_robot_and_tradeoff_are_drawn_or_their_absence_is_told() {
     }
 }
 
-/// A column as the page's script reads it.
+/// Unpacks a column like the page's script.
 fn unpacked(column: &serde_json::Value) -> Vec<serde_json::Value> {
     if let Some(runs) = column["runs"].as_array() {
         let count = |c: &serde_json::Value| c.as_u64().unwrap() as usize;
@@ -66,7 +66,7 @@ fn unpacked(column: &serde_json::Value) -> Vec<serde_json::Value> {
     column.as_array().unwrap().clone()
 }
 
-/// Columns with long runs or small steps are packed; unpacked they are what the analysis says.
+/// Columns with long runs or small steps are packed; unpacking restores the analysis values.
 #[test]
 fn packed_columns_hold_every_cell() {
     let analysis = support::analysis(4, 3);

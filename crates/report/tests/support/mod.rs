@@ -1,14 +1,12 @@
-//! A made-up, seeded analysis for the tests of the report. None of its numbers was measured.
+//! A made-up, seeded analysis for the report tests. None of its numbers was measured.
 
 pub mod studies;
 
 use skinrig_analysis::result::*;
 use skinrig_model::*;
-use skinrig_report::{
-    DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakenRow,
-};
+use skinrig_report::{DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakeRow};
 
-/// A small generator (SplitMix64): the report needs no better one.
+/// A small generator (SplitMix64), sufficient for the report.
 pub struct Noise(pub u64);
 
 impl Noise {
@@ -68,7 +66,7 @@ pub fn analysis(side: u32, repetitions: u32) -> Analysis {
             ));
         }
     }
-    let count = |verdict: &str| {
+    let count = |verdict: Verdict| {
         presses
             .iter()
             .filter(|p| p.role != PressRole::Sync && p.verdict == verdict)
@@ -76,10 +74,10 @@ pub fn analysis(side: u32, repetitions: u32) -> Analysis {
     };
     let counts = PressCounts {
         planned: presses.len() as u32 - 3,
-        valid: count("valid"),
-        missed: count("missed"),
-        invalid: count("invalid"),
-        excluded: count("excluded"),
+        valid: count(Verdict::Valid),
+        missed: count(Verdict::Missed),
+        invalid: count(Verdict::Invalid),
+        excluded: count(Verdict::Excluded),
         sync: 3,
     };
     let of_first = presses
@@ -268,21 +266,21 @@ fn press(
     let inside = SkinOutline::PAPER.contains(estimate);
     let (verdict, reason) = match id % 211 {
         13 => (
-            "invalid",
+            Verdict::Invalid,
             Some("settled 0.31 mm from the planned position, limit 0.10 mm"),
         ),
-        47 => ("missed", Some("the run stopped before it")),
+        47 => (Verdict::Missed, Some("the run stopped before it")),
         90 => (
-            "excluded",
+            Verdict::Excluded,
             Some("min_cluster_events: 12 clustered events in camera 1, at least 20 needed"),
         ),
         _ if !inside => (
-            "excluded",
+            Verdict::Excluded,
             Some("exclude_outside: the estimate lies outside the skin"),
         ),
-        _ => ("valid", None),
+        _ => (Verdict::Valid, None),
     };
-    let missed = verdict == "missed";
+    let missed = verdict == Verdict::Missed;
     let start = 2.9 * f64::from(id);
     let t = |s: f64| HostTime::from_secs_f64(start + s);
     let view = |camera: usize, noise: &mut Noise| {
@@ -314,9 +312,9 @@ fn press(
         planned: at,
         depth_mm: 2.0,
         truth: (!missed).then_some(truth),
-        verdict: verdict.into(),
+        verdict,
         reason: reason.map(str::to_owned),
-        rule: reason.map(|r| r.split([':', ',']).next().unwrap_or(r).to_owned()),
+        rule: reason.map(|r| r.split([':', ',']).next().unwrap_or(r).to_owned().into()),
         timing: (!missed).then(|| PressTiming {
             approach: t(0.8),
             contact: t(1.0),
@@ -347,7 +345,7 @@ fn metrics(presses: &[PressResult], valid_only: bool) -> Metrics {
         .collect();
     let errors: Vec<(f64, f64)> = scored
         .iter()
-        .filter(|p| !valid_only || p.verdict == "valid")
+        .filter(|p| !valid_only || p.verdict == Verdict::Valid)
         .filter_map(|p| p.error_mm())
         .collect();
     let n = errors.len() as u32;
@@ -368,7 +366,10 @@ fn metrics(presses: &[PressResult], valid_only: bool) -> Metrics {
             .unwrap_or(0.0)
     };
     let rmse = mean(&|v| v.0 * v.0 + v.1 * v.1).sqrt();
-    let attempted = scored.iter().filter(|p| p.verdict != "missed").count() as u32;
+    let attempted = scored
+        .iter()
+        .filter(|p| p.verdict != Verdict::Missed)
+        .count() as u32;
     Metrics {
         rmse_mm: e(rmse, n),
         rmse_x_mm: e(mean(&|v| v.0 * v.0).sqrt(), n),
@@ -521,7 +522,7 @@ pub fn provenance() -> Provenance {
             (77, "cut off: leg 1 ended during the press"),
             (93, "camera 2 lost 4096 bytes during the press"),
         ]
-        .map(|(press, reason)| RetakenRow {
+        .map(|(press, reason)| RetakeRow {
             press,
             attempt: 1,
             reason: reason.into(),
@@ -548,7 +549,7 @@ pub fn provenance() -> Provenance {
     }
 }
 
-/// A session in which nothing happened.
+/// An empty session.
 pub fn empty() -> Analysis {
     let full = analysis(2, 1);
     Analysis {

@@ -1,4 +1,4 @@
-//! Made-up studies for the tests of the report, shaped like the real ones. None of their numbers was measured.
+//! Made-up studies for the report tests, shaped like real ones. None of their numbers was measured.
 
 use skinrig_analysis::result::*;
 use skinrig_model::*;
@@ -59,7 +59,7 @@ pub fn reduction() -> Reduction {
     }
 }
 
-/// A detector whose onsets follow the contact by 9 to 40 ms.
+/// A detector with onsets 9 to 40 ms after contact.
 pub fn latency(noise: &mut Noise, presses: &[PressResult]) -> Latency {
     let onsets: Vec<(PressId, Option<f64>)> = presses
         .iter()
@@ -227,7 +227,7 @@ pub fn threshold() -> ThresholdChoice {
     }
 }
 
-/// The published skin and the areas of its fields of view as drawn by hand.
+/// The published skin with its fields of view, as measured by hand.
 pub fn coverage(cell_mm: f64, places: &[Point2]) -> Coverage {
     let locations = places.len() as u32;
     let polygon =
@@ -315,7 +315,7 @@ pub fn activity(noise: &mut Noise, camera: CameraId) -> Activity {
     }
 }
 
-/// The published way of judging.
+/// The published evaluation.
 pub fn reference() -> ReferenceCode {
     ReferenceCode {
         presses: 256,
@@ -338,7 +338,7 @@ pub fn reference() -> ReferenceCode {
     }
 }
 
-/// Two broken laws.
+/// Two violations.
 pub fn findings() -> Vec<Finding> {
     vec![
         Finding {
@@ -362,7 +362,7 @@ pub fn findings() -> Vec<Finding> {
     ]
 }
 
-/// A map with a point that it leaves out far away, and one that bends.
+/// A map with a distant rejected point, and a bent one.
 pub fn clock_residuals() -> Vec<ClockResiduals> {
     let map = |map, size_us: f64| ClockResiduals {
         map,

@@ -1,8 +1,8 @@
-//! Every constant of the optical model, with its unit, its source and the range in which it means something.
+//! Every constant of the optical model, with its unit, source and valid range.
 
 use thiserror::Error;
 
-/// A setting outside the range in which the model means anything.
+/// A setting outside its valid range.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error("expected optical.{name} {expected}, found {found}; correct the setting or leave it out")]
 pub struct InvalidOpticalSetting {
@@ -32,14 +32,14 @@ pub struct OpticalConfig {
     pub attenuation_per_mm: f64,
     /// Light scattered into a ray per length and unit of fluence, 1/mm (assumption).
     pub scatter_per_mm: f64,
-    /// Light that no dent can take away (over the skin, dark current), in units of an emitter's radiance
+    /// Light that no dent can block (over the skin, dark current), in units of an emitter's radiance
     /// (assumption).
     pub stray: f64,
 
     // ---- indentation
     /// Length over which the dent flattens outside the tip, in skin thicknesses (assumption).
     pub dent_decay_thicknesses: f64,
-    /// Guided light lost per mm of path where the skin is thinned to nothing, 1/mm (assumption).
+    /// Guided light lost per mm of path at full thinning of the skin, 1/mm (assumption).
     pub thinning_loss_per_mm: f64,
     /// Guided light lost per mm of path and unit of surface slope, 1/mm (assumption).
     pub slope_loss_per_mm: f64,
@@ -50,17 +50,17 @@ pub struct OpticalConfig {
     pub creep_fraction: f64,
     /// Time constant of that part, ms (assumption: soft 30:1 PDMS).
     pub creep_time_ms: f64,
-    /// The tip may wander sideways by this much before its dent is computed anew, mm.
+    /// Lateral motion of the tip beyond which its dent is recomputed, mm.
     pub same_place_mm: f64,
 
     // ---- image
     /// Gaussian height of the skin's illuminated band over its rows, as a fraction of the number of rows
     /// (assumption).
     pub band_sigma_rows: f64,
-    /// Height of a dent's image apart from its distance: light reaches the lens at many inclinations, px
+    /// Height of a dent's image apart from its distance: due to the range of inclinations of the light, px
     /// (assumption).
     pub dent_sigma_px: f64,
-    /// A camera sees no dent as nearer than this, mm: the height of the image stays finite.
+    /// Lower limit on the distance of a dent from the camera, mm: keeps the height of its image finite.
     pub nearest_mm: f64,
 
     // ---- pixels
@@ -123,7 +123,7 @@ impl Default for OpticalConfig {
 }
 
 impl OpticalConfig {
-    /// The same constants without any noise: no leak, no shot noise, no hot pixels, equal thresholds.
+    /// The same constants without noise: no leak, no shot noise, no hot pixels, equal thresholds.
     #[must_use]
     pub const fn without_noise(self) -> Self {
         Self {

@@ -1,8 +1,8 @@
-//! What the tip does to the skin: the dent's shape, how it takes light from the columns and returns some of
-//! it.
+//! Optical effect of the tip on the skin: shape of the dent, light that it blocks in each column and light that its
+//! flanks return.
 //!
 //! For a dent that is `a` mm deep, column `u` loses the part `x = 1 - exp(-a loss(u))` of the light that
-//! comes from behind it, and a pixel in row `v` of that column sees `I / I0 = 1 + x c(u, v)`. Everything but
+//! arrives from behind it, and a pixel in row `v` of that column sees `I / I0 = 1 + x c(u, v)`. Everything but
 //! `x` is computed once per dent.
 
 use std::ops::Range;
@@ -20,7 +20,7 @@ const STEP_MM: f64 = 0.5;
 const FLANK_DECAYS: f64 = 5.0;
 /// Directions for which the light that falls on a flank is tabulated.
 const FLANK_DIRECTIONS: usize = 64;
-/// Columns that lose less than this part of their light at 1 mm of indentation are left alone.
+/// Columns that lose a smaller part of their light than this at 1 mm of indentation are ignored.
 const LEAST_LOSS_PER_MM: f64 = 0.002;
 /// Rows are followed over this many standard deviations of the dent's image.
 const ROW_SIGMAS: f64 = 3.0;
@@ -65,10 +65,10 @@ impl DentShape {
     }
 }
 
-/// How one dent changes the picture of one camera.
+/// Effect of one dent on the image of one camera.
 #[derive(Debug, Clone)]
 pub(super) struct Dent {
-    /// Columns and rows whose pixels must be looked at.
+    /// Columns and rows whose pixels must be evaluated.
     pub(super) columns: Range<usize>,
     pub(super) rows: Range<usize>,
     /// Columns and rows that this dent itself changes.
@@ -86,7 +86,7 @@ pub(super) struct Dent {
 }
 
 impl Dent {
-    /// The dent at `place`. Pixels that `replaced` changed are looked at, too.
+    /// The dent at `place`. Pixels that `replaced` changed are also evaluated.
     pub(super) fn new(
         scene: &SceneConfig,
         config: &OpticalConfig,
@@ -152,7 +152,7 @@ impl Dent {
     pub(super) fn depth_of_loss(&self, u: usize, x: f64) -> f64 {
         let k = self.loss_per_mm[u];
         if k == 0.0 {
-            // This column is dark to the dent: x stays 0 for ever.
+            // The dent does not affect this column: x stays 0.
             return if x < 0.0 {
                 f64::NEG_INFINITY
             } else {
@@ -179,11 +179,11 @@ fn extent(loss: &[f64]) -> Range<usize> {
     first.zip(last).map_or(0..0, |(a, b)| a..b + 1)
 }
 
-/// What a ray meets on its way across the dent, per mm of indentation.
+/// Losses and gains along a ray through the dent, per mm of indentation.
 struct Crossing {
     loss_per_mm: f64,
     shine_per_mm: f64,
-    /// Where along the ray the dent is, mm from the camera.
+    /// Position of the dent along the ray, mm from the camera.
     nearest_mm: f64,
 }
 
@@ -236,7 +236,7 @@ fn cross(
         crossing.loss_per_mm += ds
             * (config.thinning_loss_per_mm * depth / shape.thickness_mm
                 + config.slope_loss_per_mm * slope);
-        // The flank shines into the camera where it faces it.
+        // Only flanks that face the camera reflect light into it.
         let facing = -dot(outward, d);
         if facing > 0.0 {
             crossing.shine_per_mm += ds * slope * facing * lit[direction_index(outward)];
@@ -257,7 +257,7 @@ fn flank_light(light: &Illumination, place: Vec2) -> [f64; FLANK_DIRECTIONS] {
     lit
 }
 
-/// Index of a unit direction on the diamond |x| + |y| = 1, counted counter-clockwise from +x: cheap and exact
+/// Index of a unit direction on the diamond |x| + |y| = 1, counted counter-clockwise from +x: fast and exact
 /// everywhere.
 fn direction_index(d: Vec2) -> usize {
     let t = d[1] / (d[0].abs() + d[1].abs());
@@ -279,7 +279,7 @@ fn direction_of_index(i: usize) -> Vec2 {
     [x / l, y / l]
 }
 
-/// Where the dent appears vertically.
+/// Vertical position and extent of the dent's image.
 struct Image {
     centre: f64,
     sigma: f64,

@@ -1,4 +1,4 @@
-//! The light in the undisturbed skin: emitters, fluence, and what each column of the camera sees.
+//! The light in the undisturbed skin: emitters, fluence, and the light that each column of the camera receives.
 //!
 //! Light travels in the skin's plane (the 4 mm guide it). A column's light is what comes from the wall at the
 //! far end of its ray, where emitters sit, plus what the skin scatters into the ray on the way, plus stray
@@ -82,7 +82,7 @@ impl Illumination {
         }
     }
 
-    /// What one emitter sends through `p`: direction of travel and fluence (per mm: light spreads in a
+    /// Light of one emitter at `p`: direction of travel and fluence (per mm: light spreads in a
     /// plane).
     pub(super) fn at(&self, emitter: &Emitter, p: Vec2) -> (Vec2, f64) {
         let to = [p[0] - emitter.at[0], p[1] - emitter.at[1]];
@@ -98,7 +98,7 @@ impl Illumination {
         self.emitters.iter().map(|e| self.at(e, p).1).sum()
     }
 
-    /// Radiance of the wall at `p` towards the unit direction `d`: the emitters near `p`, blurred.
+    /// Radiance of the wall at `p` towards the unit direction `d`: emitters near `p`, blurred.
     fn wall(&self, p: Vec2, d: Vec2, sigma_mm: f64) -> f64 {
         let term = |e: &Emitter| {
             let offset = [p[0] - e.at[0], p[1] - e.at[1]];
@@ -113,7 +113,7 @@ impl Illumination {
     }
 }
 
-/// The light that one column of the camera sees in the undisturbed skin.
+/// Light that one column of the camera receives from the undisturbed skin.
 #[derive(Debug, Clone)]
 pub(super) struct Column {
     /// Unit direction of the ray, away from the camera.

@@ -1,12 +1,12 @@
 //! The optical level: events that follow from a light-path model of the skin.
 //!
-//! Light of emitters travels in the plane of the skin to the camera; the dent of the tip takes light from the
+//! Light of emitters travels in the plane of the skin to the camera; the dent of the tip blocks light of the
 //! rays that cross it and returns some from its flanks; each pixel turns changes of its log intensity into
-//! events. Where the skin was touched is never told to the events: localisation errors come out of the
+//! events. The events do not depend on the touched position directly: localisation errors result from the
 //! optics. Formulas, constants and limits: `docs/explanation/optical-model.md`.
 //!
-//! Data flows `light` (once) -> `dent` (once per touched place) -> `pixels` (every millisecond that changes)
-//! with `noise` beside.
+//! Data flow: `light` (once) -> `dent` (once per touched place) -> `pixels` (every millisecond with a change).
+//! `noise` is added independently.
 
 mod config;
 mod dent;
@@ -27,14 +27,14 @@ use light::{Column, Illumination, Vec2};
 use noise::Noise;
 use pixels::{Pixels, Ramp};
 
-/// A relaxing dent shallower than this is gone, mm: no pixel can notice it.
+/// Depth below which a relaxing dent is dropped, mm: no pixel can detect it.
 const GONE_MM: f64 = 1e-5;
 
-/// How deep the skin is indented, and where. The optical effect of a depth `d` that is held follows as
+/// Depth and position of the indentation. The optical effect of a held depth `d` is
 /// `(1 - creep) d + creep m` with `m' = (d - m) / tau`: the standard linear solid, driven by depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Contact {
-    /// Where the tip first touched.
+    /// Position of first touch.
     place: Vec2,
     /// Depth of the tip, mm.
     depth_mm: f64,
@@ -70,7 +70,7 @@ impl OpticalModel {
         Self::build(scene, OpticalConfig::default())
     }
 
-    /// The model with the lamps off: no emitter shines, and pixels are too slow to show shot noise. Leakage and hot pixels stay.
+    /// The model with the lamps off: no emitter is lit and dark pixels show no shot noise. Leakage and hot pixels remain.
     #[must_use]
     pub fn dark(scene: &SceneConfig) -> Self {
         let config = OpticalConfig {
@@ -110,7 +110,7 @@ impl OpticalModel {
             &config,
             &mut Stream::new(scene.seed, Purpose::Pixels, 1),
         );
-        pixels.aim_at(&dent);
+        pixels.start_dent(&dent);
         Self {
             scene: scene.clone(),
             config,
@@ -144,7 +144,7 @@ impl OpticalModel {
 
     fn indent(&mut self, t_ns: i64, [x, y, z]: [f64; 3]) -> Ramp {
         let c = &mut self.contact;
-        // The base is rigid: the skin gives way no farther than its thickness.
+        // The base is rigid: the depth is limited to the skin's thickness.
         let on_skin = z < 0.0 && self.scene.outline.contains(Point2::new(x, y));
         let depth_mm = if on_skin {
             (-z).min(self.scene.skin_thickness_mm)
@@ -155,7 +155,7 @@ impl OpticalModel {
         let elsewhere = dx * dx + dy * dy > self.config.same_place_mm * self.config.same_place_mm;
         if depth_mm > 0.0 && elsewhere {
             if c.depth_mm == 0.0 {
-                // A fresh touch; what is left of the dent before is dropped.
+                // A new touch; the remainder of the previous dent is dropped.
                 (c.memory_mm, c.effect_mm, c.seen_mm) = (0.0, 0.0, 0.0);
             }
             c.place = [x, y];
@@ -167,7 +167,7 @@ impl OpticalModel {
                 c.place,
                 Some(&self.dent),
             );
-            self.pixels.aim_at(&self.dent);
+            self.pixels.start_dent(&self.dent);
         }
         c.depth_mm = depth_mm;
         c.memory_mm += (depth_mm - c.memory_mm) * self.creep_step;

@@ -1,4 +1,4 @@
-//! Events that no dent causes: leakage, shot noise, hot pixels.
+//! Events not caused by dents: leakage, shot noise, hot pixels.
 
 use skinrig_model::{Polarity, SENSOR_HEIGHT, SENSOR_WIDTH};
 
@@ -17,20 +17,20 @@ pub(super) struct Noise {
     shot_total_hz: f64,
     hot: Vec<(u16, u16, f64)>,
     total_hz: f64,
-    /// Brightness of each column and row of the undisturbed picture; their product is 1 at its brightest.
+    /// Brightness of each column and row of the undisturbed image; their product is 1 at the brightest pixel.
     column_light: Vec<f64>,
     row_light: Vec<f64>,
-    /// Shot-noise weights: the sum of all rows up to and with this one, and the largest in each row.
+    /// Shot-noise weights: cumulative sum over the rows, and the largest in each row.
     shot_below: Vec<f64>,
     shot_peak: Vec<f64>,
-    /// When the next noise event comes, ns after the first tip sample.
+    /// Time of the next noise event, ns after the first tip sample.
     next_ns: f64,
 }
 
-/// Rate of shot-noise events at brightness `q` (1 = the picture's brightest) as a part of the highest rate. A
-/// dark pixel is too slow to show its noise, a bright one has little of it.
+/// Rate of shot-noise events at brightness `q` (1 = brightest pixel) relative to the highest rate. A
+/// dark pixel is too slow to show noise, a bright one has little noise.
 fn shot_weight(q: f64) -> f64 {
-    /// Brightness with the most noise.
+    /// Brightness with the highest rate.
     const WORST: f64 = 0.3;
     let r = q / WORST;
     4.0 * r / ((1.0 + r) * (1.0 + r))
@@ -124,7 +124,7 @@ impl Noise {
         while self.next_ns < start + GRID_NS as f64 {
             let us = (((self.next_ns - start) / 1e3) as i64).clamp(0, GRID_NS / 1000 - 1);
             let (x, y, polarity) = self.draw();
-            pixels.strike(
+            pixels.inject(
                 PixelEvent {
                     t_ns: t_ns + us * 1000,
                     x,

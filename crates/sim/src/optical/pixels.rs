@@ -1,9 +1,9 @@
 //! The pixels of one camera: references, thresholds, refractory time.
 //!
-//! A pixel remembers the light of its last event and speaks when the light has changed by its threshold (in
-//! log intensity) since. Light is `1 + x c` (see the `dent` module), monotone in the dent's depth: so each
-//! pixel knows the two values of `x` at which it will speak next, each column the two depths, and nothing
-//! else is looked at while the dent moves.
+//! A pixel stores the light at its last event and emits the next one when the light has changed by its threshold (in
+//! log intensity). Light is `1 + x c` (see the `dent` module), monotone in the dent's depth: therefore each
+//! pixel stores the two values of `x` at which it emits next, each column the two depths, and no other pixel
+//! is evaluated while the dent moves.
 
 use skinrig_model::{Polarity, SENSOR_HEIGHT, SENSOR_WIDTH};
 
@@ -15,12 +15,12 @@ use super::dent::Dent;
 
 const NS_PER_US: i64 = 1_000;
 const STEP_US: i64 = GRID_NS / NS_PER_US;
-/// The least threshold that mismatch can leave a pixel, log intensity.
+/// Lower limit on a pixel's threshold after mismatch, log intensity.
 const LEAST_THRESHOLD: f64 = 0.01;
-/// Contrasts below this count as none.
+/// Contrasts below this are treated as zero.
 const NO_CONTRAST: f64 = 1e-9;
 
-/// Light during one grid step: the depth goes linearly from `from_mm` to `to_mm`.
+/// Light during one grid step: the depth changes linearly from `from_mm` to `to_mm`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ramp {
     pub(super) t_ns: i64,
@@ -28,7 +28,7 @@ pub(super) struct Ramp {
     pub(super) to_mm: f64,
 }
 
-/// The lost light of one column during a step: `x` goes linearly from `from` to `to`.
+/// The lost light of one column during a step: `x` changes linearly from `from` to `to`.
 #[derive(Debug, Clone, Copy)]
 struct Loss {
     t_ns: i64,
@@ -42,18 +42,18 @@ impl Loss {
     }
 }
 
-/// One pixel that can see the skin.
+/// One pixel with the skin in its view.
 #[derive(Debug, Clone, Copy)]
 struct Pixel {
-    /// Light remembered at the last event, undisturbed = 1.
+    /// Light at the last event, undisturbed = 1.
     reference: f64,
-    /// Factor of the reference at which an ON event comes, above 1, and an OFF event, below 1.
+    /// Factors on the reference for an ON event, above 1, and an OFF event, below 1.
     on: f64,
     off: f64,
-    /// It speaks when `x` falls below `low` or rises above `high`. Infinite while it is held.
+    /// It emits when `x` falls below `low` or rises above `high`. Infinite while it is held.
     low: f64,
     high: f64,
-    /// In its refractory time; the reference is taken when that ends.
+    /// In its refractory time; the reference is set when that ends.
     held: bool,
 }
 
@@ -63,11 +63,11 @@ impl Pixel {
         (self.low, self.high) = (f64::NEG_INFINITY, f64::INFINITY);
     }
 
-    /// Finds the next `x` to speak at, for contrast `c`.
-    fn aim(&mut self, c: f64) {
+    /// Computes the next `x` at which the pixel emits, for contrast `c`.
+    fn set_next(&mut self, c: f64) {
         let (up, down) = (self.reference * self.on, self.reference * self.off);
         if c.abs() < NO_CONTRAST {
-            // The light is 1 whatever x is: speak at once or never.
+            // The light is 1 for every x: emit immediately or never.
             self.high = if up < 1.0 { -1.0 } else { f64::INFINITY };
             self.low = if down > 1.0 { 2.0 } else { f64::NEG_INFINITY };
         } else if c > 0.0 {
@@ -83,17 +83,17 @@ impl Pixel {
 pub(super) struct Pixels {
     first_row: usize,
     rows: usize,
-    /// Pixels that can see the skin, column by column.
+    /// Pixels with the skin in their view, column by column.
     skin: Vec<Pixel>,
     /// Time of the last event of every pixel of the sensor, row by row.
     last_ns: Vec<i64>,
     /// (column, row) of the held pixels.
     held: Vec<(u16, u16)>,
-    /// Depths beyond which some pixel of the column speaks.
+    /// Depths beyond which some pixel of the column emits.
     low_mm: Vec<f64>,
     high_mm: Vec<f64>,
     refractory_ns: i64,
-    /// The dent is new: its pixels must be looked at whether it moves or not.
+    /// The dent is new: its pixels must be evaluated even if it does not move.
     fresh: bool,
 }
 
@@ -112,7 +112,7 @@ impl Pixels {
                     threshold(config.threshold_on),
                     threshold(config.threshold_off),
                 );
-                // A pixel's last event, before the session, left its reference anywhere between its
+                // The last event before the session left each pixel's reference anywhere between its
                 // thresholds.
                 let reference = libm::exp(0.5 * (random.unit() * (on + off) - on));
                 Pixel {
@@ -138,21 +138,21 @@ impl Pixels {
         }
     }
 
-    /// A new dent: every pixel it reaches finds its next events.
-    pub(super) fn aim_at(&mut self, dent: &Dent) {
+    /// A new dent: every pixel in its reach gets its next thresholds.
+    pub(super) fn start_dent(&mut self, dent: &Dent) {
         self.fresh = true;
         for u in dent.columns.clone() {
             for v in dent.rows.clone() {
                 let i = self.index(u, v);
                 if !self.skin[i].held {
-                    self.skin[i].aim(dent.contrast(u, v));
+                    self.skin[i].set_next(dent.contrast(u, v));
                 }
             }
-            self.aim_column(dent, u);
+            self.set_next_in_column(dent, u);
         }
     }
 
-    /// Goes through one grid step with the given dent.
+    /// Simulates one grid step with the given dent.
     pub(super) fn step(&mut self, dent: &Dent, ramp: Ramp, out: &mut Vec<PixelEvent>) {
         self.release(dent, ramp, out);
         if ramp.from_mm == ramp.to_mm && !self.fresh {
@@ -165,16 +165,16 @@ impl Pixels {
                 for v in dent.rows.clone() {
                     let pixel = &self.skin[self.index(u, v)];
                     if loss.to > pixel.high || loss.to < pixel.low {
-                        self.speak(dent, u, v, loss, 0, out);
+                        self.emit(dent, u, v, loss, 0, out);
                     }
                 }
-                self.aim_column(dent, u);
+                self.set_next_in_column(dent, u);
             }
         }
     }
 
-    /// An event that light did not cause. False when the pixel is in its refractory time.
-    pub(super) fn strike(&mut self, event: PixelEvent, out: &mut Vec<PixelEvent>) -> bool {
+    /// Adds an event not caused by light. Returns false when the pixel is in its refractory time.
+    pub(super) fn inject(&mut self, event: PixelEvent, out: &mut Vec<PixelEvent>) -> bool {
         let (u, v) = (usize::from(event.x), usize::from(event.y));
         let last = &mut self.last_ns[v * usize::from(SENSOR_WIDTH) + u];
         if event.t_ns < last.saturating_add(self.refractory_ns) {
@@ -196,7 +196,7 @@ impl Pixels {
         u * self.rows + v - self.first_row
     }
 
-    /// Pixels whose refractory time ends in this step take the light of that moment as their reference.
+    /// Pixels whose refractory time ends in this step take the light at that time as their reference.
     fn release(&mut self, dent: &Dent, ramp: Ramp, out: &mut Vec<PixelEvent>) {
         let mut k = 0;
         while k < self.held.len() {
@@ -215,9 +215,9 @@ impl Pixels {
             let i = self.index(u, v);
             self.skin[i].held = false;
             self.skin[i].reference = 1.0 + loss.at_us(us) * c;
-            self.skin[i].aim(c);
-            // Speaking may hold the pixel again, at the list's end, until a later step.
-            self.speak(dent, u, v, loss, us, out);
+            self.skin[i].set_next(c);
+            // Emitting may hold the pixel again, at the list's end, until a later step.
+            self.emit(dent, u, v, loss, us, out);
             let (low, high) = (self.skin[i].low, self.skin[i].high);
             self.low_mm[u] = self.low_mm[u].max(dent.depth_of_loss(u, low));
             self.high_mm[u] = self.high_mm[u].min(dent.depth_of_loss(u, high));
@@ -225,7 +225,7 @@ impl Pixels {
     }
 
     /// Emits all events of one pixel from `from_us` to the end of the step.
-    fn speak(
+    fn emit(
         &mut self,
         dent: &Dent,
         u: usize,
@@ -268,11 +268,11 @@ impl Pixels {
             }
             from_us = end_us;
             pixel.reference = 1.0 + loss.at_us(end_us) * c;
-            pixel.aim(c);
+            pixel.set_next(c);
         }
     }
 
-    fn aim_column(&mut self, dent: &Dent, u: usize) {
+    fn set_next_in_column(&mut self, dent: &Dent, u: usize) {
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
         if !dent.rows.is_empty() {
             for pixel in &self.skin[self.index(u, dent.rows.start)..self.index(u, dent.rows.end)] {

@@ -1,4 +1,4 @@
-//! Laws of the optical model.
+//! Properties of the optical model.
 
 use std::collections::HashMap;
 
@@ -59,7 +59,7 @@ fn ms(e: &PixelEvent) -> i64 {
 
 const P: Point2 = Point2::new(-6.0, 14.0);
 
-/// FNV-1a, 64 bit: enough to notice a difference.
+/// FNV-1a, 64 bit: sufficient to detect a difference.
 fn digest(events: &[PixelEvent]) -> u64 {
     let mut h = 0xcbf2_9ce4_8422_2325_u64;
     for e in events {
@@ -78,8 +78,8 @@ fn digest(events: &[PixelEvent]) -> u64 {
 }
 
 #[test]
-fn equal_seeds_give_the_golden_bytes() {
-    // Changes only when the model or its defaults change on purpose; must be the same on every machine.
+fn equal_seeds_give_the_golden_digest() {
+    // Update only when the model or its defaults change intentionally; identical on every machine.
     let digests = CameraId::ALL.map(|id| {
         let events = run(&mut OpticalModel::new(&scene(id)), &press(P, 2.0));
         (events.len(), digest(&events))
@@ -101,7 +101,7 @@ const GOLDEN: [(usize, u64); 2] = [
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(6))]
     #[test]
-    fn calls_may_be_divided_anyhow(cuts in prop::collection::vec(0usize..=501, 0..6)) {
+    fn result_does_not_depend_on_the_division_into_calls(cuts in prop::collection::vec(0usize..=501, 0..6)) {
         let tips = press(P, 1.5);
         let whole = run(&mut OpticalModel::new(&scene(CameraId::Two)), &tips);
         let mut cuts = cuts;
@@ -120,7 +120,7 @@ proptest! {
     }
 
     #[test]
-    fn no_path_of_the_tip_panics_or_leaves_the_sensor(
+    fn any_tip_path_gives_events_inside_the_sensor(
         path in prop::collection::vec((-80.0f64..100.0, -80.0f64..80.0, -9.0f64..2.0), 2..6)
     ) {
         let mut model = OpticalModel::new(&scene(CameraId::One));
@@ -134,7 +134,7 @@ proptest! {
 }
 
 #[test]
-fn samples_far_apart_mean_straight_motion() {
+fn sparse_samples_are_interpolated_linearly() {
     let corners = [(0, 1.0), (100, -2.0), (200, -2.0), (300, 1.0), (500, 1.0)]
         .map(|(t, z)| tip(t, P.x_mm, P.y_mm, z));
     let events = run(&mut quiet(CameraId::One), &corners);
@@ -146,10 +146,10 @@ fn samples_far_apart_mean_straight_motion() {
 }
 
 #[test]
-fn without_motion_there_is_only_noise_at_its_rate() {
+fn without_motion_only_noise_at_its_rate_remains() {
     let rest: Vec<_> = (0..=4000).map(|t| tip(t, P.x_mm, P.y_mm, 1.0)).collect();
     assert!(run(&mut quiet(CameraId::One), &rest).is_empty());
-    // A tip that stays at a depth makes events only while the skin creeps: of the order of its time constant,
+    // A tip held at a depth causes events only while the skin creeps: for about its time constant,
     // 700 ms.
     let held: Vec<_> = (0..=5500).map(|t| tip(t, P.x_mm, P.y_mm, -1.0)).collect();
     let events = run(&mut quiet(CameraId::One), &held);
@@ -164,12 +164,12 @@ fn without_motion_there_is_only_noise_at_its_rate() {
     let expected = model.noise_hz() * 4.0;
     let events = run(&mut model, &rest);
     let found = events.len() as f64;
-    // Refractory times take a little from the hottest pixel; 5 standard deviations of a Poisson count.
+    // Refractory times lower the rate of the hottest pixel slightly; 5 standard deviations of a Poisson count.
     assert!(
         (found - expected).abs() < 5.0 * expected.sqrt() + 0.02 * expected,
         "{found} of {expected}"
     );
-    // Shot noise lies where there is light to see, hot pixels stay where they are.
+    // Shot noise occurs where there is light; hot pixels keep their positions.
     let on_skin = events.iter().filter(|e| (185..=360).contains(&e.y)).count() as f64;
     assert!(on_skin > 0.6 * found);
     let mut counts = HashMap::new();
@@ -184,7 +184,7 @@ fn without_motion_there_is_only_noise_at_its_rate() {
 }
 
 #[test]
-fn deeper_presses_make_more_events() {
+fn deeper_presses_cause_more_events() {
     for id in CameraId::ALL {
         let counts = [0.0, 0.5, 1.0, 2.0, 3.0].map(|d| run(&mut quiet(id), &press(P, d)).len());
         assert_eq!(counts[0], 0);
@@ -206,7 +206,7 @@ fn pressing_darkens_and_releasing_brightens() {
         };
         let (down, up) = (on_part(0, 110), on_part(200, 310));
         assert!(down < 0.45 && up > 0.55, "{down} {up}");
-        // Nothing before the tip touches (33 ms) and the light has become an event (200 us).
+        // No event before the touch (33 ms) plus the latency (200 us).
         assert!(events.iter().all(|e| e.t_ns >= 33 * GRID_NS + 200_000));
     }
 }
@@ -216,7 +216,7 @@ fn mean_column(events: &[PixelEvent]) -> f64 {
 }
 
 #[test]
-fn events_appear_where_the_camera_sees_the_dent_with_an_error_of_their_own() {
+fn events_appear_at_the_dent_with_a_position_dependent_error() {
     let mut errors = Vec::new();
     for id in CameraId::ALL {
         for (x, y) in [
@@ -234,7 +234,7 @@ fn events_appear_where_the_camera_sees_the_dent_with_an_error_of_their_own() {
             errors.push(error);
         }
     }
-    // The error belongs to the place: no constant offset, not zero.
+    // The error depends on the position: neither a constant offset nor zero.
     let spread = errors.iter().fold(f64::MIN, |a, &b| a.max(b))
         - errors.iter().fold(f64::MAX, |a, &b| a.min(b));
     assert!(spread > 1.0, "{errors:?}");
@@ -270,7 +270,7 @@ fn refractory_time_holds_for_every_pixel() {
     assert!(closest >= i64::from(refractory_us) * 1000, "{closest}");
     assert!(
         closest < i64::from(refractory_us) * 1200,
-        "the refractory time was never tried: {closest}"
+        "no events were as close as the refractory time: {closest}"
     );
 }
 
@@ -290,12 +290,12 @@ fn thresholds_set_the_number_of_events() {
         .len() as f64
     };
     let ratio = count(0.1) / count(0.2);
-    // Half the threshold: twice the events of each pixel, and some from pixels that said nothing before.
+    // Half the threshold: twice the events of each pixel, and some from pixels without events before.
     assert!((2.0..4.0).contains(&ratio), "{ratio}");
 }
 
 #[test]
-fn a_pixel_never_speaks_for_less_than_its_threshold() {
+fn a_pixel_never_emits_below_its_threshold() {
     // The net count of a pixel's events times its threshold follows its log intensity: after a full
     // relaxation, ON and OFF balance to within one threshold (refractory time short enough not to lose
     // changes).
@@ -345,7 +345,7 @@ fn latency_shifts_events_and_changes_nothing_else() {
 }
 
 #[test]
-fn skin_that_was_held_relaxes_after_release() {
+fn held_skin_relaxes_after_release() {
     let mut tips = press(P, 2.0);
     tips.extend((501..=3000).map(|t| tip(t, P.x_mm, P.y_mm, 1.0)));
     let tail = |creep_fraction| {
@@ -364,7 +364,7 @@ fn skin_that_was_held_relaxes_after_release() {
 }
 
 #[test]
-fn a_sliding_tip_is_seen_where_it_goes() {
+fn events_follow_a_sliding_tip() {
     let from = Point2::new(-20.0, 2.0);
     let mut tips = vec![
         tip(0, from.x_mm, from.y_mm, 0.5),
@@ -386,8 +386,8 @@ fn a_sliding_tip_is_seen_where_it_goes() {
 }
 
 #[test]
-fn outside_the_skin_and_at_its_base_nothing_strange_happens() {
-    // Beside the skin there is nothing to indent.
+fn tip_beside_the_skin_or_at_its_base_is_handled() {
+    // Beside the skin nothing is indented.
     assert!(
         run(
             &mut quiet(CameraId::One),
@@ -395,7 +395,7 @@ fn outside_the_skin_and_at_its_base_nothing_strange_happens() {
         )
         .is_empty()
     );
-    // The base is rigid: 9 mm are as good as the skin's 4 (up to the time that the tip takes).
+    // The base is rigid: 9 mm has the same effect as the skin's 4 mm (apart from the travel time of the tip).
     let deep = |z: f64| {
         run(
             &mut quiet(CameraId::One),
@@ -422,7 +422,7 @@ fn outside_the_skin_and_at_its_base_nothing_strange_happens() {
 }
 
 #[test]
-fn odd_scenes_give_noise_not_panics() {
+fn unusual_scenes_give_noise_without_panics() {
     let odd: [fn(&mut SceneConfig); 5] = [
         |s| s.skin_rows = (360, 185),
         |s| s.skin_rows = (500, 700),
@@ -439,7 +439,7 @@ fn odd_scenes_give_noise_not_panics() {
 }
 
 #[test]
-fn settings_outside_their_range_are_refused() {
+fn settings_outside_their_range_are_rejected() {
     let refuse = |change: fn(&mut OpticalConfig)| {
         let mut config = OpticalConfig::default();
         change(&mut config);

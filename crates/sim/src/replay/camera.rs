@@ -1,4 +1,4 @@
-//! A camera of a recording.
+//! A replayed camera.
 
 use skinrig_device::{CameraCapabilities, CameraSettings, DeviceError, EventCamera};
 use skinrig_model::{
@@ -8,7 +8,7 @@ use skinrig_model::{
 
 use super::tape::Tape;
 
-/// Plays the part of a camera: gives the recorded chunks, unchanged.
+/// A camera that returns the recorded chunks unchanged.
 pub struct ReplayedCamera {
     tape: Tape,
     id: CameraId,
@@ -71,7 +71,7 @@ impl EventCamera for ReplayedCamera {
         }
     }
 
-    /// Gives the settings that were recorded; a request for other biases than the recorded is refused.
+    /// Returns the recorded settings. Rejects other biases than the recorded ones.
     fn configure(&mut self, settings: &CameraSettings) -> Result<Vec<Setting>, DeviceError> {
         self.expect_stopped()?;
         let can = self.capabilities();
@@ -111,12 +111,12 @@ impl EventCamera for ReplayedCamera {
         self.tape.lock().take_chunks(self.id, false, chunks)
     }
 
-    /// The same as [`poll`](Self::poll): the recording has closed its chunks where it was flushed.
+    /// Same as [`poll`](Self::poll): the recorded chunks are already closed where they were flushed.
     fn flush(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
         self.poll(chunks)
     }
 
-    /// Hands over the rest of the recording when every recorded command has been given.
+    /// Returns the rest of the recording once all recorded commands have been given.
     fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
         if !self.streaming {
             return Ok(());

@@ -1,4 +1,4 @@
-//! The robot of a recording.
+//! The replayed robot.
 
 use skinrig_device::{DeviceError, Indenter, IndenterCapabilities, MotionLimits, RobotSample};
 use skinrig_model::{
@@ -9,7 +9,7 @@ use skinrig_model::{
 use super::tape::Tape;
 use skinrig_device::limits;
 
-/// Plays the part of the robot: takes the recorded commands, gives the recorded poses.
+/// A robot that checks commands against the recorded ones and returns the recorded poses.
 pub struct ReplayedIndenter {
     tape: Tape,
     robot_from_skin: RigidTransform<Robot, Skin>,
@@ -41,7 +41,7 @@ impl Indenter for ReplayedIndenter {
         self.tape.lock().identity(DeviceRole::Indenter)
     }
 
-    /// Wide: the recorded commands say what is allowed.
+    /// Wide limits: the recorded commands decide what is allowed.
     fn capabilities(&self) -> IndenterCapabilities {
         IndenterCapabilities {
             workspace_min_mm: [-1_000.0; 3],
@@ -54,7 +54,7 @@ impl Indenter for ReplayedIndenter {
         }
     }
 
-    /// The settings that were recorded, when there are any.
+    /// Returns the recorded settings, if any.
     fn configure(&mut self, limits: &MotionLimits) -> Result<Vec<Setting>, DeviceError> {
         limits::check_limits(&self.serial(), &self.capabilities(), limits)?;
         self.limits = Some(*limits);

@@ -1,16 +1,15 @@
-//! A recorded session as a rig: the same traits, served from a recording.
+//! A recorded session as a rig with the usual traits.
 //!
-//! # How replay keeps in step
+//! # Timing of a replay
 //!
-//! The recording, not real time, drives the clock. Each motion command of the controller is compared with the
-//! recorded one (else [`DeviceError::Diverged`]), and the clock is then set to the instant of the recorded
-//! command. Between commands the clock goes where it is asked to, but never past the next recorded command
-//! without stopping there once: a wait that would pass it ends early, at that instant, and the next wait goes on.
-//! So a controller whose decisions follow from device data and clock alone meets every recorded instant and
-//! brings about the same records.
+//! The recording drives the clock. Each motion command of the controller is compared with the recorded one
+//! ([`DeviceError::Diverged`] if they differ), and the clock is set to the recorded time of the command. Between commands the clock
+//! follows the controller's waits, but stops once at the time of the next recorded command: a wait beyond it returns early, and the next
+//! wait continues. A controller whose decisions depend only on device data and clock therefore reaches every recorded time and produces
+//! the same records.
 //!
-//! Poses, chunks and marks are handed over as recorded: poses with `t <= now`, chunks with `host_time <= now`,
-//! reports of the trigger box that had been taken by `now`, marks when asked for. At most one block of poses and one chunk per camera are held in memory.
+//! Data is returned as recorded: poses with `t <= now`, chunks with `host_time <= now`, reports of the trigger box received by `now`, marks
+//! when requested. Memory holds at most one block of poses and one chunk per camera.
 
 mod camera;
 mod indenter;
@@ -30,24 +29,24 @@ pub use trigger::ReplayedTriggerBox;
 #[cfg(doc)]
 use skinrig_device::DeviceError;
 
-/// What is known about the recorded rig.
+/// Description of the recorded rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedRig {
     /// Its name, for example `simulated (geometric)`.
     pub name: String,
-    /// Where the skin lay.
+    /// Pose of the skin.
     pub robot_from_skin: RigidTransform<Robot, Skin>,
     /// Geometry for analyses.
     pub geometry: RigGeometry,
     /// Word format of each camera.
     pub stream_formats: [StreamFormat; 2],
-    /// What had been written to the cameras.
+    /// Settings written to the cameras.
     pub camera_settings: [CameraSettings; 2],
     /// The rig's description as JSON.
     pub description_json: String,
 }
 
-/// A rig that replays `recording`. There is a trigger box when the recording knows one.
+/// A rig that replays `recording`. It has a trigger box if the recording does.
 #[must_use]
 pub fn replayed_rig(rig: RecordedRig, recording: Box<dyn Recording>) -> Rig {
     let has_box = recording.identity(DeviceRole::TriggerBox).is_some();

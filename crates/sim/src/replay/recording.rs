@@ -1,4 +1,4 @@
-//! What a recording must give to be replayed, in model types only.
+//! Interface of a recording for replay, in model types only.
 
 use skinrig_model::{
     BoxReport, CameraId, DeviceIdentity, DeviceRole, HostTime, MotionCommand, PoseSample, RawChunk,
@@ -10,12 +10,12 @@ use skinrig_model::{
 #[error("recording: {0}")]
 pub struct RecordingError(pub String);
 
-/// A stored run, streamed: every `next_*` goes on where it stopped and gives `None` at the end.
+/// A stored run as streams: each `next_*` continues where it stopped and returns `None` at the end.
 pub trait Recording: Send {
-    /// Who the device was; `None` when the rig had no such device.
+    /// Identity of the device; `None` if the rig had no such device.
     fn identity(&self, role: DeviceRole) -> Option<DeviceIdentity>;
 
-    /// The device's settings as read back.
+    /// Settings of the device as read back.
     fn settings(&self, role: DeviceRole) -> Vec<Setting>;
 
     /// The next motion command, in time order.
@@ -36,7 +36,7 @@ pub trait Recording: Send {
     /// [`RecordingError`] when it cannot be read.
     fn next_mark(&mut self) -> Result<Option<SentMark>, RecordingError>;
 
-    /// The next report of the trigger box, with the instant at which it was taken, in that order.
+    /// The next report of the trigger box with the time at which it was received, in that order.
     ///
     /// # Errors
     /// [`RecordingError`] when it cannot be read.

@@ -12,8 +12,7 @@ use skinrig_model::{
 use super::recording::{Recording, RecordingError};
 use skinrig_device::limits::millimetres;
 
-/// This long after its last pose, and no other to come, a recording has ended. Shorter than any controller waits
-/// for a pose (0.1 s), longer than its ticks.
+/// Time after its last pose at which a recording ends. Shorter than any controller waits for a pose (0.1 s), longer than its ticks.
 const LONGEST_GAP: HostDuration = HostDuration::from_millis(50);
 
 /// Reading positions in a recording.
@@ -26,15 +25,15 @@ pub struct Reader {
     last_pose: Option<HostTime>,
     mark: Option<SentMark>,
     marks_read: u64,
-    /// The next report of the trigger box, once it was looked for.
+    /// The next report of the trigger box, once read.
     report: Option<Option<(HostTime, BoxReport)>>,
     chunks: [Option<RawChunk>; 2],
     chunks_read: [bool; 2],
-    /// A read of the next command that failed; told at the next request.
+    /// Failed read of the next command; reported at the next request.
     failure: Option<RecordingError>,
 }
 
-/// A shared handle on the recording.
+/// A shared handle of the recording.
 #[derive(Clone)]
 pub struct Tape {
     reader: Arc<Mutex<Reader>>,
@@ -42,7 +41,7 @@ pub struct Tape {
 }
 
 impl Tape {
-    /// At the beginning of `recording`.
+    /// At the start of `recording`.
     #[must_use]
     pub fn new(
         recording: Box<dyn Recording>,
@@ -73,7 +72,7 @@ impl Tape {
         }
     }
 
-    /// Robot to skin coordinates.
+    /// Transform from robot to skin coordinates.
     #[must_use]
     pub const fn skin_from_robot(&self) -> RigidTransform<Skin, Robot> {
         self.skin_from_robot
@@ -123,13 +122,13 @@ impl Reader {
         }
     }
 
-    /// There is nothing further that the device could be asked for: the recorded run ended here.
+    /// The recorded run ended: no request can be served.
     pub(super) fn ended(&self, role: DeviceRole) -> DeviceError {
         DeviceError::Lost {
             role,
             serial: self.identity(role).serial,
             detail: format!(
-                "the recording ends here, at {}; expected nothing further to be asked",
+                "the recording ends here, at {}; expected no further request",
                 self.now
             ),
         }
@@ -146,7 +145,7 @@ impl Reader {
         self.now
     }
 
-    /// Goes to `t`, or only to the next command's instant when that lies between.
+    /// Advances to `t`, or only to the time of the next command before it.
     fn wait_until(&mut self, t: HostTime) {
         let stop = match self.command {
             Some((at, _)) if self.now < at && at < t => at,
@@ -155,7 +154,7 @@ impl Reader {
         self.now = self.now.max(stop);
     }
 
-    /// Compares with the next recorded command and sets the clock to its instant.
+    /// Compares with the next recorded command and sets the clock to its time.
     pub(super) fn take_command(&mut self, found: MotionCommand) -> Result<(), DeviceError> {
         self.check(DeviceRole::Indenter)?;
         let at = format!("command {}", self.commands_read);
@@ -186,7 +185,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Appends the poses up to the present.
+    /// Appends the poses up to now.
     pub(super) fn take_poses(&mut self, out: &mut Vec<PoseSample>) -> Result<(), DeviceError> {
         loop {
             while let Some(pose) = self.poses.front().filter(|p| p.t <= self.now) {
@@ -231,7 +230,7 @@ impl Reader {
         }
     }
 
-    /// Appends what the trigger box reported up to the present.
+    /// Appends the trigger box reports up to now.
     pub(super) fn take_reports(&mut self, out: &mut Vec<BoxReport>) -> Result<(), DeviceError> {
         loop {
             let next = match self.report.take() {
@@ -251,7 +250,7 @@ impl Reader {
         }
     }
 
-    /// Appends the chunks up to the present; all the rest when `rest` and no command is left.
+    /// Appends the chunks up to now; all remaining ones if `rest` and no command is left.
     pub(super) fn take_chunks(
         &mut self,
         camera: CameraId,
@@ -297,7 +296,7 @@ impl Clock for ReplayClock {
         self.tape.lock().now()
     }
 
-    /// Ends early, once, at the instant of a recorded command.
+    /// Returns early, once, at the time of a recorded command.
     fn wait_until(&mut self, t: HostTime) {
         self.tape.lock().wait_until(t);
     }

@@ -1,4 +1,4 @@
-//! The trigger box of a recording.
+//! The replayed trigger box.
 
 use skinrig_device::{DeviceError, TriggerBox, TriggerCapabilities};
 use skinrig_model::{
@@ -7,7 +7,7 @@ use skinrig_model::{
 
 use super::tape::Tape;
 
-/// Plays the part of the trigger box: takes the recorded marks in order and gives their recorded instants.
+/// A trigger box that accepts the recorded marks in order and returns their recorded times.
 pub struct ReplayedTriggerBox {
     tape: Tape,
     busy_until: Option<HostTime>,

@@ -1,4 +1,4 @@
-//! A scripted experimenter: presses without a controller, and a recording in memory.
+//! Test support: presses without a controller, and a recording in memory.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
@@ -33,7 +33,7 @@ pub fn ready(rig: &mut Rig) {
     rig.indenter.arm().unwrap();
 }
 
-/// What came out of a run.
+/// Results of a run.
 #[derive(Default)]
 pub struct Take {
     pub samples: Vec<RobotSample>,
@@ -51,7 +51,7 @@ impl Take {
             .collect()
     }
 
-    /// Collects what the devices have.
+    /// Collects the available data of the devices.
     pub fn poll(&mut self, rig: &mut Rig) -> Result<(), DeviceError> {
         rig.indenter.poll(&mut self.samples)?;
         for (camera, chunks) in rig.cameras.iter_mut().zip(&mut self.chunks) {
@@ -72,8 +72,7 @@ impl Take {
     }
 }
 
-/// Presses at each place, 2 mm deep, on a fixed schedule of 1.5 s per press; `ticks` gives the waits between
-/// two looks in µs, again and again.
+/// Presses 2 mm deep at each place, on a fixed schedule of 1.5 s per press; `ticks` are the polling intervals in µs, repeated cyclically.
 pub fn press_all(rig: &mut Rig, places: &[Point2], ticks: &[i64]) -> Result<Take, DeviceError> {
     let mut take = Take::default();
     let mut tick = ticks.iter().copied().cycle();
@@ -114,7 +113,7 @@ pub fn places(n: usize) -> Vec<Point2> {
         .collect()
 }
 
-/// Everything that a run said, in memory.
+/// All data of a run, in memory.
 #[derive(Default, Clone)]
 pub struct Log {
     pub identities: Vec<(DeviceRole, DeviceIdentity)>,
@@ -154,7 +153,7 @@ impl Recording for Log {
     }
 }
 
-/// A device that writes down what passes through it.
+/// A device that records all calls.
 pub struct Noted<D> {
     inner: D,
     log: Arc<Mutex<Log>>,
@@ -300,7 +299,7 @@ impl TriggerBox for Noted<Box<dyn TriggerBox>> {
     }
 }
 
-/// A clock that two can hold.
+/// A clock with two owners.
 #[derive(Clone)]
 pub struct SharedClock(Arc<Mutex<Box<dyn Clock>>>);
 
@@ -319,7 +318,7 @@ impl Clock for SharedClock {
     }
 }
 
-/// `rig` with every device writing to the returned log.
+/// `rig` with all devices recording into the returned log.
 pub fn noted(rig: Rig) -> (Rig, Arc<Mutex<Log>>) {
     let log = Arc::new(Mutex::new(Log::default()));
     let clock = SharedClock::new(rig.clock);

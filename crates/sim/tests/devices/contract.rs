@@ -1,4 +1,4 @@
-//! The contract suite over simulated devices, and over replays of what they did.
+//! Contract tests with simulated devices, and with replays of their recordings.
 
 use std::sync::{Arc, Mutex};
 
@@ -6,13 +6,13 @@ use crate::common::{LIMITS, Log, noted};
 use skinrig_device::contract::{self, IndenterContract};
 use skinrig_device::detached::Calls;
 use skinrig_device::{
-    Clock, DetachedBox, DetachedCamera, EventCamera, Indenter, Patience, Rig, TriggerBox,
+    Clock, DetachedBox, DetachedCamera, EventCamera, Indenter, Rig, Timeouts, TriggerBox,
 };
 use skinrig_model::{
     CameraId, HostDuration, HostTime, Mark, MarkKind, Point3, PressId, SimLevel, StreamFormat,
 };
 use skinrig_sim::replay::{RecordedRig, replayed_rig};
-use skinrig_sim::{Paced, SimClock, SimConfig, simulated_rig};
+use skinrig_sim::{PacedClock, SimClock, SimConfig, simulated_rig};
 
 const OPTIONS: IndenterContract = IndenterContract {
     limits: LIMITS,
@@ -23,7 +23,7 @@ const OPTIONS: IndenterContract = IndenterContract {
     outside: Point3::new(0.0, 81.0, 0.0),
     speed_mm_s: 80.0,
     tolerance_mm: 0.05,
-    patience: HostDuration::from_millis(1_500),
+    move_timeout: HostDuration::from_millis(1_500),
     rate_share: 0.9,
 };
 
@@ -40,7 +40,7 @@ fn replay_of(log: &Log) -> Rig {
     replayed_rig(known, Box::new(log.clone()))
 }
 
-/// Runs `suite` on noted simulated rigs, then on replays of them in the same order.
+/// Runs `suite` on recorded simulated rigs, then on replays of them in the same order.
 fn both(mut suite: impl FnMut(&mut dyn FnMut() -> Rig)) {
     for level in [SimLevel::Kinematic, SimLevel::Geometric] {
         let logs: Arc<Mutex<Vec<Arc<Mutex<Log>>>>> = Arc::default();
@@ -61,7 +61,7 @@ fn both(mut suite: impl FnMut(&mut dyn FnMut() -> Rig)) {
 #[test]
 fn clocks_keep_the_contract() {
     contract::clock(&mut SimClock::new());
-    contract::clock(&mut Paced::new(SimClock::new()));
+    contract::clock(&mut PacedClock::new(SimClock::new()));
     contract::clock(replay_of(&Log::default()).clock.as_mut());
 }
 
@@ -102,7 +102,7 @@ fn trigger_boxes_keep_the_contract() {
         })
         .collect();
     let marks = &marks;
-    // A recording without any device knows no trigger box; the noted rig names it at its first mark.
+    // A recording without any device has no trigger box; the recorded rig has one from its first mark.
     both(|make| {
         let mut split = || -> (Box<dyn TriggerBox>, Box<dyn Clock>) {
             let rig = make();
@@ -112,7 +112,7 @@ fn trigger_boxes_keep_the_contract() {
     });
 }
 
-/// A clock that goes on when the device has answered.
+/// A clock that advances once the device has replied.
 #[derive(Clone)]
 struct SettledClock {
     clock: Arc<Mutex<Box<dyn Clock>>>,
@@ -146,7 +146,7 @@ fn sim() -> Rig {
 }
 
 #[test]
-fn devices_on_threads_of_their_own_keep_the_contract() {
+fn detached_devices_keep_the_contract() {
     let settings = sim().camera_settings;
     for id in CameraId::ALL {
         let mut make = || -> (Box<dyn EventCamera>, Box<dyn Clock>) {
@@ -154,7 +154,7 @@ fn devices_on_threads_of_their_own_keep_the_contract() {
             let clock = SettledClock::new(rig.clock);
             let [one, two] = rig.cameras;
             let camera = if id == CameraId::One { one } else { two };
-            let camera = DetachedCamera::new(camera, Box::new(clock.clone()), Patience::BENCH);
+            let camera = DetachedCamera::new(camera, Box::new(clock.clone()), Timeouts::BENCH);
             let camera = camera.expect("a thread");
             *clock.calls.lock().unwrap() = Some(camera.calls());
             (Box::new(camera), Box::new(clock))
@@ -169,7 +169,7 @@ fn devices_on_threads_of_their_own_keep_the_contract() {
         let rig = sim();
         let clock = SettledClock::new(rig.clock);
         let device = rig.trigger_box.expect("a trigger box");
-        let device = DetachedBox::new(device, Box::new(clock.clone()), Patience::BENCH);
+        let device = DetachedBox::new(device, Box::new(clock.clone()), Timeouts::BENCH);
         let device = device.expect("a thread");
         *clock.calls.lock().unwrap() = Some(device.calls());
         (Box::new(device), Box::new(clock))

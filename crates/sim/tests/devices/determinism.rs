@@ -1,4 +1,4 @@
-//! Equal configurations give equal bytes, however often one looks; different seeds do not.
+//! Equal configurations give equal bytes at any polling rate; different seeds do not.
 
 use crate::common::{Take, places, press_all, ready};
 use proptest::prelude::*;
@@ -31,13 +31,13 @@ proptest! {
         prop_assert_eq!(&often.reports, &seldom.reports);
         for camera in CameraId::ALL {
             prop_assert!(often.bytes(camera) == seldom.bytes(camera));
-            // Without flushes even the chunks are the same.
+            // Without flushes even the chunks are equal.
             prop_assert!(often.chunks[camera.index()] == seldom.chunks[camera.index()]);
         }
     }
 }
 
-/// FNV-1a, for a fingerprint that is easy to compare.
+/// FNV-1a, as a fingerprint.
 fn fingerprint(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |h, &b| {
         (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
@@ -50,7 +50,7 @@ fn seeds_matter_and_bytes_are_pinned() {
     let two = run(&SimConfig::new(2, SimLevel::Geometric), &[10_000]);
     assert_ne!(one.bytes(CameraId::One), two.bytes(CameraId::One));
     assert_ne!(one.bytes(CameraId::One), one.bytes(CameraId::Two));
-    // The same on every machine: a change here means that old seeds give other sessions.
+    // Equal on every machine: after a change, old seeds give other sessions.
     let prints = CameraId::ALL.map(|c| fingerprint(&one.bytes(c)));
     assert_eq!(prints.map(|p| format!("{p:016x}")), PINNED);
 }

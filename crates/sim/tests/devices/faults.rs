@@ -1,4 +1,4 @@
-//! Each injected fault is seen through the error or the count that stands for it.
+//! Each injected fault shows as the documented error or count.
 
 use crate::common::{LIMITS, Take, places, press_all, ready};
 use skinrig_device::DeviceError;
@@ -7,7 +7,7 @@ use skinrig_model::{
     BoxReport, CameraId, DeviceRole, HostTime, Polarity, RawChunk, SimLevel, StreamFormat,
     pulse::{DecodedMarks, decode_marks},
 };
-use skinrig_sim::{Fault, SimConfig, When, simulated_rig};
+use skinrig_sim::{Fault, FaultTrigger, SimConfig, simulated_rig};
 
 fn with(level: SimLevel, fault: Fault) -> SimConfig {
     SimConfig {
@@ -27,7 +27,10 @@ fn failed(config: &SimConfig) -> DeviceError {
 
 #[test]
 fn lost_indenter() {
-    for when in [When::At(HostTime(700_000_000)), When::Contact(1)] {
+    for when in [
+        FaultTrigger::At(HostTime(700_000_000)),
+        FaultTrigger::Contact(1),
+    ] {
         let config = with(SimLevel::Kinematic, Fault::IndenterLost(when));
         let mut rig = simulated_rig(&config);
         ready(&mut rig);
@@ -39,7 +42,7 @@ fn lost_indenter() {
                 ..
             })
         ));
-        // It stays lost, and says so to the one who disarms.
+        // It stays lost, also when disarmed.
         assert!(matches!(
             rig.indenter.disarm(),
             Err(DeviceError::Lost { .. })
@@ -65,13 +68,13 @@ fn sluggish_indenter_is_late() {
         s.measured.distance_mm(s.commanded)
     };
     assert!(off_at_hold(vec![]) < 0.05);
-    let when = When::At(HostTime::ZERO);
+    let when = FaultTrigger::At(HostTime::ZERO);
     assert!(off_at_hold(vec![Fault::Sluggish { when, percent: 5 }]) > 0.5);
 }
 
 #[test]
-fn unplugged_camera_delivers_what_it_had() {
-    let when = When::At(HostTime(400_000_000));
+fn an_unplugged_camera_delivers_its_remaining_data() {
+    let when = FaultTrigger::At(HostTime(400_000_000));
     let camera = CameraId::Two;
     let config = with(SimLevel::Kinematic, Fault::CameraUnplugged { camera, when });
     let mut rig = simulated_rig(&config);
@@ -97,7 +100,7 @@ fn unplugged_camera_delivers_what_it_had() {
 
 #[test]
 fn lost_bytes_are_counted() {
-    let when = When::At(HostTime(400_000_000));
+    let when = FaultTrigger::At(HostTime(400_000_000));
     let camera = CameraId::One;
     let fault = Fault::CameraBytesLost {
         camera,
@@ -131,7 +134,7 @@ fn lost_bytes_are_counted() {
 }
 
 #[test]
-fn a_lost_start_pulse_spoils_one_train_in_one_camera() {
+fn a_lost_start_pulse_makes_one_train_of_one_camera_unreadable() {
     let fault = Fault::PulseLost {
         camera: CameraId::Two,
         train: 1,
@@ -151,7 +154,7 @@ fn a_lost_start_pulse_spoils_one_train_in_one_camera() {
 }
 
 #[test]
-fn a_noisy_line_spoils_no_name_and_only_one_camera() {
+fn a_noisy_line_corrupts_no_mark_and_affects_only_one_camera() {
     let fault = Fault::NoisyLine {
         camera: CameraId::Two,
         lost_percent: 3,
@@ -183,7 +186,7 @@ fn a_noisy_line_spoils_no_name_and_only_one_camera() {
 }
 
 #[test]
-fn the_box_tells_its_clock_what_it_sent_and_what_touched() {
+fn the_box_reports_its_clock_its_trains_and_contacts() {
     let mut config = SimConfig::new(4, SimLevel::Kinematic);
     config.trigger_box.max_drift_ppm = 500.0;
     let mut rig = simulated_rig(&config);
@@ -200,7 +203,7 @@ fn the_box_tells_its_clock_what_it_sent_and_what_touched() {
             BoxReport::Reset { .. } => panic!("no reset was planned"),
         }
     }
-    // Nearly three seconds: an exchange each 0.1 s, each wide enough for two delays.
+    // Nearly three seconds: an exchange every 0.1 s, each at least two delays wide.
     assert!((28..=30).contains(&ties.len()), "{}", ties.len());
     assert!(
         ties.iter()
@@ -221,7 +224,7 @@ fn the_box_tells_its_clock_what_it_sent_and_what_touched() {
         inputs.iter().map(|i| i.0).collect::<Vec<_>>(),
         [true, false, true, false]
     );
-    // The marks' box times lie where the exchanges about them put the host's times.
+    // The marks' box times agree with the host times according to the exchanges around them.
     for (sent, (_, at)) in take.marks.iter().zip(&marks) {
         let before = ties.iter().rev().find(|(_, _, us)| us <= at).copied();
         if let Some((low, high, us)) = before {
@@ -239,7 +242,7 @@ fn the_box_tells_its_clock_what_it_sent_and_what_touched() {
 fn trigger_box_lost() {
     let error = failed(&with(
         SimLevel::Kinematic,
-        Fault::TriggerBoxLost(When::Contact(0)),
+        Fault::TriggerBoxLost(FaultTrigger::Contact(0)),
     ));
     assert!(matches!(
         error,
@@ -251,7 +254,7 @@ fn trigger_box_lost() {
 }
 
 #[test]
-fn settings_that_do_not_take() {
+fn settings_that_read_back_differently_are_errors() {
     let mut rig = simulated_rig(&with(SimLevel::Kinematic, Fault::IndenterReadBack));
     assert!(matches!(
         rig.indenter.configure(&LIMITS),

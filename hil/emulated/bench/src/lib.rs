@@ -1,4 +1,4 @@
-//! A whole bench of stand-ins in real time, tied together as wires and light tie a real one.
+//! A complete emulated bench in real time, with its devices connected like real ones by wires and light.
 //!
 //! ```text
 //!  skinrig run --rig hil/rigs/emulated.yaml     (a child process: production drivers only)
@@ -37,38 +37,38 @@ use ties::Ties;
 pub(crate) const ARM_SERIAL: u16 = 4711;
 /// Serial number in the trigger box's EEPROM.
 pub(crate) const BOX_SERIAL: &str = "emulated";
-/// Names the stand-in for libdrd in a rig file.
+/// Environment variable with the path of the emulated libdrd, for rig files.
 pub const LIBRARY_VARIABLE: &str = "SKINRIG_EMULATED_LIBDRD";
-/// Names the port of the trigger box in a rig file.
+/// Environment variable with the port of the trigger box, for rig files.
 pub(crate) const BOX_VARIABLE: &str = "SKINRIG_EMULATED_TRIGGER_BOX";
 
-/// Names the file while which exists the lamps are off, in a rig file.
+/// Environment variable, for rig files, with the path of a file that exists while the lamps are off.
 pub(crate) const LAMPS_VARIABLE: &str = "SKINRIG_EMULATED_LAMPS_OFF";
 
-/// What the bench is.
+/// Configuration of the bench.
 #[derive(Debug, Clone)]
 pub struct BenchConfig {
     /// Seed of the cameras' true geometry and of their noise.
     pub seed: u64,
-    /// What the pixels do: `geometric` or `optical`.
+    /// Pixel model: `geometric` or `optical`.
     pub level: SimLevel,
-    /// Where the skin lies; the same as in the rig file.
+    /// Pose of the skin; the same as in the rig file.
     pub robot_from_skin: RigidTransform<Robot, Skin>,
-    /// How fast the cameras' clocks are, ppm.
+    /// Rate deviations of the camera clocks, ppm.
     pub camera_ppm: [f64; 2],
-    /// What the cameras' clocks read at the start, µs.
+    /// Camera times at the start, µs.
     pub camera_origin_us: [u64; 2],
-    /// How fast the trigger box's clock is, ppm.
+    /// Rate deviation of the trigger box's clock, ppm.
     pub box_ppm: f64,
     /// Stiffness of the skin, N/m.
     pub skin_n_m: f64,
-    /// Probability that a contact gives no events in a camera, 0 to 1.
+    /// Probability that a contact produces no events in a camera, 0 to 1.
     pub dead_share: f64,
 }
 
 impl Default for BenchConfig {
-    /// A bench with crystals as they are: tens of ppm apart. Box and camera 1 are 25 ppm apart, so that trains every 100 ms meet the
-    /// camera's microseconds at two phases only, by turns.
+    /// A bench with realistic crystals, tens of ppm apart. Box and camera 1 differ by 25 ppm, so that trains every 100 ms meet the camera's
+    /// microseconds alternately at only two phases.
     fn default() -> Self {
         Self {
             seed: 1,
@@ -78,13 +78,13 @@ impl Default for BenchConfig {
             camera_origin_us: [0, 7_000_000],
             box_ppm: 48.0,
             skin_n_m: 500.0,
-            // A sound skin answers to every press: what is missing in a night is then somebody's fault.
+            // Without dead contacts, a press missing in a night is always a fault.
             dead_share: 0.0,
         }
     }
 }
 
-/// A bench cannot be set up.
+/// The bench could not be set up.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
     /// The arm.
@@ -93,17 +93,17 @@ pub enum BenchError {
     /// The cameras.
     #[error(transparent)]
     Cameras(#[from] BusError),
-    /// The trigger box needs tools that this machine lacks.
+    /// Tools for the trigger box are missing on this computer.
     #[error("emulated trigger box: {0}")]
     Box(#[from] Unavailable),
-    /// What ties them together.
+    /// The connections between the devices.
     #[error("emulated bench: {0}")]
     Ties(#[source] io::Error),
 }
 
-/// A running bench; everything on it ends with this value.
+/// A running bench. Dropping it ends everything on it.
 pub struct EmulatedBench {
-    // Declared first: nothing may reach for a device that is gone.
+    // Declared first, so that no thread uses a device that is gone.
     ties: Ties,
     arm: Arc<EmulatedArm>,
     bus: Arc<Bus>,
@@ -111,10 +111,10 @@ pub struct EmulatedBench {
 }
 
 impl EmulatedBench {
-    /// Starts arm, cameras and trigger box, and ties them together.
+    /// Starts and connects arm, cameras and trigger box.
     ///
     /// # Errors
-    /// When a device cannot be started; [`BenchError::Box`] on a machine without avr-gcc or simavr.
+    /// When a device cannot be started; [`BenchError::Box`] on a computer without avr-gcc or simavr.
     pub fn start(config: &BenchConfig) -> Result<Self, BenchError> {
         let trigger_box = EmulatedBox::start(&BoardOptions {
             ppm: config.box_ppm,
@@ -148,10 +148,10 @@ impl EmulatedBench {
         })
     }
 
-    /// A command that runs beside this bench: its USB bus, its libdrd, its serial port, its lamps.
+    /// A command with access to this bench: its USB bus, libdrd, serial port and lamps.
     ///
     /// # Errors
-    /// [`BenchError::Cameras`] when the preload library was not built.
+    /// [`BenchError::Cameras`] if the preload library was not built.
     pub fn command(&self, program: impl AsRef<OsStr>) -> Result<Command, BenchError> {
         let mut command = self.bus.command(program)?;
         command
@@ -167,7 +167,7 @@ impl EmulatedBench {
         &self.arm
     }
 
-    /// The cameras' bus: faults.
+    /// The cameras' bus, for faults.
     #[must_use]
     pub fn bus(&self) -> &Bus {
         &self.bus

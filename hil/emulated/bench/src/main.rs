@@ -1,4 +1,4 @@
-//! Runs a command beside an emulated bench: `emulated-bench [--seed N] [--level LEVEL] -- COMMAND ...`.
+//! Runs a command with access to an emulated bench: `emulated-bench [--seed N] [--level LEVEL] -- COMMAND ...`.
 #![expect(clippy::print_stderr, reason = "a program that owns its terminal")]
 
 use std::process::ExitCode;

@@ -1,4 +1,4 @@
-//! What ties the devices together: the tip that the cameras see, and the wires from the trigger box to the cameras.
+//! Connections between the emulated devices: the tip that the cameras see, and the wires from the trigger box to the cameras.
 
 use std::io;
 use std::sync::Arc;
@@ -9,34 +9,34 @@ use std::time::Duration;
 use drd::{ArmView, EmulatedArm};
 use skinrig_emulated_camera::Bus;
 use skinrig_emulated_camera::world::{Edge, Tip};
-use skinrig_emulated_trigger_box::{CAMERA_1, CAMERA_2, EdgeStream, EmulatedBox, Told};
+use skinrig_emulated_trigger_box::{BoardMessage, CAMERA_1, CAMERA_2, EdgeStream, EmulatedBox};
 use skinrig_model::CameraId;
 
 /// Serial numbers of the two cameras, as in `hil/rigs/emulated.yaml`.
 pub const CAMERA_SERIALS: [&str; 2] = ["00000001", "00000002"];
 
-/// How often the tip is looked at.
+/// Interval at which the tip is read.
 const LOOK_EVERY: Duration = Duration::from_micros(500);
-/// How long the wires wait before they look whether they are still needed.
-const PATIENCE: Duration = Duration::from_millis(50);
-/// The cameras' input that the box is wired to: TRIG IN.
+/// Interval at which the wire threads check whether to end.
+const TIMEOUT: Duration = Duration::from_millis(50);
+/// Camera input connected to the box: TRIG IN.
 const TRIGGER_INPUT: u8 = 0;
 
-/// How well the wire from the trigger box to a camera carries pulses.
+/// Quality of the wire from the trigger box to a camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wire {
-    /// All of them.
+    /// Transmits all pulses.
     Whole,
-    /// All but one of [`LEAKS_EVERY`].
+    /// Loses every [`LEAKS_EVERY`]-th pulse.
     Leaky,
-    /// None.
+    /// Disconnected.
     Cut,
 }
 
-/// A leaky wire loses each such pulse.
+/// A leaky wire loses every pulse with this index.
 pub const LEAKS_EVERY: u32 = 11;
 
-/// The threads; they end with this value.
+/// The connecting threads; dropping this value ends them.
 pub(crate) struct Ties {
     cut: Arc<AtomicBool>,
     wires: Arc<[AtomicU8; 2]>,
@@ -70,7 +70,7 @@ impl Ties {
         Ok(ties)
     }
 
-    /// Lets a camera's wire carry pulses as well as this.
+    /// Sets the quality of a camera's wire.
     pub(crate) fn wire(&self, camera: CameraId, wire: Wire) {
         self.wires[camera.index()].store(wire as u8, Ordering::Relaxed);
     }
@@ -86,18 +86,18 @@ impl Drop for Ties {
     fn drop(&mut self) {
         self.cut.store(true, Ordering::Relaxed);
         for thread in self.threads.drain(..) {
-            // A thread that panicked has said so itself.
+            // A panic has already printed its message.
             let _ = thread.join();
         }
     }
 }
 
-/// Tells the cameras where the tip is. They never look further than it has been told.
+/// Reports the tip position to the cameras, which never simulate beyond the last report.
 fn show_tip(arm: &ArmView, bus: &Bus, cut: &AtomicBool) {
     let world = bus.world();
     let source = world.source();
     while !cut.load(Ordering::Relaxed) {
-        // A dead firmware shows nothing more; the run under test finds that out by itself.
+        // A dead firmware sends nothing; the run under test detects that by itself.
         let Ok(state) = arm.state() else { break };
         let at_ns = i64::try_from(state.t_ns).unwrap_or(i64::MAX);
         world.tip(Tip {
@@ -110,15 +110,15 @@ fn show_tip(arm: &ArmView, bus: &Bus, cut: &AtomicBool) {
     world.leave(source);
 }
 
-/// Carries the box's pulses to the cameras' inputs. A board on a busy machine lags; the cameras wait for it.
+/// Forwards the box's pulses to the cameras' inputs. The cameras wait for a board that lags on a busy computer.
 fn carry_edges(mut edges: EdgeStream, bus: &Bus, wires: &[AtomicU8; 2], cut: &AtomicBool) {
     let world = bus.world();
     let source = world.source();
     let clock = edges.clock();
     let mut pulses = [0_u32; 2];
     while !cut.load(Ordering::Relaxed) {
-        match edges.told(PATIENCE) {
-            Ok(Some(Told::Edge(edge))) => {
+        match edges.next_message(TIMEOUT) {
+            Ok(Some(BoardMessage::Edge(edge))) => {
                 let n = match edge.pin {
                     CAMERA_1 => 0,
                     CAMERA_2 => 1,
@@ -137,7 +137,7 @@ fn carry_edges(mut edges: EdgeStream, bus: &Bus, wires: &[AtomicU8; 2], cut: &At
                 };
                 world.edge(CAMERA_SERIALS[n], edge);
             }
-            Ok(Some(Told::At(cycle))) => world.announce(source, clock.host_ns(cycle)),
+            Ok(Some(BoardMessage::At(cycle))) => world.announce(source, clock.host_ns(cycle)),
             Ok(None) => {}
             Err(_) => break,
         }

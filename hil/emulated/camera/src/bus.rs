@@ -1,4 +1,4 @@
-//! The bus: makes the devices, answers for them, and starts processes that see them.
+//! The emulated bus: creates the devices, serves them, and starts processes that see them.
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -46,14 +46,14 @@ struct Inner {
     closed: AtomicBool,
 }
 
-/// An emulated bus; everything on it ends with this value.
+/// An emulated bus. Dropping it removes everything on it.
 pub struct Bus(Arc<Inner>);
 
 impl Bus {
-    /// Makes a bus and plugs its devices in.
+    /// Creates a bus with its devices.
     ///
     /// # Errors
-    /// When the configuration contradicts itself or the machine refuses.
+    /// When the configuration is inconsistent or the system fails.
     pub fn start(config: &BusConfig) -> Result<Self, BusError> {
         let bed = TestBed::create()?;
         let inner = Arc::new(Inner {
@@ -82,19 +82,19 @@ impl Bus {
         Ok(Self(inner))
     }
 
-    /// The folder that stands for `/sys` and `/dev`.
+    /// Folder that replaces `/sys` and `/dev`.
     #[must_use]
     pub fn root(&self) -> &Path {
         self.0.bed.root()
     }
 
-    /// What reaches the cameras from outside.
+    /// Inputs of the cameras from outside.
     #[must_use]
     pub fn world(&self) -> Arc<World> {
         Arc::clone(&self.0.world)
     }
 
-    /// A line to steer the devices by.
+    /// A connection for controlling the devices.
     ///
     /// # Errors
     /// When the machine refuses.
@@ -102,7 +102,7 @@ impl Bus {
         Remote::connect(self.root())
     }
 
-    /// A command that sees this bus in place of the machine's.
+    /// A command that sees this bus instead of the computer's.
     ///
     /// # Errors
     /// [`BusError::NoShim`].
@@ -122,7 +122,7 @@ impl Drop for Bus {
         inner.world.close();
         let serials: Vec<String> = inner.lock().keys().cloned().collect();
         for serial in serials {
-            // One that is unplugged already stays so.
+            // A device that is already unplugged stays so.
             let _ = inner.obey(&serial, Order::Unplug);
         }
         for name in ["world", "steer"] {
@@ -132,7 +132,7 @@ impl Drop for Bus {
     }
 }
 
-/// The preload library: where the variable `SKINRIG_USBSHIM` says, else beside this program, where cargo puts it.
+/// The preload library: from the variable `SKINRIG_USBSHIM`, otherwise next to this program, where Cargo puts it.
 ///
 /// # Errors
 /// [`BusError::NoShim`].
@@ -147,7 +147,7 @@ pub fn shim() -> Result<PathBuf, BusError> {
     }
     let program = std::env::current_exe()?;
     let folder = program.parent().unwrap_or(Path::new("."));
-    // A test is in `deps` itself, a program above it.
+    // A test is in `deps`, a program one level above.
     let candidates = [folder.join(SHIM), folder.join("deps").join(SHIM)];
     let [first, second] = &candidates;
     if second.is_file() && !first.is_file() {
@@ -230,7 +230,7 @@ impl Inner {
             }
             let inner = Arc::clone(self);
             let serving = move || {
-                // A line that breaks is a process that ended.
+                // A broken connection means that the process ended.
                 let _ = inner.converse(stream);
             };
             if thread::Builder::new()

@@ -1,13 +1,13 @@
-//! What is on the bus: devices, what they show, how their clocks run.
+//! Configuration of the bus: devices, their content and their clocks.
 //!
-//! The same values as JSON are the input of `emulated-cameras`; every key but `kind` and `serial` has a default.
+//! The same values as JSON are the input of `emulated-cameras`; all keys except `kind` and `serial` have defaults.
 
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::{CameraId, RigidTransform, Robot, SimLevel, Skin};
 
-/// A bus and its devices, in the order of their ports.
+/// A bus with its devices in the order of their ports.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BusConfig {
@@ -15,22 +15,21 @@ pub struct BusConfig {
     pub devices: Vec<DeviceConfig>,
 }
 
-/// One device.
+/// A device.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum DeviceConfig {
     /// A Prophesee EVK1 Gen3.1.
     Evk1(Box<Evk1Config>),
-    /// Another maker's protocol under the same vendor and product number (EVK3): it records every vendor request,
-    /// none of which may reach it.
+    /// A camera with another protocol but the same vendor and product ID (EVK3). It records vendor requests, none of which may reach it.
     Treuzell {
-        /// Its name on this bus.
+        /// Name on this bus.
         serial: String,
     },
 }
 
 impl DeviceConfig {
-    /// The name under which the device is steered.
+    /// Name of the device in control requests.
     #[must_use]
     pub fn serial(&self) -> &str {
         match self {
@@ -46,55 +45,55 @@ impl From<Evk1Config> for DeviceConfig {
     }
 }
 
-/// Who may use a device.
+/// Access to a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Access {
-    /// Whoever opens it.
+    /// Free.
     #[default]
     Free,
-    /// Another program holds its interface (claim: EBUSY).
+    /// Another program has claimed its interface (claim fails with EBUSY).
     Busy,
-    /// The user may not open it, as without an udev rule (open: EACCES).
+    /// The user has no permission, as without a udev rule (open fails with EACCES).
     NotPermitted,
 }
 
-/// When bytes are made.
+/// Timing of the byte stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Pacing {
-    /// At the rate of real time. A host that is too slow loses events, as with a real camera.
+    /// In real time. A slow host loses events, as with a real camera.
     #[default]
     RealTime,
-    /// As fast as the host takes them: the camera's time waits. Nothing is ever lost.
+    /// At the speed of the host: the camera's time waits, and nothing is lost.
     HostTime,
 }
 
-/// What the pixels do.
+/// Content of the pixel events.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Content {
-    /// Nothing.
+    /// No events.
     #[default]
     Silence,
     /// Events at random pixels and times.
     Noise {
-        /// Mean rate of the whole sensor, events/s; up to a few million.
+        /// Mean rate of the sensor, events/s; up to a few million.
         events_per_s: f64,
         /// Seed.
         seed: u64,
     },
-    /// A fixed pattern at a fixed rate, cheap to make: for the sensor's maximum of 50 Mev/s and beyond.
+    /// A fixed pattern at a fixed rate, cheap to generate: for the sensor's maximum of 50 Mev/s and more.
     Dense {
         /// Rate, 10^6 events/s.
         mev_per_s: f64,
     },
-    /// The events of an EVT2 RAW file, shifted so that the first comes at the start; silence after the last.
+    /// Events of an EVT2 RAW file, shifted so that the first one occurs at the start; none after the last.
     File {
         /// The file.
         path: PathBuf,
     },
-    /// What a camera of the simulated bench sees of the tip that [`world`](crate::world) reports.
+    /// A camera of the simulated bench, which sees the tip reported through [`world`](crate::world).
     Scene(Box<SceneContent>),
 }
 
@@ -102,21 +101,21 @@ pub enum Content {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneContent {
-    /// Which of the two.
+    /// Camera 1 or 2.
     pub camera: CameraId,
-    /// Seed of the bench: true geometry, noise, hot pixels.
+    /// Seed of the bench: true geometry, noise and hot pixels.
     pub seed: u64,
     /// `geometric` or `optical`.
     pub level: SimLevel,
-    /// Where the skin lies in the robot's frame; absent: as in the simulated bench.
+    /// Pose of the skin in the robot frame; default: as in the simulated bench.
     #[serde(default)]
     pub robot_from_skin: Option<RigidTransform<Robot, Skin>>,
-    /// Probability that a contact gives no events, 0 to 1; absent: as in the simulated bench. For `geometric` only.
+    /// Probability that a contact produces no events, 0 to 1; default: as in the simulated bench. Only for `geometric`.
     #[serde(default)]
     pub dead_share: Option<f64>,
 }
 
-/// An EVK1. Defaults marked *assumed* are not known from public sources.
+/// An EVK1. Defaults marked *assumed* are not public.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Evk1Config {
@@ -126,36 +125,35 @@ pub struct Evk1Config {
     pub product_id: u16,
     /// Speed of the connection, Mbit/s: 5000, or 480 on a USB 2 port.
     pub speed_mbit: u32,
-    /// Who may use it.
+    /// Access to it.
     pub access: Access,
-    /// Answer to request 0x70: 2 for an EVK1, 3 for a CX3 board.
+    /// Reply to request 0x70: 2 for an EVK1, 3 for a CX3 board.
     pub board_version: u16,
-    /// Answer to request 0x72: 0x1c for Gen3.1, 0x11 for the rescue image.
+    /// Reply to request 0x72: 0x1c for Gen3.1, 0x11 for the rescue image.
     pub system_id: u16,
     /// Register 0x0804: major << 16, minor << 8, micro.
     pub fpga_version: u32,
-    /// Register 0x0218. That of the sensor without exposure measurement is not known; the default is the register
-    /// map's.
+    /// Register 0x0218. The value of a sensor without exposure measurement is not public; the default is that of the register map.
     pub chip_id: u32,
-    /// The FPGA has booted this long after plugging, ms.
+    /// Boot time of the FPGA after plugging, ms.
     pub boot_ms: u64,
-    /// Its clock is fast by this, parts per million.
+    /// Rate deviation of its clock, ppm; positive is fast.
     pub drift_ppm: f64,
     /// Its time at the first start, µs.
     pub origin_us: u64,
-    /// Whether its time begins again at every start, or goes on meanwhile (not known; both occur here).
+    /// Whether its time restarts at every start or continues (not public; both are supported).
     pub time_restarts: bool,
-    /// A trigger edge is seen this late, ns (assumed 0).
+    /// Minimum delay of trigger edges, ns (assumed 0).
     pub trigger_delay_ns: u32,
-    /// And later by up to this, uniformly, ns (assumed 0).
+    /// Maximum additional, uniformly distributed delay, ns (assumed 0).
     pub trigger_jitter_ns: u32,
-    /// Bytes that it holds while no transfer waits (assumed 512 KiB).
+    /// Capacity of its buffer while no transfer waits, bytes (assumed 512 KiB).
     pub fifo_bytes: usize,
-    /// Words of an earlier session that its buffers still hold.
+    /// Words of an earlier session left in its buffers.
     pub stale_words: usize,
-    /// When bytes are made.
+    /// Timing of the byte stream.
     pub pacing: Pacing,
-    /// What the pixels do.
+    /// Content of the pixel events.
     pub content: Content,
 }
 
@@ -185,7 +183,7 @@ impl Default for Evk1Config {
 }
 
 impl Evk1Config {
-    /// A camera with this serial number and everything else by default.
+    /// A camera with this serial number and default values.
     #[must_use]
     pub fn new(serial: &str) -> Self {
         Self {

@@ -1,30 +1,30 @@
-//! What keeps an emulated bus from being made.
+//! Errors when creating an emulated bus.
 
 use std::io;
 use std::path::PathBuf;
 
-/// Names the preload library where it is not beside the program.
+/// Environment variable with the path of the preload library, if it is not next to the program.
 pub(crate) const SHIM_VARIABLE: &str = "SKINRIG_USBSHIM";
 pub(crate) const SHIM: &str = "libusbshim.so";
 
-/// A bus cannot be made.
+/// The bus could not be created.
 #[derive(Debug, thiserror::Error)]
 pub enum BusError {
-    /// The machine refuses.
+    /// The system failed.
     #[error("emulated bus: {0}")]
     Io(#[from] io::Error),
-    /// Two devices of one name, or a number that is none.
+    /// Two devices with the same name, or an invalid number.
     #[error("emulated bus: expected {expected}, found {found}")]
     Config {
-        /// What would do.
+        /// Acceptable values.
         expected: String,
-        /// What was given.
+        /// Given value.
         found: String,
     },
-    /// What the pixels should do cannot be done.
+    /// The pixel content is not available.
     #[error("emulated camera: {0}")]
     Content(String),
-    /// The preload library is not there.
+    /// The preload library does not exist.
     #[error("emulated bus: expected {SHIM} at {}; build skinrig-usbshim or set {SHIM_VARIABLE}", .0.display())]
     NoShim(PathBuf),
 }

@@ -1,15 +1,15 @@
-//! A test that runs itself again in a process whose USB bus is an emulated one.
+//! Runs a test again in a process whose USB bus is an emulated one.
 //!
 //! ```text
 //! #[test]
 //! fn a_camera_is_found() {
 //!     on_bus("a_camera_is_found", vec![Evk1Config::new("00001621").into()], |remote| {
-//!         // here the process's libusb sees the emulated camera, and `remote` steers it
+//!         // in this process libusb sees the emulated camera, and `remote` controls it
 //!     });
 //! }
 //! ```
 //!
-//! The test program needs the preload library beside it: a dev-dependency on `skinrig-usbshim`.
+//! The test program needs the preload library next to it: a dev-dependency on `skinrig-usbshim`.
 
 use std::fs::{self, File};
 use std::process::Stdio;
@@ -21,16 +21,16 @@ use crate::config::{BusConfig, DeviceConfig};
 use crate::error::BusError;
 use crate::steer::Remote;
 
-/// A test that hangs fails after this.
-const PATIENCE: Duration = Duration::from_secs(180);
+/// Time limit of a test.
+const TIMEOUT: Duration = Duration::from_secs(180);
 
-/// Written by the process that runs a test's body, so that a misspelt name does not pass.
+/// Written by the process that runs a test's body, so that a misspelt name fails.
 const RAN: &str = "ran";
 
 /// Runs `body` on a bus with these devices. `test` is the full name of the calling test, as cargo prints it.
 ///
 /// # Panics
-/// When the body does, or when it does not end within three minutes.
+/// When the body panics or does not end within three minutes.
 pub fn on_bus(test: &str, devices: Vec<DeviceConfig>, body: impl FnOnce(&Remote)) {
     let remote = Remote::from_environment();
     if let Some(remote) = remote.expect("the emulator that started this process must listen") {
@@ -46,7 +46,7 @@ pub fn on_bus(test: &str, devices: Vec<DeviceConfig>, body: impl FnOnce(&Remote)
     );
 }
 
-/// Runs the test of this name under the preload library; what it said.
+/// Runs the test with this name under the preload library; returns its output.
 fn in_child(bus: &Bus, test: &str) -> Result<String, BusError> {
     let log = bus.root().join("log");
     let file = File::create(&log)?;
@@ -57,7 +57,7 @@ fn in_child(bus: &Bus, test: &str) -> Result<String, BusError> {
         .stdout(file.try_clone()?)
         .stderr(file)
         .spawn()?;
-    let deadline = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + TIMEOUT;
     let status = loop {
         if let Some(status) = child.try_wait()? {
             break Some(status);
@@ -73,6 +73,6 @@ fn in_child(bus: &Bus, test: &str) -> Result<String, BusError> {
     match status {
         Some(status) if status.success() => Ok(said),
         Some(status) => panic!("on the emulated bus: {status}\n{said}"),
-        None => panic!("on the emulated bus: expected an end within {PATIENCE:?}\n{said}"),
+        None => panic!("on the emulated bus: expected the test to end within {TIMEOUT:?}\n{said}"),
     }
 }

@@ -1,4 +1,4 @@
-//! Emulated EVK1 cameras on an emulated USB bus: what a process under test sees through the real libusb.
+//! Emulated EVK1 cameras on an emulated USB bus, which a process under test sees through the real libusb.
 //!
 //! ```text
 //!  process under test                     emulator (this crate: a thread of the parent, or its own process)
@@ -8,16 +8,16 @@
 //!                                                      -> evk1::requests -> registers      <- world (edges, tip)
 //! ```
 //!
-//! A [`Bus`] makes a folder that looks like a machine's `/sys` and `/dev` with the configured devices in it, and answers
-//! the system calls that the preload library `skinrig-usbshim` sends over. Nothing of the driver is replaced.
+//! A [`Bus`] creates a folder that looks like a computer's `/sys` and `/dev` with the configured devices, and serves the system calls that
+//! the preload library `skinrig-usbshim` forwards. No part of the driver is replaced.
 //!
-//! * [`config`]: which devices there are and what they show; also the JSON of the binary `emulated-cameras`.
-//! * [`world`]: trigger edges, the time of who makes them, and the robot's tip, from other threads or processes.
-//! * [`steer`]: plug and unplug, faults, counters, the journal of requests; from the process under test as well.
-//! * [`harness`]: a test that runs itself again under the preload library.
+//! * [`config`]: devices and their content; also the JSON input of the binary `emulated-cameras`.
+//! * [`world`]: trigger edges, the time of their source, and the robot's tip, from other threads or processes.
+//! * [`steer`]: plugging, faults, counters and the journal of requests, also from the process under test.
+//! * [`harness`]: runs a test again under the preload library.
 //!
-//! Everything here is emulated: what a real EVK1 does is known from public sources only (`evk1.md` in the sources'
-//! words: the EVK1 reference), and what they leave open is a setting in [`config`] or marked *assumed*.
+//! Everything here is emulated: the behaviour of a real EVK1 is known only from public sources (`evk1.md`, "the EVK1 reference" in the
+//! source code). Open questions are settings in [`config`] or marked *assumed*.
 #![cfg(target_os = "linux")]
 
 pub mod bus;

@@ -1,6 +1,6 @@
-//! Steers the devices of a bus from anywhere, the process under test included: plug, faults, counters, journals.
+//! Controls the devices of a bus from any process, including the one under test: plugging, faults, counters, journals.
 //!
-//! One line of JSON per order and per answer, on the Unix stream socket `ROOT/steer`.
+//! One line of JSON per request and per reply, on the Unix stream socket `ROOT/steer`.
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
@@ -14,12 +14,12 @@ use crate::evk1::Counters as Evk1Counters;
 use crate::usb::queues::Handed as HandedOver;
 use crate::usb::usbfs::Setup;
 
-/// What has been handed to the host from the data endpoint.
+/// Data delivered to the host from the data endpoint.
 pub type Handed = HandedOver;
-/// What a camera has counted.
+/// Counts of a camera.
 pub type Counters = Evk1Counters;
 
-/// Names the folder of the bus in a process under test.
+/// Environment variable with the folder of the bus, for processes under test.
 pub(crate) const ROOT_VARIABLE: &str = "UMOCKDEV_DIR";
 
 /// A vendor request that reached a device.
@@ -31,9 +31,9 @@ pub struct Request {
     pub value: u16,
     /// wIndex.
     pub index: u16,
-    /// From device to host.
+    /// Whether the transfer is from device to host.
     pub is_in: bool,
-    /// What came from the host.
+    /// Data from the host.
     pub data: Vec<u8>,
 }
 
@@ -48,13 +48,13 @@ impl Request {
         }
     }
 
-    /// The register that a register request is about.
+    /// Address in a register request.
     #[must_use]
     pub const fn register(&self) -> u32 {
         (self.index as u32) << 16 | self.value as u32
     }
 
-    /// The value that a register write (request 0x56) writes.
+    /// Value in a register write (request 0x56).
     #[must_use]
     pub fn written(&self) -> Option<u32> {
         let value = <[u8; 4]>::try_from(&self.data[..]).ok()?;
@@ -62,34 +62,34 @@ impl Request {
     }
 }
 
-/// What a camera shows of itself.
+/// Observable state of a camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Observation {
-    /// What the host has.
+    /// Data delivered to the host.
     pub handed: Handed,
-    /// What it counted.
+    /// Its counters.
     pub counters: Counters,
 }
 
-/// An order for one device.
+/// A request to a device.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Order {
-    /// Pull the cable.
+    /// Unplugs the cable.
     Unplug,
-    /// Plug it in again: the same device at the same port, powered up anew.
+    /// Plugs the cable in again: the same device at the same port, after a power-up.
     Plug,
-    /// Stall the data endpoint until the host clears it.
+    /// Stalls the data endpoint until the host clears it.
     Stall,
-    /// The next transfer ends this many bytes early; they follow in the one after it.
+    /// Ends the next transfer this many bytes early; the following transfer has them.
     Cut(usize),
-    /// Put these words into the next packet.
+    /// Inserts these words into the next packet.
     Garbage(Vec<u32>),
-    /// Every packet loses this many words at its end, as when the camera's buffer is full; 0 is well.
+    /// Number of words lost at the end of every packet, as with a full camera buffer; 0 is normal.
     Lose(usize),
-    /// So many pixels make an event every millisecond, whatever they see; 0 is well.
+    /// Number of pixels with an event every millisecond; 0 is normal.
     HotPixels(u16),
-    /// Writes to this register do not take.
+    /// Makes this register ignore writes.
     Stick(u32),
     /// Whether control requests stay unanswered.
     Silence(bool),
@@ -97,28 +97,28 @@ pub enum Order {
     FailReads(bool),
     /// Whether resets of the port fail.
     FailResets(bool),
-    /// After so many more transfers with bytes one fails, and its bytes are lost.
+    /// Fails one transfer, with a loss of its bytes, after this many more transfers.
     BreakTransfer(u32),
-    /// An edge at a trigger input, at a time of the monotonic clock in ns.
+    /// An edge at a trigger input, in ns of the monotonic clock.
     Edge {
         /// The input.
         channel: u8,
-        /// True for a rising edge.
+        /// Whether it is a rising edge.
         rising: bool,
-        /// When.
+        /// Time.
         at_ns: i64,
     },
-    /// Tell what the camera has counted.
+    /// Reads the counters.
     Observe,
-    /// Tell every vendor request so far.
+    /// Reads the journal of vendor requests.
     Journal,
-    /// Tell the value of a register, without a request.
+    /// Reads the value of a register, without a USB request.
     Register(u32),
-    /// Let the board have this temperature, in 1/4096 °C.
+    /// Sets the board's temperature, in 1/4096 °C.
     Temperature(u32),
 }
 
-/// The answer to an order.
+/// A reply.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Answer {
@@ -130,14 +130,14 @@ pub enum Answer {
     Journal(Vec<Request>),
     /// To [`Order::Register`].
     Register(u32),
-    /// It cannot be done.
+    /// Failure.
     Failed(String),
 }
 
-/// An order on its way: the serial number of the device, and what to do.
+/// A request with the serial number of the device.
 pub(crate) type Addressed = (String, Order);
 
-/// A line to the emulator.
+/// A connection to the emulator.
 #[derive(Debug)]
 pub struct Remote {
     root: PathBuf,
@@ -148,7 +148,7 @@ impl Remote {
     /// Connects to the bus in this folder.
     ///
     /// # Errors
-    /// When nobody listens there.
+    /// When the bus does not accept connections.
     pub fn connect(root: &Path) -> io::Result<Self> {
         let stream = UnixStream::connect(root.join("steer"))?;
         stream.set_read_timeout(Some(Duration::from_secs(20)))?;
@@ -158,10 +158,10 @@ impl Remote {
         })
     }
 
-    /// Connects to the bus that this process runs on; `None` when it runs on none.
+    /// Connects to the bus of this process; `None` if it has none.
     ///
     /// # Errors
-    /// When it should, and nobody listens there.
+    /// When that bus does not accept connections.
     pub(crate) fn from_environment() -> io::Result<Option<Self>> {
         std::env::var_os(ROOT_VARIABLE)
             .map(|root| Self::connect(Path::new(&root)))
@@ -174,10 +174,10 @@ impl Remote {
         &self.root
     }
 
-    /// Gives an order to a device and waits until it is done.
+    /// Sends a request to a device and waits until it is done.
     ///
     /// # Errors
-    /// When the emulator is gone or cannot do it.
+    /// When the emulator is gone or the request fails.
     pub fn order(&self, serial: &str, order: Order) -> io::Result<Answer> {
         let mut line = self
             .line
@@ -205,7 +205,7 @@ impl Remote {
         }
     }
 
-    /// Every vendor request that has reached a device.
+    /// All vendor requests that reached a device.
     ///
     /// # Errors
     /// As [`order`](Self::order).
@@ -227,8 +227,8 @@ impl Remote {
         }
     }
 
-    /// An edge at a trigger input at `at_ns` of the monotonic clock ([`now_ns`](crate::world::now_ns)). One that is to keep its
-    /// place in the stream is told some time ahead.
+    /// Injects an edge at a trigger input at `at_ns` of the monotonic clock ([`now_ns`](crate::world::now_ns)). Send it ahead of time if it must
+    /// keep its place in the stream.
     ///
     /// # Errors
     /// As [`order`](Self::order).

@@ -1,4 +1,4 @@
-//! A camera of another maker's protocol under the EVK1's vendor and product number: it must be left alone.
+//! A camera with another protocol but the EVK1's vendor and product ID: drivers must leave it alone.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -29,7 +29,7 @@ impl Treuzell {
         }
     }
 
-    /// Every vendor request that has reached it.
+    /// Vendor requests that reached it.
     pub fn journal(&self) -> Vec<Request> {
         self.journal
             .lock()

@@ -1,23 +1,22 @@
-//! What reaches the cameras from outside: edges on their trigger inputs, the position of the robot's tip, light.
+//! Inputs of the cameras: edges on their trigger inputs, the position of the robot's tip, and light.
 //!
-//! Times are those of this machine's monotonic clock (`CLOCK_MONOTONIC`), ns, in every process.
+//! Times are those of the computer's monotonic clock (`CLOCK_MONOTONIC`), ns, in every process.
 //!
 //! Other processes write lines to the Unix stream socket `ROOT/world`:
 //!
 //! ```text
 //! edge SERIAL CHANNEL LEVEL T_NS     an edge at a camera's trigger input: LEVEL 1 rises, 0 falls
-//! time T_NS                          no later line of this connection is about anything before T_NS
-//! tip T_NS X_MM Y_MM Z_MM            where the robot's tip is, in the robot's frame
+//! time T_NS                          later lines of this connection concern no time before T_NS
+//! tip T_NS X_MM Y_MM Z_MM            position of the robot's tip in the robot frame
 //! ```
 //!
-//! Lines of one connection come in time order. Cameras lag behind the present by `LATENCY_NS`, so that an edge
-//! finds its place in the stream. A process whose own time may fall further behind, such as a simulated microcontroller
-//! on a busy machine, writes `time` at least every millisecond of it: cameras then never pass what it has
-//! announced, and its edges keep their exact places. A line that cannot be read is answered with `error: ...` and ends
-//! the connection.
+//! Lines of one connection must be in time order. Cameras lag behind the current time by `LATENCY_NS`, so that an edge finds its place in
+//! the stream. A process that may lag further, such as a simulated microcontroller on a busy computer, writes `time` at least once per
+//! millisecond of its own time: cameras then never pass the announced time, and its edges keep their exact places. An unreadable line
+//! gets the reply `error: ...` and ends the connection.
 //!
-//! The lamps are off while there is a file `ROOT/lamps-off`, whatever is in it: `touch` switches them off, `rm -f` on. They shine on
-//! all cameras; a packet that a camera makes later knows.
+//! The lamps are off while a file `ROOT/lamps-off` exists: `touch` switches them off, `rm -f` on. They affect all cameras, from the next
+//! packet on.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::io::{BufRead, BufReader, Write};
@@ -29,34 +28,34 @@ use std::time::Duration;
 
 use rustix::time::{ClockId, clock_gettime};
 
-/// While there is a file of this name in the bus's folder, the lamps are off.
+/// The lamps are off while a file with this name exists in the bus's folder.
 const LAMPS_OFF: &str = "lamps-off";
 
-/// How far cameras lag behind the present at least, ns.
+/// Minimum lag of cameras behind the current time, ns.
 pub(crate) const LATENCY_NS: i64 = 2_000_000;
 
-/// How long tip positions are remembered, ns: as long as a camera may lag behind a source that is late. One that finds its press
-/// forgotten would see nothing but noise.
+/// How long tip positions are kept, ns: as long as a camera may lag behind a slow source. Without the positions of a press the camera would
+/// only see noise.
 const REMEMBERED_NS: i64 = 60_000_000_000;
 
-/// How long edges are remembered that no camera takes, ns.
+/// How long unread edges are kept, ns.
 const EDGES_REMEMBERED_NS: i64 = 60_000_000_000;
 
 /// An edge at a trigger input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Edge {
-    /// The input: 0 is TRIG IN, 6 the loop-back of trigger out, 7 the auxiliary input.
+    /// The input: 0 is TRIG IN, 6 the loop-back of the trigger output, 7 the auxiliary input.
     pub channel: u8,
-    /// True for a rising edge.
+    /// Whether it is a rising edge.
     pub rising: bool,
-    /// When, monotonic clock, ns.
+    /// Time on the monotonic clock, ns.
     pub at_ns: i64,
 }
 
-/// Where the tip was.
+/// A tip position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tip {
-    /// When, monotonic clock, ns.
+    /// Time on the monotonic clock, ns.
     pub at_ns: i64,
     /// Robot frame, mm.
     pub position_mm: [f64; 3],
@@ -66,13 +65,13 @@ pub struct Tip {
 struct State {
     edges: BTreeMap<String, VecDeque<Edge>>,
     tips: VecDeque<Tip>,
-    /// By connection: what it says is about this time or later.
+    /// By connection: time up to which it has announced.
     announced: BTreeMap<u64, i64>,
     next_source: u64,
     closed: bool,
 }
 
-/// What reaches the cameras of one bus.
+/// Inputs of the cameras of one bus.
 #[derive(Debug, Default)]
 pub struct World {
     state: Mutex<State>,
@@ -80,7 +79,7 @@ pub struct World {
     lamps_off: PathBuf,
 }
 
-/// The monotonic clock, ns.
+/// Current time of the monotonic clock, ns.
 #[must_use]
 pub fn now_ns() -> i64 {
     let now = clock_gettime(ClockId::Monotonic);
@@ -88,7 +87,7 @@ pub fn now_ns() -> i64 {
 }
 
 impl World {
-    /// The world around the bus in this folder.
+    /// Inputs for the bus in this folder.
     pub(crate) fn around(root: &Path) -> Self {
         Self {
             lamps_off: root.join(LAMPS_OFF),
@@ -96,13 +95,13 @@ impl World {
         }
     }
 
-    /// The lamps are off while this file exists.
+    /// The file that switches the lamps off.
     #[must_use]
     pub fn lamps_off(&self) -> &Path {
         &self.lamps_off
     }
 
-    /// Whether light falls on what the cameras see.
+    /// Whether the lamps are on.
     pub(crate) fn is_lit(&self) -> bool {
         !self.lamps_off.exists()
     }
@@ -111,12 +110,12 @@ impl World {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// An edge at the trigger input of the camera with this serial number.
+    /// Adds an edge at the trigger input of the camera with this serial number.
     pub fn edge(&self, serial: &str, edge: Edge) {
         let mut state = self.lock();
         let edges = state.edges.entry(serial.to_owned()).or_default();
         edges.push_back(edge);
-        // A camera that does not run takes none.
+        // A camera that is not running reads none.
         while edges
             .front()
             .is_some_and(|e| e.at_ns < edge.at_ns - EDGES_REMEMBERED_NS)
@@ -125,7 +124,7 @@ impl World {
         }
     }
 
-    /// Where the tip is.
+    /// Sets the tip position.
     pub fn tip(&self, tip: Tip) {
         let mut state = self.lock();
         state.tips.push_back(tip);
@@ -138,33 +137,33 @@ impl World {
         }
     }
 
-    /// A new source of edges that announces its own time; see [`World::announce`].
+    /// Adds a source of edges that announces its own time; see [`World::announce`].
     pub fn source(&self) -> u64 {
         let mut state = self.lock();
         state.next_source += 1;
         state.next_source
     }
 
-    /// Nothing that `source` says from now on is about anything before `t_ns`.
+    /// Announces that `source` sends nothing more from before `t_ns`.
     pub fn announce(&self, source: u64, t_ns: i64) {
         self.lock().announced.insert(source, t_ns);
         self.changed.notify_all();
     }
 
-    /// `source` has no more to say.
+    /// Removes `source`.
     pub fn leave(&self, source: u64) {
         self.lock().announced.remove(&source);
         self.changed.notify_all();
     }
 
-    /// Waits until everything before `t_ns` is known, at most for `patience`.
-    pub(crate) fn wait_until(&self, t_ns: i64, patience: Duration) -> bool {
+    /// Waits until all inputs before `t_ns` are known, at most for `timeout`.
+    pub(crate) fn wait_until(&self, t_ns: i64, timeout: Duration) -> bool {
         let state = self.lock();
         let ahead_ns = t_ns - state.horizon();
         if ahead_ns <= 0 {
             return true;
         }
-        let nap = Duration::from_nanos(ahead_ns as u64).min(patience);
+        let nap = Duration::from_nanos(ahead_ns as u64).min(timeout);
         let (state, _) = self
             .changed
             .wait_timeout(state, nap)
@@ -172,7 +171,7 @@ impl World {
         t_ns <= state.horizon()
     }
 
-    /// The edges of a camera before `until_ns`.
+    /// Edges of a camera before `until_ns`.
     pub(crate) fn take_edges(&self, serial: &str, until_ns: i64) -> Vec<Edge> {
         let mut state = self.lock();
         let Some(edges) = state.edges.get_mut(serial) else {
@@ -184,8 +183,8 @@ impl World {
         due
     }
 
-    /// Where the tip was at `t_ns`: between two reports on the line between them, before the first and after the last
-    /// at these. `None` when nobody has said.
+    /// Tip position at `t_ns`, interpolated linearly between reports and constant before the first and after the last. `None` without a
+    /// report.
     pub(crate) fn tip_at(&self, t_ns: i64) -> Option<[f64; 3]> {
         let state = self.lock();
         let after = state.tips.partition_point(|t| t.at_ns <= t_ns);
@@ -204,7 +203,7 @@ impl World {
         }
     }
 
-    /// Takes what other processes say on `listener`.
+    /// Reads the lines of other processes from `listener`.
     pub(crate) fn listen(self: &Arc<Self>, listener: UnixListener) -> std::io::Result<()> {
         let world = Arc::clone(self);
         thread::Builder::new()
@@ -303,7 +302,7 @@ impl World {
 }
 
 impl State {
-    /// Everything before this is known.
+    /// Time up to which all inputs are known.
     fn horizon(&self) -> i64 {
         let present = now_ns() - LATENCY_NS;
         self.announced.values().fold(present, |a, b| a.min(*b))

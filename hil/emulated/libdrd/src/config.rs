@@ -1,56 +1,56 @@
-//! What an emulated arm is, and what can go wrong with it.
+//! Configuration and faults of an emulated arm.
 
 use serde::{Deserialize, Serialize};
 
-/// A simulated arm. The defaults are plausible for an omega.3; none is the vendor's number unless told.
+/// An emulated arm. The defaults are plausible for an omega.3; only those marked as such are the vendor's.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArmConfig {
-    /// Version of the SDK that the library claims: major, minor, release.
+    /// SDK version that the library reports: major, minor, release.
     pub sdk: [i32; 3],
-    /// Every connected device; only the one at `arm_index` has an arm.
+    /// All connected devices; only the one at `arm_index` has an arm.
     pub devices: Vec<DeviceConfig>,
-    /// Which of the devices is the arm.
+    /// Index of the device with the arm.
     pub arm_index: usize,
-    /// Whether the arm was calibrated since power-up.
+    /// Whether the arm has been calibrated since power-up.
     pub initialised: bool,
-    /// Duration of `drdAutoInit`'s search once the arm has moved to its known position, s.
+    /// Duration of `drdAutoInit` after the arm has reached its reference position, s.
     pub auto_init_s: f64,
-    /// Where the tip starts, m.
+    /// Initial tip position, m.
     pub start_m: [f64; 3],
     /// Centre of the reachable sphere, m.
     pub reach_centre_m: [f64; 3],
-    /// Radius of the reachable sphere, m; end stops beyond. (The z range of 165 mm is that reported by users.)
+    /// Radius of the reachable sphere, m, with end stops beyond. (Users report a z range of 165 mm.)
     pub reach_radius_m: f64,
-    /// Moving mass as the motors feel it, kg.
+    /// Moving mass felt by the motors, kg.
     pub inertia_kg: f64,
-    /// Mass that gravity pulls at the effector, kg.
+    /// Mass at the effector under gravity, kg.
     pub gravity_mass_kg: f64,
-    /// Mass that gravity compensation assumes until told otherwise, kg.
+    /// Initial mass of the gravity compensation, kg.
     pub assumed_mass_kg: f64,
     /// True tilt of the base about the inverted y axis, degrees.
     pub tilt_deg: f64,
-    /// Friction of the joints: constant part, N.
+    /// Joint friction: constant part, N.
     pub dry_friction_n: f64,
-    /// Friction of the joints: part in proportion to speed, N per (m/s).
+    /// Joint friction: part proportional to speed, N per (m/s).
     pub viscous_friction_n_s_m: f64,
     /// Electromagnetic brake, N per (m/s).
     pub brake_n_s_m: f64,
-    /// Largest force of the motors, N (12 N is the vendor's number).
+    /// Largest motor force, N (12 N is the vendor's number).
     pub max_force_n: f64,
-    /// Speed of one axis at which the controller takes the power off, m/s.
+    /// Speed of one axis at which the controller switches the power off, m/s.
     pub velocity_trip_m_s: f64,
-    /// Watchdog at power-up, units of 125 us; 0 is off.
+    /// Watchdog at power-up, units of 125 µs; 0 is off.
     pub watchdog: u8,
     /// Rate of the regulation loop, kHz, at most 4.
     pub loop_khz: f64,
-    /// Step of the reported position, m.
+    /// Resolution of the reported position, m.
     pub resolution_m: f64,
     /// Sample under the tip.
     pub contact: Option<Contact>,
-    /// A true C++ `bool` comes back as a byte other than 1.
+    /// Whether true C++ `bool`s are returned as a byte other than 1.
     pub odd_bools: bool,
-    /// The journal also holds calls that only read.
+    /// Whether the journal includes calls that only read.
     pub journal_reads: bool,
 }
 
@@ -84,7 +84,7 @@ impl Default for ArmConfig {
     }
 }
 
-/// How a device names itself.
+/// Identity of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DeviceConfig {
@@ -106,13 +106,13 @@ impl Default for DeviceConfig {
     }
 }
 
-/// A flat elastic sample: pushes back along its normal, never pulls.
+/// A flat elastic sample that pushes along its normal and never pulls.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Contact {
     /// A point of the surface, robot frame, m.
     pub point_m: [f64; 3],
-    /// Normal out of the sample; any length but 0.
+    /// Outward normal of any non-zero length.
     pub normal: [f64; 3],
     /// N/m.
     pub stiffness_n_m: f64,
@@ -170,86 +170,85 @@ pub enum Setting {
     RegulateGrip,
     /// Priorities of the calling and of the regulation thread. Without effect.
     Priorities,
-    /// Watchdog, units of 125 us.
+    /// Watchdog, units of 125 µs.
     Watchdog,
 }
 
-/// Something that goes wrong. Faults stay until [`EmulatedArm::clear_faults`](crate::EmulatedArm::clear_faults)
-/// unless they are events.
+/// A fault. Faults last until [`EmulatedArm::clear_faults`](crate::EmulatedArm::clear_faults), except those marked as events.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Fault {
     /// Every open fails with this code.
     Open(i32),
-    /// Another process holds the arm.
+    /// Another process has the arm open.
     Busy,
-    /// The device claims another type.
+    /// The device reports another type.
     DeviceType(i32),
-    /// The serial number cannot be read.
+    /// The serial number is unreadable.
     NoSerial,
-    /// The library has no gains for the device.
+    /// The library has no regulation gains for the device.
     Unsupported,
-    /// The test of the controller's memory fails.
+    /// The controller's memory test fails.
     ControllerMemory,
     /// `drdAutoInit` fails with this code.
     AutoInitFails(i32),
-    /// `drdAutoInit` never comes back.
+    /// `drdAutoInit` never returns.
     AutoInitHangs,
     /// `drdStart` fails with this code.
     StartFails(i32),
     /// Event: the regulation thread ends and the library brakes.
     RegulationDies,
-    /// The regulation thread is suspended altogether: no more force commands, nobody notices.
+    /// The regulation thread is suspended: force commands stop without any error.
     RegulationHangs,
     /// The regulation loop runs at this rate, kHz.
     LoopRate(f64),
-    /// USB is unplugged until the faults are cleared; the library needs a new open.
+    /// USB is disconnected until the faults are cleared; the device must be reopened.
     Unplug,
-    /// Event: the mains went off and on; the arm needs a new open and calibration.
+    /// Event: a power cycle; the arm must be reopened and calibrated.
     PowerLoss,
-    /// Event: someone pressed the force button on the base. The next press allows forces again.
+    /// Event: the force button on the base is pressed. Pressing it again allows forces.
     Button,
     /// Event: the velocity trip.
     VelocityTrip,
-    /// Event: the watchdog's trip.
+    /// Event: a watchdog trip.
     WatchdogTrip,
-    /// Something blocks the arm where it is.
+    /// The arm is blocked at its position.
     Jammed,
-    /// The joints rub: this much more viscous friction, N per (m/s).
+    /// Additional viscous friction of the joints, N per (m/s).
     Friction(f64),
-    /// `drdIsMoving` never becomes false; blocking moves never come back.
+    /// `drdIsMoving` stays true; blocking moves never return.
     MovingForever,
     /// Every reported position is NaN.
     PositionNan,
-    /// Every reported position is off by this, m.
+    /// Offset of every reported position, m.
     PositionJump([f64; 3]),
-    /// Reported positions no longer change, and neither does the loop's counter.
+    /// Reported positions and the loop's counter freeze.
     PositionFrozen,
-    /// Every reported force is off by this, N.
+    /// Offset of every reported force, N.
     ForceOffset([f64; 3]),
     /// Reported forces drift along z, N/s.
     ForceDrift(f64),
-    /// Reported forces are noisy with this standard deviation, N.
+    /// Standard deviation of noise on reported forces, N.
     ForceNoise(f64),
-    /// The setting reports success and keeps its value.
+    /// Writing the setting reports success but has no effect.
     Ignore(Setting),
     /// The next n calls of `drdStop` and of `dhdStop` fail.
     StopFails(u32),
-    /// `drdStop` answers 0 and does nothing unless a regulation runs: what the vendor's does then is not documented.
+    /// `drdStop` returns 0 without effect unless a regulation runs; the vendor's behaviour is not documented.
     StopNeedsRegulation,
     /// The next n calls of `drdClose` fail.
     CloseFails(u32),
-    /// The status vector has only this many words.
+    /// Number of words in the status vector.
     StatusLength(usize),
 }
 
-/// When a fault sets in.
+/// When a fault starts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum When {
-    /// At once.
+    /// Immediately.
     Now,
     /// After this time, s.
     After(f64),
-    /// This time after the next move or tracked target is accepted, s.
+    /// This time after the next accepted move or tracked target, s.
     IntoMove(f64),
     /// When the tip is below this height, m.
     Below(f64),

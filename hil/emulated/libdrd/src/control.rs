@@ -1,4 +1,4 @@
-//! The control client: starts an arm, sees its true state, makes things go wrong.
+//! Control client: starts an emulated arm, reads its true state, and injects faults.
 
 use std::fs;
 use std::io::{self, BufRead, BufReader};
@@ -16,17 +16,17 @@ use crate::page::{ArmState, Page};
 use crate::wire::{Connection, Control, Request};
 use crate::{FIRMWARE_VARIABLE, entry, file};
 
-/// How often a wait looks at the arm.
+/// Polling interval of waits.
 const LOOK_EVERY: Duration = Duration::from_micros(500);
 
-/// An arm that runs, seen from any process: its state at any rate, and nothing else.
+/// Read-only view of a running arm from any process.
 #[derive(Debug)]
 pub struct ArmView {
     page: Page,
 }
 
 impl ArmView {
-    /// Looks at the arm in `directory`.
+    /// Attaches to the arm in `directory`.
     ///
     /// # Errors
     /// When no arm runs there.
@@ -34,7 +34,7 @@ impl ArmView {
         Page::open(&directory.join(file::PAGE)).map(|page| Self { page })
     }
 
-    /// The state of the arm, at most a millisecond old on a machine with time to spare. Costs well below a microsecond.
+    /// State of the arm, at most one millisecond old on an idle machine. Takes well below a microsecond.
     ///
     /// # Errors
     /// When the firmware died.
@@ -49,34 +49,34 @@ impl ArmView {
     }
 }
 
-/// An arm with its firmware process; both end with this value.
+/// An arm with its firmware process; dropping it ends both.
 #[derive(Debug)]
 pub struct EmulatedArm {
-    // Declared first: the firmware goes before its directory does.
+    // Declared first, so that the firmware ends before its directory is removed.
     firmware: Firmware,
     connection: Mutex<Connection>,
     view: ArmView,
     directory: TempDir,
 }
 
-/// The process; ended on drop.
+/// The firmware process; killed on drop.
 #[derive(Debug)]
 struct Firmware(Child);
 
 impl Drop for Firmware {
     fn drop(&mut self) {
-        // Either may fail only because the process is gone already.
+        // Both fail only if the process has already ended.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
 impl EmulatedArm {
-    /// Starts the firmware of an arm in a directory of its own, with a copy of the library beside it.
+    /// Starts the firmware of an arm in a new directory with a copy of the library.
     ///
     /// # Errors
     /// When the library was not built beside this executable, the process cannot be started, or the
-    /// configuration is refused.
+    /// configuration is invalid.
     pub fn spawn(config: &ArmConfig) -> io::Result<Self> {
         assert_ne!(entry::keep(), 0, "the linker kept the entry");
         let directory = tempfile::Builder::new().prefix("arm-").tempdir()?;
@@ -118,7 +118,7 @@ impl EmulatedArm {
         self.directory.path().join(file::LIBRARY)
     }
 
-    /// The arm's directory, for [`ARM_VARIABLE`](crate::ARM_VARIABLE) and [`ArmView::attach`].
+    /// Directory of the arm, for [`ARM_VARIABLE`](crate::ARM_VARIABLE) and [`ArmView::attach`].
     #[must_use]
     pub fn directory(&self) -> &Path {
         self.directory.path()
@@ -138,10 +138,10 @@ impl EmulatedArm {
         self.view.state()
     }
 
-    /// Waits until the arm is as wanted, and returns that state.
+    /// Waits until the arm's state satisfies a condition, and returns it.
     ///
     /// # Errors
-    /// [`io::ErrorKind::TimedOut`] after `within`, with the last state; when the firmware died.
+    /// [`io::ErrorKind::TimedOut`] after `within`, with the last state; or when the firmware died.
     pub fn wait_until(
         &self,
         within: Duration,
@@ -154,14 +154,14 @@ impl EmulatedArm {
                 return Ok(state);
             }
             if started.elapsed() > within {
-                let fault = format!("the arm is not as wanted after {within:?}: {state:?}");
+                let fault = format!("timed out after {within:?} with the arm in {state:?}");
                 return Err(io::Error::new(io::ErrorKind::TimedOut, fault));
             }
             thread::sleep(LOOK_EVERY);
         }
     }
 
-    /// Makes something go wrong.
+    /// Injects a fault.
     ///
     /// # Errors
     /// When the firmware died.
@@ -169,7 +169,7 @@ impl EmulatedArm {
         self.control(Control::Inject(when, fault))
     }
 
-    /// Repairs everything, and forgets the faults that have not come yet. What a fault did stays done.
+    /// Clears all faults, including scheduled ones. Does not undo their effects.
     ///
     /// # Errors
     /// When the firmware died.
@@ -177,7 +177,7 @@ impl EmulatedArm {
         self.control(Control::ClearFaults)
     }
 
-    /// Puts another sample under the tip, or none.
+    /// Replaces or removes the sample under the tip.
     ///
     /// # Errors
     /// When the firmware died.
@@ -185,7 +185,7 @@ impl EmulatedArm {
         self.control(Control::SetContact(contact))
     }
 
-    /// Puts the tip elsewhere by hand, m, at rest.
+    /// Moves the tip by hand to a position, m, at rest.
     ///
     /// # Errors
     /// When the firmware died.
@@ -193,7 +193,7 @@ impl EmulatedArm {
         self.control(Control::Place(position_m))
     }
 
-    /// The journal of all C calls so far.
+    /// Journal of all C calls so far.
     ///
     /// # Errors
     /// When it cannot be read.
@@ -210,10 +210,10 @@ impl EmulatedArm {
     }
 }
 
-/// The `libdrd.so` that Cargo built together with this executable.
+/// The `libdrd.so` that Cargo built with this executable.
 ///
 /// # Errors
-/// [`io::ErrorKind::NotFound`] when there is none.
+/// [`io::ErrorKind::NotFound`] if it does not exist.
 pub fn library_beside_this_executable() -> io::Result<PathBuf> {
     let name = format!(
         "{}drd{}",
@@ -221,7 +221,7 @@ pub fn library_beside_this_executable() -> io::Result<PathBuf> {
         std::env::consts::DLL_SUFFIX
     );
     let executable = std::env::current_exe()?;
-    // Test executables lie in `deps`, where the library is built; programs one level above.
+    // Test executables are in `deps`, like the library; programs are one level above.
     let places = executable
         .parent()
         .into_iter()

@@ -1,4 +1,4 @@
-//! How an executable that links this crate becomes the firmware before its `main`.
+//! Turns an executable that links this crate into the firmware, before its `main`.
 
 use std::ffi::OsString;
 use std::io::Read;
@@ -11,19 +11,19 @@ extern "C" fn become_firmware_if_asked() {
     }
 }
 
-/// The linker's list of functions to call at the start.
+/// The linker's list of functions to call at start-up.
 #[used]
 #[cfg_attr(target_os = "macos", unsafe(link_section = "__DATA,__mod_init_func"))]
 #[cfg_attr(not(target_os = "macos"), unsafe(link_section = ".init_array"))]
 static AT_START: extern "C" fn() = become_firmware_if_asked;
 
-/// Keeps the linker from leaving this file out: whoever starts a firmware refers to the list.
+/// Referenced wherever a firmware is started, so that the linker keeps this file.
 pub fn keep() -> usize {
     &raw const AT_START as usize
 }
 
 fn become_firmware(directory: &OsString) -> ! {
-    // Whoever started this firmware holds the other end of standard input: no orphan outlives it.
+    // The parent holds the other end of standard input, so that no orphan outlives it.
     std::thread::spawn(|| {
         let mut rest = Vec::new();
         let _ = std::io::stdin().read_to_end(&mut rest);

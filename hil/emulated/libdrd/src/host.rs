@@ -1,4 +1,4 @@
-//! The library inside the driving program: its connection to the arm, open devices, errors per thread.
+//! The library in the driving process: connection to the arm, open devices, errors per thread.
 
 use std::cell::Cell;
 use std::ffi::{CStr, OsStr};
@@ -18,22 +18,22 @@ thread_local! {
     static LAST_ERROR: Cell<i32> = const { Cell::new(0) };
 }
 
-/// What the library found when it was first called.
+/// Properties of the arm found at the first call.
 #[derive(Debug)]
 pub struct Link {
     connection: Mutex<Connection>,
     page: Page,
-    /// Version of the SDK to claim.
+    /// SDK version to report.
     pub sdk: [i32; 3],
-    /// True comes back as another byte than 1.
+    /// Whether true is returned as a byte other than 1.
     pub odd_bools: bool,
-    /// Place of the device that has an arm.
+    /// Index of the device with an arm.
     arm: i8,
     open: Mutex<Open>,
     journal: Option<Writer>,
 }
 
-/// Devices that this process has open.
+/// Devices opened by this process.
 #[derive(Debug, Default)]
 struct Open {
     ids: Vec<i8>,
@@ -43,7 +43,7 @@ struct Open {
 static LINK: OnceLock<Link> = OnceLock::new();
 static EXPERT: AtomicBool = AtomicBool::new(false);
 
-/// The arm, if there is one. None found is not remembered: it may come.
+/// The arm, if there is one. A missing arm is not cached, because it may appear later.
 pub fn link() -> Option<&'static Link> {
     static FINDING: Mutex<()> = Mutex::new(());
     let _one_at_a_time = lock(&FINDING);
@@ -56,7 +56,7 @@ pub fn link() -> Option<&'static Link> {
     }
 }
 
-/// The directory of the arm: that of this library if it holds a socket, else the one named in the environment.
+/// Directory of the arm: that of this library if it contains a socket, otherwise the one in the environment.
 fn arm_directory() -> Option<PathBuf> {
     let beside = own_directory().filter(|d| d.join(file::SOCKET).exists());
     beside.or_else(|| std::env::var_os(ARM_VARIABLE).map(PathBuf::from))
@@ -105,14 +105,14 @@ impl Link {
     }
 
     fn ask(&self, request: &Request) -> Reply {
-        // A firmware that is gone is a device that is gone.
+        // A dead firmware means a disconnected device.
         lock(&self.connection)
             .ask(request)
             .unwrap_or_else(|_| Reply::failed(ErrorCode::COM))
     }
 }
 
-/// A number that crossed the border as `f64`.
+/// Converts a number that was transferred as `f64`.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "small integers; a float cast saturates"
@@ -121,22 +121,22 @@ pub fn integer(value: f64) -> i32 {
     value as i32
 }
 
-/// The calling thread's last error.
+/// Last error of the calling thread.
 pub fn last_error() -> i32 {
     LAST_ERROR.get()
 }
 
-/// Remembers an error of the calling thread.
+/// Sets the last error of the calling thread.
 pub(crate) fn set_error(code: ErrorCode) {
     LAST_ERROR.set(code.0);
 }
 
-/// Allows or forbids the guarded calls.
+/// Enables or disables expert mode.
 pub(crate) fn set_expert(on: bool) {
     EXPERT.store(on, Ordering::SeqCst);
 }
 
-/// Checks that the guarded calls are allowed.
+/// Checks that expert mode is enabled.
 pub fn expert() -> Result<(), ErrorCode> {
     if EXPERT.load(Ordering::SeqCst) {
         Ok(())
@@ -152,7 +152,7 @@ pub fn journal(began_ns: u64, name: &str, arguments: &[f64], result: f64) {
     }
 }
 
-/// Number of devices: connected, free.
+/// Number of devices: connected, and free.
 pub fn count() -> Result<[i32; 2], ErrorCode> {
     let Some(link) = link() else {
         return Ok([0, 0]);
@@ -163,7 +163,7 @@ pub fn count() -> Result<[i32; 2], ErrorCode> {
     }
 }
 
-/// Opens a device by its place.
+/// Opens a device by index.
 pub fn open(id: i8) -> Result<i8, ErrorCode> {
     let link = link().ok_or(ErrorCode::NO_DEVICE_FOUND)?;
     let index = usize::try_from(id).map_err(|_| ErrorCode::INVALID_INDEX)?;
@@ -198,7 +198,7 @@ fn index(id: i8) -> usize {
     usize::try_from(id).unwrap_or(usize::MAX)
 }
 
-/// The device of that id among the open ones; -1 is the one opened last.
+/// The open device with this ID; -1 is the one opened most recently.
 fn device(id: i8) -> Result<(&'static Link, i8), ErrorCode> {
     let link = link().ok_or(ErrorCode::NO_DEVICE_FOUND)?;
     let open = lock(&link.open);
@@ -211,7 +211,7 @@ fn device(id: i8) -> Result<(&'static Link, i8), ErrorCode> {
     }
 }
 
-/// Makes a call about an open device.
+/// Calls the firmware about an open device.
 pub fn call(id: i8, call: Call) -> Result<Vec<f64>, ErrorCode> {
     let (link, id) = device(id)?;
     checked(link.ask(&Request::Device {
@@ -220,7 +220,7 @@ pub fn call(id: i8, call: Call) -> Result<Vec<f64>, ErrorCode> {
     }))
 }
 
-/// The state of the arm as the library sees it, without a message.
+/// State of the arm as reported by the library, read without a message.
 pub fn state(id: i8) -> Result<ArmState, ErrorCode> {
     let (link, id) = device(id)?;
     if id != link.arm {

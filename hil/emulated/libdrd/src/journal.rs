@@ -1,9 +1,8 @@
-//! The journal: one line per C call, from every process that loaded the library.
+//! The journal: one line per C call of every process that loaded the library.
 //!
-//! `time process thread name function arguments -> result`: time in ns of `CLOCK_MONOTONIC` at the start of
-//! the call, the system's process id, the thread's number in the process and its name (spaces as `_`), the
-//! arguments as numbers with commas (`-` for none). Lines are written when a call ends; [`Journal`] puts them in the
-//! order in which the calls began.
+//! `time process thread name function arguments -> result`: start time in ns of `CLOCK_MONOTONIC`, process ID, index and name of the thread
+//! (spaces as `_`), and the arguments as comma-separated numbers (`-` for none). Lines are written at the end of a call; [`Journal`] sorts
+//! them by start.
 
 use std::cell::OnceCell;
 use std::fs::{self, File};
@@ -14,29 +13,29 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::file;
 use crate::time::now_ns;
 
-/// One call.
+/// A call.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
-    /// When it began, ns of `CLOCK_MONOTONIC`.
+    /// Start, ns of `CLOCK_MONOTONIC`.
     pub t_ns: u64,
-    /// Process.
+    /// Process ID.
     pub pid: u32,
-    /// Number of the thread in its process, from 0 in the order of first calls.
+    /// Index of the thread in its process, from 0 in order of first calls.
     pub thread: u64,
     /// Name of the thread.
     pub thread_name: String,
     /// Name of the function.
     pub call: String,
-    /// Arguments that are numbers, without places to write to and without the device.
+    /// Numeric arguments, without output pointers and the device.
     pub arguments: Vec<f64>,
-    /// What it returned; NaN for a function that returns nothing.
+    /// Result; NaN for a function without one.
     pub result: f64,
 }
 
-/// The calls in the order in which they began.
+/// Calls in order of their start.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Journal {
-    /// All of them.
+    /// All calls.
     pub entries: Vec<Entry>,
 }
 
@@ -44,13 +43,13 @@ impl Journal {
     /// Reads the journal of the arm in `directory`.
     ///
     /// # Errors
-    /// When the file cannot be read or holds something else.
+    /// When the file is unreadable or malformed.
     pub fn read(directory: &Path) -> io::Result<Self> {
         let text = match fs::read_to_string(directory.join(file::JOURNAL)) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
             other => other?,
         };
-        // A killed process may leave its last line without an end.
+        // A killed process may leave an incomplete last line.
         let whole = text.rfind('\n').map_or("", |end| &text[..end]);
         let mut entries = whole
             .lines()
@@ -69,19 +68,19 @@ impl Journal {
         self.entries.iter().filter(move |e| e.call == name)
     }
 
-    /// Place of the first call of a function.
+    /// Position of the first call of a function.
     #[must_use]
     pub fn first(&self, name: &str) -> Option<usize> {
         self.entries.iter().position(|e| e.call == name)
     }
 
-    /// Place of the last call of a function.
+    /// Position of the last call of a function.
     #[must_use]
     pub fn last(&self, name: &str) -> Option<usize> {
         self.entries.iter().rposition(|e| e.call == name)
     }
 
-    /// Every thread that called a function which does more than read: process, number, name.
+    /// Every thread that called more than read functions: process, index, name.
     #[must_use]
     pub fn owners(&self) -> Vec<(u32, u64, String)> {
         let mut owners: Vec<_> = self
@@ -95,7 +94,7 @@ impl Journal {
         owners
     }
 
-    /// Largest distance between one target of a motion and the next, m, per function.
+    /// Largest distance between consecutive targets of a motion, m, per function.
     #[must_use]
     pub fn largest_step_m(&self, name: &str) -> f64 {
         let targets: Vec<&[f64]> = self
@@ -115,7 +114,7 @@ impl Journal {
             .fold(0.0, f64::max)
     }
 
-    /// Calls that fight the regulation thread: power or brakes between a start and the next stop.
+    /// Calls that interfere with the regulation thread: power or brakes between a start and the next stop.
     #[must_use]
     pub fn beside_regulation(&self) -> Vec<&Entry> {
         let mut regulating = false;
@@ -135,7 +134,7 @@ impl Journal {
 /// Whether a function only reads.
 #[must_use]
 pub(crate) fn is_reading(name: &str) -> bool {
-    // Behind the prefix, `dhd` or `drd`.
+    // The verb after the prefix `dhd` or `drd`.
     let verb = name.get(3..).unwrap_or_default();
     ["Get", "Is", "Error"].iter().any(|v| verb.starts_with(v)) || name == "drdWaitForTick"
 }
@@ -164,7 +163,7 @@ fn parse(line: &str) -> Option<Entry> {
     })
 }
 
-/// Where a library writes its calls.
+/// Writes calls of a library.
 #[derive(Debug)]
 pub(crate) struct Writer {
     file: File,
@@ -172,7 +171,7 @@ pub(crate) struct Writer {
 }
 
 impl Writer {
-    /// Appends to the journal of the arm in `directory`; `reads` also takes calls that only read.
+    /// Appends to the journal of the arm in `directory`; `reads`: include calls that only read.
     pub fn open(directory: &Path, reads: bool) -> io::Result<Self> {
         let file = File::options()
             .append(true)
@@ -181,7 +180,7 @@ impl Writer {
         Ok(Self { file, reads })
     }
 
-    /// Writes one call. One write per line, so that processes do not mix and nothing waits in a buffer.
+    /// Writes a call as a single write, so that lines of several processes never mix.
     pub fn write(&self, began_ns: u64, call: &str, arguments: &[f64], result: f64) {
         if !self.reads && is_reading(call) {
             return;
@@ -207,7 +206,7 @@ pub(crate) fn began() -> u64 {
     now_ns()
 }
 
-/// Number and name of the calling thread.
+/// Index and name of the calling thread.
 fn this_thread() -> (u64, String) {
     static NEXT: AtomicU64 = AtomicU64::new(0);
     thread_local! {
@@ -219,10 +218,10 @@ fn this_thread() -> (u64, String) {
     })
 }
 
-/// The name that the system knows the calling thread by: its handle may belong to another Rust library.
+/// System name of the calling thread: its handle may belong to another Rust library.
 fn thread_name() -> String {
     let mut name = [0_u8; 64];
-    // SAFETY: the place takes 64 bytes, more than any system's thread names, and lives through the call.
+    // SAFETY: the buffer has 64 bytes, more than any system's thread names, and outlives the call.
     let failed = unsafe {
         libc::pthread_getname_np(libc::pthread_self(), name.as_mut_ptr().cast(), name.len())
     };

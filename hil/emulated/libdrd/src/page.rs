@@ -1,4 +1,4 @@
-//! The arm's state in a page of shared memory: written by the firmware, read by everybody at any rate.
+//! State of the arm in shared memory: written by the firmware, read by any process at any rate.
 
 use std::fs::File;
 use std::io;
@@ -7,7 +7,7 @@ use std::path::Path;
 use std::ptr::NonNull;
 use std::sync::atomic::{AtomicU64, Ordering, fence};
 
-/// What the controller does with the motors.
+/// State of the motors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
     /// Not calibrated; motors off.
@@ -20,10 +20,10 @@ pub enum Mode {
     Brake,
 }
 
-/// State of the emulated arm at one instant. Robot frame, SI units.
+/// State of the emulated arm. Robot frame, SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArmState {
-    /// Instant, ns of `CLOCK_MONOTONIC`.
+    /// Time, ns of `CLOCK_MONOTONIC`.
     pub t_ns: u64,
     /// Iterations of the regulation loop so far.
     pub tick: u64,
@@ -31,50 +31,50 @@ pub struct ArmState {
     pub position_m: [f64; 3],
     /// True velocity, m/s.
     pub velocity_m_s: [f64; 3],
-    /// Force of the motors, N, gravity compensation included; 0 unless the mode is [`Mode::Force`].
+    /// Motor force including gravity compensation, N; 0 unless the mode is [`Mode::Force`].
     pub motor_force_n: [f64; 3],
     /// Force of the sample on the tip, N.
     pub contact_force_n: [f64; 3],
-    /// Set point of regulation, m.
+    /// Set point of the regulation, m.
     pub reference_m: [f64; 3],
-    /// Position as the library reports it, m: quantised, and with the faults in force.
+    /// Reported position, m: quantised, and with active faults.
     pub reported_position_m: [f64; 3],
-    /// Velocity as the library reports it, m/s.
+    /// Reported velocity, m/s.
     pub reported_velocity_m_s: [f64; 3],
-    /// Force as the library reports it, N: without the gravity term, and with the faults in force.
+    /// Reported force, N: without gravity compensation, and with active faults.
     pub reported_force_n: [f64; 3],
-    /// What the controller does with the motors.
+    /// State of the motors.
     pub mode: Mode,
-    /// Why the power went off the last time, as the status vector tells it.
+    /// Why the power last went off, as in the status vector.
     pub force_off_cause: i32,
-    /// Times the watchdog tripped.
+    /// Number of watchdog trips.
     pub watchdog_trips: u64,
-    /// Times the velocity trip tripped.
+    /// Number of velocity trips.
     pub velocity_trips: u64,
-    /// The arm was calibrated since power-up.
+    /// Whether the arm has been calibrated since power-up.
     pub initialised: bool,
-    /// A calibration or a sweep of the end stops is under way.
+    /// Whether a calibration or a sweep of the end stops is in progress.
     pub initialising: bool,
-    /// The regulation thread lives.
+    /// Whether the regulation thread is running.
     pub regulating: bool,
-    /// A move or a tracked target is under way.
+    /// Whether a move or a tracked target is in progress.
     pub moving: bool,
-    /// USB is connected.
+    /// Whether USB is connected.
     pub connected: bool,
-    /// The motors cannot give what regulation wants.
+    /// Whether the motors are saturated.
     pub saturated: bool,
-    /// A library holds the device.
+    /// Whether a library has the device open.
     pub held: bool,
 }
 
-/// Numbers of a state in the page, behind the sequence counter.
+/// Size of a state in the page, in words after the sequence counter.
 const WORDS: usize = 2 + 8 * 3 + 5;
 /// Size of the page's file.
 const BYTES: usize = (WORDS + 1) * 8;
-/// Attempts of a reader before it takes the writer for dead.
+/// Read attempts before the writer counts as dead.
 const ATTEMPTS: u32 = 100_000;
 
-/// The mapped page. Word 0 counts writes; it is odd while one is under way (a sequence lock).
+/// The mapped page. Word 0 is a sequence lock: it counts writes and is odd during a write.
 #[derive(Debug)]
 pub struct Page {
     words: NonNull<AtomicU64>,
@@ -86,7 +86,7 @@ unsafe impl Send for Page {}
 unsafe impl Sync for Page {}
 
 impl Page {
-    /// Makes the page's file and maps it.
+    /// Creates and maps the page's file.
     pub fn create(path: &Path) -> io::Result<Self> {
         let file = File::options()
             .read(true)
@@ -136,7 +136,7 @@ impl Page {
         unsafe { self.words.add(index).as_ref() }
     }
 
-    /// Publishes a state. One writer at a time: the firmware writes under its lock.
+    /// Publishes a state. Single writer: the firmware writes under its lock.
     pub fn write(&self, state: &ArmState) {
         let sequence = self.word(0).load(Ordering::Relaxed);
         self.word(0)
@@ -149,7 +149,7 @@ impl Page {
             .store(sequence.wrapping_add(2), Ordering::Release);
     }
 
-    /// The latest state; `None` if the firmware died while it wrote, or never wrote.
+    /// The latest state; `None` if the firmware died during a write, or never wrote.
     pub fn read(&self) -> Option<ArmState> {
         for attempt in 0..ATTEMPTS {
             let before = self.word(0).load(Ordering::Acquire);

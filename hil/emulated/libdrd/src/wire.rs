@@ -1,4 +1,4 @@
-//! Messages between library or control client and firmware: one JSON value per line, one reply per request.
+//! Messages between the library or control client and the firmware: one JSON value per line, one reply per request.
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
@@ -11,50 +11,50 @@ use skinrig_drd_abi::ErrorCode;
 
 use crate::config::{Contact, Fault, Setting, When};
 
-/// No reply takes longer than this unless the firmware is gone.
+/// Time limit of a reply; exceeded only if the firmware is gone.
 const REPLY_WITHIN: Duration = Duration::from_secs(20);
 
-/// What is asked of the firmware process.
+/// A request to the firmware process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Request {
-    /// A library introduces the process that it drives the arm for.
+    /// Introduces the process for which a library drives the arm.
     Hello {
         /// Process id.
         pid: u32,
     },
     /// A call about one device.
     Device {
-        /// Place in the enumeration.
+        /// Index in the enumeration.
         index: usize,
         /// The call.
         call: Call,
     },
-    /// How many devices are connected, and how many of them free: two values.
+    /// Number of connected devices, and of free ones: two values.
     Count,
-    /// From the control client.
+    /// A request of the control client.
     Control(Control),
 }
 
 /// A call about one device.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Call {
-    /// Takes the device.
+    /// Opens the device.
     Open,
-    /// Gives it back.
+    /// Closes the device.
     Close,
-    /// Values: type, serial (negative if unreadable), firmware version, memory fine, supported.
+    /// Values: type, serial (negative if unreadable), firmware version, memory test passed, supported.
     Identity,
     /// Values: the status vector.
     Status,
     /// Whether it is calibrated: one value.
     Initialised,
-    /// Begins the calibration; it goes on until [`ArmState::initialising`](crate::ArmState) is false.
+    /// Starts the calibration, which runs until [`ArmState::initialising`](crate::ArmState) is false.
     AutoInit,
-    /// Begins the sweep of the end stops.
+    /// Starts the sweep of the end stops.
     CheckInit,
     /// Starts regulation.
     Start,
-    /// Stops regulation; `keep_force` leaves the motors on.
+    /// Stops the regulation; `keep_force` leaves the motors on.
     Stop {
         /// Leave the motors on.
         keep_force: bool,
@@ -69,7 +69,7 @@ pub enum Call {
     Move([f64; 3]),
     /// Filtered target, m.
     Track([f64; 3]),
-    /// Hold here.
+    /// Holds the position.
     Hold,
     /// Sets a parameter.
     Set(Setting, Vec<f64>),
@@ -77,32 +77,32 @@ pub enum Call {
     Get(Setting),
 }
 
-/// From the control client.
+/// Requests of the control client.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Control {
-    /// Makes something go wrong.
+    /// Injects a fault.
     Inject(When, Fault),
-    /// Repairs everything.
+    /// Clears all faults.
     ClearFaults,
-    /// Puts another sample under the tip, or none.
+    /// Replaces or removes the sample under the tip.
     SetContact(Option<Contact>),
-    /// Puts the tip elsewhere by hand, m, at rest.
+    /// Moves the tip by hand, m, at rest.
     Place([f64; 3]),
 }
 
-/// What comes back.
+/// A reply.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Reply {
     /// Result of the call; negative for failure.
     pub rc: i32,
     /// Error code of a failure.
     pub code: i32,
-    /// What was asked for.
+    /// Requested values.
     pub values: Vec<f64>,
 }
 
 impl Reply {
-    /// Success without more.
+    /// Success without values.
     pub fn ok() -> Self {
         Self::values(Vec::new())
     }

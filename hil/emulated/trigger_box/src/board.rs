@@ -1,4 +1,4 @@
-//! The board program as a child process, and what can be done to it.
+//! The board program as a child process, with its inputs and faults.
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
@@ -12,46 +12,46 @@ use crate::edges::EdgeStream;
 /// How to run the board.
 #[derive(Debug, Clone, Default)]
 pub struct BoardOptions {
-    /// As fast as it can, not at the host's pace.
+    /// Whether it runs as fast as possible instead of in real time.
     pub free_running: bool,
-    /// How fast (above 0) or slow its clock is, ppm.
+    /// Rate deviation of its clock, ppm; positive is fast.
     pub ppm: f64,
-    /// The serial number in its EEPROM; none as on a new board.
+    /// Serial number in its EEPROM; `None` for a new board.
     pub serial: Option<String>,
-    /// Where its port shall appear; a place of its own if none is given.
+    /// Path for its serial port; in a temporary folder if `None`.
     pub port: Option<PathBuf>,
-    /// Where its socket shall appear.
+    /// Path for its socket.
     pub socket: Option<PathBuf>,
 }
 
-/// Chances per million bytes on the serial line, both ways.
+/// Error rates of the serial line in both directions, per million bytes.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NoisePerMillion {
-    /// One bit turned.
+    /// Bytes with a flipped bit.
     pub flip: u32,
-    /// Byte lost.
+    /// Lost bytes.
     pub drop: u32,
-    /// A random byte before it.
+    /// Random bytes inserted.
     pub insert: u32,
 }
 
-/// What the noise did so far.
+/// Errors so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NoiseDone {
-    /// Bytes with a turned bit.
+    /// Bytes with a flipped bit.
     pub flipped: u64,
     /// Lost bytes.
     pub dropped: u64,
-    /// Bytes that nobody sent.
+    /// Inserted bytes.
     pub inserted: u64,
 }
 
-/// Why the board begins anew.
+/// Cause of a reset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ResetCause {
-    /// The supply sagged.
+    /// A brown-out of the supply.
     BrownOut,
-    /// The reset button, or a port that was opened.
+    /// The reset button, or opening the port.
     Button,
 }
 
@@ -69,26 +69,26 @@ impl EmulatedBox {
     /// Builds and starts the board.
     ///
     /// # Errors
-    /// [`Unavailable`] when this machine lacks a tool.
+    /// [`Unavailable`] if a tool is missing.
     ///
     /// # Panics
-    /// When the board does not start although all tools are there.
+    /// When the board does not start although all tools exist.
     pub fn start(options: &BoardOptions) -> Result<Self, Unavailable> {
         let built = build()?;
         Ok(Self::launch(&built, options)
             .unwrap_or_else(|e| panic!("the board does not start: {e}")))
     }
 
-    /// As [`EmulatedBox::start`]; a machine that cannot is told on standard error, past the capture of test output.
+    /// Like [`EmulatedBox::start`]; reports missing tools on standard error, bypassing the capture of test output.
     ///
     /// # Panics
-    /// As there.
+    /// As [`EmulatedBox::start`].
     #[must_use]
     pub fn start_or_skip(options: &BoardOptions) -> Option<Self> {
         match Self::start(options) {
             Ok(board) => Some(board),
             Err(reason) => {
-                // Not to be told is no reason to fail.
+                // Failing to print is not an error.
                 let _ = writeln!(io::stderr(), "skipped: no emulated trigger box: {reason}");
                 None
             }
@@ -141,13 +141,13 @@ impl EmulatedBox {
         })
     }
 
-    /// The path of the serial port.
+    /// Path of the serial port.
     #[must_use]
     pub fn port(&self) -> &Path {
         &self.port
     }
 
-    /// The path of the board's socket.
+    /// Path of the board's socket.
     #[must_use]
     pub fn socket(&self) -> &Path {
         &self.socket
@@ -161,7 +161,7 @@ impl EmulatedBox {
         EdgeStream::open(&self.socket)
     }
 
-    /// The present cycle.
+    /// The current cycle.
     ///
     /// # Errors
     /// When the board is gone.
@@ -169,7 +169,7 @@ impl EmulatedBox {
         self.order("cycle")
     }
 
-    /// Drives the input now; returns the cycle.
+    /// Sets the input level now; returns the cycle.
     ///
     /// # Errors
     /// When the board is gone.
@@ -177,10 +177,10 @@ impl EmulatedBox {
         self.order(&format!("input {}", u8::from(high)))
     }
 
-    /// Drives the input to these levels in these later cycles, which must be in order.
+    /// Schedules input levels at these cycles, in order.
     ///
     /// # Errors
-    /// When the board is gone, or too many are planned.
+    /// When the board is gone, or the schedule is full.
     pub fn plan_input(&mut self, plan: &[(bool, u64)]) -> io::Result<()> {
         let lines: String = plan
             .iter()
@@ -190,7 +190,7 @@ impl EmulatedBox {
         plan.iter().try_for_each(|_| self.taken().map(|_| ()))
     }
 
-    /// Wires the spare output to the input, which follows it after this many cycles; 0 takes the wire away.
+    /// Connects the spare output to the input with this delay in cycles; 0 disconnects it.
     ///
     /// # Errors
     /// When the board is gone.
@@ -198,7 +198,7 @@ impl EmulatedBox {
         self.order(&format!("loop {cycles}")).map(|_| ())
     }
 
-    /// Spoils bytes of the serial line from now on; tells what the noise did before.
+    /// Sets the error rates of the serial line; returns the errors so far.
     ///
     /// # Errors
     /// When the board is gone.
@@ -218,10 +218,10 @@ impl EmulatedBox {
         }
     }
 
-    /// Pulls the cable: no port, no power.
+    /// Unplugs the cable: no port, no power.
     ///
     /// # Errors
-    /// When the board is gone, or unplugged already.
+    /// When the board is gone, or already unplugged.
     pub fn unplug(&mut self) -> io::Result<u64> {
         self.order("unplug")
     }
@@ -229,7 +229,7 @@ impl EmulatedBox {
     /// Plugs the cable in again.
     ///
     /// # Errors
-    /// When the board is gone, or plugged in already.
+    /// When the board is gone, or already plugged in.
     pub fn plug(&mut self) -> io::Result<u64> {
         self.order("plug")
     }
@@ -245,7 +245,7 @@ impl EmulatedBox {
         })
     }
 
-    /// Lets the firmware hang, until its watchdog or anything else resets it.
+    /// Hangs the firmware until a reset, for example by its watchdog.
     ///
     /// # Errors
     /// When the board is gone.
@@ -253,7 +253,7 @@ impl EmulatedBox {
         self.order("hang")
     }
 
-    /// Gives an order; the cycle in which it was taken.
+    /// Sends a command; returns the cycle of its execution.
     fn order(&mut self, line: &str) -> io::Result<u64> {
         self.control.write_all(format!("{line}\n").as_bytes())?;
         self.taken()
@@ -276,7 +276,7 @@ impl EmulatedBox {
 
 impl Drop for EmulatedBox {
     fn drop(&mut self) {
-        // What is left of it is of no use to anybody, and may be gone already.
+        // Ignore errors: the process may have ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
         let _ = std::fs::remove_file(&self.port);

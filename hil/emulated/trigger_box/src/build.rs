@@ -1,4 +1,4 @@
-//! Builds firmware and board, once per state of their sources.
+//! Builds firmware and board program, once per version of their sources.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::Write;
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::{env, fs, io};
 
-/// Why this machine cannot emulate the box.
+/// Why this computer cannot emulate the box.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Unavailable(pub String);
 
@@ -22,7 +22,7 @@ impl std::fmt::Display for Unavailable {
 
 impl std::error::Error for Unavailable {}
 
-/// What was built.
+/// Build results.
 #[derive(Debug, Clone)]
 pub struct Built {
     /// The firmware image.
@@ -31,13 +31,13 @@ pub struct Built {
     pub board: PathBuf,
 }
 
-/// Builds both beside the running program, or finds them built.
+/// Builds both next to the running program, unless they exist.
 ///
 /// # Errors
-/// [`Unavailable`] when a tool is missing.
+/// [`Unavailable`] if a tool is missing.
 ///
 /// # Panics
-/// When the tools are there and the sources do not compile: that is a fault of the sources, to be seen.
+/// When the tools exist but the sources do not compile.
 pub fn build() -> Result<Built, Unavailable> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let firmware_dir = here.join("../../trigger_box");
@@ -54,7 +54,7 @@ pub fn build() -> Result<Built, Unavailable> {
     }
     make(&firmware_dir, scratch.path(), "trigger_box.elf");
     make(here, scratch.path(), "board");
-    // Whoever comes first wins; the loser's build is the same.
+    // Of concurrent builds the first one wins; the results are equal.
     let made = scratch.keep();
     if fs::rename(&made, &cache).is_err() {
         assert!(
@@ -62,7 +62,7 @@ pub fn build() -> Result<Built, Unavailable> {
             "cannot keep the build in {}",
             cache.display()
         );
-        // Only disk space is at stake.
+        // Failure only costs disk space.
         let _ = fs::remove_dir_all(made);
     }
     Ok(built)
@@ -137,7 +137,7 @@ fn sources(here: &Path, firmware: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Where the build of these sources is kept, and a place beside it to make it in.
+/// Folder of the build of these sources, and a temporary folder next to it.
 fn places(sources: &[PathBuf]) -> io::Result<(PathBuf, tempfile::TempDir)> {
     let mut hash = DefaultHasher::new();
     for source in sources {

@@ -1,4 +1,4 @@
-//! The edges of the emulated pins, and what their cycles mean on the host's clock.
+//! Edges of the emulated pins, and conversion of cycles to host time.
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
@@ -20,27 +20,27 @@ pub const CAMERA_2: u8 = 2;
 /// The spare output, Arduino D11.
 pub const SPARE: u8 = 3;
 
-/// A pin changed its level.
+/// A level change of a pin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Edge {
-    /// In this cycle of the processor since the board was started.
+    /// Processor cycle since the board was started.
     pub cycle: u64,
     /// [`INPUT`], [`CAMERA_1`], [`CAMERA_2`] or [`SPARE`].
     pub pin: u8,
-    /// To this level.
+    /// The new level.
     pub high: bool,
 }
 
-/// What a board tells.
+/// A message of the board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Told {
-    /// A pin changed its level.
+pub enum BoardMessage {
+    /// A level change of a pin.
     Edge(Edge),
-    /// The board is in this cycle: no later edge comes before it. Only told by [`EdgeStream::follow`].
+    /// The current cycle: no later message has an earlier one. Only with [`EdgeStream::follow`].
     At(u64),
 }
 
-impl Told {
+impl BoardMessage {
     fn parse(line: &str) -> Option<Self> {
         if let Some(cycle) = line.strip_prefix("at ") {
             return cycle.parse().ok().map(Self::At);
@@ -53,7 +53,7 @@ impl Told {
     }
 }
 
-/// The edges of one pin as a camera with a perfect clock would tell them, in whole microseconds of the board.
+/// Edges of one pin as seen by a camera with a perfect clock, in whole microseconds of the board.
 #[must_use]
 pub fn trigger_edges(edges: &[Edge], pin: u8) -> Vec<TriggerEdge> {
     edges
@@ -67,22 +67,21 @@ pub fn trigger_edges(edges: &[Edge], pin: u8) -> Vec<TriggerEdge> {
         .collect()
 }
 
-/// How the board's cycles lie on the host's monotonic clock (`CLOCK_MONOTONIC`).
+/// Relation of the board's cycles to the host's monotonic clock (`CLOCK_MONOTONIC`).
 ///
-/// A board that keeps pace is never ahead of this line; when the machine is busy it tells its edges later, with the
-/// same cycles.
+/// A board in real time is never ahead of this line; on a busy computer it reports its edges later, with the same cycles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoardClock {
-    /// Cycle 0, ns.
+    /// Time of cycle 0, ns.
     pub start_ns: i64,
     /// Cycles per ns.
     pub cycles_per_ns: f64,
-    /// False when the board runs as fast as it can: then its cycles mean nothing to the host.
+    /// False when the board runs as fast as possible, so that its cycles have no host time.
     pub paced: bool,
 }
 
 impl BoardClock {
-    /// The host's monotonic clock in this cycle, ns.
+    /// Host time of a cycle on the monotonic clock, ns.
     #[must_use]
     pub fn host_ns(&self, cycle: u64) -> i64 {
         self.start_ns + (cycle as f64 / self.cycles_per_ns) as i64
@@ -98,26 +97,26 @@ impl BoardClock {
     }
 }
 
-/// All edges of a board since this stream was opened. A thread takes them from the socket, so the board never waits.
+/// All edges of a board from now on. A thread reads the socket, so that the board never waits.
 pub struct EdgeStream {
-    told: Receiver<Told>,
+    messages: Receiver<BoardMessage>,
     socket: UnixStream,
     clock: BoardClock,
 }
 
 impl EdgeStream {
-    /// Listens to the board at this socket; returns when no later edge can be missed.
+    /// Connects to the board at this socket; returns when no later edge can be missed.
     ///
     /// # Errors
-    /// When the board is not there or does not answer.
+    /// When the board is not running or does not respond.
     pub fn open(socket: &Path) -> io::Result<Self> {
         Self::with(socket, "clock\nsubscribe\n")
     }
 
-    /// As [`EdgeStream::open`]; [`EdgeStream::told`] then also gives the board's time every millisecond.
+    /// Like [`EdgeStream::open`]; [`EdgeStream::next_message`] then also returns the board's time every millisecond.
     ///
     /// # Errors
-    /// As there.
+    /// As [`EdgeStream::open`].
     pub fn follow(socket: &Path) -> io::Result<Self> {
         Self::with(socket, "clock\nsubscribe\ntimes\n")
     }
@@ -138,53 +137,53 @@ impl EdgeStream {
             return Err(bad(&line));
         }
         stream.set_read_timeout(None)?;
-        let (sender, told) = channel();
+        let (sender, messages) = channel();
         thread::Builder::new()
             .name("emulated edges".to_owned())
             .spawn(move || {
                 for line in lines.lines() {
                     let Ok(line) = line else { return };
-                    if let Some(told) = Told::parse(&line)
-                        && sender.send(told).is_err()
+                    if let Some(messages) = BoardMessage::parse(&line)
+                        && sender.send(messages).is_err()
                     {
                         return;
                     }
                 }
             })?;
         Ok(Self {
-            told,
+            messages,
             socket: stream,
             clock,
         })
     }
 
-    /// What the cycles mean.
+    /// Relation of the cycles to host time.
     #[must_use]
     pub fn clock(&self) -> BoardClock {
         self.clock
     }
 
-    /// The next edge, waiting for `patience` at most; `None` when there was none.
+    /// The next edge, waiting up to `timeout`; `None` if there was none.
     ///
     /// # Errors
     /// When the board is gone.
-    pub fn next(&mut self, patience: Duration) -> io::Result<Option<Edge>> {
+    pub fn next(&mut self, timeout: Duration) -> io::Result<Option<Edge>> {
         loop {
-            match self.told(patience)? {
-                Some(Told::Edge(edge)) => return Ok(Some(edge)),
-                Some(Told::At(_)) => {}
+            match self.next_message(timeout)? {
+                Some(BoardMessage::Edge(edge)) => return Ok(Some(edge)),
+                Some(BoardMessage::At(_)) => {}
                 None => return Ok(None),
             }
         }
     }
 
-    /// What the board tells next, waiting for `patience` at most; `None` when it told nothing.
+    /// The next message, waiting up to `timeout`; `None` if there was none.
     ///
     /// # Errors
     /// When the board is gone.
-    pub fn told(&mut self, patience: Duration) -> io::Result<Option<Told>> {
-        match self.told.recv_timeout(patience) {
-            Ok(told) => Ok(Some(told)),
+    pub fn next_message(&mut self, timeout: Duration) -> io::Result<Option<BoardMessage>> {
+        match self.messages.recv_timeout(timeout) {
+            Ok(messages) => Ok(Some(messages)),
             Err(RecvTimeoutError::Timeout) => Ok(None),
             Err(RecvTimeoutError::Disconnected) => Err(io::ErrorKind::UnexpectedEof.into()),
         }
@@ -193,11 +192,11 @@ impl EdgeStream {
     /// The next `n` edges.
     ///
     /// # Errors
-    /// When they do not come within `patience` each.
-    pub fn take(&mut self, n: usize, patience: Duration) -> io::Result<Vec<Edge>> {
+    /// When one of them takes longer than `timeout`.
+    pub fn take(&mut self, n: usize, timeout: Duration) -> io::Result<Vec<Edge>> {
         (0..n)
             .map(|k| {
-                self.next(patience)?.ok_or_else(|| {
+                self.next(timeout)?.ok_or_else(|| {
                     io::Error::new(io::ErrorKind::TimedOut, format!("{k} of {n} edges came"))
                 })
             })
@@ -207,7 +206,7 @@ impl EdgeStream {
 
 impl Drop for EdgeStream {
     fn drop(&mut self) {
-        // Wakes the thread; a board that is gone has woken it already.
+        // Wakes the thread, unless the board's end has already done so.
         let _ = self.socket.shutdown(std::net::Shutdown::Both);
     }
 }

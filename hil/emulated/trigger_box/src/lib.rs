@@ -1,8 +1,8 @@
-//! The trigger box's real firmware on an emulated ATmega328P: its serial port is a pseudo-terminal, its pins are a socket.
+//! The trigger box's real firmware on an emulated ATmega328P, with a pseudo-terminal as serial port and a socket for its pins.
 //!
-//! [`EmulatedBox::start`] builds the firmware with avr-gcc and the board program `board.c` on libsimavr, once, and starts
-//! it. The driver opens [`EmulatedBox::port`] like any serial port; whoever wants the pulses, a test or an emulated
-//! camera, opens an [`EdgeStream`] on [`EmulatedBox::socket`].
+//! [`EmulatedBox::start`] builds the firmware with avr-gcc and the board program `board.c` with libsimavr, once, and starts it. The driver
+//! opens [`EmulatedBox::port`] like any serial port; a test or an emulated camera that needs the pulses opens an [`EdgeStream`] on
+//! [`EmulatedBox::socket`].
 
 mod board;
 mod build;
@@ -11,6 +11,6 @@ mod edges;
 pub use board::{BoardOptions, EmulatedBox, NoiseDone, NoisePerMillion, ResetCause};
 pub use build::{Built, Unavailable, build};
 pub use edges::{
-    BoardClock, CAMERA_1, CAMERA_2, CYCLES_PER_US, Edge, EdgeStream, INPUT, SPARE, Told,
+    BoardClock, BoardMessage, CAMERA_1, CAMERA_2, CYCLES_PER_US, Edge, EdgeStream, INPUT, SPARE,
     trigger_edges,
 };

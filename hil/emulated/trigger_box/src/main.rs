@@ -1,6 +1,6 @@
-//! Runs an emulated trigger box until its standard input ends, for trying things by hand.
+//! Runs an emulated trigger box until its standard input ends, for manual tests.
 //!
-//! `skinrig-emulated-trigger-box PORT SOCKET [PPM]`: the paths at which its serial port and its board's socket appear.
+//! `skinrig-emulated-trigger-box PORT SOCKET [PPM]`: paths for its serial port and its board's socket.
 
 use std::io::{self, Read, Write};
 use std::process::ExitCode;

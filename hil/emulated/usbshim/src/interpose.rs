@@ -1,4 +1,4 @@
-//! The C library's functions that take part: each does what the original does, on the emulated bus where that is meant.
+//! Interposed functions of the C library: same behaviour as the originals, but redirected to the emulated bus where needed.
 
 use std::ffi::CStr;
 use std::os::unix::net::UnixStream;
@@ -14,12 +14,12 @@ type OpenDir = unsafe extern "C" fn(*const c_char) -> *mut DIR;
 type Close = unsafe extern "C" fn(c_int) -> c_int;
 type IoctlFn = unsafe extern "C" fn(c_int, Ioctl, *mut c_void) -> c_int;
 
-/// The original of an interposed function: what the next library offers under its name.
+/// The original of an interposed function, from the next library.
 macro_rules! original {
     ($kind:ty, $name:literal) => {{
         static ADDRESS: OnceLock<usize> = OnceLock::new();
         let address = *ADDRESS.get_or_init(|| {
-            // SAFETY: RTLD_NEXT and a C string; the C library has every function that is looked up here.
+            // SAFETY: RTLD_NEXT and a C string; the C library has all functions that are looked up here.
             unsafe { libc::dlsym(libc::RTLD_NEXT, $name.as_ptr()) }.expose_provenance()
         });
         assert!(address != 0, "the C library has no {:?}", $name);
@@ -30,9 +30,9 @@ macro_rules! original {
     }};
 }
 
-/// The line of each open emulated device to the emulator, by its file descriptor.
+/// Connection to the emulator of each open emulated device, by file descriptor.
 ///
-/// The lock of one is held during one `ioctl`, as the kernel holds a device's.
+/// Locked during an `ioctl`, as the kernel locks a device.
 static LINES: [Mutex<Option<UnixStream>>; 4096] = [const { Mutex::new(None) }; 4096];
 
 fn line(fd: c_int) -> Option<&'static Mutex<Option<UnixStream>>> {
@@ -45,7 +45,7 @@ fn replace_line(fd: c_int, with: Option<UnixStream>) -> bool {
         &mut *slot.lock().unwrap_or_else(PoisonError::into_inner),
         with,
     );
-    // Closing it comes through `close` below, which must find the slot unlocked.
+    // Closing it calls `close` below, which needs the slot unlocked.
     drop(before);
     true
 }
@@ -56,7 +56,7 @@ fn fail(errno: c_int) -> c_int {
     -1
 }
 
-/// Opens `path` by `open`, elsewhere when it belongs to the bus.
+/// Opens `path` with `open`, redirected if it belongs to the bus.
 fn open_with(path: &CStr, open: impl Fn(&CStr) -> c_int) -> c_int {
     let Some((root, there)) =
         redirect::root().and_then(|r| Some((r, redirect::redirected(r, path)?)))
@@ -78,7 +78,7 @@ fn open_with(path: &CStr, open: impl Fn(&CStr) -> c_int) -> c_int {
         return fd;
     }
     let original = original!(Close, c"close");
-    // SAFETY: `fd` was opened above and is known to nobody else.
+    // SAFETY: `fd` was opened above and is not used elsewhere.
     unsafe { original(fd) };
     fail(libc::ENODEV)
 }
@@ -122,7 +122,7 @@ macro_rules! interpose_openat {
     )*};
 }
 
-// Those whose names begin with underscores are what `open` becomes where _FORTIFY_SOURCE is on; they take no mode.
+// The names with underscores replace `open` under _FORTIFY_SOURCE; they take no mode.
 interpose_open!(
     open = c"open",
     open64 = c"open64",
@@ -170,7 +170,7 @@ pub unsafe extern "C" fn ioctl(fd: c_int, request: Ioctl, argument: *mut c_void)
         // SAFETY: the caller's own descriptor, request and argument.
         return unsafe { original(fd, request, argument) };
     };
-    // A request is 32 bits wide; a caller may have sign-extended it.
+    // A request has 32 bits; the caller may have sign-extended it.
     let request = (request & 0xffff_ffff) as usize;
     // SAFETY: `argument` is what the caller passed with this request.
     match unsafe { wire::ioctl(stream, request, argument) } {
@@ -179,7 +179,7 @@ pub unsafe extern "C" fn ioctl(fd: c_int, request: Ioctl, argument: *mut c_void)
             result
         }
         Err(wire::Broken) => {
-            // Half a message may be under way: nothing after it would be understood.
+            // The message may be incomplete, so the connection is unusable.
             let _ = stream.shutdown(std::net::Shutdown::Both);
             fail(libc::ENODEV)
         }

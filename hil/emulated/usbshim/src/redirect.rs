@@ -1,17 +1,17 @@
-//! Which paths lead to the emulated bus, and where.
+//! Redirection of paths to the emulated bus.
 
 use std::ffi::{CStr, CString, OsStr};
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// Names the folder of the emulated bus.
+/// Environment variable with the folder of the emulated bus.
 const ROOT: &str = "UMOCKDEV_DIR";
 
 const DEVICES: &[u8] = b"/dev/bus/usb";
 const EMULATED: [&[u8]; 3] = [DEVICES, b"/sys/bus/usb", b"/sys/devices"];
 
-/// The folder of the emulated bus; `None` in a process that was started without one.
+/// The folder of the emulated bus; `None` in a process without one.
 pub fn root() -> Option<&'static Path> {
     static FOLDER: OnceLock<Option<PathBuf>> = OnceLock::new();
     FOLDER
@@ -19,7 +19,7 @@ pub fn root() -> Option<&'static Path> {
         .as_deref()
 }
 
-/// Where `path` is on the emulated bus; `None` when it is not of the bus.
+/// Redirected path; `None` if `path` does not belong to the bus.
 pub fn redirected(root: &Path, path: &CStr) -> Option<CString> {
     let emulated = EMULATED.iter().any(|p| begins_with(path.to_bytes(), p));
     emulated
@@ -27,7 +27,7 @@ pub fn redirected(root: &Path, path: &CStr) -> Option<CString> {
         .and_then(|p| CString::new(p.into_os_string().into_encoded_bytes()).ok())
 }
 
-/// Whether `path` is the file of a device (and not of a folder of them).
+/// Whether `path` is a device file (and not a folder).
 pub fn is_device(path: &CStr) -> bool {
     let path = path.to_bytes();
     begins_with(path, DEVICES) && path.len() > DEVICES.len() + 4
@@ -38,13 +38,13 @@ pub fn socket(root: &Path, device: &CStr) -> PathBuf {
     below(root, b"/ioctl", device.to_bytes())
 }
 
-/// The error number that opening a device gives, when it must not be opened.
+/// Error number of opening a device that must not be opened.
 pub fn refusal(root: &Path, device: &CStr) -> Option<i32> {
     let text = std::fs::read_to_string(below(root, b"/refuse", device.to_bytes())).ok()?;
     text.trim().parse().ok()
 }
 
-/// `path` is `folder` or below it.
+/// Whether `path` is `folder` or below it.
 fn begins_with(path: &[u8], folder: &[u8]) -> bool {
     path.strip_prefix(folder)
         .is_some_and(|rest| rest.is_empty() || rest[0] == b'/')

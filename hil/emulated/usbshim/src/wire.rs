@@ -1,8 +1,7 @@
-//! One `ioctl` as a conversation with the emulator.
+//! Forwards an `ioctl` to the emulator.
 //!
-//! A message is three native words. The process asks `[IOCTL, request, argument]`; the emulator then reads and writes
-//! the process's memory as the kernel would (`[READ_MEM, address, length]`, `[WRITE_MEM, address, length]` and the
-//! bytes), and ends with `[DONE, result, errno]`.
+//! A message has three native words. The process sends `[IOCTL, request, argument]`; the emulator then accesses the process's memory like
+//! the kernel (`[READ_MEM, address, length]`, `[WRITE_MEM, address, length]` with the bytes), and ends with `[DONE, result, errno]`.
 
 use std::os::fd::{AsRawFd, RawFd};
 use std::os::unix::net::UnixStream;
@@ -16,10 +15,10 @@ const DONE: usize = 3;
 const READ_MEM: usize = 5;
 const WRITE_MEM: usize = 6;
 
-/// The emulator answers at once; one that stays silent for this long is as good as gone.
+/// Time limit of a reply; the emulator replies at once.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// The line to the emulator broke.
+/// The connection to the emulator failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Broken;
 
@@ -34,8 +33,8 @@ pub fn connect(path: &Path) -> std::io::Result<UnixStream> {
 /// Result and errno of an `ioctl`.
 ///
 /// # Safety
-/// `argument` is what the caller of `ioctl` passed: the request says which memory behind it may be read and
-/// written. The emulator asks for that memory only, as the kernel does.
+/// `argument` is that of the `ioctl` caller: the request defines which memory behind it may be accessed. The emulator accesses only that
+/// memory, like the kernel.
 pub unsafe fn ioctl(
     stream: &UnixStream,
     request: usize,
@@ -93,7 +92,7 @@ unsafe fn receive(fd: RawFd, mut to: *mut u8, mut left: usize) -> Result<(), Bro
     Ok(())
 }
 
-/// Bytes moved by a call; none when a signal came in between.
+/// Bytes transferred by a call; 0 after a signal.
 fn progress(result: isize) -> Result<usize, Broken> {
     match usize::try_from(result) {
         Ok(bytes) => Ok(bytes),
@@ -144,7 +143,7 @@ mod tests {
     fn an_emulator_that_ends_breaks_the_line() {
         let (ours, theirs) = UnixStream::pair().unwrap();
         drop(theirs);
-        // SAFETY: there is nobody to name memory.
+        // SAFETY: no memory is accessed.
         let result = unsafe { ioctl(&ours, 7, std::ptr::null_mut()) };
         assert_eq!(result, Err(Broken));
     }

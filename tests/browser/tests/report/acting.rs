@@ -1,11 +1,11 @@
-//! Acting: pointing, keys, filtering, sorting, zooming.
+//! Actions: pointing, keys, filtering, sorting, zooming.
 
 use serde_json::{Value, json};
 use skinrig_browser::Page;
 
 use crate::{Session, counted, keep, with_report};
 
-/// What the inspector says, as name and value; the cameras' values carry their camera.
+/// Content of the inspector as name and value; camera values are prefixed with their camera.
 fn inspected(page: &mut Page<'_>) -> Vec<(String, String)> {
     let read = "(() => { let camera = ''; return [...document.querySelectorAll('#inspect dt')].map(dt => { \
         if (dt.className === 'head') { camera = dt.textContent + ' '; return null; } \
@@ -23,7 +23,7 @@ fn said(rows: &[(String, String)], name: &str) -> String {
         .clone()
 }
 
-/// The inspector says of the press that it names what the results say.
+/// The inspector shows the same values as the results for the press that it names.
 fn agrees(session: &Session, rows: &[(String, String)]) {
     let number: u64 = said(rows, "press").parse().unwrap();
     let press = session
@@ -94,7 +94,7 @@ fn the_keyboard_walks_from_press_to_press() {
     });
 }
 
-/// Chooses a value of a filter as its list does.
+/// Selects a filter value as in its list.
 fn choose(page: &mut Page<'_>, filter: &str, value: &str) {
     page.ask(&format!(
         "(() => {{ const s = document.querySelector('[data-testid=filter-{filter}]'); s.value = {}; \
@@ -156,7 +156,7 @@ fn shows(page: &mut Page<'_>, session: &Session, like: impl Fn(&Value) -> bool) 
         .map(|p| p["location"].to_string())
         .collect();
     assert_eq!(discs, json!(places.len()));
-    // The steps of the distribution: one per press.
+    // Steps of the distribution: one per press.
     let steps = page
         .text("document.querySelector('#error-distribution .ecdf')?.getAttribute('d') ?? ''")
         .unwrap();

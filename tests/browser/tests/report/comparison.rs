@@ -1,4 +1,4 @@
-//! The page of a comparison of two runs: loading, downloads, dark, print, phone.
+//! Comparison page of two runs: loading, downloads, dark mode, print, phone.
 
 use std::path::PathBuf;
 use std::sync::OnceLock;
@@ -10,7 +10,7 @@ use crate::downloads::{AT_A_TIME, buttons, rows};
 use crate::reading::{LIGHTNESS, complaints};
 use crate::{keep, kept_folder, skinrig};
 
-/// The page that sets one simulated skin beside another.
+/// Page that compares two simulated skins.
 fn comparison() -> &'static PathBuf {
     static PAGE: OnceLock<PathBuf> = OnceLock::new();
     PAGE.get_or_init(|| {

@@ -6,7 +6,7 @@ use skinrig_browser::Page;
 use crate::{counted, with_report};
 
 pub(crate) fn rows(bytes: &[u8]) -> (Vec<String>, usize) {
-    // The reader refuses rows of another length than the head's.
+    // The reader rejects rows with another length than the header.
     let mut reader = csv::Reader::from_reader(bytes);
     let head = reader
         .headers()
@@ -18,7 +18,7 @@ pub(crate) fn rows(bytes: &[u8]) -> (Vec<String>, usize) {
     (head, rows.len())
 }
 
-/// So many files at a time: after ten from one page a browser asks its reader first.
+/// Files per page: after ten downloads a browser asks for permission.
 pub(crate) const AT_A_TIME: usize = 8;
 
 pub(crate) fn buttons(page: &mut Page<'_>, kind: &str) -> Vec<String> {

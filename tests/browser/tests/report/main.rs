@@ -1,4 +1,4 @@
-//! The report of a real run on the simulated rig, read in a headless Chromium. Pictures for a person to look at are kept in
+//! The report of a real run on the simulated rig, in a headless Chromium. Screenshots for visual inspection are in
 //! `target/browser/`.
 #![expect(
     clippy::unwrap_used,
@@ -30,7 +30,7 @@ impl Session {
         self.results["analysis"]["presses"].as_array().unwrap()
     }
 
-    /// How many presses are like that.
+    /// Number of presses that `like` accepts.
     fn count(&self, like: impl Fn(&Value) -> bool) -> usize {
         self.presses().iter().filter(|p| like(p)).count()
     }
@@ -40,7 +40,7 @@ impl Session {
     }
 }
 
-/// True for the presses that the figures of errors show.
+/// True for the presses shown in the error figures.
 fn counted(press: &Value) -> bool {
     press["role"] == "score"
         && press["verdict"] == "valid"
@@ -59,7 +59,7 @@ fn skinrig(arguments: &[&str]) {
     assert!(matches!(exit, Exit::Ok), "skinrig {arguments:?}");
 }
 
-/// The one session of this test program.
+/// The session shared by all tests of this program.
 fn session() -> &'static Session {
     static SESSION: OnceLock<Session> = OnceLock::new();
     SESSION.get_or_init(|| {
@@ -99,7 +99,7 @@ fn session() -> &'static Session {
     })
 }
 
-/// Runs a test with the report open; says so and passes on a machine without a browser.
+/// Runs a test with the report open; prints a note and passes without a browser.
 fn with_report(test: impl FnOnce(&mut Page<'_>, &Session)) {
     let mut browser = match Browser::start() {
         Ok(browser) => browser,
@@ -115,7 +115,7 @@ fn with_report(test: impl FnOnce(&mut Page<'_>, &Session)) {
     test(&mut page, session);
 }
 
-/// Keeps a picture of the page.
+/// Saves a screenshot of the page.
 fn keep(page: &mut Page<'_>, name: &str, whole: bool) {
     let folder = kept_folder();
     std::fs::create_dir_all(&folder).unwrap();

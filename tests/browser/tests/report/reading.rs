@@ -5,7 +5,7 @@ use skinrig_browser::{Page, Size};
 
 use crate::{keep, kept_folder, with_report};
 
-/// Everything that a page can complain of, and every request but its own.
+/// All errors and warnings of a page, and all requests except for itself.
 pub(crate) fn complaints(page: &mut Page<'_>, own_ending: &str) -> Vec<String> {
     let events = page.events().into_iter();
     let bad = events.filter(|e| match e.method.as_str() {
@@ -31,7 +31,7 @@ fn it_loads_without_a_word_and_asks_nobody() {
             page.ask(rows).unwrap(),
             json!(session.presses().len().min(50))
         );
-        // Every part of the script ran to its end: the last one writes this.
+        // Every part of the script ran: the last one writes this.
         assert!(
             page.text("document.querySelector('#page-state').textContent")
                 .unwrap()
@@ -39,7 +39,7 @@ fn it_loads_without_a_word_and_asks_nobody() {
         );
         let found = complaints(page, ".report.html");
         assert!(found.is_empty(), "{found:#?}");
-        // The policy of the page holds against what is not its own script.
+        // The page's policy blocks everything except its own script.
         page.ask("document.body.insertAdjacentHTML('beforeend', '<img src=x onerror=\"window.ran = 1\">')")
             .unwrap();
         page.ask("new Promise(done => setTimeout(done, 50))")
@@ -88,7 +88,7 @@ fn provenance_faults_and_exclusions_stand_on_the_first_screen() {
                 "{key}: {block}"
             );
         }
-        // Nothing sticks out of its card.
+        // Nothing overflows its card.
         let wide = "[...document.querySelectorAll('.first .card')].filter(c => c.scrollWidth > c.clientWidth).length";
         assert_eq!(page.ask(wide).unwrap(), json!(0));
         keep(page, "first-screen", false);
@@ -135,7 +135,7 @@ fn headings_landmarks_and_tables_are_in_order() {
         assert_eq!(page.ask(uncaptioned).unwrap(), json!(0));
         let untold = "[...document.querySelectorAll('svg.fig')].filter(s => !s.querySelector('title')?.textContent || !s.querySelector('desc')?.textContent).length";
         assert_eq!(page.ask(untold).unwrap(), json!(0));
-        // The first stop of the keyboard leads past the head, and shows itself.
+        // The first tab stop skips the header, and is visible.
         page.key("Tab").unwrap();
         assert_eq!(
             page.ask("document.activeElement.className").unwrap(),
@@ -179,7 +179,7 @@ fn everything_that_can_be_used_has_a_name() {
             let Some(role) = used.iter().find(|r| **r == role) else {
                 continue;
             };
-            // A group that cannot be focused only holds others together.
+            // A group that cannot be focused only contains others.
             let properties = node["properties"].as_array();
             let focusable = properties.is_some_and(|p| p.iter().any(|p| p["name"] == "focusable"));
             if *role == "group" && !focusable {
@@ -204,7 +204,7 @@ fn everything_that_can_be_used_has_a_name() {
     });
 }
 
-/// How light a colour is, 0 to 255.
+/// Lightness of a colour, 0 to 255.
 pub(crate) const LIGHTNESS: &str = "(c => Math.max(...c.match(/\\d+/g).slice(0, 3).map(Number)))";
 
 #[test]

@@ -1,4 +1,4 @@
-//! A trigger box that answers anything: on the line, in a frame, in a reply to what was asked.
+//! A trigger box with arbitrary answers: on the line, in a frame, in a reply to a request.
 
 use std::io;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,12 +8,12 @@ use skinrig_device::{RealClock, TriggerBox as _};
 use skinrig_model::{Mark, MarkKind, PressId};
 use skinrig_trigger_box::frame::{self, FrameReader};
 use skinrig_trigger_box::protocol::{Counters, Events, Hello, Reply, SelfTest, parse_mark};
-use skinrig_trigger_box::{Dial, OpenError, SerialTriggerBox, TriggerBoxConfig, Wire};
+use skinrig_trigger_box::{Connector, OpenError, SerialTriggerBox, TriggerBoxConfig, Wire};
 
-/// Long enough for a thread to answer another, short enough for many cases.
+/// Long enough for one thread to answer another, short enough for many cases.
 const SOON: Duration = Duration::from_millis(2);
 
-/// The bytes as they stand on the line, as bodies of good frames, and as answers to the driver's requests.
+/// Processes the bytes as raw line data, as bodies of valid frames, and as answers to the driver's requests.
 pub fn trigger_box(bytes: &[u8]) {
     let mut reader = FrameReader::default();
     for body in bytes.iter().filter_map(|b| reader.push(*b)) {
@@ -27,7 +27,7 @@ pub fn trigger_box(bytes: &[u8]) {
 }
 
 fn look(body: &[u8]) {
-    let answers = Reply::parse(body).map_or_else(|| body.to_vec(), |reply| reply.answers);
+    let answers = Reply::parse(body).map_or_else(|| body.to_vec(), |reply| reply.data);
     let _ = Hello::parse(&answers);
     let _ = Events::parse(&answers);
     let _ = Counters::parse(&answers);
@@ -70,7 +70,7 @@ fn drive(bytes: &[u8]) {
     let _ = driver.disarm();
 }
 
-/// What is left to say, and what is on its way.
+/// Remaining script, and data in flight.
 struct Script {
     left: Vec<u8>,
     line: Vec<u8>,
@@ -79,12 +79,12 @@ struct Script {
 }
 
 impl Script {
-    /// The next bytes of the script; fewer at its end.
+    /// Takes the next bytes of the script; fewer at its end.
     fn take(&mut self, n: usize) -> Vec<u8> {
         self.left.drain(..n.min(self.left.len())).collect()
     }
 
-    /// A reply to a request: its command and number, and anything else from the script. The first greeting is a good one.
+    /// Replies to a request with its command and number, and the rest from the script. The first greeting is valid.
     fn answer(&mut self, request: &[u8]) {
         let [version, command, id @ ..] = request else {
             return;
@@ -105,17 +105,17 @@ impl Script {
     }
 }
 
-/// What the firmware says of itself (`hil/trigger_box/protocol.h`).
+/// Greeting of the firmware (`hil/trigger_box/protocol.h`).
 const GREETING: &[u8] = b"\x01\x01\x00\x10\x00\x13skinrig-trigger-box";
 
 struct Line(Arc<Mutex<Script>>);
 
-impl Dial for Line {
+impl Connector for Line {
     fn target(&self) -> &str {
         "fuzz"
     }
 
-    fn dial(&mut self) -> Result<Box<dyn Wire>, OpenError> {
+    fn connect(&mut self) -> Result<Box<dyn Wire>, OpenError> {
         Ok(Box::new(Self(Arc::clone(&self.0))))
     }
 }

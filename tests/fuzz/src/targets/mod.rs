@@ -1,4 +1,4 @@
-//! The kinds of foreign input.
+//! Kinds of untrusted input.
 
 mod containers;
 mod firmware;
@@ -27,7 +27,7 @@ pub const fn all() -> [Target; 12] {
         dictionary: &[],
         elsewhere: &[],
     };
-    // The longest plan that a protocol may ask for has 131,071 presses.
+    // The longest plan that a protocol may request has 131,071 presses.
     const YAML: Target = Target {
         bound: Bound {
             fixed: 128 * MIB,
@@ -202,7 +202,7 @@ pub const fn all() -> [Target; 12] {
     ]
 }
 
-/// The target of this name.
+/// Finds a target by name.
 ///
 /// # Panics
 /// For a name that no target has.

@@ -1,4 +1,4 @@
-//! A robot library whose every answer may be anything: numbers that are none, lies, refusals.
+//! A robot library with arbitrary answers: NaN, wrong values, errors.
 
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
@@ -8,11 +8,13 @@ use skinrig_drd_abi::{
 };
 use skinrig_omega3::OmegaConfig;
 use skinrig_omega3::brake::brake;
-use skinrig_omega3::config::{Initialise, Patience};
-use skinrig_omega3::sdk::{Answer, CallError, Generator, Pace, Quantity, Reading, Sdk};
+use skinrig_omega3::config::{Initialise, Timeouts};
+use skinrig_omega3::sdk::{
+    CallError, CallResult, Generator, GeneratorLimits, Quantity, Reading, Sdk,
+};
 use skinrig_omega3::{enumerate, open};
 
-/// Lists, opens, initialises and brakes a robot over such a library.
+/// Lists, opens, initialises and brakes a robot with such a library.
 pub fn answers(bytes: &[u8]) {
     let sdk = Hostile(Mutex::new(bytes.to_vec()));
     if let Ok(found) = enumerate::list(&sdk) {
@@ -23,20 +25,20 @@ pub fn answers(bytes: &[u8]) {
     }
     let config = OmegaConfig {
         initialise: Initialise::SampleIsOff,
-        patience: Patience {
+        timeouts: Timeouts {
             brake_attempts: 3,
             brake_retry: Duration::ZERO,
-            ..Patience::default()
+            ..Timeouts::default()
         },
         ..OmegaConfig::default()
     };
     match open::open(&sdk, &config, |_| Ok(())) {
-        Ok(robot) => _ = brake(&sdk, robot.id, &config.patience, |_| ()),
+        Ok(robot) => _ = brake(&sdk, robot.id, &config.timeouts, |_| ()),
         Err(e) => assert!(!e.into_device("77").to_string().is_empty()),
     }
 }
 
-/// Takes its answers from these bytes, and gives good ones when there are no more.
+/// Takes its answers from these bytes, and gives valid ones when they run out.
 struct Hostile(Mutex<Vec<u8>>);
 
 impl Hostile {
@@ -47,8 +49,8 @@ impl Hostile {
         Some(said)
     }
 
-    /// A quarter of the answers are refusals, another is whatever comes, the rest is good.
-    fn answer<T, const N: usize>(&self, good: T, any: impl Fn([u8; N]) -> T) -> Answer<T> {
+    /// A quarter of the answers are errors, a quarter arbitrary, the rest valid.
+    fn answer<T, const N: usize>(&self, good: T, any: impl Fn([u8; N]) -> T) -> CallResult<T> {
         match self.take::<1>().map(|[choice]| choice % 4) {
             Some(0) => Err(CallError {
                 call: "hostile",
@@ -65,19 +67,19 @@ impl Hostile {
             .map_or(good, |[choice]| (choice % 4 == 1) != good)
     }
 
-    fn done(&self) -> Answer<()> {
+    fn done(&self) -> CallResult<()> {
         self.answer((), |_: [u8; 0]| ())
     }
 
-    fn real(&self, good: f64) -> Answer<f64> {
+    fn real(&self, good: f64) -> CallResult<f64> {
         self.answer(good, f64::from_le_bytes)
     }
 
-    fn vector(&self) -> Answer<[f64; 3]> {
+    fn vector(&self) -> CallResult<[f64; 3]> {
         Ok([self.real(0.0)?, self.real(0.0)?, self.real(0.0)?])
     }
 
-    fn reading(&self) -> Answer<Reading> {
+    fn reading(&self) -> CallResult<Reading> {
         Ok(Reading {
             position_m: self.vector()?,
             cached: self.yes(false),
@@ -90,35 +92,35 @@ impl Sdk for Hostile {
         let number = || self.answer(10, i32::from_le_bytes).unwrap_or_default();
         SdkVersion::new(number(), number(), number())
     }
-    fn device_count(&self) -> Answer<i8> {
+    fn device_count(&self) -> CallResult<i8> {
         self.answer(1, i8::from_le_bytes)
     }
-    fn open(&self, index: i8) -> Answer<DeviceId> {
+    fn open(&self, index: i8) -> CallResult<DeviceId> {
         self.answer(index, i8::from_le_bytes)
     }
-    fn close(&self, _: DeviceId) -> Answer<()> {
+    fn close(&self, _: DeviceId) -> CallResult<()> {
         self.done()
     }
-    fn system_type(&self, _: DeviceId) -> Answer<i32> {
+    fn system_type(&self, _: DeviceId) -> CallResult<i32> {
         self.answer(DEVICE_OMEGA3, i32::from_le_bytes)
     }
     fn system_name(&self, _: DeviceId) -> Option<String> {
         let name = self.take::<16>()?;
         Some(String::from_utf8_lossy(&name).into_owned())
     }
-    fn serial(&self, _: DeviceId) -> Answer<u16> {
+    fn serial(&self, _: DeviceId) -> CallResult<u16> {
         self.answer(77, u16::from_le_bytes)
     }
-    fn firmware(&self, _: DeviceId) -> Answer<f64> {
+    fn firmware(&self, _: DeviceId) -> CallResult<f64> {
         self.real(3.0)
     }
-    fn com_mode(&self, _: DeviceId) -> Answer<i32> {
+    fn com_mode(&self, _: DeviceId) -> CallResult<i32> {
         self.answer(1, i32::from_le_bytes)
     }
-    fn check_memory(&self, _: DeviceId) -> Option<Answer<()>> {
+    fn check_memory(&self, _: DeviceId) -> Option<CallResult<()>> {
         Some(self.done())
     }
-    fn status(&self, _: DeviceId) -> Answer<StatusVector> {
+    fn status(&self, _: DeviceId) -> CallResult<StatusVector> {
         let mut words = [0; STATUS_CAPACITY];
         for word in &mut words[..17] {
             *word = self.answer(0, i32::from_le_bytes)?;
@@ -133,77 +135,82 @@ impl Sdk for Hostile {
     fn is_initialized(&self, _: DeviceId) -> bool {
         self.yes(true)
     }
-    fn auto_init(&self, _: DeviceId) -> Answer<()> {
+    fn auto_init(&self, _: DeviceId) -> CallResult<()> {
         self.done()
     }
-    fn set(&self, _: DeviceId, _: Quantity, _: f64) -> Option<Answer<()>> {
+    fn set(&self, _: DeviceId, _: Quantity, _: f64) -> Option<CallResult<()>> {
         self.yes(true).then(|| self.done())
     }
-    fn get(&self, _: DeviceId, _: Quantity) -> Option<Answer<f64>> {
+    fn get(&self, _: DeviceId, _: Quantity) -> Option<CallResult<f64>> {
         self.yes(true).then(|| self.real(0.0))
     }
-    fn compensate_gravity(&self, _: DeviceId) -> Answer<()> {
+    fn compensate_gravity(&self, _: DeviceId) -> CallResult<()> {
         self.done()
     }
-    fn enable_expert_mode(&self) -> Answer<()> {
+    fn enable_expert_mode(&self) -> CallResult<()> {
         self.done()
     }
-    fn watchdog(&self, _: DeviceId) -> Answer<u8> {
+    fn watchdog(&self, _: DeviceId) -> CallResult<u8> {
         self.answer(80, u8::from_le_bytes)
     }
-    fn set_watchdog(&self, _: DeviceId, _: u8) -> Answer<()> {
+    fn set_watchdog(&self, _: DeviceId, _: u8) -> CallResult<()> {
         self.done()
     }
-    fn velocity_threshold(&self, _: DeviceId) -> Answer<u32> {
+    fn velocity_threshold(&self, _: DeviceId) -> CallResult<u32> {
         self.answer(40, u32::from_le_bytes)
     }
-    fn start(&self, _: DeviceId) -> Answer<()> {
+    fn start(&self, _: DeviceId) -> CallResult<()> {
         self.done()
     }
-    fn stop(&self, _: DeviceId) -> Answer<()> {
+    fn stop(&self, _: DeviceId) -> CallResult<()> {
         self.done()
     }
     fn is_running(&self, _: DeviceId) -> bool {
         self.yes(false)
     }
-    fn control_khz(&self, _: DeviceId) -> Answer<f64> {
+    fn control_khz(&self, _: DeviceId) -> CallResult<f64> {
         self.real(4.0)
     }
-    fn regulate_position(&self, _: DeviceId) -> Answer<()> {
+    fn regulate_position(&self, _: DeviceId) -> CallResult<()> {
         self.done()
     }
-    fn enable_filter(&self, _: DeviceId) -> Answer<()> {
+    fn enable_filter(&self, _: DeviceId) -> CallResult<()> {
         self.done()
     }
     fn is_filtering(&self, _: DeviceId) -> bool {
         self.yes(true)
     }
-    fn set_pace(&self, _: DeviceId, _: Generator, _: Pace) -> Answer<()> {
+    fn set_generator_limits(
+        &self,
+        _: DeviceId,
+        _: Generator,
+        _: GeneratorLimits,
+    ) -> CallResult<()> {
         self.done()
     }
-    fn pace(&self, _: DeviceId, _: Generator) -> Answer<Pace> {
-        Ok(Pace {
+    fn generator_limits(&self, _: DeviceId, _: Generator) -> CallResult<GeneratorLimits> {
+        Ok(GeneratorLimits {
             acceleration_m_s2: self.real(1.0)?,
             speed_m_s: self.real(1.0)?,
             jerk_m_s3: self.real(1.0)?,
         })
     }
-    fn track(&self, _: DeviceId, _: [f64; 3]) -> Answer<()> {
+    fn track(&self, _: DeviceId, _: [f64; 3]) -> CallResult<()> {
         self.done()
     }
-    fn regulated_position(&self, _: DeviceId) -> Answer<Reading> {
+    fn regulated_position(&self, _: DeviceId) -> CallResult<Reading> {
         self.reading()
     }
-    fn position(&self, _: DeviceId) -> Answer<Reading> {
+    fn position(&self, _: DeviceId) -> CallResult<Reading> {
         self.reading()
     }
-    fn force(&self, _: DeviceId) -> Answer<[f64; 3]> {
+    fn force(&self, _: DeviceId) -> CallResult<[f64; 3]> {
         self.vector()
     }
-    fn emergency_stop(&self, _: DeviceId) -> Answer<()> {
+    fn emergency_stop(&self, _: DeviceId) -> CallResult<()> {
         self.done()
     }
-    fn force_off(&self, _: DeviceId) -> Answer<()> {
+    fn force_off(&self, _: DeviceId) -> CallResult<()> {
         self.done()
     }
 }

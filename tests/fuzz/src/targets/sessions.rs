@@ -1,4 +1,4 @@
-//! Session files, as a stranger hands them over.
+//! Session files from an untrusted source.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use skinrig_model::{
 use skinrig_recorder::{ChunkScanner, RecorderError, SessionReader, SessionWriter};
 use tempfile::TempDir;
 
-/// A folder for one case, in memory where the system has such a place.
+/// Folder of one case, in memory if the system supports it.
 pub struct Folder(TempDir);
 
 impl Folder {
@@ -38,7 +38,7 @@ impl Folder {
     }
 }
 
-/// What `verify` decodes chunks with.
+/// Chunk decoder for `verify`.
 struct Rescan([Scanner; 2]);
 
 impl ChunkScanner for Rescan {
@@ -62,8 +62,8 @@ impl ChunkScanner for Rescan {
     }
 }
 
-/// A session file: listed, read, verified, salvaged, gone on with. It must not become anything but a session, and nothing but the
-/// files that belong to it may appear.
+/// Lists, reads, verifies, salvages and resumes a session file. It must stay a session, and only files that belong to it may
+/// appear.
 pub fn session(bytes: &[u8]) {
     let folder = Folder::new();
     let path = folder.file("x.session.sqlite", bytes);
@@ -78,7 +78,7 @@ pub fn session(bytes: &[u8]) {
     let _ = go_on(&path);
 }
 
-/// Everything that a reader offers; what one method refuses does not keep the next from being asked.
+/// Calls every method of the reader; an error of one does not prevent the next.
 fn read(path: &Path) -> Result<(), RecorderError> {
     let reader = SessionReader::open(path)?;
     let _ = reader.session_id();
@@ -107,7 +107,7 @@ fn read(path: &Path) -> Result<(), RecorderError> {
     Ok(())
 }
 
-/// Begins a further leg, and leaves it.
+/// Begins a further leg, and abandons it.
 fn go_on(path: &Path) -> Result<(), RecorderError> {
     let rescan = [StreamFormat::Evt2; 2].map(Scanner::new);
     let mut writer = SessionWriter::resume(path, &mut Rescan(rescan))?;

@@ -1,4 +1,4 @@
-//! Camera bytes: the words of every format, and folded chunks.
+//! Camera bytes: words of every format, and folded chunks.
 
 use skinrig_formats::{Decoder, EventSink, Scanner};
 use skinrig_model::{CdEvent, StreamFormat, TriggerEdge};
@@ -11,7 +11,7 @@ impl EventSink for Forget {
     fn on_trigger(&mut self, _: TriggerEdge) {}
 }
 
-/// The first byte chooses the format and where the words are split; a device that starts anew in between.
+/// The first byte selects the format and where the words are split; the device restarts in between.
 pub fn any_format(bytes: &[u8]) {
     let Some((choice, words)) = bytes.split_first() else {
         return;
@@ -43,7 +43,7 @@ pub fn any_format(bytes: &[u8]) {
     );
 }
 
-/// The first four bytes claim a length, the others are to be unfolded to it.
+/// The first four bytes claim a length; the others are unfolded to it.
 pub fn folded(bytes: &[u8]) {
     let Some((claim, stored)) = bytes.split_first_chunk::<4>() else {
         return;

@@ -1,4 +1,4 @@
-//! Texts that people write and send around: protocols, schedules, rig files, position tables, bias files.
+//! Text files written by people: protocols, schedules, rig files, position tables, bias files.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use skinrig_formats::positions::{LengthUnit, PositionTable};
 use skinrig_model::Point2;
 use skinrig_protocol::{Protocol, RigFile, Schedule, check, path_svg};
 
-/// Beyond this many presses a plan is right and only long: its compilation is not what is tested here.
+/// Plans with more presses are valid but long; compiling them is not the purpose here.
 const FEW: usize = 2_000;
 
 /// A press-position table.
@@ -21,7 +21,7 @@ pub fn biases(bytes: &[u8]) {
     let _ = skinrig_evk1::biases::parse_bias_file(&String::from_utf8_lossy(bytes));
 }
 
-/// A protocol, and the plan, checks and pictures that come from it.
+/// A protocol, with its plan, checks and figures.
 pub fn protocol(bytes: &[u8]) {
     let table = |_: &Path| Ok(b"x,y\n1,2\n3,4\n".to_vec());
     match Protocol::parse("x.yaml", bytes, &[], &table) {
@@ -39,7 +39,7 @@ pub fn protocol(bytes: &[u8]) {
     }
 }
 
-/// A description of a recording that was made without skinrig.
+/// The schedule of a recording made without skinrig.
 pub fn schedule(bytes: &[u8]) {
     match Schedule::parse("x.yaml", bytes, &[]) {
         Err(found) => assert!(!found.to_string().is_empty()),
@@ -50,7 +50,7 @@ pub fn schedule(bytes: &[u8]) {
     }
 }
 
-/// A description of a bench.
+/// The description of a bench.
 pub fn rig(bytes: &[u8]) {
     if let Err(found) = RigFile::parse("x.yaml", bytes, &|_| Some("../x".to_owned())) {
         assert!(!found.to_string().is_empty());

@@ -1,4 +1,4 @@
-//! An allocator that counts what is held, and refuses what no input may ask for.
+//! An allocator that counts held memory, and rejects requests that no input may cause.
 #![expect(
     unsafe_code,
     reason = "the trait of allocators is unsafe; every call goes on to the system's"
@@ -7,7 +7,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-/// A single request beyond this fails, as on a machine that has no more.
+/// A single larger request fails, as on a machine without that memory.
 const REFUSED: usize = 1 << 30;
 
 /// Counts for the whole process.
@@ -24,14 +24,14 @@ impl Counting {
         }
     }
 
-    /// Forgets the peak; returns what is held now.
+    /// Resets the peak; returns the present value.
     pub fn reset_peak(&self) -> usize {
         let held = self.held.load(Relaxed);
         self.peak.store(held, Relaxed);
         held
     }
 
-    /// Most bytes held at once since the last reset.
+    /// Peak since the last reset, bytes.
     pub fn peak(&self) -> usize {
         self.peak.load(Relaxed)
     }

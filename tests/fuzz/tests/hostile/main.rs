@@ -1,6 +1,7 @@
-//! Every target over its corpus and over seeded mutations of it: no panic in any thread, no memory beyond the bound, an end.
+//! Runs every target over its corpus and over seeded mutations of it: no panic in any thread, no memory beyond the bound,
+//! and termination.
 //!
-//! `SKINRIG_FUZZ_FACTOR` multiplies the number of mutations, `SKINRIG_FUZZ_SEED` chooses others.
+//! `SKINRIG_FUZZ_FACTOR` multiplies the number of mutations, `SKINRIG_FUZZ_SEED` selects others.
 #![expect(clippy::unwrap_used, clippy::expect_used, reason = "tests")]
 #![expect(
     clippy::print_stderr,
@@ -23,14 +24,14 @@ use self::allocator::Counting;
 #[global_allocator]
 static MEMORY: Counting = Counting::new();
 
-/// A case that takes longer has no end. Generous: other programs compete for the processors.
+/// Timeout of a case. Generous, because other programs compete for the processors.
 const HANGS: Duration = Duration::from_secs(120);
 
 /// Panics of any thread so far.
 static PANICS: AtomicU64 = AtomicU64::new(0);
-/// What is being run, and since when.
+/// The running case, and its start.
 static CASE: Mutex<Option<(String, Vec<u8>, Instant)>> = Mutex::new(None);
-/// Memory is counted for the whole process: one target at a time.
+/// Memory is counted for the whole process, so only one target runs at a time.
 static TURN: Mutex<()> = Mutex::new(());
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -67,7 +68,7 @@ fn watch() {
     });
 }
 
-/// Writes an input where it can be looked at and added to the corpus.
+/// Writes an input to a file, for inspection and the corpus.
 fn keep(name: &str, bytes: &[u8]) -> PathBuf {
     let path = std::env::temp_dir().join(format!("skinrig-fuzz-{}.bin", name.replace(' ', "-")));
     std::fs::write(&path, bytes).expect("the temporary folder takes a file");
@@ -81,7 +82,7 @@ fn number(variable: &str, otherwise: u64) -> u64 {
     }
 }
 
-/// Runs one case, `name` says which; returns the most memory that it held.
+/// Runs one case; `name` identifies it. Returns its peak memory.
 fn run(target: &Target, name: &str, bytes: &[u8]) -> usize {
     *lock(&CASE) = Some((name.to_owned(), bytes.to_vec(), Instant::now()));
     let panics = PANICS.load(Relaxed);
@@ -120,7 +121,7 @@ fn hostile(name: &str) {
     let (mut largest, began) = (0, Instant::now());
     let cases = target.cases * number("SKINRIG_FUZZ_FACTOR", 1);
     for case in 0..cases {
-        // Each case by itself: it comes again without those before it.
+        // Each case is independent, so that it can be reproduced alone.
         let mut dice = Dice::seeded(seed.wrapping_mul(0x1_0000_0001).wrapping_add(case));
         let mut bytes = corpus[dice.below(corpus.len())].clone();
         let other = &corpus[dice.below(corpus.len())];

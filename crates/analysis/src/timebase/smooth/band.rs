@@ -1,6 +1,6 @@
-//! Symmetric matrices with three further diagonals: factor, solution and the band of the inverse.
+//! Symmetric band matrices with three further diagonals: factorisation, solution and the band of the inverse.
 
-/// A symmetric matrix with three further diagonals: for each row its diagonal and what follows.
+/// A symmetric matrix with three further diagonals: for each row its diagonal and the next three entries.
 pub type Band = Vec<[f64; 4]>;
 
 /// `w' C w` for weights of four neighbours.
@@ -15,7 +15,7 @@ pub(crate) fn quadratic(c: &Band, first: usize, w: &[f64; 4]) -> f64 {
     sum
 }
 
-/// Cholesky's factor of a positive definite band matrix: `l[i][k]` is entry (i + k, i). `None` when it is not.
+/// Cholesky factor of a positive definite band matrix: `l[i][k]` is entry (i + k, i). `None` if it is not positive definite.
 pub fn factor(a: &Band) -> Option<Band> {
     let n = a.len();
     let mut l = a.clone();
@@ -57,7 +57,7 @@ pub(crate) fn solve(l: &Band, b: &[f64]) -> Vec<f64> {
     x
 }
 
-/// The band of the inverse of `l l'` (Takahashi, Fagan and Chin 1973).
+/// Band of the inverse of `l l'` (Takahashi, Fagan and Chin 1973).
 pub(crate) fn inverse_band(l: &Band) -> Band {
     let n = l.len();
     let mut z = vec![[0.0; 4]; n];

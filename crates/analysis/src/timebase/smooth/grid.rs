@@ -1,6 +1,6 @@
-//! Cubic B-splines on equal steps of time.
+//! Cubic B-splines on equal time steps.
 
-/// Equal steps of time, and the cubic B-splines on them: one more than steps to the left, two to the right.
+/// Equal time steps and their cubic B-splines, which extend one step to the left and two to the right.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
     pub start_us: f64,
@@ -13,8 +13,8 @@ impl Grid {
         self.steps + 3
     }
 
-    /// Number of the first of the four splines that are not 0 at `x`, and their values there; beyond the ends the outer
-    /// polynomials go on.
+    /// Index of the first of the four non-zero splines at `x`, and their values; beyond the ends the outer polynomials
+    /// continue.
     pub fn weights(&self, x: f64) -> (usize, [f64; 4]) {
         let at = (x - self.start_us) / self.step_us;
         let k = (at.floor().max(0.0) as usize).min(self.steps - 1);

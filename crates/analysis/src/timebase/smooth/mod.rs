@@ -1,11 +1,12 @@
 //! A smooth map between two clocks, fitted robustly, with the uncertainty of every value and of the mean rate.
 //!
-//! What is fitted is the small deviation `y = to - from` over `x = from`, both relative to exact references, so that days in µs
+//! The fit uses the small deviation `y = to - from` over `x = from`, both relative to exact references, so that days in µs
 //! lose no digits. The map is a smoothing spline: cubic B-splines on equal steps, with a penalty on third differences
-//! (Eilers and Marx, "Flexible smoothing with B-splines and penalties", Statistical Science 11, 1996), so that a rate that changes
-//! evenly costs nothing. How much a rate wanders beyond that is not chosen but averaged over: each smoothness counts by its
-//! restricted likelihood (Patterson and Thompson 1971), the limit without any wander included. Intervals are those of the
-//! posterior (Wahba, "Bayesian confidence intervals for the cross-validated smoothing spline", JRSS B 45, 1983).
+//! (Eilers and Marx, "Flexible smoothing with B-splines and penalties", Statistical Science 11, 1996), so that an evenly
+//! changing rate costs nothing. The amount of wander beyond that is not chosen but averaged over: each smoothness is
+//! weighted by its restricted likelihood (Patterson and Thompson 1971), including the limit without any wander. Intervals
+//! are posterior intervals (Wahba, "Bayesian confidence intervals for the cross-validated smoothing spline", JRSS B 45,
+//! 1983).
 
 mod band;
 mod grid;
@@ -20,50 +21,50 @@ use self::grid::Grid;
 use self::posterior::Posterior;
 use crate::clock::line::{self, Pair, median};
 
-/// Steps of maps are at least this long, µs: a rate that changes by 6 ppm per hour bends a clock by 0.02 µs in it.
+/// Minimum step of maps, µs: a rate that changes by 6 ppm per hour bends a clock by 0.02 µs in it.
 pub const STEP_US: f64 = 10e6;
-/// Instants of trains are never judged finer than this, µs.
+/// Lower bound of the scale of train instants, µs.
 pub const FLOOR_US: f64 = 0.5;
 /// Residuals beyond this many robust standard deviations are outliers.
 const OUTLIER_SIGMAS: f64 = 5.0;
 /// Standard deviation of a normal distribution over its median absolute deviation.
 const MAD_TO_SIGMA: f64 = 1.482_602_218_505_602;
-/// Rounds of "fit, then choose the inliers anew".
+/// Maximum number of iterations of fit and inlier selection.
 const ROUNDS: usize = 8;
-/// Rate differences wander by no more than this over a session: 20 ppm, a cheap crystal over tens of kelvins.
+/// Maximum wander of rate differences over a session: 20 ppm, a cheap crystal over tens of kelvins.
 pub(crate) const WANDER: f64 = 20e-6;
 
-/// The map.
+/// A smooth map between two clocks.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Smooth {
+pub(crate) struct SmoothMap {
     grid: Grid,
     coefficients: Vec<f64>,
-    /// Posterior covariances of coefficients with themselves and the next three, µs².
+    /// Posterior covariances of each coefficient with itself and the next three, µs².
     covariances: Band,
     /// First and last point used, µs.
     span_us: (f64, f64),
     /// Standard deviation of a point about the map, µs, and its degrees of freedom.
     pub sigma_us: f64,
     pub free: f64,
-    /// RMS and largest absolute residual of the points used, µs.
+    /// RMS and largest absolute residual of the used points, µs.
     pub rms_us: f64,
     pub max_us: f64,
     /// For each point, whether it was used.
     pub used: Vec<bool>,
-    /// For each point, when it was on the first clock and its residual, µs.
+    /// For each point, its time on the first clock and its residual, µs.
     pub residuals: Vec<(f64, f64)>,
-    /// Mean rate difference between two times, the first point used and the last unless others are asked for.
+    /// Mean rate difference between two times, by default the first and the last used point.
     pub drift: Figure,
 }
 
-impl Smooth {
-    /// Fits `points`, which are in order of `from_us`, in steps of at least `step_us`. Residuals are never judged finer than
-    /// `floor_us`. `None` below 3 points or without spread in time.
+impl SmoothMap {
+    /// Fits `points`, which are in order of `from_us`, with steps of at least `step_us`. `floor_us` is the lower bound of
+    /// the residual scale. `None` below 3 points or without spread in time.
     pub fn fit(points: &[Point], step_us: f64, floor_us: f64) -> Option<Self> {
         Self::fit_with_drift(points, step_us, floor_us, None)
     }
 
-    /// As [`Self::fit`], with the drift between two times on the first clock, µs, instead of the first and last point used.
+    /// As [`Self::fit`], with the drift between two given times on the first clock, µs.
     pub(crate) fn fit_with_drift(
         points: &[Point],
         step_us: f64,
@@ -79,8 +80,8 @@ impl Smooth {
             .collect();
         let line = line::fit(&pairs, floor_us)?;
         let span = points.last()?.from_us - points.first()?.from_us;
-        // What wanders bends away from the line by more than the outlier bound: the points start over together, but for those
-        // that lie further from it than any wandering clock.
+        // A wandering clock deviates from a line by more than the outlier bound: start with all points, except those further
+        // from it than any plausible clock.
         let off = |p: &Point| p.to_us - line.offset_us - p.from_us - line.drift * p.from_us;
         let wander_us = 1_000.0 + WANDER * span;
         let mut used: Vec<bool> = points.iter().map(|p| off(p).abs() <= wander_us).collect();
@@ -134,12 +135,12 @@ impl Smooth {
         })
     }
 
-    /// The time on the other clock, µs.
+    /// Time on the other clock, µs.
     pub fn value(&self, from_us: f64) -> f64 {
         from_us + self.grid.value(&self.coefficients, from_us)
     }
 
-    /// Standard error of [`Self::value`], µs; grows before the first and behind the last point.
+    /// Standard error of [`Self::value`], µs; grows outside the range of the points.
     pub fn standard_error(&self, from_us: f64) -> f64 {
         let (first, weights) = self.grid.weights(from_us);
         quadratic(&self.covariances, first, &weights)
@@ -159,7 +160,7 @@ impl Smooth {
         self.span_us
     }
 
-    /// Points used.
+    /// Number of used points.
     pub fn n(&self) -> usize {
         self.used.iter().filter(|u| **u).count()
     }
@@ -174,7 +175,7 @@ fn picked<'a, T: Copy>(all: &'a [T], used: &'a [bool]) -> impl Iterator<Item = T
 mod tests {
     use super::*;
 
-    /// A point each second whose deviation is `y` of its time in µs, with noise of 1 µs in turn.
+    /// One point per second with deviation `y` of its time in µs, and alternating noise of 1 µs.
     fn points(n: u32, y: impl Fn(f64) -> f64) -> Vec<Point> {
         let point = |k: u32| {
             let x = f64::from(k) * 1e6;
@@ -192,7 +193,7 @@ mod tests {
         for p in all.iter_mut().step_by(50) {
             p.to_us += 700.0;
         }
-        let map = Smooth::fit(&all, 10e6, 0.5).unwrap();
+        let map = SmoothMap::fit(&all, 10e6, 0.5).unwrap();
         assert_eq!(map.n(), 3600 - 72);
         assert!((0.8..1.3).contains(&map.rms_us), "{}", map.rms_us);
         for x in [1e6, 1e9, 1.7777e9, 3.5e9, 3.6e9] {
@@ -203,14 +204,14 @@ mod tests {
         let (from, to) = map.span_us();
         let mean = (bend(to) - bend(from)) / (to - from);
         assert!((map.drift.value - mean).abs() < 4.0 * map.drift.se);
-        // Half an hour beyond the end much less is known.
+        // Half an hour beyond the end the uncertainty is much larger.
         assert!(map.standard_error(5.4e9) > 5.0 * map.standard_error(3.6e9));
     }
 
     #[test]
     fn few_points_give_the_line_of_least_squares() {
         let all = points(6, |x| 3e-6 * x);
-        let map = Smooth::fit(&all, 1e9, 0.1).unwrap();
+        let map = SmoothMap::fit(&all, 1e9, 0.1).unwrap();
         assert_eq!(map.free, 4.0);
         let sigma2 = map.sigma_us * map.sigma_us;
         let sxx: f64 = (0..6).map(|k| (f64::from(k) - 2.5).powi(2)).sum();
@@ -224,8 +225,8 @@ mod tests {
 
     #[test]
     fn too_little_gives_no_map() {
-        assert_eq!(Smooth::fit(&points(2, |_| 0.0), 10e6, 1.0), None);
+        assert_eq!(SmoothMap::fit(&points(2, |_| 0.0), 10e6, 1.0), None);
         let same = vec![Point::new(1.0, 2.0); 9];
-        assert_eq!(Smooth::fit(&same, 10e6, 1.0), None);
+        assert_eq!(SmoothMap::fit(&same, 10e6, 1.0), None);
     }
 }

@@ -1,4 +1,4 @@
-//! Points that a map is fitted to, and figures with their error.
+//! Points of a map, and values with their error.
 
 use crate::distributions::student_quantile;
 
@@ -12,7 +12,7 @@ pub struct Point {
 }
 
 impl Point {
-    /// A point as good as any other.
+    /// A point with typical noise.
     pub fn new(from_us: f64, to_us: f64) -> Self {
         Self {
             from_us,
@@ -22,7 +22,7 @@ impl Point {
     }
 }
 
-/// A figure with its standard error, which has so many degrees of freedom.
+/// A value with its standard error and degrees of freedom.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Figure {
     pub value: f64,
@@ -31,7 +31,7 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// The difference to another that errs by itself: degrees of freedom after Welch (1947).
+    /// Difference to another value with independent error: degrees of freedom after Welch (1947).
     pub fn less(self, other: Self) -> Self {
         let (a, b) = (self.se * self.se, other.se * other.se);
         let free = (a + b) * (a + b) / (a * a / self.free + b * b / other.free);
@@ -46,7 +46,7 @@ impl Figure {
         }
     }
 
-    /// The standard error 1.96 of which are half of the 95 % interval, few degrees of freedom included.
+    /// Standard error such that 1.96 of it are half of the 95 % interval, also for few degrees of freedom.
     pub(crate) fn stated_se(self) -> f64 {
         self.se * student_quantile(0.975, self.free) / 1.96
     }

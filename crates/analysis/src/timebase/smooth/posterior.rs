@@ -1,20 +1,20 @@
-//! What points say of a map: the average over all smoothnesses, each by its restricted likelihood.
+//! Posterior of a map: the average over all smoothnesses, weighted by their restricted likelihood.
 
 use super::band::{Band, dot};
 use super::grid::Grid;
 use super::smoothness::{Candidate, Data, FREE};
 
-/// Points for each step of the spline, on average at least.
+/// Minimum average number of points per step of the spline.
 const POINTS_PER_STEP: usize = 4;
-/// Most steps: of a longer session they are longer.
-const MOST_STEPS: usize = 4000;
-/// Probability, before anything is known, that rates change evenly: larger, and wander that hardly shows is taken for none and
-/// intervals hold too rarely; smaller, and the intervals of rates that do not wander are too wide.
+/// Maximum number of steps; longer sessions have longer steps.
+const MAX_STEPS: usize = 4000;
+/// Prior probability that rates change evenly. If larger, weak wander is taken for none and coverage is too low; if smaller,
+/// intervals of steady rates are too wide.
 const EVEN_SHARE: f64 = 0.125;
-/// Of fewer points a straight line is made.
+/// Fewer points give a straight line.
 const LINE_BELOW: usize = 8;
 
-/// What the points say of the coefficients, averaged over all smoothnesses.
+/// Posterior of the coefficients, averaged over all smoothnesses.
 pub(crate) struct Posterior {
     pub grid: Grid,
     pub span_us: (f64, f64),
@@ -27,8 +27,8 @@ pub(crate) struct Posterior {
 }
 
 impl Posterior {
-    /// Of (time, deviation, spread) in order of time, with the mean rate between two times, the first and the last point's unless
-    /// others are asked for, µs.
+    /// From (time, deviation, spread) in time order, with the mean rate between two times, by default the first and the last
+    /// point's, µs.
     pub fn new(
         points: &[(f64, f64, f64)],
         step_us: f64,
@@ -44,7 +44,7 @@ impl Posterior {
         let most = if free < FREE {
             1
         } else {
-            (n / POINTS_PER_STEP).clamp(1, MOST_STEPS)
+            (n / POINTS_PER_STEP).clamp(1, MAX_STEPS)
         };
         let steps = ((span / step_us) as usize).clamp(1, most);
         let grid = Grid {
@@ -52,7 +52,7 @@ impl Posterior {
             step_us: span / steps as f64,
             steps,
         };
-        // Relative to the chord through the first and last: what is left is small.
+        // Relative to the chord through the first and last point, so that the values are small.
         let y0 = points[0].1;
         let slope = (points[n - 1].1 - y0) / span;
         let rest = points
@@ -61,7 +61,7 @@ impl Posterior {
         let rest: Vec<(f64, f64, f64)> = rest.collect();
         let between_us = between_us.unwrap_or((first, last));
         let mut data = Data::new(&rest, &grid, free, between_us);
-        // Relative to the parabola, which no penalty holds: else what is large in it would be lost in the rounding of large penalties.
+        // Relative to the parabola, which no penalty affects: otherwise rounding errors of large penalties would swamp it.
         let parabola = data.parabola()?.coefficients;
         let rest = rest
             .iter()
@@ -72,7 +72,7 @@ impl Posterior {
         let mut candidates: Vec<Candidate> = data.parabola().into_iter().collect();
         let mean = data.information.iter().map(|r| r[0]).sum::<f64>() / size as f64;
         let wandering = data.wandering(mean);
-        // A rate that changes evenly is what crystals left alone do: it has its share before anything is known.
+        // Undisturbed crystals change their rate evenly, hence the prior share.
         let odds = EVEN_SHARE / (1.0 - EVEN_SHARE) * wandering.len().max(1) as f64;
         for candidate in &mut candidates {
             candidate.log_likelihood += libm::log(odds);

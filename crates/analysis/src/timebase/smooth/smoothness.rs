@@ -1,25 +1,25 @@
-//! One smoothness at a time: the map of greatest posterior density, its covariances and its restricted likelihood.
+//! A single smoothness: the map of maximum posterior density, its covariances and its restricted likelihood.
 
 use super::band::{Band, dot, factor, inverse_band, solve};
 use super::grid::Grid;
 
-/// Smoothnesses that are tried, as powers of ten of the mean information on a coefficient: below the first a map follows the
-/// noise, above the last nothing is left in 64 bits of what the points say.
+/// Candidate smoothnesses as powers of ten of the mean information on a coefficient: below the first a map follows the
+/// noise, above the last 64 bits lose the information of the points.
 const LOWEST_POWER: f64 = -2.0;
 const HIGHEST_POWER: f64 = 12.0;
-/// Coefficients that no penalty holds: those of a parabola.
+/// Number of coefficients that no penalty affects: those of a parabola.
 pub(crate) const FREE: usize = 3;
 
-/// How a rate wanders.
+/// Model of rate wander.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
-    /// As temperature does: its change changes slowly.
+    /// Like temperature: the rate of change changes slowly.
     Third,
-    /// In small steps of its own.
+    /// Small independent steps.
     Second,
 }
 
-/// One smoothness: its maximum and what is left of uncertainty there.
+/// One smoothness: its maximum and the uncertainty there.
 pub(crate) struct Candidate {
     pub log_likelihood: f64,
     pub variance: f64,
@@ -30,7 +30,7 @@ pub(crate) struct Candidate {
 
 /// Sums over the points.
 pub struct Data {
-    /// Coefficients that no penalty holds.
+    /// Number of coefficients that no penalty affects.
     free: usize,
     n: f64,
     pub information: Band,
@@ -41,7 +41,7 @@ pub struct Data {
 }
 
 impl Data {
-    /// Of (time, value, spread); the mean rate is that between two times, µs.
+    /// From (time, value, spread); the mean rate is that between two times, µs.
     pub fn new(
         points: &[(f64, f64, f64)],
         grid: &Grid,
@@ -78,7 +78,7 @@ impl Data {
         data
     }
 
-    /// Takes other values at the same times.
+    /// Replaces the values at the same times.
     pub fn take(&mut self, points: &[(f64, f64, f64)], grid: &Grid) {
         self.right = vec![0.0; grid.size()];
         self.squares = 0.0;
@@ -92,7 +92,8 @@ impl Data {
         }
     }
 
-    /// All smoothnesses but the limit; none of so few points that a line is made of them. `mean`: information on a coefficient.
+    /// All smoothnesses except the limit; none if there are so few points that they give a line. `mean`: information on a
+    /// coefficient.
     pub(crate) fn wandering(&self, mean: f64) -> Vec<Candidate> {
         let mut out = Vec::new();
         for (kind, high) in [
@@ -109,8 +110,8 @@ impl Data {
         out
     }
 
-    /// With a penalty of this size, on third differences or on how much second differences scatter about their mean: neither holds
-    /// a parabola.
+    /// With a penalty of this size, on third differences or on the scatter of second differences about their mean: neither
+    /// affects a parabola.
     fn at(&self, penalty: f64, kind: Kind) -> Option<Candidate> {
         let size = self.right.len();
         let differences: &[f64] = match kind {
@@ -129,8 +130,8 @@ impl Data {
         let l = factor(&a)?;
         let mut determinant: f64 = l.iter().map(|r| 2.0 * libm::log(r[0])).sum();
         let mut covariances = inverse_band(&l);
-        // Without their mean: less the square of their sum, which the outermost coefficients alone make up (Sherman and
-        // Morrison 1950).
+        // Without their mean: subtract the square of their sum, which depends only on the outermost coefficients (Sherman
+        // and Morrison 1950).
         let mut apart = vec![0.0; size];
         if kind == Kind::Second {
             let share = penalty / rows as f64;
@@ -143,7 +144,7 @@ impl Data {
             if left.is_nan() || left <= 1e-9 {
                 return None;
             }
-            // The determinant of these penalties is that of the third differences over their number.
+            // The determinant of these penalties is that of the third differences divided by their number.
             determinant += libm::log(left) + libm::log(rows as f64);
             let scale = (share / left).sqrt();
             apart = solved.iter().map(|v| scale * v).collect();
@@ -175,7 +176,7 @@ impl Data {
         })
     }
 
-    /// With an infinite penalty: a parabola is left, or the line.
+    /// With an infinite penalty: a parabola, or the line.
     pub(crate) fn parabola(&self) -> Option<Candidate> {
         let size = self.right.len();
         let middle = 0.5 * (size - 1) as f64;
@@ -221,7 +222,7 @@ impl Data {
                 row
             })
             .collect();
-        // The limit of the determinants: that of the third differences is that of the monomials over 4.
+        // The limit of the determinants: that of the third differences is that of the monomials divided by 4.
         let determinant = libm::log(m.determinant()) + 6.0 * libm::log(scale) - libm::log(4.0);
         Some(Candidate {
             log_likelihood: -0.5 * (self.free_of_noise() * libm::log(variance) + determinant),
@@ -232,7 +233,7 @@ impl Data {
         })
     }
 
-    /// Variance of a point, with what cancels in it kept above 0.
+    /// Variance of a point, kept above 0 despite cancellation.
     fn variance(&self, explained: f64) -> f64 {
         let left = (self.squares - explained)
             .max(1e-12 * self.squares)

@@ -6,7 +6,7 @@ use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
 
-use skinrig_hil::lease::{Lease, Owner, Pace};
+use skinrig_hil::lease::{Lease, LeaseTiming, Owner};
 use skinrig_protocol::rig::RigFile;
 use tempfile::TempDir;
 
@@ -257,7 +257,7 @@ fn a_bench_that_somebody_holds_is_left_alone_and_its_holder_named() {
         "lab".to_owned(),
         "hil run nightly".to_owned(),
     );
-    let lease = Lease::take(&bench.path(LEASE), owner, Pace::default()).unwrap();
+    let lease = Lease::take(&bench.path(LEASE), owner, LeaseTiming::default()).unwrap();
     assert!(bench::is_held(lease.path()));
     bench.survey.lines.clear();
     bench.survey.left_alone = true;

@@ -99,7 +99,7 @@ fn the_terminal_says_what_moved_since_when_and_why() {
     let few = Nights::of(11, 11).trend(&[]).code(0);
     has(
         &few.out,
-        &["too few nights to say what moved: 11 of the 12 that a reference needs"],
+        &["too few nights for trends: 11 of the 12 that a reference needs"],
     );
 }
 
@@ -111,7 +111,7 @@ fn what_is_no_history_is_bad_input_and_left_alone() {
     let page = lab.text("page.html");
     skinrig(&["hil", "trend", &none, "--html", &page])
         .code(2)
-        .complains(&["expected a history of nights, found nothing", "--rebuild"]);
+        .complains(&["expected a history of nights, found no file", "--rebuild"]);
     assert!(!lab.path("none.sqlite").exists() && !lab.path("page.html").exists());
 
     std::fs::write(lab.path("notes.txt"), "name,value\n").unwrap();
@@ -244,7 +244,7 @@ fn an_accepted_change_is_learnt_anew_and_says_who_and_why() {
     let told = nights.trend(&["--html", &page]).code(0);
     has(
         &told.out,
-        &["nothing moved in 40 nights; 1 of 2 series are still being learnt"],
+        &["nothing moved in 40 nights; 1 of 2 series are still learning their reference"],
     );
     let shown = read(Path::new(&page));
     let (_, accepted) = shown.split_once("data-testid=\"accepted\"").unwrap();
@@ -276,7 +276,7 @@ fn an_accepted_change_is_learnt_anew_and_says_who_and_why() {
     );
     has(
         &nights.trend(&[]).code(0).out,
-        &["too few nights to say what moved: 4 of the 12"],
+        &["too few nights for trends: 4 of the 12"],
     );
 }
 
@@ -356,13 +356,13 @@ fn a_night_without_trends_says_why_and_is_judged_all_the_same() {
     let page = shown(&folder);
     has(
         &page,
-        &["data-testid=\"trends-not-kept\"", "--history FILE"],
+        &["data-testid=\"trends-not-requested\"", "--history FILE"],
     );
     assert!(!folder.join("trends.html").exists());
     links(&folder.join("night.html"));
 
     let (ran, folder) = nights.run(&["--history", &nights.history]);
-    let too_few = "too few nights to say what moved: 10 of the 12";
+    let too_few = "too few nights for trends: 10 of the 12";
     has(&ran.code(0).out, &[too_few]);
     has(
         &shown(&folder),
@@ -374,7 +374,7 @@ fn a_night_without_trends_says_why_and_is_judged_all_the_same() {
     let ran = ran.code(0);
     assert!(!ran.out.contains("trend"), "{ran:#?}");
     ran.complains(&[
-        "no trends tonight",
+        "no trends for this night",
         "a file that is not SQLite",
         "--rebuild",
     ]);
@@ -383,9 +383,9 @@ fn a_night_without_trends_says_why_and_is_judged_all_the_same() {
     has(
         &page,
         &[
-            "data-testid=\"trends-untold\"",
+            "data-testid=\"trends-unavailable\"",
             "a file that is not SQLite",
-            "judged all the same",
+            "Limits were checked nevertheless",
         ],
     );
     // It is added when the history is there again.

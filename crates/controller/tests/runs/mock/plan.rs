@@ -112,16 +112,16 @@ impl RecordSink for Sink {
             lock(world).t += ms * MS;
         }
         match self.fail {
-            Some((k, SinkFailure::Once)) if n == k => Err(SinkFault::Refused("disk full".into())),
+            Some((k, SinkFailure::Once)) if n == k => Err(SinkFault::Rejected("disk full".into())),
             Some((k, SinkFailure::Forever)) if n >= k => {
-                Err(SinkFault::Refused("disk full".into()))
+                Err(SinkFault::Rejected("disk full".into()))
             }
             Some((k, SinkFailure::Panic)) if n == k => {
                 std::panic::panic_any("sink panics".to_owned())
             }
             Some((k, SinkFailure::Late)) if n == k => {
                 self.records.push(record);
-                Err(SinkFault::Late("disk slow".into()))
+                Err(SinkFault::Delayed("disk slow".into()))
             }
             _ => {
                 self.records.push(record);

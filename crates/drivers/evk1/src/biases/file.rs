@@ -3,8 +3,8 @@
 use super::{BIASES, Values, complete, named};
 use crate::error::Evk1Error;
 
-/// Reads a bias file. Every value is checked against its bias's range; what the file does not name keeps its default,
-/// and the interlocks hold for the whole. Empty lines are skipped.
+/// Parses a bias file. Checks every value against its range and all interlocks. Biases that are not in the file keep their defaults;
+/// empty lines are skipped.
 ///
 /// # Errors
 /// [`Evk1Error::BiasFile`] with the line; [`Evk1Error::Refused`] for a broken interlock.
@@ -53,10 +53,10 @@ pub fn parse_bias_file(text: &str) -> Result<Values, Evk1Error> {
     complete(&values)
 }
 
-/// Writes a bias file with all biases.
+/// Formats a bias file with all biases.
 ///
 /// # Errors
-/// [`Evk1Error::Refused`] for values that could not be set.
+/// [`Evk1Error::Refused`] for invalid values.
 pub fn write_bias_file(values: &Values) -> Result<String, Evk1Error> {
     let values = complete(values)?;
     Ok(BIASES

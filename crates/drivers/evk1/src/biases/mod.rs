@@ -1,4 +1,4 @@
-//! The biases of the sensor: their ranges, the registers' codes, and the interlocks between them.
+//! The sensor's biases: ranges, register codes, and interlocks.
 //!
 //! Source: OpenEB 3.1.2, `hal_psee_plugins/src/devices/gen31/gen31_ll_biases.cpp` and `biasgen/*.calib`.
 
@@ -14,7 +14,7 @@ use crate::access::Registers;
 use crate::error::Evk1Error;
 use crate::registers::{Register, bias_generator};
 
-/// Which DAC makes a bias.
+/// Type of a bias DAC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Dac {
     Voltage,
@@ -28,7 +28,7 @@ enum Dac {
 pub struct Bias {
     /// Its name.
     pub name: &'static str,
-    /// What it accepts, mV.
+    /// Allowed range, mV.
     pub range_mv: RangeInclusive<i64>,
     /// Its default, mV.
     pub default_mv: i64,
@@ -52,10 +52,10 @@ const fn bias(
     }
 }
 
-/// The reference of the two contrast thresholds, mV; not to be changed.
+/// Reference of the two contrast thresholds, mV; fixed.
 pub(crate) const DIFF: &str = "bias_diff";
 
-/// All biases that have a name, in the order of a bias file. `bias_diff` accepts its default alone.
+/// All named biases in the order of a bias file. `bias_diff` accepts only its default.
 pub const BIASES: [Bias; 7] = [
     bias(DIFF, 21, Dac::Voltage, 299..=299, 299),
     bias("bias_diff_off", 19, Dac::Voltage, 0..=1800, 221),
@@ -130,14 +130,14 @@ const P_PLAIN: u32 = 0x5100_0000;
 /// Enabled, buffer 8; current DAC, cascode, P.
 const P_CASCODE: u32 = 0x4100_0000;
 
-/// Index of the last item that is not above `mv`; the first item is not.
+/// Index of the last item that is at most `mv`; the first item always is.
 fn lowest_below(thresholds: &[i64], mv: i64) -> usize {
     thresholds
         .partition_point(|&from| from <= mv)
         .saturating_sub(1)
 }
 
-/// The code of `mv` in a table that begins at `first_mv`; 0 beyond its end.
+/// Code of `mv` in a table that starts at `first_mv`; 0 beyond its end.
 fn code(table: &[u16], first_mv: i64, mv: i64) -> u32 {
     let at = usize::try_from(mv - first_mv).ok();
     at.and_then(|at| table.get(at))
@@ -145,7 +145,7 @@ fn code(table: &[u16], first_mv: i64, mv: i64) -> u32 {
         .map_or(0, u32::from)
 }
 
-/// All biases: those of `wanted`, and the defaults of the others.
+/// All biases: `wanted` plus the defaults of the others.
 ///
 /// # Errors
 /// [`Evk1Error::Refused`] for an unknown name, a value out of range, or a broken interlock.
@@ -166,8 +166,8 @@ pub fn complete(wanted: &Values) -> Result<Values, Evk1Error> {
     Ok(values)
 }
 
-/// The rules between biases: the contrast thresholds keep their distance from the reference, more of it while the
-/// pixel's bandwidth is high, and a high bandwidth asks for a refractory bias that is not the lowest.
+/// Checks the rules between biases: the contrast thresholds keep a distance from the reference, a larger one while the pixel bandwidth
+/// is high, and a high bandwidth requires a refractory bias above the minimum.
 fn check_interlocks(values: &Values) -> Result<(), Evk1Error> {
     let of = |name: &str| values.get(name).copied().unwrap_or_default();
     let (diff, on, off) = (of(DIFF), of("bias_diff_on"), of("bias_diff_off"));
@@ -205,8 +205,8 @@ fn check_interlocks(values: &Values) -> Result<(), Evk1Error> {
     Ok(())
 }
 
-/// Writes all biases, which [`complete`] has checked. `bias_fo` is written last when it falls and first when it rises,
-/// so that the interlocks hold after every single write.
+/// Writes all biases, after [`complete`] has checked them. Writes `bias_fo` last when it falls and first when it rises, so that the
+/// interlocks hold after every write.
 ///
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
@@ -231,7 +231,7 @@ pub fn write(registers: &mut Registers<'_>, values: &Values) -> Result<(), Evk1E
     Ok(())
 }
 
-/// Reads a bias and says what it found: `mv` when the register holds that value's word, the word otherwise.
+/// Reads a bias: returns `mv` if the register has the word of that value, otherwise the word.
 ///
 /// # Errors
 /// [`Evk1Error::Usb`].

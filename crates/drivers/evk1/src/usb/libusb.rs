@@ -1,5 +1,5 @@
-//! Cameras through libusb. Each camera has a context of its own, and nothing touches libusb's global one, which panics
-//! on a machine without USB.
+//! Transport over libusb. Each camera has its own context; libusb's global one is never used, because it panics on a computer without
+//! USB.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,7 +14,7 @@ use crate::error::UsbError;
 use crate::inbox::Inbox;
 use crate::requests::{EVENT_ENDPOINT, INTERFACE, TREUZELL_SUBCLASS, USB_IDS};
 
-/// Longest wait for a control request.
+/// Time limit of a control request.
 const CONTROL_LIMIT: Duration = Duration::from_secs(1);
 /// Vendor request to the device, IN and OUT.
 const VENDOR_IN: u8 = 0xc0;
@@ -33,22 +33,22 @@ impl From<rusb::Error> for UsbError {
     }
 }
 
-/// A device on the bus whose USB IDs an EVK1 may have.
+/// A device on the bus with USB IDs of an EVK1.
 pub struct Slot {
     context: Context,
     device: Device<Context>,
     ids: (u16, u16),
 }
 
-/// What opening a slot led to.
+/// Result of opening a device.
 pub enum Access {
-    /// Open and claimed; nothing was asked yet.
+    /// Open and claimed, not queried yet.
     Open(LibUsb),
-    /// By its descriptors a Treuzell camera, which was left alone.
+    /// A Treuzell camera according to its descriptors; left alone.
     Treuzell,
 }
 
-/// All devices on the bus whose USB IDs an EVK1 may have.
+/// All devices on the bus with USB IDs of an EVK1.
 ///
 /// # Errors
 /// [`UsbError::NoUsb`] when libusb finds no bus.
@@ -57,7 +57,7 @@ pub fn bus() -> Result<Vec<Slot>, UsbError> {
     let devices = context.devices()?;
     let mut slots = Vec::new();
     for device in devices.iter() {
-        // A device that leaves the bus meanwhile is none.
+        // Skip devices that are disconnected meanwhile.
         let Ok(descriptor) = device.device_descriptor() else {
             continue;
         };
@@ -75,7 +75,7 @@ pub fn bus() -> Result<Vec<Slot>, UsbError> {
 }
 
 impl Slot {
-    /// Where the device is plugged in, what it says it is, and how fast it is.
+    /// Bus, address, IDs and speed.
     #[must_use]
     pub fn place(&self) -> String {
         let speed = match self.device.speed() {
@@ -92,8 +92,7 @@ impl Slot {
         )
     }
 
-    /// The port that it is plugged into, as `usb-BUS-PORT.PORT`, which stays the same when it is plugged in again; `None` where the system does
-    /// not tell it.
+    /// Port as `usb-BUS-PORT.PORT`, which is stable across reconnections; `None` if the system does not report it.
     #[must_use]
     pub fn port(&self) -> Option<String> {
         let ports = self.device.port_numbers().ok().filter(|p| !p.is_empty())?;
@@ -105,13 +104,13 @@ impl Slot {
         ))
     }
 
-    /// Its bus, and its address on it.
+    /// Bus number and device address.
     #[must_use]
     pub fn address(&self) -> (u8, u8) {
         (self.device.bus_number(), self.device.address())
     }
 
-    /// True when the descriptors are those of a Treuzell camera.
+    /// Whether the descriptors are those of a Treuzell camera.
     fn treuzell(&self) -> Result<bool, UsbError> {
         let descriptor = self
             .device
@@ -123,17 +122,16 @@ impl Slot {
             .any(|d| d.sub_class_code() == TREUZELL_SUBCLASS))
     }
 
-    /// Reads the descriptors, and opens and claims the device if they may be those of an EVK1. What arrives on it is
-    /// stamped on `clock`.
+    /// Reads the descriptors; opens and claims the device if it may be an EVK1. Received data is stamped with `clock`.
     ///
     /// # Errors
-    /// [`UsbError::Busy`], [`UsbError::NoPermission`], and whatever else libusb says.
+    /// [`UsbError::Busy`], [`UsbError::NoPermission`], and other libusb errors.
     pub fn open(&self, clock: RealClock) -> Result<Access, UsbError> {
         if self.treuzell()? {
             return Ok(Access::Treuzell);
         }
         let handle = self.device.open()?;
-        // Not every system can tell.
+        // Not every system supports this.
         if handle.kernel_driver_active(INTERFACE).unwrap_or(false) {
             handle.detach_kernel_driver(INTERFACE)?;
         }
@@ -160,7 +158,7 @@ pub struct LibUsb {
 }
 
 impl LibUsb {
-    /// Clears the stall that ended the stream before, if one did.
+    /// Clears the stall that ended the previous stream, if any.
     fn unstall(&mut self) -> Result<(), UsbError> {
         if std::mem::take(&mut self.stalled) {
             self.handle.clear_halt(EVENT_ENDPOINT)?;

@@ -1,4 +1,4 @@
-//! The way to a camera: control requests, and a stream of bytes that arrive by themselves.
+//! USB transport: control requests and the event stream.
 
 mod libusb;
 mod transfers;
@@ -12,13 +12,12 @@ use crate::config::Evk1Config;
 use crate::error::UsbError;
 use crate::inbox::Inbox;
 
-/// What the driver needs from USB. The driver owns it alone, so a read and the write that follows it are never
-/// separated.
+/// USB operations of the driver. The driver has exclusive access, so a read and the following write are never separated.
 pub trait Transport: Send {
-    /// Vendor request to the device, IN (bmRequestType 0xC0); the number of bytes received.
+    /// Sends a vendor request to the device, IN (bmRequestType 0xC0). Returns the number of bytes received.
     ///
     /// # Errors
-    /// [`UsbError`], at the latest after a second.
+    /// [`UsbError`], after at most one second.
     fn control_in(
         &mut self,
         request: u8,
@@ -27,10 +26,10 @@ pub trait Transport: Send {
         answer: &mut [u8],
     ) -> Result<usize, UsbError>;
 
-    /// Vendor request to the device, OUT (bmRequestType 0x40).
+    /// Sends a vendor request to the device, OUT (bmRequestType 0x40).
     ///
     /// # Errors
-    /// [`UsbError`], at the latest after a second; [`UsbError::Short`] unless all of `data` went out.
+    /// [`UsbError`], after at most one second; [`UsbError::Short`] if part of `data` was not sent.
     fn control_out(
         &mut self,
         request: u8,
@@ -39,38 +38,37 @@ pub trait Transport: Send {
         data: &[u8],
     ) -> Result<(), UsbError>;
 
-    /// Resets the device on the bus. Claims stay.
+    /// Resets the device on the bus and keeps the claim.
     ///
     /// # Errors
     /// [`UsbError`].
     fn reset(&mut self) -> Result<(), UsbError>;
 
-    /// Takes a stall off the event endpoint.
+    /// Clears a stall of the event endpoint.
     ///
     /// # Errors
     /// [`UsbError`].
     fn clear_halt(&mut self) -> Result<(), UsbError>;
 
-    /// Reads once from the event endpoint while no stream runs; 0 when nothing came within `limit`.
+    /// Reads once from the event endpoint while no stream runs; 0 on timeout.
     ///
     /// # Errors
     /// [`UsbError`].
     fn read_events(&mut self, buffer: &mut [u8], limit: Duration) -> Result<usize, UsbError>;
 
-    /// Queues transfers on the event endpoint; from now on everything that arrives goes to `inbox`, stamped on
-    /// arrival, and so does the error that ends the stream.
+    /// Queues transfers on the event endpoint. From now on all received data goes to `inbox`, stamped on arrival, and so does the error that
+    /// ends the stream.
     ///
-    /// # Errors
+    /// [`UsbError`]; the stream is then not running.
     /// [`UsbError`]; no stream runs then.
     fn start_stream(&mut self, inbox: Arc<Inbox>, config: &Evk1Config) -> Result<(), UsbError>;
 
-    /// Takes the transfers back; what they already hold still goes to the inbox. Nothing does any more after this
-    /// returns. Allowed without a stream.
+    /// Cancels the transfers; their data still goes to the inbox. Afterwards nothing arrives. Allowed without a stream.
     ///
     /// # Errors
-    /// [`UsbError::Stuck`] when they do not come back within a second.
+    /// [`UsbError::Stuck`] if they do not return within a second.
     fn stop_stream(&mut self) -> Result<(), UsbError>;
 
-    /// Where the device is plugged in, for people.
+    /// Bus and port, for messages.
     fn place(&self) -> String;
 }

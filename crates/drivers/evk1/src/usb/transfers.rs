@@ -1,8 +1,8 @@
-//! Asynchronous bulk transfers: always queued, never waited for.
+//! Asynchronous bulk transfers that are always queued.
 //!
-//! An event thread runs libusb's event loop. The completion callback stamps the arrival, copies the bytes into the
-//! inbox's growing block (a chunk is then handed on without another copy), and submits the transfer again at once with
-//! its own buffer. The inbox never makes it wait, so the pipe keeps moving whatever the rest of the program does.
+//! An event thread runs libusb's event loop. The completion callback stamps the arrival, copies the bytes into the inbox's current block
+//! (which becomes a chunk without another copy), and resubmits the transfer with its own buffer. The inbox never blocks, so the pipe keeps
+//! moving whatever the rest of the program does.
 
 #![expect(
     unsafe_code,
@@ -32,33 +32,33 @@ use crate::error::UsbError;
 use crate::inbox::Inbox;
 use crate::requests::EVENT_ENDPOINT;
 
-/// Longest wait for cancelled transfers, and for the event thread.
+/// Time limit for cancelled transfers and for the event thread.
 const STOP_LIMIT: Duration = Duration::from_secs(1);
-/// So many transfers may fail in a row before that ends the stream, where a failure is a loss.
+/// Consecutive failed transfers that end the stream, if failures count as losses.
 const FAILURES: u32 = 100;
-/// The event loop looks up at least this often.
+/// Longest wait of the event loop.
 const LOOK_UP: Duration = Duration::from_millis(100);
 
-/// What the callbacks share with the owner of the stream.
+/// State shared by the callbacks and the owner of the stream.
 struct Shared {
     inbox: Arc<Inbox>,
     clock: RealClock,
-    /// A transfer that fails is a loss, and goes on.
+    /// Whether a failed transfer is a loss instead of the end of the stream.
     failures_are_losses: bool,
     flight: Mutex<Flight>,
-    /// Told when a transfer is not submitted again, and when the event thread ends.
+    /// Notified when a transfer is not resubmitted, and when the event thread ends.
     landed: Condvar,
-    /// The event thread shall end although transfers are under way.
+    /// Whether the event thread must end despite transfers in flight.
     abandoned: AtomicBool,
 }
 
 #[derive(Default)]
 struct Flight {
-    /// Transfers under way.
+    /// Transfers in flight.
     count: usize,
-    /// Nothing is submitted any more.
+    /// Whether submission is disabled.
     ending: bool,
-    /// Transfers that failed in a row and were submitted again.
+    /// Consecutive failed transfers.
     failed: u32,
     stalled: bool,
     thread_ended: bool,
@@ -69,7 +69,7 @@ impl Shared {
         self.flight.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits until `done` or the time limit, and returns the state then.
+    /// Waits until `done` or the time limit, and returns the state.
     fn wait(&self, done: impl Fn(&Flight) -> bool) -> MutexGuard<'_, Flight> {
         self.landed
             .wait_timeout_while(self.flight(), STOP_LIMIT, |f| !done(f))
@@ -78,11 +78,11 @@ impl Shared {
     }
 }
 
-/// One transfer with the memory that it writes to.
+/// A transfer with its buffer.
 struct Job {
     transfer: NonNull<libusb_transfer>,
     buffer: NonNull<[u8]>,
-    /// What `user_data` of the transfer points to.
+    /// Target of the transfer's `user_data`.
     shared: *const Shared,
 }
 
@@ -140,7 +140,7 @@ impl Drop for Job {
     }
 }
 
-/// Called by libusb whenever a transfer comes back, on whichever thread handles events.
+/// Completion callback of libusb, on the thread that handles events.
 extern "system" fn completed(transfer: *mut libusb_transfer) {
     // SAFETY: libusb hands over a transfer that `Job::new` filled: its `user_data` is a `Shared` that the job keeps
     // alive, and the job outlives the transfer's flight.
@@ -153,7 +153,7 @@ extern "system" fn completed(transfer: *mut libusb_transfer) {
         let bytes = std::slice::from_raw_parts((*transfer).buffer.cast_const(), length);
         ((*transfer).status, bytes)
     };
-    // Also a transfer that timed out or was cancelled can hold bytes.
+    // A transfer that timed out or was cancelled may contain data too.
     shared.inbox.push(bytes, arrived);
     let outcome = match status {
         LIBUSB_TRANSFER_COMPLETED | LIBUSB_TRANSFER_TIMED_OUT => Ok(true),
@@ -197,7 +197,7 @@ extern "system" fn completed(transfer: *mut libusb_transfer) {
     shared.landed.notify_all();
 }
 
-/// Submits a transfer that is filled and not under way; true when it is on its way.
+/// Submits a filled, idle transfer; returns whether it is in flight.
 fn submit(transfer: *mut libusb_transfer) -> Result<bool, UsbError> {
     // SAFETY: both callers hold the flight's lock and a transfer that `Job::new` filled and that is not under way.
     match unsafe { libusb_submit_transfer(transfer) } {
@@ -216,7 +216,7 @@ fn submit_error(code: i32) -> UsbError {
     }
 }
 
-/// The transfers of a running stream and the thread that serves them.
+/// The transfers of a running stream and their thread.
 pub(super) struct Transfers {
     jobs: Vec<Job>,
     shared: Arc<Shared>,
@@ -269,7 +269,7 @@ impl Transfers {
         for job in &self.jobs {
             let mut flight = self.shared.flight();
             if flight.ending {
-                break; // One came back with an error, which the inbox has.
+                break; // One returned with an error, which is in the inbox.
             }
             submit(job.transfer.as_ptr())?;
             flight.count += 1;
@@ -277,12 +277,12 @@ impl Transfers {
         Ok(())
     }
 
-    /// True when the endpoint stalled.
+    /// Whether the endpoint stalled.
     pub fn stalled(&self) -> bool {
         self.shared.flight().stalled
     }
 
-    /// Cancels the transfers and waits for them. Those that do not come back are never freed.
+    /// Cancels the transfers and waits for them. Transfers that do not return are never freed.
     pub fn stop(&mut self) -> Result<(), UsbError> {
         let Some(thread) = self.thread.take() else {
             return Ok(());
@@ -297,7 +297,7 @@ impl Transfers {
         self.context.interrupt_handle_events();
         let ended = self.shared.wait(|f| f.thread_ended).thread_ended;
         if ended {
-            // A panic of it, which nothing in it should cause, has ended the stream by now.
+            // A panic of the thread, which is not expected, has ended the stream.
             let _ = thread.join();
         }
         if left > 0 || !ended {
@@ -315,14 +315,14 @@ impl Transfers {
 
 impl Drop for Transfers {
     fn drop(&mut self) {
-        // The jobs must not be freed under way; what else went wrong has nobody left to hear it.
+        // The jobs must not be freed in flight; other errors cannot be reported here.
         let _ = self.stop();
     }
 }
 
-/// The event thread: runs until the last transfer is back.
+/// The event thread: runs until the last transfer returns.
 fn serve(context: &Context, shared: &Shared) {
-    /// Tells that the thread ends, in whichever way.
+    /// Notifies waiting threads when the event thread exits, including by panic.
     struct End<'a>(&'a Shared);
     impl Drop for End<'_> {
         fn drop(&mut self) {

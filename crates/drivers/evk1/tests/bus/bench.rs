@@ -11,7 +11,7 @@ use skinrig_model::{CameraId, RawChunk, TriggerEdge};
 pub const FIRST: &str = "00001621";
 pub const SECOND: &str = "00001753";
 
-/// A test that hangs fails after this.
+/// Time limit after which a hanging test fails.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 pub fn noise(serial: &str) -> Emulated {
@@ -33,7 +33,7 @@ pub fn open(serial: &str) -> Evk1 {
     Evk1::open_serial(serial, camera, Evk1Config::default(), RealClock::start()).unwrap()
 }
 
-/// Flushes until `enough` of what has come, or an error.
+/// Flushes until `enough` accepts the received chunks, or until an error.
 pub fn until(
     camera: &mut Evk1,
     chunks: &mut Vec<RawChunk>,

@@ -1,4 +1,4 @@
-//! What is plugged in, and who may be asked.
+//! Listing of the connected devices and access to them.
 
 use skinrig_device::{CameraSettings, EventCamera, RealClock, Roi};
 use skinrig_emulated_camera::config::Access;
@@ -30,8 +30,8 @@ fn all_kinds() -> Vec<DeviceConfig> {
 }
 
 #[test]
-fn every_kind_of_device_is_listed_with_its_next_step() {
-    let test = "devices::every_kind_of_device_is_listed_with_its_next_step";
+fn each_kind_of_device_is_listed_with_its_next_step() {
+    let test = "devices::each_kind_of_device_is_listed_with_its_next_step";
     on_bus(test, all_kinds(), |remote| {
         let lines: Vec<String> = enumerate()
             .unwrap()
@@ -52,8 +52,8 @@ fn every_kind_of_device_is_listed_with_its_next_step() {
 }
 
 #[test]
-fn a_camera_is_opened_by_its_serial_number_and_the_others_are_left_alone() {
-    let test = "devices::a_camera_is_opened_by_its_serial_number_and_the_others_are_left_alone";
+fn a_camera_is_opened_by_serial_number_without_touching_others() {
+    let test = "devices::a_camera_is_opened_by_serial_number_without_touching_others";
     on_bus(test, all_kinds(), |remote| {
         let camera = open(SECOND);
         assert_eq!(camera.identity().serial, SECOND);
@@ -72,9 +72,9 @@ fn a_camera_is_opened_by_its_serial_number_and_the_others_are_left_alone() {
 }
 
 #[test]
-fn an_empty_bus_says_what_to_check() {
+fn an_empty_bus_names_what_to_check() {
     on_bus(
-        "devices::an_empty_bus_says_what_to_check",
+        "devices::an_empty_bus_names_what_to_check",
         Vec::new(),
         |_| {
             assert_eq!(enumerate().unwrap(), []);
@@ -90,9 +90,9 @@ fn an_empty_bus_says_what_to_check() {
     );
 }
 
-/// On this very machine, with or without USB: an answer or a name, never a panic.
+/// On the real machine, with or without USB: a list or an error, never a panic.
 #[test]
-fn a_machine_without_usb_is_told_so() {
+fn missing_usb_is_reported() {
     match enumerate() {
         Ok(_) => {}
         Err(error) => assert!(matches!(error, UsbError::NoUsb(_)), "{error}"),
@@ -100,9 +100,9 @@ fn a_machine_without_usb_is_told_so() {
 }
 
 #[test]
-fn a_slow_start_is_waited_for() {
+fn driver_waits_for_a_slow_start() {
     let slow = with(FIRST, |c| c.boot_ms = 300);
-    on_bus("devices::a_slow_start_is_waited_for", vec![slow], |_| {
+    on_bus("devices::driver_waits_for_a_slow_start", vec![slow], |_| {
         assert_eq!(
             open(FIRST).identity().firmware.split(',').next(),
             Some("FPGA 3.0.0")
@@ -111,13 +111,13 @@ fn a_slow_start_is_waited_for() {
 }
 
 #[test]
-fn the_whole_driver_keeps_the_contract() {
+fn whole_driver_keeps_the_contract() {
     // Whether a camera's time begins again at every start is not known; here it goes on.
     let camera = Emulated {
         time_restarts: false,
         ..noise(FIRST)
     };
-    let test = "devices::the_whole_driver_keeps_the_contract";
+    let test = "devices::whole_driver_keeps_the_contract";
     on_bus(test, vec![camera.into()], |_| {
         let settings = CameraSettings {
             roi: Some(Roi {
@@ -142,7 +142,7 @@ fn the_whole_driver_keeps_the_contract() {
     });
 }
 
-/// Nothing but the requests of the public driver, in the order that the model of the camera has seen.
+/// Only requests of the public driver, in the order in which the camera model received them.
 #[test]
 fn only_known_registers_and_requests_are_used() {
     let test = "devices::only_known_registers_and_requests_are_used";

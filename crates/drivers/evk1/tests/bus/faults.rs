@@ -1,4 +1,4 @@
-//! What goes wrong: every wait ends, every fault has a name, and what came before is handed over.
+//! Faults: every wait ends, every fault is named, and the data before it is delivered.
 
 use skinrig_device::{CameraSettings, DeviceError, EventCamera, RealClock};
 use skinrig_emulated_camera::harness::on_bus;
@@ -9,8 +9,8 @@ use skinrig_model::CameraId;
 use crate::bench::{FIRST, events, noise, open, until};
 
 #[test]
-fn a_pulled_cable_is_named_and_the_camera_comes_back() {
-    let test = "faults::a_pulled_cable_is_named_and_the_camera_comes_back";
+fn a_disconnected_cable_is_named_and_the_camera_can_be_reopened() {
+    let test = "faults::a_disconnected_cable_is_named_and_the_camera_can_be_reopened";
     on_bus(test, vec![noise(FIRST).into()], |remote| {
         let mut camera = open(FIRST);
         camera.start().unwrap();
@@ -19,7 +19,8 @@ fn a_pulled_cable_is_named_and_the_camera_comes_back() {
         remote.order(FIRST, Order::Unplug).unwrap();
         let lost = until(&mut camera, &mut chunks, |_| false).unwrap_err();
         assert!(
-            lost.to_string().contains("the device is gone from the bus"),
+            lost.to_string()
+                .contains("the device is no longer on the bus"),
             "{lost}"
         );
         camera.stop(&mut chunks).unwrap_err();
@@ -57,8 +58,8 @@ fn a_stall_ends_the_stream_and_the_next_start_clears_it() {
 }
 
 #[test]
-fn a_register_that_does_not_take_a_value_is_named() {
-    let test = "faults::a_register_that_does_not_take_a_value_is_named";
+fn a_register_that_rejects_a_value_is_named() {
+    let test = "faults::a_register_that_rejects_a_value_is_named";
     on_bus(test, vec![noise(FIRST).into()], |remote| {
         let mut camera = open(FIRST);
         remote.order(FIRST, Order::Stick(0x0358)).unwrap();
@@ -75,14 +76,14 @@ camera 1 00001621: bgen_22 (0x0358): expected 0x71002100 after writing, found 0x
 }
 
 #[test]
-fn a_camera_that_stops_answering_is_given_up_in_time() {
-    let test = "faults::a_camera_that_stops_answering_is_given_up_in_time";
+fn an_unresponsive_camera_times_out() {
+    let test = "faults::an_unresponsive_camera_times_out";
     on_bus(test, vec![noise(FIRST).into()], |remote| {
         let mut camera = open(FIRST);
         remote.order(FIRST, Order::Silence(true)).unwrap();
         let lost = camera.start().unwrap_err();
         assert!(
-            lost.to_string().contains("no answer within the time limit"),
+            lost.to_string().contains("no reply within the time limit"),
             "{lost}"
         );
         drop(camera);
@@ -101,7 +102,7 @@ fn a_camera_that_stops_answering_is_given_up_in_time() {
     });
 }
 
-/// Transfers are cancelled and freed however the camera is let go.
+/// Transfers are cancelled and freed no matter how the camera is released.
 #[test]
 fn a_streaming_camera_can_be_dropped() {
     let test = "faults::a_streaming_camera_can_be_dropped";

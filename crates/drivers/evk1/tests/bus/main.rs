@@ -1,4 +1,4 @@
-//! The whole driver, libusb included, on an emulated bus: production code down to the system calls.
+//! The whole driver, including libusb, on an emulated bus: production code down to the system calls.
 #![cfg(target_os = "linux")]
 #![expect(clippy::unwrap_used, reason = "tests")]
 

@@ -1,4 +1,4 @@
-//! The pattern generator: registers as the reference says, events in the pattern's order at the pattern's rate.
+//! The pattern generator: registers as in the reference, events in the pattern's order and rate.
 
 use skinrig_device::{CameraSettings, DeviceError, EventCamera, NoiseFilter, Roi, TestPattern};
 use skinrig_emulated_camera::harness::on_bus;
@@ -10,7 +10,7 @@ use crate::bench::{FIRST, events, noise, open, until};
 
 const PATTERN: Option<TestPattern> = Some(TestPattern { rate_ev_s: 1e6 });
 
-/// All events, also beyond the sensor.
+/// All events, including those outside the sensor.
 fn decoded(chunks: &[RawChunk]) -> Vec<CdEvent> {
     let mut decoder = Decoder::with_geometry(StreamFormat::Evt2, Geometry::ANY);
     let (mut all, mut triggers) = (Vec::new(), Vec::new());
@@ -21,9 +21,8 @@ fn decoded(chunks: &[RawChunk]) -> Vec<CdEvent> {
 }
 
 #[test]
-fn every_event_of_the_pattern_comes_in_its_place_whatever_the_sensors_settings() {
-    let test =
-        "pattern::every_event_of_the_pattern_comes_in_its_place_whatever_the_sensors_settings";
+fn pattern_events_are_complete_and_in_order_for_all_sensor_settings() {
+    let test = "pattern::pattern_events_are_complete_and_in_order_for_all_sensor_settings";
     on_bus(test, vec![noise(FIRST).into()], |remote| {
         let value = |address| remote.register(FIRST, address).unwrap();
         let mut camera = open(FIRST);
@@ -85,9 +84,8 @@ fn every_event_of_the_pattern_comes_in_its_place_whatever_the_sensors_settings()
 }
 
 #[test]
-fn a_generator_that_does_not_take_its_settings_is_told_and_closing_leaves_it_off() {
-    let test =
-        "pattern::a_generator_that_does_not_take_its_settings_is_told_and_closing_leaves_it_off";
+fn rejected_generator_settings_are_reported_and_closing_switches_it_off() {
+    let test = "pattern::rejected_generator_settings_are_reported_and_closing_switches_it_off";
     on_bus(test, vec![noise(FIRST).into()], |remote| {
         let mut camera = open(FIRST);
         remote.order(FIRST, Order::Stick(0x0744)).unwrap();

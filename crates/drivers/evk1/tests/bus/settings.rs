@@ -1,4 +1,4 @@
-//! What the driver writes, judged by a camera that was made without the driver's tables.
+//! Register writes of the driver, checked by a camera model built without the driver's tables.
 
 use skinrig_device::{CameraSettings, DeviceError, EventCamera, NoiseFilter, Roi, SyncMode};
 use skinrig_emulated_camera::harness::on_bus;
@@ -20,7 +20,7 @@ const INITIALISED: [(u32, u32); 8] = [
     (0x074c, 0x0000_0002),
 ];
 
-/// The stock biases, and two of the initialisation that are none (sections 2.6 and 2.9).
+/// The stock biases, and two registers of the initialisation that are not biases (sections 2.6 and 2.9).
 const BIASES: [(u32, u32); 8] = [
     (0x0300, 0x5900_00b0),
     (0x034c, 0x7900_001e),
@@ -33,8 +33,8 @@ const BIASES: [(u32, u32); 8] = [
 ];
 
 #[test]
-fn a_camera_is_left_as_the_reference_says_at_every_stage() {
-    let test = "settings::a_camera_is_left_as_the_reference_says_at_every_stage";
+fn registers_match_the_reference_at_every_stage() {
+    let test = "settings::registers_match_the_reference_at_every_stage";
     on_bus(test, vec![noise(FIRST).into()], |remote| {
         let value = |address| remote.register(FIRST, address).unwrap();
         let expect = |stage: &str, values: &[(u32, u32)]| {
@@ -135,8 +135,8 @@ fn a_register_that_cannot_be_read_has_no_value() {
 }
 
 #[test]
-fn the_temperature_is_that_of_the_board_in_every_state() {
-    let test = "settings::the_temperature_is_that_of_the_board_in_every_state";
+fn temperature_is_readable_in_every_state() {
+    let test = "settings::temperature_is_readable_in_every_state";
     on_bus(test, vec![noise(FIRST).into()], |remote| {
         let mut camera = open(FIRST);
         assert_eq!(camera.temperature_c().unwrap(), Some(25.0));

@@ -17,7 +17,7 @@ fn settings(sync: SyncMode, channels: &[u8]) -> CameraSettings {
 }
 
 #[test]
-fn a_master_and_its_slave_see_an_edge_at_the_same_time() {
+fn master_and_slave_timestamp_an_edge_equally() {
     let pair = [(FIRST, 100.0), (SECOND, -300.0)].map(|(serial, drift_ppm)| {
         Emulated {
             drift_ppm,
@@ -25,7 +25,7 @@ fn a_master_and_its_slave_see_an_edge_at_the_same_time() {
         }
         .into()
     });
-    let test = "time::a_master_and_its_slave_see_an_edge_at_the_same_time";
+    let test = "time::master_and_slave_timestamp_an_edge_equally";
     on_bus(test, pair.to_vec(), |remote| {
         let (mut master, mut slave) = (open(FIRST), open(SECOND));
         master.configure(&settings(SyncMode::Master, &[0])).unwrap();
@@ -52,8 +52,8 @@ fn a_master_and_its_slave_see_an_edge_at_the_same_time() {
 }
 
 #[test]
-fn a_camera_sees_its_own_pulses_on_the_loop_back() {
-    let test = "time::a_camera_sees_its_own_pulses_on_the_loop_back";
+fn a_camera_records_its_own_pulses_on_the_loopback() {
+    let test = "time::a_camera_records_its_own_pulses_on_the_loopback";
     on_bus(test, vec![noise(FIRST).into()], |_| {
         let mut camera = open(FIRST);
         camera
@@ -80,8 +80,8 @@ fn a_camera_sees_its_own_pulses_on_the_loop_back() {
 }
 
 #[test]
-fn a_time_base_that_begins_again_is_told() {
-    let test = "time::a_time_base_that_begins_again_is_told";
+fn a_restarted_time_base_is_reported() {
+    let test = "time::a_restarted_time_base_is_reported";
     on_bus(test, vec![noise(FIRST).into()], |_| {
         let mut camera = open(FIRST);
         let mut chunks = Vec::new();
@@ -96,6 +96,9 @@ fn a_time_base_that_begins_again_is_told() {
         assert!(first < 1000 && last > 500_000, "{first}, {last}");
         let mut notes = Vec::new();
         camera.take_notes(&mut notes);
-        assert!(notes.iter().any(|n| n.contains("began again")), "{notes:?}");
+        assert!(
+            notes.iter().any(|n| n.contains("time base restarted")),
+            "{notes:?}"
+        );
     });
 }

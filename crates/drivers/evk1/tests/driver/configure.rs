@@ -1,4 +1,4 @@
-//! Settings: written whole or not at all, read back, and kept to the camera's rules.
+//! Settings: written completely or not at all, read back, and checked against the camera's limits.
 
 use skinrig_device::{CameraSettings, DeviceError, EventCamera, NoiseFilter, Roi, SyncMode};
 use skinrig_evk1::registers as r;
@@ -69,7 +69,7 @@ noise_filter: below 26 events in 1023 µs / below 26 events in 1023 µs
 }
 
 #[test]
-fn what_reads_back_differently_is_named() {
+fn a_readback_mismatch_is_named() {
     let (bench, mut camera) = opened();
     bench.model().faults.stuck_at_zero = [(r::roi_x(3).address, 1 << 4)].into();
     let error = camera.configure(&CameraSettings::default()).unwrap_err();
@@ -80,12 +80,12 @@ camera 1 00001621: td_roi_x (0x040c): expected 0xffffffff after writing, found 0
 }
 
 #[test]
-fn a_register_known_to_read_differently_is_let_pass_and_still_shown() {
+fn a_tolerated_readback_mismatch_passes_and_is_still_shown() {
     let bench = Bench::new();
     bench.model().faults.stuck_at_zero = [(r::roi_x(3).address, 1 << 4)].into();
     let refused = bench.open().err().expect("no exception, no camera");
     insta::assert_snapshot!(refused, @r"
-td_roi_x (0x040c): expected 0xffffffff after writing, found 0xffffffef: power the camera off and on; an address at which every camera of this kind reads differently goes into `read_back_exceptions`
+td_roi_x (0x040c): expected 0xffffffff after writing, found 0xffffffef: power the camera off and on; if every camera of this model reads differently at this address, add it to `read_back_exceptions`
 ");
     let mut camera = bench
         .open_with(Evk1Config {
@@ -108,7 +108,7 @@ td_roi_x (0x040c): expected 0xffffffff after writing, found 0xffffffef: power th
 }
 
 #[test]
-fn what_is_refused_writes_nothing() {
+fn rejected_settings_write_nothing() {
     let (bench, mut camera) = opened();
     camera.set_trigger_out(Some(PULSES)).unwrap();
     bench.trace();
@@ -159,7 +159,7 @@ fn the_three_sync_modes_set_their_bits() {
     }
 }
 
-/// At no moment is the auxiliary input enabled on a line that carries the sync clock.
+/// The auxiliary input is never enabled on a line that carries the sync clock.
 #[test]
 fn the_auxiliary_input_is_off_while_the_mode_changes() {
     let (bench, mut camera) = opened();
@@ -179,7 +179,7 @@ fn the_auxiliary_input_is_off_while_the_mode_changes() {
 }
 
 #[test]
-fn the_trigger_output_pulses_unless_the_camera_is_master() {
+fn trigger_output_pulses_unless_the_camera_is_master() {
     let (bench, mut camera) = opened();
     camera.set_trigger_out(Some(PULSES)).unwrap();
     let word = |register| bench.model().word(register);
@@ -201,7 +201,7 @@ fn the_trigger_output_pulses_unless_the_camera_is_master() {
     }
 }
 
-/// Lowering `bias_fo` tightens the interlocks, raising it loosens them: no single write may break one.
+/// Lowering `bias_fo` tightens the interlocks, raising it loosens them: no single write may violate one.
 #[test]
 fn interlocks_hold_after_every_single_write() {
     let (bench, mut camera) = opened();
@@ -239,7 +239,7 @@ fn interlocks_hold_after_every_single_write() {
 }
 
 #[test]
-fn a_pattern_that_was_left_on_is_switched_off_before_anything_streams() {
+fn an_active_pattern_is_switched_off_before_streaming() {
     let bench = Bench::new();
     bench
         .model()

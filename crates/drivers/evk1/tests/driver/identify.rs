@@ -1,4 +1,4 @@
-//! What is not an EVK1 Gen3.1 that can stream is refused by name, before anything is written.
+//! Any device but a streaming-capable EVK1 Gen3.1 is rejected with a reason before any write.
 
 use skinrig_evk1::requests;
 use skinrig_evk1::{Evk1Config, UsbError};
@@ -20,7 +20,7 @@ fn answering(code: u8, word: u16) -> String {
 }
 
 #[test]
-fn other_devices_are_refused_by_name() {
+fn other_devices_are_rejected_by_name() {
     let found = [
         answering(requests::BOARD_VERSION, 3),
         answering(requests::FPGA_BOOT_STATE, 0),
@@ -33,16 +33,16 @@ fn other_devices_are_refused_by_name() {
     insta::assert_snapshot!(found.join("\n"), @r"
 model: not an EVK1 Gen3.1: expected board version 2, found board version 3
 expected the FPGA to be configured within 10 s, found it still booting: power the camera off and on
-model: not an EVK1 Gen3.1: expected system ID 0x1c, found 0x11, the rescue image of the FPGA: the camera's flash needs the maker's update
+model: not an EVK1 Gen3.1: expected system ID 0x1c, found 0x11, the rescue image of the FPGA: update the camera's flash with the manufacturer's tool
 model: not an EVK1 Gen3.1: expected system ID 0x1c, found 0x1a, an EVK1 Gen4
-model: not an EVK1 Gen3.1: expected system ID 0x1c, found 0x31, a system that is not known
+model: not an EVK1 Gen3.1: expected system ID 0x1c, found 0x31, an unknown system
 reading SERIAL_MSB (0x0020): expected status 0x40, found 0x12
-asking for the board version: the device is gone from the bus: check cable and power
+reading the board version: the device is no longer on the bus: check cable and power
 ");
 }
 
 #[test]
-fn a_configuration_that_does_not_go_together_is_refused() {
+fn an_inconsistent_configuration_is_rejected() {
     let config = Evk1Config {
         chunk_bytes: 1 << 16,
         ..Evk1Config::default()

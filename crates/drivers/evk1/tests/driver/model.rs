@@ -1,4 +1,4 @@
-//! A model of an EVK1 behind the transport: registers that hold what is written, and a stream that follows them.
+//! A model of an EVK1 behind the transport: registers that store written values, and a stream that depends on them.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -13,10 +13,10 @@ use skinrig_evk1::{Evk1, Evk1Config, Evk1Error, UsbError};
 use skinrig_formats::evt2::Encoder;
 use skinrig_model::{CameraId, CdEvent, HostDuration, HostTime, Polarity};
 
-/// The FPGA closes packets about this often.
+/// Approximate interval at which the FPGA closes packets.
 const PACKET: HostDuration = HostDuration::from_micros(1024);
 
-/// One thing that the driver did.
+/// One action of the driver.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Step {
     Read(u32, u32),
@@ -24,24 +24,24 @@ pub enum Step {
     Other(String),
 }
 
-/// What the model does against the rules.
+/// Faults of the model.
 #[derive(Debug, Clone, Default)]
 pub struct Faults {
-    /// Answers to requests that are not about registers.
+    /// Replies to requests other than register accesses.
     pub answers: BTreeMap<u8, u16>,
     /// Bits of registers that cannot be set.
     pub stuck_at_zero: BTreeMap<u32, u32>,
-    /// Registers that take no write: the request stalls.
+    /// Registers that reject writes: the request stalls.
     pub refused: Vec<u32>,
-    /// Transfers do not come back.
+    /// Transfers never complete.
     pub stop_fails: bool,
     /// Status byte of register reads.
     pub read_status: Option<u8>,
-    /// Registers of the sensor are read with status 0 and as 0 while it is without power.
+    /// Registers of the sensor read as 0 with status 0 while it is unpowered.
     pub mute_without_power: bool,
     /// Resets on the bus fail.
     pub reset_fails: bool,
-    /// Ends the stream, and every request from then on when the device is gone.
+    /// Ends the stream; every later request fails, too, when the device is disconnected.
     pub error: Option<UsbError>,
 }
 
@@ -58,13 +58,13 @@ pub struct Model {
     encoder: Encoder,
     camera_us: u64,
     unsent: Duration,
-    /// Bytes in the camera's buffers when nobody streams.
+    /// Bytes in the camera's buffers while it does not stream.
     pub left_over: usize,
-    /// It goes on sending its time base when nobody streams: a word within the time limit of every read.
+    /// Sends its time base even while it does not stream: one word within the time limit of every read.
     pub never_silent: bool,
 }
 
-/// A bench of one camera and its clock.
+/// One camera model and its clock.
 #[derive(Clone)]
 pub struct Bench(Arc<Mutex<Model>>);
 
@@ -101,14 +101,14 @@ impl Bench {
         Evk1::open(usb, CameraId::One, config, clock)
     }
 
-    /// Lets time pass.
+    /// Advances the time.
     pub fn pass(&self, ms: i64) {
         let mut clock = self.clone();
         let end = clock.now() + HostDuration::from_millis(ms);
         clock.wait_until(end);
     }
 
-    /// What was done since the last call, a line each. Reading, writing and reading back one register are one line.
+    /// Actions since the last call, one line each. Reading, writing and reading back one register is one line.
     pub fn trace(&self) -> String {
         let steps = std::mem::take(&mut self.model().steps);
         let mut rest = steps.as_slice();
@@ -191,7 +191,7 @@ impl Model {
         }
     }
 
-    /// Lets one packet's time pass.
+    /// Advances the time by one packet.
     fn packet(&mut self) {
         if let (Some(error), Some(inbox)) = (&self.faults.error, &self.inbox) {
             inbox.fail(error.clone());

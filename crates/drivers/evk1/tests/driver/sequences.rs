@@ -38,7 +38,7 @@ fn a_temperature_is_one_read_and_changes_nothing() {
     insta::assert_snapshot!(bench.trace(), @"014c EVK_EXT_TEMP_VALUE is 00036c00");
 }
 
-/// The values that a device receives that starts from the public defaults.
+/// The values that a device with the public defaults receives.
 #[test]
 fn the_fpga_receives_the_values_of_the_public_driver() {
     let mut bench = Bench::new();
@@ -147,7 +147,7 @@ fn inputs_are_enabled_again_before_each_start() {
 }
 
 #[test]
-fn an_fpga_without_trigger_output_is_not_asked_for_one() {
+fn trigger_output_is_not_configured_on_an_fpga_without_one() {
     let bench = Bench::new();
     bench
         .model()

@@ -1,4 +1,4 @@
-//! The stream: what has no time is held back, what is lost is counted, what breaks is named.
+//! The stream: words without a time base are held back, losses are counted, faults are named.
 
 use proptest::prelude::*;
 use skinrig_device::{CameraSettings, Clock, DeviceError, EventCamera, NoiseFilter, SyncMode};
@@ -18,7 +18,7 @@ fn all_bytes(chunks: &[RawChunk]) -> usize {
 }
 
 #[test]
-fn a_slave_sends_nothing_until_its_clock_arrives_and_counts_what_it_held_back() {
+fn a_slave_is_silent_until_its_clock_arrives_and_counts_held_words() {
     let bench = Bench::new();
     let mut camera = bench.open().unwrap();
     let settings = CameraSettings {
@@ -49,7 +49,7 @@ fn a_slave_sends_nothing_until_its_clock_arrives_and_counts_what_it_held_back() 
 }
 
 #[test]
-fn pixels_are_silent_for_half_a_second_and_the_filter_gets_its_setting_back() {
+fn pixels_are_silent_for_half_a_second_and_the_filter_is_restored() {
     let bench = Bench::new();
     let mut camera = bench.open().unwrap();
     let settings = CameraSettings {
@@ -71,7 +71,7 @@ fn pixels_are_silent_for_half_a_second_and_the_filter_gets_its_setting_back() {
 }
 
 #[test]
-fn a_driver_that_lags_loses_whole_words_and_says_how_many() {
+fn a_lagging_reader_loses_whole_words_and_counts_them() {
     let bench = Bench::new();
     let config = Evk1Config {
         chunk_bytes: 128 << 10,
@@ -107,7 +107,7 @@ fn a_driver_that_lags_loses_whole_words_and_says_how_many() {
 }
 
 #[test]
-fn a_camera_that_leaves_is_named_after_what_it_sent() {
+fn a_disconnect_is_reported_after_the_data_sent_before_it() {
     for (error, gone) in [(UsbError::Gone, true), (UsbError::Stall, false)] {
         let bench = Bench::new();
         let mut camera = bench.open().unwrap();
@@ -217,7 +217,7 @@ fn the_overflow_counter_is_read_around_the_stream() {
     assert!(notes.contains("from 7 to 9"), "{notes}");
 }
 
-/// Whoever flushes knows of an overflow up to now; otherwise it is looked for once a second. The gap goes back to the reading before.
+/// A flush reads the overflow counter; otherwise it is read once a second. The gap starts at the previous reading.
 #[test]
 fn a_step_of_the_overflow_counter_is_a_gap() {
     let bench = Bench::new();
@@ -259,7 +259,7 @@ fn a_step_of_the_overflow_counter_is_a_gap() {
 }
 
 #[test]
-fn an_overflow_counter_that_counts_otherwise_is_only_noted() {
+fn an_implausible_overflow_counter_is_only_noted() {
     let bench = Bench::new();
     let config = Evk1Config {
         overflow_is_loss: false,
@@ -303,7 +303,7 @@ fn words_cut_between_packets_and_at_the_end_are_kept_whole() {
     );
 }
 
-/// What goes in and out of an inbox.
+/// Operations on an inbox.
 #[derive(Debug, Clone)]
 enum Op {
     Push(usize),
@@ -321,8 +321,8 @@ fn ops() -> impl Strategy<Value = Vec<Op>> {
 }
 
 proptest! {
-    /// A stream of numbered words, cut anywhere and taken at any time: every word that comes out is whole and in its
-    /// place, and the gaps are exactly what is told as lost.
+    /// A stream of numbered words, split anywhere and taken at any time: every word taken is whole and in its
+    /// place, and the gaps equal the reported losses.
     #[test]
     fn an_inbox_loses_whole_words_in_order_and_counts_them(ops in ops()) {
         const CHUNK: usize = 400;
@@ -370,7 +370,7 @@ proptest! {
         prop_assert!(waiting <= sent);
     }
 
-    /// Nothing is lost while no more waits than the backlog allows.
+    /// Nothing is lost while the waiting data does not exceed the backlog.
     #[test]
     fn an_inbox_that_is_emptied_in_time_loses_nothing(cuts in prop::collection::vec(1..500_usize, 1..100)) {
         let inbox = Inbox::new(600, 1200);
@@ -388,7 +388,7 @@ proptest! {
 }
 
 #[test]
-fn what_a_stopped_stream_left_behind_is_let_go_before_the_next_and_told() {
+fn leftover_data_of_a_stopped_stream_is_discarded_and_reported() {
     let bench = Bench::new();
     let mut camera = bench.open().unwrap();
     camera.start().unwrap();
@@ -406,7 +406,7 @@ fn what_a_stopped_stream_left_behind_is_let_go_before_the_next_and_told() {
 }
 
 #[test]
-fn a_camera_that_never_falls_silent_is_named_at_start_and_left_at_close() {
+fn a_camera_that_keeps_sending_is_named_at_start_and_ignored_at_close() {
     let bench = Bench::new();
     let mut camera = bench.open().unwrap();
     camera.start().unwrap();
@@ -424,7 +424,7 @@ fn a_camera_that_never_falls_silent_is_named_at_start_and_left_at_close() {
 }
 
 #[test]
-fn the_sensor_loses_its_power_whatever_else_fails_at_close() {
+fn the_sensor_is_powered_off_even_if_close_fails_otherwise() {
     let pixels = r::ROI_TD_RSTN.register;
     let time_base = r::STEREO_MERGE_ENABLE.register;
     let clock_out = r::CLK_OUT_EN.register;
@@ -454,7 +454,7 @@ fn the_sensor_loses_its_power_whatever_else_fails_at_close() {
 }
 
 #[test]
-fn a_start_that_fails_is_taken_back_with_the_noise_filter_as_set() {
+fn a_failed_start_is_undone_and_restores_the_noise_filter() {
     let bench = Bench::new();
     let mut camera = bench.open().unwrap();
     let settings = CameraSettings {
@@ -482,7 +482,7 @@ fn a_start_that_fails_is_taken_back_with_the_noise_filter_as_set() {
 }
 
 #[test]
-fn a_loss_that_goes_on_after_it_was_told_counts_its_time_once() {
+fn a_continuing_loss_counts_its_duration_once() {
     let inbox = Inbox::new(400, 400);
     inbox.push(&[0; 400], HostTime(10));
     inbox.push(&[0; 401], HostTime(20));
@@ -498,7 +498,7 @@ fn a_loss_that_goes_on_after_it_was_told_counts_its_time_once() {
     assert_eq!(told, [(401, 10, 20), (3, 20, 30)]);
 }
 
-/// A transfer that failed: what came before is whole, something is told as lost, and what comes next begins a word.
+/// A failed transfer: the data before it is whole, a loss is reported, and the data after it begins with a whole word.
 #[test]
 fn a_failed_transfer_is_a_loss_between_whole_words() {
     let inbox = Inbox::new(400, 4000);

@@ -1,4 +1,4 @@
-//! What is refused of a camera, what a key of the rig file accepts, and what is only told when everything is tolerated.
+//! Mismatches of a camera: rejected, accepted by a key of the rig file, or only reported when everything is tolerated.
 
 use skinrig_device::{CameraSettings, EventCamera};
 use skinrig_evk1::registers as r;
@@ -20,8 +20,8 @@ fn everything() -> Evk1Config {
     })
 }
 
-/// Refused as it is; opened by the key that accepts it, and then nothing is told; opened when everything is tolerated, and the
-/// key is told.
+/// Rejected by default; opened without a note with the key that accepts it; opened with a note on that key when everything is
+/// tolerated.
 fn accepted_by(faults: &Faults, accepting: Evk1Config, key: &str) {
     let bench = |faults: &Faults| {
         let bench = Bench::new();
@@ -48,7 +48,7 @@ fn accepted_by(faults: &Faults, accepting: Evk1Config, key: &str) {
 }
 
 #[test]
-fn each_mismatch_is_refused_until_its_own_key_accepts_it() {
+fn each_mismatch_is_rejected_until_its_own_key_accepts_it() {
     let status = Faults {
         read_status: Some(0),
         ..Faults::default()
@@ -78,9 +78,9 @@ fn each_mismatch_is_refused_until_its_own_key_accepts_it() {
     accepted_by(&stuck, accepting, "read_back_exceptions: [\"0x021c\"]");
 }
 
-/// The sensor is shut down before it is powered up, and may not answer until then.
+/// The sensor is shut down before it is powered up, and may not reply until then.
 #[test]
-fn a_sensor_without_power_need_not_answer() {
+fn an_unpowered_sensor_need_not_reply() {
     let bench = Bench::new();
     bench.model().faults.mute_without_power = true;
     bench.model().registers.insert(r::ATIS_CONTROL.address, 0);
@@ -90,9 +90,9 @@ fn a_sensor_without_power_need_not_answer() {
     opened.start().unwrap();
 }
 
-/// Nothing is told of a camera that is as expected.
+/// A camera without mismatches gives no notes.
 #[test]
-fn tolerance_alone_is_no_mismatch() {
+fn tolerance_alone_gives_no_notes() {
     let opened = Bench::new().open_with(everything()).unwrap();
     assert_eq!(opened.mismatches(), []);
 }

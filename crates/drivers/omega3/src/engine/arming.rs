@@ -1,45 +1,45 @@
-//! Powering the motors up: what must hold before, and what is waited for.
+//! Arming: preconditions, powering up, and the tare.
 
 use std::sync::Arc;
 
 use skinrig_device::{Clock, DeviceError, MotionLimits};
 use skinrig_drd_abi::{ForceOffCause, StatusField};
 
-use super::armed::{Armed, Tare};
+use super::armed::{Armed, TareState};
 use super::{CONTROL_EVERY, Engine, STATUS_EVERY, State, span};
 use crate::config::Envelope;
 use crate::correction::Correction;
 use crate::monitor::{Freshness, Monitor, Trip};
 use crate::regulation;
 use crate::supervisor::Supervisor;
+use crate::tare::TareAverage;
 use crate::trajectory::{Trajectory, norm};
-use crate::weighing::Weighing;
 
 /// Standard gravity, m/s².
 const GRAVITY_M_S2: f64 = 9.806_65;
 
-/// The share of the motors' torque that carries the arm at rest: gravity compensation, which the library leaves out of the force that it
-/// reports (public text derived from the vendor's), and what is reported beside it.
-fn carries(envelope: &Envelope, mass_kg: Option<f64>, reported_n: f64) -> String {
+/// Describes the share of motor torque that carries the arm at rest: gravity compensation, which the library excludes from its force
+/// (according to public sources), plus the reported force.
+fn describe_gravity_load(envelope: &Envelope, mass_kg: Option<f64>, reported_n: f64) -> String {
     let Some(mass_kg) = mass_kg else {
         return format!(
-            "at rest the motors push with {reported_n:.2} N besides gravity compensation, whose mass this library does not tell"
+            "at rest the motors push with {reported_n:.2} N in addition to gravity compensation, whose mass this library does not report"
         );
     };
     let compensation_n = mass_kg * GRAVITY_M_S2;
     let share = (compensation_n + reported_n) / envelope.n_per_ratio;
     format!(
-        "gravity compensation carries {compensation_n:.2} N (effector mass {mass_kg} kg), the motors push with {reported_n:.2} N \
-         more at rest: gravity_ratio {share:.3} at {} N per ratio; the rig file says {}",
+        "gravity compensation carries {compensation_n:.2} N (effector mass {mass_kg} kg), and the motors push with another \
+        {reported_n:.2} N at rest: gravity_ratio {share:.3} at {} N per ratio; the rig file has {}",
         envelope.n_per_ratio, envelope.gravity_ratio
     )
 }
 
-/// Which cap the arm was held with, and what to do when that is too little to carry it.
-fn cap(envelope: &Envelope, limits: &MotionLimits) -> String {
+/// Describes the force cap in use, and what to do if it is too small to carry the arm.
+fn describe_force_cap(envelope: &Envelope, limits: &MotionLimits) -> String {
     format!(
-        "Its motors may use {:.3} of their torque: if the arm sinks with that, raise `limits.max_force` ({} N) or settle \
-         `robot.motor_force.gravity_ratio` ({}), docs/how-to/bench.md",
+        "The motors may use {:.3} of their torque: if the arm sinks, raise `limits.max_force` ({} N) or measure \
+        `robot.motor_force.gravity_ratio` ({}), docs/how-to/bench.md",
         envelope.ratio_of(limits.max_force_n),
         limits.max_force_n,
         envelope.gravity_ratio
@@ -47,7 +47,7 @@ fn cap(envelope: &Envelope, limits: &MotionLimits) -> String {
 }
 
 impl<C: Clock> Engine<C> {
-    /// Powers the motors, waits until the regulation runs at full rate, and takes the force at rest as zero.
+    /// Powers the motors, waits until the regulation runs at full rate, and measures the tare.
     pub(crate) fn arm(&mut self) -> Result<(), DeviceError> {
         match &self.state {
             State::Armed(_) => return Ok(()),
@@ -65,49 +65,54 @@ impl<C: Clock> Engine<C> {
         }
         self.check_ready()?;
         if let Err(e) = self.power_up(&limits) {
-            return Err(self.brake_after(e));
+            return Err(self.brake_after_error(e));
         }
         let deadline =
-            self.clock.now() + span(self.config.trips.tare) + span(self.config.patience.regulation);
+            self.clock.now() + span(self.config.trips.tare) + span(self.config.timeouts.regulation);
         loop {
             let next = self.clock.now() + self.period();
             self.clock.wait_until(next);
             self.tick();
             match &self.state {
-                State::Armed(armed) if let Tare::Known(carried) = armed.tare => {
+                State::Armed(armed) if let TareState::Known(carried) = armed.tare => {
                     let mass = self.opened.effector_mass_kg;
-                    self.stream
-                        .note(carries(&self.config.envelope, mass, norm(carried)));
+                    self.stream.note(describe_gravity_load(
+                        &self.config.envelope,
+                        mass,
+                        norm(carried),
+                    ));
                     return Ok(());
                 }
                 State::Armed(_) if self.clock.now() < deadline => {}
                 State::Armed(_) => {
                     let found = format!(
-                        "moving or without new readings; see that the arm hangs free. {}",
-                        cap(&self.config.envelope, &limits)
+                        "moving or without new readings; make sure that the arm hangs free. {}",
+                        describe_force_cap(&self.config.envelope, &limits)
                     );
-                    let e = self.wrong_state("still, to take the force at rest as zero", found);
-                    return Err(self.brake_after(e));
+                    let e = self.wrong_state("at rest, to measure the tare", found);
+                    return Err(self.brake_after_error(e));
                 }
                 _ => {
-                    // The failure is told here, and not again by the next poll.
+                    // Report the failure here, and not again at the next poll.
                     let failure = match &self.state {
-                        // Held by too little torque it falls.
+                        // With too little torque the arm falls.
                         State::Tripped(
                             trip @ (Trip::Deviation { .. }
                             | Trip::Jump { .. }
                             | Trip::OutsideBox { .. }),
                         ) => {
-                            let found =
-                                format!("braked: {trip}. {}", cap(&self.config.envelope, &limits));
+                            let found = format!(
+                                "braked: {trip}. {}",
+                                describe_force_cap(&self.config.envelope, &limits)
+                            );
                             Some(self.wrong_state("armed", found))
                         }
                         _ => self.stream.failure(),
                     };
-                    if matches!(&self.state, State::Tripped(trip) if !matches!(trip, Trip::NotBraked(_)))
+                    if matches!(&self.state, State::Tripped(trip) if !matches!(trip, Trip::BrakeFailed(_)))
                     {
                         self.state = State::Parked;
-                        self.stream.heal();
+                        self.stream.clear_failure();
                     }
                     return Err(
                         failure.unwrap_or_else(|| self.wrong_state("armed", "braked again"))
@@ -119,7 +124,7 @@ impl<C: Clock> Engine<C> {
 
     fn check_ready(&self) -> Result<(), DeviceError> {
         let id = self.opened.id;
-        let status = self.sdk.status(id).map_err(|e| self.of_call(e))?;
+        let status = self.sdk.status(id).map_err(|e| self.call_error(e))?;
         if status.get(StatusField::Power) == Some(0) {
             return Err(self.wrong_state("powered", "without power; switch the robot on"));
         }
@@ -136,16 +141,16 @@ impl<C: Clock> Engine<C> {
 
     fn power_up(&mut self, limits: &MotionLimits) -> Result<(), DeviceError> {
         let (sdk, id) = (Arc::clone(&self.sdk), self.opened.id);
-        let here = sdk.position(id).map_err(|e| self.of_call(e))?;
+        let here = sdk.position(id).map_err(|e| self.call_error(e))?;
         if !here.position_m.iter().all(|c| c.is_finite()) {
             return Err(self.wrong_state("at a known position", "without one (not a number)"));
         }
         let started = regulation::start(&*sdk, id, &self.config, limits);
-        self.started = started.map_err(|e| self.not_set(e))?;
+        self.started = started.map_err(|e| self.setting_error(e))?;
         let (khz, old_cause) = self.await_regulation()?;
-        // A braked arm sinks: the set point begins where the regulation holds it now.
+        // A braked arm sinks: start from the position that the regulation holds now.
         let now = self.clock.now();
-        let here = sdk.regulated_position(id).map_err(|e| self.of_call(e))?;
+        let here = sdk.regulated_position(id).map_err(|e| self.call_error(e))?;
         let tip = self.config.mount.axes.point_from_metres(here.position_m);
         if !tip.is_finite() {
             return Err(self.wrong_state("at a known position", "without one (not a number)"));
@@ -159,15 +164,15 @@ impl<C: Clock> Engine<C> {
             monitor: Monitor::new(self.config.trips, *limits, now, tip.to_array()),
             correction: Correction::none(self.config.motion, tip.to_array()),
             freshness,
-            tare: Tare::Taking(Weighing::begin(now)),
+            tare: TareState::Averaging(TareAverage::begin(now)),
             last: now,
-            heard: now,
-            watched: now,
+            last_reading: now,
+            last_activity: now,
             old_cause,
             tip,
             status_due: now,
             control_due: now + CONTROL_EVERY,
-            hiccups: 0,
+            busy_readings: 0,
             rising: false,
             must_rise: false,
             overloaded: false,
@@ -175,19 +180,19 @@ impl<C: Clock> Engine<C> {
         Ok(())
     }
 
-    /// Waits until the regulation runs, the motors are live and the loop is fast enough; gives its rate, kHz, and why
-    /// the device says that the motors went off the last time.
+    /// Waits until the regulation runs, the motors are live and the loop is fast enough. Returns the loop rate, kHz, and the force-off
+    /// cause that the device reports.
     fn await_regulation(&mut self) -> Result<(f64, Option<ForceOffCause>), DeviceError> {
         let (sdk, id) = (Arc::clone(&self.sdk), self.opened.id);
         let least = self.config.trips.min_control_khz;
-        let deadline = self.clock.now() + span(self.config.patience.regulation);
-        // The rate is a mean since the call before: this one begins the interval.
+        let deadline = self.clock.now() + span(self.config.timeouts.regulation);
+        // The library averages the rate since the previous call: this one starts the interval.
         let _ = sdk.control_khz(id);
         loop {
             let next = self.clock.now() + STATUS_EVERY;
             self.clock.wait_until(next);
             let running = sdk.is_running(id);
-            let status = sdk.status(id).map_err(|e| self.of_call(e))?;
+            let status = sdk.status(id).map_err(|e| self.call_error(e))?;
             let live = status.is(StatusField::Force);
             let khz = sdk.control_khz(id).unwrap_or(0.0);
             if running && live && khz >= least {
@@ -200,7 +205,7 @@ impl<C: Clock> Engine<C> {
                     format!("at {khz:.3} kHz")
                 } else {
                     let cause = status.force_off_cause().unwrap_or(ForceOffCause::None);
-                    let words = crate::open::cause_words(cause);
+                    let words = crate::remark::describe_cause(cause);
                     format!(
                         "without motor power ({words}); press the force button on the base to allow it"
                     )
@@ -211,22 +216,22 @@ impl<C: Clock> Engine<C> {
         }
     }
 
-    /// Brakes after `error`; tells both if that fails too.
-    pub(super) fn brake_after(&mut self, error: DeviceError) -> DeviceError {
+    /// Brakes after `error`; reports both if that fails too.
+    pub(super) fn brake_after_error(&mut self, error: DeviceError) -> DeviceError {
         match self.brake() {
             Ok(()) => {
                 self.state = State::Parked;
                 error
             }
-            Err(live) => self.not_braked(format!("{error}; {live}")),
+            Err(live) => self.brake_failed(format!("{error}; {live}")),
         }
     }
 
-    /// The brake failed: nothing is commanded any more, every poll says so, and disarming tries again.
-    pub(super) fn not_braked(&mut self, why: String) -> DeviceError {
+    /// Braking failed: stop commanding, report the failure at every poll, and retry when disarming.
+    pub(super) fn brake_failed(&mut self, why: String) -> DeviceError {
         let error = self.lost(&why);
-        self.state = State::Tripped(Trip::NotBraked(why));
-        self.stream.heal();
+        self.state = State::Tripped(Trip::BrakeFailed(why));
+        self.stream.clear_failure();
         self.stream.fail(error.clone());
         error
     }

@@ -1,26 +1,26 @@
-//! What is done in each cycle: read, check, move on, tell; and what a trip means.
+//! The cycle of the engine: read, check, advance, publish; and the reaction to trips.
 
 use skinrig_device::{Clock, RobotSample};
 use skinrig_drd_abi::{ErrorCode, ForceOffCause};
 use skinrig_model::HostDuration;
 
-use super::armed::Tare;
+use super::armed::TareState;
 use super::{CONTROL_EVERY, Engine, STATUS_EVERY, State, span};
 use crate::monitor::Trip;
-use crate::sdk::Answer;
+use crate::sdk::CallResult;
 
-/// Longest time that one step of the set point stands for, s: a cycle that comes later makes the motion wait.
-const LONGEST_CYCLE_S: f64 = 0.004;
+/// Longest time that one step of the set point covers, s: after a later cycle the motion is delayed instead.
+const MAX_CYCLE_S: f64 = 0.004;
 
-/// A position whose reading took longer has no time of its own (the thread was held up in between): it leads the motion and is kept
-/// out of the stream, which shows a gap there.
-const READ_WITHIN: HostDuration = HostDuration::from_millis(2);
+/// A reading that takes longer has no reliable time, because the thread was interrupted. It controls the motion but is left out of
+/// the stream, which then has a gap.
+const MAX_READING_TIME: HostDuration = HostDuration::from_millis(2);
 
-/// Readings in a row that may fail because the controller was busy.
-const HICCUPS: u32 = 5;
+/// Consecutive readings that may fail because the controller was busy.
+const MAX_BUSY_READINGS: u32 = 5;
 
 impl<C: Clock> Engine<C> {
-    /// One cycle: read, check, move on, tell.
+    /// Runs one cycle.
     pub(crate) fn tick(&mut self) {
         let outcome = match &mut self.state {
             State::Armed(_) => self.armed_cycle(),
@@ -34,22 +34,22 @@ impl<C: Clock> Engine<C> {
 
     fn trip(&mut self, trip: Trip) {
         let trip = match trip {
-            // An unplugged robot may be seen first as a regulation that ended.
-            Trip::RegulationEnded => self.why_regulation_ended(),
-            Trip::Call(e) if e.code == ErrorCode::NO_REGULATION => self.why_regulation_ended(),
-            // The regulation takes the power off when it ends by itself.
+            // An unplugged robot may first show as a regulation that ended.
+            Trip::RegulationEnded => self.find_regulation_end_cause(),
+            Trip::Call(e) if e.code == ErrorCode::NO_REGULATION => self.find_regulation_end_cause(),
+            // The regulation switches the power off when it ends by itself.
             Trip::ForceOff(ForceOffCause::None | ForceOffCause::Software)
                 if !self.sdk.is_running(self.opened.id) =>
             {
-                self.why_regulation_ended()
+                self.find_regulation_end_cause()
             }
-            // It names what was the matter some earlier time.
+            // The device still reports the cause of an earlier event.
             Trip::ForceOff(cause) if Some(cause) == self.old_cause() => Trip::ForceOffAgain(cause),
             other => other,
         };
-        self.stream.fail(self.of_trip(&trip));
+        self.stream.fail(self.trip_error(&trip));
         if let Err(live) = self.brake() {
-            let _ = self.not_braked(format!("{trip}; {live}"));
+            let _ = self.brake_failed(format!("{trip}; {live}"));
             if !trip.is_loss() {
                 return;
             }
@@ -61,7 +61,7 @@ impl<C: Clock> Engine<C> {
         };
     }
 
-    /// The cause that the device told already when it was armed.
+    /// Force-off cause that the device already reported when arming.
     fn old_cause(&self) -> Option<ForceOffCause> {
         match &self.state {
             State::Armed(armed) => armed
@@ -71,7 +71,7 @@ impl<C: Clock> Engine<C> {
         }
     }
 
-    fn why_regulation_ended(&self) -> Trip {
+    fn find_regulation_end_cause(&self) -> Trip {
         match self.sdk.status(self.opened.id) {
             Err(e) => Trip::Call(e),
             Ok(status) => match status.force_off_cause() {
@@ -85,7 +85,7 @@ impl<C: Clock> Engine<C> {
     fn parked_cycle(&mut self) -> Result<(), Trip> {
         let t = self.clock.now();
         let reading = self.sdk.position(self.opened.id);
-        let Some(reading) = tolerate(&mut self.parked_hiccups, reading)? else {
+        let Some(reading) = tolerate(&mut self.parked_busy_readings, reading)? else {
             return Ok(());
         };
         let tip = self.config.mount.axes.point_from_metres(reading.position_m);
@@ -122,20 +122,20 @@ impl<C: Clock> Engine<C> {
             return Err(Trip::RegulationEnded);
         }
         let now = clock.now();
-        // Arming itself waits for nobody.
-        if stream.was_watched() || matches!(armed.tare, Tare::Taking(_)) {
-            armed.watched = now;
-        } else if now - armed.watched > span(config.trips.max_unwatched) {
+        // Arming is a blocking call, during which nobody polls.
+        if stream.take_activity() || matches!(armed.tare, TareState::Averaging(_)) {
+            armed.last_activity = now;
+        } else if now - armed.last_activity > span(config.trips.max_unwatched) {
             let limit = config.trips.max_unwatched;
             return Err(Trip::Unwatched { limit });
         }
-        // One counter for both: the reading is good when position and force are.
+        // One counter for both: a reading is good if position and force are.
         let reading = sdk
             .regulated_position(id)
             .and_then(|reading| sdk.force(id).map(|force| (reading, force)));
-        let timely = clock.now() - now <= READ_WITHIN;
-        let Some((reading, force)) = tolerate(&mut armed.hiccups, reading)? else {
-            return armed.not_silent(now, &config.trips);
+        let timely = clock.now() - now <= MAX_READING_TIME;
+        let Some((reading, force)) = tolerate(&mut armed.busy_readings, reading)? else {
+            return armed.check_silence(now, &config.trips);
         };
         let axes = config.mount.axes;
         let tip = axes.point_from_metres(reading.position_m);
@@ -164,16 +164,16 @@ impl<C: Clock> Engine<C> {
         let new = armed
             .freshness
             .is_new(now, reading.position_m, reading.cached);
-        let force_n = armed.weigh(now, pushed, new, &config.trips)?;
+        let force_n = armed.check_force(now, pushed, new, &config.trips)?;
 
-        let dt_s = (now - armed.last).as_secs_f64().min(LONGEST_CYCLE_S);
+        let dt_s = (now - armed.last).as_secs_f64().min(MAX_CYCLE_S);
         armed.last = now;
         let target = armed.advance(dt_s);
         sdk.track(id, axes.metres_from_point(target))
             .map_err(Trip::Call)?;
 
         if new {
-            armed.heard = now;
+            armed.last_reading = now;
             if timely {
                 stream.push(RobotSample {
                     t: now,
@@ -184,21 +184,22 @@ impl<C: Clock> Engine<C> {
             }
             return Ok(());
         }
-        armed.not_silent(now, &config.trips)
+        armed.check_silence(now, &config.trips)
     }
 }
 
-/// Lets a few readings in a row fail because the controller was busy.
-fn tolerate<T>(hiccups: &mut u32, answer: Answer<T>) -> Result<Option<T>, Trip> {
+/// Tolerates a few consecutive readings that fail because the controller was busy.
+fn tolerate<T>(busy_readings: &mut u32, answer: CallResult<T>) -> Result<Option<T>, Trip> {
     match answer {
         Ok(value) => {
-            *hiccups = 0;
+            *busy_readings = 0;
             Ok(Some(value))
         }
         Err(e)
-            if matches!(e.code, ErrorCode::DHC_BUSY | ErrorCode::TIMEOUT) && *hiccups < HICCUPS =>
+            if matches!(e.code, ErrorCode::DHC_BUSY | ErrorCode::TIMEOUT)
+                && *busy_readings < MAX_BUSY_READINGS =>
         {
-            *hiccups += 1;
+            *busy_readings += 1;
             Ok(None)
         }
         Err(e) => Err(Trip::Call(e)),

@@ -1,4 +1,4 @@
-//! The states of the robot and what may be asked of it in each. Runs on the thread that owns the library, on any clock.
+//! State machine of the robot. Runs on the thread that owns the library, with any clock.
 
 mod armed;
 mod arming;
@@ -11,20 +11,20 @@ use skinrig_model::{DeviceRole, HostDuration, Point3, Robot, Setting};
 
 use armed::{Armed, rises};
 
-use crate::brake::{MayBeLive, brake};
-use crate::config::{OmegaConfig, Patience};
+use crate::brake::{BrakeUnconfirmed, brake};
+use crate::config::{OmegaConfig, Timeouts};
 use crate::monitor::Trip;
-use crate::open::{NotSet, Opened, seen};
+use crate::open::{Opened, SettingError, observed_setting};
 use crate::regulation;
 use crate::sdk::{CallError, Sdk};
 use crate::span::span;
 use crate::stream::Stream;
 use crate::supervisor::Supervisor;
 
-/// Time between two looks at the status vector; each may cost an exchange on USB.
+/// Interval between two reads of the status vector; each may cost a USB transfer.
 const STATUS_EVERY: HostDuration = HostDuration::from_millis(10);
 
-/// Time between two looks at the rate of the regulation loop.
+/// Interval between two reads of the regulation loop's rate.
 const CONTROL_EVERY: HostDuration = HostDuration::from_millis(100);
 
 enum State {
@@ -34,7 +34,7 @@ enum State {
     Armed(Box<Armed>),
     /// Braked after a fault, until disarmed.
     Tripped(Trip),
-    /// Gone, until opened again.
+    /// Disconnected, until reopened.
     Lost(Trip),
 }
 
@@ -47,14 +47,14 @@ pub(crate) struct Engine<C: Clock> {
     stream: Arc<Stream>,
     supervisor: Option<Supervisor>,
     limits: Option<MotionLimits>,
-    /// What the regulation read back when it was started last.
+    /// Settings read back when the regulation was last started.
     started: Vec<Setting>,
     state: State,
-    parked_hiccups: u32,
+    parked_busy_readings: u32,
 }
 
 impl<C: Clock> Engine<C> {
-    /// Takes an open, braked robot over.
+    /// Takes over an open, braked robot.
     pub(crate) fn new(
         sdk: Arc<dyn Sdk>,
         config: Arc<OmegaConfig>,
@@ -73,7 +73,7 @@ impl<C: Clock> Engine<C> {
             limits: None,
             started: Vec::new(),
             state: State::Parked,
-            parked_hiccups: 0,
+            parked_busy_readings: 0,
         }
     }
 
@@ -98,45 +98,48 @@ impl<C: Clock> Engine<C> {
         limits::wrong_state(&self.opened.serial, expected, &found.to_string())
     }
 
-    fn of_trip(&self, trip: &Trip) -> DeviceError {
-        if trip.is_loss() || matches!(trip, Trip::NotBraked(_)) {
+    fn trip_error(&self, trip: &Trip) -> DeviceError {
+        if trip.is_loss() || matches!(trip, Trip::BrakeFailed(_)) {
             self.lost(trip)
         } else {
             self.wrong_state("armed", format!("braked: {trip}"))
         }
     }
 
-    fn not_set(&self, error: NotSet) -> DeviceError {
+    fn setting_error(&self, error: SettingError) -> DeviceError {
         error
             .into_omega(&self.opened.serial)
             .into_device(&self.opened.serial)
     }
 
-    fn of_call(&self, call: CallError) -> DeviceError {
-        self.not_set(NotSet::Call(call))
+    fn call_error(&self, call: CallError) -> DeviceError {
+        self.setting_error(SettingError::Call(call))
     }
 
     /// Writes the limits and reads them back.
-    pub(crate) fn configure(&mut self, wanted: &MotionLimits) -> Result<Vec<Setting>, DeviceError> {
-        self.stream.watch();
+    pub(crate) fn configure(
+        &mut self,
+        requested: &MotionLimits,
+    ) -> Result<Vec<Setting>, DeviceError> {
+        self.stream.mark_active();
         if let State::Lost(trip) = &self.state {
             return Err(self.lost(trip));
         }
-        let mut settings = limits::settings(wanted);
-        let written = regulation::apply(&*self.sdk, self.opened.id, &self.config, wanted);
+        let mut settings = limits::settings(requested);
+        let written = regulation::apply(&*self.sdk, self.opened.id, &self.config, requested);
         match written {
             Ok(more) => settings.extend(more),
-            Err(NotSet::Call(e))
+            Err(SettingError::Call(e))
                 if regulation::needs_regulation(&e) && !matches!(self.state, State::Armed(_)) =>
             {
-                // Written and read back when armed; what the arming before this one read is told here.
-                settings.push(seen(
+                // Written and read back when armed; report the values of the previous arming.
+                settings.push(observed_setting(
                     "regulation",
-                    "set when armed: this library takes no settings before",
+                    "written when armed: this library accepts no settings before",
                 ));
                 settings.extend(self.started.iter().cloned());
             }
-            Err(e) => return Err(self.not_set(e)),
+            Err(e) => return Err(self.setting_error(e)),
         }
         settings.extend(self.opened.settings.iter().cloned());
         settings.push(Setting {
@@ -144,35 +147,35 @@ impl<C: Clock> Engine<C> {
             requested: "true".to_owned(),
             read_back: self.sdk.is_initialized(self.opened.id).to_string(),
         });
-        self.limits = Some(*wanted);
+        self.limits = Some(*requested);
         if let State::Armed(armed) = &mut self.state {
-            armed.monitor.set_limits(*wanted);
+            armed.monitor.set_limits(*requested);
             armed
                 .trajectory
-                .set_acceleration(wanted.max_acceleration_mm_s2);
+                .set_acceleration(requested.max_acceleration_mm_s2);
         }
         Ok(settings)
     }
 
-    fn brake(&mut self) -> Result<(), MayBeLive> {
-        let (sdk, id, patience) = (Arc::clone(&self.sdk), self.opened.id, self.config.patience);
+    fn brake(&mut self) -> Result<(), BrakeUnconfirmed> {
+        let (sdk, id, timeouts) = (Arc::clone(&self.sdk), self.opened.id, self.config.timeouts);
         let clock = &mut self.clock;
-        brake(&*sdk, id, &patience, |pause| {
+        brake(&*sdk, id, &timeouts, |pause| {
             let until = clock.now() + span(pause);
             clock.wait_until(until);
         })
         .map(drop)
     }
 
-    /// Sends the set point to `target`.
+    /// Starts a motion of the set point to `target`.
     pub(crate) fn go(&mut self, target: Point3<Robot>, speed_mm_s: f64) -> Result<(), DeviceError> {
-        self.stream.watch();
+        self.stream.mark_active();
         let limits = self.limits;
         let (armed, limits) = match (&mut self.state, limits) {
             (State::Armed(armed), Some(limits)) => (armed, limits),
             (State::Tripped(trip) | State::Lost(trip), _) => {
                 let trip = trip.clone();
-                return Err(self.of_trip(&trip));
+                return Err(self.trip_error(&trip));
             }
             _ => return Err(self.wrong_state("armed", "disarmed")),
         };
@@ -194,9 +197,9 @@ impl<C: Clock> Engine<C> {
         Ok(())
     }
 
-    /// Brings the set point to rest.
+    /// Stops the set point smoothly.
     pub(crate) fn hold(&mut self) -> Result<(), DeviceError> {
-        self.stream.watch();
+        self.stream.mark_active();
         match &mut self.state {
             State::Armed(armed) => {
                 armed.trajectory.hold();
@@ -205,20 +208,20 @@ impl<C: Clock> Engine<C> {
             State::Parked => Ok(()),
             State::Tripped(trip) | State::Lost(trip) => {
                 let trip = trip.clone();
-                Err(self.of_trip(&trip))
+                Err(self.trip_error(&trip))
             }
         }
     }
 
-    /// Motors off, brake on, faults forgotten. When the robot does not confirm, it stays tripped.
+    /// Switches the motors off, brakes, and clears faults. Stays tripped if the robot does not confirm.
     pub(crate) fn disarm(&mut self) -> Result<(), DeviceError> {
         if let State::Lost(trip) = &self.state {
             let error = self.lost(trip);
-            let once = Patience {
+            let once = Timeouts {
                 brake_attempts: 1,
-                ..self.config.patience
+                ..self.config.timeouts
             };
-            // Best effort: it may be there again, and live.
+            // Best effort: the robot may be reachable again, and live.
             let _ = brake(&*self.sdk, self.opened.id, &once, |_| ());
             return Err(error);
         }
@@ -228,17 +231,17 @@ impl<C: Clock> Engine<C> {
         match self.brake() {
             Ok(()) => {
                 self.state = State::Parked;
-                self.stream.heal();
+                self.stream.clear_failure();
                 Ok(())
             }
-            Err(live) => Err(self.not_braked(live.to_string())),
+            Err(live) => Err(self.brake_failed(live.to_string())),
         }
     }
 }
 
 impl<C: Clock> Drop for Engine<C> {
-    /// However the owner ends, the arm is braked and the device closed. The supervisor is dismissed only when the
-    /// robot confirmed that; else it takes over.
+    /// Brakes the arm and closes the device however the owner ends. Dismisses the supervisor only if the robot confirmed; otherwise the
+    /// supervisor takes over.
     fn drop(&mut self) {
         let braked = match self.state {
             State::Lost(_) => false,

@@ -1,4 +1,4 @@
-//! The driver over a scripted library, on a virtual clock: exact, and without any waiting.
+//! Tests of the driver with a scripted library on a virtual clock: exact, without real waits.
 
 mod engine;
 mod open;

@@ -1,22 +1,22 @@
-//! The open procedure: each obstacle is named with its next step, nothing moves, and the device is closed again.
+//! Opening: each obstacle is reported with the next step, nothing moves, and the device is closed again.
 
 use skinrig_drd_abi::ErrorCode;
 
 use super::scripted::Scripted;
 use crate::OmegaConfig;
 use crate::Remark;
-use crate::config::{Initialise, Patience, RedundantEncoders, SupervisorCommand, Watchdog};
+use crate::config::{Initialise, RedundantEncoders, SupervisorCommand, Timeouts, Watchdog};
 use crate::enumerate;
 use crate::open::open;
 use crate::supervisor::brake_all;
 
-/// What is wrong, and words that the error must hold.
+/// An obstacle, and phrases that the error must contain.
 type Obstacle = (fn(&Scripted), &'static [&'static str]);
 
 #[test]
-fn every_obstacle_is_named_and_leaves_a_braked_closed_robot() {
+fn every_obstacle_is_reported_and_leaves_a_braked_closed_robot() {
     let obstacles: [Obstacle; 14] = [
-        (|s| s.with(|s| s.devices = 0), &["no device", "plug"]),
+        (|s| s.with(|s| s.devices = 0), &["no device", "connect"]),
         (
             |s| s.fail("drdOpenID", ErrorCode::DEVICE_IN_USE),
             &["busy", "end the other program"],
@@ -33,14 +33,17 @@ fn every_obstacle_is_named_and_leaves_a_braked_closed_robot() {
         ),
         (
             |s| s.fail("dhdCheckControllerMemory", ErrorCode::CONFIGURATION),
-            &["configuration is damaged", "serviced"],
+            &["configuration is damaged", "contact"],
         ),
-        (|s| s.with(|s| s.supported = false), &["regulate"]),
+        (|s| s.with(|s| s.supported = false), &["can control"]),
         (
             |s| s.with(|s| _ = s.status.insert(0, 0)),
             &["power", "switch the robot on"],
         ),
-        (|s| s.with(|s| _ = s.status.insert(9, 1)), &["reports one"]),
+        (
+            |s| s.with(|s| _ = s.status.insert(9, 1)),
+            &["a fault reported"],
+        ),
         (
             |s| s.with(|s| s.ignore.push("device_angle_deg")),
             &["device_angle_deg", "found 0.5"],
@@ -81,7 +84,7 @@ fn every_obstacle_is_named_and_leaves_a_braked_closed_robot() {
 }
 
 #[test]
-fn the_robot_is_chosen_by_its_serial_and_the_others_are_released() {
+fn the_robot_is_selected_by_its_serial_number_and_the_others_are_closed() {
     let sdk = Scripted::default();
     sdk.with(|s| s.devices = 3);
     let config = OmegaConfig {
@@ -91,15 +94,15 @@ fn the_robot_is_chosen_by_its_serial_and_the_others_are_released() {
     let opened = open(&sdk, &config, |_| Ok(())).unwrap();
     assert_eq!((opened.id, opened.serial.as_str()), (1, "78"));
     assert_eq!(sdk.log()[..3], ["drdOpenID", "drdClose", "drdOpenID"]);
-    // Several robots and no serial: it must be named.
+    // With several robots the serial number is required.
     let error = open(&sdk, &OmegaConfig::default(), |_| Ok(()))
         .unwrap_err()
         .to_string();
-    assert!(error.contains("name the serial"), "{error}");
+    assert!(error.contains("add the serial number"), "{error}");
 }
 
 #[test]
-fn initialisation_needs_word_that_the_sample_is_off_and_ends_braked() {
+fn initialisation_requires_that_the_sample_is_off_and_ends_braked() {
     let sdk = Scripted::default();
     sdk.with(|s| s.initialised = false);
     let config = OmegaConfig {
@@ -112,21 +115,16 @@ fn initialisation_needs_word_that_the_sample_is_off_and_ends_braked() {
         Ok(())
     })
     .unwrap();
-    assert_eq!(before, Some((Some(77), false)), "guarded before it moves");
+    assert_eq!(before, Some((Some(77), false)), "guarded before any motion");
     let log = sdk.log();
     assert_eq!(log[log.len() - 2..], ["drdAutoInit", "drdStop"]);
-    assert!(
-        opened
-            .remarks
-            .iter()
-            .any(|r| *r == Remark::InitialisedItself)
-    );
+    assert!(opened.remarks.contains(&Remark::InitialisedItself));
 }
 
 #[test]
 fn redundant_encoders_are_reported_and_required_only_where_the_rig_says_so() {
     use RedundantEncoders::{Reported, Required};
-    // What status word 13 says: absent in SDKs that write fewer words.
+    // Status word 13; missing in SDKs that write fewer words.
     for (word, wanted, opens, remarked) in [
         (Some(1), Reported, true, false),
         (Some(0), Reported, true, true),
@@ -164,7 +162,7 @@ fn redundant_encoders_are_reported_and_required_only_where_the_rig_says_so() {
 }
 
 #[test]
-fn without_a_watchdog_a_supervisor_is_enough() {
+fn a_supervisor_substitutes_for_a_missing_watchdog() {
     let sdk = Scripted::default();
     sdk.fail("dhdSetWatchdog", ErrorCode::NOT_IMPLEMENTED);
     let config = OmegaConfig {
@@ -176,11 +174,11 @@ fn without_a_watchdog_a_supervisor_is_enough() {
         ..OmegaConfig::default()
     };
     let opened = open(&sdk, &config, |_| Ok(())).unwrap();
-    assert!(opened.remarks.iter().any(|r| *r == Remark::NoWatchdog));
+    assert!(opened.remarks.contains(&Remark::NoWatchdog));
 }
 
 #[test]
-fn a_list_names_what_is_busy_or_forbidden_and_touches_no_motor() {
+fn a_list_shows_devices_that_are_busy_or_not_permitted_and_touches_no_motor() {
     let sdk = Scripted::default();
     sdk.with(|s| s.devices = 2);
     let all = enumerate::list(&sdk).unwrap();
@@ -215,7 +213,7 @@ fn motors_left_live_by_a_dead_program_are_braked_first() {
 }
 
 #[test]
-fn a_stop_that_only_answers_is_followed_by_the_direct_ones() {
+fn a_stop_without_effect_is_followed_by_direct_stops() {
     let sdk = Scripted::default();
     sdk.with(|s| (s.live, s.stop_needs_regulation) = (true, true));
     open(&sdk, &OmegaConfig::default(), |_| Ok(())).unwrap();
@@ -226,20 +224,20 @@ fn a_stop_that_only_answers_is_followed_by_the_direct_ones() {
 }
 
 #[test]
-fn a_rescue_brakes_every_robot_that_may_be_the_one_and_no_other() {
-    let once = Patience {
+fn brake_all_brakes_every_robot_that_may_be_the_one_and_no_other() {
+    let once = Timeouts {
         brake_attempts: 1,
-        ..Patience::default()
+        ..Timeouts::default()
     };
-    // Places 0 to 2 have the serial numbers 77 to 79.
-    for (wanted, nameless, opened, braked) in [
+    // Indices 0 to 2 have the serial numbers 77 to 79.
+    for (wanted, without_serial, opened, braked) in [
         (Some(78), vec![], 2, 1),
         (Some(78), vec![0], 2, 2),
         (Some(78), vec![1], 3, 1),
         (None, vec![], 3, 3),
     ] {
         let sdk = Scripted::default();
-        sdk.with(|s| (s.devices, s.nameless) = (3, nameless));
+        sdk.with(|s| (s.devices, s.without_serial) = (3, without_serial));
         brake_all(&sdk, wanted, &once).unwrap();
         let count = |call| sdk.log().iter().filter(|c| *c == call).count();
         assert_eq!((count("drdOpenID"), count("drdStop")), (opened, braked));

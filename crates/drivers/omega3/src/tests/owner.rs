@@ -1,4 +1,4 @@
-//! The thread that owns the library, when a call does not come back.
+//! The thread that owns the library, with calls that do not return.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -23,21 +23,21 @@ const LIMITS: MotionLimits = MotionLimits {
 fn open(sdk: &Arc<Scripted>) -> Result<Omega, OmegaError> {
     let mut config = OmegaConfig::default();
     config.trips.tare = Duration::from_millis(20);
-    config.patience.reply = Duration::from_millis(300);
-    config.patience.brake_retry = Duration::from_millis(1);
-    config.patience.open = Duration::from_millis(500);
+    config.timeouts.reply = Duration::from_millis(300);
+    config.timeouts.brake_retry = Duration::from_millis(1);
+    config.timeouts.open = Duration::from_millis(500);
     let path = "scripted".into();
     Omega::with_sdk(sdk.clone(), config, path, "scripted", RealClock::start())
 }
 
 #[test]
-fn a_call_that_never_returns_is_given_up_and_the_arm_braked_from_elsewhere() {
+fn a_hanging_call_times_out_and_the_arm_is_braked_from_another_thread() {
     let sdk = Arc::new(Scripted::default());
     let mut omega = open(&sdk).unwrap();
     omega.configure(&LIMITS).unwrap();
     omega.arm().unwrap();
-    sdk.with(|s| s.hangs = Some("dhdGetForce"));
-    // Heard until the thread comes to that call.
+    sdk.with(|s| s.hanging_call = Some("dhdGetForce"));
+    // Requests are accepted until the thread reaches that call.
     let error = loop {
         if let Err(error) = omega.hold() {
             break error;
@@ -49,27 +49,27 @@ fn a_call_that_never_returns_is_given_up_and_the_arm_braked_from_elsewhere() {
         assert!(text.contains(word), "{word} is not in {text}");
     }
     assert!(!sdk.with(|s| s.live));
-    // Every later request fails at once, and says the same.
+    // Every later request fails at once with the same error.
     assert_eq!(omega.arm(), Err(error));
-    sdk.with(|s| s.hangs = None);
+    sdk.with(|s| s.hanging_call = None);
 }
 
 #[test]
-fn what_the_operator_is_told_is_recorded() {
+fn remarks_are_recorded_as_settings() {
     let sdk = Arc::new(Scripted::default());
     sdk.with(|s| s.live = true);
     let settings = open(&sdk).unwrap().configure(&LIMITS).unwrap();
-    let told = settings.iter().filter(|s| s.name == "remark");
+    let remarks = settings.iter().filter(|s| s.name == "remark");
     assert!(
-        told.clone().any(|s| s.read_back.contains("were live")),
+        remarks.clone().any(|s| s.read_back.contains("were live")),
         "{settings:?}"
     );
-    assert!(told.clone().all(|s| s.requested == Setting::AS_FOUND));
+    assert!(remarks.clone().all(|s| s.requested == Setting::AS_FOUND));
 }
 
 #[test]
 #[cfg(unix)]
-fn a_supervisor_that_does_not_hear_its_goodbye_is_ended() {
+fn a_supervisor_that_ignores_its_goodbye_is_killed() {
     let deaf = SupervisorCommand {
         program: "sh".into(),
         arguments: vec!["-c".to_owned(), "echo ready; exec sleep 3600".to_owned()],
@@ -82,15 +82,15 @@ fn a_supervisor_that_does_not_hear_its_goodbye_is_ended() {
     )
     .unwrap();
     supervisor.check().unwrap();
-    // A wait without an end would be the hang of this test.
+    // An endless wait would hang this test.
     supervisor.dismiss();
 }
 
 #[test]
-fn an_open_that_never_returns_is_given_up() {
+fn a_hanging_open_times_out() {
     let sdk = Arc::new(Scripted::default());
-    sdk.with(|s| s.hangs = Some("dhdGetStatus"));
+    sdk.with(|s| s.hanging_call = Some("dhdGetStatus"));
     let error = open(&sdk).err().unwrap();
-    assert!(matches!(error, OmegaError::Late { .. }), "{error}");
-    sdk.with(|s| s.hangs = None);
+    assert!(matches!(error, OmegaError::TimedOut { .. }), "{error}");
+    sdk.with(|s| s.hanging_call = None);
 }

@@ -1,25 +1,25 @@
-//! A library of a few lines: an arm that is where it is told to be, and calls that fail on demand.
+//! A scripted `Sdk`: an arm that is always at its target, and calls that fail on demand.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 use skinrig_drd_abi::{DeviceId, ErrorCode, SdkVersion, StatusField, StatusVector};
 
-use crate::sdk::{Answer, CallError, Generator, Pace, Quantity, Reading, Sdk};
+use crate::sdk::{CallError, CallResult, Generator, GeneratorLimits, Quantity, Reading, Sdk};
 
-/// One scripted device and its library.
+/// A scripted device with its library.
 #[derive(Debug)]
 pub(crate) struct Scripted {
     pub script: Mutex<Script>,
 }
 
-/// What it is like. Tests change it at any time.
+/// State of the device. Tests may change it at any time.
 #[derive(Debug, Clone)]
 pub struct Script {
     pub log: Vec<String>,
-    /// Calls that fail: name to code and how often (`u32::MAX`: always).
+    /// Failing calls: name to error code and count (`u32::MAX`: always).
     pub fail: BTreeMap<&'static str, (i32, u32)>,
-    /// Quantities and parameters that keep their value, by their call.
+    /// Quantities and parameters that ignore writes, by call.
     pub ignore: Vec<&'static str>,
     pub devices: i8,
     pub type_number: i32,
@@ -38,21 +38,21 @@ pub struct Script {
     pub khz: f64,
     pub watchdog: u8,
     pub values: BTreeMap<&'static str, f64>,
-    pub paces: [Pace; 2],
+    pub generator_limits: [GeneratorLimits; 2],
     pub status: BTreeMap<usize, i32>,
-    /// `drdStop` answers 0 and does nothing unless a regulation runs.
+    /// `drdStop` returns 0 without effect unless a regulation runs.
     pub stop_needs_regulation: bool,
-    /// Calls that need a running regulation.
+    /// Calls that require a running regulation.
     pub needs_regulation: Vec<&'static str>,
-    /// Devices, by their place, whose serial number cannot be read.
-    pub nameless: Vec<i8>,
+    /// Indices of devices without a readable serial number.
+    pub without_serial: Vec<i8>,
     /// A call that never returns.
-    pub hangs: Option<&'static str>,
+    pub hanging_call: Option<&'static str>,
 }
 
 impl Default for Scripted {
     fn default() -> Self {
-        let fast = Pace {
+        let fast = GeneratorLimits {
             acceleration_m_s2: 1.0,
             speed_m_s: 1.0,
             jerk_m_s3: 1.0,
@@ -78,12 +78,12 @@ impl Default for Scripted {
             khz: 4.0,
             watchdog: 3,
             values: BTreeMap::new(),
-            paces: [fast; 2],
+            generator_limits: [fast; 2],
             status: BTreeMap::new(),
             stop_needs_regulation: false,
             needs_regulation: Vec::new(),
-            nameless: Vec::new(),
-            hangs: None,
+            without_serial: Vec::new(),
+            hanging_call: None,
         };
         Self {
             script: Mutex::new(script),
@@ -97,23 +97,23 @@ impl Scripted {
         change(&mut self.script.lock().unwrap())
     }
 
-    /// The calls so far that do more than read.
+    /// All calls so far, except reads.
     pub fn log(&self) -> Vec<String> {
         self.with(|s| s.log.clone())
     }
 
-    /// Lets a call fail for ever.
+    /// Makes a call fail permanently.
     pub fn fail(&self, call: &'static str, code: ErrorCode) {
         self.with(|s| s.fail.insert(call, (code.0, u32::MAX)));
     }
 
-    fn act<T>(&self, call: &'static str, effect: impl FnOnce(&mut Script) -> T) -> Answer<T> {
+    fn act<T>(&self, call: &'static str, effect: impl FnOnce(&mut Script) -> T) -> CallResult<T> {
         self.with(|s| s.log.push(call.to_owned()));
         self.read(call, effect)
     }
 
-    fn read<T>(&self, call: &'static str, look: impl FnOnce(&mut Script) -> T) -> Answer<T> {
-        while self.with(|s| s.hangs == Some(call)) {
+    fn read<T>(&self, call: &'static str, look: impl FnOnce(&mut Script) -> T) -> CallResult<T> {
+        while self.with(|s| s.hanging_call == Some(call)) {
             std::thread::park_timeout(std::time::Duration::from_millis(10));
         }
         self.with(|s| {
@@ -148,40 +148,40 @@ impl Sdk for Scripted {
     fn version(&self) -> SdkVersion {
         SdkVersion::ADVISED
     }
-    fn device_count(&self) -> Answer<i8> {
+    fn device_count(&self) -> CallResult<i8> {
         self.read("dhdGetDeviceCount", |s| s.devices)
     }
-    fn open(&self, index: i8) -> Answer<DeviceId> {
+    fn open(&self, index: i8) -> CallResult<DeviceId> {
         self.act("drdOpenID", |_| index)
     }
-    fn close(&self, _: DeviceId) -> Answer<()> {
+    fn close(&self, _: DeviceId) -> CallResult<()> {
         self.act("drdClose", |_| ())
     }
-    fn system_type(&self, _: DeviceId) -> Answer<i32> {
+    fn system_type(&self, _: DeviceId) -> CallResult<i32> {
         self.read("dhdGetSystemType", |s| s.type_number)
     }
     fn system_name(&self, _: DeviceId) -> Option<String> {
         Some("scripted".to_owned())
     }
-    fn serial(&self, id: DeviceId) -> Answer<u16> {
-        // Further devices have the following serial numbers.
-        if self.with(|s| s.nameless.contains(&id)) {
+    fn serial(&self, id: DeviceId) -> CallResult<u16> {
+        // Further devices have consecutive serial numbers.
+        if self.with(|s| s.without_serial.contains(&id)) {
             self.fail("dhdGetSerialNumber", ErrorCode::NOT_AVAILABLE);
         }
         let answer = self.read("dhdGetSerialNumber", |s| s.serial + id as u16);
         self.with(|s| s.fail.remove("dhdGetSerialNumber"));
         answer
     }
-    fn firmware(&self, _: DeviceId) -> Answer<f64> {
+    fn firmware(&self, _: DeviceId) -> CallResult<f64> {
         self.read("dhdGetVersion", |_| 3.0)
     }
-    fn com_mode(&self, _: DeviceId) -> Answer<i32> {
+    fn com_mode(&self, _: DeviceId) -> CallResult<i32> {
         self.read("dhdGetComMode", |_| 1)
     }
-    fn check_memory(&self, _: DeviceId) -> Option<Answer<()>> {
+    fn check_memory(&self, _: DeviceId) -> Option<CallResult<()>> {
         Some(self.read("dhdCheckControllerMemory", |_| ()))
     }
-    fn status(&self, _: DeviceId) -> Answer<StatusVector> {
+    fn status(&self, _: DeviceId) -> CallResult<StatusVector> {
         self.read("dhdGetStatus", |s| {
             let mut words = [0_i32; 17];
             words[StatusField::Power as usize] = 1;
@@ -202,10 +202,10 @@ impl Sdk for Scripted {
     fn is_initialized(&self, _: DeviceId) -> bool {
         self.with(|s| s.initialised)
     }
-    fn auto_init(&self, _: DeviceId) -> Answer<()> {
+    fn auto_init(&self, _: DeviceId) -> CallResult<()> {
         self.act("drdAutoInit", |s| s.initialised = true)
     }
-    fn set(&self, _: DeviceId, quantity: Quantity, value: f64) -> Option<Answer<()>> {
+    fn set(&self, _: DeviceId, quantity: Quantity, value: f64) -> Option<CallResult<()>> {
         let name = quantity.name();
         Some(self.act(name, |s| {
             if !s.ignore.contains(&name) {
@@ -213,39 +213,39 @@ impl Sdk for Scripted {
             }
         }))
     }
-    fn get(&self, _: DeviceId, quantity: Quantity) -> Option<Answer<f64>> {
+    fn get(&self, _: DeviceId, quantity: Quantity) -> Option<CallResult<f64>> {
         Some(self.read("get", |s| *s.values.get(quantity.name()).unwrap_or(&0.5)))
     }
-    fn compensate_gravity(&self, _: DeviceId) -> Answer<()> {
+    fn compensate_gravity(&self, _: DeviceId) -> CallResult<()> {
         self.act("dhdSetGravityCompensation", |_| ())
     }
-    fn enable_expert_mode(&self) -> Answer<()> {
+    fn enable_expert_mode(&self) -> CallResult<()> {
         self.act("dhdEnableExpertMode", |_| ())
     }
-    fn watchdog(&self, _: DeviceId) -> Answer<u8> {
+    fn watchdog(&self, _: DeviceId) -> CallResult<u8> {
         self.read("dhdGetWatchdog", |s| s.watchdog)
     }
-    fn set_watchdog(&self, _: DeviceId, units: u8) -> Answer<()> {
+    fn set_watchdog(&self, _: DeviceId, units: u8) -> CallResult<()> {
         self.act("dhdSetWatchdog", |s| {
             if !s.ignore.contains(&"watchdog") {
                 s.watchdog = units;
             }
         })
     }
-    fn velocity_threshold(&self, _: DeviceId) -> Answer<u32> {
+    fn velocity_threshold(&self, _: DeviceId) -> CallResult<u32> {
         self.read("dhdGetVelocityThreshold", |_| 40)
     }
-    fn start(&self, _: DeviceId) -> Answer<()> {
+    fn start(&self, _: DeviceId) -> CallResult<()> {
         self.act("drdStart", |s| {
             s.running = true;
             s.live = true;
             s.target_m = s.position_m;
-            // The worst case: a start forgets everything.
+            // Worst case: starting resets all settings.
             s.values.clear();
             s.watchdog = 3;
         })
     }
-    fn stop(&self, _: DeviceId) -> Answer<()> {
+    fn stop(&self, _: DeviceId) -> CallResult<()> {
         self.act("drdStop", |s| {
             if s.running || !s.stop_needs_regulation {
                 power_off(s);
@@ -255,13 +255,13 @@ impl Sdk for Scripted {
     fn is_running(&self, _: DeviceId) -> bool {
         self.with(|s| s.running)
     }
-    fn control_khz(&self, _: DeviceId) -> Answer<f64> {
+    fn control_khz(&self, _: DeviceId) -> CallResult<f64> {
         self.read("drdGetCtrlFreq", |s| s.khz)
     }
-    fn regulate_position(&self, _: DeviceId) -> Answer<()> {
+    fn regulate_position(&self, _: DeviceId) -> CallResult<()> {
         self.act("drdRegulatePos", |_| ())
     }
-    fn enable_filter(&self, _: DeviceId) -> Answer<()> {
+    fn enable_filter(&self, _: DeviceId) -> CallResult<()> {
         self.act("drdEnableFilter", |s| {
             s.filtering = !s.ignore.contains(&"filter");
         })
@@ -269,17 +269,22 @@ impl Sdk for Scripted {
     fn is_filtering(&self, _: DeviceId) -> bool {
         self.with(|s| s.filtering)
     }
-    fn set_pace(&self, _: DeviceId, generator: Generator, pace: Pace) -> Answer<()> {
+    fn set_generator_limits(
+        &self,
+        _: DeviceId,
+        generator: Generator,
+        limits: GeneratorLimits,
+    ) -> CallResult<()> {
         self.act(generator.name(), |s| {
             if !s.ignore.contains(&generator.name()) {
-                s.paces[generator as usize] = pace;
+                s.generator_limits[generator as usize] = limits;
             }
         })
     }
-    fn pace(&self, _: DeviceId, generator: Generator) -> Answer<Pace> {
-        self.read("pace", |s| s.paces[generator as usize])
+    fn generator_limits(&self, _: DeviceId, generator: Generator) -> CallResult<GeneratorLimits> {
+        self.read("pace", |s| s.generator_limits[generator as usize])
     }
-    fn track(&self, _: DeviceId, target_m: [f64; 3]) -> Answer<()> {
+    fn track(&self, _: DeviceId, target_m: [f64; 3]) -> CallResult<()> {
         if !self.with(|s| s.running) {
             self.fail("drdTrackPos", ErrorCode::NO_REGULATION);
         }
@@ -293,25 +298,25 @@ impl Sdk for Scripted {
             }
         })
     }
-    fn regulated_position(&self, _: DeviceId) -> Answer<Reading> {
+    fn regulated_position(&self, _: DeviceId) -> CallResult<Reading> {
         self.read("drdGetPositionAndOrientation", |s| Reading {
             position_m: s.position_m,
             cached: s.cached,
         })
     }
-    fn position(&self, _: DeviceId) -> Answer<Reading> {
+    fn position(&self, _: DeviceId) -> CallResult<Reading> {
         self.read("dhdGetPosition", |s| Reading {
             position_m: s.position_m,
             cached: s.cached,
         })
     }
-    fn force(&self, _: DeviceId) -> Answer<[f64; 3]> {
+    fn force(&self, _: DeviceId) -> CallResult<[f64; 3]> {
         self.read("dhdGetForce", |s| s.force_n)
     }
-    fn emergency_stop(&self, _: DeviceId) -> Answer<()> {
+    fn emergency_stop(&self, _: DeviceId) -> CallResult<()> {
         self.act("dhdStop", power_off)
     }
-    fn force_off(&self, _: DeviceId) -> Answer<()> {
+    fn force_off(&self, _: DeviceId) -> CallResult<()> {
         self.act("dhdEnableForce", power_off)
     }
 }

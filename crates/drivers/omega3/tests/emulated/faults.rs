@@ -1,4 +1,4 @@
-//! Every fault of the stand-in: named to the operator, and the arm braked.
+//! Every fault of the emulated arm: reported to the operator, and the arm is braked.
 
 use emulated_libdrd::{ArmConfig, DeviceConfig, EmulatedArm, Fault, Mode, Setting, When};
 use skinrig_device::{DeviceError, Indenter, RealClock};
@@ -23,16 +23,16 @@ fn assert_words(error: impl ToString, words: &[&str]) {
 }
 
 #[test]
-fn what_is_wrong_at_open_is_named_and_nothing_moves() {
+fn faults_at_open_are_reported_and_nothing_moves() {
     let codes = |code: ErrorCode| Fault::Open(code.0);
     let cases: [(Fault, [&str; 2]); 10] = [
         (codes(ErrorCode::NO_DRIVER_FOUND), ["not permitted", "udev"]),
-        (codes(ErrorCode::COM), ["link", "cable"]),
+        (codes(ErrorCode::COM), ["connection", "cable"]),
         (Fault::Busy, ["busy", "other program"]),
         (Fault::DeviceType(60), ["type 33", "type 60"]),
         (Fault::NoSerial, ["serial 1234", "without a known serial"]),
-        (Fault::Unsupported, ["regulate", "SDK"]),
-        (Fault::ControllerMemory, ["memory", "serviced"]),
+        (Fault::Unsupported, ["control", "SDK"]),
+        (Fault::ControllerMemory, ["memory", "contact"]),
         (
             Fault::Ignore(Setting::Watchdog),
             ["watchdog_125us", "expected 80"],
@@ -45,12 +45,12 @@ fn what_is_wrong_at_open_is_named_and_nothing_moves() {
     ];
     each(cases, |(fault, words)| {
         let arm = arm();
-        arm.inject(When::Now, fault).expect("is injected");
+        arm.inject(When::Now, fault).expect("fault injected");
         let mut config = config(&arm);
         config.mount.device_angle_deg = 30.0;
         let opened = Omega::open(config, RealClock::start());
         if let Fault::StatusLength(_) = fault {
-            // An older status vector is enough.
+            // An older, shorter status vector is enough.
             assert!(opened.is_ok());
             return;
         }
@@ -58,16 +58,19 @@ fn what_is_wrong_at_open_is_named_and_nothing_moves() {
             Ok(_) => panic!("{fault:?}: it opened"),
             Err(e) => assert_words(e, &words),
         }
-        let journal = arm.journal().expect("is readable");
+        let journal = arm.journal().expect("journal");
         for forbidden in ["drdStart", "drdAutoInit", "drdTrackPos"] {
             assert_eq!(journal.first(forbidden), None, "{fault:?}");
         }
-        assert!(!arm.state().expect("lives").held, "{fault:?}: still open");
+        assert!(
+            !arm.state().expect("arm state").held,
+            "{fault:?}: still open"
+        );
     });
 }
 
 #[test]
-fn another_robot_is_never_taken() {
+fn another_robot_is_never_used() {
     let arm = arm_like(&ArmConfig {
         devices: vec![DeviceConfig {
             serial: 9,
@@ -85,39 +88,39 @@ fn an_uninitialised_arm_is_refused_unless_the_sample_is_off() {
         ..ArmConfig::default()
     });
     assert_words(refused(&arm), &["initialised", "sample_is_off"]);
-    let still = arm.state().expect("lives");
+    let still = arm.state().expect("arm state");
     assert_eq!((still.mode, still.initialised), (Mode::Reset, false));
     let mut config = config(&arm);
     config.initialise = Initialise::SampleIsOff;
-    let omega = Omega::open(config, RealClock::start()).expect("initialises and opens");
-    let state = arm.state().expect("lives");
+    let omega = Omega::open(config, RealClock::start()).expect("robot initialises and opens");
+    let state = arm.state().expect("arm state");
     assert!(state.initialised && state.mode == Mode::Brake, "{state:?}");
     assert!(omega.remarks().contains(&Remark::InitialisedItself));
 }
 
 #[test]
-fn an_initialisation_that_hangs_ends_and_brakes() {
+fn a_hanging_initialisation_times_out_and_brakes() {
     let arm = arm_like(&ArmConfig {
         initialised: false,
         ..ArmConfig::default()
     });
     arm.inject(When::Now, Fault::AutoInitHangs)
-        .expect("is injected");
+        .expect("fault injected");
     let mut config = config(&arm);
     config.initialise = Initialise::SampleIsOff;
-    config.patience.open = std::time::Duration::from_secs(1);
-    config.patience.initialise = std::time::Duration::from_secs(1);
+    config.timeouts.open = std::time::Duration::from_secs(1);
+    config.timeouts.initialise = std::time::Duration::from_secs(1);
     let error = match Omega::open(config, RealClock::start()) {
         Ok(_) => panic!("it opened"),
         Err(e) => e,
     };
     assert_words(error, &["opening the robot", "force button"]);
-    arm.wait_until(PATIENCE, |s| s.mode != Mode::Force)
-        .expect("is without power");
+    arm.wait_until(TIMEOUT, |s| s.mode != Mode::Force)
+        .expect("motors are off");
 }
 
 #[test]
-fn what_goes_wrong_when_arming_is_named_and_leaves_it_braked() {
+fn faults_when_arming_are_reported_and_leave_the_arm_braked() {
     let cases = [
         (
             Fault::StartFails(ErrorCode::DEVICE_NOT_READY.0),
@@ -136,37 +139,35 @@ fn what_goes_wrong_when_arming_is_named_and_leaves_it_braked() {
         let mut config = config(&arm);
         if let Fault::LoopRate(_) | Fault::Button = fault {
             config.trips.min_control_khz = 0.5;
-            config.patience.regulation = std::time::Duration::from_secs(2);
+            config.timeouts.regulation = std::time::Duration::from_secs(2);
         }
-        let mut omega = Omega::open(config, RealClock::start()).expect("opens");
+        let mut omega = Omega::open(config, RealClock::start()).expect("robot opens");
         let configured = match fault {
-            // Already seen when the limits are written.
+            // Already detected when the limits are written.
             Fault::Ignore(Setting::MotorRatio | Setting::TrackParam) => {
-                omega.configure(&LIMITS).expect("takes its limits");
+                omega.configure(&LIMITS).expect("limits are accepted");
                 let mut other = LIMITS;
                 other.max_force_n = 3.0;
                 other.max_speed_mm_s = 20.0;
-                arm.inject(When::Now, fault).expect("is injected");
+                arm.inject(When::Now, fault).expect("fault injected");
                 omega.configure(&other)
             }
             _ => {
                 let answer = omega.configure(&LIMITS);
-                arm.inject(When::Now, fault).expect("is injected");
+                arm.inject(When::Now, fault).expect("fault injected");
                 answer
             }
         };
-        let error = configured
-            .and_then(|_| omega.arm())
-            .expect_err("is refused");
+        let error = configured.and_then(|_| omega.arm()).expect_err("an error");
         assert_words(error, &[word]);
-        let state = arm.state().expect("lives");
+        let state = arm.state().expect("arm state");
         assert_eq!(state.mode, Mode::Brake, "{fault:?}");
         assert!(!state.regulating, "{fault:?}: still regulates");
     });
 }
 
 #[test]
-fn what_goes_wrong_in_motion_is_named_and_brakes_at_once() {
+fn faults_in_motion_are_reported_and_brake_at_once() {
     let cases = [
         (Fault::RegulationDies, "regulation thread ended"),
         (Fault::Button, "force button"),
@@ -186,8 +187,10 @@ fn what_goes_wrong_in_motion_is_named_and_brakes_at_once() {
         }
         let mut omega = armed_with(config);
         arm.inject(When::IntoMove(0.05), fault)
-            .expect("is injected");
-        omega.command(point([20.0, 0.0, 10.0]), 10.0).expect("goes");
+            .expect("fault injected");
+        omega
+            .command(point([20.0, 0.0, 10.0]), 10.0)
+            .expect("command is accepted");
         let error = failure(&mut omega);
         assert!(
             matches!(error, DeviceError::State { .. }),
@@ -195,46 +198,48 @@ fn what_goes_wrong_in_motion_is_named_and_brakes_at_once() {
         );
         assert_words(&error, &[word]);
         let state = arm
-            .wait_until(PATIENCE, |s| s.mode == Mode::Brake && !s.regulating)
-            .expect("is braked");
+            .wait_until(TIMEOUT, |s| s.mode == Mode::Brake && !s.regulating)
+            .expect("arm is braked");
         assert!(state.held, "the pose is still read");
         assert!(omega.command(point(START), 10.0).is_err());
-        // Repaired and disarmed, it serves again.
-        arm.clear_faults().expect("are cleared");
+        // After a repair and a disarm it works again.
+        arm.clear_faults().expect("faults cleared");
         if fault == Fault::Button {
             arm.inject(When::Now, Fault::Button)
-                .expect("is pressed again");
+                .expect("button pressed again");
         }
-        omega.disarm().expect("disarms");
-        omega.arm().expect("arms again");
+        omega.disarm().expect("robot disarms");
+        omega.arm().expect("robot arms again");
     });
 }
 
 #[test]
-fn an_unplugged_robot_is_lost_and_never_moves_again_by_itself() {
+fn an_unplugged_robot_is_lost_and_does_not_resume_by_itself() {
     each([Fault::Unplug, Fault::PowerLoss], |fault| {
         let arm = arm();
         let mut omega = armed(&arm);
         arm.inject(When::IntoMove(0.05), fault)
-            .expect("is injected");
-        omega.command(point([20.0, 0.0, 10.0]), 10.0).expect("goes");
+            .expect("fault injected");
+        omega
+            .command(point([20.0, 0.0, 10.0]), 10.0)
+            .expect("command is accepted");
         let error = failure(&mut omega);
         assert!(
             matches!(error, DeviceError::Lost { .. }),
             "{fault:?}: {error:?}"
         );
-        assert_words(&error, &["link", "cable"]);
-        arm.clear_faults().expect("are cleared");
+        assert_words(&error, &["connection", "cable"]);
+        arm.clear_faults().expect("faults cleared");
         for answer in [omega.arm(), omega.hold(), omega.disarm()] {
             assert!(
                 matches!(answer, Err(DeviceError::Lost { .. })),
                 "{answer:?}"
             );
         }
-        assert_ne!(arm.state().expect("lives").mode, Mode::Force);
+        assert_ne!(arm.state().expect("arm state").mode, Mode::Force);
         drop(omega);
         if fault == Fault::Unplug {
-            // Plugged in again, a new open serves.
+            // After reconnection it can be opened again.
             let mut omega = armed(&arm);
             go(&mut omega, START, 20.0);
         }
@@ -242,28 +247,31 @@ fn an_unplugged_robot_is_lost_and_never_moves_again_by_itself() {
 }
 
 #[test]
-fn a_refused_stop_is_tried_until_it_works() {
+fn a_failing_stop_is_retried_until_it_works() {
     let arm = arm();
     let mut omega = armed(&arm);
     arm.inject(When::Now, Fault::StopFails(7))
-        .expect("is injected");
-    omega.disarm().expect("disarms in the end");
-    assert_eq!(arm.state().expect("lives").mode, Mode::Brake);
+        .expect("fault injected");
+    omega.disarm().expect("robot disarms");
+    assert_eq!(arm.state().expect("arm state").mode, Mode::Brake);
 }
 
 #[test]
-fn a_jammed_arm_is_pulled_no_further_than_the_lead() {
+fn a_jammed_arm_is_not_pulled_beyond_the_lead() {
     let arm = arm();
     let mut omega = armed(&arm);
-    arm.inject(When::Now, Fault::Jammed).expect("is injected");
-    omega.command(point([12.5, 0.0, 5.0]), 20.0).expect("goes");
-    let samples = poll_until(&mut omega, |s| s.commanded.distance_mm(s.measured) > 1.9)
-        .expect("nothing trips");
+    arm.inject(When::Now, Fault::Jammed)
+        .expect("fault injected");
+    omega
+        .command(point([12.5, 0.0, 5.0]), 20.0)
+        .expect("command is accepted");
+    let samples =
+        poll_until(&mut omega, |s| s.commanded.distance_mm(s.measured) > 1.9).expect("no trip");
     let lead = samples
         .iter()
         .map(|s| s.commanded.distance_mm(s.measured))
         .fold(0.0, f64::max);
     assert!(lead <= 2.0 + 1e-9, "{lead} mm");
-    let force = arm.state().expect("lives").motor_force_n;
+    let force = arm.state().expect("arm state").motor_force_n;
     assert!(force[2].abs() <= LIMITS.max_force_n + 1e-6, "{force:?}");
 }

@@ -1,4 +1,4 @@
-//! Which library is loaded, and which is not.
+//! Loading the library.
 
 use emulated_libdrd::ArmConfig;
 use skinrig_device::{Indenter, RealClock};
@@ -9,32 +9,32 @@ use skinrig_omega3::{Omega, OmegaConfig, OmegaError, Remark};
 use crate::support::*;
 
 #[test]
-fn the_identity_tells_library_version_and_file() {
+fn the_identity_includes_library_version_and_file() {
     let arm = arm();
     let omega = open(&arm);
     let identity = omega.identity();
     assert_eq!(identity.serial, "1234");
-    for word in ["SDK 3.17.5", arm.library().to_str().expect("is text")] {
+    for word in ["SDK 3.17.5", arm.library().to_str().expect("UTF-8 path")] {
         assert!(identity.firmware.contains(word), "{identity:?}");
     }
-    // The library's word on redundant encoders says little, and is told; nothing else is to be remarked.
+    // The only remark is about redundant encoders, whose report is ambiguous.
     let remarks = omega.remarks();
     assert_eq!(remarks, [Remark::NoRedundantEncoders]);
 }
 
 #[test]
-fn an_old_sdk_is_refused_and_a_middle_aged_one_remarked() {
+fn an_old_sdk_is_rejected_and_an_outdated_one_gets_a_remark() {
     for sdk in [[3, 7, 0], [3, 5, 1]] {
         let arm = arm_like(&ArmConfig {
             sdk,
             ..ArmConfig::default()
         });
-        let error = load(Some(&arm.library())).expect_err("is too old");
+        let error = load(Some(&arm.library())).expect_err("the SDK is too old");
         assert!(matches!(error, LoadError::TooOld { .. }), "{error}");
         let text = error.to_string();
         let version = format!("found {}.{}.{}", sdk[0], sdk[1], sdk[2]);
         assert!(text.contains("3.7.1") && text.contains(&version), "{text}");
-        let journal = arm.journal().expect("is readable");
+        let journal = arm.journal().expect("journal");
         let calls: Vec<_> = journal.entries.iter().map(|e| e.call.as_str()).collect();
         assert_eq!(calls, ["dhdGetSDKVersion"], "nothing else was called");
     }
@@ -44,13 +44,16 @@ fn an_old_sdk_is_refused_and_a_middle_aged_one_remarked() {
     });
     let omega = open(&arm);
     assert!(
-        matches!(omega.remarks().first(), Some(Remark::Library(advice)) if advice.contains("3.10"))
+        omega
+            .remarks()
+            .iter()
+            .any(|r| matches!(r, Remark::Library(advice) if advice.contains("3.10")))
     );
 }
 
 #[test]
-fn no_library_is_a_clear_error() {
-    let directory = tempfile::tempdir().expect("is made");
+fn a_missing_library_is_a_clear_error() {
+    let directory = tempfile::tempdir().expect("temporary directory");
     let path = directory.path().join("libdrd.so");
     let config = OmegaConfig {
         library: Some(path.clone()),
@@ -68,11 +71,11 @@ fn no_library_is_a_clear_error() {
 #[test]
 fn devices_are_listed_without_touching_a_motor() {
     let arm = arm();
-    let loaded = load(Some(&arm.library())).expect("loads");
-    let all = enumerate::list(&loaded.library).expect("lists");
+    let loaded = load(Some(&arm.library())).expect("library loads");
+    let all = enumerate::list(&loaded.library).expect("device list");
     assert_eq!(all.len(), 1);
     assert_eq!(all[0].to_string(), "omega.3, serial 1234: free");
-    let journal = arm.journal().expect("is readable");
+    let journal = arm.journal().expect("journal");
     for forbidden in ["drdStart", "dhdEnableForce", "dhdSetBrakes", "drdAutoInit"] {
         assert_eq!(journal.first(forbidden), None);
     }

@@ -1,5 +1,5 @@
-//! The driver over the stand-in for the vendor's library, loaded exactly as the vendor's, with the arm's firmware in a
-//! process of its own. All results are emulated.
+//! Tests of the driver with the emulated libdrd, which is loaded like the vendor's library; the arm's firmware runs in a separate
+//! process. All results are emulated.
 #![cfg(unix)]
 
 mod death;

@@ -1,4 +1,4 @@
-//! What a healthy arm does: the contract, lines, bounds, force, order of calls.
+//! A healthy arm: contract, lines, limits, force, and order of calls.
 
 use emulated_libdrd::journal::Journal;
 use emulated_libdrd::{ArmConfig, Contact, Mode};
@@ -18,13 +18,13 @@ fn keeps_the_contract() {
         outside: point([12.0, 15.5, 16.0]),
         speed_mm_s: 30.0,
         tolerance_mm: 0.1,
-        patience: HostDuration::from_millis(1_200),
+        move_timeout: HostDuration::from_millis(1_200),
         rate_share: 0.2,
     };
     contract::indenter(
         &mut || {
             let clock = RealClock::start();
-            let omega = Omega::open(config(&arm), clock).expect("opens");
+            let omega = Omega::open(config(&arm), clock).expect("robot opens");
             (Box::new(omega), Box::new(clock))
         },
         &options,
@@ -32,19 +32,19 @@ fn keeps_the_contract() {
 }
 
 #[test]
-fn one_thread_calls_in_order_within_bounds() {
+fn one_thread_makes_all_calls_in_order_and_within_limits() {
     let arm = arm();
     let mut omega = armed(&arm);
     go(&mut omega, [20.0, 5.0, 15.0], 30.0);
-    omega.hold().expect("holds");
-    omega.disarm().expect("disarms");
-    omega.arm().expect("arms again");
+    omega.hold().expect("robot holds");
+    omega.disarm().expect("robot disarms");
+    omega.arm().expect("robot arms again");
     go(&mut omega, START, 30.0);
     drop(omega);
-    let state = arm.state().expect("lives");
+    let state = arm.state().expect("arm state");
     assert_eq!((state.mode, state.held), (Mode::Brake, false));
 
-    let journal = arm.journal().expect("is readable");
+    let journal = arm.journal().expect("journal");
     let owners = journal.owners();
     assert_eq!(owners.len(), 1, "{owners:?}");
     assert_eq!(owners[0].2, "omega3");
@@ -61,7 +61,7 @@ fn one_thread_calls_in_order_within_bounds() {
     for pair in order.windows(2) {
         assert!(at(pair[0]) < at(pair[1]), "{pair:?}");
     }
-    // After every start the limits are written again before the first target.
+    // After every start the limits are written before the first target.
     let mut limited = false;
     for entry in &journal.entries {
         match entry.call.as_str() {
@@ -81,7 +81,7 @@ fn one_thread_calls_in_order_within_bounds() {
         assert_eq!(journal.first(forbidden), None, "{forbidden}");
     }
     assert!(journal.beside_regulation().is_empty());
-    // A braked arm sinks: each start begins anew where the arm is.
+    // A braked arm sinks: each start begins at the current position.
     let phases = journal.entries.split(|e| e.call == "drdStart");
     for phase in phases.skip(1) {
         let phase = Journal {
@@ -93,15 +93,17 @@ fn one_thread_calls_in_order_within_bounds() {
 }
 
 #[test]
-fn samples_are_new_finite_and_end_where_they_were_sent() {
+fn samples_are_new_and_finite_and_end_at_the_target() {
     let arm = arm();
     let mut omega = armed(&arm);
-    omega.command(point([20.0, 0.0, 12.0]), 25.0).expect("goes");
+    omega
+        .command(point([20.0, 0.0, 12.0]), 25.0)
+        .expect("command is accepted");
     let target = point([20.0, 0.0, 12.0]);
     let samples = poll_until(&mut omega, |s| {
         s.commanded == target && s.measured.distance_mm(target) < 0.05
     })
-    .expect("arrives");
+    .expect("tip arrives");
     assert!(samples.windows(2).all(|w| w[0].t < w[1].t));
     let lead = samples
         .iter()
@@ -109,13 +111,13 @@ fn samples_are_new_finite_and_end_where_they_were_sent() {
         .fold(0.0, f64::max);
     assert!(lead <= 2.0 + 0.1, "{lead} mm");
     assert!(samples.iter().all(|s| s.measured.is_finite()));
-    // In free air nothing pushes but friction.
-    let last = samples.last().expect("some");
+    // In free air only friction acts.
+    let last = samples.last().expect("at least one sample");
     assert!(last.force_n.abs() < 0.3, "{last:?}");
 }
 
 #[test]
-fn a_press_is_felt_upwards_and_capped_by_the_motor_ratio() {
+fn a_press_is_reported_upward_and_capped_by_the_motor_ratio() {
     let arm = arm_like(&ArmConfig {
         contact: Some(Contact {
             stiffness_n_m: 20_000.0,
@@ -125,15 +127,17 @@ fn a_press_is_felt_upwards_and_capped_by_the_motor_ratio() {
     });
     let mut omega = armed(&arm);
     go(&mut omega, [12.5, 0.0, 15.2], 10.0);
-    // Far into a hard sample: the lead bounds the pull, the ratio caps the force, nothing trips.
-    omega.command(point([12.5, 0.0, 5.0]), 5.0).expect("goes");
-    let pressed = poll_until(&mut omega, |s| s.force_n > 0.8).expect("is felt");
+    // Far into a hard sample: the lead limits the pull, the ratio limits the force, and nothing trips.
+    omega
+        .command(point([12.5, 0.0, 5.0]), 5.0)
+        .expect("command is accepted");
+    let pressed = poll_until(&mut omega, |s| s.force_n > 0.8).expect("contact force");
     let strongest = pressed.iter().map(|s| s.force_n).fold(0.0, f64::max);
-    let truly = arm.state().expect("lives").contact_force_n[2];
+    let truly = arm.state().expect("arm state").contact_force_n[2];
     assert!(truly > 0.5, "the sample pushes up: {truly} N");
     assert!(strongest <= LIMITS.max_force_n + 0.3, "{strongest} N");
     go(&mut omega, [12.5, 0.0, 20.0], 20.0);
-    omega.disarm().expect("disarms");
+    omega.disarm().expect("robot disarms");
 }
 
 #[test]
@@ -146,17 +150,19 @@ fn at_the_force_limit_it_stops_and_only_rises() {
         ..ArmConfig::default()
     });
     let mut config = config(&arm);
-    // The ratio is badly calibrated: it would allow 12 N where 2 N were asked for.
+    // A miscalibrated ratio that would allow 12 N instead of the requested 2 N.
     config.envelope.n_per_ratio = 2.0;
     config.gains.p = Some(4.0);
-    let mut omega = Omega::open(config, RealClock::start()).expect("opens");
+    let mut omega = Omega::open(config, RealClock::start()).expect("robot opens");
     let mut limits = LIMITS;
     limits.max_force_n = 1.0;
-    omega.configure(&limits).expect("takes its limits");
-    omega.arm().expect("arms");
+    omega.configure(&limits).expect("limits are accepted");
+    omega.arm().expect("robot arms");
     go(&mut omega, [12.5, 0.0, 15.2], 10.0);
-    omega.command(point([12.5, 0.0, 10.0]), 2.0).expect("goes");
-    let samples = poll_until(&mut omega, |s| s.force_n > 1.0).expect("stops, and does not brake");
+    omega
+        .command(point([12.5, 0.0, 10.0]), 2.0)
+        .expect("command is accepted");
+    let samples = poll_until(&mut omega, |s| s.force_n > 1.0).expect("a stop without braking");
     let strongest = samples.iter().map(|s| s.force_n).fold(0.0, f64::max);
     assert!(strongest < 1.5, "{strongest} N");
     let deeper = omega.command(point([12.5, 0.0, 10.0]), 2.0);
@@ -165,11 +171,11 @@ fn at_the_force_limit_it_stops_and_only_rises() {
         "{deeper:?}"
     );
     go(&mut omega, START, 20.0);
-    assert_eq!(arm.state().expect("lives").mode, Mode::Force);
+    assert_eq!(arm.state().expect("arm state").mode, Mode::Force);
 }
 
 #[test]
-fn the_tip_itself_arrives_in_soft_ground_and_only_with_the_correction() {
+fn the_tip_arrives_in_soft_ground_only_with_the_correction() {
     for corrected in [true, false] {
         let arm = arm_like(&ArmConfig {
             contact: Some(Contact::horizontal(0.015)),
@@ -181,14 +187,14 @@ fn the_tip_itself_arrives_in_soft_ground_and_only_with_the_correction() {
         }
         let mut omega = armed_with(config);
         let deep = point([12.5, 0.0, 13.0]);
-        omega.command(deep, 10.0).expect("goes");
+        omega.command(deep, 10.0).expect("command is accepted");
         let off = |s: &skinrig_device::RobotSample| s.measured.distance_mm(deep);
         let samples = if corrected {
-            poll_until(&mut omega, |s| off(s) < 0.03).expect("arrives")
+            poll_until(&mut omega, |s| off(s) < 0.03).expect("tip arrives")
         } else {
-            poll_until(&mut omega, |s| s.commanded == deep).expect("arrives")
+            poll_until(&mut omega, |s| s.commanded == deep).expect("tip arrives")
         };
-        let last = samples.last().expect("some");
+        let last = samples.last().expect("at least one sample");
         if corrected {
             // 1 N/mm times 2 mm.
             assert!((last.force_n - 2.0).abs() < 0.3, "{last:?}");
@@ -199,7 +205,7 @@ fn the_tip_itself_arrives_in_soft_ground_and_only_with_the_correction() {
 }
 
 #[test]
-fn a_loop_slower_than_the_driver_gives_each_reading_once() {
+fn a_loop_slower_than_the_driver_yields_each_reading_once() {
     let arm = arm_like(&ArmConfig {
         loop_khz: 1.0,
         ..ArmConfig::default()
@@ -209,12 +215,12 @@ fn a_loop_slower_than_the_driver_gives_each_reading_once() {
     let samples = go(&mut omega, target, 10.0);
     assert!(samples.windows(2).all(|w| w[0].t < w[1].t));
     drop(omega);
-    let journal = arm.journal().expect("is readable");
+    let journal = arm.journal().expect("journal");
     let cached = journal
         .calls("drdGetPositionAndOrientation")
         .filter(|e| e.result == 1.0)
         .count();
-    assert!(cached > 50, "the library repeated itself {cached} times");
+    assert!(cached > 50, "the library repeated {cached} readings");
     let targets = journal.calls("drdTrackPos").count();
     assert!(samples.len() < targets, "{} of {targets}", samples.len());
 }

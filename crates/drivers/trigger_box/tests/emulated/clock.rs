@@ -1,4 +1,4 @@
-//! The box's clock: times are those of the edges, and sync trains count on.
+//! The box's clock: accuracy of times, and counts of sync trains.
 
 use super::*;
 
@@ -7,7 +7,7 @@ fn monotonic_ns() -> i64 {
     t.tv_sec * 1_000_000_000 + t.tv_nsec
 }
 
-/// A clock and its zero on the monotonic clock, which lies between the two numbers.
+/// A clock and two monotonic times that enclose its zero.
 fn clock_with_origin() -> (RealClock, i64, i64) {
     let before = monotonic_ns();
     let clock = RealClock::start();
@@ -15,7 +15,7 @@ fn clock_with_origin() -> (RealClock, i64, i64) {
 }
 
 #[test]
-fn host_times_are_certain_and_box_times_are_those_of_the_edges() {
+fn host_times_are_within_their_bounds_and_box_times_match_the_edges() {
     let options = BoardOptions {
         ppm: 300.0,
         ..paced()
@@ -34,7 +34,7 @@ fn host_times_are_certain_and_box_times_are_those_of_the_edges() {
     let mut starts = Vec::new();
     for k in 0..8 {
         let sent = send_when_free(&mut device, mark(k)).unwrap();
-        let train = edges.take(EDGES_PER_TRAIN, PATIENCE).unwrap();
+        let train = edges.take(EDGES_PER_TRAIN, TIMEOUT).unwrap();
         let (earliest, latest) = truth(train[0].cycle, &edges);
         let (low, high) = (
             sent.t.0 - sent.uncertainty_ns,
@@ -42,24 +42,24 @@ fn host_times_are_certain_and_box_times_are_those_of_the_edges() {
         );
         assert!(
             low <= latest.0 && earliest.0 <= high,
-            "the edge rose at {earliest}..{latest}, told was {} +- {} ns",
+            "the edge rose at {earliest}..{latest}, reported was {} +- {} ns",
             sent.t,
             sent.uncertainty_ns
         );
         starts.push(train[0].cycle);
     }
-    // Two edges of the input, half a millisecond apart.
+    // Two input edges, half a millisecond apart.
     let soon = board.input(true).unwrap() + 2_000_000;
     board
         .plan_input(&[(false, soon), (true, soon + 8_000)])
         .unwrap();
-    let input = edges.take(2, PATIENCE).unwrap();
+    let input = edges.take(2, TIMEOUT).unwrap();
     assert!(input.iter().all(|e| e.pin == INPUT));
     poll_until(&mut device, &mut reports, |r| {
         let inputs = r.iter().filter(|r| matches!(r, BoxReport::Input { .. }));
         marks_in(r).len() == starts.len() && inputs.count() == 2
     });
-    // The box's zero lies some cycles after the board's: the same for all that it stamped.
+    // The box's zero is some cycles after the board's, the same for all time stamps.
     let told = marks_in(&reports);
     let zero = starts[0] - told[0].1.us * CYCLES_PER_US;
     for (start, (_, at)) in starts.iter().zip(&told) {
@@ -74,15 +74,15 @@ fn host_times_are_certain_and_box_times_are_those_of_the_edges() {
         .collect();
     for (edge, (rising, at_us)) in input.iter().zip(inputs) {
         assert_eq!(rising, edge.high);
-        // Stamped by the capture unit, told in whole microseconds.
+        // Stamped by the capture unit, reported in whole microseconds.
         assert!(((edge.cycle - zero) / CYCLES_PER_US).abs_diff(at_us) <= 1);
     }
-    // Each exchange holds the instant of the host that belongs to its box time.
+    // Each exchange encloses the host time of its box time.
     let mut exchanges = 0;
     for report in &reports {
         if let BoxReport::Exchange { sent, received, at } = report {
             let (earliest, latest) = truth(at.us * CYCLES_PER_US + zero, &edges);
-            // Whole microseconds were cut off.
+            // Rounded down to whole microseconds.
             assert!(sent.0 <= latest.0 + 1_000 && earliest.0 <= received.0);
             exchanges += 1;
         }
@@ -92,7 +92,7 @@ fn host_times_are_certain_and_box_times_are_those_of_the_edges() {
 }
 
 #[test]
-fn sync_trains_count_on_among_marks() {
+fn sync_trains_keep_counting_between_marks() {
     let Some(board) = start(&paced()) else {
         return;
     };
@@ -107,15 +107,15 @@ fn sync_trains_count_on_among_marks() {
         marks_in(r).len() == 6 && syncs_in(r).len() >= 4
     });
     device.set_sync(None).unwrap();
-    let end = Instant::now() + PATIENCE;
+    let end = Instant::now() + TIMEOUT;
     while device.counters().unwrap().syncs as usize > syncs_in(&reports).len() {
         device.poll(&mut reports).unwrap();
-        assert!(Instant::now() < end, "sync trains were not told");
+        assert!(Instant::now() < end, "sync trains were not reported");
     }
     let counts: Vec<u32> = syncs_in(&reports).iter().map(|s| s.0).collect();
     assert_eq!(counts, (0..counts.len() as u32).collect::<Vec<_>>());
     let trains = counts.len() + 6;
-    let all = without_skew(&edges.take(trains * EDGES_PER_TRAIN, PATIENCE).unwrap());
+    let all = without_skew(&edges.take(trains * EDGES_PER_TRAIN, TIMEOUT).unwrap());
     let seen = decode_marks(&trigger_edges(&all, CAMERA_1));
     assert_eq!((seen.stray_edges, seen.lost_edges), (0, 0));
     let marks: Vec<Mark> = seen.marks.iter().map(|m| m.mark).collect();
@@ -125,12 +125,12 @@ fn sync_trains_count_on_among_marks() {
 }
 
 #[test]
-fn a_mark_follows_the_sync_train_under_way() {
+fn a_mark_waits_for_a_running_sync_train() {
     let Some(board) = start(&free_running()) else {
         return;
     };
     let mut edges = board.edges().unwrap();
-    let mut ask = asker(&board);
+    let mut ask = requester(&board);
     let sync = |period_ms| Request::Sync {
         period_ms,
         first: 1 << 17,
@@ -138,9 +138,9 @@ fn a_mark_follows_the_sync_train_under_way() {
     ask(Request::Arm { silence_ms: 0 });
     assert_eq!(ask(sync(27)).outcome, Outcome::BadArgument);
     assert_eq!(ask(sync(28)).outcome, Outcome::Done);
-    // Told instants of first edges, and whether the mark had to wait for longer than the rest after another mark.
+    // Reported first edges, and whether the mark waited longer than the pause after another mark.
     let mut told = Vec::new();
-    let end = Instant::now() + PATIENCE;
+    let end = Instant::now() + TIMEOUT;
     while told.len() < 40 || !told.iter().any(|&(_, waited)| waited) {
         let number = told.len() as u32 + 1;
         let m = Request::Mark {
@@ -149,28 +149,28 @@ fn a_mark_follows_the_sync_train_under_way() {
         };
         let reply = ask(m);
         if reply.outcome == Outcome::Done {
-            let start = parse_mark(&reply.answers).unwrap().0;
+            let start = parse_mark(&reply.data).unwrap().0;
             told.push((
                 start,
                 start.saturating_sub(reply.at.0) > 2_000 * CYCLES_PER_US,
             ));
         }
-        assert!(Instant::now() < end, "no mark met a sync train");
+        assert!(Instant::now() < end, "no mark coincided with a sync train");
     }
     ask(sync(0));
     let mut status = ask(Request::Status);
     while status.flags.train() {
         status = ask(Request::Status);
-        assert!(Instant::now() < end, "a train without end");
+        assert!(Instant::now() < end, "an endless train");
     }
-    let counters = Counters::parse(&status.answers).unwrap();
+    let counters = Counters::parse(&status.data).unwrap();
     let trains = (counters.marks + counters.syncs) as usize;
-    let all = without_skew(&edges.take(trains * EDGES_PER_TRAIN, PATIENCE).unwrap());
+    let all = without_skew(&edges.take(trains * EDGES_PER_TRAIN, TIMEOUT).unwrap());
     let seen = decode_marks(&trigger_edges(&all, CAMERA_1));
     assert_eq!(counters.late_edges, 0);
     assert_eq!((seen.stray_edges, seen.lost_edges), (0, 0));
     assert_eq!(seen.marks.len(), told.len());
-    // The first count was one too many for its 17 bits.
+    // The first count exceeded 17 bits by one.
     assert_eq!(seen.syncs[0].count, 0);
     let starts: Vec<u64> = all
         .chunks(2 * PULSES_PER_TRAIN as usize)
@@ -181,9 +181,9 @@ fn a_mark_follows_the_sync_train_under_way() {
     let is_mark = |cycle: u64| seen.marks.iter().any(|m| m.t_us == cycle / CYCLES_PER_US);
     let marks: Vec<u64> = starts.iter().copied().filter(|&c| is_mark(c)).collect();
     for (&cycle, (ticks, waited)) in marks.iter().zip(&told) {
-        assert_eq!(cycle - marks[0], ticks - told[0].0, "told another instant");
+        assert_eq!(cycle - marks[0], ticks - told[0].0, "reported time differs");
         let before = cycle.checked_sub(train);
         let behind = before.is_some_and(|c| starts.contains(&c) && !is_mark(c));
-        assert!(behind || !waited, "it waited for nothing");
+        assert!(behind || !waited, "waited without a reason");
     }
 }

@@ -1,4 +1,4 @@
-//! The driver over a real serial port (a pseudo-terminal) against the real firmware on an emulated processor.
+//! The driver on a pseudo-terminal with the real firmware on an emulated processor.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod clock;
@@ -17,23 +17,23 @@ use skinrig_emulated_trigger_box::{
 };
 use skinrig_model::pulse::{PULSES_PER_TRAIN, PulseTrain, decode_marks};
 use skinrig_model::{BoxReport, BoxTime, HostTime, Mark, MarkKind, PressId, SentMark};
-use skinrig_trigger_box::greeting::greet;
-use skinrig_trigger_box::link::{Link, Patience};
+use skinrig_trigger_box::handshake::shake_hands;
+use skinrig_trigger_box::link::{Link, RequestTimeouts};
 use skinrig_trigger_box::protocol::{
     Counters, Event, EventKind, Events, Outcome, Reply, Request, parse_mark,
 };
-use skinrig_trigger_box::serial::SerialDial;
+use skinrig_trigger_box::serial::SerialConnector;
 use skinrig_trigger_box::{
-    Dial, OpenError, PortState, SerialTriggerBox, TriggerBoxConfig, enumerate,
+    Connector, OpenError, PortState, SerialTriggerBox, TriggerBoxConfig, enumerate,
 };
 
-/// Long enough for a machine that is busy with other things; a hang still fails.
-const PATIENCE: Duration = Duration::from_secs(120);
+/// Long enough for a busy machine; a hang still fails.
+const TIMEOUT: Duration = Duration::from_secs(120);
 
-/// Edges of one train on all three outputs.
+/// Edges per train on all three outputs.
 const EDGES_PER_TRAIN: usize = 3 * 2 * PULSES_PER_TRAIN as usize;
 
-/// A board, one at a time: a board keeps pace with the clock only while it has a good part of a processor.
+/// An emulated board. Boards run one at a time, because each needs a good part of a processor to keep real time.
 struct Board {
     board: EmulatedBox,
     _turn: MutexGuard<'static, ()>,
@@ -41,7 +41,7 @@ struct Board {
 
 fn start(options: &BoardOptions) -> Option<Board> {
     static TURN: Mutex<()> = Mutex::new(());
-    // A test that failed has dropped its board all the same.
+    // A test that failed has dropped its board anyway.
     let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     let board = EmulatedBox::start_or_skip(options)?;
     Some(Board { board, _turn: turn })
@@ -74,12 +74,12 @@ fn free_running() -> BoardOptions {
     }
 }
 
-/// Settings without any limit that a busy machine could break.
+/// Configuration without time limits that a busy machine could exceed.
 fn config(board: &EmulatedBox) -> TriggerBoxConfig {
     TriggerBoxConfig {
         silence_ms: 0,
-        command_timeout: PATIENCE,
-        hello_timeout: PATIENCE,
+        command_timeout: TIMEOUT,
+        hello_timeout: TIMEOUT,
         ..TriggerBoxConfig::new(board.port().to_str().unwrap())
     }
 }
@@ -99,27 +99,27 @@ fn mark(k: u32) -> Mark {
 
 /// Sends a mark as soon as the line is free.
 fn send_when_free(device: &mut SerialTriggerBox, mark: Mark) -> Result<SentMark, DeviceError> {
-    let end = Instant::now() + PATIENCE;
+    let end = Instant::now() + TIMEOUT;
     loop {
         match device.send(mark) {
             Err(DeviceError::State { found, .. }) if found.contains("busy") => {
-                assert!(Instant::now() < end, "busy for ever");
+                assert!(Instant::now() < end, "still busy");
             }
             other => return other,
         }
     }
 }
 
-/// Polls until `enough` holds of all reports so far.
+/// Polls until `enough` is true for all reports so far.
 fn poll_until(
     device: &mut SerialTriggerBox,
     reports: &mut Vec<BoxReport>,
     enough: impl Fn(&[BoxReport]) -> bool,
 ) {
-    let end = Instant::now() + PATIENCE;
+    let end = Instant::now() + TIMEOUT;
     while !enough(reports) {
         device.poll(reports).unwrap();
-        assert!(Instant::now() < end, "never came; so far {reports:?}");
+        assert!(Instant::now() < end, "timed out after {reports:?}");
         std::thread::yield_now();
     }
 }
@@ -132,7 +132,7 @@ fn marks_in(reports: &[BoxReport]) -> Vec<(Mark, BoxTime)> {
     only_marks.collect()
 }
 
-/// All three outputs change in the same cycle, always; the edges of one of them.
+/// Edges of one output, after checking that all three outputs always change in the same cycle.
 fn without_skew(edges: &[Edge]) -> Vec<Edge> {
     for together in edges.chunks(3) {
         let pins: Vec<u8> = together.iter().map(|e| e.pin).collect();
@@ -151,7 +151,7 @@ fn without_skew(edges: &[Edge]) -> Vec<Edge> {
         .collect()
 }
 
-/// The train of `mark`, exact to the cycle.
+/// Verifies the train of `mark` cycle by cycle.
 fn assert_train(edges: &[Edge], mark: Mark) {
     let start = edges[0].cycle;
     let found: Vec<(u64, bool)> = edges.iter().map(|e| (e.cycle - start, e.high)).collect();
@@ -176,15 +176,18 @@ fn syncs_in(reports: &[BoxReport]) -> Vec<(u32, BoxTime)> {
     only_syncs.collect()
 }
 
-/// Talks to the box without the driver around it.
-fn asker(board: &EmulatedBox) -> impl FnMut(Request) -> Reply + use<> {
+/// Sends requests to the box without the driver.
+fn requester(board: &EmulatedBox) -> impl FnMut(Request) -> Reply + use<> {
     let port = board.port().to_str().unwrap();
-    let mut link = Link::new(SerialDial::new(port).dial().unwrap(), RealClock::start());
-    let greeted = greet(&mut link, port, Some("TB-0001"), PATIENCE).unwrap();
-    assert_eq!(greeted.identity.serial, "TB-0001");
-    let patience = Patience {
+    let mut link = Link::new(
+        SerialConnector::new(port).connect().unwrap(),
+        RealClock::start(),
+    );
+    let handshake = shake_hands(&mut link, port, Some("TB-0001"), TIMEOUT).unwrap();
+    assert_eq!(handshake.identity.serial, "TB-0001");
+    let patience = RequestTimeouts {
         per_try: Duration::from_millis(60),
-        total: PATIENCE,
+        total: TIMEOUT,
     };
-    move |request| link.ask(&request, patience).unwrap().reply
+    move |request| link.request(&request, patience).unwrap().reply
 }

@@ -1,4 +1,4 @@
-//! Trains are exact, whatever else happens on the wires.
+//! Trains are exact, whatever else happens on the lines.
 
 use super::*;
 
@@ -12,7 +12,7 @@ fn run_marks(n: u32) {
     for k in 0..n {
         let sent = send_when_free(&mut device, mark(k)).unwrap();
         assert_eq!(sent.mark, mark(k));
-        let train = without_skew(&edges.take(EDGES_PER_TRAIN, PATIENCE).unwrap());
+        let train = without_skew(&edges.take(EDGES_PER_TRAIN, TIMEOUT).unwrap());
         assert_train(&train, mark(k));
         let seen = decode_marks(&trigger_edges(&train, CAMERA_1));
         assert_eq!((seen.marks.len(), seen.stray_edges), (1, 0));
@@ -27,11 +27,7 @@ fn run_marks(n: u32) {
     let counters = device.counters().unwrap();
     assert_eq!((counters.marks, counters.late_edges), (n, 0));
     assert_eq!((counters.overruns, counters.dropped_events), (0, 0));
-    assert_eq!(
-        edges.next(Duration::ZERO).unwrap(),
-        None,
-        "an edge too many"
-    );
+    assert_eq!(edges.next(Duration::ZERO).unwrap(), None, "an extra edge");
 }
 
 #[test]
@@ -48,7 +44,7 @@ fn a_hundred_thousand_pulses_without_loss() {
 
 #[test]
 fn the_contract_holds() {
-    // One board for all boxes that the suite asks for.
+    // One board for all boxes of the contract.
     let Some(board) = start(&paced()) else {
         return;
     };
@@ -63,19 +59,19 @@ fn the_contract_holds() {
 }
 
 #[test]
-fn inputs_shift_no_pulse_and_pulses_shift_no_stamp() {
+fn inputs_do_not_shift_pulses_and_pulses_do_not_shift_time_stamps() {
     let Some(mut board) = start(&free_running()) else {
         return;
     };
-    let mut ask = asker(&board);
+    let mut ask = requester(&board);
     ask(Request::Arm { silence_ms: 0 });
     board.loop_back(1).unwrap();
     let mut edges = board.edges().unwrap();
     let mut zero = None;
-    // The input follows the spare output so late that its interrupt meets that of the next edge, in every way.
+    // The input follows the spare output with delays at which its interrupt collides with that of the next edge.
     for (k, delay_us) in (0..).zip([0, 3, 20, 32, 38, 42, 45, 47, 48, 49, 51, 58, 65, 75, 95, 99]) {
         board.loop_back(1 + delay_us * CYCLES_PER_US).unwrap();
-        let from = Events::parse(&ask(Request::Events { from: 0 }).answers)
+        let from = Events::parse(&ask(Request::Events { from: 0 }).data)
             .unwrap()
             .next;
         ask(Request::Events { from });
@@ -85,19 +81,19 @@ fn inputs_shift_no_pulse_and_pulses_shift_no_stamp() {
         };
         let reply = ask(m);
         assert_eq!(reply.outcome, Outcome::Done);
-        let start = parse_mark(&reply.answers).unwrap().0;
-        let of_both = edges.take(EDGES_PER_TRAIN / 3 * 4, PATIENCE).unwrap();
+        let start = parse_mark(&reply.data).unwrap().0;
+        let of_both = edges.take(EDGES_PER_TRAIN / 3 * 4, TIMEOUT).unwrap();
         let (inputs, outputs): (Vec<Edge>, Vec<Edge>) =
             of_both.into_iter().partition(|e| e.pin == INPUT);
         let train = without_skew(&outputs);
         assert_train(&train, mark(k));
         let zero = *zero.get_or_insert(train[0].cycle - start);
-        assert_eq!(train[0].cycle - start, zero, "a train beside its time");
+        assert_eq!(train[0].cycle - start, zero, "a shifted train");
         let mut stamps = Vec::new();
-        // The box keeps 48 events before the input is refused: the mark and 47 edges, if nobody asks meanwhile.
+        // The box stores 48 events before it ignores the input: the mark and 47 edges, if no request comes in between.
         let mut from = from;
         while stamps.len() < 47 {
-            let events = Events::parse(&ask(Request::Events { from }).answers).unwrap();
+            let events = Events::parse(&ask(Request::Events { from }).data).unwrap();
             from = events.first + events.events.len() as u32;
             for event in events.events {
                 if let EventKind::Input { rising } = event.kind {
@@ -107,28 +103,28 @@ fn inputs_shift_no_pulse_and_pulses_shift_no_stamp() {
         }
         for (edge, (rising, ticks)) in inputs.iter().zip(stamps) {
             assert_eq!(rising, edge.high);
-            // The emulator lets an edge take effect between two instructions, not within one.
+            // In the emulator an edge takes effect between two instructions and never within one.
             let off = (edge.cycle - zero).abs_diff(ticks);
             assert!(
                 off <= 3,
-                "stamped {off} cycles off, {delay_us} us after the output"
+                "time stamp {off} cycles off, {delay_us} us after the output"
             );
         }
     }
-    let counters = Counters::parse(&ask(Request::Status).answers).unwrap();
+    let counters = Counters::parse(&ask(Request::Status).data).unwrap();
     assert_eq!((counters.late_edges, counters.input_glitches), (0, 0));
 }
 
 #[test]
-fn a_noisy_input_takes_nothing_from_the_trains() {
+fn a_noisy_input_does_not_affect_the_trains() {
     let Some(mut board) = start(&free_running()) else {
         return;
     };
     let mut edges = board.edges().unwrap();
-    let mut ask = asker(&board);
+    let mut ask = requester(&board);
     ask(Request::Arm { silence_ms: 0 });
     let (mut marks, mut told, mut from) = (0, Vec::new(), 0);
-    // From far more edges than the processor can stamp to fewer than are refused.
+    // From far more edges than the processor can stamp, to fewer than are ignored.
     for gap_us in [2, 5, 9, 14, 23, 40, 61] {
         let soon = board.input(true).unwrap() + 8_000_000;
         let noise: Vec<(bool, u64)> = (0..300)
@@ -144,20 +140,20 @@ fn a_noisy_input_takes_nothing_from_the_trains() {
             while ask(m.clone()).outcome != Outcome::Done {}
             let mut outputs = Vec::new();
             while outputs.len() < EDGES_PER_TRAIN {
-                let edge = edges.next(PATIENCE).unwrap().unwrap();
+                let edge = edges.next(TIMEOUT).unwrap().unwrap();
                 if edge.pin != INPUT {
                     outputs.push(edge);
                 }
             }
             assert_train(&without_skew(&outputs), mark(marks));
-            // A slow host takes six events for each mark, while the input would fill all that is free.
-            let events = Events::parse(&ask(Request::Events { from }).answers).unwrap();
+            // A slow host reads six events per mark, while the input would fill all free memory.
+            let events = Events::parse(&ask(Request::Events { from }).data).unwrap();
             from = events.first + events.events.len() as u32;
             told.extend(events.events);
         }
     }
     loop {
-        let events = Events::parse(&ask(Request::Events { from }).answers).unwrap();
+        let events = Events::parse(&ask(Request::Events { from }).data).unwrap();
         from = events.first + events.events.len() as u32;
         told.extend(events.events);
         if from == events.next {
@@ -166,7 +162,7 @@ fn a_noisy_input_takes_nothing_from_the_trains() {
     }
     let is_mark = |e: &&Event| matches!(e.kind, EventKind::Mark(_));
     assert_eq!(told.iter().filter(is_mark).count(), marks as usize);
-    let counters = Counters::parse(&ask(Request::Status).answers).unwrap();
+    let counters = Counters::parse(&ask(Request::Status).data).unwrap();
     assert_eq!(counters.marks, marks);
     assert_eq!((counters.late_edges, counters.dropped_events), (0, 0));
     assert!(counters.input_mutes > 0, "{counters:?}");

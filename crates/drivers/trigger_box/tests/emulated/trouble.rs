@@ -1,9 +1,9 @@
-//! Noise, unplugging, resets, hangs, a silent host.
+//! Noise, unplugging, resets, hangs, and a silent host.
 
 use super::*;
 
 #[test]
-fn on_a_noisy_line_every_mark_is_sent_once_or_named() {
+fn on_a_noisy_line_every_mark_is_sent_once_or_reported() {
     let Some(mut board) = start(&free_running()) else {
         return;
     };
@@ -34,36 +34,36 @@ fn on_a_noisy_line_every_mark_is_sent_once_or_named() {
     let done = board.noise(0, NoisePerMillion::default()).unwrap();
     assert!(
         done.flipped > 5 && done.dropped > 5 && done.inserted > 5,
-        "{done:?}: the test tests nothing"
+        "{done:?}: no fault occurred, so this tests nothing"
     );
     let counters = device.counters().unwrap();
     assert!(counters.bad_checksums + counters.bad_frames > 0);
     let trains = counters.marks as usize;
-    let all = without_skew(&edges.take(trains * EDGES_PER_TRAIN, PATIENCE).unwrap());
+    let all = without_skew(&edges.take(trains * EDGES_PER_TRAIN, TIMEOUT).unwrap());
     let seen = decode_marks(&trigger_edges(&all, CAMERA_1));
     assert_eq!(seen.stray_edges, 0);
-    // In order and never twice; a mark is missing only where an error said so.
+    // In order and never twice; a mark may be missing only after an error.
     let mut on_the_line = seen.marks.iter().map(|m| m.mark).peekable();
     for (mark, certain) in sent {
         let there = on_the_line.next_if_eq(&mark).is_some();
-        assert!(there || !certain, "{mark:?} was promised and not sent");
+        assert!(there || !certain, "{mark:?} was confirmed but not sent");
     }
-    assert_eq!(on_the_line.next(), None, "a train that nobody asked for");
-    // The events came through the noise as well.
+    assert_eq!(on_the_line.next(), None, "an unrequested train");
+    // The events arrived despite the noise too.
     let mut reports = Vec::new();
     poll_until(&mut device, &mut reports, |r| marks_in(r).len() >= trains);
     assert_eq!(marks_in(&reports).len(), trains);
 }
 
 #[test]
-fn a_box_that_was_unplugged_comes_back() {
+fn an_unplugged_box_is_reconnected() {
     let Some(mut board) = start(&paced()) else {
         return;
     };
     let mut edges = board.edges().unwrap();
     let mut device = open(&board, RealClock::start());
     send_when_free(&mut device, mark(1)).unwrap();
-    edges.take(EDGES_PER_TRAIN, PATIENCE).unwrap();
+    edges.take(EDGES_PER_TRAIN, TIMEOUT).unwrap();
     board.unplug().unwrap();
     let lost = device.send(mark(2)).unwrap_err();
     assert!(matches!(lost, DeviceError::Lost { .. }), "{lost}");
@@ -72,15 +72,15 @@ fn a_box_that_was_unplugged_comes_back() {
     assert!(matches!(lost, DeviceError::Lost { .. }), "{lost}");
     board.plug().unwrap();
     comes_back(&mut device, &mut reports);
-    // Armed again, and with a fresh count of marks.
+    // Rearmed, with new mark numbers.
     send_when_free(&mut device, mark(3)).unwrap();
-    let train = without_skew(&edges.take(EDGES_PER_TRAIN, PATIENCE).unwrap());
+    let train = without_skew(&edges.take(EDGES_PER_TRAIN, TIMEOUT).unwrap());
     assert_train(&train, mark(3));
 }
 
-/// Polls through the time in which the box is lost, until it has told one reset.
+/// Polls while the box is lost, until it reports one reset.
 fn comes_back(device: &mut SerialTriggerBox, reports: &mut Vec<BoxReport>) {
-    let end = Instant::now() + PATIENCE;
+    let end = Instant::now() + TIMEOUT;
     loop {
         let answer = device.poll(reports);
         assert!(
@@ -93,13 +93,13 @@ fn comes_back(device: &mut SerialTriggerBox, reports: &mut Vec<BoxReport>) {
         if resets.count() == 1 && answer.is_ok() {
             return;
         }
-        assert!(Instant::now() < end, "it did not come back");
+        assert!(Instant::now() < end, "the box did not recover");
         std::thread::yield_now();
     }
 }
 
 #[test]
-fn a_brown_out_is_told_as_a_reset_and_its_cause_is_kept() {
+fn a_brown_out_is_reported_as_a_reset_with_its_cause() {
     let Some(mut board) = start(&paced()) else {
         return;
     };
@@ -114,7 +114,7 @@ fn a_brown_out_is_told_as_a_reset_and_its_cause_is_kept() {
         .iter()
         .position(|r| matches!(r, BoxReport::Reset { .. }))
         .unwrap();
-    // Sync trains go on by themselves, with counts that were never used.
+    // Sync trains resume by themselves with new counts.
     poll_until(&mut device, &mut reports, |r| {
         !syncs_in(&r[reset..]).is_empty()
     });
@@ -125,7 +125,7 @@ fn a_brown_out_is_told_as_a_reset_and_its_cause_is_kept() {
 }
 
 #[test]
-fn a_firmware_that_hangs_is_restarted_by_its_watchdog() {
+fn a_hanging_firmware_is_restarted_by_its_watchdog() {
     let Some(mut board) = start(&paced()) else {
         return;
     };
@@ -143,7 +143,7 @@ fn a_silent_host_disarms_the_box() {
         return;
     };
     let mut edges = board.edges().unwrap();
-    let mut ask = asker(&board);
+    let mut ask = requester(&board);
     let sync = |period_ms| Request::Sync {
         period_ms,
         first: 0,
@@ -154,8 +154,8 @@ fn a_silent_host_disarms_the_box() {
         mark: mark(0),
     };
     assert_eq!(ask(m.clone()).outcome, Outcome::NotArmed);
-    // A second of the box's time is much less of ours, so it may be over before the second request.
-    let end = Instant::now() + PATIENCE;
+    // A second of box time is much shorter for the host, so it may be over before the second request.
+    let end = Instant::now() + TIMEOUT;
     loop {
         assert_eq!(
             ask(Request::Arm { silence_ms: 1_000 }).outcome,
@@ -164,17 +164,17 @@ fn a_silent_host_disarms_the_box() {
         if ask(sync(50)).outcome == Outcome::Done {
             break;
         }
-        assert!(Instant::now() < end, "disarmed each time");
+        assert!(Instant::now() < end, "disarmed repeatedly");
     }
-    edges.take(10 * EDGES_PER_TRAIN, PATIENCE).unwrap();
-    // Two more seconds of it.
+    edges.take(10 * EDGES_PER_TRAIN, TIMEOUT).unwrap();
+    // Two more seconds of box time.
     let end = board.cycle().unwrap() + 2_000_000 * CYCLES_PER_US;
     while board.cycle().unwrap() < end {
         std::thread::yield_now();
     }
     let reply = ask(Request::Status);
     assert!(reply.flags.disarmed_by_silence() && !reply.flags.armed() && !reply.flags.syncing());
-    let counters = Counters::parse(&reply.answers).unwrap();
+    let counters = Counters::parse(&reply.data).unwrap();
     assert!((10..=21).contains(&counters.syncs), "{counters:?}");
     assert_eq!(ask(m).outcome, Outcome::NotArmed);
 }

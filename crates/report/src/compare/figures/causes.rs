@@ -1,8 +1,8 @@
-//! Owns the figure of what carries a change.
+//! Owns the figure of the causes of a change.
 
 use skinrig_compare::{Causes, Comparison};
 
-use super::{BETTER, Drawn, NEITHER, Sheet, WORSE};
+use super::{BETTER, FigureBuilder, NEITHER, RenderedFigure, WORSE};
 use crate::axes::{Scale, tick_label, ticks};
 use crate::format::number;
 use crate::svg::Px;
@@ -13,11 +13,11 @@ const TOP: f64 = 34.0;
 const LEFT: f64 = 250.0;
 const RIGHT: f64 = 800.0;
 
-/// Contributions to the change of the mean square error of skin `k`.
-pub(in crate::compare) fn causes(result: &Comparison, k: usize, of: &Causes) -> Drawn {
+/// Contributions to the change of the mean square error between the first skin and skin `k`.
+pub(in crate::compare) fn causes(result: &Comparison, k: usize, of: &Causes) -> RenderedFigure {
     let letter = result.skins[k].letter;
     let rows: Vec<(&str, &skinrig_compare::statistics::Interval, bool)> =
-        std::iter::once(("change in all", &of.change_mm2, true))
+        std::iter::once(("total change", &of.change_mm2, true))
             .chain(
                 of.contributions
                     .iter()
@@ -26,13 +26,13 @@ pub(in crate::compare) fn causes(result: &Comparison, k: usize, of: &Causes) -> 
             .collect();
     let height = TOP + ROW * rows.len() as f64 + 70.0;
     let caption = format!(
-        "What carries the change of the mean square error from A ({} mm²) to {letter} ({} mm²), with 95 % intervals over places. The \
-         parts add up to the change. Left: lowers the error.",
+        "Contributions to the change of the mean square error from A ({} mm²) to {letter} ({} mm²), with 95 % \
+         intervals over locations. The parts add up to the change. Left of zero: lowers the error.",
         number(Some(of.mse_mm2[0]), 3),
         number(Some(of.mse_mm2[1]), 3)
     );
-    let title = "What carries the change".to_owned();
-    let mut sheet = Sheet::new(
+    let title = "Contributions to the change".to_owned();
+    let mut figure = FigureBuilder::new(
         &format!("causes-{k}"),
         title,
         caption,
@@ -47,7 +47,7 @@ pub(in crate::compare) fn causes(result: &Comparison, k: usize, of: &Causes) -> 
     let room = 0.06 * (high - low).max(1e-9);
     let scale = Scale::new((low - room, high + room), (LEFT, RIGHT));
     let bottom = TOP + ROW * rows.len() as f64;
-    let svg = &mut sheet.svg;
+    let svg = &mut figure.svg;
     let at = ticks(scale.data.0, scale.data.1, 6);
     let step = if at.len() > 1 { at[1] - at[0] } else { 1.0 };
     for t in at {
@@ -64,7 +64,7 @@ pub(in crate::compare) fn causes(result: &Comparison, k: usize, of: &Causes) -> 
         ((LEFT + RIGHT) / 2.0, bottom + 38.0),
         "label",
         "middle",
-        "part of the change of the mean square error (mm²)",
+        "contribution to the change of the mean square error (mm²)",
     );
     for (i, (name, part, whole)) in rows.iter().enumerate() {
         let y = TOP + ROW * i as f64;
@@ -121,5 +121,5 @@ pub(in crate::compare) fn causes(result: &Comparison, k: usize, of: &Causes) -> 
             svg.line("axis", (14.0, y + ROW - 4.0), (WIDTH - 14.0, y + ROW - 4.0));
         }
     }
-    sheet.finish(result, k, height)
+    figure.finish(result, k, height)
 }

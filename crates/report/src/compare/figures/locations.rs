@@ -1,8 +1,8 @@
-//! Owns the figure of both skins' errors place by place.
+//! Owns the figure that compares both skins per location.
 
 use skinrig_compare::Comparison;
 
-use super::{Drawn, Sheet, of_sign};
+use super::{FigureBuilder, RenderedFigure, sign_colour};
 use crate::axes::{Axes, Scale};
 use crate::figures::nice_above;
 use crate::format::number;
@@ -10,8 +10,8 @@ use crate::svg::Px;
 
 const SIZE: (f64, f64) = (620.0, 560.0);
 
-/// Error of skin `k` against that of the first at each place that both have.
-pub(in crate::compare) fn locations(result: &Comparison, k: usize) -> Option<Drawn> {
+/// Error of skin `k` against that of the first skin at each shared location.
+pub(in crate::compare) fn locations(result: &Comparison, k: usize) -> Option<RenderedFigure> {
     let letter = result.skins[k].letter;
     let points: Vec<_> = result
         .locations
@@ -29,12 +29,13 @@ pub(in crate::compare) fn locations(result: &Comparison, k: usize) -> Option<Dra
     });
     let lower = points.iter().filter(|(_, a, b)| b < a).count();
     let caption = format!(
-        "Mean error at each place: of A along x, of {letter} along y. Below the line {letter} errs less ({lower} of {} places). \
-         Filled: the 95 % interval of the difference excludes zero. Ranks by error are in the table of places.",
+        "Mean error per location: A along x, {letter} along y. Below the line {letter} errs less ({lower} of {} \
+         locations). Filled: the 95 % interval of the difference excludes zero. The table of locations lists ranks by \
+         error.",
         points.len()
     );
-    let title = "Place by place".to_owned();
-    let mut sheet = Sheet::new(&format!("places-{k}"), title, caption, "locations", SIZE);
+    let title = "Location by location".to_owned();
+    let mut figure = FigureBuilder::new(&format!("places-{k}"), title, caption, "locations", SIZE);
     let axes = Axes {
         x: Scale::new((0.0, end), (70.0, 590.0)),
         y: Scale::new((0.0, end), (482.0, 22.0)),
@@ -42,7 +43,7 @@ pub(in crate::compare) fn locations(result: &Comparison, k: usize) -> Option<Dra
         y_label: format!("mean error of {letter} (mm)"),
         tick_count: (6, 6),
     };
-    let svg = &mut sheet.svg;
+    let svg = &mut figure.svg;
     axes.draw(svg);
     svg.line(
         "ref2",
@@ -51,7 +52,7 @@ pub(in crate::compare) fn locations(result: &Comparison, k: usize) -> Option<Dra
     );
     for (location, a, b) in &points {
         let here = &location.skins[k];
-        let colour = of_sign(here.sign());
+        let colour = sign_colour(here.sign());
         let style = if here.sign() == 0 {
             "fill:none;stroke:var(--mark);stroke-width:1.3".to_owned()
         } else {
@@ -76,5 +77,5 @@ pub(in crate::compare) fn locations(result: &Comparison, k: usize) -> Option<Dra
         svg.holding("title", &[], &text);
         svg.close();
     }
-    Some(sheet.finish(result, k, SIZE.1))
+    Some(figure.finish(result, k, SIZE.1))
 }

@@ -1,10 +1,10 @@
-//! Owns the maps: error of both skins and their difference, one colour step for one mm in all three.
+//! Owns the maps: error of both skins and their difference, with the same colour step per mm in all three.
 
-use skinrig_compare::{Comparison, Here, Location};
+use skinrig_compare::{Comparison, Location, LocationComparison};
 use skinrig_model::Point2;
 
 use super::scales::{LEFT, PANEL, STEP, bars, diverging};
-use super::{Drawn, Sheet};
+use super::{FigureBuilder, RenderedFigure};
 use crate::axes::{Axes, Scale};
 use crate::colour::viridis;
 use crate::format::number;
@@ -13,8 +13,8 @@ use crate::svg::{Px, Svg, polyline};
 const SIZE: (f64, f64) = (1240.0, 528.0);
 const TOP: f64 = 40.0;
 
-/// The maps of skin `k` beside the first.
-pub(in crate::compare) fn maps(result: &Comparison, k: usize) -> Option<Drawn> {
+/// Maps of the first skin and of skin `k`.
+pub(in crate::compare) fn maps(result: &Comparison, k: usize) -> Option<RenderedFigure> {
     let outline = result.outline?;
     let letter = result.skins[k].letter;
     let errors = result
@@ -38,13 +38,13 @@ pub(in crate::compare) fn maps(result: &Comparison, k: usize) -> Option<Drawn> {
         .filter(|l| tested(&l.skins[k]))
         .count();
     let caption = format!(
-        "Mean error of the presses at each place, for both skins, and the difference {letter} - A. One mm is the same length on both \
-         colour bars. Lines: mean error vectors, {times} times as long as they are. Triangles down (blue): {letter} errs less, its 95 % \
-         interval excludes zero ({better} of {tested} places with an interval); triangles up (orange): it errs more ({worse}). Of \
-         places without any difference one in twenty is marked by chance ({} here).",
+        "Mean error per location for both skins, and the difference {letter} - A. One mm has the same length on both \
+         colour bars. Lines: mean error vectors, magnified {times} times. Triangles down (blue): {letter} errs less \
+         and its 95 % interval excludes zero ({better} of {tested} locations with an interval); triangles up (orange): \
+         it errs more ({worse}). Without any true difference one location in twenty is marked by chance ({} here).",
         number(Some(tested as f64 * 0.05), 0)
     );
-    let mut sheet = Sheet::new(
+    let mut figure = FigureBuilder::new(
         &format!("maps-{k}"),
         format!("Where {letter} errs more or less than A"),
         caption,
@@ -79,7 +79,7 @@ pub(in crate::compare) fn maps(result: &Comparison, k: usize) -> Option<Drawn> {
             },
             tick_count: (5, 5),
         };
-        let svg = &mut sheet.svg;
+        let svg = &mut figure.svg;
         let shown: String = title.chars().take(46).collect();
         svg.text((left, TOP - 16.0), "panel", "start", &shown);
         axes.draw(svg);
@@ -121,17 +121,17 @@ pub(in crate::compare) fn maps(result: &Comparison, k: usize) -> Option<Drawn> {
             );
         }
     }
-    bars(&mut sheet.svg, end, letter);
-    Some(sheet.finish(result, k, SIZE.1))
+    bars(&mut figure.svg, end, letter);
+    Some(figure.finish(result, k, SIZE.1))
 }
 
-fn tested(here: &Here) -> bool {
+fn tested(here: &LocationComparison) -> bool {
     here.difference_mm
         .is_some_and(|d| d.low.is_some() && d.high.is_some())
 }
 
-/// What is read when the pointer rests on a place.
-fn told(location: &Location) -> String {
+/// Tooltip of a location.
+fn tooltip(location: &Location) -> String {
     let skins = location.skins.iter().zip('A'..).map(|(here, letter)| {
         let rank = here.rank.map_or(String::new(), |r| format!(", rank {r}"));
         format!(
@@ -160,11 +160,18 @@ fn disc(svg: &mut Svg, (x, y): (f64, f64), r: f64, fill: &str, ring: bool, locat
             ("style", &format!("stroke:#14181d;stroke-width:{width}")),
         ],
     );
-    svg.holding("title", &[], &told(location));
+    svg.holding("title", &[], &tooltip(location));
     svg.close();
 }
 
-fn error_disc(svg: &mut Svg, at: (f64, f64), r: f64, here: &Here, end: f64, location: &Location) {
+fn error_disc(
+    svg: &mut Svg,
+    at: (f64, f64),
+    r: f64,
+    here: &LocationComparison,
+    end: f64,
+    location: &Location,
+) {
     match here.error_mm {
         Some(error) => disc(svg, at, r, &viridis(error / end), false, location),
         None if here.presses[1] > 0 => {
@@ -223,7 +230,7 @@ fn difference_disc(svg: &mut Svg, at: (f64, f64), r: f64, location: &Location, k
     );
 }
 
-/// A round number above 98 % of the errors.
+/// Round number above 98 % of the errors.
 fn scale_end(mut errors: Vec<f64>) -> Option<f64> {
     errors.sort_by(f64::total_cmp);
     let last = errors.len().checked_sub(1)?;
@@ -232,7 +239,7 @@ fn scale_end(mut errors: Vec<f64>) -> Option<f64> {
     ))
 }
 
-/// Half the least distance between neighbours, mm, at most 6.
+/// Half the smallest distance between neighbours, mm, at most 6.
 fn radius(locations: &[Location]) -> f64 {
     let mut nearest: Vec<f64> = locations
         .iter()
@@ -249,7 +256,7 @@ fn radius(locations: &[Location]) -> f64 {
     (0.46 * typical).clamp(0.8, 4.2)
 }
 
-/// A round factor that makes a large mean error vector about as long as 7 mm.
+/// Round factor that scales a large mean error vector to about 7 mm.
 fn magnification(result: &Comparison, k: usize) -> f64 {
     let vectors = result
         .locations

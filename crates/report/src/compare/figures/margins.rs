@@ -1,10 +1,10 @@
-//! Owns the figure of differences in units of their margins: what is equivalent, what is not, at a glance.
+//! Owns the figure of differences in units of their margins, which shows equivalence at a glance.
 
 use skinrig_compare::statistics::{Better, Comparison as Compared, Verdict};
 use skinrig_compare::{Comparison, Row};
 
-use super::{BETTER, Drawn, NEITHER, Sheet, WORSE};
-use crate::compare::words;
+use super::{BETTER, FigureBuilder, NEITHER, RenderedFigure, WORSE};
+use crate::compare::text;
 use crate::svg::{Px, dots};
 
 const WIDTH: f64 = 900.0;
@@ -12,11 +12,11 @@ const ROW: f64 = 30.0;
 const TOP: f64 = 56.0;
 const LEFT: f64 = 190.0;
 const RIGHT: f64 = 690.0;
-/// Margins shown to either side.
-const MOST: f64 = 4.0;
+/// Margins shown on each side.
+const MAX_MARGINS: f64 = 4.0;
 
-/// Skin `k` against the first, metric by metric; `None` without a margin.
-pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<Drawn> {
+/// Skin `k` against the first, one row per metric; `None` without margins.
+pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<RenderedFigure> {
     let rows: Vec<(&Row, &Compared, f64, Option<Verdict>)> = result
         .table
         .iter()
@@ -30,20 +30,20 @@ pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<Drawn
     }
     let letter = result.skins[k].letter;
     let height = TOP + ROW * rows.len() as f64 + 66.0;
-    let mut sheet = Sheet::new(
+    let mut figure = FigureBuilder::new(
         &format!("margins-{k}"),
-        format!("{letter} against A, in margins"),
+        format!("{letter} against A, in units of the margins"),
         format!(
-            "Differences with their 95 % intervals in units of the margin of each metric, turned so that right is better. Within the \
-             band a difference is none. Arrows: beyond {MOST} margins."
+            "Differences with 95 % intervals in units of each metric's margin. Right is better. Differences within the \
+             band are equivalent. Arrows: beyond {MAX_MARGINS} margins."
         ),
         "metrics",
         (WIDTH, height),
     );
-    let svg = &mut sheet.svg;
+    let svg = &mut figure.svg;
     let middle = (LEFT + RIGHT) / 2.0;
-    let per = (RIGHT - LEFT) / (2.0 * MOST);
-    let x = |v: f64| middle + per * v.clamp(-MOST, MOST);
+    let per = (RIGHT - LEFT) / (2.0 * MAX_MARGINS);
+    let x = |v: f64| middle + per * v.clamp(-MAX_MARGINS, MAX_MARGINS);
     let bottom = TOP + ROW * rows.len() as f64;
     svg.leaf(
         "rect",
@@ -72,7 +72,7 @@ pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<Drawn
         (middle, bottom + 38.0),
         "label",
         "middle",
-        "difference in margins",
+        "difference (margins)",
     );
     svg.text(
         (LEFT, TOP - 22.0),
@@ -89,7 +89,7 @@ pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<Drawn
     svg.text((middle, TOP - 22.0), "note", "middle", "no difference");
     for (i, (row, c, margin, verdict)) in rows.iter().enumerate() {
         let y = TOP + ROW * (i as f64 + 0.5) - 4.0;
-        let turn = turn(row, c) / margin;
+        let turn = improvement_factor(row, c) / margin;
         let ends = |v: Option<f64>| v.map(|v| v * turn);
         let (mut low, mut high) = (ends(c.difference.low), ends(c.difference.high));
         if turn < 0.0 {
@@ -104,13 +104,13 @@ pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<Drawn
         };
         svg.text((LEFT - 14.0, y + 4.0), "tick ink", "end", &row.name);
         let stroke = format!("stroke:{colour};stroke-width:3;stroke-linecap:round;fill:none");
-        if low < MOST && high > -MOST {
+        if low < MAX_MARGINS && high > -MAX_MARGINS {
             let data = format!("M{} {}H{}", Px(x(low)), Px(y), Px(x(high)));
             svg.leaf("path", &[("d", &data), ("style", &stroke)]);
         }
         for (end, direction) in [(low, -1.0), (high, 1.0)] {
-            if end.abs() > MOST && end * direction > 0.0 {
-                let tip = x(direction * MOST) + 9.0 * direction;
+            if end.abs() > MAX_MARGINS && end * direction > 0.0 {
+                let tip = x(direction * MAX_MARGINS) + 9.0 * direction;
                 let data = format!("M{} {}l{} -5v10Z", Px(tip), Px(y), Px(-9.0 * direction));
                 svg.leaf(
                     "path",
@@ -118,7 +118,7 @@ pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<Drawn
                 );
             }
         }
-        if at.abs() <= MOST {
+        if at.abs() <= MAX_MARGINS {
             let style = format!("stroke:{colour};stroke-width:11;stroke-linecap:round");
             svg.leaf("path", &[("d", &dots([(x(at), y)])), ("style", &style)]);
         }
@@ -126,20 +126,20 @@ pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<Drawn
             (RIGHT + 24.0, y + 4.0),
             "tick ink",
             "start",
-            words::verdict(*verdict),
+            text::verdict(*verdict),
         );
         let said = format!(
             "margin {} {}",
-            words::value(row, Some(*margin)),
-            row.shown.unit
+            text::value(row, Some(*margin)),
+            row.format.unit
         );
         svg.text((WIDTH - 12.0, y + 4.0), "tick", "end", &said);
     }
-    Some(sheet.finish(result, k, height))
+    Some(figure.finish(result, k, height))
 }
 
-/// What a difference is multiplied by so that above 0 is better.
-fn turn(row: &Row, c: &Compared) -> f64 {
+/// Sign and scale that turn a difference so that positive is better.
+fn improvement_factor(row: &Row, c: &Compared) -> f64 {
     match row.metric.better() {
         Better::Lower => -1.0,
         Better::Higher => 1.0,

@@ -1,4 +1,4 @@
-//! Owns the figures of a comparison: maps, differences in margins, location by location, what carries a change.
+//! Owns the figures of a comparison: maps, differences in margins, location by location, causes.
 
 mod causes;
 mod locations;
@@ -14,12 +14,12 @@ pub(super) use margins::margins;
 use serde::Serialize;
 use skinrig_compare::Comparison;
 
-use super::words::short;
+use super::text::short;
 use crate::svg::{Px, Svg};
 
-/// A figure, as the template takes it.
+/// A figure for the template.
 #[derive(Debug, Serialize)]
-pub(super) struct Drawn {
+pub(super) struct RenderedFigure {
     pub id: String,
     pub title: String,
     pub caption: String,
@@ -29,13 +29,14 @@ pub(super) struct Drawn {
     pub interaction: &'static str,
 }
 
-/// Colours of better and worse, dark enough on both papers: blue and orange are told apart by every common colour vision.
+/// Colours of better and worse, dark enough on light and dark paper. Blue and orange are distinct in all common types of
+/// colour vision.
 pub(super) const BETTER: &str = "#2b7bba";
 pub(super) const WORSE: &str = "#d9721a";
 pub(super) const NEITHER: &str = "#8f99a3";
 
-/// Colour of a sign: -1 better, 1 worse.
-const fn of_sign(sign: i8) -> &'static str {
+/// Colour for -1 (better), 1 (worse) or 0.
+const fn sign_colour(sign: i8) -> &'static str {
     match sign {
         -1 => BETTER,
         1 => WORSE,
@@ -43,8 +44,8 @@ const fn of_sign(sign: i8) -> &'static str {
     }
 }
 
-/// A figure being drawn.
-struct Sheet {
+/// Builder for a figure.
+struct FigureBuilder {
     svg: Svg,
     id: String,
     title: String,
@@ -52,7 +53,7 @@ struct Sheet {
     table: String,
 }
 
-impl Sheet {
+impl FigureBuilder {
     fn new(id: &str, title: String, caption: String, table: &str, (w, h): (f64, f64)) -> Self {
         let mut svg = Svg::new();
         let view = format!("0 0 {} {}", Px(w), Px(h));
@@ -79,8 +80,8 @@ impl Sheet {
         }
     }
 
-    /// Ends the figure with the sessions that it stands on.
-    fn finish(mut self, result: &Comparison, k: usize, height: f64) -> Drawn {
+    /// Adds the footer with the sessions behind the figure, and closes it.
+    fn finish(mut self, result: &Comparison, k: usize, height: f64) -> RenderedFigure {
         let of = |i: usize| {
             let skin = &result.skins[i];
             let ids: Vec<String> = skin
@@ -92,10 +93,10 @@ impl Sheet {
             let more = if skin.sessions.len() > 3 { ", …" } else { "" };
             format!("{} {} ({}{more})", skin.letter, skin.name, ids.join(", "))
         };
-        let stand_in = super::words::stand_in(result).map_or(String::new(), |w| format!("   {w}"));
+        let stand_in = super::text::stand_in(result).map_or(String::new(), |w| format!("   {w}"));
         let foot = format!("{}   {}{stand_in}", of(0), of(k));
         self.svg.text((10.0, height - 8.0), "foot", "start", &foot);
-        Drawn {
+        RenderedFigure {
             id: self.id,
             title: self.title,
             caption: self.caption,

@@ -1,4 +1,4 @@
-//! Owns the colour scales of the maps: errors, and their differences, as many px per mm in both.
+//! Owns the colour scales of the maps. Errors and differences have the same number of px per mm.
 
 use super::{BETTER, NEITHER, WORSE};
 use crate::axes::{tick_label, ticks};
@@ -10,7 +10,7 @@ pub(super) const PANEL: f64 = 350.0;
 pub(super) const STEP: f64 = 400.0;
 const BAR_Y: f64 = 450.0;
 
-/// Blue for -1, a light grey for 0, orange for 1.
+/// Blue for -1, light grey for 0, orange for 1.
 pub(super) fn diverging(share: f64) -> String {
     let share = share.clamp(-1.0, 1.0);
     let channel = |hex: &str, i: usize| {
@@ -27,7 +27,7 @@ pub(super) fn diverging(share: f64) -> String {
 
 pub(super) fn bars(svg: &mut Svg, end: f64, letter: char) {
     let width = PANEL;
-    // As many px per mm in both.
+    // Same px per mm in both bars.
     let per_mm = width / (2.0 * end);
     bar(svg, LEFT, (0.0, end), per_mm, "mean error (mm)", &|mm| {
         viridis(mm / end)

@@ -1,7 +1,7 @@
-//! Emulated cameras as a process of their own.
+//! Emulated cameras in a separate process.
 //!
-//! `emulated-cameras CONFIG.json` prints the bus's folder and the preload library as a line of JSON and serves until
-//! its input ends; `emulated-cameras CONFIG.json -- COMMAND ...` runs a command on the bus and ends with its status.
+//! `emulated-cameras CONFIG.json` prints the bus's folder and the preload library as a line of JSON and runs until its input ends;
+//! `emulated-cameras CONFIG.json -- COMMAND ...` runs a command on the bus and exits with its status.
 #![expect(
     clippy::print_stdout,
     clippy::print_stderr,

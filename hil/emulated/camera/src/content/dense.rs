@@ -1,4 +1,4 @@
-//! A fixed pattern at a fixed rate, copied rather than made: for rates at which making events would be the limit.
+//! A fixed pattern at a fixed rate, copied instead of generated, for rates at which generating events would be too slow.
 
 use skinrig_formats::evt2::TIME_HIGH_CADENCE_US;
 use skinrig_model::{SENSOR_HEIGHT, SENSOR_WIDTH};
@@ -15,7 +15,7 @@ pub(crate) struct Dense {
     words: Vec<u32>,
     next: usize,
     per_slot: f64,
-    /// Events that are due, with the fraction that is left over.
+    /// Number of due events, including a fraction.
     due: f64,
 }
 
@@ -38,7 +38,7 @@ impl Dense {
         }
     }
 
-    /// The words of the 16 µs from `slot_us` on, spread evenly.
+    /// Words of the 16 µs from `slot_us` on, evenly spaced.
     pub fn slot(&mut self, slot_us: u64, bytes: &mut Vec<u8>) {
         self.due += self.per_slot;
         let count = self.due as usize;
@@ -56,7 +56,7 @@ impl Dense {
         self.next = (self.next + count) % PATTERN;
     }
 
-    /// The same rate as single events, for when the registers let only some through.
+    /// The same rate as single events, for when the registers filter some of them.
     pub fn events(&mut self, from_ns: i64, until_ns: i64, out: &mut Vec<PixelEvent>) {
         let slots = (until_ns - from_ns) as f64 / (TIME_HIGH_CADENCE_US as f64 * 1e3);
         self.due += self.per_slot * slots;

@@ -1,4 +1,4 @@
-//! What the pixels of a camera do.
+//! Content of a camera's pixel events.
 
 mod dense;
 mod recorded;
@@ -63,7 +63,7 @@ impl Source {
         }
     }
 
-    /// The source whose words need no events.
+    /// The source that provides encoded words instead of events.
     pub fn dense(&mut self) -> Option<&mut Dense> {
         match self {
             Self::Dense(dense) => Some(dense),
@@ -71,7 +71,7 @@ impl Source {
         }
     }
 
-    /// Appends the events of `from_ns..until_ns` in the order of time. Spans follow one another.
+    /// Appends the events of `from_ns..until_ns` in order of time. Ranges must be consecutive.
     pub fn events(
         &mut self,
         world: &World,

@@ -1,4 +1,4 @@
-//! What a camera of the simulated bench sees of a tip that moves in real time.
+//! Events of a camera of the simulated bench that sees a tip in real time.
 
 use skinrig_model::{Point3, RigidTransform, Robot, SimLevel, Skin};
 use skinrig_sim::SimConfig;
@@ -14,19 +14,19 @@ pub(crate) struct Scene {
     scene: SceneConfig,
     config: SimConfig,
     skin_from_robot: RigidTransform<Skin, Robot>,
-    /// Where the tip is before anybody says.
+    /// Tip position before the first report.
     rest: Point3<Skin>,
     running: Option<Running>,
     /// Events that belong to the next packet.
     ahead: Vec<PixelEvent>,
 }
 
-/// The pixels of this run.
+/// Pixels of the current run.
 struct Running {
     pixels: Box<dyn PixelModel>,
-    /// Whether light falls on what they see.
+    /// Whether the lamps are on.
     lit: bool,
-    /// The last sample that they have seen.
+    /// The last processed sample.
     last: TipSample,
 }
 
@@ -53,7 +53,7 @@ impl Scene {
         })
     }
 
-    /// Events begin with the grid step after `from_ns`. Every start has noise of its own.
+    /// Events start with the grid step after `from_ns`. Every start has its own noise.
     pub fn start(&mut self, world: &World, from_ns: i64) {
         let t_ns = (from_ns / GRID_NS + 1) * GRID_NS;
         let first = TipSample {
@@ -64,7 +64,7 @@ impl Scene {
         self.running = Some(self.begin(world.is_lit(), first));
     }
 
-    /// Pixels from here on, which are those of before and have noise of their own.
+    /// New pixel models from here on: the same pixels with new noise.
     fn begin(&mut self, lit: bool, last: TipSample) -> Running {
         let (scene, geometric) = (&self.scene, &self.config.geometric);
         let pixels: Box<dyn PixelModel> = match (self.config.level, lit) {
@@ -89,7 +89,7 @@ impl Scene {
         };
         let lit = world.is_lit();
         if lit != running.lit {
-            // What switching itself makes every pixel do is left out.
+            // The events of all pixels caused by switching the lamps are omitted.
             running = self.begin(lit, running.last);
         }
         let mut last = running.last;

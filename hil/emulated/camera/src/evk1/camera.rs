@@ -1,4 +1,4 @@
-//! One camera: its registers, what is wrong with it, and what it counted.
+//! One camera: registers, faults and counters.
 
 use std::collections::BTreeSet;
 use std::mem;
@@ -16,31 +16,31 @@ use crate::usb::descriptors::Descriptors;
 use crate::usb::queues::Queues;
 use crate::world::{World, now_ns};
 
-/// What is wrong with a camera.
+/// Faults of a camera.
 #[derive(Debug, Clone, Default)]
 pub struct Faults {
-    /// Registers whose writes do not take.
+    /// Registers that ignore writes.
     pub stuck: BTreeSet<u32>,
-    /// No control request is answered any more.
+    /// Whether control requests stay unanswered.
     pub silent: bool,
-    /// Register reads report failure.
+    /// Whether register reads report failure.
     pub failing_reads: bool,
-    /// Words to put into the next packet.
+    /// Words to insert into the next packet.
     pub garbage: Vec<u32>,
-    /// Words that each packet loses at its end.
+    /// Words lost at the end of each packet.
     pub lost_words: usize,
-    /// Pixels that make an event every millisecond.
+    /// Number of pixels with an event every millisecond.
     pub hot_pixels: u16,
 }
 
 /// One run of the time base.
 #[derive(Debug)]
 pub struct Run {
-    /// Tells it from the runs before.
+    /// Number of the run.
     pub number: u64,
-    /// When it began, true time, ns.
+    /// Start in true time, ns.
     pub from_ns: i64,
-    /// The camera's time in it.
+    /// The camera's time during the run.
     pub time: TimeBase,
 }
 
@@ -50,15 +50,15 @@ pub struct Model {
     pub faults: Faults,
     pub counters: Counters,
     pub journal: Vec<Request>,
-    /// Number and beginning of the run under way.
+    /// Number and start of the current run.
     running: Option<(u64, i64, Sync)>,
-    /// Camera time at the end of the last run, µs.
+    /// Camera time at the end of the previous run, µs.
     reached_us: u64,
     unplugged: bool,
 }
 
 impl Model {
-    /// Sets what the board's temperature sensor reports, in 1/4096 °C.
+    /// Sets the value of the board's temperature sensor, in 1/4096 °C.
     pub(crate) fn set_temperature(&mut self, steps: u32) {
         self.registers.set(r::TEMPERATURE, steps);
     }
@@ -81,7 +81,7 @@ pub struct Evk1 {
 }
 
 impl Evk1 {
-    /// A camera that has just been plugged in; `serial` is its number as a register value.
+    /// A camera that was just plugged in; `serial` is its number as a register value.
     pub fn new(
         config: Evk1Config,
         serial: u32,
@@ -89,7 +89,7 @@ impl Evk1 {
         world: Arc<World>,
         sync_line: Arc<SyncLine>,
     ) -> Self {
-        // Class, subclass and strings of an EVK1 are not known: vendor-specific, none, none.
+        // Class, subclass and strings of an EVK1 are not public: vendor-specific, none, none.
         let descriptors = Descriptors {
             vendor: 0x04b4,
             product: config.product_id,
@@ -130,7 +130,7 @@ impl Evk1 {
         self.model.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The FPGA has booted.
+    /// Whether the FPGA has booted.
     pub(crate) fn is_booted(&self) -> bool {
         self.plugged.elapsed() >= Duration::from_millis(self.config.boot_ms)
     }
@@ -139,7 +139,7 @@ impl Evk1 {
         Oscillator::new(self.config.drift_ppm)
     }
 
-    /// Does what a register write sets off.
+    /// Performs the side effects of a register write.
     pub fn written(&self, model: &mut Model, address: u32, value: u32) {
         match address {
             r::ROI_CTRL if value >> 5 & 1 == 1 => {
@@ -173,7 +173,7 @@ impl Evk1 {
         }
     }
 
-    /// Waits for the next run of the time base; `None` when the camera is gone.
+    /// Waits for the next run of the time base; `None` when the camera is unplugged.
     pub(crate) fn next_run(&self, after: u64) -> Option<Run> {
         let mut model = self.lock();
         loop {
@@ -197,7 +197,7 @@ impl Evk1 {
                     Sync::Standalone | Sync::Master => TimeBase::Own {
                         oscillator: self.oscillator(),
                         from_ns,
-                        // A master's slaves count from 0, and so does it.
+                        // A master's slaves count from 0, and so does the master.
                         base_us: if sync == Sync::Master { 0 } else { base_us },
                     },
                 };
@@ -214,7 +214,7 @@ impl Evk1 {
         }
     }
 
-    /// What the registers let through in this run; `None` when it has ended.
+    /// Event filters according to the registers in this run; `None` when it has ended.
     pub fn gates(&self, run: u64) -> Option<Gates> {
         let model = self.lock();
         model
@@ -222,17 +222,17 @@ impl Evk1 {
             .then(|| Gates::read(&model.registers, &model.roi))
     }
 
-    /// Words that belong into the next packet and mean nothing.
+    /// Garbage words to insert into the next packet.
     pub fn garbage(&self) -> Vec<u32> {
         mem::take(&mut self.lock().faults.garbage)
     }
 
-    /// How many pixels make an event every millisecond.
+    /// Number of pixels with an event every millisecond.
     pub fn hot_pixels(&self) -> u16 {
         self.lock().faults.hot_pixels
     }
 
-    /// Hands a packet of a run over and books it, unless the run has ended meanwhile. What finds no place is lost.
+    /// Sends a packet of a run and counts it, unless the run has ended. Bytes that do not fit are lost.
     pub fn send(
         &self,
         run: u64,
@@ -241,7 +241,7 @@ impl Evk1 {
         reached_us: u64,
         count: impl FnOnce(&mut Counters),
     ) {
-        // Held while the packet is pushed, so that none comes after the answer to the write that stops the run.
+        // Hold the lock during the push, so that no packet follows the reply to the write that stops the run.
         let mut model = self.lock();
         if !model.is_running(run) {
             return;
@@ -259,7 +259,7 @@ impl Evk1 {
         model.counters.dropped_bytes += dropped as u64;
         model.reached_us = reached_us;
         if dropped_words > 0 {
-            // One per word that found no place, and no more than the register holds (assumed).
+            // One per lost word, at most the register's maximum (assumed).
             let hits = model.registers.get(r::OVERFLOW_HITCOUNT) as usize + dropped_words;
             model
                 .registers
@@ -267,7 +267,7 @@ impl Evk1 {
         }
     }
 
-    /// The cable is pulled.
+    /// Handles an unplugged cable.
     pub fn unplug(&self) {
         let mut model = self.lock();
         model.unplugged = true;

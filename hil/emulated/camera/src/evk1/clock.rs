@@ -1,11 +1,11 @@
-//! Camera time: an oscillator, and the sync line on which one camera's time becomes another's.
+//! Camera time: an oscillator, and the sync line that transmits a master's time to its slaves.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// An oscillator that is a little fast or slow.
+/// An oscillator with a constant rate deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Oscillator {
-    /// Parts per billion by which it is fast.
+    /// Rate deviation, parts per billion; positive is fast.
     drift_ppb: i64,
 }
 
@@ -16,9 +16,9 @@ impl Oscillator {
         }
     }
 
-    /// Whole microseconds that it counts in `ns` of true time.
+    /// Whole microseconds counted in `ns` of true time.
     pub(crate) const fn count_us(self, ns: i64) -> u64 {
-        // Whole and broken seconds apart, so that no product leaves 64 bits in any run.
+        // Separate whole seconds and fraction, so that no product exceeds 64 bits in any run.
         let (whole, rest) = (ns / 1_000_000_000, ns % 1_000_000_000);
         let drift = whole * self.drift_ppb + rest * self.drift_ppb / 1_000_000_000;
         let counted = ns + drift;
@@ -30,18 +30,18 @@ impl Oscillator {
     }
 }
 
-/// A master's time base while it runs.
+/// A run of a master's time base.
 #[derive(Debug, Clone, Copy)]
 pub struct Pulses {
     oscillator: Oscillator,
     from_ns: i64,
-    /// When it ended.
+    /// End of the run.
     to_ns: Option<i64>,
-    /// Tells one run from the next.
+    /// Number of the run.
     run: u64,
 }
 
-/// The line that carries a master's pulses, 1 MHz, to its slaves.
+/// The line with a master's 1 MHz pulses to its slaves.
 #[derive(Debug, Default)]
 pub struct SyncLine(Mutex<Option<Pulses>>);
 
@@ -50,7 +50,7 @@ impl SyncLine {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A master's time base runs from `from_ns` on.
+    /// Starts the master's time base at `from_ns`.
     pub fn begin(&self, oscillator: Oscillator, from_ns: i64) {
         let mut line = self.lock();
         let run = line.map_or(1, |before| before.run + 1);
@@ -62,7 +62,7 @@ impl SyncLine {
         });
     }
 
-    /// The master's time base stops.
+    /// Stops the master's time base.
     pub fn end(&self, at_ns: i64) {
         if let Some(pulses) = self.lock().as_mut() {
             pulses.to_ns.get_or_insert(at_ns);
@@ -70,10 +70,10 @@ impl SyncLine {
     }
 }
 
-/// The time of one camera from a start of its time base to the stop.
+/// The time of a camera from a start of its time base to the stop.
 #[derive(Debug)]
 pub enum TimeBase {
-    /// Its own.
+    /// Its own clock.
     Own {
         oscillator: Oscillator,
         /// True time at the start, ns.
@@ -81,18 +81,18 @@ pub enum TimeBase {
         /// Camera time at the start, µs.
         base_us: u64,
     },
-    /// It counts the pulses on the sync line since its own start.
+    /// Counts the pulses on the sync line since its own start.
     Counted {
         from_ns: i64,
-        /// Counted in the master's runs before this one.
+        /// Pulses of the master's earlier runs.
         base_us: u64,
-        /// The run that is being counted, and how far it had counted when it began to be.
+        /// The current run, and its count when this camera started counting it.
         current: Option<(Pulses, u64)>,
     },
 }
 
 impl TimeBase {
-    /// The camera's time at true time `t_ns`, µs. Times that are asked for never go back.
+    /// Camera time at true time `t_ns`, µs. Requested times must not decrease.
     pub fn at(&mut self, t_ns: i64, line: &SyncLine) -> u64 {
         match self {
             Self::Own {

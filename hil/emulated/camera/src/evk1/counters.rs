@@ -1,22 +1,22 @@
-//! What an emulated camera counts.
+//! Counters of an emulated camera.
 
 use serde::{Deserialize, Serialize};
 
-/// What a camera has counted since it was plugged in.
+/// Counts since the camera was plugged in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Counters {
-    /// Bytes made.
+    /// Bytes generated.
     pub made_bytes: u64,
-    /// Bytes that found no place, because the host did not fetch those before.
+    /// Bytes lost because the host did not fetch earlier ones in time.
     pub dropped_bytes: u64,
     /// Trigger edges sent.
     pub trigger_words: u64,
-    /// Trigger edges that became known only after their place in the stream, and were sent late.
+    /// Trigger edges that arrived after their place in the stream and were sent late.
     pub late_edges: u64,
     /// Requests for registers that do not exist.
     pub unknown_registers: u64,
-    /// Requests that a camera refuses or that no driver may send (flash, boot loader).
+    /// Requests that a camera rejects or that a driver must never send (flash, boot loader).
     pub refused_requests: u64,
-    /// Times that the time base was started.
+    /// Starts of the time base.
     pub starts: u64,
 }

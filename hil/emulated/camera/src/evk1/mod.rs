@@ -1,7 +1,6 @@
-//! The EVK1 Gen3.1: registers, requests, sensor gates, time base, and the thread that makes its stream.
+//! The EVK1 Gen3.1: registers, requests, event filters, time base, and the thread that generates its stream.
 //!
-//! Written from the EVK1 reference alone and kept apart from the driver's own table of registers, so that a slip in
-//! one of the two shows.
+//! Written from the EVK1 reference alone and independent of the driver's register table, so that an error in one of them shows.
 
 mod camera;
 mod clock;

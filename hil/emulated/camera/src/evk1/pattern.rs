@@ -1,7 +1,7 @@
-//! The FPGA's pattern generator (EVK1 reference, section 2.17): events in the place of the sensor's.
+//! The FPGA's pattern generator (EVK1 reference, section 2.17), which replaces the sensor's events.
 //!
-//! The order and the rate are those of the public driver and its checker. That the region, the noise filter and the biases, which
-//! are the sensor's, have no say over it, and that the field-of-view filter, which is the FPGA's, has, is assumed.
+//! Order and rate are those of the public driver and its checker. It is assumed that the region, the noise filter and the biases, which
+//! belong to the sensor, do not affect it, and that the field-of-view filter, which belongs to the FPGA, does.
 
 use skinrig_model::Polarity;
 
@@ -15,26 +15,26 @@ const ROWS: u32 = 1024;
 /// Clock cycles per µs of the camera's time.
 const CYCLES_PER_US: f64 = 100.0;
 
-/// What the registers make of it.
+/// Configuration according to the registers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pattern {
     /// Events per µs of the camera's time.
     per_us: f64,
-    /// A diagonal instead of columns.
+    /// Whether the scan is diagonal instead of column by column.
     diagonal: bool,
     polarity: Polarity,
-    /// First column and row that pass, and how many.
+    /// First column and row that pass, and their number.
     window: Option<[u32; 4]>,
 }
 
 impl Pattern {
-    /// `None` while it is off, or makes events of exposure measurement, which this sensor has not.
+    /// `None` while it is off or generates exposure measurement events, which this sensor does not support.
     pub fn read(registers: &Registers) -> Option<Self> {
         let bit = |n| registers.bit(r::TEST_PATTERN_CONTROL, n);
         if !bit(0) || bit(8) {
             return None;
         }
-        // The two periods take turns, each for its own time.
+        // The two periods alternate, each for its own time.
         let period = |address| {
             let word = registers.get(address);
             (f64::from(word >> 16), f64::from(word & 0x3ff) / 1024.0)
@@ -71,11 +71,11 @@ impl Pattern {
     }
 }
 
-/// Where the scan is.
+/// State of the scan.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Scan {
     next: u32,
-    /// Part of an event that is due.
+    /// Fraction of the next event.
     due: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Makes the stream of one camera: packet by packet, as long as its time base runs.
+//! Generates the stream of one camera packet by packet while its time base runs.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -16,13 +16,13 @@ use crate::random::Splitmix;
 use crate::world::Edge;
 use skinrig_sim::scene::PixelEvent;
 
-/// How often a wait looks whether the run has ended.
-const PATIENCE: Duration = Duration::from_millis(5);
+/// Interval at which waits check whether the run has ended.
+const MAX_WAIT: Duration = Duration::from_millis(5);
 
-/// A pixel that is made hot fires this often, ns.
+/// Event interval of a hot pixel, ns.
 const HOT_EVERY_NS: i64 = 1_000_000;
 
-/// The input that trigger out loops back to.
+/// Input to which the trigger output loops back.
 const LOOP_BACK: u8 = 6;
 
 /// Streams until the camera is unplugged.
@@ -39,17 +39,17 @@ struct Producer<'a> {
     camera: &'a Evk1,
     source: &'a mut Source,
     run: Run,
-    /// True time up to which everything has been made, ns.
+    /// True time up to which the stream has been generated, ns.
     made_ns: i64,
     encoder: Encoder,
-    /// Camera time up to which everything has been made, µs.
+    /// Camera time up to which the stream has been generated, µs.
     reached_us: u64,
-    /// True when pulses of trigger out began, ns.
+    /// True time at which the trigger output started, ns.
     pulses_from_ns: Option<i64>,
-    /// Edges that jitter has moved into the next packet.
+    /// Edges that jitter moved into the next packet.
     edges: Vec<Edge>,
     random: Splitmix,
-    /// Of the pattern generator.
+    /// State of the pattern generator.
     scan: Scan,
     events: Vec<PixelEvent>,
 }
@@ -58,7 +58,7 @@ impl<'a> Producer<'a> {
     fn new(camera: &'a Evk1, mut run: Run, source: &'a mut Source) -> Self {
         let from_ns = run.from_ns;
         let first_us = run.time.at(from_ns, &camera.sync_line);
-        // Edges of before are not seen.
+        // Earlier edges are not seen.
         camera.world.take_edges(&camera.config.serial, from_ns);
         source.start(&camera.world, from_ns);
         Self {
@@ -86,17 +86,17 @@ impl<'a> Producer<'a> {
         while let Some(before) = self.camera.gates(self.run.number) {
             let until_ns = self.made_ns + i64::from(before.packet_us) * 1_000;
             let due = match config.pacing {
-                Pacing::RealTime => world.wait_until(until_ns, PATIENCE),
-                Pacing::HostTime => queues.wait_for_room(config.fifo_bytes, PATIENCE),
+                Pacing::RealTime => world.wait_until(until_ns, MAX_WAIT),
+                Pacing::HostTime => queues.wait_for_room(config.fifo_bytes, MAX_WAIT),
             };
-            // What was written meanwhile counts for this packet.
+            // Register writes in the meantime affect this packet.
             if due && let Some(gates) = self.camera.gates(self.run.number) {
                 self.packet(until_ns, &gates);
             }
         }
     }
 
-    /// Everything up to `until_ns` as one packet.
+    /// Generates everything up to `until_ns` as one packet.
     fn packet(&mut self, until_ns: i64, gates: &Gates) {
         let line = &self.camera.sync_line;
         let end_us = self.run.time.at(until_ns, line);
@@ -117,7 +117,7 @@ impl<'a> Producer<'a> {
             let mut edges = edges.iter().peekable();
             let mut slot_us = self.reached_us.next_multiple_of(TIME_HIGH_CADENCE_US);
             while slot_us < end_us {
-                // Always in order: slots follow one another.
+                // Always in order, because slots are consecutive.
                 let _ = self.encoder.advance_to(slot_us, &mut bytes);
                 dense.slot(slot_us, &mut bytes);
                 slot_us += TIME_HIGH_CADENCE_US;
@@ -149,7 +149,7 @@ impl<'a> Producer<'a> {
         });
     }
 
-    /// The events of the packet, filtered by what the registers let through.
+    /// Events of the packet after the filters.
     fn pixel_events(&mut self, until_ns: i64, gates: &Gates) {
         self.events.clear();
         self.source
@@ -172,11 +172,11 @@ impl<'a> Producer<'a> {
         }
     }
 
-    /// Writes events and edges in the order of time, and the time base up to the end of the packet.
+    /// Writes events and edges in order of time, and the time base up to the end of the packet.
     fn encode(&mut self, until_ns: i64, end_us: u64, edges: &[TriggerEdge], bytes: &mut Vec<u8>) {
         let line = &self.camera.sync_line;
         if end_us == self.reached_us {
-            // A slave whose master does not run: the words flow, their time stands still (EVK1 reference, section 5).
+            // A slave without a running master: words flow with a constant time (EVK1 reference, section 5).
             let words = (until_ns - self.made_ns) / (TIME_HIGH_CADENCE_US as i64 * 1_000);
             let high = 0x8000_0000 | (end_us >> 6) as u32 & 0x0fff_ffff;
             bytes.extend((0..words).flat_map(|_| high.to_le_bytes()));
@@ -199,14 +199,14 @@ impl<'a> Producer<'a> {
         for edge in edges {
             push_edge(&mut self.encoder, *edge, bytes);
         }
-        // The last microsecond belongs to the next packet, which may have an event in it.
+        // The last microsecond belongs to the next packet, which may contain events in it.
         let reached = self
             .encoder
             .advance_to(end_us.max(self.encoder.reached_us()), bytes);
         debug_assert!(reached.is_ok(), "time ran backwards: {reached:?}");
     }
 
-    /// The edges that the camera sees before `until_ns`, and how many of them it should have seen earlier.
+    /// Edges that the camera sees before `until_ns`, and the number of late ones.
     fn due_edges(&mut self, until_ns: i64, gates: &Gates) -> (Vec<TriggerEdge>, u64) {
         let Evk1 {
             config,
@@ -216,7 +216,7 @@ impl<'a> Producer<'a> {
         } = self.camera;
         let delay_ns = i64::from(config.trigger_delay_ns);
         for mut edge in world.take_edges(&config.serial, until_ns - delay_ns) {
-            // Told only now, by a source that lags behind: it came before the camera looked.
+            // A late report from a slow source: the edge was before the camera looked.
             if edge.at_ns < self.run.from_ns {
                 continue;
             }
@@ -245,7 +245,7 @@ impl<'a> Producer<'a> {
         (seen, late)
     }
 
-    /// The edges of the camera's own trigger output, which come back on input 6.
+    /// Edges of the camera's own trigger output, which return on input 6.
     fn loop_back(&mut self, until_ns: i64, gates: &Gates) {
         let Some((period_us, width_us)) = gates.pulses else {
             self.pulses_from_ns = None;
@@ -276,7 +276,7 @@ fn hot_pixels(pixels: u16, span_ns: Range<i64>, events: &mut Vec<PixelEvent>) {
     }
     let mut t_ns = (span_ns.start + HOT_EVERY_NS - 1) / HOT_EVERY_NS * HOT_EVERY_NS;
     while t_ns < span_ns.end {
-        // Spread over the sensor by steps that share no factor with its sides.
+        // Spread over the sensor with steps that are coprime to its sides.
         events.extend((0..pixels).map(|n| PixelEvent {
             t_ns,
             x: (u32::from(n) * 211 % u32::from(SENSOR_WIDTH)) as u16,
@@ -289,7 +289,7 @@ fn hot_pixels(pixels: u16, span_ns: Range<i64>, events: &mut Vec<PixelEvent>) {
 }
 
 fn push_edge(encoder: &mut Encoder, edge: TriggerEdge, bytes: &mut Vec<u8>) {
-    // An edge that the encoder has passed within a dense slot keeps its place in the stream.
+    // An edge behind the encoder's position in a dense slot keeps its place in the stream.
     let t_us = edge.t_us.max(encoder.reached_us());
     let written = encoder.trigger(TriggerEdge { t_us, ..edge }, bytes);
     debug_assert!(

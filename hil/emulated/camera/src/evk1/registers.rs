@@ -1,7 +1,7 @@
 //! The registers of an EVK1 Gen3.1 and their values at power-up (EVK1 reference, sections 2.1 to 2.5).
 //!
-//! Values are those that the public register map lists; a real device's are not known. A register that the reference does
-//! not list does not exist here: a request for it is refused, so that a wrong address shows.
+//! Values are those of the public register map; those of a real device are not public. Registers that the reference does not list do not
+//! exist here: requests for them are rejected, so that a wrong address shows.
 
 use std::collections::BTreeMap;
 
@@ -36,7 +36,7 @@ pub const FPGA_VERSION: u32 = 0x0804;
 pub const PKT_END_ENABLE: u32 = 0x1400;
 pub const PKT_END_INTERVAL_US: u32 = 0x1404;
 
-/// Registers that only report: what is written to them is ignored.
+/// Read-only registers: writes are ignored.
 const READ_ONLY: [u32; 14] = [
     0x000c,
     0x000e,
@@ -54,7 +54,7 @@ const READ_ONLY: [u32; 14] = [
     0x080c,
 ];
 
-/// Registers whose value at power-up is not 0.
+/// Registers with a non-zero value at power-up.
 const POWER_UP: [(u32, u32); 20] = [
     // Soft reset, no blocking of events, HVGA remap bypassed, test bus off, both pixel resets released.
     (ATIS_CONTROL, 0x000c_8118),
@@ -81,7 +81,7 @@ const POWER_UP: [(u32, u32); 20] = [
     (TEMPERATURE, 25 << 12),
 ];
 
-/// Ranges of registers that exist: first, last, step.
+/// Existing registers: first, last, step.
 const EXISTING: [(u32, u32, u32); 21] = [
     // System control; registers are two apart and 32 bits wide.
     (0x0000, 0x0000, 2),
@@ -134,12 +134,12 @@ impl Registers {
         Self(values)
     }
 
-    /// `None` when there is no such register.
+    /// `None` if the register does not exist.
     pub fn read(&self, address: u32) -> Option<u32> {
         self.0.get(&address).copied()
     }
 
-    /// The value of a register that is known to exist.
+    /// Value of a register that is known to exist.
     pub fn get(&self, address: u32) -> u32 {
         self.read(address).unwrap_or(0)
     }
@@ -148,7 +148,7 @@ impl Registers {
         self.get(address) >> bit & 1 == 1
     }
 
-    /// What a host may write; `false` when there is no such register.
+    /// Host write; `false` if the register does not exist.
     pub fn write(&mut self, address: u32, value: u32) -> bool {
         let Some(slot) = self.0.get_mut(&address) else {
             return false;
@@ -160,7 +160,7 @@ impl Registers {
         true
     }
 
-    /// What the device itself writes.
+    /// Write by the device itself.
     pub fn set(&mut self, address: u32, value: u32) {
         self.0.insert(address, value);
     }

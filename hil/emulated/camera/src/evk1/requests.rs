@@ -11,7 +11,7 @@ const WRITE_REGISTER: u8 = 0x56;
 const BOARD_VERSION: u8 = 0x70;
 const BOOT_STATE: u8 = 0x71;
 const SYSTEM_ID: u8 = 0x72;
-/// FX3 id, release version, build date, VCS id: what a real one answers is not known; nothing depends on it.
+/// FX3 ID, release version, build date, VCS ID: the real replies are not public, and nothing depends on them.
 const FX3_VERSIONS: std::ops::RangeInclusive<u8> = 0x78..=0x7b;
 
 /// Byte 0 of a successful register read.

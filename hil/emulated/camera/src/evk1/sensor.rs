@@ -1,4 +1,4 @@
-//! What the registers let through: which pixels live, which inputs count, whether time runs.
+//! Event filters according to the registers: active pixels, enabled inputs, and whether time runs.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use super::pattern::Pattern;
 use super::registers as r;
 use super::registers::Registers;
 
-/// Pixels that are on: columns and rows, of which a pixel needs both.
+/// Active pixels: a pixel is active if both its column and its row are.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Roi {
     columns: [u32; 20],
@@ -36,7 +36,7 @@ impl Roi {
     }
 }
 
-/// Whose time a camera counts (section 2.14).
+/// Source of a camera's time (section 2.14).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sync {
     Standalone,
@@ -57,29 +57,29 @@ impl Sync {
     }
 }
 
-/// What the registers say while a packet is made.
+/// Filters while a packet is generated.
 #[derive(Debug, Clone)]
 pub(crate) struct Gates {
-    /// Pixels send events.
+    /// Whether pixels send events.
     pub pixels: bool,
-    /// The pattern generator sends events in their place.
+    /// Pattern generator that replaces the pixels.
     pub pattern: Option<Pattern>,
-    /// OFF events are disabled by the bias (seen on an EVK1 at code 0, section 2.9).
+    /// Whether the bias disables OFF events (seen on an EVK1 at code 0, section 2.9).
     pub no_off: bool,
     pub roi: Arc<Roi>,
-    /// Below this many events in that many µs nothing passes (section 2.11).
+    /// Noise filter: minimum events per period in µs (section 2.11).
     pub filter: Option<(u32, u32)>,
-    /// Trigger inputs that count, bit by channel.
+    /// Enabled trigger inputs, bit by channel.
     pub triggers: u32,
-    /// Trigger out, which loops back to input 6: period and width, µs.
+    /// Trigger output, which loops back to input 6: period and width, µs.
     pub pulses: Option<(u32, u32)>,
-    /// A packet ends after this long, µs.
+    /// Duration of a packet, µs.
     pub packet_us: u32,
-    /// Transfers end with packets.
+    /// Whether transfers end with packets.
     pub short_packets: bool,
 }
 
-/// The time base runs and bytes flow to the host.
+/// Whether the time base runs and bytes flow to the host.
 pub fn runs(registers: &Registers) -> bool {
     registers.bit(r::CCAM2_CONTROL, 8) && registers.bit(r::CCAM2_CONTROL, 9)
 }

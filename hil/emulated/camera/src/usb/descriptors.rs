@@ -1,4 +1,4 @@
-//! What a device says about itself when it is plugged in (USB 3.2 section 9.6).
+//! Descriptors of a device (USB 3.2 section 9.6).
 
 /// The descriptors of one device with one configuration and one interface.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,7 +36,7 @@ impl Descriptors {
         };
         let [release, vendor, product] = [release, self.vendor, self.product].map(u16::to_le_bytes);
         let string = |n: usize| u8::from(self.strings[n].is_some()) * (n as u8 + 1);
-        // bcdDevice is 0: no public dump of a real camera says otherwise.
+        // bcdDevice is 0: no public dump of a real camera shows another value.
         [
             18,
             DEVICE,
@@ -77,7 +77,7 @@ impl Descriptors {
         bytes
     }
 
-    /// The answer to GET_DESCRIPTOR; `None` for one that the device does not have.
+    /// Reply to GET_DESCRIPTOR; `None` if the device does not have the descriptor.
     pub fn get(&self, kind: u8, index: u8) -> Option<Vec<u8>> {
         match (kind, index) {
             (DEVICE, 0) => Some(self.device().to_vec()),

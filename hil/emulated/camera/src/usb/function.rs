@@ -1,27 +1,27 @@
-//! What a device does beyond what the bus does for all.
+//! Device-specific behaviour behind the generic bus.
 
 use super::descriptors::Descriptors;
 use super::usbfs::Setup;
 
-/// The answer to a control request.
+/// Reply to a control request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Reply {
-    /// Done; for a request from device to host, with these bytes.
+    /// Success; with data for a request from device to host.
     Done(Vec<u8>),
-    /// The device refuses (protocol stall).
+    /// Rejected (protocol stall).
     Stall,
-    /// The device never answers.
+    /// Never answered.
     Silence,
 }
 
 /// A device behind the bus.
 pub(crate) trait Function: Send + Sync {
-    /// What it says about itself.
+    /// Its descriptors.
     fn descriptors(&self) -> &Descriptors;
 
-    /// A control request that is not about descriptors; `data` comes from the host.
+    /// Handles a control request other than for descriptors; `data` comes from the host.
     fn control(&self, setup: Setup, data: &[u8]) -> Reply;
 
-    /// The host reset the port.
+    /// Handles a port reset.
     fn reset(&self) {}
 }

@@ -1,7 +1,7 @@
-//! The transfers of one device: waiting, finished, and the bytes that the device has ready.
+//! Transfers of one device: queued, finished, and the bytes that are ready.
 //!
-//! As in Linux's usbfs: every open file has its own transfers, an interface belongs to one of them, and what a
-//! transfer brought is fetched by whoever submitted it.
+//! As in Linux's usbfs, every open file has its own transfers, an interface belongs to one file, and results are fetched by the file that
+//! submitted the transfer.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::mem;
@@ -14,25 +14,25 @@ use serde::{Deserialize, Serialize};
 use super::readiness::Readiness;
 use super::usbfs::Urb;
 
-/// A transfer under way: the URB and its address in the process under test.
+/// A submitted transfer: the URB and its address in the process under test.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Submitted {
     pub address: u64,
     pub urb: Urb,
 }
 
-/// A finished transfer, and what it brings into the process's memory at which address.
+/// A finished transfer with its data and target address in the process.
 #[derive(Debug)]
 pub struct Finished {
     pub address: u64,
     pub urb: Urb,
     pub to: u64,
     pub bytes: Vec<u8>,
-    /// Bytes of the data endpoint (and not of a control request).
+    /// Number of bytes from the data endpoint, without control requests.
     pub data: bool,
 }
 
-/// What has been handed to the host from the data endpoint.
+/// Data delivered to the host from the data endpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Handed {
     /// Bytes.
@@ -47,7 +47,7 @@ pub struct Handed {
 struct OpenFile {
     /// Transfers that wait for bytes.
     waiting: VecDeque<Submitted>,
-    /// Control requests that never get an answer.
+    /// Control requests that are never answered.
     unanswered: Vec<Submitted>,
     done: VecDeque<Finished>,
 }
@@ -59,22 +59,22 @@ struct State {
     claimed_by: Option<u64>,
     unplugged: bool,
     halted: bool,
-    /// Bytes that no transfer has taken yet, oldest first; `head` of the first are gone.
+    /// Bytes not yet taken by a transfer, oldest first; the first `head` are gone.
     fifo: VecDeque<Vec<u8>>,
     head: usize,
     level: usize,
-    /// The last byte of the FIFO ends a packet.
+    /// Whether the last byte of the FIFO ends a packet.
     ended: bool,
-    /// The next transfer ends this many bytes early.
+    /// Bytes by which the next transfer ends early.
     cut: Option<usize>,
-    /// After so many more transfers one fails.
+    /// Transfers until one fails.
     broken: Option<u32>,
     resets_fail: bool,
     handed: Handed,
     ready: Readiness,
 }
 
-/// The queues of one device. `room` is signalled whenever a transfer starts to wait.
+/// Queues of one device. `room` is signalled when a transfer is queued.
 #[derive(Debug)]
 pub struct Queues {
     state: Mutex<State>,
@@ -82,7 +82,7 @@ pub struct Queues {
     capacity: usize,
 }
 
-/// Whoever holds the interface of a busy device without being a process under test.
+/// Holder of a busy device's interface, outside the processes under test.
 const SOMEBODY: u64 = 0;
 
 impl Queues {
@@ -115,7 +115,7 @@ impl Queues {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Somebody else holds the interface from now on.
+    /// Marks the interface as claimed by another program.
     pub(crate) fn occupy(&self) {
         self.lock().claimed_by = Some(SOMEBODY);
     }
@@ -167,7 +167,7 @@ impl Queues {
     pub fn submit(&self, file: u64, transfer: Submitted) -> Result<(), Errno> {
         let mut state = self.lock();
         state.plugged()?;
-        // The kernel claims for a process that forgot to.
+        // The kernel claims the interface implicitly.
         match state.claimed_by {
             Some(by) if by != file => return Err(Errno::BUSY),
             _ => state.claimed_by = Some(file),
@@ -205,7 +205,7 @@ impl Queues {
         Ok(())
     }
 
-    /// Cancels the transfer whose URB is at `address`; what it has got so far goes with it.
+    /// Cancels the transfer whose URB is at `address`; it returns with the data received so far.
     pub(crate) fn discard(&self, file: u64, address: u64) -> Result<(), Errno> {
         let mut state = self.lock();
         let Some(open) = state.files.get_mut(&file) else {
@@ -245,10 +245,10 @@ impl Queues {
         }
     }
 
-    /// Counts what a reaped transfer brought.
+    /// Counts the data of a reaped transfer.
     pub fn count(&self, bytes: &[u8]) {
         let before = self.lock().handed;
-        // Only the thread that serves the file counts, so nothing comes in between.
+        // Only the thread that serves the file counts, so this is not interrupted.
         let mut crc = crc32fast::Hasher::new_with_initial_len(before.crc32, before.bytes);
         crc.update(bytes);
         self.lock().handed = Handed {
@@ -258,12 +258,12 @@ impl Queues {
         };
     }
 
-    /// The host clears a stall of the data endpoint.
+    /// Clears a stall of the data endpoint.
     pub fn clear_halt(&self) {
         self.lock().halted = false;
     }
 
-    /// The host resets the port: bytes that nobody has fetched are gone. False when nothing came of it.
+    /// Resets the port: unfetched bytes are discarded. Returns false if the reset fails.
     pub fn reset(&self) -> bool {
         let mut state = self.lock();
         if state.resets_fail {
@@ -276,7 +276,7 @@ impl Queues {
 
     // ---- from the device
 
-    /// Adds bytes to the FIFO; `end` when the device ends a packet with them, which ends a transfer as well.
+    /// Adds bytes to the FIFO. `end`: the device ends a packet, which also ends a transfer.
     pub fn push(&self, bytes: Vec<u8>, end: bool) {
         let mut state = self.lock();
         if state.unplugged {
@@ -290,7 +290,7 @@ impl Queues {
         state.serve();
     }
 
-    /// How many bytes the device can get rid of: into waiting transfers and the FIFO.
+    /// Bytes that fit into queued transfers and the FIFO.
     pub fn free(&self) -> usize {
         let state = self.lock();
         let waiting: usize = state
@@ -302,20 +302,20 @@ impl Queues {
         (self.capacity + waiting).saturating_sub(state.level)
     }
 
-    /// Waits until more than `bytes` are free, at most for `patience`.
-    pub(crate) fn wait_for_room(&self, bytes: usize, patience: Duration) -> bool {
+    /// Waits until more than `bytes` are free, at most for `timeout`.
+    pub(crate) fn wait_for_room(&self, bytes: usize, timeout: Duration) -> bool {
         if self.free() > bytes {
             return true;
         }
         let state = self.lock();
-        let waited = self.room.wait_timeout(state, patience);
+        let waited = self.room.wait_timeout(state, timeout);
         drop(waited);
         self.free() > bytes
     }
 
     // ---- from whoever makes faults
 
-    /// The cable is pulled: everything under way ends, nothing begins.
+    /// Unplugs the cable: all transfers end, and new ones fail.
     pub fn unplug(&self) {
         let mut state = self.lock();
         state.unplugged = true;
@@ -324,29 +324,29 @@ impl Queues {
         self.room.notify_all();
     }
 
-    /// The data endpoint stalls until the host clears it.
+    /// Stalls the data endpoint until the host clears it.
     pub fn stall(&self) {
         let mut state = self.lock();
         state.halted = true;
         state.abort(Errno::PIPE);
     }
 
-    /// The next transfer of the data endpoint that has more than `bytes` ends that much early; they follow in the next.
+    /// Ends the next transfer with more than `bytes` that much early; the following transfer has them.
     pub(crate) fn cut_next(&self, bytes: usize) {
         self.lock().cut = Some(bytes);
     }
 
-    /// Whether resets of the port fail.
+    /// Sets whether resets of the port fail.
     pub(crate) fn fail_resets(&self, on: bool) {
         self.lock().resets_fail = on;
     }
 
-    /// The transfer of the data endpoint after `transfers` more fails, with what it holds.
+    /// Fails the data transfer after `transfers` more ones, including its data.
     pub(crate) fn break_after(&self, transfers: u32) {
         self.lock().broken = Some(transfers);
     }
 
-    /// What has been handed to the host so far.
+    /// Data delivered to the host so far.
     pub fn handed(&self) -> Handed {
         self.lock().handed
     }
@@ -361,7 +361,7 @@ impl State {
         }
     }
 
-    /// Lets waiting transfers end: full, or with the last bytes of a packet.
+    /// Completes queued transfers that are full or end with a packet.
     fn serve(&mut self) {
         while let Some((file, transfer)) = self.next_waiting() {
             let length = transfer.urb.length();
@@ -447,7 +447,7 @@ impl State {
         self.tell();
     }
 
-    /// Ends everything under way.
+    /// Ends all transfers.
     fn abort(&mut self, errno: Errno) {
         let files: Vec<u64> = self.files.keys().copied().collect();
         for file in files {

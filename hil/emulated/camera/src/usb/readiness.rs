@@ -1,4 +1,4 @@
-//! Makes `poll` on an emulated device work: its file is a FIFO that takes exactly one byte.
+//! Makes `poll` work on an emulated device: its file is a FIFO with a capacity of exactly one byte.
 //!
 //! libusb opens the file for reading and writing and polls it for writing; the kernel reports a device as writable when
 //! a transfer has finished. A FIFO that is full is not writable, an empty one is.
@@ -10,7 +10,7 @@ use std::path::Path;
 use rustix::fs::{CWD, Mode, mkfifoat};
 use rustix::pipe::fcntl_setpipe_size;
 
-/// The file that stands for a device.
+/// The file of a device.
 #[derive(Debug)]
 pub(crate) struct Readiness {
     fifo: File,
@@ -18,7 +18,7 @@ pub(crate) struct Readiness {
 }
 
 impl Readiness {
-    /// Makes the file; nothing has finished yet.
+    /// Creates the file in the state without finished transfers.
     pub fn create(path: &Path) -> std::io::Result<Self> {
         mkfifoat(CWD, path, Mode::from_raw_mode(0o666))?;
         let fifo = OpenOptions::new().read(true).write(true).open(path)?;
@@ -29,7 +29,7 @@ impl Readiness {
         Ok(this)
     }
 
-    /// Says whether a transfer has finished that nobody has fetched.
+    /// Sets whether there are finished transfers to fetch.
     pub fn set(&mut self, ready: bool) {
         // Never blocks: a byte is read only when there is one, and written only when there is none.
         let moved = match (ready, self.full) {

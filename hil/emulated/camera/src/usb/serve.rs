@@ -1,4 +1,4 @@
-//! Answers the system calls of one open device.
+//! Serves the system calls on an open device.
 
 use std::io;
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -24,7 +24,7 @@ pub struct Node {
     pub queues: Arc<Queues>,
 }
 
-/// Serves everyone who opens the device, until the listener is shut down.
+/// Serves all processes that open the device, until the listener is shut down.
 pub fn listen(node: Node, listener: UnixListener) -> io::Result<()> {
     thread::Builder::new()
         .name("usb node".into())
@@ -46,7 +46,7 @@ impl Node {
     fn serve(&self, stream: UnixStream) {
         let file = self.queues.open();
         let mut wire = Wire::new(stream);
-        // A line that breaks is a process that ended: its device is closed, as the kernel closes it.
+        // A broken connection means that the process ended: close the device, like the kernel.
         while let Ok(Some(asked)) = wire.next() {
             if self.answer(file, &mut wire, asked).is_err() {
                 break;

@@ -1,4 +1,4 @@
-//! The folder that a process under test takes for the machine's `/sys` and `/dev`.
+//! The folder that replaces a computer's `/sys` and `/dev` for a process under test.
 
 use std::fs;
 use std::io;
@@ -9,19 +9,19 @@ use super::descriptors::Descriptors;
 
 const HUB: &str = "devices/pci0000:00/0000:00:14.0/usb1";
 
-/// Longest path of a Unix socket on Linux, without its end.
+/// Maximum length of a Unix socket path on Linux, without the terminator.
 const SOCKET_PATH: usize = 107;
 
-/// The folder; removed with this value.
+/// The folder; removed on drop.
 #[derive(Debug)]
 pub(crate) struct TestBed(tempfile::TempDir);
 
-/// Where a device is.
+/// Address of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Address {
-    /// The port on the one hub, from 1: changes when a device is plugged elsewhere.
+    /// Port of the only hub, from 1; depends on where the device is plugged in.
     pub port: u8,
-    /// Number on the bus, from 2: new at every plugging.
+    /// Device number on the bus, from 2; new after every plugging.
     pub number: u8,
 }
 
@@ -62,17 +62,17 @@ impl TestBed {
         self.0.path()
     }
 
-    /// The file that stands for the device.
+    /// The device file.
     pub fn node(&self, at: Address) -> PathBuf {
         self.root().join(at.node())
     }
 
-    /// The socket on which its system calls arrive.
+    /// The socket for its system calls.
     pub fn socket(&self, at: Address) -> PathBuf {
         self.root().join("ioctl").join(at.node())
     }
 
-    /// From now on opening the device gives this error.
+    /// Makes opening the device fail with this error.
     pub fn refuse(&self, at: Address, errno: rustix::io::Errno) -> io::Result<()> {
         let file = self.root().join("refuse").join(at.node());
         fs::write(file, errno.raw_os_error().to_string())

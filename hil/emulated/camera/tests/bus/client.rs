@@ -1,4 +1,4 @@
-//! A client in a few lines: registers, start, stop, bytes.
+//! A minimal client: registers, start, stop, bytes.
 
 use std::time::Duration;
 
@@ -59,7 +59,7 @@ impl Camera {
         self.write(address, after).expect("write");
     }
 
-    /// Powers the sensor and lets all pixels send; `sync` is what bits 12 and 14 of ATIS_CONTROL are.
+    /// Powers the sensor and enables all pixels; `sync` sets bits 12 and 14 of ATIS_CONTROL.
     pub fn configure(&self, sync: u32) {
         self.write(0x0000, 0x000c_0117 | sync).expect("power");
         self.write(0x0238, 1).expect("clock");
@@ -81,7 +81,7 @@ impl Camera {
         self.set(CCAM2_CONTROL, 1 << 9, false);
     }
 
-    /// One transfer; what it brought.
+    /// Runs one transfer and returns its data.
     pub fn transfer(&mut self) -> rusb::Result<usize> {
         let mut buffer = vec![0; 128 << 10];
         let n = self.handle.read_bulk(0x81, &mut buffer, SECOND)?;
@@ -89,7 +89,7 @@ impl Camera {
         Ok(n)
     }
 
-    /// Receives until `enough`, judging by everything that has come.
+    /// Receives until `enough` is true for all data so far.
     pub fn until(&mut self, mut enough: impl FnMut(&Seen) -> bool) -> Seen {
         for _ in 0..20_000 {
             self.transfer().expect("bytes");
@@ -102,7 +102,7 @@ impl Camera {
     }
 }
 
-/// What a stream holds.
+/// Content of a stream.
 #[derive(Debug)]
 pub struct Seen {
     pub events: Vec<CdEvent>,

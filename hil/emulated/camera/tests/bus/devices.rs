@@ -1,4 +1,4 @@
-//! What is found on the bus, and who may use it.
+//! Devices on the bus, and access to them.
 
 use rusb::{Error, Speed};
 use skinrig_emulated_camera::config::Access;
@@ -16,7 +16,7 @@ fn with(serial: &str, access: Access) -> DeviceConfig {
 }
 
 #[test]
-fn every_kind_of_device_shows_as_it_would() {
+fn every_kind_of_device_is_visible_as_expected() {
     let bus = vec![
         with("00001621", Access::Free),
         with("00001622", Access::Busy),
@@ -26,7 +26,7 @@ fn every_kind_of_device_shows_as_it_would() {
         },
     ];
     on_bus(
-        "devices::every_kind_of_device_shows_as_it_would",
+        "devices::every_kind_of_device_is_visible_as_expected",
         bus,
         |remote| {
             let found = devices();
@@ -76,10 +76,10 @@ fn an_interface_belongs_to_one_program_at_a_time() {
 }
 
 #[test]
-fn registers_keep_what_is_written_and_strangers_are_refused() {
+fn registers_keep_their_values_and_unknown_requests_are_rejected() {
     let bus = vec![with("00001621", Access::Free)];
     on_bus(
-        "devices::registers_keep_what_is_written_and_strangers_are_refused",
+        "devices::registers_keep_their_values_and_unknown_requests_are_rejected",
         bus,
         |remote| {
             let camera = Camera::open(0);
@@ -97,7 +97,7 @@ fn registers_keep_what_is_written_and_strangers_are_refused() {
             assert_eq!(camera.read(0x0354), Ok(0x7900_0029));
             assert_eq!(camera.read(0x0003), Err(Error::Pipe));
             assert_eq!(camera.write(0x0368 + 4, 1), Err(Error::Pipe));
-            // Reading flash and a second register bank: no driver may.
+            // Flash reads and a second register bank, which no driver may use.
             let flash = camera.handle.read_control(0xc0, 0xc2, 0, 0, &mut b, SECOND);
             assert_eq!(flash, Err(Error::Pipe));
             let counters = remote.observe("00001621").unwrap().counters;

@@ -1,4 +1,4 @@
-//! What goes wrong, and that libusb sees it as it would on a real bus.
+//! Faults, which libusb must see as on a real bus.
 
 use rusb::Error;
 use skinrig_emulated_camera::config::Content;
@@ -30,9 +30,9 @@ fn running() -> Camera {
 }
 
 #[test]
-fn a_pulled_cable_ends_everything_and_a_new_one_begins_anew() {
+fn an_unplugged_cable_ends_all_transfers_and_a_new_one_restarts_the_device() {
     on_bus(
-        "faults::a_pulled_cable_ends_everything_and_a_new_one_begins_anew",
+        "faults::an_unplugged_cable_ends_all_transfers_and_a_new_one_restarts_the_device",
         bus(),
         |remote| {
             let mut camera = running();
@@ -71,9 +71,9 @@ fn a_stall_lasts_until_it_is_cleared() {
 }
 
 #[test]
-fn a_transfer_may_end_within_a_word_and_garbage_may_come() {
+fn a_transfer_may_end_within_a_word_and_contain_garbage() {
     on_bus(
-        "faults::a_transfer_may_end_within_a_word_and_garbage_may_come",
+        "faults::a_transfer_may_end_within_a_word_and_contain_garbage",
         bus(),
         |remote| {
             let mut camera = running();
@@ -110,9 +110,9 @@ fn a_transfer_may_end_within_a_word_and_garbage_may_come() {
 }
 
 #[test]
-fn a_register_may_stick_and_a_request_may_stay_unanswered() {
+fn a_register_may_ignore_writes_and_a_request_may_stay_unanswered() {
     on_bus(
-        "faults::a_register_may_stick_and_a_request_may_stay_unanswered",
+        "faults::a_register_may_ignore_writes_and_a_request_may_stay_unanswered",
         bus(),
         |remote| {
             let camera = Camera::open(0);
@@ -128,9 +128,9 @@ fn a_register_may_stick_and_a_request_may_stay_unanswered() {
 }
 
 #[test]
-fn a_buffer_that_is_full_loses_words_and_the_camera_counts_them() {
+fn a_full_buffer_loses_words_and_the_camera_counts_them() {
     on_bus(
-        "faults::a_buffer_that_is_full_loses_words_and_the_camera_counts_them",
+        "faults::a_full_buffer_loses_words_and_the_camera_counts_them",
         bus(),
         |remote| {
             let mut camera = running();

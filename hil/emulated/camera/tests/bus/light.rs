@@ -1,4 +1,4 @@
-//! Lamps that are switched while a camera runs.
+//! Lamps switched while a camera runs.
 
 use std::fs;
 
@@ -41,7 +41,7 @@ fn noise_falls_when_the_lamps_are_off_and_comes_back() {
                 } else if lamps_off.exists() {
                     fs::remove_file(&lamps_off).unwrap();
                 }
-                // What was made before the lamps were switched, and the packet under way, does not count.
+                // Skip packets generated before the lamps were switched.
                 let made = remote.observe(SERIAL).unwrap().counters.made_bytes as usize;
                 let from_us = until(&mut camera, made + 2_000).last_us;
                 let seen = until(&mut camera, made + 2_000 + BYTES);
@@ -49,7 +49,7 @@ fn noise_falls_when_the_lamps_are_off_and_comes_back() {
                 rates.push(events as f64 / (seen.last_us - from_us) as f64 * 1e6);
             }
             camera.stop();
-            // 1,800 events/s of background, of which a third is left, and 612 of hot pixels.
+            // 1,800 events/s of background, of which a third remains, and 612 of hot pixels.
             let [lit, dark, again] = rates[..] else {
                 panic!("{rates:?}")
             };
@@ -59,7 +59,7 @@ fn noise_falls_when_the_lamps_are_off_and_comes_back() {
     );
 }
 
-/// Receives this many bytes in all; what is in them.
+/// Receives this many bytes in total and returns their content.
 fn until(camera: &mut Camera, bytes: usize) -> Seen {
     while camera.received.len() < bytes {
         camera.transfer().expect("bytes");

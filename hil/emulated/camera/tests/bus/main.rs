@@ -1,4 +1,4 @@
-//! The emulated bus and its cameras, seen through the real libusb by a client that knows only the EVK1 reference.
+//! The emulated bus and its cameras, tested through the real libusb by a client based on the EVK1 reference alone.
 #![cfg(target_os = "linux")]
 
 mod client;

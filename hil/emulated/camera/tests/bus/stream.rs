@@ -1,4 +1,4 @@
-//! What comes out of a camera that runs.
+//! Stream of a running camera.
 
 use skinrig_emulated_camera::Evk1Config;
 use skinrig_emulated_camera::config::{Content, Pacing};
@@ -34,7 +34,7 @@ fn an_idle_camera_sends_its_time_every_16_us_in_packets_of_1024_us() {
             while packets.len() < 50 {
                 packets.push(camera.transfer().unwrap());
             }
-            // Late readers get several packets at a time, never a part of one; the first also has the word of t = 0.
+            // A slow reader gets several whole packets at a time; the first also contains the word of t = 0.
             assert_eq!(packets[0] % 256, 4, "{packets:?}");
             assert!(packets[1..].iter().all(|n| n % 256 == 0), "{packets:?}");
             for (n, word) in words(&camera.received).enumerate() {
@@ -129,13 +129,13 @@ fn pixels_send_only_when_powered_released_and_in_the_region() {
 }
 
 #[test]
-fn a_slow_host_loses_events_and_they_are_counted() {
+fn a_slow_host_loses_events_that_are_counted() {
     let dense = Evk1Config {
         fifo_bytes: 64 << 10,
         ..camera(Content::Dense { mev_per_s: 20.0 })
     };
     on_bus(
-        "stream::a_slow_host_loses_events_and_they_are_counted",
+        "stream::a_slow_host_loses_events_that_are_counted",
         vec![dense.into()],
         |remote| {
             let mut camera = Camera::open(0);
@@ -151,7 +151,7 @@ fn a_slow_host_loses_events_and_they_are_counted() {
             camera.stop();
             assert!(counters.dropped_bytes > 1_000_000, "{counters:?}");
             assert_eq!(camera.read(0x0018), Ok(0xffff));
-            // What is left is what it could hold.
+            // The remaining data is the capacity of the buffer.
             camera.transfer().unwrap();
             let seen = remote.observe(SERIAL).unwrap();
             assert_eq!(seen.handed.bytes, 64 << 10);

@@ -15,7 +15,7 @@ const STANDALONE: u32 = 1 << 12;
 const MASTER: u32 = 1 << 12 | 1 << 14;
 const SLAVE: u32 = 1 << 14;
 
-/// Far enough ahead that an edge is known before its time, on a busy machine as well.
+/// Far enough ahead that an edge is known before its time, even on a busy computer.
 fn soon() -> i64 {
     now_ns() + 200_000_000
 }
@@ -39,9 +39,9 @@ fn pair() -> Vec<DeviceConfig> {
 }
 
 #[test]
-fn edges_come_at_their_times_on_enabled_inputs_only() {
+fn edges_arrive_at_their_times_on_enabled_inputs_only() {
     on_bus(
-        "time::edges_come_at_their_times_on_enabled_inputs_only",
+        "time::edges_arrive_at_their_times_on_enabled_inputs_only",
         pair(),
         |remote| {
             let mut camera = Camera::open(0);
@@ -61,7 +61,7 @@ fn edges_come_at_their_times_on_enabled_inputs_only() {
             }
             let seen = camera.until(|s| s.triggers.len() >= 3);
             let zero = seen.triggers[0].t_us;
-            // 100 ppm of 700 µs is less than a microsecond; the first edge lies somewhere within one.
+            // 100 ppm of 700 µs is below a microsecond; the first edge may be anywhere within one.
             let after: Vec<_> = seen
                 .triggers
                 .iter()
@@ -155,14 +155,14 @@ fn a_slave_that_starts_after_its_master_is_behind() {
 }
 
 #[test]
-fn a_time_base_begins_again_at_every_start_or_goes_on() {
+fn a_time_base_restarts_at_every_start_or_continues() {
     let mut bus = pair();
     let DeviceConfig::Evk1(second) = &mut bus[1] else {
         panic!("{bus:?}")
     };
     (second.time_restarts, second.origin_us) = (false, 5_000_000);
     on_bus(
-        "time::a_time_base_begins_again_at_every_start_or_goes_on",
+        "time::a_time_base_restarts_at_every_start_or_continues",
         bus,
         |_| {
             for (n, first_us, second_us) in [(0, 0, 0), (1, 5_000_000, 5_020_000)] {

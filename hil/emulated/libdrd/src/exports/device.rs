@@ -39,7 +39,7 @@ pub extern "system" fn drdClose(id: i8) -> i32 {
     run("drdClose", &[], -1, || host::close(id).map(|()| 0))
 }
 
-/// What a device says of itself.
+/// Identity reported by a device.
 struct Identity {
     device_type: i32,
     serial: Option<u16>,

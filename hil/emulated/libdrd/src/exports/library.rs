@@ -9,7 +9,7 @@ use super::outcome::{fill, run};
 use crate::host;
 use crate::time::now_ns;
 
-/// Version that the library claims without an arm.
+/// Version reported without an arm.
 const SDK: [i32; 3] = [3, 17, 5];
 
 fn sdk() -> [i32; 3] {

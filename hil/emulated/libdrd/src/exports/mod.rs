@@ -1,4 +1,4 @@
-//! The C interface: every function of the table, checked against it when this crate is compiled.
+//! The C interface: every function of the table, checked against it at compile time.
 
 mod device;
 mod library;
@@ -15,7 +15,7 @@ use reading::*;
 use regulation::*;
 use settings::*;
 
-/// An export with another signature than the table's does not compile, nor does a missing one.
+/// Fails to compile if an export is missing or has another signature than in the table.
 macro_rules! same_signatures {
     ($($group:ident $need:ident {
         $($(#[$doc:meta])* $name:ident($($arg:ident: $ty:ty),* $(,)?) -> $ret:ty;)*

@@ -9,8 +9,8 @@ use crate::host;
 use crate::page::ArmState;
 use crate::wire::Call;
 
-/// The state, if the regulation loop fills its buffer. What the vendor's library returns without the loop is
-/// not documented; this one fails, so that nobody relies on an old pose.
+/// The state, if the regulation loop runs. The vendor's behaviour without the loop is not documented; this library fails, so that no
+/// program relies on an old pose.
 fn looped(id: i8) -> Outcome<ArmState> {
     let state = host::state(id)?;
     if state.regulating {
@@ -20,7 +20,7 @@ fn looped(id: i8) -> Outcome<ArmState> {
     }
 }
 
-/// 1 if this instant was read before through the same call, else 0.
+/// 1 if the same call has already returned this reading, otherwise 0.
 fn cached(last: &Mutex<u64>, now: u64) -> i32 {
     let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
     let again = *last == now;
@@ -122,7 +122,7 @@ pub unsafe extern "system" fn dhdGetStatus(status: *mut i32, id: i8) -> i32 {
     })
 }
 
-/// Iterations and instant of the previous question, ns.
+/// Iterations and time of the previous call, ns.
 static LAST_RATE: Mutex<(u64, u64)> = Mutex::new((0, 0));
 
 #[unsafe(no_mangle)]

@@ -10,12 +10,12 @@ use crate::host;
 use crate::page::ArmState;
 use crate::wire::Call;
 
-/// How often a blocking call looks whether it is done.
+/// Polling interval of blocking calls.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
-/// Longest wait for a tick of a loop that may have stopped.
+/// Time limit for a tick of a loop that may have stopped.
 const LONGEST_TICK: Duration = Duration::from_millis(100);
 
-/// Waits without end, as the vendor's blocking calls do; a device that is gone ends it.
+/// Waits indefinitely, like the vendor's blocking calls; ends if the device is gone.
 fn wait_while(id: i8, busy: impl Fn(&ArmState) -> bool) -> Outcome<ArmState> {
     loop {
         let state = host::state(id)?;
@@ -86,7 +86,7 @@ pub extern "system" fn drdHold(id: i8) -> i32 {
     run_call("drdHold", &[], id, Call::Hold)
 }
 
-/// 2 while the motors cannot give what regulation wants: a success all the same.
+/// 2 while the motors are saturated: still a success.
 fn accepted(id: i8) -> Outcome<i32> {
     Ok(if host::state(id)?.saturated {
         MOTOR_SATURATED

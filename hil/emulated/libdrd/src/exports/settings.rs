@@ -1,4 +1,4 @@
-//! Parameters: each is set by one call and read back by another.
+//! Parameters with a setter and a getter each.
 
 use super::outcome::{fill, run, run_bool, values};
 use crate::config::Setting;
@@ -7,7 +7,7 @@ use crate::wire::Call;
 
 fn set(name: &str, setting: Setting, numbers: &[f64], id: i8) -> i32 {
     run(name, numbers, -1, || {
-        // A number that is not finite does not survive the way to the firmware.
+        // Non-finite numbers cannot be sent to the firmware.
         if numbers.iter().any(|n| !n.is_finite()) {
             return Err(skinrig_drd_abi::ErrorCode::INVALID);
         }
@@ -19,10 +19,10 @@ fn flag(on: bool) -> f64 {
     f64::from(u8::from(on))
 }
 
-/// Reads a parameter into places.
+/// Reads a parameter into output pointers.
 ///
 /// # Safety
-/// Each place is NULL or good for one number.
+/// Each pointer is NULL or valid for one number.
 unsafe fn get<const N: usize>(name: &str, setting: Setting, places: [*mut f64; N], id: i8) -> i32 {
     run(name, &[], -1, || {
         let numbers = values(host::call(id, Call::Get(setting))?)?;
@@ -32,7 +32,7 @@ unsafe fn get<const N: usize>(name: &str, setting: Setting, places: [*mut f64; N
     })
 }
 
-/// Reads a parameter that is returned.
+/// Reads a parameter as the return value.
 fn returned(name: &str, setting: Setting, id: i8) -> f64 {
     run(name, &[], -1.0, || {
         let [number] = values(host::call(id, Call::Get(setting))?)?;
@@ -189,7 +189,7 @@ pub unsafe extern "system" fn dhdGetWatchdog(units: *mut u8, id: i8) -> i32 {
     })
 }
 
-/// The vendor's units are its own; so is this number.
+/// The vendor's units are not documented, so this number is arbitrary.
 const VELOCITY_THRESHOLD: u32 = 400;
 
 #[unsafe(no_mangle)]

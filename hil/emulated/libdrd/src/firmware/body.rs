@@ -1,4 +1,4 @@
-//! The moving body: mass, gravity, friction, brake, end stops, sample. Knows nothing of commands.
+//! The moving body: mass, gravity, friction, brake, end stops and sample.
 
 use super::vector::{Vector, ZERO, add, dot, norm, scale, shorten, sub};
 use crate::config::{ArmConfig, Contact};
@@ -14,7 +14,7 @@ pub fn gravity(mass_kg: f64, tilt_deg: f64) -> Vector {
     scale([-sin, 0.0, -cos], mass_kg * GRAVITY_M_S2)
 }
 
-/// The tip and everything that moves with it, taken as one mass.
+/// The tip and everything that moves with it, as one mass.
 #[derive(Debug, Clone)]
 pub(crate) struct Body {
     /// True position of the tip, m.
@@ -25,15 +25,15 @@ pub(crate) struct Body {
     pub contact_force: Vector,
     /// The sample.
     pub contact: Option<Contact>,
-    /// Something holds it where it is.
+    /// Whether it is blocked.
     pub jammed: bool,
-    /// Viscous friction beyond that of the configuration, N per (m/s).
+    /// Additional viscous friction, N per (m/s).
     pub rub_n_s_m: f64,
     weight: Vector,
 }
 
 impl Body {
-    /// At rest where the configuration says.
+    /// At rest at the configured position.
     pub fn new(config: &ArmConfig) -> Self {
         Self {
             position: config.start_m,
@@ -46,7 +46,7 @@ impl Body {
         }
     }
 
-    /// Goes on for `dt` seconds under a motor force, with or without the electromagnetic brake.
+    /// Advances by `dt` seconds under a motor force, with or without the electromagnetic brake.
     pub fn step(&mut self, config: &ArmConfig, motor: Vector, braking: bool, dt: f64) {
         self.contact_force = self.push_of_sample();
         if self.jammed {
@@ -61,8 +61,7 @@ impl Body {
         ]
         .into_iter()
         .fold(ZERO, add);
-        // Viscous terms implicitly, so that the brake is stable at any strength; then dry friction, which
-        // takes away speed and never turns it round.
+        // Implicit viscous terms keep a brake of any strength stable; then dry friction, which reduces the speed and never reverses it.
         let viscous = config.viscous_friction_n_s_m
             + self.rub_n_s_m
             + if braking { config.brake_n_s_m } else { 0.0 };

@@ -1,4 +1,4 @@
-//! Answers to requests: what the library would do, and what the controller allows.
+//! Handles requests like the library and the controller.
 
 use skinrig_drd_abi::{ErrorCode, StatusField};
 
@@ -9,7 +9,7 @@ use crate::config::{Fault, Setting};
 use crate::page::Mode;
 use crate::wire::{Call, Control, Reply};
 
-/// Who asks.
+/// Sender of a request.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Caller {
     /// Number of the connection.
@@ -21,7 +21,7 @@ pub(crate) struct Caller {
 type Answer = Result<Vec<f64>, ErrorCode>;
 
 impl World {
-    /// Counts devices: connected, and free.
+    /// Number of connected devices, and of free ones.
     pub fn count(&self) -> Reply {
         let all = if self.connected() {
             self.config.devices.len()
@@ -33,12 +33,12 @@ impl World {
         Reply::values([all, free].map(|n| n as f64).to_vec())
     }
 
-    /// Does what the control client wants.
+    /// Handles a request of the control client.
     pub fn control(&mut self, control: Control) -> Reply {
         match control {
             Control::Inject(when, fault) => {
                 self.faults.inject(self.t_ns(), when, fault);
-                // What is due now shows at once.
+                // Effects that are due are visible at once.
                 self.let_faults_happen();
             }
             Control::ClearFaults => self.faults.clear(),
@@ -54,7 +54,7 @@ impl World {
         Reply::ok()
     }
 
-    /// Answers a call about a device.
+    /// Handles a call about a device.
     pub fn call(&mut self, caller: Caller, index: usize, call: &Call) -> Reply {
         let Some(device) = self.config.devices.get(index).cloned() else {
             return Reply::failed(ErrorCode::INVALID_INDEX);
@@ -165,7 +165,7 @@ impl World {
             pid: caller.pid,
             stopped: false,
         });
-        // What the controller holds survives an open; what the library holds starts afresh.
+        // The controller's state survives an open; the library's is reset.
         let watchdog = self.settings.watchdog;
         self.settings = Settings {
             watchdog,
@@ -195,7 +195,7 @@ impl World {
         ]
     }
 
-    /// The status vector, as long as the SDK's version makes it.
+    /// Status vector of the length for the SDK version.
     fn status(&self) -> Vec<i32> {
         let is = |mode: Mode| i32::from(self.mode == mode);
         let fields = [
@@ -208,7 +208,7 @@ impl World {
             (StatusField::Brake, is(Mode::Brake)),
             (StatusField::Gravity, i32::from(self.settings.gravity)),
             (StatusField::TimeGuard, 1),
-            // "The check failed, or there are none": the word that says least.
+            // 0, "failed or none": the least informative value.
             (StatusField::Redundancy, 0),
             (StatusField::ForceOffCause, self.cause as i32),
             (StatusField::Locks, -1),
@@ -254,7 +254,7 @@ impl World {
         if !self.initialised {
             return Err(ErrorCode::DEVICE_NOT_READY);
         }
-        // Whether the vendor's Start keeps gains and parameters is not documented: here it forgets them.
+        // It is not documented whether the vendor's start keeps gains and parameters: this one resets them.
         let Settings {
             gains,
             moves,

@@ -1,9 +1,9 @@
-//! What goes wrong, when, and what the library then reports.
+//! Faults: scheduling, and their effect on reported values.
 
 use super::vector::{Vector, add};
 use crate::config::{Fault, Setting, When};
 
-/// Faults in waiting and faults in force.
+/// Scheduled and active faults.
 #[derive(Debug, Default)]
 pub struct Faults {
     waiting: Vec<Waiting>,
@@ -22,7 +22,7 @@ enum Waiting {
     Contact(Fault),
 }
 
-/// Pose and force as the library reports them.
+/// Pose and force as reported by the library.
 #[derive(Debug, Clone, Copy)]
 pub struct Reported {
     pub tick: u64,
@@ -31,7 +31,7 @@ pub struct Reported {
     pub force: Vector,
 }
 
-/// Whether a fault happens and is over, rather than stays.
+/// Whether a fault is an event instead of a state.
 fn is_event(fault: Fault) -> bool {
     matches!(
         fault,
@@ -55,7 +55,7 @@ impl Faults {
         });
     }
 
-    /// Forgets all of them.
+    /// Removes all faults.
     pub fn clear(&mut self) {
         *self = Self {
             noise: self.noise,
@@ -63,7 +63,7 @@ impl Faults {
         };
     }
 
-    /// A move or tracked target was accepted.
+    /// Handles an accepted move or tracked target.
     pub(crate) fn move_began(&mut self, now_ns: u64) {
         for waiting in &mut self.waiting {
             if let Waiting::IntoMove(s, fault) = *waiting {
@@ -72,7 +72,7 @@ impl Faults {
         }
     }
 
-    /// Takes the faults whose time has come; those that stay are in force from now on.
+    /// Takes the faults that are due; those that are states become active.
     pub fn due(&mut self, now_ns: u64, z_m: f64, touching: bool) -> Vec<Fault> {
         if self.waiting.is_empty() {
             return Vec::new();
@@ -95,22 +95,22 @@ impl Faults {
         due
     }
 
-    /// The first answer of `pick` among the faults in force.
+    /// First result of `pick` among the active faults.
     pub fn find<T>(&self, pick: impl FnMut(&Fault) -> Option<T>) -> Option<T> {
         self.active.iter().find_map(pick)
     }
 
-    /// Whether such a fault is in force.
+    /// Whether a fault is active.
     pub fn is(&self, which: impl FnMut(&Fault) -> bool) -> bool {
         self.active.iter().any(which)
     }
 
-    /// Whether a setting keeps its value whatever it is told.
+    /// Whether a setting ignores writes.
     pub fn ignores(&self, setting: Setting) -> bool {
         self.is(|f| matches!(f, Fault::Ignore(s) if *s == setting))
     }
 
-    /// Whether a stop fails; one failure less is left.
+    /// Whether a stop fails; counts the failure.
     pub fn stop_fails(&mut self) -> bool {
         self.active.iter_mut().any(|f| match f {
             Fault::StopFails(left) => count_down(left),
@@ -118,7 +118,7 @@ impl Faults {
         })
     }
 
-    /// Whether a close fails; one failure less is left.
+    /// Whether a close fails; counts the failure.
     pub(crate) fn close_fails(&mut self) -> bool {
         self.active.iter_mut().any(|f| match f {
             Fault::CloseFails(left) => count_down(left),
@@ -126,7 +126,7 @@ impl Faults {
         })
     }
 
-    /// What the library reports of a pose and a force.
+    /// Reported values of a pose and a force.
     pub fn report(
         &mut self,
         now_ns: u64,
@@ -190,7 +190,7 @@ fn later(now_ns: u64, s: f64) -> u64 {
     now_ns.saturating_add((s * 1e9) as u64)
 }
 
-/// Noise of mean 0 and standard deviation 1, the same in every run.
+/// Reproducible noise with mean 0 and standard deviation 1.
 #[derive(Debug, Clone, Copy)]
 struct Noise(u64);
 

@@ -1,7 +1,7 @@
-//! Calibration and the sweep of the end stops: the library moves the arm by itself.
+//! Calibration and the sweep of the end stops, during which the library moves the arm.
 //!
-//! Which way the vendor's library takes is not documented; this one goes through the centre of the
-//! workspace, and the sweep to its ends along each axis, samples in the way or not.
+//! The vendor's paths are not documented. The calibration goes to the centre of the workspace; the sweep goes to the ends of each axis,
+//! whether a sample is in the way or not.
 
 use super::regulation::Regulation;
 use super::trajectory::Limits;
@@ -9,24 +9,24 @@ use super::vector::Vector;
 use super::world::World;
 use crate::config::Fault;
 
-/// How fast it moves.
+/// Speed of these motions.
 const LIMITS: Limits = Limits {
     amax: 2.0,
     vmax: 0.2,
     jerk: 50.0,
 };
 
-/// A calibration or a sweep under way.
+/// A calibration or sweep in progress.
 #[derive(Debug)]
 pub struct Initialisation {
-    /// Places to go to, last first.
+    /// Remaining positions, last first.
     way: Vec<Vector>,
-    /// Time to wait at the end, s.
+    /// Waiting time at the end, s.
     wait_s: f64,
 }
 
 impl World {
-    /// Begins a calibration, or also a sweep.
+    /// Starts a calibration, optionally followed by a sweep.
     pub(crate) fn begin_initialisation(&mut self, sweep: bool) {
         let mut way = vec![self.config.reach_centre_m];
         if sweep {
@@ -45,7 +45,7 @@ impl World {
         self.start_regulation();
     }
 
-    /// Goes on with it for `dt` seconds.
+    /// Advances by `dt` seconds.
     pub fn initialise(&mut self, dt: f64) {
         let (Some(initialisation), Some(regulation)) =
             (&mut self.initialisation, &mut self.regulation)

@@ -1,4 +1,4 @@
-//! The arm itself, in a process of its own: it goes on when the program that drives it dies.
+//! The firmware process: the arm continues when the program that drives it dies.
 
 mod body;
 mod calls;
@@ -26,19 +26,19 @@ use crate::page::Page;
 use crate::time::now_ns;
 use crate::wire::{Connection, Reply, Request};
 
-/// How often the arm is taken to the present when nobody asks.
+/// Interval at which the simulation advances without requests.
 const WAKE_EVERY: Duration = Duration::from_micros(250);
-/// How many wake-ups lie between two looks at the driving process.
+/// Wake-ups between two checks of the driving process.
 const WAKES_PER_LOOK: u32 = 16;
 
-/// The arm and the page that shows it.
+/// The arm and its shared memory.
 #[derive(Debug)]
 struct Firmware {
     world: Mutex<World>,
     page: Page,
 }
 
-/// The world at its present; shows the new state when it is released.
+/// The world at the current time; publishes the new state on drop.
 struct Present<'a> {
     world: MutexGuard<'a, World>,
     page: &'a Page,
@@ -64,8 +64,7 @@ impl Drop for Present<'_> {
 
 /// Runs the firmware of the arm in `directory` until the process ends.
 ///
-/// Reads `arm.json` there if it exists. With `tell_ready` it writes a line to standard output as soon as a
-/// library can connect.
+/// Reads `arm.json` if it exists. With `tell_ready`, prints a line as soon as a library can connect.
 ///
 /// # Errors
 /// When the directory, the configuration, the page or the socket cannot be used.
@@ -120,7 +119,7 @@ fn check(config: &ArmConfig) -> io::Result<()> {
     Err(io::Error::new(io::ErrorKind::InvalidData, fault))
 }
 
-/// Takes the arm to the present again and again.
+/// Advances the arm repeatedly.
 fn live(firmware: &Firmware) {
     for wake in 0_u32.. {
         thread::sleep(WAKE_EVERY);
@@ -134,19 +133,19 @@ fn live(firmware: &Firmware) {
     }
 }
 
-/// Whether a process is stopped by a signal or dead, where the system tells.
+/// Whether a process is stopped by a signal or dead, if the system reports it.
 fn is_stopped(pid: u32) -> bool {
     let Ok(stat) = fs::read_to_string(format!("/proc/{pid}/stat")) else {
         return false;
     };
-    // The state is the letter behind the command's name, which is in parentheses and may hold some.
+    // The state letter follows the command name in parentheses, which may contain parentheses.
     let state = stat
         .rsplit_once(") ")
         .and_then(|(_, rest)| rest.chars().next());
     matches!(state, Some('T' | 't' | 'Z' | 'X'))
 }
 
-/// Answers one library or control client until it goes away.
+/// Serves one library or control client until it disconnects.
 fn serve(firmware: &Firmware, connection: u64, mut peer: Connection) {
     let mut pid = 0;
     while let Ok(Some(request)) = peer.receive() {

@@ -1,4 +1,4 @@
-//! The regulation loop: set points from a motion, and a force from set point and pose.
+//! The regulation loop: set points of a motion, and the force from set point and pose.
 
 use super::body::gravity;
 use super::settings::Settings;
@@ -6,15 +6,15 @@ use super::trajectory::{Follower, Line};
 use super::vector::{Vector, ZERO, add, norm, scale, shorten, sub};
 use crate::config::ArmConfig;
 
-/// What one unit of each gain means here: N/m, N/(m s), N/(m/s). The vendor's units are not documented.
+/// Meaning of one unit of each gain: N/m, N/(m s), N/(m/s). The vendor's units are not documented.
 const UNIT_GAINS: [f64; 3] = [1000.0, 5000.0, 50.0];
-/// The integral term alone never wants more, N.
+/// Limit of the integral term, N.
 const INTEGRAL_LIMIT_N: f64 = 12.0;
 
-/// Slower than this the arm is at rest, m/s.
+/// Speed below which the arm is at rest, m/s.
 const SETTLED_M_S: f64 = 1e-3;
 
-/// Where the set points come from.
+/// Source of the set points.
 #[derive(Debug, Clone)]
 enum Motion {
     Hold,
@@ -22,21 +22,21 @@ enum Motion {
     Track { target: Vector, axes: [Follower; 3] },
 }
 
-/// The state of the loop.
+/// State of the loop.
 #[derive(Debug, Clone)]
 pub struct Regulation {
     /// Set point, m.
     pub reference: Vector,
     motion: Motion,
-    /// The last motion's set points are done, the arm is not at rest yet.
+    /// The last motion's set points are complete, but the arm is not at rest yet.
     settling: bool,
     integral: Vector,
-    /// The motors cannot give what the loop wants.
+    /// Whether the motors are saturated.
     pub saturated: bool,
 }
 
 impl Regulation {
-    /// Holds where the arm is.
+    /// Holds the current position.
     pub fn new(position: Vector) -> Self {
         Self {
             reference: position,
@@ -47,18 +47,18 @@ impl Regulation {
         }
     }
 
-    /// Whether a motion is under way.
+    /// Whether a motion is in progress.
     pub fn moving(&self) -> bool {
         self.settling || !matches!(self.motion, Motion::Hold)
     }
 
-    /// Drops any motion.
+    /// Stops any motion.
     pub fn hold(&mut self, position: Vector) {
         self.reference = position;
         self.motion = Motion::Hold;
     }
 
-    /// A straight line from the present set point, from rest even if that moves.
+    /// Starts a straight line from the current set point, from rest even if that moves.
     pub fn move_to(&mut self, target: Vector, settings: &Settings) {
         let line = Line::new(self.reference, target, settings.moves);
         self.motion = Motion::Line {
@@ -68,7 +68,7 @@ impl Regulation {
         self.settling = true;
     }
 
-    /// Follows a target from now on; raw without the filter.
+    /// Follows a target from now on; unfiltered without the filter.
     pub fn track(&mut self, target: Vector, settings: &Settings) {
         if !settings.filter {
             self.hold(target);
@@ -82,7 +82,7 @@ impl Regulation {
         self.settling = true;
     }
 
-    /// One iteration of `dt` seconds: the force that the motors are told, gravity compensation included.
+    /// One iteration of `dt` seconds: returns the commanded motor force including gravity compensation.
     pub(crate) fn iterate(
         &mut self,
         config: &ArmConfig,
@@ -107,7 +107,7 @@ impl Regulation {
             self.integral = ZERO;
             ZERO
         };
-        // The cap holds for the sum: with too low a ratio gravity compensation eats it up and the arm sinks.
+        // The cap applies to the sum: a low ratio leaves too little for gravity compensation, and the arm sinks.
         let wanted = add(servo, gravity_compensation(settings));
         let limit = settings.motor_ratio * config.max_force_n;
         self.saturated = norm(wanted) > limit;
@@ -139,7 +139,7 @@ impl Regulation {
     }
 }
 
-/// What gravity compensation adds.
+/// Contribution of gravity compensation.
 pub fn gravity_compensation(settings: &Settings) -> Vector {
     if settings.gravity {
         scale(gravity(settings.effector_mass, settings.device_angle), -1.0)

@@ -1,4 +1,4 @@
-//! Parameters as the library keeps them: checked when set, read back as they are.
+//! Parameters of the library: validated when set, read back unchanged.
 
 use skinrig_drd_abi::ErrorCode;
 
@@ -38,7 +38,7 @@ pub struct Settings {
     pub watchdog: u8,
 }
 
-/// What the vendor's library starts with.
+/// The vendor's initial values.
 const START: Limits = Limits {
     amax: 1.0,
     vmax: 1.0,
@@ -46,7 +46,7 @@ const START: Limits = Limits {
 };
 
 impl Settings {
-    /// After an open.
+    /// State after an open.
     pub fn new(config: &ArmConfig) -> Self {
         Self {
             device_angle: 0.0,
@@ -69,7 +69,7 @@ impl Settings {
     /// Sets one parameter.
     ///
     /// # Errors
-    /// [`ErrorCode::INVALID`] for a value out of range; the parameter stays as it was.
+    /// [`ErrorCode::INVALID`] for a value out of range; the parameter is unchanged.
     pub fn set(&mut self, setting: Setting, values: &[f64]) -> Result<(), ErrorCode> {
         if values.iter().any(|v| !v.is_finite()) {
             return Err(ErrorCode::INVALID);

@@ -1,4 +1,4 @@
-//! Set points between here and there: a straight line with limited jerk, and a filter per axis.
+//! Set points of a motion: a straight line with limited jerk, and a filter per axis.
 
 use std::collections::VecDeque;
 
@@ -15,7 +15,7 @@ pub struct Limits {
     pub jerk: f64,
 }
 
-/// A straight line from rest to rest, as fast as the limits allow; acceleration is continuous.
+/// The fastest straight line from rest to rest within the limits, with continuous acceleration.
 #[derive(Debug, Clone, Copy)]
 pub struct Line {
     from: Vector,
@@ -24,15 +24,15 @@ pub struct Line {
     jerk: f64,
     /// Duration of each phase of constant jerk, s.
     jerk_s: f64,
-    /// Duration of speeding up, s; slowing down takes as long.
+    /// Duration of the acceleration, s; the deceleration takes as long.
     ramp_s: f64,
     /// Speed between the ramps, m/s.
     speed: f64,
-    /// Duration of the whole, s.
+    /// Total duration, s.
     total_s: f64,
 }
 
-/// Phase of constant jerk and whole ramp from rest to `speed`, s.
+/// Duration of a constant-jerk phase, and of the whole ramp from rest to `speed`, s.
 fn ramp(speed: f64, limits: Limits) -> (f64, f64) {
     if speed * limits.jerk <= limits.amax * limits.amax {
         let jerk_s = (speed / limits.jerk).sqrt();
@@ -56,7 +56,7 @@ impl Line {
         let mut speed = limits.vmax;
         let ramps = |speed: f64| speed * ramp(speed, limits).1;
         if ramps(speed) > length {
-            // Too short for full speed: the peak speed whose two ramps are just as long as the way.
+            // Too short for full speed: use the peak speed whose two ramps cover the distance.
             let (mut low, mut high) = (0.0, speed);
             for _ in 0..80 {
                 let middle = 0.5 * (low + high);
@@ -87,7 +87,7 @@ impl Line {
         }
     }
 
-    /// Way made `t` seconds into the ramp.
+    /// Distance travelled `t` seconds into the ramp.
     fn ramp_way(&self, t: f64) -> f64 {
         let (j, t1) = (self.jerk, self.jerk_s);
         if t < t1 {
@@ -101,7 +101,7 @@ impl Line {
         }
     }
 
-    /// Set point `t` seconds after the start, and whether that is the end.
+    /// Set point `t` seconds after the start, and whether it is the end.
     pub fn at(&self, t: f64) -> (Vector, bool) {
         let way = if t >= self.total_s {
             self.length
@@ -119,24 +119,24 @@ impl Line {
     }
 }
 
-/// One axis that follows a target at any time without a jump in position, speed or acceleration.
+/// One axis that follows a changing target without jumps in position, speed or acceleration.
 ///
-/// A set point with limited acceleration, averaged over as long as the jerk limit asks for: the mean of
-/// something that never overshoots does not overshoot either.
+/// A set point with limited acceleration, averaged over the time required by the jerk limit. The mean of a signal without overshoot has
+/// none either.
 #[derive(Debug, Clone)]
 pub struct Follower {
     /// Set point, m.
     pub position: f64,
-    /// The set point before averaging, m, and its speed, m/s.
+    /// Set point before averaging, m, and its speed, m/s.
     raw: f64,
     raw_speed: f64,
-    /// The raw set points of the averaging time, oldest first, m.
+    /// Unfiltered set points of the averaging window, oldest first, m.
     window: VecDeque<f64>,
     /// Sum of the window, m.
     sum: f64,
 }
 
-/// How close to the target counts as there: rounding, m.
+/// Distance to the target that counts as arrived, for rounding, m.
 const THERE_M: f64 = 1e-12;
 
 impl Follower {
@@ -151,10 +151,10 @@ impl Follower {
         }
     }
 
-    /// Goes on for `dt` seconds; whether the target is reached and held.
+    /// Advances by `dt` seconds; returns whether the target is reached and held.
     pub fn follow(&mut self, target: f64, limits: Limits, dt: f64) -> bool {
         let left = target - self.raw;
-        // As fast as still allows to stop at the target, and never past it within this step.
+        // The largest speed that still allows a stop at the target, which this step must not pass.
         let able = (2.0 * limits.amax * left.abs())
             .sqrt()
             .min(limits.vmax)
@@ -172,7 +172,7 @@ impl Follower {
         there
     }
 
-    /// Acceleration jumps by at most twice its limit, so twice amax / jerk is long enough to average over.
+    /// Acceleration changes by at most twice its limit, so averaging over twice amax / jerk is enough.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -196,7 +196,7 @@ impl Follower {
     }
 }
 
-/// Longest averaging, steps of the loop: four seconds at 4 kHz.
+/// Longest averaging window, steps of the loop: four seconds at 4 kHz.
 const MOST_STEPS: f64 = 16_000.0;
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
-//! Three numbers and what one does with them.
+//! Three-dimensional vectors.
 
 /// A vector in the robot frame.
 pub type Vector = [f64; 3];
 
-/// Nothing in every direction.
+/// The zero vector.
 pub const ZERO: Vector = [0.0; 3];
 
 /// a + b.
@@ -16,7 +16,7 @@ pub fn sub(a: Vector, b: Vector) -> Vector {
     std::array::from_fn(|i| a[i] - b[i])
 }
 
-/// a times a number.
+/// a times a scalar.
 pub fn scale(a: Vector, by: f64) -> Vector {
     a.map(|x| x * by)
 }

@@ -1,4 +1,4 @@
-//! The arm as a whole: body, controller and regulation loop, advanced in real time in fixed steps.
+//! The complete arm: body, controller and regulation loop, advanced in real time in fixed steps.
 
 use skinrig_drd_abi::WATCHDOG_UNIT_US;
 
@@ -11,10 +11,10 @@ use super::vector::{Vector, ZERO, add, norm, sub};
 use crate::config::{ArmConfig, Fault};
 use crate::page::{ArmState, Mode};
 
-/// Step of the simulation, us.
+/// Simulation step, µs.
 pub const STEP_US: u32 = 250;
 
-/// Why the power went off, as the status vector tells it.
+/// Why the power went off, as in the status vector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cause {
     None = 0,
@@ -25,25 +25,25 @@ pub enum Cause {
     Usb = 5,
 }
 
-/// The program that holds the arm.
+/// The program that has the arm open.
 #[derive(Debug, Clone, Copy)]
 pub struct Holder {
     /// Number of its connection.
     pub connection: u64,
     /// Its process.
     pub pid: u32,
-    /// Stopped by a signal: its threads do not run, and so neither does its regulation loop.
+    /// Whether it is stopped by a signal, so that its regulation loop does not run.
     pub stopped: bool,
 }
 
-/// What the regulation loop left in its buffer.
+/// Buffer of the regulation loop.
 #[derive(Debug, Clone, Copy)]
 struct LoopBuffer {
     position: Vector,
     velocity: Vector,
 }
 
-/// Everything about one arm.
+/// State of one arm.
 #[derive(Debug)]
 pub struct World {
     pub config: ArmConfig,
@@ -56,11 +56,11 @@ pub struct World {
     pub initialised: bool,
     pub mode: Mode,
     pub cause: Cause,
-    /// The force button on the base has been pressed and not pressed again.
+    /// Whether the force button on the base is active.
     pub button_off: bool,
-    /// Force that the motors were last told, N.
+    /// Last commanded motor force, N.
     pub commanded: Vector,
-    /// When they were last told, ns.
+    /// Time of the last command, ns.
     pub last_command_ns: u64,
     t_ns: u64,
     tick: u64,
@@ -104,12 +104,12 @@ impl World {
         }
     }
 
-    /// Present of the simulation, ns.
+    /// Current simulation time, ns.
     pub fn t_ns(&self) -> u64 {
         self.t_ns
     }
 
-    /// Takes the arm to the present.
+    /// Advances the arm to the current time.
     pub fn advance_to(&mut self, now_ns: u64) {
         while self.t_ns + u64::from(STEP_US) * 1000 <= now_ns {
             self.t_ns += u64::from(STEP_US) * 1000;
@@ -136,7 +136,7 @@ impl World {
         }
     }
 
-    /// The loop's thread runs: it lives, its process is there and not stopped, and nothing hangs it.
+    /// Whether the loop's thread runs: started, its process alive and not stopped, and not suspended by a fault.
     fn loop_runs(&self) -> bool {
         self.regulation.is_some()
             && self.holder.is_some_and(|h| !h.stopped)
@@ -165,7 +165,7 @@ impl World {
         }
     }
 
-    /// The controller's own guards, in force while the motors are live.
+    /// The controller's own protections while the motors are live.
     fn guard(&mut self) {
         if self
             .body
@@ -183,7 +183,7 @@ impl World {
         }
     }
 
-    /// Motors off, brake. Regulation, if it runs, goes on without power.
+    /// Switches the motors off and the brake on. A running regulation continues without power.
     pub fn power_off(&mut self, cause: Cause) {
         self.commanded = ZERO;
         self.cause = cause;
@@ -194,7 +194,7 @@ impl World {
         };
     }
 
-    /// Motors on, unless the button on the base is off.
+    /// Switches the motors on, unless the button on the base prevents it.
     pub fn power_on(&mut self) -> bool {
         if !self.button_off {
             self.mode = Mode::Force;
@@ -204,14 +204,14 @@ impl World {
         !self.button_off
     }
 
-    /// Starts the regulation loop where the arm is.
+    /// Starts the regulation loop at the current position.
     pub(crate) fn start_regulation(&mut self) {
         self.regulation = Some(Regulation::new(self.body.position));
         self.commanded = gravity_compensation(&self.settings);
         self.power_on();
     }
 
-    /// Lets happen what is due.
+    /// Applies the faults that are due.
     pub(crate) fn let_faults_happen(&mut self) {
         let touching = norm(self.body.contact_force) > 0.0;
         for event in self.faults.due(self.t_ns, self.body.position[2], touching) {
@@ -254,22 +254,21 @@ impl World {
         }
     }
 
-    /// The library lost the device, or the program is gone: nothing regulates it any more. The motors
-    /// keep the force that they were last told.
+    /// Handles a disconnected library or a dead program: the regulation ends, and the motors keep the last commanded force.
     pub fn let_go(&mut self) {
         self.holder = None;
         self.regulation = None;
         self.initialisation = None;
     }
 
-    /// Whether a motion is under way, as the library tells it.
+    /// Whether a motion is in progress, as reported by the library.
     pub fn moving(&self) -> bool {
         let regulation = self.regulation.as_ref();
         regulation.is_some_and(Regulation::moving)
             || (regulation.is_some() && self.faults.is(|f| matches!(f, Fault::MovingForever)))
     }
 
-    /// The arm as everybody may see it.
+    /// The public state of the arm.
     pub fn state(&mut self) -> ArmState {
         let motor_force_n = if self.mode == Mode::Force {
             self.commanded
@@ -280,7 +279,7 @@ impl World {
         let (position, velocity) = if regulating {
             (self.buffer.position, self.buffer.velocity)
         } else {
-            // Without the loop a reading comes from the device itself.
+            // Without the loop, readings come from the device.
             (self.body.position, self.body.velocity)
         };
         let force = if self.mode == Mode::Force {
@@ -326,7 +325,7 @@ impl World {
         norm(sub(target, self.config.reach_centre_m)) <= self.config.reach_radius_m
     }
 
-    /// The point of the reachable sphere in that direction from its centre, a little inside.
+    /// The point near the surface of the reachable sphere in that direction from its centre.
     pub fn inside(&self, direction: Vector) -> Vector {
         let reach = 0.95 * self.config.reach_radius_m;
         add(self.config.reach_centre_m, direction.map(|x| x * reach))

@@ -1,4 +1,4 @@
-//! Each thing that can be made to go wrong, as the driver then sees it.
+//! Each fault as seen by the driver.
 
 use std::sync::mpsc;
 use std::thread;
@@ -9,7 +9,7 @@ use skinrig_drd_abi::{ForceOffCause, StatusField};
 
 use crate::support::{Bench, ID, WITHIN};
 
-/// A bench whose arm is high up and at rest, regulated.
+/// A bench with the arm high up, at rest and regulated.
 fn high_up() -> Bench {
     Bench::started(&ArmConfig {
         start_m: [0.0125, 0.0, 0.05],
@@ -22,7 +22,7 @@ fn inject(bench: &Bench, when: When, fault: Fault) {
 }
 
 #[test]
-fn an_open_fails_as_it_is_told_to_and_not_after_the_repair() {
+fn an_open_fails_with_the_injected_error_until_it_is_cleared() {
     let bench = Bench::new(&ArmConfig::default());
     // SAFETY: a function of the table.
     let open = || (unsafe { (bench.sdk.drdOpenID)(0) }, bench.last_error());
@@ -40,7 +40,7 @@ fn an_open_fails_as_it_is_told_to_and_not_after_the_repair() {
 }
 
 #[test]
-fn a_device_can_be_another_one_or_a_damaged_one() {
+fn a_device_can_have_another_type_or_damaged_memory() {
     let bench = Bench::new(&ArmConfig::default());
     let sdk = &bench.sdk;
     // SAFETY: functions of the table, called with their signatures.
@@ -53,7 +53,7 @@ fn a_device_can_be_another_one_or_a_damaged_one() {
         assert_eq!((sdk.dhdGetSystemType)(ID), 63);
         let mut serial = 0;
         assert_eq!((sdk.dhdGetSerialNumber)(&raw mut serial, ID), -1);
-        // A failure that is not negative.
+        // The only failure with a positive result.
         assert_eq!((sdk.dhdCheckControllerMemory.unwrap())(ID), 14);
         assert_eq!((sdk.drdIsSupported)(ID), 0);
     }
@@ -81,7 +81,7 @@ fn calibration_and_start_fail_or_hang() {
             result.recv_timeout(Duration::from_millis(300)).is_err(),
             "it came back"
         );
-        // Another thread still gets through, and the power goes off.
+        // Another thread can still make calls, and the power goes off.
         assert_eq!((sdk.dhdStop)(ID), 0);
         assert_eq!(bench.arm.state().unwrap().mode, Mode::Reset);
         assert_eq!((sdk.drdStop)(false, ID), 0);
@@ -96,7 +96,7 @@ fn calibration_and_start_fail_or_hang() {
 }
 
 #[test]
-fn regulation_dies_in_a_move_and_the_arm_is_braked() {
+fn a_regulation_that_ends_during_a_move_brakes_the_arm() {
     let bench = high_up();
     inject(&bench, When::IntoMove(0.1), Fault::RegulationDies);
     assert!(bench.move_to([0.0125, 0.0, -0.02]) >= 0);
@@ -111,7 +111,7 @@ fn regulation_dies_in_a_move_and_the_arm_is_braked() {
 }
 
 #[test]
-fn a_hanging_regulation_thread_is_noticed_by_the_watchdog_alone() {
+fn only_the_watchdog_detects_a_hanging_regulation_thread() {
     let bench = high_up();
     // SAFETY: functions of the table, called with their signatures.
     unsafe {
@@ -182,7 +182,7 @@ fn a_trip_leaves_regulation_running_without_power() {
             assert_eq!((bench.sdk.drdStop)(false, ID), 0);
             assert_eq!((bench.sdk.drdStart)(ID), 0);
         }
-        // The button on the base has the last word: only another press gives the power back.
+        // The button on the base has priority: only another press restores the power.
         assert_eq!(
             bench.status().is(StatusField::Force),
             fault != Fault::Button
@@ -191,7 +191,7 @@ fn a_trip_leaves_regulation_running_without_power() {
 }
 
 #[test]
-fn too_fast_a_move_trips_the_controller() {
+fn a_move_that_is_too_fast_trips_the_controller() {
     let bench = high_up();
     // SAFETY: a function of the table.
     let set = unsafe { (bench.sdk.drdSetPosMoveParam)(50.0, 2.0, 5000.0, ID) };
@@ -208,7 +208,7 @@ fn too_fast_a_move_trips_the_controller() {
 }
 
 #[test]
-fn a_jammed_arm_stays_where_it_is_while_its_set_point_goes_on() {
+fn a_jammed_arm_stays_in_place_while_its_set_point_moves() {
     let bench = high_up();
     inject(&bench, When::Now, Fault::Jammed);
     let start = bench.arm.state().unwrap().position_m;
@@ -225,7 +225,7 @@ fn a_jammed_arm_stays_where_it_is_while_its_set_point_goes_on() {
 }
 
 #[test]
-fn an_arm_whose_joints_rub_comes_late_and_arrives() {
+fn an_arm_with_high_friction_arrives_late() {
     let bench = high_up();
     inject(&bench, When::Now, Fault::Friction(800.0));
     assert!(bench.move_to([0.0125, 0.0, 0.04]) >= 0);
@@ -237,7 +237,7 @@ fn an_arm_whose_joints_rub_comes_late_and_arrives() {
 }
 
 #[test]
-fn reported_poses_and_forces_lie() {
+fn reported_poses_and_forces_are_falsified() {
     let bench = high_up();
     let (_, real) = bench.position();
     inject(&bench, When::Now, Fault::PositionJump([0.0, 0.001, 0.0]));
@@ -278,7 +278,7 @@ fn reported_poses_and_forces_lie() {
 }
 
 #[test]
-fn an_ignored_setting_reports_success_and_reads_back_as_it_was() {
+fn an_ignored_setting_reports_success_and_reads_back_unchanged() {
     let bench = Bench::started(&ArmConfig::default());
     inject(&bench, When::Now, Fault::Ignore(Setting::MotorRatio));
     // SAFETY: functions of the table, called with their signatures.
@@ -292,7 +292,7 @@ fn an_ignored_setting_reports_success_and_reads_back_as_it_was() {
 }
 
 #[test]
-fn stops_and_closes_fail_so_many_times() {
+fn stops_and_closes_fail_a_given_number_of_times() {
     let bench = Bench::started(&ArmConfig::default());
     inject(&bench, When::Now, Fault::StopFails(2));
     inject(&bench, When::Now, Fault::CloseFails(1));
@@ -331,7 +331,7 @@ fn a_short_status_vector_and_a_slow_loop() {
 }
 
 #[test]
-fn a_fault_can_wait_for_the_touch() {
+fn a_fault_can_start_at_contact() {
     let bench = high_up();
     bench
         .arm

@@ -1,7 +1,6 @@
-//! What the arm does when the program that drives it dies, hangs, or leaves without stopping.
+//! Behaviour of the arm when the program that drives it dies, hangs, or exits without stopping.
 //!
-//! The program is this executable again: started with [`ARM`] set, the test [`driving_program`] drives that
-//! arm until it is killed.
+//! The program is this executable: started with [`ARM`] set, the test [`driving_program`] drives that arm until it is killed.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -13,9 +12,9 @@ use drd::{ArmConfig, EmulatedArm, Mode};
 
 use crate::support::{Bench, ID, WITHIN, load, start};
 
-/// Names the directory of the arm to drive.
+/// Environment variable with the directory of the arm to drive.
 const ARM: &str = "DRIVEN_ARM";
-/// Watchdog to set, units of 125 us.
+/// Watchdog to set, units of 125 µs.
 const WATCHDOG: &str = "DRIVEN_WATCHDOG";
 
 #[test]
@@ -38,7 +37,7 @@ fn driving_program() {
     }
 }
 
-/// A driving program that holds the arm; killed on drop.
+/// A driving program that has the arm open; killed on drop.
 struct Program(Child, BufReader<ChildStdout>);
 
 impl Program {
@@ -96,7 +95,7 @@ fn without_a_watchdog_the_motors_stay_on_until_another_program_brakes() {
     let program = Program::start(&arm, 0);
     program.signal("-KILL");
     let gone = arm.wait_until(WITHIN, |s| !s.held).unwrap();
-    // Many times the longest watchdog later the force is still what the dead program wanted last.
+    // Many times the longest watchdog later, the force is still the last one of the dead program.
     let later = arm
         .wait_until(WITHIN, |s| s.t_ns > gone.t_ns + 300_000_000)
         .unwrap();
@@ -121,7 +120,7 @@ fn the_watchdog_brakes_the_arm_when_its_program_is_stopped_by_a_signal() {
     program.signal("-STOP");
     let after = arm.wait_until(WITHIN, |s| s.mode == Mode::Brake).unwrap();
     assert_eq!(after.force_off_cause, 3);
-    // It still holds the device: nobody else gets in.
+    // It still has the device open, so that no other program can open it.
     let sdk = load(&arm.library());
     // SAFETY: functions of the table, called with their signatures.
     let (opened, error) = unsafe { ((sdk.drdOpenID)(0), (sdk.dhdErrorGetLast)()) };

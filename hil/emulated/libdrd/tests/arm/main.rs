@@ -1,4 +1,4 @@
-//! The stand-in as a driver meets it: loaded at run time, its firmware in another process.
+//! The emulated libdrd as used by a driver: loaded at run time, with its firmware in another process.
 #![cfg(unix)]
 #![expect(
     clippy::unwrap_used,

@@ -1,11 +1,11 @@
-//! How the arm moves: filtered and raw targets, the sweep of the end stops, gravity on a tilted base.
+//! Motion of the arm: filtered and raw targets, the sweep of the end stops, gravity on a tilted base.
 
 use drd::{ArmConfig, Contact};
 
 use crate::support::{Bench, ID, WITHIN};
 
 #[test]
-fn a_filtered_target_is_approached_and_a_raw_one_jumped_to() {
+fn a_filtered_target_is_approached_and_a_raw_one_is_taken_at_once() {
     let bench = Bench::started(&ArmConfig::default());
     let track = |z| {
         // SAFETY: a function of the table.
@@ -29,7 +29,7 @@ fn a_filtered_target_is_approached_and_a_raw_one_jumped_to() {
 }
 
 #[test]
-fn a_sweep_of_the_end_stops_goes_everywhere_samples_or_not() {
+fn a_sweep_of_the_end_stops_covers_the_workspace_despite_samples() {
     let config = ArmConfig {
         reach_radius_m: 0.01,
         start_m: ArmConfig::default().reach_centre_m,
@@ -56,12 +56,12 @@ fn a_sweep_of_the_end_stops_goes_everywhere_samples_or_not() {
 }
 
 #[test]
-fn gravity_is_compensated_for_the_tilt_and_the_mass_that_are_set() {
+fn gravity_compensation_follows_the_configured_tilt_and_mass() {
     let bench = Bench::started(&ArmConfig {
         tilt_deg: 90.0,
         ..ArmConfig::default()
     });
-    // Told nothing, the library holds up a weight that pulls elsewhere: the servo shows it as a force.
+    // By default the library compensates the wrong weight and direction, and the servo shows the difference as a force.
     let weight_n = 0.12 * 9.81;
     let sideways =
         |n: f64| move |s: &drd::ArmState| (s.reported_force_n[0] - n).abs() < 0.05 && !s.moving;

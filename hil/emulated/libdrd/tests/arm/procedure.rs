@@ -1,4 +1,4 @@
-//! The procedure of a press from open to close, as a driver runs it, and what the journal says of it.
+//! The procedure of a press from open to close, as in a driver, and its journal.
 
 use crate::support::{Bench, ID, WITHIN};
 use drd::{ArmConfig, Contact, Mode};
@@ -52,7 +52,7 @@ fn a_press_from_open_to_close() {
         assert!(succeeded(bench.move_to(press_m)));
         let pressed = arm.wait_until(WITHIN, |s| !s.moving).unwrap();
         let [_, _, force] = bench.force();
-        // The sample's push and the servo's are in balance, and the tip stops short of its target.
+        // The forces of sample and servo balance, and the tip stops short of its target.
         let contact_n = pressed.contact_force_n[2];
         assert!(
             contact_n > 1.0 && (tare - force - contact_n).abs() < 0.1,
@@ -99,7 +99,7 @@ fn a_press_from_open_to_close() {
 #[test]
 fn the_library_exports_the_whole_table_and_nothing_that_is_never_used() {
     let path = drd::library_beside_this_executable().unwrap();
-    // SAFETY: the stand-in runs no code of its own when it is loaded, unless told to be a firmware.
+    // SAFETY: the library runs no code when it is loaded, unless it is to become a firmware.
     let library = unsafe { libloading::Library::new(path) }.unwrap();
     // SAFETY: the address is only looked at.
     let has = |name: &str| unsafe { library.get::<*const ()>(name.as_bytes()) }.is_ok();

@@ -1,6 +1,6 @@
-//! How library, firmware and control client find each other, and that no process is left over.
+//! Connection between library, firmware and control client, and termination of all processes.
 //!
-//! Programs of other processes are this executable again, told by a variable which part to play.
+//! Other processes are this executable with a variable that selects their role.
 
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
@@ -11,7 +11,7 @@ use drd::{ARM_VARIABLE, ArmConfig, ArmView, EmulatedArm};
 
 use crate::support::{ID, WITHIN, load};
 
-/// Tells the test of the same name to play its part.
+/// Environment variable that makes the test with the same name play its role.
 const PART: &str = "PART";
 
 fn play(part: &str) -> Command {
@@ -41,7 +41,7 @@ fn drives_the_arm_that_the_environment_names() {
     }
 }
 
-/// A process that is killed when the test is over.
+/// A process that is killed on drop.
 struct Killed(Child);
 
 impl Drop for Killed {
@@ -137,7 +137,7 @@ fn a_firmware_ends_with_the_process_that_started_it() {
 }
 
 #[test]
-fn a_configuration_that_makes_no_sense_is_refused() {
+fn an_invalid_configuration_is_rejected() {
     let refused = |config: &ArmConfig| EmulatedArm::spawn(config).unwrap_err().to_string();
     assert!(
         refused(&ArmConfig {

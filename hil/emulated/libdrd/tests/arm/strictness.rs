@@ -1,4 +1,4 @@
-//! What the library refuses, with which error, on which thread.
+//! Rejected calls, with their error and thread.
 
 use std::ptr::null_mut;
 use std::thread;
@@ -88,10 +88,10 @@ fn an_error_belongs_to_the_thread_that_made_it() {
 #[test]
 fn cached_readings_and_saturated_motors_are_successes_other_than_zero() {
     let bench = Bench::started(&ArmConfig::default());
-    // A busy machine may let the arm go on between two readings, but not each of so many times.
+    // A busy computer may let the arm advance between two readings, but not every time.
     let readings: Vec<i32> = (0..1000).map(|_| bench.position().0).collect();
     assert!(readings.contains(&TIMEGUARD) && readings.iter().all(|rc| *rc >= 0));
-    // Less than the arm weighs: the motors are saturated and the arm sinks although it is regulated.
+    // Less than the arm's weight: the motors saturate, and the arm sinks despite the regulation.
     // SAFETY: a function of the table.
     assert_eq!(unsafe { (bench.sdk.drdSetMotRatioMax)(0.05, ID) }, 0);
     let before = bench.arm.wait_until(WITHIN, |s| s.saturated).unwrap();
@@ -103,7 +103,7 @@ fn cached_readings_and_saturated_motors_are_successes_other_than_zero() {
 }
 
 #[test]
-fn the_status_vector_is_as_long_as_the_version_makes_it() {
+fn the_status_vector_has_the_length_of_the_version() {
     for (sdk, length) in [
         ([3, 5, 1], 15),
         ([3, 7, 1], 16),
@@ -152,7 +152,7 @@ fn only_the_device_of_the_right_serial_has_an_arm() {
 }
 
 #[test]
-fn the_brake_is_viscous_and_the_arm_rests_on_what_is_below() {
+fn the_brake_is_viscous_and_the_arm_rests_on_the_sample_below() {
     let contact = Some(drd::Contact::horizontal(0.017));
     let bench = Bench::started(&ArmConfig {
         contact,

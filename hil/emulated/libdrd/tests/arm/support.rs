@@ -1,4 +1,4 @@
-//! The library as a driver loads it, with the few calls that every test makes.
+//! Loads the library like a driver, with calls that every test makes.
 
 use std::ffi::c_void;
 use std::path::Path;
@@ -8,7 +8,7 @@ use std::time::Duration;
 use drd::{ArmConfig, EmulatedArm};
 use skinrig_drd_abi::{DeviceId, Functions, StatusVector};
 
-/// Longer than anything takes on a busy machine: only a hang reaches it.
+/// Longer than anything takes on a busy computer.
 pub const WITHIN: Duration = Duration::from_secs(30);
 
 /// The functions of the library at `path`, loaded for the rest of the process.
@@ -25,7 +25,7 @@ pub fn load(path: &Path) -> Functions {
     .unwrap()
 }
 
-/// Opens, starts, sets gentle motion: 50 mm/s.
+/// Opens and starts with a slow motion of 50 mm/s.
 pub fn start(sdk: &Functions) {
     // SAFETY: functions of the table, called with their signatures.
     unsafe {
@@ -50,7 +50,7 @@ impl Bench {
         Self { arm, sdk }
     }
 
-    /// Open, started, with gentle motion.
+    /// Open and started, with slow motion.
     pub fn started(config: &ArmConfig) -> Self {
         let bench = Self::new(config);
         start(&bench.sdk);

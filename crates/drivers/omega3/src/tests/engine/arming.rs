@@ -1,4 +1,4 @@
-//! What is set, read back and asked before the motors are live.
+//! Settings and checks before the motors are live.
 
 use super::*;
 
@@ -10,7 +10,7 @@ fn keeps_the_contract() {
         outside: Point3::new(0.0, 31.0, 0.0),
         speed_mm_s: 30.0,
         tolerance_mm: 0.05,
-        patience: HostDuration::from_millis(2_000),
+        move_timeout: HostDuration::from_millis(2_000),
         rate_share: 0.9,
     };
     contract::indenter(
@@ -23,7 +23,7 @@ fn keeps_the_contract() {
 }
 
 #[test]
-fn a_start_that_forgets_everything_is_configured_again_before_the_first_target() {
+fn a_start_that_resets_settings_is_configured_again_before_the_first_target() {
     let bench = Bench::armed();
     let log = bench.sdk.log();
     let start = log.iter().position(|c| c == "drdStart").unwrap();
@@ -38,14 +38,14 @@ fn a_start_that_forgets_everything_is_configured_again_before_the_first_target()
         let last = log.iter().rposition(|c| c == call).unwrap();
         assert!(start < last && last < target, "{call} in {log:?}");
     }
-    let pace = bench.sdk.with(|s| s.paces[1]);
-    assert!(pace.speed_m_s < 0.1, "never the library's 1 m/s: {pace}");
+    let limits = bench.sdk.with(|s| s.generator_limits[1]);
+    assert!(limits.speed_m_s < 0.1, "not the library's 1 m/s: {limits}");
     let ratio = bench.sdk.with(|s| s.values["motor_ratio_max"]);
     assert!((ratio - 4.0 / 12.0).abs() < 1e-12, "{ratio}");
 }
 
 #[test]
-fn what_does_not_read_back_is_not_armed() {
+fn a_setting_that_does_not_read_back_prevents_arming() {
     for (ignored, name) in [
         ("motor_ratio_max", "motor_ratio_max"),
         ("gain_i", "gain_i"),
@@ -53,13 +53,13 @@ fn what_does_not_read_back_is_not_armed() {
         ("filter", "track_filter"),
     ] {
         let bench = Bench::new();
-        bench.ask(|e| e.configure(&LIMITS)).unwrap();
+        bench.request(|e| e.configure(&LIMITS)).unwrap();
         bench.sdk.with(|s| {
             s.ignore.push(ignored);
-            s.paces[1].speed_m_s = 1.0;
+            s.generator_limits[1].speed_m_s = 1.0;
             s.values.clear();
         });
-        let error = bench.ask(Engine::arm).unwrap_err();
+        let error = bench.request(Engine::arm).unwrap_err();
         let DeviceError::ReadBack { name: found, .. } = &error else {
             panic!("{ignored}: {error}")
         };
@@ -69,19 +69,19 @@ fn what_does_not_read_back_is_not_armed() {
 }
 
 #[test]
-fn an_arm_that_rests_on_something_is_not_armed() {
+fn an_arm_that_rests_on_something_cannot_be_armed() {
     let bench = Bench::new();
-    bench.ask(|e| e.configure(&LIMITS)).unwrap();
+    bench.request(|e| e.configure(&LIMITS)).unwrap();
     bench.sdk.with(|s| s.force_n = [0.0, 0.0, -1.8]);
-    let error = bench.ask(Engine::arm).unwrap_err().to_string();
+    let error = bench.request(Engine::arm).unwrap_err().to_string();
     assert!(error.contains("does not hang free"), "{error}");
     assert!(!bench.sdk.with(|s| s.live));
-    // Told once; the robot is disarmed.
+    // Reported once; the robot is disarmed.
     assert_eq!(bench.stream.failure(), None);
 }
 
 #[test]
-fn a_cause_from_before_arming_is_not_taken_for_a_new_one() {
+fn a_force_off_cause_from_before_arming_is_not_reported_as_new() {
     for (cause, ended, word) in [
         (5, true, "regulation thread ended"),
         (1, true, "regulation thread ended"),
@@ -89,8 +89,8 @@ fn a_cause_from_before_arming_is_not_taken_for_a_new_one() {
     ] {
         let bench = Bench::new();
         bench.sdk.with(|s| s.cause = cause);
-        bench.ask(|e| e.configure(&LIMITS)).unwrap();
-        bench.ask(Engine::arm).unwrap();
+        bench.request(|e| e.configure(&LIMITS)).unwrap();
+        bench.request(Engine::arm).unwrap();
         bench.sdk.with(|s| (s.running, s.live) = (!ended, false));
         bench.run_ms(30);
         let failure = bench.stream.failure().unwrap();
@@ -100,16 +100,16 @@ fn a_cause_from_before_arming_is_not_taken_for_a_new_one() {
 }
 
 #[test]
-fn what_the_device_answered_is_recorded_number_by_number() {
+fn values_read_back_are_recorded_as_separate_numbers() {
     let bench = Bench::new();
-    let settings = bench.ask(|e| e.configure(&LIMITS)).unwrap();
+    let settings = bench.request(|e| e.configure(&LIMITS)).unwrap();
     let speed = settings
         .iter()
         .find(|s| s.name == "track_parameters_speed_m_s")
         .unwrap();
     assert_eq!((&*speed.requested, &*speed.read_back), ("0.08", "0.08"));
     let read_of = |name: &str| {
-        let settings = bench.ask(|e| e.configure(&LIMITS)).unwrap();
+        let settings = bench.request(|e| e.configure(&LIMITS)).unwrap();
         let found = settings.into_iter().find(|s| s.name == name).unwrap();
         (found.requested, found.read_back)
     };
@@ -120,30 +120,30 @@ fn what_the_device_answered_is_recorded_number_by_number() {
 }
 
 #[test]
-fn a_library_that_takes_settings_only_while_regulating_is_no_difference() {
+fn settings_accepted_only_while_regulating_are_no_difference() {
     let bench = Bench::new();
     bench
         .sdk
         .with(|s| s.needs_regulation.push("motor_ratio_max"));
-    let settings = bench.ask(|e| e.configure(&LIMITS)).unwrap();
+    let settings = bench.request(|e| e.configure(&LIMITS)).unwrap();
     for s in &settings {
         let as_found = s.requested == Setting::AS_FOUND;
         assert!(as_found || s.requested == s.read_back, "{s:?}");
     }
     assert!(settings.iter().all(|s| s.name != "gain_i"));
-    bench.ask(Engine::arm).unwrap();
-    bench.ask(Engine::disarm).unwrap();
-    let settings = bench.ask(|e| e.configure(&LIMITS)).unwrap();
+    bench.request(Engine::arm).unwrap();
+    bench.request(Engine::disarm).unwrap();
+    let settings = bench.request(|e| e.configure(&LIMITS)).unwrap();
     assert!(settings.iter().any(|s| s.name == "gain_i"), "{settings:?}");
 }
 
 #[test]
-fn a_watchdog_that_a_start_forgets_is_set_again() {
+fn a_watchdog_reset_by_a_start_is_set_again() {
     let bench = Bench::armed();
     assert_eq!(bench.sdk.with(|s| s.watchdog), 80);
-    bench.ask(Engine::disarm).unwrap();
+    bench.request(Engine::disarm).unwrap();
     bench.sdk.with(|s| s.ignore.push("watchdog"));
-    let error = bench.ask(Engine::arm).unwrap_err();
+    let error = bench.request(Engine::arm).unwrap_err();
     assert!(
         matches!(&error, DeviceError::ReadBack { name, .. } if name == "watchdog_125us"),
         "{error}"

@@ -1,10 +1,10 @@
-//! Faults brake, are named, and stay until they are disarmed.
+//! Faults brake the arm, are reported, and remain until it is disarmed.
 
 use super::*;
 
 #[test]
-fn every_fault_brakes_and_is_named_until_disarmed() {
-    let mishaps: [Mishap; 12] = [
+fn every_fault_brakes_and_is_reported_until_disarmed() {
+    let mishaps: [FaultCase; 12] = [
         (|s| s.with(|s| s.cached = true), "no new position"),
         (|s| s.with(|s| s.running = false), "regulation thread ended"),
         (|s| s.with(|s| s.khz = 0.5), "regulation loop is slow"),
@@ -42,28 +42,28 @@ fn every_fault_brakes_and_is_named_until_disarmed() {
         let refused = bench.go([20.0, 0.0, 5.0], 20.0);
         assert!(matches!(refused, Err(DeviceError::State { .. })), "{word}");
         assert!(
-            bench.ask(Engine::arm).is_err(),
+            bench.request(Engine::arm).is_err(),
             "{word}: armed after a fault"
         );
-        // Repaired and disarmed by the operator, it serves again.
+        // After a repair and a disarm the robot works again.
         bench.sdk.with(|s| {
             *s = super::super::scripted::Script {
                 log: Vec::new(),
                 ..Scripted::default().script.into_inner().unwrap()
             }
         });
-        bench.ask(Engine::disarm).unwrap();
-        bench.ask(Engine::arm).unwrap();
+        bench.request(Engine::disarm).unwrap();
+        bench.request(Engine::arm).unwrap();
         assert_eq!(bench.stream.failure(), None, "{word}");
     }
 }
 
 #[test]
-fn a_robot_that_is_gone_stays_gone() {
+fn a_disconnected_robot_stays_lost() {
     for armed in [true, false] {
         let bench = Bench::armed();
         if !armed {
-            bench.ask(Engine::disarm).unwrap();
+            bench.request(Engine::disarm).unwrap();
         }
         for call in [
             "drdGetPositionAndOrientation",
@@ -78,11 +78,11 @@ fn a_robot_that_is_gone_stays_gone() {
         let failure = bench.stream.failure().unwrap();
         assert!(matches!(failure, DeviceError::Lost { .. }), "{failure}");
         let words = failure.to_string();
-        assert!(words.contains("link to the device broke"), "{words}");
+        assert!(words.contains("connection to the device failed"), "{words}");
         for answer in [
-            bench.ask(Engine::disarm),
-            bench.ask(Engine::arm),
-            bench.ask(Engine::hold),
+            bench.request(Engine::disarm),
+            bench.request(Engine::arm),
+            bench.request(Engine::hold),
         ] {
             assert!(
                 matches!(answer, Err(DeviceError::Lost { .. })),
@@ -93,35 +93,35 @@ fn a_robot_that_is_gone_stays_gone() {
 }
 
 #[test]
-fn a_refused_brake_is_tried_in_every_way_and_told_loudly() {
+fn a_failing_brake_is_retried_in_every_way_and_reported() {
     let bench = Bench::armed();
     bench.sdk.with(|s| s.fail.insert("drdStop", (22, 3)));
     bench.sdk.with(|s| s.fail.insert("dhdStop", (1, 3)));
     let before = bench.clock.now();
-    bench.ask(Engine::disarm).unwrap();
+    bench.request(Engine::disarm).unwrap();
     let tries = bench.sdk.log().iter().filter(|c| *c == "drdStop").count();
     assert_eq!(tries, 4);
     assert_eq!(bench.clock.now() - before, HostDuration::from_millis(300));
 
-    bench.ask(Engine::arm).unwrap();
+    bench.request(Engine::arm).unwrap();
     bench.sdk.fail("drdStop", ErrorCode::NO_REGULATION);
     bench.sdk.fail("dhdStop", ErrorCode::COM);
-    let error = bench.ask(Engine::disarm).unwrap_err().to_string();
+    let error = bench.request(Engine::disarm).unwrap_err().to_string();
     for word in ["may be live", "20 attempts", "mains"] {
         assert!(error.contains(word), "{word} is not in {error}");
     }
 }
 
 #[test]
-fn a_brake_that_only_claims_to_work_is_not_believed() {
+fn a_brake_without_effect_is_not_accepted() {
     let bench = Bench::armed();
     bench.sdk.with(|s| s.status.insert(5, 1));
-    let error = bench.ask(Engine::disarm).unwrap_err().to_string();
+    let error = bench.request(Engine::disarm).unwrap_err().to_string();
     assert!(error.contains("motors are live"), "{error}");
 }
 
 #[test]
-fn an_arm_that_nobody_looks_at_is_braked_and_one_that_is_polled_is_not() {
+fn an_arm_that_is_not_polled_is_braked_and_one_that_is_polled_is_not() {
     let bench = Bench::armed();
     bench.go([20.0, 0.0, 5.0], 20.0).unwrap();
     for _ in 0..5 {
@@ -135,17 +135,17 @@ fn an_arm_that_nobody_looks_at_is_braked_and_one_that_is_polled_is_not() {
     assert!(!bench.sdk.with(|s| s.live));
     let failure = bench.stream.failure().unwrap().to_string();
     assert!(
-        failure.contains("nobody looked at the live arm for 2s"),
+        failure.contains("the live arm was not polled for 2s"),
         "{failure}"
     );
-    // Braked, it may be left alone.
-    bench.ask(Engine::disarm).unwrap();
+    // A braked arm need not be polled.
+    bench.request(Engine::disarm).unwrap();
     bench.run_ms(10_000);
     assert_eq!(bench.stream.failure(), None);
 }
 
 #[test]
-fn forces_that_cannot_be_read_trip_though_positions_can() {
+fn unreadable_forces_trip_even_if_positions_are_readable() {
     let bench = Bench::armed();
     bench.sdk.fail("dhdGetForce", ErrorCode::TIMEOUT);
     bench.run_ms(20);
@@ -155,7 +155,7 @@ fn forces_that_cannot_be_read_trip_though_positions_can() {
 }
 
 #[test]
-fn readings_that_fail_slowly_are_a_silence() {
+fn slowly_failing_readings_count_as_silence() {
     let bench = Bench::armed();
     bench.go([20.0, 0.0, 0.0], 5.0).unwrap();
     bench
@@ -166,35 +166,39 @@ fn readings_that_fail_slowly_are_a_silence() {
         // Each call takes 100 ms to fail.
         let later = clock.now() + HostDuration::from_millis(100);
         clock.wait_until(later);
-        bench.ask(Engine::tick);
+        bench.request(Engine::tick);
     }
     let failure = bench.stream.failure().unwrap().to_string();
     assert!(failure.contains("no new position"), "{failure}");
 }
 
 #[test]
-fn a_brake_that_fails_ends_the_motion_and_is_tried_again() {
+fn a_failed_brake_ends_the_motion_and_is_retried() {
     let bench = Bench::armed();
     bench.go([20.0, 0.0, -20.0], 20.0).unwrap();
     bench.run_ms(50);
     for call in ["drdStop", "dhdStop", "dhdEnableForce"] {
         bench.sdk.fail(call, ErrorCode::DHC_BUSY);
     }
-    let error = bench.ask(Engine::disarm).unwrap_err();
+    let error = bench.request(Engine::disarm).unwrap_err();
     assert_eq!(bench.stream.failure(), Some(error));
     let target = bench.sdk.with(|s| s.target_m);
     bench.run_ms(100);
-    assert_eq!(bench.sdk.with(|s| s.target_m), target, "it moves on");
+    assert_eq!(
+        bench.sdk.with(|s| s.target_m),
+        target,
+        "the motion continues"
+    );
     assert!(bench.go([20.0, 0.0, 20.0], 20.0).is_err());
     bench.sdk.with(|s| s.fail.clear());
-    bench.ask(Engine::disarm).unwrap();
+    bench.request(Engine::disarm).unwrap();
     assert!(!bench.sdk.with(|s| s.live));
-    bench.ask(Engine::arm).unwrap();
+    bench.request(Engine::arm).unwrap();
     assert_eq!(bench.stream.failure(), None);
 }
 
 #[test]
-fn however_the_owner_ends_the_arm_is_braked_and_closed() {
+fn dropping_the_owner_brakes_and_closes() {
     let bench = Bench::armed();
     let sdk = bench.sdk.clone();
     drop(bench);

@@ -1,4 +1,4 @@
-//! The cycle: the contract, every trip, the force limits, braking that is refused.
+//! Tests of the engine: contract, trips, force limits, and failing brakes.
 
 mod arming;
 mod faults;
@@ -17,15 +17,15 @@ use super::scripted::Scripted;
 use crate::OmegaConfig;
 use crate::axes::{Axes, Axis};
 use crate::engine::Engine;
-use crate::indenter::{capabilities, check_wanted};
+use crate::indenter::{capabilities, check_limits_of_run};
 use crate::open::open;
 use crate::stream::Stream;
 
-/// Time that passes only when someone waits.
+/// VirtualClock time that advances only during waits.
 #[derive(Clone, Default)]
-struct Virtual(Arc<Mutex<i64>>);
+struct VirtualClock(Arc<Mutex<i64>>);
 
-impl Clock for Virtual {
+impl Clock for VirtualClock {
     fn now(&self) -> HostTime {
         HostTime(*self.0.lock().unwrap())
     }
@@ -36,10 +36,10 @@ impl Clock for Virtual {
     }
 }
 
-/// The engine in cycles of its own, as the owner thread runs it.
+/// Runs the engine cycle by cycle like the owner thread.
 struct Bench {
-    engine: Mutex<(Engine<Virtual>, HostTime)>,
-    clock: Virtual,
+    engine: Mutex<(Engine<VirtualClock>, HostTime)>,
+    clock: VirtualClock,
     stream: Arc<Stream>,
     sdk: Arc<Scripted>,
     config: OmegaConfig,
@@ -52,7 +52,7 @@ impl Bench {
 
     fn with(config: OmegaConfig) -> Arc<Self> {
         let sdk = Arc::new(Scripted::default());
-        let clock = Virtual::default();
+        let clock = VirtualClock::default();
         let stream = Arc::new(Stream::default());
         let opened = open(&*sdk, &config, |_| Ok(())).unwrap();
         let engine = Engine::new(
@@ -72,15 +72,15 @@ impl Bench {
         })
     }
 
-    /// Armed within `LIMITS`.
+    /// An armed bench with `LIMITS`.
     fn armed() -> Arc<Self> {
         let bench = Self::new();
-        bench.ask(|e| e.configure(&LIMITS)).unwrap();
-        bench.ask(Engine::arm).unwrap();
+        bench.request(|e| e.configure(&LIMITS)).unwrap();
+        bench.request(Engine::arm).unwrap();
         bench
     }
 
-    fn ask<T>(&self, request: impl FnOnce(&mut Engine<Virtual>) -> T) -> T {
+    fn request<T>(&self, request: impl FnOnce(&mut Engine<VirtualClock>) -> T) -> T {
         request(&mut self.engine.lock().unwrap().0)
     }
 
@@ -101,7 +101,7 @@ impl Bench {
 
     fn go(&self, to: [f64; 3], speed: f64) -> Result<(), DeviceError> {
         let [x, y, z] = to;
-        self.ask(|e| e.go(Point3::new(x, y, z), speed))
+        self.request(|e| e.go(Point3::new(x, y, z), speed))
     }
 
     fn poll(&self) -> (Vec<RobotSample>, u64) {
@@ -111,7 +111,7 @@ impl Bench {
     }
 }
 
-/// The robot and the clock of a bench, for the contract.
+/// Robot and clock of a bench, for the contract tests.
 struct Handle(Arc<Bench>);
 
 impl Clock for Handle {
@@ -136,24 +136,24 @@ impl Indenter for Handle {
         capabilities(&self.0.config)
     }
     fn configure(&mut self, limits: &MotionLimits) -> Result<Vec<Setting>, DeviceError> {
-        check_wanted("77", &self.0.config, limits)?;
-        self.0.ask(|e| e.configure(limits))
+        check_limits_of_run("77", &self.0.config, limits)?;
+        self.0.request(|e| e.configure(limits))
     }
     fn arm(&mut self) -> Result<(), DeviceError> {
-        self.0.ask(Engine::arm)
+        self.0.request(Engine::arm)
     }
     fn command(&mut self, target: Point3<Robot>, speed_mm_s: f64) -> Result<(), DeviceError> {
-        self.0.ask(|e| e.go(target, speed_mm_s))
+        self.0.request(|e| e.go(target, speed_mm_s))
     }
     fn poll(&mut self, samples: &mut Vec<RobotSample>) -> Result<(), DeviceError> {
         self.0.stream.take(samples);
         self.0.stream.failure().map_or(Ok(()), Err)
     }
     fn hold(&mut self) -> Result<(), DeviceError> {
-        self.0.ask(Engine::hold)
+        self.0.request(Engine::hold)
     }
     fn disarm(&mut self) -> Result<(), DeviceError> {
-        self.0.ask(Engine::disarm)
+        self.0.request(Engine::disarm)
     }
 }
 
@@ -165,5 +165,5 @@ const LIMITS: MotionLimits = MotionLimits {
     max_force_n: 4.0,
 };
 
-/// What happens, and a word that the error must hold.
-type Mishap = (fn(&Scripted), &'static str);
+/// A fault, and a phrase that the error must contain.
+type FaultCase = (fn(&Scripted), &'static str);

@@ -1,4 +1,4 @@
-//! Motion under its limits, and what is told of it.
+//! Motion within its limits, and its samples.
 
 use super::*;
 
@@ -7,14 +7,17 @@ fn at_the_force_limit_the_tip_stops_and_may_only_rise() {
     let bench = Bench::armed();
     bench.go([20.0, 0.0, 0.0], 20.0).unwrap();
     bench.run_ms(100);
-    // 4.2 N above the 0.2 N at which it hung still: the limit is 4 N.
+    // 4.2 N above the tare of 0.2 N; the limit is 4 N.
     bench.sdk.with(|s| s.force_n = [0.0, 0.0, 0.2 - 4.1]);
     bench.run_ms(1);
     bench.poll();
     bench.run_ms(50);
     let (samples, _) = bench.poll();
     let set_points: Vec<_> = samples.iter().map(|s| s.commanded).collect();
-    assert!(set_points.windows(2).all(|w| w[0] == w[1]), "it went on");
+    assert!(
+        set_points.windows(2).all(|w| w[0] == w[1]),
+        "the motion continued"
+    );
     assert!((samples[0].force_n - 4.1).abs() < 1e-9, "{:?}", samples[0]);
     assert_eq!(bench.stream.failure(), None);
     let deeper = bench.go([20.0, 0.0, 0.0], 20.0);
@@ -32,9 +35,9 @@ fn at_the_force_limit_the_tip_stops_and_may_only_rise() {
 }
 
 #[test]
-fn a_way_aside_is_no_rise_however_far_the_arm_sags() {
+fn a_sideways_path_is_not_a_rise_however_far_the_arm_sags() {
     let bench = Bench::armed();
-    // It hangs 1 mm below its set point.
+    // The arm hanging_call 1 mm below its set point.
     bench
         .sdk
         .with(|s| (s.follows, s.position_m[2]) = (false, 0.009));
@@ -44,7 +47,11 @@ fn a_way_aside_is_no_rise_however_far_the_arm_sags() {
     bench.run_ms(1);
     let stopped = bench.sdk.with(|s| s.target_m);
     bench.run_ms(50);
-    assert_eq!(bench.sdk.with(|s| s.target_m), stopped, "it went on");
+    assert_eq!(
+        bench.sdk.with(|s| s.target_m),
+        stopped,
+        "the motion continued"
+    );
     let [x, y, _] = stopped.map(|m| m * 1e3);
     for (to, allowed) in [
         ([x, y, 10.0], false),
@@ -57,7 +64,7 @@ fn a_way_aside_is_no_rise_however_far_the_arm_sags() {
 }
 
 #[test]
-fn a_stuck_arm_pulls_no_further_than_the_lead() {
+fn a_stuck_arm_is_not_pulled_beyond_the_lead() {
     let bench = Bench::armed();
     bench.sdk.with(|s| s.follows = false);
     bench.go([20.0, 0.0, -20.0], 20.0).unwrap();
@@ -77,9 +84,9 @@ fn a_stuck_arm_pulls_no_further_than_the_lead() {
 }
 
 #[test]
-fn a_robot_that_presses_to_its_front_has_the_robot_frame_turned() {
+fn a_robot_that_presses_forward_has_a_rotated_robot_frame() {
     let mut config = OmegaConfig::default();
-    // Robot z, away from the sample, is the device's -x.
+    // Robot z, away from the sample, is device -x.
     config.mount.axes = Axes::new([Axis::PlusZ, Axis::PlusY, Axis::MinusX]).unwrap();
     config.envelope.min_mm = [-40.0; 3];
     config.envelope.max_mm = [40.0; 3];
@@ -89,9 +96,9 @@ fn a_robot_that_presses_to_its_front_has_the_robot_frame_turned() {
         max_mm: [30.0; 3],
         ..LIMITS
     };
-    bench.ask(|e| e.configure(&limits)).unwrap();
+    bench.request(|e| e.configure(&limits)).unwrap();
     bench.sdk.with(|s| s.force_n = [0.0; 3]);
-    bench.ask(Engine::arm).unwrap();
+    bench.request(Engine::arm).unwrap();
     bench.go([5.0, -3.0, -25.0], 20.0).unwrap();
     bench.run_ms(1900);
     bench.poll();
@@ -100,7 +107,7 @@ fn a_robot_that_presses_to_its_front_has_the_robot_frame_turned() {
         .map(|i| (at[i] - [0.025, -0.003, 0.005][i]).abs())
         .sum();
     assert!(off < 1e-6, "{at:?}");
-    // The motors push along +x, into the sample: it pushes back along robot +z.
+    // The motors push along +x into the sample, so the sample pushes along robot +z.
     bench.sdk.with(|s| s.force_n = [1.5, 0.0, 0.0]);
     bench.run_ms(2);
     let (samples, _) = bench.poll();
@@ -109,11 +116,11 @@ fn a_robot_that_presses_to_its_front_has_the_robot_frame_turned() {
 }
 
 #[test]
-fn an_unread_stream_is_bounded_and_counts_what_it_lost() {
+fn an_unread_stream_is_bounded_and_counts_dropped_samples() {
     let bench = Bench::armed();
     for _ in 0..10 {
-        // Somebody is there, and takes no samples.
-        bench.ask(Engine::hold).unwrap();
+        // The program commands the robot but never takes samples.
+        bench.request(Engine::hold).unwrap();
         bench.run_ms(1000);
     }
     let (samples, dropped) = bench.poll();
@@ -124,7 +131,7 @@ fn an_unread_stream_is_bounded_and_counts_what_it_lost() {
 }
 
 #[test]
-fn late_cycles_slow_the_motion_and_never_lengthen_a_step() {
+fn late_cycles_delay_the_motion_and_never_lengthen_a_step() {
     let bench = Bench::armed();
     bench.go([20.0, 0.0, -20.0], 40.0).unwrap();
     let mut clock = bench.clock.clone();
@@ -133,7 +140,7 @@ fn late_cycles_slow_the_motion_and_never_lengthen_a_step() {
         let later = clock.now() + HostDuration::from_millis(50);
         clock.wait_until(later);
         bench.poll();
-        bench.ask(Engine::tick);
+        bench.request(Engine::tick);
         let now = bench.sdk.with(|s| s.target_m);
         let step = (now[2] - last[2]).abs() * 1e3;
         assert!(step <= bench.config.motion.max_step_mm + 1e-9, "{step} mm");

@@ -1,0 +1,41 @@
+//! Law: the skin locates better than a blind guess.
+
+use std::collections::BTreeSet;
+
+use skinrig_model::{Point2, PressRole, Verdict};
+
+use super::finding::finding;
+use crate::metrics::spread_mm;
+use crate::result::{Analysis, Fault, Finding, Law, PressResult};
+
+/// Above this share of the error of a constant guess (mean position), an RMSE says nothing about the skin: cameras,
+/// positions or times are not what they seem, or the skin is dead.
+const MAX_SHARE: f64 = 0.7;
+/// Minimum number of locations for a statement.
+const MIN_PLACES: usize = 4;
+
+pub fn findings(analysis: &Analysis) -> Option<Finding> {
+    let counts = |p: &&PressResult| {
+        p.role == PressRole::Score && p.verdict == Verdict::Valid && p.estimate().is_some()
+    };
+    let scored = analysis.presses.iter().filter(counts);
+    let truths: Vec<Point2> = scored.filter_map(|p| p.truth).collect();
+    let places: BTreeSet<(u64, u64)> = truths
+        .iter()
+        .map(|p| (p.x_mm.to_bits(), p.y_mm.to_bits()))
+        .collect();
+    let (rmse_mm, ignorance_mm) = (
+        analysis.scored.rmse_mm.value?,
+        spread_mm(truths.iter().copied()),
+    );
+    (places.len() >= MIN_PLACES && rmse_mm > MAX_SHARE * ignorance_mm).then(|| {
+        let evidence = format!(
+            "expected an error below that of a constant guess, found RMSE {rmse_mm:.1} mm where guessing the mean \
+             position gives {ignorance_mm:.1} mm (n {})",
+            truths.len()
+        );
+        let mut found = finding(Law::CentroidFollowsPosition, Fault::Unknown, None, evidence);
+        found.invalidates = true;
+        found
+    })
+}

@@ -1,0 +1,218 @@
+//! Owns the clocks of the cameras before segmentation: from the time base, from marks, or from the presses in the event
+//! rates.
+
+use skinrig_model::CameraId;
+
+use crate::accumulate::{Accumulator, PassRequest, pass, rate_bin_us};
+use crate::clock::{align_by_rates, fit_marks};
+use crate::error::AnalysisError;
+use crate::event_cache::EventCache;
+use crate::input::{EventSource, SessionInput};
+use crate::press_spans::spans;
+use crate::rates::RateHistogram;
+use crate::result::{Activity, ClockFit, OffSensor, RatesDetections, RatesEvidence};
+use crate::timebase::{Tie, TimeBase};
+use crate::untimed::{self, Untimed};
+
+/// Clock of a camera, and by-products of finding it.
+pub struct CameraClock {
+    pub clock: Option<ClockFit>,
+    /// Filled if the events were read for the clock; otherwise still to be filled.
+    pub rates: Option<RateHistogram>,
+    /// True if the events have been read.
+    pub read: bool,
+    pub activity: Option<Activity>,
+    pub cache: Option<EventCache>,
+    /// Per row of the plan: why the clock does not time it.
+    pub untimed: Vec<Option<Untimed>>,
+    pub off_sensor: OffSensor,
+    pub warnings: Vec<String>,
+}
+
+/// Clocks of both cameras.
+pub struct CameraClocks {
+    pub cameras: [CameraClock; 2],
+    /// Certainty of the alignment by event rates; `None` if no camera was aligned by them.
+    pub evidence: Option<RatesEvidence>,
+    /// Reasons why that alignment cannot be used.
+    pub violations: Vec<String>,
+}
+
+impl CameraClocks {
+    /// Finds the clocks. Reads events if neither time base nor marks give one; cameras in parallel.
+    pub fn new(
+        input: &SessionInput,
+        source: &dyn EventSource,
+        base: Option<&TimeBase>,
+    ) -> Result<Self, AnalysisError> {
+        let read = |camera: CameraId| CameraClock::new(input, source, camera, base);
+        let [one, two] = std::thread::scope(|scope| {
+            let second = scope.spawn(|| read(CameraId::Two));
+            let first = read(CameraId::One);
+            let second = match second.join() {
+                Ok(result) => result,
+                Err(panic) => std::panic::resume_unwind(panic),
+            };
+            [first, second]
+        });
+        let mut readings = Self {
+            cameras: [one?, two?],
+            evidence: None,
+            violations: Vec::new(),
+        };
+        readings.align(input);
+        Ok(readings)
+    }
+
+    /// Finds missing clocks from the event rates of all cameras without one.
+    fn align(&mut self, input: &SessionInput) {
+        let spans = spans(input);
+        let rates = [0, 1].map(|k| {
+            let reading = &self.cameras[k];
+            reading.rates.as_ref().filter(|_| reading.read)
+        });
+        if spans.is_empty() || rates.iter().all(Option::is_none) {
+            return;
+        }
+        let found = align_by_rates(rates, &spans);
+        self.evidence = found.evidence;
+        for (k, fit) in found.cameras.into_iter().enumerate() {
+            let reading = &mut self.cameras[k];
+            match fit {
+                Some(Ok(fit)) => {
+                    reading.clock = Some(fit.fit);
+                    reading.warnings.extend(fit.warnings);
+                }
+                Some(Err(why)) => {
+                    let why = format!("no clock alignment: {why}");
+                    self.violations.push(format!("{}: {why}", CameraId::ALL[k]));
+                    reading.warnings.push(why);
+                }
+                None => {}
+            }
+        }
+        let limits = &input.settings.alignment;
+        let sights = self.evidence.iter().flat_map(|e| e.cameras);
+        for (camera, sights) in CameraId::ALL.into_iter().zip(sights) {
+            let beyond = sights.and_then(|s| unexplained(&s, limits.min_explained));
+            self.violations
+                .extend(beyond.map(|what| format!("{camera}: {what}")));
+        }
+        let least = limits.min_log_odds;
+        if let Some(evidence) = self.evidence.filter(|e| e.log_odds < least) {
+            self.violations.push(doubt(&evidence, least));
+        }
+    }
+}
+
+impl CameraClock {
+    fn new(
+        input: &SessionInput,
+        source: &dyn EventSource,
+        camera: CameraId,
+        base: Option<&TimeBase>,
+    ) -> Result<Self, AnalysisError> {
+        let k = camera.index();
+        let base_clock = base.and_then(|b| b.clocks[k]);
+        let by_marks = |channel| fit_marks(&input.edges[k], channel, &input.marks);
+        let channel = input.rig.trigger_channel.filter(|_| base_clock.is_none());
+        let marks = channel.and_then(by_marks);
+        let mut reading = Self {
+            clock: base_clock.or(marks.as_ref().map(|m| m.fit)),
+            rates: Some(RateHistogram::new(rate_bin_us(&input.settings))),
+            read: false,
+            activity: None,
+            cache: None,
+            untimed: untimed::rows(input, camera, base, marks.as_ref()),
+            off_sensor: OffSensor::default(),
+            warnings: Vec::new(),
+        };
+        let by_marks = |u: &&Untimed| u.tie == Tie::Mark;
+        let far = reading.untimed.iter().flatten().filter(by_marks).count();
+        if far > 0 {
+            reading.warnings.push(format!(
+                "{far} presses are not timed: they are more than {} s from the nearest trigger mark seen",
+                input.settings.alignment.max_tie_distance_us * 1e-6
+            ));
+        }
+        reading
+            .warnings
+            .extend(marks.into_iter().flat_map(|m| m.warnings));
+        if reading.clock.is_some() {
+            return Ok(reading);
+        }
+        if !input.marks.is_empty() {
+            reading.warnings.push(format!(
+                "too few trigger marks to fit the clock ({} sent, {} edges seen): using event rates instead",
+                input.marks.len(),
+                input.edges[k].len()
+            ));
+        }
+        let wanted = PassRequest {
+            rates: reading.rates.take(),
+            cache: Some(EventCache::default()),
+            ..PassRequest::default()
+        };
+        let first = pass(
+            source,
+            camera,
+            Accumulator::new(camera, &input.settings, wanted),
+        )?;
+        Ok(Self {
+            rates: first.rates,
+            read: true,
+            activity: first.activity,
+            cache: first.cache,
+            off_sensor: first.off_sensor,
+            ..reading
+        })
+    }
+}
+
+/// Why the plan does not match the recording of a camera.
+fn unexplained(sights: &RatesDetections, least: f64) -> Option<String> {
+    let share = |n: u32, of: u32| f64::from(n) / f64::from(of.max(1));
+    let (found, bursts) = (sights.found, sights.found + sights.strays);
+    let percent = 100.0 * least;
+    if share(found, sights.expected) < least {
+        return Some(format!(
+            "expected bursts of events at {percent:.0} % or more of the {} planned presses, found {found}",
+            sights.expected
+        ));
+    }
+    (share(found, bursts) < least).then(|| {
+        format!(
+            "expected {percent:.0} % or more of the {bursts} bursts of events during the plan to be planned presses, \
+             found {found}: the recording has more presses than the schedule"
+        )
+    })
+}
+
+/// Why an alignment by event rates is not certain enough.
+fn doubt(evidence: &RatesEvidence, least: f64) -> String {
+    let odds = evidence.log_odds;
+    let other = match evidence.runner_up_s {
+        Some(shifts_s) => {
+            let each = shifts_s.iter().zip(&evidence.cameras).zip(CameraId::ALL);
+            let each: Vec<String> = each
+                .filter(|((_, sights), _)| sights.is_some())
+                .map(|((shift_s, _), camera)| {
+                    format!(
+                        "{camera} {shift_s:+.1} s ({:+.1} presses)",
+                        shift_s / evidence.period_s
+                    )
+                })
+                .collect();
+            format!(
+                "presses later by {} fit about as well or better",
+                each.join(" and ")
+            )
+        }
+        None => "the plan may not belong to these recordings at all".to_owned(),
+    };
+    format!(
+        "alignment by event rates: expected log-odds of at least {least} (natural logarithm) against all other \
+         alignments, found {odds:.1}: {other}; check the schedule (presses, sync presses, period) against the \
+         recordings, or lower analysis.alignment.min_log_odds"
+    )
+}

@@ -1,0 +1,94 @@
+//! The list of commands in the help, grouped by the task a user has in mind.
+
+use clap::{Command, CommandFactory, FromArgMatches};
+
+use super::Cli;
+
+/// Heading and commands of each group, in the order of a campaign.
+const GROUPS: [(&str, &[&str]); 5] = [
+    ("Plan", &["check", "plan", "schema"]),
+    (
+        "Record",
+        &[
+            "run", "resume", "import", "watch", "status", "control", "note",
+        ],
+    ),
+    (
+        "Analyse",
+        &["analyze", "report", "compare", "tradeoff", "prototypes"],
+    ),
+    (
+        "Sessions",
+        &[
+            "sessions", "show", "tag", "verify", "salvage", "export", "inspect",
+        ],
+    ),
+    ("Bench", &["doctor", "devices", "jog", "hil"]),
+];
+
+/// Parses a command line; the help lists commands by group.
+///
+/// # Errors
+/// Whatever clap finds wrong, and the help when it was asked for.
+pub fn parse<I, T>(words: I) -> Result<Cli, clap::Error>
+where
+    I: IntoIterator<Item = T>,
+    T: Into<std::ffi::OsString> + Clone,
+{
+    let mut command = command();
+    let matches = command.try_get_matches_from_mut(words)?;
+    Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
+}
+
+fn command() -> Command {
+    let command = Cli::command();
+    let list = list(&command);
+    command.help_template(format!(
+        "{{before-help}}{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{list}\nOptions:\n{{options}}{{after-help}}"
+    ))
+}
+
+fn list(command: &Command) -> String {
+    let widest = GROUPS.iter().flat_map(|(_, names)| *names);
+    let width = widest.map(|name| name.len()).max().unwrap_or_default();
+    let mut text = String::new();
+    for (heading, names) in GROUPS {
+        text += &format!("{heading}:\n");
+        for name in names {
+            let about = command.find_subcommand(name).and_then(Command::get_about);
+            let about = about.map(ToString::to_string).unwrap_or_default();
+            text += &format!("  {name:width$}  {about}\n");
+        }
+        text += "\n";
+    }
+    text + "`skinrig COMMAND --help` has the options and examples of a command.\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_command_stands_in_one_group() {
+        let command = Cli::command();
+        let visible = command.get_subcommands().filter(|c| !c.is_hide_set());
+        let mut visible: Vec<&str> = visible.map(Command::get_name).collect();
+        let mut listed: Vec<&str> = GROUPS
+            .iter()
+            .flat_map(|(_, names)| *names)
+            .copied()
+            .collect();
+        visible.sort_unstable();
+        listed.sort_unstable();
+        assert_eq!(listed, visible);
+    }
+
+    #[test]
+    fn help_shows_the_groups_and_no_heap() {
+        let help = parse(["skinrig", "--help"]).unwrap_err().to_string();
+        for (heading, _) in GROUPS {
+            assert!(help.contains(&format!("{heading}:\n")), "{help}");
+        }
+        assert!(!help.contains("Commands:"), "{help}");
+    }
+}

@@ -1,0 +1,120 @@
+//! Formats the parts of a comparison: values with units, verdicts, required presses.
+
+use skinrig_compare::statistics::{Comparison, Interval, PressesNeeded, Verdict};
+use skinrig_compare::{BaselineComparison, Comparison as Result, Row, Skin};
+
+use crate::format::{NONE, number};
+
+/// Value in the display unit of the row.
+pub(super) fn value(row: &Row, value: Option<f64>) -> String {
+    number(value.map(|v| v * row.format.scale), row.format.digits)
+}
+
+/// Same, with a sign.
+pub(super) fn signed(row: &Row, of: f64) -> String {
+    let text = value(row, Some(of));
+    let zero = text.bytes().all(|b| matches!(b, b'0' | b'.'));
+    if of > 0.0 && !zero {
+        format!("+{text}")
+    } else {
+        text
+    }
+}
+
+/// Interval; infinite ends are open.
+pub(super) fn interval(row: &Row, of: &Interval) -> String {
+    match (of.low, of.high) {
+        (None, None) => NONE.to_owned(),
+        (low, high) => {
+            let low = low.map_or_else(|| "-∞".to_owned(), |v| value(row, Some(v)));
+            let high = high.map_or_else(|| "∞".to_owned(), |v| value(row, Some(v)));
+            format!("[{low}, {high}]")
+        }
+    }
+}
+
+/// Name and unit of a row.
+pub(super) fn heading(row: &Row) -> String {
+    match row.format.unit {
+        "" => row.name.clone(),
+        unit => format!("{} ({unit})", row.name),
+    }
+}
+
+pub(super) const fn verdict(of: Option<Verdict>) -> &'static str {
+    match of {
+        Some(Verdict::Better) => "better",
+        Some(Verdict::Worse) => "worse",
+        Some(Verdict::Equivalent) => "equivalent",
+        Some(Verdict::Undecided) => "undecided",
+        None => "no verdict",
+    }
+}
+
+/// Presses required for a decision, without a full stop; `None` when decided.
+pub(super) fn needed(of: &Comparison) -> Option<String> {
+    match of.needed {
+        PressesNeeded::Nothing => None,
+        PressesNeeded::OutOfReach => Some("no practical number of presses would decide".to_owned()),
+        PressesNeeded::More(enough) => {
+            let mut text = format!(
+                "if the measured difference is real, {} locations in total ({} more presses per skin) would show `{}`",
+                enough.locations,
+                enough.more_presses_by_locations,
+                verdict(Some(enough.towards))
+            );
+            if let (Some(repetitions), Some(more)) =
+                (enough.repetitions, enough.more_presses_by_repetitions)
+            {
+                text +=
+                    &format!(", or {repetitions} repetitions at the same locations ({more} more)");
+            }
+            Some(text)
+        }
+    }
+}
+
+/// `simulated` or `emulated` when any session was recorded without hardware.
+pub(super) fn stand_in(result: &Result) -> Option<&'static str> {
+    let any = |word: &str| {
+        let sessions = result.skins.iter().flat_map(|s| &s.sessions);
+        sessions
+            .into_iter()
+            .any(|f| f.origin.as_deref() == Some(word))
+    };
+    match (any("simulated"), any("emulated")) {
+        (true, _) => Some("simulated"),
+        (false, true) => Some("emulated"),
+        (false, false) => None,
+    }
+}
+
+/// Summary of a skin in one line.
+pub(super) fn skin(of: &Skin) -> String {
+    let sessions = match of.sessions.as_slice() {
+        [one] => format!("session {} of {}", short(&one.session_id), one.started),
+        many => format!("{} sessions", many.len()),
+    };
+    format!(
+        "{}: {sessions}; {} of {} scored presses count, at {} locations",
+        of.name, of.counted, of.attempted, of.locations
+    )
+}
+
+pub(super) fn short(id: &str) -> String {
+    id.chars().take(8).collect()
+}
+
+/// RMSE of a skin and the first, with difference and interval.
+pub(super) fn headline(result: &Result, against: &BaselineComparison) -> String {
+    let (Some(row), Some(c)) = (result.headline(), &against.comparison) else {
+        return against.error.clone().unwrap_or_default();
+    };
+    format!(
+        "RMSE {} → {} mm, difference {} mm {}",
+        value(row, Some(c.a.value)),
+        value(row, Some(c.b.value)),
+        signed(row, c.difference.value),
+        interval(row, &c.difference),
+    )
+}

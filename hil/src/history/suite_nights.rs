@@ -1,0 +1,12 @@
+//! The suites in a history.
+
+/// A suite on one bench, with the number of its nights.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SuiteNights {
+    /// Name of the bench.
+    pub rig: String,
+    /// Name of the suite.
+    pub suite: String,
+    /// Number of nights.
+    pub nights: usize,
+}
