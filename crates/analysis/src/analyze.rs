@@ -468,8 +468,8 @@ fn stream(
     );
     let views = collected.views.iter().map(|(_, view)| *view);
     let silences = Silences::new(rates, views, ends);
-    let scheduled = input.outcomes.iter().flatten().any(|o| o.scheduled);
-    let contacts_s = if scheduled {
+    // The clock of a camera is that of one leg.
+    let contacts_s = if input.legs.is_empty() {
         let listed = pressed.iter();
         let listed = listed.map(|s| (s.contact_us * 1e-6, s.release_us * 1e-6));
         contacts_s(rates, clock, &listed.collect::<Vec<_>>())

@@ -25,10 +25,18 @@ fn row(case: &Case, judged: &Judged) -> String {
     format!("| {} | {} | {outcome} |", case.group, case.name)
 }
 
+/// True unless the number is right or withheld. With other noise a fault may stay below what names it, or an alignment below
+/// its odds: neither claims anything wrong.
+const fn is_unsafe(observed: &Observed) -> bool {
+    !matches!(observed, Observed::Right | Observed::Refused(_))
+}
+
 /// Runs every case with this many seeds; returns failures with their outcome.
 fn failures(seeds: u64) -> Vec<String> {
+    let only = std::env::var("ONLY").unwrap_or_default();
     let cases: Vec<(Case, u64)> = all()
         .into_iter()
+        .filter(|case| case.name.contains(&only))
         .flat_map(|case| (0..seeds).map(move |seed| (case.clone(), seed)))
         .collect();
     let judged: Vec<(Case, u64, Judged)> = cases
@@ -38,12 +46,14 @@ fn failures(seeds: u64) -> Vec<String> {
             (case, seed, judged)
         })
         .collect();
+    let deviating = judged.iter().filter(|(.., judged)| !judged.holds).count();
+    println!("{deviating} of {} not as the case allows", judged.len());
     for (case, _, judged) in judged.iter().filter(|(_, seed, _)| *seed == 0) {
         println!("{}", row(case, judged));
     }
     judged
         .into_iter()
-        .filter(|(.., judged)| !judged.holds)
+        .filter(|(_, seed, judged)| !judged.holds && (*seed == 0 || is_unsafe(&judged.observed)))
         .map(|(case, seed, judged)| {
             format!(
                 "{}: {}, seed {seed}: allowed {:?}, came out {judged}",
@@ -66,7 +76,7 @@ fn no_wrong_input_ends_valid_with_a_wrong_number() {
 }
 
 #[test]
-#[ignore = "ten seeds of every case take minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig-wrong-inputs -- --ignored"]
+#[ignore = "ten seeds of every case take minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig-wrong-inputs -- --ignored; ONLY=text takes the cases with it in their name"]
 fn nor_does_any_of_ten_seeds() {
     let failures = failures(10);
     assert!(

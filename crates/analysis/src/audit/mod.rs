@@ -22,6 +22,7 @@ mod repetitions;
 mod resection;
 mod segments;
 mod statistics;
+mod whole_presses;
 
 use crate::input::SessionInput;
 use crate::onsets::Onset;
@@ -33,7 +34,7 @@ use crate::stream::Silences;
 pub struct Streams {
     /// Silent periods.
     pub silences: [Silences; 2],
-    /// Contacts detected in the counts, s on the host clock; empty unless requested.
+    /// Contacts detected in the counts, s on the host clock; empty for a session of several legs.
     pub contacts_s: [Vec<f64>; 2],
     /// Onsets of the presses.
     pub onsets: [Vec<Onset>; 2],
@@ -63,6 +64,10 @@ pub fn audit(input: &SessionInput, analysis: &Analysis, streams: &Streams) -> Ve
             streams.contacts_s.each_ref().map(Vec::as_slice),
         ),
         burst::findings(analysis, &presses_seen),
+        whole_presses::findings(
+            &presses_seen,
+            streams.contacts_s.each_ref().map(Vec::as_slice),
+        ),
         follow::findings(analysis, &presses_seen),
         repetitions::findings(&presses_seen),
         drift::findings(input, analysis),

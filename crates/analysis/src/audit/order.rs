@@ -1,10 +1,10 @@
 //! Decides which findings follow from others, and which comes first.
 
-use crate::result::{Fault, Finding};
+use crate::result::{Fault, Finding, Law};
 
 /// Drops findings that follow from a more certain one; the most certain comes first.
 pub(crate) fn leading_first(mut found: Vec<Finding>) -> Vec<Finding> {
-    found.sort_by_key(|f| (place(f.fault), !f.invalidates));
+    found.sort_by_key(|f| (place(f), !f.invalidates));
     let mut kept: Vec<Finding> = Vec::new();
     for finding in found {
         let again = |k: &Finding| k.fault == finding.fault && k.camera == finding.camera;
@@ -16,35 +16,41 @@ pub(crate) fn leading_first(mut found: Vec<Finding>) -> Vec<Finding> {
 }
 
 /// Rank by directness: missing or contradictory data first, inferred faults last.
-const fn place(fault: Fault) -> u8 {
-    match fault {
+fn place(finding: &Finding) -> u8 {
+    match finding.fault {
+        Fault::ClockWrong if is_seen_in_bursts(finding) => 5,
         Fault::JournalContradictory => 0,
         Fault::NoEvents => 1,
         Fault::RecordingShort => 2,
         Fault::RecordingGap => 3,
         Fault::NoTruth => 4,
-        Fault::PressesMissing => 5,
-        Fault::OneCameraTwice => 6,
-        Fault::UnitOfPositions => 7,
-        Fault::NotTouched => 8,
-        Fault::CameraBlind => 9,
-        Fault::IndexShifted => 10,
-        Fault::OrderOfPresses => 11,
-        Fault::AxesExchanged => 12,
-        Fault::AxisMirrored => 13,
-        Fault::PictureTurned => 14,
-        Fault::CamerasSwapped => 15,
-        Fault::PositionsDisplaced => 16,
-        Fault::ClockWrong => 17,
-        Fault::SyncPattern => 18,
-        Fault::PressesUnlisted => 19,
-        Fault::HeightOff => 20,
-        Fault::RobotOff => 21,
-        Fault::RigMoved => 22,
-        Fault::GeometryOff => 23,
-        Fault::NoTriggers => 24,
-        Fault::Unknown => 25,
+        Fault::PressesMissing => 6,
+        Fault::OneCameraTwice => 7,
+        Fault::UnitOfPositions => 8,
+        Fault::NotTouched => 9,
+        Fault::CameraBlind => 10,
+        Fault::IndexShifted => 11,
+        Fault::OrderOfPresses => 12,
+        Fault::AxesExchanged => 13,
+        Fault::AxisMirrored => 14,
+        Fault::PictureTurned => 15,
+        Fault::CamerasSwapped => 16,
+        Fault::PositionsDisplaced => 17,
+        Fault::ClockWrong => 18,
+        Fault::SyncPattern => 19,
+        Fault::PressesUnlisted => 20,
+        Fault::HeightOff => 21,
+        Fault::RobotOff => 22,
+        Fault::RigMoved => 23,
+        Fault::GeometryOff => 24,
+        Fault::NoTriggers => 25,
+        Fault::Unknown => 26,
     }
+}
+
+/// True if the bursts of one camera come at the times of other presses.
+fn is_seen_in_bursts(finding: &Finding) -> bool {
+    finding.law == Law::BurstWithMotion && finding.camera.is_some()
 }
 
 /// True if `a` implies `b`.
@@ -114,6 +120,21 @@ fn explains(a: &Finding, b: &Finding) -> bool {
             Fault::RigMoved | Fault::Unknown => true,
             _ => false,
         },
+        // The views are those of other presses, and the ends of the path have none.
+        Fault::ClockWrong if is_seen_in_bursts(a) => {
+            b.fault.is_mistaken_identity()
+                || matches!(
+                    b.fault,
+                    Fault::PressesMissing
+                        | Fault::CameraBlind
+                        | Fault::IndexShifted
+                        | Fault::HeightOff
+                        | Fault::RobotOff
+                        | Fault::RigMoved
+                        | Fault::GeometryOff
+                        | Fault::Unknown
+                )
+        }
         Fault::ClockWrong => {
             matches!(
                 b.fault,

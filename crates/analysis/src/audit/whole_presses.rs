@@ -1,0 +1,171 @@
+//! Law: a camera's bursts come at its own presses, not whole presses earlier or later.
+//!
+//! Presses are periodic, so a clock that is off by whole periods still puts a burst into almost every window, of another
+//! press. What tells is the ends of the path, the sync presses and every pause: there, presses lack their burst and bursts
+//! lack their press, and another shift explains both.
+//!
+//! Applies to measured press times; the alignment of a scheduled recording compares all shifts itself.
+
+use skinrig_model::CameraId;
+
+use super::finding::finding;
+use super::observed_press::ObservedPress;
+use crate::result::{Fault, Finding, Law};
+
+/// A contact this close to a press belongs to it, s.
+const NEAR_S: f64 = 0.15;
+/// Smaller shifts are no whole presses, s.
+const MIN_SHIFT_S: f64 = 0.5;
+/// Share of the presses by which a shift may be off: beyond it, a stretch of presses has no bursts at all, which is another
+/// finding.
+const MAX_SHIFT_SHARE: f64 = 0.2;
+/// Presses by which a shift may be off in any case.
+const MAX_SHIFT_PRESSES: usize = 10;
+/// Presses at each end whose contacts propose shifts.
+const PROPOSING: usize = 3;
+/// A press without a burst, or a burst without a press, is this unlikely under the right shift, nats: 9 to 1.
+const UNEXPLAINED: f64 = 2.2;
+/// Another shift must be this much likelier than none, nats: 60,000 to 1, because hundreds are compared.
+const CLEARLY: f64 = 11.0;
+/// Minimum number of presses.
+const MIN_PRESSES: usize = 6;
+
+/// `contacts_s`: contacts detected in the counts of each camera, s on the host clock, ascending.
+pub fn findings(presses_seen: &[ObservedPress<'_>], contacts_s: [&[f64]; 2]) -> Vec<Finding> {
+    let mut listed: Vec<f64> = presses_seen
+        .iter()
+        .filter(|t| !t.outcome.scheduled)
+        .filter_map(|t| Some(t.timing?.contact.as_secs_f64()))
+        .collect();
+    listed.sort_by(f64::total_cmp);
+    let of = |camera: CameraId| {
+        let contacts = contacts_s[camera.index()];
+        let best = likelier_shift(&listed, contacts)?;
+        let here = explained(&listed, contacts, 0.0);
+        let evidence = format!(
+            "expected the bursts of {camera} at the presses, found {here} of {} presses with one, and {} of them {:+.2} s \
+             later: odds of e^{:.0} ({} bursts)",
+            listed.len(),
+            best.explained,
+            best.shift_s,
+            best.gain,
+            contacts.len()
+        );
+        let mut found = finding(
+            Law::BurstWithMotion,
+            Fault::ClockWrong,
+            Some(camera),
+            evidence,
+        );
+        // The events in the windows are those of other presses.
+        found.invalidates = true;
+        Some(found)
+    };
+    CameraId::ALL.into_iter().filter_map(of).collect()
+}
+
+/// A shift that explains presses and bursts better than none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Shift {
+    /// From a press to its burst, s.
+    shift_s: f64,
+    /// Presses with a burst under it.
+    explained: usize,
+    /// Log-odds against no shift, nats.
+    gain: f64,
+}
+
+/// The likeliest shift, if it is clearly likelier than none.
+fn likelier_shift(listed: &[f64], contacts: &[f64]) -> Option<Shift> {
+    let n = listed.len();
+    if n < MIN_PRESSES || contacts.len() < MIN_PRESSES {
+        return None;
+    }
+    let reach = MAX_SHIFT_PRESSES.max((MAX_SHIFT_SHARE * n as f64) as usize);
+    let here = explained(listed, contacts, 0.0);
+    let proposing = (0..PROPOSING).chain(n - PROPOSING..n);
+    let proposals = proposing.flat_map(|press| {
+        let nearest = contacts.partition_point(|c| *c < listed[press]);
+        let (from, to) = (
+            nearest.saturating_sub(reach),
+            (nearest + reach).min(contacts.len()),
+        );
+        contacts[from..to].iter().map(move |c| c - listed[press])
+    });
+    // Both counts change by what is explained more: so many more presses have a burst, and so many more bursts a press.
+    let judged = proposals.filter(|s| s.abs() >= MIN_SHIFT_S).map(|shift_s| {
+        let explained = explained(listed, contacts, shift_s);
+        Shift {
+            shift_s,
+            explained,
+            gain: 2.0 * UNEXPLAINED * (explained as f64 - here as f64),
+        }
+    });
+    let best = judged.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
+    (best.gain > CLEARLY).then_some(best)
+}
+
+/// Presses with a contact of their own after `shift_s`.
+fn explained(listed: &[f64], contacts: &[f64], shift_s: f64) -> usize {
+    let mut rest = contacts.iter().peekable();
+    let has_its_own = |press: &&f64| {
+        let at = **press + shift_s;
+        while rest.next_if(|c| **c < at - NEAR_S).is_some() {}
+        rest.next_if(|c| **c <= at + NEAR_S).is_some()
+    };
+    listed.iter().filter(has_its_own).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three sync presses 1 s apart, a pause, then `n` presses every 2 s.
+    fn path(n: u32) -> Vec<f64> {
+        let sync = (0..3).map(f64::from);
+        sync.chain((0..n).map(|i| 6.0 + 2.0 * f64::from(i)))
+            .collect()
+    }
+
+    fn moved(all: &[f64], by_s: f64) -> Vec<f64> {
+        all.iter().map(|t| t + by_s).collect()
+    }
+
+    #[test]
+    fn a_clock_off_by_whole_presses_is_found_by_the_ends_of_the_path() {
+        for n in [10, 50, 250] {
+            let listed = path(n);
+            for presses in [-3, -2, 2, 3] {
+                let by_s = 2.0 * f64::from(presses);
+                let found = likelier_shift(&listed, &moved(&listed, by_s)).expect("is found");
+                assert!(
+                    (found.shift_s - by_s).abs() < 1e-9,
+                    "{n} {presses} {found:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn weak_presses_and_bursts_of_noise_are_no_shift() {
+        let listed = path(50);
+        for missing in 2..7 {
+            let mut contacts: Vec<f64> = listed
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| i % missing != 0)
+                .map(|(_, t)| t + 0.02)
+                .collect();
+            contacts.extend((0..20).map(|i| 1.3 + 4.7 * f64::from(i)));
+            contacts.sort_by(f64::total_cmp);
+            assert_eq!(
+                likelier_shift(&listed, &contacts),
+                None,
+                "every {missing}th"
+            );
+        }
+        assert_eq!(likelier_shift(&listed, &[]), None);
+        assert_eq!(likelier_shift(&listed, &listed[..30]), None);
+        assert_eq!(likelier_shift(&listed, &listed[20..]), None);
+    }
+}
