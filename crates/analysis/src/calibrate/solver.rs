@@ -60,7 +60,11 @@ pub(crate) fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
         };
         let promised = damping * step.component_mul(&step).dot(&scale) - step.dot(&here.gradient);
         if promised <= problem.tolerance * here.cost {
-            return ended(at, here.cost, "converged: the error no longer changes");
+            return ended(
+                at,
+                here.cost,
+                "converged: the error does not change any more",
+            );
         }
         let there = at + step;
         let next = problem.normal(&there);
@@ -74,7 +78,11 @@ pub(crate) fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
             damping *= growth;
             growth *= 2.0;
             if damping > DAMPING.1 {
-                return ended(at, here.cost, "converged to floating-point resolution");
+                return ended(
+                    at,
+                    here.cost,
+                    "converged to the resolution of floating point",
+                );
             }
         }
     }
