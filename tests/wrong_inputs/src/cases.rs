@@ -875,6 +875,18 @@ fn robots(t: &mut Table) {
         },
         &[Right, Refused, Named(ClockWrong), Named(CameraBlind)],
     );
+    t.case(
+        "the trigger wires crossed, one sync press",
+        |s| {
+            robot(s, |b| {
+                b.timetable.sync.count = 1;
+                if let Some(robot) = &mut b.robot {
+                    robot.wires_crossed = true;
+                }
+            })
+        },
+        &[Right, Refused, Named(ClockWrong), Named(CameraBlind)],
+    );
 }
 
 fn doubles(t: &mut Table) {

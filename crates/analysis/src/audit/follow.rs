@@ -105,6 +105,7 @@ fn another_reading(path: &Path<'_>, as_is: &ScoredReading<'_>) -> Option<Finding
     let mut readings = path.alternatives();
     readings.extend(path.displaced(as_is));
     readings.push(path.as_planned());
+    readings.extend(path.streams_apart());
     let judged = readings.iter().map(|r| path.score(r));
     let best = judged
         .filter(|j| j.follows(FOLLOWS))

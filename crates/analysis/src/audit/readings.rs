@@ -20,6 +20,8 @@ const MAX_PRESSES: usize = 600;
 pub(crate) const MAX_SHIFT: i32 = 5;
 /// Cost of a fitted displacement, nats: two free parameters anywhere on the skin.
 const FREE_DISPLACEMENT: f64 = 4.0;
+/// Cost of a shift of each stream, nats: one of eleven each.
+const FREE_SHIFTS: f64 = 4.8;
 /// Maximum evidence of the sync presses against a reading, nats per camera: they share one location, which may be poorly
 /// visible.
 const MAX_SYNC: f64 = 8.0;
@@ -39,6 +41,8 @@ pub struct Reading {
     pub mirrored: [bool; 2],
     /// Position of each press of the path; `None` if the reading does not define it.
     pub at: Vec<Option<Point2>>,
+    /// Rows by which each stream is late: its columns are those of the presses so many rows later.
+    pub rows: [i32; 2],
     /// Added to the cost, nats.
     penalty: f64,
 }
@@ -124,6 +128,7 @@ impl<'a> Path<'a> {
             cameras: [0, 1],
             mirrored: [false; 2],
             at: self.positions(),
+            rows: [0; 2],
             penalty: 0.0,
         }
     }
@@ -159,12 +164,10 @@ impl<'a> Path<'a> {
         for frame in Frame::all(&self.rig.outline) {
             all.push(self.in_frame(&frame));
         }
-        // On a single straight line, a shift of the list displaces all locations alike, just as displaced cameras would.
-        let bends = self
-            .repetitions()
-            .into_iter()
-            .any(|r| self.lines(r).len() > 1);
-        for by in (1..=MAX_SHIFT).flat_map(|k| [k, -k]).filter(|_| bends) {
+        for by in (1..=MAX_SHIFT)
+            .flat_map(|k| [k, -k])
+            .filter(|_| self.bends())
+        {
             let at = (0..self.presses_seen.len()).map(|i| self.shifted(i, by));
             all.push(Reading {
                 fault: Some(Fault::IndexShifted),
@@ -209,6 +212,36 @@ impl<'a> Path<'a> {
             at: self.presses_seen.iter().map(|t| Some(t.planned)).collect(),
             ..self.as_it_is()
         }
+    }
+
+    /// Each stream shifted by rows of its own, as if its clock were whole presses off: the likeliest shift of each, if they
+    /// differ. The cost of a stream does not depend on the other one.
+    pub(crate) fn streams_apart(&self) -> Option<Reading> {
+        if !self.bends() {
+            return None;
+        }
+        let base = self.as_it_is();
+        let likeliest = |k: usize| {
+            let costs = (-MAX_SHIFT..=MAX_SHIFT).filter_map(|by| {
+                let shifted = Reading {
+                    rows: [by; 2],
+                    ..base.clone()
+                };
+                Some((self.score(&shifted).fits[k]?.cost, by))
+            });
+            costs.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, by)| by)
+        };
+        let rows = [likeliest(0)?, likeliest(1)?];
+        (rows[0] != rows[1]).then(|| Reading {
+            fault: Some(Fault::ClockWrong),
+            description: format!(
+                "the streams shifted by {:+} and {:+} presses (cameras 1 and 2)",
+                rows[0], rows[1]
+            ),
+            rows,
+            penalty: FREE_SHIFTS,
+            ..base
+        })
     }
 
     /// Position of the press `by` rows after press `i`, in the same repetition or another one.
@@ -259,6 +292,12 @@ impl<'a> Path<'a> {
             }
         }
         all
+    }
+
+    /// On a single straight line, a shift of the list displaces all locations alike, just as displaced cameras would.
+    fn bends(&self) -> bool {
+        let mut repetitions = self.repetitions().into_iter();
+        repetitions.any(|r| self.lines(r).len() > 1)
     }
 
     /// Straight lines of the path within `range`.
@@ -318,14 +357,11 @@ impl<'a> Path<'a> {
 
     /// Columns of stream `k` and positions by `reading`.
     fn pairs(&self, reading: &Reading, k: usize) -> Vec<(f64, Point2)> {
-        let seen = self
-            .presses_seen
-            .iter()
-            .zip(&reading.at)
-            .step_by(self.stride);
-        seen.filter_map(|(touch, at)| {
+        let seen = self.presses_seen.iter().enumerate().step_by(self.stride);
+        seen.filter_map(|(i, touch)| {
             let column = mirrored(touch.sights[k].column?, reading.mirrored[k]);
-            Some((column, (*at)?))
+            let row = usize::try_from(i as i64 + i64::from(reading.rows[k])).ok()?;
+            Some((column, (*reading.at.get(row)?)?))
         })
         .collect()
     }
