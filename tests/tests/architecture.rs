@@ -1,4 +1,4 @@
-//! Checks the architecture: dependencies between crates, and licences of dependencies.
+//! Checks the architecture: dependencies between crates, and licences of dependencies. No manifest skips tests that exist.
 #![expect(
     clippy::unwrap_used,
     reason = "a test that cannot read the workspace must fail"
@@ -495,4 +495,58 @@ fn only_the_published_registry_is_used() {
         .filter(|l| *l != r#"source = "registry+https://github.com/rust-lang/crates.io-index""#)
         .collect();
     assert!(foreign.is_empty(), "{foreign:?}");
+}
+
+/// Source of a target: of a library its crate's whole `src`, of a program its own file.
+fn source_of(target: &Value) -> String {
+    let main = Path::new(target["src_path"].as_str().unwrap());
+    if target["kind"][0] == "bin" {
+        return std::fs::read_to_string(main).unwrap();
+    }
+    let mut files = Vec::new();
+    let folder = main.parent().unwrap();
+    rust_files(folder, folder, &mut files);
+    files.into_iter().map(|(_, text)| text).collect()
+}
+
+/// True if the documentation holds an example that rustdoc would run.
+fn has_example(source: &str) -> bool {
+    let mut fences = source.lines().filter_map(|line| {
+        let line = line.trim_start();
+        let text = line.strip_prefix("///").or(line.strip_prefix("//!"))?;
+        text.trim_start().strip_prefix("```")
+    });
+    // Fences come in pairs; the first of each names the language.
+    std::iter::from_fn(|| {
+        let language = fences.next()?;
+        fences.next();
+        Some(language)
+    })
+    .any(|language| {
+        let first = language.split([',', ' ']).next().unwrap_or_default();
+        ["", "rust", "no_run", "should_panic", "compile_fail"].contains(&first)
+    })
+}
+
+#[test]
+fn a_manifest_leaves_out_no_test_that_exists() {
+    let metadata = metadata();
+    let mut left_out = Vec::new();
+    for package in members(&metadata) {
+        for target in package["targets"].as_array().unwrap() {
+            let kind = target["kind"][0].as_str().unwrap();
+            if !["lib", "cdylib", "proc-macro", "bin"].contains(&kind) {
+                continue;
+            }
+            let source = source_of(target);
+            let name = &target["name"];
+            if target["test"] == false && source.contains("#[test]") {
+                left_out.push(format!("{name}: test = false, but there are unit tests"));
+            }
+            if kind != "bin" && target["doctest"] == false && has_example(&source) {
+                left_out.push(format!("{name}: doctest = false, but there is an example"));
+            }
+        }
+    }
+    assert!(left_out.is_empty(), "{left_out:#?}");
 }
