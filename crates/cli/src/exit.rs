@@ -1,7 +1,6 @@
 //! Exit codes and the errors behind them.
 
 use std::fmt;
-use std::io::IsTerminal;
 use std::process::{ExitCode, Termination};
 
 use skinrig_nightly::NightExit;
@@ -82,7 +81,7 @@ impl Failure {
 
     /// Findings in a protocol or schedule; each one already begins with `error:`.
     pub fn findings(found: &Diagnostics) -> Self {
-        let message = found.render(std::io::stderr().is_terminal());
+        let message = found.render(crate::terminal::is_coloured(&std::io::stderr()));
         Self {
             exit: Exit::Input,
             message: message.trim_end().to_owned(),

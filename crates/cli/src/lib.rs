@@ -83,11 +83,15 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> Exit {
 
 fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
     let json = cli.json;
+    let output = terminal::Output {
+        json,
+        verbose: cli.verbose,
+    };
     match &cli.command {
         Command::Check(a) => check::check(a, json),
         Command::Plan(a) => check::plan(a, json),
-        Command::Run(a) => run::run(a, &command_line(arguments), json),
-        Command::Resume(a) => resume::resume(a, &command_line(arguments), json),
+        Command::Run(a) => run::run(a, &command_line(arguments), output),
+        Command::Resume(a) => resume::resume(a, &command_line(arguments), output),
         Command::Status(a) => status::status(a, json),
         Command::Control(a) => control::control(a, json),
         Command::Note(a) => control::note(a, json),
@@ -100,13 +104,13 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Tag(a) => tag::tag(a, json),
         Command::Sessions(a) => sessions::sessions(a, json),
         Command::Show(a) => show::show(a, json),
-        Command::Analyze(a) => results::analyze(a, json),
+        Command::Analyze(a) => results::analyze(a, output),
         Command::Report(a) => results::report(a, json),
         Command::Compare(a) => compare::compare(a, json),
         Command::Tradeoff(a) => tradeoff::tradeoff(a, json),
         Command::Verify(a) => verify::verify(a, json),
         Command::Salvage(a) => salvage::salvage(a, json),
-        Command::Import(a) => import::import(a, &command_line(arguments), json),
+        Command::Import(a) => import::import(a, &command_line(arguments), output),
         Command::Export(a) => export::export(a, json),
         Command::Inspect(a) => inspect::inspect(a, json),
         Command::Schema(a) => schema::schema(a),

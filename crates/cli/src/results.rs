@@ -1,6 +1,5 @@
 //! `skinrig analyze` and `skinrig report`, and the end of `run` and `import`: from a session to its results.
 
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use skinrig_analysis::tradeoff::Tradeoff;
@@ -12,6 +11,7 @@ use skinrig_results::{AlignedSession, AnalyzedSession, Session};
 use crate::analyses;
 use crate::args::{AnalyzeArgs, ReportArgs};
 use crate::exit::{Exit, Failure, Outcome};
+use crate::terminal::Output;
 
 /// The results of one session.
 pub struct Results {
@@ -156,9 +156,9 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     })
 }
 
-/// Prints the results table and the paths of what was written.
-pub(crate) fn print_results(results: &Results, json: bool, paths: &(PathBuf, PathBuf)) {
-    if json {
+/// Prints the answer, or all figures (`-v`), and the paths of what was written.
+pub(crate) fn print_results(results: &Results, output: Output, paths: &(PathBuf, PathBuf)) {
+    if output.json {
         let mut document = skinrig_report::json(&results.report_input());
         if let Some(object) = document.as_object_mut() {
             object.insert(
@@ -170,12 +170,20 @@ pub(crate) fn print_results(results: &Results, json: bool, paths: &(PathBuf, Pat
         }
         crate::terminal::print_json(&document);
     } else {
-        let color = std::io::stdout().is_terminal();
-        let table = skinrig_report::terminal_table(&results.report_input(), color);
-        crate::terminal::out(format_args!("{table}"));
-        outln!("\nsession  {}", results.session.display());
-        outln!("results  {}", paths.0.display());
-        outln!("report   {}", paths.1.display());
+        let color = crate::terminal::is_coloured(&std::io::stdout());
+        let input = results.report_input();
+        let text = if output.verbose {
+            skinrig_report::terminal_table(&input, color) + "\n"
+        } else {
+            skinrig_report::terminal_summary(&input, color)
+        };
+        crate::terminal::out(format_args!("{text}"));
+        outln!("session   {}", results.session.display());
+        outln!("results   {}", paths.0.display());
+        outln!("report    {}", paths.1.display());
+        if !output.verbose && results.analysis.is_valid() {
+            outln!("next      open the report, or print all figures with -v");
+        }
     }
 }
 
@@ -214,7 +222,7 @@ pub fn check_limit(results: &Results, max_rmse_mm: Option<f64>) -> Outcome {
 ///
 /// # Errors
 /// See [`analyze_session`], `write_results`, [`check_limit`].
-pub fn analyze(args: &AnalyzeArgs, json: bool) -> Outcome {
+pub fn analyze(args: &AnalyzeArgs, output: Output) -> Outcome {
     let choices = Choices {
         overrides: &args.overrides,
         reference_code: args.reference_code,
@@ -229,7 +237,7 @@ pub fn analyze(args: &AnalyzeArgs, json: bool) -> Outcome {
     let older = replaced(&results, args.out.as_deref());
     let paths = write_results(&results, args.out.as_deref(), html.as_deref())?;
     older.iter().for_each(|note| errln!("{note}"));
-    print_results(&results, json, &paths);
+    print_results(&results, output, &paths);
     check_limit(&results, args.max_rmse)
 }
 

@@ -27,6 +27,7 @@ use crate::rig::{self, bench, gates, planted};
 use crate::run::{close, conclude};
 use crate::signals::Operator;
 use crate::sink::{ReplayExpectations, SessionSink};
+use crate::terminal::Output;
 use skinrig_results::Rescan;
 use skinrig_results::RigDocument;
 
@@ -45,7 +46,7 @@ struct UnfinishedSession {
 ///
 /// # Errors
 /// [`Failure`] with the code that says what kind.
-pub fn resume(args: &ResumeArgs, command_line: &str, json: bool) -> Outcome {
+pub fn resume(args: &ResumeArgs, command_line: &str, output: Output) -> Outcome {
     let operator = Operator::listen().map_err(Failure::internal)?;
     let session = &args.session;
     // From here on nobody else writes it, and it is what was recorded.
@@ -65,7 +66,7 @@ pub fn resume(args: &ResumeArgs, command_line: &str, json: bool) -> Outcome {
         }
         return Err(Failure::input(nothing_left(session, end)));
     }
-    if !json {
+    if !output.json {
         outln!("{}", describe(session, &found, &wanted));
     }
     let header = ResumeHeader {
@@ -80,7 +81,7 @@ pub fn resume(args: &ResumeArgs, command_line: &str, json: bool) -> Outcome {
     } else {
         (session.clone(), end_only(&found, header, writer)?)
     };
-    conclude(&session, &report, args.no_analysis, None, json)
+    conclude(&session, &report, args.no_analysis, None, output)
 }
 
 /// Why a session cannot go on: what is wrong with it, item by item, or why it cannot be read.

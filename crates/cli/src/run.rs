@@ -26,6 +26,7 @@ use crate::results::{self};
 use crate::rig::{self, RepeatedOperator, bench, gates, planted};
 use crate::signals::Operator;
 use crate::sink::{ReplayExpectations, SessionSink};
+use crate::terminal::Output;
 use skinrig_results::RigDocument;
 
 /// What is to be recorded, before the rig adds what it knows.
@@ -224,19 +225,19 @@ fn header(
 ///
 /// # Errors
 /// [`Failure`] with the code that says what kind.
-pub fn run(args: &RunArgs, command_line: &str, json: bool) -> Outcome {
+pub fn run(args: &RunArgs, command_line: &str, output: Output) -> Outcome {
     // Before any device is opened: from then on a robot may be live.
     let operator = Operator::listen().map_err(Failure::internal)?;
     let (session, report) = match (&args.replay, &args.protocol) {
         (Some(recording), _) => replay(recording, &args.sessions, command_line, &operator)?,
-        (None, Some(protocol)) => fresh(args, protocol, command_line, json, &operator)?,
+        (None, Some(protocol)) => fresh(args, protocol, command_line, output, &operator)?,
         (None, None) => {
             return Err(Failure::input(
                 "expected a protocol file or --replay SESSION",
             ));
         }
     };
-    conclude(&session, &report, args.no_analysis, args.max_rmse, json)
+    conclude(&session, &report, args.no_analysis, args.max_rmse, output)
 }
 
 /// Analyses a recorded session, prints its results, and turns the run's end into an exit code.
@@ -248,16 +249,16 @@ pub fn conclude(
     report: &RunReport,
     no_analysis: bool,
     max_rmse_mm: Option<f64>,
-    json: bool,
+    output: Output,
 ) -> Outcome {
-    let analysed = if no_analysis && json {
+    let analysed = if no_analysis && output.json {
         crate::terminal::print_json(&serde_json::json!({ "files": { "session": session } }));
         Ok(Exit::Ok)
     } else if no_analysis {
         outln!("{}", session.display());
         Ok(Exit::Ok)
     } else {
-        analyse(session, max_rmse_mm, json)
+        analyse(session, max_rmse_mm, output)
     };
     // How the run ended comes first: a failing analysis must not hide a fault of the rig.
     let kept = format!("everything recorded so far is kept: {}", session.display());
@@ -350,10 +351,10 @@ fn go_on(session: &Path) -> String {
     }
 }
 
-fn analyse(session: &Path, max_rmse_mm: Option<f64>, json: bool) -> Outcome {
+fn analyse(session: &Path, max_rmse_mm: Option<f64>, output: Output) -> Outcome {
     let results = results::analyze_session(session, results::Choices::default())?;
     let written = results::write_results(&results, None, None)?;
-    results::print_results(&results, json, &written);
+    results::print_results(&results, output, &written);
     results::check_limit(&results, max_rmse_mm)
 }
 
@@ -361,12 +362,12 @@ fn fresh(
     args: &RunArgs,
     protocol: &Path,
     command_line: &str,
-    json: bool,
+    output: Output,
     operator: &Operator,
 ) -> Result<(PathBuf, RunReport), Failure> {
     let checked = check::load(protocol, &args.overrides)?;
     if let Some(file) = &args.rig {
-        return on_bench(args, checked.protocol, file, command_line, json, operator);
+        return on_bench(args, checked.protocol, file, command_line, output, operator);
     }
     let (protocol, mut plan) = (checked.protocol, checked.plan);
     let level = match &args.level {
@@ -379,7 +380,7 @@ fn fresh(
     plan.seed = seed;
     let summary = plan.summary();
     let faults = [&protocol.faults[..], &args.faults].concat();
-    if !json {
+    if !output.json {
         outln!("{summary}");
         outln!("rig       simulated ({level}), seed {seed}\n");
     }
@@ -420,7 +421,7 @@ fn on_bench(
     mut protocol: Protocol,
     file: &Path,
     command_line: &str,
-    json: bool,
+    output: Output,
     operator: &Operator,
 ) -> Result<(PathBuf, RunReport), Failure> {
     let mut file = bench::load(file)?;
@@ -443,7 +444,7 @@ fn on_bench(
     let seed = args.seed.unwrap_or(protocol.seed);
     plan.seed = seed;
     let summary = plan.summary();
-    if !json {
+    if !output.json {
         outln!("{summary}");
         outln!("rig       {}\n", bench::display_name(&file));
     }

@@ -6,10 +6,19 @@
 
 use std::borrow::Cow;
 use std::fmt::Arguments;
-use std::io::{ErrorKind, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use skinrig_model::text::{is_hidden, visible};
+
+/// How a command presents its result.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Output {
+    /// As JSON, for programs.
+    pub json: bool,
+    /// With all figures.
+    pub verbose: bool,
+}
 
 static OUTPUT_FAILED: AtomicBool = AtomicBool::new(false);
 
@@ -31,6 +40,12 @@ fn harmless(text: &str) -> Cow<'_, str> {
         out.push_str(&visible(part));
     }
     Cow::Owned(out)
+}
+
+/// True if `stream` is a terminal whose reader has not asked for no colour (`NO_COLOR`, <https://no-color.org>).
+pub(crate) fn is_coloured(stream: &impl IsTerminal) -> bool {
+    let unwanted = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
+    stream.is_terminal() && !unwanted
 }
 
 /// Writes to standard output.

@@ -1,7 +1,5 @@
 //! `skinrig tradeoff`: what speed costs in accuracy, measured on a session.
 
-use std::io::IsTerminal;
-
 use rustix::time::{ClockId, clock_gettime};
 use skinrig_analysis::AnalysisError;
 use skinrig_analysis::tradeoff::{Cost, Plan, Row, Tradeoff, measure};
@@ -133,7 +131,11 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
         document["files"] = serde_json::json!({ "page": html_path, "results": json_path });
         crate::terminal::print_json(&document);
     } else {
-        let table = terminal_table(&result, &rig, std::io::stdout().is_terminal());
+        let table = terminal_table(
+            &result,
+            &rig,
+            crate::terminal::is_coloured(&std::io::stdout()),
+        );
         crate::terminal::out(format_args!("{table}"));
         for answer in &recommendations {
             outln!("\n{}:", answer.question);

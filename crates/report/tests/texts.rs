@@ -2,7 +2,7 @@
 
 mod support;
 
-use skinrig_report::{JSON_VERSION, ReportInput, json, terminal_table};
+use skinrig_report::{JSON_VERSION, ReportInput, json, terminal_summary, terminal_table};
 
 #[test]
 fn terminal_table_reads_like_this() {
@@ -164,6 +164,35 @@ fn json_document_has_this_layout() {
         "json",
         serde_json::to_string_pretty(&blunt(document)).unwrap()
     );
+}
+
+/// The answer comes first, and what qualifies it never scrolls it away.
+#[test]
+fn the_summary_answers_first_in_few_lines() {
+    let mut analysis = support::analysis(16, 10);
+    let provenance = support::provenance();
+    let summary = |analysis: &skinrig_analysis::Analysis| {
+        let input = ReportInput {
+            analysis,
+            provenance: provenance.clone(),
+            tradeoff: None,
+        };
+        let text = terminal_summary(&input, false);
+        assert!(text.lines().count() <= 8, "{text}");
+        assert!(text.lines().all(|l| l.chars().count() <= 80), "{text}");
+        text
+    };
+    insta::assert_snapshot!("terminal_summary", summary(&analysis));
+    analysis.warnings = (0..20)
+        .map(|i| format!("warning {i} {}", "long ".repeat(60)))
+        .collect();
+    let many = summary(&analysis);
+    assert!(many.starts_with("RMSE  "), "{many}");
+    assert!(many.contains(" more: see the report"), "{many}");
+    analysis.findings = support::studies::findings();
+    let found = summary(&analysis);
+    assert!(found.contains("fault     cameras swapped; "), "{found}");
+    assert!(found.contains("do        check which camera"), "{found}");
 }
 
 /// Findings come before every number.

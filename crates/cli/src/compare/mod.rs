@@ -4,7 +4,6 @@ mod facts;
 mod inputs;
 mod margins;
 
-use std::io::IsTerminal;
 use std::path::PathBuf;
 
 use skinrig_analysis::{Analysis, AnalysisError};
@@ -46,7 +45,8 @@ pub fn compare(args: &CompareArgs, json: bool) -> Outcome {
             document["files"] = serde_json::json!({ "page": page, "results": results });
             crate::terminal::print_json(&document);
         } else {
-            let table = report::terminal_table(&result, std::io::stdout().is_terminal());
+            let table =
+                report::terminal_table(&result, crate::terminal::is_coloured(&std::io::stdout()));
             crate::terminal::out(format_args!("{table}"));
             outln!("\npage      {}", page.display());
             outln!("results   {}", results.display());
@@ -56,7 +56,8 @@ pub fn compare(args: &CompareArgs, json: bool) -> Outcome {
     if json {
         crate::terminal::print_json(&document);
     } else {
-        let table = report::terminal_table(&result, std::io::stdout().is_terminal());
+        let table =
+            report::terminal_table(&result, crate::terminal::is_coloured(&std::io::stdout()));
         crate::terminal::out(format_args!("{table}"));
     }
     Err(Failure::input(blocked.unwrap_or_default()))

@@ -53,7 +53,7 @@ impl Live {
         Self {
             folder,
             display,
-            colour: colour(terminal),
+            colour: colour(&std::io::stderr()),
             total: suite.checks.len(),
             told: 0,
             unwritten: None,
@@ -76,10 +76,9 @@ impl Live {
     }
 }
 
-/// Colours on a terminal, unless `NO_COLOR` asks for none (<https://no-color.org>).
-pub fn colour(terminal: bool) -> Colour {
-    let unwanted = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
-    if terminal && !unwanted {
+/// The colours of `stream`.
+pub fn colour(stream: &impl IsTerminal) -> Colour {
+    if crate::terminal::is_coloured(stream) {
         Colour::On
     } else {
         Colour::Off

@@ -1,6 +1,5 @@
 //! `skinrig hil run`: a suite on a bench, from its plan to its results.
 
-use std::io::IsTerminal;
 use std::path::Path;
 
 use chrono::{SecondsFormat, Utc};
@@ -85,7 +84,7 @@ pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
     if json {
         crate::terminal::print_json(&serde_json::to_value(&night).map_err(Failure::internal)?);
     } else {
-        let colour = live::colour(std::io::stdout().is_terminal());
+        let colour = live::colour(&std::io::stdout());
         outln!("{}", night::tree(&night, colour).trim_end());
         outln!("{}", folder.join(folder::PAGE).display());
     }

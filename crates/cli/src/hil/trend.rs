@@ -1,6 +1,5 @@
 //! `skinrig hil trend`: what moved over the nights, since when, and why, probably.
 
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use skinrig_hil::history::{self, AppendOutcome, Filter, HistoryError};
@@ -50,7 +49,7 @@ pub fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
         let links: Vec<Links> = kept.iter().map(|k| k.links(None)).collect();
         let style = Style {
             unicode: !args.ascii && is_unicode(),
-            color: std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none(),
+            color: crate::terminal::is_coloured(&std::io::stdout()),
             nights: args.nights,
         };
         let text = terminal(&report, &links, shown, style);

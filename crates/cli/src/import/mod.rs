@@ -30,6 +30,7 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::run::{Intent, conclude, record};
 use crate::signals::Operator;
 use crate::sink::ReplayExpectations;
+use crate::terminal::Output;
 use camera::{ChunkFeed, FileCamera};
 use indenter::ScheduledIndenter;
 
@@ -41,7 +42,7 @@ const SMALLEST_PATH_MM: f64 = 1.0;
 /// # Errors
 /// [`Failure::input`] for files that are not what they should be, also when one breaks off inside: what was read up to there is
 /// kept. [`Failure::rig`] when the session cannot be written.
-pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
+pub fn import(args: &ImportArgs, command_line: &str, output: Output) -> Outcome {
     let name = args.schedule.to_string_lossy();
     for file in [&args.camera1, &args.camera2, &args.presses] {
         regular::check(file).map_err(|e| Failure::input(format!("{}: {e}", file.display())))?;
@@ -89,7 +90,7 @@ pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
         .to_string(),
     };
     let last = times.last().map_or(0, |t| t.0);
-    if !json {
+    if !output.json {
         outln!(
             "import  {} presses by schedule, {:.0} s: {} and {}",
             plan.presses.len(),
@@ -119,7 +120,7 @@ pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
         .causes
         .iter()
         .any(|c| matches!(c, ControllerError::Device(_)));
-    conclude(&session, &report, args.no_analysis, None, json).map_err(|failure| {
+    conclude(&session, &report, args.no_analysis, None, output).map_err(|failure| {
         // No rig took part: what a camera did not deliver is missing or broken in its file.
         if unreadable {
             Failure {

@@ -92,7 +92,7 @@ fn with_height_off(fault: Option<&str>, depth: &str, code: i32) -> String {
     let lab = Lab::new();
     let folder = text(&lab.path("a"));
     let depth = format!("depth={depth}");
-    let mut arguments = vec!["run", SMALL, "--sessions", &folder, "--set", &depth];
+    let mut arguments = vec!["run", "-v", SMALL, "--sessions", &folder, "--set", &depth];
     arguments.extend(fault.iter().flat_map(|f| ["--fault", f]));
     let said = skinrig(&arguments).code(code);
     let shown = skinrig(&["show", &text(&only(&lab.path("a"), ".session.sqlite"))]).code(0);

@@ -31,6 +31,7 @@ fn a_press_has_one_number_everywhere() {
     let lab = Lab::new();
     let folder = lab.path("a");
     let run = skinrig(&[
+        "-v",
         "run",
         SMALL,
         "--sessions",

@@ -21,7 +21,7 @@ fn number_before(text: &str, word: &str) -> u64 {
 #[test]
 fn a_run_ends_with_results_that_add_up_and_files_that_exist() {
     let lab = Lab::new();
-    let said = skinrig(&["run", SMALL, "--sessions", &lab.text("s")]).code(0);
+    let said = skinrig(&["run", "-v", SMALL, "--sessions", &lab.text("s")]).code(0);
     let out = &said.out;
     for part in [
         "presses   10: 0 calibrate, 8 score, 2 sync",
@@ -65,9 +65,9 @@ fn a_run_ends_with_results_that_add_up_and_files_that_exist() {
         assert!(fit.contains("residual rms"), "{fit}");
     }
     for (key, ending) in [
-        ("session  ", ".session.sqlite"),
-        ("results  ", ".results.json"),
-        ("report   ", ".report.html"),
+        ("session   ", ".session.sqlite"),
+        ("results   ", ".results.json"),
+        ("report    ", ".report.html"),
     ] {
         let line = out.lines().rfind(|l| l.starts_with(key)).unwrap();
         assert_eq!(line[key.len()..], text(&only(&lab.path("s"), ending)));
@@ -157,7 +157,9 @@ fn analyze_and_report_give_the_same_results_again_and_others_with_other_settings
     let session = lab.record("s", &[]);
     assert!(files(&lab.path("s"), ".results.json").is_empty());
     let path = text(&session);
-    skinrig(&["analyze", &path]).code(0);
+    let answer = skinrig(&["analyze", &path]).code(0).out;
+    assert!(answer.starts_with("RMSE  "), "{answer}");
+    assert!(answer.lines().count() <= 12, "{answer}");
     let first = read_json(&only(&lab.path("s"), ".results.json"));
     skinrig(&["report", &path, "--out", &lab.text("r.html")]).code(0);
     assert!(std::fs::metadata(lab.path("r.html")).unwrap().len() > 10_000);

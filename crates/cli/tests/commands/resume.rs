@@ -41,7 +41,7 @@ fn a_resumed_session_gives_the_results_of_one_that_was_never_cut_off() {
         .find(|p| p["verdict"] == "open" && p["attempts"] == 1);
     let press = open.expect("one press was under way")["press"].clone();
 
-    let said = skinrig(&["resume", &text(&session)]).code(0).out;
+    let said = skinrig(&["resume", "-v", &text(&session)]).code(0).out;
     assert!(said.contains(&format!("press {press} cut off")), "{said}");
     let told = format!("press {press}: cut off: leg 1 of the session ended without its outcome");
     for line in [

@@ -1,6 +1,7 @@
 //! Owns the terminal table of results: findings, headline, presses, clocks; the studies are in [`studies`].
 
 mod studies;
+mod summary;
 mod text;
 
 use std::fmt::Write as _;
@@ -9,6 +10,7 @@ use skinrig_analysis::result::{
     Alignment, AlignmentStatus, Analysis, ClockFit, ClockMethod, Estimate, MapName, Metrics,
 };
 
+pub(crate) use self::summary::summary;
 use self::text::WIDTH;
 pub(crate) use self::text::{Paint, plain, wrap};
 use crate::format::{digits_of_error, grouped, interval, number, or_missing};
