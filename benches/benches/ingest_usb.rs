@@ -35,7 +35,7 @@ mod linux {
     use skinrig_recorder::SessionWriter;
 
     /// Environment variable with the job of the recording process.
-    pub const JOB: &str = "SKINRIG_BENCH_JOB";
+    pub(crate) const JOB: &str = "SKINRIG_BENCH_JOB";
 
     const SERIALS: [&str; 2] = ["00001621", "00001622"];
     /// Maximum rate of the sensor, and end of the search, Mev/s per camera.
@@ -87,7 +87,7 @@ mod linux {
         }
     }
 
-    pub fn measure() -> Result<(), Box<dyn Error>> {
+    pub(crate) fn measure() -> Result<(), Box<dyn Error>> {
         let seconds: f64 = match std::env::var("SKINRIG_BENCH_SECONDS") {
             Ok(text) => text.parse()?,
             Err(_) => 5.0,
@@ -245,7 +245,7 @@ mod linux {
     }
 
     /// The recording process: both cameras into the sink.
-    pub fn record(job: &str) -> Result<(), Box<dyn Error>> {
+    pub(crate) fn record(job: &str) -> Result<(), Box<dyn Error>> {
         let job: Value = serde_json::from_str(job)?;
         let span = Duration::from_secs_f64(job["seconds"].as_f64().ok_or("expected seconds")?);
         let path = job["path"].as_str().ok_or("expected a path")?;

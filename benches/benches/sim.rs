@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use skinrig_bench::Table;
-use skinrig_controller::{ControlHandle, RecordSink, SinkFault, execute};
+use skinrig_controller::{ControlHandle, RecordSink, Run, SinkFault};
 use skinrig_model::{CameraId, Record, RunEnd, RunHeader, SimLevel};
 
 const PROTOCOL: &str = concat!(
@@ -69,7 +69,7 @@ fn simulate(level: SimLevel, presses: u32) -> (Scales, f64) {
         presses: plan.presses.clone(),
     };
     let mut scales = Scales::default();
-    let report = execute(&plan, header, rig, &ControlHandle::new(), &mut scales);
+    let report = Run::new(&plan, header, rig, &ControlHandle::new(), &mut scales).execute();
     assert_eq!(report.end, RunEnd::Completed);
     (scales, plan.summary().duration_s)
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use skinrig_analysis::EventSource;
+use skinrig_analysis::{EventSource, EventSourceError};
 use skinrig_formats::hdf5::{Container, EventWriter};
 use skinrig_formats::{FormatsError, Geometry};
 use skinrig_model::{CameraId, CdEvent};
@@ -44,12 +44,11 @@ impl EventSource for Files {
         &self,
         camera: CameraId,
         each: &mut dyn FnMut(&[CdEvent]),
-    ) -> Result<(), String> {
-        let words = |e: FormatsError| e.to_string();
-        let container = Container::open(&self.path(camera)).map_err(words)?;
-        let mut reader = container.events(None, Geometry::EVK1).map_err(words)?;
+    ) -> Result<(), EventSourceError> {
+        let container = Container::open(&self.path(camera))?;
+        let mut reader = container.events(None, Geometry::EVK1)?;
         loop {
-            match reader.next_batch().map_err(words)? {
+            match reader.next_batch()? {
                 [] => return Ok(()),
                 batch => each(batch),
             }
@@ -66,7 +65,7 @@ impl EventSource for Memory {
         &self,
         camera: CameraId,
         each: &mut dyn FnMut(&[CdEvent]),
-    ) -> Result<(), String> {
+    ) -> Result<(), EventSourceError> {
         self.0[camera.index()].chunks(16_384).for_each(each);
         Ok(())
     }

@@ -18,7 +18,7 @@ pub const PRESSES: u32 = 289;
 /// Time from press to press, s.
 pub const PERIOD_S: f64 = 868.0 / 289.0;
 /// Events of one camera in one period.
-pub const PERIOD_EVENTS: usize = 24_000;
+pub(crate) const PERIOD_EVENTS: usize = 24_000;
 /// Contact of the first press on the host's clock, s.
 const FIRST_S: f64 = 15.0;
 /// From contact to release, s.

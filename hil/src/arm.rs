@@ -36,7 +36,7 @@ const DEFAULT_SEARCH: TouchSearch = TouchSearch {
 
 /// Lowest region that a check needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Reach {
+pub(crate) enum Reach {
     /// Never below clearance height.
     Air,
     /// Into the skin, as deep as the rig file allows.
@@ -321,7 +321,7 @@ impl Arm<'_> {
     ///
     /// # Errors
     /// As [`go`](Self::go).
-    pub fn go_above(&mut self, at: Point2) -> Result<PoseSample, Problem> {
+    pub(crate) fn go_above(&mut self, at: Point2) -> Result<PoseSample, Problem> {
         let high_mm = 2.0 * CLEARANCE_MM;
         let here = self.pose()?.measured;
         if here.z_mm < high_mm {

@@ -24,7 +24,7 @@ pub const fn subject(role: DeviceRole) -> &'static str {
 
 /// Name of a camera in results.
 #[must_use]
-pub const fn camera_subject(camera: CameraId) -> &'static str {
+pub(crate) const fn camera_subject(camera: CameraId) -> &'static str {
     subject(DeviceRole::of_camera(camera))
 }
 

@@ -37,7 +37,7 @@ impl TestVolume {
     ///
     /// # Errors
     /// When the frame is too old, or the workspace does not contain the volume.
-    pub fn from_rig(rig: &RigFile, today: i64) -> Result<Self, Problem> {
+    pub(crate) fn from_rig(rig: &RigFile, today: i64) -> Result<Self, Problem> {
         let age_days = today - rig.frame.date.days_since_1970();
         let most_h = rig.preflight.touch_off_max_age.as_secs_f64() / 3600.0;
         // As in preflight: a date has no hour, and in another time zone today may be tomorrow.
@@ -75,7 +75,7 @@ impl TestVolume {
 
     /// Five points in free air: the centre and four around it, alternately low and high.
     #[must_use]
-    pub fn air_points(&self) -> [Point3<Skin>; 5] {
+    pub(crate) fn air_points(&self) -> [Point3<Skin>; 5] {
         let Point2 { x_mm: x, y_mm: y } = self.centre;
         let (low, high) = (AIR_HEIGHT_MM, AIR_HEIGHT_MM + HEIGHT_RANGE_MM);
         [
@@ -102,7 +102,7 @@ impl TestVolume {
 
     /// Bounding box of the workspace in the skin frame: smallest and largest coordinates, mm.
     #[must_use]
-    pub fn workspace_bounds(&self) -> ([f64; 3], [f64; 3]) {
+    pub(crate) fn workspace_bounds(&self) -> ([f64; 3], [f64; 3]) {
         let skin_from_robot = self.robot_from_skin.inverse();
         let (mut least, mut most) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         let workspace = &self.limits.workspace;

@@ -14,24 +14,24 @@ const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 const CAMPAIGN: &str = "tests/crash/campaign.yaml";
 
 /// Every planned press with its attempts.
-pub type Presses = Vec<(PlannedPress, Vec<AttemptRow>)>;
+pub(crate) type Presses = Vec<(PlannedPress, Vec<AttemptRow>)>;
 
 /// Command for the program with these arguments, not yet started.
-pub fn program<S: AsRef<OsStr>>(arguments: &[S]) -> Command {
+pub(crate) fn program<S: AsRef<OsStr>>(arguments: &[S]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_skinrig"));
     command.current_dir(ROOT).args(arguments);
     command
 }
 
 /// Command that records the campaign in `folder`.
-pub fn campaign(folder: &Path) -> Command {
+pub(crate) fn campaign(folder: &Path) -> Command {
     let mut command = program(&["run", CAMPAIGN, "--no-analysis", "--sessions"]);
     command.arg(folder);
     command
 }
 
 /// Output of a program, for messages.
-pub fn words(output: &Output) -> String {
+pub(crate) fn words(output: &Output) -> String {
     let text = |bytes| String::from_utf8_lossy(bytes).into_owned();
     format!(
         "{}{}{}",
@@ -43,14 +43,14 @@ pub fn words(output: &Output) -> String {
 
 /// Runs to the end, expects this exit code, and returns the output.
 #[track_caller]
-pub fn expect(mut command: Command, code: i32) -> String {
+pub(crate) fn expect(mut command: Command, code: i32) -> String {
     let output = command.output().unwrap();
     assert_eq!(output.status.code(), Some(code), "{}", words(&output));
     words(&output)
 }
 
 /// The only session of a folder; `None` if the process was killed before creating one.
-pub fn session_in(folder: &Path) -> Option<PathBuf> {
+pub(crate) fn session_in(folder: &Path) -> Option<PathBuf> {
     let entries = std::fs::read_dir(folder).ok()?;
     let mut found = entries
         .map(|e| e.unwrap().path())
@@ -65,14 +65,14 @@ pub fn session_in(folder: &Path) -> Option<PathBuf> {
 }
 
 /// Content of the journal; `None` for a session without a header, which is empty.
-pub fn journal(session: &Path) -> Option<Presses> {
+pub(crate) fn journal(session: &Path) -> Option<Presses> {
     let reader = SessionReader::open(session).ok()?;
     reader.header().ok()?;
     Some(reader.presses().unwrap())
 }
 
 /// The campaign without any fault.
-pub struct Uninterrupted {
+pub(crate) struct Uninterrupted {
     /// Total duration, including process start.
     pub took: Duration,
     presses: usize,
@@ -82,7 +82,7 @@ pub struct Uninterrupted {
 
 impl Uninterrupted {
     /// Recorded once for all tests.
-    pub fn get() -> &'static Self {
+    pub(crate) fn get() -> &'static Self {
         static ONCE: OnceLock<Uninterrupted> = OnceLock::new();
         ONCE.get_or_init(|| {
             let folder = tempfile::tempdir().unwrap();
@@ -107,7 +107,7 @@ impl Uninterrupted {
     /// results match the uninterrupted campaign: equal counts, an RMSE within its 95 % interval, certified clocks. At most
     /// `kills` attempts may be cut off.
     #[track_caller]
-    pub fn assert_equalled_by(&self, session: &Path, kills: usize, case: &str) {
+    pub(crate) fn assert_equalled_by(&self, session: &Path, kills: usize, case: &str) {
         let verified = expect(program(&[OsStr::new("verify"), session.as_os_str()]), 0);
         assert!(verified.contains("sound, sealed"), "{case}: {verified}");
         let reader = SessionReader::open(session).unwrap();
@@ -165,7 +165,7 @@ fn analysis(session: &Path) -> Value {
 
 /// Earlier records are unchanged: an attempt with an outcome keeps it, one without is marked as cut off.
 #[track_caller]
-pub fn assert_kept(before: &Presses, after: &Presses, case: &str) {
+pub(crate) fn assert_kept(before: &Presses, after: &Presses, case: &str) {
     for ((_, before), (planned, after)) in before.iter().zip(after) {
         assert!(after.len() >= before.len(), "{case}: {}", planned.id);
         for (was, is) in before.iter().zip(after) {
@@ -185,7 +185,7 @@ pub fn assert_kept(before: &Presses, after: &Presses, case: &str) {
 }
 
 /// Command for `skinrig resume` of `session`.
-pub fn resume(session: &Path) -> Command {
+pub(crate) fn resume(session: &Path) -> Command {
     let mut command = program(&["resume", "--no-analysis"]);
     command.arg(session);
     command
@@ -194,7 +194,7 @@ pub fn resume(session: &Path) -> Command {
 /// Resumes a session after `kills`, and checks that it equals the uninterrupted campaign. A session without a header is
 /// rejected and is empty.
 #[track_caller]
-pub fn goes_on(session: &Path, kills: usize, case: &str) {
+pub(crate) fn goes_on(session: &Path, kills: usize, case: &str) {
     let Some(before) = journal(session) else {
         expect(resume(session), 2);
         return;
@@ -205,7 +205,7 @@ pub fn goes_on(session: &Path, kills: usize, case: &str) {
 }
 
 /// A small seeded generator of 64-bit numbers (SplitMix64, Steele, Lea and Flood 2014), for test data only.
-pub struct Dice(pub u64);
+pub(crate) struct Dice(pub u64);
 
 impl Dice {
     fn next(&mut self) -> u64 {
@@ -217,12 +217,12 @@ impl Dice {
     }
 
     /// Uniform below `n`, which is far below 2^64.
-    pub fn below(&mut self, n: u64) -> u64 {
+    pub(crate) fn below(&mut self, n: u64) -> u64 {
         self.next() % n
     }
 
     /// Random bytes.
-    pub fn bytes(&mut self, n: u64) -> Vec<u8> {
+    pub(crate) fn bytes(&mut self, n: u64) -> Vec<u8> {
         (0..n).map(|_| self.next() as u8).collect()
     }
 }

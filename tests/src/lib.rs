@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use skinrig_controller::{ControlHandle, RecordSink, RunReport, SinkFault, execute};
+use skinrig_controller::{ControlHandle, RecordSink, Run, RunReport, SinkFault};
 use skinrig_device::Rig;
 use skinrig_model::{CameraId, Record, RunHeader};
 use skinrig_protocol::{Plan, Protocol};
@@ -76,7 +76,7 @@ pub fn record(
         control: control.clone(),
         watch,
     };
-    let report = execute(plan, header, rig, &control, &mut sink);
+    let report = Run::new(plan, header, rig, &control, &mut sink).execute();
     sink.writer.finish()?;
     Ok(report)
 }

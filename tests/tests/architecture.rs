@@ -12,8 +12,12 @@ use serde_json::Value;
 
 /// Allowed dependencies between our crates, except in tests. Mirrors the table in `ARCHITECTURE.md`.
 const ALLOWED: &[(&str, &[&str])] = &[
+    ("skinrig-text", &[]),
     ("skinrig-settings-derive", &[]),
-    ("skinrig-settings", &["skinrig-settings-derive"]),
+    (
+        "skinrig-settings",
+        &["skinrig-settings-derive", "skinrig-text"],
+    ),
     ("skinrig-model", &["skinrig-settings"]),
     ("skinrig-formats", &["skinrig-model"]),
     ("skinrig-protocol", &["skinrig-model", "skinrig-settings"]),
@@ -51,6 +55,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "skinrig-model",
             "skinrig-nightly",
             "skinrig-settings",
+            "skinrig-text",
         ],
     ),
     ("skinrig-nightly", &["skinrig-model"]),
@@ -107,6 +112,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "skinrig-export",
             "skinrig-nightly",
             "skinrig-hil",
+            "skinrig-text",
         ],
     ),
 ];

@@ -9,10 +9,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use clap::Parser;
 use clap::error::ErrorKind;
 use serde_json::Value;
-use skinrig::args::Cli;
 use skinrig_protocol::suite::Suite;
 
 fn top() -> PathBuf {
@@ -153,7 +151,7 @@ fn the_night_is_a_command_that_the_program_takes() {
     let command = one(&service, "Service", "ExecStart");
     let words: Vec<&str> = command.split_whitespace().collect();
     assert_eq!(words[1..3], ["hil", "run"]);
-    if let Err(e) = Cli::try_parse_from(&words) {
+    if let Err(e) = skinrig::parse(&words) {
         panic!("{command}: {e}");
     }
     for file in ["/etc/skinrig/nightly.yaml", "/etc/skinrig/rig.yaml"] {
@@ -405,7 +403,7 @@ fn every_command_of_the_guides_is_one_of_the_program() {
                 .take_while(|w| w.bytes().all(|b| b.is_ascii_alphabetic()));
             let mut words: Vec<&str> = words.take(3).collect();
             words.push("--help");
-            let kind = Cli::try_parse_from(&words).unwrap_err().kind();
+            let kind = skinrig::parse(&words).unwrap_err().kind();
             assert_eq!(kind, ErrorKind::DisplayHelp, "{file}: {command}");
             seen += 1;
         }

@@ -163,7 +163,7 @@ fn write(path: &Path, records: &[Record]) {
         }
         writer.accept(record.clone()).unwrap();
     }
-    let end = RunEnd::Stopped("the contract is no plan".into());
+    let end = RunEnd::Stopped("the contract is no plan".to_owned().into());
     writer.accept(Record::Ended { t: last, end }).unwrap();
     writer.finish().unwrap();
 }

@@ -15,9 +15,7 @@ use skinrig::results::{Choices, analyze_session};
 use skinrig::rig::{self, gates};
 use skinrig_analysis::Analysis;
 use skinrig_analysis::result::PressResult;
-use skinrig_controller::{
-    ControlHandle, ControllerSettings, RecordSink, RunReport, SinkFault, execute_checked,
-};
+use skinrig_controller::{ControlHandle, RecordSink, RunReport, SinkFault};
 use skinrig_model::{CameraId, HostTime, PressId, PressTiming, Record, RunEnd, SimLevel};
 use skinrig_protocol::{FaultKind, FaultPhase, FaultTime, Plan, PlantedFault, Protocol};
 use skinrig_recorder::{SessionReader, SessionWriter, verify};
@@ -174,10 +172,9 @@ fn run((protocol, plan): (&Protocol, &Plan), fault: Option<PlantedFault>, path: 
         moved: false,
     };
     let control = ControlHandle::new();
-    let settings = ControllerSettings::default();
-    let report = execute_checked(
-        plan, header, simulated, &control, &mut sink, preflight, settings,
-    );
+    let report = skinrig_controller::Run::new(plan, header, simulated, &control, &mut sink)
+        .checked(preflight)
+        .execute();
     let seals = killed.is_none() && sink.saboteur.before_the_seal().is_ok();
     let writer = sink.writer.take();
     let sealed = seals && writer.is_some_and(|writer| writer.finish().is_ok());
@@ -306,10 +303,7 @@ fn judge(run: &Run, fault: PlantedFault, without: &Ideal) -> Cell {
     if retaken > 0 {
         let _ = write!(words, ", {retaken} retaken");
     }
-    let mut reason = match &report.end {
-        RunEnd::Completed => String::new(),
-        RunEnd::Stopped(r) | RunEnd::Faulted(r) => r.clone(),
-    };
+    let mut reason = report.end.reason().unwrap_or_default().to_owned();
     match &analysis {
         Ok(a) => {
             for p in &a.presses {

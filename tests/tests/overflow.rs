@@ -77,7 +77,7 @@ fn what_a_camera_drops_spoils_the_press_and_is_told() {
                 match outcome.verdict {
                     PressVerdict::Invalid(why) => {
                         attempts += 1;
-                        assert!(why.contains("camera 1 lost"), "{why}");
+                        assert!(why.to_string().contains("camera 1 lost"), "{why}");
                     }
                     PressVerdict::Missed(_) => {}
                     other => panic!("{other:?}"),

@@ -75,7 +75,7 @@ fn a_retaken_press_counts_once_and_its_marks_misname_nothing() {
             let PressVerdict::Invalid(why) = verdict(attempt) else {
                 panic!("{attempt:?}");
             };
-            assert!(why.contains("lost"), "{why}");
+            assert!(why.to_string().contains("lost"), "{why}");
         }
     }
     // The loss and its position are in the stream.

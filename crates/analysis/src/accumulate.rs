@@ -53,7 +53,7 @@ const NO_EVENT: CdEvent = CdEvent {
 
 /// Outputs to collect in a pass.
 #[derive(Default)]
-pub struct PassRequest<'a> {
+pub(crate) struct PassRequest<'a> {
     /// Windows, sorted by start.
     pub windows: &'a [Window],
     /// Rows of the plan that get an image, with their press.
@@ -116,7 +116,7 @@ struct OpenWindow {
 
 /// Event counts of a press in one camera.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct EventCounts {
+pub(crate) struct EventCounts {
     /// Events in the window.
     pub events: u32,
     /// ON events in the window.
@@ -150,7 +150,7 @@ pub(crate) fn press_view(
 }
 
 /// Outputs of [`Accumulator::finish`].
-pub struct PassOutput {
+pub(crate) struct PassOutput {
     pub rates: Option<RateHistogram>,
     /// (row of the plan, view).
     pub views: Vec<(usize, PressView)>,
@@ -169,7 +169,11 @@ pub struct PassOutput {
 
 impl<'a> Accumulator<'a> {
     /// Collects the outputs in `request`.
-    pub fn new(camera: CameraId, settings: &'a AnalysisSettings, wanted: PassRequest<'a>) -> Self {
+    pub(crate) fn new(
+        camera: CameraId,
+        settings: &'a AnalysisSettings,
+        wanted: PassRequest<'a>,
+    ) -> Self {
         let PassRequest {
             windows,
             pictured,
@@ -218,7 +222,7 @@ impl<'a> Accumulator<'a> {
     }
 
     /// Processes the next events of the stream.
-    pub fn take(&mut self, events: &[CdEvent]) {
+    pub(crate) fn take(&mut self, events: &[CdEvent]) {
         for slice in events.chunks(SLICE) {
             if self.error.is_some() {
                 return;
@@ -481,7 +485,7 @@ impl<'a> Accumulator<'a> {
     }
 
     /// Ends the pass: closes open windows; windows without events are empty.
-    pub fn finish(mut self) -> Result<PassOutput, AnalysisError> {
+    pub(crate) fn finish(mut self) -> Result<PassOutput, AnalysisError> {
         while !self.open.is_empty() {
             let done = self.open.remove(0);
             self.close(done);
@@ -544,7 +548,7 @@ pub(crate) fn pass(
 ) -> Result<PassOutput, AnalysisError> {
     source
         .for_each_slice(camera, &mut |events| accumulator.take(events))
-        .map_err(|message| AnalysisError::Events { camera, message })?;
+        .map_err(|source| AnalysisError::Events { camera, source })?;
     accumulator.finish()
 }
 

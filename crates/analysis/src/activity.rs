@@ -14,18 +14,18 @@ const HEIGHT: u16 = SENSOR_HEIGHT / CELL_PX;
 pub(crate) struct ActivityGrid(Counters);
 
 impl ActivityGrid {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self(Counters::new(usize::from(WIDTH) * usize::from(HEIGHT)))
     }
 
     /// Counts an event on the sensor.
-    pub fn add(&mut self, event: &CdEvent) {
+    pub(crate) fn add(&mut self, event: &CdEvent) {
         let cell =
             usize::from(event.y / CELL_PX) * usize::from(WIDTH) + usize::from(event.x / CELL_PX);
         self.0.add(cell);
     }
 
-    pub fn result(&self, camera: CameraId) -> Activity {
+    pub(crate) fn result(&self, camera: CameraId) -> Activity {
         Activity {
             camera,
             cell_px: CELL_PX,

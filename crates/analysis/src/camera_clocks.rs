@@ -15,7 +15,7 @@ use crate::timebase::{Tie, TimeBase};
 use crate::untimed::{self, Untimed};
 
 /// Clock of a camera, and by-products of finding it.
-pub struct CameraClock {
+pub(crate) struct CameraClock {
     pub clock: Option<ClockFit>,
     /// Filled if the events were read for the clock; otherwise still to be filled.
     pub rates: Option<RateHistogram>,
@@ -30,7 +30,7 @@ pub struct CameraClock {
 }
 
 /// Clocks of both cameras.
-pub struct CameraClocks {
+pub(crate) struct CameraClocks {
     pub cameras: [CameraClock; 2],
     /// Certainty of the alignment by event rates; `None` if no camera was aligned by them.
     pub evidence: Option<RatesEvidence>,
@@ -40,7 +40,7 @@ pub struct CameraClocks {
 
 impl CameraClocks {
     /// Finds the clocks. Reads events if neither time base nor marks give one; cameras in parallel.
-    pub fn new(
+    pub(crate) fn new(
         input: &SessionInput,
         source: &dyn EventSource,
         base: Option<&TimeBase>,

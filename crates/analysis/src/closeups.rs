@@ -40,7 +40,7 @@ impl Closeups {
     /// Spreads them over the executed scored presses (over all presses if none scores) and over their locations: from each
     /// of equal parts of the session, the press nearest to its share of the locations. Equal steps alone would hit the same
     /// few locations in every repetition.
-    pub fn choose(input: &SessionInput, keep: Retention) -> Self {
+    pub(crate) fn choose(input: &SessionInput, keep: Retention) -> Self {
         let done = |scored: bool| -> Vec<(usize, PressId, u32)> {
             let rows = input.planned.iter().zip(&input.outcomes).enumerate();
             rows.filter(|(_, (p, _))| !scored || p.role == PressRole::Score)

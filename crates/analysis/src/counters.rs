@@ -12,7 +12,7 @@ pub(crate) struct Counters {
 
 impl Counters {
     /// Counters that are 0.
-    pub fn new(len: usize) -> Self {
+    pub(crate) fn new(len: usize) -> Self {
         Self {
             low: vec![0; len],
             rounds: Vec::new(),
@@ -20,13 +20,13 @@ impl Counters {
     }
 
     /// Number of counters.
-    pub const fn len(&self) -> usize {
+    pub(crate) const fn len(&self) -> usize {
         self.low.len()
     }
 
     /// Increments one counter. False if it does not exist.
     #[inline]
-    pub fn add(&mut self, index: usize) -> bool {
+    pub(crate) fn add(&mut self, index: usize) -> bool {
         let Some(low) = self.low.get_mut(index) else {
             return false;
         };
@@ -38,7 +38,7 @@ impl Counters {
     }
 
     /// Adds to one counter. False if it does not exist.
-    pub fn add_many(&mut self, index: usize, n: u32) -> bool {
+    pub(crate) fn add_many(&mut self, index: usize, n: u32) -> bool {
         let Some(low) = self.low.get_mut(index) else {
             return false;
         };
@@ -61,14 +61,14 @@ impl Counters {
 
     /// Value of a counter.
     #[inline]
-    pub fn get(&self, index: usize) -> u64 {
+    pub(crate) fn get(&self, index: usize) -> u64 {
         let rounds = self.rounds.get(index).copied().unwrap_or(0);
         u64::from(rounds) << u8::BITS | u64::from(self.low[index])
     }
 
     /// Sum of eight counters from an index on, and a bit for each that is above 1.
     #[inline]
-    pub fn eight(&self, first: usize) -> (u64, u64) {
+    pub(crate) fn eight(&self, first: usize) -> (u64, u64) {
         let word = self.low[first..first + 8]
             .iter()
             .rev()
@@ -86,7 +86,7 @@ impl Counters {
     }
 
     /// Sums of counters that are `N` apart, like the columns of a table.
-    pub fn columns<const N: usize>(&self) -> [u64; N] {
+    pub(crate) fn columns<const N: usize>(&self) -> [u64; N] {
         let mut sums = [0; N];
         // This many bytes fit into 16 bits: add rows side by side.
         for rows in self.low.chunks(256 * N) {
@@ -109,7 +109,7 @@ impl Counters {
     }
 
     /// Resets a range to 0.
-    pub fn clear(&mut self, indices: Range<usize>) {
+    pub(crate) fn clear(&mut self, indices: Range<usize>) {
         self.low[indices.clone()].fill(0);
         if let Some(rounds) = self.rounds.get_mut(indices) {
             rounds.fill(0);
@@ -117,7 +117,7 @@ impl Counters {
     }
 
     /// All values in order.
-    pub fn iter(&self) -> impl Iterator<Item = u64> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = u64> {
         (0..self.len()).map(|index| self.get(index))
     }
 }
@@ -130,7 +130,7 @@ mod bytes {
     const EVEN: u64 = 0x00ff_00ff_00ff_00ff;
 
     /// Their sum: in four pairs, then the uppermost 16 bits of the product.
-    pub const fn sum(word: u64) -> u64 {
+    pub(super) const fn sum(word: u64) -> u64 {
         let pairs = (word & EVEN) + (word >> 8 & EVEN);
         pairs.wrapping_mul(0x0001_0001_0001_0001) >> 48
     }

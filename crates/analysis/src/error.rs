@@ -2,8 +2,10 @@
 
 use skinrig_model::{CameraId, PressId};
 
+use crate::input::EventSourceError;
+
 /// Why there is no analysis. All other problems become rows, counts or warnings in the result.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum AnalysisError {
     /// The journal does not fit the plan.
     #[error(
@@ -62,12 +64,12 @@ pub enum AnalysisError {
         found: String,
     },
     /// The events of a camera could not be read to the end.
-    #[error("{camera}: {message}")]
+    #[error("{camera}: {source}")]
     Events {
         /// Which camera.
         camera: CameraId,
-        /// Message of the source.
-        message: String,
+        /// Error of the source.
+        source: EventSourceError,
     },
     /// Too many events are off the sensor.
     #[error(

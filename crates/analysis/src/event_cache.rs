@@ -15,7 +15,7 @@ const TIME_END_US: u64 = 1 << (u64::BITS - TIME_SHIFT);
 
 /// Events in order of arrival, 8 bytes each: time (44 bit, µs), polarity, row, column.
 #[derive(Debug, Default)]
-pub struct EventCache {
+pub(crate) struct EventCache {
     packed: Vec<u64>,
     /// Origin of the times; half of their range is before the first event.
     start_us: u64,
@@ -27,7 +27,7 @@ pub struct EventCache {
 impl EventCache {
     /// Adds the next events, which are on the sensor and in time order, all of them or none: false if there is no space, or
     /// a time is out of range.
-    pub fn add(&mut self, events: &[CdEvent]) -> bool {
+    pub(crate) fn add(&mut self, events: &[CdEvent]) -> bool {
         let (Some(first), Some(last)) = (events.first(), events.last()) else {
             return true;
         };
@@ -58,12 +58,12 @@ impl EventCache {
     }
 
     /// True if no event is older than its predecessor.
-    pub const fn in_order(&self) -> bool {
+    pub(crate) const fn in_order(&self) -> bool {
         !self.in_disorder
     }
 
     /// Calls `each` with consecutive slices of all events, once.
-    pub fn for_each_slice(&self, mut each: impl FnMut(&[CdEvent])) {
+    pub(crate) fn for_each_slice(&self, mut each: impl FnMut(&[CdEvent])) {
         let mut events = Vec::with_capacity(SLICE);
         let start_us = self.start_us;
         for slice in self.packed.chunks(SLICE) {

@@ -84,15 +84,18 @@ pub struct SessionInput {
     pub settings: AnalysisSettings,
 }
 
+/// Why a source could not deliver all events: the source's own error.
+pub type EventSourceError = Box<dyn std::error::Error + Send + Sync>;
+
 /// Source of events. One pass per camera and call; memory stays bounded.
 pub trait EventSource: Sync {
     /// Calls `each` with consecutive slices of all CD events of the camera in stream order, once.
     ///
     /// # Errors
-    /// A message for the user if the stream cannot be read to the end.
+    /// When the stream cannot be read to the end.
     fn for_each_slice(
         &self,
         camera: CameraId,
         each: &mut dyn FnMut(&[CdEvent]),
-    ) -> Result<(), String>;
+    ) -> Result<(), EventSourceError>;
 }

@@ -63,7 +63,7 @@ mod width;
 pub use analyze::{analyze, analyze_with_events};
 pub use error::AnalysisError;
 pub use hash::results_hash;
-pub use input::{Descent, EarlierAttempt, EventSource, SessionInput};
+pub use input::{Descent, EarlierAttempt, EventSource, EventSourceError, SessionInput};
 pub use leg::LegStart;
 pub use press_events::{RetainedPresses, Retention};
 pub use result::{ANALYSIS_VERSION, Analysis};

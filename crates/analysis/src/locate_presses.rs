@@ -12,7 +12,7 @@ use crate::verdict;
 
 /// Observations of one camera, by rows of the plan.
 #[derive(Debug, Clone, Copy)]
-pub struct CameraObservations<'a> {
+pub(crate) struct CameraObservations<'a> {
     pub has_clock: bool,
     pub views: &'a [Option<PressView>],
     /// Rows with lost bytes in their window.
@@ -22,13 +22,13 @@ pub struct CameraObservations<'a> {
 }
 
 /// Every planned press with its verdict, and the geometry that located it.
-pub struct LocatedPresses {
+pub(crate) struct LocatedPresses {
     pub presses: Vec<PressResult>,
     pub calibrated: SessionCalibration,
 }
 
 /// Applies journal, data and rules to the presses, calibrates, and locates all presses.
-pub fn locate_presses(
+pub(crate) fn locate_presses(
     input: &SessionInput,
     seen: [CameraObservations<'_>; 2],
     warnings: &mut Vec<String>,

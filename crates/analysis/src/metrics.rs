@@ -5,7 +5,7 @@
 //! over the locations.
 
 use rayon::prelude::*;
-use skinrig_model::{Point2, SkinOutline};
+use skinrig_model::{Point2, SkinOutline, quantile as sorted_quantile};
 
 use crate::exact;
 use crate::result::{Estimate, Metrics, Penalised};
@@ -281,8 +281,7 @@ fn bootstrap(places: &[LocationErrors], resamples: u32, seed: u64) -> [Option<(f
     })
 }
 
-/// Quantile `q` (0..=1) with linear interpolation between order statistics (type 7 of Hyndman and Fan 1996, numpy's
-/// default); `None` without values. Reorders `values`.
+/// [`sorted_quantile`] of values in any order, in linear time; `None` without values. Reorders `values`.
 pub(crate) fn quantile(values: &mut [f64], q: f64) -> Option<f64> {
     if values.is_empty() {
         return None;
@@ -291,5 +290,5 @@ pub(crate) fn quantile(values: &mut [f64], q: f64) -> Option<f64> {
     let index = position.floor() as usize;
     let (_, &mut low, above) = values.select_nth_unstable_by(index, f64::total_cmp);
     let high = above.iter().copied().min_by(f64::total_cmp).unwrap_or(low);
-    Some(low + (position - index as f64) * (high - low))
+    sorted_quantile(&[low, high], position - index as f64)
 }

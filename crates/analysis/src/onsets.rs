@@ -31,7 +31,7 @@ pub(crate) struct Onset {
 /// In each press the time from the start of the descent to the contact is split where a higher rate from there on is most
 /// likely (Poisson, against the rate before the descent; maximum of `n ln(n / e) - (n - e)` for `n` events where `e` were
 /// expected). Events of an earlier press can only raise the idle rate and delay the onset.
-pub fn onsets(input: &SessionInput, rates: &RateHistogram, clock: &ClockFit) -> Vec<Onset> {
+pub(crate) fn onsets(input: &SessionInput, rates: &RateHistogram, clock: &ClockFit) -> Vec<Onset> {
     let timings = || input.outcomes.iter().flatten().filter_map(|o| o.timing);
     let earlier = input.earlier.iter().filter_map(|e| e.clear);
     let mut clears: Vec<HostTime> = timings().map(|t| t.clear).chain(earlier).collect();

@@ -20,20 +20,20 @@ pub(crate) struct PixelSet {
 
 impl PixelSet {
     /// An empty set over `height` rows.
-    pub fn new(height: usize) -> Self {
+    pub(crate) fn new(height: usize) -> Self {
         Self {
             words: vec![0; height * ROW_WORDS],
         }
     }
 
     /// Empties the set and gives it `height` rows.
-    pub fn reset(&mut self, height: usize) {
+    pub(crate) fn reset(&mut self, height: usize) {
         self.words.clear();
         self.words.resize(height * ROW_WORDS, 0);
     }
 
     /// Adds a pixel of the rows.
-    pub fn insert(&mut self, index: usize) {
+    pub(crate) fn insert(&mut self, index: usize) {
         self.words[index / BITS] |= 1 << (index % BITS);
     }
 
@@ -49,14 +49,14 @@ impl PixelSet {
     }
 
     /// Ranges of 64 indices that cover the set, skipping empty ones.
-    pub fn blocks(&self) -> impl Iterator<Item = Range<usize>> {
+    pub(crate) fn blocks(&self) -> impl Iterator<Item = Range<usize>> {
         let words = self.words.iter().enumerate();
         let occupied = words.filter(|(_, word)| **word != 0);
         occupied.map(|(i, _)| i * BITS..(i + 1) * BITS)
     }
 
     /// The words of one row.
-    pub fn row(&self, row: usize) -> &[u64] {
+    pub(crate) fn row(&self, row: usize) -> &[u64] {
         &self.words[row * ROW_WORDS..(row + 1) * ROW_WORDS]
     }
 }

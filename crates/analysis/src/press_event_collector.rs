@@ -26,7 +26,7 @@ pub(crate) struct PressEventCollector {
 
 impl PressEventCollector {
     /// An empty collector; the plans are sorted by the start of their views.
-    pub const fn new(plans: Vec<RetentionPlan>) -> Self {
+    pub(crate) const fn new(plans: Vec<RetentionPlan>) -> Self {
         Self {
             plans,
             next: 0,
@@ -35,7 +35,7 @@ impl PressEventCollector {
     }
 
     /// Processes the next events in time order. When the memory limit is reached, this press and all later ones are dropped.
-    pub fn take(&mut self, events: &[CdEvent]) {
+    pub(crate) fn take(&mut self, events: &[CdEvent]) {
         for plan in &mut self.plans[self.next..] {
             let view = &mut plan.view;
             let start = events.partition_point(|e| e.t_us < view.start_us);
@@ -70,7 +70,7 @@ impl PressEventCollector {
     }
 
     /// The complete views, without dropped ones.
-    pub fn finish(mut self) -> Vec<RetentionPlan> {
+    pub(crate) fn finish(mut self) -> Vec<RetentionPlan> {
         self.advance(u64::MAX);
         self.plans
     }

@@ -12,7 +12,7 @@ pub(crate) fn timings(input: &SessionInput) -> impl Iterator<Item = (usize, Pres
 }
 
 /// Executed presses in time order.
-pub fn spans(input: &SessionInput) -> Vec<PressSpan> {
+pub(crate) fn spans(input: &SessionInput) -> Vec<PressSpan> {
     let mut spans: Vec<PressSpan> = timings(input)
         .map(|(row, t)| PressSpan {
             contact_us: t.contact.0 as f64 * 1e-3,

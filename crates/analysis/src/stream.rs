@@ -18,11 +18,11 @@ const SIGMAS: f64 = 6.0;
 const MIN_PRESS_S: f64 = 0.5;
 
 /// A silence or press on the camera's clock, µs.
-pub type Span = (u64, u64);
+pub(crate) type Span = (u64, u64);
 
 /// Periods without events although the camera sends noise: before its first event, in between, after its last.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Silences {
+pub(crate) struct Silences {
     /// From time 0 to the first event; `None` if not significant.
     pub before: Option<Span>,
     /// Between events.
@@ -34,7 +34,7 @@ pub struct Silences {
 impl Silences {
     /// Silences of a stream with presses separated by noisy idle times; none without noise. `first_us` and `last_us` are the
     /// camera's times of the first and last planned press.
-    pub fn new(
+    pub(crate) fn new(
         rates: &RateHistogram,
         views: impl Iterator<Item = PressView>,
         (first_us, last_us): (f64, f64),
@@ -76,7 +76,7 @@ impl Silences {
     }
 
     /// All silences.
-    pub fn spans(&self) -> Vec<Span> {
+    pub(crate) fn spans(&self) -> Vec<Span> {
         let ends = self.before.into_iter().chain(self.after);
         self.between.iter().copied().chain(ends).collect()
     }

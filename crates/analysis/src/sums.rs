@@ -5,7 +5,7 @@
 
 /// A running sum and its accumulated rounding error.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Sum {
+pub(crate) struct Sum {
     sum: f64,
     lost: f64,
 }
@@ -13,7 +13,7 @@ pub struct Sum {
 impl Sum {
     /// Adds one term.
     #[inline]
-    pub fn add(&mut self, x: f64) {
+    pub(crate) fn add(&mut self, x: f64) {
         let next = self.sum + x;
         self.lost += if self.sum.abs() >= x.abs() {
             (self.sum - next) + x
@@ -25,7 +25,7 @@ impl Sum {
 
     /// The sum. Infinite or NaN where plain addition is.
     #[must_use]
-    pub fn total(self) -> f64 {
+    pub(crate) fn total(self) -> f64 {
         if self.sum.is_finite() {
             self.sum + self.lost
         } else {

@@ -39,7 +39,7 @@ impl fmt::Display for Untimed {
 
 /// Rows of the plan that the clock of `camera` does not time. `marks`: ties of its clock if there is no time base. Does not
 /// apply to a clock aligned by event rates, whose ties are the presses themselves.
-pub fn rows(
+pub(crate) fn rows(
     input: &SessionInput,
     camera: CameraId,
     base: Option<&TimeBase>,
@@ -71,7 +71,7 @@ pub fn rows(
 }
 
 /// Same for both cameras, from the session alone.
-pub fn of_session(input: &SessionInput) -> [Vec<Option<Untimed>>; 2] {
+pub(crate) fn of_session(input: &SessionInput) -> [Vec<Option<Untimed>>; 2] {
     let base = time_base(input);
     CameraId::ALL.map(|camera| {
         let k = camera.index();

@@ -11,7 +11,11 @@
 //!
 //! Only the journal and the data decide on sync presses; no rule excludes them.
 
-use skinrig_model::{AnalysisSettings, CameraId, PressOutcome, PressRole, PressVerdict, Verdict};
+use std::borrow::Cow;
+
+use skinrig_model::{
+    AnalysisSettings, CameraId, InvalidReason, PressOutcome, PressRole, PressVerdict, Verdict,
+};
 
 use crate::check;
 use crate::result::{Estimate, LocationOutcome, PressCounts, PressResult, PressView};
@@ -35,7 +39,9 @@ impl Judgement {
 
     fn invalid(rule: Rule) -> Self {
         Self {
-            verdict: PressVerdict::Invalid(rule.to_string()),
+            verdict: PressVerdict::Invalid(InvalidReason::Faults {
+                text: rule.to_string(),
+            }),
             rule: Some(rule),
         }
     }
@@ -62,7 +68,9 @@ impl Judgement {
         match self.verdict {
             PressVerdict::Missed(_) | PressVerdict::Invalid(_) => self,
             _ => Self {
-                verdict: PressVerdict::Invalid(format!("not timed: {untimed} ({camera})")),
+                verdict: PressVerdict::Invalid(InvalidReason::Faults {
+                    text: format!("not timed: {untimed} ({camera})"),
+                }),
                 rule: Some(Rule::NotTimed(camera)),
             },
         }
@@ -70,7 +78,7 @@ impl Judgement {
 
     /// Verdict of the journal; its rule is the reason without numbers, except camera numbers.
     fn from_journal(verdict: PressVerdict) -> Self {
-        let rule = verdict.reason().map(Rule::of_journal);
+        let rule = verdict.reason().map(|text| Rule::of_journal(&text));
         Self { verdict, rule }
     }
 }
@@ -215,7 +223,7 @@ pub(crate) fn is_done_as_planned(press: &PressResult) -> bool {
 /// Writes a verdict into a row.
 pub fn put(row: &mut PressResult, judgement: Judgement) {
     row.verdict = judgement.verdict.kind();
-    row.reason = judgement.verdict.reason().map(str::to_owned);
+    row.reason = judgement.verdict.reason().map(Cow::into_owned);
     row.rule = judgement.rule;
 }
 

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use skinrig_analysis::{EventSource, SessionInput, analyze, results_hash};
+use skinrig_analysis::{EventSource, EventSourceError, SessionInput, analyze, results_hash};
 use skinrig_formats::{Geometry, hdf5::Container};
 use skinrig_model::{
     AnalysisSettings, CameraId, CdEvent, Point2, PressRole, RigGeometry, SkinOutline,
@@ -20,16 +20,14 @@ impl EventSource for Recording {
         &self,
         camera: CameraId,
         each: &mut dyn FnMut(&[CdEvent]),
-    ) -> Result<(), String> {
+    ) -> Result<(), EventSourceError> {
         let file = self
             .0
             .join(format!("grid_path2_v2_camera{}.hdf5", camera.number()));
-        let container = Container::open(&file).map_err(|e| e.to_string())?;
-        let mut reader = container
-            .events(None, Geometry::EVK1)
-            .map_err(|e| e.to_string())?;
+        let container = Container::open(&file)?;
+        let mut reader = container.events(None, Geometry::EVK1)?;
         loop {
-            let batch = reader.next_batch().map_err(|e| e.to_string())?;
+            let batch = reader.next_batch()?;
             if batch.is_empty() {
                 return Ok(());
             }

@@ -1,15 +1,17 @@
 //! Names of analyses. A session's own settings give the official one; everything else is a variant with files of its own beside it.
 
+mod summary;
+
 use std::fmt::Write as _;
-use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use skinrig_report::{Summary, Variant};
 
 use crate::exit::Failure;
 use crate::paths::{beside, folder_of};
+
+pub(crate) use self::summary::{SummaryError, summary};
 
 /// Stands before the name of a variant in the names of its files.
 const MARK: &str = ".analysis-";
@@ -17,8 +19,6 @@ const MARK: &str = ".analysis-";
 const RESULTS: &str = ".results.json";
 /// Longest name.
 const MOST_CHARS: usize = 60;
-/// The summary stands so near to the end of a file of results.
-const TAIL_BYTES: u64 = 1 << 16;
 
 /// The results of a session's analysis with this name; `None`: the official one.
 pub(crate) fn results_path(session: &Path, name: Option<&str>) -> PathBuf {
@@ -42,29 +42,42 @@ fn path(session: &Path, name: Option<&str>, ending: &str) -> PathBuf {
     }
 }
 
+/// Why a text is not a name of a variant.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum NameError {
+    /// The name of the session's own analysis.
+    #[error("expected another name: `official` is the analysis with the session's own settings")]
+    Official,
+    /// Too long, or with characters that do not belong in the name of a file.
+    #[error(
+        "expected 1 to {MOST_CHARS} of a-z, 0-9, `.`, `_`, `=`, `-`, a letter or digit first, found `{}`",
+        found.escape_debug()
+    )]
+    Characters {
+        /// The text.
+        found: String,
+    },
+}
+
 /// A name of an analysis, as `--name` and `--analysis` take it.
 ///
 /// # Errors
-/// In words, for what is none.
-pub fn parse(text: &str) -> Result<String, String> {
+/// [`NameError`] for what is none.
+pub(crate) fn parse(text: &str) -> Result<String, NameError> {
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "._=-".contains(c);
     let first = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
     let fits = text.len() <= MOST_CHARS && text.starts_with(first) && text.chars().all(plain);
     match (fits, text) {
-        (true, "official") => Err(
-            "expected another name: `official` is the analysis with the session's own settings"
-                .to_owned(),
-        ),
+        (true, "official") => Err(NameError::Official),
         (true, _) => Ok(text.to_owned()),
-        (false, _) => Err(format!(
-            "expected 1 to {MOST_CHARS} of a-z, 0-9, `.`, `_`, `=`, `-`, a letter or digit first, found `{}`",
-            text.escape_debug()
-        )),
+        (false, _) => Err(NameError::Characters {
+            found: text.to_owned(),
+        }),
     }
 }
 
 /// The name of a variant that nobody named: by what it changes.
-pub fn own_name(changed: &[String], reference_code: bool) -> String {
+pub(crate) fn own_name(changed: &[String], reference_code: bool) -> String {
     let reference = reference_code.then(|| "reference-code".to_owned());
     let words = changed
         .iter()
@@ -103,67 +116,18 @@ pub fn own_name(changed: &[String], reference_code: bool) -> String {
     name
 }
 
-/// What the results of an analysis beside a session say in short, from their last bytes. Those of another session or another analysis
-/// in that place are refused.
-///
-/// # Errors
-/// In words, when there are none or they are not its own.
-pub fn summary(session: &Path, session_id: &str, name: Option<&str>) -> Result<Summary, String> {
-    let found = read_summary(&results_path(session, name)).map_err(|e| match name {
-        Some(name) if e == NOT_THERE => format!("no analysis `{name}`"),
-        _ => e,
-    })?;
-    if found.session_id != session_id {
-        return Err("results of another session lie beside it".to_owned());
-    }
-    match (&found.variant, name) {
-        (None, None) => Ok(found),
-        (Some(variant), Some(name)) if variant.name == name => Ok(found),
-        (Some(variant), _) => Err(format!(
-            "results of the analysis `{}` lie in their place: analyze it again",
-            variant.name
-        )),
-        (None, Some(_)) => Err(
-            "results with the session's own settings lie in their place: analyze it again"
-                .to_owned(),
-        ),
-    }
-}
-
-const NOT_THERE: &str = "not analysed";
-
-fn read_summary(path: &Path) -> Result<Summary, String> {
-    let mut file = std::fs::File::open(path).map_err(|e| match e.kind() {
-        std::io::ErrorKind::NotFound => NOT_THERE.to_owned(),
-        _ => e.to_string(),
-    })?;
-    let older = || "results of an older skinrig: analyze the session again".to_owned();
-    let length = file.metadata().map_err(|e| e.to_string())?.len();
-    let from = SeekFrom::Start(length.saturating_sub(TAIL_BYTES));
-    let mut tail = Vec::new();
-    file.seek(from)
-        .and_then(|_| file.take(TAIL_BYTES).read_to_end(&mut tail))
-        .map_err(|e| e.to_string())?;
-    // A key of the outermost object; within a text of JSON no line ends.
-    let key = b"\n  \"summary\": ";
-    let at = tail.windows(key.len()).position(|w| w == key);
-    let text = &tail[at.ok_or_else(older)? + key.len()..];
-    let mut reader = serde_json::Deserializer::from_slice(text);
-    Summary::deserialize(&mut reader).map_err(|_| older())
-}
-
 /// An analysis that lies beside a session.
-pub struct AnalysisFile {
+pub(crate) struct AnalysisFile {
     /// Its name; `None`: the official one.
     pub name: Option<String>,
     /// Its file of results.
     pub results: PathBuf,
     /// What it says in short, or why that cannot be told.
-    pub summary: Result<Summary, String>,
+    pub summary: Result<Summary, SummaryError>,
 }
 
 /// The analyses beside a session, the official one first, then by name.
-pub fn all(session: &Path, session_id: &str) -> Vec<AnalysisFile> {
+pub(crate) fn all(session: &Path, session_id: &str) -> Vec<AnalysisFile> {
     let listed = |name: Option<String>| AnalysisFile {
         results: results_path(session, name.as_deref()),
         summary: summary(session, session_id, name.as_deref()),
@@ -198,7 +162,7 @@ pub fn all(session: &Path, session_id: &str) -> Vec<AnalysisFile> {
 ///
 /// # Errors
 /// [`Failure::input`] when there is none of that name.
-pub fn variant(session: &Path, session_id: &str, name: &str) -> Result<Variant, Failure> {
+pub(crate) fn variant(session: &Path, session_id: &str, name: &str) -> Result<Variant, Failure> {
     let found = summary(session, session_id, Some(name)).map(|s| s.variant);
     found.ok().flatten().ok_or_else(|| {
         let others: Vec<String> = all(session, session_id).into_iter().filter_map(|a| a.name).collect();

@@ -21,7 +21,7 @@ const ASK_EVERY: Duration = Duration::from_millis(20);
 /// # Errors
 /// [`Failure::input`] when nobody runs it, [`Failure::rig`] when the run does not hear, [`Failure::limit`] when the
 /// request has not had its effect within `--wait`.
-pub fn control(args: &ControlArgs, json: bool) -> Outcome {
+pub(crate) fn control(args: &ControlArgs, json: bool) -> Outcome {
     let session = sessions::find_running(&args.session)?;
     let number = handed(&session, &Request::Control(args.what))?;
     let acknowledged = wait(&session, ACKNOWLEDGE_WITHIN, |live| live.heard >= number)?;
@@ -90,7 +90,7 @@ fn has_effect(what: RunRequest, state: &str) -> bool {
 ///
 /// # Errors
 /// As [`control`].
-pub fn note(args: &NoteArgs, json: bool) -> Outcome {
+pub(crate) fn note(args: &NoteArgs, json: bool) -> Outcome {
     let session = sessions::find_running(&args.session)?;
     let by = match &args.by {
         Some(name) => name.clone(),

@@ -9,6 +9,7 @@ use skinrig_hil::lease::{self, LeaseState};
 use skinrig_omega3::enumerate::{Availability, SERIAL_UNKNOWN};
 use skinrig_omega3::load::LoadError;
 use skinrig_protocol::rig::{RigFile, RigKind};
+use skinrig_text::{Column, Table, widest};
 use skinrig_trigger_box::PortState;
 
 use crate::args::DevicesArgs;
@@ -46,11 +47,17 @@ pub(crate) struct Line {
     pub usb: Option<(u8, u8)>,
 }
 
+impl Line {
+    fn shown_serial(&self) -> &str {
+        self.serial.as_deref().unwrap_or("-")
+    }
+}
+
 /// `skinrig devices`.
 ///
 /// # Errors
 /// [`crate::exit::Failure`] for a rig file that cannot be read. Nothing connected is no error.
-pub fn devices(args: &DevicesArgs, json: bool) -> Outcome {
+pub(crate) fn devices(args: &DevicesArgs, json: bool) -> Outcome {
     let rig = args.rig.as_deref().map(bench::load).transpose()?;
     let lines = survey(rig.as_ref());
     if json {
@@ -78,27 +85,15 @@ fn print(lines: &[Line], rig: Option<&RigFile>) {
     if let Some(rig) = rig {
         outln!("rig       {}", bench::display_name(rig));
     }
-    let width = |of: fn(&Line) -> usize| lines.iter().map(of).max().unwrap_or(0);
-    let what = width(|l| l.what.chars().count());
-    let serial = width(|l| l.serial.as_ref().map_or(1, |s| s.chars().count()));
+    let column = |of: fn(&Line) -> &str| widest(lines.iter().map(of));
+    let (what, serial) = (column(|l| &l.what), column(Line::shown_serial));
+    let table = Table::new([11, what, serial, 13].map(Column::left));
     for l in lines {
-        let role = l
-            .role
-            .as_ref()
-            .map(|r| format!("  [{r}]"))
-            .unwrap_or_default();
-        outln!(
-            "{:<11}  {:<what$}  {:<serial$}  {:<13}{}{role}",
-            l.device,
-            l.what,
-            l.serial.as_deref().unwrap_or("-"),
-            l.state,
-            if l.detail.is_empty() {
-                String::new()
-            } else {
-                format!("  {}", l.detail)
-            }
-        );
+        let role = l.role.as_ref().map(|r| format!("[{r}]"));
+        let first = [l.device, &l.what, l.shown_serial(), l.state];
+        let more = [Some(l.detail.as_str()), role.as_deref()];
+        let more = more.into_iter().flatten().filter(|c| !c.is_empty());
+        outln!("{}", table.row(first.into_iter().chain(more)));
         if let Some(next) = &l.next_step {
             outln!("             next: {next}");
         }

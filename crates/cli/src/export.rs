@@ -18,7 +18,7 @@ use crate::results::{self, Choices, Results};
 ///
 /// # Errors
 /// [`Failure::input`] for an unreadable session; [`Failure::internal`] when a file cannot be written.
-pub fn export(args: &ExportArgs, json: bool) -> Outcome {
+pub(crate) fn export(args: &ExportArgs, json: bool) -> Outcome {
     let reader = SessionReader::open(&args.session).map_err(Failure::session)?;
     let header = reader.header().map_err(Failure::session)?;
     let is_bundle = args.kinds.contains(&ExportKind::Bundle);
@@ -114,7 +114,7 @@ fn files(
     let tabular = |kind: &ExportKind| kind.is_tabular();
     let needed = kinds.iter().any(tabular) && tables.iter().any(|t| t.needs_analysis());
     let results = if needed {
-        let found = results::analyze_session(&args.session, Choices::default());
+        let found = results::analyze_shown(&args.session, Choices::default());
         Some(found.map_err(without_analysis)?)
     } else {
         None
@@ -217,13 +217,13 @@ fn cameras(
 ///
 /// # Errors
 /// [`Failure::input`] for a session that cannot be analysed; [`Failure::internal`] when a file cannot be written.
-pub fn derived(
+pub(crate) fn derived(
     session: &Path,
     reader: &SessionReader,
     header: &RunHeader,
     folder: &Folder,
 ) -> Result<Vec<PathBuf>, Failure> {
-    let mut results = results::analyze_session(session, Choices::default())?;
+    let mut results = results::analyze_shown(session, Choices::default())?;
     // Measured on some machine at some time: it does not follow from the session.
     results.tradeoff = None;
     let (json, html) = results::documents(&results)?;

@@ -15,7 +15,7 @@ use crate::exit::{Exit, Failure, Outcome};
 ///
 /// # Errors
 /// [`Failure::input`] when the file is none of the known kinds or cannot be read to its end.
-pub fn inspect(args: &InspectArgs, as_json: bool) -> Outcome {
+pub(crate) fn inspect(args: &InspectArgs, as_json: bool) -> Outcome {
     if !(args.gap > 0.0 && args.gap.is_finite()) {
         return Err(Failure::input(format!(
             "--gap: expected a time above 0 ms, found {}",

@@ -2,54 +2,67 @@
 //!
 //! The binary is a thin shell over [`main_with`]; whole-system tests use the same modules.
 #[macro_use]
-pub mod terminal;
+mod terminal;
 
 mod analyses;
-pub mod args;
+mod args;
 pub mod check;
-pub mod compare;
-pub mod control;
-pub mod devices;
-pub mod doctor;
+mod compare;
+mod completions;
+mod control;
+mod devices;
+mod doctor;
 pub mod exit;
-pub mod export;
+mod export;
 pub mod fault;
-pub mod hil;
+mod hil;
 mod host;
-pub mod import;
-pub mod inspect;
-pub mod jog;
-pub mod paths;
-pub mod progress;
-pub mod prototypes;
-pub mod provenance;
-pub mod recording;
-pub mod remote;
+mod import;
+mod inspect;
+mod jog;
+mod man;
+mod paths;
+mod phase;
+mod progress;
+mod prototypes;
+mod provenance;
+mod recording;
+mod remote;
 pub mod results;
-pub mod resume;
+mod resume;
 pub mod rig;
-pub mod run;
-pub mod salvage;
-pub mod sample_size;
+mod run;
+mod salvage;
+mod sample_size;
 mod schema;
-pub mod sessions;
-pub mod show;
-pub mod signals;
+mod sessions;
+mod show;
+mod signals;
 pub mod sink;
-pub mod status;
-pub mod supervise;
-pub mod tag;
-pub mod tradeoff;
+mod status;
+mod supervise;
+mod tag;
+mod tradeoff;
 mod tradeoff_file;
-pub mod verify;
-pub mod version;
-pub mod watch;
+mod verify;
+mod version;
+mod watch;
 mod whole_file;
 
 use std::ffi::OsString;
 
+use clap::Parser;
+
 use crate::args::{Cli, Command};
 use crate::exit::{Exit, Outcome};
+
+/// Parses these words (the first is the program's name) and runs nothing.
+///
+/// # Errors
+/// What clap finds wrong with them; help and version are such an error too.
+pub fn parse(words: &[&str]) -> Result<(), clap::Error> {
+    Cli::try_parse_from(words).map(|_| ())
+}
 
 /// Runs the program with these arguments (the first is its own name) and says how it ended.
 pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> Exit {
@@ -114,6 +127,8 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Export(a) => export::export(a, json),
         Command::Inspect(a) => inspect::inspect(a, json),
         Command::Schema(a) => schema::schema(a),
+        Command::Completions(a) => completions::completions(a),
+        Command::Man(a) => man::man(a, json),
         Command::SuperviseArm => supervise::supervise(),
         Command::HoldArm(a) => hil::hold::hold(a),
     }

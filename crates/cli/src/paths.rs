@@ -7,7 +7,7 @@ use chrono::{DateTime, Utc};
 use crate::exit::Failure;
 
 /// The ending of every session file.
-pub const SESSION_SUFFIX: &str = ".session.sqlite";
+pub(crate) const SESSION_SUFFIX: &str = ".session.sqlite";
 
 /// A new session's path in `folder` (made when missing): `<UTC time>-<protocol>-<prototype>.session.sqlite`,
 /// with a number when that name is taken.
@@ -43,7 +43,7 @@ pub(crate) fn new_session(
 
 /// The file beside `session` with another ending, for example `.report.html`.
 #[must_use]
-pub fn beside(session: &Path, suffix: &str) -> PathBuf {
+pub(crate) fn beside(session: &Path, suffix: &str) -> PathBuf {
     let name = session
         .file_name()
         .map(|n| n.to_string_lossy().into_owned())
@@ -54,7 +54,7 @@ pub fn beside(session: &Path, suffix: &str) -> PathBuf {
 
 /// The folder of a session; the present one for a bare name.
 #[must_use]
-pub fn folder_of(session: &Path) -> &Path {
+pub(crate) fn folder_of(session: &Path) -> &Path {
     let folder = session.parent().filter(|p| !p.as_os_str().is_empty());
     folder.unwrap_or(Path::new("."))
 }

@@ -28,7 +28,7 @@ enum Display {
 impl ProgressView {
     /// A view for a run that should take `expected` of rig time; a bar when standard error is a terminal.
     #[must_use]
-    pub fn new(presses: usize, expected: HostDuration) -> Self {
+    pub(crate) fn new(presses: usize, expected: HostDuration) -> Self {
         let display = if std::io::stderr().is_terminal() {
             let bar = ProgressBar::with_draw_target(
                 Some(presses as u64),
@@ -54,7 +54,7 @@ impl ProgressView {
 
     /// A view for a further leg of a session, as [`new`](Self::new).
     #[must_use]
-    pub fn resumed(
+    pub(crate) fn resumed(
         presses: &[PlannedPress],
         histories: &[PressHistory],
         wanted: &[bool],
@@ -70,12 +70,12 @@ impl ProgressView {
 
     /// The run as of the last record.
     #[must_use]
-    pub const fn progress(&self) -> &Progress {
+    pub(crate) const fn progress(&self) -> &Progress {
         self.tracker.progress()
     }
 
     /// Writes lines above the bar.
-    pub fn say(&self, text: &str) {
+    pub(crate) fn say(&self, text: &str) {
         match &self.display {
             Display::Bar(bar) => bar.suspend(|| errln!("{text}")),
             Display::Lines { .. } => errln!("{text}"),
@@ -83,7 +83,7 @@ impl ProgressView {
     }
 
     /// Takes the next record.
-    pub fn update(&mut self, record: &Record) {
+    pub(crate) fn update(&mut self, record: &Record) {
         self.tracker.update(record);
         let done = self.tracker.progress().done;
         let waited = self.began.elapsed();
@@ -115,7 +115,7 @@ impl ProgressView {
     }
 
     /// Takes the bar away; what was shown as lines stays.
-    pub fn finish(&mut self) {
+    pub(crate) fn finish(&mut self) {
         if let Display::Bar(bar) = &self.display {
             bar.finish_and_clear();
         }

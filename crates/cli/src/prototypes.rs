@@ -7,11 +7,12 @@ use serde::Serialize;
 use skinrig_analysis::result::Estimate;
 use skinrig_recorder::{SessionState, SessionSummary, list};
 use skinrig_report::Variant;
+use skinrig_text::{Column, Table};
 
 use crate::analyses::summary;
 use crate::args::PrototypesArgs;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::sessions::{clip, copies, originals};
+use crate::sessions::{copies, originals};
 
 /// Sessions in a sparkline, the last ones.
 const SPARKS: usize = 16;
@@ -59,7 +60,7 @@ struct Prototype {
 ///
 /// # Errors
 /// [`Failure::input`] when the folder cannot be read, or has no session of the prototype that was named.
-pub fn prototypes(args: &PrototypesArgs, json: bool) -> Outcome {
+pub(crate) fn prototypes(args: &PrototypesArgs, json: bool) -> Outcome {
     let mut sessions = list(&args.folder).map_err(Failure::session)?;
     if let Some(wanted) = &args.prototype {
         crate::sessions::of_prototype(&args.folder, wanted)?;
@@ -106,7 +107,7 @@ fn gather(sessions: &[SessionSummary], analysis: Option<&str>) -> Vec<Prototype>
                 (None, Some("no scored press located".to_owned()))
             }
             Ok(found) => (Some(found.rmse_mm), None),
-            Err(why) => (None, Some(why.clone())),
+            Err(why) => (None, Some(why.to_string())),
         };
         let (variant, overrides) =
             found.map_or_else(|_| (None, Vec::new()), |f| (f.variant, f.overrides));
@@ -145,15 +146,27 @@ fn gather(sessions: &[SessionSummary], analysis: Option<&str>) -> Vec<Prototype>
 }
 
 fn print(all: &[Prototype], each: bool) {
+    let table = Table::new([
+        Column::left(18).clipped(),
+        Column::left(22).clipped(),
+        Column::left(9).clipped(),
+        Column::right(8),
+        Column::left(16),
+        Column::left(20),
+        Column::left(20),
+    ]);
     outln!(
-        "{:<18}  {:<22}  {:<9}  {:>8}  {:<16}  {:<20}  {:<20}  trend",
-        "prototype",
-        "protocol",
-        "rig",
-        "sessions",
-        "last (UTC)",
-        "best RMSE, mm",
-        "last RMSE, mm"
+        "{}",
+        table.row([
+            "prototype",
+            "protocol",
+            "rig",
+            "sessions",
+            "last (UTC)",
+            "best RMSE, mm",
+            "last RMSE, mm",
+            "trend"
+        ])
     );
     for prototype in all {
         for (i, series) in prototype.series.iter().enumerate() {
@@ -165,17 +178,17 @@ fn print(all: &[Prototype], each: bool) {
                 .iter()
                 .filter_map(|p| p.rmse_mm?.value)
                 .collect();
-            outln!(
-                "{:<18}  {:<22}  {:<9}  {:>8}  {:<16}  {:<20}  {:<20}  {}",
-                clip(name, 18),
-                clip(protocol, 22),
-                clip(&series.rig_kind, 9),
-                series.points.len(),
-                minute(last),
-                interval(series.best),
-                interval(series.last),
-                sparkline(&rmse[rmse.len().saturating_sub(SPARKS)..])
-            );
+            let row = table.row([
+                name,
+                protocol,
+                &series.rig_kind,
+                &series.points.len().to_string(),
+                &minute(last),
+                &interval(series.best),
+                &interval(series.last),
+                &sparkline(&rmse[rmse.len().saturating_sub(SPARKS)..]),
+            ]);
+            outln!("{row}");
             if each {
                 series.points.iter().for_each(print_point);
             } else {
@@ -203,11 +216,9 @@ fn print_point(point: &Point) {
         [] => String::new(),
         _ => format!("  [{}]", point.tags.join(" ")),
     };
-    outln!(
-        "  {:<16}  {found:<20}  {}{tags}",
-        minute(&point.started_at),
-        name.to_string_lossy()
-    );
+    let table = Table::new([Column::left(16), Column::left(20)]).indent(2);
+    let file = format!("{}{tags}", name.to_string_lossy());
+    outln!("{}", table.row([minute(&point.started_at), found, file]));
     print_changes("    ", point);
 }
 

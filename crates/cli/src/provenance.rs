@@ -3,7 +3,7 @@
 use crate::rig::bench::TOLERATED;
 use chrono::DateTime;
 use skinrig_analysis::Analysis;
-use skinrig_model::{HostTime, PressVerdict, RunEnd, RunHeader, Setting};
+use skinrig_model::{HostTime, PressVerdict, RunHeader, Setting};
 use skinrig_recorder::{RecorderError, SessionReader};
 use skinrig_report::{DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakeRow};
 use skinrig_results::Origin;
@@ -12,7 +12,7 @@ use skinrig_results::Origin;
 ///
 /// # Errors
 /// [`RecorderError`] when the session cannot be read.
-pub fn provenance(
+pub(crate) fn provenance(
     reader: &SessionReader,
     header: &RunHeader,
     analysis: &Analysis,
@@ -36,10 +36,7 @@ pub fn provenance(
             }),
         ),
         Some((_, end)) => {
-            let reason = match &end {
-                RunEnd::Completed => None,
-                RunEnd::Stopped(r) | RunEnd::Faulted(r) => Some(r.clone()),
-            };
+            let reason = end.reason().map(str::to_owned);
             (end.name().to_owned(), reason)
         }
     };
@@ -137,9 +134,9 @@ fn legs(reader: &SessionReader, header: &RunHeader) -> Result<Vec<LegRow>, Recor
         Some(apart.as_seconds_f64() - ran_s)
     };
     let end = |i: usize| match &rows[i].end {
-        Some((_, end)) => match end {
-            RunEnd::Completed => end.name().to_owned(),
-            RunEnd::Stopped(why) | RunEnd::Faulted(why) => format!("{}: {why}", end.name()),
+        Some((_, end)) => match end.reason() {
+            None => end.name().to_owned(),
+            Some(why) => format!("{}: {why}", end.name()),
         },
         None if i + 1 == rows.len() && skinrig_recorder::writer_of(reader.path()).is_some() => {
             "under way".to_owned()
@@ -168,13 +165,11 @@ fn retaken(reader: &SessionReader) -> Result<Vec<RetakeRow>, RecorderError> {
             if verdict == Some(&PressVerdict::Valid) {
                 continue;
             }
-            let reason = verdict
-                .and_then(PressVerdict::reason)
-                .unwrap_or("no outcome");
+            let reason = verdict.and_then(PressVerdict::reason);
             rows.push(RetakeRow {
                 press: planned.id.number(),
                 attempt: attempt.id.number,
-                reason: reason.to_owned(),
+                reason: reason.unwrap_or("no outcome".into()).into_owned(),
             });
         }
     }

@@ -34,7 +34,7 @@ impl SessionRecording {
     ///
     /// # Errors
     /// [`RecorderError`] when it cannot be read.
-    pub fn open(path: &Path, header: &RunHeader) -> Result<Self, RecorderError> {
+    pub(crate) fn open(path: &Path, header: &RunHeader) -> Result<Self, RecorderError> {
         let reader = SessionReader::open(path)?;
         let [one, two] = CameraId::ALL;
         // A session that was cut off has no end; nothing of interest is long after its last command.

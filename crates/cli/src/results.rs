@@ -11,7 +11,9 @@ use skinrig_results::{AlignedSession, AnalyzedSession, Session};
 use crate::analyses;
 use crate::args::{AnalyzeArgs, ReportArgs};
 use crate::exit::{Exit, Failure, Outcome};
+use crate::phase::Phase;
 use crate::terminal::Output;
+use crate::tradeoff_file::TradeoffFileError;
 
 /// The results of one session.
 pub struct Results {
@@ -24,7 +26,7 @@ pub struct Results {
     /// Where they come from.
     pub provenance: Provenance,
     /// The tradeoff that lies beside the session, or why it cannot be read.
-    pub tradeoff: Option<Result<Tradeoff, String>>,
+    pub tradeoff: Option<Result<Tradeoff, TradeoffFileError>>,
 }
 
 impl Results {
@@ -37,7 +39,7 @@ impl Results {
             tradeoff: self
                 .tradeoff
                 .as_ref()
-                .map(|t| t.as_ref().map_err(String::as_str)),
+                .map(|t| t.as_ref().map_err(|e| e as _)),
         }
     }
 }
@@ -91,6 +93,21 @@ pub(crate) fn open(
 /// [`Failure::input`] for files that are no readable session or settings that do not parse.
 pub fn analyze_session(path: &Path, choices: Choices<'_>) -> Result<Results, Failure> {
     let (aligned, variant) = open(path, choices)?;
+    complete(path, aligned, variant)
+}
+
+/// As [`analyze_session`], with its progress on the terminal.
+pub(crate) fn analyze_shown(path: &Path, choices: Choices<'_>) -> Result<Results, Failure> {
+    let (aligned, variant) = open(path, choices)?;
+    let _phase = Phase::reading("analysing", aligned.events.bytes_read());
+    complete(path, aligned, variant)
+}
+
+fn complete(
+    path: &Path,
+    aligned: AlignedSession,
+    variant: Option<Variant>,
+) -> Result<Results, Failure> {
     let AnalyzedSession {
         session,
         legs,
@@ -126,6 +143,16 @@ pub(crate) fn write_results(
     write(&json_path, json.as_bytes())?;
     write(&html_path, html.as_bytes())?;
     Ok((json_path, html_path))
+}
+
+/// As [`write_results`], with its phase on the terminal.
+pub(crate) fn write_shown(
+    results: &Results,
+    json_path: Option<&Path>,
+    html_path: Option<&Path>,
+) -> Result<(PathBuf, PathBuf), Failure> {
+    let _phase = Phase::begin("writing the report");
+    write_results(results, json_path, html_path)
 }
 
 /// The results as JSON and the report.
@@ -228,14 +255,14 @@ pub fn analyze(args: &AnalyzeArgs, output: Output) -> Outcome {
         reference_code: args.reference_code,
         name: args.name.as_deref(),
     };
-    let results = analyze_session(&args.session, choices)?;
+    let results = analyze_shown(&args.session, choices)?;
     if let (Some(variant), Some(out)) = (&results.provenance.variant, &args.out) {
         let official = analyses::results_path(&args.session, None);
         not_official(&official, out, variant)?;
     }
     let html = args.out.as_ref().map(|out| out.with_extension("html"));
     let older = replaced(&results, args.out.as_deref());
-    let paths = write_results(&results, args.out.as_deref(), html.as_deref())?;
+    let paths = write_shown(&results, args.out.as_deref(), html.as_deref())?;
     older.iter().for_each(|note| errln!("{note}"));
     print_results(&results, output, &paths);
     check_limit(&results, args.max_rmse)
@@ -290,9 +317,9 @@ pub fn report(args: &ReportArgs, json: bool) -> Outcome {
         reference_code: v.reference_code,
         name: Some(&v.name),
     });
-    let results = analyze_session(&args.session, choices)?;
+    let results = analyze_shown(&args.session, choices)?;
     let older = replaced(&results, None);
-    let paths = write_results(&results, None, args.out.as_deref())?;
+    let paths = write_shown(&results, None, args.out.as_deref())?;
     older.iter().for_each(|note| errln!("{note}"));
     if json {
         crate::terminal::print_json(&serde_json::json!({ "report": paths.1, "results": paths.0 }));

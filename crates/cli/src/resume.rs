@@ -46,7 +46,7 @@ struct UnfinishedSession {
 ///
 /// # Errors
 /// [`Failure`] with the code that says what kind.
-pub fn resume(args: &ResumeArgs, command_line: &str, output: Output) -> Outcome {
+pub(crate) fn resume(args: &ResumeArgs, command_line: &str, output: Output) -> Outcome {
     let operator = Operator::listen().map_err(Failure::internal)?;
     let session = &args.session;
     // From here on nobody else writes it, and it is what was recorded.
@@ -115,11 +115,9 @@ fn refusal(error: RecorderError) -> Failure {
 
 /// Every press has its outcome, and how the run ended is in the session: that is not made a better end afterwards.
 fn nothing_left(session: &Path, end: &RunEnd) -> String {
-    let reason = match end {
-        RunEnd::Completed => "completed".to_owned(),
-        RunEnd::Stopped(reason) | RunEnd::Faulted(reason) => {
-            format!("{}: {reason}", end.name())
-        }
+    let reason = match end.reason() {
+        None => end.name().to_owned(),
+        Some(reason) => format!("{}: {reason}", end.name()),
     };
     format!(
         "{0}: expected presses left to make, found none; the run ended {reason}\n  next: resolve that, then `skinrig analyze {0}`",
@@ -266,15 +264,9 @@ fn go_on(
         .with_notes(notes)
         .with_faults(FaultInjector::new(&args.faults));
     let settings = bench::settings(&rig.kind);
-    let run = Run::with_settings(
-        &rest,
-        found.header.clone(),
-        rig,
-        operator.control(),
-        &mut sink,
-        settings,
-    );
-    let report = run
+    let session_header = found.header.clone();
+    let report = Run::new(&rest, session_header, rig, operator.control(), &mut sink)
+        .with_settings(settings)
         .checked(preflight)
         .resumed(Resume {
             header,

@@ -3,9 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use chrono::{DateTime, SecondsFormat, Utc};
-use skinrig_controller::{
-    ControllerError, Preflight, Problem, Run, RunReport, SinkFault, execute_checked,
-};
+use skinrig_controller::{ControllerError, Preflight, Problem, Run, RunReport, SinkFault};
 use skinrig_device::Rig;
 use skinrig_model::{
     AnalysisSettings, CameraId, HostDuration, HostTime, InterruptionKind, PressRole, PressVerdict,
@@ -30,7 +28,7 @@ use crate::terminal::Output;
 use skinrig_results::RigDocument;
 
 /// What is to be recorded, before the rig adds what it knows.
-pub struct Intent<'a> {
+pub(crate) struct Intent<'a> {
     /// The protocol or schedule, byte for byte.
     pub text: &'a str,
     /// Its file name.
@@ -64,7 +62,7 @@ pub struct Intent<'a> {
 ///
 /// # Errors
 /// [`Failure::internal`] when the session cannot be made. A rig or recorder fault during the run is in the report.
-pub fn record(
+pub(crate) fn record(
     intent: &Intent<'_>,
     plan: &Plan,
     mut rig: Rig,
@@ -100,13 +98,12 @@ pub fn record(
     if intent.known.scheduled {
         settings.camera_lag = None;
     }
-    let report = match preflight {
-        Some(mut preflight) => {
-            preflight.caller_checks.insert(0, gates::recorder(&path));
-            execute_checked(plan, header, rig, control, &mut sink, preflight, settings)
-        }
-        None => Run::with_settings(plan, header, rig, control, &mut sink, settings).execute(),
-    };
+    let mut run = Run::new(plan, header, rig, control, &mut sink).with_settings(settings);
+    if let Some(mut preflight) = preflight {
+        preflight.caller_checks.insert(0, gates::recorder(&path));
+        run = run.checked(preflight);
+    }
+    let report = run.execute();
     close(sink, path, report, operator)
 }
 
@@ -225,7 +222,7 @@ fn header(
 ///
 /// # Errors
 /// [`Failure`] with the code that says what kind.
-pub fn run(args: &RunArgs, command_line: &str, output: Output) -> Outcome {
+pub(crate) fn run(args: &RunArgs, command_line: &str, output: Output) -> Outcome {
     // Before any device is opened: from then on a robot may be live.
     let operator = Operator::listen().map_err(Failure::internal)?;
     let (session, report) = match (&args.replay, &args.protocol) {
@@ -244,7 +241,7 @@ pub fn run(args: &RunArgs, command_line: &str, output: Output) -> Outcome {
 ///
 /// # Errors
 /// [`Failure`] with the code that says what kind.
-pub fn conclude(
+pub(crate) fn conclude(
     session: &Path,
     report: &RunReport,
     no_analysis: bool,
@@ -318,7 +315,7 @@ fn cost_by_the_rig(session: &Path) -> Result<Option<String>, Failure> {
         .filter(|((press, _), wanted)| *wanted && press.role != PressRole::Sync)
         .map(|((press, known), _)| {
             let reason = known.verdict.as_ref().and_then(PressVerdict::reason);
-            format!("{}: {}", press.id, reason.unwrap_or("no verdict"))
+            format!("{}: {}", press.id, reason.unwrap_or("no verdict".into()))
         })
         .collect();
     if cost.is_empty() {
@@ -352,8 +349,8 @@ fn go_on(session: &Path) -> String {
 }
 
 fn analyse(session: &Path, max_rmse_mm: Option<f64>, output: Output) -> Outcome {
-    let results = results::analyze_session(session, results::Choices::default())?;
-    let written = results::write_results(&results, None, None)?;
+    let results = results::analyze_shown(session, results::Choices::default())?;
+    let written = results::write_shown(&results, None, None)?;
     results::print_results(&results, output, &written);
     results::check_limit(&results, max_rmse_mm)
 }

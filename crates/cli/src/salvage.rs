@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use skinrig_recorder::{SESSION_SUFFIX, SalvageReport, salvage as bring_back};
+use skinrig_text::{Column, Table};
 
 use crate::args::SalvageArgs;
 use crate::exit::{Exit, Failure, Outcome};
@@ -11,7 +12,7 @@ use crate::exit::{Exit, Failure, Outcome};
 ///
 /// # Errors
 /// [`Failure::input`] when nothing of a session is found or the new file exists; [`Failure::limit`] when something is lost.
-pub fn salvage(args: &SalvageArgs, json: bool) -> Outcome {
+pub(crate) fn salvage(args: &SalvageArgs, json: bool) -> Outcome {
     let to = args.out.clone().unwrap_or_else(|| beside(&args.session));
     let report = bring_back(&args.session, &to).map_err(Failure::session)?;
     if json {
@@ -43,13 +44,15 @@ fn beside(session: &Path) -> PathBuf {
 }
 
 fn print(report: &SalvageReport) {
-    outln!("{:<16}  {:>9}  {:>9}", "table", "rows back", "missing");
+    let columns = Table::new([Column::left(16), Column::right(9), Column::right(9)]);
+    outln!("{}", columns.row(["table", "rows back", "missing"]));
     for table in &report.tables {
         let missing = match table.missing {
             0 => "-".to_owned(),
             n => n.to_string(),
         };
-        outln!("{:<16}  {:>9}  {missing:>9}", table.name, table.rows);
+        let rows = table.rows.to_string();
+        outln!("{}", columns.row([&table.name, &rows, &missing]));
     }
     for lost in &report.lost {
         let chunks = if lost.first_seq == lost.last_seq {

@@ -7,7 +7,7 @@ use crate::exit::{Exit, Outcome};
 ///
 /// # Errors
 /// None; the schemas are built in.
-pub fn schema(args: &SchemaArgs) -> Outcome {
+pub(crate) fn schema(args: &SchemaArgs) -> Outcome {
     let schema = match args.kind {
         SchemaKind::Protocol => skinrig_protocol::schema_json(),
         SchemaKind::Schedule => skinrig_protocol::schedule_schema_json(),

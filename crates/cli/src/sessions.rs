@@ -7,6 +7,7 @@ use std::time::SystemTime;
 use skinrig_recorder::{
     SESSION_SUFFIX, SessionReader, SessionState, SessionSummary, list, writer_of,
 };
+use skinrig_text::{Column, Table, cut};
 
 use crate::args::SessionsArgs;
 use crate::exit::{Exit, Failure, Outcome};
@@ -15,7 +16,7 @@ use crate::exit::{Exit, Failure, Outcome};
 ///
 /// # Errors
 /// [`Failure::input`] when the folder cannot be read.
-pub fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
+pub(crate) fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
     let mut found = list(&args.folder).map_err(Failure::session)?;
     if let Some(wanted) = &args.prototype {
         found.retain(|s| s.prototype() == Some(wanted));
@@ -29,17 +30,28 @@ pub fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
         outln!("no sessions in {}", args.folder.display());
         return Ok(Exit::Ok);
     }
+    let table = Table::new([
+        Column::left(19),
+        Column::left(14).clipped(),
+        Column::left(22).clipped(),
+        Column::left(24).clipped(),
+        Column::right(13),
+        Column::right(8),
+    ]);
     outln!(
-        "{:<19}  {:<14}  {:<22}  {:<24}  {:>13}  {:>8}  file",
-        "started (UTC)",
-        "prototype",
-        "protocol",
-        "rig",
-        "valid/planned",
-        "MB"
+        "{}",
+        table.row([
+            "started (UTC)",
+            "prototype",
+            "protocol",
+            "rig",
+            "valid/planned",
+            "MB",
+            "file"
+        ])
     );
     for session in &found {
-        outln!("{}", line(session));
+        outln!("{}", line(&table, session));
     }
     Ok(Exit::Ok)
 }
@@ -48,7 +60,7 @@ pub fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
 ///
 /// # Errors
 /// [`Failure::input`] when there is none, or when several are being written.
-pub fn find(place: &Path) -> Result<PathBuf, Failure> {
+pub(crate) fn find(place: &Path) -> Result<PathBuf, Failure> {
     if !place.is_dir() {
         return Ok(place.to_owned());
     }
@@ -155,7 +167,7 @@ pub(crate) fn originals(all: &[SessionSummary]) -> Vec<&SessionSummary> {
 
 /// A remark on every copy that `originals` leaves out.
 #[must_use]
-pub fn copies(all: &[SessionSummary]) -> Vec<String> {
+pub(crate) fn copies(all: &[SessionSummary]) -> Vec<String> {
     let mut remarks = Vec::new();
     for copies in by_id(all).values() {
         let Some(kept) = stands_for(copies) else {
@@ -203,7 +215,7 @@ fn written(session: &Path) -> Option<SystemTime> {
     at(session).max(at(Path::new(&log)))
 }
 
-fn line(session: &SessionSummary) -> String {
+fn line(table: &Table, session: &SessionSummary) -> String {
     let name = session.path.file_name();
     let file = name
         .map(|n| n.to_string_lossy().into_owned())
@@ -242,24 +254,15 @@ fn line(session: &SessionSummary) -> String {
             if let Some(problem) = tags_problem {
                 said += &format!("  tags unreadable: {problem}");
             }
-            format!(
-                "{:<19}  {:<14}  {:<22}  {:<24}  {:>13}  {:>8.1}  {file}{state}{said}",
-                started_at.chars().take(19).collect::<String>(),
-                clip(prototype, 14),
-                clip(protocol, 22),
-                clip(rig_name, 24),
-                format!("{}/{}", presses.valid, presses.planned),
-                session.size_bytes as f64 / 1e6,
-            )
+            table.row([
+                cut(started_at, 19),
+                prototype,
+                protocol,
+                rig_name,
+                &format!("{}/{}", presses.valid, presses.planned),
+                &format!("{:.1}", session.size_bytes as f64 / 1e6),
+                &format!("{file}{state}{said}"),
+            ])
         }
-    }
-}
-
-/// At most `width` characters of `text`.
-pub(crate) fn clip(text: &str, width: usize) -> String {
-    if text.chars().count() <= width {
-        text.to_owned()
-    } else {
-        text.chars().take(width - 1).chain(['…']).collect()
     }
 }

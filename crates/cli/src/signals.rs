@@ -14,12 +14,17 @@ static PRESSED: AtomicU8 = AtomicU8::new(0);
 
 /// The operator at this terminal, with a hand on the run from before the first device is opened. Clones are the same one.
 #[derive(Clone)]
-pub struct Operator {
+pub(crate) struct Operator {
     control: ControlHandle,
     over: Arc<AtomicBool>,
     asked: Arc<AtomicBool>,
     of_suite: bool,
 }
+
+/// The system refused the handler of signals, or its thread.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot listen for ctrl-C: {0}")]
+pub(crate) struct SignalError(#[from] std::io::Error);
 
 /// What ctrl-C is answered with, once, twice and three times.
 type Words = [&'static str; 3];
@@ -41,7 +46,7 @@ impl Operator {
     ///
     /// # Errors
     /// As `on_ctrl_c`.
-    pub fn listen() -> Result<Self, String> {
+    pub(crate) fn listen() -> Result<Self, SignalError> {
         Self::answering(OF_RUN, false)
     }
 
@@ -49,11 +54,11 @@ impl Operator {
     ///
     /// # Errors
     /// As [`on_ctrl_c`].
-    pub(crate) fn of_suite() -> Result<Self, String> {
+    pub(crate) fn of_suite() -> Result<Self, SignalError> {
         Self::answering(OF_SUITE, true)
     }
 
-    fn answering(words: Words, of_suite: bool) -> Result<Self, String> {
+    fn answering(words: Words, of_suite: bool) -> Result<Self, SignalError> {
         let flag = || Arc::new(AtomicBool::new(false));
         let (control, over, asked) = (ControlHandle::new(), flag(), flag());
         let (hand, is_over, is_asked) = (control.clone(), Arc::clone(&over), Arc::clone(&asked));
@@ -85,13 +90,13 @@ impl Operator {
 
     /// The hand on the run.
     #[must_use]
-    pub const fn control(&self) -> &ControlHandle {
+    pub(crate) const fn control(&self) -> &ControlHandle {
         &self.control
     }
 
     /// Whether ctrl-C was pressed, or the system asked for an end.
     #[must_use]
-    pub fn asked(&self) -> bool {
+    pub(crate) fn asked(&self) -> bool {
         self.asked.load(Ordering::SeqCst)
     }
 
@@ -104,17 +109,15 @@ impl Operator {
 /// Calls `react` with 1, 2, 3, ... each time ctrl-C is pressed, from a thread of its own, until the program ends.
 ///
 /// # Errors
-/// A message when the system refuses the thread or the handler.
-pub(crate) fn on_ctrl_c(react: impl Fn(u8) + Send + 'static) -> Result<(), String> {
-    let refused = |e: std::io::Error| format!("cannot listen for ctrl-C: {e}");
+/// When the system refuses the thread or the handler.
+pub(crate) fn on_ctrl_c(react: impl Fn(u8) + Send + 'static) -> Result<(), SignalError> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_io()
-        .build()
-        .map_err(refused)?;
+        .build()?;
     // Registered here, so that no signal finds the program without a handler once this returns.
     let mut signals = {
         let _inside = runtime.enter();
-        Signals::new().map_err(refused)?
+        Signals::new()?
     };
     std::thread::Builder::new()
         .name("ctrl-c".into())
@@ -127,9 +130,8 @@ pub(crate) fn on_ctrl_c(react: impl Fn(u8) + Send + 'static) -> Result<(), Strin
                     react(pressed);
                 }
             });
-        })
-        .map(drop)
-        .map_err(refused)
+        })?;
+    Ok(())
 }
 
 /// What asks for an end, each with the count of ctrl-C that it is at least.

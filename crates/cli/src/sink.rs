@@ -16,7 +16,7 @@ use crate::rig::gates;
 
 /// What the rig cannot know about its presses, but an import or the replay of one can.
 #[derive(Debug, Clone, Default)]
-pub struct ReplayExpectations {
+pub(crate) struct ReplayExpectations {
     /// Times and positions come from a schedule; nothing was measured.
     pub scheduled: bool,
     /// When each scheduled press happens, each moment as the time since its attempt began. The controller sees its poses
@@ -65,7 +65,11 @@ pub(crate) struct SessionSink {
 impl SessionSink {
     /// A sink over a new session.
     #[must_use]
-    pub fn new(writer: SessionWriter, view: ProgressView, known: ReplayExpectations) -> Self {
+    pub(crate) fn new(
+        writer: SessionWriter,
+        view: ProgressView,
+        known: ReplayExpectations,
+    ) -> Self {
         Self {
             writer,
             view,
@@ -115,7 +119,7 @@ impl SessionSink {
     ///
     /// # Errors
     /// [`RecorderError`]; the session stays readable.
-    pub fn seal(mut self) -> Result<Sealed, RecorderError> {
+    pub(crate) fn seal(mut self) -> Result<Sealed, RecorderError> {
         self.view.finish();
         self.fault_injector.before_the_seal()?;
         self.writer.finish_with_notice(|| errln!("{HELD_OPEN}"))
@@ -169,7 +173,7 @@ impl RecordSink for SessionSink {
             _ => {}
         }
         if let Record::Preflight(checks) = &record {
-            self.view.say(&gates::table(checks));
+            self.view.say(&gates::report(checks));
         }
         self.fault_injector.before(&record)?;
         if let Record::Ended { t, .. } = &record {

@@ -21,13 +21,14 @@ const LAST: usize = 5;
 ///
 /// # Errors
 /// [`Failure::input`] when there is no readable session.
-pub fn status(args: &StatusArgs, as_json: bool) -> Outcome {
+pub(crate) fn status(args: &StatusArgs, as_json: bool) -> Outcome {
     let session = sessions::find(&args.session)?;
     // The writer first: a run that ends in between has then left its end in the file.
     let writer = writer_of(&session);
     let (live, silence) = match ask(&session, &Request::Status) {
         Ok(Reply::Live(live)) => (Some(live), None),
-        Ok(Reply::Refused(why)) | Err(RemoteError::Failed(why)) => (None, Some(why)),
+        Ok(Reply::Refused(why)) => (None, Some(why)),
+        Err(RemoteError::Failed(why)) => (None, Some(why.to_string())),
         Ok(Reply::Handed(_)) | Err(RemoteError::NotListening) => (None, None),
     };
     let filed = match filed(&session) {
@@ -87,10 +88,7 @@ fn filed(session: &Path) -> Result<Value, RecorderError> {
         .iter()
         .map(|n| json!([n.t.as_secs_f64(), n.text]))
         .collect();
-    let reason = end.as_ref().and_then(|end| match end {
-        RunEnd::Completed => None,
-        RunEnd::Stopped(r) | RunEnd::Faulted(r) => Some(r.as_str()),
-    });
+    let reason = end.as_ref().and_then(RunEnd::reason);
     Ok(json!({
         "id": reader.session_id()?, "sealed": reader.seal()?.is_some(),
         "started_at": header.started_at, "prototype": header.prototype, "operator": header.operator,

@@ -6,7 +6,7 @@ use crate::exit::{Exit, Failure, Outcome};
 ///
 /// # Errors
 /// [`Failure::rig`] when the arm could not be braked: it may be live.
-pub fn supervise() -> Outcome {
+pub(crate) fn supervise() -> Outcome {
     let ended = skinrig_omega3::supervisor::supervise(
         std::io::stdin(),
         std::io::stdout(),

@@ -14,7 +14,7 @@ use crate::exit::{Exit, Failure, Outcome};
 ///
 /// # Errors
 /// [`Failure::input`] for what is no tag, no session, or no log of it.
-pub fn tag(args: &TagArgs, json: bool) -> Outcome {
+pub(crate) fn tag(args: &TagArgs, json: bool) -> Outcome {
     // As `show`: which session of a folder is meant is not to be guessed, for what is said of it stays.
     let session = args.session.clone();
     let session_id = SessionReader::open(&session)
@@ -52,7 +52,7 @@ pub fn tag(args: &TagArgs, json: bool) -> Outcome {
 
 /// The tags, in order; `-` without any.
 #[must_use]
-pub fn words(all: &Annotations) -> String {
+pub(crate) fn words(all: &Annotations) -> String {
     let tags: Vec<&str> = all.tags.iter().map(String::as_str).collect();
     match tags[..] {
         [] => "-".to_owned(),

@@ -10,6 +10,7 @@ use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use skinrig_model::text::{is_hidden, visible};
+use skinrig_text::starts_with_style;
 
 /// How a command presents its result.
 #[derive(Debug, Clone, Copy, Default)]
@@ -22,11 +23,6 @@ pub struct Output {
 
 static OUTPUT_FAILED: AtomicBool = AtomicBool::new(false);
 
-/// What this program writes itself to colour its own words, and no other sequence: no text can hide, move or erase anything with them.
-const STYLES: [&str; 10] = [
-    "[0m", "[1m", "[2m", "[32m", "[33m", "[34m", "[36m", "[1;31m", "[1;32m", "[1;35m",
-];
-
 /// `text` with everything written out that a terminal would obey, but for the colours of this program.
 fn harmless(text: &str) -> Cow<'_, str> {
     if !text.contains(is_hidden) {
@@ -35,8 +31,12 @@ fn harmless(text: &str) -> Cow<'_, str> {
     let mut parts = text.split('\u{1b}');
     let mut out = visible(parts.next().unwrap_or_default()).into_owned();
     for part in parts {
-        let style = STYLES.iter().any(|style| part.starts_with(style));
-        out.push_str(if style { "\u{1b}" } else { "\\u{1b}" });
+        // No text can hide, move or erase anything with our own styles.
+        out.push_str(if starts_with_style(part) {
+            "\u{1b}"
+        } else {
+            "\\u{1b}"
+        });
         out.push_str(&visible(part));
     }
     Cow::Owned(out)
@@ -49,7 +49,7 @@ pub(crate) fn is_coloured(stream: &impl IsTerminal) -> bool {
 }
 
 /// Writes to standard output.
-pub fn out(text: Arguments<'_>) {
+pub(crate) fn out(text: Arguments<'_>) {
     let mut out = std::io::stdout().lock();
     let text = text.to_string();
     if let Err(e) = out
@@ -62,7 +62,7 @@ pub fn out(text: Arguments<'_>) {
 }
 
 /// Writes to standard error; there is nowhere to report a fault of it.
-pub fn err(text: Arguments<'_>) {
+pub(crate) fn err(text: Arguments<'_>) {
     let text = text.to_string();
     let _ = std::io::stderr()
         .lock()

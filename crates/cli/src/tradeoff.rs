@@ -10,6 +10,7 @@ use skinrig_results::Origin;
 use crate::analyses::tradeoff_path;
 use crate::args::{CostKind, TradeoffArgs};
 use crate::exit::{Exit, Failure, Outcome};
+use crate::phase::Phase;
 use crate::results::{Choices, not_official, open, write};
 use crate::tradeoff_file::FORMAT;
 
@@ -53,6 +54,36 @@ fn recommendations<'a>(result: &'a Tradeoff, args: &TradeoffArgs) -> Vec<Recomme
     target.into_iter().chain(budget).collect()
 }
 
+/// An answer with what it was chosen for, and the lines of the protocol that select it. `own` says what a variant changes.
+fn print_answer(answer: &Recommendation<'_>, own: Option<&str>) {
+    outln!("{}:", answer.question);
+    let Some(row) = answer.row else {
+        outln!("  none of the choices tried\n");
+        return;
+    };
+    let name = match own {
+        _ if !row.overrides.is_empty() => label(&row.choice),
+        Some(own) => own.to_owned(),
+        None => "the session's own settings".to_owned(),
+    };
+    let bound = |bound: Option<f64>| bound.map_or("-".to_owned(), |mm| format!("{mm:.2}"));
+    let rmse = &row.rmse_mm;
+    outln!(
+        "  {name}: RMSE {} mm, 95 % interval [{}, {}], n {}; {:.3} ms of CPU time per press\n",
+        bound(rmse.value),
+        bound(rmse.low),
+        bound(rmse.high),
+        rmse.n,
+        row.cpu_us * 1e-3
+    );
+    if !row.overrides.is_empty() {
+        protocol_lines(row)
+            .lines()
+            .for_each(|line| outln!("  {line}"));
+        outln!("");
+    }
+}
+
 const fn cost_name(cost: CostKind) -> &'static str {
     match cost {
         CostKind::Cpu => "CPU time",
@@ -76,7 +107,7 @@ fn rig_in_words(header: &RunHeader) -> String {
 /// # Errors
 /// What keeps a session from being analysed, files that cannot be written, and [`Failure::limit`] when nothing meets
 /// a demand.
-pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
+pub(crate) fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
     let choices = Choices {
         overrides: &args.overrides,
         reference_code: false,
@@ -98,7 +129,9 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
         repeats: args.repeats,
         least_located: args.min_located.map(|percent| percent / 100.0),
     };
+    let phase = Phase::reading("measuring every choice", aligned.events.bytes_read());
     let measured = measure(&aligned.input, &aligned.events, plan, &mut thread_cpu_s);
+    drop(phase);
     let result = measured.map_err(|e| match e {
         AnalysisError::Invalid(_) => Failure::limit(e),
         other => Failure::input(other),
@@ -131,28 +164,16 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
         document["files"] = serde_json::json!({ "page": html_path, "results": json_path });
         crate::terminal::print_json(&document);
     } else {
+        let own = variant.as_ref().map(|v| v.changed.join(", "));
+        recommendations
+            .iter()
+            .for_each(|a| print_answer(a, own.as_deref()));
         let table = terminal_table(
             &result,
             &rig,
             crate::terminal::is_coloured(&std::io::stdout()),
         );
         crate::terminal::out(format_args!("{table}"));
-        for answer in &recommendations {
-            outln!("\n{}:", answer.question);
-            match answer.row {
-                None => outln!("  none of the choices tried"),
-                Some(row) if row.overrides.is_empty() => match &variant {
-                    None => outln!("  the session's own settings"),
-                    Some(variant) => outln!("  {}", variant.changed.join(", ")),
-                },
-                Some(row) => {
-                    outln!("  {}\n", label(&row.choice));
-                    for line in protocol_lines(row).lines() {
-                        outln!("  {line}");
-                    }
-                }
-            }
-        }
         outln!("\npage     {}", html_path.display());
         outln!("results  {}", json_path.display());
     }

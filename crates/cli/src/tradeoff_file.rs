@@ -1,6 +1,8 @@
 //! The file of a tradeoff beside a session.
 
-use std::path::Path;
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use skinrig_analysis::tradeoff::Tradeoff;
@@ -8,32 +10,67 @@ use skinrig_analysis::tradeoff::Tradeoff;
 use crate::analyses::tradeoff_path;
 
 /// Values of the document's `format` and `format_version`.
-pub const FORMAT: (&str, u32) = ("skinrig-tradeoff", 1);
+pub(crate) const FORMAT: (&str, u32) = ("skinrig-tradeoff", 1);
 
-/// The tradeoff that an earlier `skinrig tradeoff` left beside a session: `None` where there is none, and why it cannot be read.
-pub(crate) fn beside_session(session: &Path) -> Option<Result<Tradeoff, String>> {
-    let path = tradeoff_path(session, None).with_extension("json");
-    let text = match std::fs::read_to_string(&path) {
-        Ok(text) => text,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return None,
-        Err(e) => return Some(Err(format!("{}: {e}", path.display()))),
-    };
-    let parsed = serde_json::from_str::<Document>(&text).map_err(|e| e.to_string());
-    let fits = parsed.and_then(|d| {
-        if (d.format.as_str(), d.format_version) == FORMAT {
-            Ok(d.tradeoff)
-        } else {
-            Err(format!("found {} version {}", d.format, d.format_version))
-        }
-    });
-    Some(fits.map_err(|found| {
+/// Why the tradeoff beside a session cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum TradeoffFileError {
+    /// The file cannot be read.
+    #[error("{}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Error of the operating system.
+        source: io::Error,
+    },
+    /// The file is not such a document.
+    #[error("{}", Self::anew(path, source))]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// Error of the parser.
+        source: serde_json::Error,
+    },
+    /// The document has another format or version.
+    #[error("{}", Self::anew(path, &format_args!("found {format} version {version}")))]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        format: String,
+        /// Its version.
+        version: u32,
+    },
+}
+
+impl TradeoffFileError {
+    fn anew(path: &Path, found: &dyn fmt::Display) -> String {
         format!(
             "{}: expected {} version {}, {found}; next: `skinrig tradeoff` writes it anew",
             path.display(),
             FORMAT.0,
             FORMAT.1
         )
-    }))
+    }
+}
+
+/// The tradeoff that an earlier `skinrig tradeoff` left beside a session: `None` where there is none, and why it cannot be read.
+pub(crate) fn beside_session(session: &Path) -> Option<Result<Tradeoff, TradeoffFileError>> {
+    let path = tradeoff_path(session, None).with_extension("json");
+    let text = match std::fs::read_to_string(&path) {
+        Ok(text) => text,
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return None,
+        Err(source) => return Some(Err(TradeoffFileError::Read { path, source })),
+    };
+    Some(match serde_json::from_str::<Document>(&text) {
+        Err(source) => Err(TradeoffFileError::Parse { path, source }),
+        Ok(d) if (d.format.as_str(), d.format_version) == FORMAT => Ok(d.tradeoff),
+        Ok(d) => Err(TradeoffFileError::Version {
+            path,
+            format: d.format,
+            version: d.format_version,
+        }),
+    })
 }
 
 /// What is read of the document again.

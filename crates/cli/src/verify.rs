@@ -9,13 +9,14 @@ use skinrig_recorder::{RecorderError, SessionReader, verify as recheck};
 use crate::args::SessionArg;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::export;
+use crate::phase::Phase;
 use skinrig_results::Rescan;
 
 /// Recomputes everything in a session, and holds the files of a bundle against its manifest.
 ///
 /// # Errors
 /// [`Failure::input`] for a file that is no session and a folder that is no bundle; [`Failure::limit`] when something does not match.
-pub fn verify(args: &SessionArg, json: bool) -> Outcome {
+pub(crate) fn verify(args: &SessionArg, json: bool) -> Outcome {
     if args.session.is_dir() {
         return bundle(&args.session, json);
     }
@@ -145,7 +146,9 @@ fn session(path: &Path, json: bool) -> Outcome {
     if let Err(e @ RecorderError::NotASession { .. }) = SessionReader::open(path) {
         return Err(Failure::session(e));
     }
+    let phase = Phase::begin("checking every byte");
     let report = recheck(path, &mut Rescan::default()).map_err(Failure::session)?;
+    drop(phase);
     let name = path.display();
     if json {
         crate::terminal::print_json(&serde_json::json!({

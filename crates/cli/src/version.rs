@@ -1,7 +1,8 @@
 //! Which build of skinrig this is: in sessions, nights and reports, and in `skinrig --version`.
 
 /// Version, commit and, where the sources were changed since, a digest of the changes: `0.1.0 (commit 0123abcd)`.
-pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("SKINRIG_BUILD"), ")");
+pub(crate) const VERSION: &str =
+    concat!(env!("CARGO_PKG_VERSION"), " (", env!("SKINRIG_BUILD"), ")");
 
 /// The same with the program's name.
 pub(crate) const SOFTWARE: &str = concat!(

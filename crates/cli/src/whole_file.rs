@@ -13,7 +13,7 @@ const PARTIAL: &str = ".partial-";
 ///
 /// # Errors
 /// What the system says; then nothing of it is left behind, and what was at `path` is still there.
-pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+pub(crate) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     remove_left_over(path);
     let (partial, mut file) = own(path)?;
     let written = file

@@ -47,20 +47,20 @@ pub(crate) struct Attempt<'a> {
 
 impl Attempt<'_> {
     /// Error vector in mm; `None` for a press that does not count.
-    pub fn error(&self) -> Option<(f64, f64)> {
+    pub(crate) fn error(&self) -> Option<(f64, f64)> {
         let valid = self.press.verdict == Verdict::Valid;
         self.press.error_mm().filter(|_| valid)
     }
 
     /// Error length in mm; `None` for a press that does not count.
-    pub fn error_mm(&self) -> Option<f64> {
+    pub(crate) fn error_mm(&self) -> Option<f64> {
         self.error().map(|(x, y)| libm::hypot(x, y))
     }
 }
 
 impl Locations {
     /// Collects the locations and the shared depths of `subjects`.
-    pub fn of(subjects: &[Subject]) -> Self {
+    pub(crate) fn of(subjects: &[Subject]) -> Self {
         let mut locations = Self::default();
         for press in subjects.iter().flat_map(scored) {
             let next = locations.at.len() as u32;
@@ -80,12 +80,12 @@ impl Locations {
     }
 
     /// Planned position of a location.
-    pub fn at(&self, location: u32) -> Point2 {
+    pub(crate) fn at(&self, location: u32) -> Point2 {
         self.at[location as usize]
     }
 
     /// Number of locations.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.at.len()
     }
 
@@ -95,7 +95,10 @@ impl Locations {
     }
 
     /// Attempted scored presses of `subject` at the shared depths.
-    pub fn attempts<'a>(&'a self, subject: &'a Subject) -> impl Iterator<Item = Attempt<'a>> {
+    pub(crate) fn attempts<'a>(
+        &'a self,
+        subject: &'a Subject,
+    ) -> impl Iterator<Item = Attempt<'a>> {
         let depth = |p: &PressResult| {
             self.depths
                 .iter()
@@ -120,7 +123,7 @@ impl Locations {
     }
 
     /// Locations that both `subjects` attempted.
-    pub fn shared(&self, subjects: [&Subject; 2]) -> BTreeSet<u32> {
+    pub(crate) fn shared(&self, subjects: [&Subject; 2]) -> BTreeSet<u32> {
         let [a, b] = subjects.map(|s| {
             self.attempts(s)
                 .map(|p| p.location)

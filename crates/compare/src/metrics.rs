@@ -120,7 +120,7 @@ impl Metric {
 
     /// Display format of its values.
     #[must_use]
-    pub const fn display_format(self) -> DisplayFormat {
+    pub(crate) const fn display_format(self) -> DisplayFormat {
         let (scale, unit, digits) = match self {
             Self::LocatedRate | Self::WithinRate => (100.0, "%", 1),
             Self::Latency | Self::LatencyWidth => (1.0, "ms", 1),

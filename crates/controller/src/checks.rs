@@ -1,18 +1,9 @@
-//! The preflight: checks of rig and devices before the robot is powered.
+//! The preflight's settings, and its checks of a device's identity and settings.
 
-use skinrig_device::DeviceError;
-use skinrig_model::pulse::{LOOPBACK, decode_marks};
 use skinrig_model::{
-    CameraId, CheckKind, DeviceIdentity, DeviceRole, HostDuration, PreflightCheck, RawChunk,
-    Record, Setting, TriggerEdge,
+    CameraId, CheckKind, DeviceIdentity, DeviceRole, HostDuration, PreflightCheck, Setting,
 };
 use skinrig_protocol::rig::RigFile;
-
-use crate::error::{ControllerError, Halt};
-use crate::executor::{Collect, Executor};
-
-/// How often to send the test mark before the line counts as broken: one damaged train must not cost a night.
-const ATTEMPTS: u32 = 4;
 
 /// Checks to make before the robot is powered.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -47,79 +38,6 @@ pub struct Loopback {
     pub channels: [u8; 2],
     /// Longest time from sending until the bytes of both cameras reach the host.
     pub within: HostDuration,
-}
-
-/// Data from the cameras during the preflight.
-#[derive(Debug, Default)]
-pub(crate) struct StreamProbe {
-    edges: [Vec<TriggerEdge>; 2],
-    first_us: [Option<u64>; 2],
-    last_us: [Option<u64>; 2],
-}
-
-impl StreamProbe {
-    pub(crate) fn observe(&mut self, chunk: &RawChunk) {
-        let i = chunk.camera.index();
-        self.edges[i].extend_from_slice(&chunk.triggers);
-        for t_us in [chunk.facts.first_us, chunk.facts.last_us]
-            .into_iter()
-            .flatten()
-        {
-            self.first_us[i].get_or_insert(t_us);
-            self.last_us[i] = Some(t_us);
-        }
-    }
-
-    fn advances(&self, camera: CameraId) -> bool {
-        let i = camera.index();
-        matches!((self.first_us[i], self.last_us[i]), (Some(a), Some(b)) if b > a)
-    }
-
-    /// True if the loop-back mark, and no other mark, arrived on `channel`.
-    fn saw_mark(&self, camera: CameraId, channel: u8) -> bool {
-        let marks = decode_marks(&self.on(camera, channel)).marks;
-        !marks.is_empty() && marks.iter().all(|m| m.mark == LOOPBACK)
-    }
-
-    fn on(&self, camera: CameraId, channel: u8) -> Vec<TriggerEdge> {
-        let edges = self.edges[camera.index()].iter().copied();
-        edges.filter(|e| e.channel == channel).collect()
-    }
-
-    /// Description of the edges on `channel` and elsewhere.
-    fn describe(&self, camera: CameraId, channel: u8) -> String {
-        let here = self.on(camera, channel);
-        let mut channels: Vec<u8> = self.edges[camera.index()]
-            .iter()
-            .map(|e| e.channel)
-            .collect();
-        channels.sort_unstable();
-        channels.dedup();
-        channels.retain(|c| *c != channel);
-        let decoded = decode_marks(&here);
-        let what = match decoded.marks.as_slice() {
-            [] if here.is_empty() => format!("no edge on channel {channel}"),
-            [] => format!(
-                "no mark on channel {channel}, but {} edges: {} periodic trains, {} edges of no train",
-                here.len(),
-                decoded.syncs.len(),
-                decoded.stray_edges
-            ),
-            marks if marks.iter().all(|m| m.mark == LOOPBACK) => "the mark".to_owned(),
-            [first, ..] => {
-                let n = decoded.marks.len();
-                format!(
-                    "{n} marks, the first `{}` of {}",
-                    first.mark.kind, first.mark.press
-                )
-            }
-        };
-        if channels.is_empty() {
-            what
-        } else {
-            format!("{what}; edges on channel {channels:?}")
-        }
-    }
 }
 
 impl ExpectedDevice {
@@ -200,188 +118,52 @@ pub fn differing(settings: &[Setting]) -> impl Iterator<Item = &Setting> {
     written.filter(|s| !same(&s.requested, &s.read_back))
 }
 
-impl Executor<'_> {
-    /// Checks identity and read-back settings of a device.
-    pub(crate) fn check_device(
-        &mut self,
-        role: DeviceRole,
-        identity: &DeviceIdentity,
-        settings: &[Setting],
-    ) {
-        let Some(preflight) = &self.preflight else {
-            return;
-        };
-        let wanted = preflight.expected.iter().find(|e| e.role == role);
-        let mut checks = identity_checks(role, wanted, identity);
-        for (name, value) in wanted.iter().flat_map(|w| &w.settings) {
-            let found = settings.iter().find(|s| s.name == *name);
-            checks.push(
-                PreflightCheck::new(
-                    format!("{role}: {name}"),
-                    value.as_str(),
-                    found.map_or("not reported", |s| s.read_back.as_str()),
-                    found.is_some_and(|s| same(value, &s.read_back)),
-                    "find out what changed, or accept the value in the rig file after testing it",
-                )
-                .about(CheckKind::ReadBack(role)),
-            );
-        }
-        if role != DeviceRole::TriggerBox {
-            checks.push(read_back(role, settings));
-        }
-        if role == DeviceRole::Indenter {
-            let told = settings.iter().find(|s| s.name == "initialised");
-            checks.push(match told {
-                Some(s) => PreflightCheck::new(
-                    "indenter: initialised",
-                    "true",
-                    s.read_back.as_str(),
-                    s.read_back == "true",
-                    "initialise the robot by hand (calibration pole into the pit), or see docs/how-to/bench.md",
-                )
-                .about(CheckKind::State(role)),
-                None => PreflightCheck::skipped(
-                    "indenter: initialised",
-                    "true",
-                    "not reported by this robot",
-                ),
-            });
-        }
-        self.checks.extend(checks);
-    }
-
-    /// Checks, with the cameras streaming, that both clocks advance and a mark arrives through both.
-    pub(crate) fn check_streams(&mut self) -> Result<(), Halt> {
-        let Some(preflight) = self.preflight.clone() else {
-            return Ok(());
-        };
-        self.watch = Some(StreamProbe::default());
-        let answer = self.watch_streams(&preflight);
-        self.watch = None;
-        answer
-    }
-
-    fn watch_streams(&mut self, preflight: &Preflight) -> Result<(), Halt> {
-        if let Some(within) = preflight.clocks_within {
-            self.watch_until(within, |w| CameraId::ALL.into_iter().all(|c| w.advances(c)))?;
-            for camera in CameraId::ALL {
-                let watch = self.watch.as_ref();
-                let times = watch.map_or((None, None), |w| {
-                    (w.first_us[camera.index()], w.last_us[camera.index()])
-                });
-                let found = match times {
-                    (Some(a), Some(b)) => format!("from {a} to {b} us"),
-                    _ => "no time".to_owned(),
-                };
-                self.checks.push(
-                    PreflightCheck::new(
-                        format!("{camera}: clock"),
-                        format!("advancing within {}", seconds(within)),
-                        found,
-                        watch.is_some_and(|w| w.advances(camera)),
-                        "power-cycle the camera; a slave camera needs its master's sync line",
-                    )
-                    .about(CheckKind::Clock(DeviceRole::of_camera(camera))),
-                );
-            }
-        }
-        let Some(loopback) = preflight.loopback else {
-            return Ok(());
-        };
-        if self.trigger_box.is_none() {
-            return Ok(());
-        }
-        let seen = |w: &StreamProbe| {
-            CameraId::ALL
-                .into_iter()
-                .all(|c| w.saw_mark(c, loopback.channels[c.index()]))
-        };
-        let mut attempts = 0;
-        while attempts < ATTEMPTS && !self.watch.as_ref().is_some_and(seen) {
-            attempts += 1;
-            self.send_loopback()?;
-            let share = HostDuration(loopback.within.0 / i64::from(ATTEMPTS));
-            self.watch_until(share, seen)?;
-        }
-        for camera in CameraId::ALL {
-            let channel = loopback.channels[camera.index()];
-            let watch = self.watch.as_ref();
-            self.checks.push(PreflightCheck::new(
-                format!("{camera}: trigger loop-back"),
-                format!(
-                    "the mark on channel {channel} within {}",
-                    seconds(loopback.within)
-                ),
-                watch.map_or_else(String::new, |w| {
-                    let found = w.describe(camera, channel);
-                    match attempts {
-                        1 => found,
-                        n => format!("{found}; {n} marks were sent"),
-                    }
-                }),
-                watch.is_some_and(|w| w.saw_mark(camera, channel)),
-                "check the trigger cable, its channel in the rig file, and levels (docs/how-to/bench.md)",
+/// All checks of a configured device: its identity, required values and settings read back, and the robot's state.
+pub(crate) fn device_checks(
+    role: DeviceRole,
+    wanted: Option<&ExpectedDevice>,
+    identity: &DeviceIdentity,
+    settings: &[Setting],
+) -> Vec<PreflightCheck> {
+    let mut checks = identity_checks(role, wanted, identity);
+    for (name, value) in wanted.iter().flat_map(|w| &w.settings) {
+        let found = settings.iter().find(|s| s.name == *name);
+        checks.push(
+            PreflightCheck::new(
+                format!("{role}: {name}"),
+                value.as_str(),
+                found.map_or("not reported", |s| s.read_back.as_str()),
+                found.is_some_and(|s| same(value, &s.read_back)),
+                "find out what changed, or accept the value in the rig file after testing it",
             )
-            .about(CheckKind::Trigger(DeviceRole::of_camera(camera))));
-        }
-        Ok(())
+            .about(CheckKind::ReadBack(role)),
+        );
     }
-
-    /// Sends the test mark as soon as the line is free; the box may be sending its own train.
-    fn send_loopback(&mut self) -> Result<(), Halt> {
-        let until = self.now() + self.settings.mark_within;
-        while let Some(trigger) = &mut self.trigger_box {
-            match trigger.send(LOOPBACK) {
-                Ok(sent) => {
-                    let train = trigger.capabilities().train_duration;
-                    self.hold_line(sent.t + train);
-                    break;
-                }
-                Err(DeviceError::Pending { .. }) => self.tick(None)?,
-                Err(DeviceError::State { .. }) if self.now() < until => self.tick(Some(until))?,
-                Err(e) => return Err(ControllerError::from(e).into()),
-            }
-        }
-        Ok(())
+    if role != DeviceRole::TriggerBox {
+        checks.push(read_back(role, settings));
     }
-
-    /// Polls the cameras until `done`, or until `within` has passed.
-    fn watch_until(
-        &mut self,
-        within: HostDuration,
-        done: impl Fn(&StreamProbe) -> bool,
-    ) -> Result<(), Halt> {
-        let until = self.now() + within;
-        while !self.watch.as_ref().is_some_and(&done) && self.now() < until {
-            self.tick(Some(until))?;
-            // A chunk may take long to fill.
-            self.collect(Collect::Flush)?;
-        }
-        Ok(())
+    if role == DeviceRole::Indenter {
+        checks.push(initialised(settings));
     }
+    checks
+}
 
-    /// Emits the checks. If one failed, or a device failed meanwhile, nothing is armed.
-    pub(crate) fn conclude_preflight(&mut self, result: Result<(), Halt>) -> Result<(), Halt> {
-        if self.preflight.is_none() {
-            return result;
-        }
-        let mut checks = std::mem::take(&mut self.checks);
-        if let Err(Halt::Fault(e)) = &result {
-            checks.push(PreflightCheck::new(
-                "devices",
-                "every device answers, fits the plan and keeps its settings",
-                e.to_string(),
-                false,
-                "`skinrig devices` shows what is connected",
-            ));
-        }
-        let failed: Vec<PreflightCheck> = checks.iter().filter(|c| c.failed()).cloned().collect();
-        self.journal.emit(Record::Preflight(checks))?;
-        result?;
-        if failed.is_empty() {
-            return Ok(());
-        }
-        Err(ControllerError::Preflight { failed }.into())
+/// Checks that the robot is initialised, if it reports that.
+fn initialised(settings: &[Setting]) -> PreflightCheck {
+    match settings.iter().find(|s| s.name == "initialised") {
+        Some(s) => PreflightCheck::new(
+            "indenter: initialised",
+            "true",
+            s.read_back.as_str(),
+            s.read_back == "true",
+            "initialise the robot by hand (calibration pole into the pit), or see docs/how-to/bench.md",
+        )
+        .about(CheckKind::State(DeviceRole::Indenter)),
+        None => PreflightCheck::skipped(
+            "indenter: initialised",
+            "true",
+            "not reported by this robot",
+        ),
     }
 }
 
@@ -403,11 +185,6 @@ fn read_back(role: DeviceRole, settings: &[Setting]) -> PreflightCheck {
         "power-cycle the device and try again",
     )
     .about(CheckKind::ReadBack(role))
-}
-
-/// `2 s`, without trailing zeros.
-fn seconds(t: HostDuration) -> String {
-    format!("{} s", t.as_secs_f64())
 }
 
 /// Equal as texts, or as numbers in single precision.

@@ -1,13 +1,7 @@
-//! Continuity of the camera streams: their time keeps pace with the host's, their data reach the end of each press, and the event rate
-//! stays below its limit. A press with faulty data is repeated.
+//! Continuity of a camera stream: its time keeps pace with the host's, and its data are complete up to a known time.
 
 use skinrig_device::DeviceError;
-use skinrig_model::{CameraId, HostDuration, HostTime, RawChunk, Record};
-
-use crate::error::{ControllerError, Halt};
-use crate::executor::{Collect, Executor};
-use crate::press::cleared_at;
-use crate::press_fault::PressFault;
+use skinrig_model::{HostDuration, HostTime, RawChunk};
 
 /// Largest drift between two clocks, parts per million: far beyond any quartz.
 const DRIFT_PPM: i64 = 1_000;
@@ -102,109 +96,9 @@ impl Continuity {
     }
 }
 
-impl Executor<'_> {
-    /// Checks the time of a chunk. Late data are noted, and the verdict on a press waits for them. A forward jump of the
-    /// camera's clock ends the run, because later presses could not be placed in time. When resumed, the session gets a new clock
-    /// for what follows.
-    pub(crate) fn follow_stream(&mut self, chunk: &RawChunk) -> Result<(), ControllerError> {
-        let Some(limit) = self.settings.camera_lag else {
-            return Ok(());
-        };
-        let camera = chunk.camera;
-        match self.continuity[camera.index()].observe(chunk, limit) {
-            StreamTiming::InStep => Ok(()),
-            StreamTiming::Stepped(us) => Err(ControllerError::ClockStep {
-                camera,
-                limit,
-                found: HostDuration(us * 1_000),
-            }),
-            StreamTiming::Late(us) => {
-                let text = format!(
-                    "{camera}: expected data within {limit}, found them {} late",
-                    HostDuration(us * 1_000)
-                );
-                let t = chunk.host_time;
-                self.journal.emit(Record::Note { t, text })
-            }
-        }
-    }
-
-    /// Waits, up to a limit, until both cameras have delivered their data of the press, so that losses are known before the
-    /// verdict.
-    pub(crate) fn await_streams(&mut self) -> Result<(), Halt> {
-        if self.settings.camera_lag.is_none() {
-            return Ok(());
-        }
-        let end = self.end_of_press();
-        let within = self.settings.data_within;
-        self.collect(Collect::Flush)?;
-        // A camera that never completes a flush is a fault.
-        while !self.is_flushed_to(end)
-            || self.first_behind(end).is_some() && self.now() < end + within
-        {
-            self.tick(None)?;
-            self.collect(Collect::Flush)?;
-        }
-        for camera in CameraId::ALL {
-            let reached = self.continuity[camera.index()].reached();
-            if reached.is_none_or(|t| t < end) {
-                let late = PressFault::DataLate {
-                    camera,
-                    end,
-                    waited: within,
-                    reached,
-                };
-                self.with_open(|open| open.data_faults.push(late));
-            }
-        }
-        Ok(())
-    }
-
-    /// Whether both cameras have delivered everything up to `t`.
-    pub(crate) fn is_flushed_to(&self, t: HostTime) -> bool {
-        self.continuity.iter().all(|c| c.is_flushed_to(t))
-    }
-
-    /// A camera whose stream has not reached `end`.
-    fn first_behind(&self, end: HostTime) -> Option<CameraId> {
-        let behind = |c: &CameraId| {
-            let reached = self.continuity[c.index()].reached();
-            reached.is_none_or(|t| t < end)
-        };
-        CameraId::ALL.into_iter().find(behind)
-    }
-
-    /// Time at which the tip was clear again; the current time if it never was.
-    fn end_of_press(&self) -> HostTime {
-        let cleared = self.open.as_ref().and_then(cleared_at);
-        cleared.unwrap_or_else(|| self.now())
-    }
-
-    /// Compares the event rates of the current press with the limit of the plan, if it has one.
-    pub(crate) fn check_event_rate(&mut self) {
-        let Some(level) = self.plan.suspend.event_rate.map(|t| t.trip) else {
-            return;
-        };
-        let now = self.now();
-        self.with_open(|open| {
-            let seconds = (now - open.began).as_secs_f64().max(1e-3);
-            for camera in CameraId::ALL {
-                let rate = open.events[camera.index()] as f64 / seconds;
-                if rate > level {
-                    open.data_faults.push(PressFault::EventStorm {
-                        camera,
-                        level_ev_s: level,
-                        found_ev_s: rate,
-                    });
-                }
-            }
-        });
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use skinrig_model::ChunkFacts;
+    use skinrig_model::{CameraId, ChunkFacts};
 
     use super::*;
 

@@ -77,7 +77,7 @@ impl<'a> GuardedIndenter<'a> {
 
     /// Adds a floor; upward motion is always allowed.
     #[must_use]
-    pub const fn with_floor(mut self, floor: Option<Floor>) -> Self {
+    pub(crate) const fn with_floor(mut self, floor: Option<Floor>) -> Self {
         self.floor = floor;
         self
     }
@@ -85,6 +85,11 @@ impl<'a> GuardedIndenter<'a> {
     /// Identity of the robot.
     pub fn identity(&self) -> DeviceIdentity {
         self.inner.identity()
+    }
+
+    /// Pose of the frame in which targets and poses are given.
+    pub(crate) const fn robot_from_skin(&self) -> &RigidTransform<Robot, Skin> {
+        &self.robot_from_skin
     }
 
     /// Capabilities of the robot.

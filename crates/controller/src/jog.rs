@@ -26,7 +26,7 @@ const TRACE_EVERY: HostDuration = HostDuration::from_millis(100);
 const RETRACT_MM: f64 = 10.0;
 
 /// Returns true once the operator wants everything to stop.
-pub type StopCheck<'a> = &'a dyn Fn() -> bool;
+pub(crate) type StopCheck<'a> = &'a dyn Fn() -> bool;
 
 /// A manually moved robot. Dropping it holds, retracts and disarms.
 pub struct Jog<'a> {
@@ -200,7 +200,8 @@ impl<'a> Jog<'a> {
                     tolerance_mm: self.limits.position_tolerance_mm,
                     target,
                     allowed,
-                    found: self.indenter.position().map(|p| p.measured),
+                    max_force_n: self.limits.max_force_n,
+                    found: self.indenter.position(),
                 }
                 .into());
             }

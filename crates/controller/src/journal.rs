@@ -1,10 +1,14 @@
-//! Passes records to the sink and keeps the tally: every planned press ends with exactly one outcome.
+//! Passes records to the sink and keeps the tally: every planned press ends with exactly one outcome. Buffers pose samples.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use skinrig_model::{AttemptId, PressHistory, PressId, PressOutcome, PressVerdict, Record};
+use skinrig_model::{
+    AttemptId, HostDuration, HostTime, PoseSample, PressHistory, PressId, PressOutcome,
+    PressVerdict, Record,
+};
 
 use crate::error::{ControllerError, Problem};
+use crate::settings::ControllerSettings;
 use crate::sink::{RecordSink, SinkFault};
 
 /// State of a planned press.
@@ -23,19 +27,34 @@ pub(crate) struct Journal<'a> {
     states: Vec<PressState>,
     /// Attempts at each press so far, including earlier legs.
     attempts: Vec<u32>,
-    /// True during the end of the run: a failing or panicking sink no longer interrupts it.
-    lenient: bool,
+    /// Pose samples not yet emitted.
+    poses: Vec<PoseSample>,
+    /// Pose samples per record.
+    pose_block: usize,
+    /// Time of the last check of the sink.
+    checked: HostTime,
+    check_every: HostDuration,
+    /// True during the end of the run: failures of the sink, the cameras or the trigger box no longer interrupt it.
+    is_ending: bool,
     /// Problems during the end of the run.
-    pub(crate) problems: Vec<Problem>,
+    problems: Vec<Problem>,
 }
 
 impl<'a> Journal<'a> {
-    pub(crate) fn new(sink: &'a mut dyn RecordSink, presses: usize) -> Self {
+    pub(crate) fn new(
+        sink: &'a mut dyn RecordSink,
+        presses: usize,
+        settings: &ControllerSettings,
+    ) -> Self {
         Self {
             sink,
             states: vec![PressState::Planned; presses],
             attempts: vec![0; presses],
-            lenient: false,
+            poses: Vec::new(),
+            pose_block: settings.pose_block,
+            checked: HostTime::ZERO,
+            check_every: settings.check_sink_every,
+            is_ending: false,
             problems: Vec::new(),
         }
     }
@@ -68,14 +87,33 @@ impl<'a> Journal<'a> {
         self.sink.free_bytes()
     }
 
-    /// Checks that the sink still has its records.
-    pub(crate) fn check(&mut self) -> Result<(), ControllerError> {
+    /// Regularly checks that the records are still where they were written.
+    pub(crate) fn check(&mut self, now: HostTime) -> Result<(), ControllerError> {
+        if now - self.checked < self.check_every {
+            return Ok(());
+        }
+        self.checked = now;
         Ok(self.sink.check()?)
     }
 
     /// From now on no failure of the sink interrupts the end of the run.
     pub(crate) const fn begin_ending(&mut self) {
-        self.lenient = true;
+        self.is_ending = true;
+    }
+
+    /// True during the end of the run: failures become problems.
+    pub(crate) const fn is_ending(&self) -> bool {
+        self.is_ending
+    }
+
+    /// Problems during the end of the run.
+    pub(crate) fn problems(&self) -> &[Problem] {
+        &self.problems
+    }
+
+    /// Takes the problems during the end of the run.
+    pub(crate) fn take_problems(&mut self) -> Vec<Problem> {
+        std::mem::take(&mut self.problems)
     }
 
     pub(crate) fn problem(&mut self, doing: &'static str, error: impl Into<ControllerError>) {
@@ -90,7 +128,7 @@ impl<'a> Journal<'a> {
 
     /// Emits a record. During the end of the run a failure becomes a problem instead of an error.
     pub(crate) fn emit(&mut self, record: Record) -> Result<(), ControllerError> {
-        if !self.lenient {
+        if !self.is_ending {
             return Ok(self.sink.accept(record)?);
         }
         match catch_unwind(AssertUnwindSafe(|| self.sink.accept(record))) {
@@ -99,6 +137,29 @@ impl<'a> Journal<'a> {
             Err(_) => self.problem("", SinkFault::Rejected("panicked".to_owned())),
         }
         Ok(())
+    }
+
+    /// Emits a note.
+    pub(crate) fn note(&mut self, t: HostTime, text: String) -> Result<(), ControllerError> {
+        self.emit(Record::Note { t, text })
+    }
+
+    /// Buffers pose samples; emits them once a block is full.
+    pub(crate) fn add_poses(&mut self, samples: &[PoseSample]) -> Result<(), ControllerError> {
+        self.poses.extend_from_slice(samples);
+        if self.poses.len() >= self.pose_block {
+            self.emit_poses()?;
+        }
+        Ok(())
+    }
+
+    /// Emits all buffered samples.
+    pub(crate) fn emit_poses(&mut self) -> Result<(), ControllerError> {
+        if self.poses.is_empty() {
+            return Ok(());
+        }
+        let block = std::mem::take(&mut self.poses);
+        self.emit(Record::Poses(block))
     }
 
     fn set(&mut self, press: PressId, state: PressState) {
@@ -111,7 +172,7 @@ impl<'a> Journal<'a> {
     pub(crate) fn intent(
         &mut self,
         attempt: AttemptId,
-        t: skinrig_model::HostTime,
+        t: HostTime,
     ) -> Result<(), ControllerError> {
         let told = self.emit(Record::Intent { attempt, t });
         if !was_rejected(&told) {

@@ -1,23 +1,8 @@
 //! Executes plans through the device traits, owns safety and emits records. Depends on no driver, SQL or terminal.
 //!
-//! [`execute`] is the entry point: it takes a plan, a rig, a [`ControlHandle`] for the operator and a
-//! [`RecordSink`], and returns a [`RunReport`] once the robot is disarmed, whatever happened in between.
-//! Internally a [`Run`] passes through `Planned -> Armed -> Running -> Finished`, and calls that do not fit the
-//! current state do not compile:
-//!
-//! ```compile_fail
-//! # use skinrig_controller::{Run, Planned, Running};
-//! fn press_before_arming(run: Run<'_, Planned>) -> Run<'_, Running> {
-//!     run.begin() // only an armed run can begin
-//! }
-//! ```
-//!
-//! ```
-//! # use skinrig_controller::{Run, Planned, Finished, RunReport};
-//! fn in_order(run: Run<'_, Planned>) -> Result<Run<'_, Finished>, Box<RunReport>> {
-//!     Ok(run.arm()?.begin().run())
-//! }
-//! ```
+//! [`Run`] is the entry point: it takes a plan, a rig, a [`ControlHandle`] for the operator and a
+//! [`RecordSink`], and [`Run::execute`] returns a [`RunReport`] once the robot is disarmed, whatever happened in
+//! between. `docs/reference/runs.md` has the transition table of a run.
 //!
 //! [`Run::resumed`] continues an interrupted session as a further leg with the rest of its plan.
 //!
@@ -28,11 +13,10 @@
 //! accepted the command, and these times separate the phases of a press. So a replayed rig that sets its clock
 //! to the recorded time at each command reproduces the same commands, phase times and verdicts.
 
-mod arming;
+mod camera_streams;
 pub mod checks;
 mod continuity;
 pub mod control;
-mod ending;
 pub mod error;
 mod executor;
 pub mod guard;
@@ -41,19 +25,22 @@ pub mod jog;
 mod journal;
 mod machine;
 mod not_arrived;
+mod open_press;
+mod pose_trackers;
 mod preflight;
-mod press;
+mod preflight_run;
 pub mod press_fault;
+mod press_series;
 pub mod press_tracker;
 pub mod progress;
 pub mod run;
 pub mod settings;
 pub mod sink;
-pub mod states;
-mod steps;
-mod surface;
+mod states;
+mod stream_probe;
 pub mod suspend;
 mod touch;
+mod trigger_line;
 mod verdict;
 pub mod watchdog;
 
@@ -67,9 +54,7 @@ pub use jog::{Jog, MoveOutcome, TouchOutcome};
 pub use not_arrived::NotArrived;
 pub use press_fault::{PressFault, TimingFault, TouchFault};
 pub use progress::{Progress, ProgressTracker};
-pub use run::{
-    Armed, Finished, Planned, Resume, Run, RunReport, Running, execute, execute_checked,
-};
+pub use run::{Resume, Run, RunReport};
 pub use settings::ControllerSettings;
 pub use sink::{RecordSink, SinkFault};
 pub use states::State;

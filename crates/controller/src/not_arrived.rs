@@ -1,10 +1,10 @@
 //! The error of a motion that did not reach its target.
 
-use skinrig_model::{HostDuration, Point3, Skin};
+use skinrig_model::{HostDuration, Point3, PoseSample, Skin};
 
 /// The tip did not settle at its target in time.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{what}: expected to settle within {tolerance_mm} mm of {} in {allowed}, found {}", point(.target), .found.as_ref().map_or_else(|| "no pose".to_owned(), point))]
+#[error("{what}: expected to settle within {tolerance_mm} mm of {} in {allowed}, found {}", point(.target), self.found())]
 pub struct NotArrived {
     /// Name of the motion.
     pub what: String,
@@ -14,8 +14,27 @@ pub struct NotArrived {
     pub target: Point3<Skin>,
     /// Time allowed.
     pub allowed: HostDuration,
-    /// Measured position at the end of that time.
-    pub found: Option<Point3<Skin>>,
+    /// Largest force that the motors may apply, N. A tip that something holds back rests at about this force or stops below it.
+    pub max_force_n: f64,
+    /// Last sample of that time.
+    pub found: Option<PoseSample>,
+}
+
+impl NotArrived {
+    fn found(&self) -> String {
+        let Some(found) = self.found else {
+            return "no pose".to_owned();
+        };
+        let at = point(&found.measured);
+        if found.force_n.is_finite() {
+            format!(
+                "{at} and a force of {:.2} N of at most {} N",
+                found.force_n, self.max_force_n
+            )
+        } else {
+            at
+        }
+    }
 }
 
 /// `(x, y, z) mm` to the micrometre.

@@ -2,7 +2,9 @@
 
 use std::fmt;
 
-use skinrig_model::{CameraId, HostDuration, HostTime, Point3, PressFaultKind, PressVerdict, Skin};
+use skinrig_model::{
+    CameraId, HostDuration, HostTime, InvalidReason, Point3, PressFaultKind, Skin,
+};
 
 use crate::not_arrived::{NotArrived, point};
 
@@ -227,7 +229,7 @@ impl fmt::Display for PressFault {
             ),
             Self::Paused => f.write_str(PAUSED),
             Self::Suspended(reason) => f.write_str(reason),
-            Self::RunEnded(reason) => write!(f, "{}: {reason}", PressVerdict::CUT_OFF),
+            Self::RunEnded(reason) => write!(f, "{}{reason}", InvalidReason::CUT_OFF),
             Self::Touch(touch) => touch.fmt(f),
             Self::Timing(moments) => moments.fmt(f),
         }

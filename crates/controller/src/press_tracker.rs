@@ -29,7 +29,7 @@ impl Settling {
     /// Settled once samples after `after` stay within the limits' tolerance of `target` for their settle
     /// time.
     #[must_use]
-    pub const fn new(target: Point3<Skin>, limits: &RunLimits, after: HostTime) -> Self {
+    pub(crate) const fn new(target: Point3<Skin>, limits: &RunLimits, after: HostTime) -> Self {
         Self {
             target,
             tolerance_mm: limits.position_tolerance_mm,
@@ -55,7 +55,7 @@ impl Settling {
     }
 
     /// Processes the next sample.
-    pub fn feed(&mut self, sample: &PoseSample) {
+    pub(crate) fn feed(&mut self, sample: &PoseSample) {
         if sample.t <= self.after {
             return;
         }
@@ -78,7 +78,7 @@ impl Settling {
 
     /// Time of the first sample at which the tip had been within the tolerance for the whole settle time.
     #[must_use]
-    pub const fn settled(&self) -> Option<HostTime> {
+    pub(crate) const fn settled(&self) -> Option<HostTime> {
         self.settled
     }
 }
@@ -117,7 +117,7 @@ impl PressTracker {
     /// Tracks a press at `at` with depth `depth_mm`, whose downward motion was commanded at `down_from` from the pose
     /// `last`.
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         at: Point2,
         depth_mm: f64,
         limits: &RunLimits,
@@ -157,20 +157,20 @@ impl PressTracker {
     }
 
     /// Sets contact and surface height from the sample of the touch; the depth counts from there.
-    pub const fn touched(&mut self, sample: &PoseSample) {
+    pub(crate) const fn touched(&mut self, sample: &PoseSample) {
         self.contact = Some(sample.t);
         self.touched_mm = Some(sample.measured.z_mm);
     }
 
     /// Height of the surface, touched or assumed, mm.
     #[must_use]
-    pub fn surface_mm(&self) -> f64 {
+    pub(crate) fn surface_mm(&self) -> f64 {
         self.touched_mm.unwrap_or(0.0)
     }
 
     /// Height of the touched surface, mm.
     #[must_use]
-    pub const fn touched_mm(&self) -> Option<f64> {
+    pub(crate) const fn touched_mm(&self) -> Option<f64> {
         self.touched_mm
     }
 
@@ -180,7 +180,7 @@ impl PressTracker {
     }
 
     /// Processes the next sample.
-    pub fn feed(&mut self, s: &PoseSample) {
+    pub(crate) fn feed(&mut self, s: &PoseSample) {
         if s.force_n.is_finite() {
             let peak = self.peak_force_n.unwrap_or(s.force_n);
             self.peak_force_n = Some(peak.max(s.force_n));
@@ -262,37 +262,37 @@ impl PressTracker {
 
     /// Time at which the tip settled at clearance height.
     #[must_use]
-    pub const fn clear(&self) -> Option<HostTime> {
+    pub(crate) const fn clear(&self) -> Option<HostTime> {
         self.clear
     }
 
     /// Time at which the set point began to move down.
     #[must_use]
-    pub const fn approach(&self) -> Option<HostTime> {
+    pub(crate) const fn approach(&self) -> Option<HostTime> {
         self.approach
     }
 
     /// First crossing of the surface downwards, interpolated.
     #[must_use]
-    pub const fn contact(&self) -> Option<HostTime> {
+    pub(crate) const fn contact(&self) -> Option<HostTime> {
         self.contact
     }
 
     /// Time at which the tip settled at depth.
     #[must_use]
-    pub const fn at_depth(&self) -> Option<HostTime> {
+    pub(crate) const fn at_depth(&self) -> Option<HostTime> {
         self.at_depth
     }
 
     /// Time at which the set point began to move up.
     #[must_use]
-    pub const fn retract(&self) -> Option<HostTime> {
+    pub(crate) const fn retract(&self) -> Option<HostTime> {
         self.retract
     }
 
     /// First crossing of the surface upwards after the upward command, interpolated.
     #[must_use]
-    pub const fn release(&self) -> Option<HostTime> {
+    pub(crate) const fn release(&self) -> Option<HostTime> {
         self.release
     }
 
@@ -300,7 +300,7 @@ impl PressTracker {
     ///
     /// # Errors
     /// The first phase time that is missing or out of order.
-    pub fn timing(&self) -> Result<PressTiming, TimingFault> {
+    pub(crate) fn timing(&self) -> Result<PressTiming, TimingFault> {
         let need = |t: Option<HostTime>, what: &'static str| t.ok_or(TimingFault::Missing(what));
         let timing = PressTiming {
             approach: need(self.approach, "start of the approach")?,
@@ -327,7 +327,7 @@ impl PressTracker {
 
     /// Mean measured tip position during the hold.
     #[must_use]
-    pub fn mean(&self) -> Option<Point3<Skin>> {
+    pub(crate) fn mean(&self) -> Option<Point3<Skin>> {
         if self.hold_samples == 0 {
             return None;
         }
@@ -337,7 +337,7 @@ impl PressTracker {
 
     /// Largest measured force, N.
     #[must_use]
-    pub const fn peak_force_n(&self) -> Option<f64> {
+    pub(crate) const fn peak_force_n(&self) -> Option<f64> {
         self.peak_force_n
     }
 

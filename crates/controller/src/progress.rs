@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, VecDeque};
 use skinrig_model::pulse::decode_marks;
 use skinrig_model::{
     CameraId, HostDuration, HostTime, PlannedPress, Point2, PressHistory, PressId, PressVerdict,
-    PulseTrain, RawChunk, Record, RunEnd, TriggerEdge,
+    PulseTrain, RawChunk, Record, RunEnd, TriggerEdge, Verdict,
 };
 
 /// Event rates are averages over this span of rig time.
@@ -61,33 +61,13 @@ pub struct Progress {
     pub end: Option<RunEnd>,
 }
 
-/// Verdict of a press, without its reason.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum VerdictKind {
-    Valid,
-    Invalid,
-    Missed,
-    Excluded,
-}
-
-impl From<&PressVerdict> for VerdictKind {
-    fn from(verdict: &PressVerdict) -> Self {
-        match verdict {
-            PressVerdict::Valid => Self::Valid,
-            PressVerdict::Invalid(_) => Self::Invalid,
-            PressVerdict::Missed(_) => Self::Missed,
-            PressVerdict::Excluded(_) => Self::Excluded,
-        }
-    }
-}
-
 /// Tracks the progress of a run from its records.
 #[derive(Debug, Clone, Default)]
 pub struct ProgressTracker {
     progress: Progress,
     presses: Vec<PlannedPress>,
     /// Last verdict of each press, if any.
-    verdicts: Vec<Option<VerdictKind>>,
+    verdicts: Vec<Option<Verdict>>,
     /// Presses that ended before this process and are not repeated.
     before: usize,
     expected: Option<HostDuration>,
@@ -115,12 +95,11 @@ impl ProgressTracker {
         wanted: &[bool],
     ) -> Self {
         self.plan(presses);
-        for ((verdict_kind, history), wanted) in self.verdicts.iter_mut().zip(histories).zip(wanted)
-        {
-            *verdict_kind = match &history.verdict {
+        for ((last, history), wanted) in self.verdicts.iter_mut().zip(histories).zip(wanted) {
+            *last = match &history.verdict {
                 _ if *wanted => None,
                 Some(PressVerdict::Missed(_)) | None => None,
-                Some(verdict) => Some(VerdictKind::from(verdict)),
+                Some(verdict) => Some(verdict.kind()),
             };
         }
         self.count();
@@ -134,23 +113,23 @@ impl ProgressTracker {
         self.progress.planned = presses.len();
     }
 
-    fn ended(&mut self, press: PressId, verdict_kind: VerdictKind) {
+    fn ended(&mut self, press: PressId, verdict: Verdict) {
         if let Some(f) = self.verdicts.get_mut(press.index() as usize) {
-            *f = Some(verdict_kind);
+            *f = Some(verdict);
         }
         self.count();
     }
 
     fn count(&mut self) {
-        let n = |verdict_kind| {
+        let n = |verdict| {
             self.verdicts
                 .iter()
-                .filter(|f| **f == Some(verdict_kind))
+                .filter(|f| **f == Some(verdict))
                 .count()
         };
         let p = &mut self.progress;
-        (p.valid, p.invalid) = (n(VerdictKind::Valid), n(VerdictKind::Invalid));
-        (p.missed, p.excluded) = (n(VerdictKind::Missed), n(VerdictKind::Excluded));
+        (p.valid, p.invalid) = (n(Verdict::Valid), n(Verdict::Invalid));
+        (p.missed, p.excluded) = (n(Verdict::Missed), n(Verdict::Excluded));
         p.done = p.valid + p.invalid + p.missed + p.excluded;
     }
 
@@ -184,9 +163,9 @@ impl ProgressTracker {
             Record::BoxReports { t, .. } => self.reached(*t),
             Record::Chunk(chunk) => self.chunk(chunk),
             Record::Outcome(outcome) => {
-                self.ended(outcome.attempt.press, VerdictKind::from(&outcome.verdict));
+                self.ended(outcome.attempt.press, outcome.verdict.kind());
             }
-            Record::Missed(attempt, _) => self.ended(attempt.press, VerdictKind::Missed),
+            Record::Missed(attempt, _) => self.ended(attempt.press, Verdict::Missed),
             Record::Interruption { kind, t, .. } => {
                 use skinrig_model::InterruptionKind as K;
                 p.paused = matches!(kind, K::Pause | K::PauseNow);

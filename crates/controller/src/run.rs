@@ -1,9 +1,9 @@
-//! The typed life cycle of a run, and the function that executes all of it.
-
-use std::marker::PhantomData;
+//! A run: its parts, and the report of its execution.
 
 use skinrig_device::Rig;
-use skinrig_model::{AttemptId, HostTime, PressHistory, PressId, ResumeHeader, RunEnd, RunHeader};
+use skinrig_model::{
+    AttemptId, HostTime, PressHistory, PressId, Record, ResumeHeader, RunEnd, RunHeader,
+};
 use skinrig_protocol::plan::Plan;
 
 use crate::checks::Preflight;
@@ -13,7 +13,6 @@ use crate::executor::Executor;
 use crate::press_fault::PressFault;
 use crate::settings::ControllerSettings;
 use crate::sink::RecordSink;
-use crate::states::Event;
 
 /// Data to continue an interrupted, stopped or faulted session.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -63,37 +62,51 @@ impl RunReport {
     }
 }
 
-/// State of a [`Run`]: no device is open.
-#[derive(Debug)]
-pub enum Planned {}
-/// State of a [`Run`]: devices are configured and read back, cameras stream, the robot holds.
-#[derive(Debug)]
-pub enum Armed {}
-/// State of a [`Run`]: ready to execute its steps.
-#[derive(Debug)]
-pub enum Running {}
-/// State of a [`Run`]: disarmed, all records written.
-#[derive(Debug)]
-pub enum Finished {}
-
-/// A run in state `S`. Dropping it in any state before [`Finished`] first retracts, disarms, stops the cameras and
-/// writes the last records.
-pub struct Run<'a, S> {
-    executor: Executor<'a>,
-    state: PhantomData<S>,
+/// A run of a plan on a rig. Nothing happens before [`execute`](Self::execute).
+pub struct Run<'a> {
+    leg: Leg,
+    parts: RunParts<'a>,
 }
 
-impl<'a, S> Run<'a, S> {
-    fn into_state<T>(self) -> Run<'a, T> {
-        Run {
-            executor: self.executor,
-            state: PhantomData,
+/// The leg of the session that a run executes.
+pub(crate) struct Leg {
+    header: RunHeader,
+    resume: Option<Resume>,
+}
+
+/// Everything that the executor of a run needs.
+pub(crate) struct RunParts<'a> {
+    pub(crate) plan: &'a Plan,
+    pub(crate) rig: Rig,
+    pub(crate) control: ControlHandle,
+    pub(crate) sink: &'a mut dyn RecordSink,
+    pub(crate) settings: ControllerSettings,
+    pub(crate) preflight: Option<Preflight>,
+}
+
+impl Leg {
+    /// Header of the session.
+    pub(crate) const fn header(&self) -> &RunHeader {
+        &self.header
+    }
+
+    /// History of each planned press from earlier legs; `None` in the first leg.
+    pub(crate) fn histories(&self) -> Option<&[PressHistory]> {
+        self.resume.as_ref().map(|r| r.histories.as_slice())
+    }
+
+    /// First record of the leg.
+    pub(crate) fn first_record(&self) -> Record {
+        match &self.resume {
+            None => Record::Started(Box::new(self.header.clone())),
+            Some(resume) => Record::Resumed(Box::new(resume.header.clone())),
         }
     }
 }
 
-impl<'a> Run<'a, Planned> {
-    /// A run of `plan` on `rig`. Nothing happens until it is armed.
+impl<'a> Run<'a> {
+    /// A run of `plan` on `rig` that emits all records to `sink`. `header` is the first record.
+    #[must_use]
     pub fn new(
         plan: &'a Plan,
         header: RunHeader,
@@ -101,35 +114,33 @@ impl<'a> Run<'a, Planned> {
         control: &ControlHandle,
         sink: &'a mut dyn RecordSink,
     ) -> Self {
-        Self::with_settings(
-            plan,
-            header,
-            rig,
-            control,
-            sink,
-            ControllerSettings::default(),
-        )
-    }
-
-    /// Like [`new`](Self::new), with settings other than the defaults.
-    pub fn with_settings(
-        plan: &'a Plan,
-        header: RunHeader,
-        rig: Rig,
-        control: &ControlHandle,
-        sink: &'a mut dyn RecordSink,
-        settings: ControllerSettings,
-    ) -> Self {
         Self {
-            executor: Executor::new(plan, header, rig, control, sink, settings),
-            state: PhantomData,
+            leg: Leg {
+                header,
+                resume: None,
+            },
+            parts: RunParts {
+                plan,
+                rig,
+                control: control.clone(),
+                sink,
+                settings: ControllerSettings::default(),
+                preflight: None,
+            },
         }
     }
 
-    /// Adds checks before the robot is powered.
+    /// Replaces the default settings.
+    #[must_use]
+    pub fn with_settings(mut self, settings: ControllerSettings) -> Self {
+        self.parts.settings = settings;
+        self
+    }
+
+    /// Adds a preflight: if a check fails, the robot is not powered, and the report names the check.
     #[must_use]
     pub fn checked(mut self, preflight: Preflight) -> Self {
-        self.executor.preflight = Some(preflight);
+        self.parts.preflight = Some(preflight);
         self
     }
 
@@ -137,105 +148,209 @@ impl<'a> Run<'a, Planned> {
     /// ([`Plan::remaining`] with the presses of [`Plan::wanted`]), the header that of the session.
     #[must_use]
     pub fn resumed(mut self, resume: Resume) -> Self {
-        self.executor.journal.restore(&resume.histories);
-        self.executor.resume = Some(resume);
+        self.leg.resume = Some(resume);
         self
     }
 
-    /// Executes the plan from arming to disarming, and returns the report; see [`execute`].
+    /// Executes the plan from arming to disarming.
+    ///
+    /// Returns when the rig is at rest, even after a stop, an abort, a fault of a device or of the sink, or a panic in
+    /// any of them.
     pub fn execute(self) -> RunReport {
-        match self.arm() {
-            Ok(run) => run.begin().run().report(),
-            Err(report) => *report,
-        }
+        Executor::new(self.parts).execute(&self.leg)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::panic::{AssertUnwindSafe, catch_unwind, panic_any};
+    use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+    use skinrig_device::{DeviceError, Indenter, IndenterCapabilities, MotionLimits, RobotSample};
+    use skinrig_model::{
+        DeviceIdentity, Point3, RigidTransform, Robot, Setting, SimLevel, Skin, StreamFormat,
+    };
+    use skinrig_protocol::plan::{OnTrip, RunLimits};
+    use skinrig_protocol::{Retakes, Suspend};
+    use skinrig_sim::config::SimConfig;
+    use skinrig_sim::rig::simulated_rig;
+
+    use super::*;
+    use crate::sink::SinkFault;
+
+    const CLEARANCE_MM: f64 = 5.0;
+
+    /// State of the robot, and the call that panics, counted from now on.
+    #[derive(Default)]
+    struct Log {
+        is_armed: bool,
+        calls: u32,
+        panic_at: Option<u32>,
+        height_mm: f64,
     }
 
-    /// Checks the plan against the rig, configures every device and reads it back, starts the cameras and
-    /// powers the robot, which holds its position.
-    ///
-    /// The report of a run that ended here, with the rig at rest.
-    /// The report of a run that ended here, the rig at rest.
-    pub fn arm(mut self) -> Result<Run<'a, Armed>, Box<RunReport>> {
-        match self.executor.catch_panic(Executor::arm) {
-            Ok(()) => Ok(self.into_state()),
-            Err(halt) => {
-                self.executor.conclude(Err(halt));
-                Err(Box::new(self.executor.take_report()))
+    /// A simulated robot that logs its state.
+    struct LoggedIndenter<I> {
+        inner: I,
+        skin_from_robot: RigidTransform<Skin, Robot>,
+        log: Arc<Mutex<Log>>,
+    }
+
+    fn lock(log: &Mutex<Log>) -> MutexGuard<'_, Log> {
+        log.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    impl<I> LoggedIndenter<I> {
+        fn call(&self) {
+            let mut log = lock(&self.log);
+            log.calls += 1;
+            if log.panic_at == Some(log.calls) {
+                drop(log);
+                panic_any("robot panics".to_owned());
             }
         }
     }
-}
 
-impl<'a> Run<'a, Armed> {
-    /// Starts the plan. Nothing moves yet.
-    #[must_use]
-    pub fn begin(mut self) -> Run<'a, Running> {
-        self.executor.machine.fire(Event::Begin);
-        self.into_state()
+    impl<I: Indenter> Indenter for LoggedIndenter<I> {
+        fn identity(&self) -> DeviceIdentity {
+            self.inner.identity()
+        }
+        fn capabilities(&self) -> IndenterCapabilities {
+            self.inner.capabilities()
+        }
+        fn configure(&mut self, limits: &MotionLimits) -> Result<Vec<Setting>, DeviceError> {
+            self.inner.configure(limits)
+        }
+        fn arm(&mut self) -> Result<(), DeviceError> {
+            self.inner.arm()?;
+            lock(&self.log).is_armed = true;
+            Ok(())
+        }
+        fn command(&mut self, target: Point3<Robot>, speed_mm_s: f64) -> Result<(), DeviceError> {
+            self.call();
+            self.inner.command(target, speed_mm_s)
+        }
+        fn poll(&mut self, samples: &mut Vec<RobotSample>) -> Result<(), DeviceError> {
+            self.call();
+            let answer = self.inner.poll(samples);
+            if let Some(last) = samples.last() {
+                lock(&self.log).height_mm = self.skin_from_robot.apply(last.measured).z_mm;
+            }
+            answer
+        }
+        fn hold(&mut self) -> Result<(), DeviceError> {
+            self.call();
+            self.inner.hold()
+        }
+        fn disarm(&mut self) -> Result<(), DeviceError> {
+            self.inner.disarm()?;
+            lock(&self.log).is_armed = false;
+            Ok(())
+        }
     }
-}
 
-impl<'a> Run<'a, Running> {
-    /// Executes the plan and ends the run, whatever happens.
-    #[must_use]
-    pub fn run(mut self) -> Run<'a, Finished> {
-        let result = self.executor.catch_panic(Executor::steps);
-        self.executor.conclude(result);
-        self.into_state()
+    #[derive(Default)]
+    struct Records(Vec<Record>);
+
+    impl RecordSink for Records {
+        fn accept(&mut self, record: Record) -> Result<(), SinkFault> {
+            self.0.push(record);
+            Ok(())
+        }
     }
-}
 
-impl Run<'_, Finished> {
-    /// Result of the run.
-    pub fn report(mut self) -> RunReport {
-        self.executor.take_report()
+    fn plan_without_steps() -> Plan {
+        Plan {
+            version: 1,
+            name: "empty".into(),
+            seed: 1,
+            limits: RunLimits {
+                workspace_min_mm: [-40.0, -50.0, -3.0],
+                workspace_max_mm: [60.0, 55.0, 40.0],
+                clearance_mm: CLEARANCE_MM,
+                max_depth_mm: 3.0,
+                max_speed_mm_s: 100.0,
+                max_force_n: 8.0,
+                position_tolerance_mm: 0.05,
+                settle_time: skinrig_model::HostDuration::from_millis(20),
+                max_acceleration_mm_s2: None,
+                on_trip: OnTrip::Retract,
+            },
+            surroundings: None,
+            retakes: Retakes::NONE,
+            max_consecutive_invalid: 0,
+            surface_check: None,
+            suspend: Suspend::default(),
+            presses: Vec::new(),
+            steps: Vec::new(),
+        }
     }
-}
 
-impl Executor<'_> {
-    fn take_report(&mut self) -> RunReport {
-        // Concluding always leaves a report; a missing one must not read as success.
-        self.report.take().unwrap_or_else(|| RunReport {
-            end: RunEnd::Faulted("internal error: no report".to_owned()),
-            causes: vec![ControllerError::Internal("no report".to_owned())],
-            press_faults: Vec::new(),
-            valid_presses: Vec::new(),
-            ended_at: HostTime::ZERO,
-            planned: self.plan.presses.len(),
-            valid: 0,
-            invalid: 0,
-            missed: self.plan.presses.len(),
-            retracted: false,
-            disarmed: false,
-            problems: Vec::new(),
-        })
+    fn header(config: &SimConfig) -> RunHeader {
+        RunHeader {
+            protocol_text: String::new(),
+            protocol_name: String::new(),
+            protocol_sha256: String::new(),
+            overrides: Vec::new(),
+            plan_json: String::new(),
+            plan_sha256: String::new(),
+            seed: 1,
+            rig_kind: String::new(),
+            rig_name: String::new(),
+            rig_json: String::new(),
+            robot_from_skin: config.robot_from_skin,
+            stream_formats: [StreamFormat::Evt2; 2],
+            prototype: String::new(),
+            operator: String::new(),
+            started_at: String::new(),
+            host: String::new(),
+            software: String::new(),
+            command_line: String::new(),
+            presses: Vec::new(),
+        }
     }
-}
 
-/// Executes `plan` on `rig` from arming to disarming, and emits all records to `sink`.
-///
-/// Returns when the rig is at rest, even after a stop, an abort, a fault of a device or of the sink, or a panic in
-/// any of them. `header` is the first record.
-pub fn execute(
-    plan: &Plan,
-    header: RunHeader,
-    rig: Rig,
-    control: &ControlHandle,
-    sink: &mut dyn RecordSink,
-) -> RunReport {
-    Run::new(plan, header, rig, control, sink).execute()
-}
-
-/// Like [`execute`], after a preflight: if a check fails, the robot is not powered, and the report names the check.
-pub fn execute_checked(
-    plan: &Plan,
-    header: RunHeader,
-    rig: Rig,
-    control: &ControlHandle,
-    sink: &mut dyn RecordSink,
-    preflight: Preflight,
-    settings: ControllerSettings,
-) -> RunReport {
-    let run = Run::with_settings(plan, header, rig, control, sink, settings);
-    run.checked(preflight).execute()
+    #[test]
+    fn an_armed_executor_that_is_dropped_or_unwound_comes_to_rest() {
+        // Last case: the robot panics once more while the first panic unwinds.
+        for (is_unwound, second) in [(false, None), (true, None), (true, Some(20))] {
+            let mut config = SimConfig::new(5, SimLevel::Kinematic);
+            config.start = Point3::new(0.0, 0.0, 1.0);
+            let log = Arc::new(Mutex::new(Log::default()));
+            let mut rig = simulated_rig(&config);
+            rig.indenter = Box::new(LoggedIndenter {
+                // Leaked, because only a reference to a boxed robot is a robot.
+                inner: Box::leak(rig.indenter),
+                skin_from_robot: config.robot_from_skin.inverse(),
+                log: log.clone(),
+            });
+            let (plan, mut sink) = (plan_without_steps(), Records::default());
+            let control = ControlHandle::new();
+            let run = Run::new(&plan, header(&config), rig, &control, &mut sink);
+            let ended = catch_unwind(AssertUnwindSafe(|| {
+                let Run { leg, parts } = run;
+                let mut executor = Executor::new(parts);
+                assert_eq!(executor.arm(&leg), Ok(()));
+                {
+                    let mut log = lock(&log);
+                    assert!(log.is_armed && log.height_mm < CLEARANCE_MM - 1.0);
+                    log.panic_at = second.map(|n| log.calls + n);
+                }
+                if is_unwound {
+                    panic_any("caller panics".to_owned());
+                }
+            }));
+            assert_eq!(ended.is_err(), is_unwound);
+            let log = lock(&log);
+            assert!(!log.is_armed && log.height_mm > CLEARANCE_MM - 0.06);
+            assert!(log.panic_at.is_none_or(|n| log.calls > n));
+            assert!(matches!(
+                sink.0.last(),
+                Some(Record::Ended {
+                    end: RunEnd::Faulted(_),
+                    ..
+                })
+            ));
+        }
+    }
 }

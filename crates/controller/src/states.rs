@@ -33,10 +33,10 @@ pub enum State {
 
 /// Event in a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Event {
+pub(crate) enum Event {
     /// All devices are armed.
     ArmingDone,
-    /// The caller starts the plan.
+    /// The plan starts.
     Begin,
     /// The operator requests a pause.
     Pause,
@@ -118,32 +118,6 @@ impl State {
             Self::Finished => "finished",
         }
     }
-
-    /// True if the robot's motors may be on.
-    #[must_use]
-    pub const fn may_be_armed(self) -> bool {
-        // In state planned, arming may have begun; it counts from its start.
-        !matches!(self, Self::Finished)
-    }
-}
-
-impl Event {
-    /// All events.
-    pub const ALL: [Self; 13] = [
-        Self::ArmingDone,
-        Self::Begin,
-        Self::Pause,
-        Self::PauseNow,
-        Self::Resume,
-        Self::Stop,
-        Self::Abort,
-        Self::Halt,
-        Self::Fault,
-        Self::SafePoint,
-        Self::PlanDone,
-        Self::Cleared,
-        Self::Disarmed,
-    ];
 }
 
 /// The transition table. Total: the compiler checks that every pair is covered.
@@ -304,44 +278,59 @@ pub(crate) const fn transition(state: State, event: Event) -> (State, Action) {
     }
 }
 
-/// The table as Markdown, one row per state, one column per event: `next state: action`.
-#[must_use]
-pub fn markdown() -> String {
-    let mut out = String::from("| state |");
-    for event in Event::ALL {
-        out.push_str(&format!(" {event:?} |"));
-    }
-    out.push_str("\n|---|");
-    out.push_str(&"---|".repeat(Event::ALL.len()));
-    out.push('\n');
-    for state in State::ALL {
-        out.push_str(&format!("| **{state:?}** |"));
-        for event in Event::ALL {
-            let cell = match transition(state, event) {
-                (_, Action::Ignore) => " · |".to_owned(),
-                (_, Action::Reject) => " ✗ |".to_owned(),
-                (next, Action::None) => format!(" {next:?} |"),
-                (next, action) => format!(" {next:?}: {action:?} |"),
-            };
-            out.push_str(&cell);
-        }
-        out.push('\n');
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::{BTreeMap, BTreeSet};
 
     use super::*;
 
+    const EVENTS: [Event; 13] = [
+        Event::ArmingDone,
+        Event::Begin,
+        Event::Pause,
+        Event::PauseNow,
+        Event::Resume,
+        Event::Stop,
+        Event::Abort,
+        Event::Halt,
+        Event::Fault,
+        Event::SafePoint,
+        Event::PlanDone,
+        Event::Cleared,
+        Event::Disarmed,
+    ];
+
+    /// The table as Markdown, one row per state, one column per event: `next state: action`.
+    fn markdown() -> String {
+        let mut out = String::from("| state |");
+        for event in EVENTS {
+            out.push_str(&format!(" {event:?} |"));
+        }
+        out.push_str("\n|---|");
+        out.push_str(&"---|".repeat(EVENTS.len()));
+        out.push('\n');
+        for state in State::ALL {
+            out.push_str(&format!("| **{state:?}** |"));
+            for event in EVENTS {
+                let cell = match transition(state, event) {
+                    (_, Action::Ignore) => " · |".to_owned(),
+                    (_, Action::Reject) => " ✗ |".to_owned(),
+                    (next, Action::None) => format!(" {next:?} |"),
+                    (next, action) => format!(" {next:?}: {action:?} |"),
+                };
+                out.push_str(&cell);
+            }
+            out.push('\n');
+        }
+        out
+    }
+
     /// Every reachable state with a shortest path to it.
     fn reachable() -> BTreeMap<State, Vec<Event>> {
         let mut ways = BTreeMap::from([(State::Planned, vec![])]);
         let mut todo = vec![State::Planned];
         while let Some(state) = todo.pop() {
-            for event in Event::ALL {
+            for event in EVENTS {
                 let (next, action) = transition(state, event);
                 if action != Action::Reject && !ways.contains_key(&next) {
                     let mut way = ways[&state].clone();
@@ -365,7 +354,7 @@ mod tests {
     #[test]
     fn a_paused_run_continues_only_on_request() {
         fn explore(state: State, left: u32) {
-            for event in Event::ALL.into_iter().take(if left == 0 { 0 } else { 13 }) {
+            for event in EVENTS.into_iter().take(if left == 0 { 0 } else { 13 }) {
                 let (next, action) = transition(state, event);
                 if action == Action::Continue {
                     assert_eq!(next, State::Running, "{state:?} {event:?}");
@@ -387,7 +376,7 @@ mod tests {
     #[test]
     fn only_disarming_finishes_and_nothing_leaves_the_end() {
         for state in State::ALL {
-            for event in Event::ALL {
+            for event in EVENTS {
                 let (next, action) = transition(state, event);
                 if next == State::Finished && state != State::Finished {
                     assert_eq!(event, Event::Disarmed, "from {state:?}");

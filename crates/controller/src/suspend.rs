@@ -1,15 +1,10 @@
-//! Suspension: a run waits at clearance height during a disturbance, and continues automatically afterwards.
+//! The conditions that suspend a run: each with its hysteresis, evaluated once per window.
 
-use skinrig_device::DeviceError;
-use skinrig_model::{CameraId, HostDuration, HostTime, InterruptionKind, RawChunk, Record};
+use skinrig_model::{CameraId, HostDuration, HostTime, RawChunk};
 use skinrig_protocol::{Suspend, Threshold, UnderWay};
 
-use crate::error::{ControllerError, Halt};
-use crate::executor::{Collect, Executor};
-use crate::states::{Event, State};
-
 /// Prefix of the reason of every suspension.
-pub(crate) const SUSPENDED: &str = "suspended";
+const SUSPENDED: &str = "suspended";
 /// Averaging time of rates.
 const WINDOW: HostDuration = HostDuration::from_millis(1_000);
 
@@ -106,10 +101,25 @@ struct Condition {
 
 /// Values measured over a window, other than those from chunks.
 #[derive(Debug, Clone, Copy, Default)]
-struct WindowMeasurements {
-    /// °C.
-    temperatures_c: [Option<f64>; 2],
-    free_b: Option<f64>,
+pub(crate) struct WindowMeasurements {
+    /// °C; `None` if not measured in this window.
+    pub(crate) temperatures_c: [Option<f64>; 2],
+    /// Free space at the session file, bytes.
+    pub(crate) free_b: Option<f64>,
+}
+
+/// End of a suspension.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum SuspensionEnd {
+    /// Every condition is back to normal; the text of the interruption that continues the run.
+    Calm(String),
+    /// The suspension has reached its limit.
+    TooLong {
+        /// Its reason.
+        reason: String,
+        /// Longest suspension.
+        limit: HostDuration,
+    },
 }
 
 /// All conditions of a run, and whether one of them suspends it.
@@ -176,18 +186,83 @@ impl Suspender {
         self.holding.as_ref().map(|(_, reason)| reason.as_str())
     }
 
-    fn is_idle(&self) -> bool {
+    /// True if nothing is monitored.
+    pub(crate) fn is_idle(&self) -> bool {
         self.disk.is_none() && self.cameras.iter().all(Vec::is_empty)
     }
 
-    fn monitors_temperature(&self, camera: CameraId) -> bool {
+    pub(crate) fn monitors_temperature(&self, camera: CameraId) -> bool {
         let watched = &self.cameras[camera.index()];
         watched.iter().any(|w| w.quantity == Quantity::Temperature)
     }
 
     /// Stops monitoring the temperature of a camera that cannot measure it.
-    fn stop_monitoring_temperature(&mut self, camera: CameraId) {
+    pub(crate) fn stop_monitoring_temperature(&mut self, camera: CameraId) {
         self.cameras[camera.index()].retain(|w| w.quantity != Quantity::Temperature);
+    }
+
+    pub(crate) const fn monitors_disk(&self) -> bool {
+        self.disk.is_some()
+    }
+
+    /// Stops monitoring the free space of a sink that does not report it.
+    pub(crate) fn stop_monitoring_disk(&mut self) {
+        self.disk = None;
+    }
+
+    /// How a suspension treats the press in progress.
+    pub(crate) const fn press_under_way(&self) -> UnderWay {
+        self.settings.press
+    }
+
+    /// Time up to which the data of the current window must be complete, once the window has passed.
+    pub(crate) fn due_window(&mut self, now: HostTime) -> Option<HostTime> {
+        let from = *self.window_from.get_or_insert(now);
+        (now - from >= WINDOW).then(|| from + WINDOW)
+    }
+
+    /// Starts the next window; returns the length of the last one in seconds.
+    pub(crate) fn next_window(&mut self, now: HostTime) -> f64 {
+        let from = self.window_from.replace(now).unwrap_or(now);
+        (now - from).as_secs_f64()
+    }
+
+    /// Evaluates a whole window. A condition that begins during another wait suspends the run once that ends.
+    pub(crate) fn evaluate(&mut self, t: HostTime, seconds: f64, measured: WindowMeasurements) {
+        let tripped = self.feed(t, seconds, measured);
+        if tripped.is_some() {
+            self.pending = tripped;
+        }
+        if self.is_calm() {
+            self.pending = None;
+        }
+    }
+
+    /// Reason to suspend a run that is running now. An earlier suspension is over then, because the operator resumed.
+    pub(crate) fn take_reason(&mut self) -> Option<String> {
+        self.holding = None;
+        let words = self.pending.take()?;
+        Some(format!("{SUSPENDED}: {words}"))
+    }
+
+    /// Starts a suspension.
+    pub(crate) fn hold(&mut self, t: HostTime, reason: String) {
+        self.holding = Some((t, reason));
+    }
+
+    /// Ends the current suspension if it is over or too long. Without `may_continue` it can only be too long.
+    pub(crate) fn end(&mut self, now: HostTime, may_continue: bool) -> Option<SuspensionEnd> {
+        let (since, reason) = self.holding.as_ref()?;
+        let limit = self.settings.give_up_after;
+        if self.is_calm() && may_continue {
+            let words = format!("no longer {reason}");
+            self.holding = None;
+            return Some(SuspensionEnd::Calm(words));
+        }
+        (now - *since >= limit).then(|| SuspensionEnd::TooLong {
+            reason: reason.clone(),
+            limit,
+        })
     }
 
     fn is_calm(&self) -> bool {
@@ -195,13 +270,8 @@ impl Suspender {
         !all.any(|w| w.hysteresis.is_tripped())
     }
 
-    /// Evaluates a whole window; returns a description of the condition that tripped.
-    fn evaluate(
-        &mut self,
-        t: HostTime,
-        seconds: f64,
-        measured: WindowMeasurements,
-    ) -> Option<String> {
+    /// Passes the values of a window to the conditions; returns a description of the first one that tripped.
+    fn feed(&mut self, t: HostTime, seconds: f64, measured: WindowMeasurements) -> Option<String> {
         let mut words = None;
         let mut feed = |w: &mut Condition, of: &str, value: f64| {
             if w.hysteresis.feed(t, value) == Some(Transition::Tripped) {
@@ -232,125 +302,5 @@ impl Suspender {
         }
         (self.events, self.lost) = ([0; 2], [0; 2]);
         words
-    }
-}
-
-impl Executor<'_> {
-    /// Evaluates the conditions of the plan once per window; suspends, resumes or ends the run.
-    pub(crate) fn suspend(&mut self) -> Result<(), Halt> {
-        let running = matches!(
-            self.machine.state(),
-            State::Running | State::Pausing | State::PausingNow | State::Paused
-        );
-        if self.suspender.is_idle() || !running || self.ending {
-            return Ok(());
-        }
-        let now = self.now();
-        let from = *self.suspender.window_from.get_or_insert(now);
-        if now - from < WINDOW {
-            return Ok(());
-        }
-        // A chunk may take long to fill, and its data belong to this window. If it is not yet complete, the next turn tries again.
-        if !self.is_flushed_to(from + WINDOW) {
-            self.collect(Collect::Flush)?;
-        }
-        if !self.is_flushed_to(from + WINDOW) {
-            return Ok(());
-        }
-        self.suspender.window_from = Some(now);
-        let measured = WindowMeasurements {
-            temperatures_c: self.temperatures(now)?,
-            free_b: self.free_space(now)?,
-        };
-        let seconds = (now - from).as_secs_f64();
-        let tripped = self.suspender.evaluate(now, seconds, measured);
-        if self.machine.state() == State::Running {
-            self.suspender.holding = None; // the operator resumed
-        }
-        // A condition that begins during another wait suspends the run once that ends.
-        if tripped.is_some() {
-            self.suspender.pending = tripped;
-        }
-        if self.suspender.is_calm() {
-            self.suspender.pending = None;
-        }
-        if self.machine.state() == State::Running
-            && let Some(words) = self.suspender.pending.take()
-        {
-            let reason = format!("{SUSPENDED}: {words}");
-            let (event, kind) = match self.suspender.settings.press {
-                UnderWay::Finish => (Event::Pause, InterruptionKind::Pause),
-                UnderWay::BreakOff => (Event::PauseNow, InterruptionKind::PauseNow),
-            };
-            self.interrupt(event, kind, now, reason.clone())?;
-            self.suspender.holding = Some((now, reason));
-        }
-        let Some((since, reason)) = &self.suspender.holding else {
-            return Ok(());
-        };
-        let limit = self.suspender.settings.give_up_after;
-        if self.suspender.is_calm() && self.machine.state() != State::PausingNow {
-            let words = format!("no longer {reason}");
-            self.suspender.holding = None;
-            return self.interrupt(Event::Resume, InterruptionKind::Resume, now, words);
-        }
-        if now - *since >= limit {
-            let reason = reason.clone();
-            return Err(ControllerError::Suspended { reason, limit }.into());
-        }
-        Ok(())
-    }
-
-    /// Reads the temperatures of the monitored cameras. No answer is a fault, as in any other call.
-    fn temperatures(&mut self, t: HostTime) -> Result<[Option<f64>; 2], ControllerError> {
-        let mut found = [None; 2];
-        for camera in CameraId::ALL {
-            if !self.suspender.monitors_temperature(camera) {
-                continue;
-            }
-            let told = match self.cameras[camera.index()].temperature_c() {
-                Err(DeviceError::Pending { .. }) => continue, // read in the next window
-                other => other?,
-            };
-            if told.is_none() {
-                self.suspender.stop_monitoring_temperature(camera);
-                let text = format!(
-                    "suspend.temperature: {camera} cannot measure its temperature: not monitored"
-                );
-                self.journal.emit(Record::Note { t, text })?;
-            }
-            found[camera.index()] = told;
-        }
-        Ok(found)
-    }
-
-    /// Free space at the session file in bytes, if monitored.
-    fn free_space(&mut self, t: HostTime) -> Result<Option<f64>, ControllerError> {
-        if self.suspender.disk.is_none() {
-            return Ok(None);
-        }
-        let free_b = self.journal.free_bytes().map(|b| b as f64);
-        if free_b.is_none() {
-            self.suspender.disk = None;
-            let text = "suspend.disk_free: the free space is unknown: not monitored";
-            self.journal.emit(Record::Note {
-                t,
-                text: text.to_owned(),
-            })?;
-        }
-        Ok(free_b)
-    }
-
-    fn interrupt(
-        &mut self,
-        event: Event,
-        kind: InterruptionKind,
-        t: HostTime,
-        reason: String,
-    ) -> Result<(), Halt> {
-        self.machine.fire(event);
-        Ok(self
-            .journal
-            .emit(Record::Interruption { kind, t, reason })?)
     }
 }

@@ -1,8 +1,10 @@
 //! The verdict on an attempt, and whether to repeat it.
 
-use skinrig_model::{CameraId, Point3, PressOutcome, PressTiming, PressVerdict};
+use std::iter;
 
-use crate::executor::OpenPress;
+use skinrig_model::{InvalidReason, Point3, PressOutcome, PressTiming, PressVerdict};
+
+use crate::open_press::OpenPress;
 use crate::press_fault::PressFault;
 use crate::press_tracker::PressTracker;
 
@@ -20,11 +22,28 @@ impl JudgedAttempt {
     }
 }
 
+/// Why an attempt with these faults is invalid; `None` without faults.
+fn invalid_reason(faults: &[PressFault]) -> Option<InvalidReason> {
+    let (first, rest) = faults.split_first()?;
+    let joined = |first: String| {
+        let rest = rest.iter().map(ToString::to_string);
+        iter::once(first).chain(rest).collect::<Vec<_>>().join("; ")
+    };
+    Some(match first {
+        PressFault::RunEnded(reason) => InvalidReason::RunEnded {
+            reason: joined(reason.clone()),
+        },
+        fault => InvalidReason::Faults {
+            text: joined(fault.to_string()),
+        },
+    })
+}
+
 /// Outcome of a press: valid only if all phases were measured, the tip stayed in place and no data were lost.
-pub(crate) fn judge(open: &OpenPress, fault: Option<PressFault>) -> JudgedAttempt {
+pub(crate) fn judge(press: &OpenPress, fault: Option<PressFault>) -> JudgedAttempt {
     let mut faults: Vec<PressFault> = fault.into_iter().collect();
     let mut timing: Option<PressTiming> = None;
-    if let Some(tracker) = &open.tracker {
+    if let Some(tracker) = press.tracker() {
         match tracker.timing() {
             Ok(t) => timing = Some(t),
             Err(fault) if faults.is_empty() => faults.push(PressFault::Timing(fault)),
@@ -34,27 +53,14 @@ pub(crate) fn judge(open: &OpenPress, fault: Option<PressFault>) -> JudgedAttemp
             faults.extend(tracker.check_hold().err().map(PressFault::Timing));
         }
     }
-    for camera in CameraId::ALL {
-        let (lost, bytes) = (open.lost[camera.index()], open.bytes[camera.index()]);
-        if lost > 0 {
-            faults.push(PressFault::DataLost {
-                camera,
-                bytes: lost,
-            });
-        } else if bytes == 0 {
-            faults.push(PressFault::NoData { camera });
-        }
-    }
-    faults.extend_from_slice(&open.data_faults);
-    let tracker = open.tracker.as_ref();
+    faults.extend(press.data_faults());
+    let tracker = press.tracker();
     let mean = tracker.and_then(PressTracker::mean);
     let outcome = PressOutcome {
-        attempt: open.attempt,
-        verdict: if faults.is_empty() {
-            PressVerdict::Valid
-        } else {
-            let reasons: Vec<String> = faults.iter().map(ToString::to_string).collect();
-            PressVerdict::Invalid(reasons.join("; "))
+        attempt: press.attempt(),
+        verdict: match invalid_reason(&faults) {
+            None => PressVerdict::Valid,
+            Some(reason) => PressVerdict::Invalid(reason),
         },
         faults: faults.iter().map(PressFault::kind).collect(),
         timing,

@@ -1,6 +1,6 @@
 //! A rig: the devices of one bench and their description.
 
-use skinrig_model::{CameraId, RigGeometry, RigidTransform, Robot, Skin};
+use skinrig_model::{RigGeometry, RigidTransform, Robot, Skin};
 
 use crate::{CameraSettings, Clock, EventCamera, Indenter, TriggerBox};
 
@@ -26,11 +26,4 @@ pub struct Rig {
     pub geometry: RigGeometry,
     /// Description of the rig for the record, as JSON; for a simulated rig its complete configuration.
     pub description_json: String,
-}
-
-impl Rig {
-    /// The camera with this id.
-    pub fn camera_mut(&mut self, id: CameraId) -> &mut dyn EventCamera {
-        self.cameras[id.index()].as_mut()
-    }
 }

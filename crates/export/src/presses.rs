@@ -1,7 +1,9 @@
 //! The tidy table of presses: one row per planned press, with its last attempt and the views of both cameras.
 
+use std::borrow::Cow;
+
 use skinrig_analysis::result::{ClockFit, LocationOutcome, PressResult, PressView};
-use skinrig_model::{HostTime, PlannedPress, PressRole, PressTiming};
+use skinrig_model::{HostTime, PlannedPress, PressTiming};
 use skinrig_recorder::AttemptRow;
 
 use crate::error::ExportError;
@@ -98,18 +100,10 @@ pub(crate) fn table(source: &Source<'_>) -> Result<Table, ExportError> {
     })
 }
 
-const fn role(role: PressRole) -> &'static str {
-    match role {
-        PressRole::Sync => "sync",
-        PressRole::Calibrate => "calibrate",
-        PressRole::Score => "score",
-    }
-}
-
 /// Columns on plan and execution.
 fn journal(table: &mut Columns<'_>) {
     table.int("press", |r| i64::from(r.planned.id.number()));
-    table.text("role", |r| Some(role(r.planned.role).to_owned()));
+    table.text("role", |r| Some(r.planned.role.name().to_owned()));
     table.int("repetition", |r| i64::from(r.planned.repetition.number()));
     table.int("location", |r| i64::from(r.planned.location.number()));
     table.real("x_mm", |r| Some(r.planned.at.x_mm));
@@ -124,7 +118,7 @@ fn journal(table: &mut Columns<'_>) {
     });
     table.text("reason", |r| match r.found {
         Some(found) => found.reason.clone(),
-        None => r.last()?.verdict.reason().map(str::to_owned),
+        None => r.last()?.verdict.reason().map(Cow::into_owned),
     });
     table.text("truth_source", |r| {
         let scheduled = r.last()?.scheduled;

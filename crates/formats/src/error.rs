@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::raw::HeaderProblem;
+
 /// An error of this crate. Messages name the file, the place in it, what was expected and what was found.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -83,7 +85,7 @@ pub enum FormatsError {
     },
     /// A line of a RAW header.
     #[error(
-        "{}: header, byte {offset}, key `{key}`: expected {expected}, found {found}",
+        "{}: header, byte {offset}, key `{key}`: {problem}",
         path.display()
     )]
     Header {
@@ -93,10 +95,9 @@ pub enum FormatsError {
         offset: u64,
         /// The key; empty when the line has none.
         key: String,
-        /// What is valid there.
-        expected: String,
-        /// What was found.
-        found: String,
+        /// What was expected and found.
+        #[source]
+        problem: HeaderProblem,
     },
     /// A key or value that a RAW header cannot hold.
     #[error(

@@ -16,6 +16,8 @@ pub mod preflight;
 pub mod press;
 pub mod press_fault;
 pub mod pulse;
+pub mod quantile;
+pub mod reason;
 pub mod record;
 pub mod scene;
 pub mod settings;
@@ -39,6 +41,8 @@ pub use press::{
 };
 pub use press_fault::PressFaultKind;
 pub use pulse::{Label, Mark, MarkKind, PulseTrain, SeenMark, SeenSync, SentMark};
+pub use quantile::quantile;
+pub use reason::{InvalidReason, StopReason};
 pub use record::{
     DeviceIdentity, InterruptionKind, MotionCommand, Record, ResumeHeader, RunEnd, RunHeader,
     Setting,

@@ -1,5 +1,6 @@
 //! Presses: planned, attempted and judged.
 
+use std::borrow::Cow;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -7,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::frame::Point2;
 use crate::id::{AttemptId, LocationId, PressId, RepetitionId, as_index};
 use crate::press_fault::PressFaultKind;
+use crate::reason::InvalidReason;
 use crate::time::{HostDuration, HostTime};
 
 /// Role of a press. Calibration presses never score.
@@ -19,6 +21,18 @@ pub enum PressRole {
     Calibrate,
     /// Its truth is used only to score.
     Score,
+}
+
+impl PressRole {
+    /// `sync`, `calibrate` or `score`, as stored and shown.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Sync => "sync",
+            Self::Calibrate => "calibrate",
+            Self::Score => "score",
+        }
+    }
 }
 
 /// One press of the plan. Stored plans hold its three numbers as indices, counted from 0.
@@ -115,7 +129,7 @@ pub enum PressVerdict {
     /// Never attempted (the run stopped before it).
     Missed(String),
     /// Attempted, but what happened is not what was planned, or data were lost in its window.
-    Invalid(String),
+    Invalid(InvalidReason),
     /// Done, but left out of the metrics by a stated rule.
     Excluded(String),
 }
@@ -141,28 +155,23 @@ impl PressVerdict {
     /// What stands for the outcome of an attempt that leg `leg` of a session began and did not live to end: whether the robot
     /// pressed is not known.
     #[must_use]
-    pub fn cut_off(leg: u32) -> Self {
-        let why = Self::CUT_OFF;
-        Self::Invalid(format!(
-            "{why}: leg {leg} of the session ended without its outcome"
-        ))
+    pub const fn cut_off(leg: u32) -> Self {
+        Self::Invalid(InvalidReason::LegEnded { leg })
     }
-
-    /// How the reason begins of an attempt that did not come to its end: the program was gone, or the run ended during it.
-    pub const CUT_OFF: &'static str = "cut off";
 
     /// True for an attempt that did not come to its end; nothing can be said of its press.
     #[must_use]
-    pub fn is_cut_off(&self) -> bool {
-        matches!(self, Self::Invalid(reason) if reason.starts_with(Self::CUT_OFF))
+    pub const fn is_cut_off(&self) -> bool {
+        matches!(self, Self::Invalid(reason) if reason.is_cut_off())
     }
 
     /// Why, for everything but `Valid`.
     #[must_use]
-    pub fn reason(&self) -> Option<&str> {
+    pub fn reason(&self) -> Option<Cow<'_, str>> {
         match self {
             Self::Valid => None,
-            Self::Missed(r) | Self::Invalid(r) | Self::Excluded(r) => Some(r),
+            Self::Invalid(reason) => Some(reason.text()),
+            Self::Missed(text) | Self::Excluded(text) => Some(text.into()),
         }
     }
 }

@@ -12,6 +12,7 @@ use crate::pose::PoseSample;
 use crate::preflight::PreflightCheck;
 use crate::press::{PlannedPress, PressOutcome};
 use crate::pulse::SentMark;
+use crate::reason::StopReason;
 use crate::stream::{RawChunk, StreamFormat};
 use crate::time::HostTime;
 use crate::trigger_box::BoxReport;
@@ -183,8 +184,8 @@ pub enum RunEnd {
     /// Every step of the plan was executed.
     Completed,
     /// The operator stopped or aborted it.
-    Stopped(String),
-    /// A device, a limit or the recorder ended it.
+    Stopped(StopReason),
+    /// A device, a limit or the recorder ended it: the causes in words, separated by `; `.
     Faulted(String),
 }
 
@@ -196,6 +197,16 @@ impl RunEnd {
             Self::Completed => "completed",
             Self::Stopped(_) => "stopped",
             Self::Faulted(_) => "faulted",
+        }
+    }
+
+    /// Why, for everything but `Completed`.
+    #[must_use]
+    pub fn reason(&self) -> Option<&str> {
+        match self {
+            Self::Completed => None,
+            Self::Stopped(reason) => Some(reason.text()),
+            Self::Faulted(reason) => Some(reason),
         }
     }
 }

@@ -4,7 +4,10 @@
 //! caused by the computer or by skinrig, become `error`. MARGINAL passes; its output shows it.
 
 use std::fmt::Write as _;
+use std::time::Duration;
 
+pub use quick_junit::SerializeError;
+use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 use skinrig_model::text::visible;
 
 use crate::cause::Cause;
@@ -41,104 +44,70 @@ impl Outcome {
 }
 
 /// Formats a night as a JUnit document. `host` is the computer's name.
-#[must_use]
-pub fn junit(night: &Night, host: &str) -> String {
-    let count = |outcome: Outcome| {
-        let of = |c: &&CheckResult| Outcome::of(c.verdict, c.cause) == outcome;
-        night.checks.iter().filter(of).count()
-    };
-    let counts = format!(
-        "tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\" time=\"{:.3}\"",
-        night.checks.len(),
-        count(Outcome::Failure),
-        count(Outcome::Error),
-        count(Outcome::Skipped),
-        night.took_s.max(0.0)
-    );
-    let mut out = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
-    let name = escape(&night.suite);
+///
+/// # Errors
+/// [`SerializeError`] when writing fails; no known input causes this.
+pub fn junit(night: &Night, host: &str) -> Result<String, SerializeError> {
+    let took = duration(night.took_s);
+    let mut suite = TestSuite::new(printable(&night.suite));
+    suite.set_time(took);
     // JUnit readers expect timestamps without a time zone; ours are UTC.
-    let at = escape(night.started.trim_end_matches('Z'));
-    let host = escape(host);
-    push_line(
-        &mut out,
-        0,
-        &format!("<testsuites name=\"{name}\" {counts}>"),
-    );
-    push_line(
-        &mut out,
-        1,
-        &format!("<testsuite name=\"{name}\" {counts} timestamp=\"{at}\" hostname=\"{host}\">"),
-    );
-    properties(&mut out, night);
-    for check in &night.checks {
-        test_case(&mut out, night, check);
+    let at = night.started.trim_end_matches('Z');
+    for (name, value) in [("timestamp", at), ("hostname", host)] {
+        suite.extra.insert(name.into(), printable(value).into());
     }
-    push_line(&mut out, 1, "</testsuite>");
-    push_line(&mut out, 0, "</testsuites>");
-    out
+    add_properties(&mut suite, night);
+    let cases = night.checks.iter().map(|check| test_case(night, check));
+    suite.add_test_cases(cases);
+    let mut report = Report::new(printable(&night.suite));
+    report.set_time(took);
+    report.add_test_suite(suite);
+    report.to_string()
 }
 
-fn properties(out: &mut String, night: &Night) {
-    push_line(out, 2, "<properties>");
-    let mut property = |name: &str, value: &str| {
-        let (name, value) = (escape(name), escape(value));
-        push_line(
-            out,
-            3,
-            &format!("<property name=\"{name}\" value=\"{value}\"/>"),
-        );
+fn add_properties(suite: &mut TestSuite, night: &Night) {
+    let mut add = |name: &str, value: &str| {
+        suite.add_property((printable(name), printable(value)));
     };
-    property("night", &night.id);
-    property("verdict", night.verdict.name());
-    property("rig", &night.rig);
-    property("rig_kind", &night.rig_kind);
-    property("suite_sha256", &night.suite_sha256);
-    property("software", &night.versions.software);
-    property("finished", if night.finished { "true" } else { "false" });
+    add("night", &night.id);
+    add("verdict", night.verdict.name());
+    add("rig", &night.rig);
+    add("rig_kind", &night.rig_kind);
+    add("suite_sha256", &night.suite_sha256);
+    add("software", &night.versions.software);
+    add("finished", if night.finished { "true" } else { "false" });
     for (device, version) in &night.versions.firmware {
-        property(&format!("firmware {device}"), version);
+        add(&format!("firmware {device}"), version);
     }
-    push_line(out, 2, "</properties>");
 }
 
-fn test_case(out: &mut String, night: &Night, check: &CheckResult) {
-    let took_s = check.attempts.iter().fold(0.0, |sum, a| sum + a.took_s);
-    push_line(
-        out,
-        2,
-        &format!(
-            "<testcase name=\"{}\" classname=\"{}\" time=\"{took_s:.3}\">",
-            escape(&check.name),
-            escape(&night.suite)
-        ),
-    );
-    let kind = check.verdict.name();
-    let message = escape(&message(check));
-    match Outcome::of(check.verdict, check.cause) {
-        Outcome::Passed => {}
-        Outcome::Skipped => push_line(out, 3, &format!("<skipped message=\"{message}\"/>")),
-        Outcome::Failure => failure(out, "failure", kind, &message, check),
-        Outcome::Error => failure(out, "error", kind, &message, check),
-    }
+fn test_case(night: &Night, check: &CheckResult) -> TestCase {
+    let non_success = |kind: NonSuccessKind| {
+        let mut status = TestCaseStatus::non_success(kind);
+        status.set_type(check.verdict.name());
+        status.set_description(printable(&evidence_text(check)));
+        status
+    };
+    let mut status = match Outcome::of(check.verdict, check.cause) {
+        Outcome::Passed => TestCaseStatus::success(),
+        Outcome::Skipped => TestCaseStatus::skipped(),
+        Outcome::Failure => non_success(NonSuccessKind::Failure),
+        Outcome::Error => non_success(NonSuccessKind::Error),
+    };
+    status.set_message(printable(&message(check)));
+    let mut case = TestCase::new(printable(&check.name), status);
+    case.set_classname(printable(&night.suite));
+    case.set_time(duration(check.attempts.iter().map(|a| a.took_s).sum()));
     let values = values(check);
     if !values.is_empty() {
-        push_line(
-            out,
-            3,
-            &format!("<system-out>{}</system-out>", escape(&values)),
-        );
+        case.set_system_out(printable(&values));
     }
-    push_line(out, 2, "</testcase>");
+    case
 }
 
-fn failure(out: &mut String, tag: &str, kind: &str, message: &str, check: &CheckResult) {
-    let text = escape(&evidence_text(check));
-    push_line(
-        out,
-        3,
-        &format!("<{tag} type=\"{kind}\" message=\"{message}\">{text}</{tag}>"),
-    );
+/// Zero for values that are no durations.
+fn duration(seconds: f64) -> Duration {
+    Duration::try_from_secs_f64(seconds).unwrap_or_default()
 }
 
 /// One-line reason of the verdict.
@@ -197,29 +166,8 @@ fn values(check: &CheckResult) -> String {
     text
 }
 
-fn push_line(out: &mut String, depth: usize, line: &str) {
-    for _ in 0..depth {
-        out.push_str("  ");
-    }
-    out.push_str(line);
-    out.push('\n');
-}
-
-/// Escapes text for XML. Replaces characters that XML 1.0 forbids.
-fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in visible(text).chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\n' | '\t' => out.push(c),
-            '\u{fffe}' | '\u{ffff}' => {
-                out.push(char::REPLACEMENT_CHARACTER);
-            }
-            c => out.push(c),
-        }
-    }
-    out
+/// `text` with hidden characters spelled out, and without characters that XML 1.0 forbids.
+fn printable(text: &str) -> String {
+    let text = visible(text).replace('\t', " ");
+    text.replace(['\u{fffe}', '\u{ffff}'], "\u{fffd}")
 }

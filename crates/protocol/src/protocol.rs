@@ -19,7 +19,7 @@ use crate::surface_check::SurfaceCheck;
 use crate::suspend::Suspend;
 
 /// Reads a file that a protocol names. The path is the protocol's folder joined with the name in the protocol.
-pub type Loader<'a> = &'a dyn Fn(&Path) -> std::io::Result<Vec<u8>>;
+pub(crate) type Loader<'a> = &'a dyn Fn(&Path) -> std::io::Result<Vec<u8>>;
 
 /// A protocol that was read and checked. Lengths in mm, skin frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -21,7 +21,7 @@ pub(crate) struct BoxRow {
 
 impl BoxRow {
     /// Columns of a report received at `taken`.
-    pub fn of(taken: HostTime, report: BoxReport) -> Result<Self, Fault> {
+    pub(crate) fn of(taken: HostTime, report: BoxReport) -> Result<Self, Fault> {
         let us = |at: BoxTime| {
             let fits = i64::try_from(at.us);
             fits.map(Some)

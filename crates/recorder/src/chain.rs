@@ -11,7 +11,7 @@ use crate::totals;
 
 /// Result of checking the seal that a leg removed.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum PreviousSeal {
+pub(crate) enum PreviousSeal {
     /// The rows of the earlier legs match its hashes and counts.
     Verified,
     /// An old version of skinrig archived only its tree hash, which cannot be recomputed.
@@ -21,7 +21,11 @@ pub enum PreviousSeal {
 }
 
 /// Archives the seal, if any, that leg `leg` removes from a file with schema version `schema`.
-pub async fn archive_seal(conn: &mut SqliteConnection, leg: u32, schema: u32) -> Result<(), Fault> {
+pub(crate) async fn archive_seal(
+    conn: &mut SqliteConnection,
+    leg: u32,
+    schema: u32,
+) -> Result<(), Fault> {
     sqlx::query(
         "INSERT INTO previous_seal (leg, schema_version, planned, valid, missed, invalid, excluded, sync_planned, sync_valid,
            sync_missed, sync_invalid, sync_excluded, chunks, raw_bytes, stored_bytes, lost_bytes, cd_events, trigger_edges,
@@ -52,7 +56,7 @@ struct Leg {
 }
 
 /// Checks every seal that a leg removed; returns leg number and result.
-pub async fn check(conn: &mut SqliteConnection) -> Result<Vec<(i64, PreviousSeal)>, Fault> {
+pub(crate) async fn check(conn: &mut SqliteConnection) -> Result<Vec<(i64, PreviousSeal)>, Fault> {
     if !has_table(conn, "leg").await? {
         return Ok(Vec::new());
     }

@@ -44,14 +44,6 @@ impl Codec {
             Self::TimeHighRuns => "th-rle",
         }
     }
-
-    /// Codec with this name.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Self> {
-        [Self::None, Self::TimeHighRuns]
-            .into_iter()
-            .find(|c| c.name() == name)
-    }
 }
 
 impl fmt::Display for Codec {

@@ -155,7 +155,7 @@ pub(crate) struct TableDigest {
 
 /// State of a session when it was sealed before a further leg.
 #[derive(Debug, Clone, Copy)]
-pub struct EarlierState<'a> {
+pub(crate) struct EarlierState<'a> {
     /// Number of the leg that followed.
     pub leg: i64,
     /// Schema version of the file at that time.
@@ -282,7 +282,7 @@ mod tests {
             .build()
             .unwrap();
         runtime.block_on(async {
-            for version in 1..=crate::SCHEMA_VERSION {
+            for version in 1..=crate::migrations::SCHEMA_VERSION {
                 let path = folder.path().join(format!("{version}.session.sqlite"));
                 let mut old = schema::create_version(&path, version).await.unwrap();
                 let path = folder.path().join(format!("{version}-now.session.sqlite"));

@@ -69,7 +69,7 @@ impl LockedFile {
 
 /// The session file and its log files, as the writer opened them.
 #[derive(Debug)]
-pub struct LockedFiles {
+pub(crate) struct LockedFiles {
     path: PathBuf,
     session: LockedFile,
     log: Option<LockedFile>,
@@ -81,7 +81,7 @@ impl LockedFiles {
     /// Locks the session file at `path`, and its log if there is one.
     ///
     /// `Ok(None)` if another writer holds either of them.
-    pub fn take(path: &Path) -> std::io::Result<Option<Self>> {
+    pub(crate) fn take(path: &Path) -> std::io::Result<Option<Self>> {
         let path = std::path::absolute(path)?;
         if is_own(&path) {
             return Ok(None);
@@ -125,7 +125,7 @@ impl LockedFiles {
     ///
     /// # Errors
     /// [`RecorderError::Displaced`].
-    pub fn check(&self) -> Result<(), RecorderError> {
+    pub(crate) fn check(&self) -> Result<(), RecorderError> {
         let displaced = |path: PathBuf, found: String| RecorderError::Displaced { path, found };
         let now = FileId::at(&self.path);
         if now != Some(self.session.id) {
@@ -181,7 +181,7 @@ impl LockedFiles {
     }
 
     /// Copies the open session file, which must have no log, to the first path that works.
-    pub fn copy(&self, paths: &[PathBuf]) -> Result<PathBuf, RescueError> {
+    pub(crate) fn copy(&self, paths: &[PathBuf]) -> Result<PathBuf, RescueError> {
         let copy = |mut to: File| -> std::io::Result<()> {
             let mut from = &self.session.file;
             from.seek(SeekFrom::Start(0))?;
@@ -192,7 +192,7 @@ impl LockedFiles {
     }
 
     /// Removes log files left beside the old and the new path, once SQLite has closed them.
-    pub fn remove_log_files(&self) {
+    pub(crate) fn remove_log_files(&self) {
         let log = self.log.as_ref().map(|log| log.id);
         let places = [Some(self.path.clone()), self.session.current_path()];
         for place in places.into_iter().flatten() {
@@ -250,7 +250,7 @@ fn first_of(
 ///
 /// The session file is opened only if it has no log and is writable: then no reader in this process has locks on it that
 /// closing it would drop.
-pub fn is_locked_by_writer(path: &Path) -> bool {
+pub(crate) fn is_locked_by_writer(path: &Path) -> bool {
     if is_own(path) {
         return true;
     }
@@ -265,7 +265,7 @@ pub fn is_locked_by_writer(path: &Path) -> bool {
 }
 
 /// Whether this process writes the session at `path`.
-pub fn is_own(path: &Path) -> bool {
+pub(crate) fn is_own(path: &Path) -> bool {
     FileId::at(path).is_some_and(|id| own_sessions().contains(&id))
 }
 
@@ -303,7 +303,7 @@ mod byte {
     ///
     /// A sealed session cannot be opened for writing, and a read-only handle can take only a shared lock. So each writer sets a shared
     /// lock, then looks for another one: of two simultaneous writers, at least one sees the other.
-    pub fn lock(file: &File) -> io::Result<bool> {
+    pub(super) fn lock(file: &File) -> io::Result<bool> {
         set(file, libc::F_RDLCK)?;
         if is_locked(file) {
             set(file, libc::F_UNLCK)?;

@@ -7,7 +7,7 @@ use crate::error::{RecorderError, RescueError};
 
 /// Locks nothing.
 #[derive(Debug)]
-pub struct LockedFiles;
+pub(crate) struct LockedFiles;
 
 impl LockedFiles {
     /// Always succeeds.
@@ -45,7 +45,7 @@ impl LockedFiles {
     }
 
     /// Does nothing.
-    pub fn remove_log_files(&self) {}
+    pub(crate) fn remove_log_files(&self) {}
 }
 
 /// Where to save a session that was moved or removed while it was written.
@@ -58,7 +58,7 @@ pub(crate) struct RescueTargets {
 }
 
 /// Always false: unknown.
-pub fn is_locked_by_writer(_: &Path) -> bool {
+pub(crate) fn is_locked_by_writer(_: &Path) -> bool {
     false
 }
 

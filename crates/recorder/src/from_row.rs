@@ -16,15 +16,6 @@ use crate::query::{
 };
 use crate::rows::{AttemptRow, ChunkMeta};
 
-/// The name of a role in the session file.
-pub(crate) const fn role_name(role: PressRole) -> &'static str {
-    match role {
-        PressRole::Sync => "sync",
-        PressRole::Calibrate => "calibrate",
-        PressRole::Score => "score",
-    }
-}
-
 pub(crate) fn header_from(row: &SqliteRow) -> Result<RunHeader, Fault> {
     let format = |column: &str| -> Result<StreamFormat, Fault> {
         text(row, column)?
@@ -63,7 +54,7 @@ pub(crate) fn planned_from(row: &SqliteRow) -> Result<PlannedPress, Fault> {
     const ROLES: [PressRole; 3] = [PressRole::Sync, PressRole::Calibrate, PressRole::Score];
     Ok(PlannedPress {
         id: PressId::from_index(num(row, "id")?),
-        role: enum_value(row, "role", &ROLES, role_name)?,
+        role: enum_value(row, "role", &ROLES, PressRole::name)?,
         repetition: RepetitionId::from_index(num(row, "repetition")?),
         location: LocationId::from_index(num(row, "location")?),
         at: Point2::new(real(row, "x_mm")?, real(row, "y_mm")?),
@@ -81,7 +72,7 @@ pub(crate) fn attempt_from(row: &SqliteRow) -> Result<AttemptRow, Fault> {
         None => None,
         Some("valid") => Some(PressVerdict::Valid),
         Some("missed") => Some(PressVerdict::Missed(reason)),
-        Some("invalid") => Some(PressVerdict::Invalid(reason)),
+        Some("invalid") => Some(PressVerdict::Invalid(reason.into())),
         Some("excluded") => Some(PressVerdict::Excluded(reason)),
         Some(other) => return Err(Fault::bad(id, "a verdict", format!("`{other}`"))),
     };

@@ -6,7 +6,7 @@ use std::time::Instant;
 use sha2::{Digest, Sha256};
 use skinrig_model::{
     BoxReport, HostTime, PlannedPress, PoseSample, PreflightCheck, PressId, PressOutcome,
-    PressVerdict, Record, RunEnd, RunHeader,
+    PressVerdict, Record, RunHeader,
 };
 use sqlx::sqlite::SqliteConnection;
 
@@ -23,7 +23,7 @@ const COMMIT_RECORDS: usize = 4096;
 const BLOCK_SAMPLES: usize = 4096;
 
 /// The journal of a session file, open for writing.
-pub struct Journal {
+pub(crate) struct Journal {
     pub path: PathBuf,
     pub conn: SqliteConnection,
     /// Number of the current leg.
@@ -36,7 +36,7 @@ pub struct Journal {
 }
 
 impl Journal {
-    pub fn new(path: PathBuf, conn: SqliteConnection, leg: u32) -> Self {
+    pub(crate) fn new(path: PathBuf, conn: SqliteConnection, leg: u32) -> Self {
         Self {
             path,
             conn,
@@ -50,7 +50,7 @@ impl Journal {
     }
 
     /// Start of the current transaction; `None` if nothing was written since the last commit.
-    pub const fn opened(&self) -> Option<Instant> {
+    pub(crate) const fn opened(&self) -> Option<Instant> {
         self.opened
     }
 
@@ -60,7 +60,7 @@ impl Journal {
     }
 
     /// Commits, so that everything written so far is durable.
-    pub async fn commit(&mut self) -> Result<(), Fault> {
+    pub(crate) async fn commit(&mut self) -> Result<(), Fault> {
         self.flush_poses().await?;
         if self.opened.is_some() {
             sqlx::query("COMMIT").execute(&mut self.conn).await?;
@@ -72,7 +72,7 @@ impl Journal {
     }
 
     /// Writes one record in the current transaction.
-    pub async fn write(&mut self, ready: PreparedRecord, bytes: usize) -> Result<(), Fault> {
+    pub(crate) async fn write(&mut self, ready: PreparedRecord, bytes: usize) -> Result<(), Fault> {
         if self.opened.is_none() {
             sqlx::query("BEGIN IMMEDIATE")
                 .execute(&mut self.conn)
@@ -210,14 +210,10 @@ impl Journal {
                 Ok(())
             }
             Record::Ended { t, end } => {
-                let reason = match &end {
-                    RunEnd::Completed => None,
-                    RunEnd::Stopped(reason) | RunEnd::Faulted(reason) => Some(reason),
-                };
                 sqlx::query("INSERT INTO run_end (id, t_ns, status, reason) VALUES (1, ?, ?, ?)")
                     .bind(t.0)
                     .bind(end.name())
-                    .bind(reason)
+                    .bind(end.reason())
                     .execute(&mut self.conn)
                     .await?;
                 Ok(())
@@ -303,7 +299,7 @@ impl Journal {
              VALUES (?, ?, ?, ?, ?, ?, ?)",
         )
         .bind(press.id.index())
-        .bind(crate::from_row::role_name(press.role))
+        .bind(press.role.name())
         .bind(press.repetition.index())
         .bind(press.location.index())
         .bind(press.at.x_mm)

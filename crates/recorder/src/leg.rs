@@ -28,7 +28,7 @@ impl LegOffset {
     ///
     /// # Errors
     /// [`RecorderError::Record`] if a time or chunk number overflows.
-    pub fn apply(&self, mut record: Record) -> Result<Record, RecorderError> {
+    pub(crate) fn apply(&self, mut record: Record) -> Result<Record, RecorderError> {
         match self.shift(&mut record) {
             Some(()) => Ok(record),
             None => Err(RecorderError::Record {

@@ -53,7 +53,6 @@ pub use close_result::Sealed;
 pub use codec::Codec;
 pub use error::{CopyError, RecorderError, RescueError, WriteFailure};
 pub use lock::writer_of;
-pub use migrations::SCHEMA_VERSION;
 pub use queue::QueueLoad;
 pub use reader::SessionReader;
 pub use rows::{
@@ -63,8 +62,7 @@ pub use rows::{
 pub use salvage::{LostBytes, SalvageReport, SalvagedTable, salvage};
 pub use sidecar::SESSION_SUFFIX;
 pub use tags::{
-    Annotation, AnnotationNote, Annotations, TAGS_SUFFIX, annotate, annotations, is_valid_tag,
-    tags_path,
+    Annotation, AnnotationNote, Annotations, annotate, annotations, is_valid_tag, tags_path,
 };
 pub use verify::{ChunkScanner, VerifyReport, verify};
 pub use writer::SessionWriter;

@@ -36,7 +36,7 @@ impl WriterLock {
     ///
     /// # Errors
     /// [`RecorderError::InUse`] if another writer holds it.
-    pub fn take(session: &Path) -> Result<Self, RecorderError> {
+    pub(crate) fn take(session: &Path) -> Result<Self, RecorderError> {
         let path = lock_path(session);
         let io = |source| RecorderError::Io {
             path: path.clone(),
@@ -144,7 +144,7 @@ impl WriterLock {
     ///
     /// # Errors
     /// [`RecorderError::Displaced`].
-    pub fn check(&self) -> Result<(), RecorderError> {
+    pub(crate) fn check(&self) -> Result<(), RecorderError> {
         self.files.as_ref().map_or(Ok(()), LockedFiles::check)
     }
 
@@ -160,7 +160,7 @@ impl WriterLock {
     }
 
     /// Copies the open session file; see [`LockedFiles::copy`].
-    pub fn copy(&self, paths: &[PathBuf]) -> Result<PathBuf, RescueError> {
+    pub(crate) fn copy(&self, paths: &[PathBuf]) -> Result<PathBuf, RescueError> {
         let none = || Err(RescueError::NotOpen);
         self.files
             .as_ref()
@@ -168,7 +168,7 @@ impl WriterLock {
     }
 
     /// Removes the log files that a displaced session leaves behind.
-    pub fn remove_log_files(&self) {
+    pub(crate) fn remove_log_files(&self) {
         if let Some(files) = &self.files {
             files.remove_log_files();
         }

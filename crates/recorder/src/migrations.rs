@@ -6,7 +6,7 @@ use sqlx::SqlSafeStr;
 use sqlx::migrate::{Migration, MigrationType, Migrator};
 
 /// Schema version that this build writes, and the newest that it reads (`PRAGMA user_version`).
-pub const SCHEMA_VERSION: u32 = 10;
+pub(crate) const SCHEMA_VERSION: u32 = 10;
 
 /// All migrations, oldest first: version, description and SQL. Listed by hand, because the macro that reads the folder would
 /// build SQLite a second time for the compiler.

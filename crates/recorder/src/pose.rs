@@ -6,7 +6,7 @@ use skinrig_model::{HostTime, Point3, PoseSample, Skin};
 pub(crate) const SAMPLE_BYTES: usize = 64;
 
 /// Appends `sample` to `data`.
-pub fn encode(sample: &PoseSample, data: &mut Vec<u8>) {
+pub(crate) fn encode(sample: &PoseSample, data: &mut Vec<u8>) {
     data.extend_from_slice(&sample.t.0.to_le_bytes());
     for value in [sample.commanded.to_array(), sample.measured.to_array()].as_flattened() {
         data.extend_from_slice(&value.to_le_bytes());
@@ -15,7 +15,7 @@ pub fn encode(sample: &PoseSample, data: &mut Vec<u8>) {
 }
 
 /// Samples of a block. Ignores bytes after the last whole record: the caller checks the length.
-pub fn decode(data: &[u8]) -> Vec<PoseSample> {
+pub(crate) fn decode(data: &[u8]) -> Vec<PoseSample> {
     data.as_chunks::<SAMPLE_BYTES>()
         .0
         .iter()

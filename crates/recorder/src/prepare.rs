@@ -60,7 +60,7 @@ impl Drop for PanicNotifier {
 }
 
 /// Prepares records in order until the queue closes.
-pub fn run(shared: &Arc<Shared>, mut preparer: Preparer) {
+pub(crate) fn run(shared: &Arc<Shared>, mut preparer: Preparer) {
     let _notifier = PanicNotifier(Arc::clone(shared));
     while let Some((record, bytes)) = shared.next_to_prepare() {
         shared.push_prepared(preparer.prepare(record), bytes);

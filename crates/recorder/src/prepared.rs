@@ -6,11 +6,11 @@ use crate::codec::Codec;
 use crate::query::Fault;
 
 /// A record ready to write, or the reason why it cannot be written. Keeps its place in the order either way.
-pub type Prepared = Result<PreparedRecord, Fault>;
+pub(crate) type Prepared = Result<PreparedRecord, Fault>;
 
 /// A record ready to write.
 #[derive(Debug)]
-pub enum PreparedRecord {
+pub(crate) enum PreparedRecord {
     /// Camera bytes.
     Chunk(Box<PreparedChunk>),
     /// Any other record, unchanged.

@@ -10,7 +10,7 @@ use crate::error::RecorderError;
 
 /// A failed query, or a row that violates the schema, before its file is known.
 #[derive(Debug)]
-pub enum Fault {
+pub(crate) enum Fault {
     /// SQLite failed.
     Sql(Box<sqlx::Error>),
     /// A value violates the schema.
@@ -29,7 +29,7 @@ impl From<sqlx::Error> for Fault {
 
 impl Fault {
     /// Fault for a value that violates the schema.
-    pub fn bad(place: impl ToString, expected: impl ToString, found: impl ToString) -> Self {
+    pub(crate) fn bad(place: impl ToString, expected: impl ToString, found: impl ToString) -> Self {
         Self::Bad {
             place: place.to_string(),
             expected: expected.to_string(),
@@ -38,7 +38,7 @@ impl Fault {
     }
 
     /// Converts it to the error for this file.
-    pub fn at(self, path: &Path, doing: &'static str) -> RecorderError {
+    pub(crate) fn at(self, path: &Path, doing: &'static str) -> RecorderError {
         let path = path.to_owned();
         match self {
             Self::Sql(source) => RecorderError::Sql {
@@ -74,7 +74,7 @@ pub(crate) async fn each_row(
 }
 
 /// An integer column.
-pub fn int(row: &SqliteRow, column: &str) -> Result<i64, Fault> {
+pub(crate) fn int(row: &SqliteRow, column: &str) -> Result<i64, Fault> {
     Ok(row.try_get(column)?)
 }
 
@@ -84,7 +84,7 @@ pub(crate) fn opt_int(row: &SqliteRow, column: &str) -> Result<Option<i64>, Faul
 }
 
 /// An integer column that must fit `T`.
-pub fn num<T: TryFrom<i64>>(row: &SqliteRow, column: &str) -> Result<T, Fault> {
+pub(crate) fn num<T: TryFrom<i64>>(row: &SqliteRow, column: &str) -> Result<T, Fault> {
     let value = int(row, column)?;
     T::try_from(value)
         .map_err(|_| Fault::bad(column, format!("a {}", std::any::type_name::<T>()), value))
@@ -96,7 +96,7 @@ pub(crate) fn opt_num<T: TryFrom<i64>>(row: &SqliteRow, column: &str) -> Result<
 }
 
 /// A real column.
-pub fn real(row: &SqliteRow, column: &str) -> Result<f64, Fault> {
+pub(crate) fn real(row: &SqliteRow, column: &str) -> Result<f64, Fault> {
     Ok(row.try_get(column)?)
 }
 
@@ -132,7 +132,7 @@ pub(crate) fn text_if_present(row: &SqliteRow, column: &str) -> Result<Option<St
 }
 
 /// A text column.
-pub fn text(row: &SqliteRow, column: &str) -> Result<String, Fault> {
+pub(crate) fn text(row: &SqliteRow, column: &str) -> Result<String, Fault> {
     Ok(row.try_get(column)?)
 }
 
@@ -142,19 +142,19 @@ pub(crate) fn opt_text(row: &SqliteRow, column: &str) -> Result<Option<String>, 
 }
 
 /// A blob column.
-pub fn blob(row: &SqliteRow, column: &str) -> Result<Vec<u8>, Fault> {
+pub(crate) fn blob(row: &SqliteRow, column: &str) -> Result<Vec<u8>, Fault> {
     Ok(row.try_get(column)?)
 }
 
 /// A blob column of 32 bytes.
-pub fn sha(row: &SqliteRow, column: &str) -> Result<[u8; 32], Fault> {
+pub(crate) fn sha(row: &SqliteRow, column: &str) -> Result<[u8; 32], Fault> {
     let bytes = blob(row, column)?;
     <[u8; 32]>::try_from(bytes.as_slice())
         .map_err(|_| Fault::bad(column, "32 bytes", format!("{} bytes", bytes.len())))
 }
 
 /// A text column with the name of one of `all`.
-pub fn enum_value<T: Copy>(
+pub(crate) fn enum_value<T: Copy>(
     row: &SqliteRow,
     column: &str,
     all: &[T],

@@ -24,7 +24,7 @@ struct DiskTimeout(Duration);
 
 /// State shared by the caller, the preparation thread and the writer thread.
 #[derive(Debug)]
-pub struct Shared {
+pub(crate) struct Shared {
     queue: Mutex<Queue>,
     changed: Condvar,
     disk_timeout: Duration,
@@ -74,7 +74,7 @@ pub struct QueueLoad {
 
 /// How to close a session.
 #[derive(Debug, Clone)]
-pub enum CloseMode {
+pub(crate) enum CloseMode {
     /// Commit and leave it unsealed.
     Unsealed,
     /// Seal it.
@@ -84,7 +84,7 @@ pub enum CloseMode {
 }
 
 /// Next task of the writer thread.
-pub enum WriterTask {
+pub(crate) enum WriterTask {
     /// Write these records, each with its bytes in the queue.
     Write(VecDeque<(Prepared, usize)>),
     /// Commit: no record arrived in time.
@@ -126,7 +126,7 @@ impl Shared {
     ///
     /// # Errors
     /// [`RecorderError::WriteFailed`] if the record was not queued; [`RecorderError::WriteTimeout`] if it was queued but may not be durable.
-    pub fn accept(&self, record: Record) -> Result<(), RecorderError> {
+    pub(crate) fn accept(&self, record: Record) -> Result<(), RecorderError> {
         let (bytes, durable) = (size_of(&record), is_durable(&record));
         let mut queue = self.lock();
         let full = |q: &Queue| q.failed.is_none() && q.bytes > 0 && q.bytes + bytes > QUEUE_BYTES;
@@ -158,7 +158,7 @@ impl Shared {
     }
 
     /// Load of the queue so far.
-    pub fn load(&self) -> QueueLoad {
+    pub(crate) fn load(&self) -> QueueLoad {
         let queue = self.lock();
         QueueLoad {
             most_bytes: queue.most_bytes,
@@ -183,7 +183,7 @@ impl Shared {
     }
 
     /// Passes on the result for the record that [`next_to_prepare`](Self::next_to_prepare) returned.
-    pub fn push_prepared(&self, prepared: Prepared, bytes: usize) {
+    pub(crate) fn push_prepared(&self, prepared: Prepared, bytes: usize) {
         let mut queue = self.lock();
         queue.preparing = false;
         if queue.failed.is_none() {
@@ -193,7 +193,7 @@ impl Shared {
     }
 
     /// Waits for the next task of the writer thread. Returns a commit at `commit_at`.
-    pub fn next_task(&self, commit_at: Option<Instant>) -> WriterTask {
+    pub(crate) fn next_task(&self, commit_at: Option<Instant>) -> WriterTask {
         let mut queue = self.lock();
         loop {
             if !queue.prepared.is_empty() {
@@ -223,20 +223,20 @@ impl Shared {
     }
 
     /// Frees the space of a record that was written.
-    pub fn release(&self, bytes: usize) {
+    pub(crate) fn release(&self, bytes: usize) {
         let mut queue = self.lock();
         queue.bytes = queue.bytes.saturating_sub(bytes);
         self.changed.notify_all();
     }
 
     /// Reports that the first `records` records are on disk.
-    pub fn mark_durable(&self, records: u64) {
+    pub(crate) fn mark_durable(&self, records: u64) {
         self.lock().durable = records;
         self.changed.notify_all();
     }
 
     /// Stops all writing. The first reason is kept.
-    pub fn fail(&self, failure: WriteFailure) {
+    pub(crate) fn fail(&self, failure: WriteFailure) {
         let mut queue = self.lock();
         queue.failed.get_or_insert(failure);
         queue.accepted.clear();
@@ -247,7 +247,7 @@ impl Shared {
     }
 
     /// Reason why writing stopped, if it has.
-    pub fn failure(&self) -> Option<WriteFailure> {
+    pub(crate) fn failure(&self) -> Option<WriteFailure> {
         self.lock().failed.clone()
     }
 
@@ -272,7 +272,7 @@ impl Shared {
     }
 
     /// Closes the queue: no record follows.
-    pub fn close(&self, mode: CloseMode) {
+    pub(crate) fn close(&self, mode: CloseMode) {
         self.lock().closed = Some(mode);
         self.changed.notify_all();
     }

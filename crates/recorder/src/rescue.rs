@@ -17,7 +17,7 @@ const RETRY_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Checkpoints the log into the session file if that file still exists. Otherwise, or if readers prevent it, copies everything through
 /// the open connection. Returns the path, or the reason for failure.
-pub async fn rescue(
+pub(crate) async fn rescue(
     mut conn: SqliteConnection,
     targets: RescueTargets,
 ) -> Result<PathBuf, RescueError> {

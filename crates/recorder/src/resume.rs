@@ -116,7 +116,7 @@ fn lock(path: &Path) -> Result<WriterLock, RecorderError> {
 }
 
 /// Begins the leg in one transaction: durable on return, or nothing changed.
-pub async fn begin(
+pub(crate) async fn begin(
     path: &Path,
     header: &ResumeHeader,
 ) -> Result<(SqliteConnection, LegStart), RecorderError> {

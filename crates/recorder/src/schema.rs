@@ -28,7 +28,7 @@ const CHECKPOINT_PAGES: u32 = 256;
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Creates a session file with an empty schema.
-pub async fn create(path: &Path) -> Result<SqliteConnection, RecorderError> {
+pub(crate) async fn create(path: &Path) -> Result<SqliteConnection, RecorderError> {
     create_file(path)?;
     create_schema(path).await
 }
@@ -50,7 +50,7 @@ pub(crate) fn create_file(path: &Path) -> Result<(), RecorderError> {
 }
 
 /// Creates the schema in an empty file.
-pub async fn create_schema(path: &Path) -> Result<SqliteConnection, RecorderError> {
+pub(crate) async fn create_schema(path: &Path) -> Result<SqliteConnection, RecorderError> {
     let fault = |e: sqlx::Error| Fault::from(e).at(path, "creating the schema");
     let mut conn = new_file(path).await.map_err(fault)?;
     MIGRATOR.run(&mut conn).await.map_err(|e| fault(e.into()))?;
@@ -105,7 +105,7 @@ pub(crate) async fn reopen(path: &Path) -> Result<SqliteConnection, RecorderErro
 }
 
 /// Migrates the schema to this build's version within a transaction. Data that an older schema lacks stay empty.
-pub async fn migrate(all: &mut Transaction<'_, Sqlite>) -> Result<(), Fault> {
+pub(crate) async fn migrate(all: &mut Transaction<'_, Sqlite>) -> Result<(), Fault> {
     let done = MIGRATOR.run(&mut **all).await;
     done.map_err(|e| Fault::from(sqlx::Error::from(e)))
 }
@@ -161,7 +161,7 @@ const SEAL_WAIT: Duration = Duration::from_secs(90);
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
 /// Opens a session file for reading, after checking its first page.
-pub async fn open(path: &Path) -> Result<SqliteConnection, RecorderError> {
+pub(crate) async fn open(path: &Path) -> Result<SqliteConnection, RecorderError> {
     reject_special_files(path)?;
     let from = Instant::now();
     while crate::lock::is_being_sealed(path) && from.elapsed() < SEAL_WAIT {

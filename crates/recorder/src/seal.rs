@@ -82,7 +82,7 @@ pub(crate) async fn seal_page(conn: &mut SqliteConnection) -> Result<u32, Fault>
 }
 
 /// Replaces `placeholder` on page `page` of the closed file with the file's hash, and returns the hash.
-pub fn stamp(path: &Path, page: u32, placeholder: &[u8; 32]) -> std::io::Result<[u8; 32]> {
+pub(crate) fn stamp(path: &Path, page: u32, placeholder: &[u8; 32]) -> std::io::Result<[u8; 32]> {
     let mut file = OpenOptions::new().read(true).write(true).open(path)?;
     let at = locate(&mut file, page, placeholder)?.ok_or_else(|| {
         std::io::Error::other("expected the placeholder exactly once on the page of the seal")

@@ -11,7 +11,7 @@ pub const SESSION_SUFFIX: &str = ".session.sqlite";
 
 /// Path of the file that SQLite keeps beside a session: `-wal`, the write-ahead log, or `-journal`, the rollback
 /// journal.
-pub fn sidecar_path(path: &Path, ending: &str) -> PathBuf {
+pub(crate) fn sidecar_path(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(ending);
     PathBuf::from(name)

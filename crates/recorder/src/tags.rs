@@ -15,7 +15,7 @@ use crate::error::RecorderError;
 use crate::sidecar::SESSION_SUFFIX;
 
 /// File name suffix of these logs.
-pub const TAGS_SUFFIX: &str = ".tags.jsonl";
+pub(crate) const TAGS_SUFFIX: &str = ".tags.jsonl";
 /// Longest log, bytes.
 const MAX_LOG_BYTES: u64 = 1 << 20;
 /// Longest tag, characters.

@@ -7,7 +7,9 @@ use crate::query::{Fault, each_row, int, num, opt_text};
 use crate::rows::{PressTally, SessionTotals};
 
 /// Verdict counts by last attempt: calibrating and scored presses, then sync presses.
-pub async fn tallies(conn: &mut SqliteConnection) -> Result<(PressTally, PressTally), Fault> {
+pub(crate) async fn tallies(
+    conn: &mut SqliteConnection,
+) -> Result<(PressTally, PressTally), Fault> {
     let presses = "SELECT p.role = 'sync' AS sync, a.verdict AS verdict, count(*) AS n
          FROM press p LEFT JOIN attempt a
            ON a.press = p.id AND a.number = (SELECT max(number) FROM attempt WHERE press = p.id)
@@ -42,7 +44,7 @@ async fn tally_all(
 }
 
 /// Sizes and counts, computed from the rows.
-pub async fn totals(conn: &mut SqliteConnection) -> Result<SessionTotals, Fault> {
+pub(crate) async fn totals(conn: &mut SqliteConnection) -> Result<SessionTotals, Fault> {
     let (presses, sync) = tallies(conn).await?;
     let mut totals = SessionTotals {
         presses,
@@ -96,7 +98,7 @@ pub(crate) async fn totals_before(
 }
 
 /// Reads the columns that the sums over `chunk` and the seal have in common.
-pub fn sizes(row: &SqliteRow, totals: &mut SessionTotals) -> Result<(), Fault> {
+pub(crate) fn sizes(row: &SqliteRow, totals: &mut SessionTotals) -> Result<(), Fault> {
     totals.chunks = num(row, "chunks")?;
     totals.raw_bytes = num(row, "raw_bytes")?;
     totals.stored_bytes = num(row, "stored_bytes")?;
@@ -108,7 +110,7 @@ pub fn sizes(row: &SqliteRow, totals: &mut SessionTotals) -> Result<(), Fault> {
 }
 
 /// Reads a tally of the seal; `prefix` is empty or `sync_`.
-pub fn tally(row: &SqliteRow, prefix: &str) -> Result<PressTally, Fault> {
+pub(crate) fn tally(row: &SqliteRow, prefix: &str) -> Result<PressTally, Fault> {
     let column = |name: &str| num(row, &format!("{prefix}{name}"));
     Ok(PressTally {
         planned: column("planned")?,

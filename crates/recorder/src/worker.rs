@@ -21,7 +21,7 @@ const COMMIT_AFTER: Duration = Duration::from_millis(500);
 const SEAL_RETRY_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Writes prepared records into the session file.
-pub struct Worker {
+pub(crate) struct Worker {
     pub runtime: Runtime,
     pub journal: Journal,
     pub shared: Arc<Shared>,
@@ -55,7 +55,7 @@ fn failure(fault: Fault, path: &Path, doing: &'static str) -> WriteFailure {
 
 impl Worker {
     /// Writes until the session is closed, then closes it as requested.
-    pub fn run(mut self) -> Option<CloseResult> {
+    pub(crate) fn run(mut self) -> Option<CloseResult> {
         let notifier = ExitNotifier(Arc::clone(&self.shared));
         let path = self.journal.path.clone();
         let mut written = 0;

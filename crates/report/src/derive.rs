@@ -5,13 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use skinrig_analysis::result::{Analysis, Latency, OffSensor, PressResult};
 use skinrig_analysis::rule::Rule;
 use skinrig_analysis::triangulate::locate;
-use skinrig_model::{CameraId, LocationId, Point2, PressId, PressRole, Verdict};
+use skinrig_model::{CameraId, LocationId, Point2, PressId, PressRole, Verdict, quantile};
 
 use crate::format::grouped;
 
 /// True for the presses behind the headline: scored, valid, with truth and estimate.
 #[must_use]
-pub fn is_counted(press: &PressResult) -> bool {
+pub(crate) fn is_counted(press: &PressResult) -> bool {
     press.role == PressRole::Score
         && press.verdict == Verdict::Valid
         && error_norm_mm(press).is_some()
@@ -49,7 +49,7 @@ pub struct LocationSummary {
     pub std_mm: Option<f64>,
 }
 
-/// One summary per location with at least one press that [`is_counted`], by location number.
+/// One summary per location with at least one press that `is_counted`, by location number.
 #[must_use]
 pub fn locations(analysis: &Analysis) -> Vec<LocationSummary> {
     let mut groups: BTreeMap<LocationId, Vec<&PressResult>> = BTreeMap::new();
@@ -229,13 +229,6 @@ pub(crate) fn onset_percentiles(latency: &Latency) -> Option<(f64, f64, f64)> {
         quantile(&onsets, 0.5)?,
         quantile(&onsets, 0.95)?,
     ))
-}
-
-/// Quantile of ascending values, linearly interpolated.
-fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
-    let at = share * sorted.len().checked_sub(1)? as f64;
-    let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
-    Some(low + (high - low) * at.fract())
 }
 
 /// A calibration press: ground truth, and estimates before and after the calibration.

@@ -9,7 +9,7 @@ use crate::input::ReportInput;
 use crate::provenance::Variant;
 
 /// Value of the document's `format` field.
-pub const JSON_FORMAT: &str = "skinrig-report";
+pub(crate) const JSON_FORMAT: &str = "skinrig-report";
 /// Version of the document's layout. Version 1 counted presses, repetitions and locations from 0; version 2 counts from 1.
 pub const JSON_VERSION: u32 = 2;
 

@@ -29,7 +29,7 @@ pub(crate) struct Frame<'a> {
 
 impl Frame<'_> {
     /// Renders the page with this content.
-    pub fn render(&self, content: Value) -> Result<String, ReportError> {
+    pub(crate) fn render(&self, content: Value) -> Result<String, ReportError> {
         let mut env = Environment::new();
         env.set_auto_escape_callback(|_| AutoEscape::Html);
         for (name, source) in TEMPLATES.iter().chain(self.templates) {

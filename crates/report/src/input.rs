@@ -1,5 +1,7 @@
 //! Owns the input of a report.
 
+use std::error::Error;
+
 use skinrig_analysis::result::Analysis;
 use skinrig_analysis::tradeoff::Tradeoff;
 
@@ -13,5 +15,5 @@ pub struct ReportInput<'a> {
     /// Origin of the session.
     pub provenance: Provenance,
     /// Tradeoff measured on this session: its result, or why it cannot be read.
-    pub tradeoff: Option<Result<&'a Tradeoff, &'a str>>,
+    pub tradeoff: Option<Result<&'a Tradeoff, &'a (dyn Error + Send + Sync)>>,
 }

@@ -33,7 +33,7 @@ mod input;
 mod tables;
 mod terminal;
 
-pub use document::{JSON_FORMAT, JSON_VERSION, Summary};
+pub use document::{JSON_VERSION, Summary};
 pub use error::ReportError;
 pub use input::ReportInput;
 pub use provenance::{
@@ -48,7 +48,7 @@ pub fn html(input: &ReportInput<'_>) -> Result<String, ReportError> {
     page::render(input)
 }
 
-/// The results as JSON for programs: `format` ([`JSON_FORMAT`]), `format_version` ([`JSON_VERSION`]), `valid` (false: do not
+/// The results as JSON for programs: `format` (`JSON_FORMAT`), `format_version` ([`JSON_VERSION`]), `valid` (false: do not
 /// use the numbers), `provenance` ([`Provenance`]), `summary` ([`Summary`]), `analysis` (the fields of
 /// [`Analysis`](skinrig_analysis::Analysis) without the bulk series `rates`, `pictures`, `zooms`, `activity`, `motion` and
 /// `alignment.residuals`) and `comparison` ([`comparison::Row`]s: the session beside the published numbers).

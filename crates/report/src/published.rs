@@ -22,9 +22,7 @@ pub const PASS_RATE: (f64, f64) = (0.95, 0.85);
 pub(crate) const AREAS_MM2: [f64; 3] = [9328.0, 8763.0, 4620.0];
 /// Effective taxels over the sensor and over the probed area, without reduction (table "MSOWS").
 pub(crate) const TAXELS: (f64, f64) = (105.0, 46.0);
-/// Width of the 5-95 % interval of the onsets, ms: without reduction, and at 1024-fold reduction (section 3.2).
-pub const LATENCY_WIDTH_MS: (f64, f64) = (31.0, 113.0);
-/// False alarms per second, at the same reductions (section 3.2).
+/// False alarms per second: without reduction, and at 1024-fold reduction (section 3.2).
 pub(crate) const FALSE_ALARMS_PER_S: (f64, f64) = (0.13, 1.86);
 /// Share of trials detected, at the same reductions: target without reduction, result at 1024 (section 3.2).
 pub(crate) const DETECTED_RATE: (f64, f64) = (0.95, 0.88);
@@ -285,7 +283,7 @@ pub(crate) const SKINS: [Skin; 7] = [
 
 /// A tactile sensor of the paper's overview table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sensor {
+pub(crate) struct Sensor {
     /// Kind of sensor.
     pub name: &'static str,
     /// Author and year of the source.

@@ -63,7 +63,7 @@ impl Display for Px {
 }
 
 /// Attributes: name and value. Values are escaped.
-pub type Attributes<'a> = &'a [(&'a str, &'a dyn Display)];
+pub(crate) type Attributes<'a> = &'a [(&'a str, &'a dyn Display)];
 
 /// An SVG document or fragment under construction.
 #[derive(Debug, Default)]

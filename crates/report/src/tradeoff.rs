@@ -7,6 +7,7 @@ use minijinja::{Value, context};
 use serde::Serialize;
 use skinrig_analysis::result::Estimate;
 use skinrig_analysis::tradeoff::{Cost, Row, Tradeoff};
+use skinrig_text::{Column, Paint, Table};
 
 pub use crate::choices::label;
 use crate::choices::short;
@@ -21,7 +22,6 @@ const CSS: &str = include_str!("../assets/tradeoff/page.css");
 
 /// Above this many rows only the session's own and those on a front are printed; the files have all.
 const MAX_ROWS: usize = 120;
-const LABEL: usize = 31;
 
 /// Fronts of a row as letters: c for CPU time, b for bytes, d for delay.
 fn fronts(row: &Row) -> String {
@@ -77,49 +77,53 @@ pub fn terminal_table(result: &Tradeoff, rig: &str, color: bool) -> String {
         result.repeats,
         result.timed_presses,
     );
-    let _ = writeln!(
-        out,
-        "{:<4}{:<LABEL$} {:>6} {:>14} {:>4} {:>7} {:>6} {:>7} {:>7} {:>6}",
-        "", "", "RMSE", "95 % interval", "n", "located", "within", "CPU", "sent", "delay"
-    );
-    let _ = writeln!(
-        out,
-        "{:<4}{:<LABEL$} {:>6} {:>14} {:>4} {:>7} {:>6} {:>7} {:>7} {:>6}",
-        "", "", "mm", "mm", "", "%", "%", "µs", "kB/s", "ms"
-    );
+    let paint = Paint::new(color);
+    let numbers = [6, 14, 4, 7, 6, 7, 7, 6].map(Column::right);
+    let mut columns = vec![Column::left(3), Column::left(31).clipped()];
+    columns.extend(numbers);
+    let table = Table::new(columns).gap(1);
+    for head in [
+        [
+            "",
+            "",
+            "RMSE",
+            "95 % interval",
+            "n",
+            "located",
+            "within",
+            "CPU",
+            "sent",
+            "delay",
+        ],
+        ["", "", "mm", "mm", "", "%", "%", "µs", "kB/s", "ms"],
+    ] {
+        let _ = writeln!(out, "{}", table.row(head));
+    }
     for (i, row) in ordered(result).into_iter().enumerate() {
         let mut name = label(&row.choice);
         if !row.competes {
             name = format!("({name})");
         }
-        if name.chars().count() > LABEL {
-            name = name.chars().take(LABEL - 1).chain(['…']).collect();
-        }
-        let line = format!(
-            "{:<4}{:<LABEL$} {:>6} {:>14} {:>4} {:>7} {:>6} {:>7} {:>7} {:>6}",
+        let line = table.row([
             fronts(row),
             name,
             number(row.rmse_mm.value, 2),
             interval(&row.rmse_mm, 1.0, 2),
-            row.rmse_mm.n,
+            row.rmse_mm.n.to_string(),
             percent(&row.located_rate),
             percent(&row.within_rate),
             short(row.cpu_us),
             short(row.bytes_per_s / 1e3),
             short(row.delay_ms),
-        );
-        let line = line.trim_end();
-        let _ = if color && !row.fronts.is_empty() {
-            writeln!(out, "\u{1b}[1m{line}\u{1b}[0m")
+        ]);
+        let line = if row.fronts.is_empty() {
+            line
         } else {
-            writeln!(out, "{line}")
+            paint.bold(&line)
         };
+        let _ = writeln!(out, "{line}");
         if i == 0 {
-            let _ = writeln!(
-                out,
-                "{:<4}^ the session's settings; all others change them",
-                ""
-            );
+            out += "    ^ the session's settings; all others change them\n";
         }
     }
     if result.rows.len() > MAX_ROWS {

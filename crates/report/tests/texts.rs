@@ -191,8 +191,31 @@ fn the_summary_answers_first_in_few_lines() {
     assert!(many.contains(" more: see the report"), "{many}");
     analysis.findings = support::studies::findings();
     let found = summary(&analysis);
-    assert!(found.contains("fault     cameras swapped; "), "{found}");
+    assert!(found.starts_with("FAULT     cameras swapped; "), "{found}");
     assert!(found.contains("do        check which camera"), "{found}");
+}
+
+/// What only the full table has must not be what a reader of the summary needed to know.
+#[test]
+fn the_summary_shows_what_qualifies_the_answer() {
+    let mut analysis = support::analysis(16, 10);
+    analysis.scored.rmse_mm.value = None;
+    analysis.off_sensor[0].events = 3;
+    let mut provenance = support::provenance();
+    provenance.interruptions = vec![skinrig_report::InterruptionRow {
+        kind: "fault".to_owned(),
+        t_s: 2.5,
+        reason: "camera 1 sent nothing".to_owned(),
+    }];
+    let input = ReportInput {
+        analysis: &analysis,
+        provenance,
+        tradeoff: None,
+    };
+    insta::assert_snapshot!(
+        "terminal_summary_of_an_odd_session",
+        terminal_summary(&input, false)
+    );
 }
 
 /// Findings come before every number.

@@ -18,7 +18,7 @@ const STRAIGHT_MS: i64 = 5;
 ///
 /// # Errors
 /// When the poses cannot be read.
-pub fn timing(
+pub(crate) fn timing(
     reader: &SessionReader,
     outcomes: &[Option<PressOutcome>],
 ) -> Result<(Option<f64>, Option<f64>), RecorderError> {
@@ -46,7 +46,7 @@ pub fn timing(
 ///
 /// # Errors
 /// When the poses cannot be read.
-pub fn descents(
+pub(crate) fn descents(
     reader: &SessionReader,
     outcomes: &[Option<PressOutcome>],
 ) -> Result<Vec<Option<Descent>>, RecorderError> {

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
-use skinrig_analysis::{EventSource, LegStart};
+use skinrig_analysis::{EventSource, EventSourceError, LegStart};
 use skinrig_formats::{Decoder, Geometry, Scanner};
 use skinrig_model::{CameraId, CdEvent, ChunkFacts, StreamFormat, TriggerEdge};
 use skinrig_recorder::{ChunkScanner, SessionReader};
@@ -15,6 +17,7 @@ pub struct SessionEvents {
     formats: [StreamFormat; 2],
     /// Time shift of each further leg, by its recorded start.
     moves: [BTreeMap<u64, i64>; 2],
+    bytes_read: Arc<AtomicU64>,
 }
 
 impl SessionEvents {
@@ -27,7 +30,14 @@ impl SessionEvents {
             path: path.to_owned(),
             formats,
             moves: [0, 1].map(|k| legs.iter().map(|leg| recorded(leg, k)).collect()),
+            bytes_read: Arc::default(),
         }
+    }
+
+    /// Camera bytes read so far, over all passes; for the display of progress.
+    #[must_use]
+    pub fn bytes_read(&self) -> Arc<AtomicU64> {
+        Arc::clone(&self.bytes_read)
     }
 }
 
@@ -36,22 +46,23 @@ impl EventSource for SessionEvents {
         &self,
         camera: CameraId,
         each: &mut dyn FnMut(&[CdEvent]),
-    ) -> Result<(), String> {
-        let reader = SessionReader::open(&self.path).map_err(|e| e.to_string())?;
+    ) -> Result<(), EventSourceError> {
+        let reader = SessionReader::open(&self.path)?;
         let moves = &self.moves[camera.index()];
         let mut legs = LegDecoder::new(self.formats[camera.index()]);
-        reader
-            .for_each_chunk(camera, 0, |meta, bytes| {
-                if let Some(origin_us) = meta.restart_us {
-                    legs.restart(
-                        origin_us,
-                        moves.get(&origin_us).copied().unwrap_or_default(),
-                    );
-                }
-                legs.lost(meta.lost_before);
-                legs.for_each_slice(bytes, each);
-            })
-            .map_err(|e| e.to_string())
+        let read = reader.for_each_chunk(camera, 0, |meta, bytes| {
+            if let Some(origin_us) = meta.restart_us {
+                legs.restart(
+                    origin_us,
+                    moves.get(&origin_us).copied().unwrap_or_default(),
+                );
+            }
+            legs.lost(meta.lost_before);
+            legs.for_each_slice(bytes, each);
+            let read = bytes.len() as u64;
+            self.bytes_read.fetch_add(read, Ordering::Relaxed);
+        });
+        Ok(read?)
     }
 }
 

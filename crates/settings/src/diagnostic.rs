@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Serialize;
+use skinrig_text::{Paint, Style, width};
 
 use crate::source::{Location, Sources, Span};
 
@@ -46,7 +47,7 @@ impl Diagnostics {
     /// With `color`, ANSI escapes mark severity, places and fixes.
     #[must_use]
     pub fn render(&self, color: bool) -> String {
-        let paint = Paint(color);
+        let paint = Paint::new(color);
         let mut out = String::new();
         for diagnostic in &self.list {
             diagnostic.write(&mut out, paint);
@@ -57,7 +58,7 @@ impl Diagnostics {
             n if n >= MOST_FINDINGS => format!("{n} errors; more were not listed"),
             n => format!("{n} errors"),
         };
-        out.push_str(&paint.error(&count));
+        out.push_str(&paint.apply(Style::Error, &count));
         out.push('\n');
         out
     }
@@ -83,26 +84,36 @@ impl Diagnostic {
         } = &self.location;
         let number = line.to_string();
         let margin = " ".repeat(number.len());
-        let bar = paint.frame("|");
-        out.push_str(&format!("{}: {}\n", paint.error("error"), self.message));
+        let bar = paint.apply(Style::Frame, "|");
+        out.push_str(&format!(
+            "{}: {}\n",
+            paint.apply(Style::Error, "error"),
+            self.message
+        ));
         let path = if self.path.is_empty() {
             String::new()
         } else {
-            format!("  {}", paint.strong(&self.path))
+            format!("  {}", paint.bold(&self.path))
         };
         out.push_str(&format!(
             "{margin}{} {file}:{line}:{}{path}\n",
-            paint.frame("-->"),
+            paint.apply(Style::Frame, "-->"),
             self.location.column
         ));
         out.push_str(&format!("{margin} {bar}\n"));
         let column = (column + 1).saturating_sub(*text_column).max(1);
-        out.push_str(&format!("{} {bar} {text}\n", paint.frame(&number)));
-        let room = (text.chars().count() + 1).saturating_sub(column - 1).max(1);
+        out.push_str(&format!(
+            "{} {bar} {text}\n",
+            paint.apply(Style::Frame, &number)
+        ));
+        let before: String = text.chars().take(column - 1).collect();
+        let marked: String = text.chars().skip(column - 1).take(*length).collect();
+        // A place behind the last character has no width of its own.
+        let carets = "^".repeat(width(&marked).max(1));
         out.push_str(&format!(
             "{margin} {bar} {}{}\n",
-            " ".repeat(column - 1),
-            paint.error(&"^".repeat((*length).min(room)))
+            " ".repeat(width(&before)),
+            paint.apply(Style::Error, &carets)
         ));
         for (label, value) in [("expected", &self.expected), ("found", &self.found)] {
             if let Some(value) = value {
@@ -110,34 +121,11 @@ impl Diagnostic {
             }
         }
         if let Some(help) = &self.help {
-            out.push_str(&format!("{margin} = {}: {help}\n", paint.help("help")));
+            out.push_str(&format!(
+                "{margin} = {}: {help}\n",
+                paint.apply(Style::Help, "help")
+            ));
         }
-    }
-}
-
-/// ANSI escapes, or none.
-#[derive(Clone, Copy)]
-struct Paint(bool);
-
-impl Paint {
-    fn with(self, code: &str, text: &str) -> String {
-        if self.0 {
-            format!("\u{1b}[{code}m{text}\u{1b}[0m")
-        } else {
-            text.to_owned()
-        }
-    }
-    fn error(self, text: &str) -> String {
-        self.with("1;31", text)
-    }
-    fn frame(self, text: &str) -> String {
-        self.with("34", text)
-    }
-    fn strong(self, text: &str) -> String {
-        self.with("1", text)
-    }
-    fn help(self, text: &str) -> String {
-        self.with("1;32", text)
     }
 }
 
@@ -292,5 +280,29 @@ pub fn one_of<'a>(words: impl IntoIterator<Item = &'a str>) -> String {
         [] => "nothing".to_owned(),
         [only] => only.clone(),
         [first @ .., last] => format!("{} or {last}", first.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn carets_stand_below_wide_and_combining_characters() {
+        for (text, marked, carets) in [
+            ("name: skin", "skin", "      ^^^^"),
+            ("皮膚: 一号", "一号", "      ^^^^"),
+            ("e\u{301}te\u{301}: 2", "2", "     ^"),
+            ("name:", "", "     ^"),
+        ] {
+            let mut sources = Sources::default();
+            let source = sources.add("file", text);
+            let start = text.len() - marked.len();
+            let mut collector = Collector::new(sources);
+            collector.error(Span::new(source, start, text.len()), "", "wrong");
+            let shown = collector.finish().render(false);
+            let expected = format!("1 | {text}\n  | {carets}\n");
+            assert!(shown.contains(&expected), "{shown}");
+        }
     }
 }

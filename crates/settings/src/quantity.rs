@@ -209,7 +209,8 @@ pub fn parse(text: &str, wanted: &[Dimension]) -> Result<Quantity, QuantityError
     }
     let (unit, divisor) = match split_divisor(rest) {
         Ok(parts) => parts,
-        Err(found) => {
+        Err(BadDivisor(divisor)) => {
+            let found = format!("`{}`", divisor.chars().take(30).collect::<String>());
             let help =
                 Some("write a quotient as `868 s / 289`, by a whole number above 0".to_owned());
             return Err(fail("the divisor is no whole number above 0", found, help));
@@ -318,8 +319,11 @@ pub(crate) fn split_number(text: &str) -> (Option<f64>, &str) {
     (number.parse().ok(), rest.trim_start())
 }
 
+/// Text after a `/` that is not a whole number above 0.
+struct BadDivisor<'a>(&'a str);
+
 /// A unit and the divisor after it, 1 when there is none. `mm/s` is a unit, `s / 289` a quotient.
-fn split_divisor(rest: &str) -> Result<(&str, f64), String> {
+fn split_divisor(rest: &str) -> Result<(&str, f64), BadDivisor<'_>> {
     let Some((unit, divisor)) = rest.rsplit_once('/') else {
         return Ok((rest.trim(), 1.0));
     };
@@ -329,10 +333,7 @@ fn split_divisor(rest: &str) -> Result<(&str, f64), String> {
     }
     match divisor.parse::<u32>() {
         Ok(d) if d > 0 => Ok((unit.trim(), f64::from(d))),
-        _ => Err(format!(
-            "`{}`",
-            divisor.chars().take(30).collect::<String>()
-        )),
+        _ => Err(BadDivisor(divisor)),
     }
 }
 

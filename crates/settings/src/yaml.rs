@@ -47,7 +47,7 @@ pub(crate) struct Entry {
 
 impl Node {
     /// A few words about the node, for "found".
-    pub fn describe(&self) -> String {
+    pub(crate) fn describe(&self) -> String {
         match &self.kind {
             Kind::Null => "nothing".to_owned(),
             Kind::Refused => "an alias".to_owned(),

@@ -74,7 +74,7 @@ pub(crate) struct SimCamera {
 impl SimCamera {
     /// Camera `id` of a rig.
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         config: &SimConfig,
         id: CameraId,
         shared: Shared,

@@ -46,7 +46,7 @@ pub(crate) struct Outgoing {
 
 impl Streaming {
     /// Simulates one grid step, with or without an event storm, and encodes its events and edges into `fresh`.
-    pub fn step(
+    pub(crate) fn step(
         &mut self,
         from: TipSample,
         to: TipSample,
@@ -137,7 +137,7 @@ fn encode_edge(
 
 impl Outgoing {
     /// Adds new bytes that arrived at `at`.
-    pub fn take(
+    pub(crate) fn take(
         &mut self,
         fresh: &mut Vec<u8>,
         at: HostTime,
@@ -167,7 +167,7 @@ impl Outgoing {
     }
 
     /// Closes the current chunk if it has content.
-    pub fn close(&mut self, camera: CameraId, scanner: &mut Scanner) {
+    pub(crate) fn close(&mut self, camera: CameraId, scanner: &mut Scanner) {
         if self.bytes.is_empty() && self.lost_before == 0 {
             return;
         }

@@ -17,7 +17,7 @@ pub(crate) struct ColumnTable {
 impl ColumnTable {
     /// Table of `camera`.
     #[must_use]
-    pub fn new(camera: CameraModel) -> Self {
+    pub(crate) fn new(camera: CameraModel) -> Self {
         let angles = (0..BORDERS)
             .map(|u| camera.angle_of_column_deg(u as f64))
             .collect();
@@ -26,7 +26,7 @@ impl ColumnTable {
 
     /// Fractional column of `p`, linear between borders (within 1e-3 px of the exact inverse); `None` outside the field of view.
     #[must_use]
-    pub fn column(&self, p: Point2) -> Option<f64> {
+    pub(crate) fn column(&self, p: Point2) -> Option<f64> {
         let angle = self.camera.angle_of_point_deg(p);
         let above = self.angles.partition_point(|&a| a <= angle);
         if above == 0 || above >= BORDERS {

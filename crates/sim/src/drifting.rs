@@ -35,7 +35,7 @@ impl DriftingClock {
 
     /// The same clock set forward by `by_us`.
     #[must_use]
-    pub const fn stepped(mut self, by_us: i64) -> Self {
+    pub(crate) const fn stepped(mut self, by_us: i64) -> Self {
         self.origin_ns += by_us * 1_000;
         self
     }

@@ -23,7 +23,7 @@ pub(crate) struct SimIndenter {
 impl SimIndenter {
     /// The robot of a rig.
     #[must_use]
-    pub fn new(config: &SimConfig, shared: Shared) -> Self {
+    pub(crate) fn new(config: &SimConfig, shared: Shared) -> Self {
         let lost = config.faults.iter().find_map(|f| match f {
             Fault::IndenterLost(when) => Some(*when),
             _ => None,

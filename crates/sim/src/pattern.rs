@@ -16,7 +16,7 @@ pub(crate) struct ScanModel {
 
 impl ScanModel {
     /// A scan that starts at the first pixel.
-    pub fn new(scan: PatternScan) -> Self {
+    pub(crate) fn new(scan: PatternScan) -> Self {
         Self {
             scan,
             next: 0,

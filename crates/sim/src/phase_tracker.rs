@@ -11,7 +11,7 @@ const NEAR_MM: f64 = 1.5;
 
 /// Times of the motion phases in order, ns of world time.
 #[derive(Debug, Default)]
-pub struct PhaseTracker {
+pub(crate) struct PhaseTracker {
     times: [Vec<i64>; 6],
     /// Whether the tip went down and is not yet up again.
     down: bool,
@@ -24,7 +24,7 @@ pub struct PhaseTracker {
 impl PhaseTracker {
     /// Time of the n-th occurrence of `phase`, from 0, ns.
     #[must_use]
-    pub fn when(&self, phase: MotionPhase, n: u32) -> Option<i64> {
+    pub(crate) fn when(&self, phase: MotionPhase, n: u32) -> Option<i64> {
         self.times[phase as usize].get(n as usize).copied()
     }
 
@@ -33,12 +33,12 @@ impl PhaseTracker {
     }
 
     /// The motors were switched on.
-    pub fn armed(&mut self, t_ns: i64) {
+    pub(crate) fn armed(&mut self, t_ns: i64) {
         self.push(MotionPhase::Arming, t_ns);
     }
 
     /// A motion started.
-    pub fn sent(&mut self, t_ns: i64, from: Point3<Skin>, to: Point3<Skin>) {
+    pub(crate) fn sent(&mut self, t_ns: i64, from: Point3<Skin>, to: Point3<Skin>) {
         if from.plane().distance_mm(to.plane()) > SIDEWAYS_MM {
             self.push(MotionPhase::Travel, t_ns);
         } else if to.z_mm < from.z_mm && to.z_mm < NEAR_MM {
@@ -53,7 +53,7 @@ impl PhaseTracker {
     }
 
     /// The set point stopped, with or without contact.
-    pub fn at_rest(&mut self, t_ns: i64, touching: bool) {
+    pub(crate) fn at_rest(&mut self, t_ns: i64, touching: bool) {
         if touching && self.down && !self.held {
             self.held = true;
             self.push(MotionPhase::Hold, t_ns);

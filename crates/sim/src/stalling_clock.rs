@@ -14,7 +14,7 @@ pub(crate) struct StallingClock {
 
 impl StallingClock {
     /// Clock of `shared` with the stall faults among `faults`; `None` without any.
-    pub fn new(shared: Shared, faults: &[Fault]) -> Option<Self> {
+    pub(crate) fn new(shared: Shared, faults: &[Fault]) -> Option<Self> {
         let faults: Vec<_> = faults
             .iter()
             .filter_map(|fault| match *fault {

@@ -35,7 +35,7 @@ pub(crate) struct SimTriggerBox {
 impl SimTriggerBox {
     /// The box of a rig.
     #[must_use]
-    pub fn new(config: &SimConfig, shared: Shared) -> Self {
+    pub(crate) fn new(config: &SimConfig, shared: Shared) -> Self {
         let lost = config.faults.iter().find_map(|fault| match fault {
             Fault::TriggerBoxLost(when) => Some(*when),
             _ => None,

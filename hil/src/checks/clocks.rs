@@ -27,7 +27,7 @@ const MIN_TRAINS: u64 = 10;
 const RESIDUAL_FLOOR_US: f64 = 1.0;
 
 /// Runs the check.
-pub fn clocks(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn clocks(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::Clocks { duration } = check.measure else {
         return;
     };

@@ -23,7 +23,7 @@ const MAX_SAG_MM: f64 = 0.5;
 const LIMIT_SHARE: f64 = 0.9;
 
 /// Runs the check.
-pub fn depth(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn depth(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::Depth { depth_mm, presses } = check.measure else {
         return;
     };
@@ -86,7 +86,7 @@ fn check_depth_limit(arm: &Arm<'_>, depth_mm: f64) -> Result<(), Problem> {
 }
 
 /// Runs the check.
-pub fn force_ceiling(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn force_ceiling(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::ForceCeiling { force_n, depth_mm } = check.measure else {
         return;
     };

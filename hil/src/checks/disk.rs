@@ -20,7 +20,7 @@ const WRITE_TIMEOUT: Duration = Duration::from_secs(120);
 const RESERVE: f64 = 1.1;
 
 /// Runs the check.
-pub fn disk(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn disk(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::Disk { amount_b } = check.measure else {
         return;
     };

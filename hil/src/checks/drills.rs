@@ -21,7 +21,7 @@ const AVERAGING: HostDuration = HostDuration::from_millis(100);
 const REST_TOLERANCE_MM: f64 = 0.1;
 
 /// Runs the check.
-pub fn watchdog(_: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn watchdog(_: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     if skip_unless_permitted(bench, Drill::Watchdog, "watchdog", found) {
         return;
     }
@@ -64,7 +64,7 @@ fn skip_unless_permitted(
 }
 
 /// Runs the check.
-pub fn stop(_: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn stop(_: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     if skip_unless_permitted(bench, Drill::Stop, "stop", found) {
         return;
     }

@@ -6,7 +6,7 @@ use crate::bench::Bench;
 use crate::findings::{Findings, GoldenRecord};
 
 /// Runs the check. The bench runs and analyses the campaign; metrics that it did not measure become unmeasured.
-pub fn golden(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn golden(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::Golden { protocol } = &check.measure else {
         return;
     };

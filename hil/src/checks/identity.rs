@@ -13,7 +13,7 @@ use crate::findings::Findings;
 const METRICS: &[&str] = &["differences"];
 
 /// Runs the check.
-pub fn identity(_check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn identity(_check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let expected = ExpectedDevice::of_rig(bench.rig());
     let devices = bench.devices();
     let mut check = |role: DeviceRole, answer: Result<DeviceIdentity, Problem>| {

@@ -18,7 +18,7 @@ const SETTLE: HostDuration = HostDuration::from_millis(1_000);
 const MIN_EVENTS: u32 = 5;
 
 /// Runs the check.
-pub fn noise(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn noise(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::Noise {
         light,
         duration,

@@ -90,7 +90,7 @@ impl Reader {
     }
 
     /// Decodes a chunk.
-    pub fn push(&mut self, chunk: &RawChunk) {
+    pub(super) fn push(&mut self, chunk: &RawChunk) {
         if chunk.lost_before > 0 {
             self.decoder.lost(chunk.lost_before);
             // Lost data is counted as such: accept any position afterwards.
@@ -130,7 +130,7 @@ pub(super) fn watch(
 
 impl Counts {
     /// Coordinates of a pixel for messages.
-    pub fn pixel_name(&self, at: usize) -> String {
+    pub(crate) fn pixel_name(&self, at: usize) -> String {
         format!(
             "column {}, row {}",
             at % self.width.max(1),

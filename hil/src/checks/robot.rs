@@ -23,7 +23,7 @@ const SETTLE_TOLERANCE_MM: f64 = 0.1;
 const SET_POINT_TOLERANCE_MM: f64 = 1e-3;
 
 /// Runs the check.
-pub fn robot_state(_: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn robot_state(_: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     with_arm(bench, Reach::Air, found, &["creep"], &mut |arm, found| {
         let mut seen = Vec::new();
         arm.watch(REST, &mut seen, |_| false)?;
@@ -79,7 +79,7 @@ pub(super) fn mean(samples: &[PoseSample]) -> Point3<Skin> {
 }
 
 /// Runs the check.
-pub fn repeatability(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn repeatability(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::Repeatability {
         approaches,
         speed_mm_s,
@@ -159,7 +159,7 @@ fn spread_mm(positions: &[Vec<Point3<Skin>>]) -> f64 {
 }
 
 /// Runs the check.
-pub fn step_response(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn step_response(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::StepResponse { distance_mm, steps } = check.measure else {
         return;
     };

@@ -12,7 +12,7 @@ use crate::findings::Findings;
 const METRICS: &[&str] = &["differences"];
 
 /// Runs the check.
-pub fn settings(_check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn settings(_check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     for camera in CameraId::ALL {
         check_camera(camera, bench, found);
     }

@@ -18,7 +18,7 @@ const PATTERN: &[&str] = &["received", "lost", "gaps"];
 const SETTLE: HostDuration = HostDuration::from_millis(500);
 
 /// Runs the check.
-pub fn idle(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn idle(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::Idle { duration } = check.measure else {
         return;
     };
@@ -42,7 +42,7 @@ pub fn idle(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
 }
 
 /// Runs the check.
-pub fn test_pattern(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn test_pattern(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::TestPattern {
         duration,
         rate_ev_s,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use skinrig_analysis::timebase::{Wire, WireTrain, wire};
+use skinrig_analysis::timebase::{NoCameraClock, Wire, WireTrain, wire};
 use skinrig_model::pulse::{MAX_MARKED_PRESS, PULSES_PER_TRAIN, decode_marks};
 use skinrig_model::{
     BoxReport, CameraId, HostDuration, Label, Mark, MarkKind, PressId, RawChunk, TriggerEdge,
@@ -44,12 +44,12 @@ pub(super) struct Edges(pub [Vec<TriggerEdge>; 2]);
 
 impl Edges {
     /// Adds the edges of `chunk`.
-    pub fn add(&mut self, chunk: &RawChunk) {
+    pub(super) fn add(&mut self, chunk: &RawChunk) {
         self.0[chunk.camera.index()].extend_from_slice(&chunk.triggers);
     }
 
     /// Edges of `camera` on `channel`.
-    pub fn on_channel(&self, camera: CameraId, channel: u8) -> Vec<TriggerEdge> {
+    pub(super) fn on_channel(&self, camera: CameraId, channel: u8) -> Vec<TriggerEdge> {
         let edges = self.0[camera.index()].iter().copied();
         edges.filter(|e| e.channel == channel).collect()
     }
@@ -63,7 +63,7 @@ impl Edges {
 }
 
 /// Runs the check.
-pub fn trigger_loopback(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn trigger_loopback(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     let Measure::TriggerLoopback { trains } = check.measure else {
         return;
     };
@@ -127,7 +127,7 @@ struct LineQuality {
     /// Jitter, s, and the number of edges behind it.
     jitter: Option<(f64, u64)>,
     /// Why no clock could be fitted, in which case pulses are only counted.
-    unfitted: Option<String>,
+    unfitted: Option<NoCameraClock>,
 }
 
 impl LineQuality {

@@ -103,12 +103,12 @@ impl From<sqlx::Error> for QueryError {
 
 impl QueryError {
     /// `found` at `place`, where `expected` should be.
-    pub fn damaged(place: &str, expected: &str, found: impl std::fmt::Display) -> Self {
+    pub(super) fn damaged(place: &str, expected: &str, found: impl std::fmt::Display) -> Self {
         Self::Damaged(format!("{place}: expected {expected}, found {found}"))
     }
 
     /// Adds the file and the operation.
-    pub fn at(self, path: &Path, doing: &'static str) -> HistoryError {
+    pub(super) fn at(self, path: &Path, doing: &'static str) -> HistoryError {
         let path = path.to_owned();
         match self {
             Self::Sql(source) if is_damage(&source) => HistoryError::Damaged {

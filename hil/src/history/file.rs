@@ -13,9 +13,9 @@ use sqlx::{ConnectOptions, Connection, Row, SqlSafeStr, Sqlite, Transaction};
 use super::error::{HistoryError, QueryError};
 
 /// Schema version that this program writes, and the newest that it reads (`PRAGMA user_version`).
-pub const HISTORY_SCHEMA_VERSION: u32 = 1;
+pub(crate) const HISTORY_SCHEMA_VERSION: u32 = 1;
 /// `skrh` in ASCII (`PRAGMA application_id`).
-pub const HISTORY_APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrh");
+pub(crate) const HISTORY_APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrh");
 
 /// Every migration, oldest first: version, description and SQL.
 const MIGRATIONS: [(i64, &str, &str); 1] = [(

@@ -18,7 +18,6 @@ use tokio::runtime::Runtime;
 
 pub use error::HistoryError;
 use error::QueryError;
-pub use file::{HISTORY_APPLICATION_ID, HISTORY_SCHEMA_VERSION};
 
 /// Result of adding a night.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

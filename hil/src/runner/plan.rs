@@ -36,7 +36,7 @@ pub struct PlanInputs {
 
 /// Estimated duration of one attempt, deliberately generous: a check starts only if this much budget is left.
 #[must_use]
-pub fn estimated_duration(check: &Check, inputs: &PlanInputs) -> HostDuration {
+pub(crate) fn estimated_duration(check: &Check, inputs: &PlanInputs) -> HostDuration {
     if check.skip.is_some() {
         return HostDuration::ZERO;
     }
@@ -75,7 +75,7 @@ pub fn estimated_duration(check: &Check, inputs: &PlanInputs) -> HostDuration {
 /// until they pass would bias the result and its protocol has its own retakes; the force ceiling and the drills, because an arm that
 /// did not stop must not move again unattended.
 #[must_use]
-pub const fn repeat_rule(suite: &Suite, measure: &Measure) -> RepeatRule {
+pub(crate) const fn repeat_rule(suite: &Suite, measure: &Measure) -> RepeatRule {
     match measure {
         Measure::Golden { .. }
         | Measure::ForceCeiling { .. }

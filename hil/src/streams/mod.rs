@@ -11,7 +11,7 @@ use crate::bench::{Bench, Devices, Problem};
 use crate::device_evidence::{self, COMPUTER};
 use crate::findings::Findings;
 
-pub use self::stats::StreamStats;
+pub(crate) use self::stats::StreamStats;
 
 /// Interval between two polls of the devices.
 const STEP: HostDuration = HostDuration::from_millis(10);
@@ -23,7 +23,7 @@ const LINE_WITHIN: HostDuration = HostDuration::from_millis(1_000);
 const MAX_POLL_DELAY: HostDuration = HostDuration::from_millis(1_000);
 
 /// The streaming devices of a bench. Dropping this value stops the cameras.
-pub struct Streams<'a> {
+pub(crate) struct Streams<'a> {
     devices: &'a mut Devices,
     cameras: [CameraStream; 2],
     box_problem: Option<Problem>,
@@ -42,7 +42,7 @@ pub struct Streams<'a> {
 
 impl<'a> Streams<'a> {
     /// Configures both cameras as for a run, calls `prepare` for each, and starts them, sync slaves before their master.
-    pub fn start(
+    pub(crate) fn start(
         bench: &'a mut dyn Bench,
         prepare: &mut dyn FnMut(CameraId, &mut dyn EventCamera) -> Result<(), DeviceError>,
     ) -> Self {
@@ -113,7 +113,7 @@ impl<'a> Streams<'a> {
 
     /// Current time.
     #[must_use]
-    pub fn now(&self) -> HostTime {
+    pub(crate) fn now(&self) -> HostTime {
         self.devices.clock.now()
     }
 
@@ -125,7 +125,7 @@ impl<'a> Streams<'a> {
 
     /// All reports of the box so far.
     #[must_use]
-    pub fn reports(&self) -> &[BoxReport] {
+    pub(crate) fn reports(&self) -> &[BoxReport] {
         &self.reports
     }
 
@@ -136,13 +136,13 @@ impl<'a> Streams<'a> {
     }
 
     /// Ignores faults of the trigger box: in a check of the cameras alone they would excuse a camera's fault.
-    pub fn without_box(mut self) -> Self {
+    pub(crate) fn without_box(mut self) -> Self {
         self.box_is_needed = false;
         self
     }
 
     /// Starts counting.
-    pub fn start_counting(&mut self, see: &mut dyn FnMut(&RawChunk)) {
+    pub(crate) fn start_counting(&mut self, see: &mut dyn FnMut(&RawChunk)) {
         self.poll_devices(true, see);
         self.measuring = true;
         self.cameras
@@ -151,7 +151,7 @@ impl<'a> Streams<'a> {
     }
 
     /// Polls the devices for `span`, or until the suite must end, and passes each chunk to `see`.
-    pub fn pass(&mut self, span: HostDuration, see: &mut dyn FnMut(&RawChunk)) {
+    pub(crate) fn pass(&mut self, span: HostDuration, see: &mut dyn FnMut(&RawChunk)) {
         let end = self.now() + span;
         while self.now() < end && !(self.stop)() {
             self.step(end, see);
@@ -160,7 +160,7 @@ impl<'a> Streams<'a> {
 
     /// Sends a mark as soon as the line is free, and polls the devices until its train is over. Returns false if the mark was not sent:
     /// the box failed ([`Self::finish`] adds the evidence), or the suite must end.
-    pub fn send(&mut self, mark: Mark, see: &mut dyn FnMut(&RawChunk)) -> bool {
+    pub(crate) fn send(&mut self, mark: Mark, see: &mut dyn FnMut(&RawChunk)) -> bool {
         let until = self.now() + LINE_WITHIN + self.timing_slack;
         while self.box_problem.is_none() && !(self.stop)() {
             let Some(Ok(trigger)) = &mut self.devices.trigger_box else {
@@ -184,7 +184,7 @@ impl<'a> Streams<'a> {
 
     /// Waits until the streams of both cameras pass the present or stall, then stops the cameras and counts their last data. Failures
     /// go to `found`, with `metrics` unmeasured on the failed camera.
-    pub fn finish(
+    pub(crate) fn finish(
         mut self,
         found: &mut Findings,
         metrics: &[&'static str],

@@ -10,7 +10,7 @@ const STALLED_AFTER: HostDuration = HostDuration::from_millis(2_000);
 
 /// Counts of a camera's stream since counting started.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct StreamStats {
+pub(crate) struct StreamStats {
     /// Received bytes.
     pub bytes: u64,
     /// Bytes known to be lost.
@@ -26,7 +26,7 @@ pub struct StreamStats {
 impl StreamStats {
     /// Length of the stream on the camera's clock, s; `None` if the clock did not advance.
     #[must_use]
-    pub fn span_s(&self) -> Option<f64> {
+    pub(crate) fn span_s(&self) -> Option<f64> {
         let (from, to) = self.span_us?;
         (to > from).then(|| (to - from) as f64 * 1e-6)
     }
@@ -46,7 +46,7 @@ pub(super) struct CameraStream {
 
 impl CameraStream {
     /// Starts counting.
-    pub fn start_counting(&mut self) {
+    pub(crate) fn start_counting(&mut self) {
         self.stats = StreamStats {
             span_us: self.latest_us.map(|us| (us, us)),
             ..StreamStats::default()
@@ -54,7 +54,7 @@ impl CameraStream {
     }
 
     /// Updates the camera time from a chunk received at `now`, and adds the chunk to the counts if `counts`.
-    pub fn add_chunk(&mut self, chunk: &RawChunk, now: HostTime, counts: bool) {
+    pub(crate) fn add_chunk(&mut self, chunk: &RawChunk, now: HostTime, counts: bool) {
         if let Some(us) = chunk.facts.last_us {
             if self.latest_us != Some(us) {
                 self.advanced_at = now;
@@ -73,7 +73,7 @@ impl CameraStream {
     }
 
     /// Evidence of a stall, if the camera time has not advanced for too long. `timing_slack` extends the limit for emulated devices.
-    pub fn check_stall(
+    pub(crate) fn check_stall(
         &self,
         camera: CameraId,
         now: HostTime,

@@ -18,7 +18,7 @@ use skinrig_sim::{Fault, SimConfig, simulated_rig};
 const RIG: &str = include_str!("../../rigs/emulated.yaml");
 
 /// Simulated devices with the rig file of an emulated bench.
-pub struct SimBench {
+pub(crate) struct SimBench {
     pub config: SimConfig,
     pub rig: RigFile,
     pub devices: Option<Devices>,
@@ -31,7 +31,7 @@ pub struct SimBench {
 }
 
 impl SimBench {
-    pub fn new(level: SimLevel, faults: Vec<Fault>) -> Self {
+    pub(crate) fn new(level: SimLevel, faults: Vec<Fault>) -> Self {
         let rig = RigFile::parse("emulated.yaml", RIG.as_bytes(), &|_| {
             Some("/nowhere".to_owned())
         });
@@ -49,7 +49,7 @@ impl SimBench {
     }
 
     /// Runs the check `text`.
-    pub fn run_check(&mut self, text: &str) -> Findings {
+    pub(crate) fn run_check(&mut self, text: &str) -> Findings {
         let text = format!("skinrig_suite: 1\nname: one\nbudget: 1 h\nchecks:\n  {text}\n");
         let suite = Suite::parse("suite.yaml", text.as_bytes()).unwrap_or_else(|e| panic!("{e}"));
         let found = checks::run(&suite.checks[0], self);
@@ -64,7 +64,7 @@ impl SimBench {
     }
 
     /// Rate difference between a camera's clock and the box's, ppm.
-    pub fn drift_ppm(&self, camera: CameraId) -> f64 {
+    pub(crate) fn drift_ppm(&self, camera: CameraId) -> f64 {
         let of = |purpose, index, origin_s, ppm| {
             let mut random = Stream::new(self.config.seed, purpose, index);
             DriftingClock::draw(origin_s, ppm, &mut random, 0).drift_ppb() as f64 * 1e-9
@@ -78,7 +78,7 @@ impl SimBench {
 }
 
 /// The only value of `metric` on `subject`.
-pub fn value<'a>(found: &'a Findings, subject: &str, metric: &str) -> &'a Value {
+pub(crate) fn value<'a>(found: &'a Findings, subject: &str, metric: &str) -> &'a Value {
     let is_it = |v: &&Value| v.subject == subject && v.metric == metric;
     let mut values = found.values.iter().filter(is_it);
     let first = values
@@ -92,13 +92,13 @@ pub fn value<'a>(found: &'a Findings, subject: &str, metric: &str) -> &'a Value 
 }
 
 /// The measured number of `metric` on `subject`.
-pub fn number(found: &Findings, subject: &str, metric: &str) -> f64 {
+pub(crate) fn number(found: &Findings, subject: &str, metric: &str) -> f64 {
     let value = value(found, subject, metric).value;
     value.unwrap_or_else(|| panic!("{subject} {metric} unmeasured in {found:#?}"))
 }
 
 /// Kind and subject of each piece of evidence.
-pub fn kinds_and_subjects(found: &Findings) -> Vec<(EvidenceKind, &str)> {
+pub(crate) fn kinds_and_subjects(found: &Findings) -> Vec<(EvidenceKind, &str)> {
     found
         .evidence
         .iter()

@@ -17,7 +17,7 @@ use skinrig_sim::{Fault, SimConfig, simulated_rig};
 const RIG: &str = include_str!("../../rigs/emulated.yaml");
 
 /// Reopens its devices after a close and counts how often.
-pub struct SimBench {
+pub(crate) struct SimBench {
     pub rig: RigFile,
     config: SimConfig,
     devices: Option<Devices>,
@@ -29,7 +29,7 @@ pub struct SimBench {
 }
 
 impl SimBench {
-    pub fn new(faults: Vec<Fault>) -> Self {
+    pub(crate) fn new(faults: Vec<Fault>) -> Self {
         let environment = |_: &str| Some("/nowhere".to_owned());
         let rig = RigFile::parse("emulated.yaml", RIG.as_bytes(), &environment).unwrap();
         let mut config = SimConfig::new(1, SimLevel::Kinematic);
@@ -48,7 +48,7 @@ impl SimBench {
     }
 
     /// Runs the check `text`, for example `robot_state: {creep: {at_most: 1 mm}}`.
-    pub fn run_check(&mut self, text: &str) -> Findings {
+    pub(crate) fn run_check(&mut self, text: &str) -> Findings {
         let text = format!("skinrig_suite: 1\nname: one\nbudget: 1 h\nchecks:\n  {text}\n");
         let suite = Suite::parse("suite.yaml", text.as_bytes()).unwrap_or_else(|e| panic!("{e}"));
         let [check] = &suite.checks[..] else {

@@ -19,10 +19,10 @@ const RIG: &str = include_str!("../../rigs/emulated.yaml");
 
 /// A clock that tests advance by hand.
 #[derive(Clone, Default)]
-pub struct ManualClock(Arc<AtomicI64>);
+pub(crate) struct ManualClock(Arc<AtomicI64>);
 
 impl ManualClock {
-    pub fn advance(&self, seconds: i64) {
+    pub(crate) fn advance(&self, seconds: i64) {
         self.0.fetch_add(seconds * 1_000_000_000, Ordering::SeqCst);
     }
 }
@@ -38,7 +38,7 @@ impl Clock for ManualClock {
 }
 
 /// A bench without devices; counts how often it is closed.
-pub struct DevicelessBench {
+pub(crate) struct DevicelessBench {
     rig: RigFile,
     pub closed: u32,
     pub stop: Cell<bool>,
@@ -46,7 +46,7 @@ pub struct DevicelessBench {
 }
 
 impl DevicelessBench {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let environment = |_: &str| Some("/nowhere".to_owned());
         Self {
             rig: RigFile::parse("emulated.yaml", RIG.as_bytes(), &environment).unwrap(),
@@ -103,10 +103,14 @@ type Step = Box<dyn Fn(&mut Findings)>;
 
 /// Scripted findings, attempt by attempt; a check without a script finds nothing.
 #[derive(Default)]
-pub struct Script(RefCell<BTreeMap<&'static str, VecDeque<Step>>>);
+pub(crate) struct Script(RefCell<BTreeMap<&'static str, VecDeque<Step>>>);
 
 impl Script {
-    pub fn attempt(self, check: &'static str, step: impl Fn(&mut Findings) + 'static) -> Self {
+    pub(crate) fn attempt(
+        self,
+        check: &'static str,
+        step: impl Fn(&mut Findings) + 'static,
+    ) -> Self {
         let mut all = self.0.borrow_mut();
         all.entry(check).or_default().push_back(Box::new(step));
         drop(all);
@@ -129,7 +133,7 @@ impl Script {
 
 /// Records the progress.
 #[derive(Default)]
-pub struct ProgressLog {
+pub(crate) struct ProgressLog {
     pub started: Vec<(String, usize)>,
     pub published: Vec<(usize, bool)>,
 }
@@ -145,7 +149,7 @@ impl NightObserver for ProgressLog {
 }
 
 /// A suite with these checks and a budget in seconds.
-pub fn suite(budget_s: u32, checks: &str) -> Suite {
+pub(crate) fn suite(budget_s: u32, checks: &str) -> Suite {
     let text = format!(
         "skinrig_suite: 1\nname: scripted\nbudget: {budget_s} s\nrepeats: {{at_most: 2, must_pass: 2}}\nchecks:\n{checks}"
     );
@@ -153,7 +157,7 @@ pub fn suite(budget_s: u32, checks: &str) -> Suite {
 }
 
 /// Runs `suite` on `bench` with scripted findings.
-pub fn night(
+pub(crate) fn night(
     suite: &Suite,
     script: &Script,
     clock: &ManualClock,
@@ -169,7 +173,7 @@ pub fn night(
 }
 
 /// As [`night`], with a new bench.
-pub fn run_suite(suite: &Suite, script: &Script) -> Night {
+pub(crate) fn run_suite(suite: &Suite, script: &Script) -> Night {
     let (clock, mut bench) = (ManualClock::default(), DevicelessBench::new());
     night(
         suite,
@@ -180,7 +184,7 @@ pub fn run_suite(suite: &Suite, script: &Script) -> Night {
     )
 }
 
-pub fn blank() -> Night {
+pub(crate) fn blank() -> Night {
     Night {
         version: 1,
         id: "night".to_owned(),

@@ -1,6 +1,6 @@
 //! Sessions created in memory, press by press: inputs of the analysis and events.
 
-use skinrig_analysis::{EventSource, SessionInput};
+use skinrig_analysis::{EventSource, EventSourceError, SessionInput};
 use skinrig_model::{
     AnalysisSettings, AttemptId, CameraId, CdEvent, HostTime, LocationId, Mark, MarkKind,
     PlannedPress, Point2, PressId, PressOutcome, PressRole, PressTiming, PressVerdict, PulseTrain,
@@ -20,7 +20,7 @@ impl EventSource for Memory {
         &self,
         camera: CameraId,
         each: &mut dyn FnMut(&[CdEvent]),
-    ) -> Result<(), String> {
+    ) -> Result<(), EventSourceError> {
         self.events[camera.index()]
             .chunks(self.slice)
             .for_each(each);

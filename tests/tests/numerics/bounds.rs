@@ -4,10 +4,10 @@ use std::cell::RefCell;
 use std::fmt::Display;
 
 /// Half the distance of 1.0 from the next double.
-pub const UNIT: f64 = f64::EPSILON / 2.0;
+pub(crate) const UNIT: f64 = f64::EPSILON / 2.0;
 
 /// A guaranteed bound on an error.
-pub struct Bound {
+pub(crate) struct Bound {
     /// Name in the table of the document.
     pub name: &'static str,
     /// Limit in the unit stated in the document.
@@ -16,7 +16,7 @@ pub struct Bound {
 
 macro_rules! bounds {
     ($($constant:ident: $name:literal <= $limit:literal;)*) => {
-        $(pub const $constant: Bound = Bound { name: $name, limit: $limit };)*
+        $(pub(crate) const $constant: Bound = Bound { name: $name, limit: $limit };)*
         const ALL: &[(Bound, &str)] = &[$(($constant, stringify!($limit))),*];
     };
 }
@@ -47,13 +47,13 @@ bounds! {
 }
 
 /// Tracks one bound: fails at the first larger error, and finally reports the worst one.
-pub struct Watch {
+pub(crate) struct Watch {
     bound: &'static Bound,
     worst: RefCell<(f64, String)>,
 }
 
 impl Watch {
-    pub fn new(bound: &'static Bound) -> Self {
+    pub(crate) fn new(bound: &'static Bound) -> Self {
         Self {
             bound,
             worst: RefCell::new((0.0, String::new())),
@@ -61,7 +61,7 @@ impl Watch {
     }
 
     /// Checks one error; `at` is shown if it is too large. NaN is too large.
-    pub fn see(&self, error: f64, at: impl Display) {
+    pub(crate) fn see(&self, error: f64, at: impl Display) {
         let Bound { name, limit } = self.bound;
         assert!(error <= *limit, "{name}: {error:e} > {limit:e} at {at}");
         if error > self.worst.borrow().0 {

@@ -46,7 +46,7 @@ fn cases() -> impl Strategy<Value = Case> {
 }
 
 /// A runner that writes no files.
-pub fn runner(cases: u32) -> TestRunner {
+pub(crate) fn runner(cases: u32) -> TestRunner {
     TestRunner::new(Config {
         cases,
         failure_persistence: None,

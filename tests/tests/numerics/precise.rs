@@ -8,22 +8,22 @@ use dashu_float::round::mode::HalfEven;
 use skinrig_model::{CameraModel, Point2, StereoGeometry};
 
 /// A number with 256 bits (77 digits).
-pub type Real = FBig<HalfEven, 2>;
+pub(crate) type Real = FBig<HalfEven, 2>;
 
 const BITS: usize = 256;
 
 /// The exact value of a finite `x`.
-pub fn real(x: f64) -> Real {
+pub(crate) fn real(x: f64) -> Real {
     Real::try_from(x).unwrap().with_precision(BITS).value()
 }
 
 /// The nearest double.
-pub fn near(x: &Real) -> f64 {
+pub(crate) fn near(x: &Real) -> f64 {
     x.to_f64().value()
 }
 
 /// `|fast - exact|`, rounded only at the end; infinite for anything but a finite `fast`.
-pub fn error(fast: f64, exact: &Real) -> f64 {
+pub(crate) fn error(fast: f64, exact: &Real) -> f64 {
     if fast.is_finite() {
         near(&(real(fast) - exact)).abs()
     } else {
@@ -32,7 +32,7 @@ pub fn error(fast: f64, exact: &Real) -> f64 {
 }
 
 /// Distance of a point from its exact position.
-pub fn distance(fast: Point2, exact: &[Real; 2]) -> f64 {
+pub(crate) fn distance(fast: Point2, exact: &[Real; 2]) -> f64 {
     let [x, y] = exact;
     error(fast.x_mm, x).hypot(error(fast.y_mm, y))
 }
@@ -52,12 +52,12 @@ fn lens_angle(w: f64, s: &Real) -> Real {
 }
 
 /// The angle at which that lens shows column `u`, degrees from the axis.
-pub fn angle_of_column(w: f64, u: f64) -> Real {
+pub(crate) fn angle_of_column(w: f64, u: f64) -> Real {
     lens_angle(w, &((real(u) - real(320.0)) / real(320.0)))
 }
 
 /// The column at which that lens (|W| at most 1) shows `angle_deg`, by bisection.
-pub fn column_of_angle(w: f64, angle_deg: &Real) -> f64 {
+pub(crate) fn column_of_angle(w: f64, angle_deg: &Real) -> f64 {
     let (mut low, mut high) = (real(-1.0), real(1.0));
     for _ in 0..80 {
         let middle = (&low + &high) / real(2.0);
@@ -71,7 +71,7 @@ pub fn column_of_angle(w: f64, angle_deg: &Real) -> f64 {
 }
 
 /// Viewing angle of a point in degrees, skew included: clockwise from the axis.
-pub fn angle_of_point(camera: &CameraModel, p: Point2) -> Real {
+pub(crate) fn angle_of_point(camera: &CameraModel, p: Point2) -> Real {
     let [ax, ay] = from(camera.position, camera.aim);
     let [bx, by] = from(camera.position, p);
     let clockwise = &ay * &bx - &ax * &by;
@@ -83,7 +83,7 @@ fn from(a: Point2, b: Point2) -> [Real; 2] {
 }
 
 /// Intersection of two rays.
-pub struct Meeting {
+pub(crate) struct Meeting {
     /// Position; `None` if the lines are exactly parallel.
     pub at: Option<[Real; 2]>,
     /// Signed distance from each camera along its ray; zero without an intersection.
@@ -93,7 +93,7 @@ pub struct Meeting {
 }
 
 /// Intersects the rays at these angles (degrees).
-pub fn intersect(geometry: &StereoGeometry, angles_deg: [Real; 2]) -> Meeting {
+pub(crate) fn intersect(geometry: &StereoGeometry, angles_deg: [Real; 2]) -> Meeting {
     let unit = |k: usize| {
         let camera = &geometry.cameras[k];
         let [ax, ay] = from(camera.position, camera.aim);

@@ -1,7 +1,7 @@
 //! Background rates from zero to fifty million events per second, and simultaneous presses.
 
 use skinrig_analysis::rule::Rule;
-use skinrig_analysis::{Analysis, EventSource, SessionInput, analyze};
+use skinrig_analysis::{Analysis, EventSource, EventSourceError, SessionInput, analyze};
 use skinrig_model::{
     AnalysisSettings, CalibrationModel, CameraId, CdEvent, HostTime, MarkKind, Point2, Polarity,
     PressRole, PressTiming, RigGeometry, SkinOutline, StereoGeometry,
@@ -24,7 +24,11 @@ struct Flood {
 }
 
 impl EventSource for Flood {
-    fn for_each_slice(&self, _: CameraId, each: &mut dyn FnMut(&[CdEvent])) -> Result<(), String> {
+    fn for_each_slice(
+        &self,
+        _: CameraId,
+        each: &mut dyn FnMut(&[CdEvent]),
+    ) -> Result<(), EventSourceError> {
         let event = |t_us, i: u64| CdEvent {
             t_us,
             x: 300 + (i % 40) as u16,

@@ -8,7 +8,7 @@ use crate::laws::runner;
 use crate::support::{Memory, session};
 
 /// Serialising and parsing must change nothing: NaN and infinity would be lost.
-pub fn holds_only_numbers(a: &Analysis) {
+pub(crate) fn holds_only_numbers(a: &Analysis) {
     let text = serde_json::to_string(a).unwrap();
     let back: Analysis = serde_json::from_str(&text)
         .unwrap_or_else(|e| panic!("{e}: {}", around(&text, e.column())));

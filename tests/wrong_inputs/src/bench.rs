@@ -90,9 +90,9 @@ pub struct Timetable {
 }
 
 /// Times of the paper's press relative to contact, s: approach (before), at depth, retract, release, clear.
-pub const MOMENTS_S: [f64; 5] = [0.175, 0.175, 0.325, 0.55, 0.725];
+pub(crate) const MOMENTS_S: [f64; 5] = [0.175, 0.175, 0.325, 0.55, 0.725];
 /// Contact of the first press of a recording, s after time 0 of its schedule.
-pub const FIRST_CONTACT_S: f64 = MOMENTS_S[0];
+pub(crate) const FIRST_CONTACT_S: f64 = MOMENTS_S[0];
 /// Columns and rows of the path.
 const LINES: usize = 5;
 const LINE: usize = 5;
@@ -441,7 +441,7 @@ impl Bench {
 
     /// The press in progress at a host time, if any.
     #[must_use]
-    pub fn pressed_at(&self, host_s: f64) -> Option<Point2> {
+    pub(crate) fn pressed_at(&self, host_s: f64) -> Option<Point2> {
         let near = self.pressed.iter().min_by(|a, b| {
             let off = |p: &Pressed| (p.contact_s - host_s).abs();
             off(a).total_cmp(&off(b))

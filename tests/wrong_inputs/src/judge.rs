@@ -96,7 +96,7 @@ impl Numbers {
 
     /// True if every known value agrees with the reported one.
     #[must_use]
-    pub fn are_right(&self) -> bool {
+    pub(crate) fn are_right(&self) -> bool {
         let near = |other: Option<f64>| {
             other.is_none_or(|other| {
                 (self.reported - other).abs() <= self.half_width + SHARE * other + SLACK_MM

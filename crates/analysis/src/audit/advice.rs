@@ -3,7 +3,7 @@
 use crate::result::Fault;
 
 /// The next step for the user.
-pub const fn of(fault: Fault) -> &'static str {
+pub(super) const fn of(fault: Fault) -> &'static str {
     match fault {
         Fault::CamerasSwapped => {
             "swap the two camera files of the import (--camera1, --camera2), or the camera serials in the rig file"

@@ -14,7 +14,7 @@ const MAX_SHARE: f64 = 0.7;
 /// Minimum number of locations for a statement.
 const MIN_PLACES: usize = 4;
 
-pub fn findings(analysis: &Analysis) -> Option<Finding> {
+pub(super) fn findings(analysis: &Analysis) -> Option<Finding> {
     let counts = |p: &&PressResult| {
         p.role == PressRole::Score && p.verdict == Verdict::Valid && p.estimate().is_some()
     };

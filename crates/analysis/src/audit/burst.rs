@@ -23,7 +23,7 @@ const MIN_STRETCH_SHARE: f64 = 0.15;
 /// and the minimum share of the other presses that respond.
 const SHARE_ELSEWHERE: f64 = 0.7;
 
-pub fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) -> Vec<Finding> {
+pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) -> Vec<Finding> {
     let [one, two] = CameraId::ALL.map(|camera| {
         let sights = presses_seen
             .iter()

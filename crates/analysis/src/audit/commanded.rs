@@ -30,7 +30,7 @@ const MOVING_PX: f64 = 20.0;
 /// Largest shift of the press list to consider.
 const MAX_SHIFT: i32 = 5;
 
-pub fn findings(input: &SessionInput, presses_seen: &[ObservedPress<'_>]) -> Vec<Finding> {
+pub(super) fn findings(input: &SessionInput, presses_seen: &[ObservedPress<'_>]) -> Vec<Finding> {
     let path: Vec<&ObservedPress<'_>> = presses_seen
         .iter()
         .filter(|t| t.role != PressRole::Sync && t.done())

@@ -16,7 +16,7 @@ const MAX_WITHOUT_TRUTH: f64 = 0.2;
 /// Smallest share of sent marks that a clock fit can use if the trigger line works.
 const MIN_MARKS: f64 = 0.5;
 
-pub fn findings(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
+pub(super) fn findings(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
     let mut found = Vec::new();
     found.extend(contradiction(input));
     found.extend(events(analysis));

@@ -15,7 +15,7 @@ const SIGMAS: f64 = 3.0;
 /// Minimum number of presses with times for an alignment (`clock::fit_rates`).
 const MIN_PRESSES: usize = 4;
 
-pub fn findings(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
+pub(super) fn findings(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
     let timed = input
         .outcomes
         .iter()

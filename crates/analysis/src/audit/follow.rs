@@ -37,7 +37,7 @@ const SAME_SHARE: f64 = 0.9;
 /// Presses in another order cover the same area as the list, within this factor along each axis.
 const SAME_EXTENT: f64 = 1.5;
 
-pub fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) -> Vec<Finding> {
+pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) -> Vec<Finding> {
     let path = Path::new(&analysis.rig, presses_seen);
     if path.places < MIN_PLACES {
         return Vec::new();

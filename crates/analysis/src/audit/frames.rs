@@ -9,7 +9,7 @@ const FACTORS: [f64; 6] = [1e-3, 0.1, 1.0 / 25.4, 1e3, 10.0, 25.4];
 
 /// A transform from positions of the table to the skin frame.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Frame {
+pub(super) struct Frame {
     /// Fault of the table.
     pub fault: Fault,
     /// Description, as in "the positions with ...".
@@ -23,7 +23,7 @@ pub struct Frame {
 
 impl Frame {
     /// Transforms a position to the skin frame.
-    pub fn skin(&self, p: Point2) -> Point2 {
+    pub(super) fn skin(&self, p: Point2) -> Point2 {
         let (x, y) = (p.x_mm - self.about.x_mm, p.y_mm - self.about.y_mm);
         let [[xx, xy], [yx, yy]] = self.matrix;
         Point2::new(
@@ -33,7 +33,7 @@ impl Frame {
     }
 
     /// A table displaced by this offset.
-    pub fn displaced(by: [f64; 2], description: String) -> Self {
+    pub(super) fn displaced(by: [f64; 2], description: String) -> Self {
         Self {
             fault: Fault::PositionsDisplaced,
             description,
@@ -44,7 +44,7 @@ impl Frame {
     }
 
     /// All known transforms, about 0 and about the middle of the skin.
-    pub fn all(outline: &SkinOutline) -> Vec<Self> {
+    pub(super) fn all(outline: &SkinOutline) -> Vec<Self> {
         let centre = outline.centre;
         let mut all = Vec::new();
         for (about, name) in [(Point2::default(), "0"), (centre, "the skin's centre")] {

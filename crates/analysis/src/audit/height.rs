@@ -15,7 +15,7 @@ const MAX_HEIGHT_MM: f64 = 0.1;
 /// Nor are shorter times before contact, beyond the clock uncertainty: two bins of the event rate, ms.
 const MAX_BEFORE_MS: f64 = 20.0;
 
-pub fn findings(
+pub(super) fn findings(
     input: &SessionInput,
     analysis: &Analysis,
     onsets: [&[Onset]; 2],

@@ -31,7 +31,7 @@ use crate::stream::Silences;
 
 /// Evidence from the streams alone, camera 1 and camera 2.
 #[derive(Debug, Clone, Default)]
-pub struct Streams {
+pub(crate) struct Streams {
     /// Silent periods.
     pub silences: [Silences; 2],
     /// Contacts detected in the counts, s on the host clock; empty for a session of several legs.
@@ -45,7 +45,7 @@ pub struct Streams {
 /// Uses the table of presses, the journal, the clock fits and the event rates of `analysis`. Only the last law uses located
 /// positions: a calibration can absorb a fault that the nominal geometry shows.
 #[must_use]
-pub fn audit(input: &SessionInput, analysis: &Analysis, streams: &Streams) -> Vec<Finding> {
+pub(crate) fn audit(input: &SessionInput, analysis: &Analysis, streams: &Streams) -> Vec<Finding> {
     let presses_seen = observed_press::observed_presses(input, analysis);
     let [one, two] = &streams.silences;
     let found = [

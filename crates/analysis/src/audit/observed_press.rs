@@ -15,7 +15,7 @@ const RESPONSE_SIGMAS: f64 = 2.0;
 const FIELD_MARGIN_DEG: f64 = 6.0;
 
 /// An attempted press of the path or of the sync part.
-pub struct ObservedPress<'a> {
+pub(crate) struct ObservedPress<'a> {
     /// Press.
     pub press: PressId,
     /// Role of the press.
@@ -40,7 +40,7 @@ pub struct ObservedPress<'a> {
 
 /// Observation of a press by one camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CameraObservation {
+pub(crate) struct CameraObservation {
     /// Centroid column of a significant press, px.
     pub column: Option<f64>,
     /// Events in the window above the idle prediction, in standard errors; `None` if unknown, or if the press is at the edge
@@ -52,18 +52,18 @@ pub struct CameraObservation {
 
 impl ObservedPress<'_> {
     /// Measured position, or planned position if not measured.
-    pub fn at(&self) -> Point2 {
+    pub(super) fn at(&self) -> Point2 {
         self.truth.unwrap_or(self.planned)
     }
 
     /// True if the journal reports no problem.
-    pub fn done(&self) -> bool {
+    pub(super) fn done(&self) -> bool {
         self.outcome.verdict == PressVerdict::Valid
     }
 }
 
 /// Attempted presses, in plan order.
-pub fn observed_presses<'a>(
+pub(crate) fn observed_presses<'a>(
     input: &'a SessionInput,
     analysis: &Analysis,
 ) -> Vec<ObservedPress<'a>> {
@@ -97,7 +97,7 @@ pub fn observed_presses<'a>(
 }
 
 /// True when both coordinates are finite.
-pub fn is_number(p: Point2) -> bool {
+pub(super) fn is_number(p: Point2) -> bool {
     p.x_mm.is_finite() && p.y_mm.is_finite()
 }
 

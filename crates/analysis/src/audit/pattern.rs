@@ -18,7 +18,10 @@ const SYNC_LENGTHS: f64 = 2.0;
 const SYNC_S: f64 = 3.0;
 
 /// `contacts_s`: contacts detected in the counts of each camera, s on the host clock.
-pub fn findings(presses_seen: &[ObservedPress<'_>], contacts_s: [&[f64]; 2]) -> Vec<Finding> {
+pub(super) fn findings(
+    presses_seen: &[ObservedPress<'_>],
+    contacts_s: [&[f64]; 2],
+) -> Vec<Finding> {
     let scheduled: Vec<&ObservedPress<'_>> = presses_seen
         .iter()
         .filter(|t| t.outcome.scheduled)

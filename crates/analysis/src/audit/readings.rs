@@ -30,7 +30,7 @@ const SAME_DIRECTION: f64 = 0.7;
 
 /// One reading of the session.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Reading {
+pub(super) struct Reading {
     /// Fault that this reading implies; `None` for the session as recorded.
     pub fault: Option<Fault>,
     /// Description.
@@ -49,7 +49,7 @@ pub struct Reading {
 
 /// A reading with its best fit.
 #[derive(Debug, Clone)]
-pub struct ScoredReading<'a> {
+pub(crate) struct ScoredReading<'a> {
     pub reading: &'a Reading,
     /// Cameras that explain the streams best.
     pub fits: [Option<Resection>; 2],
@@ -61,7 +61,7 @@ pub struct ScoredReading<'a> {
 
 impl ScoredReading<'_> {
     /// True if the streams follow the presses: residual below this share of the ignorance residual.
-    pub fn follows(&self, share: f64) -> bool {
+    pub(super) fn follows(&self, share: f64) -> bool {
         let each = self.fits.iter().zip(self.ignorance_deg);
         each.clone().any(|(fit, _)| fit.is_some())
             && each
@@ -71,7 +71,7 @@ impl ScoredReading<'_> {
 }
 
 /// Presses of the path in order, and the sync presses.
-pub struct Path<'a> {
+pub(super) struct Path<'a> {
     pub rig: &'a RigGeometry,
     /// All presses of the path with a column in at least one camera.
     pub presses_seen: Vec<&'a ObservedPress<'a>>,
@@ -84,7 +84,7 @@ pub struct Path<'a> {
 }
 
 impl<'a> Path<'a> {
-    pub fn new(rig: &'a RigGeometry, presses_seen: &'a [ObservedPress<'a>]) -> Self {
+    pub(super) fn new(rig: &'a RigGeometry, presses_seen: &'a [ObservedPress<'a>]) -> Self {
         let seen = |t: &&ObservedPress<'_>| t.sights.iter().any(|s| s.column.is_some());
         let path: Vec<&ObservedPress<'_>> = presses_seen
             .iter()
@@ -134,7 +134,7 @@ impl<'a> Path<'a> {
     }
 
     /// All other known readings.
-    pub fn alternatives(&self) -> Vec<Reading> {
+    pub(crate) fn alternatives(&self) -> Vec<Reading> {
         let base = self.as_it_is();
         let mut all = Vec::new();
         for (cameras, fault, description) in [
@@ -192,7 +192,7 @@ impl<'a> Path<'a> {
     }
 
     /// Positions displaced opposite to the common displacement of both cameras.
-    pub fn displaced(&self, as_is: &ScoredReading<'_>) -> Option<Reading> {
+    pub(super) fn displaced(&self, as_is: &ScoredReading<'_>) -> Option<Reading> {
         let [Some(one), Some(two)] = as_is.fits else {
             return None;
         };
@@ -221,14 +221,18 @@ impl<'a> Path<'a> {
             return None;
         }
         let base = self.as_it_is();
+        let shifts = (-MAX_SHIFT..=MAX_SHIFT).map(|by| {
+            let shifted = Reading {
+                rows: [by; 2],
+                ..base.clone()
+            };
+            (by, self.score(&shifted).fits)
+        });
+        let shifts: Vec<_> = shifts.collect();
         let likeliest = |k: usize| {
-            let costs = (-MAX_SHIFT..=MAX_SHIFT).filter_map(|by| {
-                let shifted = Reading {
-                    rows: [by; 2],
-                    ..base.clone()
-                };
-                Some((self.score(&shifted).fits[k]?.cost, by))
-            });
+            let costs = shifts
+                .iter()
+                .filter_map(|(by, fits)| Some((fits[k].as_ref()?.cost, *by)));
             costs.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, by)| by)
         };
         let rows = [likeliest(0)?, likeliest(1)?];
@@ -245,7 +249,7 @@ impl<'a> Path<'a> {
     }
 
     /// Position of the press `by` rows after press `i`, in the same repetition or another one.
-    pub fn shifted(&self, i: usize, by: i32) -> Option<Point2> {
+    pub(super) fn shifted(&self, i: usize, by: i32) -> Option<Point2> {
         let there = usize::try_from(i as i64 + i64::from(by)).ok()?;
         Some(self.presses_seen.get(there)?.at())
     }
@@ -324,7 +328,7 @@ impl<'a> Path<'a> {
     }
 
     /// Fits the cameras to `reading`.
-    pub fn score<'r>(&self, reading: &'r Reading) -> ScoredReading<'r> {
+    pub(super) fn score<'r>(&self, reading: &'r Reading) -> ScoredReading<'r> {
         let mut judged = ScoredReading {
             reading,
             fits: [None; 2],

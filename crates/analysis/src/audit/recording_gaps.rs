@@ -13,7 +13,7 @@ struct MissedPresses {
     description: String,
 }
 
-pub fn findings(
+pub(super) fn findings(
     input: &SessionInput,
     analysis: &Analysis,
     silences: [&Silences; 2],

@@ -20,7 +20,7 @@ const MAX_SHARE: f64 = 0.5;
 /// Standard error of a median divided by the median absolute deviation and the root of n: 1.4826 sqrt(pi / 2).
 const MEDIAN_ERROR: f64 = 1.858;
 
-pub fn findings(presses_seen: &[ObservedPress<'_>]) -> Vec<Finding> {
+pub(super) fn findings(presses_seen: &[ObservedPress<'_>]) -> Vec<Finding> {
     CameraId::ALL
         .into_iter()
         .filter_map(|camera| disagreement(presses_seen, camera))

@@ -87,7 +87,7 @@ pub(crate) fn resect(
 }
 
 /// Viewing angle of each column minus that of its position, degrees within ±180.
-pub fn residuals(camera: &CameraModel, pairs: &[(f64, Point2)]) -> Vec<f64> {
+pub(super) fn residuals(camera: &CameraModel, pairs: &[(f64, Point2)]) -> Vec<f64> {
     let one = |&(column, at): &(f64, Point2)| residual_deg(camera, column, at);
     pairs.iter().map(one).collect()
 }

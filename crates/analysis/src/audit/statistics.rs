@@ -3,6 +3,6 @@
 use crate::metrics::quantile;
 
 /// The median; `None` without values.
-pub fn median(mut values: Vec<f64>) -> Option<f64> {
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
     quantile(&mut values, 0.5)
 }

@@ -33,7 +33,10 @@ const CLEARLY: f64 = 11.0;
 const MIN_PRESSES: usize = 6;
 
 /// `contacts_s`: contacts detected in the counts of each camera, s on the host clock, ascending.
-pub fn findings(presses_seen: &[ObservedPress<'_>], contacts_s: [&[f64]; 2]) -> Vec<Finding> {
+pub(super) fn findings(
+    presses_seen: &[ObservedPress<'_>],
+    contacts_s: [&[f64]; 2],
+) -> Vec<Finding> {
     let mut listed: Vec<f64> = presses_seen
         .iter()
         .filter(|t| !t.outcome.scheduled)

@@ -18,7 +18,7 @@ use crate::sets::{CalibrationPress, CalibrationSet};
 use crate::verdict;
 
 /// Geometry for locating the presses of a session.
-pub struct SessionCalibration {
+pub(crate) struct SessionCalibration {
     /// Geometry.
     pub geometry: StereoGeometry,
     /// How it was found; `None` for the nominal geometry.
@@ -30,7 +30,7 @@ pub struct SessionCalibration {
 /// Calibrates on the calibration presses. With [`ThresholdRule::Calibrated`] it first chooses the minimum number of cluster
 /// events from cross-validated errors; presses of either role with fewer events get their verdict, and the calibration,
 /// including the choice of the model, is repeated without them.
-pub fn calibrate_session(
+pub(crate) fn calibrate_session(
     input: &SessionInput,
     presses: &mut [PressResult],
     warnings: &mut Vec<String>,

@@ -16,7 +16,7 @@ const FOLDS: usize = 10;
 const STREAM: u64 = 1 << 32;
 
 /// Assignment of presses to folds: all presses of a location are held out together.
-pub struct Folds {
+pub(crate) struct Folds {
     of_sight: Vec<usize>,
     count: usize,
     /// Locations outside the largest fold.

@@ -20,7 +20,7 @@ const NO_DIFFERENCE_MM: f64 = 1e-6;
 
 /// Difference between the errors of two models.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Difference {
+pub(super) struct Difference {
     /// Bounded root mean square error of the one minus that of the other, mm. Positive: the other is better.
     pub mm: f64,
     /// Its standard error over locations, mm.
@@ -31,7 +31,7 @@ pub struct Difference {
 
 impl Difference {
     /// The difference in its standard errors.
-    pub fn ratio(&self) -> f64 {
+    pub(super) fn ratio(&self) -> f64 {
         if self.mm.abs() <= NO_DIFFERENCE_MM {
             0.0
         } else {
@@ -46,7 +46,7 @@ impl Difference {
 }
 
 /// Bounded squared errors of presses at known locations.
-pub struct Losses<'a> {
+pub(super) struct Losses<'a> {
     locations: &'a [u32],
     bound_mm: f64,
 }
@@ -54,7 +54,10 @@ pub struct Losses<'a> {
 impl<'a> Losses<'a> {
     /// `locations[i]` belongs to press i in each of the models' `errors_mm`. The bound is common to all models and comes
     /// from the one with the smallest median error.
-    pub fn new<'b>(locations: &'a [u32], errors_mm: impl Iterator<Item = &'b [f64]>) -> Self {
+    pub(super) fn new<'b>(
+        locations: &'a [u32],
+        errors_mm: impl Iterator<Item = &'b [f64]>,
+    ) -> Self {
         let median = |errors: &[f64]| {
             let mut sorted = errors.to_vec();
             sorted.sort_unstable_by(f64::total_cmp);
@@ -69,7 +72,7 @@ impl<'a> Losses<'a> {
     }
 
     /// Bound on the errors, mm.
-    pub const fn bound_mm(&self) -> f64 {
+    pub(super) const fn bound_mm(&self) -> f64 {
         self.bound_mm
     }
 
@@ -79,7 +82,7 @@ impl<'a> Losses<'a> {
     }
 
     /// Root mean square of the bounded errors, mm.
-    pub fn rms_mm(&self, errors_mm: &[f64]) -> f64 {
+    pub(super) fn rms_mm(&self, errors_mm: &[f64]) -> f64 {
         super::root_mean_square(
             &errors_mm
                 .iter()
@@ -114,7 +117,7 @@ impl<'a> Losses<'a> {
 
 /// Comparison of one model with the current one.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Step {
+pub(super) struct Step {
     /// Index of the current model.
     pub against: usize,
     /// Error of the current model minus that of the candidate.

@@ -7,10 +7,10 @@ use skinrig_model::{CalibrationModel, StereoGeometry};
 pub(crate) const PARAMETERS: usize = 10;
 
 /// All parameters; a nested model moves only the first 4, 6, 8 or 10.
-pub type Parameters = SVector<f64, PARAMETERS>;
+pub(super) type Parameters = SVector<f64, PARAMETERS>;
 
 /// Names, in order.
-pub const NAMES: [&str; PARAMETERS] = [
+pub(super) const NAMES: [&str; PARAMETERS] = [
     "camera 1 x (mm)",
     "camera 1 y (mm)",
     "camera 2 x (mm)",
@@ -33,7 +33,7 @@ const FARTHEST_MM: f64 = 60.0;
 const MAX_SKEWED_DEG: f64 = 45.0;
 
 /// The nested models, smallest first.
-pub const MODELS: [CalibrationModel; 4] = [
+pub(super) const MODELS: [CalibrationModel; 4] = [
     CalibrationModel::Positions,
     CalibrationModel::PositionsSkews,
     CalibrationModel::Full,

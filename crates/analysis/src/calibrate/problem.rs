@@ -55,7 +55,7 @@ pub(crate) struct StereoModel([PosedCamera; 2]);
 
 impl StereoModel {
     /// `base` at its own parameters.
-    pub fn of(base: &StereoGeometry) -> Self {
+    pub(super) fn of(base: &StereoGeometry) -> Self {
         Self(
             base.cameras
                 .map(|c| PosedCamera::new(c, c.lens.coefficients().0)),
@@ -149,7 +149,7 @@ impl StereoModel {
 
 /// Definition of the two residuals of a press, mm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Measure {
+pub(super) enum Measure {
     /// Estimate minus truth, x and y; the bound applies to the length of the vector.
     Error,
     /// Arc about camera 1 and camera 2 from the ray to the truth; each is bounded.
@@ -157,7 +157,7 @@ pub enum Measure {
 }
 
 /// Sum of squared residuals, half of its gradient `Jᵀr`, and the normal matrix `JᵀJ`.
-pub struct Normal {
+pub(super) struct Normal {
     pub cost: f64,
     pub gradient: Parameters,
     pub matrix: SMatrix<f64, PARAMETERS, PARAMETERS>,
@@ -165,7 +165,7 @@ pub struct Normal {
 
 /// Bounded residuals of presses as functions of the first `count` parameters.
 #[derive(Clone, Copy)]
-pub struct Problem<'a> {
+pub(super) struct Problem<'a> {
     pub sights: &'a [CalibrationPress],
     pub base: &'a StereoGeometry,
     pub count: usize,
@@ -179,7 +179,7 @@ pub struct Problem<'a> {
 impl Problem<'_> {
     /// Everything that a step needs, in one pass over the presses and without allocation. Sums are in the order of the
     /// presses.
-    pub fn normal(&self, p: &Parameters) -> Normal {
+    pub(super) fn normal(&self, p: &Parameters) -> Normal {
         let stereo = StereoModel::at(self.base, p);
         let mut cost = 0.0;
         let mut gradient = [0.0; PARAMETERS];
@@ -205,7 +205,7 @@ impl Problem<'_> {
     }
 
     /// All residuals (x and y of each press in turn) and the whole Jacobian.
-    pub fn rows(&self, p: &Parameters) -> (DVector<f64>, DMatrix<f64>) {
+    pub(super) fn rows(&self, p: &Parameters) -> (DVector<f64>, DMatrix<f64>) {
         let stereo = StereoModel::at(self.base, p);
         let mut residuals = DVector::zeros(2 * self.sights.len());
         let mut jacobian = DMatrix::zeros(2 * self.sights.len(), self.count);

@@ -22,7 +22,7 @@ const FLAT: f64 = 1e-10;
 const MIN_GAIN_RATIO: f64 = 1e-4;
 
 /// Result of a descent.
-pub struct Descent {
+pub(super) struct Descent {
     pub parameters: Parameters,
     pub cost: f64,
     /// Why it ended.

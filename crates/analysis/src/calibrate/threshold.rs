@@ -28,7 +28,7 @@ const STREAM: u64 = 3 << 32;
 ///
 /// Candidates are `floor` and, for each press above it, the smallest threshold that rejects this press. The floor also stays
 /// if even the best threshold is no better than a blind guess.
-pub fn choose(
+pub(super) fn choose(
     sights: &[CalibrationPress],
     errors_mm: &[f64],
     floor: u32,

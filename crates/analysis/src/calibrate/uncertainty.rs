@@ -28,7 +28,7 @@ pub(crate) struct Uncertainty {
 }
 
 /// `residuals` and `jacobian` at the solution; `locations[i]` belongs to rows 2i and 2i + 1.
-pub fn uncertainty(
+pub(super) fn uncertainty(
     residuals: &DVector<f64>,
     jacobian: &DMatrix<f64>,
     locations: &[u32],

@@ -1,5 +1,6 @@
 //! Owns the activity of a camera over its recording: event rate on a scale from idle to pressed.
 
+use super::error::RatesError;
 use super::span::PressSpan;
 use crate::rates::RateHistogram;
 
@@ -11,7 +12,7 @@ pub(super) struct Activity {
 }
 
 impl Activity {
-    pub(super) fn new(rates: &RateHistogram, presses: &[PressSpan]) -> Result<Self, String> {
+    pub(super) fn new(rates: &RateHistogram, presses: &[PressSpan]) -> Result<Self, RatesError> {
         let bin_us = rates.bin_us() as f64;
         // Square roots make Poisson noise equal at all rates.
         let roots: Vec<f64> = rates
@@ -26,11 +27,7 @@ impl Activity {
         let low = crate::metrics::quantile(&mut roots.clone(), 0.5 * (1.0 - share)).unwrap_or(0.0);
         let high = crate::metrics::quantile(&mut roots.clone(), 1.0 - 0.25 * share).unwrap_or(0.0);
         if high - low < 0.5 {
-            return Err(
-                "expected presses to stand out in the event rates, found hardly any difference between \
-                 busy and idle times; was the camera running and the crop right?"
-                    .to_owned(),
-            );
+            return Err(RatesError::Flat);
         }
         let values: Vec<f64> = roots
             .iter()

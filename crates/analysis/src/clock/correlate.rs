@@ -55,7 +55,7 @@ pub(crate) struct Correlator {
 
 impl Correlator {
     /// For templates of up to `longest_template` values.
-    pub fn new(series: &[f64], longest_template: usize) -> Self {
+    pub(super) fn new(series: &[f64], longest_template: usize) -> Self {
         let size = (series.len() + longest_template).next_power_of_two().max(2);
         let mut transformed = vec![(0.0, 0.0); size];
         for (to, from) in transformed.iter_mut().zip(series) {

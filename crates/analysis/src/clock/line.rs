@@ -137,6 +137,6 @@ fn square(x: f64) -> f64 {
 }
 
 /// The median; `None` without values. Reorders the values.
-pub fn median(values: &mut [f64]) -> Option<f64> {
+pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     crate::metrics::quantile(values, 0.5)
 }

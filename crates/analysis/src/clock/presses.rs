@@ -12,6 +12,7 @@
 use super::NO_TIME_US;
 use super::activity::Activity;
 use super::bursts::Bursts;
+use super::error::RatesError;
 use super::line::Line;
 use super::refine::{UNKNOWN_DRIFT, refine};
 use super::search::{MAX_DRIFT, Map, first_map};
@@ -34,7 +35,7 @@ pub struct RatesFit {
 #[derive(Debug, Clone, PartialEq)]
 pub struct RatesAlignment {
     /// Per requested camera: its clock, or why there is none.
-    pub cameras: [Option<Result<RatesFit, String>>; 2],
+    pub cameras: [Option<Result<RatesFit, RatesError>>; 2],
     /// Certainty of the alignment; `None` without any clock.
     pub evidence: Option<RatesEvidence>,
 }
@@ -68,7 +69,7 @@ pub fn align_by_rates(rates: [Option<&RateHistogram>; 2], presses: &[PressSpan])
         match choose(&plan, [trains[0].as_ref(), trains[1].as_ref()]) {
             Ok(found) => choice = Some(found),
             Err(why) => {
-                cameras = cameras.map(|c| c.map(|_| Err(why.clone())));
+                cameras = cameras.map(|c| c.map(|_| Err(why)));
                 choice = None;
                 break;
             }
@@ -119,13 +120,13 @@ pub fn align_by_rates(rates: [Option<&RateHistogram>; 2], presses: &[PressSpan])
 pub fn fit_rates(
     rates: &RateHistogram,
     presses: &[PressSpan],
-) -> Result<(RatesFit, RatesEvidence), String> {
+) -> Result<(RatesFit, RatesEvidence), RatesError> {
     let found = align_by_rates([Some(rates), None], presses);
     let [first, _] = found.cameras;
     match (first, found.evidence) {
         (Some(Ok(fit)), Some(evidence)) => Ok((fit, evidence)),
         (Some(Err(why)), _) => Err(why),
-        _ => Err("expected bursts in the event rates, found none".to_owned()),
+        _ => Err(RatesError::NoBursts),
     }
 }
 
@@ -139,25 +140,22 @@ struct Camera {
 
 impl Camera {
     /// An alignment that may still be off by whole periods.
-    fn new(rates: &RateHistogram, presses: &[PressSpan]) -> Result<Self, String> {
+    fn new(rates: &RateHistogram, presses: &[PressSpan]) -> Result<Self, RatesError> {
         if presses.len() < 4 {
-            return Err(format!(
-                "expected at least 4 presses with known times to align the clock by event rates, found {}",
-                presses.len()
-            ));
+            return Err(RatesError::FewPresses {
+                found: presses.len(),
+            });
         }
         let span_us = presses[presses.len() - 1].release_us - presses[0].contact_us;
         if !(0.0..=MAX_BINS * rates.bin_us() as f64).contains(&span_us) {
-            return Err(format!(
-                "expected the presses in time order within two days, found {:.0} s between the first and the last",
-                span_us * 1e-6
-            ));
+            return Err(RatesError::Span {
+                span_s: span_us * 1e-6,
+            });
         }
         if rates.start_us() >= NO_TIME_US {
-            return Err(format!(
-                "expected camera times below 2^62 µs, found events at {} µs: the time base of the stream is broken",
-                rates.start_us()
-            ));
+            return Err(RatesError::BrokenTimeBase {
+                start_us: rates.start_us(),
+            });
         }
         let activity = Activity::new(rates, presses)?;
         let map = first_map(&activity, presses, 0.0);
@@ -176,7 +174,7 @@ impl Camera {
     }
 
     /// Shifts the presses to later times and refines the clock there.
-    fn shift(&mut self, presses: &[PressSpan], shift_us: f64) -> Result<(), String> {
+    fn shift(&mut self, presses: &[PressSpan], shift_us: f64) -> Result<(), RatesError> {
         self.map.offset_us += shift_us * (1.0 + self.map.drift);
         (self.map, self.line) = refine(&self.activity, presses, self.map)?;
         Ok(())

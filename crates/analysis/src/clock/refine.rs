@@ -1,6 +1,7 @@
 //! Owns the refinement of a camera clock: lag of each press against the mean press, and onset of the mean press.
 
 use super::activity::Activity;
+use super::error::RatesError;
 use super::line::{self, Pair, median};
 use super::search::{Map, period_us};
 use super::span::PressSpan;
@@ -20,39 +21,45 @@ pub(super) const MIN_STRENGTH: f64 = 0.33;
 pub(super) fn refine(
     activity: &Activity,
     presses: &[PressSpan],
-    mut map: Map,
-) -> Result<(Map, line::Line), String> {
-    let mut last = None;
-    for lag_us in LAGS_US {
-        map.offset_us += onset_us(activity, presses, map);
-        let profile = Profile::new(activity, presses, map);
-        let pairs = lags(activity, presses, map, &profile, lag_us);
-        let line = line::fit(&pairs, FLOOR_US).ok_or_else(|| {
-            format!(
-                "expected at least 3 presses to be visible in the event rates, found {}",
-                pairs.len()
-            )
-        })?;
-        map.offset_us = line.offset_us;
-        map.drift = line.drift;
-        if line.drift_se > UNKNOWN_DRIFT {
-            // Turn the line about its middle until it has no drift.
-            let used: Vec<f64> = pairs
-                .iter()
-                .zip(&line.used)
-                .filter(|(_, u)| **u)
-                .map(|(p, _)| p.host_us)
-                .collect();
-            let middle = used.iter().sum::<f64>() / used.len() as f64;
-            map.offset_us += line.drift * middle;
-            map.drift = 0.0;
-        }
-        last = Some(line);
+    map: Map,
+) -> Result<(Map, line::Line), RatesError> {
+    let [first_us, further_us @ ..] = LAGS_US;
+    let (mut map, mut line) = refine_once(activity, presses, map, first_us)?;
+    for lag_us in further_us {
+        (map, line) = refine_once(activity, presses, map, lag_us)?;
     }
     // Recompute the onset with well-aligned presses.
     map.offset_us += onset_us(activity, presses, map);
-    last.map(|line| (map, line))
-        .ok_or_else(|| "no refinement iteration".to_owned())
+    Ok((map, line))
+}
+
+/// One iteration, with lags up to `lag_us`.
+fn refine_once(
+    activity: &Activity,
+    presses: &[PressSpan],
+    mut map: Map,
+    lag_us: f64,
+) -> Result<(Map, line::Line), RatesError> {
+    map.offset_us += onset_us(activity, presses, map);
+    let profile = Profile::new(activity, presses, map);
+    let pairs = lags(activity, presses, map, &profile, lag_us);
+    let few = RatesError::FewVisible { found: pairs.len() };
+    let line = line::fit(&pairs, FLOOR_US).ok_or(few)?;
+    map.offset_us = line.offset_us;
+    map.drift = line.drift;
+    if line.drift_se > UNKNOWN_DRIFT {
+        // Turn the line about its middle until it has no drift.
+        let used: Vec<f64> = pairs
+            .iter()
+            .zip(&line.used)
+            .filter(|(_, u)| **u)
+            .map(|(p, _)| p.host_us)
+            .collect();
+        let middle = used.iter().sum::<f64>() / used.len() as f64;
+        map.offset_us += line.drift * middle;
+        map.drift = 0.0;
+    }
+    Ok((map, line))
 }
 
 /// Mean activity around the predicted contacts within the recording.

@@ -1,6 +1,7 @@
 //! Owns the choice among all alignments of both cameras: the likeliest pair of shifts, and its odds against all others.
 
 use super::bursts::Bursts;
+use super::error::RatesError;
 use super::tally::{Counter, NEAR_US, Plan, Tally};
 
 /// Cell width for differences between bursts and presses, µs.
@@ -37,7 +38,7 @@ pub(super) struct ShiftChoice {
 ///
 /// # Errors
 /// When there are too many bursts to consider all shifts.
-pub(super) fn choose(plan: &Plan, trains: [Option<&Bursts>; 2]) -> Result<ShiftChoice, String> {
+pub(super) fn choose(plan: &Plan, trains: [Option<&Bursts>; 2]) -> Result<ShiftChoice, RatesError> {
     let mut shifts: [Vec<(f64, f64)>; 2] = [Vec::new(), Vec::new()];
     for k in 0..2 {
         if let Some(train) = trains[k] {
@@ -92,7 +93,7 @@ pub(super) fn choose(plan: &Plan, trains: [Option<&Bursts>; 2]) -> Result<ShiftC
 }
 
 /// Likeliest shifts of one camera alone with their log likelihoods, likeliest first.
-fn likeliest(plan: &Plan, train: &Bursts, k: usize) -> Result<Vec<(f64, f64)>, String> {
+fn likeliest(plan: &Plan, train: &Bursts, k: usize) -> Result<Vec<(f64, f64)>, RatesError> {
     let differences = Differences::new(&train.at_us, plan.contacts_us())?;
     let mut found = differences.peaks();
     found.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.total_cmp(&b.0)));
@@ -115,7 +116,7 @@ fn paired(
     first: &Bursts,
     second: &Bursts,
     shifts: &mut [Vec<(f64, f64)>; 2],
-) -> Result<Vec<[f64; 2]>, String> {
+) -> Result<Vec<[f64; 2]>, RatesError> {
     let coincidences = Differences::new(&second.at_us, first.at_us.iter().copied())?;
     let mut between = coincidences.peaks();
     between.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.total_cmp(&b.0)));
@@ -166,15 +167,15 @@ struct Differences {
 
 impl Differences {
     /// Each of `later` minus each of `earlier`, both in order, µs.
-    fn new(later: &[f64], earlier: impl Iterator<Item = f64> + Clone) -> Result<Self, String> {
+    fn new(later: &[f64], earlier: impl Iterator<Item = f64> + Clone) -> Result<Self, RatesError> {
         let n = earlier.clone().count();
         let work = later.len() as u64 * n as u64;
         if work > MAX_WORK {
-            return Err(format!(
-                "expected at most {MAX_WORK} comparisons of a burst with a press, found {} bursts and {n} presses: is the \
-                 recording mostly noise?",
-                later.len()
-            ));
+            return Err(RatesError::TooManyBursts {
+                most: MAX_WORK,
+                bursts: later.len(),
+                presses: n,
+            });
         }
         let cell = |us: f64| (us / CELL_US).floor() as i64;
         let ends = |f: fn(f64, f64) -> f64, start: f64| earlier.clone().fold(start, f);

@@ -25,7 +25,7 @@ pub(crate) fn half_plane(polygon: &[Point2], on: Point2, normal: [f64; 2]) -> Ve
 }
 
 /// Intersection of two convex polygons; `window` is counter-clockwise.
-pub fn convex(polygon: &[Point2], window: &[Point2]) -> Vec<Point2> {
+pub(crate) fn convex(polygon: &[Point2], window: &[Point2]) -> Vec<Point2> {
     let mut out = polygon.to_vec();
     let next = window.iter().cycle().skip(1);
     for (a, b) in window.iter().zip(next) {

@@ -30,7 +30,7 @@ impl Step {
     }
 
     /// Squared distance between a pixel of the tile and one of the other tile.
-    pub fn squared(&self, from: usize, to: usize) -> usize {
+    pub(crate) fn squared(&self, from: usize, to: usize) -> usize {
         let apart = |tiles: isize, from: usize, to: usize| {
             (tiles * SIDE as isize + to as isize).abs_diff(from as isize)
         };
@@ -72,7 +72,7 @@ pub(super) struct Tiles {
 
 impl Tiles {
     /// For discs of radius `eps_px`, border included, limited to the width of the sensor.
-    pub fn new(eps_px: f64) -> Self {
+    pub(super) fn new(eps_px: f64) -> Self {
         let eps_sq = eps_px * eps_px;
         let fits = |dx: usize, dy: usize| (dx * dx + dy * dy) as f64 <= eps_sq;
         // Half width at each row distance.
@@ -132,41 +132,41 @@ impl Tiles {
     }
 
     /// Steps to all tiles that a disc around some pixel of a tile reaches.
-    pub fn steps(&self) -> &[Step] {
+    pub(super) fn steps(&self) -> &[Step] {
         &self.steps
     }
 
     /// One step of each pair that leads to another tile and back, with its index; near tiles first.
-    pub fn forward(&self) -> &[(usize, Step)] {
+    pub(super) fn forward(&self) -> &[(usize, Step)] {
         &self.forward
     }
 
     /// Masks of the disc around a pixel of a tile, at each step.
     #[inline]
-    pub fn masks(&self, at: usize) -> &[u64] {
+    pub(super) fn masks(&self, at: usize) -> &[u64] {
         let n = self.steps.len();
         &self.masks[at * n..(at + 1) * n]
     }
 
     /// Parts of the disc around a pixel of a tile: half of the steps, on average, if a disc is as large as a tile.
     #[inline]
-    pub fn parts(&self, at: usize) -> &[Part] {
+    pub(super) fn parts(&self, at: usize) -> &[Part] {
         &self.parts[self.starts[at]..self.starts[at + 1]]
     }
 
     /// Number of tiles for this many rows of pixels, including the frame.
-    pub const fn count(&self, height: usize) -> usize {
+    pub(super) const fn count(&self, height: usize) -> usize {
         (height.div_ceil(SIDE) + 2 * self.margin) * self.stride
     }
 
     /// Index of the tile of a row's first pixel.
     #[inline]
-    pub const fn first(&self, row: usize) -> usize {
+    pub(super) const fn first(&self, row: usize) -> usize {
         (row / SIDE + self.margin) * self.stride + self.margin
     }
 
     /// (row, column) of the first pixel of a tile outside the frame.
-    pub const fn corner(&self, tile: usize) -> (usize, usize) {
+    pub(super) const fn corner(&self, tile: usize) -> (usize, usize) {
         let (row, column) = (tile / self.stride, tile % self.stride);
         ((row - self.margin) * SIDE, (column - self.margin) * SIDE)
     }

@@ -9,7 +9,7 @@ const COLUMNS: usize = SENSOR_WIDTH as usize;
 
 /// Number of events in each column of bins.
 #[derive(Debug, Clone)]
-pub struct ColumnCounts {
+pub(crate) struct ColumnCounts {
     shift: u32,
     counts: Vec<u32>,
     events: u32,
@@ -18,7 +18,7 @@ pub struct ColumnCounts {
 impl ColumnCounts {
     /// For bins of side `side_px`, px.
     #[must_use]
-    pub fn new(side_px: u16) -> Self {
+    pub(crate) fn new(side_px: u16) -> Self {
         let shift = side_px.max(1).trailing_zeros();
         Self {
             shift,
@@ -28,7 +28,7 @@ impl ColumnCounts {
     }
 
     /// Resets the counts and fills them with `events`.
-    pub fn fill(&mut self, events: &[PackedEvent]) {
+    pub(crate) fn fill(&mut self, events: &[PackedEvent]) {
         self.counts.fill(0);
         for event in events {
             if let Some(count) = self.counts.get_mut(usize::from(event.x() >> self.shift)) {
@@ -40,13 +40,13 @@ impl ColumnCounts {
 
     /// Counts, left to right.
     #[must_use]
-    pub fn counts(&self) -> &[u32] {
+    pub(crate) fn counts(&self) -> &[u32] {
         &self.counts
     }
 
     /// Number of all events.
     #[must_use]
-    pub const fn events(&self) -> u32 {
+    pub(crate) const fn events(&self) -> u32 {
         self.events
     }
 }

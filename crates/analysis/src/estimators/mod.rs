@@ -12,8 +12,9 @@ mod streaming;
 mod thinning;
 
 pub use clusters::Clusters;
-pub use columns::{ColumnCounts, Median};
-pub use peak::Peak;
+pub(crate) use columns::ColumnCounts;
+pub use columns::Median;
+pub(crate) use peak::Peak;
 pub use real::Real;
 pub use streaming::Streaming;
 pub use thinning::Thinning;
@@ -66,7 +67,7 @@ enum Kind {
 impl PressEstimator {
     /// Estimator for these settings and a camera with the cropped rows `rows.0..=rows.1`. The settings are validated.
     #[must_use]
-    pub fn new(settings: &AnalysisSettings, rows: (u16, u16)) -> Self {
+    pub(crate) fn new(settings: &AnalysisSettings, rows: (u16, u16)) -> Self {
         let (side, eps) = (settings.bin_px, settings.eps_px);
         let wide = settings.precision == Precision::F64;
         Self(match settings.estimator {
@@ -84,7 +85,7 @@ impl PressEstimator {
     }
 
     /// Estimates the column of a window that begins at `from_us`, from its events in time order.
-    pub fn estimate(&mut self, events: &[PackedEvent], from_us: u32) -> ColumnEstimate {
+    pub(crate) fn estimate(&mut self, events: &[PackedEvent], from_us: u32) -> ColumnEstimate {
         match &mut self.0 {
             Kind::Clusters(e) => e.estimate(events),
             Kind::Median(e) => e.estimate(events),

@@ -11,7 +11,7 @@ const MIN_SIGMA_BINS: f64 = 0.5;
 /// Smooths the events per column with a Gaussian whose standard deviation is the clustering radius, and takes the first
 /// maximum; a parabola through it and its neighbours gives the position between bins.
 #[derive(Debug, Clone)]
-pub struct Peak<R> {
+pub(crate) struct Peak<R> {
     side_px: u16,
     reach_px: f64,
     columns: ColumnCounts,
@@ -25,7 +25,7 @@ pub struct Peak<R> {
 impl<R: Real> Peak<R> {
     /// For bins of this side, smoothed by `sigma_px`.
     #[must_use]
-    pub fn new(side_px: u16, sigma_px: f64) -> Self {
+    pub(crate) fn new(side_px: u16, sigma_px: f64) -> Self {
         let columns = ColumnCounts::new(side_px);
         let sigma = (sigma_px / f64::from(side_px.max(1))).max(MIN_SIGMA_BINS);
         let radius = (KERNEL_SIGMAS * sigma).ceil() as usize;
@@ -43,7 +43,7 @@ impl<R: Real> Peak<R> {
     }
 
     /// See `super::PressEstimator::estimate`.
-    pub fn estimate(&mut self, events: &[PackedEvent]) -> ColumnEstimate {
+    pub(crate) fn estimate(&mut self, events: &[PackedEvent]) -> ColumnEstimate {
         self.columns.fill(events);
         if self.columns.events() == 0 {
             return ColumnEstimate::default();

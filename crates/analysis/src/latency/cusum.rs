@@ -26,7 +26,7 @@ impl Cusum {
     /// A detector of an `alpha`-fold (above 1) increase over `rate_per_s` that requires `consecutive` bins (at least 1) in a
     /// row at or above the threshold.
     #[must_use]
-    pub fn new(alpha: f64, rate_per_s: f64, bin_s: f64, consecutive: u32) -> Self {
+    pub(crate) fn new(alpha: f64, rate_per_s: f64, bin_s: f64, consecutive: u32) -> Self {
         Self {
             gain: libm::log(alpha),
             loss: (alpha - 1.0) * rate_per_s * bin_s,
@@ -42,7 +42,7 @@ impl Cusum {
     /// First bin of the first run at or above each of `thresholds` (ascending), in one pass: the sum does not depend on the
     /// threshold, and a run at a higher threshold never begins before the first at a lower one.
     #[must_use]
-    pub fn onsets(&self, smoothed: &[f64], thresholds: &[f64]) -> Vec<Option<usize>> {
+    pub(crate) fn onsets(&self, smoothed: &[f64], thresholds: &[f64]) -> Vec<Option<usize>> {
         let mut found = vec![None; thresholds.len()];
         let mut open = 0;
         let mut sum = 0.0;

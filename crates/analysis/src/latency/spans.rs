@@ -20,7 +20,7 @@ const ROUNDING_US: f64 = 2.0;
 
 /// Time between a press and its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Neighbours {
+pub(crate) struct Neighbours {
     /// Release of the previous press, µs after the contact (negative); minus infinity without one.
     pub release_before_us: f64,
     /// Contact of the next press, µs after the contact; infinity without one.
@@ -30,7 +30,7 @@ pub struct Neighbours {
 impl Neighbours {
     /// Neighbours of every press with known timing, by row.
     #[must_use]
-    pub fn of(presses: &[PressResult]) -> Vec<Option<Self>> {
+    pub(crate) fn of(presses: &[PressResult]) -> Vec<Option<Self>> {
         let mut order: Vec<usize> = (0..presses.len()).collect();
         order.retain(|i| presses[*i].timing.is_some());
         order.sort_by_key(|i| presses[*i].timing.map(|t| t.contact));
@@ -53,7 +53,7 @@ impl Neighbours {
 
 /// Trial and background: host times relative to the contact, µs.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Spans {
+pub(crate) struct Spans {
     /// Trial; includes the contact.
     pub trial_us: (f64, f64),
     /// Background.
@@ -66,7 +66,7 @@ impl Spans {
     /// Trial and background of a press, where both cameras were recording and no neighbour is in contact; `None` without a
     /// trial or without a background of 20 ms.
     #[must_use]
-    pub fn of(
+    pub(crate) fn of(
         sights: &[HostTimeView<'_>; 2],
         neighbours: Neighbours,
         background: Background,

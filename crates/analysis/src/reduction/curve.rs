@@ -91,7 +91,7 @@ impl Sums {
 
 impl CurveContext<'_> {
     /// Rows of the curve for one kind of thinning, factor 1 first.
-    pub fn rows(&self, outcomes: &[Outcome], kind: usize) -> Vec<ReductionRow> {
+    pub(super) fn rows(&self, outcomes: &[Outcome], kind: usize) -> Vec<ReductionRow> {
         let mut sorted: Vec<&Outcome> = outcomes.iter().collect();
         sorted.sort_by_key(|o| o.location);
         let places: Vec<&[&Outcome]> = sorted.chunk_by(|a, b| a.location == b.location).collect();

@@ -44,7 +44,12 @@ pub(super) struct Thinner {
 }
 
 impl Thinner {
-    pub fn new(crop: (u16, u16), eps_px: f64, min_samples: u32, centroid: CentroidRule) -> Self {
+    pub(super) fn new(
+        crop: (u16, u16),
+        eps_px: f64,
+        min_samples: u32,
+        centroid: CentroidRule,
+    ) -> Self {
         Self {
             grid: PixelGrid::new(crop),
             dbscan: Dbscan::new(eps_px, min_samples),
@@ -56,7 +61,7 @@ impl Thinner {
     }
 
     /// Loads the events of a view, fewer than 2^32, and returns the unthinned result.
-    pub fn load(&mut self, events: &[PackedEvent]) -> ThinnedView {
+    pub(super) fn load(&mut self, events: &[PackedEvent]) -> ThinnedView {
         self.pixels.clear();
         self.pixels.extend(events.iter().map(|e| (e.x(), e.y())));
         let n = self.count();
@@ -68,7 +73,7 @@ impl Thinner {
 
     /// Thins the view by 2, 4 .. 2^`max_power` with each of `kinds`; all factors of the first kind come first. All random
     /// numbers come from `rng`; the result depends on earlier calls only since the last [`Self::load`].
-    pub fn thin(
+    pub(super) fn thin(
         &mut self,
         rng: &mut Xoshiro256PlusPlus,
         kinds: &[Thinning],

@@ -22,7 +22,7 @@ pub(crate) struct Attempt<'a> {
 
 impl<'a> Attempt<'a> {
     /// A retained press with its row of the table; `None` without a measured position.
-    pub fn new(row: &PressResult, kept: &'a RetainedPress) -> Option<Self> {
+    pub(crate) fn new(row: &PressResult, kept: &'a RetainedPress) -> Option<Self> {
         Some(Self {
             press: row.press,
             location: row.location.index(),
@@ -68,7 +68,7 @@ pub(crate) struct Outcome {
 
 impl Outcome {
     /// The press thinned by 2^`power` with this seed.
-    pub fn trial(&self, seed: usize, kind: usize, power: usize) -> &Trial {
+    pub(crate) fn trial(&self, seed: usize, kind: usize, power: usize) -> &Trial {
         match power {
             0 => &self.full,
             _ => &self.thinned[(seed * self.kinds + kind) * self.max_power + power - 1],
@@ -91,7 +91,7 @@ pub(crate) struct Trials<'a> {
 impl Trials<'_> {
     /// Thins and locates every press; `accept` decides whether a position counts as located. The result is in the order of
     /// `attempts` and bit-identical for any number of threads: each press, seed and camera has its own random numbers.
-    pub fn run(
+    pub(crate) fn run(
         &self,
         attempts: &[Attempt<'_>],
         accept: impl Fn(&LocationOutcome) -> Option<Point2> + Sync,

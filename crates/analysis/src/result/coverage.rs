@@ -83,7 +83,7 @@ mod rows {
 
     const CELLS: usize = 320;
 
-    pub fn serialize<S: Serializer>(counts: &[u64], to: S) -> Result<S::Ok, S::Error> {
+    pub(super) fn serialize<S: Serializer>(counts: &[u64], to: S) -> Result<S::Ok, S::Error> {
         let line = |row: &[u64]| row.iter().map(u64::to_string).collect::<Vec<_>>().join(" ");
         counts
             .chunks(CELLS)
@@ -92,7 +92,7 @@ mod rows {
             .serialize(to)
     }
 
-    pub fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<Vec<u64>, D::Error> {
+    pub(super) fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<Vec<u64>, D::Error> {
         let lines = Vec::<String>::deserialize(from)?;
         let numbers = lines
             .iter()

@@ -15,7 +15,7 @@ impl TimeBase {
 }
 
 /// True if most of the trains that camera `k` misses did arrive, away from the line: the wire works, but a clock does not.
-pub fn drifts(
+pub(super) fn drifts(
     k: usize,
     off_line: OffLineTrains,
     alignment: &Alignment,
@@ -28,7 +28,7 @@ pub fn drifts(
 }
 
 /// The drifting clock: if both cameras agree it is the box's.
-pub fn drifting(
+pub(super) fn drifting(
     drifts: [bool; 2],
     off_line: [OffLineTrains; 2],
     alignment: &Alignment,

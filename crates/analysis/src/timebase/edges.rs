@@ -81,7 +81,7 @@ impl OffLineTrains {
     }
 
     /// Combines both.
-    pub fn and(self, other: Self) -> Self {
+    pub(super) fn and(self, other: Self) -> Self {
         Self {
             trains: self.trains + other.trains,
             most_us: self.most_us.max(other.most_us),
@@ -91,12 +91,12 @@ impl OffLineTrains {
 
 impl CameraFromBox {
     /// Distance from a box time to the nearest train used by the map, µs.
-    pub fn tie_distance_us(&self, box_us: f64) -> f64 {
+    pub(super) fn tie_distance_us(&self, box_us: f64) -> f64 {
         distance_us(&self.ties_us, box_us)
     }
 
     /// Camera time of a box time, relative to the reference, µs.
-    pub fn at(&self, box_us: f64) -> Figure {
+    pub(super) fn at(&self, box_us: f64) -> Figure {
         Figure {
             value: self.map.value(box_us),
             se: self.map.standard_error(box_us),
@@ -107,7 +107,7 @@ impl CameraFromBox {
     /// Systematic error, not reduced by more edges, µs: edges have an unknown mean delay of the size of their scatter (less
     /// than 2 standard deviations for any uniform or decaying delay), both clocks have a resolution of 1 µs, and before the
     /// first train and after the last the rate may have changed by [`WANDER`].
-    pub fn bound_us(&self, box_us: f64) -> f64 {
+    pub(super) fn bound_us(&self, box_us: f64) -> f64 {
         2.0 * self.edge_sigma_us + 1.0 + WANDER * beyond_us(&self.ties_us, box_us)
     }
 }
@@ -128,15 +128,47 @@ pub(crate) fn beyond_us(ties: &[f64], at: f64) -> f64 {
     }
 }
 
+/// Why the edges that a camera saw give no clock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NoCameraClock {
+    /// The box sent nothing.
+    #[error("the box reported no train")]
+    NoTrain,
+    /// No sent train is recognisable.
+    #[error("none of {sent} sent trains can be identified among {edges} edges")]
+    Unidentified {
+        /// Trains sent.
+        sent: usize,
+        /// Edges seen on the channel.
+        edges: usize,
+    },
+    /// The trains contradict each other, or their clock drifts too fast.
+    #[error(
+        "{identified} of {sent} sent trains can be identified, but they are not on a plausible clock line"
+    )]
+    NoLine {
+        /// Trains identified by their bits.
+        identified: usize,
+        /// Trains sent.
+        sent: usize,
+    },
+    /// Too few trains at their predicted positions.
+    #[error("only {seen} trains were seen")]
+    FewSeen {
+        /// Trains seen.
+        seen: usize,
+    },
+}
+
 /// Edges of one channel, sorted; used ones are removed.
-pub struct Edges {
+pub(super) struct Edges {
     all: Vec<TriggerEdge>,
     used: Vec<bool>,
     trains: Vec<ReadTrain>,
 }
 
 impl Edges {
-    pub fn new(edges: &[TriggerEdge], channel: u8) -> Self {
+    pub(super) fn new(edges: &[TriggerEdge], channel: u8) -> Self {
         let mut all: Vec<TriggerEdge> = edges
             .iter()
             .copied()
@@ -152,14 +184,17 @@ impl Edges {
 
     /// Map of one epoch, or why there is none. `recorded`: periods in which the camera was recording, on its own clock, µs;
     /// empty if unknown.
-    pub fn map(&mut self, epoch: &Epoch, recorded: &[(u64, u64)]) -> Result<CameraFromBox, String> {
+    pub(super) fn map(
+        &mut self,
+        epoch: &Epoch,
+        recorded: &[(u64, u64)],
+    ) -> Result<CameraFromBox, NoCameraClock> {
         let anchors = anchors(&self.trains, &epoch.trains);
         let Some(reference_us) = anchors.first().map(|a| a.1) else {
-            return Err(format!(
-                "none of {} sent trains can be identified among {} edges",
-                epoch.trains.len(),
-                self.all.len()
-            ));
+            return Err(NoCameraClock::Unidentified {
+                sent: epoch.trains.len(),
+                edges: self.all.len(),
+            });
         };
         let points: Vec<Point> = anchors
             .iter()
@@ -167,12 +202,9 @@ impl Edges {
             .collect();
         let mut map = SmoothMap::fit(&points, STEP_US, ANCHOR_FLOOR_US)
             .filter(|map| map.drift.value.abs() <= crate::clock::NO_CLOCK_DRIFT)
-            .ok_or_else(|| {
-                format!(
-                    "{} of {} sent trains can be identified, but they are not on a plausible clock line",
-                    anchors.len(),
-                    epoch.trains.len()
-                )
+            .ok_or(NoCameraClock::NoLine {
+                identified: anchors.len(),
+                sent: epoch.trains.len(),
             })?;
         let contradicted = (points.len() - map.n()) as u32;
         let mut matched = Vec::new();
@@ -188,7 +220,7 @@ impl Edges {
                 .filter_map(|(sent, at)| Some(Point::new(sent.box_us, (*at)?)))
                 .collect();
             map = SmoothMap::fit(&seen, STEP_US, FLOOR_US)
-                .ok_or_else(|| format!("only {} trains were seen", seen.len()))?;
+                .ok_or(NoCameraClock::FewSeen { seen: seen.len() })?;
             seen_us = seen.iter().map(|p| p.from_us).collect();
         }
         let used = seen_us.into_iter().zip(&map.used).filter(|(_, u)| **u);

@@ -8,7 +8,7 @@ use crate::leg::{LegStart, leg_at};
 
 /// A time exchange: `sent <= box time <= received`, µs.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tie {
+pub(super) struct Tie {
     pub sent_us: f64,
     pub received_us: f64,
     /// Box clock relative to [`Epoch::reference_us`]; resolution 1 µs.
@@ -17,7 +17,7 @@ pub struct Tie {
 
 /// A train that the box sent.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SentTrain {
+pub(crate) struct SentTrain {
     pub label: Label,
     pub train: PulseTrain,
     /// First rising edge on the box's clock, relative to [`Epoch::reference_us`].

@@ -33,7 +33,7 @@ const ROUNDS: usize = 9;
 
 /// The map.
 #[derive(Debug, Clone, PartialEq)]
-pub struct HostFromBox {
+pub(super) struct HostFromBox {
     /// Box times between which the map is nearly straight, ascending, µs.
     pub knots_us: Vec<f64>,
     /// The fit, which is clamped to the bounds where it exceeds them.
@@ -48,7 +48,7 @@ pub struct HostFromBox {
 
 impl HostFromBox {
     /// From exchanges in order of box time; `None` below 3 or without spread in time.
-    pub fn new(ties: &[Tie]) -> Option<Self> {
+    pub(super) fn new(ties: &[Tie]) -> Option<Self> {
         let points = quickest(ties);
         let fit = SmoothMap::fit(&points, STEP_US, FLOOR_US)?;
         let (first, last) = (ties.first()?.box_us, ties.last()?.box_us);
@@ -68,7 +68,7 @@ impl HostFromBox {
     }
 
     /// Host time of a box time, µs.
-    pub fn host_us(&self, box_us: f64) -> f64 {
+    pub(super) fn host_us(&self, box_us: f64) -> f64 {
         self.fit.value(box_us) + self.moved_us(box_us)
     }
 
@@ -79,7 +79,7 @@ impl HostFromBox {
     }
 
     /// Box time of a host time, µs. Both clocks have nearly the same rate, so the iteration converges fast.
-    pub fn box_us(&self, host_us: f64) -> f64 {
+    pub(super) fn box_us(&self, host_us: f64) -> f64 {
         let mut box_us = host_us - self.host_us(0.0);
         for _ in 0..ROUNDS {
             box_us += host_us - self.host_us(box_us);
@@ -88,7 +88,7 @@ impl HostFromBox {
     }
 
     /// Host time of a box time, with its random error: that of the delays, if both directions take equally long on average.
-    pub fn at(&self, box_us: f64) -> Figure {
+    pub(super) fn at(&self, box_us: f64) -> Figure {
         Figure {
             value: self.host_us(box_us),
             se: self.fit.standard_error(box_us),
@@ -97,13 +97,13 @@ impl HostFromBox {
     }
 
     /// Mean rate of host over box time, minus 1, between two box times, µs, with its random error.
-    pub fn drift(&self, between_us: (f64, f64)) -> Option<Figure> {
+    pub(super) fn drift(&self, between_us: (f64, f64)) -> Option<Figure> {
         let fit = SmoothMap::fit_with_drift(&self.points, STEP_US, FLOOR_US, Some(between_us))?;
         Some(fit.drift)
     }
 
     /// Half width of the interval about [`Self::host_us`] that certainly contains the host time of a box time, µs.
-    pub fn bound_us(&self, box_us: f64) -> f64 {
+    pub(super) fn bound_us(&self, box_us: f64) -> f64 {
         let (low, high) = self.bounds.at(box_us);
         let by = self.moved_us(box_us);
         // Beyond the exchanges only the tolerance of crystals bounds the rate.
@@ -111,7 +111,7 @@ impl HostFromBox {
     }
 
     /// Distance from a box time to the nearest exchange, µs.
-    pub fn tie_distance_us(&self, box_us: f64) -> f64 {
+    pub(super) fn tie_distance_us(&self, box_us: f64) -> f64 {
         distance_us(&self.ties_us, box_us)
     }
 }

@@ -2,7 +2,7 @@
 
 use skinrig_model::{BoxReport, Label, TriggerEdge};
 
-use super::edges::Edges;
+use super::edges::{Edges, NoCameraClock};
 use super::epochs::epochs;
 use crate::result::LineCounts;
 
@@ -36,10 +36,14 @@ pub struct WireTrain {
 ///
 /// # Errors
 /// Why the box's clock cannot be aligned with the camera's: no trains, or fewer than three identifiable ones.
-pub fn wire(reports: &[BoxReport], edges: &[TriggerEdge], channel: u8) -> Result<Wire, String> {
+pub fn wire(
+    reports: &[BoxReport],
+    edges: &[TriggerEdge],
+    channel: u8,
+) -> Result<Wire, NoCameraClock> {
     let epochs = epochs(reports, &[]);
     let Some(epoch) = epochs.iter().max_by_key(|e| e.trains.len()) else {
-        return Err("the box reported no train".to_owned());
+        return Err(NoCameraClock::NoTrain);
     };
     let found = Edges::new(edges, channel).map(epoch, &[])?;
     let trains = epoch.trains.iter().zip(&found.whole_pulses);

@@ -131,7 +131,7 @@ impl Choice {
 
 /// Distinct choices to try, the session's own first.
 #[must_use]
-pub fn sweep(session: Choice, full: bool) -> Vec<Choice> {
+pub(super) fn sweep(session: Choice, full: bool) -> Vec<Choice> {
     let mut all = vec![session];
     let windows = || WINDOWS_MS.iter().map(|w| Some(*w)).chain([None]);
     let regions = [Region::Full, Region::Half, Region::Quarter];
@@ -213,7 +213,7 @@ fn promising(session: Choice) -> Vec<Choice> {
 
 /// Overrides (`analysis.key`, value) that turn the settings `from` into `to`, as in a protocol.
 #[must_use]
-pub fn overrides(from: &AnalysisSettings, to: &AnalysisSettings) -> Vec<(String, String)> {
+pub(super) fn overrides(from: &AnalysisSettings, to: &AnalysisSettings) -> Vec<(String, String)> {
     let mut out = Vec::new();
     let mut put = |differs: bool, key: &str, value: String| {
         if differs {

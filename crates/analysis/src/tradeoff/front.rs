@@ -34,7 +34,7 @@ impl Cost {
 /// For points (error, cost), true if no other point dominates: none is as good in both and better in one. `None` does not
 /// compete.
 #[must_use]
-pub fn pareto(points: &[Option<(f64, f64)>]) -> Vec<bool> {
+pub(crate) fn pareto(points: &[Option<(f64, f64)>]) -> Vec<bool> {
     let mut order: Vec<(usize, f64, f64)> = points
         .iter()
         .enumerate()

@@ -13,7 +13,7 @@ mod tests;
 mod timing;
 
 pub use choice::{Choice, Region};
-pub use front::{Cost, pareto};
+pub use front::Cost;
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::{AnalysisSettings, CalibrationModel, PressRole, ReductionSettings};

@@ -28,7 +28,7 @@ pub(crate) struct Replay<'a> {
 }
 
 /// Result of one way of locating.
-pub struct Outcome {
+pub(super) struct Outcome {
     pub metrics: Metrics,
     pub penalised: Penalised,
     pub located: LocatedPresses,
@@ -41,7 +41,7 @@ pub struct Outcome {
 impl<'a> Replay<'a> {
     /// `None` if no scored press was retained or a camera has no clock. Presses with measured times that were not retained
     /// do not participate; if there are any, presses without times do not either.
-    pub fn new(
+    pub(super) fn new(
         input: &'a SessionInput,
         analysis: &Analysis,
         kept: &'a RetainedPresses,
@@ -73,7 +73,7 @@ impl<'a> Replay<'a> {
     }
 
     /// Participating presses of this role, and the number of attempted ones in the plan.
-    pub fn counts(&self, role: PressRole) -> (u32, u32) {
+    pub(super) fn counts(&self, role: PressRole) -> (u32, u32) {
         let of = |row: &usize| self.input.planned[*row].role == role;
         let attempted = |row: &usize| of(row) && self.input.outcomes[*row].is_some();
         let all = (0..self.input.planned.len()).filter(attempted).count();
@@ -84,7 +84,7 @@ impl<'a> Replay<'a> {
     }
 
     /// Retained presses of a role.
-    pub fn presses(&self, role: PressRole) -> impl Iterator<Item = &'a RetainedPress> {
+    pub(super) fn presses(&self, role: PressRole) -> impl Iterator<Item = &'a RetainedPress> {
         let input = self.input;
         self.kept
             .presses
@@ -111,7 +111,7 @@ impl<'a> Replay<'a> {
     }
 
     /// Mean length of a scored press's window, s.
-    pub fn press_s(&self, settings: &AnalysisSettings) -> f64 {
+    pub(super) fn press_s(&self, settings: &AnalysisSettings) -> f64 {
         let windows = self.windows_by_row(CameraId::One, settings);
         let lengths: Vec<f64> = self
             .presses(PressRole::Score)
@@ -122,7 +122,7 @@ impl<'a> Replay<'a> {
     }
 
     /// Locates and evaluates all presses under `settings`.
-    pub fn run(&self, settings: &AnalysisSettings) -> Outcome {
+    pub(super) fn run(&self, settings: &AnalysisSettings) -> Outcome {
         let n = self.input.planned.len();
         let mut views: [Vec<Option<PressView>>; 2] = [Vec::new(), Vec::new()];
         let mut lost = [Vec::new(), Vec::new()];
@@ -285,18 +285,18 @@ impl<'a> Replay<'a> {
 }
 
 /// Converts a time of the camera's clock to time in a view, µs.
-pub fn after(view: &EventView, camera_us: u64) -> u32 {
+pub(super) fn after(view: &EventView, camera_us: u64) -> u32 {
     u32::try_from(camera_us.saturating_sub(view.start_us)).unwrap_or(u32::MAX)
 }
 
 /// Selects the events that reach the estimator.
-pub struct Filter {
+pub(super) struct Filter {
     thinning: Thinning,
     rows: (u16, u16),
 }
 
 impl Filter {
-    pub fn new(camera: CameraId, settings: &AnalysisSettings) -> Self {
+    pub(super) fn new(camera: CameraId, settings: &AnalysisSettings) -> Self {
         Self {
             thinning: Thinning::new(settings.thinning, camera, settings.seed),
             rows: settings.crop_v[camera.index()],
@@ -312,7 +312,7 @@ impl Filter {
     }
 
     /// Collects the events of a window.
-    pub fn window(&self, view: &EventView, window: &Window, out: &mut Vec<PackedEvent>) {
+    pub(super) fn window(&self, view: &EventView, window: &Window, out: &mut Vec<PackedEvent>) {
         let events = view.between(after(view, window.start_us), after(view, window.end_us));
         out.clear();
         out.extend(events.iter().filter(|e| self.passes(view, **e)));

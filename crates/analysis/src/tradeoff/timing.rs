@@ -20,7 +20,7 @@ pub(crate) struct Candidate {
 }
 
 /// Median, lowest and highest time of a press over the repeats, µs.
-pub struct Time {
+pub(super) struct Time {
     pub median_us: f64,
     pub range_us: (f64, f64),
 }
@@ -33,7 +33,7 @@ type Prepared = Vec<[(Vec<PackedEvent>, u32); 2]>;
 ///
 /// The timed part is what a computer at the skin would do with the events that reach it: counting, the estimate in both
 /// cameras, the intersection. Events dropped before (thinning, rows, time window) cost nothing here.
-pub fn run(
+pub(super) fn run(
     replay: &Replay<'_>,
     outline: &SkinOutline,
     candidates: &[Candidate],

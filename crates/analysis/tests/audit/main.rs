@@ -133,6 +133,20 @@ fn a_shifted_press_list() {
     });
 }
 
+/// All presses have a burst in both cameras: only the columns tell that one camera shows other presses.
+#[test]
+fn a_stream_of_other_presses() {
+    for rows_late in [1, 2, 4] {
+        let wishes = Wishes {
+            rows_late,
+            places: 20,
+            line: Some(true),
+            ..Wishes::default()
+        };
+        names(Fault::ClockWrong, |seed| session(seed, wishes));
+    }
+}
+
 /// Shifts positions `by` rows earlier; rows without a neighbour keep their own.
 fn shift(input: &mut SessionInput, by: i32, also_planned: bool) {
     let planned: Vec<Point2> = input.planned.iter().map(|p| p.at).collect();
@@ -363,7 +377,7 @@ fn sessions_too_small_to_judge_are_not_accused() {
     assert_eq!(named(&run(&nothing).findings), [Fault::PressesMissing]);
     let refused = edit(0, Wishes::default(), |input| {
         for outcome in input.outcomes.iter_mut().flatten() {
-            outcome.verdict = PressVerdict::Invalid("settled 0.3 mm from plan".to_owned());
+            outcome.verdict = PressVerdict::Invalid("settled 0.3 mm from plan".to_owned().into());
         }
     });
     assert_eq!(named(&run(&refused).findings), [Fault::RobotOff]);

@@ -5,24 +5,24 @@ use skinrig_model::{
     AnalysisSettings, CalibrationModel, CdEvent, LensModel, MarkKind, Point2, Polarity, PressRole,
     RigGeometry, SkinOutline, StereoGeometry,
 };
-pub use skinrig_planted::Memory;
+pub(crate) use skinrig_planted::Memory;
 use skinrig_planted::{Touch, mark, press, timing};
 
 /// A session with its parameters.
-pub struct Session {
+pub(crate) struct Session {
     pub input: SessionInput,
     pub events: Memory,
 }
 
 /// SplitMix64.
-pub struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
-    pub fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    pub fn unit(&mut self) -> f64 {
+    pub(crate) fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -30,23 +30,23 @@ impl Random {
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    pub fn within(&mut self, half: f64) -> f64 {
+    pub(crate) fn within(&mut self, half: f64) -> f64 {
         half * (2.0 * self.unit() - 1.0)
     }
 
     /// Roughly normal, unit variance.
-    pub fn normal(&mut self) -> f64 {
+    pub(crate) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
     }
 
-    pub fn below(&mut self, n: usize) -> usize {
+    pub(crate) fn below(&mut self, n: usize) -> usize {
         (self.unit() * n as f64) as usize
     }
 }
 
 /// Modifications of a seeded session.
 #[derive(Clone, Copy, Default)]
-pub struct Wishes {
+pub(crate) struct Wishes {
     /// Index of the rig (`None`: from the seed).
     pub rig: Option<usize>,
     /// Number of locations along y instead of a path (0: a path).
@@ -61,6 +61,8 @@ pub struct Wishes {
     pub repetitions: u32,
     /// Shift of camera 2's columns in the second repetition, px.
     pub move_px: f64,
+    /// Camera 2 sees the press this many rows later, so that every window has a burst, of another press.
+    pub rows_late: usize,
     /// Camera 2 sends no events after this share of the session.
     pub dark_from: Option<f64>,
     /// Neither camera sends events after this share of the session.
@@ -117,12 +119,12 @@ fn path(random: &mut Random, least: usize) -> Vec<Point2> {
 }
 
 /// The valid session of this seed.
-pub fn sound(seed: u64) -> Session {
+pub(crate) fn sound(seed: u64) -> Session {
     session(seed, Wishes::default())
 }
 
 /// The session of this seed with modifications.
-pub fn session(seed: u64, wishes: Wishes) -> Session {
+pub(crate) fn session(seed: u64, wishes: Wishes) -> Session {
     let mut random = Random::new(seed);
     let drawn = random.below(4);
     let at = RIGS[wishes.rig.unwrap_or(drawn)];
@@ -221,6 +223,11 @@ pub fn session(seed: u64, wishes: Wishes) -> Session {
             }
         }
         for (k, events) in events.iter_mut().enumerate() {
+            let at = if k == 1 && role != PressRole::Sync {
+                path[(location as usize + wishes.rows_late) % path.len()]
+            } else {
+                at
+            };
             let Some(u) = truth.cameras[k].column_of_point(at) else {
                 continue;
             };

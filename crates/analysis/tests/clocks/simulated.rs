@@ -6,10 +6,10 @@ use skinrig_analysis::rates::RateHistogram;
 const BIN_US: u64 = 10_000;
 
 /// Seeded random numbers (splitmix64).
-pub struct Dice(u64);
+pub(crate) struct Dice(u64);
 
 impl Dice {
-    pub fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5851_f42d_4c95_7f2d)
     }
 
@@ -22,20 +22,20 @@ impl Dice {
     }
 
     /// 0 to 1.
-    pub fn unit(&mut self) -> f64 {
+    pub(crate) fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
     /// Below `n`.
-    pub fn below(&mut self, n: usize) -> usize {
+    pub(crate) fn below(&mut self, n: usize) -> usize {
         (self.unit() * n as f64) as usize
     }
 
-    pub fn chance(&mut self, p: f64) -> bool {
+    pub(crate) fn chance(&mut self, p: f64) -> bool {
         self.unit() < p
     }
 
@@ -84,7 +84,7 @@ impl Recording {
 }
 
 /// A simulated rig, its plan, and the recordings of the cameras.
-pub struct World {
+pub(crate) struct World {
     pub dice: Dice,
     /// From the schedule: contact, and whether it is a sync press.
     pub plan: Vec<(f64, bool)>,
@@ -99,7 +99,7 @@ const SPAN_S: f64 = 0.55;
 
 impl World {
     /// An ordinary recording of `presses` presses after three sync presses, planned as executed.
-    pub fn new(seed: u64, presses: usize) -> Self {
+    pub(crate) fn new(seed: u64, presses: usize) -> Self {
         let mut dice = Dice::new(seed);
         let period_s = [3.0 + 1.0 / 289.0, 3.0 + 1.0 / 289.0, 1.5, 2.2][dice.below(4)];
         let mut plan: Vec<(f64, bool)> = (0..3).map(|i| (f64::from(i), true)).collect();
@@ -141,7 +141,7 @@ impl World {
     }
 
     /// Limits the plan to `presses` presses of the path, from press `first` on.
-    pub fn plan_only(&mut self, first: usize, presses: usize) {
+    pub(crate) fn plan_only(&mut self, first: usize, presses: usize) {
         let mut i = 0;
         self.plan.retain(|p| {
             let keep = p.1 || (first..first + presses).contains(&i);
@@ -151,7 +151,7 @@ impl World {
     }
 
     /// The plan has more presses than were executed.
-    pub fn plan_more(&mut self, presses: usize) {
+    pub(crate) fn plan_more(&mut self, presses: usize) {
         let last_s = self.plan.last().map_or(0.0, |p| p.0);
         let period_s = self.period_s;
         self.plan
@@ -159,7 +159,7 @@ impl World {
     }
 
     /// Adds an unplanned repetition of the path after a pause.
-    pub fn repeat(&mut self, pause_s: f64) {
+    pub(crate) fn repeat(&mut self, pause_s: f64) {
         let path: Vec<Burst> = self.bursts[3..3 + self.path()].to_vec();
         let last_s = self.bursts.iter().map(|b| b.at_s).fold(0.0, f64::max);
         let by_s = last_s + pause_s + self.period_s - path[0].at_s;
@@ -172,20 +172,20 @@ impl World {
         }));
     }
 
-    pub fn without_sync(&mut self) {
+    pub(crate) fn without_sync(&mut self) {
         self.plan.retain(|p| !p.1);
         self.bursts.drain(..3);
     }
 
     /// The sync presses were executed, but no camera saw them.
-    pub fn blind_sync(&mut self) {
+    pub(crate) fn blind_sync(&mut self) {
         self.bursts[..3]
             .iter_mut()
             .for_each(|b| b.strength = [0.0; 2]);
     }
 
     /// The plan has another interval between the sync presses than was executed.
-    pub fn sync_interval(&mut self, planned_s: f64, made_s: f64) {
+    pub(crate) fn sync_interval(&mut self, planned_s: f64, made_s: f64) {
         for i in 0..3 {
             let before = (2 - i) as f64;
             self.plan[i].0 = 2.0 - before * planned_s;
@@ -194,7 +194,7 @@ impl World {
     }
 
     /// Adds a sync press before the others.
-    pub fn fourth_sync(&mut self) {
+    pub(crate) fn fourth_sync(&mut self) {
         let first = self.bursts[0];
         self.bursts.push(Burst {
             at_s: first.at_s - 1.0,
@@ -202,28 +202,28 @@ impl World {
         });
     }
 
-    pub fn start_late(&mut self, camera: usize, presses: f64) {
+    pub(crate) fn start_late(&mut self, camera: usize, presses: f64) {
         self.cameras[camera].from_s = 2.0 + PAUSE_S + (presses - 0.5) * self.period_s;
     }
 
-    pub fn stop_early(&mut self, camera: usize, presses: f64) {
+    pub(crate) fn stop_early(&mut self, camera: usize, presses: f64) {
         self.cameras[camera].to_s = 2.0 + PAUSE_S + (presses - 0.5) * self.period_s;
     }
 
-    pub fn hole(&mut self, camera: usize, length_s: f64) {
+    pub(crate) fn hole(&mut self, camera: usize, length_s: f64) {
         let r = self.cameras[camera];
         let from_s = self.dice.between(r.from_s.max(0.0), r.to_s - length_s);
         self.cameras[camera].hole_s = Some((from_s, from_s + length_s));
     }
 
-    pub fn drift(&mut self, ppm: [f64; 2]) {
+    pub(crate) fn drift(&mut self, ppm: [f64; 2]) {
         for (camera, ppm) in self.cameras.iter_mut().zip(ppm) {
             camera.ppm = ppm;
         }
     }
 
     /// A share of the path's presses was not executed, or was seen by no camera or only one.
-    pub fn miss(&mut self, share: f64) {
+    pub(crate) fn miss(&mut self, share: f64) {
         for i in 3..self.bursts.len() {
             if self.dice.chance(share) {
                 match self.dice.below(4) {
@@ -236,7 +236,7 @@ impl World {
     }
 
     /// A share of the presses was executed twice, the second time 0.8 to 1 s later.
-    pub fn double(&mut self, share: f64) {
+    pub(crate) fn double(&mut self, share: f64) {
         for i in 3..self.bursts.len() {
             if self.dice.chance(share) {
                 let after_s = self.dice.between(0.8, 1.0);
@@ -250,7 +250,7 @@ impl World {
     }
 
     /// Noise bursts at random times, in one camera or both.
-    pub fn noise(&mut self, count: usize) {
+    pub(crate) fn noise(&mut self, count: usize) {
         let to_s = self.cameras[0].to_s;
         for _ in 0..count {
             let height = self.dice.between(5.0, 40.0);
@@ -264,12 +264,12 @@ impl World {
     }
 
     /// Replaces the plan by that of another recording.
-    pub fn foreign_plan(&mut self) {
+    pub(crate) fn foreign_plan(&mut self) {
         let stretch = self.dice.between(1.1, 1.9);
         self.plan.iter_mut().for_each(|p| p.0 *= stretch);
     }
 
-    pub fn presses(&self) -> Vec<PressSpan> {
+    pub(crate) fn presses(&self) -> Vec<PressSpan> {
         self.plan
             .iter()
             .map(|&(s, sync)| PressSpan {
@@ -281,7 +281,7 @@ impl World {
     }
 
     /// Recording of camera `k`.
-    pub fn rates(&mut self, k: usize) -> RateHistogram {
+    pub(crate) fn rates(&mut self, k: usize) -> RateHistogram {
         let r = self.cameras[k];
         let bin_s = BIN_US as f64 * 1e-6;
         let (from, to) = (r.camera_s(r.from_s) / bin_s, r.camera_s(r.to_s) / bin_s);
@@ -322,13 +322,13 @@ impl World {
         rates
     }
 
-    pub fn align(&mut self) -> RatesAlignment {
+    pub(crate) fn align(&mut self) -> RatesAlignment {
         let rates = [self.rates(0), self.rates(1)];
         align_by_rates([Some(&rates[0]), Some(&rates[1])], &self.presses())
     }
 
     /// Largest error of the clocks found, in the middle of each camera's recording of the plan, s; `None` without a clock.
-    pub fn error_s(&self, found: &RatesAlignment) -> Option<f64> {
+    pub(crate) fn error_s(&self, found: &RatesAlignment) -> Option<f64> {
         let mut worst = 0.0f64;
         for (r, fit) in self.cameras.iter().zip(&found.cameras) {
             let fit = fit.as_ref()?.as_ref().ok()?.fit;

@@ -11,7 +11,8 @@ use proptest::prelude::*;
 use skinrig_analysis::result::LocationOutcome;
 use skinrig_analysis::rule::Rule;
 use skinrig_analysis::{
-    AnalysisError, EventSource, Retention, SessionInput, analyze, analyze_with_events, results_hash,
+    AnalysisError, EventSource, EventSourceError, Retention, SessionInput, analyze,
+    analyze_with_events, results_hash,
 };
 use skinrig_model::{
     CalibrationModel, CameraId, CdEvent, Point2, Polarity, PressRole, PressVerdict, StereoGeometry,
@@ -124,7 +125,7 @@ impl EventSource for Counted<'_> {
         &self,
         camera: CameraId,
         each: &mut dyn FnMut(&[CdEvent]),
-    ) -> Result<(), String> {
+    ) -> Result<(), EventSourceError> {
         self.1[camera.index()].fetch_add(1, Ordering::Relaxed);
         self.0.for_each_slice(camera, each)
     }
@@ -202,7 +203,7 @@ fn whatever_goes_wrong_has_its_own_row_and_reason() {
     verdict(
         &mut input,
         50,
-        PressVerdict::Invalid("force limit".to_owned()),
+        PressVerdict::Invalid("force limit".to_owned().into()),
     );
     verdict(
         &mut input,
@@ -430,23 +431,20 @@ fn contradictions_are_refused_with_their_place() {
             &self,
             camera: CameraId,
             _: &mut dyn FnMut(&[CdEvent]),
-        ) -> Result<(), String> {
+        ) -> Result<(), EventSourceError> {
             match camera {
                 CameraId::One => Ok(()),
-                CameraId::Two => Err("chunk 7 is damaged".to_owned()),
+                CameraId::Two => Err("chunk 7 is damaged".into()),
             }
         }
     }
     let (input, _) = session();
     let found = analyze(&input, &Broken).unwrap_err();
-    let message = "chunk 7 is damaged".to_owned();
-    assert_eq!(
-        found,
-        AnalysisError::Events {
-            camera: CameraId::Two,
-            message
-        }
-    );
+    let AnalysisError::Events { camera, source } = found else {
+        panic!("{found}");
+    };
+    assert_eq!(camera, CameraId::Two);
+    assert_eq!(source.to_string(), "chunk 7 is damaged");
 }
 
 proptest! {
@@ -468,7 +466,7 @@ proptest! {
             match fate {
                 0 => *outcome = None,
                 1 => o.verdict = PressVerdict::Missed("m".to_owned()),
-                2 => o.verdict = PressVerdict::Invalid("i".to_owned()),
+                2 => o.verdict = PressVerdict::Invalid("i".to_owned().into()),
                 3 => o.verdict = PressVerdict::Excluded("e".to_owned()),
                 4 => o.timing = None,
                 5 => o.measured_at = Some(Point2::new(f64::NAN, 0.0)),

@@ -5,17 +5,17 @@ use skinrig_model::{
     AnalysisSettings, CdEvent, HostTime, MarkKind, Point2, Polarity, PressRole, RigGeometry,
     SkinOutline, StereoGeometry,
 };
-pub use skinrig_planted::Memory;
+pub(crate) use skinrig_planted::Memory;
 use skinrig_planted::{Touch, mark, press, timing};
 
-pub const PLANTED: [f64; 8] = [43.0, -33.0, 47.5, 38.0, -1.2, 0.4, -0.11, 0.03];
+pub(crate) const PLANTED: [f64; 8] = [43.0, -33.0, 47.5, 38.0, -1.2, 0.4, -0.11, 0.03];
 /// Camera clocks: offset (µs) and drift (ppm).
-pub const CLOCKS: [(f64, f64); 2] = [(4.2e6, 28.0), (17_592_186_044_416.0, -35.0)];
+pub(crate) const CLOCKS: [(f64, f64); 2] = [(4.2e6, 28.0), (17_592_186_044_416.0, -35.0)];
 
-pub struct Random(pub u64);
+pub(crate) struct Random(pub u64);
 
 impl Random {
-    pub fn unit(&mut self) -> f64 {
+    pub(crate) fn unit(&mut self) -> f64 {
         self.0 = self
             .0
             .wrapping_mul(6_364_136_223_846_793_005)
@@ -23,18 +23,18 @@ impl Random {
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
     /// Roughly normal, unit variance.
-    pub fn normal(&mut self) -> f64 {
+    pub(crate) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
     }
 }
 
-pub fn camera_us(camera: usize, host_s: f64) -> f64 {
+pub(crate) fn camera_us(camera: usize, host_s: f64) -> f64 {
     let (offset, ppm) = CLOCKS[camera];
     offset + host_s * 1e6 * (1.0 + ppm * 1e-6)
 }
 
 /// Three sync presses, then 25 places in two repetitions: the first calibrates, the second scores.
-pub fn plan() -> Vec<(PressRole, u32, u32, Point2, f64)> {
+pub(crate) fn plan() -> Vec<(PressRole, u32, u32, Point2, f64)> {
     let centre = Point2::new(10.0, 2.0);
     let mut out: Vec<_> = (0..3)
         .map(|i| (PressRole::Sync, 0, 0, centre, 2.0 + f64::from(i)))
@@ -55,7 +55,7 @@ pub fn plan() -> Vec<(PressRole, u32, u32, Point2, f64)> {
     out
 }
 
-pub fn session() -> (SessionInput, Memory) {
+pub(crate) fn session() -> (SessionInput, Memory) {
     let mut random = Random(7);
     let planted = StereoGeometry::paper_like(PLANTED);
     let mut input = skinrig_planted::session(

@@ -9,7 +9,7 @@ use skinrig_model::{
 };
 
 /// SplitMix64 (public domain, S. Vigna).
-pub struct Random(pub u64);
+pub(crate) struct Random(pub u64);
 
 impl Random {
     fn bits(&mut self) -> u64 {
@@ -21,7 +21,7 @@ impl Random {
     }
 
     /// Uniform.
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
@@ -39,7 +39,7 @@ impl Random {
 
 /// A clock over host time, µs: an origin, a rate, and a rate that changes.
 #[derive(Debug, Clone)]
-pub struct Clock {
+pub(crate) struct Clock {
     origin_us: f64,
     drift: f64,
     /// Change of the rate per µs.
@@ -55,7 +55,7 @@ const WALK_STEP_US: f64 = 1e6;
 
 impl Clock {
     /// 20 ppm fast, with a rate that swings by `swing` (share, angular frequency per µs).
-    pub fn swinging(origin_us: f64, swing: (f64, f64)) -> Self {
+    pub(crate) fn swinging(origin_us: f64, swing: (f64, f64)) -> Self {
         Self {
             origin_us,
             drift: 20e-6,
@@ -66,7 +66,7 @@ impl Clock {
     }
 
     /// What it shows at a host time.
-    pub fn at(&self, host_us: f64) -> f64 {
+    pub(crate) fn at(&self, host_us: f64) -> f64 {
         self.origin_us
             + host_us * (1.0 + self.drift)
             + 0.5 * self.wander * host_us * host_us
@@ -75,7 +75,7 @@ impl Clock {
     }
 
     /// The same crystal, begun anew.
-    pub fn anew(&self, origin_us: f64) -> Self {
+    pub(crate) fn anew(&self, origin_us: f64) -> Self {
         Self {
             origin_us,
             ..self.clone()
@@ -92,7 +92,7 @@ impl Clock {
     }
 
     /// The host time at which it shows this.
-    pub fn host_us(&self, at_us: f64) -> f64 {
+    pub(crate) fn host_us(&self, at_us: f64) -> f64 {
         let mut host_us = (at_us - self.origin_us) / (1.0 + self.drift);
         for _ in 0..4 {
             host_us -= (self.at(host_us) - at_us) / (1.0 + self.drift);
@@ -103,7 +103,7 @@ impl Clock {
 
 /// How rates change besides evenly, by up to 3 ppm per hour.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Wander {
+pub(crate) enum Wander {
     /// Not.
     Even,
     /// They swing by 1 ppm, in between so many and so many s.
@@ -114,7 +114,7 @@ pub enum Wander {
 
 /// How long each way of an exchange takes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Delay {
+pub(crate) enum Delay {
     /// A serial line: 150 µs and an exponential of 100 µs.
     Serial,
     /// A busy host: 150 µs and 60 µs over a uniform number (Pareto's tail without a variance), 5 ms besides in one of ten.
@@ -153,7 +153,7 @@ impl Delay {
 
 /// What goes wrong, and how far clocks are apart.
 #[derive(Debug, Clone, Copy)]
-pub struct Conditions {
+pub(crate) struct Conditions {
     pub span_s: f64,
     pub most_drift: f64,
     pub wander: Wander,
@@ -173,7 +173,7 @@ pub struct Conditions {
     pub delay: Delay,
 }
 
-pub const CLEAN: Conditions = Conditions {
+pub(crate) const CLEAN: Conditions = Conditions {
     span_s: 40.0,
     most_drift: 500e-6,
     wander: Wander::Even,
@@ -188,7 +188,7 @@ pub const CLEAN: Conditions = Conditions {
     delay: Delay::Serial,
 };
 
-pub const NOISY: Conditions = Conditions {
+pub(crate) const NOISY: Conditions = Conditions {
     lost: 0.2,
     doubled: 0.02,
     spurious: 0.05,
@@ -196,7 +196,7 @@ pub const NOISY: Conditions = Conditions {
 };
 
 /// What a bench records, and its clocks.
-pub struct Bench {
+pub(crate) struct Bench {
     pub boxed: Clock,
     pub cameras: [Clock; 2],
     pub reports: Vec<BoxReport>,
@@ -210,7 +210,7 @@ pub struct Bench {
 }
 
 /// A press each 2 s with a mark at contact, at depth and release, a sync train each second, an exchange each 0.1 s.
-pub fn bench(seed: u64, c: &Conditions) -> Bench {
+pub(crate) fn bench(seed: u64, c: &Conditions) -> Bench {
     let mut r = Random(seed);
     let mut clock = |origin_us: f64| Clock {
         origin_us: r.between(0.0, origin_us),
@@ -248,7 +248,7 @@ fn walk(r: &mut Random, c: &Conditions) -> Arc<[f64]> {
 }
 
 /// What a bench with these clocks records.
-pub fn run(mut r: Random, boxed: Clock, cameras: [Clock; 2], c: &Conditions) -> Bench {
+pub(crate) fn run(mut r: Random, boxed: Clock, cameras: [Clock; 2], c: &Conditions) -> Bench {
     let mut trains = Vec::new();
     let mut presses = Vec::new();
     let mut free_us = 0.0;
@@ -347,7 +347,7 @@ pub fn run(mut r: Random, boxed: Clock, cameras: [Clock; 2], c: &Conditions) -> 
 }
 
 impl Bench {
-    pub fn align(&self, limits: &AlignmentSettings) -> TimeBase {
+    pub(crate) fn align(&self, limits: &AlignmentSettings) -> TimeBase {
         let ties = TimeBaseInput {
             reports: &self.reports,
             edges: [&self.edges[0], &self.edges[1]],

@@ -3,7 +3,7 @@
 use skinrig_analysis::result::{AlignmentStatus, MapName};
 use skinrig_analysis::rule::Rule;
 use skinrig_analysis::timebase::Tie;
-use skinrig_analysis::{EventSource, SessionInput, analyze};
+use skinrig_analysis::{EventSource, EventSourceError, SessionInput, analyze};
 use skinrig_model::{
     AlignmentSettings, AnalysisSettings, BoxReport, CameraId, CdEvent, HostTime, Point2, PressRole,
     RigGeometry, SentMark, SkinOutline, StereoGeometry, Verdict,
@@ -139,7 +139,11 @@ fn presses_after_the_last_exchange_are_not_timed() {
 struct Dark;
 
 impl EventSource for Dark {
-    fn for_each_slice(&self, _: CameraId, _: &mut dyn FnMut(&[CdEvent])) -> Result<(), String> {
+    fn for_each_slice(
+        &self,
+        _: CameraId,
+        _: &mut dyn FnMut(&[CdEvent]),
+    ) -> Result<(), EventSourceError> {
         Ok(())
     }
 }

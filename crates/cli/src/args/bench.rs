@@ -58,7 +58,7 @@ pub struct DetectArgs {
 
 /// Arguments of `run`.
 #[derive(Debug, Args)]
-pub struct RunArgs {
+pub(crate) struct RunArgs {
     /// The protocol file; not needed with `--replay`.
     #[arg(required_unless_present = "replay", conflicts_with = "replay")]
     pub protocol: Option<PathBuf>,
@@ -112,7 +112,7 @@ pub struct RunArgs {
 
 /// Arguments of `resume`.
 #[derive(Debug, Args)]
-pub struct ResumeArgs {
+pub(crate) struct ResumeArgs {
     /// The session file.
     pub session: PathBuf,
 
@@ -144,7 +144,7 @@ pub struct ResumeArgs {
 
 /// Arguments of `status`.
 #[derive(Debug, Args)]
-pub struct StatusArgs {
+pub(crate) struct StatusArgs {
     /// The session file, or a folder: its running session, or else its newest.
     #[arg(default_value = "sessions")]
     pub session: PathBuf,
@@ -152,7 +152,7 @@ pub struct StatusArgs {
 
 /// Arguments of `control`.
 #[derive(Debug, Args)]
-pub struct ControlArgs {
+pub(crate) struct ControlArgs {
     /// The session file, or a folder with one running session.
     pub session: PathBuf,
 
@@ -167,7 +167,7 @@ pub struct ControlArgs {
 
 /// Arguments of `note`.
 #[derive(Debug, Args)]
-pub struct NoteArgs {
+pub(crate) struct NoteArgs {
     /// The session file, or a folder with one running session.
     pub session: PathBuf,
 
@@ -182,7 +182,7 @@ pub struct NoteArgs {
 
 /// Arguments of `devices`.
 #[derive(Debug, Args)]
-pub struct DevicesArgs {
+pub(crate) struct DevicesArgs {
     /// Also query what this rig file names: the robot library and the trigger box's port.
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
@@ -190,7 +190,7 @@ pub struct DevicesArgs {
 
 /// Arguments of `jog`.
 #[derive(Debug, Args)]
-pub struct JogArgs {
+pub(crate) struct JogArgs {
     /// The rig file of a bench [default: the simulated rig].
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
@@ -211,7 +211,7 @@ pub struct JogArgs {
 
 /// Arguments of `watch`.
 #[derive(Debug, Args)]
-pub struct WatchArgs {
+pub(crate) struct WatchArgs {
     /// The session file, or a folder: its running session, or else its newest. It does not have to exist yet.
     #[arg(default_value = "sessions")]
     pub session: PathBuf,

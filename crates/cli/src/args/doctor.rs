@@ -6,7 +6,7 @@ use clap::Args;
 
 /// Arguments of `doctor`.
 #[derive(Debug, Args)]
-pub struct DoctorArgs {
+pub(crate) struct DoctorArgs {
     /// Also compare this rig file with the hardware that is connected.
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,

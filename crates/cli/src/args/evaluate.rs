@@ -38,7 +38,7 @@ pub struct AnalyzeArgs {
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
-pub struct CompareArgs {
+pub(crate) struct CompareArgs {
     /// Two or more skins: session files, folders of sessions, or names of prototypes (all of their sessions in `--sessions`).
     #[arg(required = true, num_args = 2.., value_name = "SKIN")]
     pub skins: Vec<String>,
@@ -86,7 +86,7 @@ pub enum CostKind {
 
 /// Arguments of `tradeoff`.
 #[derive(Debug, Args)]
-pub struct TradeoffArgs {
+pub(crate) struct TradeoffArgs {
     /// The session file.
     pub session: PathBuf,
 

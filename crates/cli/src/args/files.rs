@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 
 /// Arguments of `sessions`.
 #[derive(Debug, Args)]
-pub struct SessionsArgs {
+pub(crate) struct SessionsArgs {
     /// The folder of sessions.
     #[arg(default_value = "sessions")]
     pub folder: PathBuf,
@@ -22,7 +22,7 @@ pub struct SessionsArgs {
 
 /// Arguments of `prototypes`.
 #[derive(Debug, Args)]
-pub struct PrototypesArgs {
+pub(crate) struct PrototypesArgs {
     /// The folder of sessions.
     #[arg(default_value = "sessions")]
     pub folder: PathBuf,
@@ -38,7 +38,7 @@ pub struct PrototypesArgs {
 
 /// Arguments of `tag`.
 #[derive(Debug, Args)]
-pub struct TagArgs {
+pub(crate) struct TagArgs {
     /// The session file.
     pub session: PathBuf,
 
@@ -61,7 +61,7 @@ pub struct TagArgs {
 
 /// Arguments of `show`.
 #[derive(Debug, Args)]
-pub struct ShowArgs {
+pub(crate) struct ShowArgs {
     /// The session file.
     pub session: PathBuf,
 
@@ -76,7 +76,7 @@ pub struct ShowArgs {
 
 /// Arguments of `import`.
 #[derive(Debug, Args)]
-pub struct ImportArgs {
+pub(crate) struct ImportArgs {
     /// Camera 1: bimvee HDF5 or Prophesee RAW.
     #[arg(long, value_name = "FILE")]
     pub camera1: PathBuf,
@@ -116,7 +116,7 @@ pub struct ImportArgs {
 
 /// Formats that `export` can write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ExportKind {
+pub(crate) enum ExportKind {
     /// Tables as Parquet, one file each.
     Parquet,
     /// Tables as one NumPy archive of structured arrays.
@@ -143,7 +143,7 @@ impl ExportKind {
 
 /// Which tables `export` writes; docs/reference/exports.md describes their columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ExportTable {
+pub(crate) enum ExportTable {
     /// One row per press: what both cameras saw and where the skin was estimated to be touched.
     Presses,
     /// One row per metric.
@@ -156,7 +156,7 @@ pub enum ExportTable {
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]
-pub struct ExportArgs {
+pub(crate) struct ExportArgs {
     /// The session file.
     pub session: PathBuf,
 
@@ -179,7 +179,7 @@ pub struct ExportArgs {
 
 /// Arguments of `inspect`.
 #[derive(Debug, Args)]
-pub struct InspectArgs {
+pub(crate) struct InspectArgs {
     /// The file.
     pub file: PathBuf,
 
@@ -190,7 +190,7 @@ pub struct InspectArgs {
 
 /// The schema to print.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum SchemaKind {
+pub(crate) enum SchemaKind {
     /// Protocols (`run`, `check`, `plan`).
     Protocol,
     /// Schedules (`import`).
@@ -205,15 +205,30 @@ pub enum SchemaKind {
 
 /// Arguments of `schema`.
 #[derive(Debug, Args)]
-pub struct SchemaArgs {
+pub(crate) struct SchemaArgs {
     /// The schema to print.
     #[arg(value_enum, default_value = "protocol")]
     pub kind: SchemaKind,
 }
 
+/// `completions`.
+#[derive(Debug, Args)]
+pub(crate) struct CompletionsArgs {
+    /// The shell.
+    #[arg(value_enum)]
+    pub shell: clap_complete::Shell,
+}
+
+/// `man`.
+#[derive(Debug, Args)]
+pub(crate) struct ManArgs {
+    /// The folder; created if it is missing.
+    pub folder: PathBuf,
+}
+
 /// `salvage`.
 #[derive(Debug, Args)]
-pub struct SalvageArgs {
+pub(crate) struct SalvageArgs {
     /// The damaged session file; its write-ahead log (`-wal`) is also read if it is beside it.
     pub session: PathBuf,
 

@@ -5,7 +5,7 @@ use clap::{Command, CommandFactory, FromArgMatches};
 use super::Cli;
 
 /// Heading and commands of each group, in the order of a campaign.
-const GROUPS: [(&str, &[&str]); 5] = [
+const GROUPS: [(&str, &[&str]); 6] = [
     ("Plan", &["check", "plan", "schema"]),
     (
         "Record",
@@ -24,13 +24,14 @@ const GROUPS: [(&str, &[&str]); 5] = [
         ],
     ),
     ("Bench", &["doctor", "devices", "jog", "hil"]),
+    ("Shell", &["completions", "man"]),
 ];
 
 /// Parses a command line; the help lists commands by group.
 ///
 /// # Errors
 /// Whatever clap finds wrong, and the help when it was asked for.
-pub fn parse<I, T>(words: I) -> Result<Cli, clap::Error>
+pub(crate) fn parse<I, T>(words: I) -> Result<Cli, clap::Error>
 where
     I: IntoIterator<Item = T>,
     T: Into<std::ffi::OsString> + Clone,
@@ -40,7 +41,8 @@ where
     Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
 }
 
-fn command() -> Command {
+/// The command line with its grouped help.
+pub(crate) fn command() -> Command {
     let command = Cli::command();
     let list = list(&command);
     command.help_template(format!(

@@ -11,24 +11,24 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
-pub use self::bench::{
+pub(crate) use self::bench::{
     ControlArgs, DetectArgs, DevicesArgs, JogArgs, NoteArgs, PlanArgs, ResumeArgs, RunArgs,
     StatusArgs, WatchArgs,
 };
-pub use self::doctor::DoctorArgs;
-pub use self::evaluate::{AnalyzeArgs, CompareArgs, CostKind, ReportArgs, TradeoffArgs};
-pub use self::files::{
-    ExportArgs, ExportKind, ExportTable, ImportArgs, InspectArgs, PrototypesArgs, SalvageArgs,
-    SchemaArgs, SchemaKind, SessionsArgs, ShowArgs, TagArgs,
+pub(crate) use self::doctor::DoctorArgs;
+pub(crate) use self::evaluate::{AnalyzeArgs, CompareArgs, CostKind, ReportArgs, TradeoffArgs};
+pub(crate) use self::files::{
+    CompletionsArgs, ExportArgs, ExportKind, ExportTable, ImportArgs, InspectArgs, ManArgs,
+    PrototypesArgs, SalvageArgs, SchemaArgs, SchemaKind, SessionsArgs, ShowArgs, TagArgs,
 };
-pub use self::groups::parse;
+pub(crate) use self::groups::{command, parse};
 use crate::exit::Exit;
 use crate::hil::args::{HilArgs, HoldArmArgs};
 
 /// Runs tactile-skin experiments: protocol, robot, event cameras, session, analysis, report.
 #[derive(Debug, Parser)]
 #[command(name = "skinrig", version = crate::version::VERSION, about, after_help = Exit::HELP, arg_required_else_help = true)]
-pub struct Cli {
+pub(crate) struct Cli {
     /// Print results as JSON on standard output; progress and messages stay on standard error.
     #[arg(long, global = true)]
     pub json: bool,
@@ -44,7 +44,7 @@ pub struct Cli {
 
 /// The commands.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(crate) enum Command {
     /// Check a protocol and every motion it would make, without moving anything.
     #[command(after_help = "Example:\n  skinrig check protocols/demo.yaml")]
     Check(ProtocolArgs),
@@ -205,6 +205,18 @@ pub enum Command {
     #[command(after_help = "Example:\n  skinrig schema > skinrig.schema.json")]
     Schema(SchemaArgs),
 
+    /// Print the completions of a shell: commands, options and their values with the Tab key.
+    #[command(
+        after_help = "Examples:\n  skinrig completions bash > ~/.local/share/bash-completion/completions/skinrig\n  \
+                      skinrig completions zsh > ~/.zfunc/_skinrig        (with ~/.zfunc in fpath)\n  \
+                      skinrig completions fish > ~/.config/fish/completions/skinrig.fish"
+    )]
+    Completions(CompletionsArgs),
+
+    /// Write a manual page of each command.
+    #[command(after_help = "Example:\n  skinrig man ~/.local/share/man/man1 && man skinrig-run")]
+    Man(ManArgs),
+
     /// Brake the robot's arm if the program that started this one dies.
     #[command(hide = true)]
     SuperviseArm,
@@ -227,7 +239,7 @@ pub struct ProtocolArgs {
 
 /// A session file or a bundle.
 #[derive(Debug, Args)]
-pub struct SessionArg {
+pub(crate) struct SessionArg {
     /// The session file, or the folder of a bundle.
     pub session: PathBuf,
 }

@@ -12,7 +12,7 @@ use super::facts::facts;
 use crate::analyses;
 use crate::args::CompareArgs;
 use crate::exit::Failure;
-use crate::results::{Choices, analyze_session};
+use crate::results::{Choices, analyze_shown};
 use crate::sessions::{copies, originals};
 
 /// Most skins that are compared at once: letters A to H.
@@ -129,7 +129,7 @@ fn session(path: &Path, name: Option<&str>) -> Result<Session, Failure> {
                 reference_code: v.reference_code,
                 name: Some(&v.name),
             });
-            analyze_session(path, choices)
+            analyze_shown(path, choices)
                 .map_err(|f| Failure {
                     message: format!("{}\n  ({}: no results)", f.message, path.display()),
                     ..f

@@ -13,6 +13,7 @@ use skinrig_report::compare as report;
 
 use crate::args::CompareArgs;
 use crate::exit::{Exit, Failure, Outcome};
+use crate::phase::Phase;
 use crate::results::{Choices, open, write};
 
 /// The name of the page when none is given.
@@ -23,7 +24,7 @@ const PAGE: &str = "comparison.html";
 /// # Errors
 /// [`Failure::input`] for what is no session or prototype, for limits that do not parse, and for skins that may not be
 /// compared; [`Failure::internal`] when a file cannot be written.
-pub fn compare(args: &CompareArgs, json: bool) -> Outcome {
+pub(crate) fn compare(args: &CompareArgs, json: bool) -> Outcome {
     let choices = margins::choices(args)?;
     let found = inputs::subjects(args)?;
     let subjects: Vec<Subject> = found.iter().map(|f| f.subject.clone()).collect();
@@ -31,7 +32,9 @@ pub fn compare(args: &CompareArgs, json: bool) -> Outcome {
     let allowed = skinrig_compare::differences(&subjects, &choices.overrides);
     let may = allowed.iter().all(|d| d.next.is_none() || d.overridden);
     let exchanged = if may { exchanged(&found)? } else { Vec::new() };
+    let phase = Phase::begin("comparing");
     let result = compare_skins(&subjects, &exchanged, &choices);
+    drop(phase);
     let blocked = refusal(&result, args);
     let mut document = report::json(&result);
     if blocked.is_none() {

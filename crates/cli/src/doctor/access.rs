@@ -53,7 +53,7 @@ const READ_WRITE: u32 = 0o6;
 impl Node {
     /// The rights of the file at `path`, links followed; `None` without a file.
     #[cfg(unix)]
-    pub fn of(path: &Path) -> Option<Self> {
+    pub(super) fn of(path: &Path) -> Option<Self> {
         use std::os::unix::fs::MetadataExt;
 
         let found = std::fs::metadata(path).ok()?;

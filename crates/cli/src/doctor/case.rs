@@ -9,7 +9,7 @@ use super::survey::Survey;
 use crate::rig::inputs::Input;
 
 /// What is examined.
-pub struct Case<'a> {
+pub(super) struct Case<'a> {
     pub machine: &'a Machine,
     pub rig: Option<&'a RigFile>,
     /// What the rig file names on this computer.

@@ -1,7 +1,10 @@
 //! What the doctor says: one finding per check, as a table for people and as JSON for programs.
 
+use std::fmt;
+
 use serde::Serialize;
 use skinrig_protocol::rig::RigFile;
+use skinrig_text::{Column, Table, widest};
 
 use crate::rig::bench::display_name;
 
@@ -82,21 +85,21 @@ impl Check {
         }
     }
 
-    pub fn ok(self, found: impl Into<String>) -> Finding {
+    pub(super) fn ok(self, found: impl Into<String>) -> Finding {
         self.end(Verdict::Ok, found, None)
     }
 
-    pub fn warning(self, found: impl Into<String>, next: impl Into<String>) -> Finding {
+    pub(super) fn warning(self, found: impl Into<String>, next: impl Into<String>) -> Finding {
         self.end(Verdict::Warning, found, Some(next.into()))
     }
 
-    pub fn problem(self, found: impl Into<String>, next: impl Into<String>) -> Finding {
+    pub(super) fn problem(self, found: impl Into<String>, next: impl Into<String>) -> Finding {
         self.end(Verdict::Problem, found, Some(next.into()))
     }
 
     /// `why` takes the place of what was found.
-    pub(crate) fn not_checked(self, why: impl Into<String>) -> Finding {
-        self.end(Verdict::NotChecked, why, None)
+    pub(crate) fn not_checked(self, why: impl fmt::Display) -> Finding {
+        self.end(Verdict::NotChecked, why.to_string(), None)
     }
 
     /// Not checked, and what would let it be.
@@ -132,16 +135,16 @@ pub(super) fn table(rig: Option<&RigFile>, findings: &[Finding]) -> String {
         Some(rig) => format!("rig       {}\n", display_name(rig)),
         None => "rig       none (--rig FILE also checks what the file says)\n".to_owned(),
     };
-    let widest = findings.iter().map(|f| f.check.chars().count()).max();
-    let width = widest.unwrap_or(0);
+    let widest = widest(findings.iter().map(|f| f.check.as_str()));
+    let table = Table::new([Column::left(11), Column::left(widest)]).indent(2);
     let mut area = "";
     for f in findings {
         if f.area != area {
             area = f.area;
             out += &format!("{area}\n");
         }
-        let name = f.verdict.name();
-        out += &format!("  {name:<11}  {:<width$}  {}\n", f.check, f.found);
+        out += &table.row([f.verdict.name(), &f.check, &f.found]);
+        out.push('\n');
         if f.verdict != Verdict::Ok {
             out += &format!("{:15}expected: {}\n", "", f.expected);
         }

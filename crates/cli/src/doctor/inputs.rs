@@ -8,8 +8,8 @@ pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
     let found = case.inputs.iter().map(|input| {
         let check = check("rig file", &input.key, &input.expected);
         match &input.found {
-            Ok(found) => check.ok(found),
-            Err(found) => check.problem(found, &input.next),
+            Ok(found) => check.ok(found.display().to_string()),
+            Err(why) => check.problem(why.to_string(), &input.next),
         }
     });
     found.collect()

@@ -1,20 +1,44 @@
 //! The machine as its files tell it: `/sys`, `/proc`, `/etc`, `/run` and `/dev` below one folder.
 
 use std::collections::BTreeMap;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use super::access::{Node, User};
+
+/// Why the machine's files do not tell something.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum MachineError {
+    /// A file or folder cannot be read.
+    #[error("cannot read {path}: {source}")]
+    Unreadable {
+        /// As the kernel names it.
+        path: String,
+        /// Error of the operating system.
+        source: io::Error,
+    },
+    /// The status of this process names no user.
+    #[error("/proc/self/status does not tell the user")]
+    NoUser,
+}
+
+impl MachineError {
+    fn of(path: &str) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        |source| Self::Unreadable { path, source }
+    }
+}
 
 /// A machine.
 pub(super) struct Machine {
     root: PathBuf,
     /// Free bytes of a folder.
-    pub free_b: fn(&Path) -> Result<f64, String>,
+    pub free_b: fn(&Path) -> io::Result<f64>,
 }
 
 impl Machine {
     /// The one that this program runs on.
-    pub fn this() -> Self {
+    pub(super) fn this() -> Self {
         Self {
             root: PathBuf::from("/"),
             free_b: crate::rig::gates::free_bytes,
@@ -23,7 +47,7 @@ impl Machine {
 
     /// One that was planted in `root`, with so much free space everywhere.
     #[cfg(test)]
-    pub fn planted(root: &Path, free_b: fn(&Path) -> Result<f64, String>) -> Self {
+    pub(super) fn planted(root: &Path, free_b: fn(&Path) -> io::Result<f64>) -> Self {
         Self {
             root: root.to_owned(),
             free_b,
@@ -31,34 +55,31 @@ impl Machine {
     }
 
     /// Where `path`, which begins with `/`, lies.
-    pub fn path(&self, path: &str) -> PathBuf {
+    pub(super) fn path(&self, path: &str) -> PathBuf {
         self.root.join(path.trim_start_matches('/'))
     }
 
     /// A file without the white space at its ends.
     ///
     /// # Errors
-    /// A fragment that names the file.
-    pub fn text(&self, path: &str) -> Result<String, String> {
+    /// [`MachineError::Unreadable`].
+    pub(super) fn text(&self, path: &str) -> Result<String, MachineError> {
         // Opened and read as such: what stands in for a bus on a test bench knows no other way.
-        match std::fs::read(self.path(path)) {
-            Ok(bytes) => Ok(String::from_utf8_lossy(&bytes).trim().to_owned()),
-            Err(e) => Err(format!("cannot read {path}: {e}")),
-        }
+        let bytes = std::fs::read(self.path(path)).map_err(MachineError::of(path))?;
+        Ok(String::from_utf8_lossy(&bytes).trim().to_owned())
     }
 
     /// A number in a file of its own.
-    pub fn number(&self, path: &str) -> Option<u64> {
+    pub(super) fn number(&self, path: &str) -> Option<u64> {
         self.text(path).ok()?.parse().ok()
     }
 
     /// The names in a folder, sorted.
     ///
     /// # Errors
-    /// A fragment that names the folder.
-    pub fn names(&self, folder: &str) -> Result<Vec<String>, String> {
-        let entries = std::fs::read_dir(self.path(folder))
-            .map_err(|e| format!("cannot read {folder}: {e}"))?;
+    /// [`MachineError::Unreadable`].
+    pub(super) fn names(&self, folder: &str) -> Result<Vec<String>, MachineError> {
+        let entries = std::fs::read_dir(self.path(folder)).map_err(MachineError::of(folder))?;
         let mut names: Vec<String> = entries
             .flatten()
             .map(|e| e.file_name().to_string_lossy().into_owned())
@@ -68,25 +89,25 @@ impl Machine {
     }
 
     /// Whether there is something at `path`.
-    pub fn has(&self, path: &str) -> bool {
+    pub(super) fn has(&self, path: &str) -> bool {
         self.path(path).exists()
     }
 
     /// Where a symbolic link points, as it is written.
-    pub fn link(&self, path: &str) -> Option<PathBuf> {
+    pub(super) fn link(&self, path: &str) -> Option<PathBuf> {
         std::fs::read_link(self.path(path)).ok()
     }
 
     /// Who may open the file at `path`.
-    pub fn node(&self, path: &str) -> Option<Node> {
+    pub(super) fn node(&self, path: &str) -> Option<Node> {
         Node::of(&self.path(path))
     }
 
     /// A file of lines `key<colon>value`, such as `/proc/self/status`.
     ///
     /// # Errors
-    /// A fragment that names the file.
-    pub fn table(&self, path: &str) -> Result<BTreeMap<String, String>, String> {
+    /// [`MachineError::Unreadable`].
+    pub(super) fn table(&self, path: &str) -> Result<BTreeMap<String, String>, MachineError> {
         let lines = self.text(path)?;
         let pairs = lines.lines().filter_map(|l| l.split_once(':'));
         Ok(pairs
@@ -97,8 +118,8 @@ impl Machine {
     /// Who runs this program.
     ///
     /// # Errors
-    /// A fragment that names the file that does not tell.
-    pub fn user(&self) -> Result<User, String> {
+    /// [`MachineError`] when the status of this process does not tell.
+    pub(super) fn user(&self) -> Result<User, MachineError> {
         let status = self.table("/proc/self/status")?;
         let ids = |key: &str| -> Vec<u32> {
             let text = status.get(key).map_or("", String::as_str);
@@ -108,7 +129,7 @@ impl Machine {
         };
         // Real, effective, saved, of the file system.
         let (Some(&uid), Some(&gid)) = (ids("Uid").get(1), ids("Gid").get(1)) else {
-            return Err("/proc/self/status does not tell the user".to_owned());
+            return Err(MachineError::NoUser);
         };
         let capabilities = status.get("CapEff");
         let capabilities = capabilities.and_then(|text| u64::from_str_radix(text, 16).ok());
@@ -123,7 +144,7 @@ impl Machine {
     }
 
     /// The name of a group.
-    pub fn group(&self, gid: u32) -> String {
+    pub(super) fn group(&self, gid: u32) -> String {
         self.name_of("/etc/group", gid)
     }
 

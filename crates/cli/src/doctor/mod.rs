@@ -36,7 +36,7 @@ use survey::Survey;
 ///
 /// # Errors
 /// [`crate::exit::Failure`] for a rig file that cannot be read. Problems are no error: they are [`Exit::Rig`].
-pub fn doctor(args: &DoctorArgs, json: bool) -> Outcome {
+pub(crate) fn doctor(args: &DoctorArgs, json: bool) -> Outcome {
     let rig = args.rig.as_deref().map(rig_bench::load).transpose()?;
     let lease = rig.as_ref().map(lease::path);
     // Asking costs the trigger box a reset, which nobody who holds the bench must suffer.

@@ -7,6 +7,7 @@ use skinrig_omega3::enumerate::USB_VENDOR;
 use super::access::User;
 use super::case::Case;
 use super::finding::{Finding, check};
+use super::machine::MachineError;
 use super::survey::{LEFT_ALONE, name_of};
 use super::usb;
 use crate::devices::Line;
@@ -27,7 +28,7 @@ pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
     findings
 }
 
-fn who(user: Result<&User, &String>) -> Finding {
+fn who(user: Result<&User, &MachineError>) -> Finding {
     let check = check(AREA, "user", "an ordinary user with rights of its own");
     match user {
         Ok(user) if user.uid == 0 => check.warning(
@@ -35,7 +36,7 @@ fn who(user: Result<&User, &String>) -> Finding {
             "run it as the user of the bench",
         ),
         Ok(user) => check.ok(format!("{} (uid {})", user.name, user.uid)),
-        Err(why) => check.not_checked(why.as_str()),
+        Err(why) => check.not_checked(why),
     }
 }
 
@@ -96,7 +97,7 @@ fn robot(case: &Case<'_>, user: Option<&User>) -> Vec<Finding> {
         (Some(node), None) => check().not_checked(format!("{node}: the user is not known")),
         (None, _) => check().not_checked(match devices {
             Ok(_) => "no device of Force Dimension (USB vendor 1451) on the bus".to_owned(),
-            Err(why) => why,
+            Err(why) => why.to_string(),
         }),
     }]
 }

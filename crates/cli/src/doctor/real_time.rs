@@ -7,6 +7,7 @@ use skinrig_evk1::Evk1Config;
 use super::access::{CAP_IPC_LOCK, CAP_SYS_NICE};
 use super::case::Case;
 use super::finding::{Check, Finding, check};
+use super::machine::MachineError;
 use crate::rig::gates::size;
 
 const AREA: &str = "real time";
@@ -25,15 +26,34 @@ pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
     ]
 }
 
+/// `/proc/self/limits`, or why it cannot be read.
+type Limits = Result<String, MachineError>;
+
+/// Why a limit of this process is not known.
+#[derive(Debug, thiserror::Error)]
+enum LimitError<'a> {
+    /// The limits cannot be read.
+    #[error("{0}")]
+    Unreadable(&'a MachineError),
+    /// The limit is not a number.
+    #[error("{name}: {found}")]
+    NotANumber { name: &'a str, found: &'a str },
+    /// The limit is missing.
+    #[error("/proc/self/limits does not tell `{name}`")]
+    Missing { name: &'a str },
+}
+
 /// The soft limit of a line of `/proc/self/limits`, `u64::MAX` without one.
-fn soft(limits: &Result<String, String>, name: &str) -> Result<u64, String> {
-    let text = limits.as_ref().map_err(Clone::clone)?;
+fn soft<'a>(limits: &'a Limits, name: &'a str) -> Result<u64, LimitError<'a>> {
+    let text = limits.as_ref().map_err(LimitError::Unreadable)?;
     let line = text.lines().find_map(|l| l.strip_prefix(name));
     let word = line.and_then(|rest| rest.split_whitespace().next());
     match word {
         Some("unlimited") => Ok(u64::MAX),
-        Some(number) => number.parse().map_err(|_| format!("{name}: {number}")),
-        None => Err(format!("/proc/self/limits does not tell `{name}`")),
+        Some(found) => found
+            .parse()
+            .map_err(|_| LimitError::NotANumber { name, found }),
+        None => Err(LimitError::Missing { name }),
     }
 }
 
@@ -55,7 +75,7 @@ fn may(case: &Case<'_>, capability: u64) -> bool {
     user.is_ok_and(|u| u.capabilities & capability != 0)
 }
 
-fn priority(case: &Case<'_>, limits: &Result<String, String>) -> Finding {
+fn priority(case: &Case<'_>, limits: &Limits) -> Finding {
     let check = check(
         AREA,
         "priority",
@@ -69,7 +89,7 @@ fn priority(case: &Case<'_>, limits: &Result<String, String>) -> Finding {
     }
 }
 
-fn locked_memory(case: &Case<'_>, limits: &Result<String, String>) -> Finding {
+fn locked_memory(case: &Case<'_>, limits: &Limits) -> Finding {
     let check = check(AREA, "locked memory", "unlimited (RLIMIT_MEMLOCK)");
     match soft(limits, "Max locked memory") {
         Err(why) => check.not_checked(why),

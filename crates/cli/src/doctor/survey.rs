@@ -35,7 +35,7 @@ pub(super) enum Library {
 
 impl Survey {
     /// Asks everything that is there.
-    pub fn make(rig: Option<&RigFile>) -> Self {
+    pub(super) fn make(rig: Option<&RigFile>) -> Self {
         Self {
             lines: devices::survey(rig),
             left_alone: false,
@@ -61,12 +61,12 @@ impl Survey {
     }
 
     /// What plays this role of the rig file.
-    pub fn role(&self, role: &str) -> Option<&Line> {
+    pub(super) fn role(&self, role: &str) -> Option<&Line> {
         self.lines.iter().find(|l| l.role.as_deref() == Some(role))
     }
 
     /// Cameras that are on the bus, whatever keeps them from being used.
-    pub fn cameras(&self) -> impl Iterator<Item = &Line> {
+    pub(super) fn cameras(&self) -> impl Iterator<Item = &Line> {
         let seen = |l: &&Line| l.device == "camera" && l.usb.is_some();
         self.lines
             .iter()

@@ -1,6 +1,6 @@
 //! The USB tree as the kernel tells it under `/sys/bus/usb/devices`.
 
-use super::machine::Machine;
+use super::machine::{Machine, MachineError};
 
 /// Where the kernel lists devices.
 const DEVICES: &str = "/sys/bus/usb/devices";
@@ -22,7 +22,7 @@ pub(super) struct UsbDevice {
 
 impl UsbDevice {
     /// The file by which it is opened.
-    pub fn node(&self) -> String {
+    pub(super) fn node(&self) -> String {
         let (bus, address) = self.place;
         format!("/dev/bus/usb/{bus:03}/{address:03}")
     }
@@ -31,8 +31,8 @@ impl UsbDevice {
 /// Every device but hubs of the controllers themselves.
 ///
 /// # Errors
-/// A fragment that says what cannot be read.
-pub(super) fn list(machine: &Machine) -> Result<Vec<UsbDevice>, String> {
+/// When the kernel's list cannot be read.
+pub(super) fn list(machine: &Machine) -> Result<Vec<UsbDevice>, MachineError> {
     let names = machine.names(DEVICES)?;
     // `3-1.4` is port 4 of the hub at port 1 of bus 3; `3-1.4:1.0` is one of its interfaces, `usb3` the bus itself.
     let devices = names.iter().filter(|n| n.contains('-') && !n.contains(':'));

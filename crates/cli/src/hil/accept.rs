@@ -12,7 +12,7 @@ use crate::host::user_name;
 ///
 /// # Errors
 /// [`Failure::input`] for a series or a night that the history does not have, or without a reason.
-pub fn accept(args: &HilAcceptArgs, json: bool) -> Outcome {
+pub(crate) fn accept(args: &HilAcceptArgs, json: bool) -> Outcome {
     if args.reason.trim().is_empty() {
         return Err(Failure::input("--reason: expected why, found nothing"));
     }

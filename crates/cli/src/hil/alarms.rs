@@ -1,28 +1,54 @@
 //! What is kept of an alarm: the golden session of the night that raised it, beside the history, where it stays when old nights are
 //! cleared away.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use skinrig_hil::history;
 use skinrig_nightly::trend::{Alarm, Report};
-use skinrig_recorder::SessionReader;
+use skinrig_recorder::{RecorderError, SessionReader};
 use skinrig_report::trend::Links;
 
 use super::folder;
 
+/// Why there is no session of an alarm.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum NoEvidence {
+    /// The night has no golden session.
+    #[error("that night has no golden session")]
+    NoGolden,
+    /// The session is not sealed.
+    #[error("{} is not sealed", session.display())]
+    Unsealed {
+        /// The session.
+        session: PathBuf,
+    },
+    /// The session cannot be read.
+    #[error(transparent)]
+    Session(#[from] RecorderError),
+    /// The session cannot be copied.
+    #[error("{}: {source}", to.display())]
+    Copy {
+        /// The copy.
+        to: PathBuf,
+        /// Error of the operating system.
+        source: io::Error,
+    },
+}
+
 /// The files of an alarm.
 #[derive(Debug)]
-pub struct AlarmEvidence {
+pub(crate) struct AlarmEvidence {
     /// The folder of the history.
     home: PathBuf,
     /// The page of the night that raised it.
     page: Option<PathBuf>,
     /// The session that shows it, or why there is none.
-    pub session: Result<PathBuf, String>,
+    pub session: Result<PathBuf, NoEvidence>,
 }
 
 /// Keeps the session of every alarm in `alarms/NIGHT/` beside the history, once; one entry per alarm.
-pub fn keep(history: &Path, report: &Report) -> Vec<AlarmEvidence> {
+pub(super) fn keep(history: &Path, report: &Report) -> Vec<AlarmEvidence> {
     let one = |alarm: &Alarm| {
         let night = &report.nights[alarm.raised];
         let home = history::folder_of(history, &night.folder);
@@ -30,7 +56,7 @@ pub fn keep(history: &Path, report: &Report) -> Vec<AlarmEvidence> {
         let kept = history::folder_of(history, "alarms").join(plain(&alarm.id));
         let session = match &night.golden {
             Some(golden) => copy(&home.join(golden), &kept),
-            None => Err("that night has no golden session".to_owned()),
+            None => Err(NoEvidence::NoGolden),
         };
         AlarmEvidence {
             home: history::folder_of(history, ""),
@@ -42,17 +68,16 @@ pub fn keep(history: &Path, report: &Report) -> Vec<AlarmEvidence> {
 }
 
 /// Puts a sealed session into `folder`, unless it is there: as a second name of the file where that can be, else as a copy.
-fn copy(session: &Path, folder: &Path) -> Result<PathBuf, String> {
+fn copy(session: &Path, folder: &Path) -> Result<PathBuf, NoEvidence> {
     let name = session.file_name().unwrap_or_default();
     let to = folder.join(name);
     if to.is_file() {
         return Ok(to);
     }
-    let seal = SessionReader::open(session).and_then(|reader| reader.seal());
-    match seal {
-        Ok(Some(_)) => {}
-        Ok(None) => return Err(format!("{} is not sealed", session.display())),
-        Err(e) => return Err(e.to_string()),
+    if SessionReader::open(session)?.seal()?.is_none() {
+        return Err(NoEvidence::Unsealed {
+            session: session.to_owned(),
+        });
     }
     let part = folder.join("part");
     let copied = std::fs::create_dir_all(folder).and_then(|()| {
@@ -63,7 +88,7 @@ fn copy(session: &Path, folder: &Path) -> Result<PathBuf, String> {
     });
     match copied {
         Ok(()) => Ok(to),
-        Err(e) => Err(format!("{}: {e}", to.display())),
+        Err(source) => Err(NoEvidence::Copy { to, source }),
     }
 }
 
@@ -76,7 +101,7 @@ fn plain(id: &str) -> String {
 
 impl AlarmEvidence {
     /// As links of a page in `folder`; `None`: of no page.
-    pub fn links(&self, folder: Option<&Path>) -> Links {
+    pub(super) fn links(&self, folder: Option<&Path>) -> Links {
         let session = self.session.as_ref().ok();
         let commands = session.map_or_else(Vec::new, |path| {
             let path = quoted(path);
@@ -90,7 +115,7 @@ impl AlarmEvidence {
             night: self.page.as_deref().and_then(href),
             session: session.and_then(|p| href(p)),
             commands,
-            missing: self.session.as_ref().err().cloned(),
+            missing: self.session.as_ref().err().map(ToString::to_string),
         }
     }
 }

@@ -6,7 +6,7 @@ use clap::{Args, Subcommand};
 
 /// Arguments of `hil`.
 #[derive(Debug, Args)]
-pub struct HilArgs {
+pub(crate) struct HilArgs {
     /// The command.
     #[command(subcommand)]
     pub command: HilCommand,
@@ -14,7 +14,7 @@ pub struct HilArgs {
 
 /// The commands of `hil`.
 #[derive(Debug, Subcommand)]
-pub enum HilCommand {
+pub(crate) enum HilCommand {
     /// Run a suite's checks on a bench against limits stated in advance, and tell rig, skin and software causes apart.
     #[command(
         after_help = "Examples:\n  skinrig hil run hil/nightly.yaml --rig hil/rigs/NAME.yaml\n  \
@@ -57,7 +57,7 @@ pub enum HilCommand {
 
 /// Arguments of `hil lease`.
 #[derive(Debug, Args)]
-pub struct HilLeaseArgs {
+pub(crate) struct HilLeaseArgs {
     /// The rig file of the bench [default: all leases on this computer].
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
@@ -65,7 +65,7 @@ pub struct HilLeaseArgs {
 
 /// Arguments of `hold-arm`.
 #[derive(Debug, Args)]
-pub struct HoldArmArgs {
+pub(crate) struct HoldArmArgs {
     /// The rig file of the bench.
     #[arg(long, value_name = "FILE")]
     pub rig: PathBuf,
@@ -73,7 +73,7 @@ pub struct HoldArmArgs {
 
 /// Arguments of `hil run`.
 #[derive(Debug, Args)]
-pub struct HilRunArgs {
+pub(crate) struct HilRunArgs {
     /// The suite.
     pub suite: PathBuf,
 
@@ -100,7 +100,7 @@ pub struct HilRunArgs {
 
 /// Arguments of `hil trend`.
 #[derive(Debug, Args)]
-pub struct HilTrendArgs {
+pub(crate) struct HilTrendArgs {
     /// The history of nights.
     #[arg(default_value = "nights/history.sqlite")]
     pub history: PathBuf,
@@ -136,7 +136,7 @@ pub struct HilTrendArgs {
 
 /// Arguments of `hil accept`.
 #[derive(Debug, Args)]
-pub struct HilAcceptArgs {
+pub(crate) struct HilAcceptArgs {
     /// The series, as `hil trend` calls it.
     #[arg(required_unless_present = "all", conflicts_with = "all")]
     pub series: Option<String>,

@@ -1,7 +1,8 @@
 //! The bench of a rig file for a suite of checks: production drivers, each opened by itself.
 
+use std::io;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use skinrig_controller::ControlHandle;
@@ -158,27 +159,47 @@ impl Bench for RealBench {
     }
 }
 
+/// Why the lamps' program did not switch them.
+#[derive(Debug, thiserror::Error)]
+enum LampsError {
+    /// The rig file names no program.
+    #[error("expected a program")]
+    NoProgram,
+    /// The system cannot start it.
+    #[error("cannot be started: {0}")]
+    Start(#[source] io::Error),
+    /// The system cannot wait for its end.
+    #[error("cannot be waited for: {0}")]
+    Wait(#[source] io::Error),
+    /// It failed.
+    #[error("expected success, found {0}")]
+    Failed(ExitStatus),
+    /// It takes too long.
+    #[error("expected an end within {LAMPS_WITHIN:?}")]
+    Late,
+}
+
 /// Runs a program to its end, without a shell.
-fn switch(words: &[String]) -> Result<(), String> {
-    let (program, arguments) = words.split_first().ok_or("expected a program")?;
+fn switch(words: &[String]) -> Result<(), LampsError> {
+    let (program, arguments) = words.split_first().ok_or(LampsError::NoProgram)?;
     let mut child = Command::new(program)
         .args(arguments)
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .spawn()
-        .map_err(|e| format!("cannot be started: {e}"))?;
+        .map_err(LampsError::Start)?;
     let until = Instant::now() + LAMPS_WITHIN;
     loop {
         match child.try_wait() {
             Ok(Some(status)) if status.success() => return Ok(()),
-            Ok(Some(status)) => return Err(format!("expected success, found {status}")),
+            Ok(Some(status)) => return Err(LampsError::Failed(status)),
             Ok(None) if Instant::now() < until => std::thread::sleep(LOOK_EVERY),
             Ok(None) => {
                 let _ = child.kill();
                 let _ = child.wait();
-                return Err(format!("expected an end within {LAMPS_WITHIN:?}"));
+                return Err(LampsError::Late);
             }
-            Err(e) => return Err(format!("cannot be waited for: {e}")),
+            Err(e) => return Err(LampsError::Wait(e)),
         }
     }
 }

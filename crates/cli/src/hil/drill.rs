@@ -34,7 +34,7 @@ const SEEN_WITHIN: Duration = Duration::from_secs(2);
 ///
 /// # Errors
 /// [`Problem`] when it could not be done.
-pub fn watchdog(bench: &mut RealBench) -> Result<DrillResult, Problem> {
+pub(super) fn watchdog(bench: &mut RealBench) -> Result<DrillResult, Problem> {
     let mut holder = Holder::start(&bench.rig().file_name)?;
     let held = holder.holds(bench)?;
     let killed = Instant::now();

@@ -10,9 +10,9 @@ use skinrig_nightly::Night;
 use crate::exit::Failure;
 
 /// The results for programs.
-pub const JSON: &str = "night.json";
+pub(super) const JSON: &str = "night.json";
 /// The page for people.
-pub const PAGE: &str = "night.html";
+pub(super) const PAGE: &str = "night.html";
 /// The page of the nights up to this one.
 pub(crate) const TRENDS: &str = "trends.html";
 /// The results for programs that collect those of tests.
@@ -24,7 +24,11 @@ const MOST: usize = 100;
 ///
 /// # Errors
 /// [`Failure::rig`] (3, infrastructure) when it cannot be made.
-pub fn make(out: &Path, started: DateTime<Utc>, suite: &str) -> Result<(String, PathBuf), Failure> {
+pub(super) fn make(
+    out: &Path,
+    started: DateTime<Utc>,
+    suite: &str,
+) -> Result<(String, PathBuf), Failure> {
     let wrong = |path: &Path, e: &io::Error| {
         Failure::rig(format!(
             "{}: cannot be made: {e}\n  next: choose a folder that can be written, with --out",
@@ -64,7 +68,7 @@ fn file_name(name: &str) -> String {
 ///
 /// # Errors
 /// What the system answers.
-pub fn write(folder: &Path, name: &str, text: &str) -> io::Result<()> {
+pub(super) fn write(folder: &Path, name: &str, text: &str) -> io::Result<()> {
     let (part, whole) = (folder.join(format!("{name}.part")), folder.join(name));
     let mut file = File::create(&part)?;
     file.write_all(text.as_bytes())?;

@@ -21,7 +21,7 @@ use crate::{check, run};
 ///
 /// # Errors
 /// [`Problem`] when there is no session to speak of.
-pub fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Problem> {
+pub(super) fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Problem> {
     let (protocol, plan) = protocol(bench, file)?;
     let folder = bench.folder().to_owned();
     let rig = bench.take_rig(&protocol)?;
@@ -39,7 +39,7 @@ pub fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Problem> 
     .map_err(|f| trouble(EvidenceKind::Disk, "computer", &f))?;
     let mut findings = Findings::default();
     if let RunEnd::Stopped(why) = &report.end {
-        findings.add_evidence(EvidenceKind::TimeOut, "robot", why.as_str());
+        findings.add_evidence(EvidenceKind::TimeOut, "robot", why.text());
     }
     findings.evidence.extend(run_evidence::from_report(&report));
     let mut golden = GoldenRun {

@@ -30,7 +30,7 @@ const CLOCKED: [&str; 8] = [
 ];
 
 /// Fills `found` with what `analysis` says, and with the evidence of what keeps it from being believed.
-pub fn numbers(analysis: &Analysis, lost_bytes: [u64; 2], found: &mut Findings) {
+pub(super) fn numbers(analysis: &Analysis, lost_bytes: [u64; 2], found: &mut Findings) {
     evidence(analysis, lost_bytes, found);
     if !analysis.is_valid() {
         // Where an event or a press belongs is not known: no number that stands on it is to be used.

@@ -23,7 +23,7 @@ const ENDS_WITHIN: Duration = Duration::from_secs(15);
 ///
 /// # Errors
 /// [`Failure::rig`] when the robot fails.
-pub fn hold(args: &HoldArmArgs) -> Outcome {
+pub(crate) fn hold(args: &HoldArmArgs) -> Outcome {
     let rig = bench::load(&args.rig)?;
     let over = Arc::new(AtomicBool::new(false));
     let ends = Arc::clone(&over);

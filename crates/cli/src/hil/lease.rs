@@ -15,7 +15,7 @@ use crate::rig::bench;
 ///
 /// # Errors
 /// [`Failure::rig`] (3) when somebody else holds it: who, since when, and what to do.
-pub fn take(rig: &RigFile, what: &str) -> Result<Lease, Failure> {
+pub(crate) fn take(rig: &RigFile, what: &str) -> Result<Lease, Failure> {
     let owner = Owner::this_process(user(), host_name(), what.to_owned());
     let lease = Lease::take(&path(rig), owner, LeaseTiming::default()).map_err(Failure::rig)?;
     if let Some(note) = lease.note() {
@@ -54,7 +54,7 @@ fn user() -> String {
 ///
 /// # Errors
 /// [`Failure`] when rig file or lease cannot be read.
-pub fn lease(args: &HilLeaseArgs, json: bool) -> Outcome {
+pub(crate) fn lease(args: &HilLeaseArgs, json: bool) -> Outcome {
     let paths = match &args.rig {
         Some(file) => vec![path(&bench::load(file)?)],
         None => all()?,

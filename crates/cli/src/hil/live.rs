@@ -1,6 +1,6 @@
 //! What a terminal shows while a suite runs, and the night kept after every check.
 
-use std::io::IsTerminal;
+use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -13,13 +13,13 @@ use skinrig_report::night::{self, Colour};
 use super::folder;
 
 /// Shows the night as it grows, and writes it down.
-pub struct Live {
+pub(super) struct Live {
     folder: PathBuf,
     display: Display,
     colour: Colour,
     total: usize,
     told: usize,
-    unwritten: Option<String>,
+    unwritten: Option<io::Error>,
 }
 
 enum Display {
@@ -32,8 +32,8 @@ enum Display {
 impl Live {
     /// For a night of `suite` that is kept in `folder`.
     #[must_use]
-    pub fn new(folder: PathBuf, suite: &Suite) -> Self {
-        let terminal = std::io::stderr().is_terminal();
+    pub(super) fn new(folder: PathBuf, suite: &Suite) -> Self {
+        let terminal = io::stderr().is_terminal();
         let display = if terminal {
             let bar = ProgressBar::with_draw_target(
                 Some(suite.checks.len() as u64),
@@ -53,7 +53,7 @@ impl Live {
         Self {
             folder,
             display,
-            colour: colour(&std::io::stderr()),
+            colour: colour(&io::stderr()),
             total: suite.checks.len(),
             told: 0,
             unwritten: None,
@@ -61,7 +61,7 @@ impl Live {
     }
 
     /// Takes the live line away, and tells the first fault in writing the night down.
-    pub fn finish(self) -> Option<String> {
+    pub(super) fn finish(self) -> Option<io::Error> {
         if let Display::Bar(bar) = &self.display {
             bar.finish_and_clear();
         }
@@ -77,7 +77,7 @@ impl Live {
 }
 
 /// The colours of `stream`.
-pub fn colour(stream: &impl IsTerminal) -> Colour {
+pub(super) fn colour(stream: &impl IsTerminal) -> Colour {
     if crate::terminal::is_coloured(stream) {
         Colour::On
     } else {
@@ -100,7 +100,7 @@ impl NightObserver for Live {
 
     fn check_finished(&mut self, night: &Night) {
         if let Err(e) = folder::write_json(&self.folder, night) {
-            self.unwritten.get_or_insert_with(|| e.to_string());
+            self.unwritten.get_or_insert(e);
         }
         let width = self.total.to_string().len();
         for check in night.checks.iter().skip(self.told) {

@@ -1,19 +1,19 @@
 //! `skinrig hil`: a suite of checks on a bench.
 
-pub mod accept;
+pub(crate) mod accept;
 mod alarms;
-pub mod args;
-pub mod bench;
+pub(crate) mod args;
+pub(crate) mod bench;
 mod drill;
 mod folder;
 mod golden;
 mod golden_numbers;
-pub mod hold;
-pub mod lease;
+pub(crate) mod hold;
+pub(crate) mod lease;
 mod live;
 mod real_bench;
-pub mod run;
-pub mod trend;
+pub(crate) mod run;
+pub(crate) mod trend;
 mod trouble;
 
 use crate::exit::Outcome;
@@ -23,7 +23,7 @@ use args::{HilArgs, HilCommand};
 ///
 /// # Errors
 /// [`crate::exit::Failure`] with the code that says what kind.
-pub fn hil(args: &HilArgs, command_line: &str, json: bool) -> Outcome {
+pub(crate) fn hil(args: &HilArgs, command_line: &str, json: bool) -> Outcome {
     match &args.command {
         HilCommand::Lease(a) => lease::lease(a, json),
         HilCommand::Run(a) => run::run(a, command_line, json),

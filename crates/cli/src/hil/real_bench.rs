@@ -31,7 +31,12 @@ pub(crate) struct RealBench {
 impl RealBench {
     /// The bench of `rig`, with nothing opened yet. What it records goes into `folder`.
     #[must_use]
-    pub fn new(rig: RigFile, folder: PathBuf, operator: Operator, command_line: &str) -> Self {
+    pub(super) fn new(
+        rig: RigFile,
+        folder: PathBuf,
+        operator: Operator,
+        command_line: &str,
+    ) -> Self {
         Self {
             rig,
             folder,
@@ -47,7 +52,7 @@ impl RealBench {
 
     /// The same, which is ours as long as this lease is.
     #[must_use]
-    pub fn holding(self, lease: Lease) -> Self {
+    pub(super) fn holding(self, lease: Lease) -> Self {
         Self {
             lease: Some(lease),
             ..self
@@ -56,13 +61,13 @@ impl RealBench {
 
     /// Whoever sits at this terminal.
     #[must_use]
-    pub const fn operator(&self) -> &Operator {
+    pub(super) const fn operator(&self) -> &Operator {
         &self.operator
     }
 
     /// The arguments as one line.
     #[must_use]
-    pub fn command_line(&self) -> &str {
+    pub(super) fn command_line(&self) -> &str {
         &self.command_line
     }
 
@@ -133,7 +138,7 @@ impl RealBench {
 }
 
 /// How late stand-ins may be that share this computer's processors.
-pub fn patience(kind: RigKind) -> HostDuration {
+pub(super) fn patience(kind: RigKind) -> HostDuration {
     match kind {
         RigKind::Emulated => bench::SLOW_LATE,
         RigKind::Bench => HostDuration::ZERO,

@@ -1,16 +1,19 @@
 //! `skinrig hil run`: a suite on a bench, from its plan to its results.
 
+use std::io;
 use std::path::Path;
 
 use chrono::{SecondsFormat, Utc};
 use skinrig_device::RealClock;
+use skinrig_hil::history::HistoryError;
 use skinrig_hil::runner::plan::PlanInputs;
 use skinrig_hil::{Bench as _, SuiteRunner};
 use skinrig_model::HostDuration;
 use skinrig_nightly::night::NIGHT_VERSION;
-use skinrig_nightly::{Night, NightExit, Verdict, Versions};
+use skinrig_nightly::{Night, NightExit, Verdict, Versions, junit};
 use skinrig_protocol::rig::RigFile;
 use skinrig_protocol::suite::{Measure, Suite};
+use skinrig_report::ReportError;
 use skinrig_report::night::{self, Trends, span};
 use skinrig_report::trend::sentence;
 
@@ -29,7 +32,7 @@ use crate::signals::Operator;
 ///
 /// # Errors
 /// [`Failure`] before the night begins: 2 for what was asked for, 3 for what the computer does not let us.
-pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
+pub(crate) fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
     // Before any device is opened: from then on a robot may be live.
     let operator = Operator::of_suite().map_err(Failure::rig)?;
     let suite = load(&args.suite)?;
@@ -84,11 +87,11 @@ pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
     if json {
         crate::terminal::print_json(&serde_json::to_value(&night).map_err(Failure::internal)?);
     } else {
-        let colour = live::colour(&std::io::stdout());
+        let colour = live::colour(&io::stdout());
         outln!("{}", night::tree(&night, colour).trim_end());
         outln!("{}", folder.join(folder::PAGE).display());
     }
-    match unwritten.map_or(trends, Err) {
+    match unwritten.map_or(trends, |e| Err(KeepError::Night(e))) {
         Ok(None) => Ok(Exit::Night(night.exit)),
         // Trends say what moved; whether the night is good is said by its limits alone.
         Ok(Some(trends)) => {
@@ -114,21 +117,38 @@ pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
 }
 
 /// What the trends say, when they were asked for, or why they say nothing.
-type TrendOutcome = Option<Result<After, String>>;
+type TrendOutcome = Option<Result<After, HistoryError>>;
+
+/// Why a night is not written in all its forms.
+#[derive(Debug, thiserror::Error)]
+enum KeepError {
+    /// The night as JSON.
+    #[error(transparent)]
+    Night(io::Error),
+    /// Another file of the night.
+    #[error("{name}: {source}")]
+    File {
+        name: &'static str,
+        source: io::Error,
+    },
+    /// A page that cannot be put together.
+    #[error(transparent)]
+    Page(#[from] ReportError),
+    /// JUnit XML that cannot be put together.
+    #[error(transparent)]
+    Junit(#[from] junit::SerializeError),
+}
 
 /// Writes the finished night in its other forms, and adds it to the history.
-fn keep(night: &Night, folder: &Path, history: Option<&Path>) -> Result<TrendOutcome, String> {
-    let write = |name: &str, text: &str| {
-        folder::write(folder, name, text).map_err(|e| format!("{name}: {e}"))
+fn keep(night: &Night, folder: &Path, history: Option<&Path>) -> Result<TrendOutcome, KeepError> {
+    let write = |name: &'static str, text: &str| {
+        folder::write(folder, name, text).map_err(|source| KeepError::File { name, source })
     };
     let page = |trends: Trends<'_>| {
-        let page = night::html(night, trends).map_err(|e| e.to_string())?;
+        let page = night::html(night, trends)?;
         write(folder::PAGE, &page)
     };
-    write(
-        folder::JUNIT,
-        &skinrig_nightly::junit::junit(night, &host_name()),
-    )?;
+    write(folder::JUNIT, &junit::junit(night, &host_name())?)?;
     let Some(history) = history else {
         page(Trends::NotRequested)?;
         return Ok(None);
@@ -137,17 +157,17 @@ fn keep(night: &Night, folder: &Path, history: Option<&Path>) -> Result<TrendOut
     page(Trends::Unavailable(
         "the program ended before it had read them",
     ))?;
-    let after = trend::after(history, night, folder).map_err(|e| e.to_string());
+    let after = trend::after(history, night, folder);
     match &after {
         Ok(after) => {
-            write(folder::TRENDS, &after.page().map_err(|e| e.to_string())?)?;
+            write(folder::TRENDS, &after.page()?)?;
             page(Trends::Available {
                 report: &after.report,
                 links: &after.links,
                 page: folder::TRENDS,
             })?;
         }
-        Err(why) => page(Trends::Unavailable(why))?,
+        Err(why) => page(Trends::Unavailable(&why.to_string()))?,
     }
     Ok(Some(after))
 }

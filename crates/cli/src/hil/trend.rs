@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use glob::{Pattern, PatternError};
 use skinrig_hil::history::{self, AppendOutcome, Filter, HistoryError};
 use skinrig_nightly::trend::{Acceptance, History, Report, judge};
 use skinrig_nightly::{Night, NightExit};
@@ -18,13 +19,18 @@ use crate::exit::{Exit, Failure, Outcome};
 /// # Errors
 /// [`Failure::input`] for a file that is no history, a bench or a series that is not in it; [`Failure::internal`] when something
 /// cannot be written.
-pub fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
+pub(crate) fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
     if let Some(folder) = &args.rebuild {
         rebuild(&args.history, folder)?;
     }
     let (history, report) = judged(args)?;
     let pattern = args.series.as_deref().unwrap_or("*");
-    let shown = |name: &str| matches(pattern, name);
+    let series = series(pattern).map_err(|e| {
+        Failure::input(format!(
+            "--series: expected part of the name of a series, or a pattern with `*`, found `{pattern}`: {e}"
+        ))
+    })?;
+    let shown = |name: &str| series.matches(name);
     if args.series.is_some() && !report.charts.iter().any(|c| shown(&c.series.name)) {
         return Err(Failure::input(format!(
             "--series: expected part of the name of a series, or a pattern with `*`, found `{pattern}`, which none of {} has; \
@@ -110,26 +116,13 @@ fn rebuild(path: &Path, nights: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Whether `name` has the pattern: with `*` for anything as a whole, without one as a part.
-fn matches(pattern: &str, name: &str) -> bool {
-    if !pattern.contains('*') {
-        return name.contains(pattern);
+/// Pattern for names of series: with `*` it matches a whole name, without one any part of it.
+fn series(pattern: &str) -> Result<Pattern, PatternError> {
+    if pattern.contains('*') {
+        Pattern::new(pattern)
+    } else {
+        Pattern::new(&format!("*{}*", Pattern::escape(pattern)))
     }
-    let mut parts = pattern.split('*');
-    let Some(mut rest) = parts.next().and_then(|first| name.strip_prefix(first)) else {
-        return false;
-    };
-    let parts: Vec<&str> = parts.collect();
-    let Some((last, middle)) = parts.split_last() else {
-        return rest.is_empty();
-    };
-    for part in middle {
-        match rest.find(part) {
-            Some(at) => rest = &rest[at + part.len()..],
-            None => return false,
-        }
-    }
-    rest.ends_with(last)
 }
 
 /// Whether the terminal takes more than ASCII, by the locale's own variables, strongest first.
@@ -149,7 +142,7 @@ pub(super) struct After {
 
 impl After {
     /// The page of all charts, for the night's folder.
-    pub fn page(&self) -> Result<String, ReportError> {
+    pub(super) fn page(&self) -> Result<String, ReportError> {
         page(&self.report, &self.links, &self.accepted)
     }
 }
@@ -173,7 +166,7 @@ pub(super) fn after(path: &Path, night: &Night, home: &Path) -> Result<After, Hi
 
 #[cfg(test)]
 mod tests {
-    use super::matches;
+    use super::series;
 
     #[test]
     fn patterns_are_parts_or_wholes() {
@@ -187,8 +180,11 @@ mod tests {
             ("golden/*/located", "golden/skin/located", true),
             ("b*", "a/b/c", false),
             ("a*bb*b", "a/bb", false),
+            ("[x]", "a[x]", true),
+            ("[x]", "ax", false),
         ] {
-            assert_eq!(matches(pattern, name), expected, "{pattern} {name}");
+            let pattern = series(pattern).unwrap();
+            assert_eq!(pattern.matches(name), expected, "{pattern} {name}");
         }
     }
 }

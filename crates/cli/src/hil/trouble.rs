@@ -18,7 +18,7 @@ fn trouble(kind: EvidenceKind, subject: &str, what: &dyn std::fmt::Display) -> P
 }
 
 /// Why the robot could not be opened.
-pub fn robot(error: &OmegaError, rig: &RigFile) -> Problem {
+pub(super) fn robot(error: &OmegaError, rig: &RigFile) -> Problem {
     let kind = match error {
         OmegaError::Load(_) | OmegaError::Thread(_) | OmegaError::Supervisor(_) => {
             EvidenceKind::Absent
@@ -51,7 +51,7 @@ fn robot_not_found(rig: &RigFile) -> EvidenceKind {
 }
 
 /// Why a camera, called `subject` in results, could not be opened.
-pub fn camera(error: &Evk1Error, subject: &str, held: usize) -> Problem {
+pub(super) fn camera(error: &Evk1Error, subject: &str, held: usize) -> Problem {
     let kind = match error {
         Evk1Error::NotFound { .. } => camera_not_found(held),
         Evk1Error::NotEvk1 { .. } => EvidenceKind::OtherDevice,
@@ -89,7 +89,7 @@ fn camera_not_found(held: usize) -> EvidenceKind {
 }
 
 /// Why the trigger box could not be opened.
-pub fn trigger_box(error: &DeviceError, setup: &BoxSetup) -> Problem {
+pub(super) fn trigger_box(error: &DeviceError, setup: &BoxSetup) -> Problem {
     let kind = match error {
         DeviceError::Lost { .. } => match SerialConnector::new(&setup.port).connect() {
             Err(OpenError::Absent(_)) => EvidenceKind::Absent,

@@ -5,10 +5,12 @@
 //! them; a chunk therefore "arrives" when the schedule's time reaches the file's time, and the last ones at
 //! the stop.
 
+use std::io;
+use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use skinrig_device::{CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera};
-use skinrig_formats::{Scanner, evt2};
+use skinrig_formats::{FormatsError, Scanner, evt2};
 use skinrig_model::{
     CameraId, CdEvent, ChunkFacts, DeviceIdentity, DeviceRole, RawChunk, Setting, StreamFormat,
     TriggerEdge,
@@ -27,7 +29,45 @@ const LATE_START_US: u64 = 60_000_000;
 /// time words gives no reason for more.
 const TIME_HIGH_EVERY_US: u64 = 64;
 
-type Item = Result<(Vec<u8>, ChunkFacts, Vec<TriggerEdge>), String>;
+/// Why a recording cannot be read to its end.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum RecordingError {
+    /// The file is damaged, or has events that EVT2 cannot hold.
+    #[error(transparent)]
+    Formats(#[from] FormatsError),
+    /// The container has no events.
+    #[error("{}: expected events, found none", path.display())]
+    NoEvents {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The stream has no words.
+    #[error("{}: expected events, found nothing after the header", path.display())]
+    NoWords {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The stream ends within a word.
+    #[error(
+        "{}: expected whole words of {word} bytes, found {rest} bytes after the last one: the file is cut off",
+        path.display()
+    )]
+    CutOff {
+        /// The file.
+        path: PathBuf,
+        /// Bytes per word.
+        word: usize,
+        /// Bytes after the last whole word.
+        rest: usize,
+    },
+}
+
+/// The system refused the thread that reads a recording.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot start a reading thread: {0}")]
+pub(crate) struct ThreadError(#[from] io::Error);
+
+type Item = Result<(Vec<u8>, ChunkFacts, Vec<TriggerEdge>), RecordingError>;
 
 /// Where the reading thread puts what it reads.
 pub(crate) struct ChunkFeed {
@@ -40,20 +80,20 @@ pub(crate) struct ChunkFeed {
 
 /// The run ended before the file did; reading on is pointless.
 #[derive(Debug)]
-pub struct RunEnded;
+pub(super) struct RunEnded;
 
 impl ChunkFeed {
     /// Takes the next events of a container without words of its own, in time order.
     ///
     /// # Errors
     /// [`RunEnded`]; [`ChunkFeed::fail`] has been called when an event cannot be encoded.
-    pub fn events(&mut self, events: &[CdEvent]) -> Result<(), RunEnded> {
+    pub(super) fn events(&mut self, events: &[CdEvent]) -> Result<(), RunEnded> {
         for event in events {
             if self.encoder.is_none() {
                 let first = event.t_us - event.t_us % TIME_HIGH_EVERY_US;
                 match evt2::Encoder::with_cadence(first, TIME_HIGH_EVERY_US) {
                     Ok(encoder) => self.encoder = Some(encoder),
-                    Err(e) => return self.fail(e.to_string()),
+                    Err(e) => return self.fail(e.into()),
                 }
                 self.chunk_from_us = first;
             }
@@ -65,7 +105,7 @@ impl ChunkFeed {
                     .as_mut()
                     .map(|x| x.advance_to(end, &mut self.bytes))
                 {
-                    return self.fail(e.to_string());
+                    return self.fail(e.into());
                 }
                 self.send()?;
                 self.chunk_from_us = end;
@@ -77,7 +117,7 @@ impl ChunkFeed {
                 ..*event
             };
             if let Some(Err(e)) = self.encoder.as_mut().map(|x| x.cd(event, &mut self.bytes)) {
-                return self.fail(e.to_string());
+                return self.fail(e.into());
             }
             if self.bytes.len() >= CHUNK_BYTES {
                 self.send()?;
@@ -91,7 +131,7 @@ impl ChunkFeed {
     ///
     /// # Errors
     /// [`RunEnded`].
-    pub fn raw(&mut self, bytes: &[u8]) -> Result<(), RunEnded> {
+    pub(super) fn raw(&mut self, bytes: &[u8]) -> Result<(), RunEnded> {
         self.bytes.extend_from_slice(bytes);
         if self.bytes.len() >= CHUNK_BYTES {
             self.send()
@@ -100,12 +140,12 @@ impl ChunkFeed {
         }
     }
 
-    /// Ends the stream with an error for the user.
+    /// Ends the stream with an error.
     ///
     /// # Errors
     /// Always [`RunEnded`].
-    pub fn fail(&mut self, message: String) -> Result<(), RunEnded> {
-        self.queue.send(Err(message)).map_err(|_| RunEnded)?;
+    pub(super) fn fail(&mut self, error: RecordingError) -> Result<(), RunEnded> {
+        self.queue.send(Err(error)).map_err(|_| RunEnded)?;
         Err(RunEnded)
     }
 
@@ -137,18 +177,18 @@ pub(crate) struct FileCamera {
 }
 
 impl FileCamera {
-    /// A camera whose stream `read` produces on a thread of its own. `read` ends with an error for the user or
+    /// A camera whose stream `read` produces on a thread of its own. `read` ends with an error or
     /// when the file does.
     ///
     /// # Errors
-    /// A message when the thread cannot be started.
-    pub fn new(
+    /// When the thread cannot be started.
+    pub(super) fn new(
         camera: CameraId,
         identity: DeviceIdentity,
         format: StreamFormat,
         clock: SimClock,
-        read: impl FnOnce(&mut ChunkFeed) -> Result<(), String> + Send + 'static,
-    ) -> Result<Self, String> {
+        read: impl FnOnce(&mut ChunkFeed) -> Result<(), RecordingError> + Send + 'static,
+    ) -> Result<Self, ThreadError> {
         let (sender, queue) = sync_channel(QUEUE);
         std::thread::Builder::new()
             .name(format!("read-camera-{}", camera.number()))
@@ -162,10 +202,9 @@ impl FileCamera {
                 };
                 let _ = match read(&mut feed) {
                     Ok(()) => feed.send(),
-                    Err(message) => feed.fail(message),
+                    Err(error) => feed.fail(error),
                 };
-            })
-            .map_err(|e| format!("cannot start a reading thread: {e}"))?;
+            })?;
         Ok(Self {
             camera,
             identity,
@@ -191,7 +230,7 @@ impl FileCamera {
                 Some(waiting) => waiting,
                 None => match self.queue.recv() {
                     Ok(Ok(next)) => next,
-                    Ok(Err(detail)) => return Err(self.lost(detail)),
+                    Ok(Err(error)) => return Err(self.lost(error.to_string())),
                     Err(_) => return self.ended(until_us),
                 },
             };

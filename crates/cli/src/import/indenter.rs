@@ -28,7 +28,7 @@ pub(crate) struct ScheduledIndenter {
 
 impl ScheduledIndenter {
     /// At rest at `start`.
-    pub fn new(clock: SimClock, start: Point3<Robot>) -> Self {
+    pub(super) fn new(clock: SimClock, start: Point3<Robot>) -> Self {
         Self {
             clock,
             from: start,

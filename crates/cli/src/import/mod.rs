@@ -31,7 +31,7 @@ use crate::run::{Intent, conclude, record};
 use crate::signals::Operator;
 use crate::sink::ReplayExpectations;
 use crate::terminal::Output;
-use camera::{ChunkFeed, FileCamera};
+use camera::{ChunkFeed, FileCamera, RecordingError};
 use indenter::ScheduledIndenter;
 
 /// Presses closer together than this are no path, mm: less than any indenter's tip.
@@ -42,7 +42,7 @@ const SMALLEST_PATH_MM: f64 = 1.0;
 /// # Errors
 /// [`Failure::input`] for files that are not what they should be, also when one breaks off inside: what was read up to there is
 /// kept. [`Failure::rig`] when the session cannot be written.
-pub fn import(args: &ImportArgs, command_line: &str, output: Output) -> Outcome {
+pub(crate) fn import(args: &ImportArgs, command_line: &str, output: Output) -> Outcome {
     let name = args.schedule.to_string_lossy();
     for file in [&args.camera1, &args.camera2, &args.presses] {
         regular::check(file).map_err(|e| Failure::input(format!("{}: {e}", file.display())))?;
@@ -280,24 +280,26 @@ fn open(
     Ok((opened.map_err(Failure::internal)?, about))
 }
 
-fn read_hdf5(path: &Path, stream: Option<&str>, feed: &mut ChunkFeed) -> Result<(), String> {
-    let container = Container::open(path).map_err(|e| e.to_string())?;
-    let mut events = container
-        .events(stream, Geometry::EVK1)
-        .map_err(|e| e.to_string())?;
+fn read_hdf5(
+    path: &Path,
+    stream: Option<&str>,
+    feed: &mut ChunkFeed,
+) -> Result<(), RecordingError> {
+    let container = Container::open(path)?;
+    let mut events = container.events(stream, Geometry::EVK1)?;
     if events.rows() == 0 {
-        return Err(format!("{}: expected events, found none", path.display()));
+        return Err(RecordingError::NoEvents { path: path.into() });
     }
     loop {
-        let batch = events.next_batch().map_err(|e| e.to_string())?;
+        let batch = events.next_batch()?;
         if batch.is_empty() || feed.events(batch).is_err() {
             return Ok(());
         }
     }
 }
 
-fn read_raw(path: &Path, feed: &mut ChunkFeed) -> Result<(), String> {
-    let mut reader = RawReader::open(path).map_err(|e| e.to_string())?;
+fn read_raw(path: &Path, feed: &mut ChunkFeed) -> Result<(), RecordingError> {
+    let mut reader = RawReader::open(path)?;
     let word = match reader.header().format {
         StreamFormat::Evt2 => 4,
         StreamFormat::Evt21 | StreamFormat::Evt21Legacy => 8,
@@ -305,7 +307,7 @@ fn read_raw(path: &Path, feed: &mut ChunkFeed) -> Result<(), String> {
     };
     let mut total = 0;
     loop {
-        let bytes = reader.next_chunk().map_err(|e| e.to_string())?;
+        let bytes = reader.next_chunk()?;
         total += bytes.len();
         if bytes.is_empty() {
             break;
@@ -315,14 +317,12 @@ fn read_raw(path: &Path, feed: &mut ChunkFeed) -> Result<(), String> {
         }
     }
     match (total, total % word) {
-        (0, _) => Err(format!(
-            "{}: expected events, found nothing after the header",
-            path.display()
-        )),
+        (0, _) => Err(RecordingError::NoWords { path: path.into() }),
         (_, 0) => Ok(()),
-        (_, rest) => Err(format!(
-            "{}: expected whole words of {word} bytes, found {rest} bytes after the last one: the file is cut off",
-            path.display()
-        )),
+        (_, rest) => Err(RecordingError::CutOff {
+            path: path.into(),
+            word,
+            rest,
+        }),
     }
 }

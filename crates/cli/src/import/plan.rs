@@ -13,12 +13,12 @@ const TRAVEL_MM_S: f64 = 1_000.0;
 const SETTLE: HostDuration = HostDuration::from_millis(10);
 
 /// Where the scheduled tip waits before the first press.
-pub const fn start() -> Point3<Robot> {
+pub(super) const fn start() -> Point3<Robot> {
     Point3::new(0.0, 0.0, START_MM)
 }
 
 /// The plan of `presses` at `times`.
-pub fn compile(schedule: &Schedule, presses: Vec<PlannedPress>, times: &[HostTime]) -> Plan {
+pub(super) fn compile(schedule: &Schedule, presses: Vec<PlannedPress>, times: &[HostTime]) -> Plan {
     let phases = schedule.phases;
     let span = |from: HostDuration, to: HostDuration| (to.0 - from.0) as f64 * 1e-9;
     let deepest_mm = presses.iter().map(|p| p.depth_mm).fold(0.0, f64::max);

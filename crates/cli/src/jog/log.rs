@@ -9,7 +9,7 @@ use skinrig_model::{HostTime, PoseSample};
 use crate::exit::Failure;
 
 /// An open log.
-pub struct Log {
+pub(super) struct Log {
     path: PathBuf,
     file: File,
     broken: bool,
@@ -20,7 +20,7 @@ impl Log {
     ///
     /// # Errors
     /// [`Failure::internal`] when it cannot be made.
-    pub fn create(path: &Path) -> Result<Self, Failure> {
+    pub(super) fn create(path: &Path) -> Result<Self, Failure> {
         let refused = |e: std::io::Error| {
             Failure::internal(format!(
                 "cannot write the log {}: {e}\n  next: give another place with --log",
@@ -39,12 +39,12 @@ impl Log {
 
     /// Where it is.
     #[must_use]
-    pub fn path(&self) -> &Path {
+    pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
     /// Writes one line.
-    pub fn line(&mut self, t: HostTime, kind: &str, text: &str) {
+    pub(super) fn line(&mut self, t: HostTime, kind: &str, text: &str) {
         let text = text.replace('\n', " | ");
         let written = writeln!(self.file, "{:.3}\t{kind}\t{text}", t.as_secs_f64());
         // A log that fails must not leave the robot where it is: said once, and the orders go on.

@@ -3,6 +3,7 @@
 mod log;
 mod order;
 mod points;
+mod refusal;
 
 use std::io::{BufRead, IsTerminal};
 use std::path::PathBuf;
@@ -13,8 +14,7 @@ use std::time::{Duration, Instant};
 
 use chrono::Utc;
 use skinrig_controller::{
-    ControlHandle, ControllerError, ControllerSettings, Floor, GuardError, Jog, MoveOutcome,
-    TouchOutcome,
+    ControlHandle, ControllerError, ControllerSettings, Floor, Jog, MoveOutcome, TouchOutcome,
 };
 use skinrig_device::{Clock, Indenter, MotionLimits, RealClock};
 use skinrig_hil::lease::Lease;
@@ -31,6 +31,7 @@ use crate::signals;
 use log::Log;
 use order::Order;
 use points::NamedPoint;
+use refusal::{InputError, Refusal};
 
 /// Between two looks at the robot while nobody types.
 const IDLE: Duration = Duration::from_millis(10);
@@ -145,7 +146,7 @@ fn limits(bench: &Bench) -> (RunLimits, MotionLimits) {
 ///
 /// # Errors
 /// [`Failure::rig`] when the robot fails; [`Failure::input`] for a wrong line of a piped file, which ends the jog.
-pub fn jog(args: &JogArgs) -> Outcome {
+pub(crate) fn jog(args: &JogArgs) -> Outcome {
     let path = args.log.clone().unwrap_or_else(default_log);
     let mut log = Log::create(&path)?;
     let idle = Duration::try_from_secs_f64(args.idle)
@@ -312,7 +313,7 @@ impl Table {
                 Ok(None) => continue,
                 Ok(Some(Order::Quit)) => return Ok(Exit::Ok),
                 Ok(Some(order)) => self.obey(order),
-                Err(e) => Err(Refusal::Input(e)),
+                Err(e) => Err(Refusal::Input(e.into())),
             };
             log.path_of_tip(&self.jog.take_trace());
             heard = Instant::now(); // a long motion is no idle time
@@ -330,7 +331,7 @@ impl Table {
                     return Err(Failure::rig(e));
                 }
                 Err(Refusal::Input(e)) => {
-                    log.line(self.jog.now(), "refused", &e);
+                    log.line(self.jog.now(), "refused", &e.to_string());
                     if !interactive {
                         // Nobody looks: what comes after a line that was not obeyed may rely on it.
                         return Err(Failure::input(format!("`{line}`: {e}")));
@@ -396,9 +397,7 @@ impl Table {
 
     fn point(&mut self, name: String, skin: Option<[f64; 3]>) -> Result<String, Refusal> {
         let Some(robot) = self.last_touch.take() else {
-            return Err(Refusal::Input(
-                "expected a touch since the last point, found none; `touch` first".to_owned(),
-            ));
+            return Err(Refusal::Input(InputError::NoTouch));
         };
         self.points.retain(|p| p.name != name);
         let [x, y, z] = robot.to_array();
@@ -410,34 +409,6 @@ impl Table {
     fn block(&self) -> String {
         let today = Utc::now().format("%Y-%m-%d").to_string();
         points::block(&self.points, &today)
-    }
-}
-
-/// Why an order was not obeyed.
-enum Refusal {
-    /// It may not be; the robot is as it was.
-    Input(String),
-    /// The robot failed.
-    Rig(ControllerError),
-}
-
-impl From<ControllerError> for Refusal {
-    fn from(e: ControllerError) -> Self {
-        match e {
-            // The robot is silent: no matter of what was typed.
-            ControllerError::Guard(
-                GuardError::StalePose { .. } | GuardError::NotArmed | GuardError::Tripped { .. },
-            ) => Self::Rig(e),
-            ControllerError::Guard(e @ GuardError::Floor { .. }) => Self::Input(format!(
-                "{e}\n  next: check where the skin is; if it lies lower than the rig file's frame says, start `skinrig jog` \
-                 with --beyond-frame"
-            )),
-            ControllerError::Guard(e) => Self::Input(e.to_string()),
-            ControllerError::Device(e @ skinrig_device::DeviceError::Refused { .. }) => {
-                Self::Input(e.to_string())
-            }
-            e => Self::Rig(e),
-        }
     }
 }
 

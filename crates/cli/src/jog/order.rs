@@ -1,10 +1,11 @@
 //! What the operator types, as orders.
 
-use skinrig_settings::{Dimension, quantity};
+use skinrig_settings::Dimension;
+use skinrig_settings::quantity::{self, QuantityError};
 
 /// One line.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Order {
+pub(super) enum Order {
     /// Along one axis, 0 to 2, by so many mm.
     By(usize, f64),
     /// Straight to a point, mm.
@@ -36,14 +37,64 @@ point NAME [at 10 2 0 mm]     the last touch is this point (where it lies on the
 points                        the touched points as a block for the rig file
 quit                          hold, rise, disarm";
 
+/// Why a line is not an order.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(crate) enum OrderError {
+    /// The first word is unknown.
+    #[error(
+        "expected x, y, z, to, speed, where, touch, point, points, help or quit, found `{found}`"
+    )]
+    Word {
+        /// The word.
+        found: String,
+    },
+    /// An order without arguments has one.
+    #[error("expected nothing after `{word}`, found `{found}`")]
+    Argument {
+        /// The order.
+        word: String,
+        /// What follows it.
+        found: String,
+    },
+    /// Not a quantity of the dimension.
+    #[error("expected {}, found {}", .0.expected, .0.found)]
+    Quantity(QuantityError),
+    /// A speed of 0 or below.
+    #[error("expected a speed above 0, found {mm_s} mm/s")]
+    Speed {
+        /// The speed, mm/s.
+        mm_s: f64,
+    },
+    /// A way of 0 or below.
+    #[error("expected a way above 0, found {mm} mm")]
+    Way {
+        /// The way, mm.
+        mm: f64,
+    },
+    /// Not the name of a point, or more than that.
+    #[error(
+        "expected `point NAME` or `point NAME at 10 2 0 mm`, the name of letters, digits, - and _, found `{found}`"
+    )]
+    Point {
+        /// What follows `point`.
+        found: String,
+    },
+    /// Not three coordinates.
+    #[error("expected three coordinates such as `0 0 5 mm`, found `{found}`")]
+    Coordinates {
+        /// The text.
+        found: String,
+    },
+}
+
 /// How far `touch` goes down when it is not said, mm.
 const TOUCH_WAY_MM: f64 = 5.0;
 
 /// Reads a line; `None` for a blank one and a comment.
 ///
 /// # Errors
-/// What was expected and found.
-pub fn parse(line: &str) -> Result<Option<Order>, String> {
+/// [`OrderError`]: what was expected and found.
+pub(super) fn parse(line: &str) -> Result<Option<Order>, OrderError> {
     let line = line.split('#').next().unwrap_or("").trim();
     let (word, rest) = match line.split_once(char::is_whitespace) {
         Some((word, rest)) => (word, rest.trim()),
@@ -53,7 +104,10 @@ pub fn parse(line: &str) -> Result<Option<Order>, String> {
         if rest.is_empty() {
             Ok(Some(order))
         } else {
-            Err(format!("expected nothing after `{word}`, found `{rest}`"))
+            Err(OrderError::Argument {
+                word: word.to_owned(),
+                found: rest.to_owned(),
+            })
         }
     };
     match word {
@@ -65,51 +119,50 @@ pub fn parse(line: &str) -> Result<Option<Order>, String> {
         "to" => Ok(Some(Order::To(triple(rest)?))),
         "speed" => match measured(rest, Dimension::Speed)? {
             v if v > 0.0 => Ok(Some(Order::Speed(v))),
-            v => Err(format!("expected a speed above 0, found {v} mm/s")),
+            mm_s => Err(OrderError::Speed { mm_s }),
         },
         "touch" if rest.is_empty() => Ok(Some(Order::Touch(TOUCH_WAY_MM))),
         "touch" => match length(rest)? {
             v if v > 0.0 => Ok(Some(Order::Touch(v))),
-            v => Err(format!("expected a way above 0, found {v} mm")),
+            mm => Err(OrderError::Way { mm }),
         },
         "point" => point(rest).map(Some),
         "where" => bare(Order::Where),
         "points" => bare(Order::Points),
         "help" => bare(Order::Help),
         "quit" => bare(Order::Quit),
-        other => Err(format!(
-            "expected x, y, z, to, speed, where, touch, point, points, help or quit, found `{other}`"
-        )),
+        other => Err(OrderError::Word {
+            found: other.to_owned(),
+        }),
     }
 }
 
-fn point(rest: &str) -> Result<Order, String> {
+fn point(rest: &str) -> Result<Order, OrderError> {
     let (name, place) = match rest.split_once(" at ") {
         Some((name, place)) => (name.trim(), Some(triple(place.trim())?)),
         None => (rest, None),
     };
     let plain = |c: char| c.is_alphanumeric() || c == '-' || c == '_';
     if name.is_empty() || !name.chars().all(plain) {
-        return Err(format!(
-            "expected `point NAME` or `point NAME at 10 2 0 mm`, the name of letters, digits, - and _, found `{rest}`"
-        ));
+        return Err(OrderError::Point {
+            found: rest.to_owned(),
+        });
     }
     Ok(Order::Point(name.to_owned(), place))
 }
 
-fn measured(text: &str, dimension: Dimension) -> Result<f64, String> {
+fn measured(text: &str, dimension: Dimension) -> Result<f64, OrderError> {
     quantity::parse(text, &[dimension])
         .map(|q| q.value)
-        .map_err(|e| format!("expected {}, found {}", e.expected, e.found))
+        .map_err(OrderError::Quantity)
 }
 
-fn length(text: &str) -> Result<f64, String> {
+fn length(text: &str) -> Result<f64, OrderError> {
     measured(text, Dimension::Length)
 }
 
 /// Three lengths: each with its unit, or one unit for all at the end. Commas may stand between.
-fn triple(text: &str) -> Result<[f64; 3], String> {
-    let wrong = || format!("expected three coordinates such as `0 0 5 mm`, found `{text}`");
+fn triple(text: &str) -> Result<[f64; 3], OrderError> {
     let flat = text.replace(',', " ");
     let words: Vec<&str> = flat.split_whitespace().collect();
     let one = |a: &str, unit: &str| length(&format!("{a}{unit}"));
@@ -125,7 +178,9 @@ fn triple(text: &str) -> Result<[f64; 3], String> {
         }
         [x, y, z, unit] => Ok([one(x, unit)?, one(y, unit)?, one(z, unit)?]),
         [x, a, y, b, z, c] => Ok([one(x, a)?, one(y, b)?, one(z, c)?]),
-        _ => Err(wrong()),
+        _ => Err(OrderError::Coordinates {
+            found: text.to_owned(),
+        }),
     }
 }
 

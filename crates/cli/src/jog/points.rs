@@ -15,7 +15,7 @@ pub(crate) struct NamedPoint {
 
 /// The key `frame` of a rig file with these points, to be pasted.
 #[must_use]
-pub fn block(points: &[NamedPoint], date: &str) -> String {
+pub(super) fn block(points: &[NamedPoint], date: &str) -> String {
     let mut out = format!("frame:\n  touch_off:\n    date: {date}\n    points:\n");
     for p in points {
         let [x, y, z] = p.robot.to_array();

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use skinrig_controller::{ControlHandle, Progress, State};
 
+use super::error::ServerError;
 use super::server::Server;
 use super::wire::{Live, Reply, Request, RunRequest};
 
@@ -14,7 +15,7 @@ const RENEW_EVERY: Duration = Duration::from_millis(100);
 
 /// Where the controller's thread leaves a copy of the run's progress.
 #[derive(Debug)]
-pub struct Board {
+pub(crate) struct Board {
     progress: Arc<Mutex<Progress>>,
     control: ControlHandle,
     began: Instant,
@@ -23,7 +24,7 @@ pub struct Board {
 impl Board {
     /// A board of a run that nothing is known of yet.
     #[must_use]
-    pub fn new(control: ControlHandle) -> Self {
+    pub(crate) fn new(control: ControlHandle) -> Self {
         Self {
             progress: Arc::default(),
             control,
@@ -33,7 +34,7 @@ impl Board {
 
     /// Answers one request; never waits.
     #[must_use]
-    pub fn answer(&self, request: Request) -> Reply {
+    pub(crate) fn answer(&self, request: Request) -> Reply {
         match request {
             Request::Status => Reply::Live(Box::new(self.live())),
             // Whoever ends a run that is over would otherwise wait for an answer that never comes.
@@ -75,7 +76,7 @@ impl Board {
 }
 
 /// The side of the run: listens, and is told the progress. Dropped, it listens no more.
-pub struct Remote {
+pub(crate) struct Remote {
     progress: Arc<Mutex<Progress>>,
     renewed: Option<Instant>,
     _server: Server,
@@ -86,7 +87,7 @@ impl Remote {
     ///
     /// # Errors
     /// Why that is not possible; the run does without.
-    pub fn open(session: &Path, control: &ControlHandle) -> Result<Self, String> {
+    pub(crate) fn open(session: &Path, control: &ControlHandle) -> Result<Self, ServerError> {
         let board = Board::new(control.clone());
         let progress = Arc::clone(&board.progress);
         let server = Server::open(session, move |request| board.answer(request))?;
@@ -98,7 +99,7 @@ impl Remote {
     }
 
     /// Renews what is shown, `bulk` data from time to time only; leaves it when somebody reads it at this instant.
-    pub fn show(&mut self, progress: &Progress, bulk: bool) {
+    pub(crate) fn show(&mut self, progress: &Progress, bulk: bool) {
         if bulk && self.renewed.is_some_and(|t| t.elapsed() < RENEW_EVERY) {
             return;
         }

@@ -2,36 +2,26 @@
 
 use std::path::Path;
 
+use super::error::RemoteError;
 use super::wire::{Reply, Request};
-
-/// Why a run gave no answer.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum RemoteError {
-    /// No program is listening: there is no run, or it was killed.
-    NotListening,
-    /// A program is listening, but the exchange failed.
-    Failed(String),
-}
 
 /// Asks the run that writes the session at `session`.
 ///
 /// # Errors
 /// [`RemoteError`].
 #[cfg(unix)]
-pub fn ask(session: &Path, request: &Request) -> Result<Reply, RemoteError> {
+pub(crate) fn ask(session: &Path, request: &Request) -> Result<Reply, RemoteError> {
     use std::io::ErrorKind;
     use std::os::unix::net::UnixStream;
 
-    let trouble = |e: std::io::Error| RemoteError::Failed(e.to_string());
-    for place in super::place::places(session).map_err(trouble)? {
+    use super::error::ExchangeError;
+
+    for place in super::place::places(session).map_err(ExchangeError::Place)? {
         match UnixStream::connect(&place) {
             Ok(stream) => return talk(stream, request),
             Err(e) => match e.kind() {
                 ErrorKind::PermissionDenied => {
-                    return Err(RemoteError::Failed(format!(
-                        "{}: the run belongs to another user",
-                        place.display()
-                    )));
+                    return Err(ExchangeError::OtherUser { place }.into());
                 }
                 // Nothing there, nobody behind it, no socket, or an address that is too long for one.
                 _ => continue,
@@ -53,10 +43,12 @@ fn talk(stream: std::os::unix::net::UnixStream, request: &Request) -> Result<Rep
     use std::io::{ErrorKind, Read, Write};
     use std::time::Duration;
 
+    use super::error::ExchangeError;
+
     /// Longest wait for an answer: others may be before us.
     const ANSWER_WITHIN: Duration = Duration::from_secs(5);
 
-    super::place::check_peer(&stream, super::place::may_answer).map_err(RemoteError::Failed)?;
+    super::place::check_peer(&stream, super::place::may_answer).map_err(ExchangeError::Peer)?;
     let mut said = Vec::new();
     let mut talked = || -> std::io::Result<()> {
         let mut stream = &stream;
@@ -74,9 +66,8 @@ fn talk(stream: std::os::unix::net::UnixStream, request: &Request) -> Result<Rep
         Err(e) if matches!(e.kind(), ErrorKind::BrokenPipe | ErrorKind::ConnectionReset) => {
             Err(RemoteError::NotListening)
         }
-        Err(e) => Err(RemoteError::Failed(format!("no answer from the run: {e}"))),
+        Err(e) => Err(ExchangeError::NoAnswer(e).into()),
         Ok(()) if said.is_empty() => Err(RemoteError::NotListening),
-        Ok(()) => serde_json::from_slice(&said)
-            .map_err(|e| RemoteError::Failed(format!("an unreadable answer: {e}"))),
+        Ok(()) => Ok(serde_json::from_slice(&said).map_err(ExchangeError::Unreadable)?),
     }
 }

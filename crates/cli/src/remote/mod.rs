@@ -6,22 +6,24 @@
 
 mod board;
 mod client;
+mod error;
 #[cfg(unix)]
 mod place;
 #[cfg(unix)]
 mod server;
 mod wire;
 
-pub use board::{Board, Remote};
-pub use client::{RemoteError, ask};
-pub use wire::{Live, MOST_NAME_CHARS, Reply, Request, RunRequest};
+pub(crate) use board::Remote;
+pub(crate) use client::ask;
+pub(crate) use error::RemoteError;
+pub(crate) use wire::{Live, MOST_NAME_CHARS, Reply, Request, RunRequest};
 
 /// No sockets of the file system here.
 #[cfg(not(unix))]
 mod server {
     use std::path::Path;
 
-    use super::{Reply, Request};
+    use super::{Reply, Request, ServerError};
 
     /// Nothing listens.
     pub(crate) struct Server;
@@ -32,8 +34,8 @@ mod server {
         pub fn open(
             _session: &Path,
             _answer: impl FnMut(Request) -> Reply + Send + 'static,
-        ) -> Result<Self, String> {
-            Err("this system has no control from another terminal; use ctrl-C".to_owned())
+        ) -> Result<Self, ServerError> {
+            Err(ServerError::Unsupported)
         }
     }
 }

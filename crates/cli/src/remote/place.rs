@@ -8,13 +8,15 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
+use super::error::PeerError;
+
 /// The places of the socket of `session`, the preferred one first: beside it; where that cannot be (the address of a socket
 /// is at most about 100 bytes long, and not every file system has sockets) in a folder of the user's own, under a name made
 /// of the session's path. None depends on the environment, so that every terminal finds the same.
 ///
 /// # Errors
 /// When the session's folder cannot be found.
-pub fn places(session: &Path) -> io::Result<[PathBuf; 2]> {
+pub(super) fn places(session: &Path) -> io::Result<[PathBuf; 2]> {
     let session = fs::canonicalize(session)?;
     let mut beside = session.clone().into_os_string();
     beside.push("-control");
@@ -56,19 +58,20 @@ fn me() -> u32 {
 /// the socket alone keep strangers out.
 ///
 /// # Errors
-/// A message for the stranger.
-pub(crate) fn check_peer(stream: &UnixStream, may: fn(u32, u32) -> bool) -> Result<(), String> {
+/// [`PeerError`]: what the stranger is told.
+pub(crate) fn check_peer(stream: &UnixStream, may: fn(u32, u32) -> bool) -> Result<(), PeerError> {
     #[cfg(target_os = "linux")]
     {
         let peer = rustix::net::sockopt::socket_peercred(stream)
-            .map_err(|e| format!("cannot identify the other end: {e}"))?
+            .map_err(|e| PeerError::Unidentified(e.into()))?
             .uid
             .as_raw();
         let me = me();
         if !may(peer, me) {
-            return Err(format!(
-                "expected user {me} at the other end, found user {peer}"
-            ));
+            return Err(PeerError::OtherUser {
+                expected: me,
+                found: peer,
+            });
         }
     }
     #[cfg(not(target_os = "linux"))]

@@ -10,8 +10,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use super::error::ServerError;
 use super::place;
-use super::wire::{MOST_REQUEST_BYTES, Reply, Request};
+use super::wire::{MOST_REQUEST_BYTES, Reply, Request, RequestError};
 
 /// Who asks must have asked within this time.
 const ASK_WITHIN: Duration = Duration::from_millis(300);
@@ -35,23 +36,27 @@ impl Server {
     ///
     /// # Errors
     /// Why no place of a socket can be used.
-    pub fn open(
+    pub(super) fn open(
         session: &Path,
         answer: impl FnMut(Request) -> Reply + Send + 'static,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, ServerError> {
         let answer = Arc::new(Mutex::new(answer));
-        let [beside, own] = place::places(session).map_err(|e| e.to_string())?;
+        let [beside, own] = place::places(session)?;
         let (listener, path) = match bind(&beside) {
             Ok(listener) => (listener, beside),
-            Err(first) => match place::make_own_folder().and_then(|()| bind(&own)) {
+            Err(beside_error) => match place::make_own_folder().and_then(|()| bind(&own)) {
                 Ok(listener) => (listener, own),
-                Err(e) => {
-                    let (beside, own) = (beside.display(), own.display());
-                    return Err(format!("{beside}: {first}; {own}: {e}"));
+                Err(own_error) => {
+                    return Err(ServerError::Bind {
+                        beside,
+                        beside_error,
+                        own,
+                        own_error,
+                    });
                 }
             },
         };
-        let id = identity(&path).map_err(|e| e.to_string())?;
+        let id = identity(&path)?;
         let over = Arc::new(AtomicBool::new(false));
         let is_over = Arc::clone(&over);
         let thread = std::thread::Builder::new()
@@ -67,8 +72,7 @@ impl Server {
                         Err(_) => std::thread::sleep(TRY_AGAIN),
                     }
                 }
-            })
-            .map_err(|e| e.to_string())?;
+            })?;
         Ok(Self {
             path,
             id,
@@ -128,9 +132,9 @@ fn identity(path: &Path) -> io::Result<(u64, u64)> {
 /// Hears one request and answers it.
 fn serve(mut stream: UnixStream, answer: &Mutex<impl FnMut(Request) -> Reply>) -> io::Result<()> {
     let reply = match place::check_peer(&stream, place::may_ask) {
-        Err(refused) => Reply::Refused(refused),
+        Err(why) => Reply::Refused(why.to_string()),
         Ok(()) => match hear(&mut stream)? {
-            Err(refused) => Reply::Refused(refused),
+            Err(why) => Reply::Refused(why.to_string()),
             Ok(request) => {
                 let mut answer = answer.lock().unwrap_or_else(PoisonError::into_inner);
                 (*answer)(request)
@@ -144,13 +148,13 @@ fn serve(mut stream: UnixStream, answer: &Mutex<impl FnMut(Request) -> Reply>) -
 }
 
 /// Reads one line within the time and length that a caller has.
-fn hear(stream: &mut UnixStream) -> io::Result<Result<Request, String>> {
+fn hear(stream: &mut UnixStream) -> io::Result<Result<Request, RequestError>> {
     let until = Instant::now() + ASK_WITHIN;
     let (mut line, mut block) = (Vec::new(), [0; 1024]);
     loop {
         let left = until.saturating_duration_since(Instant::now());
         if left.is_zero() {
-            return Ok(Err("expected a request at once, found none".to_owned()));
+            return Ok(Err(RequestError::Late));
         }
         stream.set_read_timeout(Some(left))?;
         let n = match stream.read(&mut block) {
@@ -171,17 +175,15 @@ fn hear(stream: &mut UnixStream) -> io::Result<Result<Request, String>> {
             return Ok(Request::parse(&line[..end]));
         }
         if n == 0 || line.len() > MOST_REQUEST_BYTES {
-            return Ok(Err(format!(
-                "expected one line of at most {MOST_REQUEST_BYTES} bytes, found {} without an end",
-                line.len()
-            )));
+            return Ok(Err(RequestError::Endless { found: line.len() }));
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::client::{RemoteError, ask};
+    use super::super::client::ask;
+    use super::super::error::RemoteError;
     use super::super::wire::RunRequest;
     use super::*;
 
@@ -214,7 +216,7 @@ mod tests {
         ));
         let running = server(&session);
         assert_eq!(fs::metadata(place).unwrap().mode() & 0o777, 0o600);
-        assert_eq!(ask(&session, &PAUSE), Ok(Reply::Handed(7)));
+        assert_eq!(ask(&session, &PAUSE).unwrap(), Reply::Handed(7));
         drop(running);
         assert!(matches!(
             ask(&session, &PAUSE),
@@ -230,7 +232,7 @@ mod tests {
         // Something else lies there, and stays.
         fs::write(&beside, "mine").unwrap();
         let running = server(&session);
-        assert_eq!(ask(&session, &PAUSE), Ok(Reply::Handed(7)));
+        assert_eq!(ask(&session, &PAUSE).unwrap(), Reply::Handed(7));
         assert!(own.exists());
         drop(running);
         assert!(!own.exists());
@@ -241,7 +243,7 @@ mod tests {
         let far = deep.join("a.session.sqlite");
         fs::write(&far, "").unwrap();
         let running = server(&far);
-        assert_eq!(ask(&far, &PAUSE), Ok(Reply::Handed(7)));
+        assert_eq!(ask(&far, &PAUSE).unwrap(), Reply::Handed(7));
         drop(running);
     }
 
@@ -268,7 +270,7 @@ mod tests {
             .map(|_| UnixStream::connect(place).unwrap())
             .collect();
         drop(UnixStream::connect(place).unwrap());
-        assert_eq!(ask(&session, &PAUSE), Ok(Reply::Handed(7)));
+        assert_eq!(ask(&session, &PAUSE).unwrap(), Reply::Handed(7));
         drop((silent, running));
     }
 }

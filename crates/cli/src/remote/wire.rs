@@ -10,14 +10,14 @@ pub(crate) const MOST_REQUEST_BYTES: usize = 16 * 1024;
 /// Longest answer, bytes.
 pub(crate) const MOST_REPLY_BYTES: usize = 64 * 1024;
 /// Longest remark, characters.
-pub const MOST_NOTE_CHARS: usize = 2_000;
+pub(crate) const MOST_NOTE_CHARS: usize = 2_000;
 /// Longest name of an operator, characters.
-pub const MOST_NAME_CHARS: usize = 64;
+pub(crate) const MOST_NAME_CHARS: usize = 64;
 
 /// What the operator asks of the run; `docs/reference/runs.md` says what each does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "snake_case")]
-pub enum RunRequest {
+pub(crate) enum RunRequest {
     /// Wait after the current press.
     Pause,
     /// Abort the current press, leave the skin, and wait.
@@ -35,7 +35,7 @@ pub enum RunRequest {
 /// A question.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Request {
+pub(crate) enum Request {
     /// Ask for the state of the run.
     Status,
     /// Control the run.
@@ -52,7 +52,7 @@ pub enum Request {
 /// The answer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Reply {
+pub(crate) enum Reply {
     /// The state of the run.
     Live(Box<Live>),
     /// Accepted; the number of the request or remark.
@@ -63,7 +63,7 @@ pub enum Reply {
 
 /// A run at one instant, as reported by the run itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Live {
+pub(crate) struct Live {
     /// Name of its [`State`].
     pub state: String,
     /// Requests made so far, by ctrl-C or from another terminal.
@@ -105,7 +105,7 @@ pub struct Live {
 
 /// A press of a [`Live`] run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LivePress {
+pub(crate) struct LivePress {
     /// Its number in the plan, from 1.
     pub number: u32,
     /// `sync`, `calibrate` or `score`.
@@ -118,7 +118,7 @@ pub struct LivePress {
 
 /// A camera of a [`Live`] run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LiveCamera {
+pub(crate) struct LiveCamera {
     /// CD events per second of rig time over about the last second.
     pub events_per_s: Option<f64>,
     /// CD events in this leg.
@@ -129,29 +129,59 @@ pub struct LiveCamera {
     pub marks_seen: u64,
 }
 
+/// Why what a caller sent is not a request.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum RequestError {
+    /// The caller sent nothing in time.
+    #[error("expected a request at once, found none")]
+    Late,
+    /// The line does not end.
+    #[error(
+        "expected one line of at most {MOST_REQUEST_BYTES} bytes, found {found} without an end"
+    )]
+    Endless {
+        /// Bytes received.
+        found: usize,
+    },
+    /// The line does not parse.
+    #[error("expected a request of `skinrig`, found other bytes: {0}")]
+    Foreign(#[from] serde_json::Error),
+    /// A text of a note is empty or too long.
+    #[error("expected a {part} of 1 to {most} characters, found {found}")]
+    Length {
+        /// `name` or `note`.
+        part: &'static str,
+        /// Maximum, characters.
+        most: usize,
+        /// Length, characters.
+        found: usize,
+    },
+    /// A text of a note has control characters.
+    #[error("expected a {part} without control characters, found one")]
+    Control {
+        /// `name` or `note`.
+        part: &'static str,
+    },
+}
+
 impl Request {
     /// Reads a request, which may be anything that anybody wrote.
     ///
     /// # Errors
-    /// What was expected.
-    pub fn parse(line: &[u8]) -> Result<Self, String> {
-        let request: Self = serde_json::from_slice(line)
-            .map_err(|e| format!("expected a request of `skinrig`, found other bytes: {e}"))?;
+    /// [`RequestError`].
+    pub(crate) fn parse(line: &[u8]) -> Result<Self, RequestError> {
+        let request: Self = serde_json::from_slice(line)?;
         if let Self::Note { by, text } = &request {
-            for (what, words, most) in [
+            for (part, words, most) in [
                 ("name", by, MOST_NAME_CHARS),
                 ("note", text, MOST_NOTE_CHARS),
             ] {
                 let found = words.chars().count();
                 if !(1..=most).contains(&found) {
-                    return Err(format!(
-                        "expected a {what} of 1 to {most} characters, found {found}"
-                    ));
+                    return Err(RequestError::Length { part, most, found });
                 }
                 if words.chars().any(char::is_control) {
-                    return Err(format!(
-                        "expected a {what} without control characters, found one"
-                    ));
+                    return Err(RequestError::Control { part });
                 }
             }
         }
@@ -162,7 +192,7 @@ impl Request {
 impl Live {
     /// From what the terminal of the run shows.
     #[must_use]
-    pub fn of(p: &Progress, state: State, counts: [u64; 3], waited_s: f64) -> Self {
+    pub(crate) fn of(p: &Progress, state: State, counts: [u64; 3], waited_s: f64) -> Self {
         let [asked, heard, noted] = counts;
         Self {
             state: state.name().to_owned(),
@@ -216,7 +246,7 @@ mod tests {
             note("Ann", "the lamp flickers: \"40 %\""),
         ] {
             let line = serde_json::to_vec(&request).unwrap();
-            assert_eq!(Request::parse(&line), Ok(request));
+            assert_eq!(Request::parse(&line).unwrap(), request);
         }
     }
 

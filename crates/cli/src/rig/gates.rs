@@ -1,12 +1,14 @@
 //! What the program itself checks before a run: disk, frame, recorder; and whom the rig file expects.
 
+use std::io;
 use std::path::Path;
 
 use chrono::Utc;
 use skinrig_controller::{ExpectedDevice, Loopback, Preflight};
 use skinrig_device::Rig;
-use skinrig_model::{CheckKind, HostDuration, PreflightCheck};
+use skinrig_model::{CheckKind, CheckVerdict, HostDuration, PreflightCheck};
 use skinrig_protocol::rig::{Frame, PreflightLimits, RigFile, RigKind};
+use skinrig_text::{Column, Table, widest};
 
 /// Space that must be left on the disk after a session of the simulated rig, bytes.
 const SIMULATED_RESERVE_B: f64 = 200e6;
@@ -106,7 +108,7 @@ fn disk(folder: &Path, session_b: f64, reserve_b: f64) -> PreflightCheck {
         .unwrap_or(Path::new("."));
     match free_bytes(there) {
         Ok(free_b) => PreflightCheck::new("disk", expected, size(free_b), free_b >= need_b, next),
-        Err(e) => PreflightCheck::new("disk", expected, e, false, next),
+        Err(e) => PreflightCheck::new("disk", expected, e.to_string(), false, next),
     }
     .about(CheckKind::Disk)
 }
@@ -116,8 +118,8 @@ fn disk(folder: &Path, session_b: f64, reserve_b: f64) -> PreflightCheck {
 ///
 /// # Errors
 /// What the system answers.
-pub fn free_bytes(folder: &Path) -> Result<f64, String> {
-    let room = rustix::fs::statvfs(folder).map_err(|e| e.to_string())?;
+pub fn free_bytes(folder: &Path) -> io::Result<f64> {
+    let room = rustix::fs::statvfs(folder)?;
     Ok(room.f_bavail as f64 * room.f_frsize as f64)
 }
 
@@ -126,8 +128,11 @@ pub fn free_bytes(folder: &Path) -> Result<f64, String> {
 ///
 /// # Errors
 /// Always.
-pub fn free_bytes(_folder: &Path) -> Result<f64, String> {
-    Err("free space cannot be asked for on this system".to_owned())
+pub fn free_bytes(_folder: &Path) -> io::Result<f64> {
+    Err(io::Error::new(
+        io::ErrorKind::Unsupported,
+        "free space cannot be asked for on this system",
+    ))
 }
 
 /// `1.5 GB`.
@@ -173,23 +178,36 @@ fn frame(frame: &Frame, limits: &PreflightLimits) -> Vec<PreflightCheck> {
     [age, fit].map(|c| c.about(CheckKind::Frame)).into()
 }
 
+/// What a run shows of its preflight: one line when no check failed, else [`table`].
+#[must_use]
+pub(crate) fn report(checks: &[PreflightCheck]) -> String {
+    if checks.iter().any(PreflightCheck::failed) {
+        return table(checks);
+    }
+    let of = |verdict| checks.iter().filter(move |c| c.verdict == verdict);
+    let mut line = format!("preflight {} passed", of(CheckVerdict::Passed).count());
+    let skipped: Vec<&str> = of(CheckVerdict::Skipped)
+        .map(|c| c.check.as_str())
+        .collect();
+    if !skipped.is_empty() {
+        line += &format!(", not checked: {}", skipped.join("; "));
+    }
+    line + "; `skinrig show SESSION` lists them"
+}
+
 /// The table for people: check, expected, found, verdict, and under a failed check the next step.
 #[must_use]
 pub fn table(checks: &[PreflightCheck]) -> String {
-    let width = |of: fn(&PreflightCheck) -> &str| {
-        let widest = checks.iter().map(|c| of(c).chars().count()).max();
-        widest.unwrap_or(0).min(60)
+    let column = |of: fn(&PreflightCheck) -> &str| {
+        let widest = widest(checks.iter().map(of));
+        Column::left(widest.min(60))
     };
-    let (name, expected) = (width(|c| &c.check), width(|c| &c.expected));
+    let (check, expected) = (column(|c| &c.check), column(|c| &c.expected));
+    let table = Table::new([Column::left(7), check, expected]).indent(2);
     let mut out = String::from("preflight\n");
     for c in checks {
-        out.push_str(&format!(
-            "  {:<7}  {:<name$}  {:<expected$}  {}\n",
-            c.verdict.name(),
-            c.check,
-            c.expected,
-            c.found
-        ));
+        out += &table.row([c.verdict.name(), &c.check, &c.expected, &c.found]);
+        out.push('\n');
         if c.failed() {
             out.push_str(&format!("           next: {}\n", c.next_step));
         }
@@ -200,8 +218,20 @@ pub fn table(checks: &[PreflightCheck]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skinrig_model::CheckVerdict;
     use skinrig_protocol::rig::Date;
+
+    #[test]
+    fn a_preflight_without_a_failure_takes_one_line() {
+        let passed = PreflightCheck::new("disk", "1 GB", "2 GB", true, "");
+        let skipped = PreflightCheck::skipped("frame", "touched points", "simulated");
+        let failed = PreflightCheck::new("camera 1: clock", "advancing", "no time", false, "x");
+        assert_eq!(
+            report(&[passed.clone(), skipped]),
+            "preflight 1 passed, not checked: frame; `skinrig show SESSION` lists them"
+        );
+        let all = [passed, failed];
+        assert_eq!(report(&all), table(&all));
+    }
 
     #[test]
     fn a_session_that_does_not_fit_fails() {
@@ -252,5 +282,15 @@ mod tests {
             table(&checks),
             "preflight\n  passed   disk             1 GB       2 GB\n  failed   camera 1: clock  advancing  no time\n           next: power-cycle it\n"
         );
+    }
+    #[test]
+    fn wide_and_combining_characters_keep_the_table_aligned() {
+        let check = |name: &str| PreflightCheck::new(name, "free", "found", true, "");
+        let checks = ["disk", "カメラ1", "cle\u{301}"].map(check);
+        let shown = table(&checks);
+        for line in shown.lines().skip(1) {
+            let before = line.strip_suffix("found").unwrap();
+            assert_eq!(skinrig_text::width(before), 26, "{shown}");
+        }
     }
 }

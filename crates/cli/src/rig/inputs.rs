@@ -1,5 +1,6 @@
 //! What a rig file names on this computer: bias files and lamp programs. Looked at before anything is opened or moved.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use skinrig_protocol::CameraRequest;
@@ -9,16 +10,47 @@ use super::bench;
 use crate::exit::Failure;
 
 /// Something that a rig file names, and whether it can be used.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug)]
 pub struct Input {
     /// The key that names it.
     pub key: String,
     /// What has to be there.
     pub expected: String,
     /// What is there.
-    pub found: Result<String, String>,
+    pub found: Result<PathBuf, UnusableInput>,
     /// What to do when it cannot be used.
     pub next: String,
+}
+
+/// Why what a rig file names cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum UnusableInput {
+    /// The bias file cannot be read.
+    #[error("{}", .0.message)]
+    BiasFile(Failure),
+    /// The rig file names no program.
+    #[error("no program")]
+    NoProgram,
+    /// No folder of `PATH` has the program.
+    #[error("`{name}`, which is not in PATH")]
+    NotInPath {
+        /// Name of the program.
+        name: String,
+    },
+    /// The program is a folder, or something else.
+    #[error("`{}`, which is not a file", file.display())]
+    NotAFile {
+        /// Its path.
+        file: PathBuf,
+    },
+    /// This user may not run the program.
+    #[error("`{}`: {source}", file.display())]
+    NotRunnable {
+        /// Its path.
+        file: PathBuf,
+        /// Error of the operating system.
+        source: io::Error,
+    },
 }
 
 /// Every bias file and every lamp program of `rig`.
@@ -31,9 +63,7 @@ pub fn all(rig: &RigFile) -> Vec<Input> {
             inputs.push(Input {
                 key: format!("cameras.{name}.bias_file"),
                 expected: "a bias file that can be read".to_owned(),
-                found: read
-                    .map(|_| file.display().to_string())
-                    .map_err(|failure| failure.message),
+                found: read.map(|_| file.clone()).map_err(UnusableInput::BiasFile),
                 next: "correct the path, which is relative to the rig file, or remove the key"
                     .to_owned(),
             });
@@ -44,8 +74,7 @@ pub fn all(rig: &RigFile) -> Vec<Input> {
             inputs.push(Input {
                 key: format!("hil.light.{key}"),
                 expected: "a program that this user may run".to_owned(),
-                found: program(words, std::env::var_os("PATH").as_deref())
-                    .map(|path| path.display().to_string()),
+                found: program(words, std::env::var_os("PATH").as_deref()),
                 next: "give an existing program, by its path or by a name in PATH, or remove `hil.light`"
                     .to_owned(),
             });
@@ -77,16 +106,16 @@ pub fn check(rig: &RigFile) -> Result<(), Failure> {
 
 /// The file that running `words` would start, as the system looks for it: a name with a slash is a path, any other one is
 /// looked for in the folders of `path`.
-fn program(words: &[String], path: Option<&std::ffi::OsStr>) -> Result<PathBuf, String> {
+fn program(words: &[String], path: Option<&std::ffi::OsStr>) -> Result<PathBuf, UnusableInput> {
     let Some(name) = words.first().filter(|name| !name.is_empty()) else {
-        return Err("no program".to_owned());
+        return Err(UnusableInput::NoProgram);
     };
     if name.contains('/') {
         let file = PathBuf::from(name);
         return runnable(&file).map(|()| file);
     }
     let folders = path.map(std::env::split_paths).into_iter().flatten();
-    let mut why = format!("`{name}`, which is not in PATH");
+    let mut why = UnusableInput::NotInPath { name: name.clone() };
     for folder in folders {
         let file = folder.join(name);
         match runnable(&file) {
@@ -99,22 +128,29 @@ fn program(words: &[String], path: Option<&std::ffi::OsStr>) -> Result<PathBuf, 
 }
 
 #[cfg(unix)]
-fn runnable(file: &Path) -> Result<(), String> {
+fn runnable(file: &Path) -> Result<(), UnusableInput> {
     use rustix::fs::{Access, access};
 
-    let name = file.display();
+    let unusable = |source| UnusableInput::NotRunnable {
+        file: file.to_owned(),
+        source,
+    };
     match std::fs::metadata(file) {
-        Err(e) => Err(format!("`{name}`: {e}")),
-        Ok(there) if !there.is_file() => Err(format!("`{name}`, which is not a file")),
-        Ok(_) => access(file, Access::EXEC_OK).map_err(|e| format!("`{name}`: {e}")),
+        Err(e) => Err(unusable(e)),
+        Ok(there) if !there.is_file() => Err(UnusableInput::NotAFile {
+            file: file.to_owned(),
+        }),
+        Ok(_) => access(file, Access::EXEC_OK).map_err(|e| unusable(e.into())),
     }
 }
 
 #[cfg(not(unix))]
-fn runnable(file: &Path) -> Result<(), String> {
+fn runnable(file: &Path) -> Result<(), UnusableInput> {
     match file.is_file() {
         true => Ok(()),
-        false => Err(format!("`{}`, which is not a file", file.display())),
+        false => Err(UnusableInput::NotAFile {
+            file: file.to_owned(),
+        }),
     }
 }
 
@@ -134,26 +170,17 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("lamp");
         let path = Some(folder.path().as_os_str());
-        assert!(program(&words("lamp"), path).unwrap_err().contains("PATH"));
+        let error = |words: &[String]| program(words, path).unwrap_err().to_string();
+        assert!(error(&words("lamp")).contains("PATH"));
         std::fs::write(&file, "#!/bin/sh\n").unwrap();
         set_mode(&file, 0o755);
-        assert_eq!(program(&words("lamp"), path), Ok(file.clone()));
-        assert_eq!(
-            program(&words(&file.display().to_string()), None),
-            Ok(file.clone())
-        );
+        assert_eq!(program(&words("lamp"), path).unwrap(), file);
+        let full = words(&file.display().to_string());
+        assert_eq!(program(&full, None).unwrap(), file);
         set_mode(&file, 0o644);
-        assert!(
-            program(&words("lamp"), path)
-                .unwrap_err()
-                .contains("denied")
-        );
+        assert!(error(&words("lamp")).contains("denied"));
         let here = folder.path().display().to_string();
-        assert!(
-            program(&words(&here), path)
-                .unwrap_err()
-                .contains("not a file")
-        );
+        assert!(error(&words(&here)).contains("not a file"));
         assert!(program(&[], path).is_err());
     }
 

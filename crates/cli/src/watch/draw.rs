@@ -13,7 +13,7 @@ const MOST: [usize; 2] = [36, 18];
 
 /// The frame.
 #[must_use]
-pub fn text(frame: &Frame) -> String {
+pub(super) fn text(frame: &Frame) -> String {
     let p = &frame.presses;
     let mut lines = vec![
         format!("session  {}", frame.session.display()),

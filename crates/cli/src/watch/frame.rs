@@ -1,5 +1,6 @@
 //! What there is to see of a run at one instant.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -24,7 +25,7 @@ const LEFT_ALONE: Duration = Duration::from_secs(10);
 
 /// A run at one instant.
 #[derive(Debug, Serialize)]
-pub struct Frame {
+pub(super) struct Frame {
     /// The file.
     pub session: PathBuf,
     /// In a word or some.
@@ -59,7 +60,7 @@ pub struct Frame {
 
 /// A place of the path.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Place {
+pub(super) struct Place {
     /// Where, skin frame, mm.
     pub at_mm: [f64; 2],
     /// Presses planned there.
@@ -89,7 +90,7 @@ pub(crate) struct Latest {
 
 /// Something that broke the normal course.
 #[derive(Debug, Serialize)]
-pub struct Fault {
+pub(super) struct Fault {
     /// When, session time, s.
     pub t_s: f64,
     /// What.
@@ -100,13 +101,13 @@ pub struct Fault {
 
 impl Frame {
     /// Nothing more will happen.
-    pub fn is_over(&self) -> bool {
+    pub(super) fn is_over(&self) -> bool {
         self.sealed || self.writer.is_none()
     }
 }
 
 /// Follows one session.
-pub struct Follower {
+pub(super) struct Follower {
     session: PathBuf,
     /// What never changes: read once.
     head: Option<SessionInfo>,
@@ -126,7 +127,7 @@ struct SessionInfo {
 
 impl Follower {
     /// Of the session at this path.
-    pub fn new(session: PathBuf) -> Self {
+    pub(super) fn new(session: PathBuf) -> Self {
         Self {
             session,
             head: None,
@@ -147,13 +148,13 @@ impl Follower {
     }
 
     /// The file.
-    pub fn session(&self) -> &Path {
+    pub(super) fn session(&self) -> &Path {
         &self.session
     }
 
     /// A look at the run; `None` when nothing new is known. The file is open for the length of it only, and with `patience` not at
     /// all while it may be being sealed.
-    pub fn look(
+    pub(super) fn look(
         &mut self,
         writer: Option<&str>,
         patience: bool,
@@ -190,7 +191,7 @@ impl Follower {
             attempt: outcome.attempt.number,
             at_mm: [planned.at.x_mm, planned.at.y_mm],
             verdict: outcome.verdict.name().to_owned(),
-            reason: outcome.verdict.reason().map(str::to_owned),
+            reason: outcome.verdict.reason().map(Cow::into_owned),
             cameras: self
                 .signals
                 .get(&outcome.attempt)

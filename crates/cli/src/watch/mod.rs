@@ -26,7 +26,7 @@ const CLEAR: &str = "\u{1b}[H\u{1b}[J";
 ///
 /// # Errors
 /// [`Failure::input`] for what is no session; with `--once` also when there is none yet.
-pub fn watch(args: &WatchArgs, json: bool) -> Outcome {
+pub(crate) fn watch(args: &WatchArgs, json: bool) -> Outcome {
     let every = Duration::try_from_secs_f64(args.every)
         .map_err(|e| Failure::input(format!("--every: {e}")))?;
     let mut told = false;

@@ -14,7 +14,7 @@ const CHUNKS: u32 = 8;
 
 /// What a camera saw of a press.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Signal {
+pub(super) struct Signal {
     /// Events per second from contact to release.
     pub press_per_s: f64,
     /// Events per second in the 0.3 s before the motion for it.
@@ -24,7 +24,7 @@ pub struct Signal {
 impl Signal {
     /// Signal over noise; with no noise at all that of one event.
     #[must_use]
-    pub fn ratio(self) -> f64 {
+    pub(super) fn ratio(self) -> f64 {
         self.press_per_s / self.idle_per_s.max(1e6 / IDLE_US as f64)
     }
 }
@@ -38,7 +38,7 @@ struct Count {
 
 /// What the cameras saw of these presses, as far as the last chunks tell. The clocks are laid on one another by the least delay
 /// between the last event of a chunk and its arrival: good to some milliseconds.
-pub fn signals(
+pub(super) fn signals(
     reader: &SessionReader,
     formats: [StreamFormat; 2],
     outcomes: &[&PressOutcome],

@@ -42,6 +42,8 @@ fn one_skin_twice_is_not_better_and_the_page_is_whole() {
         "{}",
         said.out
     );
+    let verdict = said.out.lines().next().unwrap();
+    assert!(verdict.starts_with("VERDICT   B against A: "), "{verdict}");
     // Numbers and names are of this run; what stands where is not.
     let layout: String = said
         .out

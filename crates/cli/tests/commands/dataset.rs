@@ -9,11 +9,11 @@ use skinrig_protocol::Schedule;
 use crate::support::{Dice, Lab, text};
 
 /// Camera time at the schedule's time 0, µs: what the import has to find.
-pub const OFFSET_US: [f64; 2] = [7_312_000.0, 11_905_000.0];
+pub(crate) const OFFSET_US: [f64; 2] = [7_312_000.0, 11_905_000.0];
 /// Camera clock against the schedule's clock, parts per million.
-pub const DRIFT_PPM: [f64; 2] = [40.0, -25.0];
+pub(crate) const DRIFT_PPM: [f64; 2] = [40.0, -25.0];
 /// Presses of the path; with three sync presses before them.
-pub const PRESSES: usize = 12;
+pub(crate) const PRESSES: usize = 12;
 
 const PERIOD_S: f64 = 1.5;
 const SYNC: usize = 3;
@@ -41,14 +41,14 @@ analysis: {calibration: none}
 ";
 
 /// The files of one recording.
-pub struct Dataset {
+pub(crate) struct Dataset {
     pub cameras: [PathBuf; 2],
     pub presses: PathBuf,
     pub schedule: PathBuf,
 }
 
 /// Where the path presses.
-pub fn positions() -> Vec<Point2> {
+pub(crate) fn positions() -> Vec<Point2> {
     (0..PRESSES)
         .map(|k| Point2::new(-10.0 + 10.0 * (k / 4) as f64, -14.0 + 9.0 * (k % 4) as f64))
         .collect()
@@ -56,7 +56,7 @@ pub fn positions() -> Vec<Point2> {
 
 impl Dataset {
     /// Writes the recording into `lab`.
-    pub fn new(lab: &Lab) -> Self {
+    pub(crate) fn new(lab: &Lab) -> Self {
         let cameras = CameraId::ALL.map(|camera| {
             let path = lab.path(&format!("camera{}.hdf5", camera.number()));
             let mut writer = EventWriter::create(&path, 0).unwrap();
@@ -76,7 +76,7 @@ impl Dataset {
     }
 
     /// `import` with these files into `folder`.
-    pub fn arguments(&self, folder: &Path) -> Vec<String> {
+    pub(crate) fn arguments(&self, folder: &Path) -> Vec<String> {
         let words = [
             ("--camera1", &self.cameras[0]),
             ("--camera2", &self.cameras[1]),
@@ -93,7 +93,7 @@ impl Dataset {
 }
 
 /// A CSV in metres that ends with a row of nothing but a blank, as the published one.
-pub fn csv(positions: &[Point2]) -> String {
+pub(crate) fn csv(positions: &[Point2]) -> String {
     let mut text = String::from("x,y,z\n");
     for p in positions {
         text += &format!("{},{},0.0\n", p.x_mm / 1e3, p.y_mm / 1e3);
@@ -110,7 +110,7 @@ fn schedule() -> Vec<(f64, Point2)> {
 }
 
 /// What `camera` saw: a burst while the tip goes in, one of the other polarity while it leaves, and background.
-pub fn events(camera: CameraId) -> Vec<CdEvent> {
+pub(crate) fn events(camera: CameraId) -> Vec<CdEvent> {
     let mut dice = Dice(1 + u64::from(camera.number()));
     let rig = Schedule::parse("made", SCHEDULE.as_bytes(), &[])
         .unwrap()

@@ -2,7 +2,7 @@
 
 use crate::support::{ROOT, skinrig};
 
-const COMMANDS: [&str; 24] = [
+const COMMANDS: [&str; 26] = [
     "doctor",
     "devices",
     "check",
@@ -27,6 +27,8 @@ const COMMANDS: [&str; 24] = [
     "watch",
     "prototypes",
     "tag",
+    "completions",
+    "man",
 ];
 
 #[test]
@@ -128,4 +130,42 @@ fn the_shipped_schemas_are_those_that_the_program_prints() {
             printed
         );
     }
+}
+
+/// Bash itself completes with the script; commands that skinrig starts itself are in no script and on no page.
+#[test]
+fn shells_complete_and_manuals_are_written() {
+    for shell in ["bash", "zsh", "fish"] {
+        let script = skinrig(&["completions", shell]).code(0).out;
+        assert!(script.contains("tradeoff"), "{shell}");
+        assert!(!script.contains("supervise-arm"), "{shell}");
+        assert!(!script.contains("hold-arm"), "{shell}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let script = folder.path().join("skinrig.bash");
+    std::fs::write(&script, skinrig(&["completions", "bash"]).out).unwrap();
+    let complete = format!(
+        "source {}; COMP_WORDS=(skinrig tra); COMP_CWORD=1; _skinrig skinrig tra skinrig; echo \"${{COMPREPLY[@]}}\"",
+        script.display()
+    );
+    if let Ok(bash) = std::process::Command::new("bash")
+        .args(["-c", &complete])
+        .output()
+    {
+        assert_eq!(String::from_utf8_lossy(&bash.stdout).trim(), "tradeoff");
+    }
+
+    let pages = folder.path().join("man");
+    skinrig(&["man", pages.to_str().unwrap()]).code(0);
+    let names = std::fs::read_dir(&pages).unwrap();
+    let names: Vec<String> = names
+        .map(|n| n.unwrap().file_name().into_string().unwrap())
+        .collect();
+    for name in COMMANDS {
+        assert!(names.contains(&format!("skinrig-{name}.1")), "{names:?}");
+    }
+    assert!(!names.iter().any(|n| n.contains("arm")), "{names:?}");
+    let run = std::fs::read_to_string(pages.join("skinrig-run.1")).unwrap();
+    assert!(run.contains(r"max\-rmse"), "{run}");
+    skinrig(&["man", "/dev/null/x"]).code(2);
 }

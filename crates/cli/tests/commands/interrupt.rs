@@ -11,13 +11,13 @@ use crate::replay::assert_replays;
 use crate::support::{Lab, ROOT, SMALL, files, only, program, said, show, skinrig, text};
 
 /// A run in real time, after its first press.
-pub struct Underway {
+pub(crate) struct Underway {
     child: Child,
     lines: BufReader<ChildStderr>,
 }
 
 impl Underway {
-    pub fn new(folder: &Path) -> Self {
+    pub(crate) fn new(folder: &Path) -> Self {
         let folder = text(folder);
         Self::of(program(&[
             "run",
@@ -28,7 +28,7 @@ impl Underway {
         ]))
     }
 
-    pub fn of(mut command: Command) -> Self {
+    pub(crate) fn of(mut command: Command) -> Self {
         let mut child = command
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -42,7 +42,7 @@ impl Underway {
 
     /// Reads messages up to one that contains `word`.
     #[track_caller]
-    pub fn wait_for(&mut self, word: &str) {
+    pub(crate) fn wait_for(&mut self, word: &str) {
         let mut line = String::new();
         while !line.contains(word) {
             line.clear();
@@ -51,7 +51,7 @@ impl Underway {
         }
     }
 
-    pub fn signal(&self, name: &str) {
+    pub(crate) fn signal(&self, name: &str) {
         let pid = self.child.id().to_string();
         let sent = Command::new("kill")
             .args([format!("-{name}"), pid])
@@ -61,7 +61,7 @@ impl Underway {
     }
 
     /// Waits for the end; the exit code, none for a process that was killed, and the rest of the messages.
-    pub fn end(mut self) -> (Option<i32>, String) {
+    pub(crate) fn end(mut self) -> (Option<i32>, String) {
         let mut rest = String::new();
         while self.lines.read_line(&mut rest).unwrap() > 0 {}
         (self.child.wait().unwrap().code(), rest)

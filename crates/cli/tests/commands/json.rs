@@ -8,7 +8,7 @@ use crate::dataset::Dataset;
 use crate::support::{Lab, SMALL, only, skinrig, text};
 
 /// Every path of keys in `value` with the kinds of value found there; lists are merged into `[]`.
-pub fn shape(value: &Value) -> String {
+pub(crate) fn shape(value: &Value) -> String {
     fn walk(value: &Value, path: &str, found: &mut BTreeMap<String, BTreeSet<&'static str>>) {
         let kind = match value {
             Value::Null => "null",

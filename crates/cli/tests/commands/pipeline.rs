@@ -1,6 +1,7 @@
 //! From a protocol to results and files in other programs' formats.
 
 use std::path::Path;
+use std::process::{Command, Stdio};
 
 use skinrig_formats::hdf5::Container;
 use skinrig_formats::raw::RawReader;
@@ -306,4 +307,34 @@ fn exports_hold_exactly_what_was_recorded_and_inspect_reads_them() {
     let before = std::fs::read(&presses).unwrap();
     skinrig(&[&csv[..], &["--only", "presses", "--overwrite"]].concat()).code(0);
     assert!(before == std::fs::read(&presses).unwrap());
+}
+
+/// On a terminal each phase says what it does; in a pipe nothing but the answer is written.
+#[test]
+fn a_terminal_shows_what_takes_time() {
+    let lab = Lab::new();
+    let session = lab.record("s", &[]);
+    let piped = skinrig(&["analyze", &session.display().to_string()]).code(0);
+    assert_eq!(piped.err, "");
+
+    let command = format!(
+        "{} analyze {}",
+        env!("CARGO_BIN_EXE_skinrig"),
+        session.display()
+    );
+    let typescript = lab.path("typescript");
+    let mut script = Command::new("script");
+    script
+        .args(["-qec", &command])
+        .arg(&typescript)
+        .env("TERM", "xterm");
+    let Ok(run) = script.stdin(Stdio::null()).output() else {
+        println!("skipped: no `script` of util-linux, which gives a program a terminal");
+        return;
+    };
+    assert!(run.status.success(), "{run:?}");
+    let shown = String::from_utf8_lossy(&std::fs::read(&typescript).unwrap()).into_owned();
+    for part in ["analysing, ", " MB read", "writing the report", "RMSE  "] {
+        assert!(shown.contains(part), "{part}: {shown}");
+    }
 }

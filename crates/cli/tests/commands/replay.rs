@@ -6,7 +6,7 @@ use crate::support::{Lab, chunks, only, read_json, show, skinrig, text};
 
 /// Replays `session` into `folder` and asserts that nothing but names and dates differs.
 #[track_caller]
-pub fn assert_replays(lab: &Lab, session: &Path, folder: &str) {
+pub(crate) fn assert_replays(lab: &Lab, session: &Path, folder: &str) {
     skinrig(&["analyze", &text(session)]).code(0);
     let original = read_json(&session_results(session));
     let stopped = show(session)["end"] == "stopped";

@@ -12,13 +12,13 @@ use skinrig_recorder::SessionReader;
 use tempfile::TempDir;
 
 /// The workspace: where protocols lie, and where the program is started.
-pub const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+pub(crate) const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 /// Two rounds of four presses and two sync presses, 17 s of rig time.
-pub const SMALL: &str = "crates/cli/tests/fixtures/small.yaml";
+pub(crate) const SMALL: &str = "crates/cli/tests/fixtures/small.yaml";
 
 /// What one call of the program did.
 #[derive(Debug)]
-pub struct Said {
+pub(crate) struct Said {
     pub code: Option<i32>,
     pub out: String,
     pub err: String,
@@ -27,7 +27,7 @@ pub struct Said {
 impl Said {
     /// Asserts the exit code; the message shows everything that was said.
     #[track_caller]
-    pub fn code(self, expected: i32) -> Self {
+    pub(crate) fn code(self, expected: i32) -> Self {
         assert_eq!(self.code, Some(expected), "{self:#?}");
         assert!(!self.err.contains("panicked"), "{self:#?}");
         self
@@ -35,7 +35,7 @@ impl Said {
 
     /// Standard output as JSON.
     #[track_caller]
-    pub fn json(&self) -> Value {
+    pub(crate) fn json(&self) -> Value {
         match serde_json::from_str(&self.out) {
             Ok(value) => value,
             Err(e) => panic!("expected JSON on standard output, found {e}\n{}", self.out),
@@ -44,7 +44,7 @@ impl Said {
 
     /// Asserts that standard error has all of `parts`.
     #[track_caller]
-    pub fn complains(self, parts: &[&str]) -> Self {
+    pub(crate) fn complains(self, parts: &[&str]) -> Self {
         for part in parts {
             assert!(self.err.contains(part), "expected {part:?} in {self:#?}");
         }
@@ -53,7 +53,7 @@ impl Said {
 }
 
 /// The program with these arguments, not yet started.
-pub fn program<S: AsRef<OsStr>>(arguments: &[S]) -> Command {
+pub(crate) fn program<S: AsRef<OsStr>>(arguments: &[S]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_skinrig"));
     command.current_dir(ROOT).args(arguments);
     // Each call has its leases for itself: tests run side by side, on benches of one name.
@@ -75,12 +75,12 @@ fn leases() -> PathBuf {
 }
 
 /// Runs the program to its end. Neither of its outputs is a terminal.
-pub fn skinrig<S: AsRef<OsStr>>(arguments: &[S]) -> Said {
+pub(crate) fn skinrig<S: AsRef<OsStr>>(arguments: &[S]) -> Said {
     said(program(arguments))
 }
 
 /// Runs `command` to its end.
-pub fn said(mut command: Command) -> Said {
+pub(crate) fn said(mut command: Command) -> Said {
     let output = command.output().unwrap();
     Said {
         code: output.status.code(),
@@ -90,26 +90,26 @@ pub fn said(mut command: Command) -> Said {
 }
 
 /// A folder of one test, removed with it.
-pub struct Lab(TempDir);
+pub(crate) struct Lab(TempDir);
 
 impl Lab {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self(tempfile::tempdir().unwrap())
     }
 
     /// A path in the folder.
-    pub fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }
 
     /// The same as text, for arguments.
-    pub fn text(&self, name: &str) -> String {
+    pub(crate) fn text(&self, name: &str) -> String {
         text(&self.path(name))
     }
 
     /// Records the small campaign with more arguments and without analysis; the session's path.
     #[track_caller]
-    pub fn record(&self, folder: &str, more: &[&str]) -> PathBuf {
+    pub(crate) fn record(&self, folder: &str, more: &[&str]) -> PathBuf {
         let sessions = self.text(folder);
         let mut arguments = vec!["run", SMALL, "--sessions", &sessions, "--no-analysis"];
         arguments.extend_from_slice(more);
@@ -119,12 +119,12 @@ impl Lab {
 }
 
 /// A path as text, for arguments.
-pub fn text(path: &Path) -> String {
+pub(crate) fn text(path: &Path) -> String {
     path.to_str().unwrap().to_owned()
 }
 
 /// The files of `folder` whose names end so, sorted.
-pub fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
+pub(crate) fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(folder) else {
         return Vec::new();
     };
@@ -138,7 +138,7 @@ pub fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
 
 /// The one file of `folder` whose name ends so.
 #[track_caller]
-pub fn only(folder: &Path, ending: &str) -> PathBuf {
+pub(crate) fn only(folder: &Path, ending: &str) -> PathBuf {
     let found = files(folder, ending);
     assert_eq!(found.len(), 1, "expected one *{ending}, found {found:?}");
     found[0].clone()
@@ -146,20 +146,20 @@ pub fn only(folder: &Path, ending: &str) -> PathBuf {
 
 /// A JSON file.
 #[track_caller]
-pub fn read_json(path: &Path) -> Value {
+pub(crate) fn read_json(path: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
 /// `show --json --presses` of a session.
 #[track_caller]
-pub fn show(session: &Path) -> Value {
+pub(crate) fn show(session: &Path) -> Value {
     skinrig(&["show", "--json", "--presses", &text(session)])
         .code(0)
         .json()
 }
 
 /// The bytes of each chunk of a camera.
-pub fn chunks(session: &Path, camera: CameraId) -> Vec<Vec<u8>> {
+pub(crate) fn chunks(session: &Path, camera: CameraId) -> Vec<Vec<u8>> {
     let reader = SessionReader::open(session).unwrap();
     let mut chunks = Vec::new();
     reader
@@ -169,7 +169,7 @@ pub fn chunks(session: &Path, camera: CameraId) -> Vec<Vec<u8>> {
 }
 
 /// Lower-case hex SHA-256.
-pub fn sha256(bytes: &[u8]) -> String {
+pub(crate) fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes)
         .iter()
         .map(|b| format!("{b:02x}"))
@@ -177,10 +177,10 @@ pub fn sha256(bytes: &[u8]) -> String {
 }
 
 /// A small seeded generator of 64-bit numbers (SplitMix64, Steele, Lea and Flood 2014), for test data only.
-pub struct Dice(pub u64);
+pub(crate) struct Dice(pub u64);
 
 impl Dice {
-    pub fn next(&mut self) -> u64 {
+    pub(crate) fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -189,12 +189,12 @@ impl Dice {
     }
 
     /// Below `n`, which is far below 2^64.
-    pub fn below(&mut self, n: u64) -> u64 {
+    pub(crate) fn below(&mut self, n: u64) -> u64 {
         self.next() % n
     }
 
     /// In 0..1.
-    pub fn unit(&mut self) -> f64 {
+    pub(crate) fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
 }

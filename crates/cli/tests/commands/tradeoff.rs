@@ -102,6 +102,20 @@ fn a_demand_that_nothing_meets_ends_with_code_4_and_a_table_fits_a_terminal() {
         said.out
     );
     assert!(said.out.contains("streaming f32"), "{}", said.out);
+    // The answer comes before the table.
+    let answer = said.out.find("none of the choices tried").unwrap();
+    assert!(answer < said.out.find("choices tried on").unwrap());
+    let budget = ["tradeoff", &session, "--repeats", "1", "--budget", "10s"];
+    let met = skinrig(&budget).code(0).out;
+    let mut lines = met.lines();
+    assert!(
+        lines.next().unwrap().starts_with("most accurate within"),
+        "{met}"
+    );
+    let chosen = lines.next().unwrap();
+    for part in [": RMSE ", " mm, 95 % interval [", ", n ", " ms of CPU time"] {
+        assert!(chosen.contains(part), "{part}: {chosen}");
+    }
     skinrig(&["tradeoff", &session, "--budget", "5 mm"])
         .code(2)
         .complains(&["time"]);

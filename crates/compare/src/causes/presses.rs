@@ -42,7 +42,7 @@ pub(super) struct SkinPresses {
 const CHANCE: f64 = 2.0;
 
 impl SkinPresses {
-    pub fn of(subject: &Subject, locations: &Locations, shared: &BTreeSet<u32>) -> Self {
+    pub(super) fn of(subject: &Subject, locations: &Locations, shared: &BTreeSet<u32>) -> Self {
         let mut all: BTreeMap<u32, Vec<PressFactors>> = BTreeMap::new();
         for session in &subject.sessions {
             let id = session.facts.session_id.as_str();
@@ -69,16 +69,16 @@ impl SkinPresses {
         }
     }
 
-    pub fn locations(&self) -> impl Iterator<Item = u32> {
+    pub(super) fn locations(&self) -> impl Iterator<Item = u32> {
         self.by_place.keys().copied()
     }
 
-    pub fn has(&self, location: u32) -> bool {
+    pub(super) fn has(&self, location: u32) -> bool {
         self.by_place.contains_key(&location)
     }
 
     /// Drops all other locations.
-    pub fn keep(&mut self, locations: &[u32]) {
+    pub(super) fn keep(&mut self, locations: &[u32]) {
         self.by_place
             .retain(|location, _| locations.contains(location));
     }
@@ -88,12 +88,12 @@ impl SkinPresses {
         self.calibration_cost
     }
 
-    pub fn count(&self) -> u32 {
+    pub(super) fn count(&self) -> u32 {
         self.by_place.values().map(Vec::len).sum::<usize>() as u32
     }
 
     /// Presses at the i-th location.
-    pub fn at(&self, i: usize) -> &[PressFactors] {
+    pub(super) fn at(&self, i: usize) -> &[PressFactors] {
         self.by_place.values().nth(i).map_or(&[], Vec::as_slice)
     }
 

@@ -35,7 +35,7 @@ enum LimitSource {
 
 impl Inference {
     /// Inference for one sample.
-    pub fn alone(of: &Measure, settings: &Settings) -> Self {
+    pub(super) fn alone(of: &Measure, settings: &Settings) -> Self {
         let totals = of.totals();
         let (error, df) = (error(&totals), totals.len() as f64 - 1.0);
         let method = match of.shape.ratio() {
@@ -55,7 +55,7 @@ impl Inference {
     }
 
     /// Inference for `b - sign * a`; `sign` is 1 or, for ratios only, -1.
-    pub fn difference(a: &Measure, b: &Measure, sign: f64, settings: &Settings) -> Self {
+    pub(super) fn difference(a: &Measure, b: &Measure, sign: f64, settings: &Settings) -> Self {
         let totals = [a.totals(), b.totals()];
         let value = b.value - sign * a.value;
         let (error, df) = spread(&totals, sign, settings.pairing);
@@ -91,7 +91,7 @@ impl Inference {
     }
 
     /// Two-sided interval with coverage 1 - `alpha`.
-    pub fn interval(&self, alpha: f64) -> Interval {
+    pub(super) fn interval(&self, alpha: f64) -> Interval {
         let (low, high) = match &self.method {
             IntervalMethod::Student { error, df } => {
                 let half = student_quantile(1.0 - 0.5 * alpha, *df) * error;

@@ -39,7 +39,7 @@ pub(super) enum Shape {
 
 impl Shape {
     /// Ratio for the bootstrap; `None` if too few locations contribute.
-    pub fn ratio(&self) -> Option<&Ratio> {
+    pub(super) fn ratio(&self) -> Option<&Ratio> {
         match self {
             Self::Ratio(ratio) => Some(ratio),
             Self::Counts(_, _, ratio) => {
@@ -76,7 +76,7 @@ pub(super) enum Scale {
 
 impl Scale {
     /// Metric and its derivative with respect to the ratio; the derivative is 0 at the end of the range.
-    pub fn of(self, ratio: f64) -> (f64, f64) {
+    pub(super) fn of(self, ratio: f64) -> (f64, f64) {
         match self {
             Self::Same => (ratio, 1.0),
             Self::Root if ratio > 0.0 => (ratio.sqrt(), 0.5 / ratio.sqrt()),
@@ -91,17 +91,17 @@ impl Scale {
 
 impl Measure {
     /// Number of presses.
-    pub fn presses(&self) -> u32 {
+    pub(super) fn presses(&self) -> u32 {
         self.by_location.iter().map(|p| p.1.len() as u32).sum()
     }
 
     /// Number of locations.
-    pub fn locations(&self) -> usize {
+    pub(super) fn locations(&self) -> usize {
         self.by_location.len()
     }
 
     /// Contribution of each location to the error of the value.
-    pub fn totals(&self) -> Vec<f64> {
+    pub(super) fn totals(&self) -> Vec<f64> {
         let n = f64::from(self.presses());
         let sums = self.by_location.iter().map(|p| p.1.iter().sum::<f64>());
         sums.map(|s| s / n).collect()

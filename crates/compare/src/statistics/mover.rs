@@ -20,7 +20,7 @@ pub(super) enum Limits {
 
 impl Limits {
     /// Limits of `measure`; without any event it takes the overdispersion of `other`.
-    pub fn of(measure: &Measure, other: Option<&Measure>) -> Self {
+    pub(super) fn of(measure: &Measure, other: Option<&Measure>) -> Self {
         let error_of = |of: &Measure| error(&of.totals());
         match &measure.shape {
             Shape::Ratio(_) => Self::Plain(measure.value, error_of(measure)),
@@ -45,7 +45,7 @@ impl Limits {
     }
 
     /// Limits at `c` standard errors; infinite where open.
-    pub fn at(&self, c: f64) -> (f64, f64) {
+    pub(super) fn at(&self, c: f64) -> (f64, f64) {
         match self {
             Self::Share(p, trials) => scores::wilson(*p, *trials, c),
             Self::Rate(events, exposure) => scores::poisson(*events, *exposure, c),

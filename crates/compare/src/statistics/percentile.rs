@@ -16,13 +16,13 @@ pub(super) struct Percentile {
 
 impl Percentile {
     /// Limits at `c` standard errors; infinite where misses begin or trials end.
-    pub fn limits(&self, c: f64) -> (f64, f64) {
+    pub(super) fn limits(&self, c: f64) -> (f64, f64) {
         let (low, high) = scores::wilson(self.q, self.effective, c);
         (self.at(low), self.at(high))
     }
 
     /// Number of missed trials.
-    pub fn missed(&self) -> u32 {
+    pub(super) fn missed(&self) -> u32 {
         let times = self.sorted.partition_point(|t| t.is_finite());
         (self.sorted.len() - times) as u32
     }

@@ -11,7 +11,8 @@ use super::sample::{Clusters, late};
 use super::scores;
 use skinrig_analysis::distributions::normal_quantile;
 
-/// Value at rank `q` of sorted values (type 7 of Hyndman and Fan 1996).
+/// Value at rank `q` of sorted values (type 7 of Hyndman and Fan 1996). Infinite values are misses: a rank among them is
+/// infinite, where [`skinrig_model::quantile()`] is not a number.
 fn at_rank(sorted: &[f64], q: f64) -> f64 {
     let position = q.clamp(0.0, 1.0) * (sorted.len() - 1) as f64;
     let index = position.floor() as usize;

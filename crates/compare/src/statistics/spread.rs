@@ -15,7 +15,7 @@ pub(super) enum RepeatEstimator {
 
 impl RepeatEstimator {
     /// Estimator that is unbiased between samples with series of different length.
-    pub fn for_samples<'a>(samples: impl IntoIterator<Item = &'a Data>) -> Self {
+    pub(crate) fn for_samples<'a>(samples: impl IntoIterator<Item = &'a Data>) -> Self {
         let clusters = samples.into_iter().filter_map(|data| match data {
             Data::RepeatStd(clusters) => Some(clusters),
             _ => None,

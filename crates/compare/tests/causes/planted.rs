@@ -20,7 +20,7 @@ const DEPTH_MM: f64 = 2.0;
 
 /// Planted defect of a skin, its cameras or its robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum PlantedCause {
+pub(crate) enum PlantedCause {
     /// Nothing.
     Nothing,
     /// Camera 1 was moved after the calibration: along x (mm) and rotated (degrees).
@@ -38,7 +38,7 @@ pub enum PlantedCause {
 }
 
 /// Seeded, approximately normal numbers.
-pub struct NoiseSource(pub u64);
+pub(crate) struct NoiseSource(pub u64);
 
 impl NoiseSource {
     fn unit(&mut self) -> f64 {
@@ -55,14 +55,14 @@ impl NoiseSource {
 }
 
 /// A simulated session that can be analysed repeatedly.
-pub struct SimulatedSession {
+pub(crate) struct SimulatedSession {
     input: SessionInput,
     events: Memory,
     facts: Facts,
 }
 
 /// Records a session: one calibration repetition, two scored ones.
-pub fn record(seed: u64, plant: PlantedCause) -> SimulatedSession {
+pub(crate) fn record(seed: u64, plant: PlantedCause) -> SimulatedSession {
     let mut config = SimConfig::new(seed, SimLevel::Geometric);
     let g = &mut config.geometric;
     // Half of the published events with a shorter decay: faster, and with less carry-over between presses.
@@ -132,7 +132,7 @@ pub fn record(seed: u64, plant: PlantedCause) -> SimulatedSession {
 
 impl SimulatedSession {
     /// Analyses it as a skin, with its own settings or another thinning.
-    pub fn skin(&self, letter: char, thinning: Option<u32>) -> Subject {
+    pub(crate) fn skin(&self, letter: char, thinning: Option<u32>) -> Subject {
         let mut input = self.input.clone();
         input.settings.thinning = thinning.unwrap_or(input.settings.thinning);
         let analysis: Analysis = analyze(&input, &self.events).unwrap();

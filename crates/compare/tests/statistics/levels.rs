@@ -6,7 +6,7 @@ use crate::populations::{Draws, SimulatedPair};
 
 /// Shares among the populations that could be compared.
 #[derive(Debug, Default, Clone, Copy)]
-pub struct Rates {
+pub(crate) struct Rates {
     /// The interval of the difference covers the truth.
     pub covered: f64,
     /// Claimed to differ.
@@ -19,7 +19,7 @@ pub struct Rates {
 
 /// How populations are drawn and compared.
 #[derive(Debug, Clone, Copy)]
-pub struct Trial {
+pub(crate) struct Trial {
     pub pair: SimulatedPair,
     pub populations: u32,
     /// Treats presses as independent.
@@ -29,7 +29,7 @@ pub struct Trial {
 }
 
 impl Trial {
-    pub fn new(pair: SimulatedPair) -> Self {
+    pub(crate) fn new(pair: SimulatedPair) -> Self {
         Self {
             pair,
             populations: 300,
@@ -40,7 +40,7 @@ impl Trial {
     }
 
     /// Compares pairs of skins. The margin equals the true difference, if there is one.
-    pub fn rates(&self) -> Rates {
+    pub(crate) fn rates(&self) -> Rates {
         let [a, b] = self.pair.truth();
         let truth = b - a;
         let question = Question {

@@ -4,27 +4,27 @@ use skinrig_analysis::seeded;
 use skinrig_compare::statistics::{Better, Count, Kind, Position, Sample};
 
 /// Seeded random numbers.
-pub struct Draws(Box<dyn FnMut() -> f64>);
+pub(crate) struct Draws(Box<dyn FnMut() -> f64>);
 
 impl Draws {
-    pub fn new(seed: u64, stream: u64) -> Self {
+    pub(crate) fn new(seed: u64, stream: u64) -> Self {
         let mut rng = seeded::generator(seed, stream);
         Self(Box::new(move || 0.5 + 0.5 * seeded::signed_unit(&mut rng)))
     }
 
     /// Uniform in 0..1.
-    pub fn uniform(&mut self) -> f64 {
+    pub(crate) fn uniform(&mut self) -> f64 {
         (self.0)()
     }
 
     /// Standard normal (Box and Muller 1958).
-    pub fn normal(&mut self) -> f64 {
+    pub(crate) fn normal(&mut self) -> f64 {
         let (u, v) = (1.0 - self.uniform(), self.uniform());
         (-2.0 * libm::log(u)).sqrt() * libm::cos(2.0 * std::f64::consts::PI * v)
     }
 
     /// Poisson of this mean (Knuth 1969).
-    pub fn poisson(&mut self, mean: f64) -> u32 {
+    pub(crate) fn poisson(&mut self, mean: f64) -> u32 {
         let (mut product, mut n) = (self.uniform(), 0);
         while product > libm::exp(-mean) {
             product *= self.uniform();
@@ -36,7 +36,7 @@ impl Draws {
 
 /// Two skins and one metric.
 #[derive(Debug, Clone, Copy)]
-pub struct SimulatedPair {
+pub(crate) struct SimulatedPair {
     pub kind: Kind,
     /// Locations, and repetitions at each.
     pub locations: u32,
@@ -48,9 +48,9 @@ pub struct SimulatedPair {
 }
 
 /// Standard deviations: location effect shared by both skins, location effect of each skin, and press noise.
-pub const SHARED: f64 = 0.6;
-pub const OWN: f64 = 0.8;
-pub const NOISE: f64 = 0.5;
+pub(crate) const SHARED: f64 = 0.6;
+pub(crate) const OWN: f64 = 0.8;
+pub(crate) const NOISE: f64 = 0.5;
 /// Share of missed trials.
 const MISSED: f64 = 0.02;
 /// Mean exposure of a count, s.
@@ -70,7 +70,7 @@ struct Press {
 }
 
 impl SimulatedPair {
-    pub fn new(kind: Kind) -> Self {
+    pub(crate) fn new(kind: Kind) -> Self {
         Self {
             kind,
             locations: 24,
@@ -81,7 +81,7 @@ impl SimulatedPair {
     }
 
     /// With a difference as large as a typical margin.
-    pub fn shifted(self) -> Self {
+    pub(crate) fn shifted(self) -> Self {
         let shift = match self.kind {
             Kind::Share => 0.9,
             Kind::CountRate => 0.8,
@@ -92,7 +92,7 @@ impl SimulatedPair {
         Self { shift, ..self }
     }
 
-    pub fn better(&self) -> Better {
+    pub(crate) fn better(&self) -> Better {
         match self.kind {
             Kind::Share | Kind::Taxels => Better::Higher,
             Kind::Mean => Better::NearerZero,
@@ -101,7 +101,7 @@ impl SimulatedPair {
     }
 
     /// Draws a pair of samples. With `naive` every press is its own location, as if presses were independent.
-    pub fn draw(&self, draws: &mut Draws, naive: bool) -> [Sample; 2] {
+    pub(crate) fn draw(&self, draws: &mut Draws, naive: bool) -> [Sample; 2] {
         let mut presses: [Vec<Press>; 2] = [Vec::new(), Vec::new()];
         for location in 0..self.locations {
             let shared = [SHARED * draws.normal(), SHARED * draws.normal()];
@@ -187,7 +187,7 @@ impl SimulatedPair {
     }
 
     /// Population value of the metric, of A and of B.
-    pub fn truth(&self) -> [f64; 2] {
+    pub(crate) fn truth(&self) -> [f64; 2] {
         [0.0, self.shift].map(|shift| {
             let place = SHARED * SHARED + OWN * OWN;
             let press = place + NOISE * NOISE;

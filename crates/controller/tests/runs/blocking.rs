@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, ThreadId};
 
-use skinrig_controller::{ControllerError, RunReport, execute};
+use skinrig_controller::{ControllerError, Run, RunReport};
 use skinrig_device::detached::Calls;
 use skinrig_device::*;
 use skinrig_model::*;
@@ -323,7 +323,7 @@ fn run(site: Option<(Site, i64)>, detached: bool) -> Told {
     }
     let mut sink = Sink::default();
     let control = lock(&world).control.clone();
-    let report = execute(&plan, header(&plan), rig, &control, &mut sink);
+    let report = Run::new(&plan, header(&plan), rig, &control, &mut sink).execute();
     let world = lock(&world);
     Told {
         report,

@@ -92,13 +92,7 @@ fn the_operator_may_interrupt_at_every_tick() {
     assert!(ticks > 200, "{ticks}");
     let (mut broken_off, mut halted_in_skin) = (0, 0);
     for tick in 1..=ticks {
-        for press in [
-            Press::Pause,
-            Press::PauseNow,
-            Press::Stop,
-            Press::Abort,
-            Press::Halt,
-        ] {
+        for press in Press::REQUESTS {
             let told = run(Faults {
                 operator: Some((tick, press)),
                 ..faults()
@@ -151,7 +145,7 @@ fn the_operator_may_interrupt_at_every_tick() {
                 }
                 Press::Note => unreachable!("has a test of its own"),
                 Press::Abort => {
-                    let wanted = RunEnd::Stopped("operator: abort".to_owned());
+                    let wanted = RunEnd::Stopped(StopReason::Abort);
                     // At the very last ticks nothing is left to abort.
                     if told.report.end != RunEnd::Completed {
                         assert_eq!(told.report.end, wanted, "{case}");

@@ -1,24 +1,24 @@
 //! Whole runs on a scripted rig: the good course, and every way it can break off.
 
 use crate::mock::*;
-use skinrig_controller::{RunReport, execute};
+use skinrig_controller::{Run, RunReport};
 use skinrig_device::SyncMode;
 use skinrig_model::*;
 use skinrig_protocol::plan::Plan;
 
-pub const START: [f64; 3] = [-5.0, 3.0, 20.0];
+pub(crate) const START: [f64; 3] = [-5.0, 3.0, 20.0];
 
-pub struct Told {
+pub(crate) struct Told {
     pub world: Shared,
     pub records: Vec<Record>,
     pub report: RunReport,
 }
 
-pub fn run_plan(plan: &Plan, faults: Faults, start: [f64; 3], sink: Sink) -> Told {
+pub(crate) fn run_plan(plan: &Plan, faults: Faults, start: [f64; 3], sink: Sink) -> Told {
     let world = World::shared(faults, start);
     let control = lock(&world).control.clone();
     let mut sink = sink;
-    let report = execute(plan, header(plan), rig(&world), &control, &mut sink);
+    let report = Run::new(plan, header(plan), rig(&world), &control, &mut sink).execute();
     Told {
         world,
         records: sink.records,
@@ -26,11 +26,11 @@ pub fn run_plan(plan: &Plan, faults: Faults, start: [f64; 3], sink: Sink) -> Tol
     }
 }
 
-pub fn run(faults: Faults) -> Told {
+pub(crate) fn run(faults: Faults) -> Told {
     run_plan(&plan(), faults, START, Sink::default())
 }
 
-pub fn faults() -> Faults {
+pub(crate) fn faults() -> Faults {
     Faults {
         train_ms: 9,
         stiffness_n_mm: 0.5,
@@ -39,7 +39,7 @@ pub fn faults() -> Faults {
 }
 
 impl Told {
-    pub fn outcomes(&self) -> Vec<&PressOutcome> {
+    pub(crate) fn outcomes(&self) -> Vec<&PressOutcome> {
         let mut found = Vec::new();
         for r in &self.records {
             if let Record::Outcome(o) = r {
@@ -49,23 +49,25 @@ impl Told {
         found
     }
 
-    pub fn verdicts(&self) -> Vec<&'static str> {
+    pub(crate) fn verdicts(&self) -> Vec<&'static str> {
         self.outcomes().iter().map(|o| o.verdict.name()).collect()
     }
 
-    pub fn invalid_reason(&self, n: usize) -> &str {
-        self.outcomes()[n].verdict.reason().unwrap_or("valid")
+    pub(crate) fn invalid_reason(&self, n: usize) -> String {
+        let outcome = self.outcomes()[n];
+        outcome
+            .verdict
+            .reason()
+            .unwrap_or("valid".into())
+            .into_owned()
     }
 
-    pub fn end_reason(&self) -> &str {
-        match &self.report.end {
-            RunEnd::Completed => "completed",
-            RunEnd::Stopped(r) | RunEnd::Faulted(r) => r,
-        }
+    pub(crate) fn end_reason(&self) -> &str {
+        self.report.end.reason().unwrap_or("completed")
     }
 
     /// What must hold after every run whose sink took all records.
-    pub fn check(&self, case: &str) {
+    pub(crate) fn check(&self, case: &str) {
         self.check_rig(case);
         let n = self.report.planned as u32;
         for press in 0..n {
@@ -119,7 +121,7 @@ impl Told {
     }
 
     /// What must hold of the rig after every run.
-    pub fn check_rig(&self, case: &str) {
+    pub(crate) fn check_rig(&self, case: &str) {
         let w = lock(&self.world);
         let r = &self.report;
         assert_eq!(w.violations, Vec::<String>::new(), "{case}");
@@ -128,7 +130,7 @@ impl Told {
         assert_eq!(r.disarmed, w.confirmed, "{case}: {r:?}");
         if r.disarmed {
             assert!(!w.armed, "{case}: disarmed");
-            let halted = matches!(&r.end, RunEnd::Stopped(why) if why.contains("halt"));
+            let halted = r.end == RunEnd::Stopped(StopReason::Halt);
             assert!(r.retracted || halted, "{case}: {r:?}");
             assert!(
                 halted || !w.ever_armed || w.tip[2] >= 4.94,
@@ -290,7 +292,7 @@ fn a_camera_that_follows_another_starts_first() {
         for (settings, sync) in rig.camera_settings.iter_mut().zip(modes) {
             settings.sync = sync;
         }
-        let report = execute(&plan, header(&plan), rig, &control, &mut Sink::default());
+        let report = Run::new(&plan, header(&plan), rig, &control, &mut Sink::default()).execute();
         assert_eq!(report.end, RunEnd::Completed);
         let w = lock(&world);
         w.started.clone()

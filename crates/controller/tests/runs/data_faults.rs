@@ -2,7 +2,7 @@
 
 use crate::course::*;
 use crate::mock::*;
-use skinrig_controller::execute;
+use skinrig_controller::Run;
 use skinrig_model::*;
 use skinrig_protocol::plan::Step;
 
@@ -135,7 +135,7 @@ fn a_slow_recorder_delays_but_breaks_nothing() {
         slow: Some((world.clone(), 150)), // longer than a pose may be old
         ..Sink::default()
     };
-    let report = execute(&plan, header(&plan), rig(&world), &control, &mut sink);
+    let report = Run::new(&plan, header(&plan), rig(&world), &control, &mut sink).execute();
     assert_eq!(
         (report.valid, &report.end),
         (3, &RunEnd::Completed),

@@ -1,6 +1,5 @@
 //! Runs that never arm, and runs that their caller drops.
 
-use skinrig_controller::{ControllerSettings, Run};
 use skinrig_model::*;
 use skinrig_protocol::plan::{Plan, Step};
 
@@ -70,46 +69,4 @@ fn what_the_trigger_box_says_about_the_run_is_recorded() {
     let told = run_plan(&plan(), faults, START, Sink::default());
     let said = |r: &&Record| matches!(r, Record::Note { text, .. } if text == "trigger box: 2 edges were late");
     assert_eq!(told.records.iter().filter(said).count(), 1);
-}
-
-#[test]
-fn a_run_that_is_dropped_or_unwound_comes_to_rest() {
-    // The last one: the robot panics once more while the caller's panic unwinds.
-    for (unwound, second) in [(false, None), (true, None), (true, Some(Failure::Panic))] {
-        let world = World::shared(faults(), [0.0, 0.0, -1.0]);
-        let control = lock(&world).control.clone();
-        let plan = plan();
-        let mut sink = Sink::default();
-        let dropped = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-            let settings = ControllerSettings::default();
-            let run = Run::with_settings(
-                &plan,
-                header(&plan),
-                rig(&world),
-                &control,
-                &mut sink,
-                settings,
-            );
-            let armed = run.arm();
-            assert!(armed.is_ok() && lock(&world).armed);
-            {
-                let mut w = lock(&world);
-                w.faults.at_call = second.map(|f| (w.calls + 20, f));
-            }
-            if unwound {
-                std::panic::panic_any("mock caller panics".to_owned());
-            }
-        }));
-        assert_eq!(dropped.is_err(), unwound);
-        let w = lock(&world);
-        assert!(!w.armed && w.streaming == [false; 2] && w.tip[2] > 4.94);
-        assert!(second.is_none() || w.calls > 30);
-        assert!(matches!(
-            sink.records.last(),
-            Some(Record::Ended {
-                end: RunEnd::Faulted(_),
-                ..
-            })
-        ));
-    }
 }

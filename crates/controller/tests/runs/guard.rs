@@ -1,8 +1,10 @@
 //! Arbitrary commands: nothing forbidden reaches the robot, and everything allowed does.
 
 use proptest::prelude::*;
-use skinrig_controller::{ControllerError, ControllerSettings, GuardError, GuardedIndenter};
-use skinrig_model::{HostTime, Point2, Point3, SkinOutline};
+use skinrig_controller::{
+    ControllerError, ControllerSettings, GuardError, GuardedIndenter, WatchdogTrip,
+};
+use skinrig_model::{HostDuration, HostTime, Point2, Point3, SkinOutline};
 use skinrig_protocol::area::{Area, KeepOut, Surroundings};
 
 use crate::mock::*;
@@ -91,6 +93,8 @@ proptest! {
         let (world, guard) = guarded();
         let mut guard = guard.with_surroundings(Some(around()));
         let mut poses = Vec::new();
+        // Time since the pose stream was last read, and the lowest height seen.
+        let (mut unseen, mut lowest_mm) = (0, f64::INFINITY);
         // Where the tip went down below clearance height.
         let mut foot: Option<[f64; 2]> = None;
         guard.arm().map_err(|e| TestCaseError::fail(e.to_string()))?;
@@ -133,9 +137,25 @@ proptest! {
                 }
                 Act::Look(ms) => {
                     lock(&world).t += ms * MS;
-                    prop_assert!(guard.poll(&MockClock(world.clone()), &mut poses).is_ok());
+                    let seen = guard.poll(&MockClock(world.clone()), &mut poses);
+                    let gap = HostDuration(unseen + ms * MS);
+                    unseen = 0;
+                    lowest_mm = poses.iter().map(|p| p.measured.z_mm).fold(lowest_mm, f64::min);
+                    if let Err(why) = seen {
+                        // Only this is a fault here: nobody looked for too long while the tip may have been low.
+                        let is_late = matches!(
+                            why,
+                            ControllerError::Watchdog(WatchdogTrip::Late { found, .. }) if found == gap
+                        );
+                        let limit = ControllerSettings::default().late_after;
+                        prop_assert!(is_late && gap > limit && lowest_mm < 4.95, "{gap}: {why}");
+                        return Ok(());
+                    }
                 }
-                Act::Blind(ms) => lock(&world).t += ms * MS,
+                Act::Blind(ms) => {
+                    unseen += ms * MS;
+                    lock(&world).t += ms * MS;
+                }
                 Act::Hold => prop_assert!(guard.hold().is_ok()),
                 Act::Arm => prop_assert!(guard.arm().is_ok()),
                 Act::Disarm => prop_assert!(guard.disarm().is_ok()),

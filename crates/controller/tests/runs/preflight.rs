@@ -1,9 +1,6 @@
 //! The preflight on the simulated rig: what is checked, and that a failed check powers nothing.
 
-use skinrig_controller::{
-    ControlHandle, ControllerSettings, ExpectedDevice, Loopback, Preflight, RunReport,
-    execute_checked,
-};
+use skinrig_controller::{ControlHandle, ExpectedDevice, Loopback, Preflight, Run, RunReport};
 use skinrig_model::*;
 use skinrig_sim::config::SimConfig;
 use skinrig_sim::faults::Fault;
@@ -35,15 +32,9 @@ fn run(faults: Vec<Fault>, preflight: Preflight) -> (RunReport, Vec<PreflightChe
     let mut sink = Sink::default();
     let rig = simulated_rig(&config);
     let control = ControlHandle::new();
-    let report = execute_checked(
-        &plan,
-        header,
-        rig,
-        &control,
-        &mut sink,
-        preflight,
-        ControllerSettings::default(),
-    );
+    let report = Run::new(&plan, header, rig, &control, &mut sink)
+        .checked(preflight)
+        .execute();
     let tables: Vec<_> = sink
         .records
         .iter()

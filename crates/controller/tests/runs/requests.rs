@@ -1,6 +1,6 @@
 //! What the operator's hand learns: that a request was heard, that a remark was written, where the run is.
 
-use skinrig_controller::{State, execute};
+use skinrig_controller::{Run, State};
 use skinrig_model::{Record, RunEnd};
 
 use crate::course::{START, faults, run, run_plan};
@@ -39,7 +39,7 @@ fn a_remark_to_a_run_that_fails_at_once_is_written() {
     let control = lock(&world).control.clone();
     assert_eq!(control.note(NOTE.into()), Ok(1));
     let (plan, mut sink) = (plan(), Sink::default());
-    let report = execute(&plan, header(&plan), rig(&world), &control, &mut sink);
+    let report = Run::new(&plan, header(&plan), rig(&world), &control, &mut sink).execute();
     assert!(matches!(report.end, RunEnd::Faulted(_)), "{report:?}");
     let is_note = |r: &Record| matches!(r, Record::Note { text, .. } if text == NOTE);
     assert!(sink.records.iter().any(is_note) && control.notes_recorded() == 1);
@@ -49,13 +49,7 @@ fn a_remark_to_a_run_that_fails_at_once_is_written() {
 fn every_request_is_heard_whenever_it_comes() {
     let ticks = lock(&run(faults()).world).ticks;
     for tick in (1..=ticks).step_by(7) {
-        for press in [
-            Press::Pause,
-            Press::PauseNow,
-            Press::Stop,
-            Press::Abort,
-            Press::Halt,
-        ] {
+        for press in Press::REQUESTS {
             let told = with(tick, press);
             let control = lock(&told.world).control.clone();
             assert_eq!(control.state(), State::Finished, "{press:?} at {tick}");

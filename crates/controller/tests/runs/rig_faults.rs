@@ -1,6 +1,6 @@
 //! What goes wrong on the simulated rig, at every stage of a press: how the real controller ends there.
 
-use skinrig_controller::{ControlHandle, RunReport, execute};
+use skinrig_controller::{ControlHandle, Run, RunReport};
 use skinrig_model::*;
 use skinrig_protocol::plan::Plan;
 use skinrig_sim::config::SimConfig;
@@ -23,7 +23,7 @@ fn run(plan: &Plan, config: &SimConfig) -> Told {
         ..header(plan)
     };
     let rig = simulated_rig(config);
-    let report = execute(plan, header, rig, &ControlHandle::new(), &mut sink);
+    let report = Run::new(plan, header, rig, &ControlHandle::new(), &mut sink).execute();
     Told {
         report,
         records: sink.records,
@@ -32,10 +32,7 @@ fn run(plan: &Plan, config: &SimConfig) -> Told {
 
 impl Told {
     fn end(&self) -> &str {
-        match &self.report.end {
-            RunEnd::Completed => "completed",
-            RunEnd::Stopped(r) | RunEnd::Faulted(r) => r,
-        }
+        self.report.end.reason().unwrap_or("completed")
     }
 
     fn last_height_mm(&self) -> f64 {

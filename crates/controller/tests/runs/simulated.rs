@@ -1,6 +1,6 @@
 //! The controller on the simulated rig.
 
-use skinrig_controller::{ControlHandle, ControllerSettings, Run, execute};
+use skinrig_controller::{ControlHandle, ControllerSettings, Run};
 use skinrig_model::*;
 use skinrig_protocol::plan::{Plan, Step};
 use skinrig_sim::config::SimConfig;
@@ -9,7 +9,7 @@ use skinrig_sim::rig::simulated_rig;
 use crate::mock::{MS, Sink, header, plan};
 
 /// The mock's plan at a pace that a robot with inertia can follow.
-pub fn paced_plan() -> Plan {
+pub(crate) fn paced_plan() -> Plan {
     let mut plan = plan();
     for step in &mut plan.steps {
         if let Step::Press(p) = step {
@@ -35,13 +35,14 @@ fn presses_on_the_simulated_rig_are_valid_and_reproducible() {
     let plan = paced_plan();
     let run = || {
         let mut sink = Sink::default();
-        let report = execute(
+        let report = Run::new(
             &plan,
             sim_header(&plan, &config),
             simulated_rig(&config),
             &ControlHandle::new(),
             &mut sink,
-        );
+        )
+        .execute();
         assert_eq!(report.end, RunEnd::Completed, "{report:?}");
         assert_eq!(report.problems, Vec::new());
         assert!(report.retracted && report.disarmed);
@@ -106,8 +107,9 @@ fn no_tick_of_1_to_10_ms_breaks_a_press() {
         let rig = simulated_rig(&config);
         let header = sim_header(&plan, &config);
         let control = ControlHandle::new();
-        let armed = Run::with_settings(&plan, header, rig, &control, &mut sink, settings).arm();
-        let report = armed.map_or_else(|report| *report, |run| run.begin().run().report());
+        let report = Run::new(&plan, header, rig, &control, &mut sink)
+            .with_settings(settings)
+            .execute();
         assert_eq!(
             (report.valid, &report.end),
             (3, &RunEnd::Completed),

@@ -1,6 +1,6 @@
 //! Encoder noise: a healthy robot's readings refuse no motion, and a robot that is aside is named as that.
 
-use skinrig_controller::{ControllerError, PressFault, RunReport, execute};
+use skinrig_controller::{ControllerError, PressFault, Run, RunReport};
 use skinrig_model::*;
 use skinrig_protocol::plan::{Plan, Step};
 
@@ -51,7 +51,7 @@ fn run(plan: &Plan, encoders: (u64, i64, f64)) -> (RunReport, Vec<String>) {
     };
     let world = World::shared(faults, [0.0, 0.0, 10.0]);
     let control = lock(&world).control.clone();
-    let report = execute(plan, header(plan), rig(&world), &control, &mut Nowhere);
+    let report = Run::new(plan, header(plan), rig(&world), &control, &mut Nowhere).execute();
     let violations = lock(&world).violations.clone();
     (report, violations)
 }

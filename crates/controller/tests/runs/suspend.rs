@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use skinrig_controller::suspend::{Hysteresis, Transition};
-use skinrig_controller::{RecordSink, SinkFault, execute};
+use skinrig_controller::{RecordSink, Run, SinkFault};
 use skinrig_model::{HostDuration, HostTime, InterruptionKind, Record, RunEnd};
 use skinrig_protocol::{Suspend, Threshold, UnderWay};
 
@@ -131,7 +131,7 @@ fn run(
         world: world.clone(),
         low: low_ms,
     };
-    let report = execute(&plan, header(&plan), rig(&world), &control, &mut disk);
+    let report = Run::new(&plan, header(&plan), rig(&world), &control, &mut disk).execute();
     let rows = disk.sink.records.into_iter().filter_map(|r| match r {
         Record::Interruption { kind, t, reason } => Some((kind, t.0 / MS, reason)),
         _ => None,

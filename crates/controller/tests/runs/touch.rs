@@ -1,6 +1,6 @@
 //! Presses that find the surface by touch, on the simulated rig whose skin does not lie where the frame says.
 
-use skinrig_controller::{ControlHandle, Resume, Run, execute};
+use skinrig_controller::{ControlHandle, Resume, Run};
 use skinrig_model::*;
 use skinrig_protocol::plan::{Plan, Step};
 use skinrig_protocol::{Route, Surface, SurfaceCheck, TouchSearch};
@@ -40,7 +40,7 @@ fn run(off_mm: f64, plan: &Plan) -> (RunEnd, Vec<PressOutcome>, Vec<PoseSample>)
         ..header(plan)
     };
     let mut sink = Sink::default();
-    let report = execute(plan, header, rig, &ControlHandle::new(), &mut sink);
+    let report = Run::new(plan, header, rig, &ControlHandle::new(), &mut sink).execute();
     assert!(report.retracted && report.disarmed, "{report:?}");
     let (mut outcomes, mut poses) = (Vec::new(), Vec::new());
     for record in sink.records {
@@ -151,7 +151,7 @@ fn checked(off_mm: f64, each_repetition: bool) -> (RunEnd, Vec<Record>) {
         ..header(&plan)
     };
     let mut sink = Sink::default();
-    let report = execute(&plan, header, rig, &ControlHandle::new(), &mut sink);
+    let report = Run::new(&plan, header, rig, &ControlHandle::new(), &mut sink).execute();
     assert!(report.retracted && report.disarmed, "{report:?}");
     (report.end, sink.records)
 }
@@ -306,7 +306,7 @@ fn a_robot_that_cannot_reach_the_deepest_touch_is_refused() {
         ..header(&plan)
     };
     let mut sink = Sink::default();
-    let report = execute(&plan, header, rig, &ControlHandle::new(), &mut sink);
+    let report = Run::new(&plan, header, rig, &ControlHandle::new(), &mut sink).execute();
     let RunEnd::Faulted(reason) = report.end else {
         panic!("{report:?}");
     };

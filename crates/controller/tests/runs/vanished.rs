@@ -2,7 +2,7 @@
 
 use crate::course::{START, faults};
 use crate::mock::*;
-use skinrig_controller::{ControllerError, RecordSink, RunReport, SinkFault, execute};
+use skinrig_controller::{ControllerError, RecordSink, Run, RunReport, SinkFault};
 use skinrig_model::*;
 
 /// A sink whose records are gone from some time on, which it says only when it is asked. ms of the rig's clock.
@@ -44,7 +44,7 @@ fn run(gone_ms: i64, operator: Option<(u64, Press)>) -> (Vanishing, RunReport) {
         gone_ms,
         asked_ms: Vec::new(),
     };
-    let report = execute(&plan, header(&plan), rig(&world), &control, &mut sink);
+    let report = Run::new(&plan, header(&plan), rig(&world), &control, &mut sink).execute();
     (sink, report)
 }
 

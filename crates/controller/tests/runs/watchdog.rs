@@ -183,7 +183,9 @@ fn every_cause_ends_the_press_within_two_ticks() {
             assert!(reason.starts_with(words), "{case}: {reason}");
             assert!(told.report.disarmed, "{case}");
             let verdicts = told.records.iter().filter_map(|r| match r {
-                Record::Outcome(o) => Some((o.verdict.name(), o.verdict.reason().unwrap_or(""))),
+                Record::Outcome(o) => {
+                    Some((o.verdict.name(), o.verdict.reason().unwrap_or_default()))
+                }
                 _ => None,
             });
             let verdicts = verdicts.collect::<Vec<_>>();

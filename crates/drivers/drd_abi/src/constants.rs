@@ -10,8 +10,6 @@ pub const DEFAULT_DEVICE: DeviceId = -1;
 
 /// Type number of the omega.3.
 pub const DEVICE_OMEGA3: i32 = 33;
-/// Type number of the first generation of the omega, no longer supported.
-pub const DEVICE_OMEGA: i32 = 32;
 /// Unlisted type number that one public library also accepts as an omega.3.
 pub const DEVICE_OMEGA3_UNLISTED: i32 = 110;
 
@@ -20,23 +18,13 @@ pub const TIMEGUARD: i32 = 1;
 /// Success with a saturated motor: the force keeps its direction but is weaker.
 pub const MOTOR_SATURATED: i32 = 2;
 
-/// Communication modes: synchronous USB.
-pub const COM_MODE_SYNC: i32 = 0;
 /// Communication modes: asynchronous USB, the default.
 pub const COM_MODE_ASYNC: i32 = 1;
-/// Communication modes: the vendor's simulator, no device.
-pub const COM_MODE_VIRTUAL: i32 = 3;
-/// Communication modes: a device on the network.
-pub const COM_MODE_NETWORK: i32 = 4;
 
 /// Unit of the controller's watchdog, µs.
 pub const WATCHDOG_UNIT_US: u32 = 125;
 /// Serial number of a device that does not report one.
 pub const SERIAL_UNKNOWN: u16 = 65535;
-/// USB vendor ID of Force Dimension. Match it alone: product IDs vary between omegas.
-pub const USB_VENDOR_ID: u16 = 0x1451;
-/// Largest translational force of the omega.3, N.
-pub const OMEGA3_MAX_FORCE_N: f64 = 12.0;
 
 /// Whether a result means success: any number that is not negative.
 #[must_use]

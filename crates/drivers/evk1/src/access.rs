@@ -36,7 +36,7 @@ impl<'a> Registers<'a> {
     }
 
     /// The transport, for requests other than register access.
-    pub fn transport(&mut self) -> &mut dyn Transport {
+    pub(crate) fn transport(&mut self) -> &mut dyn Transport {
         self.transport
     }
 

@@ -3,7 +3,7 @@
 use crate::registers::Register;
 
 /// Next step when a user has no permission to open the camera.
-pub const UDEV_STEP: &str =
+pub(crate) const UDEV_STEP: &str =
     "install hil/udev/70-skinrig.rules (hil/README.md), then reconnect the camera";
 
 /// A transfer or a request to the USB stack failed.

@@ -32,7 +32,7 @@ pub mod usb;
 
 pub use camera::Evk1;
 pub use config::Evk1Config;
-pub use error::{Evk1Error, UDEV_STEP, UsbError};
+pub use error::{Evk1Error, UsbError};
 pub use identify::{Found, FoundState, Identity, enumerate};
 pub use report::StreamReport;
 pub use tolerance::{Accept, Mismatch, Mismatches, Tolerance};

@@ -114,12 +114,10 @@ pub const USE_EXT_START: Field = bit(ATIS_CONTROL, "USE_EXT_START", 14);
 /// Reset of the change detection, active low.
 pub const TD_RSTN: Field = bit(ATIS_CONTROL, "TD_RSTN", 18);
 /// Reset of the exposure measurement, active low.
-pub const EM_RSTN: Field = bit(ATIS_CONTROL, "EM_RSTN", 19);
+pub(crate) const EM_RSTN: Field = bit(ATIS_CONTROL, "EM_RSTN", 19);
 
 /// The FPGA's host side.
 pub const CCAM2_CONTROL: Register = register("CCAM2_CONTROL", 0x0008, 0x0000_0020);
-/// 64-bit events; stays 0, the words are EVT2.
-pub const ENABLE_64BITS_EVENT: Field = bit(CCAM2_CONTROL, "ENABLE_64BITS_EVENT", 3);
 /// The interface to the host.
 pub(crate) const HOST_IF_ENABLE: Field = bit(CCAM2_CONTROL, "HOST_IF_ENABLE", 8);
 /// The time base runs.
@@ -259,8 +257,6 @@ pub(crate) const RO_DUAL_CTRL: Field = bit(ROB_CTRL, "ro_dual_ctrl", 0);
 pub const NFL_CTRL: Register = register("nfl_ctrl", 0x0248, 0x0000_00c8);
 /// Switch of the filter.
 pub const NFL_EN: Field = bit(NFL_CTRL, "nfl_en", 0);
-/// Clock cycles per tick of the filter.
-pub const NFL_PRE_CNT_THRESH: Field = field(NFL_CTRL, "pre_cnt_thresh", 1, 7);
 /// Thresholds of the filter.
 pub const NFL_THRESH: Register = register("nfl_thresh", 0x024c, 0x0019_0032);
 /// Events per period below which the filter drops everything.
@@ -492,7 +488,6 @@ mod tests {
         assert_eq!(f.put(u32::MAX, 0), !f.mask());
         assert_eq!(f.put(0, u32::MAX), f.mask());
         assert_eq!(f.max(), 1023);
-        assert_eq!(NFL_PRE_CNT_THRESH.of(NFL_CTRL.default), 0x64);
         assert_eq!(NFL_EVT_THRESH.of(NFL_THRESH.default), 0x32);
     }
 }

@@ -8,7 +8,7 @@ use crate::axes::Axes;
 /// Complete configuration. The defaults are cautious; no value comes from the device.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OmegaConfig {
-    /// Path of the vendor's library. `None`: searched, see [`crate::load::search_paths`].
+    /// Path of the vendor's library. `None`: searched, see `search_paths` of `load`.
     pub library: Option<PathBuf>,
     /// Serial number of this bench's robot; any other is rejected. `None` accepts the only free robot.
     pub serial: Option<u16>,

@@ -92,7 +92,7 @@ fn list(attempts: &[Attempt]) -> String {
 /// depend on other installed files. Otherwise: SDK directories from the environment, common directories, and names for the system's
 /// own search.
 #[must_use]
-pub fn search_paths(
+pub(crate) fn search_paths(
     configured: Option<&Path>,
     variable: impl Fn(&str) -> Option<OsString>,
 ) -> Vec<PathBuf> {
@@ -138,7 +138,7 @@ fn sdk_directories(root: &Path) -> Vec<PathBuf> {
         .to_vec()
 }
 
-/// Loads the first library in [`search_paths`]. It is never unloaded.
+/// Loads the first library in `search_paths`. It is never unloaded.
 ///
 /// # Errors
 /// [`LoadError`]. A library that exists but cannot be used ends the search, so that no other version is loaded by accident.

@@ -70,7 +70,7 @@ impl Profile {
 
     /// Continues at the current speed along another line of `length` mm. The caller has checked that it can still stop there.
     #[must_use]
-    pub const fn continue_on(self, length: f64, limits: ProfileLimits) -> Self {
+    pub(crate) const fn continue_on(self, length: f64, limits: ProfileLimits) -> Self {
         Self {
             limits,
             length,

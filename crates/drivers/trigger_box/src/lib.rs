@@ -19,6 +19,6 @@ pub mod wire;
 mod worker;
 
 pub use config::TriggerBoxConfig;
-pub use discover::{BY_ID, FoundPort, PortState, enumerate, port_of_adapter};
+pub use discover::{FoundPort, PortState, enumerate};
 pub use driver::SerialTriggerBox;
 pub use wire::{Connector, OpenError, Wire};

@@ -218,11 +218,6 @@ impl Flags {
     pub fn disarmed_by_silence(self) -> bool {
         self.0 & 8 != 0
     }
-    /// Level of the input.
-    #[must_use]
-    pub fn input_high(self) -> bool {
-        self.0 & 16 != 0
-    }
 }
 
 /// A reply of the box.
@@ -303,7 +298,7 @@ impl Reply {
 
     /// Whether this is the reply to `request` with number `id`.
     #[must_use]
-    pub fn is_reply_to(&self, request: &Request, id: u16) -> bool {
+    pub(crate) fn is_reply_to(&self, request: &Request, id: u16) -> bool {
         self.command == request.command()
             && self.id == id
             && (self.version == PROTOCOL_VERSION || self.command == HELLO)

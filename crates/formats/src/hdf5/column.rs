@@ -124,7 +124,7 @@ buffers! {
 impl IntColumn {
     /// Accepts an open dataset of integers, of an enumeration (h5py's booleans), or of floating-point numbers, which must
     /// be whole.
-    pub fn new(dataset: H5Dataset, name: &str, path: &Path) -> Result<Self, FormatsError> {
+    pub(super) fn new(dataset: H5Dataset, name: &str, path: &Path) -> Result<Self, FormatsError> {
         let wrong = |found: String| FormatsError::Dataset {
             path: path.into(),
             dataset: name.into(),
@@ -150,7 +150,12 @@ impl IntColumn {
     }
 
     /// Reads the values from row `start` on into `out`.
-    pub fn read(&mut self, start: usize, out: &mut [u16], path: &Path) -> Result<(), FormatsError> {
+    pub(super) fn read(
+        &mut self,
+        start: usize,
+        out: &mut [u16],
+        path: &Path,
+    ) -> Result<(), FormatsError> {
         let broken = self.buffer.read(&self.dataset, start, out);
         match broken.map_err(|error| unreadable(path, &self.name, start, out.len(), &error))? {
             None => Ok(()),

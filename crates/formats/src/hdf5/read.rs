@@ -159,12 +159,6 @@ impl EventReader {
         self.outside
     }
 
-    /// Rows delivered so far.
-    #[must_use]
-    pub fn rows_read(&self) -> u64 {
-        self.next_row as u64
-    }
-
     /// Rows in all.
     #[must_use]
     pub fn rows(&self) -> u64 {

@@ -4,13 +4,14 @@ use std::path::Path;
 
 use skinrig_model::StreamFormat;
 
+use super::problem::{FormatProblem, HeaderProblem, ValueMismatch};
 use crate::error::FormatsError;
 use crate::stream::Geometry;
 
 /// Longest header line, bytes.
-const MAX_LINE: usize = 1024;
+pub(super) const MAX_LINE: usize = 1024;
 /// Most header lines.
-const MAX_LINES: usize = 255;
+pub(super) const MAX_LINES: usize = 255;
 /// Longest header, bytes.
 pub(super) const MAX_HEADER: usize = (MAX_LINES + 1) * (MAX_LINE + 2);
 
@@ -52,63 +53,52 @@ impl RawHeader {
         let mut meaning = Meaning::default();
         let (mut at, mut has_end) = (0, false);
         while !has_end && bytes[at..].starts_with(b"% ") {
-            let error = |key: &str, expected: &str, found: &str| FormatsError::Header {
+            let error = |key: &str, problem| FormatsError::Header {
                 path: path.into(),
                 offset: at as u64,
                 key: key.into(),
-                expected: expected.into(),
-                found: found.into(),
+                problem,
             };
             let line = &bytes[at + 2..];
             let line = &line[..line.len().min(MAX_LINE)];
             let Some(length) = line.iter().position(|b| *b == b'\n') else {
-                let expected = format!("a line of at most {MAX_LINE} bytes");
-                return Err(error("", &expected, "no end of line"));
+                return Err(error("", HeaderProblem::LongLine));
             };
             let Ok(text) = std::str::from_utf8(&line[..length]) else {
-                let found = String::from_utf8_lossy(&line[..length.min(40)]);
-                return Err(error("", "text in UTF-8", &format!("{found:?}")));
+                let found = String::from_utf8_lossy(&line[..length.min(40)]).into_owned();
+                return Err(error("", HeaderProblem::NotUtf8 { found }));
             };
             let mut tokens = text.split_whitespace();
             let Some(key) = tokens.next() else {
-                return Err(error("", "a key", "an empty line"));
+                return Err(error("", HeaderProblem::NoKey));
             };
             let value = tokens.collect::<Vec<_>>().join(" ");
             has_end = key == "end";
             if !has_end {
                 if entries.len() == MAX_LINES {
-                    let expected = format!("at most {MAX_LINES} header lines");
-                    return Err(error(key, &expected, "more"));
+                    return Err(error(key, HeaderProblem::ManyLines));
                 }
-                meaning
-                    .take(key, &value)
-                    .map_err(|expected| error(key, &expected, &value))?;
+                meaning.take(key, &value).map_err(|mismatch| {
+                    let found = value.clone();
+                    error(key, HeaderProblem::Value { mismatch, found })
+                })?;
                 entries.push((key.to_owned(), value));
             }
             at += 2 + length + 1;
         }
-        let error = |key: &str, expected: &str, found: String| FormatsError::Header {
+        let error = |key: &str, problem| FormatsError::Header {
             path: path.into(),
             offset: at as u64,
             key: key.into(),
-            expected: expected.into(),
-            found,
+            problem,
         };
         if at == 0 {
             let start = String::from_utf8_lossy(&bytes[..bytes.len().min(8)]).into_owned();
-            return Err(error(
-                "",
-                "a header that begins with `% `",
-                format!("{start:?}"),
-            ));
+            return Err(error("", HeaderProblem::Missing { start }));
         }
-        let format = meaning.stream_format().map_err(|found| {
-            error(
-                "format",
-                "one of EVT2, EVT21, EVT3 in `format` or `evt`",
-                found,
-            )
-        })?;
+        let format = meaning
+            .stream_format()
+            .map_err(|why| error("format", HeaderProblem::Format(why)))?;
         Ok(Self {
             geometry: meaning.geometry(),
             entries,
@@ -134,7 +124,7 @@ impl RawHeader {
 
 impl Meaning {
     /// Takes one entry; the error says what was expected.
-    fn take(&mut self, key: &str, value: &str) -> Result<(), String> {
+    fn take(&mut self, key: &str, value: &str) -> Result<(), ValueMismatch> {
         match key {
             "format" => {
                 let mut parts = value.split(';').map(str::trim);
@@ -145,7 +135,7 @@ impl Meaning {
                         Some(("height", n)) => set_size(&mut self.height, n, "height")?,
                         Some(("endianness", order)) => self.set_order(order)?,
                         Some(_) => {}
-                        None => return Err("options of the form name=value".into()),
+                        None => return Err(ValueMismatch::Options),
                     }
                 }
             }
@@ -153,13 +143,13 @@ impl Meaning {
             "endianness" => self.set_order(value)?,
             "geometry" => {
                 let Some((width, height)) = value.split_once('x') else {
-                    return Err("WIDTHxHEIGHT".into());
+                    return Err(ValueMismatch::Geometry);
                 };
                 set_size(&mut self.width, width, "width")?;
                 set_size(&mut self.height, height, "height")?;
             }
             "system_ID" => {
-                let id = value.parse().map_err(|_| "a decimal number")?;
+                let id = value.parse().map_err(|_| ValueMismatch::Number)?;
                 self.system_id = Some(id);
             }
             "integrator_name" | "camera_integrator_name" => {
@@ -170,20 +160,20 @@ impl Meaning {
         Ok(())
     }
 
-    fn set_order(&mut self, order: &str) -> Result<(), String> {
+    fn set_order(&mut self, order: &str) -> Result<(), ValueMismatch> {
         let legacy = match order {
             "legacy" => true,
             "little" => false,
-            _ => return Err("endianness little or legacy".into()),
+            _ => return Err(ValueMismatch::Endianness),
         };
         if self.legacy_order.is_some_and(|stated| stated != legacy) {
-            return Err("the endianness that the header states elsewhere".into());
+            return Err(ValueMismatch::OtherEndianness);
         }
         self.legacy_order = Some(legacy);
         Ok(())
     }
 
-    fn stream_format(&self) -> Result<StreamFormat, String> {
+    fn stream_format(&self) -> Result<StreamFormat, FormatProblem> {
         // System IDs (EVK1 reference, sections 1.1 and 4.4): 28 EVK1 Gen3.1, 35 and 40 EVK3 Gen3.1.
         let by_camera = match self.system_id {
             Some(28 | 35) => Some("2.0"),
@@ -195,12 +185,17 @@ impl Meaning {
             Some("EVT2") => Some("2.0"),
             Some("EVT21") => Some("2.1"),
             Some("EVT3") => Some("3.0"),
-            Some(other) => return Err(format!("format `{other}`")),
+            Some(other) => {
+                let format = other.to_owned();
+                return Err(FormatProblem::Format { format });
+            }
         };
         let version = match (by_format, self.evt.as_deref()) {
             (Some(format), Some(evt)) if format != evt => {
-                let name = self.format.as_deref().unwrap_or_default();
-                return Err(format!("format `{name}` and evt `{evt}`"));
+                return Err(FormatProblem::Contradiction {
+                    format: self.format.clone().unwrap_or_default(),
+                    evt: evt.to_owned(),
+                });
             }
             (Some(version), _) | (None, Some(version)) => Some(version),
             (None, None) => by_camera,
@@ -217,8 +212,10 @@ impl Meaning {
                     StreamFormat::Evt21
                 })
             }
-            Some(other) => Err(format!("evt `{other}`")),
-            None => Err("neither key, and no system_ID that implies it".into()),
+            Some(other) => Err(FormatProblem::Evt {
+                evt: other.to_owned(),
+            }),
+            None => Err(FormatProblem::Unstated),
         }
     }
 
@@ -233,17 +230,15 @@ impl Meaning {
 }
 
 /// Takes a stated size, which must not contradict an earlier one.
-fn set_size(size: &mut Option<u16>, text: &str, what: &str) -> Result<(), String> {
+fn set_size(size: &mut Option<u16>, text: &str, side: &'static str) -> Result<(), ValueMismatch> {
     let value = text
         .trim()
         .parse()
         .ok()
         .filter(|v| (1..=2048).contains(v))
-        .ok_or_else(|| format!("a {what} in 1..=2048"))?;
+        .ok_or(ValueMismatch::Size { side })?;
     match size.replace(value) {
-        Some(stated) if stated != value => {
-            Err(format!("{what} {stated} as stated elsewhere in the header"))
-        }
+        Some(stated) if stated != value => Err(ValueMismatch::OtherSize { side, stated }),
         _ => Ok(()),
     }
 }

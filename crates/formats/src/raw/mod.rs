@@ -6,9 +6,11 @@
 //! shifts them so that the first is near 0.
 
 mod header;
+mod problem;
 mod read;
 mod write;
 
 pub use header::RawHeader;
+pub use problem::{FormatProblem, HeaderProblem, ValueMismatch};
 pub use read::RawReader;
 pub use write::{RawMetadata, RawWriter};

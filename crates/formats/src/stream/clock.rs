@@ -39,17 +39,17 @@ impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
     }
 
     /// True once a time base word was seen, and none can have been lost since.
-    pub const fn known(&self) -> bool {
+    pub(super) const fn known(&self) -> bool {
         self.known && !self.stale
     }
 
     /// Words were lost.
-    pub const fn lost(&mut self) {
+    pub(super) const fn lost(&mut self) {
         self.stale = true;
     }
 
     /// The current base, µs.
-    pub const fn base_us(&self) -> u64 {
+    pub(super) const fn base_us(&self) -> u64 {
         self.epoch_us + ((self.high as u64) << SHIFT)
     }
 
@@ -59,17 +59,17 @@ impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
     }
 
     /// The last counter value.
-    pub const fn high(&self) -> u32 {
+    pub(super) const fn high(&self) -> u32 {
         self.high
     }
 
     /// Moves on to `high`, which the caller knows to be ordinary progress.
-    pub const fn advance(&mut self, high: u32) {
+    pub(super) const fn advance(&mut self, high: u32) {
         self.high = high;
     }
 
     /// Processes the next counter value (below `2^BITS`).
-    pub fn set(&mut self, high: u32) -> Step {
+    pub(super) fn set(&mut self, high: u32) -> Step {
         let from_us = self.base_us();
         let previous = self.high;
         self.high = high;

@@ -196,7 +196,7 @@ pub(super) struct Words {
 
 impl Words {
     /// As at the start of a stream whose times count from `origin_us`.
-    pub fn restart(&mut self, origin_us: u64) {
+    pub(super) fn restart(&mut self, origin_us: u64) {
         *self = Self {
             base: TimeBase::starting_at(origin_us),
             ..Self::default()
@@ -204,13 +204,13 @@ impl Words {
     }
 
     /// Words were lost.
-    pub const fn lost(&mut self) {
+    pub(super) const fn lost(&mut self) {
         self.base.lost();
         self.other = None;
     }
 
     /// Decodes whole words.
-    pub fn run<const KEEP: bool>(
+    pub(super) fn run<const KEEP: bool>(
         &mut self,
         mut bytes: &[u8],
         output: &mut Output,

@@ -20,7 +20,7 @@ pub(super) struct Words {
 }
 
 impl Words {
-    pub fn new(legacy: bool) -> Self {
+    pub(super) fn new(legacy: bool) -> Self {
         Self {
             base: TimeBase::default(),
             legacy,
@@ -28,17 +28,17 @@ impl Words {
     }
 
     /// As at the start of a stream whose times count from `origin_us`.
-    pub fn restart(&mut self, origin_us: u64) {
+    pub(super) fn restart(&mut self, origin_us: u64) {
         self.base = TimeBase::starting_at(origin_us);
     }
 
     /// Words were lost.
-    pub const fn lost(&mut self) {
+    pub(super) const fn lost(&mut self) {
         self.base.lost();
     }
 
     /// Decodes whole words.
-    pub fn run<const KEEP: bool>(
+    pub(super) fn run<const KEEP: bool>(
         &mut self,
         bytes: &[u8],
         output: &mut Output,

@@ -45,7 +45,7 @@ struct Other {
 
 impl Words {
     /// As at the start of a stream whose times count from `origin_us`.
-    pub fn restart(&mut self, origin_us: u64) {
+    pub(super) fn restart(&mut self, origin_us: u64) {
         *self = Self {
             base: TimeBase::starting_at(origin_us),
             ..Self::default()
@@ -53,7 +53,7 @@ impl Words {
     }
 
     /// Words were lost.
-    pub const fn lost(&mut self) {
+    pub(super) const fn lost(&mut self) {
         self.base.lost();
         self.low_is_lost = true;
         self.y = None;
@@ -67,7 +67,7 @@ impl Words {
     }
 
     /// Decodes whole words.
-    pub fn run<const KEEP: bool>(
+    pub(super) fn run<const KEEP: bool>(
         &mut self,
         bytes: &[u8],
         output: &mut Output,

@@ -22,7 +22,7 @@ pub(super) struct Output {
 }
 
 impl Output {
-    pub fn new(geometry: Geometry) -> Self {
+    pub(super) fn new(geometry: Geometry) -> Self {
         const NONE: CdEvent = CdEvent {
             t_us: 0,
             x: 0,
@@ -46,13 +46,13 @@ impl Output {
 
     /// Records the time of a timed word.
     #[inline]
-    pub fn timed(&mut self, t_us: u64) {
+    pub(super) fn timed(&mut self, t_us: u64) {
         self.last_us = Some(t_us);
         self.chunk_first_us.get_or_insert(t_us);
     }
 
     /// Delivers the buffered events.
-    pub fn flush(&mut self, sink: &mut impl EventSink) {
+    pub(super) fn flush(&mut self, sink: &mut impl EventSink) {
         if self.len > 0 {
             sink.on_cd(&self.buffer[..self.len]);
             self.len = 0;
@@ -61,7 +61,7 @@ impl Output {
 
     /// Adds one CD event, checked against the sensor.
     #[inline]
-    pub fn cd<const KEEP: bool>(&mut self, event: CdEvent, sink: &mut impl EventSink) {
+    pub(super) fn cd<const KEEP: bool>(&mut self, event: CdEvent, sink: &mut impl EventSink) {
         self.timed(event.t_us);
         if !self.geometry.contains(event.x, event.y) {
             self.stats.out_of_geometry += 1;
@@ -81,7 +81,7 @@ impl Output {
     }
 
     /// Adds one trigger edge.
-    pub fn trigger(&mut self, edge: TriggerEdge, sink: &mut impl EventSink) {
+    pub(super) fn trigger(&mut self, edge: TriggerEdge, sink: &mut impl EventSink) {
         self.timed(edge.t_us);
         self.stats.triggers[usize::from(edge.channel & 31)] += 1;
         self.flush(sink);
@@ -89,13 +89,13 @@ impl Output {
     }
 
     /// Adds one complete monitoring message.
-    pub fn monitoring(&mut self, monitoring: Monitoring, sink: &mut impl EventSink) {
+    pub(super) fn monitoring(&mut self, monitoring: Monitoring, sink: &mut impl EventSink) {
         self.flush(sink);
         sink.on_monitoring(monitoring);
     }
 
     /// Adds one time base word, which set the time `now_us` if that is known.
-    pub fn time_high(&mut self, step: Step, now_us: Option<u64>, sink: &mut impl EventSink) {
+    pub(super) fn time_high(&mut self, step: Step, now_us: Option<u64>, sink: &mut impl EventSink) {
         self.stats.time_high += 1;
         if let Some(now_us) = now_us {
             self.timed(now_us);

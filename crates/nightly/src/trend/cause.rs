@@ -30,7 +30,7 @@ enum Component {
 
 /// What a series describes, according to its check.
 #[must_use]
-pub fn series_cause(series: &str) -> Cause {
+pub(crate) fn series_cause(series: &str) -> Cause {
     let mut parts = series.split('/');
     match (parts.next().unwrap_or_default(), parts.next()) {
         ("golden", _) | ("derived", Some("skin")) => Cause::Skin,

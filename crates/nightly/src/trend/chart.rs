@@ -1,6 +1,7 @@
 //! Control chart of one series: scores every night against the reference nights and detects runs of outliers.
 
 use serde::Serialize;
+use skinrig_model::quantile;
 
 use super::change::{self, ChangeWindow};
 use super::history::{Acceptance, NightHead, Point, Series};
@@ -259,7 +260,7 @@ fn set_level_after(chart: &mut Chart, at: usize) {
         .map(|n| n.value)
         .collect();
     values.sort_by(f64::total_cmp);
-    excursion.after = super::reference::quantile(&values, 0.5);
+    excursion.after = quantile(&values, 0.5).unwrap_or(f64::NAN);
 }
 
 impl Chart {

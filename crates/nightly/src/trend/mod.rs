@@ -13,7 +13,7 @@ pub mod reference;
 pub mod report;
 pub mod run_length;
 
-pub use cause::{Attribution, series_cause};
+pub use cause::Attribution;
 pub use change::ChangeWindow;
 pub use chart::{Chart, ChartPoint, Direction, Excursion, chart};
 pub use history::{Acceptance, History, NightHead, Point, Series};

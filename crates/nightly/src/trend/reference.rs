@@ -1,11 +1,12 @@
 //! Reference of a series: robust centre and spread of its normal nights.
 
 use serde::Serialize;
+use skinrig_model::quantile;
 
 /// Minimum number of nights of a reference.
 pub(crate) const MIN_NIGHTS: usize = 12;
 /// Maximum number of nights of a reference. Later nights are only compared with it, so that a slow drift is detected.
-pub const MAX_NIGHTS: usize = 100;
+pub(crate) const MAX_NIGHTS: usize = 100;
 
 /// Smallest spread as a share of the centre: without it, metrics that hardly vary would raise irrelevant alarms.
 const MIN_RELATIVE_SPREAD: f64 = 0.005;
@@ -54,14 +55,14 @@ impl Reference {
         }
         let mut sorted: Vec<f64> = samples.iter().map(|s| s.value).collect();
         sorted.sort_by(f64::total_cmp);
-        let centre = quantile(&sorted, 0.5);
+        let centre = quantile(&sorted, 0.5)?;
         let mut distances: Vec<f64> = sorted.iter().map(|v| (v - centre).abs()).collect();
         distances.sort_by(f64::total_cmp);
-        let middle = PER_MAD * quantile(&distances, 0.5);
+        let middle = PER_MAD * quantile(&distances, 0.5)?;
         let floor = spread_floor(samples, centre, counts);
         let side = |tail: f64| middle.max(tail / TAIL_AT).max(floor);
-        let below = side(centre - quantile(&sorted, 1.0 - TAIL));
-        let above = side(quantile(&sorted, TAIL) - centre);
+        let below = side(centre - quantile(&sorted, 1.0 - TAIL)?);
+        let above = side(quantile(&sorted, TAIL)? - centre);
         let plain = Self {
             nights,
             centre,
@@ -107,9 +108,9 @@ fn spread_floor(samples: &[Sample], centre: f64, counts: bool) -> f64 {
         floor = floor.max(((sum + 3.0) / n).sqrt());
     }
     let mut halves: Vec<f64> = samples.iter().filter_map(|s| s.half_interval).collect();
-    if !halves.is_empty() {
-        halves.sort_by(f64::total_cmp);
-        floor = floor.max(quantile(&halves, 0.5) / 1.96);
+    halves.sort_by(f64::total_cmp);
+    if let Some(half) = quantile(&halves, 0.5) {
+        floor = floor.max(half / 1.96);
     }
     let share = centre / 100.0;
     let trials = samples.iter().filter_map(|s| s.trials).max();
@@ -135,16 +136,6 @@ fn correlation(scores: impl Iterator<Item = f64>) -> f64 {
     let product: f64 = pairs.map(|w| (w[0] - mean) * (w[1] - mean)).sum();
     let unbiased = product / square + 1.0 / n;
     unbiased.clamp(0.0, MAX_CORRELATION)
-}
-
-/// Quantile of sorted values with linear interpolation.
-pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
-    let place = share * sorted.len().saturating_sub(1) as f64;
-    let (low, high) = (place.floor() as usize, place.ceil() as usize);
-    match (sorted.get(low), sorted.get(high)) {
-        (Some(a), Some(b)) => a + (b - a) * place.fract(),
-        _ => f64::NAN,
-    }
 }
 
 #[cfg(test)]

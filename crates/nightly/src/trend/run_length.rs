@@ -52,7 +52,7 @@ impl Rule {
 
     /// Whether the last scores raise an alarm above the centre (`sign` 1) or below it (-1).
     #[must_use]
-    pub fn fires(self, scores: &[f64], sign: f64) -> bool {
+    pub(crate) fn fires(self, scores: &[f64], sign: f64) -> bool {
         let last = scores
             .len()
             .checked_sub(self.nights)

@@ -100,7 +100,7 @@ fn plain(text: &str) {
 
 #[test]
 fn document_is_well_formed_and_counts_add_up() {
-    let text = junit(&night_with_every_verdict(), "bench-1");
+    let text = junit(&night_with_every_verdict(), "bench-1").expect("write JUnit");
     let tags = elements(&text);
     let named = |name: &str| -> Vec<&Vec<(String, String)>> {
         let opened = tags.iter().filter_map(|tag| match tag {
@@ -174,8 +174,8 @@ fn document_is_valid_against_the_schema() {
     };
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/judging");
     let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("junit.xml");
-    std::fs::write(&file, junit(&night_with_every_verdict(), "bench-1"))
-        .expect("write a temporary file");
+    let text = junit(&night_with_every_verdict(), "bench-1").expect("write JUnit");
+    std::fs::write(&file, text).expect("write a temporary file");
     let done = std::process::Command::new(python)
         .arg(folder.join("validate.py"))
         .arg(folder.join("junit.xsd"))

@@ -5,7 +5,7 @@ use skinrig_nightly::{
     Attempt, Cause, CheckResult, Measurement, Night, NightExit, Part, Verdict, Versions,
 };
 
-pub fn measured(metric: &str, value: Option<f64>, limit: Limit) -> Measurement {
+pub(crate) fn measured(metric: &str, value: Option<f64>, limit: Limit) -> Measurement {
     Measurement {
         metric: metric.to_owned(),
         value,
@@ -19,7 +19,7 @@ pub fn measured(metric: &str, value: Option<f64>, limit: Limit) -> Measurement {
     }
 }
 
-pub fn part(subject: &str, measurements: Vec<Measurement>) -> Part {
+pub(crate) fn part(subject: &str, measurements: Vec<Measurement>) -> Part {
     Part {
         subject: subject.to_owned(),
         verdict: Verdict::worst(measurements.iter().map(|m| m.verdict)),
@@ -28,7 +28,7 @@ pub fn part(subject: &str, measurements: Vec<Measurement>) -> Part {
 }
 
 /// Attempts that ended so.
-pub fn attempts(verdicts: &[Verdict]) -> Vec<Attempt> {
+pub(crate) fn attempts(verdicts: &[Verdict]) -> Vec<Attempt> {
     let one = |verdict: &Verdict| Attempt {
         began_s: 0.0,
         took_s: 1.5,
@@ -41,7 +41,7 @@ pub fn attempts(verdicts: &[Verdict]) -> Vec<Attempt> {
     verdicts.iter().map(one).collect()
 }
 
-pub fn check(name: &str, verdict: Verdict, cause: Option<Cause>) -> CheckResult {
+pub(crate) fn check(name: &str, verdict: Verdict, cause: Option<Cause>) -> CheckResult {
     CheckResult {
         name: name.to_owned(),
         title: name.replace('_', " "),
@@ -57,7 +57,7 @@ pub fn check(name: &str, verdict: Verdict, cause: Option<Cause>) -> CheckResult 
 }
 
 /// A finished night of these checks.
-pub fn night(checks: Vec<CheckResult>) -> Night {
+pub(crate) fn night(checks: Vec<CheckResult>) -> Night {
     let mut night = Night {
         version: 1,
         id: "2026-11-20T02-00-00Z-nightly".to_owned(),

@@ -7,7 +7,7 @@ use skinrig_nightly::{Verdict, Versions};
 
 /// Distribution of a metric of an unchanged bench.
 #[derive(Debug, Clone, Copy)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// Always this value.
     Always(f64),
     /// Poisson counts with this mean.
@@ -172,7 +172,7 @@ const OTHERS: &[(&str, &str, &str, &str, Kind)] = &[
 
 /// A planted change of a bench.
 #[derive(Debug, Clone)]
-pub struct Planted {
+pub(crate) struct Planted {
     /// Prefix of the names of the affected series.
     pub series: &'static str,
     /// First affected night.
@@ -182,7 +182,7 @@ pub struct Planted {
 }
 
 /// A bench whose nights are drawn in order.
-pub struct Bench {
+pub(crate) struct Bench {
     random: Xoshiro256PlusPlus,
     metrics: Vec<Metric>,
     temperature: f64,
@@ -200,7 +200,7 @@ struct Metric {
 }
 
 /// A drawn value of a night.
-pub struct Drawn<'a> {
+pub(crate) struct Drawn<'a> {
     pub name: &'a str,
     pub unit: &'static str,
     pub value: f64,
@@ -210,7 +210,7 @@ pub struct Drawn<'a> {
 
 impl Bench {
     /// An unchanged bench.
-    pub fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         let mut metrics = Vec::new();
         for camera in ["camera1", "camera2"] {
             for (check, metric, unit, kind) in CAMERAS {
@@ -236,7 +236,7 @@ impl Bench {
     }
 
     /// Sets the spread of one metric, relative to its mean.
-    pub fn spread(mut self, series: &str, spread: f64) -> Self {
+    pub(crate) fn spread(mut self, series: &str, spread: f64) -> Self {
         for metric in self.metrics.iter_mut().filter(|m| m.name == series) {
             if let Normal(mean, _, r, t) = metric.kind {
                 metric.kind = Normal(mean, spread, r, t);
@@ -246,7 +246,7 @@ impl Bench {
     }
 
     /// The values of night number `at`; `None`: the night is missing.
-    pub fn night(&mut self, at: usize) -> Option<Vec<Drawn<'_>>> {
+    pub(crate) fn night(&mut self, at: usize) -> Option<Vec<Drawn<'_>>> {
         let Self {
             random,
             metrics,
@@ -281,7 +281,7 @@ impl Bench {
     }
 
     /// History of `nights` nights.
-    pub fn history(mut self, nights: usize) -> History {
+    pub(crate) fn history(mut self, nights: usize) -> History {
         let mut history = History::default();
         for at in 0..nights {
             let night = history.nights.len();
@@ -308,7 +308,7 @@ impl Bench {
 }
 
 /// Head of night number `at`; the number is in its name.
-pub fn head(at: usize) -> NightHead {
+pub(crate) fn head(at: usize) -> NightHead {
     NightHead {
         id: format!("night-{at:04}"),
         started: date(at),
@@ -330,7 +330,7 @@ pub fn head(at: usize) -> NightHead {
 }
 
 /// 02:00 UTC, `at` days after 2025-01-01.
-pub fn date(at: usize) -> String {
+pub(crate) fn date(at: usize) -> String {
     const DAYS: [usize; 12] = [31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
     let (year, mut day) = (2025 + at / 365, at % 365);
     let mut month = 0;

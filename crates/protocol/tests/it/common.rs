@@ -5,27 +5,27 @@ use std::path::{Path, PathBuf};
 use skinrig_protocol::{Diagnostics, Protocol};
 
 /// The folder of shipped protocols.
-pub fn folder() -> PathBuf {
+pub(crate) fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../protocols")
 }
 
 /// The text of a shipped file.
-pub fn shipped(name: &str) -> String {
+pub(crate) fn shipped(name: &str) -> String {
     std::fs::read_to_string(folder().join(name)).unwrap()
 }
 
 /// A loader that knows no file.
-pub fn nothing(_: &Path) -> std::io::Result<Vec<u8>> {
+pub(crate) fn nothing(_: &Path) -> std::io::Result<Vec<u8>> {
     Err(std::io::Error::from(std::io::ErrorKind::NotFound))
 }
 
 /// Parses a text with overrides.
-pub fn parse(text: &str, overrides: &[&str]) -> Result<Protocol, Diagnostics> {
+pub(crate) fn parse(text: &str, overrides: &[&str]) -> Result<Protocol, Diagnostics> {
     let overrides: Vec<String> = overrides.iter().map(|s| (*s).to_owned()).collect();
     Protocol::parse("test.yaml", text.as_bytes(), &overrides, &nothing)
 }
 
 /// The demo with overrides; panics with the findings when it has any.
-pub fn demo(overrides: &[&str]) -> Protocol {
+pub(crate) fn demo(overrides: &[&str]) -> Protocol {
     parse(&shipped("demo.yaml"), overrides).unwrap_or_else(|e| panic!("{e}"))
 }

@@ -290,7 +290,7 @@ fn csv_findings_point_into_the_csv() {
 fn colour_only_when_asked_for() {
     let error = parse("skinrig: 2\n", &[]).unwrap_err();
     assert!(!error.render(false).contains('\u{1b}'));
-    assert!(error.render(true).contains("\u{1b}[1;31m"));
+    assert!(error.render(true).contains("\u{1b}[1m\u{1b}[31m"));
 }
 
 #[test]

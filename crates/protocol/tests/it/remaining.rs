@@ -68,7 +68,7 @@ fn what_was_not_done_is_wanted_after_the_sync_presses() {
     // A sync press alone is no reason to press at all.
     histories[0].verdict = None;
     assert_eq!(plan.wanted(&histories), none);
-    histories[sync].verdict = Some(PressVerdict::Invalid("cut off: no power".into()));
+    histories[sync].verdict = Some(PressVerdict::Invalid("cut off: no power".to_owned().into()));
     let mut expected = vec![false; plan.presses.len()];
     expected[..=sync].fill(true);
     assert_eq!(plan.wanted(&histories), expected);
@@ -88,7 +88,7 @@ fn a_press_is_final_when_it_is_good_or_has_no_attempt_left() {
             ..PressHistory::default()
         })
     };
-    let invalid = |reason: &str| Some(PressVerdict::Invalid(reason.into()));
+    let invalid = |reason: &str| Some(PressVerdict::Invalid(reason.to_owned().into()));
     assert!(wants(0, None));
     assert!(wants(7, None));
     assert!(wants(7, Some(PressVerdict::Missed("stop".into()))));
@@ -111,14 +111,14 @@ fn of_a_plan_that_is_done_only_what_was_given_back_is_wanted() {
             plan_done: true,
         })
     };
-    let lost = || PressVerdict::Invalid("camera 1 lost 64 bytes".into());
+    let lost = || PressVerdict::Invalid("camera 1 lost 64 bytes".to_owned().into());
     assert!(wants(true, 0, lost()));
     assert!(wants(true, 2, lost()));
     assert!(!wants(true, 3, lost()));
     assert!(!wants(
         false,
         1,
-        PressVerdict::Invalid("hold: expected".into())
+        PressVerdict::Invalid("hold: expected".to_owned().into())
     ));
     assert!(!wants(false, 0, PressVerdict::Valid));
 }

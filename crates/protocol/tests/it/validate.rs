@@ -3,7 +3,12 @@
 use serde_json::Value;
 
 /// The few words of JSON Schema that the generated schemas use. `Err` names the first place that does not fit.
-pub fn validate(schema: &Value, value: &Value, root: &Value, place: &str) -> Result<(), String> {
+pub(crate) fn validate(
+    schema: &Value,
+    value: &Value,
+    root: &Value,
+    place: &str,
+) -> Result<(), String> {
     let fail = |what: &str| Err(format!("{place}: {what}: {value}"));
     if let Some(reference) = schema.get("$ref").and_then(Value::as_str) {
         let target = root.pointer(reference.trim_start_matches('#'));

@@ -168,7 +168,7 @@ impl SessionReader {
             let reason = opt_text(row, "reason")?.unwrap_or_default();
             let end = match text(row, "status")?.as_str() {
                 "completed" => RunEnd::Completed,
-                "stopped" => RunEnd::Stopped(reason),
+                "stopped" => RunEnd::Stopped(reason.into()),
                 "faulted" => RunEnd::Faulted(reason),
                 other => {
                     return Err(Fault::bad(

@@ -141,7 +141,7 @@ fn further_from(row: &sqlx::sqlite::SqliteRow) -> Result<(LegRow, Before), Fault
             let reason = opt_text(row, "previous_reason")?.unwrap_or_default();
             let end = match status.as_str() {
                 "completed" => RunEnd::Completed,
-                "stopped" => RunEnd::Stopped(reason),
+                "stopped" => RunEnd::Stopped(reason.into()),
                 "faulted" => RunEnd::Faulted(reason),
                 other => return Err(Fault::bad("leg", "completed, stopped or faulted", other)),
             };

@@ -16,7 +16,7 @@ const MAX_OVERLAP: usize = 4;
 
 /// A stored value.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Value {
+pub(super) enum Value {
     Null,
     Int(i64),
     Real(f64),
@@ -28,7 +28,7 @@ pub enum Value {
 
 /// Location of one row.
 #[derive(Debug, Clone, Copy)]
-pub struct Cell {
+pub(super) struct Cell {
     /// Row id in a table; `None` on index pages and in tables without row ids.
     pub rowid: Option<i64>,
     at: usize,
@@ -38,7 +38,7 @@ pub struct Cell {
 }
 
 /// Cells of a page; empty if it holds no rows.
-pub fn cells(image: Image, page: &[u8]) -> Vec<Cell> {
+pub(super) fn cells(image: Image, page: &[u8]) -> Vec<Cell> {
     let start = if image.page == 1 { 100 } else { 0 };
     if page.len() < MIN_PAGE_BYTES {
         return Vec::new();
@@ -101,7 +101,7 @@ impl Cell {
 
     /// Bytes of the row, from its page and its overflow pages; `None` if the chain is broken. Stops after `most` bytes: the first
     /// bytes suffice to identify a long row.
-    pub fn payload(
+    pub(super) fn payload(
         &self,
         page: &[u8],
         pages: &mut Pages,
@@ -185,7 +185,7 @@ pub(crate) fn serial_types(payload: &[u8]) -> Option<(Vec<u64>, usize)> {
 }
 
 /// Values of a record; `None` if its length contradicts its header.
-pub fn values(payload: &[u8]) -> Option<Vec<Value>> {
+pub(super) fn values(payload: &[u8]) -> Option<Vec<Value>> {
     let (types, head) = serial_types(payload)?;
     let content = types
         .iter()
@@ -195,7 +195,7 @@ pub fn values(payload: &[u8]) -> Option<Vec<Value>> {
 }
 
 /// The first `most` values of a record, as far as the possibly truncated `payload` contains them.
-pub fn leading(payload: &[u8], most: usize) -> Option<Vec<Value>> {
+pub(crate) fn leading(payload: &[u8], most: usize) -> Option<Vec<Value>> {
     let (types, mut at) = serial_types(payload)?;
     let mut out = Vec::new();
     for serial in types.into_iter().take(most) {

@@ -9,7 +9,7 @@ use super::shapes::{KeyPart, TableShape};
 
 /// A recovered row.
 #[derive(Debug, Clone)]
-pub enum FoundRow {
+pub(crate) enum FoundRow {
     /// The values.
     Values(Vec<Value>),
     /// The location of a long row, which is read again when it is written.
@@ -18,7 +18,7 @@ pub enum FoundRow {
 
 /// Recovered rows of one table, by key.
 #[derive(Debug, Default)]
-pub struct TableRows {
+pub(crate) struct TableRows {
     pub rows: BTreeMap<Vec<KeyPart>, FoundRow>,
     /// Number of rows whose overflow pages are missing.
     pub torn: u64,
@@ -26,7 +26,7 @@ pub struct TableRows {
 
 /// Gathers all rows of every table, in the order of `shapes`. A later image of a page supersedes earlier ones row by row: rows are
 /// added and completed but never deleted, except for the end and the seal of a resumed session.
-pub fn gather(pages: &mut Pages, shapes: &[TableShape]) -> io::Result<Vec<TableRows>> {
+pub(super) fn gather(pages: &mut Pages, shapes: &[TableShape]) -> io::Result<Vec<TableRows>> {
     let mut out: Vec<TableRows> = shapes.iter().map(|_| TableRows::default()).collect();
     let mut page = Vec::new();
     for image in pages.images() {
@@ -91,7 +91,7 @@ pub fn gather(pages: &mut Pages, shapes: &[TableShape]) -> io::Result<Vec<TableR
 const VERDICT: usize = 4;
 
 /// Columns of a recovered row; `None` if its overflow chain is broken.
-pub fn read(
+pub(super) fn read(
     pages: &mut Pages,
     shape: &TableShape,
     found: &FoundRow,
@@ -108,7 +108,7 @@ pub fn read(
 }
 
 /// Columns of a long row that its own page contains; the others are null.
-pub fn read_leading(
+pub(crate) fn read_leading(
     pages: &mut Pages,
     shape: &TableShape,
     found: &FoundRow,

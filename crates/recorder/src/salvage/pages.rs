@@ -18,7 +18,7 @@ const OVERFLOW_READS_PER_PAGE: u64 = 32;
 
 /// Location of one image of a page. Later images supersede earlier ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Image {
+pub(super) struct Image {
     /// Page number, from 1.
     pub page: u32,
     in_log: bool,
@@ -28,7 +28,7 @@ pub struct Image {
 #[cfg(test)]
 impl Image {
     /// Image of a page in the file itself.
-    pub const fn in_file(page: u32) -> Self {
+    pub(super) const fn in_file(page: u32) -> Self {
         Self {
             page,
             in_log: false,
@@ -38,7 +38,7 @@ impl Image {
 }
 
 /// All page images: those of the file, then those of the log.
-pub struct Pages {
+pub(super) struct Pages {
     file: File,
     log: Option<File>,
     size: usize,
@@ -54,7 +54,7 @@ pub struct Pages {
 
 impl Pages {
     /// Examines the file and the log beside it.
-    pub fn open(path: &Path, log: &Path) -> io::Result<Self> {
+    pub(super) fn open(path: &Path, log: &Path) -> io::Result<Self> {
         let mut file = File::open(path)?;
         let bytes = file.metadata()?.len();
         let mut head = [0u8; 100];
@@ -182,12 +182,12 @@ impl Pages {
     }
 
     /// Upper bound of a row's length: all pages together.
-    pub const fn most_bytes(&self) -> u64 {
+    pub(super) const fn most_bytes(&self) -> u64 {
         self.size as u64 * self.images.len() as u64
     }
 
     /// Reads an overflow page; false if it does not exist or the budget of overflow reads is used up.
-    pub fn follow(&mut self, page: u32, bytes: &mut Vec<u8>) -> io::Result<bool> {
+    pub(super) fn follow(&mut self, page: u32, bytes: &mut Vec<u8>) -> io::Result<bool> {
         let Some(image) = self.latest(page).filter(|_| self.follow > 0) else {
             return Ok(false);
         };
@@ -202,17 +202,17 @@ impl Pages {
     }
 
     /// All images, oldest first.
-    pub fn images(&self) -> Vec<Image> {
+    pub(super) fn images(&self) -> Vec<Image> {
         self.images.clone()
     }
 
     /// Latest image of a page.
-    pub fn latest(&self, page: u32) -> Option<Image> {
+    pub(super) fn latest(&self, page: u32) -> Option<Image> {
         self.latest.get(&page).map(|i| self.images[*i])
     }
 
     /// Bytes of an image; a truncated part is zero.
-    pub fn read(&mut self, image: Image, page: &mut Vec<u8>) -> io::Result<()> {
+    pub(super) fn read(&mut self, image: Image, page: &mut Vec<u8>) -> io::Result<()> {
         page.clear();
         page.resize(self.size, 0);
         let file = match (&mut self.log, image.in_log) {

@@ -7,7 +7,7 @@ use crate::query::{Fault, each_row, int, text};
 
 /// A table to salvage, with its insert statement. A test compares the list with the schema.
 #[derive(Debug, Clone, Copy)]
-pub struct TableSpec {
+pub(crate) struct TableSpec {
     pub name: &'static str,
     pub insert: &'static str,
     /// Fewest columns of a row; later schemas added the others.
@@ -29,7 +29,7 @@ const fn table(name: &'static str, least: usize, insert: &'static str) -> TableS
 }
 
 /// All tables, parents before children.
-pub const TABLES: [TableSpec; 21] = [
+pub(super) const TABLES: [TableSpec; 21] = [
     table(
         "session",
         20,
@@ -135,7 +135,7 @@ enum ColumnKind {
 
 /// Row format of a table.
 #[derive(Debug, Clone)]
-pub struct TableShape {
+pub(crate) struct TableShape {
     pub kind: TableSpec,
     columns: Vec<Column>,
     /// Whether rows are stored in key order without a row id.
@@ -144,13 +144,13 @@ pub struct TableShape {
 
 /// KeyPart of a row's key.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub enum KeyPart {
+pub(crate) enum KeyPart {
     Int(i64),
     Text(String),
 }
 
 /// Shapes of all tables, from the schema of a new file.
-pub async fn shapes(conn: &mut SqliteConnection) -> Result<Vec<TableShape>, Fault> {
+pub(super) async fn shapes(conn: &mut SqliteConnection) -> Result<Vec<TableShape>, Fault> {
     let mut out = Vec::new();
     for kind in TABLES {
         let mut keyed = false;
@@ -194,7 +194,7 @@ pub async fn shapes(conn: &mut SqliteConnection) -> Result<Vec<TableShape>, Faul
 
 impl TableShape {
     /// Whether a record with these serial types may be a row of this table.
-    pub fn matches_types(&self, types: &[u64], keyed: bool) -> bool {
+    pub(crate) fn matches_types(&self, types: &[u64], keyed: bool) -> bool {
         keyed == self.keyed
             && (self.kind.least..=self.columns.len()).contains(&types.len())
             && types.iter().zip(&self.columns).all(|(serial, column)| {
@@ -210,14 +210,14 @@ impl TableShape {
     }
 
     /// Whether the distinguishing column, if any, has one of this table's values.
-    pub fn matches_values(&self, values: &[Value]) -> bool {
+    pub(crate) fn matches_values(&self, values: &[Value]) -> bool {
         self.kind.words.is_none_or(|(column, words)| {
             matches!(values.get(column), Some(Value::Text(word)) if words.contains(&word.as_str()))
         })
     }
 
     /// The values as columns, with the row id inserted and missing later columns as null.
-    pub fn row(&self, mut values: Vec<Value>, rowid: Option<i64>) -> Vec<Value> {
+    pub(super) fn row(&self, mut values: Vec<Value>, rowid: Option<i64>) -> Vec<Value> {
         values.resize(self.columns.len(), Value::Null);
         if let (ColumnKind::RowId, Some(rowid)) = (self.columns[0].kind, rowid) {
             values[0] = Value::Int(rowid);
@@ -226,7 +226,7 @@ impl TableShape {
     }
 
     /// Key of the row; `None` if a key column has an impossible type.
-    pub fn key(&self, row: &[Value]) -> Option<Vec<KeyPart>> {
+    pub(super) fn key(&self, row: &[Value]) -> Option<Vec<KeyPart>> {
         let mut parts: Vec<(i64, KeyPart)> = Vec::new();
         for (column, value) in self.columns.iter().zip(row).filter(|(c, _)| c.key > 0) {
             let part = match value {

@@ -19,7 +19,7 @@ use crate::query::Fault;
 const ROWS_PER_COMMIT: usize = 64;
 
 /// Input and output of a salvage.
-pub struct SalvageWriter<'a> {
+pub(crate) struct SalvageWriter<'a> {
     pub conn: &'a mut SqliteConnection,
     pub pages: &'a mut Pages,
     pub shapes: &'a [TableShape],
@@ -28,7 +28,7 @@ pub struct SalvageWriter<'a> {
 }
 
 /// Failure to read the old file or to write the new one.
-pub enum SalvageError {
+pub(crate) enum SalvageError {
     Reading(io::Error),
     Writing(Fault),
 }
@@ -53,7 +53,7 @@ impl From<Fault> for SalvageError {
 
 impl SalvageError {
     /// Converts it to an error for the user.
-    pub fn at(self, from: &Path, to: &Path) -> RecorderError {
+    pub(super) fn at(self, from: &Path, to: &Path) -> RecorderError {
         match self {
             Self::Reading(source) => report::io(from, "reading it", source),
             Self::Writing(fault) => fault.at(to, "writing the salvaged rows"),
@@ -73,7 +73,7 @@ struct MissingRange {
 
 impl SalvageWriter<'_> {
     /// Writes all rows and a note about the salvage.
-    pub async fn fill(&mut self, name: &str) -> Result<(), SalvageError> {
+    pub(super) async fn fill(&mut self, name: &str) -> Result<(), SalvageError> {
         // TableRows are kept even if their parent rows are lost.
         sqlx::query("PRAGMA foreign_keys = OFF")
             .execute(&mut *self.conn)

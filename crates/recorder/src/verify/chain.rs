@@ -5,7 +5,7 @@ use crate::chain::{self, PreviousSeal};
 use crate::reader::SessionReader;
 
 /// Verifies every leg that removed a seal.
-pub fn check(reader: &SessionReader, report: &mut VerifyReport) {
+pub(super) fn check(reader: &SessionReader, report: &mut VerifyReport) {
     let links = reader.query("checking the seals before its legs", async |conn| {
         chain::check(conn).await
     });

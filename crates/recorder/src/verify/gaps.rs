@@ -7,7 +7,7 @@ use crate::rows::ChunkMeta;
 
 /// Checks gaps: each belongs to a chunk after lost bytes, begins at the last time before it or earlier, and ends at the first time after
 /// it in its leg. Missing chunks in a salvaged file may widen surrounding gaps but never narrow them.
-pub fn check(camera: CameraId, index: &[ChunkMeta], report: &mut VerifyReport) {
+pub(super) fn check(camera: CameraId, index: &[ChunkMeta], report: &mut VerifyReport) {
     let mut after_us = None;
     // Backwards: the first time at or after each chunk, within its leg.
     for (n, meta) in index.iter().enumerate().rev() {

@@ -8,7 +8,7 @@ use crate::reader::SessionReader;
 use crate::rows::LegRow;
 
 /// Checks the order of the legs, and that attempts and chunks lie within their leg.
-pub fn check(reader: &SessionReader, report: &mut VerifyReport) {
+pub(super) fn check(reader: &SessionReader, report: &mut VerifyReport) {
     // Another check reports a missing header.
     let Ok(legs) = reader.legs() else { return };
     if legs.len() == 1 {

@@ -12,7 +12,7 @@ use crate::seal::{self, Stamp};
 
 /// Checks counts, digests, tree hash and file hash. A seal without its file hash seals nothing, but its counts and digests must
 /// match the rows.
-pub fn check(reader: &SessionReader, report: &mut VerifyReport) {
+pub(super) fn check(reader: &SessionReader, report: &mut VerifyReport) {
     let Some(Some(seal)) = report.ok_or_add(reader.seal_row()) else {
         return;
     };

@@ -9,7 +9,7 @@ use skinrig_recorder::{ChunkScanner, Sealed, SessionWriter};
 
 /// EVT2 without wraps: enough to recompute facts.
 #[derive(Default)]
-pub struct Evt2 {
+pub(crate) struct Evt2 {
     base: [Option<u64>; 2],
     origin_us: [u64; 2],
 }
@@ -68,10 +68,10 @@ impl ChunkScanner for Evt2 {
     }
 }
 
-pub const ALIGNMENT_US: u64 = 5_000_000;
+pub(crate) const ALIGNMENT_US: u64 = 5_000_000;
 
 /// 20 ms of one camera from `t0_us` on: a time word every 16 µs, an event now and then, a trigger pulse.
-pub fn stream(t0_us: u64, events: u64) -> Vec<u8> {
+pub(crate) fn stream(t0_us: u64, events: u64) -> Vec<u8> {
     let mut words = Vec::new();
     for k in 0..1250u64 {
         let t = t0_us + 16 * k;
@@ -87,14 +87,14 @@ pub fn stream(t0_us: u64, events: u64) -> Vec<u8> {
     words.into_iter().flat_map(u32::to_le_bytes).collect()
 }
 
-pub fn sha(text: &str) -> String {
+pub(crate) fn sha(text: &str) -> String {
     Sha256::digest(text.as_bytes())
         .iter()
         .map(|b| format!("{b:02x}"))
         .collect()
 }
 
-pub fn header(presses: u32) -> RunHeader {
+pub(crate) fn header(presses: u32) -> RunHeader {
     let (protocol, plan) = ("name: test # äöü\n", "{\"version\":1}");
     RunHeader {
         protocol_text: protocol.into(),
@@ -135,7 +135,7 @@ pub fn header(presses: u32) -> RunHeader {
     }
 }
 
-pub fn outcome(attempt: AttemptId, t: i64, verdict: PressVerdict) -> PressOutcome {
+pub(crate) fn outcome(attempt: AttemptId, t: i64, verdict: PressVerdict) -> PressOutcome {
     let at = |ms: i64| HostTime(t + ms * 1_000_000);
     PressOutcome {
         attempt,
@@ -185,7 +185,7 @@ fn box_reports(mark: Mark, t: HostTime, k: u64) -> Vec<BoxReport> {
 }
 
 /// All records of a run of `presses` presses of 20 ms each; the last but one needs two attempts, the last is missed.
-pub fn records(presses: u32) -> Vec<Record> {
+pub(crate) fn records(presses: u32) -> Vec<Record> {
     let mut out = vec![Record::Started(Box::new(header(presses)))];
     let mut ids: Vec<AttemptId> = (0..presses - 1)
         .map(|i| AttemptId {
@@ -214,14 +214,14 @@ pub fn records(presses: u32) -> Vec<Record> {
     out.push(Record::Missed(last, "stopped before it".into()));
     out.push(Record::Ended {
         t,
-        end: RunEnd::Stopped("operator".into()),
+        end: RunEnd::Stopped("operator".to_owned().into()),
     });
     out
 }
 
 /// All records of a further leg that makes the sync press again and every press that has no valid attempt: its clocks and its
 /// chunk numbers begin anew.
-pub fn further_leg(known: &[PressHistory]) -> Vec<Record> {
+pub(crate) fn further_leg(known: &[PressHistory]) -> Vec<Record> {
     let mut out = vec![Record::Resumed(Box::new(ResumeHeader {
         operator: "another tester".into(),
         started_at: "2026-01-03T03:04:05Z".into(),
@@ -324,7 +324,9 @@ fn attempts(ids: &[AttemptId], out: &mut Vec<Record>) -> HostTime {
                 .collect(),
         ));
         let verdict = match ids.get(k as usize + 1) {
-            Some(next) if next.press == id.press => PressVerdict::Invalid("not settled".into()),
+            Some(next) if next.press == id.press => {
+                PressVerdict::Invalid("not settled".to_owned().into())
+            }
             _ => PressVerdict::Valid,
         };
         out.push(Record::Outcome(outcome(*id, t.0, verdict)));
@@ -333,7 +335,7 @@ fn attempts(ids: &[AttemptId], out: &mut Vec<Record>) -> HostTime {
 }
 
 /// Records `presses` presses and seals the session.
-pub fn sealed(path: &Path, presses: u32) -> Sealed {
+pub(crate) fn sealed(path: &Path, presses: u32) -> Sealed {
     let mut writer = SessionWriter::create(path).unwrap();
     for record in records(presses) {
         writer.accept(record).unwrap();

@@ -150,7 +150,7 @@ fn a_stopped_and_sealed_session_goes_on() {
     assert_eq!(reader.header().unwrap(), header(PRESSES));
     let legs = reader.legs().unwrap();
     assert_eq!(legs.len(), 2);
-    let stopped = RunEnd::Stopped("operator".into());
+    let stopped = RunEnd::Stopped("operator".to_owned().into());
     assert_eq!(legs[0].end.as_ref().map(|e| &e.1), Some(&stopped));
     assert_eq!(legs[0].tree_sha256, Some(first.tree_sha256));
     assert_eq!(legs[1].began.operator, "another tester");

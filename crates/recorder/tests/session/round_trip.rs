@@ -142,7 +142,7 @@ fn everything_comes_back() {
     );
     assert_eq!(
         reader.end().unwrap().unwrap().1,
-        RunEnd::Stopped("operator".into())
+        RunEnd::Stopped("operator".to_owned().into())
     );
     assert_eq!(reader.totals().unwrap(), seal.totals);
     let t = seal.totals;

@@ -13,7 +13,7 @@ use serde_json::Value;
 use skinrig_compare::Comparison;
 
 /// Value of the document's `format` field.
-pub const JSON_FORMAT: &str = "skinrig-comparison";
+pub(crate) const JSON_FORMAT: &str = "skinrig-comparison";
 /// Version of the document's layout.
 pub const JSON_VERSION: u32 = 1;
 

@@ -4,10 +4,11 @@ use std::fmt::Write as _;
 
 use skinrig_compare::statistics::Verdict;
 use skinrig_compare::{Causes, Comparison, Difference, Severity};
+use skinrig_text::{Column, Paint, Table};
 
 use super::text;
 use crate::format::{NONE, number};
-use crate::terminal::{Paint, plain, wrap};
+use crate::terminal::{plain, wrap};
 
 /// Harmless differences with their own line; the page lists all.
 const MAX_HARMLESS: usize = 4;
@@ -15,8 +16,8 @@ const MAX_HARMLESS: usize = 4;
 /// At most 80 columns, ends with a newline. `color` adds ANSI escapes without changing the layout.
 #[must_use]
 pub fn terminal_table(result: &Comparison, color: bool) -> String {
-    let paint = Paint(color);
-    let mut out = String::new();
+    let paint = Paint::new(color);
+    let mut out = verdicts(result, paint);
     for skin in &result.skins {
         out += &wrap(&format!("{:<10}", skin.letter), &plain(&text::skin(skin)));
     }
@@ -28,17 +29,57 @@ pub fn terminal_table(result: &Comparison, color: bool) -> String {
         out += &wrap("limits    ", &plain(limits));
     }
     out.push('\n');
-    out += &comparability(result, &paint);
+    out += &comparability(result, paint);
     for (k, skin) in result.skins.iter().enumerate().skip(1) {
-        out += &against(result, k, skin.letter, &paint);
+        out += &against(result, k, skin.letter, paint);
         if let Some(Some(causes)) = result.causes.get(k - 1) {
-            out += &causes_block(causes, skin.letter, &paint);
+            out += &causes_block(causes, skin.letter, paint);
         }
     }
     out
 }
 
-fn comparability(result: &Comparison, paint: &Paint) -> String {
+/// The answer, one sentence for each skin but the first.
+fn verdicts(result: &Comparison, paint: Paint) -> String {
+    let mut out = String::new();
+    if result.blocking().next().is_some() {
+        let text = "none: these skins may not be compared, see BLOCKING";
+        return paint.warn(&wrap("VERDICT   ", text)) + "\n";
+    }
+    let of = |severity| {
+        result
+            .differences
+            .iter()
+            .filter(move |d| d.severity == severity)
+    };
+    let doubts = match (
+        of(Severity::Blocking).count(),
+        of(Severity::Confounding).count(),
+    ) {
+        (0, 0) => String::new(),
+        (despite, confounding) => format!(
+            "; {} that may explain it without the skin",
+            text::counted(despite + confounding, "recorded difference")
+        ),
+    };
+    for (k, skin) in result.skins.iter().enumerate().skip(1) {
+        let row = result.headline();
+        let Some(found) = row.and_then(|r| r.against_first.iter().find(|a| a.subject == k)) else {
+            continue;
+        };
+        let text = format!(
+            "{} against A: {}. {}{doubts}",
+            skin.letter,
+            text::verdict(found.verdict),
+            text::headline(result, found)
+        );
+        out += &paint.bold(&wrap("VERDICT   ", &plain(&text)));
+    }
+    out.push('\n');
+    out
+}
+
+fn comparability(result: &Comparison, paint: Paint) -> String {
     let mut out = String::new();
     let of = |severity: Severity| {
         result
@@ -85,19 +126,27 @@ fn line(result: &Comparison, difference: &Difference) -> String {
     )
 }
 
-fn against(result: &Comparison, k: usize, letter: char, paint: &Paint) -> String {
+fn against(result: &Comparison, k: usize, letter: char, paint: Paint) -> String {
     let mut out = String::new();
     if result.table.is_empty() {
         return out;
     }
-    let head = format!(
-        "{:<26}{:>7}{:>8}{:>9}{:>18}  verdict",
-        format!("{letter} against A"),
+    let table = Table::new([
+        Column::left(26),
+        Column::right(7),
+        Column::right(8),
+        Column::right(9),
+        Column::right(18),
+    ])
+    .gap(0);
+    let head = table.row([
+        &format!("{letter} against A"),
         "A",
-        letter,
-        format!("{letter} - A"),
-        "95 % interval"
-    );
+        &letter.to_string(),
+        &format!("{letter} - A"),
+        "95 % interval",
+        "  verdict",
+    ]);
     let _ = writeln!(out, "{}", paint.bold(&head));
     let mut undecided = Vec::new();
     for row in &result.table {
@@ -110,23 +159,18 @@ fn against(result: &Comparison, k: usize, letter: char, paint: &Paint) -> String
                 text::value(row, value.map(|v| v.value))
             };
             let name = text::heading(row);
-            let _ = writeln!(
-                out,
-                "{name:<26}{:>7}{:>8}{NONE:>9}{NONE:>18}  no verdict",
-                own(0),
-                own(k)
-            );
+            let line = table.row([&name, &own(0), &own(k), NONE, NONE, "  no verdict"]);
+            let _ = writeln!(out, "{line}");
             continue;
         };
-        let text = format!(
-            "{:<26}{:>7}{:>8}{:>9}{:>18}  {}",
+        let text = table.row([
             text::heading(row),
             text::value(row, Some(c.a.value)),
             text::value(row, Some(c.b.value)),
             text::signed(row, c.difference.value),
             text::interval(row, &c.difference),
-            text::verdict(found.verdict),
-        );
+            format!("  {}", text::verdict(found.verdict)),
+        ]);
         let text = match found.verdict {
             Some(Verdict::Worse) => paint.warn(&text),
             Some(Verdict::Better) => paint.bold(&text),
@@ -153,7 +197,7 @@ fn against(result: &Comparison, k: usize, letter: char, paint: &Paint) -> String
     out
 }
 
-fn causes_block(causes: &Causes, letter: char, paint: &Paint) -> String {
+fn causes_block(causes: &Causes, letter: char, paint: Paint) -> String {
     let mm2 = |v: Option<f64>| number(v, 3);
     let head = match causes.carried_by {
         Some(factor) => format!("main cause: {}", factor.name()),

@@ -105,6 +105,11 @@ pub(super) fn short(id: &str) -> String {
     id.chars().take(8).collect()
 }
 
+/// A number of things.
+pub(super) fn counted(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}
+
 /// RMSE of a skin and the first, with difference and interval.
 pub(super) fn headline(result: &Result, against: &BaselineComparison) -> String {
     let (Some(row), Some(c)) = (result.headline(), &against.comparison) else {

@@ -10,7 +10,7 @@ use skinrig_model::{PressId, SENSOR_WIDTH, Verdict};
 /// Centroid column of every press against its number, one panel per camera (panels A and B of the paper's figure
 /// "centroids").
 #[must_use]
-pub fn centroid_tracks(input: &ReportInput<'_>) -> Figure {
+pub(crate) fn centroid_tracks(input: &ReportInput<'_>) -> Figure {
     let presses = &input.analysis.presses;
     let seen = |camera: usize| {
         presses.iter().filter_map(move |p| {

@@ -9,7 +9,7 @@ use crate::svg::{Px, Svg, dots};
 
 /// Histogram and cumulative distribution of the Euclidean error, with median, RMSE and 95th percentile.
 #[must_use]
-pub fn error_distribution(input: &ReportInput<'_>) -> Figure {
+pub(crate) fn error_distribution(input: &ReportInput<'_>) -> Figure {
     let errors = derive::sorted_errors_mm(input.analysis);
     let m = &input.analysis.scored;
     let mm = |v: Option<f64>| number(v, 2);
@@ -144,7 +144,7 @@ fn histogram(errors: &[f64], end: f64) -> (Vec<u32>, f64) {
 
 /// The error vectors: y against x, with the bias and a circle of radius RMSE.
 #[must_use]
-pub fn error_scatter(input: &ReportInput<'_>) -> Figure {
+pub(crate) fn error_scatter(input: &ReportInput<'_>) -> Figure {
     let counted = input
         .analysis
         .presses

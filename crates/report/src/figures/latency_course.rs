@@ -14,7 +14,7 @@ use crate::svg::{Px, Svg, polyline};
 /// the 5-95 % onsets (the paper's figure "event rate latency"): the whole trial, and a close-up of the onset. `None` without
 /// the study.
 #[must_use]
-pub fn latency_course(input: &ReportInput<'_>) -> Option<Figure> {
+pub(crate) fn latency_course(input: &ReportInput<'_>) -> Option<Figure> {
     let study = input.analysis.latency.as_ref()?;
     let bins = study.course.press_per_s.iter().map(Vec::len).min()?;
     if bins == 0 {

@@ -9,7 +9,7 @@ use crate::svg::Px;
 
 /// Time from contact to detection at the chosen threshold. `None` without the study or any onset.
 #[must_use]
-pub fn latency_onsets(input: &ReportInput<'_>) -> Option<Figure> {
+pub(crate) fn latency_onsets(input: &ReportInput<'_>) -> Option<Figure> {
     let study = input.analysis.latency.as_ref()?;
     let counted = derive::onsets_ms(study);
     let (low, median, high) = derive::onset_percentiles(study)?;

@@ -11,7 +11,7 @@ use crate::svg::{Px, dots, polyline};
 /// Share of trials detected against false alarms per second, one dot per threshold, the chosen one marked. `None` without
 /// the study or without thresholds.
 #[must_use]
-pub fn latency_roc(input: &ReportInput<'_>) -> Option<Figure> {
+pub(crate) fn latency_roc(input: &ReportInput<'_>) -> Option<Figure> {
     let study = input.analysis.latency.as_ref()?;
     let rows: Vec<_> = study
         .sweep

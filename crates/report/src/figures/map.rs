@@ -71,7 +71,7 @@ fn attributes(layout: &Layout) -> [String; 3] {
 /// The skin with both cameras, their fields of view, the press path, the mean error at every location, and a vector from
 /// truth to estimate for every counting press.
 #[must_use]
-pub fn skin_map(input: &ReportInput<'_>) -> Figure {
+pub(crate) fn skin_map(input: &ReportInput<'_>) -> Figure {
     let layout = Layout::new(input);
     let locations = derive::locations(input.analysis);
     let counted: Vec<_> = input
@@ -297,7 +297,7 @@ fn legend(svg: &mut Svg) {
 
 /// Standard deviation between repetitions at every location.
 #[must_use]
-pub fn repeat_map(input: &ReportInput<'_>) -> Figure {
+pub(crate) fn repeat_map(input: &ReportInput<'_>) -> Figure {
     let layout = Layout::new(input);
     let mut locations = derive::locations(input.analysis);
     locations.retain(|l| l.std_mm.is_some());

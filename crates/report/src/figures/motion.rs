@@ -72,7 +72,7 @@ pub fn pose_course(input: &ReportInput<'_>) -> Option<Figure> {
 
 /// Height, and distance per axis, during single presses. `None` without any.
 #[must_use]
-pub fn pose_presses(input: &ReportInput<'_>) -> Option<Figure> {
+pub(crate) fn pose_presses(input: &ReportInput<'_>) -> Option<Figure> {
     let motion = input
         .analysis
         .motion

@@ -23,7 +23,7 @@ const PALETTE: [[u8; 4]; 5] = [
 /// Pixels with mostly ON or mostly OFF events, one strip per press and camera; pixels outside the cluster are pale. `None`
 /// without images.
 #[must_use]
-pub fn press_pictures(input: &ReportInput<'_>) -> Option<Figure> {
+pub(crate) fn press_pictures(input: &ReportInput<'_>) -> Option<Figure> {
     let pictures = &input.analysis.pictures;
     let presses = crate::tables::pictured(input.analysis);
     if presses.is_empty() {

@@ -185,7 +185,7 @@ pub fn event_rates(input: &ReportInput<'_>) -> Figure {
 
 /// ON and OFF rates around single presses, one column per press, one row per camera. `None` without any.
 #[must_use]
-pub fn press_rates(input: &ReportInput<'_>) -> Option<Figure> {
+pub(crate) fn press_rates(input: &ReportInput<'_>) -> Option<Figure> {
     let zooms = &input.analysis.zooms;
     let mut presses: Vec<PressId> = zooms.iter().map(|z| z.press).collect();
     presses.sort_unstable();

@@ -40,7 +40,7 @@ fn value(cost: Cost, row: &Row) -> f64 {
 /// Three panels, one per cost. Points are choices, one mark per estimator; hollow ones locate too few presses. `foot` names
 /// the session.
 #[must_use]
-pub fn fronts(result: &Tradeoff, rig: &str, foot: &str) -> Figure {
+pub(crate) fn fronts(result: &Tradeoff, rig: &str, foot: &str) -> Figure {
     let shown = result.rows.iter().filter_map(|r| r.rmse_mm.value);
     let shown: Vec<f64> = shown.filter(|e| *e > 0.0).collect();
     let (low, high) = shown

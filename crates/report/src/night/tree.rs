@@ -1,14 +1,17 @@
 //! Owns the terminal tree of a night: every check with its measurements, and why a check failed and what to do next.
 
 use skinrig_nightly::{Attempt, CheckResult, Measurement, Night, Part, Verdict};
+use skinrig_text::{Column, LongWords, Paint, Style, Table, WIDTH, hang, width};
 
 use super::text;
+use crate::terminal::plain;
 
-const WIDTH: usize = 80;
+/// Columns of a verdict.
+const VERDICT: usize = 12;
 /// Column of titles.
 const INDENT: usize = 15;
-/// Column of the text about a device.
-const DEEP: usize = 28;
+/// Columns of the name of a device.
+const LABEL: usize = 12;
 
 /// Whether to write ANSI colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,16 +87,14 @@ impl Lines {
             1 => text::span(text::took_s(check)),
             n => format!("{n} attempts, {}", text::span(text::took_s(check))),
         };
-        let name = format!("{:<12}", check.verdict.name());
-        let room = WIDTH - INDENT;
-        let title = check.title.chars().count();
-        let gap = room.saturating_sub(title + took.chars().count()).max(1);
-        format!(
-            "{}   {}{}{took}",
-            self.painted(check.verdict, &name),
-            check.title,
-            " ".repeat(if took.is_empty() { 0 } else { gap })
-        )
+        let name = Column::left(VERDICT).cell(check.verdict.name());
+        let title = plain(&check.title);
+        let gap = 1;
+        let room = (WIDTH - INDENT).saturating_sub(width(&took) + gap);
+        let row = Table::new([Column::left(room)])
+            .gap(gap)
+            .row([&title, &took]);
+        format!("{}   {row}", self.painted(check.verdict, &name))
     }
 
     fn check(&mut self, check: &CheckResult) {
@@ -159,60 +160,29 @@ impl Lines {
 
     /// Text with a label, and the verdict before it.
     fn labelled(&mut self, verdict: Option<Verdict>, label: &str, text: &str) {
-        let (first, rest) = fold(text, WIDTH - DEEP);
-        let name = verdict.map_or("", Verdict::name);
-        let before = format!("{name:>12}");
-        let before = match verdict {
-            Some(v) => self.painted(v, &before),
-            None => before,
+        let column = Column::right(VERDICT);
+        let name = match verdict {
+            Some(verdict) => self.painted(verdict, &column.cell(verdict.name())),
+            None => column.cell(""),
         };
-        let label_room = DEEP - INDENT;
-        self.text
-            .push_str(&format!("{before}   {label:<label_room$}{first}\n"));
-        for line in rest {
-            self.text.push_str(&format!("{:DEEP$}{line}\n", ""));
-        }
+        let label = Column::left(LABEL).cell(&plain(label));
+        let first = format!("{name}   {label} ");
+        self.text += &hang(&first, &plain(text), LongWords::Keep);
     }
 
     fn wrapped(&mut self, indent: usize, text: &str) {
-        let (first, rest) = fold(text, WIDTH - indent);
-        for line in std::iter::once(first).chain(rest) {
-            self.text.push_str(&format!("{:indent$}{line}\n", ""));
-        }
+        self.text += &hang(&" ".repeat(indent), &plain(text), LongWords::Keep);
     }
 
     fn painted(&self, verdict: Verdict, text: &str) -> String {
-        if self.colour == Colour::Off {
-            return text.to_owned();
-        }
-        let code = match verdict {
-            Verdict::Skipped => "2",
-            Verdict::Pass => "32",
-            Verdict::Marginal => "33",
-            Verdict::Inconclusive => "36",
-            Verdict::Fail => "1;31",
-            Verdict::Invalid => "1;35",
+        let style = match verdict {
+            Verdict::Skipped => Style::Dim,
+            Verdict::Pass => Style::Good,
+            Verdict::Marginal => Style::Warning,
+            Verdict::Inconclusive => Style::Undecided,
+            Verdict::Fail => Style::Error,
+            Verdict::Invalid => Style::Invalid,
         };
-        format!("\u{1b}[{code}m{text}\u{1b}[0m")
+        Paint::new(self.colour == Colour::On).apply(style, text)
     }
-}
-
-/// Wraps `text` at `width` characters; a longer word gets its own line. Drops control characters.
-fn fold(text: &str, width: usize) -> (String, Vec<String>) {
-    let mut lines = vec![String::new()];
-    for word in text.split_whitespace() {
-        let word: String = word.chars().filter(|c| !c.is_control()).collect();
-        let last = lines.len() - 1;
-        let line = &mut lines[last];
-        if line.is_empty() {
-            line.push_str(&word);
-        } else if line.chars().count() + 1 + word.chars().count() <= width {
-            line.push(' ');
-            line.push_str(&word);
-        } else {
-            lines.push(word);
-        }
-    }
-    let first = lines.remove(0);
-    (first, lines)
 }

@@ -171,7 +171,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         clocks => clocks(input),
         calibration => calibration(input),
         settings => tables::settings(a),
-        tradeoff_unreadable => input.tradeoff.and_then(Result::err),
+        tradeoff_unreadable => input.tradeoff.and_then(Result::err).map(ToString::to_string),
         fig,
         press_total => a.presses.len(),
     })

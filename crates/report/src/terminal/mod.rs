@@ -9,10 +9,10 @@ use std::fmt::Write as _;
 use skinrig_analysis::result::{
     Alignment, AlignmentStatus, Analysis, ClockFit, ClockMethod, Estimate, MapName, Metrics,
 };
+use skinrig_text::{Column, Paint, Table, WIDTH, clip};
 
 pub(crate) use self::summary::summary;
-use self::text::WIDTH;
-pub(crate) use self::text::{Paint, plain, wrap};
+pub(crate) use self::text::{plain, wrap};
 use crate::format::{digits_of_error, grouped, interval, number, or_missing};
 use crate::input::ReportInput;
 
@@ -102,7 +102,7 @@ pub(crate) fn clock_method(method: ClockMethod) -> &'static str {
 
 /// See [`crate::terminal_table`].
 pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
-    let paint = Paint(color);
+    let paint = Paint::new(color);
     let (a, p) = (input.analysis, &input.provenance);
     let mut out = String::new();
     out += &wrap("session   ", &plain(or_missing(&p.session_id)));
@@ -154,16 +154,26 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
         out.push('\n');
     }
 
-    let head = format!(
-        "{:<24}{:>8}     {:^20}{:>7}",
-        "scored presses", "value", "95 % interval", "n"
-    );
+    let table = Table::new([
+        Column::left(24),
+        Column::right(7),
+        Column::left(3),
+        Column::centre(20),
+        Column::right(6),
+    ])
+    .gap(1);
+    let presses = |name: &str, value: String, unit: &str, interval: String, n: u32| {
+        table.row([name, &value, unit, &interval, &n.to_string(), "presses"]) + "\n"
+    };
+    let millimetres = |name: &str, e: &Estimate| {
+        let (value, interval) = (number(e.value, 2), interval(e, 1.0, 2));
+        presses(name, value, "mm", interval, e.n)
+    };
+    let head = table.row(["scored presses", "value", "", "95 % interval", "n"]);
     let _ = writeln!(out, "{}", paint.bold(&head));
     for r in metric_rows(a) {
-        let line = format!(
-            "{:<24}{:>8} {:<3} {:^20}{:>7} {}",
-            r.name, r.value, r.unit, r.interval, r.n, r.what_n
-        );
+        let n = r.n.to_string();
+        let line = table.row([&r.name, &r.value, r.unit, &r.interval, &n, r.what_n]);
         let line = if r.key == "rmse" {
             paint.bold(&line)
         } else {
@@ -173,49 +183,29 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     }
     let usable = a.is_valid();
     if let Some(share) = a.scored.rmse_diagonal_percent.filter(|_| usable) {
-        let _ = writeln!(
-            out,
-            "{:<24}{:>8} %   {:^20}{:>7} presses",
+        let e = &a.scored.rmse_mm;
+        let scale = 100.0 / a.rig.outline.diagonal_mm();
+        out += &presses(
             "RMSE, share of diagonal",
             number(Some(share), 2),
-            interval(&a.scored.rmse_mm, 100.0 / a.rig.outline.diagonal_mm(), 2),
-            a.scored.rmse_mm.n
+            "%",
+            interval(e, scale, 2),
+            e.n,
         );
     }
     if usable && a.scored_without_exclusions != a.scored {
         let e = &a.scored_without_exclusions.rmse_mm;
-        let _ = writeln!(
-            out,
-            "{:<24}{:>8} mm  {:^20}{:>7} presses",
-            "RMSE, no exclusions",
-            number(e.value, 2),
-            interval(e, 1.0, 2),
-            e.n
-        );
+        out += &millimetres("RMSE, no exclusions", e);
     }
     let f = &a.penalised;
     if usable && f.failures > 0 {
-        let _ = writeln!(
-            out,
-            "{:<24}{:>8} mm  {:^20}{:>7} presses",
-            "RMSE, failures counted",
-            number(f.rmse_mm.value, 2),
-            interval(&f.rmse_mm, 1.0, 2),
-            f.rmse_mm.n,
-        );
+        out += &millimetres("RMSE, failures counted", &f.rmse_mm);
     }
     if let Some(note) = crate::derive::geometry_note(a).filter(|_| usable) {
         out += &paint.warn(&wrap("geometry  ", &note));
     }
     for d in a.depths.iter().filter(|_| usable) {
-        let _ = writeln!(
-            out,
-            "{:<24}{:>8} mm  {:^20}{:>7} presses",
-            format!("RMSE at {} mm depth", d.depth_mm),
-            number(d.rmse_mm.value, 2),
-            interval(&d.rmse_mm, 1.0, 2),
-            d.rmse_mm.n
-        );
+        out += &millimetres(&format!("RMSE at {} mm depth", d.depth_mm), &d.rmse_mm);
     }
     out.push('\n');
 
@@ -332,13 +322,7 @@ fn left_out(a: &Analysis, sync: bool) -> String {
         let text = plain(&format!("{} {}: {}", r.n, r.verdict, r.rule));
         // One line each; the run's end and the page give the details.
         let room = WIDTH - first.len();
-        let text = if text.chars().count() > room {
-            let cut: String = text.chars().take(room - 1).collect();
-            format!("{}…", cut.trim_end())
-        } else {
-            text
-        };
-        out += &wrap(if i == 0 { first } else { &indent }, &text);
+        out += &wrap(if i == 0 { first } else { &indent }, &clip(&text, room));
     }
     if rows.len() > MAX_RULES {
         let more: u32 = rows[MAX_RULES..].iter().map(|r| r.n).sum();

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use skinrig_analysis::result::{
     Analysis, Estimate, Latency, Reduction, ReductionRow, ReferenceCode, Thinning,
 };
+use skinrig_text::{Column, Table};
 
 use super::text::{plain, wrap};
 use crate::figures::model_name;
@@ -168,10 +169,24 @@ fn latency(l: &Latency) -> String {
 
 fn reduction(study: &Reduction) -> String {
     let within = format!("within {} mm (%)", study.within_mm);
-    let mut out = format!(
-        "{:<10}{:>6} {:>22} {:>9} {:>17} {:>12}\n",
-        "reduction", "1/k", "RMSE (mm)", "pass (%)", within, "located (%)"
-    );
+    let table = Table::new([
+        Column::left(9),
+        Column::right(6),
+        Column::right(22),
+        Column::right(9),
+        Column::right(17),
+        Column::right(12),
+    ])
+    .gap(1);
+    let head = [
+        "reduction",
+        "1/k",
+        "RMSE (mm)",
+        "pass (%)",
+        &within,
+        "located (%)",
+    ];
+    let mut out = table.row(head) + "\n";
     for curve in &study.curves {
         let kind = match curve.thinning {
             Thinning::Exact => "exact",
@@ -179,7 +194,7 @@ fn reduction(study: &Reduction) -> String {
         };
         let shown = curve.rows.iter().filter(|r| FACTORS.contains(&r.factor));
         for row in shown {
-            out += &reduction_line(kind, row);
+            out += &(table.row(reduction_cells(kind, row)) + "\n");
         }
     }
     let text = format!(
@@ -191,16 +206,16 @@ fn reduction(study: &Reduction) -> String {
     out + &wrap("          ", &text)
 }
 
-fn reduction_line(kind: &str, row: &ReductionRow) -> String {
+fn reduction_cells(kind: &str, row: &ReductionRow) -> [String; 6] {
     let percent = |e: &Estimate| number(e.value.map(|v| 100.0 * v), 1);
-    format!(
-        "{kind:<10}{:>6} {:>22} {:>9} {:>17} {:>12}\n",
-        row.factor,
+    [
+        kind.to_owned(),
+        row.factor.to_string(),
         with(&row.rmse_mm, 1.0, 2),
         percent(&row.pass_rate),
         percent(&row.within_rate),
-        percent(&row.located_rate)
-    )
+        percent(&row.located_rate),
+    ]
 }
 
 fn reference(r: &ReferenceCode) -> String {

@@ -3,10 +3,12 @@
 use std::fmt::Write as _;
 
 use skinrig_analysis::result::Analysis;
+use skinrig_text::{Paint, WIDTH, elide};
 
-use super::text::{Paint, WIDTH, plain, wrap};
+use super::text::{plain, wrap};
 use crate::format::{grouped, interval, number, or_missing};
 use crate::input::ReportInput;
+use crate::provenance::InterruptionRow;
 
 /// Lines of a summary. With three paths and the next step below it, a command ends with a dozen lines.
 const MAX_LINES: usize = 8;
@@ -17,8 +19,8 @@ const MAX_ADVICE: usize = 4;
 
 /// See [`crate::terminal_summary`].
 pub(crate) fn summary(input: &ReportInput<'_>, color: bool) -> String {
-    let paint = Paint(color);
-    let mut out = head(input, &paint);
+    let paint = Paint::new(color);
+    let mut out = head(input, paint);
     let mut room = MAX_LINES.saturating_sub(out.lines().count());
     let all = remarks(input);
     for (i, remark) in all.iter().enumerate() {
@@ -36,17 +38,27 @@ pub(crate) fn summary(input: &ReportInput<'_>, color: bool) -> String {
     out
 }
 
-fn head(input: &ReportInput<'_>, paint: &Paint) -> String {
+fn head(input: &ReportInput<'_>, paint: Paint) -> String {
+    use crate::page::findings::fault;
     let (a, p) = (input.analysis, &input.provenance);
     let mut out = String::new();
+    // What is wrong stands before every number.
+    if !a.findings.is_empty() {
+        let names: Vec<String> = a.findings.iter().map(fault).collect();
+        let text = wrap("FAULT     ", &plain(&names.join("; ")));
+        out += &paint.warn(&cut(text, MAX_REMARK));
+    }
     if a.is_valid() {
         let rmse = &a.scored.rmse_mm;
-        let text = format!(
-            "RMSE      {} mm, 95 % interval {}, n {} presses",
-            number(rmse.value, 2),
-            interval(rmse, 1.0, 2),
-            rmse.n
-        );
+        let text = match rmse.value {
+            Some(value) => format!(
+                "RMSE      {} mm, 95 % interval {}, n {} presses",
+                number(Some(value), 2),
+                interval(rmse, 1.0, 2),
+                rmse.n
+            ),
+            None => "RMSE      none: no scored press was located".to_owned(),
+        };
         let _ = writeln!(out, "{}", paint.bold(&text));
     } else {
         out += &paint.warn(&wrap("INVALID   ", "use no number of this session"));
@@ -77,27 +89,33 @@ fn head(input: &ReportInput<'_>, paint: &Paint) -> String {
 
 /// All that qualifies the answer, the gravest first; each a few lines.
 fn remarks(input: &ReportInput<'_>) -> Vec<String> {
-    use crate::page::findings::fault;
     let (a, p) = (input.analysis, &input.provenance);
     let mut all: Vec<(&str, String)> = Vec::new();
     if !a.counts.add_up() {
         let text = "these counts do not add up: do not trust this result";
         all.push(("presses   ", text.to_owned()));
     }
-    if let Some(leading) = a.findings.first() {
-        let names: Vec<String> = a.findings.iter().map(fault).collect();
-        all.push(("fault     ", names.join("; ")));
-        all.push(("do        ", leading.advice.clone()));
-    }
+    all.extend(a.findings.first().map(|f| ("do        ", f.advice.clone())));
     let reasons = a.invalid_because();
     all.extend(reasons.into_iter().map(|why| ("INVALID   ", why)));
     if a.is_valid() {
+        all.extend(crate::derive::geometry_note(a).map(|text| ("geometry  ", text)));
         all.extend(other_counts(a).map(|text| ("RMSE      ", text)));
     }
     for (i, lost) in p.lost_bytes.iter().enumerate().filter(|(_, l)| **l > 0) {
         let text = format!("camera {}: {} bytes lost", i + 1, grouped(*lost));
         all.push(("loss      ", text));
     }
+    // A pause changes no answer, and the reason for the end of the run stands in the head.
+    let pause = |row: &&InterruptionRow| matches!(row.kind.as_str(), "pause" | "resume");
+    let faults = p.interruptions.iter().filter(|row| !pause(row));
+    for row in faults.filter(|row| !p.ended_by(row)) {
+        let at = number(Some(row.t_s), 1);
+        let text = format!("{} at {at} s: {}", row.kind, row.reason);
+        all.push(("event     ", text));
+    }
+    let off_sensor = crate::derive::off_sensor(a);
+    all.extend(off_sensor.into_iter().map(|text| ("left out  ", text)));
     for rejection in crate::derive::rejections(a, false) {
         let text = format!("{} {}: {}", rejection.n, rejection.verdict, rejection.rule);
         all.push(("left out  ", text));
@@ -141,8 +159,7 @@ fn cut(text: String, max_lines: usize) -> String {
     }
     let mut lines: Vec<String> = text.lines().take(max_lines).map(str::to_owned).collect();
     if let Some(last) = lines.last_mut() {
-        let short: String = last.chars().take(WIDTH - 1).collect();
-        *last = format!("{}…", short.trim_end());
+        *last = elide(last, WIDTH);
     }
     lines.join("\n") + "\n"
 }

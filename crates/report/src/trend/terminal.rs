@@ -4,11 +4,13 @@ use std::fmt::Write as _;
 
 use skinrig_nightly::trend::report::format_number as number;
 use skinrig_nightly::trend::{Chart, Report};
+use skinrig_text::{Column, LongWords, Paint, Table, WIDTH, cut, hang, wrap};
 
 use super::{Links, cause, moved, since, state, with_unit};
 use crate::terminal::plain;
 
-const WIDTH: usize = 80;
+/// Columns of the name of a series; ASCII has no mark for a cut.
+const NAME: usize = 36;
 /// Nights in a sparkline.
 const SPARK: usize = 20;
 /// Columns and rows of a chart.
@@ -39,24 +41,19 @@ pub fn terminal(
     style: Style,
 ) -> String {
     let mut out = String::new();
-    let (bold, end) = if style.color {
-        ("\u{1b}[1m", "\u{1b}[0m")
-    } else {
-        ("", "")
-    };
-    for line in wrapped(&report.headline, 0) {
-        let _ = writeln!(out, "{bold}{line}{end}");
+    let paint = Paint::new(style.color);
+    for line in wrap(&plain(&report.headline), WIDTH, LongWords::Keep) {
+        let _ = writeln!(out, "{}", paint.bold(&line));
     }
     for (alarm, links) in report.alarms.iter().zip(links) {
         let _ = writeln!(
             out,
-            "\n{bold}alarm {}{end}: {}",
-            plain(&alarm.id),
+            "\n{}: {}",
+            paint.bold(&format!("alarm {}", plain(&alarm.id))),
             since(report, alarm)
         );
-        for line in wrapped(&format!("probable cause: {}", cause(alarm)), 2) {
-            let _ = writeln!(out, "{line}");
-        }
+        let text = plain(&format!("probable cause: {}", cause(alarm)));
+        out += &hang("  ", &text, LongWords::Keep);
         for changed in &alarm.attribution.changed {
             let _ = writeln!(out, "  changed: {}", plain(changed));
         }
@@ -74,13 +71,9 @@ pub fn terminal(
     let charts = report.charts.iter().filter(|c| shown(&c.series.name));
     let charts: Vec<&Chart> = charts.collect();
     if !charts.is_empty() {
-        let _ = writeln!(
-            out,
-            "\n{:<36} {:<SPARK$} {:>13}  state",
-            "series",
-            format!("last {} nights", SPARK.min(style.nights)),
-            "last"
-        );
+        let nights = format!("last {} nights", SPARK.min(style.nights));
+        let head = table().row(["series", &nights, "last", " state"]);
+        let _ = writeln!(out, "\n{head}");
     }
     for chart in charts {
         line(&mut out, report, chart, style);
@@ -91,27 +84,29 @@ pub fn terminal(
 /// Trends of `report` in one sentence, wrapped at 80 columns.
 #[must_use]
 pub fn sentence(report: &Report) -> String {
-    wrapped(&format!("trend: {}", report.headline), 0).join("\n")
+    let text = plain(&format!("trend: {}", report.headline));
+    wrap(&text, WIDTH, LongWords::Keep).join("\n")
+}
+
+fn table() -> Table {
+    let columns = [Column::left(NAME), Column::left(SPARK), Column::right(13)];
+    Table::new(columns).gap(1)
 }
 
 fn line(out: &mut String, report: &Report, chart: &Chart, style: Style) {
-    let name: String = plain(&chart.series.name).chars().take(36).collect();
     let last = chart.nights.last();
     let last = last.map_or_else(
         || "-".to_owned(),
         |n| with_unit(n.value, &chart.series.unit),
     );
-    let (bold, end) = if style.color && chart.open_excursion().is_some() {
-        ("\u{1b}[1m", "\u{1b}[0m")
-    } else {
-        ("", "")
-    };
-    let _ = writeln!(
-        out,
-        "{bold}{name:<36} {:<SPARK$} {last:>13}  {}{end}",
+    let line = table().row([
+        cut(&plain(&chart.series.name), NAME).to_owned(),
         spark(report, chart, style),
-        state(chart)
-    );
+        last,
+        format!(" {}", state(chart)),
+    ]);
+    let paint = Paint::new(style.color && chart.open_excursion().is_some());
+    let _ = writeln!(out, "{}", paint.bold(&line));
 }
 
 /// Sparkline: one block per night, the centre of the reference in the middle; a space for a night without a value.
@@ -186,22 +181,4 @@ fn plot(out: &mut String, report: &Report, chart: &Chart, style: Style) {
         let cells: String = cells.iter().collect();
         let _ = writeln!(out, "{label:>MARGIN$} {}", cells.trim_end());
     }
-}
-
-/// Wraps text at 80 columns.
-fn wrapped(text: &str, indent: usize) -> Vec<String> {
-    let mut lines = vec![" ".repeat(indent)];
-    for word in plain(text).split(' ') {
-        let last = lines.len() - 1;
-        let empty = lines[last].trim().is_empty();
-        if !empty && lines[last].chars().count() + 1 + word.chars().count() > WIDTH {
-            lines.push(format!("{}{word}", " ".repeat(indent)));
-        } else {
-            if !empty {
-                lines[last].push(' ');
-            }
-            lines[last].push_str(word);
-        }
-    }
-    lines
 }

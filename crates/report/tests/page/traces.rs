@@ -10,7 +10,8 @@ use crate::{input, support};
 fn clocks_robot_and_tradeoff_are_drawn_or_their_absence_is_told() {
     let mut analysis = support::analysis(4, 3);
     let mut with_reason = input(&analysis);
-    with_reason.tradeoff = Some(Err("s.tradeoff.json: expected <a> result"));
+    let why = std::io::Error::other("s.tradeoff.json: expected <a> result");
+    with_reason.tradeoff = Some(Err(&why));
     let page = html(&with_reason).unwrap();
     assert!(page.contains("data-testid=\"tradeoff-unreadable\""));
     assert!(page.contains("expected &lt;a&gt; result") && !page.contains("\"no-tradeoff\""));

@@ -1,17 +1,17 @@
 //! A made-up, seeded analysis for the report tests. None of its numbers was measured.
 
-pub mod studies;
+pub(crate) mod studies;
 
 use skinrig_analysis::result::*;
 use skinrig_model::*;
 use skinrig_report::{DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakeRow};
 
 /// A small generator (SplitMix64), sufficient for the report.
-pub struct Noise(pub u64);
+pub(crate) struct Noise(pub u64);
 
 impl Noise {
     /// Uniform in 0..1.
-    pub fn uniform(&mut self) -> f64 {
+    pub(crate) fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -20,13 +20,13 @@ impl Noise {
     }
 
     /// About normal, mean 0, standard deviation 1 (sum of 12 uniforms).
-    pub fn normal(&mut self) -> f64 {
+    pub(crate) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 }
 
 /// `side * side` locations pressed `repetitions` times, three sync presses first.
-pub fn analysis(side: u32, repetitions: u32) -> Analysis {
+pub(crate) fn analysis(side: u32, repetitions: u32) -> Analysis {
     let mut noise = Noise(7);
     let geometry = StereoGeometry::PAPER;
     let outline = SkinOutline::PAPER;
@@ -456,7 +456,7 @@ fn zoom(noise: &mut Noise, press: u32, camera: CameraId) -> RateZoom {
 }
 
 /// Provenance of a simulated session.
-pub fn provenance() -> Provenance {
+pub(crate) fn provenance() -> Provenance {
     let device = |role: &str, model: &str, serial: &str, firmware: &str| DeviceRow {
         role: role.into(),
         model: model.into(),
@@ -550,7 +550,7 @@ pub fn provenance() -> Provenance {
 }
 
 /// An empty session.
-pub fn empty() -> Analysis {
+pub(crate) fn empty() -> Analysis {
     let full = analysis(2, 1);
     Analysis {
         counts: PressCounts::default(),

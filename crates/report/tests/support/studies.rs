@@ -6,7 +6,7 @@ use skinrig_model::*;
 use super::Noise;
 
 /// A value with an interval `spread` to either side.
-pub fn estimate(value: f64, spread: f64, n: u32) -> Estimate {
+pub(crate) fn estimate(value: f64, spread: f64, n: u32) -> Estimate {
     Estimate {
         value: Some(value),
         low: Some(value - spread),
@@ -16,7 +16,7 @@ pub fn estimate(value: f64, spread: f64, n: u32) -> Estimate {
 }
 
 /// Two curves over 2^0 ..= 2^12.
-pub fn reduction() -> Reduction {
+pub(crate) fn reduction() -> Reduction {
     let curve = |thinning, loss: f64| ReductionCurve {
         thinning,
         rows: (0..=12)
@@ -60,7 +60,7 @@ pub fn reduction() -> Reduction {
 }
 
 /// A detector with onsets 9 to 40 ms after contact.
-pub fn latency(noise: &mut Noise, presses: &[PressResult]) -> Latency {
+pub(crate) fn latency(noise: &mut Noise, presses: &[PressResult]) -> Latency {
     let onsets: Vec<(PressId, Option<f64>)> = presses
         .iter()
         .filter(|p| p.role == PressRole::Score && p.timing.is_some())
@@ -165,7 +165,7 @@ pub fn latency(noise: &mut Noise, presses: &[PressResult]) -> Latency {
 }
 
 /// The four nested models and the ten-parameter one, the second smallest chosen.
-pub fn models() -> Vec<ModelComparison> {
+pub(crate) fn models() -> Vec<ModelComparison> {
     let rows = [
         (CalibrationModel::None, 0, 5.87, 5.87),
         (CalibrationModel::Positions, 4, 3.61, 3.48),
@@ -192,7 +192,7 @@ pub fn models() -> Vec<ModelComparison> {
 }
 
 /// Correlations that fall with the distance of two parameters; the last one is not determined.
-pub fn correlation(parameters: usize) -> Vec<Vec<Option<f64>>> {
+pub(crate) fn correlation(parameters: usize) -> Vec<Vec<Option<f64>>> {
     let last = parameters - 1;
     let at = |i: usize, k: usize| {
         (i != last && k != last).then(|| {
@@ -210,7 +210,7 @@ pub fn correlation(parameters: usize) -> Vec<Vec<Option<f64>>> {
 }
 
 /// A cost that is flat, dips, and rises.
-pub fn threshold() -> ThresholdChoice {
+pub(crate) fn threshold() -> ThresholdChoice {
     let cost = |events: u32| {
         let x = f64::from(events).ln();
         2.9 + 0.35 * (x - 4.2).powi(2)
@@ -228,7 +228,7 @@ pub fn threshold() -> ThresholdChoice {
 }
 
 /// The published skin with its fields of view, as measured by hand.
-pub fn coverage(cell_mm: f64, places: &[Point2]) -> Coverage {
+pub(crate) fn coverage(cell_mm: f64, places: &[Point2]) -> Coverage {
     let locations = places.len() as u32;
     let polygon =
         |points: &[(f64, f64)]| vec![points.iter().map(|p| Point2::new(p.0, p.1)).collect()];
@@ -271,7 +271,7 @@ pub fn coverage(cell_mm: f64, places: &[Point2]) -> Coverage {
 }
 
 /// The parameters are those of the settings.
-pub fn cmre() -> Cmre {
+pub(crate) fn cmre() -> Cmre {
     Cmre {
         settings: CmreSettings::default(),
         cells: (20, 20),
@@ -281,7 +281,7 @@ pub fn cmre() -> Cmre {
 }
 
 /// About the published rates.
-pub fn bit_rates() -> BitRates {
+pub(crate) fn bit_rates() -> BitRates {
     BitRates {
         bits_per_event: 21.0,
         press_events_per_s: estimate(28_570.0, 600.0, 2294),
@@ -293,7 +293,7 @@ pub fn bit_rates() -> BitRates {
 }
 
 /// A bright band about row 270 under a faint rim, with a few hot pixels.
-pub fn activity(noise: &mut Noise, camera: CameraId) -> Activity {
+pub(crate) fn activity(noise: &mut Noise, camera: CameraId) -> Activity {
     let (width, height) = (320u16, 240u16);
     let mut counts = vec![0; usize::from(width) * usize::from(height)];
     for (i, count) in counts.iter_mut().enumerate() {
@@ -316,7 +316,7 @@ pub fn activity(noise: &mut Noise, camera: CameraId) -> Activity {
 }
 
 /// The published evaluation.
-pub fn reference() -> ReferenceCode {
+pub(crate) fn reference() -> ReferenceCode {
     ReferenceCode {
         presses: 256,
         calibrated: true,
@@ -339,7 +339,7 @@ pub fn reference() -> ReferenceCode {
 }
 
 /// Two violations.
-pub fn findings() -> Vec<Finding> {
+pub(crate) fn findings() -> Vec<Finding> {
     vec![
         Finding {
             law: Law::CentroidFollowsPosition,
@@ -363,7 +363,7 @@ pub fn findings() -> Vec<Finding> {
 }
 
 /// A map with a distant rejected point, and a bent one.
-pub fn clock_residuals() -> Vec<ClockResiduals> {
+pub(crate) fn clock_residuals() -> Vec<ClockResiduals> {
     let map = |map, size_us: f64| ClockResiduals {
         map,
         n: 200,
@@ -387,7 +387,7 @@ pub fn clock_residuals() -> Vec<ClockResiduals> {
 }
 
 /// A tip that lags by 10 ms.
-pub fn motion() -> Motion {
+pub(crate) fn motion() -> Motion {
     let path = |t: f64| [0.0, 0.0, 5.0 - 20.0 * t.clamp(0.0, 0.35)];
     let samples = (0..300).map(|k| f64::from(k) * 2e-3);
     Motion {

@@ -79,7 +79,7 @@ fn builds(input: syn::parse::ParseStream<'_>) -> Result<(Type, Path)> {
 }
 
 impl StructAttributes {
-    pub fn parse(attributes: &[Attribute]) -> Result<Self> {
+    pub(crate) fn parse(attributes: &[Attribute]) -> Result<Self> {
         let mut out = Self::default();
         for attribute in attributes.iter().filter(|a| a.path().is_ident("settings")) {
             attribute.parse_nested_meta(|meta| {
@@ -110,7 +110,7 @@ impl StructAttributes {
 }
 
 impl FieldAttributes {
-    pub fn parse(attributes: &[Attribute]) -> Result<Self> {
+    pub(crate) fn parse(attributes: &[Attribute]) -> Result<Self> {
         let mut out = Self::default();
         for attribute in attributes.iter().filter(|a| a.path().is_ident("setting")) {
             attribute.parse_nested_meta(|meta| {
@@ -148,7 +148,7 @@ impl FieldAttributes {
     }
 
     /// The declared range as a `ValueRange`, in the unit of the field; `otherwise` when nothing is declared.
-    pub fn range(&self, otherwise: TokenStream) -> TokenStream {
+    pub(crate) fn range(&self, otherwise: TokenStream) -> TokenStream {
         if let Some(range) = &self.range {
             return quote::quote!(#range);
         }
@@ -182,7 +182,7 @@ fn text(value: &Expr) -> Option<String> {
 }
 
 /// The lines of a doc comment as one text.
-pub fn doc(attributes: &[Attribute]) -> String {
+pub(crate) fn doc(attributes: &[Attribute]) -> String {
     let lines = attributes.iter().filter_map(|a| match &a.meta {
         Meta::NameValue(pair) if pair.path.is_ident("doc") => text(&pair.value),
         _ => None,
@@ -192,7 +192,7 @@ pub fn doc(attributes: &[Attribute]) -> String {
 }
 
 /// `MotorForce` as `motor_force`.
-pub fn snake_case(name: &str) -> String {
+pub(crate) fn snake_case(name: &str) -> String {
     let mut out = String::new();
     for (i, c) in name.chars().enumerate() {
         if c.is_uppercase() && i > 0 {

@@ -6,7 +6,7 @@ use syn::{Data, DeriveInput, Error, Fields, LitStr, Result};
 
 use crate::attributes::{doc, snake_case};
 
-pub fn choice(input: &DeriveInput) -> Result<TokenStream> {
+pub(crate) fn choice(input: &DeriveInput) -> Result<TokenStream> {
     let Data::Enum(data) = &input.data else {
         return Err(Error::new_spanned(&input.ident, "expected an enum"));
     };

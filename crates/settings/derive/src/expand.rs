@@ -19,7 +19,7 @@ struct Parts {
     default: Option<TokenStream>,
 }
 
-pub fn settings(input: &DeriveInput) -> Result<TokenStream> {
+pub(crate) fn settings(input: &DeriveInput) -> Result<TokenStream> {
     let Data::Struct(data) = &input.data else {
         return Err(Error::new_spanned(&input.ident, "expected a struct"));
     };

@@ -8,7 +8,7 @@ use crate::attributes::{FieldAttributes, pascal_case};
 use crate::unit::{SECONDS, Unit};
 
 /// What a value is, by the type of its field.
-pub enum Kind {
+pub(crate) enum Kind {
     /// `f64`, with its unit.
     Float(Option<Unit>),
     /// An integer type, with its unit.
@@ -47,7 +47,7 @@ pub(crate) fn inside_option(ty: &Type) -> Option<&Type> {
 
 impl Kind {
     /// `unit` is the unit in the field's name, if any.
-    pub fn of(ty: &Type, unit: Option<Unit>) -> Result<Self> {
+    pub(crate) fn of(ty: &Type, unit: Option<Unit>) -> Result<Self> {
         if let Type::Array(array) = ty {
             let Expr::Lit(length) = &array.len else {
                 return Err(Error::new_spanned(array, "expected a literal length"));
@@ -71,7 +71,7 @@ impl Kind {
     }
 
     /// Whether the unit at the end of the field's name is one.
-    pub fn is_measured(&self) -> bool {
+    pub(crate) fn is_measured(&self) -> bool {
         match self {
             Self::Float(_) | Self::Whole(..) => true,
             Self::List(of) | Self::Tuple(of, _) => of.is_measured(),
@@ -88,7 +88,7 @@ impl Kind {
     }
 
     /// The declared range in the unit of the field, for numbers.
-    pub fn range(&self, attributes: &FieldAttributes) -> TokenStream {
+    pub(crate) fn range(&self, attributes: &FieldAttributes) -> TokenStream {
         let widest = match self {
             Self::Whole(ty, _) => {
                 quote!(::skinrig_settings::ValueRange::between(<#ty>::MIN as f64, <#ty>::MAX as f64))
@@ -99,7 +99,7 @@ impl Kind {
     }
 
     /// The `Shape`.
-    pub fn shape(&self, attributes: &FieldAttributes) -> TokenStream {
+    pub(crate) fn shape(&self, attributes: &FieldAttributes) -> TokenStream {
         let range = self.range(attributes);
         match self {
             Self::Other(ty) => quote!(<#ty as ::skinrig_settings::Setting>::SHAPE),
@@ -140,7 +140,7 @@ impl Kind {
     }
 
     /// An expression of type `Option<T>` that reads the field `f`.
-    pub fn read(&self) -> TokenStream {
+    pub(crate) fn read(&self) -> TokenStream {
         match self {
             Self::Float(Some(unit)) => {
                 let per = unit.per;
@@ -170,7 +170,7 @@ impl Kind {
     }
 
     /// An expression of type `String`: the value at the reference `v` as typed.
-    pub fn text(&self) -> TokenStream {
+    pub(crate) fn text(&self) -> TokenStream {
         match self {
             Self::Duration(_) => quote!(format!("{} s", v.as_secs_f64())),
             Self::List(of) | Self::Tuple(of, _) => {
@@ -189,7 +189,7 @@ impl Kind {
     }
 
     /// An expression of type `Option<String>`: the range, when the value at `v` is outside it.
-    pub fn expected(&self, attributes: &FieldAttributes) -> TokenStream {
+    pub(crate) fn expected(&self, attributes: &FieldAttributes) -> TokenStream {
         let range = self.range(attributes);
         let describe = |number: TokenStream, unit: &str| {
             quote!({
@@ -210,7 +210,7 @@ impl Kind {
     }
 
     /// The default in Rust.
-    pub fn default_value(&self, text: &LitStr) -> Result<TokenStream> {
+    pub(crate) fn default_value(&self, text: &LitStr) -> Result<TokenStream> {
         let typed = text.value();
         let wrong = |expected: &str| {
             Error::new_spanned(

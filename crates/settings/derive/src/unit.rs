@@ -2,7 +2,7 @@
 
 /// A unit that a field's name can end in.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Unit {
+pub(crate) struct Unit {
     /// End of the field's name.
     pub suffix: &'static str,
     /// As typed in files.
@@ -45,7 +45,7 @@ const UNITS: &[Unit] = &[
 ];
 
 /// Seconds, the unit of durations.
-pub const SECONDS: Unit = unit("", "s", "Time", 1.0);
+pub(crate) const SECONDS: Unit = unit("", "s", "Time", 1.0);
 
 /// The unit in which a name ends, and the name without it.
 pub(crate) fn of_name(name: &str) -> Option<(Unit, &str)> {

@@ -124,8 +124,8 @@ impl Default for OpticalConfig {
 
 impl OpticalConfig {
     /// The same constants without noise: no leak, no shot noise, no hot pixels, equal thresholds.
-    #[must_use]
-    pub const fn without_noise(self) -> Self {
+    #[cfg(test)]
+    pub(crate) const fn without_noise(self) -> Self {
         Self {
             threshold_sigma: 0.0,
             leak_hz: 0.0,

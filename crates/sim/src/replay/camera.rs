@@ -9,7 +9,7 @@ use skinrig_model::{
 use super::tape::Tape;
 
 /// A camera that returns the recorded chunks unchanged.
-pub struct ReplayedCamera {
+pub(crate) struct ReplayedCamera {
     tape: Tape,
     id: CameraId,
     format: StreamFormat,
@@ -19,7 +19,7 @@ pub struct ReplayedCamera {
 impl ReplayedCamera {
     /// Camera `id` of `tape`.
     #[must_use]
-    pub const fn new(tape: Tape, id: CameraId, format: StreamFormat) -> Self {
+    pub(crate) const fn new(tape: Tape, id: CameraId, format: StreamFormat) -> Self {
         Self {
             tape,
             id,

@@ -10,7 +10,7 @@ use super::tape::Tape;
 use skinrig_device::limits;
 
 /// A robot that checks commands against the recorded ones and returns the recorded poses.
-pub struct ReplayedIndenter {
+pub(crate) struct ReplayedIndenter {
     tape: Tape,
     robot_from_skin: RigidTransform<Robot, Skin>,
     limits: Option<MotionLimits>,
@@ -21,7 +21,7 @@ pub struct ReplayedIndenter {
 impl ReplayedIndenter {
     /// The robot of `tape`.
     #[must_use]
-    pub const fn new(tape: Tape, robot_from_skin: RigidTransform<Robot, Skin>) -> Self {
+    pub(crate) const fn new(tape: Tape, robot_from_skin: RigidTransform<Robot, Skin>) -> Self {
         Self {
             tape,
             robot_from_skin,

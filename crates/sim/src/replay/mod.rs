@@ -20,11 +20,12 @@ mod trigger;
 use skinrig_device::{CameraSettings, EventCamera, Rig, TriggerBox};
 use skinrig_model::{CameraId, DeviceRole, RigGeometry, RigidTransform, Robot, Skin, StreamFormat};
 
-pub use camera::ReplayedCamera;
-pub use indenter::ReplayedIndenter;
+pub(crate) use camera::ReplayedCamera;
+pub(crate) use indenter::ReplayedIndenter;
 pub use recording::{Recording, RecordingError};
-pub use tape::{ReplayClock, Tape};
-pub use trigger::ReplayedTriggerBox;
+pub(crate) use tape::ReplayClock;
+pub(crate) use tape::Tape;
+pub(crate) use trigger::ReplayedTriggerBox;
 
 #[cfg(doc)]
 use skinrig_device::DeviceError;

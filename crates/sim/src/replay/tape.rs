@@ -16,7 +16,7 @@ use skinrig_device::limits::millimetres;
 const LONGEST_GAP: HostDuration = HostDuration::from_millis(50);
 
 /// Reading positions in a recording.
-pub struct Reader {
+pub(super) struct Reader {
     recording: Box<dyn Recording>,
     now: HostTime,
     command: Option<(HostTime, MotionCommand)>,
@@ -35,7 +35,7 @@ pub struct Reader {
 
 /// A shared handle of the recording.
 #[derive(Clone)]
-pub struct Tape {
+pub(crate) struct Tape {
     reader: Arc<Mutex<Reader>>,
     skin_from_robot: RigidTransform<Skin, Robot>,
 }
@@ -43,7 +43,7 @@ pub struct Tape {
 impl Tape {
     /// At the start of `recording`.
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         recording: Box<dyn Recording>,
         skin_from_robot: RigidTransform<Skin, Robot>,
     ) -> Self {
@@ -74,7 +74,7 @@ impl Tape {
 
     /// Transform from robot to skin coordinates.
     #[must_use]
-    pub const fn skin_from_robot(&self) -> RigidTransform<Skin, Robot> {
+    pub(crate) const fn skin_from_robot(&self) -> RigidTransform<Skin, Robot> {
         self.skin_from_robot
     }
 
@@ -279,14 +279,14 @@ impl Reader {
 }
 
 /// The clock of a replayed rig.
-pub struct ReplayClock {
+pub(crate) struct ReplayClock {
     tape: Tape,
 }
 
 impl ReplayClock {
     /// The clock of `tape`.
     #[must_use]
-    pub const fn new(tape: Tape) -> Self {
+    pub(crate) const fn new(tape: Tape) -> Self {
         Self { tape }
     }
 }

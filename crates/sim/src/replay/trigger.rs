@@ -8,7 +8,7 @@ use skinrig_model::{
 use super::tape::Tape;
 
 /// A trigger box that accepts the recorded marks in order and returns their recorded times.
-pub struct ReplayedTriggerBox {
+pub(crate) struct ReplayedTriggerBox {
     tape: Tape,
     busy_until: Option<HostTime>,
 }
@@ -16,7 +16,7 @@ pub struct ReplayedTriggerBox {
 impl ReplayedTriggerBox {
     /// The box of `tape`.
     #[must_use]
-    pub const fn new(tape: Tape) -> Self {
+    pub(crate) const fn new(tape: Tape) -> Self {
         Self {
             tape,
             busy_until: None,

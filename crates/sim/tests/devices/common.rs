@@ -15,7 +15,7 @@ use skinrig_model::{
 use skinrig_sim::replay::{Recording, RecordingError};
 
 /// Limits that every rig of these tests accepts.
-pub const LIMITS: MotionLimits = MotionLimits {
+pub(crate) const LIMITS: MotionLimits = MotionLimits {
     min_mm: [-80.0, -80.0, -60.0],
     max_mm: [80.0, 80.0, 60.0],
     max_speed_mm_s: 100.0,
@@ -24,7 +24,7 @@ pub const LIMITS: MotionLimits = MotionLimits {
 };
 
 /// Configures, starts, arms.
-pub fn ready(rig: &mut Rig) {
+pub(crate) fn ready(rig: &mut Rig) {
     rig.indenter.configure(&LIMITS).unwrap();
     for (camera, settings) in rig.cameras.iter_mut().zip(&rig.camera_settings) {
         camera.configure(settings).unwrap();
@@ -35,7 +35,7 @@ pub fn ready(rig: &mut Rig) {
 
 /// Results of a run.
 #[derive(Default)]
-pub struct Take {
+pub(crate) struct Take {
     pub samples: Vec<RobotSample>,
     pub chunks: [Vec<RawChunk>; 2],
     pub marks: Vec<SentMark>,
@@ -44,7 +44,7 @@ pub struct Take {
 
 impl Take {
     /// The bytes of a camera as one string.
-    pub fn bytes(&self, camera: CameraId) -> Vec<u8> {
+    pub(crate) fn bytes(&self, camera: CameraId) -> Vec<u8> {
         self.chunks[camera.index()]
             .iter()
             .flat_map(|c| c.bytes.iter().copied())
@@ -52,7 +52,7 @@ impl Take {
     }
 
     /// Collects the available data of the devices.
-    pub fn poll(&mut self, rig: &mut Rig) -> Result<(), DeviceError> {
+    pub(crate) fn poll(&mut self, rig: &mut Rig) -> Result<(), DeviceError> {
         rig.indenter.poll(&mut self.samples)?;
         for (camera, chunks) in rig.cameras.iter_mut().zip(&mut self.chunks) {
             camera.poll(chunks)?;
@@ -64,7 +64,7 @@ impl Take {
     }
 
     /// Ends the run.
-    pub fn stop(&mut self, rig: &mut Rig) {
+    pub(crate) fn stop(&mut self, rig: &mut Rig) {
         let _ = rig.indenter.disarm();
         for (camera, chunks) in rig.cameras.iter_mut().zip(&mut self.chunks) {
             let _ = camera.stop(chunks);
@@ -73,7 +73,11 @@ impl Take {
 }
 
 /// Presses 2 mm deep at each place, on a fixed schedule of 1.5 s per press; `ticks` are the polling intervals in µs, repeated cyclically.
-pub fn press_all(rig: &mut Rig, places: &[Point2], ticks: &[i64]) -> Result<Take, DeviceError> {
+pub(crate) fn press_all(
+    rig: &mut Rig,
+    places: &[Point2],
+    ticks: &[i64],
+) -> Result<Take, DeviceError> {
     let mut take = Take::default();
     let mut tick = ticks.iter().copied().cycle();
     let up = rig.robot_from_skin;
@@ -107,7 +111,7 @@ pub fn press_all(rig: &mut Rig, places: &[Point2], ticks: &[i64]) -> Result<Take
 }
 
 /// Places on the skin that both cameras see.
-pub fn places(n: usize) -> Vec<Point2> {
+pub(crate) fn places(n: usize) -> Vec<Point2> {
     (0..n)
         .map(|k| Point2::new(-18.0 + 7.0 * (k % 7) as f64, -14.0 + 6.0 * (k % 6) as f64))
         .collect()
@@ -115,7 +119,7 @@ pub fn places(n: usize) -> Vec<Point2> {
 
 /// All data of a run, in memory.
 #[derive(Default, Clone)]
-pub struct Log {
+pub(crate) struct Log {
     pub identities: Vec<(DeviceRole, DeviceIdentity)>,
     pub settings: Vec<(DeviceRole, Vec<Setting>)>,
     pub commands: VecDeque<(HostTime, MotionCommand)>,
@@ -154,7 +158,7 @@ impl Recording for Log {
 }
 
 /// A device that records all calls.
-pub struct Noted<D> {
+pub(crate) struct Noted<D> {
     inner: D,
     log: Arc<Mutex<Log>>,
     clock: Box<dyn Clock>,
@@ -162,7 +166,7 @@ pub struct Noted<D> {
 }
 
 impl<D> Noted<D> {
-    pub fn new(
+    pub(crate) fn new(
         inner: D,
         log: &Arc<Mutex<Log>>,
         clock: Box<dyn Clock>,
@@ -301,10 +305,10 @@ impl TriggerBox for Noted<Box<dyn TriggerBox>> {
 
 /// A clock with two owners.
 #[derive(Clone)]
-pub struct SharedClock(Arc<Mutex<Box<dyn Clock>>>);
+pub(crate) struct SharedClock(Arc<Mutex<Box<dyn Clock>>>);
 
 impl SharedClock {
-    pub fn new(clock: Box<dyn Clock>) -> Self {
+    pub(crate) fn new(clock: Box<dyn Clock>) -> Self {
         Self(Arc::new(Mutex::new(clock)))
     }
 }
@@ -319,7 +323,7 @@ impl Clock for SharedClock {
 }
 
 /// `rig` with all devices recording into the returned log.
-pub fn noted(rig: Rig) -> (Rig, Arc<Mutex<Log>>) {
+pub(crate) fn noted(rig: Rig) -> (Rig, Arc<Mutex<Log>>) {
     let log = Arc::new(Mutex::new(Log::default()));
     let clock = SharedClock::new(rig.clock);
     let place = rig.robot_from_skin;

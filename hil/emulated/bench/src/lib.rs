@@ -28,7 +28,7 @@ use skinrig_model::{CameraId, Point3, RigidTransform, Robot, SimLevel, Skin};
 pub use drd::{Fault, When};
 pub use skinrig_emulated_camera::steer::Order;
 pub use skinrig_emulated_trigger_box::NoisePerMillion;
-pub use ties::{LEAKS_EVERY, Wire};
+pub use ties::Wire;
 
 pub use ties::CAMERA_SERIALS;
 use ties::Ties;

@@ -30,7 +30,7 @@ mod linux {
 
     const USAGE: &str = "expected [--seed N] [--level geometric|optical] -- COMMAND ...";
 
-    pub fn run() -> Result<ExitCode, Box<dyn Error>> {
+    pub(crate) fn run() -> Result<ExitCode, Box<dyn Error>> {
         let mut config = BenchConfig::default();
         let mut arguments = std::env::args_os().skip(1);
         let program = loop {

@@ -27,14 +27,14 @@ const TRIGGER_INPUT: u8 = 0;
 pub enum Wire {
     /// Transmits all pulses.
     Whole,
-    /// Loses every [`LEAKS_EVERY`]-th pulse.
+    /// Loses every `LEAKS_EVERY`-th pulse.
     Leaky,
     /// Disconnected.
     Cut,
 }
 
 /// A leaky wire loses every pulse with this index.
-pub const LEAKS_EVERY: u32 = 11;
+pub(crate) const LEAKS_EVERY: u32 = 11;
 
 /// The connecting threads; dropping this value ends them.
 pub(crate) struct Ties {

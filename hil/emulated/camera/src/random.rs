@@ -8,7 +8,7 @@ use skinrig_sim::scene::PixelEvent;
 pub(crate) struct Splitmix(pub u64);
 
 impl Splitmix {
-    pub fn next(&mut self) -> u64 {
+    pub(crate) fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -16,18 +16,18 @@ impl Splitmix {
     }
 
     /// 0..`end`; `end` is not 0.
-    pub fn below(&mut self, end: u64) -> u64 {
+    pub(crate) fn below(&mut self, end: u64) -> u64 {
         ((u128::from(self.next()) * u128::from(end)) >> 64) as u64
     }
 
     /// Exponentially distributed with mean 1.
-    pub fn exponential(&mut self) -> f64 {
+    pub(crate) fn exponential(&mut self) -> f64 {
         // In (0, 1], so that the logarithm is finite.
         let unit = ((self.next() >> 11) + 1) as f64 / (1u64 << 53) as f64;
         -unit.ln()
     }
 
-    pub fn event(&mut self, t_ns: i64) -> PixelEvent {
+    pub(crate) fn event(&mut self, t_ns: i64) -> PixelEvent {
         PixelEvent {
             t_ns,
             x: self.below(SENSOR_WIDTH.into()) as u16,

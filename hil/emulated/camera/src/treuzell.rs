@@ -8,13 +8,13 @@ use crate::usb::function::{Function, Reply};
 use crate::usb::usbfs::Setup;
 
 /// An EVK3 as far as enumeration goes: interface subclass 0x19, three bulk endpoints (EVK1 reference, section 1.1).
-pub struct Treuzell {
+pub(crate) struct Treuzell {
     descriptors: Descriptors,
     journal: Mutex<Vec<Request>>,
 }
 
 impl Treuzell {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             descriptors: Descriptors {
                 vendor: 0x04b4,
@@ -30,7 +30,7 @@ impl Treuzell {
     }
 
     /// Vendor requests that reached it.
-    pub fn journal(&self) -> Vec<Request> {
+    pub(crate) fn journal(&self) -> Vec<Request> {
         self.journal
             .lock()
             .unwrap_or_else(PoisonError::into_inner)

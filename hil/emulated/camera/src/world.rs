@@ -240,11 +240,13 @@ impl World {
         self.leave(source);
     }
 
-    fn obey(&self, source: u64, line: &str) -> Result<(), String> {
+    fn obey(&self, source: u64, line: &str) -> Result<(), LineError> {
         let words: Vec<&str> = line.split_ascii_whitespace().collect();
-        let number = |word: &str| -> Result<i64, String> {
-            word.parse()
-                .map_err(|_| format!("expected a whole number, found `{word}` in `{line}`"))
+        let number = |word: &str| -> Result<i64, LineError> {
+            word.parse().map_err(|_| LineError::Number {
+                word: word.to_owned(),
+                line: line.to_owned(),
+            })
         };
         match words[..] {
             ["edge", serial, channel, level, at] => {
@@ -255,9 +257,9 @@ impl World {
                     _ => None,
                 };
                 let (Some(channel), Some(rising)) = (channel, rising) else {
-                    return Err(format!(
-                        "expected a channel in 0..8 and a level 0 or 1, found `{line}`"
-                    ));
+                    return Err(LineError::Edge {
+                        line: line.to_owned(),
+                    });
                 };
                 let at_ns = number(at)?;
                 self.edge(
@@ -281,7 +283,10 @@ impl World {
                         .parse()
                         .ok()
                         .filter(|v: &f64| v.is_finite())
-                        .ok_or_else(|| format!("expected mm, found `{word}` in `{line}`"))?;
+                        .ok_or_else(|| LineError::Position {
+                            word: word.to_owned(),
+                            line: line.to_owned(),
+                        })?;
                 }
                 self.tip(Tip {
                     at_ns: number(at)?,
@@ -289,9 +294,9 @@ impl World {
                 });
                 Ok(())
             }
-            _ => Err(format!(
-                "expected `edge SERIAL CHANNEL LEVEL T_NS`, `time T_NS` or `tip T_NS X Y Z`, found `{line}`"
-            )),
+            _ => Err(LineError::Word {
+                line: line.to_owned(),
+            }),
         }
     }
 
@@ -299,6 +304,21 @@ impl World {
         self.lock().closed = true;
         self.changed.notify_all();
     }
+}
+
+/// Why a line of another process cannot be obeyed.
+#[derive(Debug, thiserror::Error)]
+enum LineError {
+    #[error("expected a whole number, found `{word}` in `{line}`")]
+    Number { word: String, line: String },
+    #[error("expected a channel in 0..8 and a level 0 or 1, found `{line}`")]
+    Edge { line: String },
+    #[error("expected mm, found `{word}` in `{line}`")]
+    Position { word: String, line: String },
+    #[error(
+        "expected `edge SERIAL CHANNEL LEVEL T_NS`, `time T_NS` or `tip T_NS X Y Z`, found `{line}`"
+    )]
+    Word { line: String },
 }
 
 impl State {
@@ -339,7 +359,7 @@ mod tests {
             "tip 1 nan 0 0",
             "jump 1",
         ] {
-            let said = world.obey(1, bad).unwrap_err();
+            let said = world.obey(1, bad).unwrap_err().to_string();
             assert!(said.contains("expected") && said.contains(bad), "{said}");
         }
     }

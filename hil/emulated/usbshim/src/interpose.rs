@@ -139,7 +139,7 @@ interpose_openat!(
 /// # Safety
 /// As for the C function of this name.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn opendir(path: *const c_char) -> *mut DIR {
+pub(crate) unsafe extern "C" fn opendir(path: *const c_char) -> *mut DIR {
     // SAFETY: a caller of `opendir` passes a C string.
     let here = unsafe { CStr::from_ptr(path) };
     let there = redirect::root().and_then(|root| redirect::redirected(root, here));

@@ -20,7 +20,7 @@ pub fn root() -> Option<&'static Path> {
 }
 
 /// Redirected path; `None` if `path` does not belong to the bus.
-pub fn redirected(root: &Path, path: &CStr) -> Option<CString> {
+pub(crate) fn redirected(root: &Path, path: &CStr) -> Option<CString> {
     let emulated = EMULATED.iter().any(|p| begins_with(path.to_bytes(), p));
     emulated
         .then(|| below(root, b"", path.to_bytes()))
@@ -28,7 +28,7 @@ pub fn redirected(root: &Path, path: &CStr) -> Option<CString> {
 }
 
 /// Whether `path` is a device file (and not a folder).
-pub fn is_device(path: &CStr) -> bool {
+pub(crate) fn is_device(path: &CStr) -> bool {
     let path = path.to_bytes();
     begins_with(path, DEVICES) && path.len() > DEVICES.len() + 4
 }

@@ -1,7 +1,7 @@
 //! Symmetric band matrices with three further diagonals: factorisation, solution and the band of the inverse.
 
 /// A symmetric matrix with three further diagonals: for each row its diagonal and the next three entries.
-pub type Band = Vec<[f64; 4]>;
+pub(crate) type Band = Vec<[f64; 4]>;
 
 /// `w' C w` for weights of four neighbours.
 pub(crate) fn quadratic(c: &Band, first: usize, w: &[f64; 4]) -> f64 {
@@ -16,7 +16,7 @@ pub(crate) fn quadratic(c: &Band, first: usize, w: &[f64; 4]) -> f64 {
 }
 
 /// Cholesky factor of a positive definite band matrix: `l[i][k]` is entry (i + k, i). `None` if it is not positive definite.
-pub fn factor(a: &Band) -> Option<Band> {
+pub(super) fn factor(a: &Band) -> Option<Band> {
     let n = a.len();
     let mut l = a.clone();
     for i in 0..n {
@@ -81,6 +81,6 @@ pub(crate) fn inverse_band(l: &Band) -> Band {
 }
 
 /// `a' b`.
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

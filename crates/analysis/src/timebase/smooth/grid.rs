@@ -2,20 +2,20 @@
 
 /// Equal time steps and their cubic B-splines, which extend one step to the left and two to the right.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grid {
+pub(super) struct Grid {
     pub start_us: f64,
     pub step_us: f64,
     pub steps: usize,
 }
 
 impl Grid {
-    pub fn size(&self) -> usize {
+    pub(super) fn size(&self) -> usize {
         self.steps + 3
     }
 
     /// Index of the first of the four non-zero splines at `x`, and their values; beyond the ends the outer polynomials
     /// continue.
-    pub fn weights(&self, x: f64) -> (usize, [f64; 4]) {
+    pub(super) fn weights(&self, x: f64) -> (usize, [f64; 4]) {
         let at = (x - self.start_us) / self.step_us;
         let k = (at.floor().max(0.0) as usize).min(self.steps - 1);
         let u = at - k as f64;
@@ -29,7 +29,7 @@ impl Grid {
         (k, weights)
     }
 
-    pub fn value(&self, coefficients: &[f64], x: f64) -> f64 {
+    pub(super) fn value(&self, coefficients: &[f64], x: f64) -> f64 {
         let (first, weights) = self.weights(x);
         let near = coefficients[first..first + 4].iter().zip(weights);
         near.map(|(c, w)| c * w).sum()

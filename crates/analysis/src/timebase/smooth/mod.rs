@@ -14,7 +14,7 @@ mod point;
 mod posterior;
 mod smoothness;
 
-pub use self::point::{Figure, Point};
+pub(crate) use self::point::{Figure, Point};
 
 use self::band::{Band, quadratic};
 use self::grid::Grid;
@@ -22,9 +22,9 @@ use self::posterior::Posterior;
 use crate::clock::line::{self, Pair, median};
 
 /// Minimum step of maps, µs: a rate that changes by 6 ppm per hour bends a clock by 0.02 µs in it.
-pub const STEP_US: f64 = 10e6;
+pub(crate) const STEP_US: f64 = 10e6;
 /// Lower bound of the scale of train instants, µs.
-pub const FLOOR_US: f64 = 0.5;
+pub(crate) const FLOOR_US: f64 = 0.5;
 /// Residuals beyond this many robust standard deviations are outliers.
 const OUTLIER_SIGMAS: f64 = 5.0;
 /// Standard deviation of a normal distribution over its median absolute deviation.
@@ -60,7 +60,7 @@ pub(crate) struct SmoothMap {
 impl SmoothMap {
     /// Fits `points`, which are in order of `from_us`, with steps of at least `step_us`. `floor_us` is the lower bound of
     /// the residual scale. `None` below 3 points or without spread in time.
-    pub fn fit(points: &[Point], step_us: f64, floor_us: f64) -> Option<Self> {
+    pub(crate) fn fit(points: &[Point], step_us: f64, floor_us: f64) -> Option<Self> {
         Self::fit_with_drift(points, step_us, floor_us, None)
     }
 
@@ -136,12 +136,12 @@ impl SmoothMap {
     }
 
     /// Time on the other clock, µs.
-    pub fn value(&self, from_us: f64) -> f64 {
+    pub(crate) fn value(&self, from_us: f64) -> f64 {
         from_us + self.grid.value(&self.coefficients, from_us)
     }
 
     /// Standard error of [`Self::value`], µs; grows outside the range of the points.
-    pub fn standard_error(&self, from_us: f64) -> f64 {
+    pub(crate) fn standard_error(&self, from_us: f64) -> f64 {
         let (first, weights) = self.grid.weights(from_us);
         quadratic(&self.covariances, first, &weights)
             .max(0.0)
@@ -156,12 +156,12 @@ impl SmoothMap {
     }
 
     /// First and last point used, µs.
-    pub fn span_us(&self) -> (f64, f64) {
+    pub(crate) fn span_us(&self) -> (f64, f64) {
         self.span_us
     }
 
     /// Number of used points.
-    pub fn n(&self) -> usize {
+    pub(crate) fn n(&self) -> usize {
         self.used.iter().filter(|u| **u).count()
     }
 }

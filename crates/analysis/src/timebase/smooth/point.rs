@@ -4,7 +4,7 @@ use crate::distributions::student_quantile;
 
 /// Simultaneous times on two clocks, µs, relative to their references.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point {
+pub(crate) struct Point {
     pub from_us: f64,
     pub to_us: f64,
     /// Standard deviation of its noise, in units of that of a usual point; above 0.
@@ -13,7 +13,7 @@ pub struct Point {
 
 impl Point {
     /// A point with typical noise.
-    pub fn new(from_us: f64, to_us: f64) -> Self {
+    pub(crate) fn new(from_us: f64, to_us: f64) -> Self {
         Self {
             from_us,
             to_us,
@@ -24,7 +24,7 @@ impl Point {
 
 /// A value with its standard error and degrees of freedom.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Figure {
+pub(crate) struct Figure {
     pub value: f64,
     pub se: f64,
     pub free: f64,
@@ -32,7 +32,7 @@ pub struct Figure {
 
 impl Figure {
     /// Difference to another value with independent error: degrees of freedom after Welch (1947).
-    pub fn less(self, other: Self) -> Self {
+    pub(crate) fn less(self, other: Self) -> Self {
         let (a, b) = (self.se * self.se, other.se * other.se);
         let free = (a + b) * (a + b) / (a * a / self.free + b * b / other.free);
         Self {

@@ -29,7 +29,7 @@ pub(crate) struct Posterior {
 impl Posterior {
     /// From (time, deviation, spread) in time order, with the mean rate between two times, by default the first and the last
     /// point's, µs.
-    pub fn new(
+    pub(super) fn new(
         points: &[(f64, f64, f64)],
         step_us: f64,
         between_us: Option<(f64, f64)>,

@@ -29,7 +29,7 @@ pub(crate) struct Candidate {
 }
 
 /// Sums over the points.
-pub struct Data {
+pub(super) struct Data {
     /// Number of coefficients that no penalty affects.
     free: usize,
     n: f64,
@@ -42,7 +42,7 @@ pub struct Data {
 
 impl Data {
     /// From (time, value, spread); the mean rate is that between two times, µs.
-    pub fn new(
+    pub(super) fn new(
         points: &[(f64, f64, f64)],
         grid: &Grid,
         free: usize,
@@ -79,7 +79,7 @@ impl Data {
     }
 
     /// Replaces the values at the same times.
-    pub fn take(&mut self, points: &[(f64, f64, f64)], grid: &Grid) {
+    pub(super) fn take(&mut self, points: &[(f64, f64, f64)], grid: &Grid) {
         self.right = vec![0.0; grid.size()];
         self.squares = 0.0;
         for (x, y, spread) in points {

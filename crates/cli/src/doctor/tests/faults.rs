@@ -5,6 +5,7 @@ use std::fs;
 use super::super::finding::Verdict;
 use super::super::survey::Library;
 use super::{Bench, CAMERA_1, CAMERA_2, ROBOT_NODE, lamp};
+use crate::rig::inputs::UnusableInput;
 
 pub(super) type Fault = (
     &'static str,
@@ -17,7 +18,10 @@ pub(super) type Fault = (
 pub(super) const FAULTS: &[Fault] = &[
     (
         "the lamps' program is not there",
-        |b| b.inputs = vec![lamp(Err("`/usr/local/bin/lamp`: No such file"))],
+        |b| {
+            let name = "lamp".to_owned();
+            b.inputs = vec![lamp(Err(UnusableInput::NotInPath { name }))];
+        },
         ("rig file", "hil.light.dark", Verdict::Problem),
         "name a program",
     ),

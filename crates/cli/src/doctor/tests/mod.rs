@@ -3,6 +3,7 @@
 mod faults;
 
 use std::fs;
+use std::io;
 use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
 
@@ -15,7 +16,7 @@ use super::machine::Machine;
 use super::survey::{Library, Survey};
 use super::*;
 use crate::devices::Line;
-use crate::rig::inputs::Input;
+use crate::rig::inputs::{Input, UnusableInput};
 use faults::FAULTS;
 
 const RIG: &str = include_str!("../../../../../hil/rigs/bench.example.yaml");
@@ -30,7 +31,7 @@ struct Bench {
     survey: Survey,
     rig: Option<RigFile>,
     inputs: Vec<Input>,
-    free_b: fn(&Path) -> Result<f64, String>,
+    free_b: fn(&Path) -> io::Result<f64>,
 }
 
 impl Bench {
@@ -103,11 +104,11 @@ impl Bench {
 }
 
 /// The program that switches the lamps off, as it is found.
-fn lamp(found: Result<&str, &str>) -> Input {
+fn lamp(found: Result<&str, UnusableInput>) -> Input {
     Input {
         key: "hil.light.dark".to_owned(),
         expected: "a program that this user may run".to_owned(),
-        found: found.map(str::to_owned).map_err(str::to_owned),
+        found: found.map(PathBuf::from),
         next: "name a program that is there".to_owned(),
     }
 }
@@ -294,7 +295,7 @@ fn an_empty_machine_is_not_checked_and_says_why() {
     bench.inputs.clear();
     bench.survey.lines.clear();
     bench.survey.library = Library::Absent(6);
-    bench.free_b = |_| Err("no such call".to_owned());
+    bench.free_b = |_| Err(io::Error::other("no such call"));
     let findings = bench.findings();
     // Nobody writes into a folder that is not there, and nothing is held.
     for f in &findings {

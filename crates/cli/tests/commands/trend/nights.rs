@@ -96,13 +96,13 @@ fn wobble(at: usize) -> f64 {
 }
 
 /// Nights in `nights/`, with their history beside them.
-pub struct Nights {
+pub(super) struct Nights {
     pub lab: Lab,
     pub history: String,
 }
 
 impl Nights {
-    pub fn new() -> Self {
+    pub(super) fn new() -> Self {
         let lab = Lab::new();
         std::fs::create_dir(lab.path("nights")).unwrap();
         let history = lab.text("nights/history.sqlite");
@@ -110,14 +110,14 @@ impl Nights {
     }
 
     /// So many nights, of which those from `change` on gave a fifth less.
-    pub fn of(count: usize, change: usize) -> Self {
+    pub(super) fn of(count: usize, change: usize) -> Self {
         let all = Self::new();
         all.add(0..count, change, None);
         all
     }
 
     /// Nights of a golden skin and a camera; the skin gives a fifth less from `change` on.
-    pub fn add(&self, which: Range<usize>, change: usize, session: Option<&Path>) {
+    pub(super) fn add(&self, which: Range<usize>, change: usize, session: Option<&Path>) {
         for at in which {
             let share = if at < change { 1.0 } else { 0.8 };
             let events = share * (1e5 + 1e3 * wobble(at));
@@ -135,7 +135,7 @@ impl Nights {
     }
 
     /// Nights of a disk faster than any, which is a millionth of that from `change` on.
-    pub fn add_disk(&self, which: Range<usize>, change: usize) {
+    pub(super) fn add_disk(&self, which: Range<usize>, change: usize) {
         for at in which {
             let share = if at < change { 1.0 } else { 1e-6 };
             let rate = share * 1e15 * (1.0 + 0.01 * wobble(at));
@@ -153,16 +153,16 @@ impl Nights {
         home
     }
 
-    pub fn trend(&self, more: &[&str]) -> Said {
+    pub(super) fn trend(&self, more: &[&str]) -> Said {
         skinrig(&[&["hil", "trend", &self.history], more].concat())
     }
 
-    pub fn accept(&self, more: &[&str]) -> Said {
+    pub(super) fn accept(&self, more: &[&str]) -> Said {
         skinrig(&[&["hil", "accept", "--history", &self.history], more].concat())
     }
 
     /// A night of one check that needs no device, and its folder.
-    pub fn run(&self, more: &[&str]) -> (Said, PathBuf) {
+    pub(super) fn run(&self, more: &[&str]) -> (Said, PathBuf) {
         std::fs::write(self.lab.path("suite.yaml"), SUITE).unwrap();
         let (suite, out) = (self.lab.text("suite.yaml"), self.lab.text("nights"));
         let rig = "hil/rigs/emulated.yaml";

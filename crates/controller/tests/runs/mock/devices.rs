@@ -3,7 +3,7 @@
 use super::*;
 
 /// Counts a call; fails it when it is its turn.
-pub fn call(world: &Shared, role: DeviceRole) -> Result<(), DeviceError> {
+pub(crate) fn call(world: &Shared, role: DeviceRole) -> Result<(), DeviceError> {
     let mut w = lock(world);
     w.calls += 1;
     if w.dead == Some(role) {
@@ -25,7 +25,7 @@ pub fn call(world: &Shared, role: DeviceRole) -> Result<(), DeviceError> {
     }
 }
 
-pub fn identity(model: &str) -> DeviceIdentity {
+pub(crate) fn identity(model: &str) -> DeviceIdentity {
     DeviceIdentity {
         model: model.into(),
         serial: "mock".into(),
@@ -33,7 +33,7 @@ pub fn identity(model: &str) -> DeviceIdentity {
     }
 }
 
-pub struct MockClock(pub Shared);
+pub(crate) struct MockClock(pub Shared);
 
 impl Clock for MockClock {
     fn now(&self) -> HostTime {
@@ -68,7 +68,7 @@ impl Clock for MockClock {
 }
 
 /// What a scripted robot can do.
-pub fn can() -> IndenterCapabilities {
+pub(crate) fn can() -> IndenterCapabilities {
     IndenterCapabilities {
         workspace_min_mm: [-100.0; 3],
         workspace_max_mm: [100.0; 3],
@@ -80,7 +80,7 @@ pub fn can() -> IndenterCapabilities {
     }
 }
 
-pub struct MockIndenter(pub Shared);
+pub(crate) struct MockIndenter(pub Shared);
 
 impl Indenter for MockIndenter {
     fn identity(&self) -> DeviceIdentity {
@@ -150,7 +150,7 @@ impl Indenter for MockIndenter {
     }
 }
 
-pub struct MockCamera(pub Shared, pub CameraId);
+pub(crate) struct MockCamera(pub Shared, pub CameraId);
 
 impl MockCamera {
     fn role(&self) -> DeviceRole {
@@ -259,7 +259,7 @@ impl EventCamera for MockCamera {
     }
 }
 
-pub struct MockTriggerBox(pub Shared);
+pub(crate) struct MockTriggerBox(pub Shared);
 
 impl TriggerBox for MockTriggerBox {
     fn identity(&self) -> DeviceIdentity {

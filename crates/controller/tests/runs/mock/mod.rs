@@ -15,14 +15,14 @@ use skinrig_protocol::area::Surroundings;
 use skinrig_protocol::plan::{OnTrip, Plan, PressStep, RunLimits, Step};
 use skinrig_protocol::{Retakes, Surface, Suspend};
 
-pub use devices::*;
-pub use plan::*;
+pub(crate) use devices::*;
+pub(crate) use plan::*;
 
-pub const MS: i64 = 1_000_000;
+pub(crate) const MS: i64 = 1_000_000;
 
 /// How a numbered call fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Failure {
+pub(crate) enum Failure {
     /// That call alone answers with an error.
     Once,
     /// That call, and every later one to the same device.
@@ -32,10 +32,10 @@ pub enum Failure {
 }
 
 /// What the operator remarks.
-pub const NOTE: &str = "Ann: the lamp flickers";
+pub(crate) const NOTE: &str = "Ann: the lamp flickers";
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Press {
+pub(crate) enum Press {
     Pause,
     PauseNow,
     Stop,
@@ -45,9 +45,20 @@ pub enum Press {
     Note,
 }
 
+impl Press {
+    /// Every request; a remark requests nothing.
+    pub(crate) const REQUESTS: [Self; 5] = [
+        Self::Pause,
+        Self::PauseNow,
+        Self::Stop,
+        Self::Abort,
+        Self::Halt,
+    ];
+}
+
 /// What goes wrong with the feedback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Strike {
+pub(crate) enum Strike {
     /// A force of 9 N.
     Force,
     /// The tip sinks 0.05 mm every millisecond.
@@ -66,7 +77,7 @@ pub enum Strike {
 
 /// What is wrong with the world.
 #[derive(Debug, Clone, Default)]
-pub struct Faults {
+pub(crate) struct Faults {
     pub at_call: Option<(u64, Failure)>,
     /// The tip cannot go below this height from this time on, ms.
     pub floor_mm: Option<(i64, f64, i64)>,
@@ -101,7 +112,7 @@ pub struct Faults {
     pub train_ms: i64,
 }
 
-pub struct World {
+pub(crate) struct World {
     pub t: i64,
     pub calls: u64,
     pub ticks: u64,
@@ -136,14 +147,14 @@ pub struct World {
     samples: Vec<RobotSample>,
 }
 
-pub type Shared = Arc<Mutex<World>>;
+pub(crate) type Shared = Arc<Mutex<World>>;
 
-pub fn lock(world: &Shared) -> MutexGuard<'_, World> {
+pub(crate) fn lock(world: &Shared) -> MutexGuard<'_, World> {
     world.lock().unwrap_or_else(|e| e.into_inner())
 }
 
 /// Where the mock's skin lies: a quarter turn and a shift, so that mixed-up frames are seen.
-pub fn robot_from_skin() -> RigidTransform<Robot, Skin> {
+pub(crate) fn robot_from_skin() -> RigidTransform<Robot, Skin> {
     RigidTransform::new(
         [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
         [5.0, -3.0, 12.0],
@@ -151,7 +162,7 @@ pub fn robot_from_skin() -> RigidTransform<Robot, Skin> {
 }
 
 impl World {
-    pub fn shared(faults: Faults, start: [f64; 3]) -> Shared {
+    pub(crate) fn shared(faults: Faults, start: [f64; 3]) -> Shared {
         Arc::new(Mutex::new(Self {
             t: 0,
             calls: 0,
@@ -302,7 +313,7 @@ impl World {
     }
 }
 
-pub fn rig(world: &Shared) -> Rig {
+pub(crate) fn rig(world: &Shared) -> Rig {
     Rig {
         kind: "simulated".into(),
         name: "mock".into(),
@@ -325,7 +336,7 @@ pub fn rig(world: &Shared) -> Rig {
     }
 }
 
-pub const LIMITS: RunLimits = RunLimits {
+pub(crate) const LIMITS: RunLimits = RunLimits {
     workspace_min_mm: [-40.0, -50.0, -3.0],
     workspace_max_mm: [60.0, 55.0, 40.0],
     clearance_mm: 5.0,

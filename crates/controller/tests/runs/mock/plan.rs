@@ -3,7 +3,7 @@
 use super::*;
 
 /// Three presses at two places.
-pub fn plan() -> Plan {
+pub(crate) fn plan() -> Plan {
     let places = [(10.0, 2.0), (10.0, 2.0), (14.0, -6.0)];
     let presses: Vec<PlannedPress> = places
         .iter()
@@ -58,7 +58,7 @@ pub fn plan() -> Plan {
     }
 }
 
-pub fn header(plan: &Plan) -> RunHeader {
+pub(crate) fn header(plan: &Plan) -> RunHeader {
     RunHeader {
         protocol_text: String::new(),
         protocol_name: "mock".into(),
@@ -84,7 +84,7 @@ pub fn header(plan: &Plan) -> RunHeader {
 
 /// How a sink fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SinkFailure {
+pub(crate) enum SinkFailure {
     Once,
     Forever,
     Panic,
@@ -94,7 +94,7 @@ pub enum SinkFailure {
 
 /// Keeps records; fails at the record with this number (from 0) when asked to.
 #[derive(Default)]
-pub struct Sink {
+pub(crate) struct Sink {
     pub records: Vec<Record>,
     pub fail: Option<(usize, SinkFailure)>,
     pub offered: usize,

@@ -38,7 +38,7 @@ mod linux {
 
     const USAGE: &str = "expected CONFIG.json [-- COMMAND ...]";
 
-    pub fn run() -> Result<ExitCode, Box<dyn Error>> {
+    pub(crate) fn run() -> Result<ExitCode, Box<dyn Error>> {
         let mut arguments = std::env::args_os().skip(1);
         let path = arguments.next().ok_or(USAGE)?;
         let text = std::fs::read_to_string(&path)

@@ -20,7 +20,7 @@ pub(crate) struct Dense {
 }
 
 impl Dense {
-    pub fn new(mev_per_s: f64) -> Self {
+    pub(crate) fn new(mev_per_s: f64) -> Self {
         let mut random = Splitmix(1);
         let words = (0..PATTERN)
             .map(|_| {
@@ -39,7 +39,7 @@ impl Dense {
     }
 
     /// Words of the 16 µs from `slot_us` on, evenly spaced.
-    pub fn slot(&mut self, slot_us: u64, bytes: &mut Vec<u8>) {
+    pub(crate) fn slot(&mut self, slot_us: u64, bytes: &mut Vec<u8>) {
         self.due += self.per_slot;
         let count = self.due as usize;
         self.due -= count as f64;
@@ -57,7 +57,7 @@ impl Dense {
     }
 
     /// The same rate as single events, for when the registers filter some of them.
-    pub fn events(&mut self, from_ns: i64, until_ns: i64, out: &mut Vec<PixelEvent>) {
+    pub(crate) fn events(&mut self, from_ns: i64, until_ns: i64, out: &mut Vec<PixelEvent>) {
         let slots = (until_ns - from_ns) as f64 / (TIME_HIGH_CADENCE_US as f64 * 1e3);
         self.due += self.per_slot * slots;
         let count = self.due as i64;

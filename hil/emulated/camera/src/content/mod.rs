@@ -28,7 +28,7 @@ pub(crate) enum Source {
 }
 
 impl Source {
-    pub fn new(content: &Content) -> Result<Self, BusError> {
+    pub(crate) fn new(content: &Content) -> Result<Self, BusError> {
         let positive = |what: &'static str, value: f64| {
             if value.is_finite() && value > 0.0 {
                 Ok(value)
@@ -54,7 +54,7 @@ impl Source {
     }
 
     /// The time base starts.
-    pub fn start(&mut self, world: &World, from_ns: i64) {
+    pub(crate) fn start(&mut self, world: &World, from_ns: i64) {
         match self {
             Self::Silence | Self::Dense(_) => {}
             Self::Noise { next_ns, .. } => *next_ns = from_ns as f64,
@@ -64,7 +64,7 @@ impl Source {
     }
 
     /// The source that provides encoded words instead of events.
-    pub fn dense(&mut self) -> Option<&mut Dense> {
+    pub(crate) fn dense(&mut self) -> Option<&mut Dense> {
         match self {
             Self::Dense(dense) => Some(dense),
             _ => None,
@@ -72,7 +72,7 @@ impl Source {
     }
 
     /// Appends the events of `from_ns..until_ns` in order of time. Ranges must be consecutive.
-    pub fn events(
+    pub(crate) fn events(
         &mut self,
         world: &World,
         from_ns: i64,

@@ -17,7 +17,7 @@ pub(crate) struct Recorded {
 }
 
 impl Recorded {
-    pub fn open(path: &Path) -> Result<Self, BusError> {
+    pub(crate) fn open(path: &Path) -> Result<Self, BusError> {
         let told = |e: skinrig_formats::FormatsError| BusError::Content(e.to_string());
         let mut reader = RawReader::open(path).map_err(told)?;
         let mut decoder = reader.decoder();
@@ -37,11 +37,11 @@ impl Recorded {
         })
     }
 
-    pub fn start(&mut self, from_ns: i64) {
+    pub(crate) fn start(&mut self, from_ns: i64) {
         (self.next, self.from_ns) = (0, from_ns);
     }
 
-    pub fn events(&mut self, until_ns: i64, out: &mut Vec<PixelEvent>) {
+    pub(crate) fn events(&mut self, until_ns: i64, out: &mut Vec<PixelEvent>) {
         let first_us = self.events.first().map_or(0, |e| e.t_us);
         while let Some(event) = self.events.get(self.next) {
             let t_ns = self.from_ns + (event.t_us - first_us) as i64 * 1_000;

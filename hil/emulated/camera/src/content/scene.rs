@@ -31,7 +31,7 @@ struct Running {
 }
 
 impl Scene {
-    pub fn new(content: &SceneContent) -> Result<Self, BusError> {
+    pub(crate) fn new(content: &SceneContent) -> Result<Self, BusError> {
         if content.level == SimLevel::Kinematic {
             return Err(BusError::Content(
                 "expected a scene of level geometric or optical, found kinematic, which has no pixels"
@@ -54,7 +54,7 @@ impl Scene {
     }
 
     /// Events start with the grid step after `from_ns`. Every start has its own noise.
-    pub fn start(&mut self, world: &World, from_ns: i64) {
+    pub(crate) fn start(&mut self, world: &World, from_ns: i64) {
         let t_ns = (from_ns / GRID_NS + 1) * GRID_NS;
         let first = TipSample {
             t_ns,
@@ -83,7 +83,7 @@ impl Scene {
         })
     }
 
-    pub fn events(&mut self, world: &World, until_ns: i64, out: &mut Vec<PixelEvent>) {
+    pub(crate) fn events(&mut self, world: &World, until_ns: i64, out: &mut Vec<PixelEvent>) {
         let Some(mut running) = self.running.take() else {
             return;
         };

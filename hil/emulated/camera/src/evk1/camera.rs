@@ -18,7 +18,7 @@ use crate::world::{World, now_ns};
 
 /// Faults of a camera.
 #[derive(Debug, Clone, Default)]
-pub struct Faults {
+pub(crate) struct Faults {
     /// Registers that ignore writes.
     pub stuck: BTreeSet<u32>,
     /// Whether control requests stay unanswered.
@@ -35,7 +35,7 @@ pub struct Faults {
 
 /// One run of the time base.
 #[derive(Debug)]
-pub struct Run {
+pub(crate) struct Run {
     /// Number of the run.
     pub number: u64,
     /// Start in true time, ns.
@@ -44,7 +44,7 @@ pub struct Run {
     pub time: TimeBase,
 }
 
-pub struct Model {
+pub(crate) struct Model {
     pub registers: Registers,
     pub roi: Arc<Roi>,
     pub faults: Faults,
@@ -69,7 +69,7 @@ impl Model {
 }
 
 /// An emulated EVK1.
-pub struct Evk1 {
+pub(crate) struct Evk1 {
     pub config: Evk1Config,
     pub descriptors: Descriptors,
     pub queues: Arc<Queues>,
@@ -82,7 +82,7 @@ pub struct Evk1 {
 
 impl Evk1 {
     /// A camera that was just plugged in; `serial` is its number as a register value.
-    pub fn new(
+    pub(crate) fn new(
         config: Evk1Config,
         serial: u32,
         queues: Arc<Queues>,
@@ -126,7 +126,7 @@ impl Evk1 {
         }
     }
 
-    pub fn lock(&self) -> MutexGuard<'_, Model> {
+    pub(crate) fn lock(&self) -> MutexGuard<'_, Model> {
         self.model.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -140,7 +140,7 @@ impl Evk1 {
     }
 
     /// Performs the side effects of a register write.
-    pub fn written(&self, model: &mut Model, address: u32, value: u32) {
+    pub(crate) fn written(&self, model: &mut Model, address: u32, value: u32) {
         match address {
             r::ROI_CTRL if value >> 5 & 1 == 1 => {
                 model.roi = Arc::new(Roi::read(&model.registers));
@@ -215,7 +215,7 @@ impl Evk1 {
     }
 
     /// Event filters according to the registers in this run; `None` when it has ended.
-    pub fn gates(&self, run: u64) -> Option<Gates> {
+    pub(crate) fn gates(&self, run: u64) -> Option<Gates> {
         let model = self.lock();
         model
             .is_running(run)
@@ -223,17 +223,17 @@ impl Evk1 {
     }
 
     /// Garbage words to insert into the next packet.
-    pub fn garbage(&self) -> Vec<u32> {
+    pub(crate) fn garbage(&self) -> Vec<u32> {
         mem::take(&mut self.lock().faults.garbage)
     }
 
     /// Number of pixels with an event every millisecond.
-    pub fn hot_pixels(&self) -> u16 {
+    pub(crate) fn hot_pixels(&self) -> u16 {
         self.lock().faults.hot_pixels
     }
 
     /// Sends a packet of a run and counts it, unless the run has ended. Bytes that do not fit are lost.
-    pub fn send(
+    pub(crate) fn send(
         &self,
         run: u64,
         mut bytes: Vec<u8>,
@@ -268,7 +268,7 @@ impl Evk1 {
     }
 
     /// Handles an unplugged cable.
-    pub fn unplug(&self) {
+    pub(crate) fn unplug(&self) {
         let mut model = self.lock();
         model.unplugged = true;
         if let Some((_, _, Sync::Master)) = model.running.take() {

@@ -10,7 +10,7 @@ pub(crate) struct Oscillator {
 }
 
 impl Oscillator {
-    pub fn new(drift_ppm: f64) -> Self {
+    pub(crate) fn new(drift_ppm: f64) -> Self {
         Self {
             drift_ppb: (drift_ppm * 1e3).round() as i64,
         }
@@ -32,7 +32,7 @@ impl Oscillator {
 
 /// A run of a master's time base.
 #[derive(Debug, Clone, Copy)]
-pub struct Pulses {
+pub(crate) struct Pulses {
     oscillator: Oscillator,
     from_ns: i64,
     /// End of the run.
@@ -43,7 +43,7 @@ pub struct Pulses {
 
 /// The line with a master's 1 MHz pulses to its slaves.
 #[derive(Debug, Default)]
-pub struct SyncLine(Mutex<Option<Pulses>>);
+pub(crate) struct SyncLine(Mutex<Option<Pulses>>);
 
 impl SyncLine {
     fn lock(&self) -> MutexGuard<'_, Option<Pulses>> {
@@ -51,7 +51,7 @@ impl SyncLine {
     }
 
     /// Starts the master's time base at `from_ns`.
-    pub fn begin(&self, oscillator: Oscillator, from_ns: i64) {
+    pub(crate) fn begin(&self, oscillator: Oscillator, from_ns: i64) {
         let mut line = self.lock();
         let run = line.map_or(1, |before| before.run + 1);
         *line = Some(Pulses {
@@ -63,7 +63,7 @@ impl SyncLine {
     }
 
     /// Stops the master's time base.
-    pub fn end(&self, at_ns: i64) {
+    pub(crate) fn end(&self, at_ns: i64) {
         if let Some(pulses) = self.lock().as_mut() {
             pulses.to_ns.get_or_insert(at_ns);
         }
@@ -72,7 +72,7 @@ impl SyncLine {
 
 /// The time of a camera from a start of its time base to the stop.
 #[derive(Debug)]
-pub enum TimeBase {
+pub(crate) enum TimeBase {
     /// Its own clock.
     Own {
         oscillator: Oscillator,
@@ -93,7 +93,7 @@ pub enum TimeBase {
 
 impl TimeBase {
     /// Camera time at true time `t_ns`, µs. Requested times must not decrease.
-    pub fn at(&mut self, t_ns: i64, line: &SyncLine) -> u64 {
+    pub(crate) fn at(&mut self, t_ns: i64, line: &SyncLine) -> u64 {
         match self {
             Self::Own {
                 oscillator,

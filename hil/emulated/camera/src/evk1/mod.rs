@@ -11,7 +11,7 @@ mod registers;
 mod requests;
 mod sensor;
 
-pub use camera::Evk1;
-pub use clock::SyncLine;
-pub use counters::Counters;
-pub use producer::produce;
+pub(crate) use camera::Evk1;
+pub(crate) use clock::SyncLine;
+pub(crate) use counters::Counters;
+pub(crate) use producer::produce;

@@ -29,7 +29,7 @@ pub(crate) struct Pattern {
 
 impl Pattern {
     /// `None` while it is off or generates exposure measurement events, which this sensor does not support.
-    pub fn read(registers: &Registers) -> Option<Self> {
+    pub(crate) fn read(registers: &Registers) -> Option<Self> {
         let bit = |n| registers.bit(r::TEST_PATTERN_CONTROL, n);
         if !bit(0) || bit(8) {
             return None;
@@ -73,7 +73,7 @@ impl Pattern {
 
 /// State of the scan.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Scan {
+pub(super) struct Scan {
     next: u32,
     /// Fraction of the next event.
     due: f64,
@@ -81,7 +81,7 @@ pub struct Scan {
 
 impl Scan {
     /// The events of a packet: `span_us` of the camera's time, from `from_ns` to `until_ns` of true time.
-    pub fn events(
+    pub(super) fn events(
         &mut self,
         pattern: &Pattern,
         span_us: u64,

@@ -26,7 +26,7 @@ const HOT_EVERY_NS: i64 = 1_000_000;
 const LOOP_BACK: u8 = 6;
 
 /// Streams until the camera is unplugged.
-pub fn produce(camera: &Arc<Evk1>, mut source: Source) {
+pub(crate) fn produce(camera: &Arc<Evk1>, mut source: Source) {
     let mut last = 0;
     while let Some(run) = camera.next_run(last) {
         last = run.number;

@@ -7,34 +7,34 @@ use std::collections::BTreeMap;
 
 use crate::config::Evk1Config;
 
-pub const ATIS_CONTROL: u32 = 0x0000;
-pub const CCAM2_CONTROL: u32 = 0x0008;
-pub const OVERFLOW_HITCOUNT: u32 = 0x0018;
-pub const SERIAL_MSB: u32 = 0x0020;
+pub(super) const ATIS_CONTROL: u32 = 0x0000;
+pub(super) const CCAM2_CONTROL: u32 = 0x0008;
+pub(super) const OVERFLOW_HITCOUNT: u32 = 0x0018;
+pub(super) const SERIAL_MSB: u32 = 0x0020;
 pub(crate) const OUT_OF_FOV_X: u32 = 0x0034;
 pub(crate) const OUT_OF_FOV_Y: u32 = 0x0036;
-pub const EXT_SYNC_OUT_MODE: u32 = 0x003c;
-pub const TEMPERATURE: u32 = 0x014c;
+pub(super) const EXT_SYNC_OUT_MODE: u32 = 0x003c;
+pub(super) const TEMPERATURE: u32 = 0x014c;
 pub(crate) const TRIGGER_ENABLE: u32 = 0x01a0;
 pub(crate) const TRIGGER_OUT_ENABLE: u32 = 0x01a4;
 pub(crate) const TRIGGER_OUT_PERIOD: u32 = 0x01a8;
 pub(crate) const TRIGGER_OUT_WIDTH: u32 = 0x01ac;
-pub const ROI_CTRL: u32 = 0x0204;
-pub const CHIP_ID: u32 = 0x0218;
-pub const CLK_OUT_CTRL: u32 = 0x0238;
-pub const NFL_CTRL: u32 = 0x0248;
-pub const NFL_THRESH: u32 = 0x024c;
+pub(super) const ROI_CTRL: u32 = 0x0204;
+pub(super) const CHIP_ID: u32 = 0x0218;
+pub(super) const CLK_OUT_CTRL: u32 = 0x0238;
+pub(super) const NFL_CTRL: u32 = 0x0248;
+pub(super) const NFL_THRESH: u32 = 0x024c;
 pub(crate) const BIAS_DIFF_OFF: u32 = 0x034c;
 pub(crate) const TD_ROI_X: u32 = 0x0400;
 pub(crate) const TD_ROI_Y: u32 = 0x0500;
-pub const TEST_PATTERN_CONTROL: u32 = 0x0740;
-pub const TEST_PATTERN_N_PERIOD: u32 = 0x0744;
-pub const TEST_PATTERN_P_PERIOD: u32 = 0x0748;
-pub const IF_CONTROL: u32 = 0x074c;
-pub const SYSTEM_ID: u32 = 0x0800;
-pub const FPGA_VERSION: u32 = 0x0804;
-pub const PKT_END_ENABLE: u32 = 0x1400;
-pub const PKT_END_INTERVAL_US: u32 = 0x1404;
+pub(super) const TEST_PATTERN_CONTROL: u32 = 0x0740;
+pub(super) const TEST_PATTERN_N_PERIOD: u32 = 0x0744;
+pub(super) const TEST_PATTERN_P_PERIOD: u32 = 0x0748;
+pub(super) const IF_CONTROL: u32 = 0x074c;
+pub(super) const SYSTEM_ID: u32 = 0x0800;
+pub(super) const FPGA_VERSION: u32 = 0x0804;
+pub(super) const PKT_END_ENABLE: u32 = 0x1400;
+pub(super) const PKT_END_INTERVAL_US: u32 = 0x1404;
 
 /// Read-only registers: writes are ignored.
 const READ_ONLY: [u32; 14] = [
@@ -112,10 +112,10 @@ const EXISTING: [(u32, u32, u32); 21] = [
 
 /// The registers of one camera.
 #[derive(Debug, Clone)]
-pub struct Registers(BTreeMap<u32, u32>);
+pub(crate) struct Registers(BTreeMap<u32, u32>);
 
 impl Registers {
-    pub fn power_up(config: &Evk1Config, serial: u32) -> Self {
+    pub(crate) fn power_up(config: &Evk1Config, serial: u32) -> Self {
         let mut values: BTreeMap<u32, u32> = EXISTING
             .iter()
             .flat_map(|&(first, last, step)| (first..=last).step_by(step as usize))
@@ -135,21 +135,21 @@ impl Registers {
     }
 
     /// `None` if the register does not exist.
-    pub fn read(&self, address: u32) -> Option<u32> {
+    pub(crate) fn read(&self, address: u32) -> Option<u32> {
         self.0.get(&address).copied()
     }
 
     /// Value of a register that is known to exist.
-    pub fn get(&self, address: u32) -> u32 {
+    pub(crate) fn get(&self, address: u32) -> u32 {
         self.read(address).unwrap_or(0)
     }
 
-    pub fn bit(&self, address: u32, bit: u32) -> bool {
+    pub(crate) fn bit(&self, address: u32, bit: u32) -> bool {
         self.get(address) >> bit & 1 == 1
     }
 
     /// Host write; `false` if the register does not exist.
-    pub fn write(&mut self, address: u32, value: u32) -> bool {
+    pub(crate) fn write(&mut self, address: u32, value: u32) -> bool {
         let Some(slot) = self.0.get_mut(&address) else {
             return false;
         };
@@ -161,7 +161,7 @@ impl Registers {
     }
 
     /// Write by the device itself.
-    pub fn set(&mut self, address: u32, value: u32) {
+    pub(crate) fn set(&mut self, address: u32, value: u32) {
         self.0.insert(address, value);
     }
 }

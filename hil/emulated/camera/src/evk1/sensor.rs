@@ -8,20 +8,20 @@ use super::registers::Registers;
 
 /// Active pixels: a pixel is active if both its column and its row are.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Roi {
+pub(crate) struct Roi {
     columns: [u32; 20],
     rows: [u32; 15],
 }
 
 impl Roi {
-    pub fn read(registers: &Registers) -> Self {
+    pub(crate) fn read(registers: &Registers) -> Self {
         Self {
             columns: std::array::from_fn(|n| registers.get(r::TD_ROI_X + 4 * n as u32)),
             rows: std::array::from_fn(|n| registers.get(r::TD_ROI_Y + 4 * n as u32)),
         }
     }
 
-    pub fn has(&self, x: u16, y: u16) -> bool {
+    pub(crate) fn has(&self, x: u16, y: u16) -> bool {
         let bit = |words: &[u32], n: u16| {
             words
                 .get(usize::from(n / 32))
@@ -38,14 +38,14 @@ impl Roi {
 
 /// Source of a camera's time (section 2.14).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sync {
+pub(super) enum Sync {
     Standalone,
     Master,
     Slave,
 }
 
 impl Sync {
-    pub fn read(registers: &Registers) -> Self {
+    pub(super) fn read(registers: &Registers) -> Self {
         match (
             registers.bit(r::ATIS_CONTROL, 12),
             registers.bit(r::ATIS_CONTROL, 14),
@@ -80,12 +80,12 @@ pub(crate) struct Gates {
 }
 
 /// Whether the time base runs and bytes flow to the host.
-pub fn runs(registers: &Registers) -> bool {
+pub(super) fn runs(registers: &Registers) -> bool {
     registers.bit(r::CCAM2_CONTROL, 8) && registers.bit(r::CCAM2_CONTROL, 9)
 }
 
 impl Gates {
-    pub fn read(registers: &Registers, roi: &Arc<Roi>) -> Self {
+    pub(crate) fn read(registers: &Registers, roi: &Arc<Roi>) -> Self {
         let atis = |bit| registers.bit(r::ATIS_CONTROL, bit);
         let powered = (0..3).all(atis) && !atis(3);
         let clocked = registers.bit(r::IF_CONTROL, 1) && registers.bit(r::CLK_OUT_CTRL, 0);

@@ -28,7 +28,7 @@ impl Descriptors {
         self.speed_mbit >= 5000
     }
 
-    pub fn device(&self) -> [u8; 18] {
+    pub(crate) fn device(&self) -> [u8; 18] {
         let (release, packet_0) = if self.is_super_speed() {
             (0x0300u16, 9)
         } else {
@@ -59,7 +59,7 @@ impl Descriptors {
         ]
     }
 
-    pub fn configuration(&self) -> Vec<u8> {
+    pub(crate) fn configuration(&self) -> Vec<u8> {
         let endpoints = self.endpoints.len() as u8;
         let mut bytes = vec![9, CONFIGURATION, 0, 0, 1, 1, 0, 0x80, 50];
         bytes.extend([9, INTERFACE, 0, 0, endpoints]);
@@ -78,7 +78,7 @@ impl Descriptors {
     }
 
     /// Reply to GET_DESCRIPTOR; `None` if the device does not have the descriptor.
-    pub fn get(&self, kind: u8, index: u8) -> Option<Vec<u8>> {
+    pub(crate) fn get(&self, kind: u8, index: u8) -> Option<Vec<u8>> {
         match (kind, index) {
             (DEVICE, 0) => Some(self.device().to_vec()),
             (CONFIGURATION, 0) => Some(self.configuration()),

@@ -5,7 +5,7 @@ use super::usbfs::Setup;
 
 /// Reply to a control request.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Reply {
+pub(crate) enum Reply {
     /// Success; with data for a request from device to host.
     Done(Vec<u8>),
     /// Rejected (protocol stall).

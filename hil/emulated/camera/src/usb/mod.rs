@@ -1,10 +1,10 @@
 //! The USB side: a folder that looks like a machine's devices, and the system calls on them.
 
-pub mod descriptors;
-pub mod function;
-pub mod queues;
-pub mod readiness;
-pub mod serve;
-pub mod testbed;
-pub mod usbfs;
-pub mod wire;
+pub(crate) mod descriptors;
+pub(crate) mod function;
+pub(crate) mod queues;
+pub(crate) mod readiness;
+pub(crate) mod serve;
+pub(crate) mod testbed;
+pub(crate) mod usbfs;
+pub(crate) mod wire;

@@ -23,7 +23,7 @@ pub(crate) struct Submitted {
 
 /// A finished transfer with its data and target address in the process.
 #[derive(Debug)]
-pub struct Finished {
+pub(crate) struct Finished {
     pub address: u64,
     pub urb: Urb,
     pub to: u64,
@@ -76,7 +76,7 @@ struct State {
 
 /// Queues of one device. `room` is signalled when a transfer is queued.
 #[derive(Debug)]
-pub struct Queues {
+pub(crate) struct Queues {
     state: Mutex<State>,
     room: Condvar,
     capacity: usize,
@@ -87,7 +87,7 @@ const SOMEBODY: u64 = 0;
 
 impl Queues {
     /// The queues of a device that can hold `capacity` bytes.
-    pub fn new(capacity: usize, ready: Readiness) -> Self {
+    pub(crate) fn new(capacity: usize, ready: Readiness) -> Self {
         let state = State {
             files: BTreeMap::new(),
             next_file: SOMEBODY + 1,
@@ -122,7 +122,7 @@ impl Queues {
 
     // ---- from the process under test
 
-    pub fn open(&self) -> u64 {
+    pub(crate) fn open(&self) -> u64 {
         let mut state = self.lock();
         let file = state.next_file;
         state.next_file += 1;
@@ -130,7 +130,7 @@ impl Queues {
         file
     }
 
-    pub fn close(&self, file: u64) {
+    pub(crate) fn close(&self, file: u64) {
         let mut state = self.lock();
         state.files.remove(&file);
         if state.claimed_by == Some(file) {
@@ -139,7 +139,7 @@ impl Queues {
         state.tell();
     }
 
-    pub fn claim(&self, file: u64) -> Result<(), Errno> {
+    pub(crate) fn claim(&self, file: u64) -> Result<(), Errno> {
         let mut state = self.lock();
         state.plugged()?;
         if state.claimed_by.is_some_and(|by| by != file) {
@@ -149,7 +149,7 @@ impl Queues {
         Ok(())
     }
 
-    pub fn release(&self, file: u64) -> Result<(), Errno> {
+    pub(crate) fn release(&self, file: u64) -> Result<(), Errno> {
         let mut state = self.lock();
         state.plugged()?;
         if state.claimed_by != Some(file) {
@@ -159,12 +159,12 @@ impl Queues {
         Ok(())
     }
 
-    pub fn plugged(&self) -> Result<(), Errno> {
+    pub(crate) fn plugged(&self) -> Result<(), Errno> {
         self.lock().plugged()
     }
 
     /// A transfer from the data endpoint.
-    pub fn submit(&self, file: u64, transfer: Submitted) -> Result<(), Errno> {
+    pub(crate) fn submit(&self, file: u64, transfer: Submitted) -> Result<(), Errno> {
         let mut state = self.lock();
         state.plugged()?;
         // The kernel claims the interface implicitly.
@@ -185,7 +185,7 @@ impl Queues {
     }
 
     /// A control request that has been answered already.
-    pub fn answered(&self, file: u64, finished: Finished) -> Result<(), Errno> {
+    pub(crate) fn answered(&self, file: u64, finished: Finished) -> Result<(), Errno> {
         let mut state = self.lock();
         state.plugged()?;
         if let Some(open) = state.files.get_mut(&file) {
@@ -196,7 +196,7 @@ impl Queues {
     }
 
     /// A control request that the device does not answer.
-    pub fn unanswered(&self, file: u64, transfer: Submitted) -> Result<(), Errno> {
+    pub(crate) fn unanswered(&self, file: u64, transfer: Submitted) -> Result<(), Errno> {
         let mut state = self.lock();
         state.plugged()?;
         if let Some(open) = state.files.get_mut(&file) {
@@ -246,7 +246,7 @@ impl Queues {
     }
 
     /// Counts the data of a reaped transfer.
-    pub fn count(&self, bytes: &[u8]) {
+    pub(crate) fn count(&self, bytes: &[u8]) {
         let before = self.lock().handed;
         // Only the thread that serves the file counts, so this is not interrupted.
         let mut crc = crc32fast::Hasher::new_with_initial_len(before.crc32, before.bytes);
@@ -259,12 +259,12 @@ impl Queues {
     }
 
     /// Clears a stall of the data endpoint.
-    pub fn clear_halt(&self) {
+    pub(crate) fn clear_halt(&self) {
         self.lock().halted = false;
     }
 
     /// Resets the port: unfetched bytes are discarded. Returns false if the reset fails.
-    pub fn reset(&self) -> bool {
+    pub(crate) fn reset(&self) -> bool {
         let mut state = self.lock();
         if state.resets_fail {
             return false;
@@ -277,7 +277,7 @@ impl Queues {
     // ---- from the device
 
     /// Adds bytes to the FIFO. `end`: the device ends a packet, which also ends a transfer.
-    pub fn push(&self, bytes: Vec<u8>, end: bool) {
+    pub(crate) fn push(&self, bytes: Vec<u8>, end: bool) {
         let mut state = self.lock();
         if state.unplugged {
             return;
@@ -291,7 +291,7 @@ impl Queues {
     }
 
     /// Bytes that fit into queued transfers and the FIFO.
-    pub fn free(&self) -> usize {
+    pub(crate) fn free(&self) -> usize {
         let state = self.lock();
         let waiting: usize = state
             .files
@@ -316,7 +316,7 @@ impl Queues {
     // ---- from whoever makes faults
 
     /// Unplugs the cable: all transfers end, and new ones fail.
-    pub fn unplug(&self) {
+    pub(crate) fn unplug(&self) {
         let mut state = self.lock();
         state.unplugged = true;
         state.empty();
@@ -325,7 +325,7 @@ impl Queues {
     }
 
     /// Stalls the data endpoint until the host clears it.
-    pub fn stall(&self) {
+    pub(crate) fn stall(&self) {
         let mut state = self.lock();
         state.halted = true;
         state.abort(Errno::PIPE);
@@ -347,7 +347,7 @@ impl Queues {
     }
 
     /// Data delivered to the host so far.
-    pub fn handed(&self) -> Handed {
+    pub(crate) fn handed(&self) -> Handed {
         self.lock().handed
     }
 }

@@ -19,7 +19,7 @@ pub(crate) struct Readiness {
 
 impl Readiness {
     /// Creates the file in the state without finished transfers.
-    pub fn create(path: &Path) -> std::io::Result<Self> {
+    pub(crate) fn create(path: &Path) -> std::io::Result<Self> {
         mkfifoat(CWD, path, Mode::from_raw_mode(0o666))?;
         let fifo = OpenOptions::new().read(true).write(true).open(path)?;
         // One page is the smallest; a byte that has not been read occupies all of it.
@@ -30,7 +30,7 @@ impl Readiness {
     }
 
     /// Sets whether there are finished transfers to fetch.
-    pub fn set(&mut self, ready: bool) {
+    pub(crate) fn set(&mut self, ready: bool) {
         // Never blocks: a byte is read only when there is one, and written only when there is none.
         let moved = match (ready, self.full) {
             (true, true) => self.fifo.read_exact(&mut [0]),

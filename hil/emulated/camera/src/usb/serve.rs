@@ -19,13 +19,13 @@ const STANDARD_IN: u8 = 0x80;
 
 /// One device on the bus.
 #[derive(Clone)]
-pub struct Node {
+pub(crate) struct Node {
     pub function: Arc<dyn Function>,
     pub queues: Arc<Queues>,
 }
 
 /// Serves all processes that open the device, until the listener is shut down.
-pub fn listen(node: Node, listener: UnixListener) -> io::Result<()> {
+pub(crate) fn listen(node: Node, listener: UnixListener) -> io::Result<()> {
     thread::Builder::new()
         .name("usb node".into())
         .spawn(move || {

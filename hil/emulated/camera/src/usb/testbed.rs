@@ -18,7 +18,7 @@ pub(crate) struct TestBed(tempfile::TempDir);
 
 /// Address of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Address {
+pub(crate) struct Address {
     /// Port of the only hub, from 1; depends on where the device is plugged in.
     pub port: u8,
     /// Device number on the bus, from 2; new after every plugging.
@@ -33,7 +33,7 @@ impl Address {
 
 impl TestBed {
     /// A folder without devices.
-    pub fn create() -> io::Result<Self> {
+    pub(crate) fn create() -> io::Result<Self> {
         let folder = tempfile::Builder::new().prefix("usb").tempdir()?;
         let root = folder.path();
         if root.join("ioctl/dev/bus/usb/001/002").as_os_str().len() > SOCKET_PATH {
@@ -58,28 +58,28 @@ impl TestBed {
         Ok(Self(folder))
     }
 
-    pub fn root(&self) -> &Path {
+    pub(crate) fn root(&self) -> &Path {
         self.0.path()
     }
 
     /// The device file.
-    pub fn node(&self, at: Address) -> PathBuf {
+    pub(crate) fn node(&self, at: Address) -> PathBuf {
         self.root().join(at.node())
     }
 
     /// The socket for its system calls.
-    pub fn socket(&self, at: Address) -> PathBuf {
+    pub(crate) fn socket(&self, at: Address) -> PathBuf {
         self.root().join("ioctl").join(at.node())
     }
 
     /// Makes opening the device fail with this error.
-    pub fn refuse(&self, at: Address, errno: rustix::io::Errno) -> io::Result<()> {
+    pub(crate) fn refuse(&self, at: Address, errno: rustix::io::Errno) -> io::Result<()> {
         let file = self.root().join("refuse").join(at.node());
         fs::write(file, errno.raw_os_error().to_string())
     }
 
     /// Lists a device.
-    pub fn add(&self, at: Address, descriptors: &Descriptors) -> io::Result<()> {
+    pub(crate) fn add(&self, at: Address, descriptors: &Descriptors) -> io::Result<()> {
         let sys = self.root().join("sys");
         let Address { port, number } = at;
         let place = format!("{HUB}/1-{port}");
@@ -137,7 +137,7 @@ impl TestBed {
     }
 
     /// Takes a device off the list; its file stays for those who have it open.
-    pub fn remove(&self, at: Address) -> io::Result<()> {
+    pub(crate) fn remove(&self, at: Address) -> io::Result<()> {
         let sys = self.root().join("sys");
         fs::remove_file(sys.join(format!("bus/usb/devices/1-{}", at.port)))?;
         fs::remove_file(sys.join(format!("dev/char/189:{}", at.number - 1)))?;

@@ -50,11 +50,11 @@ pub(crate) enum Transfer {
 }
 
 impl Urb {
-    pub const fn new(bytes: [u8; URB_BYTES]) -> Self {
+    pub(crate) const fn new(bytes: [u8; URB_BYTES]) -> Self {
         Self(bytes)
     }
 
-    pub const fn transfer(&self) -> Transfer {
+    pub(crate) const fn transfer(&self) -> Transfer {
         match (self.0[0], self.0[1]) {
             (CONTROL, _) => Transfer::Control,
             (BULK, endpoint) if endpoint & 0x80 != 0 => Transfer::BulkIn(endpoint),
@@ -64,23 +64,23 @@ impl Urb {
     }
 
     /// Address of the data in the submitting process.
-    pub fn buffer(&self) -> u64 {
+    pub(crate) fn buffer(&self) -> u64 {
         u64::from_ne_bytes(self.field(16))
     }
 
     /// Bytes asked for; none when the caller's number is negative.
-    pub fn length(&self) -> usize {
+    pub(crate) fn length(&self) -> usize {
         usize::try_from(i32::from_ne_bytes(self.field(24))).unwrap_or(0)
     }
 
     /// Writes the outcome: 0 or a negative error number, and the bytes moved.
-    pub fn finish(&mut self, status: i32, moved: usize) {
+    pub(crate) fn finish(&mut self, status: i32, moved: usize) {
         self.0[4..8].copy_from_slice(&status.to_ne_bytes());
         let moved = i32::try_from(moved).unwrap_or(i32::MAX);
         self.0[28..32].copy_from_slice(&moved.to_ne_bytes());
     }
 
-    pub const fn as_bytes(&self) -> &[u8] {
+    pub(crate) const fn as_bytes(&self) -> &[u8] {
         &self.0
     }
 
@@ -93,7 +93,7 @@ impl Urb {
 
 /// The eight bytes that open a control transfer (USB 2.0 section 9.3).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Setup {
+pub(crate) struct Setup {
     pub request_type: u8,
     pub request: u8,
     pub value: u16,
@@ -102,7 +102,7 @@ pub struct Setup {
 }
 
 impl Setup {
-    pub const fn new(b: [u8; 8]) -> Self {
+    pub(crate) const fn new(b: [u8; 8]) -> Self {
         Self {
             request_type: b[0],
             request: b[1],
@@ -113,7 +113,7 @@ impl Setup {
     }
 
     /// Device to host.
-    pub const fn is_in(&self) -> bool {
+    pub(crate) const fn is_in(&self) -> bool {
         self.request_type & 0x80 != 0
     }
 

@@ -13,7 +13,7 @@ const WRITE_MEM: u64 = 6;
 const LONGEST: usize = 64 << 20;
 
 /// One open device.
-pub struct Wire {
+pub(crate) struct Wire {
     stream: UnixStream,
     /// Messages that go out with the next write.
     held: Vec<u8>,
@@ -21,7 +21,7 @@ pub struct Wire {
 
 /// An `ioctl` that waits for its result.
 #[derive(Debug, Clone, Copy)]
-pub struct Asked {
+pub(crate) struct Asked {
     pub request: u64,
     pub argument: u64,
 }
@@ -35,7 +35,7 @@ fn message(words: [u64; 3]) -> [u8; 24] {
 }
 
 impl Wire {
-    pub fn new(stream: UnixStream) -> Self {
+    pub(crate) fn new(stream: UnixStream) -> Self {
         Self {
             stream,
             held: Vec::with_capacity(512),
@@ -43,7 +43,7 @@ impl Wire {
     }
 
     /// The next `ioctl`; `None` when the process closed the device. Other calls on it fail.
-    pub fn next(&mut self) -> io::Result<Option<Asked>> {
+    pub(crate) fn next(&mut self) -> io::Result<Option<Asked>> {
         loop {
             let mut bytes = [0; 24];
             match self.stream.read_exact(&mut bytes) {
@@ -93,7 +93,7 @@ impl Wire {
     }
 
     /// Ends the `ioctl`.
-    pub fn done(&mut self, result: Result<(), rustix::io::Errno>) -> io::Result<()> {
+    pub(crate) fn done(&mut self, result: Result<(), rustix::io::Errno>) -> io::Result<()> {
         let words = match result {
             Ok(()) => [DONE, 0, 0],
             Err(errno) => [DONE, u64::MAX, errno.raw_os_error() as u64],

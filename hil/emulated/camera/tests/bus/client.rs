@@ -6,26 +6,26 @@ use rusb::{Context, Device, DeviceHandle, UsbContext};
 use skinrig_formats::Decoder;
 use skinrig_model::{CdEvent, StreamFormat, TriggerEdge};
 
-pub const SECOND: Duration = Duration::from_secs(1);
+pub(crate) const SECOND: Duration = Duration::from_secs(1);
 const CCAM2_CONTROL: u32 = 0x0008;
 const ROI_CTRL: u32 = 0x0204;
 
 /// Every device on the bus, in the order of the ports.
-pub fn devices() -> Vec<Device<Context>> {
+pub(crate) fn devices() -> Vec<Device<Context>> {
     let context = Context::new().expect("a bus");
     let mut all: Vec<_> = context.devices().expect("devices").iter().collect();
     all.sort_by_key(Device::address);
     all
 }
 
-pub struct Camera {
+pub(crate) struct Camera {
     pub handle: DeviceHandle<Context>,
     pub received: Vec<u8>,
 }
 
 impl Camera {
     /// The n-th device of the bus, claimed.
-    pub fn open(n: usize) -> Self {
+    pub(crate) fn open(n: usize) -> Self {
         let handle = devices()[n].open().expect("open");
         handle.claim_interface(0).expect("claim");
         Self {
@@ -34,7 +34,7 @@ impl Camera {
         }
     }
 
-    pub fn read(&self, address: u32) -> rusb::Result<u32> {
+    pub(crate) fn read(&self, address: u32) -> rusb::Result<u32> {
         let mut b = [0; 8];
         let (value, index) = (address as u16, (address >> 16) as u16);
         let n = self
@@ -44,7 +44,7 @@ impl Camera {
         Ok(u32::from_be_bytes([b[4], b[5], b[6], b[7]]))
     }
 
-    pub fn write(&self, address: u32, value: u32) -> rusb::Result<()> {
+    pub(crate) fn write(&self, address: u32, value: u32) -> rusb::Result<()> {
         let (low, high) = (address as u16, (address >> 16) as u16);
         let n = self
             .handle
@@ -60,7 +60,7 @@ impl Camera {
     }
 
     /// Powers the sensor and enables all pixels; `sync` sets bits 12 and 14 of ATIS_CONTROL.
-    pub fn configure(&self, sync: u32) {
+    pub(crate) fn configure(&self, sync: u32) {
         self.write(0x0000, 0x000c_0117 | sync).expect("power");
         self.write(0x0238, 1).expect("clock");
         self.write(CCAM2_CONTROL, 0x0920).expect("host interface");
@@ -73,16 +73,16 @@ impl Camera {
         self.write(ROI_CTRL, 0x2b).expect("pixels");
     }
 
-    pub fn start(&self) {
+    pub(crate) fn start(&self) {
         self.set(CCAM2_CONTROL, 1 << 9, true);
     }
 
-    pub fn stop(&self) {
+    pub(crate) fn stop(&self) {
         self.set(CCAM2_CONTROL, 1 << 9, false);
     }
 
     /// Runs one transfer and returns its data.
-    pub fn transfer(&mut self) -> rusb::Result<usize> {
+    pub(crate) fn transfer(&mut self) -> rusb::Result<usize> {
         let mut buffer = vec![0; 128 << 10];
         let n = self.handle.read_bulk(0x81, &mut buffer, SECOND)?;
         self.received.extend_from_slice(&buffer[..n]);
@@ -90,7 +90,7 @@ impl Camera {
     }
 
     /// Receives until `enough` is true for all data so far.
-    pub fn until(&mut self, mut enough: impl FnMut(&Seen) -> bool) -> Seen {
+    pub(crate) fn until(&mut self, mut enough: impl FnMut(&Seen) -> bool) -> Seen {
         for _ in 0..20_000 {
             self.transfer().expect("bytes");
             let seen = Seen::of(&self.received);
@@ -104,14 +104,14 @@ impl Camera {
 
 /// Content of a stream.
 #[derive(Debug)]
-pub struct Seen {
+pub(crate) struct Seen {
     pub events: Vec<CdEvent>,
     pub triggers: Vec<TriggerEdge>,
     pub last_us: u64,
 }
 
 impl Seen {
-    pub fn of(bytes: &[u8]) -> Self {
+    pub(crate) fn of(bytes: &[u8]) -> Self {
         let mut decoder = Decoder::new(StreamFormat::Evt2);
         let (mut events, mut triggers) = (Vec::new(), Vec::new());
         decoder.push_cd(bytes, &mut events, &mut triggers);

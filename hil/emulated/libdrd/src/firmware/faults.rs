@@ -106,7 +106,7 @@ impl Faults {
     }
 
     /// Whether a setting ignores writes.
-    pub fn ignores(&self, setting: Setting) -> bool {
+    pub(crate) fn ignores(&self, setting: Setting) -> bool {
         self.is(|f| matches!(f, Fault::Ignore(s) if *s == setting))
     }
 

@@ -18,7 +18,7 @@ const LIMITS: Limits = Limits {
 
 /// A calibration or sweep in progress.
 #[derive(Debug)]
-pub struct Initialisation {
+pub(crate) struct Initialisation {
     /// Remaining positions, last first.
     way: Vec<Vector>,
     /// Waiting time at the end, s.

@@ -255,7 +255,7 @@ impl World {
     }
 
     /// Handles a disconnected library or a dead program: the regulation ends, and the motors keep the last commanded force.
-    pub fn let_go(&mut self) {
+    pub(crate) fn let_go(&mut self) {
         self.holder = None;
         self.regulation = None;
         self.initialisation = None;

@@ -4,10 +4,10 @@ use skinrig_model::{HostDuration, Point2, PreflightCheck, PressRole, Record, Rep
 use skinrig_protocol::SurfaceCheck;
 use skinrig_protocol::plan::Step;
 
+use super::Executor;
+use super::search::Probe;
 use crate::error::{ControllerError, Halt};
-use crate::executor::Executor;
 use crate::press_fault::TouchFault;
-use crate::touch::Probe;
 
 /// Next step if the surface is not where the frame puts it.
 const NEXT: &str = "check the mount and the skin, touch off again (`skinrig jog --rig FILE`: `touch`, `point NAME`), and enter \
@@ -15,7 +15,7 @@ const NEXT: &str = "check the mount and the skin, touch off again (`skinrig jog 
 
 impl Executor<'_> {
     /// Touches the surface at every point of the protocol's check, if it has one. The tip ends at clearance height.
-    pub(crate) fn check_surface(&mut self, when: &str) -> Result<(), Halt> {
+    pub(super) fn check_surface(&mut self, when: &str) -> Result<(), Halt> {
         let Some(check) = &self.plan.surface_check else {
             return Ok(());
         };
@@ -37,7 +37,7 @@ impl Executor<'_> {
                 NEXT,
             ));
         }
-        self.touch = None;
+        self.trackers.end_touch();
         self.journal.emit(Record::Preflight(rows))?;
         if failed.is_empty() {
             return Ok(());
@@ -46,7 +46,7 @@ impl Executor<'_> {
     }
 
     /// After a repetition, if the protocol requires it: checks the surface, then returns to the previous location.
-    pub(crate) fn check_surface_after(&mut self, step: usize) -> Result<(), Halt> {
+    pub(super) fn check_surface_after(&mut self, step: usize) -> Result<(), Halt> {
         let wanted = self
             .plan
             .surface_check
@@ -90,12 +90,12 @@ impl Executor<'_> {
     ) -> Result<Result<f64, TouchFault>, Halt> {
         loop {
             let paused = self.safe_point()?;
-            self.begin += paused;
+            self.series.delay(paused);
             self.travel_above("travel to a check point", at)?;
-            self.breakable = true;
+            self.machine.set_interruptible(true);
             let searched = self.search_point(check, at);
-            self.breakable = false;
-            self.settling = None;
+            self.machine.set_interruptible(false);
+            self.trackers.stop_settling();
             match searched {
                 Err(Halt::PausedNow) => self.travel_above("rise from a check point", at)?,
                 Err(halt) => return Err(halt),

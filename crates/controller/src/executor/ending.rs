@@ -2,10 +2,10 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use skinrig_model::{CameraId, InterruptionKind, Record, RunEnd};
+use skinrig_model::{CameraId, InterruptionKind, Record, RunEnd, StopReason};
 
+use super::Executor;
 use crate::error::{ControllerError, Halt, NotAtRest};
-use crate::executor::Executor;
 use crate::press_fault::PressFault;
 use crate::run::RunReport;
 use crate::states::{Event, State};
@@ -13,13 +13,9 @@ use crate::states::{Event, State};
 /// How often to command retract, disarm and stop to a device that does not answer.
 const MAX_TRIES: u32 = 3;
 
-/// Reason of a run whose motors the operator switched off.
-const HALTED: &str =
-    "operator: halt; the tip stayed where it was: check it before you power the robot again";
-
 impl Executor<'_> {
     /// Runs a part of the experiment; a panic becomes a fault.
-    pub(crate) fn catch_panic(
+    pub(super) fn catch_panic(
         &mut self,
         part: impl FnOnce(&mut Self) -> Result<(), Halt>,
     ) -> Result<(), Halt> {
@@ -46,28 +42,24 @@ impl Executor<'_> {
         }
     }
 
-    /// Brings the rig to rest and closes the records. A second call does nothing.
-    pub(crate) fn conclude(&mut self, result: Result<(), Halt>) {
-        if self.machine.state() == State::Finished {
-            return;
-        }
+    /// Brings the rig to rest and closes the records.
+    pub(super) fn conclude(&mut self, result: Result<(), Halt>) -> RunReport {
         let at = catch_unwind(AssertUnwindSafe(|| self.now())).ok();
-        self.ending = true;
         self.journal.begin_ending();
         let mut causes = Vec::new();
         let (mut end, interruption) = match result {
             Ok(()) => (RunEnd::Completed, None),
             // The interruption was recorded when the operator requested it.
-            Err(Halt::Stopped) => (RunEnd::Stopped("operator: stop".to_owned()), None),
+            Err(Halt::Stopped) => (RunEnd::Stopped(StopReason::Stop), None),
             Err(Halt::Aborted) => {
                 self.machine.fire(Event::Abort);
                 (
-                    RunEnd::Stopped("operator: abort".to_owned()),
+                    RunEnd::Stopped(StopReason::Abort),
                     Some(InterruptionKind::Abort),
                 )
             }
             // Handled below, where the motors are switched off.
-            Err(Halt::Halted) => (RunEnd::Stopped("operator: halt".to_owned()), None),
+            Err(Halt::Halted) => (RunEnd::Stopped(StopReason::Halt), None),
             Err(Halt::PausedNow) => {
                 let lost = "no motion handled a pause";
                 self.machine.fire(Event::Fault);
@@ -85,56 +77,48 @@ impl Executor<'_> {
         };
 
         let (retracted, disarmed) = self.make_safe();
-        let first_reason = match &end {
-            RunEnd::Completed => String::new(),
-            RunEnd::Stopped(r) | RunEnd::Faulted(r) => r.clone(),
-        };
-        if self.halted_at.is_some() {
+        let first_reason = end.reason().unwrap_or_default().to_owned();
+        if self.machine.halted_at().is_some() {
             end = match end {
-                RunEnd::Faulted(r) => RunEnd::Faulted(format!("{r}; {HALTED}")),
-                _ => RunEnd::Stopped(HALTED.to_owned()),
+                RunEnd::Faulted(r) => RunEnd::Faulted(format!("{r}; {}", StopReason::Halt)),
+                _ => RunEnd::Stopped(StopReason::Halt),
             };
         }
-        let warning = match (retracted || self.halted_at.is_some(), disarmed) {
+        let warning = match (retracted || self.machine.halted_at().is_some(), disarmed) {
             (true, true) => None,
             (false, true) => Some(NotAtRest::NotClear),
             (_, false) => Some(NotAtRest::NotDisarmed),
         };
         if let Some(warning) = warning {
             causes.push(warning.into());
-            end = RunEnd::Faulted(match end {
-                RunEnd::Completed => warning.to_string(),
-                RunEnd::Stopped(r) | RunEnd::Faulted(r) => format!("{r}; {warning}"),
+            end = RunEnd::Faulted(match end.reason() {
+                None => warning.to_string(),
+                Some(reason) => format!("{reason}; {warning}"),
             });
         }
 
-        let reason = match &end {
-            RunEnd::Completed => String::new(),
-            RunEnd::Stopped(r) | RunEnd::Faulted(r) => r.clone(),
-        };
+        let reason = end.reason().unwrap_or_default().to_owned();
         let t = at.unwrap_or_else(|| self.indenter.position().map(|p| p.t).unwrap_or_default());
         let ended = catch_unwind(AssertUnwindSafe(|| self.now())).unwrap_or(t);
         self.attempt("outcome", |executor| {
-            executor.emit_poses()?;
-            if executor.open.is_some() {
+            executor.journal.emit_poses()?;
+            if executor.trackers.press().is_some() {
                 executor.close_press(Some(PressFault::RunEnded(reason.clone())))?;
             }
             executor.journal.miss_the_rest(&reason)
         });
         self.attempt("the operator's notes", Self::write_notes);
-        let problems = self.journal.problems.clone();
+        let problems = self.journal.problems().to_vec();
         for problem in problems {
-            let _ = self.journal.emit(Record::Note {
-                t: ended,
-                text: format!("while ending: {problem}"),
-            });
+            let _ = self.journal.note(ended, format!("while ending: {problem}"));
         }
         // First the cause of the run's end, then the problems during the end.
         let mut rows = Vec::new();
         rows.extend(interruption.map(|kind| (kind, t, first_reason)));
         rows.extend(
-            self.halted_at
-                .map(|t| (InterruptionKind::Halt, t, HALTED.to_owned())),
+            self.machine
+                .halted_at()
+                .map(|t| (InterruptionKind::Halt, t, StopReason::Halt.into())),
         );
         if warning.is_some() {
             rows.retain(|(kind, ..)| *kind != InterruptionKind::Fault);
@@ -149,12 +133,12 @@ impl Executor<'_> {
         });
         self.machine.fire(Event::Disarmed);
         // Later requests find everything already at rest.
-        self.control.acknowledge(self.control.requests_made());
+        self.machine.acknowledge(self.machine.requests_made());
         let [planned, valid, invalid, missed] = self.journal.counts();
-        self.report = Some(RunReport {
+        RunReport {
             end,
             causes,
-            press_faults: std::mem::take(&mut self.press_faults),
+            press_faults: self.series.take_faults(),
             valid_presses: self.journal.valid(),
             ended_at: ended,
             planned,
@@ -163,8 +147,8 @@ impl Executor<'_> {
             missed,
             retracted,
             disarmed,
-            problems: std::mem::take(&mut self.journal.problems),
-        });
+            problems: self.journal.take_problems(),
+        }
     }
 
     /// Retracts if the robot still answers, holds, disarms, flushes and stops the cameras, and emits notes. Returns whether
@@ -173,13 +157,15 @@ impl Executor<'_> {
         let tripped = self.indenter.trip().is_some();
         let mut retracted = !tripped || self.indenter.is_clear();
         if self.indenter.is_armed() {
-            retracted = (0..MAX_TRIES)
-                .any(|_| !self.check_halt() && self.attempt("retract", Self::rise_clear));
-            if !self.check_halt() {
+            retracted = (0..MAX_TRIES).any(|_| {
+                !self.machine.check_halt(self.clock.as_ref())
+                    && self.attempt("retract", Self::rise_clear)
+            });
+            if !self.machine.check_halt(self.clock.as_ref()) {
                 self.attempt("hold", |executor| executor.indenter.hold());
             }
         }
-        if !self.check_halt() {
+        if !self.machine.check_halt(self.clock.as_ref()) {
             self.machine.fire(Event::Cleared);
         }
         let disarmed =
@@ -220,7 +206,7 @@ impl Executor<'_> {
             }
             self.clock.wait_until(now + self.settings.tick);
             self.observe()?;
-            if self.check_halt() {
+            if self.machine.check_halt(self.clock.as_ref()) {
                 return Err(self.not_arrived("straight up", target, now - t).into());
             }
         }
@@ -230,8 +216,11 @@ impl Executor<'_> {
 
 impl Drop for Executor<'_> {
     fn drop(&mut self) {
+        if self.machine.state() == State::Finished {
+            return;
+        }
         let dropped = ControllerError::Internal("the run was dropped before its end".to_owned());
-        self.conclude(Err(Halt::Fault(dropped)));
+        let _ = self.conclude(Err(Halt::Fault(dropped)));
     }
 }
 

@@ -1,29 +1,20 @@
 //! Arming: opens, configures, reads back and starts the devices, and waits for the robot's position.
 
-use skinrig_device::{CameraCapabilities, SyncMode};
-use skinrig_model::{CameraId, DeviceRole, Record, RunHeader};
+use skinrig_model::{CameraId, DeviceRole, Record};
 use skinrig_protocol::plan::Step;
 
+use super::Executor;
+use super::steps::internal;
 use crate::error::{ControllerError, Halt};
-use crate::executor::Executor;
 use crate::preflight;
+use crate::run::Leg;
 use crate::states::{Action, Event, State};
-use crate::steps::internal;
 
 impl Executor<'_> {
     /// Brings every device to readiness. Nothing moves.
-    pub(crate) fn arm(&mut self) -> Result<(), Halt> {
-        let Some(header) = self.header.take() else {
-            return Err(ControllerError::Internal("armed twice".to_owned()).into());
-        };
-        self.journal.emit(match &self.resume {
-            None => Record::Started(header.clone()),
-            Some(resume) => Record::Resumed(Box::new(resume.header.clone())),
-        })?;
-        if let Some(preflight) = &self.preflight {
-            self.checks.extend_from_slice(&preflight.caller_checks);
-        }
-        let ready = self.catch_panic(|executor| executor.prepare(&header));
+    pub(crate) fn arm(&mut self, leg: &Leg) -> Result<(), Halt> {
+        self.journal.emit(leg.first_record())?;
+        let ready = self.catch_panic(|executor| executor.prepare(leg));
         self.conclude_preflight(ready)?;
         // If the operator has requested an end meanwhile, do not power the robot.
         self.handle_requests()?;
@@ -42,10 +33,10 @@ impl Executor<'_> {
     }
 
     /// Everything before power: configures devices, reads them back, starts and checks the cameras.
-    fn prepare(&mut self, header: &RunHeader) -> Result<(), Halt> {
-        let histories = self.resume.as_ref().map(|r| r.histories.as_slice());
-        preflight::check_plan(self.plan, header, histories)?;
-        if header.robot_from_skin != self.robot_from_skin {
+    fn prepare(&mut self, leg: &Leg) -> Result<(), Halt> {
+        let header = leg.header();
+        preflight::check_plan(self.plan, header, leg.histories())?;
+        if header.robot_from_skin != *self.indenter.robot_from_skin() {
             return Err(rig_error("header", "the skin pose of the rig", "a different one").into());
         }
         let can = self.indenter.capabilities();
@@ -59,14 +50,16 @@ impl Executor<'_> {
             )
             .into());
         }
-        let (limits, remarks) = preflight::motion_limits(self.plan, &self.robot_from_skin, &can)?;
+        let (limits, remarks) =
+            preflight::motion_limits(self.plan, self.indenter.robot_from_skin(), &can)?;
         for text in remarks {
             let t = self.now();
-            self.journal.emit(Record::Note { t, text })?;
+            self.journal.note(t, text)?;
         }
         let settings = self.indenter.configure(&limits)?;
         let identity = self.indenter.identity();
-        self.check_device(DeviceRole::Indenter, &identity, &settings);
+        self.preflight
+            .check_device(DeviceRole::Indenter, &identity, &settings);
         self.journal.emit(Record::Device {
             role: DeviceRole::Indenter,
             identity,
@@ -76,17 +69,8 @@ impl Executor<'_> {
             self.configure_camera(camera, header.stream_formats[camera.index()])?;
         }
         self.check_trigger_box()?;
-        for camera in self.start_order() {
-            self.cameras[camera.index()].start()?;
-        }
+        self.cameras.start()?;
         self.check_streams()
-    }
-
-    /// Start order of the cameras: those that follow another's time base wait for it, so they start first.
-    fn start_order(&self) -> [CameraId; 2] {
-        let mut order = CameraId::ALL;
-        order.sort_by_key(|c| self.camera_settings[c.index()].sync != SyncMode::Slave);
-        order
     }
 
     fn configure_camera(
@@ -94,20 +78,18 @@ impl Executor<'_> {
         camera: CameraId,
         format: skinrig_model::StreamFormat,
     ) -> Result<(), ControllerError> {
-        let device = self.cameras[camera.index()].as_mut();
-        if device.camera() != camera {
-            let found = device.camera().to_string();
-            return Err(rig_error("cameras", camera.to_string(), found));
+        let found = self.cameras.id(camera);
+        if found != camera {
+            return Err(rig_error("cameras", camera.to_string(), found.to_string()));
         }
-        let can: CameraCapabilities = device.capabilities();
+        let can = self.cameras.capabilities(camera);
         if can.format != format {
             let expected = format!("stream format {format} (header)");
             return Err(rig_error(camera.to_string(), expected, can.format.name()));
         }
-        let settings = device.configure(&self.camera_settings[camera.index()])?;
-        let identity = device.identity();
+        let (identity, settings) = self.cameras.configure(camera)?;
         let role = DeviceRole::of_camera(camera);
-        self.check_device(role, &identity, &settings);
+        self.preflight.check_device(role, &identity, &settings);
         self.journal.emit(Record::Device {
             role,
             identity,
@@ -121,10 +103,10 @@ impl Executor<'_> {
             .steps
             .iter()
             .any(|s| matches!(s, Step::Press(p) if !p.marks.is_empty()));
-        match &self.trigger_box {
-            Some(device) => {
-                let identity = device.identity();
-                self.check_device(DeviceRole::TriggerBox, &identity, &[]);
+        match self.trigger.identity() {
+            Some(identity) => {
+                self.preflight
+                    .check_device(DeviceRole::TriggerBox, &identity, &[]);
                 self.journal.emit(Record::Device {
                     role: DeviceRole::TriggerBox,
                     identity,

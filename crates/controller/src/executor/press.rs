@@ -4,34 +4,35 @@ use skinrig_model::HostTime;
 use skinrig_protocol::Surface;
 use skinrig_protocol::plan::PressStep;
 
+use super::Executor;
+use super::search::Probe;
+use crate::camera_streams::Collect;
 use crate::error::{ControllerError, Halt};
-use crate::executor::{Collect, Executor, OpenPress};
 use crate::journal::was_rejected;
+use crate::open_press::OpenPress;
 use crate::press_fault::PressFault;
 use crate::press_tracker::PressTracker;
-use crate::touch::Probe;
 use crate::verdict::judge;
 
 impl Executor<'_> {
     /// Executes one press. A harmless failure makes the press invalid and the run continues, after an immediate
     /// retake where that may succeed.
-    pub(crate) fn press(&mut self, step: &PressStep) -> Result<(), Halt> {
+    pub(super) fn press(&mut self, step: &PressStep) -> Result<(), Halt> {
         if let Some(after) = step.start_after_begin {
-            self.wait_at_clearance(self.begin + after)?;
+            self.wait_at_clearance(self.series.due(after))?;
         }
         let mut again = self.attempt_press(step)?;
         let first_ended = self.now();
-        let limits = self.plan.retakes;
         let mut retakes = 0;
-        while again && retakes < limits.per_press && self.retaken < limits.per_session {
+        while again && self.series.may_retake(retakes) {
             self.safe_point()?;
             retakes += 1;
-            self.retaken += 1;
+            self.series.count_retake();
             again = self.attempt_press(step)?;
         }
         // Retakes do not shorten the time until the next press.
-        self.begin += self.now() - first_ended;
-        Ok(self.invalid_run.press_ended()?)
+        self.series.delay(self.now() - first_ended);
+        Ok(self.series.end_press()?)
     }
 
     /// Makes one attempt at a press. Returns whether to repeat it.
@@ -39,17 +40,7 @@ impl Executor<'_> {
         let attempt = self.journal.next_attempt(step.press);
         let t = self.now();
         self.journal.intent(attempt, t)?;
-        self.open = Some(OpenPress {
-            attempt,
-            tracker: None,
-            marks: step.marks.clone(),
-            lost: [0; 2],
-            bytes: [0; 2],
-            events: [0; 2],
-            began: t,
-            data_faults: Vec::new(),
-        });
-        self.touch = None;
+        self.trackers.begin_press(OpenPress::new(attempt, step, t));
         // A durable intent may take a while: update the pose before moving.
         self.observe()?;
         let fault = self.press_motion(step)?;
@@ -61,7 +52,7 @@ impl Executor<'_> {
     fn press_motion(&mut self, step: &PressStep) -> Result<Option<PressFault>, Halt> {
         let began = self.now();
         if let Surface::Touch(search) = step.surface {
-            self.breakable = true;
+            self.machine.set_interruptible(true);
             let tared = self.tare(Probe::of(step), search);
             let tared = tared.map(|t| t.err().map(PressFault::Touch));
             if let Some(fault) = self.unless_paused(tared)? {
@@ -87,17 +78,21 @@ impl Executor<'_> {
         if !step.surface.is_known() {
             tracker.search_surface();
         }
-        self.with_open(|open| open.tracker = Some(tracker));
-        self.breakable = true;
+        if let Some(press) = self.trackers.press_mut() {
+            press.track(tracker);
+        }
+        self.machine.set_interruptible(true);
         let went = self.go_down(step, down, deadline);
         let fault = self.unless_paused(went)?;
-        self.settling = None; // left over from an interrupted search
+        self.trackers.stop_settling(); // left over from an interrupted search
 
         // Straight up from wherever the hold ended.
         let at_clearance = step.at.at_height(self.plan.limits.clearance_mm);
         let target = self.indenter.point_above().unwrap_or(at_clearance);
         let up = self.command(target, step.retract_speed_mm_s)?;
-        self.with_tracker(|t| t.rise_to(target, up));
+        if let Some(phases) = self.trackers.phases_mut() {
+            phases.rise_to(target, up);
+        }
         let height = self.plan.limits.clearance_mm + step.depth_mm;
         let (_, grace) = self.own_motion(height);
         let slow = height / step.retract_speed_mm_s;
@@ -106,10 +101,10 @@ impl Executor<'_> {
             let what = format!("{}, retraction", step.press);
             return Err(self.not_arrived(&what, target, allowed).into());
         }
-        while !self.line_is_free() {
-            self.tick(Some(self.line_free_at()))?;
+        while !self.trigger.is_free(self.now()) {
+            self.tick(Some(self.trigger.free_at()))?;
         }
-        let clear = self.tracker().and_then(PressTracker::clear);
+        let clear = self.trackers.phases().and_then(PressTracker::clear);
         Ok(fault.or_else(|| {
             let clear = clear.filter(|clear| *clear > deadline)?;
             Some(PressFault::ClearLate {
@@ -124,7 +119,7 @@ impl Executor<'_> {
         &mut self,
         part: Result<Option<PressFault>, Halt>,
     ) -> Result<Option<PressFault>, Halt> {
-        self.breakable = false;
+        self.machine.set_interruptible(false);
         match part {
             Err(Halt::PausedNow) => {
                 let suspended = self.suspender.reason().map(ToOwned::to_owned);
@@ -157,7 +152,9 @@ impl Executor<'_> {
             Surface::Touch(search) => {
                 match self.find_surface(Probe::of(step), search, down, deadline)? {
                     Ok(found) => {
-                        self.with_tracker(|t| t.touched(&found));
+                        if let Some(phases) = self.trackers.phases_mut() {
+                            phases.touched(&found);
+                        }
                         found.measured.z_mm
                     }
                     Err(fault) => return Ok(Some(PressFault::Touch(fault))),
@@ -170,34 +167,18 @@ impl Executor<'_> {
             Ok(t) => t,
             Err(off_target) => return Ok(Some(off_target.fault())),
         };
-        self.with_tracker(|tracker| tracker.indent_from(t));
+        if let Some(phases) = self.trackers.phases_mut() {
+            phases.indent_from(t);
+        }
         if !self.until(|t| t.at_depth().is_some(), deadline)? {
             return Ok(late(self, "indentation", bottom_mm));
         }
-        let settled = self.tracker().and_then(PressTracker::at_depth);
+        let settled = self.trackers.phases().and_then(PressTracker::at_depth);
         let until = settled.unwrap_or(t) + step.hold;
         while self.now() < until {
             self.tick(Some(until))?;
         }
         Ok(None)
-    }
-
-    fn tracker(&self) -> Option<&PressTracker> {
-        self.open.as_ref().and_then(|o| o.tracker.as_ref())
-    }
-
-    pub(crate) fn with_open(&mut self, change: impl FnOnce(&mut OpenPress)) {
-        if let Some(open) = &mut self.open {
-            change(open);
-        }
-    }
-
-    fn with_tracker(&mut self, change: impl FnOnce(&mut PressTracker)) {
-        self.with_open(|open| {
-            if let Some(tracker) = &mut open.tracker {
-                change(tracker);
-            }
-        });
     }
 
     /// Ticks until the condition on the tracker holds; false if `deadline` passed first.
@@ -207,7 +188,7 @@ impl Executor<'_> {
         deadline: HostTime,
     ) -> Result<bool, Halt> {
         loop {
-            if self.tracker().is_some_and(&done) {
+            if self.trackers.phases().is_some_and(&done) {
                 return Ok(true);
             }
             if self.now() >= deadline {
@@ -218,38 +199,31 @@ impl Executor<'_> {
     }
 
     /// Emits all bytes and poses so far, then the outcome. Returns whether to repeat the press.
-    pub(crate) fn close_press(
+    pub(super) fn close_press(
         &mut self,
         fault: Option<PressFault>,
     ) -> Result<bool, ControllerError> {
         let flushed = self.observe().and(self.collect(Collect::Flush));
-        if self.ending {
+        if self.journal.is_ending() {
             if let Err(e) = flushed {
                 self.journal.problem("", e);
             }
         } else {
             flushed?;
         }
-        self.emit_poses()?;
+        self.journal.emit_poses()?;
         self.check_event_rate();
-        let Some(open) = &self.open else {
+        let Some(press) = self.trackers.press() else {
             return Ok(false);
         };
-        let judged = judge(open, fault);
+        let judged = judge(press, fault);
         let again = judged.should_retake();
-        self.invalid_run.attempt(&judged.faults);
-        self.press_faults
-            .extend(judged.faults.into_iter().map(|f| (open.attempt, f)));
+        self.series.end_attempt(press.attempt(), judged.faults);
         let told = self.journal.outcome(judged.outcome);
         if !was_rejected(&told) {
-            self.open = None;
+            self.trackers.end_press();
         }
         told?;
         Ok(again)
     }
-}
-
-/// Time at which the tip was back at clearance height.
-pub(crate) fn cleared_at(open: &OpenPress) -> Option<HostTime> {
-    open.tracker.as_ref().and_then(PressTracker::clear)
 }

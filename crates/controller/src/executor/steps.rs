@@ -1,10 +1,10 @@
 //! Executes the steps of a plan in order.
 
-use skinrig_model::{HostDuration, HostTime, Point3, Skin};
+use skinrig_model::{HostDuration, HostTime, Point3, PoseSample, Skin};
 use skinrig_protocol::plan::Step;
 
+use super::Executor;
 use crate::error::{ControllerError, GuardError, Halt};
-use crate::executor::Executor;
 use crate::not_arrived::NotArrived;
 use crate::press_fault::PressFault;
 use crate::press_tracker::Settling;
@@ -12,18 +12,18 @@ use crate::states::{Action, Event, State};
 
 impl Executor<'_> {
     /// Everything between arming and the end.
-    pub(crate) fn steps(&mut self) -> Result<(), Halt> {
-        self.begin = self.now();
+    pub(super) fn steps(&mut self) -> Result<(), Halt> {
+        self.series.begin(self.now());
         self.safe_point()?;
         self.rise_first()?;
         self.check_surface("before the first press")?;
-        self.begin = self.now();
+        self.series.begin(self.now());
         let plan = self.plan;
         for (n, step) in plan.steps.iter().enumerate() {
             let paused = self.safe_point()?;
-            self.begin += paused;
+            self.series.delay(paused);
             match step {
-                Step::Begin { .. } => self.begin = self.now(),
+                Step::Begin { .. } => self.series.begin(self.now()),
                 Step::Pause { duration } => {
                     let due = self.now() + *duration;
                     self.wait_at_clearance(due)?;
@@ -61,7 +61,7 @@ impl Executor<'_> {
 
     /// Moves and waits until settled. Only for motions at clearance height and straight up. `pause_now` holds the robot
     /// where it is; it continues when the operator resumes.
-    pub(crate) fn go(
+    pub(super) fn go(
         &mut self,
         what: &str,
         target: Point3<Skin>,
@@ -69,16 +69,16 @@ impl Executor<'_> {
         allowed: HostDuration,
     ) -> Result<(), Halt> {
         loop {
-            self.breakable = self.indenter.is_clear();
+            self.machine.set_interruptible(self.indenter.is_clear());
             let went = self.go_once(what, target, speed_mm_s, allowed);
-            self.breakable = false;
+            self.machine.set_interruptible(false);
             if went != Err(Halt::PausedNow) {
                 return went;
             }
-            self.settling = None;
+            self.trackers.stop_settling();
             self.indenter.hold()?;
             let paused = self.safe_point()?;
-            self.begin += paused;
+            self.series.delay(paused);
         }
     }
 
@@ -93,16 +93,12 @@ impl Executor<'_> {
             Ok(t) => t,
             Err(off_target) => return Err(off_target.not_arrived(what).into()),
         };
-        let mut settling = Some(Settling::before_a_motion(target, &self.plan.limits, t));
-        std::mem::swap(&mut self.settling, &mut settling);
+        let settling = Settling::before_a_motion(target, &self.plan.limits, t);
+        self.trackers.settle(settling);
         loop {
             self.tick(None)?;
-            if self
-                .settling
-                .as_ref()
-                .is_some_and(|s| s.settled().is_some())
-            {
-                self.settling = None;
+            if self.trackers.has_settled() {
+                self.trackers.stop_settling();
                 return Ok(());
             }
             if self.now() >= t + allowed {
@@ -114,7 +110,7 @@ impl Executor<'_> {
     /// Commands a motion once the newest sample allows it. A tip at rest may be measured slightly off. If the guard rejects a motion
     /// because of the measured position, it is tried again at the next polls, under the same rules. `Err`: the tip does not return
     /// to its position.
-    pub(crate) fn command_when_steady(
+    pub(super) fn command_when_steady(
         &mut self,
         target: Point3<Skin>,
         speed_mm_s: f64,
@@ -135,7 +131,8 @@ impl Executor<'_> {
                         target: held,
                         within,
                         tolerance_mm: self.plan.limits.position_tolerance_mm,
-                        found: self.indenter.position().map(|p| p.measured),
+                        max_force_n: self.plan.limits.max_force_n,
+                        found: self.indenter.position(),
                     }));
                 }
                 other => return Ok(Ok(other?)),
@@ -143,7 +140,7 @@ impl Executor<'_> {
         }
     }
 
-    pub(crate) fn not_arrived(
+    pub(super) fn not_arrived(
         &self,
         what: &str,
         target: Point3<Skin>,
@@ -154,24 +151,25 @@ impl Executor<'_> {
             tolerance_mm: self.plan.limits.position_tolerance_mm,
             target,
             allowed,
-            found: self.indenter.position().map(|p| p.measured),
+            max_force_n: self.plan.limits.max_force_n,
+            found: self.indenter.position(),
         }
     }
 
     /// Waits until `due`; a pause delays `due` and the current repetition.
-    pub(crate) fn wait_at_clearance(&mut self, mut due: HostTime) -> Result<(), Halt> {
+    pub(super) fn wait_at_clearance(&mut self, mut due: HostTime) -> Result<(), Halt> {
         while self.now() < due {
             self.tick(Some(due))?;
             let paused = self.safe_point()?;
             due += paused;
-            self.begin += paused;
+            self.series.delay(paused);
         }
         Ok(())
     }
 
     /// Between presses: waits or ends if the operator requested it. Returns the time spent
     /// waiting.
-    pub(crate) fn safe_point(&mut self) -> Result<HostDuration, Halt> {
+    pub(super) fn safe_point(&mut self) -> Result<HostDuration, Halt> {
         let from = self.now();
         loop {
             match self.machine.state() {
@@ -189,36 +187,38 @@ impl Executor<'_> {
 }
 
 /// The tip is away from its commanded position before a motion.
-pub(crate) struct OffTarget {
+pub(super) struct OffTarget {
     target: Point3<Skin>,
     within: HostDuration,
     tolerance_mm: f64,
-    found: Option<Point3<Skin>>,
+    max_force_n: f64,
+    found: Option<PoseSample>,
 }
 
 impl OffTarget {
     /// As an error of the run: the tip left its position before `what`.
-    pub(crate) fn not_arrived(self, what: &str) -> NotArrived {
+    pub(super) fn not_arrived(self, what: &str) -> NotArrived {
         NotArrived {
             what: format!("before {what}"),
             tolerance_mm: self.tolerance_mm,
             target: self.target,
             allowed: self.within,
+            max_force_n: self.max_force_n,
             found: self.found,
         }
     }
 
     /// As a fault of a press.
-    pub(crate) fn fault(self) -> PressFault {
+    pub(super) fn fault(self) -> PressFault {
         PressFault::PushedAside {
             tolerance_mm: self.tolerance_mm,
             target: self.target,
-            found: self.found,
+            found: self.found.map(|s| s.measured),
         }
     }
 }
 
 /// The transition table has no such transition.
-pub(crate) fn internal(what: &str, state: State) -> Halt {
+pub(super) fn internal(what: &str, state: State) -> Halt {
     ControllerError::Internal(format!("{what}: not possible while {state:?}")).into()
 }

@@ -1,0 +1,58 @@
+//! Owns the reasons for which a camera has no clock from event rates.
+
+/// Why the presses in the event rates of a camera give no clock.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum RatesError {
+    /// The session has fewer presses than a rhythm needs.
+    #[error(
+        "expected at least 4 presses with known times to align the clock by event rates, found {found}"
+    )]
+    FewPresses {
+        /// Presses with known times.
+        found: usize,
+    },
+    /// The presses are out of order, or their span is too long to search.
+    #[error(
+        "expected the presses in time order within two days, found {span_s:.0} s between the first and the last"
+    )]
+    Span {
+        /// From the first contact to the last release, s; negative or NaN if out of order.
+        span_s: f64,
+    },
+    /// The camera times come from a broken time base.
+    #[error(
+        "expected camera times below 2^62 µs, found events at {start_us} µs: the time base of the stream is broken"
+    )]
+    BrokenTimeBase {
+        /// Start of the event rates, µs.
+        start_us: u64,
+    },
+    /// Busy and idle times have about the same event rate.
+    #[error(
+        "expected presses to stand out in the event rates, found hardly any difference between \
+         busy and idle times; was the camera running and the crop right?"
+    )]
+    Flat,
+    /// The refinement found too few presses for a line.
+    #[error("expected at least 3 presses to be visible in the event rates, found {found}")]
+    FewVisible {
+        /// Presses found.
+        found: usize,
+    },
+    /// Too many bursts of events to consider all shifts.
+    #[error(
+        "expected at most {most} comparisons of a burst with a press, found {bursts} bursts and {presses} presses: is the \
+         recording mostly noise?"
+    )]
+    TooManyBursts {
+        /// Maximum number of comparisons.
+        most: u64,
+        /// Bursts found.
+        bursts: usize,
+        /// Presses, or the bursts of the other camera.
+        presses: usize,
+    },
+    /// The event rates have no bursts.
+    #[error("expected bursts in the event rates, found none")]
+    NoBursts,
+}

@@ -1,0 +1,57 @@
+//! Handling of the operator's requests and notes at every tick.
+
+use skinrig_model::{InterruptionKind, Record, StopReason};
+
+use super::Executor;
+use crate::control::Request;
+use crate::error::{ControllerError, Halt};
+use crate::states::Event;
+
+impl Executor<'_> {
+    /// Handles the operator's requests.
+    pub(super) fn handle_requests(&mut self) -> Result<(), Halt> {
+        self.write_notes()?;
+        let asked = self.machine.requests_made();
+        for request in self.machine.take_requests() {
+            let before = self.machine.state();
+            let (event, kind, words) = match request {
+                Request::Halt => return Err(Halt::Halted),
+                Request::Abort => return Err(Halt::Aborted),
+                Request::Stop => (Event::Stop, InterruptionKind::Stop, StopReason::Stop.text()),
+                Request::PauseNow => (
+                    Event::PauseNow,
+                    InterruptionKind::PauseNow,
+                    "operator: pause now",
+                ),
+                Request::Pause => (Event::Pause, InterruptionKind::Pause, "operator: pause"),
+                Request::Resume => (Event::Resume, InterruptionKind::Resume, "operator: resume"),
+            };
+            let took_over = self.suspender.release();
+            self.machine.fire(event);
+            // Requests without effect are not recorded.
+            if took_over || self.machine.state() != before {
+                let t = self.now();
+                self.journal.emit(Record::Interruption {
+                    kind,
+                    t,
+                    reason: words.to_owned(),
+                })?;
+            }
+        }
+        self.machine.acknowledge(asked);
+        if self.machine.take_interruption() {
+            return Err(Halt::PausedNow);
+        }
+        Ok(())
+    }
+
+    /// Emits the operator's notes.
+    pub(super) fn write_notes(&mut self) -> Result<(), ControllerError> {
+        for text in self.machine.take_notes() {
+            let t = self.now();
+            self.journal.note(t, text)?;
+            self.machine.count_note();
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,41 @@
+# Daily commands. Install: `cargo install just`, or `pip install rust-just`; `just` alone lists them.
+_list:
+    @{{ just_executable() }} --list --unsorted
+
+# Simulate, record and analyse the demo.
+demo:
+    cargo run --release --locked -- run protocols/demo.yaml
+
+# Tests of one crate and of what its edit breaks first: `just test analysis`, `just test analysis --test audit`.
+test crate *args:
+    cargo test -p skinrig{{ if crate == "cli" { "" } else { "-" + crate } }} {{ args }}
+
+# All tests.
+test-all:
+    cargo test --workspace --locked
+
+# Formatting, lints and docs, as the check of a change wants them.
+lint:
+    cargo fmt --all --check
+    cargo clippy --workspace --all-targets --locked -- -D warnings
+    cargo clippy -p skinrig --all-targets --features evk4 --locked -- -D warnings
+    RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
+
+# The whole check of a clean clone.
+ci:
+    bash .ci/run
+
+# The nightly suite on the emulated bench.
+night out="/tmp/skinrig-nights":
+    cargo build --locked -p skinrig -p skinrig-emulated-bench
+    target/debug/emulated-bench -- target/debug/skinrig hil run hil/nightly.yaml --rig hil/rigs/emulated.yaml --out {{ out }}
+
+# Rewrite what is generated: schemas, snapshots of the command line, the page of faults.
+generate:
+    cargo run -q -p skinrig-protocol --example write_schema
+    INSTA_UPDATE=always cargo test -p skinrig --test commands json
+    SKINRIG_WRITE_DOCS=1 cargo test -p skinrig-tests --test faults
+
+# The documentation as a site, with search (needs mdbook).
+site:
+    mdbook serve docs --open
