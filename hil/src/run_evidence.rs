@@ -210,6 +210,7 @@ mod tests {
             tolerance_mm: 0.05,
             target: Point3::new(0.0, 0.0, 0.0),
             allowed: HostDuration::from_millis(1),
+            max_force_n: 8.0,
             found: None,
         };
         let one = |kind, subject: &str| vec![(kind, subject.to_owned())];
