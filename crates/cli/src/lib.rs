@@ -21,6 +21,7 @@ mod import;
 mod inspect;
 mod jog;
 mod man;
+mod new;
 mod paths;
 mod phase;
 mod progress;
@@ -101,6 +102,8 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         verbose: cli.verbose,
     };
     match &cli.command {
+        Command::Init(a) => new::init(a, json),
+        Command::New(a) => new::new(a, json),
         Command::Check(a) => check::check(a, json),
         Command::Plan(a) => check::plan(a, json),
         Command::Run(a) => run::run(a, &command_line(arguments), output),

@@ -379,7 +379,18 @@ fn fresh(
     let faults = [&protocol.faults[..], &args.faults].concat();
     if !output.json {
         outln!("{summary}");
-        outln!("rig       simulated ({level}), seed {seed}\n");
+        let needs: Vec<&str> = protocol
+            .scene
+            .needs
+            .iter()
+            .map(|need| need.name())
+            .collect();
+        let needed_for = if needs.is_empty() {
+            String::new()
+        } else {
+            format!(", for {}", needs.join(", "))
+        };
+        outln!("rig       simulated ({level}{needed_for}), seed {seed}\n");
     }
     if let Some(told) = planted::told(&faults) {
         errln!("warning: {told}\n");

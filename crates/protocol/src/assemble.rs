@@ -179,7 +179,7 @@ fn assemble(
         operator: keys.operator?,
         prototype: keys.prototype?,
         seed,
-        scene: keys.scene?.scene(),
+        scene: keys.scene?.scene(outline.centre),
         surroundings: surroundings?,
         sync,
         locations,

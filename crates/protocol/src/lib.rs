@@ -44,7 +44,7 @@ pub use faults::{FaultKind, FaultPhase, FaultTime, NoFault, PlantedFault};
 pub use limits::Limits;
 pub use phases::PressPhases;
 pub use plan::{OnTrip, Plan, PressStep, RunLimits, Step};
-pub use protocol::{CameraRequest, Motion, Pace, Protocol, Prototype, Scene, Sync};
+pub use protocol::{CameraRequest, Motion, Pace, Protocol, Prototype, Scene, SimulatedSkin, Sync};
 pub use reference_code::REFERENCE_CODE;
 pub use remaining::Route;
 pub use retakes::Retakes;

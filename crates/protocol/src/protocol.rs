@@ -5,7 +5,8 @@ use std::path::Path;
 
 use serde::Serialize;
 use skinrig_model::{
-    AnalysisSettings, HostDuration, MarkKind, Point2, Point3, PressRole, SceneNeed, SimLevel, Skin,
+    AnalysisSettings, CameraModel, HostDuration, MarkKind, Point2, Point3, PressRole, SceneNeed,
+    SimLevel, Skin,
 };
 
 use skinrig_settings::{Location, Settings};
@@ -101,8 +102,8 @@ pub struct Prototype {
     pub tip: Option<String>,
 }
 
-/// Requirements for a simulated rig.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+/// A simulated rig.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scene {
     /// The level to simulate: the named one, or the cheapest that satisfies the needs.
     pub level: SimLevel,
@@ -110,6 +111,27 @@ pub struct Scene {
     pub needs: Vec<SceneNeed>,
     /// True if the protocol sets the level explicitly.
     pub level_is_named: bool,
+    /// The skin, where it is not the published one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub skin: Option<SimulatedSkin>,
+    /// Camera 1 and camera 2 as drawn, where they are not at the published places.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cameras: Option<[CameraModel; 2]>,
+}
+
+/// What distinguishes one simulated skin from another. Defaults and sources: the optical model's constants.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SimulatedSkin {
+    /// Thickness, mm, 0.5 to 50.
+    pub thickness_mm: f64,
+    /// Length over which guided light fades to 1/e, mm, 5 to 10,000.
+    pub attenuation_length_mm: f64,
+    /// Part of a press's effect that follows slowly, 0 to 1.
+    pub creep_share: f64,
+    /// Time constant of that part, up to 60 s.
+    pub creep_time: HostDuration,
+    /// Brightness of a dent's flanks, relative to a matt white flank, 0.1 to 10.
+    pub flank_brightness: f64,
 }
 
 /// Presses before everything else.

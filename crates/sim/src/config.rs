@@ -9,6 +9,7 @@ use crate::contacts::Contacts;
 use crate::faults::Fault;
 use crate::geometric::GeometricConfig;
 use crate::motion::MotionConfig;
+use crate::optical::OpticalConfig;
 use crate::random::{Purpose, Stream};
 use crate::scene::SceneConfig;
 
@@ -134,6 +135,8 @@ pub struct SimConfig {
     pub trigger_box: TriggerBoxConfig,
     /// Event rates and spreads of the geometric level.
     pub geometric: GeometricConfig,
+    /// Constants of the optical level.
+    pub optical: OpticalConfig,
     /// Earlier contacts, skin frame, for further legs of a run.
     pub pressed_before: Vec<Point2>,
     /// Injected faults.
@@ -183,6 +186,7 @@ impl SimConfig {
             camera_clock: CameraClockConfig::default(),
             trigger_box: TriggerBoxConfig::default(),
             geometric: GeometricConfig::default(),
+            optical: OpticalConfig::default(),
             pressed_before: Vec::new(),
             faults: Vec::new(),
         }

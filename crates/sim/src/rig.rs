@@ -61,6 +61,7 @@ pub fn in_real_time(mut rig: Rig) -> Rig {
 fn pixel_factory(config: &SimConfig, id: CameraId) -> PixelFactory {
     let scene = config.scene(id);
     let level = config.level;
+    let optical = config.optical;
     let mut geometric = config.geometric.clone();
     for fault in &config.faults {
         if let Fault::DeadPress { camera, contact } = *fault
@@ -77,7 +78,7 @@ fn pixel_factory(config: &SimConfig, id: CameraId) -> PixelFactory {
         match level {
             SimLevel::Kinematic => None,
             SimLevel::Geometric => Some(Box::new(GeometricModel::new(&scene, &geometric))),
-            SimLevel::Optical => Some(Box::new(OpticalModel::new(&scene))),
+            SimLevel::Optical => Some(Box::new(OpticalModel::build(&scene, optical))),
         }
     })
 }
@@ -175,6 +176,9 @@ pub fn describe(config: &SimConfig) -> String {
             "dead_share": g.dead_share,
             "strength_spread": g.strength_spread,
         });
+    }
+    if config.level == SimLevel::Optical {
+        value["optical"] = serde_json::json!(config.optical);
     }
     value.to_string()
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::new::ProtocolKind;
 use clap::{Args, ValueEnum};
 
 /// Arguments of `sessions`.
@@ -201,6 +202,24 @@ pub(crate) enum SchemaKind {
     Limits,
     /// Suites (`hil run`).
     Suite,
+}
+
+/// `new`.
+#[derive(Debug, Args)]
+pub(crate) struct NewArgs {
+    /// What it is for.
+    #[arg(value_enum)]
+    pub kind: ProtocolKind,
+    /// The file to write [default: the kind's name in this folder].
+    pub file: Option<PathBuf>,
+}
+
+/// `init`.
+#[derive(Debug, Args)]
+pub(crate) struct InitArgs {
+    /// The folder; created if it is missing.
+    #[arg(default_value = ".")]
+    pub folder: PathBuf,
 }
 
 /// Arguments of `schema`.

@@ -6,7 +6,7 @@ use super::Cli;
 
 /// Heading and commands of each group, in the order of a campaign.
 const GROUPS: [(&str, &[&str]); 6] = [
-    ("Plan", &["check", "plan", "schema"]),
+    ("Plan", &["init", "new", "check", "plan", "schema"]),
     (
         "Record",
         &[

@@ -18,8 +18,9 @@ pub(crate) use self::bench::{
 pub(crate) use self::doctor::DoctorArgs;
 pub(crate) use self::evaluate::{AnalyzeArgs, CompareArgs, CostKind, ReportArgs, TradeoffArgs};
 pub(crate) use self::files::{
-    CompletionsArgs, ExportArgs, ExportKind, ExportTable, ImportArgs, InspectArgs, ManArgs,
-    PrototypesArgs, SalvageArgs, SchemaArgs, SchemaKind, SessionsArgs, ShowArgs, TagArgs,
+    CompletionsArgs, ExportArgs, ExportKind, ExportTable, ImportArgs, InitArgs, InspectArgs,
+    ManArgs, NewArgs, PrototypesArgs, SalvageArgs, SchemaArgs, SchemaKind, SessionsArgs, ShowArgs,
+    TagArgs,
 };
 pub(crate) use self::groups::{command, parse};
 use crate::exit::Exit;
@@ -45,6 +46,18 @@ pub(crate) struct Cli {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    /// Make a lab's folder: protocols to copy from, rig file, suites of checks, schemas for editors.
+    #[command(
+        after_help = "Example:\n  skinrig init lab && cd lab && skinrig run protocols/demo.yaml\n\n\
+        Files that are there are kept; schemas are renewed."
+    )]
+    Init(InitArgs),
+
+    /// Write a protocol to begin with.
+    #[command(after_help = "Examples:\n  skinrig new depth-sweep\n  \
+        skinrig new own-outline protocols/round-skin.yaml")]
+    New(NewArgs),
+
     /// Check a protocol and every motion it would make, without moving anything.
     #[command(after_help = "Example:\n  skinrig check protocols/demo.yaml")]
     Check(ProtocolArgs),

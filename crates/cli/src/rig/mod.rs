@@ -12,8 +12,9 @@ use std::path::Path;
 
 use skinrig_controller::ControlHandle;
 use skinrig_device::{CameraSettings, Clock, Rig};
-use skinrig_model::{HostTime, InterruptionKind, Point2, RunHeader, SimLevel};
+use skinrig_model::{HostTime, InterruptionKind, Point2, RunHeader, SimLevel, StereoGeometry};
 use skinrig_protocol::{PlantedFault, Protocol};
+use skinrig_sim::optical::OpticalConfig;
 use skinrig_sim::replay::{RecordedRig, replayed_rig};
 use skinrig_sim::{SimConfig, in_real_time, simulated_rig};
 
@@ -48,6 +49,19 @@ pub(crate) fn simulated_after(
         ..SimConfig::new(seed, level)
     };
     config.outline = protocol.surroundings.outline;
+    if let Some(skin) = protocol.scene.skin {
+        config.skin_thickness_mm = skin.thickness_mm;
+        config.optical = OpticalConfig {
+            attenuation_per_mm: 1.0 / skin.attenuation_length_mm,
+            creep_fraction: skin.creep_share,
+            creep_time_ms: 1e3 * skin.creep_time.as_secs_f64(),
+            flank_gain: skin.flank_brightness,
+            ..config.optical
+        };
+    }
+    if let Some(cameras) = protocol.scene.cameras {
+        config.nominal = StereoGeometry { cameras };
+    }
     config.faults = planted::of_devices(faults);
     let mut rig = simulated_rig(&config);
     planted::tell(&mut rig, faults);

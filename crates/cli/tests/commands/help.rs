@@ -2,7 +2,9 @@
 
 use crate::support::{ROOT, skinrig};
 
-const COMMANDS: [&str; 26] = [
+const COMMANDS: [&str; 28] = [
+    "init",
+    "new",
     "doctor",
     "devices",
     "check",

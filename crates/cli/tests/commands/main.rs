@@ -26,6 +26,7 @@ mod resume;
 mod rigs;
 mod sample_size;
 mod special;
+mod starter;
 mod strangers;
 mod streams;
 mod support;

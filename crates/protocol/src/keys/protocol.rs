@@ -35,7 +35,8 @@ pub(crate) struct ProtocolKeys {
     /// Seed of everything random in the run that has no seed of its own. Stored with the session.
     #[setting(default = "1")]
     pub seed: u64,
-    /// Requirements for a simulated rig. A real bench ignores them.
+    /// The simulated rig: what it must be good for, and how it differs from the published one. A real bench ignores it.
+    #[setting(default)]
     pub scene: SceneKeys,
     /// The skin in its own frame: mm, z out of the surface, z = 0 at the touched surface.
     #[setting(default)]

@@ -1,30 +1,82 @@
 //! Keys of the simulated scene.
 
-use skinrig_model::{SceneNeed, SimLevel, scene::cheapest_level};
+use skinrig_model::{HostDuration, Point2, SceneNeed, SimLevel, scene::cheapest_level};
 use skinrig_settings::{Collector, Field, Settings};
 
-use crate::protocol::Scene;
+use super::camera::NominalCamera;
+use crate::protocol::{Scene, SimulatedSkin};
 
-/// Requirements for a simulated rig; set `needs`, `level` or both. The cheapest sufficient level is used.
+/// What a scene is good for unless it says otherwise: event rates and where a press is seen.
+const USUAL_NEEDS: [SceneNeed; 2] = [SceneNeed::EventRates, SceneNeed::Localisation];
+
+/// The simulated rig. The cheapest level that satisfies all of it is used.
 #[derive(Settings)]
-#[settings(name = "scene", no_default, finish = Self::sufficient)]
+#[settings(name = "scene", finish = Self::sufficient)]
 pub(crate) struct SceneKeys {
-    /// Properties of the session that its user relies on.
-    #[setting(items = 1..=7, at_least_one, example = "[event_rates, localisation]")]
+    /// Properties of the session that its user relies on; `[event_rates, localisation]` when neither `needs` nor `level` is set.
+    #[setting(items = 1..=7, example = "[event_rates, localisation]")]
     needs: Option<Vec<SceneNeed>>,
     /// The simulation level outright; must be sufficient for `needs`.
-    #[setting(at_least_one)]
     level: Option<SimLevel>,
+    /// A skin other than the published one. Needs the optical level.
+    skin: Option<SkinKeys>,
+    /// Cameras at other places than in the published setup.
+    cameras: Option<SceneCameras>,
+}
+
+/// The simulated skin; what is missing is as in the model of the published one (docs/explanation/optical-model.md).
+#[derive(Settings)]
+#[settings(name = "simulated_skin")]
+pub(crate) struct SkinKeys {
+    /// Thickness. The paper: 4 mm.
+    #[setting(default = "4 mm", min = 0.5, max = 50.0)]
+    thickness_mm: f64,
+    /// Length over which guided light fades to 1/e: shorter in cloudier material.
+    #[setting(default = "100 mm", min = 5.0, max = 10_000.0)]
+    attenuation_length_mm: f64,
+    /// Part of a press's effect that follows slowly, and fades slowly after it.
+    #[setting(default = "30 %", min = 0.0, max = 100.0)]
+    creep_percent: f64,
+    /// Time constant of that part.
+    #[setting(default = "700 ms", above = 0.0, max = 60.0)]
+    creep_time: HostDuration,
+    /// Brightness of the flanks of a dent, relative to a matt white flank: what a camera sees of a press.
+    #[setting(default = "1.8", min = 0.1, max = 10.0)]
+    flank_brightness: f64,
+}
+
+/// The simulated cameras as drawn; the true ones differ a little, by the run's seed.
+#[derive(Settings)]
+#[settings(name = "scene_cameras")]
+pub(crate) struct SceneCameras {
+    /// Camera 1.
+    #[setting(example = "{position: [45 mm, -38 mm], half_field_of_view: 60 deg}")]
+    camera1: NominalCamera,
+    /// Camera 2.
+    #[setting(example = "{position: [45 mm, 42 mm], half_field_of_view: 60 deg}")]
+    camera2: NominalCamera,
 }
 
 impl SceneKeys {
-    /// The scene with its level decided.
-    pub(crate) fn scene(self) -> Scene {
-        let needs = self.needs.unwrap_or_default();
+    /// The scene with its level decided. Cameras aim at `centre` unless the file says otherwise.
+    pub(crate) fn scene(self, centre: Point2) -> Scene {
+        let needs = match (self.needs, self.level) {
+            (Some(needs), _) => needs,
+            (None, None) => USUAL_NEEDS.to_vec(),
+            (None, Some(_)) => Vec::new(),
+        };
+        let skin_level = self.skin.as_ref().map(|_| SimLevel::Optical);
         Scene {
-            level: self.level.unwrap_or_else(|| cheapest_level(&needs)),
+            level: self
+                .level
+                .or(skin_level)
+                .unwrap_or_else(|| cheapest_level(&needs)),
             needs,
             level_is_named: self.level.is_some(),
+            skin: self.skin.map(SkinKeys::skin),
+            cameras: self
+                .cameras
+                .map(|c| [c.camera1.model(centre), c.camera2.model(centre)]),
         }
     }
 
@@ -36,6 +88,16 @@ impl SceneKeys {
                     .expected("each need once")
                     .found(format!("`{}`", need.name()));
             }
+        }
+        if let Some(level) = self.level
+            && level < SimLevel::Optical
+            && self.skin.is_some()
+        {
+            let at = field.at("level");
+            out.error(at.span, "scene.level", "this level does not model the skin")
+                .expected("`optical`, because of `scene.skin`")
+                .found(format!("`{level}`"))
+                .help("write `level: optical`, or remove the key: the cheapest sufficient level is chosen");
         }
         let enough = cheapest_level(needs);
         if let Some(level) = self.level.filter(|level| *level < enough)
@@ -50,5 +112,17 @@ impl SceneKeys {
                 ));
         }
         Some(self)
+    }
+}
+
+impl SkinKeys {
+    fn skin(self) -> SimulatedSkin {
+        SimulatedSkin {
+            thickness_mm: self.thickness_mm,
+            attenuation_length_mm: self.attenuation_length_mm,
+            creep_share: self.creep_percent / 100.0,
+            creep_time: self.creep_time,
+            flank_brightness: self.flank_brightness,
+        }
     }
 }

@@ -6,7 +6,11 @@ use crate::common::{folder, nothing, parse, shipped};
 use crate::validate::validate;
 use skinrig_protocol::{Protocol, Schedule, check, path_svg, schedule_schema_json, schema_json};
 
-const PROTOCOLS: [&str; 5] = [
+const PROTOCOLS: [&str; 9] = [
+    "comparison",
+    "other-skin",
+    "own-cameras",
+    "own-outline",
     "demo",
     "paper-meander",
     "circles",

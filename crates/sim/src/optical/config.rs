@@ -1,5 +1,6 @@
 //! Every constant of the optical model, with its unit, source and valid range.
 
+use serde::Serialize;
 use thiserror::Error;
 
 /// A setting outside its valid range.
@@ -16,7 +17,7 @@ pub struct InvalidOpticalSetting {
 
 /// Constants of the optical model. "Assumption" marks values without a public source; the defaults are chosen
 /// so that event counts, polarities and spreads resemble the published ones (`docs/explanation/optical-model.md`).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OpticalConfig {
     // ---- emitters
     /// Number of emitters, evenly spaced along the three edges without cameras (paper: 32).

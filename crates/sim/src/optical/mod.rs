@@ -93,7 +93,8 @@ impl OpticalModel {
         Ok(Self::build(scene, config))
     }
 
-    fn build(scene: &SceneConfig, config: OpticalConfig) -> Self {
+    /// The model with constants that are known to be in their ranges.
+    pub(crate) fn build(scene: &SceneConfig, config: OpticalConfig) -> Self {
         let light = Illumination::new(&scene.outline, &config);
         let columns = light::columns(&scene.camera, &scene.outline, &light, &config);
         let noise = Noise::new(scene, &config, &columns);

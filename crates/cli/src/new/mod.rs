@@ -1,0 +1,138 @@
+//! `skinrig new` and `skinrig init`: files to begin with, which travel inside the program.
+
+mod files;
+
+use std::fs::{self, OpenOptions};
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+pub(crate) use self::files::ProtocolKind;
+use self::files::{LAB, PROTOCOL_SCHEMA, StarterFile};
+use crate::args::{InitArgs, NewArgs};
+use crate::exit::{Exit, Failure, Outcome};
+
+/// What became of one file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Written {
+    /// It was not there.
+    New,
+    /// It was there and is generated: it now has the content of this version.
+    Updated,
+    /// It was there and stays as it is.
+    Kept,
+}
+
+/// Writes one protocol of a kind, and the schema for editors beside it. Never overwrites a protocol.
+///
+/// # Errors
+/// [`Failure::input`] when the file is there already or cannot be written.
+pub(crate) fn new(args: &NewArgs, json: bool) -> Outcome {
+    let template = args.kind.file();
+    let file = match &args.file {
+        Some(file) => file.clone(),
+        None => PathBuf::from(template.name()),
+    };
+    let folder = match file.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    fs::create_dir_all(folder).map_err(|e| unwritable(folder, &e))?;
+    if write(&file, template)? == Written::Kept {
+        return Err(Failure::input(format!(
+            "{}: expected a file that is not there yet\n  next: name another, such as `skinrig new {} OTHER.yaml`",
+            file.display(),
+            args.kind.name(),
+        )));
+    }
+    let mut written = vec![file.clone()];
+    let schema = folder.join(PROTOCOL_SCHEMA.name());
+    if write(&schema, PROTOCOL_SCHEMA)? != Written::Kept {
+        written.push(schema);
+    }
+    if json {
+        crate::terminal::print_json(&serde_json::json!({ "files": written }));
+        return Ok(Exit::Ok);
+    }
+    for path in &written {
+        outln!("{}", path.display());
+    }
+    outln!(
+        "next: put in who and which skin (`operator`, `prototype.id`), then `skinrig check {}`",
+        file.display()
+    );
+    Ok(Exit::Ok)
+}
+
+/// Makes a lab's folder: protocols, rig file, suites, schemas, and a folder for sessions. Keeps what is there; renews schemas.
+///
+/// # Errors
+/// [`Failure::input`] when something cannot be written.
+pub(crate) fn init(args: &InitArgs, json: bool) -> Outcome {
+    let folder = args.folder.as_path();
+    let mut files = Vec::new();
+    for file in LAB {
+        let path = folder.join(file.path);
+        let parent = path.parent().unwrap_or(folder);
+        fs::create_dir_all(parent).map_err(|e| unwritable(parent, &e))?;
+        files.push((path.clone(), write(&path, *file)?));
+    }
+    let sessions = folder.join("sessions");
+    fs::create_dir_all(&sessions).map_err(|e| unwritable(&sessions, &e))?;
+    let count = |what| files.iter().filter(|(_, written)| *written == what).count();
+    if json {
+        let rows = files
+            .iter()
+            .map(|(path, written)| serde_json::json!({ "file": path, "written": written }));
+        crate::terminal::print_json(&serde_json::json!({ "files": rows.collect::<Vec<_>>() }));
+        return Ok(Exit::Ok);
+    }
+    let kept = match (count(Written::Kept), count(Written::Updated)) {
+        (0, 0) => String::new(),
+        (kept, updated) => format!(", {updated} renewed, {kept} kept as they are"),
+    };
+    outln!(
+        "{}: {} files written{kept}",
+        folder.display(),
+        count(Written::New)
+    );
+    outln!("protocols/       campaigns to copy from; `skinrig new --help` lists them");
+    outln!("hil/rigs/        bench.yaml: copy it and put in what `skinrig devices` shows");
+    outln!("hil/             suites of checks: first-contact.yaml, nightly.yaml");
+    outln!("sessions/        where recordings go");
+    let enter = if folder == Path::new(".") {
+        String::new()
+    } else {
+        format!("cd {} && ", folder.display())
+    };
+    outln!("next: {enter}skinrig run protocols/demo.yaml");
+    Ok(Exit::Ok)
+}
+
+/// Writes a file where there is none; renews one that is generated.
+fn write(path: &Path, file: StarterFile) -> Result<Written, Failure> {
+    let content = file.content();
+    match OpenOptions::new().write(true).create_new(true).open(path) {
+        Ok(mut new) => {
+            new.write_all(content.as_bytes())
+                .map_err(|e| unwritable(path, &e))?;
+            Ok(Written::New)
+        }
+        Err(e) if e.kind() == ErrorKind::AlreadyExists && file.is_generated() => {
+            if fs::read(path).is_ok_and(|found| found == content.as_bytes()) {
+                return Ok(Written::Kept);
+            }
+            fs::write(path, content.as_bytes()).map_err(|e| unwritable(path, &e))?;
+            Ok(Written::Updated)
+        }
+        Err(e) if e.kind() == ErrorKind::AlreadyExists => Ok(Written::Kept),
+        Err(e) => Err(unwritable(path, &e)),
+    }
+}
+
+fn unwritable(path: &Path, e: &std::io::Error) -> Failure {
+    Failure::input(format!(
+        "{}: expected a place that can be written: {e}\n  next: choose another folder",
+        path.display()
+    ))
+}

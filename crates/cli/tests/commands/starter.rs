@@ -1,0 +1,101 @@
+//! `skinrig new` and `skinrig init`: what a lab begins with, in a folder that knows no checkout.
+
+use std::path::Path;
+
+use crate::support::{Lab, Said, only, program, said};
+
+const KINDS: [&str; 9] = [
+    "campaign",
+    "comparison",
+    "depth-sweep",
+    "quick-check",
+    "rings",
+    "own-outline",
+    "own-cameras",
+    "other-skin",
+    "demo",
+];
+
+/// The program started in `folder`.
+fn at(folder: &Path, arguments: &[&str]) -> Said {
+    let mut command = program(arguments);
+    command.current_dir(folder);
+    said(command)
+}
+
+#[test]
+fn every_new_protocol_passes_its_check_and_none_is_overwritten() {
+    let lab = Lab::new();
+    let folder = lab.path("");
+    let help = at(&folder, &["new", "--help"]).code(0).out;
+    for kind in KINDS {
+        assert!(help.contains(kind), "{kind}: {help}");
+        let file = format!("{kind}.yaml");
+        at(&folder, &["new", kind, &file]).code(0);
+        at(&folder, &["check", &file]).code(0);
+        std::fs::write(lab.path(&file), "mine").unwrap();
+        at(&folder, &["new", kind, &file])
+            .code(2)
+            .complains(&[&file, "not there yet", "next:"]);
+        assert_eq!(std::fs::read_to_string(lab.path(&file)).unwrap(), "mine");
+    }
+    // The schema that their first line names.
+    assert!(lab.path("skinrig.schema.json").exists());
+    let made = at(&folder, &["new", "demo", "deeper/one.yaml", "--json"]).code(0);
+    assert_eq!(made.json()["files"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn a_new_lab_runs_and_keeps_what_is_its_own() {
+    let lab = Lab::new();
+    let folder = lab.path("");
+    let told = at(&folder, &["init", "here"]).code(0).out;
+    assert!(
+        told.contains("cd here && skinrig run protocols/demo.yaml"),
+        "{told}"
+    );
+    let here = lab.path("here");
+    at(&here, &["run", "protocols/quick-check.yaml"]).code(0);
+    only(&here.join("sessions"), ".session.sqlite");
+    let (own, schema) = (
+        here.join("protocols/demo.yaml"),
+        here.join("protocols/skinrig.schema.json"),
+    );
+    std::fs::write(&own, "mine").unwrap();
+    std::fs::write(&schema, "old").unwrap();
+    let told = at(&here, &["init"]).code(0).out;
+    assert!(told.contains("0 files written, 1 renewed"), "{told}");
+    assert_eq!(std::fs::read_to_string(&own).unwrap(), "mine");
+    assert_ne!(std::fs::read_to_string(&schema).unwrap(), "old");
+    std::fs::write(lab.path("file"), "").unwrap();
+    at(&folder, &["init", "file/lab"])
+        .code(2)
+        .complains(&["next:"]);
+}
+
+/// Without `scene`, the summary says what was taken; a skin of its own needs the level that models skins.
+#[test]
+fn a_scene_is_optional_and_says_what_it_took() {
+    let lab = Lab::new();
+    let folder = lab.path("");
+    at(&folder, &["new", "quick-check", "p.yaml"]).code(0);
+    let text = std::fs::read_to_string(lab.path("p.yaml")).unwrap();
+    let without = text.replace(
+        "scene:\n  needs: [triggers, event_rates, localisation]\n",
+        "",
+    );
+    assert_ne!(text, without);
+    std::fs::write(lab.path("p.yaml"), without).unwrap();
+    let told = at(&folder, &["run", "p.yaml", "--no-analysis"]).code(0).out;
+    assert!(
+        told.contains("simulated (geometric, for event_rates, localisation)"),
+        "{told}"
+    );
+    at(&folder, &["new", "other-skin", "o.yaml"]).code(0);
+    at(
+        &folder,
+        &["check", "o.yaml", "--set", "scene.level=geometric"],
+    )
+    .code(2)
+    .complains(&["scene.level", "optical"]);
+}
