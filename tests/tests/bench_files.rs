@@ -345,7 +345,7 @@ fn every_question_of_the_guide_has_a_number_of_its_own_and_a_key_that_exists() {
             && rest.bytes().all(|b| b.is_ascii_digit())
     };
     let questions = rows(&text, number);
-    assert!(questions.len() > 35, "{}", questions.len());
+    assert!(questions.len() > 30, "{}", questions.len());
     let numbers: BTreeSet<&str> = questions.iter().map(|q| q[0].as_str()).collect();
     assert_eq!(numbers.len(), questions.len(), "a number twice");
     let schema = |file: &str| -> Value { serde_json::from_str(&read(file)).unwrap() };
@@ -361,9 +361,6 @@ fn every_question_of_the_guide_has_a_number_of_its_own_and_a_key_that_exists() {
         let [number, _, _, answer] = question.as_slice() else {
             panic!("expected number, question, way and key, found {question:?}");
         };
-        if answer == "for the record" {
-            continue;
-        }
         let (schema, list) = match answer.strip_prefix("protocol: ") {
             Some(list) => (&protocol, list),
             None => (&rig, answer.as_str()),

@@ -53,19 +53,19 @@ analysis: {calibration: none}
 /// Camera buffer for a slow program: a quarter of a second of an idle stream.
 const BUFFER_BYTES: usize = 64 << 10;
 
-/// Phases in the order of the table, with the time of a fault in each: the first press is a sync press, the third the first
-/// scored one, the fifth the last.
-const PHASES: [(&str, &str); 10] = [
-    ("preflight", "preflight"),
-    ("arming", "arming"),
-    ("sync press", "hold:1"),
-    ("travel", "travel:1"),
-    ("approach", "approach:3"),
-    ("contact", "contact:3"),
-    ("hold", "hold:3"),
-    ("retract", "retract:3"),
-    ("between", "between:3"),
-    ("end", "between:5"),
+/// Phases in order, with the time of a fault in each and the presses completed before it: the first press is a sync press, the
+/// third the first scored one, the fifth the last.
+const PHASES: [(&str, &str, u64); 10] = [
+    ("preflight", "preflight", 0),
+    ("arming", "arming", 0),
+    ("sync press", "hold:1", 0),
+    ("travel", "travel:1", 2),
+    ("approach", "approach:3", 2),
+    ("contact", "contact:3", 2),
+    ("hold", "hold:3", 2),
+    ("retract", "retract:3", 2),
+    ("between", "between:3", 2),
+    ("end", "between:5", 4),
 ];
 
 /// Faults in the order of the table.
@@ -223,7 +223,8 @@ struct Cell {
 }
 
 /// Evaluates a run with a fault from its session file alone, compared with the fault-free run.
-fn judge(run: &Run, fault: PlantedFault, without: &Ideal) -> Cell {
+/// `before`: presses completed before the fault; the text gives the number of valid ones where it differs.
+fn judge(run: &Run, fault: PlantedFault, before: u64, without: &Ideal) -> Cell {
     let mut wrong = Vec::new();
     let verified = verify(&run.path, &mut Rescan::default()).unwrap();
     if !verified.is_sound() || verified.sealed != run.sealed {
@@ -283,16 +284,21 @@ fn judge(run: &Run, fault: PlantedFault, without: &Ideal) -> Cell {
         wrong.extend(differences(analysis, &without.presses, moves_as_ever));
     }
     let planned = totals.presses.planned + totals.sync.planned;
+    let kept = if valid == before {
+        String::new()
+    } else {
+        format!(", {valid} valid")
+    };
     let mut words = match (&report.end, killed) {
-        (_, true) => format!("cut off, {valid} valid"),
-        (RunEnd::Faulted(_), _) if !run.moved => "refused before motion".to_owned(),
+        (_, true) => format!("cut off{kept}"),
+        (RunEnd::Faulted(_), _) if !run.moved => "refused".to_owned(),
         (RunEnd::Faulted(_), _) => {
             let place = if report.retracted {
                 "at clearance"
             } else {
                 "braked"
             };
-            format!("ended, {valid} valid, {place}")
+            format!("ended {place}{kept}")
         }
         (RunEnd::Completed, _) if !struck => "too late to strike".to_owned(),
         (RunEnd::Completed, _) if !usable => "INVALID session".to_owned(),
@@ -436,7 +442,7 @@ fn each_fault_in_each_phase_ends_as_documented() {
             let path = lab.path().join(format!("{}-{p}.session.sqlite", FAULTS[f]));
             let fault = planted(FAULTS[f], p, record_of(p, &ideal.told, &timings));
             let run = run(experiment, Some(fault), path);
-            let cell = judge(&run, fault, &without);
+            let cell = judge(&run, fault, PHASES[p].2, &without);
             std::fs::remove_file(&run.path).unwrap();
             cell
         })
@@ -457,20 +463,33 @@ fn each_fault_in_each_phase_ends_as_documented() {
     compare(&table);
 }
 
+/// Faults with equal outcomes share a row; phases with equal outcomes in succession are named by their ends.
 fn table(cells: &[Cell]) -> String {
-    let mut table = String::from("| fault |");
-    for (phase, _) in PHASES {
-        let _ = write!(table, " {phase} |");
-    }
-    table.push_str("\n|---|");
-    table.push_str(&"---|".repeat(PHASES.len()));
-    table.push('\n');
+    let mut rows: Vec<(String, String)> = Vec::new();
     for (name, row) in FAULTS.iter().zip(cells.chunks(PHASES.len())) {
-        let _ = write!(table, "| {name} |");
-        for cell in row {
-            let _ = write!(table, " {} |", cell.words);
+        let mut outcomes: Vec<String> = Vec::new();
+        let mut first = 0;
+        for spell in row.chunk_by(|a, b| a.words == b.words) {
+            let last = first + spell.len() - 1;
+            let phases = match spell.len() {
+                1 => PHASES[first].0.to_owned(),
+                2 => format!("{}, {}", PHASES[first].0, PHASES[last].0),
+                _ => format!("{} to {}", PHASES[first].0, PHASES[last].0),
+            };
+            outcomes.push(format!("{phases}: {}", spell[0].words));
+            first = last + 1;
         }
-        table.push('\n');
+        let outcomes = outcomes.join("; ");
+        match rows.iter_mut().find(|(_, same)| *same == outcomes) {
+            Some((names, _)) => {
+                let _ = write!(names, ", {name}");
+            }
+            None => rows.push(((*name).to_owned(), outcomes)),
+        }
+    }
+    let mut table = String::from("| fault | outcome by phase |\n|---|---|\n");
+    for (names, outcomes) in rows {
+        let _ = writeln!(table, "| {names} | {outcomes} |");
     }
     table
 }

@@ -300,27 +300,41 @@ mod tests {
         Event::Disarmed,
     ];
 
-    /// The table as Markdown, one row per state, one column per event: `next state: action`.
+    /// The table as Markdown, one row per event: `states → next state: action`, and what the event does in all other states.
     fn markdown() -> String {
-        let mut out = String::from("| state |");
+        let mut out = String::from("| event | effect | in other states |\n|---|---|---|\n");
         for event in EVENTS {
-            out.push_str(&format!(" {event:?} |"));
-        }
-        out.push_str("\n|---|");
-        out.push_str(&"---|".repeat(EVENTS.len()));
-        out.push('\n');
-        for state in State::ALL {
-            out.push_str(&format!("| **{state:?}** |"));
-            for event in EVENTS {
-                let cell = match transition(state, event) {
-                    (_, Action::Ignore) => " · |".to_owned(),
-                    (_, Action::Reject) => " ✗ |".to_owned(),
-                    (next, Action::None) => format!(" {next:?} |"),
-                    (next, action) => format!(" {next:?}: {action:?} |"),
+            let mut effects: Vec<(String, String)> = Vec::new();
+            let mut elsewhere = BTreeSet::new();
+            for state in State::ALL {
+                let result = match transition(state, event) {
+                    (_, Action::Ignore) => {
+                        elsewhere.insert("ignored");
+                        continue;
+                    }
+                    (_, Action::Reject) => {
+                        elsewhere.insert("fault");
+                        continue;
+                    }
+                    (next, Action::None) => format!("{next:?}"),
+                    (next, action) if next == state => format!("{action:?}"),
+                    (next, action) => format!("{next:?}: {action:?}"),
                 };
-                out.push_str(&cell);
+                match effects.iter_mut().find(|(_, same)| *same == result) {
+                    Some((states, _)) => states.push_str(&format!(", {state:?}")),
+                    None => effects.push((format!("{state:?}"), result)),
+                }
             }
-            out.push('\n');
+            let effects: Vec<String> = effects
+                .iter()
+                .map(|(states, result)| format!("{states} → {result}"))
+                .collect();
+            let elsewhere: Vec<&str> = elsewhere.into_iter().collect();
+            out.push_str(&format!(
+                "| {event:?} | {} | {} |\n",
+                effects.join("; "),
+                elsewhere.join(", ")
+            ));
         }
         out
     }

@@ -161,8 +161,8 @@ fn right_pictures(bench: &mut Bench) {
     right_streams(bench);
 }
 
-const NEARLY: &str = "a rig description that is a few mm off looks the same";
-const TWO_BAD: &str = "two places at which the skin is bad look the same";
+const NEARLY: &str = "a rig description a few mm off looks the same";
+const TWO_BAD: &str = "two bad locations look the same";
 
 /// All cases.
 #[must_use]

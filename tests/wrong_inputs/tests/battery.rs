@@ -1,12 +1,12 @@
 //! Every case of the battery, for a sample of seeds: none is valid with a wrong result.
 
-#![expect(clippy::print_stdout, reason = "the table of the documentation")]
+#![expect(clippy::print_stdout, reason = "outcomes are printed with --nocapture")]
 
 use rayon::prelude::*;
 use skinrig_wrong_inputs::cases::{Case, all};
 use skinrig_wrong_inputs::judge::{Allowed, Judged, Observed, judge};
 
-/// A row of the table in `docs/reference/wrong-inputs.md`.
+/// Outcome of a case, as a line of the printed summary.
 fn row(case: &Case, judged: &Judged) -> String {
     let unknowable = case.allowed.iter().find_map(|allowed| match allowed {
         Allowed::Unknowable(why) => Some(*why),
@@ -24,6 +24,9 @@ fn row(case: &Case, judged: &Judged) -> String {
     };
     format!("| {} | {} | {outcome} |", case.group, case.name)
 }
+
+const BEGIN: &str = "<!-- the list is written by tests/wrong_inputs/tests/battery.rs -->\n";
+const END: &str = "<!-- end of the list -->";
 
 /// True unless the number is right or withheld. With other noise a fault may stay below what names it, or an alignment below
 /// its odds: neither claims anything wrong.
@@ -87,14 +90,66 @@ fn nor_does_any_of_ten_seeds() {
     );
 }
 
-#[test]
-fn every_case_stands_in_the_table_of_the_docs() {
-    let page = include_str!("../../../docs/reference/wrong-inputs.md");
+/// The cases in `docs/reference/wrong-inputs.md`. Cases of a group that allow the same outcomes share a line.
+fn list() -> String {
+    let mut rows: Vec<(&str, String, String)> = Vec::new();
     for case in all() {
-        let row = format!("| {} | {} | ", case.group, case.name);
-        assert!(
-            page.contains(&row),
-            "docs/reference/wrong-inputs.md lacks: {row}"
-        );
+        let mut allowed = case.allowed.clone();
+        allowed.sort_by_key(|a| match a {
+            Allowed::Right => (0, ""),
+            Allowed::Named(fault) => (1, fault.name()),
+            Allowed::Unknowable(_) => (2, ""),
+            Allowed::Refused => (3, ""),
+        });
+        let outcomes: Vec<String> = allowed
+            .iter()
+            .map(|a| match a {
+                Allowed::Right => "right".to_owned(),
+                Allowed::Named(fault) => fault.name().to_owned(),
+                Allowed::Unknowable(_) => "unknown".to_owned(),
+                Allowed::Refused => "refused".to_owned(),
+            })
+            .collect();
+        let outcomes = outcomes.join("; ");
+        match rows
+            .iter_mut()
+            .find(|(group, _, same)| *group == case.group && *same == outcomes)
+        {
+            Some((_, names, _)) => {
+                names.push_str("; ");
+                names.push_str(case.name);
+            }
+            None => rows.push((case.group, case.name.to_owned(), outcomes)),
+        }
     }
+    let mut list = String::new();
+    let mut last = "";
+    for (group, names, outcomes) in rows {
+        if group != last {
+            list.push_str(&format!("\n### {group}\n\n"));
+        }
+        list.push_str(&format!("- **{outcomes}**: {names}\n"));
+        last = group;
+    }
+    list.push('\n');
+    list
+}
+
+/// With `SKINRIG_WRITE_DOCS=1` writes the list instead of comparing it.
+#[test]
+fn the_documented_list_is_this_one() -> std::io::Result<()> {
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../docs/reference/wrong-inputs.md"
+    );
+    let page = std::fs::read_to_string(path)?;
+    let (before, rest) = page.split_once(BEGIN).unwrap_or_default();
+    let (documented, after) = rest.split_once(END).unwrap_or_default();
+    let list = list();
+    if std::env::var_os("SKINRIG_WRITE_DOCS").is_some() {
+        return std::fs::write(path, format!("{before}{BEGIN}{list}{END}{after}"));
+    }
+    let next = "SKINRIG_WRITE_DOCS=1 cargo test -p skinrig-wrong-inputs documented";
+    assert_eq!(documented, list, "{path} is not up to date; next: {next}");
+    Ok(())
 }

@@ -11,7 +11,7 @@ use super::{Nights, Seen};
 
 /// How a fault shows in a night, when no other one hides it.
 pub(super) struct Planted {
-    /// As in the table of docs/reference/nightly.md.
+    /// As in the list of docs/reference/nightly.md.
     pub name: &'static str,
     plant: fn(&mut Nights),
     /// The check that finds it.
