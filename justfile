@@ -39,3 +39,7 @@ generate:
 # The documentation as a site, with search (needs mdbook).
 site:
     mdbook serve docs --open
+
+# A tarball and a .deb for computers without a checkout.
+package out="dist":
+    packaging/package {{ out }}

@@ -14,6 +14,7 @@ mod help;
 mod hil;
 mod import;
 mod import_refusals;
+mod installed;
 mod interrupt;
 mod json;
 mod numbering;
