@@ -8,7 +8,6 @@
 //!
 //! Hooks for browser tests: every section, figure, button and the press table carries a `data-testid`.
 
-pub mod axes;
 mod choices;
 pub mod colour;
 pub mod compare;
@@ -30,6 +29,7 @@ mod error;
 mod format;
 mod frame;
 mod input;
+mod plot;
 mod tables;
 mod terminal;
 

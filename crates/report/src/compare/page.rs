@@ -6,12 +6,12 @@ use serde::Serialize;
 use skinrig_compare::statistics::Verdict;
 use skinrig_compare::{Comparison, Severity};
 
-use super::figures::{self, RenderedFigure};
-use super::{tables, text};
+use super::{figures, tables, text};
 use crate::error::ReportError;
 use crate::format::number;
 use crate::frame::{Frame, safe};
 use crate::page::script_json;
+use crate::plot::Figure;
 use crate::svg::{FIGURE_CSS, plain_css};
 
 const TEMPLATE: &str = include_str!("../../assets/compare/page.html");
@@ -29,7 +29,7 @@ struct SkinCard {
     margin: Option<String>,
     needed: Option<String>,
     rows: Vec<MetricLine>,
-    figures: Vec<Value>,
+    figures: [Option<Figure>; 4],
     causes: Option<CausesCard>,
 }
 
@@ -90,6 +90,7 @@ pub fn html(result: &Comparison) -> Result<String, ReportError> {
     frame.render(context! {
         plain_css => safe(&plain_css()),
         data => safe(&script_json(&data)?),
+        contents => [("verdict", "Verdict"), ("metrics", "Metrics"), ("maps", "Maps"), ("why", "Why"), ("sessions", "Sessions")],
         heading,
         stand_in => text::stand_in(result),
         limits => result.limits.clone(),
@@ -131,7 +132,7 @@ fn skin_card(result: &Comparison, k: usize) -> SkinCard {
         margin,
         needed: compared.and_then(text::needed),
         rows: lines(result, k),
-        figures: figures.into_iter().map(figure).collect(),
+        figures,
         causes: causes.map(|of| CausesCard {
             carried_by: of.carried_by.map(skinrig_compare::Factor::name),
             measured: of
@@ -168,16 +169,6 @@ fn skin_card(result: &Comparison, k: usize) -> SkinCard {
             presses: of.presses,
         }),
     }
-}
-
-/// Template value of a figure; none for a figure without data.
-fn figure(figure: Option<RenderedFigure>) -> Value {
-    figure.map_or(Value::from(()), |f| {
-        context! {
-            id => f.id, title => f.title, caption => f.caption, svg => Value::from_safe_string(f.svg),
-            table => f.table, interaction => f.interaction,
-        }
-    })
 }
 
 fn lines(result: &Comparison, k: usize) -> Vec<MetricLine> {

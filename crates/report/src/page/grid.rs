@@ -13,6 +13,8 @@ pub(super) struct Grid {
     notes: Vec<String>,
     /// Table in the script data to download.
     table: Option<&'static str>,
+    /// True for a table that opens on request.
+    folded: bool,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -42,6 +44,7 @@ impl Grid {
             rows: vec![],
             notes: vec![],
             table: None,
+            folded: false,
         }
     }
 
@@ -60,6 +63,12 @@ impl Grid {
             cells: cells.into_iter().collect(),
             marked,
         });
+        self
+    }
+
+    /// Shows only the title until it is opened.
+    pub(super) const fn fold(&mut self) -> &mut Self {
+        self.folded = true;
         self
     }
 

@@ -25,8 +25,8 @@ use assets::{SCRIPT, TEMPLATES};
 
 use crate::derive;
 use crate::error::ReportError;
-use crate::figures::{self, Figure};
-use crate::format::{digits_of_error, grouped, interval, number, or_missing};
+use crate::figures;
+use crate::format::{digits_of_error, grouped, interval, number, or_missing, phrase};
 use crate::frame::{Frame, safe};
 use crate::input::ReportInput;
 use crate::provenance::Provenance;
@@ -75,9 +75,9 @@ fn show_all(value: &mut serde_json::Value) {
 /// See [`crate::html`].
 pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
     let (a, p) = (input.analysis, &input.provenance);
-    let fig: BTreeMap<&str, Value> = figures::all(input)
+    let fig: BTreeMap<String, Value> = figures::all(input)
         .into_iter()
-        .map(|f| (f.id, figure_value(f)))
+        .map(|f| (f.id.clone(), Value::from(Serde(f))))
         .collect();
     let c = &a.counts;
     let usable = a.is_valid();
@@ -158,7 +158,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         provenance => provenance_rows(p, a.version),
         devices => p.devices.iter()
             .map(|d| context! {
-                role => d.role.clone(), model => d.model.clone(), serial => d.serial.clone(),
+                role => phrase(&d.role), model => d.model.clone(), serial => d.serial.clone(),
                 firmware => d.firmware.clone()
             })
             .collect::<Vec<_>>(),
@@ -250,17 +250,6 @@ fn threshold_note(a: &Analysis) -> Option<String> {
          and rejects {} of them.",
         t.events, t.n, t.left_out
     ))
-}
-
-fn figure_value(f: Figure) -> Value {
-    context! {
-        id => f.id,
-        title => f.title,
-        caption => f.caption,
-        svg => safe(&f.svg),
-        table => f.table,
-        interaction => f.interaction,
-    }
 }
 
 fn rejections(a: &Analysis, sync: bool) -> Vec<Value> {
