@@ -28,6 +28,7 @@ mod document;
 mod error;
 mod format;
 mod frame;
+mod grid;
 mod input;
 mod plot;
 mod tables;

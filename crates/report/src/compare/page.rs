@@ -4,12 +4,13 @@ use minijinja::value::Serde;
 use minijinja::{Value, context};
 use serde::Serialize;
 use skinrig_compare::statistics::Verdict;
-use skinrig_compare::{Comparison, Severity};
+use skinrig_compare::{Causes, Comparison, Severity};
 
 use super::{figures, tables, text};
 use crate::error::ReportError;
 use crate::format::number;
 use crate::frame::{Frame, safe};
+use crate::grid::Grid;
 use crate::page::script_json;
 use crate::plot::Figure;
 use crate::svg::{FIGURE_CSS, plain_css};
@@ -49,8 +50,8 @@ struct MetricLine {
 #[derive(Serialize)]
 struct CausesCard {
     carried_by: Option<&'static str>,
-    measured: Vec<[String; 3]>,
-    exchanged: Vec<[String; 4]>,
+    measured: Grid,
+    exchanged: Grid,
     places: u32,
     presses: [u32; 2],
 }
@@ -135,40 +136,45 @@ fn skin_card(result: &Comparison, k: usize) -> SkinCard {
         figures,
         causes: causes.map(|of| CausesCard {
             carried_by: of.carried_by.map(skinrig_compare::Factor::name),
-            measured: of
-                .measured
-                .iter()
-                .map(|m| {
-                    let digits = |v: Option<f64>| match v {
-                        Some(v) if v.abs() >= 100.0 => 0,
-                        _ => 3,
-                    };
-                    let [a, b] = m.values.map(|v| number(v, digits(v)));
-                    [format!("{} ({})", m.what, m.unit), a, b]
-                })
-                .collect(),
-            exchanged: of
-                .exchanged
-                .iter()
-                .map(|x| {
-                    let rmse = format!(
-                        "{} ({} of {})",
-                        number(x.rmse_mm, 2),
-                        x.located[0],
-                        x.located[1]
-                    );
-                    [
-                        x.presses.to_string(),
-                        x.calibration.to_string(),
-                        x.settings.to_string(),
-                        rmse,
-                    ]
-                })
-                .collect(),
+            measured: measured(of, skin.letter),
+            exchanged: exchanged(of),
             places: of.locations,
             presses: of.presses,
         }),
     }
+}
+
+fn measured(of: &Causes, letter: char) -> Grid {
+    let rows = of.measured.iter().map(|m| {
+        let digits = |v: Option<f64>| {
+            if v.is_some_and(|v| v.abs() >= 100.0) {
+                0
+            } else {
+                3
+            }
+        };
+        let [a, b] = m.values.map(|v| number(v, digits(v)));
+        [format!("{} ({})", m.what, m.unit), a, b]
+    });
+    let columns = ["Quantity", "#A", &format!("#{letter}")];
+    Grid::new("measured", "Measured in both", &columns).with(rows)
+}
+
+/// Errors with the calibration and settings of each skin.
+fn exchanged(of: &Causes) -> Grid {
+    let rows = of.exchanged.iter().map(|x| {
+        let [located, all] = x.located;
+        let rmse = format!("{} ({located} of {all})", number(x.rmse_mm, 2));
+        let skins = [x.presses, x.calibration, x.settings].map(|skin| skin.to_string());
+        skins.into_iter().chain([rmse])
+    });
+    let columns = [
+        "Presses of",
+        "Calibration of",
+        "Settings of",
+        "#RMSE, mm (located)",
+    ];
+    Grid::new("exchanged", "Cross-evaluation", &columns).with(rows)
 }
 
 fn lines(result: &Comparison, k: usize) -> Vec<MetricLine> {

@@ -2,8 +2,8 @@
 
 use skinrig_analysis::result::{Analysis, Estimate};
 
-use super::grid::Grid;
 use crate::format::{NONE, contact_map, interval, number};
+use crate::grid::Grid;
 use crate::published;
 
 /// Areas and taxels beside the published ones.

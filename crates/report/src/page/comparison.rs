@@ -2,9 +2,9 @@
 
 use skinrig_analysis::result::{Analysis, Thinning};
 
-use super::grid::Grid;
 use crate::comparison::{Cell, rows};
 use crate::format::{self, NONE, interval, number};
+use crate::grid::Grid;
 use crate::input::ReportInput;
 use crate::published::{self, Metric};
 

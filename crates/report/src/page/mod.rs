@@ -10,7 +10,6 @@ mod assets;
 mod calibration;
 mod comparison;
 pub(crate) mod findings;
-mod grid;
 mod latency;
 mod reduction;
 
@@ -28,6 +27,7 @@ use crate::error::ReportError;
 use crate::figures;
 use crate::format::{digits_of_error, grouped, interval, number, or_missing, phrase};
 use crate::frame::{Frame, safe};
+use crate::grid::Grid;
 use crate::input::ReportInput;
 use crate::provenance::Provenance;
 use crate::svg::{FIGURE_CSS, plain_css};
@@ -156,18 +156,9 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
             })
             .collect::<Vec<_>>(),
         provenance => provenance_rows(p, a.version),
-        devices => p.devices.iter()
-            .map(|d| context! {
-                role => phrase(&d.role), model => d.model.clone(), serial => d.serial.clone(),
-                firmware => d.firmware.clone()
-            })
-            .collect::<Vec<_>>(),
-        preflight => p.preflight.iter()
-            .map(|c| context! {
-                check => c.check.clone(), expected => c.expected.clone(), found => c.found.clone(),
-                verdict => c.verdict.name(), next => c.next_step.clone(),
-            })
-            .collect::<Vec<_>>(),
+        devices => (!p.devices.is_empty()).then(|| Value::from(Serde(devices(p)))),
+        preflight => (!p.preflight.is_empty()).then(|| Value::from(Serde(preflight(p)))),
+        preflight_checks => p.preflight.len(),
         clocks => clocks(input),
         calibration => calibration(input),
         settings => tables::settings(a),
@@ -316,6 +307,26 @@ fn provenance_rows(p: &Provenance, analysis_version: u32) -> Vec<Value> {
         rows.push(row("overrides", &p.overrides.join("  "), true));
     }
     rows
+}
+
+fn devices(p: &Provenance) -> Grid {
+    let columns = ["Role", "Model", "`Serial", "Firmware"];
+    Grid::new("devices", "Devices", &columns).with(p.devices.iter().map(|d| {
+        let (model, serial) = (d.model.clone(), d.serial.clone());
+        [phrase(&d.role), model, serial, d.firmware.clone()]
+    }))
+}
+
+fn preflight(p: &Provenance) -> Grid {
+    let columns = ["Check", "Expected", "Found", "Verdict"];
+    Grid::new("preflight", "Preflight", &columns).with(p.preflight.iter().map(|c| {
+        let found = match &*c.next_step {
+            "" => c.found.clone(),
+            next => format!("{}; {next}", c.found),
+        };
+        let verdict = c.verdict.name().to_owned();
+        [c.check.clone(), c.expected.clone(), found, verdict]
+    }))
 }
 
 fn clocks(input: &ReportInput<'_>) -> Vec<Value> {
