@@ -29,7 +29,7 @@ pub fn pose_course(input: &ReportInput<'_>) -> Option<Figure> {
         number(Some(motion.max_mm), 3),
     );
     let starts = || motion.course.iter().map(|b| b.start_s);
-    let end = starts().last().map_or(1.0, |s| s + motion.bin_s);
+    let end = starts().next_back().map_or(1.0, |s| s + motion.bin_s);
     let span = (starts().next().unwrap_or(0.0), end);
     let middle = motion.bin_s / 2.0;
     let line = |value: fn(&MotionBin) -> f64| {
