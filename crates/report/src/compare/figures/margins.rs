@@ -33,7 +33,7 @@ pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<Figur
     let n = rows.len();
     // Arrows beyond the last margin stay inside the frame.
     let end = MAX_MARGINS + 0.25;
-    let x = Axis::linear((-end, end), "difference (margins)").ticks(4);
+    let x = Axis::linear((-end, end), "difference (margins)").ticks(5);
     let names = rows.iter().map(|(row, ..)| row.name.clone());
     let mut plot = Plot::new(x, Axis::categories(names, "").downwards())
         .title(format!("← {letter} worse"))
