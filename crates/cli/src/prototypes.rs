@@ -7,7 +7,7 @@ use serde::Serialize;
 use skinrig_analysis::result::Estimate;
 use skinrig_recorder::{SessionState, SessionSummary, list};
 use skinrig_report::Variant;
-use skinrig_text::{Column, Table};
+use skinrig_text::{Blocks, Column, Table, sparkline};
 
 use crate::analyses::summary;
 use crate::args::PrototypesArgs;
@@ -186,7 +186,7 @@ fn print(all: &[Prototype], each: bool) {
                 &minute(last),
                 &interval(series.best),
                 &interval(series.last),
-                &sparkline(&rmse[rmse.len().saturating_sub(SPARKS)..]),
+                &spark(&rmse[rmse.len().saturating_sub(SPARKS)..]),
             ]);
             outln!("{row}");
             if each {
@@ -255,20 +255,15 @@ fn interval(estimate: Option<Estimate>) -> String {
     }
 }
 
-/// A bar for each value between the least and the greatest of them.
-fn sparkline(values: &[f64]) -> String {
-    const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+/// A block for each value between the least and the greatest of them.
+fn spark(values: &[f64]) -> String {
     let least = values.iter().copied().fold(f64::INFINITY, f64::min);
     let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let bar = |value: &f64| {
-        let share = if most > least {
-            (value - least) / (most - least)
-        } else {
-            0.5
-        };
-        BARS[((share * 8.0) as usize).min(7)]
+    let share = |value: &f64| match most - least {
+        span if span > 0.0 => Some((value - least) / span),
+        _ => Some(0.5),
     };
-    values.iter().map(bar).collect()
+    sparkline(values.iter().map(share), Blocks::Unicode)
 }
 
 #[cfg(test)]
@@ -277,8 +272,8 @@ mod tests {
 
     #[test]
     fn a_sparkline_spans_its_values() {
-        assert_eq!(sparkline(&[1.0, 2.0, 3.0]), "▁▅█");
-        assert_eq!(sparkline(&[2.0, 2.0]), "▅▅");
-        assert_eq!(sparkline(&[]), "");
+        assert_eq!(spark(&[1.0, 2.0, 3.0]), "▁▅█");
+        assert_eq!(spark(&[2.0, 2.0]), "▅▅");
+        assert_eq!(spark(&[]), "");
     }
 }

@@ -1,4 +1,4 @@
-//! Owns the colour scale of the figures: viridis, readable with all common types of colour vision.
+//! Owns the colour scales of the figures: viridis and blue-orange, readable with all common types of colour vision.
 //!
 //! Nine anchor colours from matplotlib's viridis table (at 0, 1/8, ... 1), with linear interpolation.
 
@@ -17,7 +17,12 @@ const VIRIDIS: [[u8; 3]; 9] = [
 /// Colour at `share` of the scale as `#rrggbb`. Clamps to 0..=1; figures label the ends of the scale accordingly.
 #[must_use]
 pub(crate) fn viridis(share: f64) -> String {
-    let [r, g, b] = viridis_rgb(share);
+    hex(viridis_rgb(share))
+}
+
+/// A colour as `#rrggbb`.
+#[must_use]
+pub(crate) fn hex([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
@@ -37,6 +42,22 @@ pub(crate) fn viridis_rgb(share: f64) -> [u8; 3] {
         (a + t * (b - a)).round() as u8
     };
     [mix(0), mix(1), mix(2)]
+}
+
+/// Blue (better) for -1, light grey for 0, orange (worse) for 1. Distinct in all common types of colour vision.
+#[must_use]
+pub(crate) fn diverging(share: f64) -> String {
+    let share = share.clamp(-1.0, 1.0);
+    let end = if share < 0.0 {
+        [0x2b, 0x7b, 0xba]
+    } else {
+        [0xd9, 0x72, 0x1a]
+    };
+    let mix = |i: usize| {
+        let (from, to) = (f64::from([0xec, 0xee, 0xf0][i]), f64::from(end[i]));
+        (from + share.abs() * (to - from)).round() as u8
+    };
+    hex([mix(0), mix(1), mix(2)])
 }
 
 #[cfg(test)]

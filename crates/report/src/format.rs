@@ -42,6 +42,35 @@ pub(crate) fn interval(e: &Estimate, scale: f64, digits: usize) -> String {
     }
 }
 
+/// Contact map score of the public code with its interval. It compares two parts of the estimated map, so it is said which
+/// one is larger: brightness `missing` in the true cell, or brightness `outside` it.
+pub(crate) fn contact_map(e: &Estimate) -> String {
+    let part = |v: f64| {
+        let name = if v < 0.0 { "outside" } else { "missing" };
+        format!("{} % {name}", number(Some(v.abs()), 2))
+    };
+    match (e.value, e.low, e.high) {
+        (Some(v), Some(low), Some(high)) => {
+            format!("{} [{} to {}]", part(v), part(low), part(high))
+        }
+        (Some(v), ..) => part(v),
+        _ => NONE.to_owned(),
+    }
+}
+
+/// An identifier as people write it: `lost_pulses` is "lost pulses", `camera1` "camera 1", `rmse` "RMSE".
+pub(crate) fn phrase(identifier: &str) -> String {
+    let word = |word: &str| match word {
+        "rmse" | "usb" | "cpu" | "evk1" | "evk4" | "drd" => word.to_uppercase(),
+        "std" => "standard deviation".to_owned(),
+        "camera1" => "camera 1".to_owned(),
+        "camera2" => "camera 2".to_owned(),
+        _ => word.to_owned(),
+    };
+    let words: Vec<String> = identifier.split(['_', ' ']).map(word).collect();
+    words.join(" ")
+}
+
 /// Whole number in groups of three, separated by thin spaces: `12 345 678`.
 pub(crate) fn grouped(n: u64) -> String {
     let digits = n.to_string();
@@ -122,6 +151,25 @@ mod tests {
         assert_eq!(written(1.893), "1.9");
         assert_eq!(written(38.0), "38.0");
         assert_eq!(written(0.0), "0.000");
+    }
+
+    #[test]
+    fn identifiers_become_words_and_scores_say_which_part_is_larger() {
+        assert_eq!(phrase("lost_pulses"), "lost pulses");
+        assert_eq!(phrase("camera1"), "camera 1");
+        assert_eq!(phrase("rmse_over_repeat"), "RMSE over repeat");
+        let score = |value| Estimate {
+            value: Some(value),
+            low: Some(value - 1.0),
+            high: Some(value + 1.0),
+            n: 3,
+        };
+        let said = contact_map(&score(-12.17));
+        assert_eq!(said, "12.17 % outside [13.17 % outside to 11.17 % outside]");
+        assert_eq!(
+            contact_map(&score(0.5)),
+            "0.50 % missing [0.50 % outside to 1.50 % missing]"
+        );
     }
 
     #[test]

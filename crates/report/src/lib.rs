@@ -8,7 +8,6 @@
 //!
 //! Hooks for browser tests: every section, figure, button and the press table carries a `data-testid`.
 
-pub mod axes;
 mod choices;
 pub mod colour;
 pub mod compare;
@@ -29,7 +28,9 @@ mod document;
 mod error;
 mod format;
 mod frame;
+mod grid;
 mod input;
+mod plot;
 mod tables;
 mod terminal;
 

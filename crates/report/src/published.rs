@@ -140,7 +140,7 @@ impl Metric {
             Self::IdleRate => "data rate, idle (kB/s)",
             Self::LatencyWidth => "detection, width of 5-95 % (ms)",
             Self::LatencyFromContact => "detection, median after contact (ms)",
-            Self::GlobalError => "contact map error (%)",
+            Self::GlobalError => "contact map imbalance (%)",
             Self::DiagonalError => "RMSE, share of the diagonal (%)",
             Self::Rmse => "localisation RMSE (mm)",
             Self::PassRate => "pass rate (%)",

@@ -3,7 +3,7 @@
 //! Why not a plotting crate: figures must follow the page's light and dark theme, so every colour that means "ink", "grid"
 //! or "camera 1" is a CSS class (`assets/frame/figure.css`) instead of a fixed value; each figure needs a title, a
 //! description and one element per press for scripts; and a page of 2,500 presses must stay small. Plotting crates provide
-//! none of this. The remaining work is small: elements here, scales and ticks in [`crate::axes`].
+//! none of this. The remaining work is small: elements here, axes and plots in [`crate::plot`].
 
 use std::fmt::{self, Display, Write};
 
@@ -138,6 +138,27 @@ impl Svg {
         )
     }
 
+    /// Text at (x, y), turned by `degrees`.
+    pub fn turned(
+        &mut self,
+        at: (f64, f64),
+        class: &str,
+        anchor: &str,
+        degrees: f64,
+        text: &str,
+    ) -> &mut Self {
+        let turn = format!("translate({} {}) rotate({degrees})", Px(at.0), Px(at.1));
+        self.holding(
+            "text",
+            &[
+                ("class", &class),
+                ("text-anchor", &anchor),
+                ("transform", &turn),
+            ],
+            text,
+        )
+    }
+
     /// A straight line.
     pub fn line(&mut self, class: &str, from: (f64, f64), to: (f64, f64)) -> &mut Self {
         self.leaf(
@@ -170,17 +191,33 @@ impl Svg {
     }
 }
 
-/// Path through the points; `close` returns to the first one.
+/// Path through the points; `close` returns to the first one. A point that is not finite breaks the path.
 pub fn polyline(points: impl IntoIterator<Item = (f64, f64)>, close: bool) -> String {
     let mut d = String::new();
+    let mut last: Option<(String, String)> = None;
+    // Start of a horizontal piece in `d`, and its direction: longer ones replace it.
+    let mut level: Option<(usize, bool)> = None;
+    let mut from = f64::NAN;
     for (x, y) in points {
-        let _ = write!(
-            d,
-            "{}{} {}",
-            if d.is_empty() { 'M' } else { 'L' },
-            Px(x),
-            Px(y)
-        );
+        if !(x.is_finite() && y.is_finite()) {
+            (last, level) = (None, None);
+            continue;
+        }
+        let (tx, ty) = (Px(x).to_string(), Px(y).to_string());
+        let (command, still) = match &last {
+            None => (format!("M{tx} {ty}"), None),
+            Some((lx, ly)) if *lx == tx && *ly == ty => continue,
+            Some((_, ly)) if *ly == ty => {
+                let forwards = x > from;
+                let start = level.filter(|l| l.1 == forwards).map_or(d.len(), |l| l.0);
+                d.truncate(start);
+                (format!("H{tx}"), Some((start, forwards)))
+            }
+            Some((lx, _)) if *lx == tx => (format!("V{ty}"), None),
+            Some(_) => (format!("L{tx} {ty}"), None),
+        };
+        d += &command;
+        (last, level, from) = (Some((tx, ty)), still, x);
     }
     if close && !d.is_empty() {
         d.push('Z');
@@ -211,6 +248,15 @@ mod tests {
             "<g data-x=\"&quot;&gt;&lt;script&gt;&amp;&#39;\"><text x=\"1\" y=\"0\" class=\"a\" \
              text-anchor=\"start\">&lt;/text&gt;&lt;img onerror=x&gt;\\u{0}</text></g>"
         );
+    }
+
+    #[test]
+    fn lines_are_short_and_break_where_a_value_is_missing() {
+        let at = |points: &[(f64, f64)]| polyline(points.iter().copied(), false);
+        let level = [(0.0, 1.0), (1.0, 1.0), (2.0, 1.0), (2.0, 3.0), (4.0, 5.0)];
+        assert_eq!(at(&level), "M0 1H2V3L4 5");
+        assert_eq!(at(&[(0.0, 1.0), (2.0, 1.0), (1.0, 1.0)]), "M0 1H2H1");
+        assert_eq!(at(&[(0.0, 1.0), (1.0, f64::NAN), (2.0, 1.0)]), "M0 1M2 1");
     }
 
     #[test]

@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 
 use minijinja::value::Serde;
 use minijinja::{Value, context};
-use serde::Serialize;
 use skinrig_analysis::result::Estimate;
 use skinrig_analysis::tradeoff::{Cost, Row, Tradeoff};
 use skinrig_text::{Column, Paint, Table};
@@ -15,6 +14,7 @@ use crate::error::ReportError;
 use crate::figures::tradeoff as figure;
 use crate::format::{interval, number};
 use crate::frame::Frame;
+use crate::grid::Grid;
 use crate::svg::FIGURE_CSS;
 
 const TEMPLATE: &str = include_str!("../assets/tradeoff/page.html");
@@ -162,28 +162,21 @@ pub fn protocol_lines(row: &Row) -> String {
     out
 }
 
-/// Names of the numeric columns, with units.
-const HEADS: [&str; 11] = [
-    "Front",
-    "RMSE (mm)",
-    "95 % interval",
-    "n",
-    "Penalised (mm)",
-    "Located (%)",
-    "Within (%)",
-    "CPU (µs)",
-    "CPU range",
-    "Sent (kB/s)",
-    "Delay (ms)",
+/// Columns of the page's table, with units.
+const COLUMNS: [&str; 12] = [
+    "Choice",
+    "#Front",
+    "#RMSE (mm)",
+    "#95 % interval",
+    "#n",
+    "#Penalised (mm)",
+    "#Located (%)",
+    "#Within (%)",
+    "#CPU (µs)",
+    "#CPU range",
+    "#Sent (kB/s)",
+    "#Delay (ms)",
 ];
-
-/// A row of the page's table.
-#[derive(Serialize)]
-struct Line {
-    class: &'static str,
-    name: String,
-    cells: [String; HEADS.len()],
-}
 
 /// A self-contained page with the figure and a table of all rows. `rig` describes the origin of the session.
 ///
@@ -196,18 +189,19 @@ pub fn page(result: &Tradeoff, session: &str, rig: &str) -> Result<String, Repor
         script: "",
     };
     let figure = figure::fronts(result, rig, &format!("session {session}"));
-    let rows = ordered(result).into_iter().enumerate();
-    let rows: Vec<Line> = rows.map(|(i, row)| line(row, i == 0)).collect();
-    frame.render(context! {
-        session, rig,
-        svg => figure.svg,
-        caption => figure.caption,
-        heads => HEADS,
-        rows => Value::from(Serde(rows)),
-    })
+    let mut table = Grid::new("choices", "All choices", &COLUMNS);
+    for (i, row) in ordered(result).into_iter().enumerate() {
+        let class = match (row.competes, row.fronts.is_empty()) {
+            (false, _) => "out",
+            (true, false) => "front",
+            (true, true) => "",
+        };
+        table.row_of(cells(row, i == 0), class);
+    }
+    frame.render(context! { session, rig, figure => Value::from(Serde(figure)), table_of_choices => Value::from(Serde(table)) })
 }
 
-fn line(row: &Row, is_own: bool) -> Line {
+fn cells(row: &Row, is_own: bool) -> [String; COLUMNS.len()] {
     let own = if is_own {
         " (the session's settings; all others change them)"
     } else {
@@ -215,25 +209,18 @@ fn line(row: &Row, is_own: bool) -> Line {
     };
     let names = row.fronts.iter().map(|c| figure::name(*c));
     let (low, high) = row.cpu_range_us;
-    Line {
-        class: match (row.competes, row.fronts.is_empty()) {
-            (false, _) => "out",
-            (true, false) => "front",
-            (true, true) => "",
-        },
-        name: format!("{}{own}", label(&row.choice)),
-        cells: [
-            names.collect::<Vec<_>>().join(", "),
-            number(row.rmse_mm.value, 2),
-            interval(&row.rmse_mm, 1.0, 2),
-            row.rmse_mm.n.to_string(),
-            number(row.penalised_rmse_mm.value, 2),
-            percent(&row.located_rate),
-            percent(&row.within_rate),
-            short(row.cpu_us),
-            format!("{} to {}", short(low), short(high)),
-            short(row.bytes_per_s / 1e3),
-            short(row.delay_ms),
-        ],
-    }
+    [
+        format!("{}{own}", label(&row.choice)),
+        names.collect::<Vec<_>>().join(", "),
+        number(row.rmse_mm.value, 2),
+        interval(&row.rmse_mm, 1.0, 2),
+        row.rmse_mm.n.to_string(),
+        number(row.penalised_rmse_mm.value, 2),
+        percent(&row.located_rate),
+        percent(&row.within_rate),
+        short(row.cpu_us),
+        format!("{} to {}", short(low), short(high)),
+        short(row.bytes_per_s / 1e3),
+        short(row.delay_ms),
+    ]
 }

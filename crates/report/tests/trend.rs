@@ -8,8 +8,12 @@ const HOSTILE: &str = "golden/<script>alert(1)</script>\u{1b}[2J/press_events";
 
 /// 40 nights; the last four are lower by a fifth.
 fn report() -> Report {
+    after(40)
+}
+
+fn after(nights: usize) -> Report {
     let mut history = History::default();
-    for night in 0..40 {
+    for night in 0..nights {
         let wobble = (night * 7 % 5) as f64;
         let level = if night < 36 { 1.0 } else { 0.8 };
         for name in [HOSTILE, "disk/computer/write_rate"] {
@@ -60,6 +64,24 @@ fn the_page_shows_the_alarm_first_and_names_as_text() {
     let alarm = html.find("data-testid=\"alarm\"").unwrap();
     assert!(alarm < html.find("data-testid=\"series\"").unwrap());
     assert!(html.contains("-20 %"));
+}
+
+/// A first night has no references: its series are there on request, under names instead of identifiers.
+#[test]
+fn series_without_a_reference_are_folded_and_have_names() {
+    let html = page(&after(1), &[], &[]).unwrap();
+    let (_, rest) = html.split_once("data-testid=\"learning\"").unwrap();
+    let (folded, _) = rest.split_once("</details>").unwrap();
+    assert!(folded.starts_with('>'), "open: {}", &folded[..20]);
+    assert!(
+        folded.contains(">computer: write rate (disk)</th>"),
+        "{folded}"
+    );
+    assert!(!html.contains("data-testid=\"series\""));
+    let known = page(&report(), &[Links::default()], &[]).unwrap();
+    assert!(!known.contains("data-testid=\"learning\""));
+    assert!(known.contains(">computer: write rate (disk)</th>"));
+    assert!(!known.contains(">disk/computer/write_rate"));
 }
 
 #[test]

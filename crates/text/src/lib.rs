@@ -1,9 +1,11 @@
-//! Text for terminals: styles, wrapping, tables. Widths are terminal columns: 2 for a wide character, 0 for a combining one.
+//! Text for terminals: styles, wrapping, tables, sparklines. Widths are terminal columns: 2 for a wide character, 0 for a combining one.
 
+mod spark;
 mod style;
 mod table;
 mod wrap;
 
+pub use spark::{Blocks, sparkline};
 pub use style::{Paint, Style, starts_with_style};
 pub use table::{Column, Table};
 pub use wrap::{LongWords, WIDTH, hang, wrap};

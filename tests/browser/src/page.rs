@@ -129,7 +129,7 @@ impl<'a> Page<'a> {
         self.mouse("mouseMoved", x, y)
     }
 
-    /// Clicks the middle of the selected element.
+    /// Clicks the middle of the selected element; opens what hides it.
     ///
     /// # Errors
     /// [`BrowserError`]; the element must exist.
@@ -143,7 +143,9 @@ impl<'a> Page<'a> {
 
     fn middle(&mut self, selector: &str) -> Result<(f64, f64), BrowserError> {
         let found = self.ask(&format!(
-            "(() => {{ const e = document.querySelector({}); e.scrollIntoView({{ block: 'center', behavior: 'instant' }}); \
+            "(() => {{ const e = document.querySelector({}); \
+             for (let d = e; d && !e.closest('summary'); d = d.parentElement) if (d.matches('details')) d.open = true; \
+             e.scrollIntoView({{ block: 'center', behavior: 'instant' }}); \
              const b = e.getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; }})()",
             json!(selector)
         ))?;

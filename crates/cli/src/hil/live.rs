@@ -8,7 +8,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use skinrig_hil::NightObserver;
 use skinrig_nightly::Night;
 use skinrig_protocol::suite::{Check, Suite};
-use skinrig_report::night::{self, Colour};
+use skinrig_report::night;
+use skinrig_text::Paint;
 
 use super::folder;
 
@@ -16,7 +17,7 @@ use super::folder;
 pub(super) struct Live {
     folder: PathBuf,
     display: Display,
-    colour: Colour,
+    paint: Paint,
     total: usize,
     told: usize,
     unwritten: Option<io::Error>,
@@ -53,7 +54,7 @@ impl Live {
         Self {
             folder,
             display,
-            colour: colour(&io::stderr()),
+            paint: paint(&io::stderr()),
             total: suite.checks.len(),
             told: 0,
             unwritten: None,
@@ -76,13 +77,9 @@ impl Live {
     }
 }
 
-/// The colours of `stream`.
-pub(super) fn colour(stream: &impl IsTerminal) -> Colour {
-    if crate::terminal::is_coloured(stream) {
-        Colour::On
-    } else {
-        Colour::Off
-    }
+/// The styles of `stream`.
+pub(super) fn paint(stream: &impl IsTerminal) -> Paint {
+    Paint::new(crate::terminal::is_coloured(stream))
 }
 
 impl NightObserver for Live {
@@ -105,7 +102,7 @@ impl NightObserver for Live {
         let width = self.total.to_string().len();
         for check in night.checks.iter().skip(self.told) {
             self.told += 1;
-            let line = night::line(check, self.colour);
+            let line = night::line(check, self.paint);
             self.say(&format!("{:>width$}/{}  {line}", self.told, self.total));
         }
         if let Display::Bar(bar) = &self.display {

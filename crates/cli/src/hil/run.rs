@@ -87,8 +87,8 @@ pub(crate) fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome 
     if json {
         crate::terminal::print_json(&serde_json::to_value(&night).map_err(Failure::internal)?);
     } else {
-        let colour = live::colour(&io::stdout());
-        outln!("{}", night::tree(&night, colour).trim_end());
+        let paint = live::paint(&io::stdout());
+        outln!("{}", night::tree(&night, paint).trim_end());
         outln!("{}", folder.join(folder::PAGE).display());
     }
     match unwritten.map_or(trends, |e| Err(KeepError::Night(e))) {

@@ -30,6 +30,12 @@ const report = (() => {
     return e;
   };
 
+  // A linear axis of a plot: ends of its data and of its pixels.
+  const axis = (plot, name) => {
+    const [from, to, start, end] = plot.dataset[name].split(' ').map(Number);
+    return { from, to, start, end, at: v => start + (v - from) / (to - from) * (end - start) };
+  };
+
   // The filter: wanted values by column, and who follows it.
   const wanted = new Map();
   const followers = [];
@@ -44,5 +50,5 @@ const report = (() => {
       for (const each of followers) each();
     },
   };
-  return { $, $$, data, table, C, total, rowOf, text, el, shape, filter };
+  return { $, $$, data, table, C, total, rowOf, text, el, shape, axis, filter };
 })();

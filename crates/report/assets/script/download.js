@@ -32,7 +32,7 @@
       const box = button.closest('[data-figure]');
       const svg = $('.fig', box);
       const t = table(box.dataset.table);
-      const followed = button.dataset.save === 'svg' ? svg.matches('[data-linked]') : t.columns.includes('press');
+      const followed = button.dataset.save === 'svg' ? $('[data-presses],.ecdf', svg) : t.columns.includes('press');
       const name = box.dataset.figure + (filter.active() && followed ? '_filtered' : '');
       if (button.dataset.save === 'svg') save(name + '.svg', 'image/svg+xml', svgFile(svg));
       else save(name + '.csv', 'text/csv', csv(t));

@@ -74,9 +74,10 @@
 
   // Distribution of the errors: bars and steps of those that pass, on the axes of all.
   const spread = $('#error-distribution');
-  const [x0, perMm, width, top, middle, bottom, perPress] =
-    ['x0', 'perMm', 'bin', 'top', 'middle', 'bottom', 'perPress'].map(name => Number(spread.dataset[name]));
+  const [shares, counts] = $$('.plot', spread);
+  const [x, share, count] = [[shares, 'x'], [shares, 'y'], [counts, 'y']].map(([plot, name]) => report.axis(plot, name));
   const bars = $('.bars', spread);
+  const width = Number(bars.dataset.bin);
   const steps = $('.ecdf', spread);
   if (steps) {
     const whole = { bars: [...bars.children], steps: steps.getAttribute('d') };
@@ -90,9 +91,9 @@
       }
       const bins = new Map();
       for (const mm of e) bins.set(Math.floor(mm / width), (bins.get(Math.floor(mm / width)) ?? 0) + 1);
-      bars.replaceChildren(...[...bins].map(([k, n]) => shape('rect', { x: x0 + k * width * perMm, y: bottom - n * perPress, width: width * perMm, height: n * perPress })));
-      const up = k => middle - (middle - top) * k / e.length;
-      steps.setAttribute('d', e.length ? `M${x0} ${middle}` + e.map((mm, k) => `H${x0 + mm * perMm}V${up(k + 1)}`).join('') : '');
+      bars.replaceChildren(...[...bins].map(([k, n]) => shape('rect', { x: x.at(k * width), y: count.at(n), width: x.at(width) - x.at(0), height: count.at(0) - count.at(n) })));
+      const up = k => share.at(100 * k / e.length);
+      steps.setAttribute('d', e.length ? `M${x.at(0)} ${share.at(0)}` + e.map((mm, k) => `H${x.at(mm)}V${up(k + 1)}`).join('') : '');
     });
   }
 })();

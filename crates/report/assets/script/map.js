@@ -5,8 +5,8 @@
   for (const box of $$('[data-layer]')) {
     box.addEventListener('change', () => $('.layer-' + box.dataset.layer, map).classList.toggle('off-layer', !box.checked));
   }
-  const [ox, oy, k] = ['ox', 'oy', 'k'].map(name => Number(map.dataset[name]));
-  const px = (x, y) => [ox + k * x, oy - k * y];
+  const [xAxis, yAxis] = ['x', 'y'].map(name => report.axis($('.plot', map), name));
+  const px = (x, y) => [xAxis.at(x), yAxis.at(y)];
   let shown = [];
   filter.follow(() => { shown = [...Array(total).keys()].filter(i => C.role[i] === 'score' && filter.passes(i)); });
   const place = i => C.truth_x_mm[i] === null ? px(C.planned_x_mm[i], C.planned_y_mm[i]) : px(C.truth_x_mm[i], C.truth_y_mm[i]);

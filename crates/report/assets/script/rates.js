@@ -2,12 +2,12 @@
 (() => {
   const { $, $$, shape } = report;
   const rates = $('#event-rates');
-  const [t0, t1, x0, x1] = ['t0', 't1', 'x0', 'x1'].map(name => Number(rates.dataset[name]));
+  const { from: t0, to: t1, start: x0, end: x1 } = report.axis($('.plot', rates), 'x');
   const width = x1 - x0;
   let view = [t0, t1];
   const axes = $$('.x-ticks', rates).filter(g => g.querySelector('line')).map(g => {
     const line = $('line', g);
-    return { g, top: line.getAttribute('y1'), bottom: line.getAttribute('y2'), label: $('text', g).getAttribute('y') };
+    return { g, top: line.getAttribute('y1'), bottom: line.getAttribute('y2'), label: $('text', g).getAttribute('y'), dy: $('text', g).getAttribute('dy') };
   });
   const drawTime = () => {
     const [a, b] = view;
@@ -18,12 +18,12 @@
     const power = 10 ** Math.floor(Math.log10(raw));
     const step = [1, 2, 5, 10].map(m => m * power).find(s => s >= raw * 0.999);
     const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
-    for (const { g, top, bottom, label } of axes) {
+    for (const { g, top, bottom, label, dy } of axes) {
       g.replaceChildren();
       for (let i = Math.ceil(a / step - 1e-9); i * step <= b * (1 + 1e-12); i++) {
         const x = x0 + (i * step - a) / (b - a) * width;
         const line = shape('line', { class: 'grid', x1: x, x2: x, y1: top, y2: bottom });
-        const tick = shape('text', { class: 'tick', x, y: label, 'text-anchor': 'middle' });
+        const tick = shape('text', { class: 'tick', x, y: label, dy, 'text-anchor': 'middle' });
         tick.textContent = (i * step).toFixed(digits);
         g.append(line, tick);
       }

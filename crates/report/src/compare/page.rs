@@ -4,14 +4,15 @@ use minijinja::value::Serde;
 use minijinja::{Value, context};
 use serde::Serialize;
 use skinrig_compare::statistics::Verdict;
-use skinrig_compare::{Comparison, Severity};
+use skinrig_compare::{Causes, Comparison, Severity};
 
-use super::figures::{self, RenderedFigure};
-use super::{tables, text};
+use super::{figures, tables, text};
 use crate::error::ReportError;
 use crate::format::number;
 use crate::frame::{Frame, safe};
+use crate::grid::Grid;
 use crate::page::script_json;
+use crate::plot::Figure;
 use crate::svg::{FIGURE_CSS, plain_css};
 
 const TEMPLATE: &str = include_str!("../../assets/compare/page.html");
@@ -29,7 +30,7 @@ struct SkinCard {
     margin: Option<String>,
     needed: Option<String>,
     rows: Vec<MetricLine>,
-    figures: Vec<Value>,
+    figures: [Option<Figure>; 4],
     causes: Option<CausesCard>,
 }
 
@@ -49,8 +50,8 @@ struct MetricLine {
 #[derive(Serialize)]
 struct CausesCard {
     carried_by: Option<&'static str>,
-    measured: Vec<[String; 3]>,
-    exchanged: Vec<[String; 4]>,
+    measured: Grid,
+    exchanged: Grid,
     places: u32,
     presses: [u32; 2],
 }
@@ -90,6 +91,7 @@ pub fn html(result: &Comparison) -> Result<String, ReportError> {
     frame.render(context! {
         plain_css => safe(&plain_css()),
         data => safe(&script_json(&data)?),
+        contents => [("verdict", "Verdict"), ("metrics", "Metrics"), ("maps", "Maps"), ("why", "Why"), ("sessions", "Sessions")],
         heading,
         stand_in => text::stand_in(result),
         limits => result.limits.clone(),
@@ -131,53 +133,48 @@ fn skin_card(result: &Comparison, k: usize) -> SkinCard {
         margin,
         needed: compared.and_then(text::needed),
         rows: lines(result, k),
-        figures: figures.into_iter().map(figure).collect(),
+        figures,
         causes: causes.map(|of| CausesCard {
             carried_by: of.carried_by.map(skinrig_compare::Factor::name),
-            measured: of
-                .measured
-                .iter()
-                .map(|m| {
-                    let digits = |v: Option<f64>| match v {
-                        Some(v) if v.abs() >= 100.0 => 0,
-                        _ => 3,
-                    };
-                    let [a, b] = m.values.map(|v| number(v, digits(v)));
-                    [format!("{} ({})", m.what, m.unit), a, b]
-                })
-                .collect(),
-            exchanged: of
-                .exchanged
-                .iter()
-                .map(|x| {
-                    let rmse = format!(
-                        "{} ({} of {})",
-                        number(x.rmse_mm, 2),
-                        x.located[0],
-                        x.located[1]
-                    );
-                    [
-                        x.presses.to_string(),
-                        x.calibration.to_string(),
-                        x.settings.to_string(),
-                        rmse,
-                    ]
-                })
-                .collect(),
+            measured: measured(of, skin.letter),
+            exchanged: exchanged(of),
             places: of.locations,
             presses: of.presses,
         }),
     }
 }
 
-/// Template value of a figure; none for a figure without data.
-fn figure(figure: Option<RenderedFigure>) -> Value {
-    figure.map_or(Value::from(()), |f| {
-        context! {
-            id => f.id, title => f.title, caption => f.caption, svg => Value::from_safe_string(f.svg),
-            table => f.table, interaction => f.interaction,
-        }
-    })
+fn measured(of: &Causes, letter: char) -> Grid {
+    let rows = of.measured.iter().map(|m| {
+        let digits = |v: Option<f64>| {
+            if v.is_some_and(|v| v.abs() >= 100.0) {
+                0
+            } else {
+                3
+            }
+        };
+        let [a, b] = m.values.map(|v| number(v, digits(v)));
+        [format!("{} ({})", m.what, m.unit), a, b]
+    });
+    let columns = ["Quantity", "#A", &format!("#{letter}")];
+    Grid::new("measured", "Measured in both", &columns).with(rows)
+}
+
+/// Errors with the calibration and settings of each skin.
+fn exchanged(of: &Causes) -> Grid {
+    let rows = of.exchanged.iter().map(|x| {
+        let [located, all] = x.located;
+        let rmse = format!("{} ({located} of {all})", number(x.rmse_mm, 2));
+        let skins = [x.presses, x.calibration, x.settings].map(|skin| skin.to_string());
+        skins.into_iter().chain([rmse])
+    });
+    let columns = [
+        "Presses of",
+        "Calibration of",
+        "Settings of",
+        "#RMSE, mm (located)",
+    ];
+    Grid::new("exchanged", "Cross-evaluation", &columns).with(rows)
 }
 
 fn lines(result: &Comparison, k: usize) -> Vec<MetricLine> {

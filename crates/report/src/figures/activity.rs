@@ -2,103 +2,80 @@
 
 use skinrig_analysis::result::Activity;
 
-use super::canvas::{Canvas, Figure};
+use super::origin::foot;
 use super::raster::{image, indexed_png};
-use crate::axes::{Axes, Scale};
-use crate::colour::viridis_rgb;
+use crate::colour::{hex, viridis_rgb};
+use crate::format::grouped;
 use crate::input::ReportInput;
-use crate::svg::{Px, Svg};
+use crate::plot::{Axis, Figure, Plot, Scale, Sheet, WIDE, colour_bar, rectangle};
+use crate::svg::Svg;
 
 /// Number of colours; more would only enlarge the file.
 const LEVELS: u8 = 64;
-/// Size of an image in the figure, px.
-const PICTURE: (f64, f64) = (540.0, 405.0);
+/// Height of an image in the figure, px.
+const HEIGHT: f64 = 400.0;
 
 /// Events per pixel of each camera over the recording on a logarithmic colour scale, with the crop (panel A with its yellow
 /// box in the paper's figure of event data). `None` without events.
 #[must_use]
 pub fn activity(input: &ReportInput<'_>) -> Option<Figure> {
     let pictures = &input.analysis.activity;
-    let most = pictures.iter().flat_map(|p| &p.counts).copied().max()?;
-    if most == 0 {
-        return None;
-    }
+    let counts = || pictures.iter().flat_map(|p| &p.counts).copied();
+    let most = counts().max().filter(|n| *n > 0)?;
     let cell = pictures.iter().map(|p| p.cell_px).max().unwrap_or(1);
     let caption = format!(
         "Accumulated pixel activity: events over the whole recording and the whole sensor, per square of {cell} x \
          {cell} pixels. Colour: number of events, logarithmic, one scale for both cameras; squares without events are \
          blank. Box: rows that are analysed."
     );
-    let mut canvas = Canvas::new(
-        input,
-        "activity",
-        "Accumulated pixel activity",
-        caption,
-        (1240.0, 520.0),
-        &[],
-    );
-    for picture in pictures {
-        let left = 62.0 + 578.0 * picture.camera.index() as f64;
-        panel(&mut canvas, picture, most, (left, 36.0));
-    }
-    scale(&mut canvas.svg, most);
-    let events: u64 = pictures.iter().flat_map(|p| &p.counts).sum();
-    let n = format!("n = {} events", crate::format::grouped(events));
-    Some(canvas.finish(&n, "activity", ""))
+    let last = pictures.len() - 1;
+    let plots = pictures.iter().enumerate().map(|(i, picture)| {
+        let plot = plot(
+            picture,
+            most,
+            input.analysis.settings.crop_v[picture.camera.index()],
+        );
+        plot.draw(move |svg, place| {
+            if i == last {
+                let (left, top, width, height) = place.frame();
+                scale(svg, most, (left + width + 12.0, top, height));
+            }
+        })
+    });
+    let sheet = Sheet::new("activity", "Accumulated pixel activity", caption, WIDE)
+        .columns(&[1.0, 1.0])
+        .margins(66.0, 64.0)
+        .row(HEIGHT, plots);
+    let n = format!("n = {} events", grouped(counts().sum()));
+    Some(sheet.finish(&foot(input), &n, "activity"))
 }
 
-fn panel(canvas: &mut Canvas<'_>, picture: &Activity, most: u64, (left, top): (f64, f64)) {
-    let crop = canvas.input.analysis.settings.crop_v[picture.camera.index()];
-    let svg = &mut canvas.svg;
+fn plot(picture: &Activity, most: u64, crop: (u16, u16)) -> Plot<'_> {
     let cell = f64::from(picture.cell_px.max(1));
-    let columns = f64::from(picture.width) * cell;
-    let rows = f64::from(picture.height) * cell;
-    let axes = Axes {
-        x: Scale::new((0.0, columns), (left, left + PICTURE.0)),
-        y: Scale::new((0.0, rows), (top, top + PICTURE.1)),
-        x_label: "column u (px)".into(),
-        y_label: if picture.camera.index() == 0 {
-            "row v (px)".into()
-        } else {
-            String::new()
-        },
-        tick_count: (8, 6),
-    };
-    let name = format!("camera {}", picture.camera.number());
-    svg.text((left, top - 10.0), "panel", "start", &name);
-    let frame: [(&str, &dyn std::fmt::Display); 4] = [
-        ("x", &Px(left)),
-        ("y", &Px(top)),
-        ("width", &Px(PICTURE.0)),
-        ("height", &Px(PICTURE.1)),
-    ];
-    let mut tile: Vec<(&str, &dyn std::fmt::Display)> = vec![("class", &"tile")];
-    tile.extend_from_slice(&frame);
-    svg.leaf("rect", &tile);
-    axes.draw(svg);
-    match png(picture, most) {
-        Some(bytes) => image(svg, "raster", (left, top, PICTURE.0, PICTURE.1), &bytes),
-        None => {
-            let middle = (left + PICTURE.0 / 2.0, top + PICTURE.1 / 2.0);
-            svg.text(middle, "empty", "middle", "no picture of this size");
+    let size = |cells| (0.0, f64::from(cells) * cell);
+    Plot::new(
+        Axis::linear(size(picture.width), "column u (px)").ticks(8),
+        Axis::linear(size(picture.height), "row v (px)")
+            .ticks(6)
+            .downwards(),
+    )
+    .title(format!("camera {}", picture.camera.number()))
+    .draw(move |svg, place| {
+        rectangle(svg, "tile", place.frame());
+        match png(picture, most) {
+            Some(bytes) => image(svg, "raster", place.frame(), &bytes),
+            None => {
+                svg.text(place.middle(), "empty", "middle", "no picture of this size");
+            }
         }
-    }
-    let (first, last) = (f64::from(crop.0), f64::from(crop.1) + 1.0);
-    let (y0, y1) = (axes.y.at(first), axes.y.at(last));
-    for class in ["crop-under", "crop"] {
-        svg.leaf(
-            "rect",
-            &[
-                ("class", &class),
-                ("x", &Px(left)),
-                ("y", &Px(y0)),
-                ("width", &Px(PICTURE.0)),
-                ("height", &Px(y1 - y0)),
-            ],
-        );
-    }
-    let text = format!("rows {} to {}", crop.0, crop.1);
-    svg.text((left + 8.0, y0 - 6.0), "crop-name", "start", &text);
+        let (left, _, width, _) = place.frame();
+        let ends = [f64::from(crop.0), f64::from(crop.1) + 1.0].map(|v| place.y.at(v));
+        for class in ["crop-under", "crop"] {
+            rectangle(svg, class, (left, ends[0], width, ends[1] - ends[0]));
+        }
+        let text = format!("rows {} to {}", crop.0, crop.1);
+        svg.text((left + 8.0, ends[0] - 6.0), "crop-name", "start", &text);
+    })
 }
 
 /// Level of a count: 0 without events, else 1 ..= LEVELS - 1 on a logarithmic scale.
@@ -122,33 +99,21 @@ fn png(picture: &Activity, most: u64) -> Option<Vec<u8>> {
     indexed_png(size, &levels, &palette)
 }
 
-/// Colour scale with decades, at the right edge.
-fn scale(svg: &mut Svg, most: u64) {
-    let (x, top, height) = (1186.0, 60.0, 357.0);
-    let steps = u32::from(LEVELS) - 1;
-    let step = height / f64::from(steps);
-    svg.open("g", &[("class", &"colour-bar")]);
-    svg.text((x - 4.0, 26.0), "label", "start", "events");
-    for i in 0..steps {
-        let [r, g, b] = viridis_rgb(f64::from(i) / f64::from(steps - 1));
-        svg.leaf(
-            "rect",
-            &[
-                ("x", &Px(x)),
-                ("y", &Px(top + height - f64::from(i + 1) * step)),
-                ("width", &"14"),
-                ("height", &Px(step + 0.4)),
-                ("fill", &format_args!("#{r:02x}{g:02x}{b:02x}")),
-            ],
-        );
-    }
-    let top_log = (most.max(2) as f64).log10();
-    for power in 0..=top_log.floor() as i32 {
-        let y = top + height * (1.0 - f64::from(power) / top_log);
-        svg.line("axis", (x + 14.0, y), (x + 18.0, y));
-        svg.text((x + 21.0, y + 4.0), "tick", "start", &power_of_ten(power));
-    }
-    svg.close();
+/// Colour scale with decades.
+fn scale(svg: &mut Svg, most: u64, (x, top, height): (f64, f64, f64)) {
+    let end = (most.max(2) as f64).log10();
+    let scale = Scale::new((0.0, end), (top + height, top));
+    let marks = (0..=end.floor() as i32).map(|p| (f64::from(p), power_of_ten(p)));
+    let colour = |share| hex(viridis_rgb(share));
+    svg.text((x - 4.0, top - 10.0), "label", "start", "events");
+    colour_bar(
+        svg,
+        scale,
+        (x, x + 14.0),
+        true,
+        colour,
+        Some(marks.collect()),
+    );
 }
 
 fn power_of_ten(power: i32) -> String {

@@ -1,8 +1,9 @@
 //! Owns the heat map of the calibration's correlation matrix.
 
-use super::canvas::{Canvas, Figure};
+use super::origin::foot;
 use crate::format::number;
 use crate::input::ReportInput;
+use crate::plot::{Canvas, Figure, HALF};
 use crate::svg::{Px, Svg};
 
 /// Correlation of each pair of calibrated parameters. `None` without a correlation matrix.
@@ -21,49 +22,30 @@ pub fn correlation(input: &ReportInput<'_>) -> Option<Figure> {
     if undetermined > 0 {
         caption += &format!(" Dash: the data do not determine {undetermined} of {n} parameters.");
     }
-    let mut canvas = Canvas::new(
-        input,
+    let head = [
         "correlation",
         "Calibration: correlation of parameters",
-        caption,
-        (620.0, 540.0),
-        &[],
-    );
+        &caption,
+    ];
+    let mut canvas = Canvas::new(head.map(str::to_owned), (HALF, 540.0), None);
     let (left, top, side) = (196.0, 20.0, 340.0);
     let step = side / n as f64;
     let svg = &mut canvas.svg;
-    for (i, row) in fit.correlation.iter().enumerate() {
+    for (i, (row, name)) in fit.correlation.iter().zip(&fit.names).enumerate() {
         let y = top + step * i as f64;
-        svg.text(
-            (left - 8.0, y + step / 2.0 + 4.0),
-            "tick",
-            "end",
-            &fit.names[i],
-        );
+        svg.text((left - 8.0, y + step / 2.0 + 4.0), "tick", "end", name);
         for (k, value) in row.iter().enumerate() {
-            cell(
-                svg,
-                (left + step * k as f64, y),
-                step,
-                value.filter(|v| v.is_finite()),
-            );
+            let at = (left + step * k as f64, y);
+            cell(svg, at, step, value.filter(|v| v.is_finite()));
         }
-        let (x, below) = (left + step * (i as f64 + 0.5), top + side + 15.0);
-        svg.holding(
-            "text",
-            &[
-                ("class", &"tick"),
-                ("text-anchor", &"end"),
-                (
-                    "transform",
-                    &format_args!("translate({} {}) rotate(-40)", Px(x + 3.0), Px(below)),
-                ),
-            ],
-            &fit.names[i],
-        );
+        let below = (left + step * (i as f64 + 0.5) + 3.0, top + side + 15.0);
+        svg.turned(below, "tick", "end", -40.0, name);
     }
-    let n = format!("n = {} presses", fit.n);
-    Some(canvas.finish(&n, "correlation", ""))
+    Some(canvas.finish(
+        &foot(input),
+        &format!("n = {} presses", fit.n),
+        "correlation",
+    ))
 }
 
 fn cell(svg: &mut Svg, (x, y): (f64, f64), step: f64, value: Option<f64>) {
@@ -93,11 +75,7 @@ fn cell(svg: &mut Svg, (x, y): (f64, f64), step: f64, value: Option<f64>) {
         } else {
             "tick ink small"
         };
-        svg.text(
-            (x + step / 2.0, y + step / 2.0 + 4.0),
-            class,
-            "middle",
-            &text,
-        );
+        let middle = (x + step / 2.0, y + step / 2.0 + 4.0);
+        svg.text(middle, class, "middle", &text);
     }
 }

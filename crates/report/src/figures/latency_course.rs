@@ -2,13 +2,11 @@
 
 use skinrig_analysis::result::Latency;
 
-use super::canvas::{Canvas, Figure, band, nice_above};
-use super::legend::{self, Sample};
-use crate::axes::{Axes, Scale};
+use super::origin::foot;
 use crate::derive;
 use crate::format::number;
 use crate::input::ReportInput;
-use crate::svg::{Px, Svg, polyline};
+use crate::plot::{Axis, Figure, Plot, Sample, Sheet, WIDE};
 
 /// Percentiles of the event rate over trials against time since contact, with those of the background and dashed lines at
 /// the 5-95 % onsets (the paper's figure "event rate latency"): the whole trial, and a close-up of the onset. `None` without
@@ -21,23 +19,19 @@ pub(crate) fn latency_course(input: &ReportInput<'_>) -> Option<Figure> {
         return None;
     }
     let onsets = derive::onset_percentiles(study);
+    let contact = if study.from_contact.is_some() {
+        "measured contact"
+    } else {
+        "contact as scheduled or aligned"
+    };
     let caption = format!(
-        "Event rate of both cameras around the {}, percentiles over {} presses: median (line) and 5 to 95 % (band). \
+        "Event rate of both cameras around the {contact}, percentiles over {} presses: median (line) and 5 to 95 % (band). \
          Horizontal: the same percentiles of the background (median {} events per second). Dashed: 5th and 95th \
          percentile of the detected onsets, {} ms apart. A: whole trial, B: onset. Counts in bins of {} ms.",
-        contact(study),
         study.trials,
         number(Some(study.background_rate_per_s), 0),
         number(study.width_ms.value, 1),
         number(Some(study.course.bin_ms), 1),
-    );
-    let mut canvas = Canvas::new(
-        input,
-        "latency-course",
-        "Detection: event rates around the contact",
-        caption,
-        (1240.0, 420.0),
-        &[],
     );
     let start = study.course.start_ms;
     let whole = (start, start + study.course.bin_ms * bins as f64);
@@ -45,129 +39,67 @@ pub(crate) fn latency_course(input: &ReportInput<'_>) -> Option<Figure> {
         (whole.0.max(-50.0), whole.1.min(150.0)),
         |(low, _, high)| {
             let margin = (1.5 * (high - low)).max(20.0);
-            (
-                (low.min(0.0) - margin).max(whole.0),
-                (high + margin).min(whole.1),
-            )
+            let first = (low.min(0.0) - margin).max(whole.0);
+            (first, (high + margin).min(whole.1))
         },
     );
-    panel(
-        &mut canvas.svg,
-        study,
-        onsets,
-        whole,
-        (66.0, 700.0),
-        "A   whole trial",
-        "whole",
-    );
-    panel(
-        &mut canvas.svg,
-        study,
-        onsets,
-        close,
-        (836.0, 388.0),
-        "B   onset",
-        "close",
-    );
-    legend::line(
-        &mut canvas.svg,
-        (66.0, 16.0),
-        &[
+    let width = onsets.map_or(String::new(), |(low, _, high)| {
+        format!("{} ms between the onsets", number(Some(high - low), 1))
+    });
+    let plots = [
+        plot(study, onsets, whole, 10)
+            .title("A   whole trial")
+            .clipped("latency-course-whole"),
+        plot(study, onsets, close, 6)
+            .title("B   onset")
+            .note(width)
+            .clipped("latency-course-close"),
+    ];
+    let title = "Detection: event rates around the contact";
+    let sheet = Sheet::new("latency-course", title, caption, WIDE)
+        .columns(&[1.8, 1.0])
+        .legend([
             (Sample::Line("line c1"), "presses, median"),
             (Sample::Area("band f1"), "presses, 5 to 95 %"),
             (Sample::Line("line c2"), "background, median"),
             (Sample::Area("band f2"), "background, 5 to 95 %"),
             (Sample::Line("ref"), "5 and 95 % of the onsets"),
-        ],
-    );
+        ])
+        .row(298.0, plots);
     let n = format!("n = {} trials", study.trials);
-    Some(canvas.finish(&n, "latency_course", ""))
+    Some(sheet.finish(&foot(input), &n, "latency_course"))
 }
 
-/// Zero of the time axis.
-fn contact(study: &Latency) -> &'static str {
-    if study.from_contact.is_some() {
-        "measured contact"
-    } else {
-        "contact as scheduled or aligned"
-    }
-}
-
-fn panel(
-    svg: &mut Svg,
+fn plot(
     study: &Latency,
     onsets: Option<(f64, f64, f64)>,
     shown: (f64, f64),
-    (left, width): (f64, f64),
-    name: &str,
-    id: &str,
-) {
-    let (top, height) = (52.0, 298.0);
+    ticks: u32,
+) -> Plot<'static> {
     let course = &study.course;
     let centre = |i: usize| course.start_ms + (i as f64 + 0.5) * course.bin_ms;
-    let inside = |i: &usize| (shown.0..=shown.1).contains(&centre(*i));
+    let kilo = |v: f32| f64::from(v) / 1e3;
     let [p5, p50, p95] = &course.press_per_s;
     let bins: Vec<usize> = (0..p5.len().min(p50.len()).min(p95.len()))
-        .filter(inside)
+        .filter(|i| (shown.0..=shown.1).contains(&centre(*i)))
         .collect();
-    let most = bins
-        .iter()
-        .map(|i| f64::from(p95[*i]))
-        .filter(|v| v.is_finite());
-    let most = most.fold(f64::from(course.background_per_s[2]), f64::max);
-    let axes = Axes {
-        x: Scale::new(shown, (left, left + width)),
-        y: Scale::new((0.0, nice_above(most / 1e3)), (top + height, top)),
-        x_label: "time since contact (ms)".into(),
-        y_label: "event rate, both cameras (kev/s)".into(),
-        tick_count: (if width > 500.0 { 10 } else { 6 }, 5),
-    };
-    axes.draw(svg);
-    svg.text((left, top - 8.0), "panel", "start", name);
-    let clip = format!("latency-course-{id}");
-    svg.open("clipPath", &[("id", &clip)]);
-    svg.leaf(
-        "rect",
-        &[
-            ("x", &Px(left)),
-            ("y", &Px(top)),
-            ("width", &Px(width)),
-            ("height", &Px(height)),
-        ],
-    );
-    svg.close();
-    svg.open("g", &[("clip-path", &format_args!("url(#{clip})"))]);
-    let y = |v: f32| axes.y.at(f64::from(v) / 1e3);
-    let [b5, b50, b95] = course.background_per_s.map(y);
-    let (l, r) = axes.x.px;
-    svg.path("band f2", &band([(l, (b5, b95)), (r, (b5, b95))]));
-    svg.line("line c2", (l, b50), (r, b50));
-    let x = |i: usize| axes.x.at(centre(i));
+    let [b5, b50, b95] = course.background_per_s.map(kilo);
+    let highest = bins.iter().map(|i| kilo(p95[*i])).chain([b95]);
+    let x = Axis::linear(shown, "time since contact (ms)").ticks(ticks);
+    let y = Axis::from_zero(highest, "event rate, both cameras (kev/s)");
     let finite = |i: &&usize| p5[**i].is_finite() && p95[**i].is_finite();
     let area = bins.iter().filter(finite);
-    svg.path(
-        "band f1",
-        &band(area.map(|i| (x(*i), (y(p5[*i]), y(p95[*i]))))),
-    );
-    let median = bins.iter().filter(|i| p50[**i].is_finite());
-    svg.path(
-        "line c1",
-        &polyline(median.map(|i| (x(*i), y(p50[*i]))), false),
-    );
-    svg.close();
-    svg.line(
-        "axis",
-        (axes.x.at(0.0), top),
-        (axes.x.at(0.0), top + height),
-    );
-    if let Some((low, _, high)) = onsets {
-        for t in [low, high] {
-            svg.line("ref", (axes.x.at(t), top), (axes.x.at(t), top + height));
-        }
-        if id == "close" {
-            let text = format!("{} ms", number(Some(high - low), 1));
-            let middle = axes.x.at((low + high) / 2.0);
-            svg.text((middle, top - 8.0), "tick", "middle", &text);
-        }
+    let mut plot = Plot::new(x, y)
+        .band("band f2", [(shown.0, (b5, b95)), (shown.1, (b5, b95))])
+        .across("line c2", b50)
+        .band(
+            "band f1",
+            area.map(|i| (centre(*i), (kilo(p5[*i]), kilo(p95[*i])))),
+        )
+        .line("line c1", bins.iter().map(|i| (centre(*i), kilo(p50[*i]))))
+        .upright("axis", 0.0);
+    for t in onsets.into_iter().flat_map(|(low, _, high)| [low, high]) {
+        plot = plot.upright("ref", t);
     }
+    plot
 }

@@ -1,39 +1,35 @@
 //! Owns the maps of the skin: localisation errors, and spread between repetitions, per location.
 
 use skinrig_analysis::result::PressResult;
-use skinrig_model::{Point2, PressRole};
+use skinrig_model::{Point2, PressId, PressRole};
 
-use super::canvas::{Canvas, Figure, LINKED, nice_above, press_path};
-use super::skin::{Layout, colour_bar};
+use super::origin::foot;
+use super::skin::{Layout, error_scale};
 use crate::colour::viridis;
 use crate::derive::{self, LocationSummary};
 use crate::input::ReportInput;
+use crate::plot::{
+    Canvas, Figure, LeftTexts, Place, Sample, column, draw_axes, press_path, scale_end, squares,
+};
 use crate::svg::{Px, Svg, dots, polyline};
 
 const SIZE: (f64, f64) = (900.0, 700.0);
-
-/// End of the colour scale: round number above 98 % of the values.
-fn scale_end(mut values: Vec<f64>) -> f64 {
-    values.retain(|v| v.is_finite());
-    values.sort_by(f64::total_cmp);
-    let at = (values.len().saturating_sub(1)) as f64 * 0.98;
-    values
-        .get(at.round() as usize)
-        .map_or(1.0, |v| nice_above(*v))
-}
+/// On a phone, scale and legend stand below the map.
+const NARROW: ((f64, f64), f64) = ((740.0, 1280.0), 1.4);
+const SIDE_TO: (f64, f64) = (-680.0, 700.0);
 
 fn discs(
     svg: &mut Svg,
-    layout: &Layout,
+    (layout, place): (&Layout, &Place),
     locations: &[LocationSummary],
     value: impl Fn(&LocationSummary) -> Option<f64>,
     end: f64,
 ) {
-    let r = layout.radius(locations);
+    let r = layout.radius(place, locations);
     svg.open("g", &[("class", &"locations"), ("data-end", &end)]);
     for l in locations {
         let Some(v) = value(l) else { continue };
-        let (x, y) = layout.px(l.planned);
+        let (x, y) = layout.px(place, l.planned);
         svg.leaf(
             "circle",
             &[
@@ -49,23 +45,24 @@ fn discs(
     svg.close();
 }
 
-fn backdrop(canvas: &mut Canvas<'_>, layout: &Layout) {
+/// Draws axes and skin; the group stays open.
+fn backdrop(canvas: &mut Canvas, layout: &Layout) -> Place {
+    let (x, y) = layout.axes();
+    // The map keeps its shape in the room beside the colour scale.
+    let width = (610.0 * 660.0 / layout.height(660.0)).min(660.0);
+    let place = Place {
+        x: x.scale((66.0, 66.0 + width)),
+        y: y.scale((18.0 + layout.height(width), 18.0)),
+    };
     let clip = format!("{}-clip", canvas.id);
     let svg = &mut canvas.svg;
-    layout.axes.draw(svg);
+    place.open(svg);
+    draw_axes(svg, &place, (&x, &y), LeftTexts::Shown);
     svg.open("clipPath", &[("id", &clip)]);
-    svg.path("clip", &layout.skin());
+    svg.path("clip", &layout.skin(&place));
     svg.close();
-    svg.path("skin", &layout.skin());
-}
-
-fn attributes(layout: &Layout) -> [String; 3] {
-    [
-        layout.axes.x.at(0.0),
-        layout.axes.y.at(0.0),
-        layout.axes.x.per_unit(),
-    ]
-    .map(|v| format!("{v:.4}"))
+    svg.path("skin", &layout.skin(&place));
+    place
 }
 
 /// The skin with both cameras, their fields of view, the press path, the mean error at every location, and a vector from
@@ -97,16 +94,10 @@ pub(crate) fn skin_map(input: &ReportInput<'_>) -> Figure {
         locations.len(),
         others.len()
     );
-    let [ox, oy, k] = attributes(&layout);
-    let mut canvas = Canvas::new(
-        input,
-        "skin-map",
-        "Skin map",
-        caption,
-        SIZE,
-        &[("data-ox", &ox), ("data-oy", &oy), ("data-k", &k), LINKED],
-    );
-    backdrop(&mut canvas, &layout);
+    let head = ["skin-map", "Skin map", &caption].map(str::to_owned);
+    let mut canvas = Canvas::new(head, SIZE, Some(NARROW));
+    let place = backdrop(&mut canvas, &layout);
+    let place = &place;
     let svg = &mut canvas.svg;
     svg.open(
         "g",
@@ -119,30 +110,33 @@ pub(crate) fn skin_map(input: &ReportInput<'_>) -> Figure {
     for (i, camera) in input.analysis.geometry.cameras.iter().enumerate() {
         let class = format!("fov f{0} c{0}", i + 1);
         let seen = coverage.map(|c| &c.views[i]).filter(|v| !v.is_empty());
-        let data = seen.map_or_else(|| layout.field_of_view(camera), |v| layout.polygons(v));
+        let data = seen.map_or_else(
+            || layout.field_of_view(place, camera),
+            |v| layout.polygons(place, v),
+        );
         if seen.is_some_and(|v| v.len() > 1) {
             svg.path(&format!("{class} no-edge"), &data);
             let id = format!("skin-map-view-{}", i + 1);
-            layout.union_edge(svg, &id, &format!("fov-edge c{}", i + 1), &data);
+            layout.union_edge(svg, place, &id, &format!("fov-edge c{}", i + 1), &data);
         } else {
             svg.path(&class, &data);
         }
     }
     match coverage.map(|c| &c.overlap) {
         Some(pieces) if pieces.len() > 1 => {
-            let data = layout.polygons(pieces);
-            layout.union_edge(svg, "skin-map-overlap", "overlap-edge", &data);
+            let data = layout.polygons(place, pieces);
+            layout.union_edge(svg, place, "skin-map-overlap", "overlap-edge", &data);
         }
         Some(pieces) => {
-            svg.path("overlap-edge", &layout.polygons(pieces));
+            svg.path("overlap-edge", &layout.polygons(place, pieces));
         }
         None => {}
     }
     svg.close();
     if let Some((coverage, cell_mm)) = coverage.and_then(|c| Some((c, c.cell_mm?))) {
-        cells(svg, &layout, &coverage.places, cell_mm);
+        cells(svg, (&layout, place), &coverage.places, cell_mm);
     }
-    svg.path("skin-edge", &layout.skin());
+    svg.path("skin-edge", &layout.skin(place));
     let first = input
         .analysis
         .presses
@@ -156,17 +150,26 @@ pub(crate) fn skin_map(input: &ReportInput<'_>) -> Figure {
         .iter()
         .filter(|p| p.role != PressRole::Sync && Some(p.repetition) == first);
     svg.open("g", &[("class", &"layer-path")]);
-    svg.path("path", &polyline(path.map(|p| layout.px(p.planned)), false));
+    svg.path(
+        "path",
+        &polyline(path.map(|p| layout.px(place, p.planned)), false),
+    );
     svg.close();
-    let end = scale_end(locations.iter().map(|l| l.mean_error_mm).collect());
-    discs(svg, &layout, &locations, |l| Some(l.mean_error_mm), end);
+    let end = scale_end(locations.iter().map(|l| l.mean_error_mm)).unwrap_or(1.0);
+    discs(
+        svg,
+        (&layout, place),
+        &locations,
+        |l| Some(l.mean_error_mm),
+        end,
+    );
     let mut vectors = String::new();
     let mut tips = Vec::with_capacity(counted.len());
     let mut numbers = Vec::with_capacity(counted.len());
     for p in &counted {
         if let (Some(t), Some(e)) = (p.truth, p.estimate()) {
-            vectors.push_str(&polyline([layout.px(t), layout.px(e)], false));
-            tips.push(layout.px(e));
+            vectors.push_str(&polyline([layout.px(place, t), layout.px(place, e)], false));
+            tips.push(layout.px(place, e));
             numbers.push(p.press);
         }
     }
@@ -175,53 +178,41 @@ pub(crate) fn skin_map(input: &ReportInput<'_>) -> Figure {
     press_path(svg, "vector", &vectors, &numbers);
     press_path(svg, "dots tips", &dots(tips), &numbers);
     svg.close();
-    let (mut squares, mut numbers) = (String::new(), Vec::new());
     let disc = |p: &PressResult| locations.iter().any(|l| l.location == p.location);
-    for p in others.iter().filter(|p| p.timing.is_some() || !disc(p)) {
-        let (x, y) = layout.px(p.truth.unwrap_or(p.planned));
-        numbers.push(p.press);
-        squares.push_str(&polyline(
-            [
-                (x - 5.0, y - 5.0),
-                (x + 5.0, y - 5.0),
-                (x + 5.0, y + 5.0),
-                (x - 5.0, y + 5.0),
-            ],
-            true,
-        ));
-    }
+    let shown = others.iter().filter(|p| p.timing.is_some() || !disc(p));
+    let (numbers, points): (Vec<PressId>, Vec<(f64, f64)>) = shown
+        .map(|p| (p.press, layout.px(place, p.truth.unwrap_or(p.planned))))
+        .unzip();
     svg.open("g", &[("class", &"layer-others")]);
-    press_path(svg, "other", &squares, &numbers);
+    press_path(svg, "other", &squares(points, 10.0), &numbers);
     svg.close();
-    layout.cameras(svg, input);
-    colour_bar(
-        svg,
-        "mean error\n(mm)",
-        end,
-        locations.iter().filter(|l| l.mean_error_mm > end).count(),
-    );
-    legend(svg);
+    layout.cameras(svg, place, input);
     svg.leaf("g", &[("class", &"selection")]);
+    svg.close();
+    canvas.moving(SIDE_TO);
+    let beyond = locations.iter().filter(|l| l.mean_error_mm > end).count();
+    error_scale(&mut canvas.svg, "mean error\n(mm)", end, beyond);
+    column(&mut canvas.svg, (756.0, 400.0), &LEGEND);
+    canvas.svg.close();
     if counted.is_empty() {
         canvas.empty("no scored press was located");
     }
-    canvas.finish(
-        &format!(
-            "n = {} presses, {} locations",
-            counted.len(),
-            locations.len()
-        ),
-        "presses",
-        "select",
-    )
+    let n = format!(
+        "n = {} presses, {} locations",
+        counted.len(),
+        locations.len()
+    );
+    canvas
+        .finish(&foot(input), &n, "presses")
+        .interactive("select")
 }
 
 /// Edge of the probed area: one cell per location, clipped to the outline.
-fn cells(svg: &mut Svg, layout: &Layout, places: &[Point2], cell_mm: f64) {
-    let side = cell_mm * layout.axes.x.per_unit();
+fn cells(svg: &mut Svg, (layout, at): (&Layout, &Place), places: &[Point2], cell_mm: f64) {
+    let side = cell_mm * at.x.per_unit();
     let mut data = String::new();
     for place in places {
-        let (x, y) = layout.px(*place);
+        let (x, y) = layout.px(at, *place);
         let (x, y) = (Px(x - side / 2.0), Px(y - side / 2.0));
         data += &format!("M{x} {y}h{0}v{0}h-{0}Z", Px(side));
     }
@@ -232,68 +223,19 @@ fn cells(svg: &mut Svg, layout: &Layout, places: &[Point2], cell_mm: f64) {
             ("clip-path", &"url(#skin-map-clip)"),
         ],
     );
-    layout.union_edge(svg, "skin-map-probed", "cell", &data);
+    layout.union_edge(svg, at, "skin-map-probed", "cell", &data);
     svg.close();
 }
 
-fn legend(svg: &mut Svg) {
-    let (x, mut y) = (756.0, 400.0);
-    let mut row = |svg: &mut Svg, label: &str, draw: &dyn Fn(&mut Svg, f64)| {
-        draw(svg, y);
-        svg.text((x + 24.0, y + 4.0), "tick", "start", label);
-        y += 21.0;
-    };
-    let swatch = |class: &'static str| {
-        move |svg: &mut Svg, y: f64| {
-            svg.leaf(
-                "rect",
-                &[
-                    ("class", &class),
-                    ("x", &Px(x)),
-                    ("y", &Px(y - 6.0)),
-                    ("width", &"18"),
-                    ("height", &"12"),
-                ],
-            );
-        }
-    };
-    row(svg, "seen by camera 1", &swatch("fov strong f1 c1"));
-    row(svg, "seen by camera 2", &swatch("fov strong f2 c2"));
-    row(svg, "seen by both", &|svg, y| {
-        svg.line("overlap-edge", (x, y), (x + 18.0, y));
-    });
-    row(svg, "probed area", &|svg, y| {
-        svg.leaf(
-            "rect",
-            &[
-                ("class", &"cell"),
-                ("x", &Px(x + 2.0)),
-                ("y", &Px(y - 7.0)),
-                ("width", &"14"),
-                ("height", &"14"),
-            ],
-        );
-    });
-    row(svg, "press path", &|svg, y| {
-        svg.line("path", (x, y), (x + 18.0, y));
-    });
-    row(svg, "truth to estimate", &|svg, y| {
-        svg.line("vector", (x, y), (x + 16.0, y));
-        svg.path("dots tips", &dots([(x + 16.0, y)]));
-    });
-    row(svg, "not counted", &|svg, y| {
-        svg.leaf(
-            "rect",
-            &[
-                ("class", &"other"),
-                ("x", &Px(x + 4.0)),
-                ("y", &Px(y - 5.0)),
-                ("width", &"10"),
-                ("height", &"10"),
-            ],
-        );
-    });
-}
+const LEGEND: [(Sample, &str); 7] = [
+    (Sample::Area("fov strong f1 c1"), "seen by camera 1"),
+    (Sample::Area("fov strong f2 c2"), "seen by camera 2"),
+    (Sample::Line("overlap-edge"), "seen by both"),
+    (Sample::Path("cell", "M-7 -7h14v14h-14Z"), "probed area"),
+    (Sample::Line("path"), "press path"),
+    (Sample::Line("vector"), "truth to estimate"),
+    (Sample::Path("other", "M-5 -5h10v10h-10Z"), "not counted"),
+];
 
 /// Standard deviation between repetitions at every location.
 #[must_use]
@@ -306,30 +248,29 @@ pub(crate) fn repeat_map(input: &ReportInput<'_>) -> Figure {
          the estimates of equally deep presses at a location, for the {} locations with at least two that count.",
         locations.len()
     );
-    let mut canvas = Canvas::new(
-        input,
-        "repeat-map",
-        "Spread between repetitions",
-        caption,
-        SIZE,
-        &[],
-    );
-    backdrop(&mut canvas, &layout);
+    let head = ["repeat-map", "Spread between repetitions", &caption];
+    let mut canvas = Canvas::new(head.map(str::to_owned), SIZE, Some(NARROW));
+    let place = backdrop(&mut canvas, &layout);
     let svg = &mut canvas.svg;
-    let end = scale_end(locations.iter().filter_map(|l| l.std_mm).collect());
-    discs(svg, &layout, &locations, |l| l.std_mm, end);
-    layout.cameras(svg, input);
-    let beyond = locations
-        .iter()
-        .filter(|l| l.std_mm.is_some_and(|s| s > end))
-        .count();
-    colour_bar(svg, "std between\nrepetitions (mm)", end, beyond);
+    let end = scale_end(locations.iter().filter_map(|l| l.std_mm)).unwrap_or(1.0);
+    discs(svg, (&layout, &place), &locations, |l| l.std_mm, end);
+    layout.cameras(svg, &place, input);
+    svg.close();
+    let beyond = locations.iter().filter(|l| l.std_mm > Some(end)).count();
+    canvas.moving(SIDE_TO);
+    error_scale(
+        &mut canvas.svg,
+        "std between\nrepetitions (mm)",
+        end,
+        beyond,
+    );
+    canvas.svg.close();
     if locations.is_empty() {
         canvas.empty("no location has two presses that count");
     }
     canvas.finish(
+        &foot(input),
         &format!("n = {} locations", locations.len()),
         "locations",
-        "",
     )
 }

@@ -1,18 +1,18 @@
 //! Owns the figures: one function each, from an analysis to a labelled SVG with title and description.
 
 mod activity;
-mod canvas;
 mod centroids;
 mod clocks;
 mod correlation;
 mod errors;
+mod histogram;
 mod latency_course;
 mod latency_onsets;
 mod latency_roc;
-mod legend;
 mod map;
 mod models;
 mod motion;
+mod origin;
 mod pictures;
 mod raster;
 mod rates;
@@ -22,9 +22,8 @@ mod skin;
 mod threshold;
 pub(crate) mod tradeoff;
 
+pub use crate::plot::Figure;
 pub use activity::activity;
-pub use canvas::Figure;
-pub(crate) use canvas::nice_above;
 pub(crate) use centroids::centroid_tracks;
 pub use clocks::clock_residuals;
 pub use correlation::correlation;
@@ -85,5 +84,5 @@ pub fn all(input: &ReportInput<'_>) -> Vec<Figure> {
 pub(crate) fn speed_accuracy(input: &ReportInput<'_>) -> Option<Figure> {
     let result = input.tradeoff.as_ref()?.as_ref().ok()?;
     let rig = "CPU times depend on the machine.";
-    Some(tradeoff::fronts(result, rig, &canvas::foot(input)))
+    Some(tradeoff::fronts(result, rig, &origin::foot(input)))
 }

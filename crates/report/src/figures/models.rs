@@ -2,12 +2,11 @@
 
 use skinrig_model::CalibrationModel;
 
-use super::canvas::{Canvas, Figure, nice_above};
-use super::legend::{self, Sample};
-use crate::axes::{Axes, Scale};
+use super::origin::foot;
 use crate::format::number;
 use crate::input::ReportInput;
-use crate::svg::{Px, dots};
+use crate::plot::{Axis, Figure, HALF, Plot, Sample, Sheet};
+use crate::svg::dots;
 
 /// Display name of a model.
 pub(crate) const fn model_name(model: CalibrationModel) -> &'static str {
@@ -34,83 +33,59 @@ pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
         location; the table below gives the differences). Small dots: RMSE on the fitted presses, always more \
         optimistic. Ring: the model used."
         .to_owned();
-    let mut canvas = Canvas::new(
-        input,
-        "models",
-        "Calibration: choice of the model",
-        caption,
-        (620.0, 480.0),
-        &[],
-    );
     let finite = |v: Option<f64>| v.filter(|v| v.is_finite());
-    let most = rows
+    let highest = rows
         .iter()
-        .filter_map(|r| finite(r.rmse_mm.high.or(r.rmse_mm.value)))
-        .fold(0.0, f64::max);
-    let axes = Axes {
-        x: Scale::new((-0.6, rows.len() as f64 - 0.4), (66.0, 604.0)),
-        y: Scale::new((0.0, nice_above(most)), (390.0, 44.0)),
-        x_label: String::new(),
-        y_label: "RMSE (mm)".into(),
-        tick_count: (0, 6),
-    };
-    let svg = &mut canvas.svg;
-    axes.draw(svg);
-    for (i, row) in rows.iter().enumerate() {
-        let x = axes.x.at(i as f64);
-        let name = format!(
-            "{} ({})",
-            model_name(row.model).replace(" (paper)", ""),
-            row.parameters
-        );
-        // Alternate label heights: five names do not fit side by side.
-        svg.text((x, 407.0 + 14.0 * (i % 2) as f64), "tick", "middle", &name);
-        if let (Some(low), Some(high)) = (finite(row.rmse_mm.low), finite(row.rmse_mm.high)) {
-            svg.line("whisker c1", (x, axes.y.at(low)), (x, axes.y.at(high)));
+        .filter_map(|r| r.rmse_mm.high.or(r.rmse_mm.value));
+    // Alternate heights: five names do not fit side by side.
+    let names = rows.iter().enumerate().map(|(i, row)| {
+        let name = model_name(row.model).replace(" (paper)", "");
+        let (lead, tail) = if i % 2 == 1 { ("\n", "") } else { ("", "\n") };
+        format!("{lead}{name} ({}){tail}", row.parameters)
+    });
+    let y = Axis::from_zero(highest, "RMSE (mm)").ticks(6);
+    let mut plot = Plot::new(Axis::categories(names, ""), y);
+    for (x, row) in (0..).map(f64::from).zip(rows) {
+        if let Some(ends) = finite(row.rmse_mm.low).zip(finite(row.rmse_mm.high)) {
+            plot = plot.line("whisker c1", [(x, ends.0), (x, ends.1)]);
         }
-        match finite(row.rmse_mm.value) {
+        plot = match finite(row.rmse_mm.value) {
+            None => plot.draw(move |svg, place| {
+                let at = (place.x.at(x), place.y.px.0 - 18.0);
+                svg.text(at, "note", "middle", "not fitted");
+            }),
             Some(value) => {
-                let y = axes.y.at(value);
-                svg.path("dots strong c1", &dots([(x, y)]));
-                svg.text(
-                    (x + 12.0, y + 4.0),
-                    "tick halo",
-                    "start",
-                    &number(Some(value), 2),
-                );
+                let plot = plot
+                    .dots("dots strong c1", [(x, value)])
+                    .draw(move |svg, place| {
+                        let (x, y) = place.at((x, value));
+                        let text = number(Some(value), 2);
+                        svg.text((x + 12.0, y + 4.0), "tick halo", "start", &text);
+                    });
                 if row.chosen {
-                    svg.leaf(
-                        "circle",
-                        &[
-                            ("class", &"ring"),
-                            ("cx", &Px(x)),
-                            ("cy", &Px(y)),
-                            ("r", &"8"),
-                        ],
-                    );
+                    plot.ring("ring", (x, value))
+                } else {
+                    plot
                 }
             }
-            None => {
-                svg.text((x, 372.0), "note", "middle", "not fitted");
+        };
+        let (bounded, fitted) = (finite(row.bounded_rmse_mm), finite(row.fitted_rmse_mm));
+        plot = plot.draw(move |svg, place| {
+            if let Some((x, y)) = bounded.map(|v| place.at((x, v))) {
+                svg.line("ref", (x - 22.0, y), (x - 4.0, y));
             }
-        }
-        if let Some(value) = finite(row.bounded_rmse_mm) {
-            let y = axes.y.at(value);
-            svg.line("ref", (x - 22.0, y), (x - 4.0, y));
-        }
-        if let Some(value) = finite(row.fitted_rmse_mm) {
-            svg.path("dots mid c2", &dots([(x - 12.0, axes.y.at(value))]));
-        }
+            if let Some((x, y)) = fitted.map(|v| place.at((x, v))) {
+                svg.path("dots mid c2", &dots([(x - 12.0, y)]));
+            }
+        });
     }
-    legend::line(
-        svg,
-        (66.0, 18.0),
-        &[
+    let sheet = Sheet::new("models", "Calibration: choice of the model", caption, HALF)
+        .legend([
             (Sample::Dot("dots strong c1"), "held-out locations"),
             (Sample::Dot("dots mid c2"), "fitted presses"),
             (Sample::Line("ref"), "held out, bounded"),
-        ],
-    );
+        ])
+        .row(346.0, [plot]);
     let n = rows.iter().map(|r| r.rmse_mm.n).max().unwrap_or(0);
-    Some(canvas.finish(&format!("n = {n} presses"), "models", ""))
+    Some(sheet.finish(&foot(input), &format!("n = {n} presses"), "models"))
 }

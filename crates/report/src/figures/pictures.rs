@@ -3,10 +3,10 @@
 use skinrig_analysis::result::{PressPicture, PressView};
 use skinrig_model::SENSOR_WIDTH;
 
-use super::canvas::{Canvas, Figure};
+use super::origin::foot;
 use super::raster::{image, indexed_png};
-use crate::axes::tick_label;
 use crate::input::ReportInput;
+use crate::plot::{Axis, Figure, Plot, Sample, Sheet, WIDE, rectangle};
 use crate::svg::Px;
 
 /// Colours of an image: no event, then ON and OFF outside the cluster, then ON and OFF inside it. An image cannot follow the
@@ -29,137 +29,80 @@ pub(crate) fn press_pictures(input: &ReportInput<'_>) -> Option<Figure> {
     if presses.is_empty() {
         return None;
     }
-    let tallest = pictures
-        .iter()
-        .map(|p| f64::from(rows(p)))
-        .fold(1.0, f64::max);
-    // Two strips side by side; a sensor pixel is `k` px wide and high.
-    let k = 570.0 / f64::from(SENSOR_WIDTH);
-    let row_height = tallest * k + 56.0;
-    let size = (1240.0, 46.0 + row_height * presses.len() as f64 + 26.0);
+    let tallest = pictures.iter().map(rows).max().unwrap_or(1);
     let caption = "Pixels with events during single presses, cropped rows of the sensor, camera 1 left, camera 2 \
         right. Colour: majority polarity of the pixel. Pale pixels are outside the cluster. Cross: centroid of the \
         cluster; triangles: its column, the only coordinate used for localisation."
         .to_owned();
-    let mut canvas = Canvas::new(
-        input,
-        "press-pictures",
-        "Single presses: sensor images",
-        caption,
-        size,
-        &[],
-    );
-    for (i, press) in presses.iter().enumerate() {
-        for camera in 0..2 {
-            let Some(p) = pictures
-                .iter()
-                .find(|p| p.press == *press && p.camera.index() == camera)
-            else {
-                continue;
-            };
-            let (x, y) = (
-                50.0 + 610.0 * f64::from(camera as u8),
-                46.0 + row_height * i as f64,
-            );
-            let view = input
-                .analysis
-                .presses
-                .iter()
-                .find(|r| r.press == *press)
-                .and_then(|r| r.views[camera]);
-            strip(&mut canvas, p, (x, y), k, view);
-        }
-    }
-    for (i, (name, class)) in [("ON", "pictured-on"), ("OFF", "pictured-off")]
-        .into_iter()
-        .enumerate()
-    {
-        let x = 1120.0 + 58.0 * i as f64;
-        canvas.svg.leaf(
-            "rect",
-            &[
-                ("class", &class),
-                ("x", &Px(x)),
-                ("y", &"8"),
-                ("width", &"11"),
-                ("height", &"11"),
-            ],
-        );
-        canvas.svg.text((x + 16.0, 18.0), "tick", "start", name);
-    }
-    Some(canvas.finish(&format!("{} presses", presses.len()), "pictures", ""))
+    let strips = presses.iter().flat_map(|press| {
+        let mut strips: Vec<&PressPicture> =
+            pictures.iter().filter(|p| p.press == *press).collect();
+        strips.sort_by_key(|p| p.camera.index());
+        strips
+    });
+    let plots = strips.map(|p| {
+        let results = input.analysis.presses.iter();
+        let press = results.clone().find(|r| r.press == p.press);
+        strip(p, press.and_then(|r| r.views[p.camera.index()]))
+    });
+    // A sensor pixel is about as wide as high.
+    let height = (f64::from(tallest) * 546.0 / f64::from(SENSOR_WIDTH)).max(24.0);
+    let title = "Single presses: sensor images";
+    let sheet = Sheet::new("press-pictures", title, caption, WIDE)
+        .columns(&[1.0, 1.0])
+        .legend([
+            (Sample::Area("pictured-on"), "ON"),
+            (Sample::Area("pictured-off"), "OFF"),
+        ])
+        .rows(height, plots);
+    Some(sheet.finish(
+        &foot(input),
+        &format!("{} presses", presses.len()),
+        "pictures",
+    ))
 }
 
 fn rows(p: &PressPicture) -> u32 {
     u32::from(p.rows.1.saturating_sub(p.rows.0)) + 1
 }
 
-fn strip(
-    canvas: &mut Canvas<'_>,
-    p: &PressPicture,
-    at: (f64, f64),
-    k: f64,
-    view: Option<PressView>,
-) {
-    let svg = &mut canvas.svg;
-    let height = f64::from(rows(p)) * k;
-    let width = f64::from(SENSOR_WIDTH) * k;
-    svg.text(
-        (at.0, at.1 - 11.0),
-        "panel",
-        "start",
-        &format!("{} · {}", p.press, p.camera),
+fn strip(p: &PressPicture, view: Option<PressView>) -> Plot<'_> {
+    let finite = |v: Option<f64>| v.filter(|v| v.is_finite());
+    let (u, v) = (
+        finite(view.and_then(|v| v.centroid_u)),
+        finite(view.and_then(|v| v.centroid_v)),
     );
-    svg.leaf(
-        "rect",
-        &[
-            ("class", &"tile"),
-            ("x", &Px(at.0)),
-            ("y", &Px(at.1)),
-            ("width", &Px(width)),
-            ("height", &Px(height)),
-        ],
-    );
-    svg.text(
-        (at.0 + width, at.1 - 11.0),
-        "tick",
-        "end",
-        "column u (px) across, row v (px) down",
-    );
-    match png(p) {
-        Some(bytes) => image(svg, "picture", (at.0, at.1, width, height), &bytes),
-        None => {
-            let middle = (at.0 + width / 2.0, at.1 + height / 2.0);
-            svg.text(middle, "empty", "middle", "no picture of this size");
+    let ends = [p.rows.0, p.rows.1].map(|v| (f64::from(v), v.to_string()));
+    let columns = [0u16, 160, 320, 480, 640].map(|u| (f64::from(u), u.to_string()));
+    let rows = (f64::from(p.rows.0) - 0.5, f64::from(p.rows.1) + 0.5);
+    Plot::new(
+        Axis::linear((0.0, f64::from(SENSOR_WIDTH)), "").marked(columns.to_vec()),
+        Axis::linear(rows, "").marked(ends.to_vec()).downwards(),
+    )
+    .title(format!("{} · {}", p.press, p.camera))
+    .note("column u (px) across, row v (px) down")
+    .deeper(6.0)
+    .draw(move |svg, place| {
+        rectangle(svg, "tile", place.frame());
+        match png(p) {
+            Some(bytes) => image(svg, "picture", place.frame(), &bytes),
+            None => {
+                svg.text(place.middle(), "empty", "middle", "no picture of this size");
+            }
         }
-    }
-    for u in [0.0, 160.0, 320.0, 480.0, 640.0] {
-        svg.text(
-            (at.0 + u * k, at.1 + height + 19.0),
-            "tick",
-            "middle",
-            &tick_label(u, 1.0),
-        );
-    }
-    for v in [p.rows.0, p.rows.1] {
-        let y = at.1 + (f64::from(v) - f64::from(p.rows.0) + 0.5) * k;
-        svg.text((at.0 - 5.0, y + 4.0), "tick", "end", &v.to_string());
-    }
-    if let Some(u) = view.and_then(|v| v.centroid_u).filter(|u| u.is_finite()) {
-        let x = at.0 + u * k;
-        let v = view.and_then(|v| v.centroid_v).filter(|v| v.is_finite());
-        if let Some(v) = v {
-            let y = at.1 + (v - f64::from(p.rows.0) + 0.5) * k;
+        let Some(x) = u.map(|u| place.x.at(u)) else {
+            return;
+        };
+        if let Some(y) = v.map(|v| place.y.at(v)) {
             let cross = format!("M{} {}h14M{} {}v14", Px(x - 7.0), Px(y), Px(x), Px(y - 7.0));
             svg.path("centroid under", &cross);
             svg.path("centroid", &cross);
         }
-        svg.path("pointer", &format!("M{} {}l-4 -7h8Z", Px(x), Px(at.1)));
-        svg.path(
-            "pointer",
-            &format!("M{} {}l-4 7h8Z", Px(x), Px(at.1 + height)),
-        );
-    }
+        let (_, top, _, height) = place.frame();
+        svg.path("pointer", &format!("M{} {}l-4 -7h8Z", Px(x), Px(top)));
+        let bottom = Px(top + height);
+        svg.path("pointer", &format!("M{} {bottom}l-4 7h8Z", Px(x)));
+    })
 }
 
 /// The image as a PNG, one px per sensor pixel. Ignores pixels outside the rows or the sensor.

@@ -1,14 +1,13 @@
 //! Owns the data-reduction figure: error and rates against the thinning factor.
 
-use skinrig_analysis::result::{Estimate, Reduction, ReductionCurve, ReductionRow, Thinning};
+use skinrig_analysis::result::{Estimate, Reduction, ReductionRow, Thinning};
 
-use super::canvas::{Canvas, Figure, band, nice_above};
-use super::legend::{self, Sample, diamond};
-use crate::axes::{Axes, Scale, tick_label, ticks};
+use super::origin::foot;
 use crate::format::number;
 use crate::input::ReportInput;
+use crate::plot::{Axis, Figure, Plot, Sample, Sheet, WIDE, extent, nice_above};
 use crate::published;
-use crate::svg::{Svg, dots, polyline};
+use crate::svg::Svg;
 
 /// Content of one panel.
 struct Panel {
@@ -29,65 +28,60 @@ pub fn reduction(input: &ReportInput<'_>) -> Option<Figure> {
     if study.curves.iter().all(|c| c.rows.is_empty()) {
         return None;
     }
-    let mut canvas = Canvas::new(
-        input,
-        "reduction",
-        "Data reduction",
-        caption(study),
-        (1240.0, 700.0),
-        &[],
-    );
-    let percent = |name| format!("{name} (%)");
-    let panels = [
-        Panel {
-            name: "A   RMSE of the located presses",
-            label: "RMSE (mm)".into(),
-            value: |r| r.rmse_mm,
-            scale: 1.0,
-            published: Some((published::RMSE_MM, published::RMSE_1024_MM)),
-        },
-        Panel {
-            name: "B   pass rate, threshold fixed at factor 1",
-            label: percent("pass rate"),
-            value: |r| r.pass_rate,
-            scale: 100.0,
-            published: Some((
-                100.0 * published::PASS_RATE.0,
-                100.0 * published::PASS_RATE.1,
-            )),
-        },
-        Panel {
-            name: "C   within the absolute limit",
-            label: percent(&format!("within {} mm", number(Some(study.within_mm), 1))),
-            value: |r| r.within_rate,
-            scale: 100.0,
-            published: None,
-        },
-        Panel {
-            name: "D   located",
-            label: percent("located rate"),
-            value: |r| r.located_rate,
-            scale: 100.0,
-            published: None,
-        },
+    let panel = |name, label: &str, value, scale, published| Panel {
+        name,
+        label: label.to_owned(),
+        value,
+        scale,
+        published,
+    };
+    let within = format!("within {} mm (%)", number(Some(study.within_mm), 1));
+    let rmse = (published::RMSE_MM, published::RMSE_1024_MM);
+    let passes = published::PASS_RATE;
+    let passes = (100.0 * passes.0, 100.0 * passes.1);
+    let panels: [Panel; 4] = [
+        panel(
+            "A   RMSE of the located presses",
+            "RMSE (mm)",
+            |r| r.rmse_mm,
+            1.0,
+            Some(rmse),
+        ),
+        panel(
+            "B   pass rate, threshold fixed at factor 1",
+            "pass rate (%)",
+            |r| r.pass_rate,
+            100.0,
+            Some(passes),
+        ),
+        panel(
+            "C   within the absolute limit",
+            &within,
+            |r| r.within_rate,
+            100.0,
+            None,
+        ),
+        panel(
+            "D   located",
+            "located rate (%)",
+            |r| r.located_rate,
+            100.0,
+            None,
+        ),
     ];
-    for (i, panel) in panels.iter().enumerate() {
-        let left = 66.0 + 620.0 * (i % 2) as f64;
-        let top = if i < 2 { 92.0 } else { 404.0 };
-        draw(&mut canvas.svg, study, panel, (left, top), i < 2);
-    }
-    legend::line(
-        &mut canvas.svg,
-        (66.0, 18.0),
-        &[
+    let n = format!("n = {} presses, {} seeds", study.presses, study.seeds);
+    let plots = panels.iter().enumerate();
+    let plots = plots.map(|(i, panel)| plot(study, panel, i < 2));
+    let sheet = Sheet::new("reduction", "Data reduction", caption(study), WIDE)
+        .columns(&[1.0, 1.0])
+        .legend([
             (Sample::Line("line c1"), "exact count (public code)"),
             (Sample::Line("line dashed c2"), "Bernoulli (paper's text)"),
             (Sample::Area("band f1"), "95 % interval over locations"),
             (Sample::Published, "published, another recording"),
-        ],
-    );
-    let n = format!("n = {} presses, {} seeds", study.presses, study.seeds);
-    Some(canvas.finish(&n, "reduction", ""))
+        ])
+        .rows(208.0, plots);
+    Some(sheet.finish(&foot(input), &n, "reduction"))
 }
 
 fn caption(study: &Reduction) -> String {
@@ -129,24 +123,20 @@ fn better_with_less(study: &Reduction) -> Option<(&ReductionRow, &ReductionRow)>
     (best.rmse_mm.high? < all.rmse_mm.low?).then_some((best, all))
 }
 
+/// Logarithm of the factor, base 2.
 fn power(row: &ReductionRow) -> f64 {
     f64::from(row.factor.max(1)).log2()
 }
 
-fn axes(study: &Reduction, panel: &Panel, (left, top): (f64, f64)) -> Axes {
+fn axes(study: &Reduction, panel: &Panel) -> (Axis, Axis) {
     let rows = || study.curves.iter().flat_map(|c| &c.rows);
-    let values = rows().flat_map(|r| {
+    let ends = rows().flat_map(|r| {
         let e = (panel.value)(r);
         [e.value, e.low, e.high]
     });
-    let drawn: Vec<f64> = values
-        .flatten()
-        .filter(|v| v.is_finite())
-        .map(|v| v * panel.scale)
-        .chain(panel.published.into_iter().flat_map(|(a, b)| [a, b]))
-        .collect();
-    let high = drawn.iter().copied().fold(0.0, f64::max);
-    let low = drawn.iter().copied().fold(f64::INFINITY, f64::min);
+    let drawn = ends.flatten().map(|v| v * panel.scale);
+    let published = panel.published.into_iter().flat_map(|(a, b)| [a, b]);
+    let (low, high) = extent(drawn.chain(published)).unwrap_or((0.0, 0.0));
     let y = if panel.scale > 1.0 {
         // Shares: from a round number below the minimum to 100 %.
         (((low - 4.0) / 10.0).floor().clamp(0.0, 9.0) * 10.0, 101.0)
@@ -154,110 +144,72 @@ fn axes(study: &Reduction, panel: &Panel, (left, top): (f64, f64)) -> Axes {
         (0.0, nice_above(high * 1.02))
     };
     let last = rows().map(power).fold(0.0, f64::max);
-    Axes {
-        x: Scale::new((-0.35, last + 0.35), (left, left + 540.0)),
-        y: Scale::new(y, (top + 208.0, top)),
-        x_label: "one event in k kept".into(),
-        y_label: panel.label.clone(),
-        tick_count: (0, 5),
-    }
+    let every = if last > 14.0 { 2 } else { 1 };
+    let factors = (0..=last as u32).step_by(every);
+    let factors = factors.map(|p| (f64::from(p), (1u64 << p).to_string()));
+    let x = Axis::linear((-0.35, last + 0.35), "one event in k kept").marked(factors.collect());
+    (x, Axis::linear(y, &*panel.label))
 }
 
-fn draw(svg: &mut Svg, study: &Reduction, panel: &Panel, at: (f64, f64), with_bytes: bool) {
-    let axes = axes(study, panel, at);
-    let (low, high) = (axes.y.data.0, axes.y.data.1.min(100.0));
-    let marks = ticks(
-        low,
-        if panel.scale > 1.0 {
-            high
-        } else {
-            axes.y.data.1
-        },
-        5,
-    );
-    let step = if marks.len() > 1 {
-        marks[1] - marks[0]
-    } else {
-        1.0
-    };
-    let ys: Vec<_> = marks.iter().map(|t| (*t, tick_label(*t, step))).collect();
-    let most = axes.x.data.1.floor() as u32;
-    let every = if most > 14 { 2 } else { 1 };
-    let xs: Vec<_> = (0..=most)
-        .step_by(every)
-        .map(|p| (f64::from(p), (1u64 << p).to_string()))
-        .collect();
-    axes.draw_with(svg, &xs, &ys);
-    let name_y = if with_bytes { at.1 - 36.0 } else { at.1 - 12.0 };
-    svg.text((at.0, name_y), "panel", "start", panel.name);
+fn plot<'a>(study: &'a Reduction, panel: &Panel, with_bytes: bool) -> Plot<'a> {
+    let (x, y) = axes(study, panel);
+    let mut plot = Plot::new(x, y).title(panel.name);
     if with_bytes {
-        bytes(svg, study, &axes, at.1);
+        plot = plot
+            .names_above()
+            .draw(|svg, place| bytes(svg, study, place));
     }
+    let finite = |v: Option<f64>| v.filter(|v| v.is_finite()).map(|v| v * panel.scale);
     for curve in &study.curves {
         let (area, line, dot) = match curve.thinning {
             Thinning::Exact => ("band f1", "line c1", "dots c1"),
             Thinning::Bernoulli => ("band f2", "line dashed c2", "dots c2"),
         };
-        let points = points(curve, panel, &axes);
-        svg.path(area, &band(points.iter().filter_map(|p| Some((p.0, p.2?)))));
-        let middle: Vec<_> = points.iter().filter_map(|p| Some((p.0, p.1?))).collect();
-        svg.path(line, &polyline(middle.iter().copied(), false));
-        svg.path(dot, &dots(middle));
+        let of = |r: &ReductionRow| (power(r), (panel.value)(r));
+        let estimates: Vec<_> = curve.rows.iter().map(of).collect();
+        let ends = estimates.iter();
+        let ends = ends.filter_map(|(x, e)| Some((*x, finite(e.low).zip(finite(e.high))?)));
+        let middle = estimates.iter();
+        let middle: Vec<_> = middle
+            .filter_map(|(x, e)| Some((*x, finite(e.value)?)))
+            .collect();
+        plot = plot
+            .band(area, ends)
+            .line(line, middle.iter().copied())
+            .dots(dot, middle);
     }
+    let rows = || study.curves.iter().flat_map(|c| &c.rows);
+    let end = rows().map(power).fold(0.0, f64::max);
     if panel.scale == 1.0 {
-        nothing_located(svg, study, &axes);
-    }
-    if let Some((one, many)) = panel.published {
-        for (power, value) in [(0.0, one), (10.0, many)] {
-            if power <= axes.x.data.1 {
-                svg.path("published", &diamond((axes.x.at(power), axes.y.at(value))));
-            }
+        // A missing line is explained.
+        let located = rows().filter(|r| r.rmse_mm.value.is_some()).map(power);
+        let last = located.fold(0.0, f64::max);
+        if end - last >= 2.0 {
+            plot = plot.draw(move |svg, place| {
+                let x = f64::midpoint(place.x.at(last + 1.0), place.x.at(end));
+                let at = (x, place.middle().1);
+                svg.text(at, "note halo", "middle", "no press is located");
+            });
         }
     }
-}
-
-/// Notes where no press is located any more, so that the missing line is explained.
-fn nothing_located(svg: &mut Svg, study: &Reduction, axes: &Axes) {
-    let rows = || study.curves.iter().flat_map(|c| &c.rows);
-    let last = rows()
-        .filter(|r| r.rmse_mm.value.is_some())
-        .map(power)
-        .fold(0.0, f64::max);
-    let end = rows().map(power).fold(0.0, f64::max);
-    if end - last >= 2.0 {
-        let (left, right) = (axes.x.at(last + 1.0), axes.x.at(end));
-        let y = (axes.y.px.0 + axes.y.px.1) / 2.0;
-        let middle = ((left + right) / 2.0, y);
-        svg.text(middle, "note halo", "middle", "no press is located");
+    if let Some((one, many)) = panel.published {
+        let there = [(0.0, one), (10.0, many)].into_iter();
+        for at in there.filter(|(power, _)| *power <= end + 0.35) {
+            plot = plot.published(at);
+        }
     }
-}
-
-/// x, y of the value, y of both ends of the interval.
-type PlotPoint = (f64, Option<f64>, Option<(f64, f64)>);
-
-fn points(curve: &ReductionCurve, panel: &Panel, axes: &Axes) -> Vec<PlotPoint> {
-    let y = |v: Option<f64>| {
-        v.filter(|v| v.is_finite())
-            .map(|v| axes.y.at(v * panel.scale))
-    };
-    let drawn = |r: &ReductionRow| {
-        let e = (panel.value)(r);
-        (axes.x.at(power(r)), y(e.value), y(e.low).zip(y(e.high)))
-    };
-    curve.rows.iter().map(drawn).collect()
+    plot
 }
 
 /// Second scale above the plot: bytes per second during a press.
-fn bytes(svg: &mut Svg, study: &Reduction, axes: &Axes, top: f64) {
+fn bytes(svg: &mut Svg, study: &Reduction, place: &crate::plot::Place) {
     let Some(curve) = study.curves.first() else {
         return;
     };
-    for row in curve
-        .rows
-        .iter()
-        .filter(|r| (power(r) as u32).is_multiple_of(2))
-    {
-        let x = axes.x.at(power(row));
+    let (_, top, ..) = place.frame();
+    let shown = |r: &&ReductionRow| (power(r) as u32).is_multiple_of(2);
+    for row in curve.rows.iter().filter(shown) {
+        let x = place.x.at(power(row));
         svg.line("axis", (x, top - 4.0), (x, top));
         let Some(kilo) = row.press_bytes_per_s.value.map(|b| b / 1e3) else {
             continue;

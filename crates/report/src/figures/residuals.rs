@@ -2,11 +2,12 @@
 
 use skinrig_model::Point2;
 
-use super::canvas::{Canvas, Figure};
+use super::origin::foot;
 use super::skin::Layout;
 use crate::derive::{self, Residual};
 use crate::format::number;
 use crate::input::ReportInput;
+use crate::plot::{Figure, Plot, Sheet, WIDE};
 use crate::svg::{dots, polyline};
 
 /// Selects the estimate to draw.
@@ -31,49 +32,40 @@ pub fn residuals(input: &ReportInput<'_>) -> Option<Figure> {
         fit.n,
         fit.outliers,
     );
-    let mut canvas = Canvas::new(
-        input,
-        "residuals",
-        "Calibration: residuals before and after",
-        caption,
-        (1240.0, 640.0),
-        &[],
-    );
-    let sides: [(&str, &str, Estimate); 2] = [
-        ("A   before", "vector strong c2", |r| r.before),
-        ("B   after", "vector strong c1", |r| r.after),
+    let layout = Layout::new(input);
+    let side = |name: &str, id: &str, class: &'static str, estimate: Estimate| {
+        let (layout, rows) = (&layout, &rows);
+        let (x, y) = layout.axes();
+        Plot::new(x, y)
+            .title(name)
+            .clipped(id)
+            .draw(move |svg, place| {
+                svg.path("skin", &layout.skin(place));
+                let vector = |r: &Residual| {
+                    let ends = [layout.px(place, r.truth), layout.px(place, estimate(r)?)];
+                    Some(polyline(ends, false))
+                };
+                let vectors: String = rows.iter().filter_map(vector).collect();
+                svg.path(class, &vectors);
+                svg.path(
+                    "dots tips",
+                    &dots(rows.iter().map(|r| layout.px(place, r.truth))),
+                );
+            })
+            .over(move |svg, place| layout.cameras(svg, place, input))
+    };
+    let plots = [
+        side("A   before", "residuals-before", "vector strong c2", |r| {
+            r.before
+        }),
+        side("B   after", "residuals-after", "vector strong c1", |r| {
+            r.after
+        }),
     ];
-    for (i, (name, class, estimate)) in sides.into_iter().enumerate() {
-        let left = 66.0 + 620.0 * i as f64;
-        let layout = Layout::within(input, (left, 34.0), (530.0, 530.0));
-        let clip = ["residuals-before", "residuals-after"][i];
-        let svg = &mut canvas.svg;
-        layout.axes.draw(svg);
-        svg.path("skin", &layout.skin());
-        svg.text((left, 22.0), "panel", "start", name);
-        svg.open("clipPath", &[("id", &clip)]);
-        svg.leaf(
-            "rect",
-            &[
-                ("x", &layout.axes.x.px.0),
-                ("y", &layout.axes.y.px.1),
-                ("width", &(layout.axes.x.px.1 - layout.axes.x.px.0)),
-                ("height", &(layout.axes.y.px.0 - layout.axes.y.px.1)),
-            ],
-        );
-        svg.close();
-        svg.open("g", &[("clip-path", &format_args!("url(#{clip})"))]);
-        let mut vectors = String::new();
-        for row in &rows {
-            if let Some(end) = estimate(row) {
-                vectors += &polyline([layout.px(row.truth), layout.px(end)], false);
-            }
-        }
-        svg.path(class, &vectors);
-        svg.path("dots tips", &dots(rows.iter().map(|r| layout.px(r.truth))));
-        svg.close();
-        layout.cameras(svg, input);
-    }
+    let title = "Calibration: residuals before and after";
+    let sheet = Sheet::new("residuals", title, caption, WIDE)
+        .columns(&[1.0, 1.0])
+        .row(layout.height(538.0), plots);
     let n = format!("n = {} calibration presses", rows.len());
-    Some(canvas.finish(&n, "residuals", ""))
+    Some(sheet.finish(&foot(input), &n, "residuals"))
 }

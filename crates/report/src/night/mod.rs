@@ -8,5 +8,5 @@ mod trends;
 
 pub use page::html;
 pub use text::span;
-pub use tree::{Colour, line, tree};
+pub use tree::{line, tree};
 pub use trends::Trends;

@@ -8,6 +8,7 @@ use skinrig_nightly::{Attempt, Cause, CheckResult, Measurement, Night, Verdict};
 use super::trends::Trends;
 use super::{bars, text};
 use crate::error::ReportError;
+use crate::format::phrase;
 use crate::frame::Frame;
 use crate::trend::{ALARM_CSS, ALARM_TEMPLATE};
 
@@ -96,6 +97,7 @@ pub fn html(night: &Night, trends: Trends<'_>) -> Result<String, ReportError> {
         .collect();
     let share = |seconds: f64| (100.0 * seconds / night.budget_s.max(1e-9)).clamp(0.0, 100.0);
     frame.render(context! {
+        contents => [("places", "Where to look"), ("trends", "Trends"), ("time", "Time"), ("checks", "Checks"), ("versions", "Versions")],
         headline => trends.headline(night),
         trends => trends.value(),
         id => night.id.clone(),
@@ -194,7 +196,7 @@ fn check_card(c: &CheckResult, longest_s: f64) -> CheckCard {
         title: c.title.clone(),
         verdict: c.verdict.name(),
         open: !matches!(c.verdict, Verdict::Pass | Verdict::Skipped),
-        why: text::why(c),
+        why: text::why_in_words(c),
         repeats: c.repeats.clone(),
         skipped: c.skipped.clone(),
         took: if c.attempts.is_empty() {
@@ -226,7 +228,7 @@ fn attempt_card(number: usize, attempt: &Attempt) -> AttemptCard {
             .evidence
             .iter()
             .map(|e| EvidenceItem {
-                subject: e.subject.clone(),
+                subject: phrase(&e.subject),
                 kind: e.kind.name(),
                 what: e.what.clone(),
                 next: e.next.clone(),
@@ -244,8 +246,8 @@ fn row(subject: &str, m: &Measurement) -> Row {
     let parts = [m.note.clone().unwrap_or_default(), samples];
     let note: Vec<String> = parts.into_iter().filter(|p| !p.is_empty()).collect();
     Row {
-        subject: subject.to_owned(),
-        metric: m.metric.replace('_', " "),
+        subject: phrase(subject),
+        metric: phrase(&m.metric),
         value: match m.value {
             Some(_) => text::amount(m.value, &m.unit),
             None => "not measured".to_owned(),

@@ -4,7 +4,7 @@ use skinrig_model::Limit;
 use skinrig_nightly::rules::{CROSS_CHECK_RULES, RULES};
 use skinrig_nightly::{Cause, CheckResult, Measurement, Night, Verdict};
 
-use crate::format::{NONE, number};
+use crate::format::{NONE, number, phrase};
 
 /// Prefixes of large numbers.
 const LARGE: [(f64, &str); 4] = [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, "")];
@@ -94,20 +94,29 @@ pub(super) fn reason(rule: &str) -> Option<&'static str> {
     named.map(|r| r.reason)
 }
 
-/// Why a check failed, in one sentence.
+/// Why a check failed, in one sentence, with the name of the rule.
 pub(super) fn why(check: &CheckResult) -> Option<String> {
-    let cause = check.cause?;
-    let because = match &check.rule {
-        Some(rule) => {
-            let witnesses = match check.witnesses.as_slice() {
-                [] => String::new(),
-                some => format!(": {}", some.join(", ")),
-            };
-            format!("{}{witnesses} [{rule}]", reason(rule).unwrap_or_default())
+    let rule = check.rule.as_ref();
+    let rule = rule.map_or_else(String::new, |rule| format!(" [{rule}]"));
+    because(check, &check.witnesses).map(|text| text + &rule)
+}
+
+/// Why a check failed, in one sentence without identifiers.
+pub(super) fn why_in_words(check: &CheckResult) -> Option<String> {
+    let witnesses: Vec<String> = check.witnesses.iter().map(|w| phrase(w)).collect();
+    because(check, &witnesses)
+}
+
+fn because(check: &CheckResult, witnesses: &[String]) -> Option<String> {
+    let cause = check.cause?.name();
+    let because = match (&check.rule, witnesses) {
+        (None, _) => "a limit was violated and no evidence explains it".to_owned(),
+        (Some(rule), []) => reason(rule).unwrap_or_default().to_owned(),
+        (Some(rule), some) => {
+            format!("{}: {}", reason(rule).unwrap_or_default(), some.join(", "))
         }
-        None => "a limit was violated and no evidence explains it".to_owned(),
     };
-    Some(format!("{}: {because}", cause.name()))
+    Some(format!("{cause}: {because}"))
 }
 
 /// Causes in order of inspection, with the checks that blame them.

@@ -13,21 +13,12 @@ const INDENT: usize = 15;
 /// Columns of the name of a device.
 const LABEL: usize = 12;
 
-/// Whether to write ANSI colours.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Colour {
-    /// With ANSI colours.
-    On,
-    /// Plain text.
-    Off,
-}
-
 /// Formats a night as a tree.
 #[must_use]
-pub fn tree(night: &Night, colour: Colour) -> String {
+pub fn tree(night: &Night, paint: Paint) -> String {
     let mut out = Lines {
         text: String::new(),
-        colour,
+        paint,
     };
     out.wrapped(
         0,
@@ -67,17 +58,17 @@ pub fn tree(night: &Night, colour: Colour) -> String {
 
 /// Formats the line of one check.
 #[must_use]
-pub fn line(check: &CheckResult, colour: Colour) -> String {
+pub fn line(check: &CheckResult, paint: Paint) -> String {
     let lines = Lines {
         text: String::new(),
-        colour,
+        paint,
     };
     lines.head(check)
 }
 
 struct Lines {
     text: String,
-    colour: Colour,
+    paint: Paint,
 }
 
 impl Lines {
@@ -183,6 +174,6 @@ impl Lines {
             Verdict::Fail => Style::Error,
             Verdict::Invalid => Style::Invalid,
         };
-        Paint::new(self.colour == Colour::On).apply(style, text)
+        self.paint.apply(style, text)
     }
 }

@@ -7,7 +7,7 @@ use skinrig_nightly::trend::report::cause_name;
 use skinrig_nightly::{Cause, Night};
 
 use super::text;
-use crate::trend::{Links, alarm_cards, since};
+use crate::trend::{Links, alarm_cards, since, with_names};
 
 /// Series listed per alarm; the others are counted.
 const MAX_LISTED: usize = 4;
@@ -105,7 +105,7 @@ impl<'a> Trends<'a> {
         });
         context! {
             state, tone, page,
-            text => format!("Trend: {}.", report.headline),
+            text => format!("Trend: {}.", with_names(&report.headline, report)),
             alarms => alarms.collect::<Vec<_>>(),
         }
     }

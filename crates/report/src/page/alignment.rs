@@ -2,8 +2,8 @@
 
 use skinrig_analysis::result::{Alignment, AlignmentStatus, Analysis};
 
-use super::grid::Grid;
 use crate::format::{NONE, by_rates, number, sentence};
+use crate::grid::Grid;
 
 /// One row per map between two clocks.
 pub(super) fn maps(a: &Analysis) -> Option<Grid> {

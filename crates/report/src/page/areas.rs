@@ -2,8 +2,8 @@
 
 use skinrig_analysis::result::{Analysis, Estimate};
 
-use super::grid::Grid;
-use crate::format::{NONE, interval, number};
+use crate::format::{NONE, contact_map, interval, number};
+use crate::grid::Grid;
 use crate::published;
 
 /// Areas and taxels beside the published ones.
@@ -87,13 +87,13 @@ pub(super) fn cmre(a: &Analysis) -> Option<Grid> {
     let c = a.cmre.as_ref()?;
     let mut grid = Grid::new(
         "cmre",
-        "Contact map error",
+        "Contact map",
         &["Quantity", "#Session", "#95 % interval", "#n"],
     );
     grid.row([
-        "contact map reconstruction error (%)".to_owned(),
-        number(c.percent.value, 2),
-        interval(&c.percent, 1.0, 2),
+        "imbalance of the contact map [95 % interval]".to_owned(),
+        contact_map(&c.percent),
+        NONE.to_owned(),
         c.percent.n.to_string(),
     ]);
     grid.row([
@@ -102,12 +102,11 @@ pub(super) fn cmre(a: &Analysis) -> Option<Grid> {
         interval(&a.scored.rmse_mm, percent_per_mm(a), 2),
         a.scored.rmse_mm.n.to_string(),
     ]);
-    if c.percent.value.is_some_and(|v| v < 0.0) {
-        grid.note(
-            "Below 0: the public code's formula goes below 0 for an estimate between the true cell and the next one. \
-             It is a score of cells, not a share; the share of the diagonal is a true share.",
-        );
-    }
+    grid.note(
+        "Imbalance, by the public code's formula: brightness that the map of the estimate lacks in the true cell, minus \
+         brightness that it has outside, weighted by distance. Missing: the first is larger; outside: the second is, as \
+         for an estimate between two cells. It is a score of cells, not a share; the share of the diagonal is one.",
+    );
     grid.note(format!(
         "Parameters: {} x {} cells of {} mm, Gaussian of {} mm, SR of {} mm. None of them is published, so this number \
          is not comparable with the published 3.75 %, which equals an RMSE of 5.30 mm as a share of the diagonal.",

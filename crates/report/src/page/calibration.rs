@@ -2,9 +2,9 @@
 
 use skinrig_analysis::result::{Analysis, CalibrationResult};
 
-use super::grid::Grid;
 use crate::figures::model_name;
 use crate::format::{NONE, interval, number, words};
+use crate::grid::Grid;
 
 /// The compared models.
 pub(super) fn models(a: &Analysis) -> Option<Grid> {

@@ -2,9 +2,9 @@
 
 use skinrig_analysis::result::{Analysis, Thinning};
 
-use super::grid::Grid;
 use crate::comparison::{Cell, rows};
-use crate::format::{NONE, interval, number};
+use crate::format::{self, NONE, interval, number};
+use crate::grid::Grid;
 use crate::input::ReportInput;
 use crate::published::{self, Metric};
 
@@ -28,6 +28,7 @@ pub(crate) fn text(cell: &Cell, metric: Metric) -> String {
     match cell {
         Cell::Missing => NONE.to_owned(),
         Cell::Text(text) => (*text).to_owned(),
+        Cell::Value(e) if metric == Metric::GlobalError => format::contact_map(e),
         Cell::Value(e) => {
             let digits = digits(metric, e.value);
             let value = number(e.value, digits);
@@ -74,7 +75,7 @@ pub(super) fn msows(input: &ReportInput<'_>) -> Grid {
     for f in &published::FOOTNOTES {
         grid.note(format!("{}: {}", f.mark, f.text));
     }
-    grid.download("comparison");
+    grid.download("comparison").fold();
     grid
 }
 
@@ -139,6 +140,7 @@ pub(super) fn skins(input: &ReportInput<'_>) -> Grid {
         true,
     );
     grid.note("All rows but the last are published values collected by the paper. Areas, loads and evaluation methods differ: not a ranking.");
+    grid.fold();
     grid
 }
 
@@ -174,6 +176,7 @@ pub(super) fn sensors(input: &ReportInput<'_>) -> Grid {
         true,
     );
     grid.note("All rows but the last are published values collected by the paper. Most measure something else: not a ranking.");
+    grid.fold();
     grid
 }
 

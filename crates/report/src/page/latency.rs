@@ -2,8 +2,8 @@
 
 use skinrig_analysis::result::{Analysis, Estimate, Latency};
 
-use super::grid::Grid;
 use crate::format::{NONE, interval, number};
+use crate::grid::Grid;
 
 /// Detection rates and times beside the published numbers.
 pub(super) fn latency(a: &Analysis) -> Option<Grid> {

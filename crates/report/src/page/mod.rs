@@ -10,7 +10,6 @@ mod assets;
 mod calibration;
 mod comparison;
 pub(crate) mod findings;
-mod grid;
 mod latency;
 mod reduction;
 
@@ -25,9 +24,10 @@ use assets::{SCRIPT, TEMPLATES};
 
 use crate::derive;
 use crate::error::ReportError;
-use crate::figures::{self, Figure};
-use crate::format::{digits_of_error, grouped, interval, number, or_missing};
+use crate::figures;
+use crate::format::{digits_of_error, grouped, interval, number, or_missing, phrase};
 use crate::frame::{Frame, safe};
+use crate::grid::Grid;
 use crate::input::ReportInput;
 use crate::provenance::Provenance;
 use crate::svg::{FIGURE_CSS, plain_css};
@@ -75,9 +75,9 @@ fn show_all(value: &mut serde_json::Value) {
 /// See [`crate::html`].
 pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
     let (a, p) = (input.analysis, &input.provenance);
-    let fig: BTreeMap<&str, Value> = figures::all(input)
+    let fig: BTreeMap<String, Value> = figures::all(input)
         .into_iter()
-        .map(|f| (f.id, figure_value(f)))
+        .map(|f| (f.id.clone(), Value::from(Serde(f))))
         .collect();
     let c = &a.counts;
     let usable = a.is_valid();
@@ -156,18 +156,9 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
             })
             .collect::<Vec<_>>(),
         provenance => provenance_rows(p, a.version),
-        devices => p.devices.iter()
-            .map(|d| context! {
-                role => d.role.clone(), model => d.model.clone(), serial => d.serial.clone(),
-                firmware => d.firmware.clone()
-            })
-            .collect::<Vec<_>>(),
-        preflight => p.preflight.iter()
-            .map(|c| context! {
-                check => c.check.clone(), expected => c.expected.clone(), found => c.found.clone(),
-                verdict => c.verdict.name(), next => c.next_step.clone(),
-            })
-            .collect::<Vec<_>>(),
+        devices => (!p.devices.is_empty()).then(|| Value::from(Serde(devices(p)))),
+        preflight => (!p.preflight.is_empty()).then(|| Value::from(Serde(preflight(p)))),
+        preflight_checks => p.preflight.len(),
         clocks => clocks(input),
         calibration => calibration(input),
         settings => tables::settings(a),
@@ -252,17 +243,6 @@ fn threshold_note(a: &Analysis) -> Option<String> {
     ))
 }
 
-fn figure_value(f: Figure) -> Value {
-    context! {
-        id => f.id,
-        title => f.title,
-        caption => f.caption,
-        svg => safe(&f.svg),
-        table => f.table,
-        interaction => f.interaction,
-    }
-}
-
 fn rejections(a: &Analysis, sync: bool) -> Vec<Value> {
     let rows = derive::rejections(a, sync).into_iter();
     rows.map(|r| context! { verdict => r.verdict.name(), rule => r.rule, example => r.example, n => r.n })
@@ -327,6 +307,26 @@ fn provenance_rows(p: &Provenance, analysis_version: u32) -> Vec<Value> {
         rows.push(row("overrides", &p.overrides.join("  "), true));
     }
     rows
+}
+
+fn devices(p: &Provenance) -> Grid {
+    let columns = ["Role", "Model", "`Serial", "Firmware"];
+    Grid::new("devices", "Devices", &columns).with(p.devices.iter().map(|d| {
+        let (model, serial) = (d.model.clone(), d.serial.clone());
+        [phrase(&d.role), model, serial, d.firmware.clone()]
+    }))
+}
+
+fn preflight(p: &Provenance) -> Grid {
+    let columns = ["Check", "Expected", "Found", "Verdict"];
+    Grid::new("preflight", "Preflight", &columns).with(p.preflight.iter().map(|c| {
+        let found = match &*c.next_step {
+            "" => c.found.clone(),
+            next => format!("{}; {next}", c.found),
+        };
+        let verdict = c.verdict.name().to_owned();
+        [c.check.clone(), c.expected.clone(), found, verdict]
+    }))
 }
 
 fn clocks(input: &ReportInput<'_>) -> Vec<Value> {

@@ -2,8 +2,8 @@
 
 use skinrig_analysis::result::{Analysis, Estimate, Thinning};
 
-use super::grid::Grid;
 use crate::format::{NONE, grouped, interval, number};
+use crate::grid::Grid;
 
 /// Display name of a kind of thinning.
 pub(crate) const fn thinning(kind: Thinning) -> &'static str {

@@ -6,224 +6,175 @@ mod table;
 mod traces;
 
 use serde_json::{Map, Value, json};
-use skinrig_analysis::result::{Analysis, CalibrationResult};
+use skinrig_analysis::result::{Analysis, CalibrationResult, PressResult, PressView};
 use skinrig_model::PressId;
 use skinrig_settings::Settings;
 
 use crate::derive;
 use crate::input::ReportInput;
-use table::{Table, rounded};
+use table::Table;
 
 /// Data for the script: session ID and named tables.
 pub(crate) fn script_data(input: &ReportInput<'_>) -> Value {
     let a = input.analysis;
-    let mut tables = Map::new();
-    let mut put = |name: &str, table: Table| {
-        tables.insert(name.to_owned(), table.finish());
-    };
-    put("presses", presses(a));
-    put("locations", locations(a));
-    put("errors", errors(a));
-    put("rates", rates(a));
-    put("press_rates", press_rates(a));
-    put("pictures", pictures(a));
-    put("clocks", clocks(a));
-    if let Some(c) = &a.calibration {
-        let rows = calibration(c);
-        let table = Table::new()
-            .column("parameter", rows.iter().map(|r| json!(r.name)))
-            .column("before", rows.iter().map(|r| rounded(r.before, 6)))
-            .column("after", rows.iter().map(|r| rounded(r.after, 6)))
-            .column(
-                "standard_error",
-                rows.iter().map(|r| rounded(r.standard_error, 6)),
-            )
-            .column(
-                "low_95",
-                rows.iter().map(|r| rounded(r.interval.map(|i| i.0), 6)),
-            )
-            .column(
-                "high_95",
-                rows.iter().map(|r| rounded(r.interval.map(|i| i.1), 6)),
-            );
-        put("calibration", table);
-    }
-    for (name, table) in studies::all(a).into_iter().chain(traces::all(input)) {
-        tables.insert(name.to_owned(), table.finish());
-    }
+    let own = [
+        ("presses", presses(a)),
+        ("locations", locations(a)),
+        ("errors", errors(a)),
+        ("rates", rates(a)),
+        ("press_rates", press_rates(a)),
+        ("pictures", pictures(a)),
+        ("clocks", clocks(a)),
+    ];
+    let fit = a
+        .calibration
+        .as_ref()
+        .map(|c| ("calibration", parameters(c)));
+    let tables = own.into_iter().chain(fit).chain(studies::all(a));
+    let tables = tables.chain(traces::all(input));
+    let tables: Map<String, Value> = tables.map(|(name, t)| (name.to_owned(), t)).collect();
     json!({ "session": input.provenance.session_id, "tables": tables })
 }
 
-fn presses(a: &Analysis) -> Table {
-    let rows = &a.presses;
-    let mm = |f: fn(&skinrig_analysis::result::PressResult) -> Option<f64>| {
-        rows.iter().map(move |p| rounded(f(p), 3))
-    };
-    let mut table = Table::new()
-        .column("press", rows.iter().map(|p| json!(p.press)))
-        .column("role", rows.iter().map(|p| json!(p.role)))
-        .column("repetition", rows.iter().map(|p| json!(p.repetition)))
-        .column("location", rows.iter().map(|p| json!(p.location)))
-        .column("verdict", rows.iter().map(|p| json!(p.verdict)))
-        .column(
-            "outcome",
-            rows.iter().map(|p| json!(p.location_outcome.name())),
-        )
-        .column("planned_x_mm", mm(|p| Some(p.planned.x_mm)))
-        .column("planned_y_mm", mm(|p| Some(p.planned.y_mm)))
-        .column("depth_mm", mm(|p| Some(p.depth_mm)))
-        .column("truth_x_mm", mm(|p| p.truth.map(|t| t.x_mm)))
-        .column("truth_y_mm", mm(|p| p.truth.map(|t| t.y_mm)))
-        .column("estimate_x_mm", mm(|p| p.estimate().map(|t| t.x_mm)))
-        .column("estimate_y_mm", mm(|p| p.estimate().map(|t| t.y_mm)))
-        .column("error_x_mm", mm(|p| p.error_mm().map(|e| e.0)))
-        .column("error_y_mm", mm(|p| p.error_mm().map(|e| e.1)))
-        .column("error_mm", mm(derive::error_norm_mm))
-        .column(
-            "contact_s",
-            rows.iter()
-                .map(|p| rounded(p.timing.map(|t| t.contact.as_secs_f64()), 4)),
-        );
-    let names: [[&'static str; 5]; 2] = [
-        [
-            "camera1_events",
-            "camera1_on_events",
-            "camera1_clusters",
-            "camera1_centroid_u_px",
-            "camera1_centroid_v_px",
-        ],
-        [
-            "camera2_events",
-            "camera2_on_events",
-            "camera2_clusters",
-            "camera2_centroid_u_px",
-            "camera2_centroid_v_px",
-        ],
-    ];
-    for (camera, [events, on, clusters, u, v]) in names.into_iter().enumerate() {
-        let view = move |p: &skinrig_analysis::result::PressResult| p.views[camera];
+fn parameters(c: &CalibrationResult) -> Value {
+    Table::of(calibration(c))
+        .any("parameter", |r| r.name.clone())
+        .number("before", 6, |r| r.before)
+        .number("after", 6, |r| r.after)
+        .number("standard_error", 6, |r| r.standard_error)
+        .number("low_95", 6, |r| r.interval.map(|i| i.0))
+        .number("high_95", 6, |r| r.interval.map(|i| i.1))
+        .finish()
+}
+
+/// Columns of one camera: events, ON events, clusters, centroid.
+const VIEWS: [[&str; 5]; 2] = [
+    [
+        "camera1_events",
+        "camera1_on_events",
+        "camera1_clusters",
+        "camera1_centroid_u_px",
+        "camera1_centroid_v_px",
+    ],
+    [
+        "camera2_events",
+        "camera2_on_events",
+        "camera2_clusters",
+        "camera2_centroid_u_px",
+        "camera2_centroid_v_px",
+    ],
+];
+
+fn presses(a: &Analysis) -> Value {
+    let mut table = Table::of(&a.presses)
+        .any("press", |p| p.press)
+        .any("role", |p| p.role)
+        .any("repetition", |p| p.repetition)
+        .any("location", |p| p.location)
+        .any("verdict", |p| p.verdict)
+        .any("outcome", |p| p.location_outcome.name())
+        .number("planned_x_mm", 3, |p| p.planned.x_mm)
+        .number("planned_y_mm", 3, |p| p.planned.y_mm)
+        .number("depth_mm", 3, |p| p.depth_mm)
+        .number("truth_x_mm", 3, |p| p.truth.map(|t| t.x_mm))
+        .number("truth_y_mm", 3, |p| p.truth.map(|t| t.y_mm))
+        .number("estimate_x_mm", 3, |p| p.estimate().map(|t| t.x_mm))
+        .number("estimate_y_mm", 3, |p| p.estimate().map(|t| t.y_mm))
+        .number("error_x_mm", 3, |p| p.error_mm().map(|e| e.0))
+        .number("error_y_mm", 3, |p| p.error_mm().map(|e| e.1))
+        .number("error_mm", 3, |p| derive::error_norm_mm(p))
+        .number("contact_s", 4, |p| {
+            p.timing.map(|t| t.contact.as_secs_f64())
+        });
+    for (camera, [events, on, clusters, u, v]) in VIEWS.into_iter().enumerate() {
+        let view = |p: &&PressResult| -> Option<PressView> { p.views[camera] };
         table = table
-            .column(
-                events,
-                rows.iter().map(|p| json!(view(p).map(|v| v.events))),
-            )
-            .column(on, rows.iter().map(|p| json!(view(p).map(|v| v.on_events))))
-            .column(
-                clusters,
-                rows.iter().map(|p| json!(view(p).map(|v| v.clusters))),
-            )
-            .column(
-                u,
-                rows.iter()
-                    .map(|p| rounded(view(p).and_then(|v| v.centroid_u), 2)),
-            )
-            .column(
-                v,
-                rows.iter()
-                    .map(|p| rounded(view(p).and_then(|v| v.centroid_v), 2)),
-            );
+            .any(events, |p| view(p).map(|v| v.events))
+            .any(on, |p| view(p).map(|v| v.on_events))
+            .any(clusters, |p| view(p).map(|v| v.clusters))
+            .number(u, 2, |p| view(p).and_then(|v| v.centroid_u))
+            .number(v, 2, |p| view(p).and_then(|v| v.centroid_v));
     }
     table
-        .column(
-            "counted",
-            rows.iter().map(|p| json!(u8::from(derive::is_counted(p)))),
-        )
-        .column("rule", rows.iter().map(|p| json!(p.rule)))
-        .column("reason", rows.iter().map(|p| json!(p.reason)))
+        .flag("counted", |p| derive::is_counted(p))
+        .any("rule", |p| p.rule.clone())
+        .any("reason", |p| p.reason.clone())
+        .finish()
 }
 
 /// The errors behind the distribution, ascending.
-fn errors(a: &Analysis) -> Table {
+fn errors(a: &Analysis) -> Value {
     let counted = a.presses.iter().filter(|p| derive::is_counted(p));
     let mut rows: Vec<(f64, PressId)> = counted
         .filter_map(|p| Some((derive::error_norm_mm(p)?, p.press)))
         .collect();
     rows.sort_by(|a, b| a.0.total_cmp(&b.0));
-    Table::new()
-        .column("press", rows.iter().map(|r| json!(r.1)))
-        .column("error_mm", rows.iter().map(|r| rounded(Some(r.0), 4)))
+    Table::of(rows)
+        .any("press", |(_, press)| *press)
+        .number("error_mm", 4, |(error, _)| *error)
+        .finish()
 }
 
-fn locations(a: &Analysis) -> Table {
-    let rows = derive::locations(a);
-    Table::new()
-        .column("location", rows.iter().map(|l| json!(l.location)))
-        .column(
-            "planned_x_mm",
-            rows.iter().map(|l| rounded(Some(l.planned.x_mm), 3)),
-        )
-        .column(
-            "planned_y_mm",
-            rows.iter().map(|l| rounded(Some(l.planned.y_mm), 3)),
-        )
-        .column("presses", rows.iter().map(|l| json!(l.n)))
-        .column(
-            "mean_error_mm",
-            rows.iter().map(|l| rounded(Some(l.mean_error_mm), 4)),
-        )
-        .column(
-            "std_between_repetitions_mm",
-            rows.iter().map(|l| rounded(l.std_mm, 4)),
-        )
+fn locations(a: &Analysis) -> Value {
+    Table::of(derive::locations(a))
+        .any("location", |l| l.location)
+        .number("planned_x_mm", 3, |l| l.planned.x_mm)
+        .number("planned_y_mm", 3, |l| l.planned.y_mm)
+        .any("presses", |l| l.n)
+        .number("mean_error_mm", 4, |l| l.mean_error_mm)
+        .number("std_between_repetitions_mm", 4, |l| l.std_mm)
+        .finish()
 }
 
-fn rates(a: &Analysis) -> Table {
-    let (mut camera, mut start, mut mean, mut peak) = (vec![], vec![], vec![], vec![]);
-    for (i, s) in a.rates.iter().enumerate() {
-        for (k, m) in s.mean_per_s.iter().enumerate() {
-            camera.push(json!(i + 1));
-            start.push(rounded(Some(s.start_s + s.bin_s * k as f64), 3));
-            mean.push(rounded(Some(f64::from(*m)), 0));
-            peak.push(rounded(s.peak_per_s.get(k).map(|p| f64::from(*p)), 0));
-        }
-    }
-    Table::new()
-        .column("camera", camera)
-        .column("bin_start_s", start)
-        .column("mean_events_per_s", mean)
-        .column("peak_events_per_s", peak)
+fn rates(a: &Analysis) -> Value {
+    let series = a.rates.iter().enumerate();
+    let bins = series.flat_map(|(i, s)| (0..s.mean_per_s.len()).map(move |k| (i + 1, s, k)));
+    Table::of(bins)
+        .any("camera", |(camera, ..)| *camera)
+        .number("bin_start_s", 3, |(_, s, k)| {
+            s.start_s + s.bin_s * *k as f64
+        })
+        .number("mean_events_per_s", 0, |(_, s, k)| {
+            f64::from(s.mean_per_s[*k])
+        })
+        .number("peak_events_per_s", 0, |(_, s, k)| {
+            s.peak_per_s.get(*k).map(|p| f64::from(*p))
+        })
+        .finish()
 }
 
-fn press_rates(a: &Analysis) -> Table {
-    let bins = || {
-        a.zooms
-            .iter()
-            .flat_map(|z| (0..z.on_per_s.len().max(z.off_per_s.len())).map(move |k| (z, k)))
-    };
-    let at = |v: &[f32], k: usize| rounded(v.get(k).map(|r| f64::from(*r)), 0);
-    Table::new()
-        .column("press", bins().map(|(z, _)| json!(z.press)))
-        .column("camera", bins().map(|(z, _)| json!(z.camera.number())))
-        .column(
-            "since_contact_s",
-            bins().map(|(z, k)| rounded(Some(z.start_s + z.bin_s * k as f64), 4)),
-        )
-        .column("on_events_per_s", bins().map(|(z, k)| at(&z.on_per_s, k)))
-        .column("off_events_per_s", bins().map(|(z, k)| at(&z.off_per_s, k)))
+fn press_rates(a: &Analysis) -> Value {
+    let bins = a.zooms.iter().flat_map(|z| {
+        let bins = z.on_per_s.len().max(z.off_per_s.len());
+        (0..bins).map(move |k| (z, k))
+    });
+    let at = |v: &[f32], k: usize| v.get(k).map(|r| f64::from(*r));
+    Table::of(bins)
+        .any("press", |(z, _)| z.press)
+        .any("camera", |(z, _)| z.camera.number())
+        .number("since_contact_s", 4, |(z, k)| {
+            z.start_s + z.bin_s * *k as f64
+        })
+        .number("on_events_per_s", 0, |(z, k)| at(&z.on_per_s, *k))
+        .number("off_events_per_s", 0, |(z, k)| at(&z.off_per_s, *k))
+        .finish()
 }
 
 /// Maximum number of presses shown as images.
 pub(crate) const PICTURED_PRESSES: usize = 6;
 
-fn pictures(a: &Analysis) -> Table {
+fn pictures(a: &Analysis) -> Value {
     let shown = pictured(a);
-    let pixels = || {
-        a.pictures
-            .iter()
-            .filter(|p| shown.contains(&p.press))
-            .flat_map(|p| p.pixels.iter().map(move |q| (p, q)))
-    };
-    Table::new()
-        .column("press", pixels().map(|(p, _)| json!(p.press)))
-        .column("camera", pixels().map(|(p, _)| json!(p.camera.number())))
-        .column("u_px", pixels().map(|(_, q)| json!(q.u)))
-        .column("v_px", pixels().map(|(_, q)| json!(q.v)))
-        .column("on_events", pixels().map(|(_, q)| json!(q.on)))
-        .column("off_events", pixels().map(|(_, q)| json!(q.off)))
-        .column(
-            "in_cluster",
-            pixels().map(|(_, q)| json!(u8::from(q.clustered))),
-        )
+    let pictures = a.pictures.iter().filter(|p| shown.contains(&p.press));
+    Table::of(pictures.flat_map(|p| p.pixels.iter().map(move |q| (p, q))))
+        .any("press", |(p, _)| p.press)
+        .any("camera", |(p, _)| p.camera.number())
+        .any("u_px", |(_, q)| q.u)
+        .any("v_px", |(_, q)| q.v)
+        .any("on_events", |(_, q)| q.on)
+        .any("off_events", |(_, q)| q.off)
+        .flag("in_cluster", |(_, q)| q.clustered)
+        .finish()
 }
 
 /// The first presses (by number) with images.
@@ -235,38 +186,19 @@ pub(crate) fn pictured(a: &Analysis) -> Vec<PressId> {
     presses
 }
 
-fn clocks(a: &Analysis) -> Table {
-    let fits = || {
-        a.clocks
-            .iter()
-            .enumerate()
-            .filter_map(|(i, c)| c.map(|c| (i + 1, c)))
-    };
-    Table::new()
-        .column("camera", fits().map(|(i, _)| json!(i)))
-        .column("method", fits().map(|(_, c)| json!(c.method)))
-        .column(
-            "offset_us",
-            fits().map(|(_, c)| rounded(Some(c.offset_us), 3)),
-        )
-        .column(
-            "drift_ppm",
-            fits().map(|(_, c)| rounded(Some(c.drift_ppm), 6)),
-        )
-        .column(
-            "drift_se_ppm",
-            fits().map(|(_, c)| rounded(Some(c.drift_se_ppm), 6)),
-        )
-        .column(
-            "residual_rms_us",
-            fits().map(|(_, c)| rounded(Some(c.residual_rms_us), 4)),
-        )
-        .column(
-            "residual_max_us",
-            fits().map(|(_, c)| rounded(Some(c.residual_max_us), 4)),
-        )
-        .column("n", fits().map(|(_, c)| json!(c.n)))
-        .column("rejected", fits().map(|(_, c)| json!(c.rejected)))
+fn clocks(a: &Analysis) -> Value {
+    let fits = a.clocks.iter().enumerate();
+    Table::of(fits.filter_map(|(i, c)| Some((i + 1, (*c)?))))
+        .any("camera", |(camera, _)| *camera)
+        .any("method", |(_, c)| c.method)
+        .number("offset_us", 3, |(_, c)| c.offset_us)
+        .number("drift_ppm", 6, |(_, c)| c.drift_ppm)
+        .number("drift_se_ppm", 6, |(_, c)| c.drift_se_ppm)
+        .number("residual_rms_us", 4, |(_, c)| c.residual_rms_us)
+        .number("residual_max_us", 4, |(_, c)| c.residual_max_us)
+        .any("n", |(_, c)| c.n)
+        .any("rejected", |(_, c)| c.rejected)
+        .finish()
 }
 
 /// A calibrated parameter.

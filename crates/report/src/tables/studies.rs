@@ -1,18 +1,20 @@
 //! Owns the data tables of the studies, for download from figures and tables.
 
-use serde_json::{Value, json};
+use serde_json::Value;
 use skinrig_analysis::result::{
-    Analysis, Estimate, Latency, ModelTest, Reduction, ReductionCurve, ReductionRow,
-    ReferenceReduction,
+    Activity, Analysis, BitRates, CalibrationResult, Cmre, Coverage, Estimate, Latency,
+    ModelComparison, Reduction, ReferenceReduction, ThresholdChoice,
 };
 
-use super::table::{Table, rounded};
+use super::table::Table;
 use crate::{comparison, derive};
 
 /// All tables of the analysis, by name.
-pub(super) fn all(a: &Analysis) -> Vec<(&'static str, Table)> {
+pub(super) fn all(a: &Analysis) -> Vec<(&'static str, Value)> {
     let latency = a.latency.as_ref();
     let calibration = a.calibration.as_ref();
+    let reference = a.reference.as_ref();
+    let activity = Some(&a.activity).filter(|all| !all.is_empty());
     let tables = [
         ("reduction", a.reduction.as_ref().map(reduction)),
         ("latency_sweep", latency.map(sweep)),
@@ -28,251 +30,184 @@ pub(super) fn all(a: &Analysis) -> Vec<(&'static str, Table)> {
         ("comparison", Some(compared(a))),
         (
             "reference_reduction",
-            a.reference.as_ref().map(|r| reference(&r.reduction)),
+            reference.map(|r| reference_rows(&r.reduction)),
         ),
-        ("activity", (!a.activity.is_empty()).then(|| activity(a))),
+        ("activity", activity.map(|all| rows_of_events(all))),
     ];
     let there = tables.into_iter();
     there.filter_map(|(name, t)| Some((name, t?))).collect()
 }
 
-/// One column per end of an estimate.
-fn estimates<'a>(
-    table: Table,
-    names: [&'static str; 3],
-    rows: impl Iterator<Item = &'a Estimate> + Clone,
-    digits: i32,
-) -> Table {
-    let [value, low, high] = names;
-    table
-        .column(value, rows.clone().map(|e| rounded(e.value, digits)))
-        .column(low, rows.clone().map(|e| rounded(e.low, digits)))
-        .column(high, rows.map(|e| rounded(e.high, digits)))
-}
-
-/// Selects an estimate of a row.
-type Part = fn(&ReductionRow) -> &Estimate;
-
-fn reduction(study: &Reduction) -> Table {
-    let rows: Vec<(&ReductionCurve, &ReductionRow)> = study
-        .curves
-        .iter()
-        .flat_map(|c| c.rows.iter().map(move |r| (c, r)))
-        .collect();
-    let of = |f: fn(&ReductionRow) -> Option<f64>, digits| {
-        rows.iter().map(move |(_, r)| rounded(f(r), digits))
-    };
-    let mut table = Table::new()
-        .column("thinning", rows.iter().map(|(c, _)| json!(c.thinning)))
-        .column("factor", rows.iter().map(|(_, r)| json!(r.factor)))
-        .column("events_per_view", of(|r| Some(r.events_per_view), 3));
-    let parts: [([&'static str; 3], Part); 6] = [
-        (["rmse_mm", "rmse_low_mm", "rmse_high_mm"], |r| &r.rmse_mm),
-        (["pass_rate", "pass_rate_low", "pass_rate_high"], |r| {
-            &r.pass_rate
-        }),
-        (
+fn reduction(study: &Reduction) -> Value {
+    let curves = study.curves.iter();
+    let rows = curves.flat_map(|c| c.rows.iter().map(move |r| (c.thinning, r)));
+    Table::of(rows)
+        .any("thinning", |(thinning, _)| *thinning)
+        .any("factor", |(_, r)| r.factor)
+        .number("events_per_view", 3, |(_, r)| r.events_per_view)
+        .estimate(["rmse_mm", "rmse_low_mm", "rmse_high_mm"], 5, |(_, r)| {
+            &r.rmse_mm
+        })
+        .estimate(
+            ["pass_rate", "pass_rate_low", "pass_rate_high"],
+            5,
+            |(_, r)| &r.pass_rate,
+        )
+        .estimate(
             ["within_rate", "within_rate_low", "within_rate_high"],
-            |r| &r.within_rate,
-        ),
-        (
+            5,
+            |(_, r)| &r.within_rate,
+        )
+        .estimate(
             ["located_rate", "located_rate_low", "located_rate_high"],
-            |r| &r.located_rate,
-        ),
-        (
+            5,
+            |(_, r)| &r.located_rate,
+        )
+        .estimate(
             [
                 "press_bytes_per_s",
                 "press_bytes_per_s_low",
                 "press_bytes_per_s_high",
             ],
-            |r| &r.press_bytes_per_s,
-        ),
-        (
+            5,
+            |(_, r)| &r.press_bytes_per_s,
+        )
+        .estimate(
             [
                 "idle_bytes_per_s",
                 "idle_bytes_per_s_low",
                 "idle_bytes_per_s_high",
             ],
-            |r| &r.idle_bytes_per_s,
-        ),
-    ];
-    for (names, part) in parts {
-        table = estimates(table, names, rows.iter().map(|(_, r)| part(r)), 5);
-    }
-    table
-        .column(
-            "rmse_lowest_seed_mm",
-            of(|r| r.rmse_of_seeds_mm.map(|s| s.0), 5),
+            5,
+            |(_, r)| &r.idle_bytes_per_s,
         )
-        .column(
-            "rmse_highest_seed_mm",
-            of(|r| r.rmse_of_seeds_mm.map(|s| s.1), 5),
-        )
+        .number("rmse_lowest_seed_mm", 5, |(_, r)| {
+            r.rmse_of_seeds_mm.map(|s| s.0)
+        })
+        .number("rmse_highest_seed_mm", 5, |(_, r)| {
+            r.rmse_of_seeds_mm.map(|s| s.1)
+        })
+        .finish()
 }
 
-fn sweep(l: &Latency) -> Table {
-    let rows = &l.sweep;
-    Table::new()
-        .column(
-            "threshold",
-            rows.iter().map(|r| rounded(Some(r.threshold), 4)),
-        )
-        .column("onsets", rows.iter().map(|r| json!(r.onsets)))
-        .column(
-            "detected_rate",
-            rows.iter().map(|r| rounded(Some(r.detected_rate), 5)),
-        )
-        .column("median_ms", rows.iter().map(|r| rounded(r.median_ms, 3)))
-        .column("width_ms", rows.iter().map(|r| rounded(r.width_ms, 3)))
-        .column("false_alarms", rows.iter().map(|r| json!(r.false_alarms)))
-        .column(
-            "at_risk_s",
-            rows.iter().map(|r| rounded(Some(r.at_risk_s), 4)),
-        )
-        .column(
-            "false_alarms_per_s",
-            rows.iter().map(|r| rounded(Some(r.false_alarms_per_s), 6)),
-        )
-        .column(
-            "chosen",
-            (0..rows.len()).map(|i| json!(u8::from(l.chosen.is_some_and(|c| c as usize == i)))),
-        )
+fn sweep(l: &Latency) -> Value {
+    Table::of(l.sweep.iter().enumerate())
+        .number("threshold", 4, |(_, r)| r.threshold)
+        .any("onsets", |(_, r)| r.onsets)
+        .number("detected_rate", 5, |(_, r)| r.detected_rate)
+        .number("median_ms", 3, |(_, r)| r.median_ms)
+        .number("width_ms", 3, |(_, r)| r.width_ms)
+        .any("false_alarms", |(_, r)| r.false_alarms)
+        .number("at_risk_s", 4, |(_, r)| r.at_risk_s)
+        .number("false_alarms_per_s", 6, |(_, r)| r.false_alarms_per_s)
+        .flag("chosen", |(i, _)| {
+            l.chosen.is_some_and(|c| c as usize == *i)
+        })
+        .finish()
 }
 
-fn course(l: &Latency) -> Table {
+fn course(l: &Latency) -> Value {
     let c = &l.course;
-    let bins = c.press_per_s.iter().map(Vec::len).min().unwrap_or(0);
-    let of = |k: usize| {
-        c.press_per_s[k]
-            .iter()
-            .take(bins)
-            .map(|v| rounded(Some(f64::from(*v)), 0))
-    };
-    let background =
-        |k: usize| std::iter::repeat_n(rounded(Some(f64::from(c.background_per_s[k])), 0), bins);
-    Table::new()
-        .column(
-            "since_contact_ms",
-            (0..bins).map(|i| rounded(Some(c.start_ms + c.bin_ms * i as f64), 3)),
-        )
-        .column("press_p5_per_s", of(0))
-        .column("press_p50_per_s", of(1))
-        .column("press_p95_per_s", of(2))
-        .column("background_p5_per_s", background(0))
-        .column("background_p50_per_s", background(1))
-        .column("background_p95_per_s", background(2))
+    let press = |k: usize| move |i: &usize| f64::from(c.press_per_s[k][*i]);
+    let background = |k: usize| move |_: &usize| f64::from(c.background_per_s[k]);
+    Table::of(0..c.press_per_s.iter().map(Vec::len).min().unwrap_or(0))
+        .number("since_contact_ms", 3, |i| c.start_ms + c.bin_ms * *i as f64)
+        .number("press_p5_per_s", 0, press(0))
+        .number("press_p50_per_s", 0, press(1))
+        .number("press_p95_per_s", 0, press(2))
+        .number("background_p5_per_s", 0, background(0))
+        .number("background_p50_per_s", 0, background(1))
+        .number("background_p95_per_s", 0, background(2))
+        .finish()
 }
 
-fn onsets(l: &Latency) -> Table {
-    let onset = l.onsets.iter().map(|(_, t)| rounded(*t, 3));
-    let early = l.onsets.iter().map(|(press, _)| {
-        let tripped = l.false_detections.iter().find(|(p, _)| p == press);
-        rounded(tripped.map(|(_, t)| *t), 3)
-    });
-    Table::new()
-        .column("press", l.onsets.iter().map(|(p, _)| json!(p)))
-        .column("onset_after_contact_ms", onset)
-        .column("false_alarm_after_contact_ms", early)
+fn onsets(l: &Latency) -> Value {
+    Table::of(&l.onsets)
+        .any("press", |(press, _)| *press)
+        .number("onset_after_contact_ms", 3, |(_, onset)| *onset)
+        .number("false_alarm_after_contact_ms", 3, |(press, _)| {
+            let early = l.false_detections.iter().find(|(p, _)| p == press);
+            early.map(|(_, ms)| *ms)
+        })
+        .finish()
 }
 
-fn models(rows: &[skinrig_analysis::result::ModelComparison]) -> Table {
-    let test = |of: fn(&ModelTest) -> f64| {
-        rows.iter()
-            .map(move |m| rounded(m.test.as_ref().map(of), 5))
-    };
-    let table = Table::new()
-        .column("model", rows.iter().map(|m| json!(m.model)))
-        .column("parameters", rows.iter().map(|m| json!(m.parameters)));
-    estimates(
-        table,
-        [
-            "validated_rmse_mm",
-            "validated_rmse_low_mm",
-            "validated_rmse_high_mm",
-        ],
-        rows.iter().map(|m| &m.rmse_mm),
-        5,
-    )
-    .column(
-        "bounded_rmse_mm",
-        rows.iter().map(|m| rounded(m.bounded_rmse_mm, 5)),
-    )
-    .column(
-        "against",
-        rows.iter().map(|m| json!(m.test.map(|t| t.against))),
-    )
-    .column("gain_mm", test(|t| t.gain_mm))
-    .column("gain_standard_error_mm", test(|t| t.standard_error_mm))
-    .column("gain_in_standard_errors", test(|t| t.ratio))
-    .column("needed_standard_errors", test(|t| t.needed))
-    .column(
-        "fitted_rmse_mm",
-        rows.iter().map(|m| rounded(m.fitted_rmse_mm, 5)),
-    )
-    .column("chosen", rows.iter().map(|m| json!(u8::from(m.chosen))))
+fn models(rows: &[ModelComparison]) -> Value {
+    let validated = [
+        "validated_rmse_mm",
+        "validated_rmse_low_mm",
+        "validated_rmse_high_mm",
+    ];
+    Table::of(rows)
+        .any("model", |m| m.model)
+        .any("parameters", |m| m.parameters)
+        .estimate(validated, 5, |m| &m.rmse_mm)
+        .number("bounded_rmse_mm", 5, |m| m.bounded_rmse_mm)
+        .any("against", |m| m.test.map(|t| t.against))
+        .number("gain_mm", 5, |m| m.test.map(|t| t.gain_mm))
+        .number("gain_standard_error_mm", 5, |m| {
+            m.test.map(|t| t.standard_error_mm)
+        })
+        .number("gain_in_standard_errors", 5, |m| m.test.map(|t| t.ratio))
+        .number("needed_standard_errors", 5, |m| m.test.map(|t| t.needed))
+        .number("fitted_rmse_mm", 5, |m| m.fitted_rmse_mm)
+        .flag("chosen", |m| m.chosen)
+        .finish()
 }
 
-fn correlation(c: &skinrig_analysis::result::CalibrationResult) -> Table {
-    let pairs = || {
-        let rows = c.names.iter().zip(&c.correlation);
-        rows.flat_map(|(a, row)| c.names.iter().zip(row).map(move |(b, r)| (a, b, r)))
-    };
-    Table::new()
-        .column("parameter", pairs().map(|(a, _, _)| json!(a)))
-        .column("with", pairs().map(|(_, b, _)| json!(b)))
-        .column("correlation", pairs().map(|(_, _, r)| rounded(*r, 4)))
+fn correlation(c: &CalibrationResult) -> Value {
+    let rows = c.names.iter().zip(&c.correlation);
+    let pairs = rows.flat_map(|(a, row)| c.names.iter().zip(row).map(move |(b, r)| (a, b, *r)));
+    Table::of(pairs)
+        .any("parameter", |(a, ..)| *a)
+        .any("with", |(_, b, _)| *b)
+        .number("correlation", 4, |(.., r)| *r)
+        .finish()
 }
 
-fn residuals(a: &Analysis) -> Table {
-    let rows = derive::residuals(a);
-    let of = |f: fn(&derive::Residual) -> Option<f64>| rows.iter().map(move |r| rounded(f(r), 3));
-    Table::new()
-        .column("press", rows.iter().map(|r| json!(r.press)))
-        .column("truth_x_mm", of(|r| Some(r.truth.x_mm)))
-        .column("truth_y_mm", of(|r| Some(r.truth.y_mm)))
-        .column("before_x_mm", of(|r| r.before.map(|p| p.x_mm)))
-        .column("before_y_mm", of(|r| r.before.map(|p| p.y_mm)))
-        .column("after_x_mm", of(|r| r.after.map(|p| p.x_mm)))
-        .column("after_y_mm", of(|r| r.after.map(|p| p.y_mm)))
+fn residuals(a: &Analysis) -> Value {
+    Table::of(derive::residuals(a))
+        .any("press", |r| r.press)
+        .number("truth_x_mm", 3, |r| r.truth.x_mm)
+        .number("truth_y_mm", 3, |r| r.truth.y_mm)
+        .number("before_x_mm", 3, |r| r.before.map(|p| p.x_mm))
+        .number("before_y_mm", 3, |r| r.before.map(|p| p.y_mm))
+        .number("after_x_mm", 3, |r| r.after.map(|p| p.x_mm))
+        .number("after_y_mm", 3, |r| r.after.map(|p| p.y_mm))
+        .finish()
 }
 
-fn threshold(t: &skinrig_analysis::result::ThresholdChoice) -> Table {
-    let rows = &t.candidates;
-    Table::new()
-        .column("events", rows.iter().map(|(e, _)| json!(e)))
-        .column("cost_mm", rows.iter().map(|(_, c)| rounded(Some(*c), 4)))
-        .column(
-            "chosen",
-            rows.iter().map(|(e, _)| json!(u8::from(*e == t.events))),
-        )
+fn threshold(t: &ThresholdChoice) -> Value {
+    Table::of(&t.candidates)
+        .any("events", |(events, _)| *events)
+        .number("cost_mm", 4, |(_, cost)| *cost)
+        .flag("chosen", |(events, _)| *events == t.events)
+        .finish()
 }
 
 /// One row per quantity, with value and interval.
-fn quantities(rows: &[(&'static str, Estimate)]) -> Table {
-    let table = Table::new().column("quantity", rows.iter().map(|(name, _)| json!(name)));
-    estimates(
-        table,
-        ["value", "low", "high"],
-        rows.iter().map(|(_, e)| e),
-        5,
-    )
-    .column("n", rows.iter().map(|(_, e)| json!(e.n)))
+fn quantities(rows: &[(&'static str, Estimate)]) -> Value {
+    Table::of(rows)
+        .any("quantity", |(name, _)| *name)
+        .estimate(["value", "low", "high"], 5, |(_, e)| e)
+        .any("n", |(_, e)| e.n)
+        .finish()
 }
 
-const fn plain(value: Option<f64>, n: u32) -> Estimate {
+fn plain(value: impl Into<Option<f64>>, n: u32) -> Estimate {
     Estimate {
-        value,
+        value: value.into(),
         low: None,
         high: None,
         n,
     }
 }
 
-fn coverage(c: &skinrig_analysis::result::Coverage) -> Table {
+fn coverage(c: &Coverage) -> Value {
     let n = c.locations;
     quantities(&[
-        ("skin_mm2", plain(Some(c.skin_mm2), 0)),
-        ("seen_by_both_mm2", plain(Some(c.seen_by_both_mm2), 0)),
+        ("skin_mm2", plain(c.skin_mm2, 0)),
+        ("seen_by_both_mm2", plain(c.seen_by_both_mm2, 0)),
         ("probed_mm2", plain(c.probed_mm2, n)),
         ("cell_mm", plain(c.cell_mm, n)),
         ("taxels_probed", c.taxels_probed),
@@ -280,76 +215,64 @@ fn coverage(c: &skinrig_analysis::result::Coverage) -> Table {
     ])
 }
 
-fn cmre(c: &skinrig_analysis::result::Cmre) -> Table {
+fn cmre(c: &Cmre) -> Value {
     quantities(&[
         ("cmre_percent", c.percent),
-        ("cell_mm", plain(Some(c.settings.cell_mm), 0)),
-        ("sigma_mm", plain(Some(c.settings.sigma_mm), 0)),
-        ("sr_mm", plain(Some(c.settings.sr_mm), 0)),
-        ("without_score", plain(Some(f64::from(c.without_score)), 0)),
+        ("cell_mm", plain(c.settings.cell_mm, 0)),
+        ("sigma_mm", plain(c.settings.sigma_mm, 0)),
+        ("sr_mm", plain(c.settings.sr_mm, 0)),
+        ("without_score", plain(f64::from(c.without_score), 0)),
     ])
 }
 
-fn bit_rates(r: &skinrig_analysis::result::BitRates) -> Table {
+fn bit_rates(r: &BitRates) -> Value {
     quantities(&[
         ("press_events_per_s", r.press_events_per_s),
         ("idle_events_per_s", r.idle_events_per_s),
         ("press_bytes_per_s", r.press_bytes_per_s),
         ("idle_bytes_per_s", r.idle_bytes_per_s),
-        ("bits_per_event", plain(Some(r.bits_per_event), 0)),
+        ("bits_per_event", plain(r.bits_per_event, 0)),
         ("press_s", r.press_s),
     ])
 }
 
-fn compared(a: &Analysis) -> Table {
-    let rows = comparison::rows(a);
+fn compared(a: &Analysis) -> Value {
     let cell = |c: &comparison::Cell| match c {
         comparison::Cell::Missing => Value::Null,
-        comparison::Cell::Text(text) => json!(text),
-        comparison::Cell::Value(e) => rounded(e.value, 5),
+        comparison::Cell::Text(text) => (*text).into(),
+        comparison::Cell::Value(e) => super::table::rounded(e.value, 5),
     };
-    Table::new()
-        .column("quantity", rows.iter().map(|r| json!(r.metric.name())))
-        .column("session", rows.iter().map(|r| cell(&r.session)))
-        .column("session_at_1024", rows.iter().map(|r| cell(&r.reduced)))
-        .column("paper", rows.iter().map(|r| json!(r.paper)))
-        .column("paper_at_1024", rows.iter().map(|r| json!(r.paper_reduced)))
-        .column("msows", rows.iter().map(|r| json!(r.msows)))
-        .column("footnotes", rows.iter().map(|r| json!(r.notes)))
+    Table::of(comparison::rows(a))
+        .any("quantity", |r| r.metric.name())
+        .any("session", |r| cell(&r.session))
+        .any("session_at_1024", |r| cell(&r.reduced))
+        .any("paper", |r| r.paper)
+        .any("paper_at_1024", |r| r.paper_reduced)
+        .any("msows", |r| r.msows)
+        .any("footnotes", |r| r.notes)
+        .finish()
 }
 
-fn reference(rows: &[ReferenceReduction]) -> Table {
-    Table::new()
-        .column("factor", rows.iter().map(|r| json!(r.factor)))
-        .column("rmse_mm", rows.iter().map(|r| rounded(r.rmse_mm, 5)))
-        .column(
-            "pass_rate",
-            rows.iter().map(|r| rounded(Some(r.pass_rate), 5)),
-        )
-        .column(
-            "pass_rate_failures_failing",
-            rows.iter().map(|r| rounded(Some(r.honest_pass_rate), 5)),
-        )
+fn reference_rows(rows: &[ReferenceReduction]) -> Value {
+    Table::of(rows)
+        .any("factor", |r| r.factor)
+        .number("rmse_mm", 5, |r| r.rmse_mm)
+        .number("pass_rate", 5, |r| r.pass_rate)
+        .number("pass_rate_failures_failing", 5, |r| r.honest_pass_rate)
+        .finish()
 }
 
 /// Sums per sensor row over the columns of the crop. The figure itself holds the full image; tens of thousands of cells
 /// would outweigh the page.
-fn activity(a: &Analysis) -> Table {
-    let rows = || {
-        a.activity.iter().flat_map(|p| {
-            let width = usize::from(p.width).max(1);
-            p.counts
-                .chunks(width)
-                .enumerate()
-                .map(move |(i, row)| (p, i, row.iter().sum::<u64>()))
-        })
-    };
-    Table::new()
-        .column("camera", rows().map(|(p, _, _)| json!(p.camera.number())))
-        .column(
-            "first_row_px",
-            rows().map(|(p, i, _)| json!(i * usize::from(p.cell_px))),
-        )
-        .column("rows", rows().map(|(p, _, _)| json!(p.cell_px)))
-        .column("events", rows().map(|(_, _, n)| json!(n)))
+fn rows_of_events(pictures: &[Activity]) -> Value {
+    let rows = pictures.iter().flat_map(|p| {
+        let rows = p.counts.chunks(usize::from(p.width).max(1)).enumerate();
+        rows.map(move |(i, row)| (p, i, row.iter().sum::<u64>()))
+    });
+    Table::of(rows)
+        .any("camera", |(p, ..)| p.camera.number())
+        .any("first_row_px", |(p, i, _)| i * usize::from(p.cell_px))
+        .any("rows", |(p, ..)| p.cell_px)
+        .any("events", |(.., n)| *n)
+        .finish()
 }

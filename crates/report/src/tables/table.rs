@@ -1,6 +1,8 @@
 //! Owns a table of the page's script data.
 
+use serde::Serialize;
 use serde_json::{Value, json};
+use skinrig_analysis::result::Estimate;
 
 use super::packing::packed;
 
@@ -19,32 +21,58 @@ pub(super) fn rounded(value: Option<f64>, digits: i32) -> Value {
     }
 }
 
-/// A table under construction: names and column-wise data, in order.
-pub(super) struct Table {
+/// A table under construction: its rows, and column-wise what is shown of them.
+pub(super) struct Table<R> {
+    rows: Vec<R>,
     columns: Vec<&'static str>,
-    data: Vec<Vec<Value>>,
+    data: Vec<Value>,
 }
 
-impl Table {
-    pub(super) const fn new() -> Self {
+impl<R> Table<R> {
+    pub(super) fn of(rows: impl IntoIterator<Item = R>) -> Self {
         Self {
+            rows: rows.into_iter().collect(),
             columns: vec![],
             data: vec![],
         }
     }
 
-    pub(super) fn column(
-        mut self,
-        name: &'static str,
-        cells: impl IntoIterator<Item = Value>,
-    ) -> Self {
+    /// A column of anything.
+    pub(super) fn any<C: Serialize>(mut self, name: &'static str, cell: impl Fn(&R) -> C) -> Self {
+        let cells = self.rows.iter().map(|row| json!(cell(row)));
+        self.data.push(packed(cells.collect()));
         self.columns.push(name);
-        self.data.push(cells.into_iter().collect());
         self
     }
 
+    /// A column of numbers with this many decimals; missing and non-finite ones become null.
+    pub(super) fn number<N: Into<Option<f64>>>(
+        self,
+        name: &'static str,
+        digits: i32,
+        cell: impl Fn(&R) -> N,
+    ) -> Self {
+        self.any(name, |row| rounded(cell(row).into(), digits))
+    }
+
+    /// A column of 0 and 1.
+    pub(super) fn flag(self, name: &'static str, cell: impl Fn(&R) -> bool) -> Self {
+        self.any(name, |row| u8::from(cell(row)))
+    }
+
+    /// Columns of value, low and high end.
+    pub(super) fn estimate(
+        self,
+        [value, low, high]: [&'static str; 3],
+        digits: i32,
+        cell: impl Fn(&R) -> &Estimate,
+    ) -> Self {
+        self.number(value, digits, |row| cell(row).value)
+            .number(low, digits, |row| cell(row).low)
+            .number(high, digits, |row| cell(row).high)
+    }
+
     pub(super) fn finish(self) -> Value {
-        let data: Vec<Value> = self.data.into_iter().map(packed).collect();
-        json!({ "columns": self.columns, "data": data })
+        json!({ "columns": self.columns, "data": self.data })
     }
 }

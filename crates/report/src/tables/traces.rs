@@ -1,23 +1,20 @@
 //! Owns the data tables of clocks, robot and tradeoff, for download from their figures.
 
-use serde_json::{Value, json};
+use serde_json::Value;
 use skinrig_analysis::result::{ClockResiduals, Motion};
 use skinrig_analysis::tradeoff::Tradeoff;
 
-use super::table::{Table, rounded};
+use super::table::Table;
 use crate::choices::label;
 use crate::input::ReportInput;
 
 /// All tables, by name.
-pub(super) fn all(input: &ReportInput<'_>) -> Vec<(&'static str, Table)> {
+pub(super) fn all(input: &ReportInput<'_>) -> Vec<(&'static str, Value)> {
     let a = input.analysis;
-    let clocks = &a.alignment.residuals;
+    let clocks = Some(&a.alignment.residuals).filter(|maps| !maps.is_empty());
     let measured = input.tradeoff.as_ref().and_then(|t| t.as_ref().ok());
     let tables = [
-        (
-            "clock_residuals",
-            (!clocks.is_empty()).then(|| residuals(clocks)),
-        ),
+        ("clock_residuals", clocks.map(|maps| residuals(maps))),
         ("pose_course", a.motion.as_ref().map(course)),
         ("pose_presses", a.motion.as_ref().map(presses)),
         ("tradeoff", measured.map(|t| tradeoff(t))),
@@ -26,81 +23,51 @@ pub(super) fn all(input: &ReportInput<'_>) -> Vec<(&'static str, Table)> {
     there.filter_map(|(name, t)| Some((name, t?))).collect()
 }
 
-fn residuals(maps: &[ClockResiduals]) -> Table {
-    let points = || {
-        maps.iter()
-            .flat_map(|m| m.points.iter().map(move |p| (m, p)))
-    };
-    Table::new()
-        .column("map", points().map(|(m, _)| json!(m.map.name())))
-        .column("host_s", points().map(|(_, p)| rounded(Some(p.host_s), 3)))
-        .column(
-            "residual_us",
-            points().map(|(_, p)| rounded(Some(p.residual_us), 3)),
-        )
-        .column("used", points().map(|(_, p)| json!(u8::from(p.used))))
+fn residuals(maps: &[ClockResiduals]) -> Value {
+    let points = maps
+        .iter()
+        .flat_map(|m| m.points.iter().map(move |p| (m, p)));
+    Table::of(points)
+        .any("map", |(m, _)| m.map.name())
+        .number("host_s", 3, |(_, p)| p.host_s)
+        .number("residual_us", 3, |(_, p)| p.residual_us)
+        .flag("used", |(_, p)| p.used)
+        .finish()
 }
 
-fn course(motion: &Motion) -> Table {
-    let bins = || motion.course.iter();
-    Table::new()
-        .column("bin_start_s", bins().map(|b| rounded(Some(b.start_s), 3)))
-        .column("rms_mm", bins().map(|b| rounded(Some(b.rms_mm), 4)))
-        .column("max_mm", bins().map(|b| rounded(Some(b.max_mm), 4)))
+fn course(motion: &Motion) -> Value {
+    Table::of(&motion.course)
+        .number("bin_start_s", 3, |b| b.start_s)
+        .number("rms_mm", 4, |b| b.rms_mm)
+        .number("max_mm", 4, |b| b.max_mm)
+        .finish()
 }
 
-fn presses(motion: &Motion) -> Table {
-    let samples = || {
-        let presses = motion.presses.iter();
-        presses.flat_map(|p| p.samples.iter().map(move |s| (p.press, s)))
-    };
-    let mut table = Table::new()
-        .column("press", samples().map(|(p, _)| json!(p)))
-        .column(
-            "since_contact_s",
-            samples().map(|(_, s)| rounded(Some(s.since_contact_s), 4)),
-        );
-    for (axis, name) in ["commanded_x_mm", "commanded_y_mm", "commanded_z_mm"]
-        .into_iter()
-        .enumerate()
-    {
-        table = table.column(
-            name,
-            samples().map(|(_, s)| rounded(Some(s.commanded_mm[axis]), 4)),
-        );
-    }
-    for (axis, name) in ["measured_x_mm", "measured_y_mm", "measured_z_mm"]
-        .into_iter()
-        .enumerate()
-    {
-        table = table.column(
-            name,
-            samples().map(|(_, s)| rounded(Some(s.measured_mm[axis]), 4)),
-        );
-    }
-    table
+fn presses(motion: &Motion) -> Value {
+    let presses = motion.presses.iter();
+    let samples = presses.flat_map(|p| p.samples.iter().map(move |s| (p.press, s)));
+    Table::of(samples)
+        .any("press", |(p, _)| *p)
+        .number("since_contact_s", 4, |(_, s)| s.since_contact_s)
+        .number("commanded_x_mm", 4, |(_, s)| s.commanded_mm[0])
+        .number("commanded_y_mm", 4, |(_, s)| s.commanded_mm[1])
+        .number("commanded_z_mm", 4, |(_, s)| s.commanded_mm[2])
+        .number("measured_x_mm", 4, |(_, s)| s.measured_mm[0])
+        .number("measured_y_mm", 4, |(_, s)| s.measured_mm[1])
+        .number("measured_z_mm", 4, |(_, s)| s.measured_mm[2])
+        .finish()
 }
 
-fn tradeoff(result: &Tradeoff) -> Table {
-    let rows = || result.rows.iter();
-    let flag = |yes: bool| -> Value { json!(u8::from(yes)) };
-    Table::new()
-        .column("choice", rows().map(|r| json!(label(&r.choice))))
-        .column("rmse_mm", rows().map(|r| rounded(r.rmse_mm.value, 4)))
-        .column("rmse_low_mm", rows().map(|r| rounded(r.rmse_mm.low, 4)))
-        .column("rmse_high_mm", rows().map(|r| rounded(r.rmse_mm.high, 4)))
-        .column(
-            "located_rate",
-            rows().map(|r| rounded(r.located_rate.value, 4)),
-        )
-        .column(
-            "cpu_us_per_press",
-            rows().map(|r| rounded(Some(r.cpu_us), 2)),
-        )
-        .column(
-            "bytes_per_s",
-            rows().map(|r| rounded(Some(r.bytes_per_s), 0)),
-        )
-        .column("delay_ms", rows().map(|r| rounded(Some(r.delay_ms), 2)))
-        .column("competes", rows().map(|r| flag(r.competes)))
+fn tradeoff(result: &Tradeoff) -> Value {
+    Table::of(&result.rows)
+        .any("choice", |r| label(&r.choice))
+        .estimate(["rmse_mm", "rmse_low_mm", "rmse_high_mm"], 4, |r| {
+            &r.rmse_mm
+        })
+        .number("located_rate", 4, |r| r.located_rate.value)
+        .number("cpu_us_per_press", 2, |r| r.cpu_us)
+        .number("bytes_per_s", 0, |r| r.bytes_per_s)
+        .number("delay_ms", 2, |r| r.delay_ms)
+        .flag("competes", |r| r.competes)
+        .finish()
 }

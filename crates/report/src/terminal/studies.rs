@@ -91,8 +91,8 @@ fn areas(a: &Analysis) -> String {
     }
     if let Some(c) = &a.cmre {
         let text = format!(
-            "{} % (cells of {} mm, Gaussian of {} mm), n {}",
-            with(&c.percent, 1.0, 2),
+            "{}; cells of {} mm, Gaussian of {} mm, n {}",
+            crate::format::contact_map(&c.percent),
             c.settings.cell_mm,
             c.settings.sigma_mm,
             c.percent.n

@@ -4,6 +4,7 @@ use serde::Serialize;
 use skinrig_nightly::Cause;
 use skinrig_nightly::trend::{Alarm, Report};
 
+use super::name::{series_name, with_names};
 use super::{Links, cause, moved, since};
 
 /// An alarm for the macro in `assets/trend/alarm.html`.
@@ -44,7 +45,7 @@ pub(crate) fn alarm_cards(report: &Report, links: &[Links]) -> Vec<AlarmCard> {
 
 fn alarm_card(report: &Report, alarm: &Alarm, links: &Links) -> AlarmCard {
     let series = |at: &usize| DriftedSeries {
-        name: report.charts[*at].series.name.clone(),
+        name: series_name(&report.charts[*at].series.name),
         by: moved(&report.charts[*at]),
         chart: *at,
     };
@@ -56,7 +57,7 @@ fn alarm_card(report: &Report, alarm: &Alarm, links: &Links) -> AlarmCard {
             since(report, alarm)
         ),
         tone: tone(alarm.attribution.cause),
-        cause: cause(alarm),
+        cause: with_names(&cause(alarm), report),
         changed: alarm.attribution.changed.clone(),
         night: links.night.clone(),
         session: links.session.clone(),

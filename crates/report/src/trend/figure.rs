@@ -3,8 +3,9 @@
 use skinrig_nightly::trend::report::{day, format_number as number};
 use skinrig_nightly::trend::{Chart, Report};
 
-use crate::axes::{Axes, Scale};
-use crate::svg::{Px, Svg, dots, polyline};
+use super::name::series_name;
+use crate::plot::{Axis, LeftTexts, Place, Plot, Scale, band, extent};
+use crate::svg::{Svg, dots, polyline};
 
 /// Sizes of a chart in an alarm and in the table, px.
 const LARGE: (f64, f64) = (860.0, 250.0);
@@ -30,12 +31,10 @@ fn range(chart: &Chart, limits: bool) -> (f64, f64) {
 }
 
 fn ends(values: &[f64]) -> (f64, f64) {
-    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if low < high {
-        (low, high)
-    } else {
-        (low - 0.5, low + 0.5)
+    match extent(values.iter().copied()) {
+        Some((low, high)) if low < high => (low, high),
+        Some((low, _)) => (low - 0.5, low + 0.5),
+        None => (0.0, 1.0),
     }
 }
 
@@ -44,68 +43,59 @@ pub(super) fn large(report: &Report, chart: &Chart) -> String {
     let (width, height) = LARGE;
     let (left, right, top, bottom) = MARGINS;
     let nights = report.nights.len();
-    let axes = Axes {
-        x: Scale::new((-0.5, nights as f64 - 0.5), (left, width - right)),
-        y: Scale::new(range(chart, true), (height - bottom, top)),
-        x_label: "night".to_owned(),
-        y_label: unit_of(chart),
-        tick_count: (0, 5),
+    // Days along the axis.
+    let days = (0..nights).step_by((nights / 7).max(1));
+    let days = days.map(|n| (n as f64, day(&report.nights[n]).to_owned()));
+    let unit = match chart.series.unit.as_str() {
+        "" => "count",
+        unit => unit,
+    };
+    let x = Axis::linear((-0.5, nights as f64 - 0.5), "night").marked(days.collect());
+    let range = range(chart, true);
+    let ys = crate::plot::ticks(range.0, range.1, 5).into_iter();
+    let y = Axis::linear(range, unit).marked(ys.map(|y| (y, number(y))).collect());
+    let place = Place {
+        x: x.scale((left, width - right)),
+        y: y.scale((height - bottom, top)),
     };
     let mut svg = begin(chart, LARGE);
-    // Days along the axis, ends included.
-    let step = (nights / 7).max(1);
-    let days = (0..nights).step_by(step);
-    let days: Vec<_> = days
-        .map(|n| (n as f64, day(&report.nights[n]).to_owned()))
-        .collect();
-    let ys = crate::axes::ticks(axes.y.data.0, axes.y.data.1, 5);
-    let ys: Vec<_> = ys.into_iter().map(|y| (y, number(y))).collect();
-    axes.draw_with(&mut svg, &days, &ys);
-    marks(&mut svg, chart, axes.x, axes.y, true);
-    svg.close();
+    let plot = Plot::new(x, y).draw(|svg, place| marks(svg, chart, place, true));
+    plot.render(&mut svg, &place, LeftTexts::Shown);
     svg.finish()
 }
 
 /// Chart in the table: no axes.
 pub(super) fn small(report: &Report, chart: &Chart) -> String {
     let (width, height) = SMALL;
-    let x = Scale::new((-0.5, report.nights.len() as f64 - 0.5), (2.0, width - 2.0));
-    let y = Scale::new(range(chart, false), (height - 2.0, 2.0));
+    let place = Place {
+        x: Scale::new((-0.5, report.nights.len() as f64 - 0.5), (2.0, width - 2.0)),
+        y: Scale::new(range(chart, false), (height - 2.0, 2.0)),
+    };
     let mut svg = begin(chart, SMALL);
-    marks(&mut svg, chart, x, y, false);
-    svg.close();
+    marks(&mut svg, chart, &place, false);
     svg.finish()
-}
-
-fn unit_of(chart: &Chart) -> String {
-    match chart.series.unit.as_str() {
-        "" => "count".to_owned(),
-        unit => unit.to_owned(),
-    }
 }
 
 fn begin(chart: &Chart, (width, height): (f64, f64)) -> Svg {
     let mut svg = Svg::new();
+    let view = format!("0 0 {width} {height}");
     svg.open(
         "svg",
         &[
             ("class", &"fig"),
-            ("viewBox", &format_args!("0 0 {width} {height}")),
+            ("viewBox", &view),
             ("width", &width),
             ("height", &height),
             ("role", &"img"),
         ],
     );
-    svg.holding(
-        "title",
-        &[],
-        &format!("{} over the nights", chart.series.name),
-    );
+    let title = format!("{} over the nights", series_name(&chart.series.name));
+    svg.holding("title", &[], &title);
     svg
 }
 
 /// Reference band, limits, change point, values.
-fn marks(svg: &mut Svg, chart: &Chart, x: Scale, y: Scale, large: bool) {
+fn marks(svg: &mut Svg, chart: &Chart, &Place { x, y }: &Place, large: bool) {
     let (left, right) = (x.px.0, x.px.1);
     if let Some(r) = chart.reference {
         // Two standard deviations of a new night: roughly where three nights in a row raise an alarm.
@@ -114,15 +104,9 @@ fn marks(svg: &mut Svg, chart: &Chart, x: Scale, y: Scale, large: bool) {
             y.at(r.centre + per * r.above),
             y.at(r.centre - per * r.below),
         );
-        svg.leaf(
-            "rect",
-            &[
-                ("class", &"band on"),
-                ("x", &Px(left)),
-                ("y", &Px(high)),
-                ("width", &Px(right - left)),
-                ("height", &Px(low - high)),
-            ],
+        svg.path(
+            "band on",
+            &band([(left, (high, low)), (right, (high, low))]),
         );
         svg.line("axis", (left, y.at(r.centre)), (right, y.at(r.centre)));
     }

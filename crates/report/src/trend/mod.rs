@@ -2,6 +2,7 @@
 
 mod alarm;
 mod figure;
+mod name;
 mod page;
 mod terminal;
 
@@ -9,6 +10,7 @@ use skinrig_nightly::trend::report::{cause_name, day, format_change, format_numb
 use skinrig_nightly::trend::{Alarm, Chart, Report};
 
 pub(crate) use alarm::alarm_cards;
+pub(crate) use name::with_names;
 pub use page::page;
 pub use terminal::{Style, sentence, terminal};
 

@@ -7,6 +7,7 @@ use skinrig_nightly::trend::report::{day, format_number as number};
 use skinrig_nightly::trend::{Acceptance, Alarm, Chart, Report};
 
 use super::alarm::{self, AlarmCard};
+use super::name::{series_name, with_names};
 use super::{ALARM_CSS, ALARM_TEMPLATE, Links, cause, figure, moved, state, with_unit};
 use crate::error::ReportError;
 use crate::frame::Frame;
@@ -34,6 +35,8 @@ struct ChartCard {
 #[derive(Serialize)]
 struct Row {
     name: String,
+    /// Identifier, for commands.
+    id: String,
     svg: String,
     reference: String,
     last: String,
@@ -67,11 +70,12 @@ pub fn page(
     };
     let cards = alarm::alarm_cards(report, links).into_iter();
     let alarms: Vec<AlarmSection> = cards.map(|card| alarm_section(report, card)).collect();
-    let rows: Vec<Row> = report.charts.iter().map(|c| row(report, c)).collect();
+    let rows = report.charts.iter().map(|c| row(report, c));
+    let (learning, rows): (Vec<Row>, Vec<Row>) = rows.partition(|r| r.state == "learning");
     let past: Vec<PastAlarm> = report.past.iter().map(|a| past_alarm(report, a)).collect();
     let (first, last) = (report.nights.first(), report.nights.last());
     frame.render(context! {
-        headline => report.headline.clone(),
+        headline => with_names(&report.headline, report),
         badge => match alarms.len() {
             0 => "no alarm".to_owned(),
             1 => "1 alarm".to_owned(),
@@ -89,8 +93,12 @@ pub fn page(
         last => last.map(day),
         alarms => Value::from(Serde(alarms)),
         rows => Value::from(Serde(rows)),
+        learning => Value::from(Serde(learning)),
+        contents => [("series", "All series")],
         past => Value::from(Serde(past)),
-        accepted => Value::from(Serde(accepted)),
+        accepted => accepted.iter().map(|a| context! {
+            series => a.series.as_deref().map(series_name), ..Value::from(Serde(a))
+        }).collect::<Vec<_>>(),
     })
 }
 
@@ -114,7 +122,8 @@ fn row(report: &Report, chart: &Chart) -> Row {
     });
     let last = chart.nights.last();
     Row {
-        name: chart.series.name.clone(),
+        name: series_name(&chart.series.name),
+        id: chart.series.name.clone(),
         svg: figure::small(report, chart),
         reference: reference.unwrap_or_else(|| match chart.nights.len() {
             1 => "1 night so far".to_owned(),
@@ -127,12 +136,15 @@ fn row(report: &Report, chart: &Chart) -> Row {
 }
 
 fn past_alarm(report: &Report, alarm: &Alarm) -> PastAlarm {
-    let series = alarm.charts.iter().map(|c| &*report.charts[*c].series.name);
+    let series = alarm
+        .charts
+        .iter()
+        .map(|c| series_name(&report.charts[*c].series.name));
     let until = alarm.ended.map(|n| day(&report.nights[n]).to_owned());
     PastAlarm {
         id: alarm.id.clone(),
         series: series.collect::<Vec<_>>().join(", "),
-        cause: cause(alarm),
+        cause: with_names(&cause(alarm), report),
         until: until.unwrap_or_default(),
     }
 }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use skinrig_nightly::trend::report::format_number as number;
 use skinrig_nightly::trend::{Chart, Report};
-use skinrig_text::{Column, LongWords, Paint, Table, WIDTH, cut, hang, wrap};
+use skinrig_text::{Blocks, Column, LongWords, Paint, Table, WIDTH, cut, hang, sparkline, wrap};
 
 use super::{Links, cause, moved, since, state, with_unit};
 use crate::terminal::plain;
@@ -111,25 +111,22 @@ fn line(out: &mut String, report: &Report, chart: &Chart, style: Style) {
 
 /// Sparkline: one block per night, the centre of the reference in the middle; a space for a night without a value.
 fn spark(report: &Report, chart: &Chart, style: Style) -> String {
-    let blocks: Vec<char> = if style.unicode {
-        "▁▂▃▄▅▆▇█"
-    } else {
-        "_.,-=+*#"
-    }
-    .chars()
-    .collect();
     let from = report.nights.len().saturating_sub(SPARK.min(style.nights));
-    (from..report.nights.len())
-        .map(|night| {
-            let found = chart.nights.binary_search_by_key(&night, |n| n.night);
-            let Ok(at) = found else { return ' ' };
-            let score = chart
-                .reference
-                .map_or(0.0, |r| r.score(chart.nights[at].value));
-            let place = (score.clamp(-4.0, 4.0) + 4.0) / 8.0 * (blocks.len() - 1) as f64;
-            blocks[place.round() as usize]
-        })
-        .collect()
+    let share = |night| {
+        let at = chart
+            .nights
+            .binary_search_by_key(&night, |n| n.night)
+            .ok()?;
+        let value = chart.nights[at].value;
+        let score = chart.reference.map_or(0.0, |r| r.score(value));
+        Some((score + 4.0) / 8.0)
+    };
+    let blocks = if style.unicode {
+        Blocks::Unicode
+    } else {
+        Blocks::Ascii
+    };
+    sparkline((from..report.nights.len()).map(share), blocks)
 }
 
 /// Chart of one series: values, centre of the reference, change point.

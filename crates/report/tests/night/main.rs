@@ -9,7 +9,8 @@ use skinrig_nightly::{
     Cause, CheckResult, Evidence, EvidenceKind, Golden, Measurement, Night, NightExit, Part,
     Verdict, Versions,
 };
-use skinrig_report::night::{Colour, Trends, html, tree};
+use skinrig_report::night::{Trends, html, tree};
+use skinrig_text::Paint;
 
 fn measured(metric: &str, value: Option<f64>, unit: &str, limit: Option<Limit>) -> Measurement {
     Measurement {
@@ -186,7 +187,7 @@ fn good_night() -> Night {
 
 #[test]
 fn the_tree_of_a_bad_night() {
-    let text = tree(&bad_night(), Colour::Off);
+    let text = tree(&bad_night(), Paint::new(false));
     for line in text.lines() {
         assert!(line.chars().count() <= 80, "{line}");
     }
@@ -195,12 +196,12 @@ fn the_tree_of_a_bad_night() {
 
 #[test]
 fn the_tree_of_a_good_night() {
-    insta::assert_snapshot!("good_night", tree(&good_night(), Colour::Off));
+    insta::assert_snapshot!("good_night", tree(&good_night(), Paint::new(false)));
 }
 
 #[test]
 fn colours_are_all_that_a_terminal_adds() {
-    let coloured = tree(&bad_night(), Colour::On);
+    let coloured = tree(&bad_night(), Paint::new(true));
     let mut plain = String::new();
     let mut rest = coloured.as_str();
     while let Some((before, after)) = rest.split_once('\u{1b}') {
@@ -209,14 +210,14 @@ fn colours_are_all_that_a_terminal_adds() {
     }
     plain.push_str(rest);
     assert!(coloured.len() > plain.len());
-    assert_eq!(plain, tree(&bad_night(), Colour::Off));
+    assert_eq!(plain, tree(&bad_night(), Paint::new(false)));
 }
 
 #[test]
 fn what_a_device_says_neither_moves_the_cursor_nor_becomes_markup() {
     let mut night = bad_night();
     night.checks[1].attempts[0].evidence[0].what = "\u{1b}[2J<b>x</b> \u{7}".to_owned();
-    assert!(!tree(&night, Colour::Off).contains(['\u{1b}', '\u{7}']));
+    assert!(!tree(&night, Paint::new(false)).contains(['\u{1b}', '\u{7}']));
     let page = html(&night, Trends::NotRequested).unwrap_or_default();
     assert!(page.contains("&lt;b&gt;x"), "{page}");
     assert!(!page.contains("<b>x</b>"));

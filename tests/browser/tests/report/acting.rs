@@ -162,7 +162,7 @@ fn shows(page: &mut Page<'_>, session: &Session, like: impl Fn(&Value) -> bool) 
         .unwrap();
     assert_eq!(steps.matches('V').count(), located);
     let heights = "Math.round([...document.querySelectorAll('#error-distribution .bars rect')].reduce((sum, r) => sum + Number(r.getAttribute('height')), 0) \
-        / Number(document.querySelector('#error-distribution').dataset.perPress))";
+        / (([from, to, start, end]) => (start - end) / (to - from))(document.querySelectorAll('#error-distribution .plot')[1].dataset.y.split(' ').map(Number)))";
     assert_eq!(page.ask(heights).unwrap(), json!(located));
 }
 

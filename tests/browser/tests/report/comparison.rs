@@ -7,7 +7,7 @@ use serde_json::json;
 use skinrig_browser::{Browser, BrowserError, Page, Size};
 
 use crate::downloads::{AT_A_TIME, buttons, rows};
-use crate::reading::{LIGHTNESS, complaints};
+use crate::reading::{LIGHTNESS, complaints, identifiers, misfits};
 use crate::{keep, kept_folder, skinrig};
 
 /// Page that compares two simulated skins.
@@ -124,5 +124,9 @@ fn it_is_dark_prints_and_fits_a_phone() {
             "{width}"
         );
         keep(page, "comparison-phone", true);
+        let found = misfits(page);
+        assert!(found.is_empty(), "{found:#?}");
+        let found = identifiers(page);
+        assert!(found.is_empty(), "{found:?}");
     });
 }

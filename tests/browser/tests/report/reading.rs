@@ -261,6 +261,103 @@ fn a_phone_scrolls_one_way_only() {
             "{width}"
         );
         keep(page, "phone", true);
+        let found = misfits(page);
+        assert!(found.is_empty(), "{found:#?}");
+    });
+}
+
+/// Figures and tables that do not fit the window, and texts that leave their figure or are too small to read.
+pub(crate) fn misfits(page: &mut Page<'_>) -> Vec<String> {
+    let script = "(() => {
+        const found = [];
+        const room = document.documentElement.clientWidth + 0.5;
+        for (const figure of document.querySelectorAll('svg.fig')) {
+            const box = figure.getBoundingClientRect();
+            const name = figure.id || figure.textContent.slice(0, 40);
+            if (figure.closest('table, details:not([open])')) continue;
+            if (box.left < 0 || box.right > room) found.push(`${name}: ${box.left} to ${box.right} px`);
+            for (const text of figure.querySelectorAll('text')) {
+                const b = text.getBoundingClientRect();
+                if (!b.width) continue;
+                const what = `${name}: ${text.textContent}`;
+                if (b.left < box.left - 3 || b.right > box.right + 3 || b.bottom > box.bottom + 3) found.push(`${what} leaves the figure`);
+                if (b.height < 6) found.push(`${what} is ${b.height} px high`);
+            }
+        }
+        for (const table of document.querySelectorAll('table')) {
+            const box = table.parentElement.getBoundingClientRect();
+            if (box.right > room) found.push(`${table.caption?.textContent}: a table of ${box.right} px`);
+        }
+        return found;
+    })()";
+    let found = page.ask(script).unwrap();
+    let texts = found.as_array().unwrap().iter();
+    texts.map(|t| t.as_str().unwrap().to_owned()).collect()
+}
+
+/// Words of the page that look like identifiers of the program. Code and keys of settings are meant literally.
+pub(crate) fn identifiers(page: &mut Page<'_>) -> Vec<String> {
+    let script = r"(() => {
+        const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+        const keys = new Set([...document.querySelectorAll('dt')].flatMap(dt => dt.textContent.split('.')));
+        const found = [];
+        while (texts.nextNode()) {
+            const { parentElement: parent, data } = texts.currentNode;
+            if (parent.closest('script, style, code, dt, .foot, [title]')) continue;
+            const words = data.match(/(?<![\w.\/])(?:[a-z]\w*(?:_[a-z]\w*)+\b|[a-z]\w+\/[a-z]\w+\/\w+)/g);
+            if (words) found.push(...words.filter(word => !keys.has(word)));
+        }
+        return found;
+    })()";
+    let found = page.ask(script).unwrap();
+    let texts = found.as_array().unwrap().iter();
+    texts.map(|t| t.as_str().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn the_contents_stay_in_sight() {
+    with_report(|page, _| {
+        for size in [Size::LAPTOP, Size::PHONE] {
+            page.resize(size).unwrap();
+            page.ask("document.querySelector('#session').scrollIntoView({ behavior: 'instant' })")
+                .unwrap();
+            let hit = "(() => { const a = document.querySelector('nav a').getBoundingClientRect(); \
+                 return document.elementFromPoint(a.x + a.width / 2, a.y + a.height / 2)?.closest('nav') !== null; })()";
+            assert_eq!(page.ask(hit).unwrap(), json!(true), "{size:?}");
+            let clear = "document.querySelector('#session-h').getBoundingClientRect().top \
+                 >= document.querySelector('nav').getBoundingClientRect().bottom";
+            assert_eq!(page.ask(clear).unwrap(), json!(true), "{size:?}");
+        }
+    });
+}
+
+#[test]
+fn tables_of_the_literature_open_on_request() {
+    with_report(|page, _| {
+        for id in ["comparison-msows", "comparison-skins", "comparison-sensors"] {
+            let shown =
+                format!("document.querySelector('[data-testid={id}] table').checkVisibility()");
+            assert_eq!(page.ask(&shown).unwrap(), json!(false), "{id}");
+            page.click(&format!("[data-testid={id}] summary")).unwrap();
+            assert_eq!(page.ask(&shown).unwrap(), json!(true), "{id}");
+        }
+    });
+}
+
+#[test]
+fn people_read_words_and_no_impossible_numbers() {
+    with_report(|page, _| {
+        let found = identifiers(page);
+        assert!(found.is_empty(), "{found:?}");
+        let map = page
+            .text("document.querySelector('[data-testid=cmre]').textContent")
+            .unwrap();
+        assert!(
+            map.contains(" % missing") || map.contains(" % outside"),
+            "{map}"
+        );
+        let negative = |w: &str| w.trim_start_matches('[').starts_with('-');
+        assert!(!map.split_whitespace().any(negative), "{map}");
     });
 }
 

@@ -3,26 +3,21 @@
 use skinrig_compare::{Comparison, Location, LocationComparison};
 use skinrig_model::Point2;
 
-use super::scales::{LEFT, PANEL, STEP, bars, diverging};
-use super::{FigureBuilder, RenderedFigure};
-use crate::axes::{Axes, Scale};
-use crate::colour::viridis;
+use super::{foot, scales};
+use crate::colour::{diverging, viridis};
 use crate::format::number;
+use crate::plot::{Axis, Figure, Place, Plot, Sheet, WIDE, extent, scale_end};
 use crate::svg::{Px, Svg, polyline};
 
-const SIZE: (f64, f64) = (1240.0, 528.0);
-const TOP: f64 = 40.0;
-
 /// Maps of the first skin and of skin `k`.
-pub(in crate::compare) fn maps(result: &Comparison, k: usize) -> Option<RenderedFigure> {
+pub(in crate::compare) fn maps(result: &Comparison, k: usize) -> Option<Figure> {
     let outline = result.outline?;
     let letter = result.skins[k].letter;
     let errors = result
         .locations
         .iter()
         .flat_map(|l| [&l.skins[0], &l.skins[k]]);
-    let errors: Vec<f64> = errors.filter_map(|h| h.error_mm).collect();
-    let end = scale_end(errors)?;
+    let end = scale_end(errors.filter_map(|h| h.error_mm))?;
     let times = magnification(result, k);
     let marked = |sign| {
         result
@@ -44,85 +39,74 @@ pub(in crate::compare) fn maps(result: &Comparison, k: usize) -> Option<Rendered
          it errs more ({worse}). Without any true difference one location in twenty is marked by chance ({} here).",
         number(Some(tested as f64 * 0.05), 0)
     );
-    let mut figure = FigureBuilder::new(
-        &format!("maps-{k}"),
-        format!("Where {letter} errs more or less than A"),
-        caption,
-        "locations",
-        SIZE,
-    );
     let polygon = outline.polygon(24);
-    let range = |f: fn(&Point2) -> f64| {
-        let low = polygon.iter().map(f).fold(f64::INFINITY, f64::min);
-        let high = polygon.iter().map(f).fold(f64::NEG_INFINITY, f64::max);
-        (low, high)
-    };
+    let range = |f: fn(&Point2) -> f64| extent(polygon.iter().map(f)).unwrap_or((0.0, 1.0));
     let (xs, ys) = (range(|p| p.x_mm), range(|p| p.y_mm));
-    let per_mm = PANEL / (xs.1 - xs.0).max(ys.1 - ys.0);
-    let radius = radius(&result.locations) * per_mm;
+    let share = (ys.1 - ys.0) / (xs.1 - xs.0);
+    // Frames of 350 px or less: one scale for both axes.
+    let (width, height) = if share > 1.0 {
+        (350.0 / share, 350.0)
+    } else {
+        (350.0, 350.0 * share)
+    };
+    let radius = radius(&result.locations) * width / (xs.1 - xs.0);
     let name = |i: usize| format!("{} {}", result.skins[i].letter, result.skins[i].name);
     let titles = [
         format!("error of {}", name(0)),
         format!("error of {}", name(k)),
         format!("{letter} - A"),
     ];
-    for (panel, title) in titles.iter().enumerate() {
-        let left = LEFT + panel as f64 * STEP;
-        let axes = Axes {
-            x: Scale::new(xs, (left, left + per_mm * (xs.1 - xs.0))),
-            y: Scale::new(ys, (TOP + per_mm * (ys.1 - ys.0), TOP)),
-            x_label: "x, skin frame (mm)".into(),
-            y_label: if panel == 0 {
-                "y, skin frame (mm)".into()
-            } else {
-                String::new()
-            },
-            tick_count: (5, 5),
-        };
-        let svg = &mut figure.svg;
-        let shown: String = title.chars().take(46).collect();
-        svg.text((left, TOP - 16.0), "panel", "start", &shown);
-        axes.draw(svg);
-        let at = |p: Point2| (axes.x.at(p.x_mm), axes.y.at(p.y_mm));
-        svg.path("skin", &polyline(polygon.iter().map(|p| at(*p)), true));
-        for location in &result.locations {
-            let place = at(location.at);
-            if panel < 2 {
-                let here = &location.skins[if panel == 0 { 0 } else { k }];
-                error_disc(svg, place, radius, here, end, location);
-            } else {
-                difference_disc(svg, place, radius, location, k, end);
+    let plots = titles.iter().enumerate().map(|(panel, title)| {
+        let polygon = &polygon;
+        Plot::new(
+            Axis::linear(xs, "x, skin frame (mm)"),
+            Axis::linear(ys, "y, skin frame (mm)"),
+        )
+        .title(title.chars().take(46).collect::<String>())
+        .draw(move |svg, place| {
+            let at = |p: &Point2| place.at((p.x_mm, p.y_mm));
+            svg.path("skin", &polyline(polygon.iter().map(at), true));
+            let skin = [0, k, k][panel];
+            for location in &result.locations {
+                let px = at(&location.at);
+                if panel < 2 {
+                    error_disc(svg, px, radius, &location.skins[skin], end, location);
+                } else {
+                    difference_disc(svg, px, radius, location, k, end);
+                }
             }
-        }
-        if panel < 2 {
-            let skin = if panel == 0 { 0 } else { k };
-            let vectors = result.locations.iter().filter_map(|l| {
-                let [x, y] = l.skins[skin].vector_mm?;
-                let tip = Point2::new(l.at.x_mm + times * x, l.at.y_mm + times * y);
-                Some(polyline([at(l.at), at(tip)], false))
-            });
-            let data: String = vectors.collect();
-            svg.leaf(
-                "path",
-                &[
-                    ("d", &data),
-                    (
-                        "style",
-                        &"fill:none;stroke:var(--paper);stroke-width:3;opacity:.75",
-                    ),
-                ],
-            );
-            svg.leaf(
-                "path",
-                &[
-                    ("d", &data),
-                    ("style", &"fill:none;stroke:var(--ink);stroke-width:1.3"),
-                ],
-            );
-        }
-    }
-    bars(&mut figure.svg, end, letter);
-    Some(figure.finish(result, k, SIZE.1))
+            if panel < 2 {
+                let data = vectors(result, place, skin, times);
+                svg.path("vectors under", &data);
+                svg.path("vectors", &data);
+            }
+            let (left, top, width, height) = place.frame();
+            let below = (left, top + height + 60.0);
+            match panel {
+                0 => scales::errors(svg, below, width, end),
+                1 => scales::marks(svg, below),
+                _ => scales::differences(svg, below, width, end, letter),
+            }
+        })
+        .deeper(scales::HEIGHT)
+    });
+    let title = format!("Where {letter} errs more or less than A");
+    let sheet = Sheet::new(&format!("maps-{k}"), &title, caption, WIDE)
+        .shared_columns(3)
+        .frames(width)
+        .row(height, plots);
+    Some(sheet.finish(&foot(result, k), "", "locations"))
+}
+
+/// Mean error vectors of a skin, magnified.
+fn vectors(result: &Comparison, place: &Place, skin: usize, times: f64) -> String {
+    let vector = |l: &Location| {
+        let [x, y] = l.skins[skin].vector_mm?;
+        let tip = (l.at.x_mm + times * x, l.at.y_mm + times * y);
+        let ends = [place.at((l.at.x_mm, l.at.y_mm)), place.at(tip)];
+        Some(polyline(ends, false))
+    };
+    result.locations.iter().filter_map(vector).collect()
 }
 
 fn tested(here: &LocationComparison) -> bool {
@@ -149,7 +133,7 @@ fn tooltip(location: &Location) -> String {
 }
 
 fn disc(svg: &mut Svg, (x, y): (f64, f64), r: f64, fill: &str, ring: bool, location: &Location) {
-    let width = if ring { "1.8" } else { ".4" };
+    let class = if ring { "disc sure" } else { "disc" };
     svg.open(
         "circle",
         &[
@@ -157,7 +141,7 @@ fn disc(svg: &mut Svg, (x, y): (f64, f64), r: f64, fill: &str, ring: bool, locat
             ("cy", &Px(y)),
             ("r", &Px(r)),
             ("fill", &fill),
-            ("style", &format!("stroke:#14181d;stroke-width:{width}")),
+            ("class", &class),
         ],
     );
     svg.holding("title", &[], &tooltip(location));
@@ -199,44 +183,14 @@ fn difference_disc(svg: &mut Svg, at: (f64, f64), r: f64, location: &Location, k
     );
     let (x, y) = at;
     let h = (0.55 * r).max(3.0);
-    let triangle = match sign {
-        -1 => format!(
-            "M{} {}h{}l{} {}Z",
-            Px(x - h),
-            Px(y - 0.6 * h),
-            Px(2.0 * h),
-            Px(-h),
-            Px(1.5 * h)
-        ),
-        1 => format!(
-            "M{} {}h{}l{} {}Z",
-            Px(x - h),
-            Px(y + 0.6 * h),
-            Px(2.0 * h),
-            Px(-h),
-            Px(-1.5 * h)
-        ),
+    let up = match sign {
+        -1 => 1.0,
+        1 => -1.0,
         _ => return,
     };
-    svg.leaf(
-        "path",
-        &[
-            ("d", &triangle),
-            (
-                "style",
-                &"fill:#14181d;stroke:#fff;stroke-width:.8;pointer-events:none",
-            ),
-        ],
-    );
-}
-
-/// Round number above 98 % of the errors.
-fn scale_end(mut errors: Vec<f64>) -> Option<f64> {
-    errors.sort_by(f64::total_cmp);
-    let last = errors.len().checked_sub(1)?;
-    Some(crate::figures::nice_above(
-        errors[(0.98 * last as f64).round() as usize],
-    ))
+    let (from, tip) = (Px(y - 0.6 * up * h), Px(1.5 * up * h));
+    let triangle = format!("M{} {from}h{}l{} {tip}Z", Px(x - h), Px(2.0 * h), Px(-h));
+    svg.path("arrow", &triangle);
 }
 
 /// Half the smallest distance between neighbours, mm, at most 6.

@@ -3,20 +3,17 @@
 use skinrig_compare::statistics::{Better, Comparison as Compared, Verdict};
 use skinrig_compare::{Comparison, Row};
 
-use super::{BETTER, FigureBuilder, NEITHER, RenderedFigure, WORSE};
+use super::{foot, sign_class};
 use crate::compare::text;
+use crate::plot::{Axis, Figure, Plot, Sheet, rectangle};
 use crate::svg::{Px, dots};
 
-const WIDTH: f64 = 900.0;
 const ROW: f64 = 30.0;
-const TOP: f64 = 56.0;
-const LEFT: f64 = 190.0;
-const RIGHT: f64 = 690.0;
 /// Margins shown on each side.
 const MAX_MARGINS: f64 = 4.0;
 
 /// Skin `k` against the first, one row per metric; `None` without margins.
-pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<RenderedFigure> {
+pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<Figure> {
     let rows: Vec<(&Row, &Compared, f64, Option<Verdict>)> = result
         .table
         .iter()
@@ -29,113 +26,78 @@ pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<Rende
         return None;
     }
     let letter = result.skins[k].letter;
-    let height = TOP + ROW * rows.len() as f64 + 66.0;
-    let mut figure = FigureBuilder::new(
-        &format!("margins-{k}"),
-        format!("{letter} against A, in units of the margins"),
-        format!(
-            "Differences with 95 % intervals in units of each metric's margin. Right is better. Differences within the \
-             band are equivalent. Arrows: beyond {MAX_MARGINS} margins."
-        ),
-        "metrics",
-        (WIDTH, height),
+    let caption = format!(
+        "Differences with 95 % intervals in units of each metric's margin. Right is better. Differences within the \
+         band are equivalent. Arrows: beyond {MAX_MARGINS} margins."
     );
-    let svg = &mut figure.svg;
-    let middle = (LEFT + RIGHT) / 2.0;
-    let per = (RIGHT - LEFT) / (2.0 * MAX_MARGINS);
-    let x = |v: f64| middle + per * v.clamp(-MAX_MARGINS, MAX_MARGINS);
-    let bottom = TOP + ROW * rows.len() as f64;
-    svg.leaf(
-        "rect",
-        &[
-            ("x", &Px(x(-1.0))),
-            ("y", &Px(TOP - 8.0)),
-            ("width", &Px(2.0 * per)),
-            ("height", &Px(bottom - TOP + 8.0)),
-            ("style", &"fill:var(--skin);stroke:var(--rule)"),
-        ],
-    );
-    for tick in [-4.0, -2.0, 0.0, 2.0, 4.0] {
-        svg.line(
-            if tick == 0.0 { "axis" } else { "grid" },
-            (x(tick), TOP - 8.0),
-            (x(tick), bottom),
-        );
-        svg.text(
-            (x(tick), bottom + 18.0),
-            "tick",
-            "middle",
-            &format!("{tick}"),
-        );
-    }
-    svg.text(
-        (middle, bottom + 38.0),
-        "label",
-        "middle",
-        "difference (margins)",
-    );
-    svg.text(
-        (LEFT, TOP - 22.0),
-        "panel",
-        "start",
-        &format!("← {letter} worse"),
-    );
-    svg.text(
-        (RIGHT, TOP - 22.0),
-        "panel",
-        "end",
-        &format!("{letter} better →"),
-    );
-    svg.text((middle, TOP - 22.0), "note", "middle", "no difference");
-    for (i, (row, c, margin, verdict)) in rows.iter().enumerate() {
-        let y = TOP + ROW * (i as f64 + 0.5) - 4.0;
-        let turn = improvement_factor(row, c) / margin;
+    let n = rows.len();
+    // Arrows beyond the last margin stay inside the frame.
+    let end = MAX_MARGINS + 0.25;
+    let x = Axis::linear((-end, end), "difference (margins)").ticks(5);
+    let names = rows.iter().map(|(row, ..)| row.name.clone());
+    let mut plot = Plot::new(x, Axis::categories(names, "").downwards())
+        .title(format!("← {letter} worse"))
+        .note(format!("{letter} better →"))
+        .draw(|svg, place| {
+            let (_, top, _, height) = place.frame();
+            let (left, right) = (place.x.at(-1.0), place.x.at(1.0));
+            rectangle(svg, "tile", (left, top, right - left, height));
+            svg.text(
+                (place.middle().0, top - 9.0),
+                "note",
+                "middle",
+                "no difference",
+            );
+        })
+        .upright("axis", 0.0);
+    for (i, (row, compared, margin, verdict)) in rows.into_iter().enumerate() {
+        let turn = improvement_factor(row, compared) / margin;
         let ends = |v: Option<f64>| v.map(|v| v * turn);
-        let (mut low, mut high) = (ends(c.difference.low), ends(c.difference.high));
+        let (mut low, mut high) = (
+            ends(compared.difference.low),
+            ends(compared.difference.high),
+        );
         if turn < 0.0 {
             std::mem::swap(&mut low, &mut high);
         }
         let (low, high) = (low.unwrap_or(-f64::INFINITY), high.unwrap_or(f64::INFINITY));
-        let at = c.difference.value * turn;
-        let colour = match verdict {
-            Some(Verdict::Better) => BETTER,
-            Some(Verdict::Worse) => WORSE,
-            _ => NEITHER,
-        };
-        svg.text((LEFT - 14.0, y + 4.0), "tick ink", "end", &row.name);
-        let stroke = format!("stroke:{colour};stroke-width:3;stroke-linecap:round;fill:none");
-        if low < MAX_MARGINS && high > -MAX_MARGINS {
-            let data = format!("M{} {}H{}", Px(x(low)), Px(y), Px(x(high)));
-            svg.leaf("path", &[("d", &data), ("style", &stroke)]);
-        }
-        for (end, direction) in [(low, -1.0), (high, 1.0)] {
-            if end.abs() > MAX_MARGINS && end * direction > 0.0 {
-                let tip = x(direction * MAX_MARGINS) + 9.0 * direction;
-                let data = format!("M{} {}l{} -5v10Z", Px(tip), Px(y), Px(-9.0 * direction));
-                svg.leaf(
-                    "path",
-                    &[("d", &data), ("style", &format!("fill:{colour}"))],
-                );
+        let at = compared.difference.value * turn;
+        let class = sign_class(match verdict {
+            Some(Verdict::Better) => -1,
+            Some(Verdict::Worse) => 1,
+            _ => 0,
+        });
+        plot = plot.draw(move |svg, place| {
+            let y = place.y.at(i as f64);
+            let x = |v: f64| place.x.at(v.clamp(-MAX_MARGINS, MAX_MARGINS));
+            if low < MAX_MARGINS && high > -MAX_MARGINS {
+                let class = format!("difference {class}");
+                svg.line(&class, (x(low), y), (x(high), y));
             }
-        }
-        if at.abs() <= MAX_MARGINS {
-            let style = format!("stroke:{colour};stroke-width:11;stroke-linecap:round");
-            svg.leaf("path", &[("d", &dots([(x(at), y)])), ("style", &style)]);
-        }
-        svg.text(
-            (RIGHT + 24.0, y + 4.0),
-            "tick ink",
-            "start",
-            text::verdict(*verdict),
-        );
-        let said = format!(
-            "margin {} {}",
-            text::value(row, Some(*margin)),
-            row.format.unit
-        );
-        svg.text((WIDTH - 12.0, y + 4.0), "tick", "end", &said);
+            for (end, direction) in [(low, -1.0), (high, 1.0)] {
+                if end.abs() > MAX_MARGINS && end * direction > 0.0 {
+                    let tip = x(direction * MAX_MARGINS) + 9.0 * direction;
+                    let back = Px(-9.0 * direction);
+                    svg.path(class, &format!("M{} {}l{back} -5v10Z", Px(tip), Px(y)));
+                }
+            }
+            if at.abs() <= MAX_MARGINS {
+                let class = format!("difference value {class}");
+                svg.path(&class, &dots([(x(at), y)]));
+            }
+            let right = place.x.px.1;
+            let verdict = text::verdict(verdict);
+            svg.text((right + 24.0, y + 4.0), "tick ink", "start", verdict);
+            let margin = text::value(row, Some(margin));
+            let text = format!("margin {margin} {}", row.format.unit);
+            svg.text((right + 228.0, y + 4.0), "tick", "end", &text);
+        });
     }
-    Some(figure.finish(result, k, height))
+    let title = format!("{letter} against A, in units of the margins");
+    let sheet = Sheet::new(&format!("margins-{k}"), &title, caption, 900.0)
+        .margins(230.0, 240.0)
+        .row(ROW * n as f64, [plot]);
+    Some(sheet.finish(&foot(result, k), "", "metrics"))
 }
 
 /// Sign and scale that turn a difference so that positive is better.
