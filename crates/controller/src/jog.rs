@@ -201,7 +201,7 @@ impl<'a> Jog<'a> {
                     target,
                     allowed,
                     max_force_n: self.limits.max_force_n,
-                    found: self.indenter.position(),
+                    found: self.indenter.position().map(Box::new),
                 }
                 .into());
             }

@@ -17,12 +17,12 @@ pub struct NotArrived {
     /// Largest force that the motors may apply, N. A tip that something holds back rests at about this force or stops below it.
     pub max_force_n: f64,
     /// Last sample of that time.
-    pub found: Option<PoseSample>,
+    pub found: Option<Box<PoseSample>>,
 }
 
 impl NotArrived {
     fn found(&self) -> String {
-        let Some(found) = self.found else {
+        let Some(found) = &self.found else {
             return "no pose".to_owned();
         };
         let at = point(&found.measured);

@@ -132,7 +132,7 @@ impl Executor<'_> {
                         within,
                         tolerance_mm: self.plan.limits.position_tolerance_mm,
                         max_force_n: self.plan.limits.max_force_n,
-                        found: self.indenter.position(),
+                        found: self.indenter.position().map(Box::new),
                     }));
                 }
                 other => return Ok(Ok(other?)),
@@ -152,7 +152,7 @@ impl Executor<'_> {
             target,
             allowed,
             max_force_n: self.plan.limits.max_force_n,
-            found: self.indenter.position(),
+            found: self.indenter.position().map(Box::new),
         }
     }
 
@@ -192,7 +192,7 @@ pub(super) struct OffTarget {
     within: HostDuration,
     tolerance_mm: f64,
     max_force_n: f64,
-    found: Option<PoseSample>,
+    found: Option<Box<PoseSample>>,
 }
 
 impl OffTarget {
