@@ -123,7 +123,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Analyze(a) => results::analyze(a, output),
         Command::Report(a) => results::report(a, json),
         Command::Compare(a) => compare::compare(a, json),
-        Command::Tradeoff(a) => tradeoff::tradeoff(a, json),
+        Command::Tradeoff(a) => tradeoff::tradeoff(a, output),
         Command::Verify(a) => verify::verify(a, json),
         Command::Salvage(a) => salvage::salvage(a, json),
         Command::Import(a) => import::import(a, &command_line(arguments), output),

@@ -4,7 +4,7 @@ use rustix::time::{ClockId, clock_gettime};
 use skinrig_analysis::AnalysisError;
 use skinrig_analysis::tradeoff::{Cost, Plan, Row, Tradeoff, measure};
 use skinrig_model::RunHeader;
-use skinrig_report::tradeoff::{label, page, protocol_lines, terminal_table};
+use skinrig_report::tradeoff::{Rows, label, page, protocol_lines, terminal_table};
 use skinrig_results::Origin;
 
 use crate::analyses::tradeoff_path;
@@ -12,6 +12,7 @@ use crate::args::{CostKind, TradeoffArgs};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::phase::Phase;
 use crate::results::{Choices, not_official, open, write};
+use crate::terminal::Output;
 use crate::tradeoff_file::FORMAT;
 
 /// CPU time of this thread, s.
@@ -107,7 +108,7 @@ fn rig_in_words(header: &RunHeader) -> String {
 /// # Errors
 /// What keeps a session from being analysed, files that cannot be written, and [`Failure::limit`] when nothing meets
 /// a demand.
-pub(crate) fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
+pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
     let choices = Choices {
         overrides: &args.overrides,
         reference_code: false,
@@ -160,7 +161,7 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
     let html = page(&result, &name.unwrap_or_default(), &rig).map_err(Failure::internal)?;
     write(&html_path, html.as_bytes())?;
     write(&json_path, text.as_bytes())?;
-    if json {
+    if output.json {
         document["files"] = serde_json::json!({ "page": html_path, "results": json_path });
         crate::terminal::print_json(&document);
     } else {
@@ -170,6 +171,11 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
             .for_each(|a| print_answer(a, own.as_deref()));
         let table = terminal_table(
             &result,
+            if output.verbose {
+                Rows::All
+            } else {
+                Rows::Front
+            },
             &rig,
             crate::terminal::is_coloured(&std::io::stdout()),
         );

@@ -20,7 +20,16 @@ use crate::svg::FIGURE_CSS;
 const TEMPLATE: &str = include_str!("../assets/tradeoff/page.html");
 const CSS: &str = include_str!("../assets/tradeoff/page.css");
 
-/// Above this many rows only the session's own and those on a front are printed; the files have all.
+/// Which rows a table has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rows {
+    /// The session's own settings and the choices on a front.
+    Front,
+    /// All choices.
+    All,
+}
+
+/// The page has all choices up to this many; the data files always have all.
 const MAX_ROWS: usize = 120;
 
 /// Fronts of a row as letters: c for CPU time, b for bytes, d for delay.
@@ -43,7 +52,7 @@ fn percent(e: &Estimate) -> String {
 }
 
 /// Rows in display order: the session's own, then those on a front by RMSE, then the others.
-fn ordered(result: &Tradeoff) -> Vec<&Row> {
+fn ordered(result: &Tradeoff, rows: Rows) -> Vec<&Row> {
     let (first, rest) = match result.rows.split_first() {
         Some((first, rest)) => (Some(first), rest),
         None => (None, &[][..]),
@@ -51,17 +60,16 @@ fn ordered(result: &Tradeoff) -> Vec<&Row> {
     let rmse = |r: &&Row| r.rmse_mm.value.unwrap_or(f64::INFINITY);
     let (mut on, others): (Vec<&Row>, Vec<&Row>) = rest.iter().partition(|r| !r.fronts.is_empty());
     on.sort_by(|a, b| rmse(a).total_cmp(&rmse(b)));
-    let others = if result.rows.len() > MAX_ROWS {
-        Vec::new()
-    } else {
-        others
+    let others = match rows {
+        Rows::Front => Vec::new(),
+        Rows::All => others,
     };
     first.into_iter().chain(on).chain(others).collect()
 }
 
-/// At most 100 columns, ends with a newline. `rig` describes the origin of the session.
+/// The chosen rows. At most 100 columns, ends with a newline. `rig` describes the origin of the session.
 #[must_use]
-pub fn terminal_table(result: &Tradeoff, rig: &str, color: bool) -> String {
+pub fn terminal_table(result: &Tradeoff, rows: Rows, rig: &str, color: bool) -> String {
     let (used, of) = result.scored;
     let mut out = format!(
         "{}\n{} choices tried on {used} of {of} attempted scoring presses (n: those that count),\n\
@@ -99,7 +107,7 @@ pub fn terminal_table(result: &Tradeoff, rig: &str, color: bool) -> String {
     ] {
         let _ = writeln!(out, "{}", table.row(head));
     }
-    for (i, row) in ordered(result).into_iter().enumerate() {
+    for (i, row) in ordered(result, rows).into_iter().enumerate() {
         let mut name = label(&row.choice);
         if !row.competes {
             name = format!("({name})");
@@ -126,8 +134,8 @@ pub fn terminal_table(result: &Tradeoff, rig: &str, color: bool) -> String {
             out += "    ^ the session's settings; all others change them\n";
         }
     }
-    if result.rows.len() > MAX_ROWS {
-        out += "\nOnly choices on a front are shown; all are in the files.\n";
+    if rows == Rows::Front {
+        out += "\nShown: the session's own settings and the fronts. The page and -v have every choice.\n";
     }
     out
 }
@@ -190,7 +198,12 @@ pub fn page(result: &Tradeoff, session: &str, rig: &str) -> Result<String, Repor
     };
     let figure = figure::fronts(result, rig, &format!("session {session}"));
     let mut table = Grid::new("choices", "All choices", &COLUMNS);
-    for (i, row) in ordered(result).into_iter().enumerate() {
+    let rows = if result.rows.len() > MAX_ROWS {
+        Rows::Front
+    } else {
+        Rows::All
+    };
+    for (i, row) in ordered(result, rows).into_iter().enumerate() {
         let class = match (row.competes, row.fronts.is_empty()) {
             (false, _) => "out",
             (true, false) => "front",

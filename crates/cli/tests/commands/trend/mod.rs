@@ -10,6 +10,8 @@ use skinrig_nightly::{Night, NightExit, Verdict};
 use crate::support::{files, only, skinrig, text};
 use nights::Nights;
 
+/// The same series as pages name it.
+const EVENTS_IN_WORDS: &str = "skin: press events (golden)";
 const EVENTS: &str = "golden/skin/press_events";
 
 /// A page, with slashes as they are: in a page they are escaped too.
@@ -169,7 +171,7 @@ fn an_alarm_links_a_session_that_outlives_its_night_and_replays() {
     let shown = read(Path::new(&page));
     has(
         says(&shown, "headline"),
-        &[EVENTS, "probable cause: the skin"],
+        &[EVENTS_IN_WORDS, "probable cause: the skin"],
     );
     assert_eq!(says(&shown, "alarms"), "1 alarm");
     assert_eq!(says(&shown, "theme"), "Dark");
@@ -248,7 +250,10 @@ fn an_accepted_change_is_learnt_anew_and_says_who_and_why() {
     );
     let shown = read(Path::new(&page));
     let (_, accepted) = shown.split_once("data-testid=\"accepted\"").unwrap();
-    has(accepted, &[first, EVENTS, "a &lt;new&gt; lamp", "ada, 20"]);
+    has(
+        accepted,
+        &[first, EVENTS_IN_WORDS, "a &lt;new&gt; lamp", "ada, 20"],
+    );
     assert_eq!(says(&shown, "alarms"), "no alarm");
     // The new level is the one that it is held against from now on.
     nights.add(40..60, 36, None);
@@ -319,7 +324,11 @@ fn the_page_of_a_night_says_what_moved_over_the_nights() {
     assert!(trends < shown.find("id=\"checks\"").unwrap());
     has(
         &shown[trends..],
-        &[&sentence, "skinrig run --replay ", "skinrig verify "],
+        &[
+            &sentence.replace(EVENTS, EVENTS_IN_WORDS),
+            "skinrig run --replay ",
+            "skinrig verify ",
+        ],
     );
     let json = std::fs::read_to_string(folder.join("night.json")).unwrap();
     let night: Night = serde_json::from_str(&json).unwrap();
