@@ -91,6 +91,16 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "skinrig-python",
+        &[
+            "skinrig",
+            "skinrig-export",
+            "skinrig-model",
+            "skinrig-recorder",
+            "skinrig-results",
+        ],
+    ),
+    (
         "skinrig",
         &[
             "skinrig-model",
@@ -126,6 +136,7 @@ const RESTRICTED: &[(&str, &[&str])] = &[
     ("rust-hdf5", &["skinrig-formats"]),
     ("parquet", &["skinrig-export"]),
     ("zip", &["skinrig-export"]),
+    ("pyo3", &["skinrig-python"]),
     ("clap", &["skinrig"]),
     ("indicatif", &["skinrig"]),
     ("chrono", &["skinrig", "skinrig-recorder", "skinrig-hil"]),

@@ -1,5 +1,6 @@
 //! Names of analyses. A session's own settings give the official one; everything else is a variant with files of its own beside it.
 
+mod stored;
 mod summary;
 
 use std::fmt::Write as _;
@@ -11,6 +12,7 @@ use skinrig_report::{Summary, Variant};
 use crate::exit::Failure;
 use crate::paths::{beside, folder_of};
 
+pub(crate) use self::stored::stored;
 pub(crate) use self::summary::{SummaryError, summary};
 
 /// Stands before the name of a variant in the names of its files.

@@ -31,12 +31,28 @@ pub fn load(path: &Path, overrides: &[String]) -> Result<Checked, Failure> {
     read(path, overrides)?.map_err(|refused| Failure::findings(&refused.found))
 }
 
+/// As [`load`], for the text of a protocol that lies in no file.
+///
+/// # Errors
+/// [`Failure::input`] with every finding at once.
+pub(crate) fn load_text(name: &str, text: &str, overrides: &[String]) -> Result<Checked, Failure> {
+    parse(name, text.as_bytes(), overrides)?.map_err(|refused| Failure::findings(&refused.found))
+}
+
 fn read(path: &Path, overrides: &[String]) -> Result<Result<Checked, Box<Refused>>, Failure> {
     let bytes = regular::read_text(path).map_err(|e| {
         Failure::input(format!("{}: cannot read the protocol: {e}", path.display()))
     })?;
+    parse(&path.to_string_lossy(), &bytes, overrides)
+}
+
+fn parse(
+    name: &str,
+    bytes: &[u8],
+    overrides: &[String],
+) -> Result<Result<Checked, Box<Refused>>, Failure> {
     let loader = regular::read_text;
-    let protocol = match Protocol::parse(&path.to_string_lossy(), &bytes, overrides, &loader) {
+    let protocol = match Protocol::parse(name, bytes, overrides, &loader) {
         Ok(protocol) => protocol,
         Err(found) => {
             let planned = None;
@@ -48,7 +64,7 @@ fn read(path: &Path, overrides: &[String]) -> Result<Result<Checked, Box<Refused
     if held.is_ok() {
         let outline = &protocol.surroundings.outline;
         skinrig_analysis::check::before_recording(&plan.presses, &protocol.analysis, outline)
-            .map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
+            .map_err(|e| Failure::input(format!("{name}: {e}")))?;
     }
     let checked = Checked { protocol, plan };
     Ok(match held {

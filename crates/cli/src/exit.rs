@@ -66,12 +66,29 @@ pub struct Failure {
     pub exit: Exit,
     /// Complete message for standard error, without the end of line.
     pub message: String,
+    /// True if a file is no session, or a damaged one.
+    pub is_damage: bool,
+}
+
+/// True if `error` says that a file is no session, or a damaged one.
+fn is_damage(error: &RecorderError) -> bool {
+    matches!(
+        error,
+        RecorderError::Damaged { .. }
+            | RecorderError::NotASession { .. }
+            | RecorderError::Empty { .. }
+            | RecorderError::Unsound { .. }
+    )
 }
 
 impl Failure {
     fn new(exit: Exit, message: impl fmt::Display) -> Self {
         let message = format!("error: {message}");
-        Self { exit, message }
+        Self {
+            exit,
+            message,
+            is_damage: false,
+        }
     }
 
     /// Bad input.
@@ -85,6 +102,7 @@ impl Failure {
         Self {
             exit: Exit::Input,
             message: message.trim_end().to_owned(),
+            is_damage: false,
         }
     }
 
@@ -95,16 +113,30 @@ impl Failure {
 
     /// A session that could not be read: bad input, unless it was the machine that failed.
     pub fn session(error: RecorderError) -> Self {
-        if error.is_system_failure() {
+        let is_damage = is_damage(&error);
+        let failure = if error.is_system_failure() {
             Self::internal(error)
         } else {
             Self::input(error)
+        };
+        Self {
+            is_damage,
+            ..failure
         }
     }
 
     /// A rig fault.
     pub fn rig(message: impl fmt::Display) -> Self {
         Self::new(Exit::Rig, message)
+    }
+
+    /// The operator ended the run.
+    pub(crate) fn stopped(message: String) -> Self {
+        Self {
+            exit: Exit::Stopped,
+            message,
+            is_damage: false,
+        }
     }
 
     /// A limit that was not met.
@@ -118,7 +150,14 @@ impl From<ResultsError> for Failure {
         match error {
             ResultsError::Session(error) => Self::session(error),
             ResultsError::Settings(found) => Self::findings(&found),
-            other => Self::input(other),
+            other => {
+                let source = std::error::Error::source(&other);
+                let recorder = source.and_then(|s| s.downcast_ref::<RecorderError>());
+                Self {
+                    is_damage: recorder.is_some_and(is_damage),
+                    ..Self::input(&other)
+                }
+            }
         }
     }
 }

@@ -20,6 +20,7 @@ mod host;
 mod import;
 mod inspect;
 mod jog;
+pub mod library;
 mod man;
 mod new;
 mod paths;

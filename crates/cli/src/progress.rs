@@ -23,6 +23,8 @@ enum Display {
     Bar(ProgressBar),
     /// A line on standard error each time another tenth of the presses is done.
     Lines { tenths: usize },
+    /// Nothing: another program runs this.
+    Hidden,
 }
 
 impl ProgressView {
@@ -47,6 +49,17 @@ impl ProgressView {
         Self {
             tracker: ProgressTracker::new(Some(expected)),
             display,
+            drawn: None,
+            began: Instant::now(),
+        }
+    }
+
+    /// A view that shows nothing, and counts.
+    #[must_use]
+    pub(crate) fn hidden(expected: HostDuration) -> Self {
+        Self {
+            tracker: ProgressTracker::new(Some(expected)),
+            display: Display::Hidden,
             drawn: None,
             began: Instant::now(),
         }
@@ -79,6 +92,7 @@ impl ProgressView {
         match &self.display {
             Display::Bar(bar) => bar.suspend(|| errln!("{text}")),
             Display::Lines { .. } => errln!("{text}"),
+            Display::Hidden => {}
         }
     }
 
@@ -111,6 +125,7 @@ impl ProgressView {
                     );
                 }
             }
+            Display::Hidden => {}
         }
     }
 

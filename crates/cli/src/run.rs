@@ -78,7 +78,11 @@ pub(crate) fn record(
     let started_at = started.to_rfc3339_opts(SecondsFormat::Secs, true);
     let header = header(intent, plan, &rig, &started_at)?;
     let (path, writer) = new_session(intent, started, folder)?;
-    let view = ProgressView::new(plan.presses.len(), intent.expected);
+    let view = if operator.is_attended() {
+        ProgressView::new(plan.presses.len(), intent.expected)
+    } else {
+        ProgressView::hidden(intent.expected)
+    };
     let mut sink = SessionSink::new(writer, view, intent.known.clone())
         .with_faults(FaultInjector::new(intent.faults));
     let control = operator.control();
@@ -258,37 +262,46 @@ pub(crate) fn conclude(
         analyse(session, max_rmse_mm, output)
     };
     // How the run ended comes first: a failing analysis must not hide a fault of the rig.
-    let kept = format!("everything recorded so far is kept: {}", session.display());
-    let also = |analysed: Outcome| {
-        if let Err(failure) = analysed {
-            errln!("{}", failure.message);
-        }
-    };
-    match &report.end {
-        RunEnd::Completed => match cost_by_the_rig(session)? {
-            Some(cost) => {
-                also(analysed);
-                Err(Failure::rig(format!(
-                    "{cost}\n  the session is kept: {}\n  next: put right what they name (device, cable, disk), then take these presses \
-                     again with `skinrig resume {0}`",
-                    session.display()
-                )))
-            }
-            None => analysed,
-        },
-        RunEnd::Stopped(reason) => {
-            also(analysed);
-            errln!("stopped: {reason}; {kept}\n  next: {}", go_on(session));
+    let ended = end_of(session, report);
+    if matches!(ended, Ok(None)) {
+        return analysed;
+    }
+    if let Err(failure) = analysed {
+        errln!("{}", failure.message);
+    }
+    match ended? {
+        Some(stopped) => {
+            errln!("{stopped}");
             Ok(Exit::Stopped)
         }
-        RunEnd::Faulted(reason) => Err(Failure::rig({
-            also(analysed);
-            format!(
-                "{reason}\n  {kept}\n  next: put right what is named above (device, cable, file, disk space), then {}; \
-                 `skinrig show` lists what was kept",
-                go_on(session)
-            )
-        })),
+        None => Ok(Exit::Ok),
+    }
+}
+
+/// How the run of `session` ended; the operator's stop as the line that says so, `None` when all is well.
+///
+/// # Errors
+/// [`Failure::rig`] for a fault, and for presses that the rig cost.
+pub(crate) fn end_of(session: &Path, report: &RunReport) -> Result<Option<String>, Failure> {
+    let kept = format!("everything recorded so far is kept: {}", session.display());
+    match &report.end {
+        RunEnd::Completed => match cost_by_the_rig(session)? {
+            Some(cost) => Err(Failure::rig(format!(
+                "{cost}\n  the session is kept: {}\n  next: put right what they name (device, cable, disk), then take these presses \
+                 again with `skinrig resume {0}`",
+                session.display()
+            ))),
+            None => Ok(None),
+        },
+        RunEnd::Stopped(reason) => Ok(Some(format!(
+            "stopped: {reason}; {kept}\n  next: {}",
+            go_on(session)
+        ))),
+        RunEnd::Faulted(reason) => Err(Failure::rig(format!(
+            "{reason}\n  {kept}\n  next: put right what is named above (device, cable, file, disk space), then {}; \
+             `skinrig show` lists what was kept",
+            go_on(session)
+        ))),
     }
 }
 
@@ -366,6 +379,17 @@ fn fresh(
     if let Some(file) = &args.rig {
         return on_bench(args, checked.protocol, file, command_line, output, operator);
     }
+    simulated(args, checked, command_line, output, operator)
+}
+
+/// Runs a protocol on the simulated rig.
+pub(crate) fn simulated(
+    args: &RunArgs,
+    checked: check::Checked,
+    command_line: &str,
+    output: Output,
+    operator: &Operator,
+) -> Result<(PathBuf, RunReport), Failure> {
     let (protocol, mut plan) = (checked.protocol, checked.plan);
     let level = match &args.level {
         Some(name) => name

@@ -19,6 +19,7 @@ pub(crate) struct Operator {
     over: Arc<AtomicBool>,
     asked: Arc<AtomicBool>,
     of_suite: bool,
+    attended: bool,
 }
 
 /// The system refused the handler of signals, or its thread.
@@ -58,6 +59,17 @@ impl Operator {
         Self::answering(OF_SUITE, true)
     }
 
+    /// An operator at no terminal: `control` alone ends the run, signals keep their meaning, and no progress is shown.
+    pub(crate) fn elsewhere(control: ControlHandle) -> Self {
+        Self {
+            control,
+            over: Arc::default(),
+            asked: Arc::default(),
+            of_suite: false,
+            attended: false,
+        }
+    }
+
     fn answering(words: Words, of_suite: bool) -> Result<Self, SignalError> {
         let flag = || Arc::new(AtomicBool::new(false));
         let (control, over, asked) = (ControlHandle::new(), flag(), flag());
@@ -85,6 +97,7 @@ impl Operator {
             over,
             asked,
             of_suite,
+            attended: true,
         })
     }
 
@@ -92,6 +105,12 @@ impl Operator {
     #[must_use]
     pub(crate) const fn control(&self) -> &ControlHandle {
         &self.control
+    }
+
+    /// True if there is a terminal to show the run on.
+    #[must_use]
+    pub(crate) const fn is_attended(&self) -> bool {
+        self.attended
     }
 
     /// Whether ctrl-C was pressed, or the system asked for an end.

@@ -17,6 +17,7 @@ mod rig_document;
 mod session;
 mod settings;
 mod stages;
+mod window;
 
 pub use error::ResultsError;
 pub use events::{Rescan, SessionEvents};
@@ -25,3 +26,4 @@ pub use rig_document::RigDocument;
 pub use session::Session;
 pub use settings::AnalysisOptions;
 pub use stages::{AlignedSession, AnalyzedSession, RecordedSession, analyze};
+pub use window::{ChunkIndex, events_between};

@@ -84,6 +84,7 @@ pub struct Analysis {
     /// Violated laws; empty for a plausible session.
     pub findings: Vec<Finding>,
     /// Events per pixel over the whole recording, camera 1 and camera 2.
+    #[serde(default)]
     pub activity: Vec<Activity>,
     /// Ignored events outside the sensor, camera 1 and camera 2.
     #[serde(default)]
@@ -91,14 +92,17 @@ pub struct Analysis {
     /// RMSE of the scored presses at each depth, shallowest first; empty for a single depth.
     pub depths: Vec<DepthResult>,
     /// Event rates of each camera over the whole session.
+    #[serde(default)]
     pub rates: [RateSeries; 2],
     /// One row per planned press, in plan order.
     pub presses: Vec<PressResult>,
     /// Warnings for the reader: fallbacks, missing data, suspicious residuals.
     pub warnings: Vec<String>,
     /// Events per pixel of a few scored presses, spread over the session and the skin.
+    #[serde(default)]
     pub pictures: Vec<PressPicture>,
     /// Event rates around a few scored presses.
+    #[serde(default)]
     pub zooms: Vec<RateZoom>,
     /// How the robot followed its commands; `None` without poses ([`crate::motion`]).
     #[serde(default)]

@@ -3,8 +3,6 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
-use skinrig_analysis::{ANALYSIS_VERSION, Analysis};
 use skinrig_compare::{Session, Subject};
 use skinrig_recorder::{SessionReader, list};
 
@@ -121,7 +119,7 @@ fn session(path: &Path, name: Option<&str>) -> Result<Session, Failure> {
     let variant = name
         .map(|name| analyses::variant(path, &facts.session_id, name))
         .transpose()?;
-    let analysis = match results_beside(path, &facts.session_id, name) {
+    let analysis = match analyses::stored(path, &facts.session_id, name) {
         Some(analysis) => analysis,
         None => {
             let choices = variant.as_ref().map_or_else(Choices::default, |v| Choices {
@@ -138,25 +136,4 @@ fn session(path: &Path, name: Option<&str>) -> Result<Session, Failure> {
         }
     };
     Ok(Session { facts, analysis })
-}
-
-/// The results beside a session, when they are its own and of this version of the analysis.
-fn results_beside(path: &Path, session_id: &str, name: Option<&str>) -> Option<Analysis> {
-    let text = std::fs::read(analyses::results_path(path, name)).ok()?;
-    let mut document: Value = serde_json::from_slice(&text).ok()?;
-    let own = document["provenance"]["session_id"].as_str() == Some(session_id);
-    let current = document["analysis"]["version"].as_u64() == Some(u64::from(ANALYSIS_VERSION));
-    // Settings of the session alone, or those of the variant that was asked for.
-    let named = document["provenance"]["variant"]["name"].as_str() == name;
-    if !(own && current && named) {
-        return None;
-    }
-    let mut analysis = document["analysis"].take();
-    // Bulk data for figures, which results leave out.
-    let none = json!({ "start_s": 0.0, "bin_s": 0.0, "mean_per_s": [], "peak_per_s": [] });
-    analysis["rates"] = json!([none, none]);
-    for field in ["pictures", "zooms", "activity"] {
-        analysis[field] = json!([]);
-    }
-    serde_json::from_value(analysis).ok()
 }

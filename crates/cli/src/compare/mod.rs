@@ -4,7 +4,7 @@ mod facts;
 mod inputs;
 mod margins;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use skinrig_analysis::{Analysis, AnalysisError};
 use skinrig_compare::{Comparison, Reanalyses, Session, Subject, compare as compare_skins};
@@ -25,25 +25,12 @@ const PAGE: &str = "comparison.html";
 /// [`Failure::input`] for what is no session or prototype, for limits that do not parse, and for skins that may not be
 /// compared; [`Failure::internal`] when a file cannot be written.
 pub(crate) fn compare(args: &CompareArgs, json: bool) -> Outcome {
-    let choices = margins::choices(args)?;
-    let found = inputs::subjects(args)?;
-    let subjects: Vec<Subject> = found.iter().map(|f| f.subject.clone()).collect();
-    // Without their right to be compared nothing is analysed again.
-    let allowed = skinrig_compare::differences(&subjects, &choices.overrides);
-    let may = allowed.iter().all(|d| d.next.is_none() || d.overridden);
-    let exchanged = if may { exchanged(&found)? } else { Vec::new() };
-    let phase = Phase::begin("comparing");
-    let result = compare_skins(&subjects, &exchanged, &choices);
-    drop(phase);
+    let (found, result) = compared(args)?;
     let blocked = refusal(&result, args);
     let mut document = report::json(&result);
     if blocked.is_none() {
         let page = args.out.clone().unwrap_or_else(|| beside(&found));
-        let results = page.with_extension("json");
-        let html = report::html(&result).map_err(Failure::internal)?;
-        let text = serde_json::to_string_pretty(&document).map_err(Failure::internal)?;
-        write(&page, html.as_bytes())?;
-        write(&results, text.as_bytes())?;
+        let results = write_page(&result, &document, &page)?;
         if json {
             document["files"] = serde_json::json!({ "page": page, "results": results });
             crate::terminal::print_json(&document);
@@ -64,6 +51,50 @@ pub(crate) fn compare(args: &CompareArgs, json: bool) -> Outcome {
         crate::terminal::out(format_args!("{table}"));
     }
     Err(Failure::input(blocked.unwrap_or_default()))
+}
+
+/// The comparison as the document of its results; written as `skinrig compare` does when `out` names a page.
+///
+/// # Errors
+/// As [`compare`].
+pub(crate) fn document(args: &CompareArgs) -> Result<serde_json::Value, Failure> {
+    let (_, result) = compared(args)?;
+    if let Some(blocked) = refusal(&result, args) {
+        return Err(Failure::input(blocked));
+    }
+    let document = report::json(&result);
+    if let Some(page) = &args.out {
+        write_page(&result, &document, page)?;
+    }
+    Ok(document)
+}
+
+fn compared(args: &CompareArgs) -> Result<(Vec<inputs::SkinSessions>, Comparison), Failure> {
+    let choices = margins::choices(args)?;
+    let found = inputs::subjects(args)?;
+    let subjects: Vec<Subject> = found.iter().map(|f| f.subject.clone()).collect();
+    // Without their right to be compared nothing is analysed again.
+    let allowed = skinrig_compare::differences(&subjects, &choices.overrides);
+    let may = allowed.iter().all(|d| d.next.is_none() || d.overridden);
+    let exchanged = if may { exchanged(&found)? } else { Vec::new() };
+    let phase = Phase::begin("comparing");
+    let result = compare_skins(&subjects, &exchanged, &choices);
+    drop(phase);
+    Ok((found, result))
+}
+
+/// Writes the page and, beside it, its results; returns the path of the results.
+fn write_page(
+    result: &Comparison,
+    document: &serde_json::Value,
+    page: &Path,
+) -> Result<PathBuf, Failure> {
+    let results = page.with_extension("json");
+    let html = report::html(result).map_err(Failure::internal)?;
+    let text = serde_json::to_string_pretty(document).map_err(Failure::internal)?;
+    write(page, html.as_bytes())?;
+    write(&results, text.as_bytes())?;
+    Ok(results)
 }
 
 /// Beside the first session.

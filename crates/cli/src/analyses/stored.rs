@@ -1,0 +1,52 @@
+//! Reads the results of an analysis back from their file beside the session.
+
+use std::path::Path;
+
+use serde::Deserialize;
+use skinrig_analysis::{ANALYSIS_VERSION, Analysis};
+
+use super::results_path;
+
+/// The version alone: another version may have other fields.
+#[derive(Deserialize)]
+struct Versioned {
+    analysis: Version,
+}
+
+#[derive(Deserialize)]
+struct Version {
+    version: u32,
+}
+
+#[derive(Deserialize)]
+struct Document {
+    /// Without the bulk data for figures, which results leave out.
+    analysis: Analysis,
+    provenance: Origin,
+}
+
+#[derive(Deserialize)]
+struct Origin {
+    session_id: String,
+    #[serde(default)]
+    variant: Option<Named>,
+}
+
+#[derive(Deserialize)]
+struct Named {
+    name: String,
+}
+
+/// The results of a session's analysis with this name (`None`: the official one), if they are its own and of this version of the
+/// analysis. Without the bulk data for figures.
+pub(crate) fn stored(session: &Path, session_id: &str, name: Option<&str>) -> Option<Analysis> {
+    let text = std::fs::read(results_path(session, name)).ok()?;
+    let found: Versioned = serde_json::from_slice(&text).ok()?;
+    if found.analysis.version != ANALYSIS_VERSION {
+        return None;
+    }
+    let found: Document = serde_json::from_slice(&text).ok()?;
+    let variant = found.provenance.variant.map(|v| v.name);
+    let is_own = found.provenance.session_id == session_id && variant.as_deref() == name;
+    is_own.then_some(found.analysis)
+}

@@ -1,0 +1,207 @@
+//! Owns what other programs call instead of the command line: the same steps, without a terminal.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use skinrig_analysis::{Analysis, LegStart};
+use skinrig_protocol::limits::Margin;
+use skinrig_recorder::SessionReader;
+use skinrig_results::{AnalysisOptions, Session};
+
+pub use skinrig_controller::ControlHandle;
+
+use crate::args::{CompareArgs, RunArgs};
+use crate::exit::Failure;
+use crate::results::{self, Choices};
+use crate::signals::Operator;
+use crate::terminal::Output;
+use crate::{analyses, check, compare, run};
+
+/// The official analysis of a session for its tables, without the bulk data for figures, and its further legs as aligned. Taken
+/// from the results beside the session if they are its own and of this version of the analysis; else it is analysed.
+///
+/// # Errors
+/// [`Failure::input`] for files that are no readable session, and for one that cannot be analysed.
+pub fn analysis_for_tables(
+    path: &Path,
+    reader: &SessionReader,
+    session_id: &str,
+) -> Result<(Analysis, Vec<LegStart>), Failure> {
+    let Some(analysis) = analyses::stored(path, session_id, None) else {
+        let results = results::analyze_session(path, Choices::default())?;
+        return Ok((results.analysis, results.legs));
+    };
+    let legs = if reader.legs().map_err(Failure::session)?.len() > 1 {
+        let session = Session::open(path, AnalysisOptions::default())?;
+        session.read_input()?.align().input.legs
+    } else {
+        Vec::new()
+    };
+    Ok((analysis, legs))
+}
+
+/// The text of the results of a session's analysis beside it, with this name (`None`: the official one).
+///
+/// # Errors
+/// [`Failure::input`] if there are none, or if they belong to another session or variant.
+pub fn stored_results(
+    session: &Path,
+    session_id: &str,
+    name: Option<&str>,
+) -> Result<String, Failure> {
+    let path = analyses::results_path(session, name);
+    if let Some(name) = name {
+        analyses::parse(name).map_err(|e| Failure::input(format!("analysis `{name}`: {e}")))?;
+        analyses::variant(session, session_id, name)?;
+    } else {
+        analyses::summary(session, session_id, None).map_err(|e| {
+            Failure::input(format!(
+                "{0}: expected results beside it, found none that can be used: {e}\n  next: `skinrig analyze {0}` makes them",
+                session.display()
+            ))
+        })?;
+    }
+    std::fs::read_to_string(&path)
+        .map_err(|e| Failure::internal(format!("{}: cannot read: {e}", path.display())))
+}
+
+/// Names of the variants beside a session.
+#[must_use]
+pub fn variants(session: &Path, session_id: &str) -> Vec<String> {
+    let all = analyses::all(session, session_id);
+    all.into_iter().filter_map(|found| found.name).collect()
+}
+
+/// Analyses a session; with `save` also writes the results and the report beside it, as `skinrig analyze` does.
+///
+/// # Errors
+/// [`Failure::input`] for files that are no readable session, and settings that do not parse; [`Failure::internal`] when a file
+/// cannot be written.
+pub fn analyze(session: &Path, choices: Choices<'_>, save: bool) -> Result<Value, Failure> {
+    if let Some(name) = choices.name {
+        analyses::parse(name).map_err(|e| Failure::input(format!("name `{name}`: {e}")))?;
+    }
+    let results = results::analyze_session(session, choices)?;
+    if save {
+        results::write_results(&results, None, None)?;
+    }
+    Ok(skinrig_report::json(&results.report_input()))
+}
+
+/// What `skinrig compare` is asked for; see its help.
+#[derive(Debug, Clone, Default)]
+pub struct CompareOptions {
+    /// Session files, folders of sessions, or names of prototypes.
+    pub skins: Vec<String>,
+    /// Folder in which to look for the prototypes' sessions.
+    pub sessions: PathBuf,
+    /// The limits file.
+    pub limits: Option<PathBuf>,
+    /// Margins, as `METRIC=MARGIN`.
+    pub margins: Vec<String>,
+    /// Error threshold of the pass rate, mm.
+    pub within_mm: Option<f64>,
+    /// Keys of blocking differences to go on in spite of.
+    pub despite: Vec<String>,
+    /// The variant to compare.
+    pub analysis: Option<String>,
+    /// Where to write the page and its results; nowhere without.
+    pub out: Option<PathBuf>,
+}
+
+/// Compares skins.
+///
+/// # Errors
+/// As `skinrig compare`.
+pub fn compare(options: CompareOptions) -> Result<Value, Failure> {
+    let margin = |text: &String| {
+        Margin::parse(text).map_err(|e| Failure::input(format!("margin `{text}`: {e}")))
+    };
+    compare::document(&CompareArgs {
+        margins: options
+            .margins
+            .iter()
+            .map(margin)
+            .collect::<Result<_, _>>()?,
+        skins: options.skins,
+        sessions: options.sessions,
+        limits: options.limits,
+        within: options.within_mm,
+        despite: options.despite,
+        analysis: options.analysis,
+        out: options.out,
+    })
+}
+
+/// Where the protocol of a simulation is.
+#[derive(Debug, Clone)]
+pub enum ProtocolSource {
+    /// In a file.
+    File(PathBuf),
+    /// In this text.
+    Text(String),
+}
+
+/// A campaign for the simulated rig.
+#[derive(Debug, Clone)]
+pub struct Simulation {
+    /// Its protocol.
+    pub protocol: ProtocolSource,
+    /// Overrides of the protocol, as `key=value`.
+    pub overrides: Vec<String>,
+    /// Folder for the session file.
+    pub folder: PathBuf,
+    /// Simulation level; the cheapest that the protocol's scene needs without.
+    pub level: Option<String>,
+    /// Seed; the protocol's without.
+    pub seed: Option<u64>,
+    /// For the session's header.
+    pub command_line: String,
+}
+
+/// Name of a protocol that lies in no file.
+const NO_FILE: &str = "protocol.yaml";
+
+/// Runs a campaign on the simulated rig, through the controller and the recorder, and returns the path of the sealed session.
+/// `control` can end it, as ctrl-C ends `skinrig run`.
+///
+/// # Errors
+/// [`Failure::findings`] for the protocol, [`Failure::rig`] for a fault on purpose, code 5 after a stop.
+pub fn simulate(simulation: Simulation, control: ControlHandle) -> Result<PathBuf, Failure> {
+    let Simulation {
+        protocol,
+        overrides,
+        folder,
+        level,
+        seed,
+        command_line,
+    } = simulation;
+    let checked = match &protocol {
+        ProtocolSource::File(path) => check::load(path, &overrides)?,
+        ProtocolSource::Text(text) => check::load_text(NO_FILE, text, &overrides)?,
+    };
+    let args = RunArgs {
+        protocol: None,
+        overrides: Vec::new(),
+        replay: None,
+        rig: None,
+        tolerant: false,
+        seed,
+        level,
+        real_time: false,
+        faults: Vec::new(),
+        sessions: folder,
+        no_analysis: true,
+        max_rmse: None,
+    };
+    let output = Output {
+        json: true,
+        verbose: false,
+    };
+    let operator = Operator::elsewhere(control);
+    let (session, report) = run::simulated(&args, checked, &command_line, output, &operator)?;
+    match run::end_of(&session, &report)? {
+        None => Ok(session),
+        Some(stopped) => Err(Failure::stopped(stopped)),
+    }
+}
