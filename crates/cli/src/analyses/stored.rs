@@ -7,17 +7,6 @@ use skinrig_analysis::{ANALYSIS_VERSION, Analysis};
 
 use super::results_path;
 
-/// The version alone: another version may have other fields.
-#[derive(Deserialize)]
-struct Versioned {
-    analysis: Version,
-}
-
-#[derive(Deserialize)]
-struct Version {
-    version: u32,
-}
-
 #[derive(Deserialize)]
 struct Document {
     /// Without the bulk data for figures, which results leave out.
@@ -41,12 +30,10 @@ struct Named {
 /// analysis. Without the bulk data for figures.
 pub(crate) fn stored(session: &Path, session_id: &str, name: Option<&str>) -> Option<Analysis> {
     let text = std::fs::read(results_path(session, name)).ok()?;
-    let found: Versioned = serde_json::from_slice(&text).ok()?;
-    if found.analysis.version != ANALYSIS_VERSION {
-        return None;
-    }
+    // Another version may have other fields, and then does not parse.
     let found: Document = serde_json::from_slice(&text).ok()?;
     let variant = found.provenance.variant.map(|v| v.name);
     let is_own = found.provenance.session_id == session_id && variant.as_deref() == name;
-    is_own.then_some(found.analysis)
+    let is_current = found.analysis.version == ANALYSIS_VERSION;
+    (is_own && is_current).then_some(found.analysis)
 }
