@@ -76,6 +76,8 @@ pub enum PressesNeeded {
     More(RequiredDesign),
     /// The difference is too close to the border for any practical number of presses.
     OutOfReach,
+    /// The values do not vary, as when every press was located: nothing tells how many more would decide.
+    Unknown,
 }
 
 /// A design that would decide. Counts are per skin.

@@ -19,6 +19,10 @@ pub(super) fn presses_needed(
     if verdict != Verdict::Undecided {
         return PressesNeeded::Nothing;
     }
+    let within = components.within.unwrap_or_default();
+    if components.between + within[0] + within[1] <= 0.0 {
+        return PressesNeeded::Unknown;
+    }
     let apart = direction(of[0].value, of[1].value, question.better);
     let tails = [1.0 - 0.5 * settings.alpha, 1.0 - settings.alpha];
     let powers = [settings.power, 0.5 * (1.0 + settings.power)];
@@ -30,7 +34,7 @@ pub(super) fn presses_needed(
     };
     let room = question.margin.map(|margin| margin - difference.abs());
     let goals = [
-        (apart, Some(distance.abs()), 0),
+        (apart, Some(distance.abs()).filter(|d| *d > 0.0), 0),
         (Verdict::Equivalent, room.filter(|r| *r > 0.0), 1),
     ];
     let now = of.each_ref().map(|i| i.by_location.len() as u32);
@@ -62,7 +66,8 @@ fn required_design(
     if allowed(MAX_LOCATIONS) < variance {
         return None;
     }
-    let (mut low, mut high) = (now.max(2), MAX_LOCATIONS);
+    // As many as now did not decide.
+    let (mut low, mut high) = (now.max(1) + 1, MAX_LOCATIONS);
     while low < high {
         let middle = low.midpoint(high);
         if allowed(middle) >= variance {

@@ -151,3 +151,19 @@ fn what_is_said_to_decide_decides() {
         assert_eq!(then.needed, PressesNeeded::Nothing);
     }
 }
+
+/// Every press of both skins was located: the interval is too wide for the margin, and no difference can be shown.
+#[test]
+fn values_that_do_not_vary_promise_no_verdict() {
+    let side = || {
+        let presses = (0..20).flat_map(|location| [(location, true); 3]);
+        Sample::share(presses)
+    };
+    let question = Question {
+        better: Better::Higher,
+        margin: Some(0.01),
+    };
+    let found = compare(&side(), &side(), &question, &Settings::default()).unwrap();
+    assert_eq!(found.verdict, Verdict::Undecided, "{found:?}");
+    assert_eq!(found.needed, PressesNeeded::Unknown, "{found:?}");
+}

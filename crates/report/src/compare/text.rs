@@ -56,6 +56,9 @@ pub(super) fn needed(of: &Comparison) -> Option<String> {
     match of.needed {
         PressesNeeded::Nothing => None,
         PressesNeeded::OutOfReach => Some("no practical number of presses would decide".to_owned()),
+        PressesNeeded::Unknown => {
+            Some("the values do not vary: nothing tells how many presses would decide".to_owned())
+        }
         PressesNeeded::More(enough) => {
             let mut text = format!(
                 "if the measured difference is real, {} locations in total ({} more presses per skin) would show `{}`",
