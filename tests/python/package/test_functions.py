@@ -113,6 +113,15 @@ def test_a_fault_of_the_rig_keeps_the_session(tmp_path):
 
 
 def test_ctrl_c_stops_a_simulation(tmp_path):
+    # A shell starts what runs in the background with ctrl-C ignored, and Python leaves it so.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        interrupted_simulation(tmp_path)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def interrupted_simulation(tmp_path):
     long = {"repetitions.count": 300, "evaluation.score": list(range(1, 301))}
     ended = threading.Event()
 
