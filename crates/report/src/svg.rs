@@ -3,7 +3,7 @@
 //! Why not a plotting crate: figures must follow the page's light and dark theme, so every colour that means "ink", "grid"
 //! or "camera 1" is a CSS class (`assets/frame/figure.css`) instead of a fixed value; each figure needs a title, a
 //! description and one element per press for scripts; and a page of 2,500 presses must stay small. Plotting crates provide
-//! none of this. The remaining work is small: elements here, axes and plots in [`crate::plot`].
+//! none of this. The remaining work is small: elements here, axes and plots in `plot`.
 
 use std::fmt::{self, Display, Write};
 
