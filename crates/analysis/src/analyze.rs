@@ -10,6 +10,7 @@ use crate::closeups::{Closeups, keep_plans, zoom_plans};
 use crate::error::AnalysisError;
 use crate::input::{EventSource, SessionInput};
 use crate::locate_presses::{CameraObservations, LocatedPresses, locate_presses};
+use crate::locator::Effort;
 use crate::metrics::{Exclusions, metrics, penalised};
 use crate::onsets::{Onset, onsets};
 use crate::press_event_collector::RetentionPlan;
@@ -88,9 +89,11 @@ pub fn analyze_with_events(
                 calibration,
                 threshold,
             },
+        locator,
     } = locate_presses(
         input,
         [cameras[0].observations(), cameras[1].observations()],
+        Effort::Full,
         &mut warnings,
     );
     let scores = ScoreSet::from_presses(&presses, &input.outcomes);
@@ -171,6 +174,7 @@ pub fn analyze_with_events(
         legs,
         contact_timing: contact_timing(input, scheduled),
         calibration,
+        locator: locator.map(|l| l.result),
         scored,
         scored_without_exclusions,
         depths,

@@ -35,6 +35,7 @@ pub mod latency;
 mod leg;
 pub mod legs;
 mod locate_presses;
+pub mod locator;
 pub mod metrics;
 pub mod motion;
 mod onsets;

@@ -5,7 +5,9 @@ use skinrig_model::{CameraId, PressRole, Verdict};
 use crate::calibrate::{SessionCalibration, calibrate_session};
 use crate::check;
 use crate::input::SessionInput;
+use crate::locator::{self, Effort, LocatorChoice};
 use crate::result::{LocationOutcome, PressResult, PressView};
+use crate::sets::CalibrationSet;
 use crate::triangulate::locate;
 use crate::untimed::Untimed;
 use crate::verdict;
@@ -21,27 +23,41 @@ pub(crate) struct CameraObservations<'a> {
     pub untimed: &'a [Option<Untimed>],
 }
 
-/// Every planned press with its verdict, and the geometry that located it.
+/// Every planned press with its verdict, and what located it.
 pub(crate) struct LocatedPresses {
     pub presses: Vec<PressResult>,
     pub calibrated: SessionCalibration,
+    pub locator: Option<LocatorChoice>,
 }
 
-/// Applies journal, data and rules to the presses, calibrates, and locates all presses.
+/// Applies journal, data and rules to the presses, calibrates, learns to locate, and locates all presses.
 pub(crate) fn locate_presses(
     input: &SessionInput,
     seen: [CameraObservations<'_>; 2],
+    effort: Effort,
     warnings: &mut Vec<String>,
 ) -> LocatedPresses {
     let mut presses = rows(input, seen);
     let calibrated = calibrate_session(input, &mut presses, warnings);
+    let set = CalibrationSet::from_presses(&presses);
+    let mut locator = locator::choose(&set, &calibrated, &input.settings, effort);
+    if let Some(choice) = &mut locator {
+        warnings.append(&mut choice.warnings);
+    }
+    let outline = &input.rig.outline;
     for row in &mut presses {
-        let column = |k: usize| row.views[k].and_then(|v| v.centroid_u);
-        row.location_outcome = locate(
-            &calibrated.geometry,
-            &input.rig.outline,
-            [column(0), column(1)],
-        );
+        let columns = row.views.map(|v| v.and_then(|v| v.centroid_u));
+        match &locator {
+            Some(choice) => {
+                let events = row.views.map(|v| v.map_or(0, |v| v.cluster_events));
+                let weaker = events[0].min(events[1]);
+                let (outcome, location) = choice.fitted.outcome(outline, columns, weaker);
+                row.location_outcome = outcome;
+                row.region = location.and_then(|l| l.region);
+                row.extrapolated = location.is_some_and(|l| l.extrapolated);
+            }
+            None => row.location_outcome = locate(&calibrated.geometry, outline, columns),
+        }
         let judged = row.role != PressRole::Sync && row.verdict == Verdict::Valid;
         if judged
             && let Some(judgement) = verdict::location_rule(&row.location_outcome, &input.settings)
@@ -49,9 +65,16 @@ pub(crate) fn locate_presses(
             verdict::put(row, judgement);
         }
     }
+    if let Some(choice) = &mut locator {
+        choice.result.reliability = match effort {
+            Effort::Full => locator::reliability(&choice.fitted, &presses, &input.settings),
+            Effort::Positions => Vec::new(),
+        };
+    }
     LocatedPresses {
         presses,
         calibrated,
+        locator,
     }
 }
 
@@ -94,6 +117,8 @@ fn rows(input: &SessionInput, seen: [CameraObservations<'_>; 2]) -> Vec<PressRes
                 timing: outcome.as_ref().and_then(|o| o.timing),
                 views,
                 location_outcome: LocationOutcome::Missing,
+                region: None,
+                extrapolated: false,
             };
             verdict::put(&mut row, judgement);
             row

@@ -14,6 +14,8 @@ pub struct CalibrationPress {
     pub press: PressId,
     /// Index of its location, for grouping.
     pub location: u32,
+    /// Index of its repetition.
+    pub repetition: u32,
     /// Centroid column in each camera, px.
     pub columns: [f64; 2],
     /// Measured position.
@@ -41,6 +43,7 @@ impl CalibrationSet {
                     Some(CalibrationPress {
                         press: p.press,
                         location: p.location.index(),
+                        repetition: p.repetition.index(),
                         columns: [one.centroid_u?, two.centroid_u?],
                         truth: p.truth?,
                         cluster_events: one.cluster_events.min(two.cluster_events),
@@ -58,6 +61,12 @@ impl CalibrationSet {
     #[must_use]
     pub fn sights(&self) -> &[CalibrationPress] {
         &self.0
+    }
+
+    /// The presses at these indices of [`Self::sights`].
+    #[must_use]
+    pub(crate) fn part(&self, rows: &[usize]) -> Self {
+        Self(rows.iter().map(|i| self.0[*i]).collect())
     }
 }
 

@@ -43,6 +43,8 @@ fn row(id: u32, role: PressRole, truth: Point2, columns: [f64; 2]) -> PressResul
         timing: None,
         views: columns.map(view),
         location_outcome: LocationOutcome::Missing,
+        region: None,
+        extrapolated: false,
     }
 }
 

@@ -28,6 +28,8 @@ fn row(location: u32, error: Option<(f64, f64)>, verdict: Verdict) -> PressResul
                 sine: 0.9,
             }
         }),
+        region: None,
+        extrapolated: false,
     }
 }
 

@@ -50,7 +50,7 @@ pub use record::{
 pub use scene::{SceneNeed, SimLevel};
 pub use settings::{
     AlignmentSettings, AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings,
-    Estimator, LatencySettings, Precision, ReducedLatencySettings, ReducedThresholdGrid,
+    Estimator, LatencySettings, Locator, Precision, ReducedLatencySettings, ReducedThresholdGrid,
     ReductionSettings, RigGeometry, ThresholdGrid, ThresholdRule, WindowAnchor,
 };
 pub use skin::{OUTLINE_SHAPE, SkinOutline};

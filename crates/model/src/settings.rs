@@ -70,6 +70,36 @@ pub enum CalibrationModel {
     Auto,
 }
 
+/// What turns the columns of both cameras into a position.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default, Serialize, Deserialize, Choice,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Locator {
+    /// The geometry, unless another locates held-out locations better by more than noise explains.
+    #[default]
+    Auto,
+    /// The intersection of the two rays.
+    Geometry,
+    /// The intersection, corrected by a Gaussian-process field that the calibration presses teach.
+    Field,
+    /// A Gaussian-process field from columns to positions, without any geometry.
+    Direct,
+}
+
+impl Locator {
+    /// Name in settings and messages.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Geometry => "geometry",
+            Self::Field => "field",
+            Self::Direct => "direct",
+        }
+    }
+}
+
 /// How the least number of clustered events of a press is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
@@ -372,6 +402,9 @@ pub struct AnalysisSettings {
     /// The lens that is calibrated: how the distance of a column from the middle becomes an angle.
     #[setting(default = "exponential")]
     pub lens: LensKind,
+    /// What turns the columns of both cameras into a position; learnt from the calibration presses alone.
+    #[setting(default = "auto")]
+    pub locator: Locator,
     /// The least that a failed press counts in the RMSE with failures counted; when absent the RMS distance of the scored presses
     /// from their mean: the error of an answer that knows nothing. Raised to the RMSE of the presses with an estimate where that is
     /// more.

@@ -6,7 +6,7 @@ use skinrig_model::{
 };
 
 use super::crossval::Folds;
-use super::paired::{Difference, Losses, Step, select_model};
+use super::paired::{CHOICE, Difference, Losses, Step, select_model};
 use super::parameters::{MODELS, model_name, parameter_count};
 use super::{Fit, different_places, error_lengths, largest_supported, threshold};
 use crate::input::SessionInput;
@@ -300,7 +300,7 @@ impl<'a> Comparison<'a> {
         let errors: Vec<Option<&[f64]>> =
             candidates.iter().map(|c| c.errors_mm.as_deref()).collect();
         let losses = Losses::new(locations, errors.iter().flatten().copied());
-        let (best, steps) = select_model(&losses, &errors)?;
+        let (best, steps) = select_model(&losses, &errors, CHOICE)?;
         Some(Self {
             losses,
             best,

@@ -48,6 +48,24 @@ impl Folds {
         }
     }
 
+    /// One fold per repetition.
+    pub(crate) fn by_repetition(sights: &[CalibrationPress]) -> Self {
+        let mut repetitions: Vec<u32> = sights.iter().map(|s| s.repetition).collect();
+        repetitions.sort_unstable();
+        repetitions.dedup();
+        let of = |s: &CalibrationPress| repetitions.binary_search(&s.repetition).unwrap_or(0);
+        Self {
+            of_sight: sights.iter().map(of).collect(),
+            count: repetitions.len(),
+            least_kept: repetitions.len().saturating_sub(1),
+        }
+    }
+
+    /// Number of folds.
+    pub(crate) const fn count(&self) -> usize {
+        self.count
+    }
+
     /// Smallest number of locations in any fit.
     pub(crate) fn least_kept(&self) -> usize {
         self.least_kept
@@ -65,14 +83,25 @@ impl Folds {
         count: usize,
         full: &Parameters,
     ) -> Option<Vec<f64>> {
-        let folds: Vec<Option<Vec<f64>>> = (0..self.count)
+        self.each(|kept, held| {
+            let pick = |rows: &[usize]| rows.iter().map(|i| sights[*i]).collect::<Vec<_>>();
+            let geometry = fitted(&pick(kept), start, count, full)?;
+            Some(error_lengths(&pick(held), &geometry))
+        })
+    }
+
+    /// Calls `held_out(kept, held)` for every fold, which returns one value per held-out press, and returns the values in
+    /// the order of the presses; `None` if a fold has none.
+    pub(crate) fn each<T: Send>(
+        &self,
+        held_out: impl Fn(&[usize], &[usize]) -> Option<Vec<T>> + Sync,
+    ) -> Option<Vec<T>> {
+        let folds: Vec<Option<Vec<T>>> = (0..self.count)
             .into_par_iter()
             .map(|fold| {
                 let (held, kept): (Vec<_>, Vec<_>) =
-                    (0..sights.len()).partition(|i| self.of_sight[*i] == fold);
-                let pick = |rows: &[usize]| rows.iter().map(|i| sights[*i]).collect::<Vec<_>>();
-                let geometry = fitted(&pick(&kept), start, count, full)?;
-                Some(error_lengths(&pick(&held), &geometry))
+                    (0..self.of_sight.len()).partition(|i| self.of_sight[*i] == fold);
+                held_out(&kept, &held)
             })
             .collect();
         let mut folds: Vec<_> = folds.into_iter().map(|f| f.map(Vec::into_iter)).collect();
@@ -81,7 +110,8 @@ impl Folds {
     }
 }
 
-fn fitted(
+/// The geometry fitted to `sights`, from `start` and from the solution `full` for all presses.
+pub(super) fn fitted(
     sights: &[CalibrationPress],
     start: &StereoGeometry,
     count: usize,
@@ -146,7 +176,7 @@ mod tests {
                 .map(|c| c.column_of_point(truth).unwrap() + 3.0 * seeded::signed_unit(&mut noise));
             out.push(CalibrationPress {
                 press: PressId::from_index(i),
-                location: i % 30,
+                location: i % 30, repetition: 0,
                 columns,
                 truth,
                 cluster_events: 100,

@@ -15,6 +15,7 @@ mod crossval;
 mod paired;
 mod parameters;
 mod problem;
+mod refit;
 mod solver;
 mod threshold;
 mod uncertainty;
@@ -28,10 +29,15 @@ use crate::sets::{CalibrationPress, CalibrationSet};
 pub use choose::{ModelChoice, choose};
 pub(crate) use choose::{SessionCalibration, calibrate_session};
 use parameters::{
-    MODELS, NAMES, PARAMETERS, Parameters, SPREAD, is_plausible, parameters_of, with_parameters,
+    MODELS, NAMES, Parameters, SPREAD, is_plausible, parameters_of, with_parameters,
 };
+pub(crate) use crossval::Folds;
+pub(crate) use paired::{Losses, select_model};
+pub(crate) use parameters::PARAMETERS;
 pub use parameters::{model_name, parameter_count};
-use problem::{Measure, Problem, StereoModel};
+use problem::{Measure, Problem};
+pub(crate) use problem::StereoModel;
+pub(crate) use refit::{Refit, covariance};
 use solver::{Descent, minimise};
 
 /// Bound on an error vector while the starts compete, mm: a quarter of the skin's side.
@@ -54,7 +60,7 @@ const STARTS: u32 = 10;
 const SAME_OPTIMUM_MM: f64 = 1e-6;
 /// Error assigned to a press whose rays do not meet in front of both cameras, and the maximum for any press, mm: the skin's
 /// diagonal (100 x 100 mm).
-const NO_FIX_ERROR_MM: f64 = 141.421_356_237_309_5;
+pub(crate) const NO_FIX_ERROR_MM: f64 = 141.421_356_237_309_5;
 /// Positions closer than this are one location, mm.
 const SAME_PLACE_MM: f64 = 0.1;
 
@@ -267,7 +273,7 @@ pub fn rmse_mm(sights: &[CalibrationPress], geometry: &StereoGeometry) -> f64 {
     root_mean_square(&error_lengths(sights, geometry))
 }
 
-fn root_mean_square(lengths: &[f64]) -> f64 {
+pub(crate) fn root_mean_square(lengths: &[f64]) -> f64 {
     let squares: f64 = lengths.iter().map(|e| e * e).sum();
     (squares / lengths.len() as f64).sqrt()
 }

@@ -12,7 +12,7 @@ use crate::distributions::student_quantile;
 const BOUND_SIGMAS: f64 = 5.0;
 /// One-sided level of all comparisons of a choice together. High on purpose: too large a model costs about one percent of
 /// the error, too small a model ten and more (`docs/adr/0022-*`).
-const CHOICE: f64 = 0.3;
+pub(super) const CHOICE: f64 = 0.3;
 /// One-sided level at which a model is called significantly worse than another.
 const CLEARLY_WORSE: f64 = 0.025;
 /// Smaller differences are rounding errors on noiseless data, mm.
@@ -20,7 +20,7 @@ const NO_DIFFERENCE_MM: f64 = 1e-6;
 
 /// Difference between the errors of two models.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Difference {
+pub(crate) struct Difference {
     /// Bounded root mean square error of the one minus that of the other, mm. Positive: the other is better.
     pub mm: f64,
     /// Its standard error over locations, mm.
@@ -31,7 +31,7 @@ pub(super) struct Difference {
 
 impl Difference {
     /// The difference in its standard errors.
-    pub(super) fn ratio(&self) -> f64 {
+    pub(crate) fn ratio(&self) -> f64 {
         if self.mm.abs() <= NO_DIFFERENCE_MM {
             0.0
         } else {
@@ -46,7 +46,7 @@ impl Difference {
 }
 
 /// Bounded squared errors of presses at known locations.
-pub(super) struct Losses<'a> {
+pub(crate) struct Losses<'a> {
     locations: &'a [u32],
     bound_mm: f64,
 }
@@ -54,7 +54,7 @@ pub(super) struct Losses<'a> {
 impl<'a> Losses<'a> {
     /// `locations[i]` belongs to press i in each of the models' `errors_mm`. The bound is common to all models and comes
     /// from the one with the smallest median error.
-    pub(super) fn new<'b>(
+    pub(crate) fn new<'b>(
         locations: &'a [u32],
         errors_mm: impl Iterator<Item = &'b [f64]>,
     ) -> Self {
@@ -72,7 +72,7 @@ impl<'a> Losses<'a> {
     }
 
     /// Bound on the errors, mm.
-    pub(super) const fn bound_mm(&self) -> f64 {
+    pub(crate) const fn bound_mm(&self) -> f64 {
         self.bound_mm
     }
 
@@ -82,7 +82,7 @@ impl<'a> Losses<'a> {
     }
 
     /// Root mean square of the bounded errors, mm.
-    pub(super) fn rms_mm(&self, errors_mm: &[f64]) -> f64 {
+    pub(crate) fn rms_mm(&self, errors_mm: &[f64]) -> f64 {
         super::root_mean_square(
             &errors_mm
                 .iter()
@@ -117,7 +117,7 @@ impl<'a> Losses<'a> {
 
 /// Comparison of one model with the current one.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Step {
+pub(crate) struct Step {
     /// Index of the current model.
     pub against: usize,
     /// Error of the current model minus that of the candidate.
@@ -125,15 +125,16 @@ pub(super) struct Step {
 }
 
 /// Chooses among nested models, smallest first: starting from the smallest, each larger one replaces the current one if its
-/// errors are significantly smaller, at a level shared by all comparisons (Bonferroni). `errors_mm[i]`: held-out errors of
+/// errors are significantly smaller, at a one-sided `level` shared by all comparisons (Bonferroni). `errors_mm[i]`: held-out errors of
 /// model i; `None` if it could not be validated. Returns the chosen model and, for each compared model, its comparison.
 pub(crate) fn select_model(
     losses: &Losses<'_>,
     errors_mm: &[Option<&[f64]>],
+    level: f64,
 ) -> Option<(usize, Vec<Option<Step>>)> {
     let mut steps = vec![None; errors_mm.len()];
     let comparisons = errors_mm.iter().flatten().count().saturating_sub(1);
-    let level = CHOICE / comparisons.max(1) as f64;
+    let level = level / comparisons.max(1) as f64;
     let mut validated = errors_mm.iter().enumerate();
     let (mut hand, mut least) = validated.find_map(|(i, e)| Some((i, (*e)?)))?;
     for (i, errors) in validated {
@@ -226,7 +227,7 @@ mod tests {
         let (a, b, c) = (times(2.0), times(2.001), times(1.0));
         let climb_of = |list: &[Option<&[f64]>]| {
             let losses = Losses::new(&places, list.iter().flatten().copied());
-            select_model(&losses, list)
+            select_model(&losses, list, CHOICE)
         };
         let (chosen, steps) = climb_of(&[Some(&a), Some(&b), Some(&c), Some(&c)]).unwrap();
         assert_eq!(chosen, 2);

@@ -6,7 +6,7 @@
 //! alone: it leads from any start into the valley whose minimum the error then finds.
 
 use nalgebra::{DMatrix, DVector, SMatrix};
-use skinrig_model::{CameraModel, LensAngle, SENSOR_WIDTH, StereoGeometry};
+use skinrig_model::{CameraModel, LensAngle, Point2, SENSOR_WIDTH, StereoGeometry};
 
 use super::parameters::{PARAMETERS, Parameters, with_parameters};
 use crate::sets::CalibrationPress;
@@ -16,6 +16,7 @@ use crate::triangulate::{Intersection, PARALLEL_SINE, meet};
 const SATURATED: f64 = 1e6;
 
 /// One camera at given parameters, with everything that does not depend on the press.
+#[derive(Debug, Clone)]
 struct PosedCamera {
     camera: CameraModel,
     /// Unit vector of the axis before skew, and the derivative of its counter-clockwise angle by x and y, rad/mm.
@@ -50,12 +51,24 @@ impl PosedCamera {
     }
 }
 
+/// Where the rays of two columns meet, and how the position moves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct RayCrossing {
+    /// Position, mm.
+    pub at: [f64; 2],
+    /// Derivative of x and y by the column of each camera, mm/px.
+    pub by_column: [[f64; 2]; 2],
+    /// Derivative of x and y by all parameters, mm per unit.
+    pub by_parameter: [[f64; PARAMETERS]; 2],
+}
+
 /// Both cameras at given parameters.
+#[derive(Debug, Clone)]
 pub(crate) struct StereoModel([PosedCamera; 2]);
 
 impl StereoModel {
     /// `base` at its own parameters.
-    pub(super) fn of(base: &StereoGeometry) -> Self {
+    pub(crate) fn of(base: &StereoGeometry) -> Self {
         Self(
             base.cameras
                 .map(|c| PosedCamera::new(c, c.lens.coefficients().0)),
@@ -73,7 +86,7 @@ impl StereoModel {
     /// Estimate minus truth, mm; `None` if the rays do not meet in front of both cameras.
     pub(crate) fn error_vector(&self, sight: &CalibrationPress) -> Option<[f64; 2]> {
         let d = [0, 1].map(|k| self.0[k].ray(sight.columns[k]).1);
-        self.error_of(sight, &self.meet(d))
+        self.error_of(sight.truth, &self.meet(d))
     }
 
     fn meet(&self, directions: [[f64; 2]; 2]) -> Intersection {
@@ -81,13 +94,34 @@ impl StereoModel {
         meet(positions, directions)
     }
 
-    fn error_of(&self, sight: &CalibrationPress, hit: &Intersection) -> Option<[f64; 2]> {
+    fn error_of(&self, truth: Point2, hit: &Intersection) -> Option<[f64; 2]> {
         let fixed = hit.sine.abs() >= PARALLEL_SINE && hit.range_mm.iter().all(|r| *r >= 0.0);
         let error = [
-            hit.at.x_mm - sight.truth.x_mm,
-            hit.at.y_mm - sight.truth.y_mm,
+            hit.at.x_mm - truth.x_mm,
+            hit.at.y_mm - truth.y_mm,
         ];
         (fixed && error.iter().all(|e| e.is_finite())).then_some(error)
+    }
+
+    /// Where the rays of these columns meet; `None` if not in front of both cameras.
+    pub(crate) fn crossing(&self, columns: [f64; 2]) -> Option<RayCrossing> {
+        let (at, by_parameter) = self.linearised(columns, Point2::new(0.0, 0.0))?;
+        let mut by_column = [[0.0; 2]; 2];
+        for (k, eye) in self.0.iter().enumerate() {
+            let half = f64::from(SENSOR_WIDTH) / 2.0;
+            let slope = eye.camera.lens.angle((columns[k] - half) / half).by_s / half;
+            // The skew turns a ray by one degree per degree.
+            for axis in 0..2 {
+                by_column[axis][k] = by_parameter[axis][4 + k] * slope;
+            }
+        }
+        let numbers = [at, by_column[0], by_column[1]];
+        let finite = numbers.iter().flatten().all(|v| v.is_finite());
+        finite.then_some(RayCrossing {
+            at,
+            by_column,
+            by_parameter,
+        })
     }
 
     /// Error vector and its derivative by all parameters, mm per unit: rows x and y.
@@ -95,10 +129,14 @@ impl StereoModel {
     /// With n_k the direction d_k turned by +90 degrees, the intersection X solves `n_k . (X - p_k) = 0`. Its
     /// differential is `n_k . dX = n_k . dp_k + r_k dphi_k`, where phi_k is the ray's counter-clockwise angle: the
     /// axis angle `atan2(aim - p_k)` minus theta_k.
-    fn linearised(&self, sight: &CalibrationPress) -> Option<([f64; 2], [[f64; PARAMETERS]; 2])> {
-        let rays = [0, 1].map(|k| self.0[k].ray(sight.columns[k]));
+    fn linearised(
+        &self,
+        columns: [f64; 2],
+        truth: Point2,
+    ) -> Option<([f64; 2], [[f64; PARAMETERS]; 2])> {
+        let rays = [0, 1].map(|k| self.0[k].ray(columns[k]));
         let hit = self.meet(rays.map(|(_, d)| d));
-        let error = self.error_of(sight, &hit)?;
+        let error = self.error_of(truth, &hit)?;
         let mut slope = [[0.0; PARAMETERS]; 2];
         for (k, eye) in self.0.iter().enumerate() {
             let (angle, d) = rays[k];
@@ -260,7 +298,7 @@ impl Problem<'_> {
     ) -> ([f64; 2], [[f64; PARAMETERS]; 2]) {
         let flat = [[0.0; PARAMETERS]; 2];
         let c = self.bound_mm;
-        let Some((e, mut slope)) = stereo.linearised(sight) else {
+        let Some((e, mut slope)) = stereo.linearised(sight.columns, sight.truth) else {
             return ([c * std::f64::consts::FRAC_1_SQRT_2; 2], flat);
         };
         let length = libm::hypot(e[0], e[1]);
@@ -281,7 +319,7 @@ impl Problem<'_> {
 
 #[cfg(test)]
 mod tests {
-    use skinrig_model::{LensKind, LensModel, Point2, PressId};
+    use skinrig_model::{LensKind, LensModel, PressId};
 
     use super::super::parameters::parameters_of;
     use super::*;
@@ -290,7 +328,7 @@ mod tests {
         (0u32..12)
             .map(|i| CalibrationPress {
                 press: PressId::from_index(i),
-                location: i,
+                location: i, repetition: 0,
                 columns: [180.0 + 25.0 * f64::from(i), 410.0 - 9.0 * f64::from(i)],
                 truth: Point2::new(10.0, f64::from(i)),
                 cluster_events: 100,

@@ -199,6 +199,7 @@ mod tests {
             CalibrationPress {
                 press: PressId::from_index(i as u32),
                 location: i as u32,
+                repetition: 0,
                 columns: [320.0; 2],
                 truth: Point2::new(30.0 * angle.cos(), 30.0 * angle.sin()),
                 cluster_events: *events,

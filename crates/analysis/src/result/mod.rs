@@ -5,6 +5,7 @@ mod audit;
 mod calibration;
 mod coverage;
 mod latency;
+mod locator;
 mod motion;
 mod reduction;
 mod reference;
@@ -21,6 +22,10 @@ pub use latency::{
     ContactLatency, ContactTiming, Latency, LatencyCourse, ReducedLatency, ThresholdRow,
     TrialBackground,
 };
+pub use locator::{
+    AffineModel, FieldModel, FieldPoint, LocatorComparison, LocatorModel, LocatorResult, LocatorTest,
+    Region, RegionLevel, ReliabilityRow, Scatter,
+};
 pub use motion::{Motion, MotionBin, PressMotion, TipSample};
 pub use reduction::{Reduction, ReductionCurve, ReductionRow, Thinning};
 pub use reference::{ReferenceCode, ReferenceReduction};
@@ -34,7 +39,7 @@ use skinrig_model::{
 use crate::rule::Rule;
 
 /// Version of this layout and of the algorithms behind it; part of every result.
-pub const ANALYSIS_VERSION: u32 = 7;
+pub const ANALYSIS_VERSION: u32 = 8;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -61,6 +66,9 @@ pub struct Analysis {
     pub contact_timing: ContactTiming,
     /// The calibration, if there was one.
     pub calibration: Option<CalibrationResult>,
+    /// The locator that turned columns into positions; `None` in results before version 8: the geometry.
+    #[serde(default)]
+    pub locator: Option<LocatorResult>,
     /// Metrics over the valid, not excluded scored presses.
     pub scored: Metrics,
     /// Metrics over all scored presses with an estimate, ignoring exclusions.
@@ -293,6 +301,12 @@ pub struct PressResult {
     pub views: [Option<PressView>; 2],
     /// Location estimate from the cameras.
     pub location_outcome: LocationOutcome,
+    /// 95 % region of the estimate; `None` without an estimate, or if too few calibration presses determine it.
+    #[serde(default)]
+    pub region: Option<Region>,
+    /// True if the columns are beyond those that taught the locator.
+    #[serde(default)]
+    pub extrapolated: bool,
 }
 
 impl PressResult {

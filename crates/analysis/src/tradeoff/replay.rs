@@ -8,6 +8,7 @@ use crate::analyze::{by_row, lost_rows};
 use crate::estimators::{PressEstimator, Thinning};
 use crate::input::SessionInput;
 use crate::locate_presses::{CameraObservations, LocatedPresses, locate_presses};
+use crate::locator::Effort;
 use crate::metrics::{Exclusions, metrics, penalised};
 use crate::press_events::{EventView, PackedEvent, RetainedPress, RetainedPresses};
 use crate::press_spans::timings;
@@ -161,7 +162,7 @@ impl<'a> Replay<'a> {
             data_lost: &lost[k],
             untimed: &untimed[k],
         });
-        let located = locate_presses(&input, seen, &mut Vec::new());
+        let located = locate_presses(&input, seen, Effort::Positions, &mut Vec::new());
         let scores = ScoreSet::from_presses(&located.presses, &input.outcomes);
         Outcome {
             metrics: metrics(

@@ -1,0 +1,303 @@
+//! Owns the choice of a locator: cross-validation over locations, paired comparison, regions.
+
+use rayon::prelude::*;
+use skinrig_model::{AnalysisSettings, CalibrationModel, Locator, StereoGeometry};
+
+use super::fitted::distance;
+use super::methods::{Hyperparameters, METHODS, Method, Start, Unfit};
+use super::{Features, Fitted, regions};
+use crate::calibrate::{Folds, Losses, NO_FIX_ERROR_MM, Refit, SessionCalibration, covariance};
+use crate::calibrate::{select_model, root_mean_square};
+use crate::metrics::{bootstrap_over_locations, root_mean_square as rms};
+use crate::result::{CalibrationResult, LocatorComparison, LocatorResult, LocatorTest};
+use crate::sets::CalibrationSet;
+
+/// One-sided level of all comparisons of a choice together: another locator has to be better than the geometry beyond
+/// reasonable doubt, because it is more to trust (`docs/adr/0038-*`).
+const CHOICE: f64 = 0.1;
+
+/// How much to learn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Effort {
+    /// Compare locators and find regions.
+    Full,
+    /// Positions alone, with the named locator.
+    Positions,
+}
+
+/// A locator, and how it was chosen.
+#[derive(Debug, Clone)]
+pub struct LocatorChoice {
+    /// The locator.
+    pub fitted: Fitted,
+    /// How it was chosen; without reliability.
+    pub result: LocatorResult,
+    /// Warnings for the reader.
+    pub warnings: Vec<String>,
+}
+
+/// Compares the methods on `set` and returns the one in `settings.locator`; for `Auto` the geometry, unless another one is
+/// significantly better at held-out locations. `geometry` and `calibration` come from the same presses.
+#[must_use]
+pub fn choose_locator(
+    set: &CalibrationSet,
+    geometry: &StereoGeometry,
+    calibration: Option<&CalibrationResult>,
+    settings: &AnalysisSettings,
+) -> Option<LocatorChoice> {
+    Learner::new(set, geometry, calibration, settings).choose(Effort::Full)
+}
+
+/// [`choose_locator`] for a calibrated session. `None` never happens with a geometry that the analysis accepts.
+pub(crate) fn choose(
+    set: &CalibrationSet,
+    calibrated: &SessionCalibration,
+    settings: &AnalysisSettings,
+    effort: Effort,
+) -> Option<LocatorChoice> {
+    let calibration = calibrated.calibration.as_ref();
+    Learner::new(set, &calibrated.geometry, calibration, settings).choose(effort)
+}
+
+/// A method on the whole set, and on parts of it.
+struct Candidate {
+    method: &'static dyn Method,
+    fit: Result<(Fitted, Option<Hyperparameters>), Unfit>,
+    /// For each press: error, mm, and squared distance in units of the predicted covariance, at held-out locations.
+    held_out: Option<Vec<HeldOut>>,
+    /// Errors in held-out repetitions, mm.
+    over_repetitions: Option<Vec<f64>>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct HeldOut {
+    error_mm: f64,
+    distance: f64,
+}
+
+impl Candidate {
+    fn errors_mm(&self) -> Option<Vec<f64>> {
+        let held = self.held_out.as_ref()?;
+        Some(held.iter().map(|h| h.error_mm).collect())
+    }
+}
+
+struct Learner<'a> {
+    set: &'a CalibrationSet,
+    settings: &'a AnalysisSettings,
+    start: Start<'a>,
+    refit: Option<Refit>,
+    parameters: usize,
+    locations: Vec<u32>,
+}
+
+impl<'a> Learner<'a> {
+    fn new(
+        set: &'a CalibrationSet,
+        geometry: &StereoGeometry,
+        calibration: Option<&CalibrationResult>,
+        settings: &'a AnalysisSettings,
+    ) -> Self {
+        Self {
+            set,
+            settings,
+            start: Start {
+                geometry: *geometry,
+                covariance: calibration.and_then(covariance),
+                near: None,
+            },
+            refit: calibration.map(Refit::new),
+            parameters: calibration.map_or(0, |c| c.values.len()),
+            locations: set.sights().iter().map(|s| s.location).collect(),
+        }
+    }
+
+    fn distinct_locations(&self) -> usize {
+        let mut all = self.locations.clone();
+        all.sort_unstable();
+        all.dedup();
+        all.len()
+    }
+
+    fn choose(&self, effort: Effort) -> Option<LocatorChoice> {
+        let wanted = self.settings.locator;
+        let learns = wanted != Locator::Auto || self.settings.calibration != CalibrationModel::None;
+        let methods: Vec<&'static dyn Method> = METHODS
+            .into_iter()
+            .filter(|m| match (m.locator(), wanted) {
+                (Locator::Geometry, _) => true,
+                (_, Locator::Auto) => learns && effort == Effort::Full,
+                (own, named) => own == named,
+            })
+            .collect();
+        let candidates: Vec<Candidate> = methods
+            .into_par_iter()
+            .map(|method| self.candidate(method, effort))
+            .collect();
+        let errors: Vec<Option<Vec<f64>>> = candidates.iter().map(Candidate::errors_mm).collect();
+        let slices: Vec<Option<&[f64]>> = errors.iter().map(Option::as_deref).collect();
+        let losses = Losses::new(&self.locations, slices.iter().flatten().copied());
+        // The geometry is the first: without its errors there is nothing to compare with.
+        let compared = slices.first().copied().flatten();
+        let (best, steps) = compared
+            .and_then(|_| select_model(&losses, &slices, CHOICE))
+            .unwrap_or((0, vec![None; candidates.len()]));
+        let named = candidates.iter().position(|c| c.method.locator() == wanted);
+        let (mut used, mut fallback) = match (wanted, named) {
+            (Locator::Auto, _) => (best, self.why_geometry(&candidates, best, learns)),
+            (_, Some(named)) => (named, None),
+            (_, None) => (0, None),
+        };
+        let mut warnings = Vec::new();
+        if let Err(unfit) = &candidates[used].fit {
+            let text = format!(
+                "the locator `{}` cannot learn: {unfit}; using `geometry`",
+                candidates[used].method.locator().name()
+            );
+            (used, fallback) = (0, Some(text.clone()));
+            warnings.push(text);
+        }
+        let rows = candidates.iter().enumerate().map(|(i, candidate)| {
+            let errors = errors[i].as_deref();
+            let pairs = errors.map_or_else(Vec::new, |errors| {
+                let pairs = self.locations.iter().zip(errors);
+                pairs.map(|(l, e)| (*l, *e)).collect::<Vec<_>>()
+            });
+            let (resamples, seed) = (self.settings.bootstrap_resamples, self.settings.seed);
+            LocatorComparison {
+                locator: candidate.method.locator(),
+                rmse_mm: bootstrap_over_locations(&pairs, resamples, seed, rms),
+                bounded_rmse_mm: errors.map(|e| losses.rms_mm(e)),
+                over_repetitions_mm: candidate.over_repetitions.as_deref().map(root_mean_square),
+                test: steps[i].map(|step| LocatorTest {
+                    against: candidates[step.against].method.locator(),
+                    gain_mm: step.difference.mm,
+                    standard_error_mm: step.difference.standard_error_mm,
+                    ratio: step.difference.ratio(),
+                    needed: step.difference.needed,
+                }),
+                unfit: candidate.fit.as_ref().err().map(ToString::to_string),
+                chosen: i == used,
+            }
+        });
+        let compared: Vec<LocatorComparison> = match effort {
+            Effort::Full if compared.is_some() => rows.collect(),
+            _ => Vec::new(),
+        };
+        let bound_mm = (!compared.is_empty()).then(|| losses.bound_mm());
+        let candidate = candidates.into_iter().nth(used)?;
+        let levels = candidate.held_out.as_deref().map_or_else(Vec::new, |held| {
+            let distances: Vec<f64> = held.iter().map(|h| h.distance).collect();
+            regions::levels(&distances, self.distinct_locations())
+        });
+        let fitted = candidate.fit.ok()?.0.with_levels(levels);
+        Some(LocatorChoice {
+            result: LocatorResult {
+                locator: fitted.locator(),
+                version: candidate.method.version(),
+                fallback,
+                compared,
+                bound_mm,
+                model: fitted.model().clone(),
+                reliability: Vec::new(),
+            },
+            fitted,
+            warnings,
+        })
+    }
+
+    /// Why an automatic choice ends at the geometry, if it does.
+    fn why_geometry(&self, candidates: &[Candidate], best: usize, learns: bool) -> Option<String> {
+        if best > 0 {
+            return None;
+        }
+        let text = if !learns {
+            "the nominal geometry is used as it is (`calibration: none`)".to_owned()
+        } else if candidates[0].held_out.is_none() {
+            format!(
+                "{} calibration locations are too few to compare locators by cross-validation",
+                self.distinct_locations()
+            )
+        } else if candidates.iter().skip(1).all(|c| c.held_out.is_none()) {
+            let mut unfit = candidates.iter().filter_map(|c| c.fit.as_ref().err());
+            let reason = unfit.next().map_or_else(
+                || "a fit without some of the locations failed".to_owned(),
+                ToString::to_string,
+            );
+            format!("no field could be compared: {reason}")
+        } else {
+            "no field is better at held-out locations by more than noise explains".to_owned()
+        };
+        Some(text)
+    }
+
+    fn candidate(&self, method: &'static dyn Method, effort: Effort) -> Candidate {
+        let fit = method.fit(self.set, &self.start);
+        let mut candidate = Candidate {
+            method,
+            fit,
+            held_out: None,
+            over_repetitions: None,
+        };
+        let (Effort::Full, Ok((_, near))) = (effort, &candidate.fit) else {
+            return candidate;
+        };
+        let near = *near;
+        let folds = Folds::deal(self.set.sights(), self.settings.seed);
+        if folds.count() > 1 && self.parameters <= folds.least_kept() {
+            candidate.held_out = self.held_out(method, &folds, near.as_ref());
+        }
+        let repetitions = Folds::by_repetition(self.set.sights());
+        if repetitions.count() > 1 {
+            let held = self.held_out(method, &repetitions, near.as_ref());
+            candidate.over_repetitions =
+                held.map(|held| held.iter().map(|h| h.error_mm).collect());
+        }
+        candidate
+    }
+
+    /// Every press located by fits of everything, geometry and hyperparameters included, to the other folds.
+    fn held_out(
+        &self,
+        method: &dyn Method,
+        folds: &Folds,
+        near: Option<&Hyperparameters>,
+    ) -> Option<Vec<HeldOut>> {
+        let presses = self.set.sights();
+        folds.each(|kept, held| {
+            let part = self.set.part(kept);
+            let geometry = match &self.refit {
+                Some(refit) => refit.geometry(&part)?,
+                None => self.start.geometry,
+            };
+            let start = Start {
+                geometry,
+                near,
+                ..self.start.clone()
+            };
+            let (fitted, _) = method.fit(&part, &start).ok()?;
+            let of = |i: &usize| {
+                let press = &presses[*i];
+                let lost = HeldOut {
+                    error_mm: NO_FIX_ERROR_MM,
+                    distance: f64::INFINITY,
+                };
+                let features = Features {
+                    columns: press.columns,
+                    cluster_events: press.cluster_events,
+                };
+                let Some(prediction) = fitted.predict(&features) else {
+                    return lost;
+                };
+                let [x, y] = prediction.at;
+                let error = [x - press.truth.x_mm, y - press.truth.y_mm];
+                let reached = prediction.covariance.and_then(|c| distance(c, error));
+                HeldOut {
+                    error_mm: libm::hypot(error[0], error[1]).min(NO_FIX_ERROR_MM),
+                    distance: reached.unwrap_or(f64::INFINITY),
+                }
+            };
+            Some(held.iter().map(of).collect())
+        })
+    }
+}

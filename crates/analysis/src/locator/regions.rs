@@ -1,0 +1,123 @@
+//! Sizes of the 95 % regions from held-out calibration presses, and their check on the scored presses.
+
+use super::fitted::{LEVEL, distance};
+use super::{Features, Fitted};
+use crate::exact;
+use crate::metrics::{bootstrap_over_locations, mean};
+use crate::result::{PressResult, RegionLevel, ReliabilityRow};
+use skinrig_model::{AnalysisSettings, PressRole, Verdict};
+
+/// Levels of the regions.
+const LEVELS: [f64; 6] = [0.5, 0.7, 0.8, 0.9, LEVEL, 0.99];
+/// Fewest locations that determine a region.
+const FEWEST: usize = 5;
+/// Held-out presses outside the region, on average, below which the distribution of the distances is assumed.
+const TAIL_PRESSES: f64 = 2.0;
+/// A distance counts at most this many medians where the distribution is assumed.
+const BOUND_MEDIANS: f64 = 9.0;
+
+/// Sizes from the squared distances of held-out presses at `locations` locations; infinite: without a position.
+///
+/// With enough presses a size is the conformal quantile: of n + 1 presses, the new one included, the share `level` lies
+/// inside, whatever the distribution. With fewer, errors are assumed normal with a scatter known from `locations - 2`
+/// degrees of freedom, and the larger of both counts. A level that most presses without position prevent is left out.
+pub(super) fn levels(distances: &[f64], locations: usize) -> Vec<RegionLevel> {
+    if locations < FEWEST {
+        return Vec::new();
+    }
+    let mut sorted = distances.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let n = sorted.len() as f64;
+    let median = sorted[sorted.len() / 2];
+    let bounded = sorted.iter().map(|d| d.min(BOUND_MEDIANS * median));
+    let variance = bounded.sum::<f64>() / (2.0 * n);
+    let freedom = (locations - 2) as f64;
+    let of = |level: f64| {
+        let rank = ((n + 1.0) * level).ceil() as usize;
+        let conformal = sorted.get(rank.max(1) - 1).copied();
+        let factor = if n * (1.0 - level) >= TAIL_PRESSES {
+            conformal?
+        } else {
+            // Quantile of F with 2 and `freedom` degrees of freedom, in closed form.
+            let tail = libm::pow(1.0 - level, -2.0 / freedom);
+            (variance * freedom * (tail - 1.0)).max(conformal.unwrap_or(0.0))
+        };
+        let usable = factor.is_finite() && factor > 0.0;
+        usable.then_some(RegionLevel { level, factor })
+    };
+    LEVELS.into_iter().filter_map(of).collect()
+}
+
+/// Shares of the valid scored presses inside the regions of each level.
+pub(crate) fn reliability(
+    fitted: &Fitted,
+    presses: &[PressResult],
+    settings: &AnalysisSettings,
+) -> Vec<ReliabilityRow> {
+    let scored = presses
+        .iter()
+        .filter(|p| p.role == PressRole::Score && p.verdict == Verdict::Valid);
+    let reached: Vec<(u32, f64)> = scored
+        .filter_map(|p| {
+            let (features, (dx, dy)) = (features(p)?, p.error_mm()?);
+            let covariance = fitted.predict(&features)?.covariance?;
+            Some((p.location.index(), distance(covariance, [dx, dy])?))
+        })
+        .collect();
+    if reached.is_empty() {
+        return Vec::new();
+    }
+    let mut locations: Vec<u32> = reached.iter().map(|r| r.0).collect();
+    locations.sort_unstable();
+    locations.dedup();
+    let row = |level: &RegionLevel| {
+        let inside = |d: f64| if d <= level.factor { 1.0 } else { 0.0 };
+        let values: Vec<(u32, f64)> = reached.iter().map(|(l, d)| (*l, inside(*d))).collect();
+        let mut share =
+            bootstrap_over_locations(&values, settings.bootstrap_resamples, settings.seed, mean);
+        if let (Some(value), Some(low), Some(high)) = (share.value, share.low, share.high) {
+            let ends = exact::share(value, locations.len(), (low, high));
+            (share.low, share.high) = (Some(ends.0), Some(ends.1));
+        }
+        ReliabilityRow {
+            level: level.level,
+            inside: share,
+        }
+    };
+    fitted.model().levels.iter().map(row).collect()
+}
+
+/// Features of a press; `None` unless both cameras see it.
+pub(crate) fn features(press: &PressResult) -> Option<Features> {
+    let [one, two] = press.views;
+    let (one, two) = (one?, two?);
+    Some(Features {
+        columns: [one.centroid_u?, two.centroid_u?],
+        cluster_events: one.cluster_events.min(two.cluster_events),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn factor(distances: &[f64], locations: usize, level: f64) -> Option<f64> {
+        let all = levels(distances, locations);
+        all.iter().find(|l| l.level == level).map(|l| l.factor)
+    }
+
+    #[test]
+    fn a_region_is_the_conformal_quantile_or_wider() {
+        let hundred: Vec<f64> = (1..=100).map(f64::from).collect();
+        assert_eq!(factor(&hundred, 100, 0.95), Some(96.0));
+        assert_eq!(factor(&hundred, 100, 0.5), Some(51.0));
+        // Twenty equal distances: one expected outside is too few, Student's tail counts.
+        let few = factor(&[2.0; 20], 20, 0.95).unwrap();
+        assert!((few - 18.0 * (20f64.powf(1.0 / 9.0) - 1.0)).abs() < 1e-9, "{few}");
+        assert_eq!(levels(&[1.0; 4], 4), []);
+        // A tenth of the presses without position.
+        let open: Vec<f64> = (0..100).map(|i| if i % 10 == 0 { f64::INFINITY } else { 1.0 }).collect();
+        assert_eq!(factor(&open, 100, 0.95), None);
+        assert_eq!(factor(&open, 100, 0.8), Some(1.0));
+    }
+}

@@ -1,0 +1,165 @@
+//! Owns the result of learning to locate: the locator in use, its serialised form, its competitors, its regions.
+
+use serde::{Deserialize, Serialize};
+use skinrig_model::Locator;
+
+use super::Estimate;
+
+/// The locator of an analysis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LocatorResult {
+    /// The locator in use, never `Auto`.
+    pub locator: Locator,
+    /// Version of its method.
+    pub version: u32,
+    /// Why another locator than the one in the settings is in use.
+    #[serde(default)]
+    pub fallback: Option<String>,
+    /// Locators compared at held-out locations; empty if there were too few locations.
+    pub compared: Vec<LocatorComparison>,
+    /// Bound on errors in the comparison, mm, as in [`super::CalibrationResult::bound_mm`].
+    #[serde(default)]
+    pub bound_mm: Option<f64>,
+    /// What it learnt.
+    pub model: LocatorModel,
+    /// Share of scored presses within the regions of several levels.
+    pub reliability: Vec<ReliabilityRow>,
+}
+
+/// A locator of the comparison.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LocatorComparison {
+    /// The locator.
+    pub locator: Locator,
+    /// RMSE of the calibration presses at locations left out of its fit, mm; the value is `None` if it could not be
+    /// fitted.
+    pub rmse_mm: Estimate,
+    /// The same with every error bounded at [`LocatorResult::bound_mm`], mm: the criterion of the comparison.
+    pub bounded_rmse_mm: Option<f64>,
+    /// RMSE in repetitions left out of its fit, mm; `None` for a single repetition.
+    pub over_repetitions_mm: Option<f64>,
+    /// Comparison with the current locator at its turn; `None` for the first.
+    pub test: Option<LocatorTest>,
+    /// Why it could not be fitted.
+    pub unfit: Option<String>,
+    /// True for the locator in use.
+    pub chosen: bool,
+}
+
+/// One step of the choice: paired by location, errors bounded.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LocatorTest {
+    /// The current locator.
+    pub against: Locator,
+    /// Bounded error of the current locator minus that of this one, mm. Positive: this one is better.
+    pub gain_mm: f64,
+    /// Standard error of the gain over locations, mm.
+    pub standard_error_mm: f64,
+    /// Gain divided by its standard error; 0 if the gain is below 1e-6 mm.
+    pub ratio: f64,
+    /// Ratio required to replace the current locator.
+    pub needed: f64,
+}
+
+/// Everything that a fitted locator needs besides the geometry.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LocatorModel {
+    /// Affine map from columns to positions; `None` where the rays are intersected.
+    pub affine: Option<AffineModel>,
+    /// Corrections of that position; `None` for the geometry alone.
+    pub field: Option<FieldModel>,
+    /// Scatter from press to press; `None` if too few presses determine it: no regions.
+    pub scatter: Option<Scatter>,
+    /// Covariance of the ten parameters of the geometry, row by row, as in [`super::CalibrationResult::names`]; `None` if
+    /// unknown or not used.
+    pub geometry_covariance: Option<Vec<Vec<f64>>>,
+    /// Squared size of a region of each level, in units of the predicted covariance, from held-out calibration presses;
+    /// empty if there are too few.
+    pub levels: Vec<RegionLevel>,
+}
+
+/// An affine map: x and y are `rows` times (1, u1, u2).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AffineModel {
+    /// Coefficients of x and y: mm, mm/px, mm/px.
+    pub rows: [[f64; 3]; 2],
+    /// Covariance of the coefficients of either row.
+    pub covariance: [[f64; 3]; 3],
+}
+
+/// Two Gaussian processes with one kernel over the columns, one each for x and y.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FieldModel {
+    /// Standard deviation of the field before data, mm.
+    pub amplitude_mm: f64,
+    /// Length scale along the column of each camera, px.
+    pub length_px: [f64; 2],
+    /// Observations.
+    pub points: Vec<FieldPoint>,
+}
+
+/// An observation of a field.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FieldPoint {
+    /// Column in each camera, px.
+    pub columns: [f64; 2],
+    /// Truth minus position without the field, mm.
+    pub residual_mm: [f64; 2],
+    /// Variance of either coordinate, mm²; large for weak presses and outliers.
+    pub variance_mm2: f64,
+}
+
+/// Scatter of a press: a part of its own, and one from the columns that grows as cluster events become fewer.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Scatter {
+    /// Standard deviation of either coordinate, mm.
+    pub fixed_mm: f64,
+    /// Standard deviation of a column at `reference_events`, px. Its variance is inversely proportional to the events.
+    pub column_px: f64,
+    /// Median cluster events of the calibration presses, weaker camera.
+    pub reference_events: f64,
+}
+
+/// Size of the regions of one level.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RegionLevel {
+    /// Probability, 0..1.
+    pub level: f64,
+    /// Squared Mahalanobis distance.
+    pub factor: f64,
+}
+
+/// Regions of one level on the scored presses.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ReliabilityRow {
+    /// Probability that the regions state, 0..1.
+    pub level: f64,
+    /// Share of the valid scored presses inside, with its interval over locations.
+    pub inside: Estimate,
+}
+
+/// 95 % region of a position: an ellipse about the estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Region {
+    /// Semi-axes, mm, the longer first.
+    pub semi_axes_mm: [f64; 2],
+    /// Direction of the longer one, degrees from the x axis, counter-clockwise, in -90..=90.
+    pub angle_deg: f64,
+}
+
+impl Region {
+    /// Squared distance of an error vector from the centre, mm, in units of the ellipse: at most 1 inside.
+    #[must_use]
+    pub fn reach(&self, error_mm: [f64; 2]) -> f64 {
+        let (sin, cos) = libm::sincos(self.angle_deg.to_radians());
+        let along = (error_mm[0] * cos + error_mm[1] * sin) / self.semi_axes_mm[0];
+        let across = (error_mm[1] * cos - error_mm[0] * sin) / self.semi_axes_mm[1];
+        along * along + across * across
+    }
+
+    /// Area, mm².
+    #[must_use]
+    pub fn area_mm2(&self) -> f64 {
+        std::f64::consts::PI * self.semi_axes_mm[0] * self.semi_axes_mm[1]
+    }
+}

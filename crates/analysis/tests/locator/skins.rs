@@ -1,0 +1,235 @@
+//! Planted skins as columns: a fast stand-in for recordings.
+
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use skinrig_analysis::calibrate::{ModelChoice, choose};
+use skinrig_analysis::locator::{Features, LocatorChoice, choose_locator};
+use skinrig_analysis::result::{LocationOutcome, PressResult, PressView};
+use skinrig_analysis::sets::CalibrationSet;
+use skinrig_model::{
+    AnalysisSettings, LocationId, Locator, Point2, PressId, PressRole, RepetitionId,
+    StereoGeometry, Verdict,
+};
+
+/// The drawn rig: where calibrations start.
+pub(crate) const DRAWN: StereoGeometry =
+    StereoGeometry::paper_like([45.0, -36.0, 45.0, 40.0, 0.0, 0.0, 0.0, 0.0]);
+
+pub(crate) struct Noise(Xoshiro256PlusPlus);
+
+impl Noise {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(Xoshiro256PlusPlus::seed_from_u64(seed))
+    }
+    pub(crate) fn unit(&mut self) -> f64 {
+        (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+    }
+    /// Standard normal but for the farthest tails.
+    pub(crate) fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
+    }
+}
+
+/// A skin with its presses.
+#[derive(Debug, Clone)]
+pub(crate) struct Skin {
+    pub(crate) seed: u64,
+    /// Presses along each side of the grid; every other one calibrates.
+    pub(crate) side: u32,
+    /// At most this many calibrate.
+    pub(crate) calibrating: usize,
+    /// Only presses in the lower left quarter calibrate.
+    pub(crate) corner: bool,
+    /// Amplitude of the smooth distortion of columns, px.
+    pub(crate) bend_px: f64,
+    /// Scatter of a column with 100 cluster events, px.
+    pub(crate) noise_px: f64,
+    /// Share of presses with a column far off.
+    pub(crate) outliers: f64,
+    /// Factor on the cluster events and its spread.
+    pub(crate) weak: f64,
+    /// Factor on the scatter of camera 2.
+    pub(crate) blind: f64,
+    pub(crate) repeats: u32,
+    /// Depths, mm, one repetition after another.
+    pub(crate) depths: &'static [f64],
+}
+
+impl Skin {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self {
+            seed,
+            side: 15,
+            calibrating: usize::MAX,
+            corner: false,
+            bend_px: 0.0,
+            noise_px: 3.0,
+            outliers: 0.0,
+            weak: 0.5,
+            blind: 1.0,
+            repeats: 1,
+            depths: &[2.0],
+        }
+    }
+
+    /// Presses of both roles.
+    pub(crate) fn presses(&self) -> Vec<PressResult> {
+        let mut noise = Noise::new(0x5eed ^ self.seed.wrapping_mul(0x9e37_79b9));
+        let planted = [43.0, -33.5, 46.0, 38.0, -1.2, 0.9, -0.11, 0.05];
+        let shifts = [2.0, 2.0, 2.0, 2.0, 1.0, 1.0, 0.04, 0.04];
+        let planted = [0, 1, 2, 3, 4, 5, 6, 7].map(|i| planted[i] + shifts[i] * noise.normal());
+        let geometry = StereoGeometry::paper_like(planted);
+        // A few smooth waves per camera.
+        let waves: Vec<[f64; 4]> = (0..8)
+            .map(|_| {
+                [
+                    noise.normal(),
+                    0.03 + 0.07 * noise.unit(),
+                    std::f64::consts::TAU * noise.unit(),
+                    std::f64::consts::TAU * noise.unit(),
+                ]
+            })
+            .collect();
+        let bend = |camera: usize, at: Point2| {
+            let part = waves[4 * camera..4 * camera + 4].iter();
+            let sum: f64 = part
+                .map(|[a, k, direction, phase]| {
+                    let (sin, cos) = direction.sin_cos();
+                    a * (k * (cos * at.x_mm + sin * at.y_mm) + phase).sin()
+                })
+                .sum();
+            0.5 * self.bend_px * sum
+        };
+        let step = 64.0 / f64::from(self.side - 1);
+        let mut rows = Vec::new();
+        let mut calibrating = 0;
+        for repetition in 0..self.repeats {
+            let depth_mm = self.depths[repetition as usize % self.depths.len()];
+            for location in 0..self.side * self.side {
+                let at = Point2::new(
+                    -22.0 + step * f64::from(location / self.side),
+                    -30.0 + step * f64::from(location % self.side),
+                );
+                let columns = geometry.cameras.map(|c| c.column_of_point(at));
+                let [Some(one), Some(two)] = columns else {
+                    continue;
+                };
+                let strength = depth_mm / 2.0 * (self.weak * noise.normal()).exp();
+                let events = (100.0 * strength).round().max(1.0) as u32;
+                let spread = self.noise_px * (100.0 / f64::from(events)).sqrt();
+                let far = noise.unit() < self.outliers;
+                let mut column = |k: usize, u: f64| {
+                    let factor = if k == 1 { self.blind } else { 1.0 };
+                    let off = if far { 60.0 * noise.normal() } else { 0.0 };
+                    u + bend(k, at) + factor * spread * noise.normal() + off
+                };
+                let views = [view(column(0, one), events), view(column(1, two), events)];
+                let lower_left = at.x_mm < 6.0 && at.y_mm < 0.0;
+                let mut role = PressRole::Score;
+                let turn = (location + location / self.side) % 2 == 0;
+                if turn && (lower_left || !self.corner) && calibrating < self.calibrating {
+                    role = PressRole::Calibrate;
+                    calibrating += usize::from(repetition == 0);
+                }
+                rows.push(PressResult {
+                    press: PressId::from_index(rows.len() as u32),
+                    role,
+                    repetition: RepetitionId::from_index(repetition),
+                    location: LocationId::from_index(location),
+                    planned: at,
+                    depth_mm,
+                    truth: Some(at),
+                    verdict: Verdict::Valid,
+                    reason: None,
+                    rule: None,
+                    timing: None,
+                    views,
+                    location_outcome: LocationOutcome::Missing,
+                    region: None,
+                    extrapolated: false,
+                });
+            }
+        }
+        rows
+    }
+
+    pub(crate) fn set(&self) -> CalibrationSet {
+        CalibrationSet::from_presses(&self.presses())
+    }
+}
+
+pub(crate) fn view(u: f64, events: u32) -> Option<PressView> {
+    Some(PressView {
+        events,
+        on_events: events / 2,
+        clusters: 1,
+        cluster_events: events,
+        centroid_u: Some(u),
+        centroid_v: Some(270.0),
+        rate_per_s: 1e3,
+        idle_rate_per_s: 10.0,
+        idle_s: 0.5,
+        spread_u: None,
+        width_u: None,
+    })
+}
+
+pub(crate) fn settings(locator: Locator) -> AnalysisSettings {
+    AnalysisSettings {
+        locator,
+        bootstrap_resamples: 20,
+        ..AnalysisSettings::default()
+    }
+}
+
+pub(crate) fn calibrated(set: &CalibrationSet) -> ModelChoice {
+    choose(set, &DRAWN, &settings(Locator::Auto))
+}
+
+pub(crate) fn learn(skin: &Skin, locator: Locator) -> LocatorChoice {
+    learn_set(&skin.set(), locator)
+}
+
+pub(crate) fn learn_set(set: &CalibrationSet, locator: Locator) -> LocatorChoice {
+    let model = calibrated(set);
+    let calibration = model.calibration.as_ref();
+    choose_locator(set, &model.geometry, calibration, &settings(locator)).unwrap()
+}
+
+pub(crate) fn features(press: &PressResult) -> Features {
+    let [one, two] = press.views.map(Option::unwrap);
+    Features {
+        columns: [one.centroid_u.unwrap(), two.centroid_u.unwrap()],
+        cluster_events: one.cluster_events.min(two.cluster_events),
+    }
+}
+
+/// A scored press that was located: press, error vector, location.
+pub(crate) fn scored(
+    skin: &Skin,
+    choice: &LocatorChoice,
+) -> Vec<(PressResult, [f64; 2], skinrig_analysis::locator::Location)> {
+    let presses = skin.presses().into_iter();
+    presses
+        .filter(|p| p.role == PressRole::Score)
+        .filter_map(|p| {
+            let location = choice.fitted.locate(&features(&p))?;
+            let truth = p.truth?;
+            let error = [location.at[0] - truth.x_mm, location.at[1] - truth.y_mm];
+            Some((p, error, location))
+        })
+        .collect()
+}
+
+/// Lengths of the errors of the scored presses, mm; one without position counts the skin's diagonal, the largest error.
+pub(crate) fn errors(skin: &Skin, choice: &LocatorChoice) -> Vec<f64> {
+    let located = scored(skin, choice);
+    let all = skin.presses().iter().filter(|p| p.role == PressRole::Score).count();
+    let lengths = located.iter().map(|(_, e, _)| e[0].hypot(e[1]).min(141.4));
+    lengths.chain((located.len()..all).map(|_| 141.4)).collect()
+}
+
+pub(crate) fn rms(skin: &Skin, choice: &LocatorChoice) -> f64 {
+    let errors = errors(skin, choice);
+    (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
+}

@@ -1,0 +1,1 @@
+//! What mirrored, turned, permuted, repeated and merged recordings have in common.
