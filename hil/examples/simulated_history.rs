@@ -5,7 +5,7 @@
     reason = "an example that cannot write has nothing to say"
 )]
 
-#[path = "../../crates/nightly/tests/trend/nights.rs"]
+#[path = "../nightly/tests/trend/nights.rs"]
 #[expect(dead_code, reason = "written for tests, which use more of it")]
 mod nights;
 

@@ -1,24 +1,25 @@
-//! What a golden campaign measured, in the units of the suite's metrics.
+//! Measured values and evidence of a golden campaign, in the units of the suite's metrics.
 
 use skinrig_analysis::Analysis;
 use skinrig_analysis::result::{Estimate, Fault, PressResult};
-use skinrig_hil::findings::Findings;
 use skinrig_model::{Point2, PressRole};
 use skinrig_nightly::EvidenceKind;
 
+use crate::findings::Findings;
+
 const SKIN: &str = "skin";
-/// Fewer presses than this say nothing of the localisation.
+/// Minimum number of presses for localisation metrics.
 const PRESSES: u64 = 12;
-/// Fewer places than this say nothing of the spread between repetitions.
-const PLACES: u64 = 4;
-/// Fewer reference presses than this at either end say nothing of a shift.
+/// Minimum number of locations for the spread between repetitions.
+const LOCATIONS: u64 = 4;
+/// Minimum number of reference presses at the start and at the end.
 const REFERENCES: u64 = 2;
-/// Two places nearer than this are one, mm.
-const SAME_MM: f64 = 1e-6;
+/// Positions closer than this are one location, mm.
+const SAME_LOCATION_MM: f64 = 1e-6;
 /// Half width of a 95 % interval in standard errors.
 const Z: f64 = 1.96;
-/// What stands on the clocks.
-const CLOCKED: [&str; 8] = [
+/// Metrics that need aligned clocks.
+const CLOCK_METRICS: [&str; 8] = [
     "rmse",
     "repeat_std",
     "latency",
@@ -29,12 +30,12 @@ const CLOCKED: [&str; 8] = [
     "reference_events",
 ];
 
-/// Fills `found` with what `analysis` says, and with the evidence of what keeps it from being believed.
-pub(super) fn numbers(analysis: &Analysis, lost_bytes: [u64; 2], found: &mut Findings) {
+/// Adds the metrics of `analysis` to `found`, and evidence of problems that make them unreliable. `lost_bytes`: by camera.
+pub fn add(analysis: &Analysis, lost_bytes: [u64; 2], found: &mut Findings) {
     evidence(analysis, lost_bytes, found);
     if !analysis.is_valid() {
-        // Where an event or a press belongs is not known: no number that stands on it is to be used.
-        for metric in CLOCKED {
+        // Without clocks no event can be assigned to a press.
+        for metric in CLOCK_METRICS {
             found.unmeasured(SKIN, metric);
         }
         valid(analysis, found);
@@ -43,7 +44,7 @@ pub(super) fn numbers(analysis: &Analysis, lost_bytes: [u64; 2], found: &mut Fin
     }
     let scored = &analysis.scored;
     estimate(found, "rmse", scored.rmse_mm, 1.0, PRESSES);
-    estimate(found, "repeat_std", scored.repeat_std_mm, 1.0, PLACES);
+    estimate(found, "repeat_std", scored.repeat_std_mm, 1.0, LOCATIONS);
     let contact = analysis.latency.as_ref().and_then(|l| l.from_contact);
     match contact {
         Some(contact) => estimate(found, "latency", contact.median_ms, 1e-3, PRESSES),
@@ -84,7 +85,7 @@ fn evidence(analysis: &Analysis, lost_bytes: [u64; 2], found: &mut Findings) {
     for finding in &analysis.findings {
         let what = format!("{}; {}", finding.evidence, finding.advice);
         let camera = finding.camera.map(|c| ["camera1", "camera2"][c.index()]);
-        let (kind, subject) = witness(finding.fault, camera.unwrap_or("camera1"));
+        let (kind, subject) = evidence_of(finding.fault, camera.unwrap_or("camera1"));
         found.add_evidence(kind, subject, what);
     }
     for (camera, lost) in ["camera1", "camera2"].into_iter().zip(lost_bytes) {
@@ -95,9 +96,9 @@ fn evidence(analysis: &Analysis, lost_bytes: [u64; 2], found: &mut Findings) {
     }
 }
 
-/// What a finding of the audit is evidence of, and of which device. A camera or a position that is not what the rig file
-/// says is the rig's fault and no reason to look at the skin.
-const fn witness(fault: Fault, camera: &'static str) -> (EvidenceKind, &'static str) {
+/// Kind of evidence and device of an audit finding. A camera or position that contradicts the rig file blames the rig, not
+/// the skin.
+const fn evidence_of(fault: Fault, camera: &'static str) -> (EvidenceKind, &'static str) {
     match fault {
         Fault::CameraBlind | Fault::NoEvents => (EvidenceKind::DeviceLost, camera),
         Fault::RecordingShort | Fault::RecordingGap => (EvidenceKind::DataLost, camera),
@@ -137,7 +138,7 @@ fn estimate(found: &mut Findings, metric: &'static str, e: Estimate, unit: f64, 
         .map(|(low, high)| [unit * low, unit * high]);
 }
 
-/// Both cameras together, over the presses that are valid.
+/// Event rates of both cameras together, over the valid presses.
 fn rates(analysis: &Analysis, found: &mut Findings) {
     let both = |of: fn(&PressResult, usize) -> Option<f64>| -> Vec<f64> {
         let valid = analysis
@@ -168,7 +169,8 @@ fn rates(analysis: &Analysis, found: &mut Findings) {
     }
 }
 
-/// The reference: the place of the first scored press, as long as presses stay there at the start, and again at the end.
+/// Compares presses at the reference location, which is that of the first scored press: those at the start of the campaign with
+/// those at its end.
 fn references(analysis: &Analysis, found: &mut Findings) {
     let scored = |p: &&PressResult| p.role == PressRole::Score;
     let scored: Vec<&PressResult> = analysis.presses.iter().filter(scored).collect();
@@ -177,7 +179,7 @@ fn references(analysis: &Analysis, found: &mut Findings) {
         found.unmeasured(SKIN, "reference_events");
         return;
     };
-    let there = |p: &&&PressResult| p.planned.distance_mm(first.planned) <= SAME_MM;
+    let there = |p: &&&PressResult| p.planned.distance_mm(first.planned) <= SAME_LOCATION_MM;
     let start: Vec<&PressResult> = scored.iter().take_while(there).copied().collect();
     let end = scored.iter().rev().take_while(there).copied();
     let end: Vec<&PressResult> = end.take(scored.len() - start.len()).collect();
@@ -185,7 +187,7 @@ fn references(analysis: &Analysis, found: &mut Findings) {
     events(&start, &end, found);
 }
 
-/// Distance between the mean estimates.
+/// Distance between the mean estimates at start and end.
 fn shift(start: &[&PressResult], end: &[&PressResult], found: &mut Findings) {
     let estimates = |presses: &[&PressResult]| -> Vec<Point2> {
         presses.iter().filter_map(|p| p.estimate()).collect()
@@ -207,7 +209,10 @@ fn shift(start: &[&PressResult], end: &[&PressResult], found: &mut Findings) {
     };
     let square: f64 = axes.iter().map(|(a, b)| (b.mean - a.mean).powi(2)).sum();
     let shift_mm = square.sqrt();
-    let variance: f64 = axes.iter().map(|(a, b)| a.of_mean() + b.of_mean()).sum();
+    let variance: f64 = axes
+        .iter()
+        .map(|(a, b)| a.variance_of_mean() + b.variance_of_mean())
+        .sum();
     let value = found
         .value(SKIN, "reference_shift", shift_mm)
         .with_samples(few, REFERENCES);
@@ -217,7 +222,7 @@ fn shift(start: &[&PressResult], end: &[&PressResult], found: &mut Findings) {
     }
 }
 
-/// Events of both cameras at the end, of those at the start.
+/// Events of both cameras at the end as a percentage of those at the start.
 fn events(start: &[&PressResult], end: &[&PressResult], found: &mut Findings) {
     let counts = |presses: &[&PressResult]| -> Vec<f64> {
         let sums = presses.iter().map(|p| {
@@ -239,7 +244,7 @@ fn events(start: &[&PressResult], end: &[&PressResult], found: &mut Findings) {
     };
     let share = b.mean / a.mean;
     // First order: relative variances add.
-    let relative = a.of_mean() / a.mean.powi(2) + b.of_mean() / b.mean.powi(2);
+    let relative = a.variance_of_mean() / a.mean.powi(2) + b.variance_of_mean() / b.mean.powi(2);
     let value = found
         .value(SKIN, "reference_events", 100.0 * share)
         .with_samples(few, REFERENCES);
@@ -253,7 +258,7 @@ fn events(start: &[&PressResult], end: &[&PressResult], found: &mut Findings) {
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     mean: f64,
-    /// With n - 1; infinite for one number alone.
+    /// Divided by n - 1; infinite for n = 1.
     variance: f64,
     n: f64,
 }
@@ -275,12 +280,12 @@ impl Sample {
     }
 
     /// Variance of the mean.
-    fn of_mean(&self) -> f64 {
+    fn variance_of_mean(&self) -> f64 {
         self.variance / self.n
     }
 
     fn interval(&self) -> Option<[f64; 2]> {
-        let half = Z * self.of_mean().sqrt();
+        let half = Z * self.variance_of_mean().sqrt();
         half.is_finite()
             .then_some([self.mean - half, self.mean + half])
     }
@@ -294,8 +299,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cameras_and_positions_that_are_not_what_the_rig_file_says_are_no_reason_to_look_at_the_skin()
-    {
+    fn contradictions_of_the_rig_file_blame_the_rig() {
         let faults = [
             (Fault::CamerasSwapped, "camera2"),
             (Fault::OneCameraTwice, "camera2"),
@@ -308,7 +312,7 @@ mod tests {
             (Fault::UnitOfPositions, "robot"),
         ];
         for (fault, device) in faults {
-            let (kind, subject) = witness(fault, "camera2");
+            let (kind, subject) = evidence_of(fault, "camera2");
             assert_eq!(subject, device, "{fault:?}");
             let rule = RULES.iter().find(|r| r.kinds.contains(&kind));
             assert_eq!(rule.and_then(|r| r.cause), Some(Cause::Rig), "{fault:?}");
