@@ -30,7 +30,7 @@ pub struct ControlHandle {
 struct Shared {
     bits: AtomicU8,
     /// Number of requests made, and of those that the controller has acknowledged.
-    asked: AtomicU64,
+    made: AtomicU64,
     acknowledged: AtomicU64,
     /// Index of the state in [`State::ALL`].
     state: AtomicU8,
@@ -103,7 +103,7 @@ impl ControlHandle {
     /// [`requests_acknowledged`](Self::requests_acknowledged) has reached the value that this returned after it.
     #[must_use]
     pub fn requests_made(&self) -> u64 {
-        self.shared.asked.load(Ordering::Acquire)
+        self.shared.made.load(Ordering::Acquire)
     }
 
     /// Number of requests that the controller has handled.
@@ -161,8 +161,8 @@ impl ControlHandle {
     }
 
     /// Acknowledges the first `requests` requests.
-    pub(crate) fn acknowledge(&self, asked: u64) {
-        self.shared.acknowledged.fetch_max(asked, Ordering::AcqRel);
+    pub(crate) fn acknowledge(&self, made: u64) {
+        self.shared.acknowledged.fetch_max(made, Ordering::AcqRel);
     }
 
     /// Publishes the state of the run.
@@ -184,7 +184,7 @@ impl ControlHandle {
             Some((b & !clear) | set)
         });
         // After the bit, so that a reader of the number finds the request.
-        self.shared.asked.fetch_add(1, Ordering::AcqRel);
+        self.shared.made.fetch_add(1, Ordering::AcqRel);
     }
 
     /// Takes all pending requests, most urgent first. A halt stays pending, so that every later check sees it.
