@@ -1,4 +1,4 @@
-//! Reads a node tree by its table: every structural error at once, and the values that could be read.
+//! Reads a node tree by its table: reports every structural error, and returns the readable values.
 
 use crate::diagnostic::{Collector, closest, did_you_mean, one_of};
 use crate::field::{Field, Value};
@@ -8,7 +8,7 @@ use crate::shape::{Key, Need, Shape, Table, Word};
 use crate::source::{Sources, Span};
 use crate::yaml::{Kind, Node, join, quote};
 
-/// Reads `node` as a mapping of `table`. Entries that could not be read are absent from the result.
+/// Reads `node` as a mapping of `table`. Unreadable entries are absent from the result.
 pub(crate) fn read_table(
     node: &Node,
     table: &'static Table,
@@ -18,7 +18,7 @@ pub(crate) fn read_table(
     let entries = match &node.kind {
         Kind::Map(entries) => entries,
         Kind::Refused => return None,
-        // `key:` with nothing after it is a mapping without keys; its required keys will be missed.
+        // `key:` with nothing after it is a mapping without keys; its required keys are reported as missing.
         Kind::Null if !path.is_empty() => {
             out.error(node.span, path, "the value is missing")
                 .expected(format!("a mapping with {}", key_names(table)))
@@ -119,7 +119,7 @@ pub(crate) fn read_table(
     })
 }
 
-/// None of the keys of a group is there.
+/// Reports that no key of a group is given.
 fn none_given(
     table: &Table,
     group: &[&'static str],
@@ -141,7 +141,7 @@ fn none_given(
         .maybe_help(help);
 }
 
-/// The first line of a mapping, to point at when something is missing from it.
+/// The first line of a mapping, as the location of a missing key.
 fn head_of(node: &Node, out: &Collector) -> Span {
     match &node.kind {
         Kind::Map(entries) => entries.first().map_or(node.span, |e| e.key_span),
@@ -317,14 +317,14 @@ fn whole(
             .expected(expected)
             .found(quote(text)),
         Ok(_) => out
-            .error(node.span, path, "a text where a number is wanted")
+            .error(node.span, path, "a text instead of a number")
             .expected(expected)
             .found(format!("\"{text}\""))
             .help("remove the quotes"),
         Err(_) => {
             let help = match quantity::split_number(text) {
                 (Some(n), rest) if !rest.is_empty() && n.fract() == 0.0 => {
-                    Some(format!("counts carry no unit: write `{n}`"))
+                    Some(format!("counts have no unit: write `{n}`"))
                 }
                 (Some(_), "") => None,
                 _ => None,
@@ -441,7 +441,7 @@ fn key_names(table: &Table) -> String {
     }
 }
 
-/// A shape in words, for "expected".
+/// Description of a shape, for "expected".
 #[must_use]
 pub fn expectation(shape: &Shape) -> String {
     match shape {
@@ -474,14 +474,14 @@ pub fn expectation(shape: &Shape) -> String {
     }
 }
 
-/// An entry of a mapping as it could be typed: `depth: 4 mm`.
+/// An entry of a mapping, ready to type: `depth: 4 mm`.
 fn entry_example(key: &Key) -> String {
     let declared = key.example.map(str::to_owned);
     let value = declared.unwrap_or_else(|| example(&key.shape));
     format!("{}: {value}", key.name)
 }
 
-/// A value of this shape as it could be typed.
+/// A value of this shape, ready to type.
 #[must_use]
 pub fn example(shape: &Shape) -> String {
     match shape {

@@ -152,15 +152,15 @@ pub(crate) struct Between {
     pub pause: HostDuration,
 }
 
-/// In which order the presses of a repetition come.
+/// Order of the presses of a repetition.
 pub(crate) enum Order {
     /// The order of the path.
     Listed,
-    /// A random one.
+    /// A random order.
     Shuffled(Shuffled),
 }
 
-/// The order that has a name.
+/// Orders with a name.
 #[derive(Clone, Copy, Choice)]
 enum KnownOrder {
     /// The order of the path.
