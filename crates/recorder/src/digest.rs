@@ -276,7 +276,7 @@ mod tests {
 
     /// A new column changes the result of `SELECT *` for earlier states: such a table needs a column list per schema.
     #[test]
-    fn earlier_states_are_read_with_the_columns_that_they_had() {
+    fn earlier_states_use_the_columns_of_their_schema() {
         let folder = tempfile::tempdir().unwrap();
         let runtime = tokio::runtime::Builder::new_current_thread()
             .build()

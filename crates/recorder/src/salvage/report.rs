@@ -25,9 +25,9 @@ pub struct SalvageReport {
 pub struct SalvagedTable {
     /// Name of the table.
     pub name: String,
-    /// TableRows in the new file.
+    /// Rows in the new file.
     pub rows: u64,
-    /// TableRows known to be missing; more may be.
+    /// Rows known to be missing; there may be more.
     pub missing: u64,
 }
 

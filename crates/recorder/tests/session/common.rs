@@ -1,4 +1,4 @@
-//! A small session of every kind of record, and a scanner that knows just enough EVT2.
+//! A small session with every kind of record, and a minimal EVT2 scanner.
 
 use std::path::Path;
 
