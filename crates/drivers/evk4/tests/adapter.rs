@@ -1,4 +1,4 @@
-//! The adapter over a scripted link: nothing here knows a camera.
+//! The adapter over a scripted link, without a camera.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -25,7 +25,7 @@ impl Clock for JumpingClock {
     }
 }
 
-/// A camera that sends a packet every millisecond: a time, a row, an event and a trigger edge. Its time goes on.
+/// A camera that sends a packet every millisecond: a time, a row, an event and a trigger edge. Its clock keeps running over stops.
 #[derive(Clone, Default)]
 struct Script {
     clock: JumpingClock,
@@ -159,7 +159,7 @@ fn the_adapter_keeps_the_contract() {
 }
 
 #[test]
-fn what_a_model_lacks_is_refused_in_its_own_words() {
+fn unsupported_settings_are_rejected_by_name() {
     let refused = |model: Model, spoil: &dyn Fn(&mut CameraSettings)| {
         let mut all = settings(model);
         spoil(&mut all);
@@ -180,7 +180,7 @@ fn what_a_model_lacks_is_refused_in_its_own_words() {
 }
 
 #[test]
-fn chunks_hold_the_facts_of_their_words() {
+fn chunks_have_the_facts_of_their_words() {
     let script = Script::default();
     let mut camera = started(&script);
     script.clock.clone().wait_until(HostTime(10 * MS));
@@ -207,7 +207,7 @@ fn chunks_hold_the_facts_of_their_words() {
 }
 
 #[test]
-fn what_the_link_dropped_is_stated_before_the_chunk_that_follows() {
+fn dropped_packets_are_reported_in_the_next_chunk() {
     let script = Script {
         drops: Some((5, 8)),
         ..Script::default()
@@ -224,7 +224,7 @@ fn what_the_link_dropped_is_stated_before_the_chunk_that_follows() {
 }
 
 #[test]
-fn what_was_dropped_after_the_last_packet_is_stated_at_stop() {
+fn packets_dropped_at_the_end_are_reported_at_stop() {
     let script = Script {
         drops_rest: Some(6),
         ..Script::default()
@@ -245,7 +245,7 @@ fn what_was_dropped_after_the_last_packet_is_stated_at_stop() {
 }
 
 #[test]
-fn a_link_that_ends_is_told_after_what_it_brought() {
+fn the_end_of_the_link_is_reported_after_its_data() {
     let script = Script {
         ends: Some(4),
         ..Script::default()

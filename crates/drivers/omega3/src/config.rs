@@ -12,7 +12,7 @@ pub struct OmegaConfig {
     pub library: Option<PathBuf>,
     /// Serial number of this bench's robot; any other is rejected. `None` accepts the only free robot.
     pub serial: Option<u16>,
-    /// Type numbers to accept besides 33 (omega.3); legacy firmware is said to report 110.
+    /// Type numbers to accept besides 33 (omega.3); legacy firmware reportedly returns 110.
     pub also_accept_types: Vec<i32>,
     /// Mounting of the robot and its effector.
     pub mount: Mount,

@@ -147,7 +147,7 @@ fn jumps_of_the_time_base_are_reported() {
     camera.flush(&mut chunks).unwrap();
     let last = chunks.last().unwrap().facts.last_us.unwrap();
     let high = 0x8000_0000 | (last / 64) as u32;
-    // One lost TIME_HIGH period is ordinary; two are not; nor is going back.
+    // One lost TIME_HIGH period is normal; two are not, nor is a backward step.
     bench
         .model()
         .send(&bytes(&[high + 1, high + 3, high + 2, high + 2]));
@@ -321,7 +321,7 @@ fn ops() -> impl Strategy<Value = Vec<Op>> {
 }
 
 proptest! {
-    /// A stream of numbered words, split anywhere and taken at any time: every word taken is whole and in its
+    /// A stream of numbered words, split anywhere and taken at any time: every word is complete and in its
     /// place, and the gaps equal the reported losses.
     #[test]
     fn an_inbox_loses_whole_words_in_order_and_counts_them(ops in ops()) {
@@ -508,6 +508,6 @@ fn a_failed_transfer_is_a_loss_between_whole_words() {
     let blocks = inbox.finish().blocks;
     let bytes: Vec<&[u8]> = blocks.iter().map(|b| b.bytes.as_slice()).collect();
     assert_eq!(bytes, [&[1, 0, 0, 0], &[3, 0, 0, 0]]);
-    // The torn word, and one for what nobody has counted.
+    // The incomplete word, and one for the unknown loss.
     assert_eq!(blocks[1].lost_before.map(|l| l.bytes), Some(6));
 }

@@ -35,7 +35,7 @@ fn describe_gravity_load(envelope: &Envelope, mass_kg: Option<f64>, reported_n: 
     )
 }
 
-/// Describes the force cap in use, and what to do if it is too small to carry the arm.
+/// Describes the force cap in use, and the next step if it is too small to carry the arm.
 fn describe_force_cap(envelope: &Envelope, limits: &MotionLimits) -> String {
     format!(
         "The motors may use {:.3} of their torque: if the arm sinks, raise `limits.max_force` ({} N) or measure \
