@@ -1,4 +1,4 @@
-//! Bytes that are missing, and marked as missing: what comes out beside them is what the whole stream says, or nothing.
+//! Streams with missing bytes that are reported as lost: all decoded events match the complete stream.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use proptest::prelude::*;
@@ -13,7 +13,7 @@ const FORMATS: [StreamFormat; 4] = [
     StreamFormat::Evt3,
 ];
 
-/// Events and edges in time order, each with how it follows the one before.
+/// Events and edges in time order, with random intervals.
 fn events() -> impl Strategy<Value = Vec<CdEvent>> {
     let step = prop_oneof![8 => 0_u64..50, 1 => 0_u64..40_000];
     let event = (step, 0_u16..640, 0_u16..480, any::<bool>());
@@ -39,7 +39,7 @@ fn is_edge(e: &CdEvent) -> bool {
     e.x % 10 == 3
 }
 
-/// As a camera sends them: a time base word only when it is due.
+/// Encodes like a camera: a time base word only when it is due.
 fn encode(format: StreamFormat, events: &[CdEvent]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let start = events[0].t_us;
@@ -106,14 +106,14 @@ fn encode(format: StreamFormat, events: &[CdEvent]) -> Vec<u8> {
     bytes
 }
 
-/// What a stream gives: events, edges.
+/// Decoded events and edges.
 type Found = (Vec<CdEvent>, Vec<TriggerEdge>);
 
 fn push(decoder: &mut Decoder, bytes: &[u8], found: &mut Found) {
     decoder.push_cd(bytes, &mut found.0, &mut found.1);
 }
 
-/// True when `part` is what is left of `whole` after something was taken out.
+/// True if `part` is `whole` with some elements removed.
 fn is_within<T: PartialEq>(part: &[T], whole: &[T]) -> bool {
     let mut rest = whole.iter();
     part.iter().all(|item| rest.any(|w| w == item))
@@ -122,10 +122,10 @@ fn is_within<T: PartialEq>(part: &[T], whole: &[T]) -> bool {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Any bytes removed at any places, whatever pieces the rest comes in: every event and edge that comes out is one of the whole
-    /// stream, with its time and place. All come out up to the first loss, and from the first time base word after the last.
+    /// Any bytes removed anywhere, and the rest split anyhow: every decoded event and edge belongs to the complete
+    /// stream, at its time and position. All are decoded up to the first loss, and from the first time base word after the last.
     #[test]
-    fn what_comes_out_beside_losses_is_true(
+    fn events_around_losses_match_the_stream(
         events in events(),
         format in prop::sample::select(FORMATS.to_vec()),
         cuts in prop::collection::vec((any::<prop::sample::Index>(), 1_usize..200), 1..4),
@@ -138,7 +138,7 @@ proptest! {
 
         let mut cuts: Vec<(usize, usize)> = cuts
             .iter()
-            // Behind the first time base word: without any, nothing tells how often the counter had wrapped.
+            // After the first time base word: without one, the number of wraps is unknown.
             .map(|(at, n)| ((8 + at.index(bytes.len())).min(bytes.len()), *n))
             .collect();
         cuts.sort_unstable();
@@ -171,7 +171,7 @@ proptest! {
         prop_assert!(is_within(&found.1, &whole.1), "{format}: edges {:?}", found.1);
         prop_assert!(found.0.starts_with(&before.0) && found.1.starts_with(&before.1));
         prop_assert_eq!(counted, (found.0.len() as u64, found.1.clone()));
-        // A decoder of the rest alone, from its first whole word on, finds as many events and edges.
+        // A decoder of the rest alone, from its first whole word, finds as many events and edges.
         let word = match format {
             StreamFormat::Evt2 => 4,
             StreamFormat::Evt3 => 2,
@@ -185,7 +185,7 @@ proptest! {
     }
 }
 
-/// Two losses with no whole word between them are one.
+/// Two losses without a whole word between them count as one.
 #[test]
 fn losses_within_one_word_add_up() {
     let event = |t_us, x| CdEvent {
