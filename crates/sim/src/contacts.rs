@@ -117,7 +117,7 @@ mod tests {
             panic!("three draws");
         };
         assert_ne!(first, again, "the same place again is another contact");
-        // A run in two parts meets what the same run in one go meets.
+        // A run in two parts meets the same contacts as in one part.
         let whole = draws(&Contacts::default(), &grid);
         let rest = draws(&Contacts::after(&grid[..30]), &grid[30..]);
         assert_eq!(rest, whole[30..]);

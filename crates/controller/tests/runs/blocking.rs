@@ -379,7 +379,7 @@ fn a_blocked_call_does_not_delay_the_loop() {
                     let named = match site {
                         Site::Stop => report.problems.iter().any(|p| silent(&p.error) == Some(site.role())),
                         _ => result.records.iter().any(
-                            |r| matches!(r, Record::Note { text, .. } if text.starts_with("trigger box: what it lost is not known")),
+                            |r| matches!(r, Record::Note { text, .. } if text.starts_with("trigger box: its losses are unknown")),
                         ),
                     };
                     assert!(named, "{case}: {report:?}");

@@ -72,7 +72,7 @@ impl Take {
     }
 }
 
-/// Presses 2 mm deep at each place, on a fixed schedule of 1.5 s per press; `ticks` are the polling intervals in µs, repeated cyclically.
+/// Presses 2 mm deep at each location, on a fixed schedule of 1.5 s per press; `ticks` are the polling intervals in µs, repeated.
 pub(crate) fn press_all(
     rig: &mut Rig,
     places: &[Point2],
@@ -110,7 +110,7 @@ pub(crate) fn press_all(
     Ok(take)
 }
 
-/// Places on the skin that both cameras see.
+/// Locations on the skin in view of both cameras.
 pub(crate) fn places(n: usize) -> Vec<Point2> {
     (0..n)
         .map(|k| Point2::new(-18.0 + 7.0 * (k % 7) as f64, -14.0 + 6.0 * (k % 6) as f64))

@@ -361,7 +361,7 @@ fn too_much_force_stops_the_robot() {
         .iter()
         .map(|s| s.measured.z_mm)
         .fold(f64::MAX, f64::min);
-    assert!(deepest > at(-1.8).z_mm, "went on pressing to {deepest}");
+    assert!(deepest > at(-1.8).z_mm, "continued to press to {deepest}");
     assert!(matches!(
         rig.indenter.command(at(-3.0), 20.0),
         Err(DeviceError::Refused { .. })
@@ -371,7 +371,7 @@ fn too_much_force_stops_the_robot() {
 }
 
 #[test]
-fn what_finds_no_room_is_lost_and_counted() {
+fn overflowing_data_is_lost_and_counted() {
     let after = |buffer_bytes: usize, looks: i64| {
         let mut config = SimConfig::new(4, SimLevel::Geometric);
         config.camera_clock.buffer_bytes = buffer_bytes;

@@ -70,7 +70,7 @@ fn commands_set_the_clock_to_their_recorded_instants() {
     let (log, first) = recorded(&at);
     let mut rig = replay(&log);
     ready(&mut rig);
-    // A controller with another rhythm, which does not wait as long: the commands pull it along.
+    // A controller with a different rhythm and shorter waits: the commands advance the clock.
     let mut again = Take::default();
     for (t, command) in log.commands.clone() {
         rig.clock
@@ -89,7 +89,7 @@ fn commands_set_the_clock_to_their_recorded_instants() {
         );
     }
     again.stop(&mut rig);
-    // Every command was given, so stopping hands over the rest.
+    // Every command was given, so stopping delivers the rest.
     assert_eq!(first.chunks, again.chunks);
 }
 
@@ -112,7 +112,7 @@ fn a_wait_stops_once_at_a_recorded_command() {
 }
 
 #[test]
-fn another_request_is_a_divergence() {
+fn a_different_request_is_a_divergence() {
     let at = places(2);
     let (log, _) = recorded(&at);
     let other = [at[0], Point2::new(at[1].x_mm + 0.001, at[1].y_mm)];
@@ -132,17 +132,20 @@ fn another_request_is_a_divergence() {
 }
 
 #[test]
-fn beyond_its_end_a_recording_says_that_it_ends() {
+fn the_end_of_a_recording_is_an_error() {
     let at = places(2);
     let (log, _) = recorded(&at);
     let mut rig = replay(&log);
     ready(&mut rig);
     let more = [at.clone(), places(1)].concat();
     let error = press_all(&mut rig, &more, &[5_000]).err();
-    let told = error.map(|e| e.to_string()).unwrap_or_default();
-    assert!(told.contains("the recording ends here, at "), "{told}");
+    let message = error.map(|e| e.to_string()).unwrap_or_default();
+    assert!(
+        message.contains("the recording ends here, at "),
+        "{message}"
+    );
 
-    // Time goes on, but no pose comes any more.
+    // Time continues, but no more poses arrive.
     let mut rig = replay(&log);
     ready(&mut rig);
     press_all(&mut rig, &at, &[5_000]).unwrap();
@@ -150,6 +153,9 @@ fn beyond_its_end_a_recording_says_that_it_ends() {
     rig.clock
         .wait_until(skinrig_model::HostTime(end.0 + 60_000_000));
     let error = rig.indenter.poll(&mut Vec::new()).err();
-    let told = error.map(|e| e.to_string()).unwrap_or_default();
-    assert!(told.contains("the recording ends here, at "), "{told}");
+    let message = error.map(|e| e.to_string()).unwrap_or_default();
+    assert!(
+        message.contains("the recording ends here, at "),
+        "{message}"
+    );
 }
