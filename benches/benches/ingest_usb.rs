@@ -223,8 +223,8 @@ mod linux {
         if !output.status.success() {
             return Err(String::from_utf8_lossy(&output.stderr).into());
         }
-        let told: Value = serde_json::from_slice(&output.stdout)?;
-        let recording: BTreeMap<String, f64> = serde_json::from_value(told["threads"].clone())?;
+        let result: Value = serde_json::from_slice(&output.stdout)?;
+        let recording: BTreeMap<String, f64> = serde_json::from_value(result["threads"].clone())?;
         spent.extend(recording);
         let mut threads: Vec<(String, f64)> = spent.into_iter().collect();
         threads.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -238,8 +238,10 @@ mod linux {
         Ok(Trial {
             made,
             dropped,
-            lost: told["lost"].as_u64().ok_or("expected the bytes lost")?,
-            seconds: told["seconds"].as_f64().ok_or("expected the time taken")?,
+            lost: result["lost"].as_u64().ok_or("expected the bytes lost")?,
+            seconds: result["seconds"]
+                .as_f64()
+                .ok_or("expected the time taken")?,
             threads,
         })
     }
@@ -316,9 +318,9 @@ mod linux {
                 t: HostTime(0),
             })?;
         }
-        let told = json!({ "lost": lost, "seconds": begun.elapsed().as_secs_f64(),
+        let result = json!({ "lost": lost, "seconds": begun.elapsed().as_secs_f64(),
             "threads": spent });
-        println!("{told}");
+        println!("{result}");
         Ok(())
     }
 
