@@ -187,7 +187,7 @@ impl ControlHandle {
         self.shared.made.fetch_add(1, Ordering::AcqRel);
     }
 
-    /// Takes all pending requests, most urgent first. A halt stays pending, so that every later check sees it.
+    /// Takes all pending requests, most urgent first. A halt stays pending, so that every later check finds it.
     pub(crate) fn take(&self) -> impl Iterator<Item = Request> + use<> {
         let bits = self.shared.bits.fetch_and(HALT, Ordering::AcqRel);
         [
@@ -261,9 +261,9 @@ mod tests {
         assert_eq!(hand.notes_recorded(), MAX_NOTES as u64);
         assert_eq!(hand.note("next".into()), Ok(MAX_NOTES as u64 + 1));
         // Another thread is adding one: the controller tries again later.
-        let held = hand.shared.notes.lock().unwrap();
+        let guard = hand.shared.notes.lock().unwrap();
         assert_eq!(hand.take_notes().len(), 0);
-        drop(held);
+        drop(guard);
         assert_eq!(hand.take_notes(), ["next"]);
     }
 

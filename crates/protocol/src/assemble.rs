@@ -34,7 +34,7 @@ impl Protocol {
         protocol(name, bytes, overrides, loader, false)
     }
 
-    /// Reads the protocol of a recording, which may use keys that a new one may not (`analysis.exclude_presses`). Otherwise as
+    /// Reads the protocol of a recording, which may contain keys that are invalid in a new one (`analysis.exclude_presses`). Otherwise as
     /// [`Protocol::parse`].
     ///
     /// # Errors

@@ -17,9 +17,9 @@ pub struct Violation {
     pub press: Option<PressId>,
     /// Index into [`Plan::steps`].
     pub step: usize,
-    /// Which part of the motion.
+    /// Part of the motion.
     pub segment: Segment,
-    /// What is wrong.
+    /// The problem.
     pub message: String,
     /// Accepted values.
     pub expected: String,

@@ -13,9 +13,9 @@ use skinrig_settings::{Field, Shape, Value};
 /// An injected fault of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PlantedFault {
-    /// What goes wrong.
+    /// Kind of the fault.
     pub kind: FaultKind,
-    /// When.
+    /// Time of the fault.
     pub when: FaultTime,
 }
 

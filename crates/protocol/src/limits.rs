@@ -123,9 +123,9 @@ pub enum MarginError {
     },
     /// The value is not a valid margin of the metric.
     Value {
-        /// What is valid.
+        /// Valid values.
         expected: String,
-        /// What was found.
+        /// Actual value.
         found: String,
     },
 }

@@ -47,7 +47,7 @@ pub struct Plan {
     pub suspend: Suspend,
     /// Every planned press; `presses[i].id == PressId::from_index(i)`, and the stored `id` is `i`.
     pub presses: Vec<PlannedPress>,
-    /// What to do, in order.
+    /// The steps, in order.
     pub steps: Vec<Step>,
 }
 
@@ -91,10 +91,10 @@ pub struct RunLimits {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum OnTrip {
-    /// Hold, rise straight up off the skin, disarm; brake at once when the feedback cannot be trusted.
+    /// Hold, rise straight up off the skin, disarm; brake immediately if the feedback is unreliable.
     #[default]
     Retract,
-    /// Brake at once, wherever the tip is.
+    /// Brake immediately, wherever the tip is.
     Brake,
 }
 
@@ -148,7 +148,7 @@ pub struct PressStep {
     /// Source of the surface height.
     #[serde(default, skip_serializing_if = "Surface::is_known")]
     pub surface: Surface,
-    /// The downward motion begins this long after the last `Begin`; at once when that is past or `None`.
+    /// The downward motion begins this long after the last `Begin`; immediately if that is past or `None`.
     pub start_after_begin: Option<HostDuration>,
     /// Speed from clearance height to the surface, mm/s.
     pub approach_speed_mm_s: f64,

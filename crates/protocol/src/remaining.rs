@@ -49,7 +49,7 @@ impl Plan {
                     let rest = self.steps.iter().skip(n + 1);
                     rest.take_while(|s| !same(s)).any(is_wanted)
                 };
-                let kept = match step {
+                let is_kept = match step {
                     Step::Begin { .. } => leads(|s| matches!(s, Step::Begin { .. })),
                     Step::Pause { .. } => n > first && leads(|s| matches!(s, Step::Pause { .. })),
                     Step::Travel { .. } => {
@@ -57,7 +57,7 @@ impl Plan {
                     }
                     Step::Press(p) => wanted(p.press),
                 };
-                if kept {
+                if is_kept {
                     steps.push(step.clone());
                 }
             }

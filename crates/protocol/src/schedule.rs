@@ -24,7 +24,7 @@ pub struct Schedule {
     pub sha256: String,
     /// Short name of the recording.
     pub name: String,
-    /// What was recorded.
+    /// Contents of the recording.
     pub description: Option<String>,
     /// Operator of the recording.
     pub operator: String,
@@ -44,7 +44,7 @@ pub struct Schedule {
     pub depth_mm: f64,
     /// The moments of a press relative to its press time.
     pub phases: PressPhases,
-    /// What one unit of the CSV's columns is in mm.
+    /// One unit of the CSV's columns in mm.
     pub csv_unit_mm: f64,
     /// Whether blank rows of the CSV are skipped.
     pub csv_skip_blank_rows: bool,
@@ -137,7 +137,7 @@ impl Schedule {
         Self::read(name, bytes, overrides, false)
     }
 
-    /// Reads the schedule of a recording, which may use keys that a new one may not (`analysis.exclude_presses`).
+    /// Reads the schedule of a recording, which may contain keys that are invalid in a new one (`analysis.exclude_presses`).
     ///
     /// # Errors
     /// [`Diagnostics`] with every finding at once.

@@ -13,7 +13,7 @@
 //!
 //! Let `base` be the value of the TIME_HIGH word before the run (literal, or the last of an earlier token).
 //! Word `k` of the run then has the value `base + ((phase + 1 + k) >> shift)` modulo 2^28. A chunk is stored unchanged if it
-//! contains a word of type 0xB, has a length that is no multiple of 4, or does not shrink.
+//! contains a word of type 0xB, has a length that is not a multiple of 4, or does not shrink.
 
 use std::fmt;
 

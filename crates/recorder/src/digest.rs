@@ -288,14 +288,14 @@ mod tests {
                 let path = folder.path().join(format!("{version}-now.session.sqlite"));
                 let mut now = schema::create(&path).await.unwrap();
                 for table in &TABLES {
-                    let there = has_table(&mut old, table.name).await.unwrap();
+                    let exists = has_table(&mut old, table.name).await.unwrap();
                     assert_eq!(
-                        there,
+                        exists,
                         table.since <= version,
                         "{} in schema {version}",
                         table.name
                     );
-                    if !there {
+                    if !exists {
                         continue;
                     }
                     let way = table.earlier.iter().rev().find(|(s, _)| *s <= version);

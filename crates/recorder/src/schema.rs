@@ -144,7 +144,7 @@ fn allow_writing(path: &Path) -> std::io::Result<()> {
     std::fs::set_permissions(path, permissions)
 }
 
-/// Rolls back a transaction whose writer was killed; until then nobody can read the file.
+/// Rolls back a transaction whose writer was killed; until then the file cannot be read.
 async fn roll_back(path: &Path) -> Result<(), RecorderError> {
     let fault = |e: sqlx::Error| Fault::from(e).at(path, "rolling back an interrupted write");
     let mut conn = writable(path).connect().await.map_err(fault)?;

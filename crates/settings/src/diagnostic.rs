@@ -11,7 +11,7 @@ use crate::source::{Location, Sources, Span};
 /// One finding. Findings are always errors: no input is repaired silently.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Diagnostic {
-    /// What is wrong, in a few words, lower case.
+    /// The problem, in a few words, lower case.
     pub message: String,
     /// The key path, for example `path.meander.pitch`; empty for the file as a whole.
     pub path: String,

@@ -108,11 +108,11 @@ fn other_language(root: &yaml::Node, table: &Table) -> Option<(Span, &'static st
     let yaml::Kind::Map(entries) = &root.kind else {
         return None;
     };
-    let given = |key: &str| entries.iter().find(|e| e.key == key);
-    if given(version_key(table)).is_some() {
+    let entry_of = |key: &str| entries.iter().find(|e| e.key == key);
+    if entry_of(version_key(table)).is_some() {
         return None;
     }
     LANGUAGES
         .iter()
-        .find_map(|(_, key, what)| given(key).map(|e| (e.key_span, *what)))
+        .find_map(|(_, key, what)| entry_of(key).map(|e| (e.key_span, *what)))
 }

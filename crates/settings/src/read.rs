@@ -34,10 +34,10 @@ pub(crate) fn read_table(
     };
     let mut values = Vec::with_capacity(table.keys.len());
     for entry in entries {
-        let here = join(path, &entry.key);
+        let key_path = join(path, &entry.key);
         let Some(key) = table.keys.iter().find(|k| k.name == entry.key) else {
             let names = table.keys.iter().map(|k| k.name);
-            out.error(entry.key_span, here, "unknown key")
+            out.error(entry.key_span, key_path, "unknown key")
                 .expected(key_names(table))
                 .found(quote(&entry.key))
                 .maybe_help(did_you_mean(&entry.key, names));
@@ -51,12 +51,12 @@ pub(crate) fn read_table(
         } else {
             entry.value.clone()
         };
-        if let Some(field) = read(&place, &key.shape, &here, out) {
+        if let Some(field) = read(&place, &key.shape, &key_path, out) {
             values.push((entry.key.clone(), field));
         }
     }
     let head = head_of(node, out);
-    let given = |name: &str| entries.iter().any(|e| e.key == name);
+    let is_given = |name: &str| entries.iter().any(|e| e.key == name);
     // A misspelt key is reported once, as an unknown key.
     let misspelt = |names: &[&'static str]| {
         let mut unknown = entries
@@ -64,7 +64,7 @@ pub(crate) fn read_table(
             .filter(|e| !table.keys.iter().any(|k| k.name == e.key));
         unknown.any(|e| closest(&e.key, names.iter().copied()).is_some())
     };
-    for key in table.keys.iter().filter(|k| !given(k.name)) {
+    for key in table.keys.iter().filter(|k| !is_given(k.name)) {
         match key.need {
             Need::Required if !misspelt(&[key.name]) => {
                 out.error(head, join(path, key.name), "a required key is missing")
@@ -86,11 +86,11 @@ pub(crate) fn read_table(
         }
     }
     for group in table.exactly_one {
-        let given: Vec<_> = entries
+        let given_entries: Vec<_> = entries
             .iter()
             .filter(|e| group.contains(&e.key.as_str()))
             .collect();
-        match given.as_slice() {
+        match given_entries.as_slice() {
             [_] => {}
             [] if misspelt(group) => {}
             [] => none_given(table, group, "exactly one", head, path, out),
@@ -102,14 +102,17 @@ pub(crate) fn read_table(
                         "only one of these keys may be given",
                     )
                     .expected(format!("exactly one of {}", one_of(group.iter().copied())))
-                    .found(one_of(given.iter().map(|e| e.key.as_str())).replace(" or ", " and "))
+                    .found(
+                        one_of(given_entries.iter().map(|e| e.key.as_str()))
+                            .replace(" or ", " and "),
+                    )
                     .help("remove all but one");
                 }
             }
         }
     }
     let any: Vec<&'static str> = table.at_least_one().collect();
-    if !any.is_empty() && !any.iter().any(|name| given(name)) && !misspelt(&any) {
+    if !any.is_empty() && !any.iter().any(|name| is_given(name)) && !misspelt(&any) {
         none_given(table, &any, "at least one", head, path, out);
     }
     Some(Field {

@@ -107,7 +107,7 @@ mod tests {
         back.reverse();
         let alone = |place: &Point2| draws(&Contacts::default(), &[*place])[0];
         for (place, drawn) in grid.iter().zip(draws(&Contacts::default(), &grid)) {
-            // Places nearer to one another than a square share one, and are told apart by their number.
+            // Places nearer to one another than a square share one, and differ by their number.
             if alone(place) != drawn {
                 assert!(back.contains(&drawn));
             }

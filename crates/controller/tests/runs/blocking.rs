@@ -87,8 +87,8 @@ struct Blocking {
 impl Blocking {
     fn pass(&mut self, site: Site) {
         if thread::current().id() == self.control {
-            let held = format!("{site:?} of {} was called by the control loop", self.role);
-            lock(&self.world).violations.push(held);
+            let violation = format!("{site:?} of {} was called by the control loop", self.role);
+            lock(&self.world).violations.push(violation);
         }
         let low = lock(&self.world).tip[2] < -1.0;
         let ours = |(s, _): &mut (Site, i64)| *s == site && (low || !site.in_contact());

@@ -67,6 +67,6 @@ fn notes_of_the_trigger_box_are_recorded() {
         ..faults()
     };
     let result = run_plan(&plan(), faults, START, Sink::default());
-    let said = |r: &&Record| matches!(r, Record::Note { text, .. } if text == "trigger box: 2 edges were late");
-    assert_eq!(result.records.iter().filter(said).count(), 1);
+    let is_note = |r: &&Record| matches!(r, Record::Note { text, .. } if text == "trigger box: 2 edges were late");
+    assert_eq!(result.records.iter().filter(is_note).count(), 1);
 }

@@ -366,10 +366,10 @@ fn step(
     let (was_armed, before) = (guard.is_armed(), lock(model).tripped);
     let answer = guard.poll(clock, poses);
     let b = lock(model);
-    let held = b.received.contains(&"hold") || b.received.contains(&"disarm");
+    let is_held = b.received.contains(&"hold") || b.received.contains(&"disarm");
     if was_armed && answer.is_err() {
         prop_assert!(
-            held,
+            is_held,
             "{:?}: {:?}, and the robot received {:?}",
             act,
             answer,

@@ -179,7 +179,7 @@ fn rejections_state_the_limit() {
             other => format!("{other:?}"),
         }
     };
-    let said = [
+    let messages = [
         ask(0.0, 0.0, -2.0, 200.0, 60),
         ask(0.0, 99.0, 10.0, 20.0, 60),
         ask(1.0, 0.0, 2.0, 20.0, 60),
@@ -187,7 +187,7 @@ fn rejections_state_the_limit() {
         ask(f64::NAN, 0.0, 6.0, 20.0, 60),
     ];
     assert_eq!(
-        said,
+        messages,
         [
             "expected a speed above 0 and at most 100 mm/s, found 200 mm/s",
             "expected a target with y from -50 to 55 mm, found 99 mm",

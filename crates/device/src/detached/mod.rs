@@ -55,16 +55,16 @@ impl Calls {
 }
 
 /// Guard of one unfinished call; counted until dropped.
-struct Counted(Calls);
+struct CallGuard(Calls);
 
-impl Counted {
+impl CallGuard {
     fn new(calls: &Calls) -> Self {
         calls.0.fetch_add(1, Ordering::AcqRel);
         Self(calls.clone())
     }
 }
 
-impl Drop for Counted {
+impl Drop for CallGuard {
     fn drop(&mut self) {
         self.0.0.fetch_sub(1, Ordering::AcqRel);
     }
@@ -147,7 +147,7 @@ impl<D: Send + 'static> Worker<D> {
         call: impl FnOnce(&mut D) -> T + Send + 'static,
     ) -> Result<Call<T>, DeviceError> {
         let (tell, reply) = mpsc::channel();
-        let counted = Counted::new(&self.calls);
+        let counted = CallGuard::new(&self.calls);
         let job: Job<D> = Box::new(move |device| {
             // Sending fails if the caller is gone.
             let _ = tell.send(call(device));

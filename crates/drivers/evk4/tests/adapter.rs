@@ -216,11 +216,11 @@ fn dropped_packets_are_reported_in_the_next_chunk() {
     script.clock.clone().wait_until(HostTime(10 * MS));
     let mut chunks = Vec::new();
     camera.stop(&mut chunks).unwrap();
-    let told: Vec<_> = chunks
+    let losses: Vec<_> = chunks
         .iter()
         .map(|c| (c.seq, c.lost_before, c.facts.cd_events))
         .collect();
-    assert_eq!(told, [(0, 0, 5), (1, 3 * PACKET as u64, 2)]);
+    assert_eq!(losses, [(0, 0, 5), (1, 3 * PACKET as u64, 2)]);
 }
 
 #[test]
@@ -233,13 +233,13 @@ fn packets_dropped_at_the_end_are_reported_at_stop() {
     script.clock.clone().wait_until(HostTime(10 * MS));
     let mut chunks = Vec::new();
     camera.stop(&mut chunks).unwrap();
-    let told: Vec<_> = chunks
+    let losses: Vec<_> = chunks
         .iter()
         .map(|c| (c.seq, c.lost_before, c.facts.cd_events, c.host_time))
         .collect();
     let lost = 4 * PACKET as u64;
     assert_eq!(
-        told,
+        losses,
         [(0, 0, 6, HostTime(6 * MS)), (1, lost, 0, HostTime(10 * MS))]
     );
 }

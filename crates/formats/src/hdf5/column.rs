@@ -54,12 +54,12 @@ macro_rules! buffers {
                     Self::F32(values) => {
                         values.resize(out.len(), 0.0);
                         dataset.read_slice_into(values, &[start], &[out.len()])?;
-                        return Ok(whole(values.iter().map(|v| f64::from(*v)), out));
+                        return Ok(store_whole(values.iter().map(|v| f64::from(*v)), out));
                     }
                     Self::F64(values) => {
                         values.resize(out.len(), 0.0);
                         dataset.read_slice_into(values, &[start], &[out.len()])?;
-                        return Ok(whole(values.iter().copied(), out));
+                        return Ok(store_whole(values.iter().copied(), out));
                     }
                 }
                 Ok(None)
@@ -78,7 +78,7 @@ macro_rules! buffers {
 }
 
 /// Stores floating-point values as whole numbers; returns the first row whose value is not one.
-fn whole(values: impl Iterator<Item = f64>, out: &mut [u16]) -> Option<usize> {
+fn store_whole(values: impl Iterator<Item = f64>, out: &mut [u16]) -> Option<usize> {
     let mut broken = None;
     for (row, (value, out)) in values.zip(out).enumerate() {
         if value.is_nan() || value.fract() != 0.0 {

@@ -32,7 +32,7 @@ pub struct RawHeader {
 
 /// State while reading a header.
 #[derive(Default)]
-struct Meaning {
+struct ParsedKeys {
     format: Option<String>,
     evt: Option<String>,
     legacy_order: Option<bool>,
@@ -50,7 +50,7 @@ impl RawHeader {
     /// numbers, contradictory keys, or a missing format.
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self, FormatsError> {
         let mut entries = Vec::new();
-        let mut meaning = Meaning::default();
+        let mut keys = ParsedKeys::default();
         let (mut at, mut has_end) = (0, false);
         while !has_end && bytes[at..].starts_with(b"% ") {
             let error = |key: &str, problem| FormatsError::Header {
@@ -78,7 +78,7 @@ impl RawHeader {
                 if entries.len() == MAX_LINES {
                     return Err(error(key, HeaderProblem::ManyLines));
                 }
-                meaning.take(key, &value).map_err(|mismatch| {
+                keys.take(key, &value).map_err(|mismatch| {
                     let found = value.clone();
                     error(key, HeaderProblem::Value { mismatch, found })
                 })?;
@@ -96,11 +96,11 @@ impl RawHeader {
             let start = String::from_utf8_lossy(&bytes[..bytes.len().min(8)]).into_owned();
             return Err(error("", HeaderProblem::Missing { start }));
         }
-        let format = meaning
+        let format = keys
             .stream_format()
             .map_err(|why| error("format", HeaderProblem::Format(why)))?;
         Ok(Self {
-            geometry: meaning.geometry(),
+            geometry: keys.geometry(),
             entries,
             has_end,
             length: at as u64,
@@ -122,7 +122,7 @@ impl RawHeader {
     }
 }
 
-impl Meaning {
+impl ParsedKeys {
     /// Processes one entry; the error states the expected value.
     fn take(&mut self, key: &str, value: &str) -> Result<(), ValueMismatch> {
         match key {

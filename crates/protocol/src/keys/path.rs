@@ -84,7 +84,7 @@ pub(crate) struct Csv {
     pub file: String,
     /// Unit of the columns `x` and `y`.
     pub unit: LengthUnit,
-    /// Whether rows with nothing but blanks are skipped; otherwise they are errors.
+    /// Whether blank rows are skipped; otherwise they are errors.
     #[setting(default = "false")]
     pub skip_blank_rows: bool,
     /// How many locations are used, from the first; all when absent.

@@ -174,9 +174,9 @@ fn every_seal_of_many_legs_is_verified() {
         let cut_off = leg % 2 == 1;
         let known = SessionReader::open(&path).unwrap().history().unwrap();
         let mut writer = SessionWriter::resume(&path, &mut Evt2::default()).unwrap();
-        let mut told = further_leg(&known);
-        told.truncate(11);
-        for record in told {
+        let mut leg_records = further_leg(&known);
+        leg_records.truncate(11);
+        for record in leg_records {
             writer.accept(record).unwrap();
         }
         if cut_off {
@@ -246,8 +246,8 @@ fn a_torn_file_hash_is_an_unfinished_seal() {
         let report = verify(&torn, &mut Evt2::default()).unwrap();
         assert!(report.is_sound() && !report.sealed, "{written}: {report:?}");
         assert!(report.remarks[0].contains("interrupted"), "{report:?}");
-        let again = SessionWriter::open_ended(&torn, &mut Evt2::default()).unwrap();
-        assert_eq!(again.finish().unwrap().tree_sha256, whole.tree_sha256);
+        let reopened = SessionWriter::open_ended(&torn, &mut Evt2::default()).unwrap();
+        assert_eq!(reopened.finish().unwrap().tree_sha256, whole.tree_sha256);
         let report = verify(&torn, &mut Evt2::default()).unwrap();
         assert!(report.is_sound() && report.sealed, "{report:?}");
     }

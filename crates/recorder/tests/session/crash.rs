@@ -89,8 +89,8 @@ fn kill_after(path: &Path, acknowledged: usize, sent: usize) {
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
-    let mut told = BufReader::new(child.stdout.take().unwrap());
-    let seen = told
+    let mut output = BufReader::new(child.stdout.take().unwrap());
+    let seen = output
         .by_ref()
         .lines()
         .filter(|line| line.as_ref().unwrap() == "sent")

@@ -53,15 +53,15 @@ impl Run {
     /// resumed. Returns its path.
     #[track_caller]
     fn into_rescued(mut self, found: &str) -> (tempfile::TempDir, PathBuf) {
-        let told = self.writer.check().unwrap_err();
-        assert!(matches!(told, RecorderError::Displaced { .. }), "{told}");
-        assert!(told.to_string().contains(found), "{told}");
+        let error = self.writer.check().unwrap_err();
+        assert!(matches!(error, RecorderError::Displaced { .. }), "{error}");
+        assert!(error.to_string().contains(found), "{error}");
         for record in std::mem::take(&mut self.rest) {
             self.writer.accept(record).unwrap();
         }
         let kept = match self.writer.finish() {
             Err(RecorderError::Rescued { to, displaced }) => {
-                assert_eq!(displaced.to_string(), told.to_string());
+                assert_eq!(displaced.to_string(), error.to_string());
                 to
             }
             other => panic!("{other:?}"),

@@ -82,9 +82,9 @@ fn lost_time_extends_from_the_last_time_to_the_next() {
     lossy(&path);
     let reader = SessionReader::open(&path).unwrap();
     let losses = reader.losses(CAMERA).unwrap();
-    let told: Vec<_> = losses.iter().map(|l| (l.seq, l.bytes, l.time)).collect();
+    let reported: Vec<_> = losses.iter().map(|l| (l.seq, l.bytes, l.time)).collect();
     assert_eq!(
-        told,
+        reported,
         [
             (1, 8, time(1_280, 6_400)),
             (2, 20, time(6_400, 64_000)),

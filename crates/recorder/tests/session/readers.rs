@@ -87,13 +87,13 @@ fn eight_readers_are_never_blocked() {
 }
 
 fn assert_next_step(refused: &RecorderError) {
-    let said = refused.to_string();
+    let message = refused.to_string();
     for part in [
         "complete, but not sealed",
         "another program kept it open",
         "skinrig resume",
     ] {
-        assert!(said.contains(part), "{said}");
+        assert!(message.contains(part), "{message}");
     }
 }
 
@@ -113,10 +113,10 @@ fn a_reader_that_stays_open_only_delays_the_seal() {
     }
     // The timeout is a setting; 60 s for a run.
     writer.set_seal_timeout(std::time::Duration::from_millis(100));
-    let mut told = 0;
-    let refused = writer.finish_with_notice(|| told += 1).unwrap_err();
+    let mut notices = 0;
+    let refused = writer.finish_with_notice(|| notices += 1).unwrap_err();
     assert_next_step(&refused);
-    assert_eq!(told, 1);
+    assert_eq!(notices, 1);
     // The reader still reads everything, and so do others.
     assert_eq!(reader.presses().unwrap().len(), 3);
     read_everything(&path).unwrap();

@@ -1,11 +1,11 @@
 //! Equal configurations give equal bytes at any polling rate; different seeds do not.
 
-use crate::common::{Take, places, press_all, ready};
+use crate::common::{RunData, places, press_all, ready};
 use proptest::prelude::*;
 use skinrig_model::{CameraId, SimLevel};
 use skinrig_sim::{SimConfig, simulated_rig};
 
-fn run(config: &SimConfig, ticks: &[i64]) -> Take {
+fn run(config: &SimConfig, ticks: &[i64]) -> RunData {
     let mut rig = simulated_rig(config);
     ready(&mut rig);
     let mut take = press_all(&mut rig, &places(2), ticks).unwrap();

@@ -1,6 +1,6 @@
 //! Each injected fault shows as the documented error or count.
 
-use crate::common::{LIMITS, Take, places, press_all, ready};
+use crate::common::{LIMITS, RunData, places, press_all, ready};
 use skinrig_device::DeviceError;
 use skinrig_formats::Decoder;
 use skinrig_model::{
@@ -107,7 +107,7 @@ fn lost_bytes_are_counted() {
         when,
         words: 1_234,
     };
-    let run = |config: &SimConfig| -> Take {
+    let run = |config: &SimConfig| -> RunData {
         let mut rig = simulated_rig(config);
         ready(&mut rig);
         let mut take = press_all(&mut rig, &places(1), &[5_000]).unwrap();

@@ -1,6 +1,6 @@
 //! A recorded run, replayed through the same traits.
 
-use crate::common::{Log, Take, noted, places, press_all, ready};
+use crate::common::{Log, RunData, places, press_all, ready, with_log};
 use skinrig_device::{DeviceError, Rig};
 use skinrig_model::{DeviceRole, Point2, SimLevel, StreamFormat};
 use skinrig_sim::replay::{RecordedRig, replayed_rig};
@@ -12,8 +12,8 @@ fn config() -> SimConfig {
     config
 }
 
-fn recorded(at: &[Point2]) -> (Log, Take) {
-    let (mut rig, log) = noted(simulated_rig(&config()));
+fn recorded(at: &[Point2]) -> (Log, RunData) {
+    let (mut rig, log) = with_log(simulated_rig(&config()));
     ready(&mut rig);
     let mut take = press_all(&mut rig, at, &[5_000]).unwrap();
     take.poll(&mut rig).unwrap();
@@ -42,15 +42,15 @@ fn the_same_requests_give_the_same_records() {
     let (log, first) = recorded(&at);
     let mut rig = replay(&log);
     ready(&mut rig);
-    let mut again = press_all(&mut rig, &at, &[5_000]).unwrap();
-    again.poll(&mut rig).unwrap();
-    again.stop(&mut rig);
-    assert_eq!(first.marks, again.marks);
+    let mut replayed = press_all(&mut rig, &at, &[5_000]).unwrap();
+    replayed.poll(&mut rig).unwrap();
+    replayed.stop(&mut rig);
+    assert_eq!(first.marks, replayed.marks);
     assert!(!first.reports.is_empty());
-    assert_eq!(first.reports, again.reports);
-    assert_eq!(first.chunks, again.chunks);
-    assert_eq!(first.samples.len(), again.samples.len());
-    for (a, b) in first.samples.iter().zip(&again.samples) {
+    assert_eq!(first.reports, replayed.reports);
+    assert_eq!(first.chunks, replayed.chunks);
+    assert_eq!(first.samples.len(), replayed.samples.len());
+    for (a, b) in first.samples.iter().zip(&replayed.samples) {
         assert_eq!(a.t, b.t);
         assert!(a.measured.distance_mm(b.measured) < 1e-9);
         assert!(a.commanded.distance_mm(b.commanded) < 1e-9);
@@ -71,7 +71,7 @@ fn commands_set_the_clock_to_their_recorded_instants() {
     let mut rig = replay(&log);
     ready(&mut rig);
     // A controller with a different rhythm and shorter waits: the commands advance the clock.
-    let mut again = Take::default();
+    let mut replayed = RunData::default();
     for (t, command) in log.commands.clone() {
         rig.clock
             .wait_until(skinrig_model::HostTime(t.0 - 1_000_000));
@@ -82,15 +82,15 @@ fn commands_set_the_clock_to_their_recorded_instants() {
             )
             .unwrap();
         assert_eq!(rig.clock.now(), t);
-        again.poll(&mut rig).unwrap();
+        replayed.poll(&mut rig).unwrap();
         assert_eq!(
-            again.samples.last().map(|s| s.t.0 / 1_000_000),
+            replayed.samples.last().map(|s| s.t.0 / 1_000_000),
             Some(t.0 / 1_000_000)
         );
     }
-    again.stop(&mut rig);
+    replayed.stop(&mut rig);
     // Every command was given, so stopping delivers the rest.
-    assert_eq!(first.chunks, again.chunks);
+    assert_eq!(first.chunks, replayed.chunks);
 }
 
 #[test]

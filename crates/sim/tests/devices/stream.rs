@@ -1,19 +1,19 @@
 //! Data of the simulated cameras: time base, rates, polarity, position, triggers.
 
-use crate::common::{Take, places, press_all, ready};
+use crate::common::{RunData, places, press_all, ready};
 use skinrig_formats::Decoder;
 use skinrig_model::{
     CameraId, CdEvent, Point2, Polarity, SimLevel, StreamFormat, TriggerEdge, pulse::decode_marks,
 };
 use skinrig_sim::{SimConfig, simulated_rig};
 
-fn decode(take: &Take, camera: CameraId) -> (Vec<CdEvent>, Vec<TriggerEdge>) {
+fn decode(take: &RunData, camera: CameraId) -> (Vec<CdEvent>, Vec<TriggerEdge>) {
     let (mut events, mut triggers) = (Vec::new(), Vec::new());
     Decoder::new(StreamFormat::Evt2).push_cd(&take.bytes(camera), &mut events, &mut triggers);
     (events, triggers)
 }
 
-fn run(config: &SimConfig, at: &[Point2]) -> Take {
+fn run(config: &SimConfig, at: &[Point2]) -> RunData {
     let mut rig = simulated_rig(config);
     ready(&mut rig);
     let mut take = press_all(&mut rig, at, &[10_000]).unwrap();
@@ -117,7 +117,7 @@ fn rates_match_the_paper() {
     let config = SimConfig::new(8, SimLevel::Geometric);
     let mut rig = simulated_rig(&config);
     ready(&mut rig);
-    let mut take = Take::default();
+    let mut take = RunData::default();
     let grid = places(12);
     let up = rig.robot_from_skin;
     let mut bounds = Vec::new();

@@ -249,8 +249,8 @@ impl EventCamera for MockCamera {
         Ok(())
     }
     fn take_notes(&mut self, notes: &mut Vec<String>) {
-        let mine = |of: &mut (CameraId, String)| of.0 == self.1;
-        notes.extend(lock(&self.0).faults.remark.take_if(mine).map(|r| r.1));
+        let is_own = |of: &mut (CameraId, String)| of.0 == self.1;
+        notes.extend(lock(&self.0).faults.remark.take_if(is_own).map(|r| r.1));
     }
     fn temperature_c(&mut self) -> Result<Option<f64>, DeviceError> {
         call(&self.0, self.role())?;

@@ -185,11 +185,11 @@ fn overflow_is_detected_by_its_counter() {
         let lost: u64 = chunks.iter().map(|c| c.lost_before).sum();
         assert_eq!(lost, camera.report().lost_bytes);
         // Reported with the start of the unknown interval, and no event after it has a time from before.
-        let told: Vec<usize> = (0..chunks.len())
+        let losses: Vec<usize> = (0..chunks.len())
             .filter(|n| chunks[*n].lost_before > 0)
             .collect();
-        assert!(told.iter().any(|n| chunks[*n].lost_from_us.is_some()));
-        for n in told {
+        assert!(losses.iter().any(|n| chunks[*n].lost_from_us.is_some()));
+        for n in losses {
             if let Some(after) = chunks[n..].iter().find(|c| !c.bytes.is_empty()) {
                 assert_eq!(after.bytes[3] >> 4, 8);
             }
@@ -201,7 +201,7 @@ fn overflow_is_detected_by_its_counter() {
         );
         let mut notes = Vec::new();
         camera.take_notes(&mut notes);
-        let said = notes.join("\n");
-        assert!(said.contains("overflow counter increased"), "{said}");
+        let text = notes.join("\n");
+        assert!(text.contains("overflow counter increased"), "{text}");
     });
 }

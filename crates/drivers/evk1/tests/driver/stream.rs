@@ -185,11 +185,11 @@ fn a_step_of_the_time_base_beyond_the_limit_is_a_loss_before_the_next_chunk() {
         .send(&bytes(&[high + 10, high + 21, high + 22, high + 21]));
     let mut chunks = Vec::new();
     camera.flush(&mut chunks).unwrap();
-    let told: Vec<_> = chunks
+    let reported: Vec<_> = chunks
         .iter()
         .map(|c| (c.lost_before, c.bytes.len()))
         .collect();
-    assert_eq!(told, [(0, 4), (4, 8), (4, 4)]);
+    assert_eq!(reported, [(0, 4), (4, 8), (4, 4)]);
     let seqs: Vec<u64> = chunks.iter().map(|c| c.seq).collect();
     let first = before.last().unwrap().seq + 1;
     assert_eq!(seqs, [first, first + 1, first + 2]);
@@ -239,8 +239,8 @@ fn a_step_of_the_overflow_counter_is_a_gap() {
     camera.poll(&mut chunks).unwrap();
     assert_eq!(chunks.len(), before, "not looked for yet");
     camera.flush(&mut chunks).unwrap();
-    let told = chunks.last().unwrap();
-    assert_eq!((told.lost_before, told.lost_from_us), (4, good_us));
+    let reported = chunks.last().unwrap();
+    assert_eq!((reported.lost_before, reported.lost_from_us), (4, good_us));
     let told_at = chunks.len();
     bench.pass(100);
     camera.flush(&mut chunks).unwrap();
@@ -491,11 +491,11 @@ fn a_continuing_loss_counts_its_duration_once() {
     inbox.push(&[0; 11], HostTime(30));
     blocks.extend(inbox.finish().blocks);
     let losses: Vec<_> = blocks.iter().filter_map(|b| b.lost_before).collect();
-    let told: Vec<_> = losses
+    let reported: Vec<_> = losses
         .iter()
         .map(|l| (l.bytes, l.since.0, l.until.0))
         .collect();
-    assert_eq!(told, [(401, 10, 20), (3, 20, 30)]);
+    assert_eq!(reported, [(401, 10, 20), (3, 20, 30)]);
 }
 
 /// A failed transfer: the data before it is whole, a loss is reported, and the data after it begins with a whole word.

@@ -141,8 +141,8 @@ impl<C: Clock> Engine<C> {
 
     fn power_up(&mut self, limits: &MotionLimits) -> Result<(), DeviceError> {
         let (sdk, id) = (Arc::clone(&self.sdk), self.opened.id);
-        let here = sdk.position(id).map_err(|e| self.call_error(e))?;
-        if !here.position_m.iter().all(|c| c.is_finite()) {
+        let position = sdk.position(id).map_err(|e| self.call_error(e))?;
+        if !position.position_m.iter().all(|c| c.is_finite()) {
             return Err(self.wrong_state("at a known position", "without one (not a number)"));
         }
         let started = regulation::start(&*sdk, id, &self.config, limits);
@@ -150,8 +150,12 @@ impl<C: Clock> Engine<C> {
         let (khz, old_cause) = self.await_regulation()?;
         // A braked arm sinks: start from the position that the regulation holds now.
         let now = self.clock.now();
-        let here = sdk.regulated_position(id).map_err(|e| self.call_error(e))?;
-        let tip = self.config.mount.axes.point_from_metres(here.position_m);
+        let position = sdk.regulated_position(id).map_err(|e| self.call_error(e))?;
+        let tip = self
+            .config
+            .mount
+            .axes
+            .point_from_metres(position.position_m);
         if !tip.is_finite() {
             return Err(self.wrong_state("at a known position", "without one (not a number)"));
         }

@@ -142,8 +142,8 @@ fn redundant_encoders_are_reported_and_required_only_where_the_rig_says_so() {
         match open(&sdk, &config, |_| Ok(())) {
             Ok(opened) => {
                 assert!(opens, "{word:?} {wanted:?}");
-                let there = opened.remarks.contains(&Remark::NoRedundantEncoders);
-                assert_eq!(there, remarked, "{word:?} {wanted:?}");
+                let is_remarked = opened.remarks.contains(&Remark::NoRedundantEncoders);
+                assert_eq!(is_remarked, remarked, "{word:?} {wanted:?}");
                 let recorded = opened.settings.iter().any(|s| {
                     s.name == "redundant_encoders"
                         && Some(&s.read_back) == word.map(|w| w.to_string()).as_ref()
