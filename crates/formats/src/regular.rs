@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn folders_devices_and_long_texts_are_refused() {
+    fn folders_devices_and_long_texts_are_rejected() {
         let folder = tempfile::tempdir().unwrap();
         let error = |path: &Path| read_text(path).unwrap_err().to_string();
         assert!(error(folder.path()).contains("found a folder"));

@@ -134,7 +134,7 @@ impl SceneNeed {
     }
 }
 
-/// The cheapest level that satisfies every need; [`SimLevel::Kinematic`] when there is none.
+/// The cheapest level that satisfies every need; [`SimLevel::Kinematic`] without needs.
 #[must_use]
 pub fn cheapest_level(needs: &[SceneNeed]) -> SimLevel {
     needs

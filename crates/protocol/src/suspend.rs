@@ -24,7 +24,7 @@ pub struct Suspend {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[setting(shape = FreeSpace::SHAPE, read = FreeSpace::threshold)]
     pub disk_free: Option<Threshold>,
-    /// Temperature of either camera; a camera that does not report it is not watched. The camera's maker states the limit.
+    /// Temperature of either camera; a camera that does not report it is not monitored. The camera's maker states the limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[setting(shape = Heat::SHAPE, read = Heat::threshold)]
     pub temperature: Option<Threshold>,

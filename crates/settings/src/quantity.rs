@@ -324,7 +324,7 @@ pub(crate) fn split_number(text: &str) -> (Option<f64>, &str) {
 /// Text after a `/` that is not a whole number above 0.
 struct BadDivisor<'a>(&'a str);
 
-/// A unit and the divisor after it, 1 when there is none. `mm/s` is a unit, `s / 289` a quotient.
+/// A unit and the divisor after it, 1 without a divisor. `mm/s` is a unit, `s / 289` a quotient.
 fn split_divisor(rest: &str) -> Result<(&str, f64), BadDivisor<'_>> {
     let Some((unit, divisor)) = rest.rsplit_once('/') else {
         return Ok((rest.trim(), 1.0));

@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_pressed_elsewhere_and_in_which_order_changes_nothing() {
+    fn contacts_elsewhere_and_their_order_have_no_effect() {
         let (grid, mut turned) = (grid(), grid());
         turned.reverse();
         let mut back = draws(&Contacts::default(), &turned);

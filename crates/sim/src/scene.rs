@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn in_the_dark_nobody_sees_a_press_and_hot_pixels_stay() {
+    fn in_the_dark_presses_are_invisible_and_hot_pixels_stay() {
         let (lit, dark) = (press(0, true), press(0, false));
         for (lit, dark) in lit.iter().zip(&dark) {
             assert!(5 * dark.len() < lit.len(), "{} {}", dark.len(), lit.len());

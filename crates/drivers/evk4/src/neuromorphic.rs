@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn a_machine_without_these_cameras_says_so() {
+    fn a_machine_without_these_cameras_is_reported() {
         for model in Model::ALL {
             assert_eq!(stated(model), sensor(model), "{}", model.word());
             let mut link = Neuromorphic::new(model, "FFFFFFFF");

@@ -10,7 +10,7 @@ use crate::error::RecorderError;
 /// Result of a salvage.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct SalvageReport {
-    /// Row counts by table, in schema order, without tables of which nothing is known.
+    /// Row counts by table, in schema order, without tables of unknown row counts.
     pub tables: Vec<SalvagedTable>,
     /// Lost camera bytes.
     pub lost: Vec<LostBytes>,

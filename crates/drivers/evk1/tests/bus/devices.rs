@@ -72,9 +72,9 @@ fn a_camera_is_opened_by_serial_number_without_touching_others() {
 }
 
 #[test]
-fn an_empty_bus_names_what_to_check() {
+fn an_empty_bus_is_reported_with_the_next_step() {
     on_bus(
-        "devices::an_empty_bus_names_what_to_check",
+        "devices::an_empty_bus_is_reported_with_the_next_step",
         Vec::new(),
         |_| {
             assert_eq!(enumerate().unwrap(), []);

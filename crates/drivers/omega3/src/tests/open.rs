@@ -122,7 +122,7 @@ fn initialisation_requires_that_the_sample_is_off_and_ends_braked() {
 }
 
 #[test]
-fn redundant_encoders_are_reported_and_required_only_where_the_rig_says_so() {
+fn redundant_encoders_are_reported_and_required_only_if_configured() {
     use RedundantEncoders::{Reported, Required};
     // Status word 13; missing in SDKs that write fewer words.
     for (word, wanted, opens, remarked) in [
