@@ -141,7 +141,7 @@ fn camera_pattern(
     assert_eq!(pixels, Ok(None), "camera: no pattern is always possible");
     let wanted = |rate_ev_s| Some(TestPattern { rate_ev_s });
     let scan = match camera.test_pattern(wanted(200e3)) {
-        Ok(scan) => scan.expect("camera: a pattern that is made must be told"),
+        Ok(scan) => scan.expect("camera must report its test pattern"),
         Err(DeviceError::Refused { .. }) => return,
         Err(e) => panic!("camera: a pattern must be made or refused: {e}"),
     };

@@ -180,7 +180,7 @@ impl SessionReader {
         let (mut last_us, mut open) = (None, None::<Loss>);
         for chunk in self.chunk_index(camera)? {
             if chunk.lost_before > 0 {
-                let told_us = chunk.lost_time.and_then(|t| t.from_us);
+                let reported_us = chunk.lost_time.and_then(|t| t.from_us);
                 let loss = open.get_or_insert(Loss {
                     seq: chunk.seq,
                     bytes: 0,
@@ -191,7 +191,7 @@ impl SessionReader {
                 });
                 loss.bytes = loss.bytes.saturating_add(chunk.lost_before);
                 // A device may report an earlier start of the loss.
-                let from_us = [loss.time.from_us, told_us];
+                let from_us = [loss.time.from_us, reported_us];
                 loss.time.from_us = from_us.into_iter().flatten().min();
             }
             if let (Some(first), Some(last)) = (chunk.facts.first_us, chunk.facts.last_us) {
