@@ -58,19 +58,19 @@ use clap::Parser;
 use crate::args::{Cli, Command};
 use crate::exit::{Exit, Outcome};
 
-/// Parses these words (the first is the program's name) and runs nothing.
+/// Parses a command line (the first word is the program's name) without running it.
 ///
 /// # Errors
-/// What clap finds wrong with them; help and version are such an error too.
+/// Errors of clap, which include help and version.
 pub fn parse(words: &[&str]) -> Result<(), clap::Error> {
     Cli::try_parse_from(words).map(|_| ())
 }
 
-/// Runs the program with these arguments (the first is its own name) and says how it ended.
+/// Runs the program with these arguments (the first is its own name) and returns its exit status.
 pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     signals::take_file_limits_as_errors();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
-    let cli = match args::parse(tag::spelled_out(arguments.clone())) {
+    let cli = match args::parse(tag::expand_removals(arguments.clone())) {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version are not errors; clap prints them to standard output.

@@ -1,4 +1,4 @@
-//! Arguments of what plans, runs and watches: the commands about a bench.
+//! Arguments of the commands that plan, run and watch experiments.
 
 use std::path::PathBuf;
 
@@ -27,12 +27,12 @@ pub struct PlanArgs {
     #[arg(long, value_name = "FILE", conflicts_with = "detect")]
     pub svg: Option<PathBuf>,
 
-    /// Power analysis: what to press to find a difference.
+    /// Power analysis: the presses needed to find a difference.
     #[command(flatten)]
     pub detect: DetectArgs,
 }
 
-/// What to press on two skins to find a difference between them.
+/// Options of the power analysis: the presses needed to find a difference between two skins.
 #[derive(Debug, Args)]
 pub struct DetectArgs {
     /// Propose the locations and repetitions that would show an RMSE difference this large between two skins, for example "1 mm".
@@ -76,7 +76,7 @@ pub(crate) struct RunArgs {
     pub rig: Option<PathBuf>,
 
     /// Accept mismatches of the rig's cameras (status bytes, resets, transfers, register read-backs), and print the rig file keys that
-    /// accept them for good. The session records it.
+    /// accept them permanently. The session records it.
     #[arg(long, requires = "rig")]
     pub tolerant: bool,
 
@@ -199,8 +199,8 @@ pub(crate) struct JogArgs {
     #[arg(long, value_name = "FILE")]
     pub log: Option<PathBuf>,
 
-    /// Let the tip go deeper below the surface of the rig file's frame than its `limits.max_depth`, down to the end of the
-    /// workspace: for touching off a skin that lies elsewhere. It is logged.
+    /// Let the tip go deeper below the frame's surface than the rig file's `limits.max_depth`, down to the end of the
+    /// workspace, to touch off a skin that is mounted elsewhere. The log records it.
     #[arg(long)]
     pub beyond_frame: bool,
 
