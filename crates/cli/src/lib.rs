@@ -9,6 +9,7 @@ mod args;
 pub mod check;
 mod compare;
 mod completions;
+mod conclusion;
 mod control;
 mod devices;
 mod doctor;

@@ -15,7 +15,7 @@ use crate::exit::Failure;
 use crate::results::{self, Choices};
 use crate::signals::Operator;
 use crate::terminal::Output;
-use crate::{analyses, check, compare, run};
+use crate::{analyses, check, compare, conclusion, run};
 
 /// Returns the official analysis of a session for its tables, without the bulk data for figures, and its later legs as aligned.
 /// Reads the results beside the session if they belong to it and to this version of the analysis; otherwise analyses the session.
@@ -200,7 +200,7 @@ pub fn simulate(simulation: Simulation, control: ControlHandle) -> Result<PathBu
     };
     let operator = Operator::elsewhere(control);
     let (session, report) = run::simulated(&args, checked, &command_line, output, &operator)?;
-    match run::end_of(&session, &report)? {
+    match conclusion::end_of(&session, &report)? {
         None => Ok(session),
         Some(stopped) => Err(Failure::stopped(stopped)),
     }

@@ -16,6 +16,7 @@ use skinrig_protocol::{Plan, Protocol, Route};
 use skinrig_recorder::{DeviceRow, RecorderError, SessionReader, SessionWriter};
 
 use crate::args::ResumeArgs;
+use crate::conclusion::{close, conclude};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::fault::FaultInjector;
 use crate::hil::lease;
@@ -24,7 +25,6 @@ use crate::paths;
 use crate::progress::ProgressView;
 use crate::rig::tolerated::ToleratedMismatches;
 use crate::rig::{self, bench, gates, planted};
-use crate::run::{close, conclude};
 use crate::signals::Operator;
 use crate::sink::{ReplayExpectations, SessionSink};
 use crate::terminal::Output;

@@ -26,8 +26,9 @@ use skinrig_protocol::Schedule;
 use skinrig_sim::SimClock;
 
 use crate::args::ImportArgs;
+use crate::conclusion::conclude;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::run::{Intent, conclude, record};
+use crate::run::{Intent, record};
 use crate::signals::Operator;
 use crate::sink::ReplayExpectations;
 use crate::terminal::Output;
