@@ -23,11 +23,9 @@ const ASK_EVERY: Duration = Duration::from_millis(20);
 /// request has not had its effect within `--wait`.
 pub(crate) fn control(args: &ControlArgs, json: bool) -> Outcome {
     let session = sessions::find_running(&args.session)?;
-    let number = handed(&session, &Request::Control(args.what))?;
-    let acknowledged = wait(&session, ACKNOWLEDGE_WITHIN, |live| live.heard >= number)?;
-    let after = match (acknowledged, args.wait) {
-        (WaitOutcome::Late(live), _) => return Err(no_acknowledgement(&live)),
-        (WaitOutcome::Until(_), Some(seconds)) => {
+    let acknowledged = acknowledged(&session, args.what)?;
+    let after = match args.wait {
+        Some(seconds) => {
             let within = Duration::try_from_secs_f64(seconds)
                 .map_err(|e| Failure::input(format!("--wait: {e}")))?;
             match wait(&session, within, |live| has_effect(args.what, &live.state))? {
@@ -37,15 +35,16 @@ pub(crate) fn control(args: &ControlArgs, json: bool) -> Outcome {
                         live.state
                     )));
                 }
-                other => other,
+                WaitOutcome::Until(live) => Some(live),
+                WaitOutcome::Ended => None,
             }
         }
-        (other, _) => other,
+        None => acknowledged,
     };
-    let state = match after {
-        WaitOutcome::Until(live) | WaitOutcome::Late(live) => live.state,
-        WaitOutcome::Ended => return ended(args.what, &session, json),
+    let Some(live) = after else {
+        return ended(args.what, &session, json);
     };
+    let state = live.state;
     if json {
         crate::terminal::print_json(&serde_json::json!({
             "session": session, "request": args.what, "heard": true, "state": state,
@@ -54,6 +53,19 @@ pub(crate) fn control(args: &ControlArgs, json: bool) -> Outcome {
         outln!("{}: acknowledged; the run is {state}", session.display());
     }
     Ok(Exit::Ok)
+}
+
+/// Hands a request to the run of `session`; the run once it has acknowledged it, `None` if it has ended.
+///
+/// # Errors
+/// As [`control`].
+pub(crate) fn acknowledged(session: &Path, what: RunRequest) -> Result<Option<Box<Live>>, Failure> {
+    let number = handed(session, &Request::Control(what))?;
+    match wait(session, ACKNOWLEDGE_WITHIN, |live| live.heard >= number)? {
+        WaitOutcome::Until(live) => Ok(Some(live)),
+        WaitOutcome::Late(live) => Err(no_acknowledgement(&live)),
+        WaitOutcome::Ended => Ok(None),
+    }
 }
 
 /// The run ended: what was asked for, or too early for it.
@@ -97,29 +109,39 @@ pub(crate) fn note(args: &NoteArgs, json: bool) -> Outcome {
         None => user_name(),
     };
     let text = args.text.join(" ");
-    let request = Request::Note {
-        by: by.clone(),
-        text: text.clone(),
-    };
-    let number = handed(&session, &request)?;
-    match wait(&session, ACKNOWLEDGE_WITHIN, |live| live.noted >= number)? {
-        WaitOutcome::Until(_) if json => crate::terminal::print_json(&serde_json::json!({
+    let goes_on = written(&session, &by, &text)?;
+    if !goes_on {
+        outln!("{}: noted; the run has ended", session.display());
+    } else if json {
+        crate::terminal::print_json(&serde_json::json!({
             "session": session, "by": by, "note": text, "written": true,
-        })),
-        WaitOutcome::Until(_) => outln!("{}: noted", session.display()),
-        WaitOutcome::Late(live) => return Err(no_acknowledgement(&live)),
-        // Written at the end of the run, or lost with a run that was killed: the session tells.
-        WaitOutcome::Ended if is_noted(&session, &format!("{by}: {text}")) => {
-            outln!("{}: noted; the run has ended", session.display());
-        }
-        WaitOutcome::Ended => {
-            return Err(Failure::input(format!(
-                "{}: the run ended before the note was written",
-                session.display()
-            )));
-        }
+        }));
+    } else {
+        outln!("{}: noted", session.display());
     }
     Ok(Exit::Ok)
+}
+
+/// Hands the run of `session` a remark, and waits until it is written. False if the run has ended meanwhile.
+///
+/// # Errors
+/// As [`control`].
+pub(crate) fn written(session: &Path, by: &str, text: &str) -> Result<bool, Failure> {
+    let request = Request::Note {
+        by: by.to_owned(),
+        text: text.to_owned(),
+    };
+    let number = handed(session, &request)?;
+    match wait(session, ACKNOWLEDGE_WITHIN, |live| live.noted >= number)? {
+        WaitOutcome::Until(_) => Ok(true),
+        WaitOutcome::Late(live) => Err(no_acknowledgement(&live)),
+        // Written at the end of the run, or lost with a run that was killed: the session tells.
+        WaitOutcome::Ended if is_noted(session, &format!("{by}: {text}")) => Ok(false),
+        WaitOutcome::Ended => Err(Failure::input(format!(
+            "{}: the run ended before the note was written",
+            session.display()
+        ))),
+    }
 }
 
 fn is_noted(session: &Path, note: &str) -> bool {

@@ -17,6 +17,8 @@ use crate::signals::Operator;
 use crate::terminal::Output;
 use crate::{analyses, check, compare, run};
 
+pub use crate::view::Program;
+
 /// The official analysis of a session for its tables, without the bulk data for figures, and its further legs as aligned. Taken
 /// from the results beside the session if they are its own and of this version of the analysis; else it is analysed.
 ///
