@@ -76,7 +76,7 @@ export const session = async (name, about, signal) => {
   if (!s.writer) draw();
   return [card,
     el('p', { class: `notice ${a && !a.valid ? 'bad' : ''}` }, summary),
-    el('div', { class: 'two' }, el('section', { class: 'card', id: 'map', 'aria-label': 'Skin map' }, map.svg),
+    el('div', { class: 'two' }, el('section', { class: 'card', id: 'map', 'aria-label': 'Skin map' }, map.svg, el('p', { class: 'soft' }, 'Colour: error, from 0 mm (blue) to 5 mm and more (red); without an error, the verdict. Lines: rays of both cameras.')),
       el('section', { class: 'card', 'aria-label': 'Playback' }, el('div', { class: 'cameras fig' }, pictures.map(p => p.canvas)),
         el('div', { class: 'transport' }, play, timeLabel, speedLabel, windowLabel), said,
         el('div', { class: 'transport' }, save('events_camera1', 'csv', 'Events 1 as CSV'), save('events_camera2', 'csv', 'Events 2 as CSV'), save('pose', 'csv', 'Path as CSV'), save('presses', 'npz', 'Presses as npz')))),

@@ -39,9 +39,19 @@ fn only_the_own_page_with_the_token_gets_answers() {
     assert!(status == 200 && page.contains("content-security-policy: default-src 'none'"));
     assert_eq!(get("/api/shelf", &own).0, 200);
     assert_eq!(get("/api/shelf", &format!("Host: {to}")).0, 401);
-    assert_eq!(get("/api/shelf", &own.replace(&token[..8], "00000000")).0, 401);
+    assert_eq!(
+        get("/api/shelf", &own.replace(&token[..8], "00000000")).0,
+        401
+    );
     assert_eq!(get("/", "Host: evil.example").0, 403);
-    assert_eq!(get("/api/shelf", &format!("{own}\r\nOrigin: http://evil.example")).0, 403);
+    assert_eq!(
+        get(
+            "/api/shelf",
+            &format!("{own}\r\nOrigin: http://evil.example")
+        )
+        .0,
+        403
+    );
     let json = format!("{own}\r\nContent-Type: application/json");
     let post = ask(to, &format!("POST /api/control HTTP/1.1\r\n{json}"), "{}");
     assert!(post.0 == 403 && post.1.contains("only reads"), "{}", post.1);

@@ -8,9 +8,10 @@ use std::time::{Duration, Instant};
 use serde_json::json;
 use skinrig_recorder::{RecorderError, writer_of};
 
+use super::alarms;
 use super::estimates::Estimates;
 use super::looks::Looks;
-use super::{Hub, Sender, alarms};
+use super::parts::{Sender, publish};
 use crate::lab::{Lab, RunState};
 
 /// Between two questions to the run, and two looks at the state of the file.
@@ -35,8 +36,13 @@ impl Sealing {
     }
 }
 
-/// Follows the session at `path` until nobody writes or watches it any more.
-pub(super) fn follow(hub: &Hub, lab: &Arc<dyn Lab>, path: &Path, to: &Sender) {
+/// Follows the session at `path` until nobody writes or watches it any more; `leave` forgets it.
+pub(super) fn follow(
+    leave: impl Fn(&Path, bool) -> bool,
+    lab: &Arc<dyn Lab>,
+    path: &Path,
+    to: &Sender,
+) {
     let stop = Arc::new(AtomicBool::new(false));
     let mut looks = Looks::new(path);
     let mut estimates = Estimates::new(path, &stop);
@@ -88,14 +94,14 @@ pub(super) fn follow(hub: &Hub, lab: &Arc<dyn Lab>, path: &Path, to: &Sender) {
         if to.receiver_count() > 0 {
             unwatched = None;
         } else if unwatched.get_or_insert_with(Instant::now).elapsed() > UNWATCHED
-            && hub.leave(path, false)
+            && leave(path, false)
         {
             break;
         }
         std::thread::sleep(TICK);
     }
     stop.store(true, Ordering::Relaxed);
-    hub.leave(path, true);
+    leave(path, true);
 }
 
 /// A run whose first records are not on the disk yet.
@@ -104,9 +110,4 @@ fn is_beginning(error: &RecorderError) -> bool {
         error,
         RecorderError::Empty { .. } | RecorderError::NotASession { .. }
     )
-}
-
-/// Replaces a part for all pages, if it changed.
-pub(super) fn publish(to: &Sender, name: &'static str, value: &impl serde::Serialize) {
-    to.send_if_modified(|parts| parts.set(name, value));
 }

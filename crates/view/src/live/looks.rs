@@ -9,8 +9,8 @@ use skinrig_model::{CameraId, HostTime, PlannedPress, StereoGeometry, StreamForm
 use skinrig_recorder::{AttemptRow, InterruptionRow, RecorderError, SessionReader};
 use skinrig_results::RigDocument;
 
-use super::follower::publish;
-use super::{Sender, picture};
+use super::parts::{Sender, publish};
+use super::picture;
 use crate::document;
 use crate::folder::name_of;
 

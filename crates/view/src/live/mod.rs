@@ -7,6 +7,7 @@ mod alarms;
 mod estimates;
 mod follower;
 mod looks;
+mod parts;
 mod picture;
 
 use std::collections::BTreeMap;
@@ -17,65 +18,16 @@ use std::time::Duration;
 use axum::body::{Body, Bytes};
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
-use serde::Serialize;
 use tokio::sync::watch;
 
 use crate::lab::Lab;
 use crate::problem::Problem;
+use parts::{Parts, Sender};
 
 /// A comment is sent after this long without news, so that a connection that is gone is noticed.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 /// Sessions that are followed at a time, at most.
 const MOST_FOLLOWED: usize = 16;
-
-/// Newest value of one part, as a server-sent event.
-#[derive(Clone)]
-struct Part {
-    name: &'static str,
-    version: u64,
-    event: Bytes,
-}
-
-/// Newest values of all parts.
-#[derive(Default)]
-pub(crate) struct Parts {
-    version: u64,
-    parts: Vec<Part>,
-}
-
-impl Parts {
-    /// Replaces a part; false if its value is the same.
-    fn set(&mut self, name: &'static str, value: &impl Serialize) -> bool {
-        let Ok(json) = serde_json::to_string(value) else {
-            return false;
-        };
-        let event = Bytes::from(format!("event: {name}\ndata: {json}\n\n"));
-        let place = self.parts.iter_mut().find(|p| p.name == name);
-        if place.as_ref().is_some_and(|p| p.event == event) {
-            return false;
-        }
-        self.version += 1;
-        let part = Part {
-            name,
-            version: self.version,
-            event,
-        };
-        match place {
-            Some(place) => *place = part,
-            None => self.parts.push(part),
-        }
-        true
-    }
-
-    /// All parts newer than `seen`, as one block.
-    fn since(&self, seen: u64) -> Bytes {
-        let new = self.parts.iter().filter(|p| p.version > seen);
-        let blocks: Vec<&[u8]> = new.map(|p| p.event.as_ref()).collect();
-        Bytes::from(blocks.concat())
-    }
-}
-
-type Sender = watch::Sender<Parts>;
 
 /// The sessions that are followed.
 #[derive(Clone, Default)]
@@ -100,9 +52,10 @@ impl Hub {
                 let sender = Arc::new(sender);
                 let (hub, lab, of) = (self.clone(), Arc::clone(lab), path.to_owned());
                 let its = Arc::clone(&sender);
+                let leave = move |path: &Path, in_any_case| hub.leave(path, in_any_case);
                 std::thread::Builder::new()
                     .name("follow".to_owned())
-                    .spawn(move || follower::follow(&hub, &lab, &of, &its))
+                    .spawn(move || follower::follow(leave, &lab, &of, &its))
                     .map_err(Problem::internal)?;
                 followed.insert(path.to_owned(), sender);
                 receiver
@@ -113,7 +66,7 @@ impl Hub {
         Ok(([kind], Body::from_stream(events(receiver))).into_response())
     }
 
-    /// Ends following `path` if nobody watches it any more, or in any case.
+    /// Forgets `path` if nobody watches it any more, or in any case; true if it is forgotten.
     fn leave(&self, path: &Path, in_any_case: bool) -> bool {
         let mut followed = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let unwatched = followed.get(path).is_none_or(|s| s.receiver_count() == 0);
@@ -145,26 +98,4 @@ fn events(
             }
         }
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_page_gets_the_newest_value_of_each_part_once() {
-        let mut parts = Parts::default();
-        assert!(parts.set("run", &1));
-        assert!(parts.set("presses", &"a"));
-        assert!(!parts.set("run", &1));
-        let all = parts.since(0);
-        assert_eq!(
-            &all[..],
-            b"event: run\ndata: 1\n\nevent: presses\ndata: \"a\"\n\n"
-        );
-        let seen = parts.version;
-        assert!(parts.since(seen).is_empty());
-        assert!(parts.set("run", &2) && parts.set("run", &3));
-        assert_eq!(&parts.since(seen)[..], b"event: run\ndata: 3\n\n");
-    }
 }
