@@ -23,11 +23,9 @@ const ASK_EVERY: Duration = Duration::from_millis(20);
 /// [`Failure::limit`] when the request has not taken effect within `--wait`.
 pub(crate) fn control(args: &ControlArgs, json: bool) -> Outcome {
     let session = sessions::find_running(&args.session)?;
-    let number = send(&session, &Request::Control(args.what))?;
-    let acknowledged = wait(&session, ACKNOWLEDGE_WITHIN, |live| live.heard >= number)?;
-    let after = match (acknowledged, args.wait) {
-        (WaitOutcome::TimedOut(live), _) => return Err(no_acknowledgement(&live)),
-        (WaitOutcome::Done(_), Some(seconds)) => {
+    let acknowledged = request(&session, args.what)?;
+    let after = match args.wait {
+        Some(seconds) => {
             let within = Duration::try_from_secs_f64(seconds)
                 .map_err(|e| Failure::input(format!("--wait: {e}")))?;
             match wait(&session, within, |live| has_effect(args.what, &live.state))? {
@@ -37,15 +35,16 @@ pub(crate) fn control(args: &ControlArgs, json: bool) -> Outcome {
                         live.state
                     )));
                 }
-                other => other,
+                WaitOutcome::Done(live) => Some(live),
+                WaitOutcome::Ended => None,
             }
         }
-        (other, _) => other,
+        None => acknowledged,
     };
-    let state = match after {
-        WaitOutcome::Done(live) | WaitOutcome::TimedOut(live) => live.state,
-        WaitOutcome::Ended => return ended(args.what, &session, json),
+    let Some(live) = after else {
+        return ended(args.what, &session, json);
     };
+    let state = live.state;
     if json {
         crate::terminal::print_json(&serde_json::json!({
             "session": session, "request": args.what, "heard": true, "state": state,
@@ -54,6 +53,19 @@ pub(crate) fn control(args: &ControlArgs, json: bool) -> Outcome {
         outln!("{}: acknowledged; the run is {state}", session.display());
     }
     Ok(Exit::Ok)
+}
+
+/// Sends a request to a session's run. Returns the run's status after the acknowledgement; `None` if the run has ended.
+///
+/// # Errors
+/// As [`control`].
+pub(crate) fn request(session: &Path, what: RunRequest) -> Result<Option<Box<Live>>, Failure> {
+    let number = send(session, &Request::Control(what))?;
+    match wait(session, ACKNOWLEDGE_WITHIN, |live| live.heard >= number)? {
+        WaitOutcome::Done(live) => Ok(Some(live)),
+        WaitOutcome::TimedOut(live) => Err(no_acknowledgement(&live)),
+        WaitOutcome::Ended => Ok(None),
+    }
 }
 
 /// Result for a run that ended: success if the request was to end it, otherwise an error.
@@ -97,29 +109,39 @@ pub(crate) fn note(args: &NoteArgs, json: bool) -> Outcome {
         None => user_name(),
     };
     let text = args.text.join(" ");
-    let request = Request::Note {
-        by: by.clone(),
-        text: text.clone(),
-    };
-    let number = send(&session, &request)?;
-    match wait(&session, ACKNOWLEDGE_WITHIN, |live| live.noted >= number)? {
-        WaitOutcome::Done(_) if json => crate::terminal::print_json(&serde_json::json!({
+    let is_running = add_note(&session, &by, &text)?;
+    if !is_running {
+        outln!("{}: noted; the run has ended", session.display());
+    } else if json {
+        crate::terminal::print_json(&serde_json::json!({
             "session": session, "by": by, "note": text, "written": true,
-        })),
-        WaitOutcome::Done(_) => outln!("{}: noted", session.display()),
-        WaitOutcome::TimedOut(live) => return Err(no_acknowledgement(&live)),
-        // Written at the end of the run, or lost if the run was killed: check the session.
-        WaitOutcome::Ended if is_noted(&session, &format!("{by}: {text}")) => {
-            outln!("{}: noted; the run has ended", session.display());
-        }
-        WaitOutcome::Ended => {
-            return Err(Failure::input(format!(
-                "{}: the run ended before the note was written",
-                session.display()
-            )));
-        }
+        }));
+    } else {
+        outln!("{}: noted", session.display());
     }
     Ok(Exit::Ok)
+}
+
+/// Adds a note to a session's run and waits until it is stored. Returns false if the run has ended since.
+///
+/// # Errors
+/// As [`control`].
+pub(crate) fn add_note(session: &Path, by: &str, text: &str) -> Result<bool, Failure> {
+    let request = Request::Note {
+        by: by.to_owned(),
+        text: text.to_owned(),
+    };
+    let number = send(session, &request)?;
+    match wait(session, ACKNOWLEDGE_WITHIN, |live| live.noted >= number)? {
+        WaitOutcome::Done(_) => Ok(true),
+        WaitOutcome::TimedOut(live) => Err(no_acknowledgement(&live)),
+        // Written at the end of the run, or lost if the run was killed: check the session.
+        WaitOutcome::Ended if is_noted(session, &format!("{by}: {text}")) => Ok(false),
+        WaitOutcome::Ended => Err(Failure::input(format!(
+            "{}: the run ended before the note was written",
+            session.display()
+        ))),
+    }
 }
 
 fn is_noted(session: &Path, note: &str) -> bool {

@@ -49,6 +49,7 @@ mod tradeoff;
 mod tradeoff_file;
 mod verify;
 mod version;
+mod view;
 mod watch;
 mod whole_file;
 
@@ -118,6 +119,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Jog(a) => jog::jog(a),
         Command::Hil(a) => hil::hil(a, &command_line(arguments), json),
         Command::Watch(a) => watch::watch(a, json),
+        Command::View(a) => view::view(a, json),
         Command::Prototypes(a) => prototypes::prototypes(a, json),
         Command::Tag(a) => tag::tag(a, json),
         Command::Sessions(a) => sessions::sessions(a, json),

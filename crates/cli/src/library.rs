@@ -17,6 +17,8 @@ use crate::signals::Operator;
 use crate::terminal::Output;
 use crate::{analyses, check, compare, conclusion, run};
 
+pub use crate::view::Program;
+
 /// Returns the official analysis of a session for its tables, without the bulk data for figures, and its later legs as aligned.
 /// Reads the results beside the session if they belong to it and to this version of the analysis; otherwise analyses the session.
 ///

@@ -80,6 +80,15 @@ pub(crate) fn prototypes(args: &PrototypesArgs, json: bool) -> Outcome {
     Ok(Exit::Ok)
 }
 
+/// The prototypes of a folder by their official analyses, as JSON.
+///
+/// # Errors
+/// As [`prototypes`].
+pub(crate) fn document(folder: &std::path::Path) -> Result<serde_json::Value, Failure> {
+    let sessions = list(folder).map_err(Failure::session)?;
+    serde_json::to_value(gather(&sessions, None)).map_err(Failure::internal)
+}
+
 /// Groups sessions by prototype, then by protocol and kind of rig; keeps their order.
 fn gather(sessions: &[SessionSummary], analysis: Option<&str>) -> Vec<Prototype> {
     type Groups = BTreeMap<(String, String), Vec<Point>>;

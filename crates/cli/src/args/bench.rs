@@ -224,3 +224,20 @@ pub(crate) struct WatchArgs {
     #[arg(long, value_name = "TIME", default_value = "1 s", value_parser = time_s)]
     pub every: f64,
 }
+
+/// Arguments of `view`.
+#[derive(Debug, Args)]
+pub(crate) struct ViewArgs {
+    /// A folder of sessions, or the session that the page opens first; its folder is the shelf.
+    #[arg(default_value = "sessions")]
+    pub session: PathBuf,
+
+    /// Open this address of this computer instead, as ADDRESS or ADDRESS:PORT: other computers that reach it and have the link can read,
+    /// over an unencrypted connection [default: 127.0.0.1 and a free port].
+    #[arg(long, value_name = "ADDRESS", value_parser = crate::view::address)]
+    pub bind: Option<std::net::SocketAddr>,
+
+    /// Let pages pause, resume, stop, abort and annotate runs, with the rights of `skinrig control`.
+    #[arg(long)]
+    pub control: bool,
+}

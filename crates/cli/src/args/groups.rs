@@ -10,7 +10,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
     (
         "Record",
         &[
-            "run", "resume", "import", "watch", "status", "control", "note",
+            "run", "resume", "import", "watch", "view", "status", "control", "note",
         ],
     ),
     (

@@ -13,7 +13,7 @@ use clap::{Args, Parser, Subcommand};
 
 pub(crate) use self::bench::{
     ControlArgs, DetectArgs, DevicesArgs, JogArgs, NoteArgs, PlanArgs, ResumeArgs, RunArgs,
-    StatusArgs, WatchArgs,
+    StatusArgs, ViewArgs, WatchArgs,
 };
 pub(crate) use self::doctor::DoctorArgs;
 pub(crate) use self::evaluate::{AnalyzeArgs, CompareArgs, CostKind, ReportArgs, TradeoffArgs};
@@ -129,6 +129,12 @@ pub(crate) enum Command {
     #[command(after_help = "Examples:\n  skinrig watch\n  \
         skinrig watch sessions/NAME.session.sqlite --once")]
     Watch(WatchArgs),
+
+    /// Show sessions in the browser, live and afterwards: press map, events, poses, the folder's shelf.
+    #[command(after_help = "Examples:\n  skinrig view sessions/\n  \
+        skinrig view sessions/NAME.session.sqlite --control\n\n\
+        Prints a link with a random token. Only this computer can open it, unless --bind names another address.")]
+    View(ViewArgs),
 
     /// List recorded sessions.
     #[command(after_help = "Examples:\n  skinrig sessions sessions/\n  \

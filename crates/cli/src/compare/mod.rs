@@ -4,6 +4,7 @@ mod facts;
 mod inputs;
 mod margins;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use skinrig_analysis::{Analysis, AnalysisError};
@@ -51,6 +52,18 @@ pub(crate) fn compare(args: &CompareArgs, json: bool) -> Outcome {
         crate::terminal::out(format_args!("{table}"));
     }
     Err(Failure::input(blocked.unwrap_or_default()))
+}
+
+/// Settings of a session by key, as used in comparisons.
+///
+/// # Errors
+/// If the session cannot be read.
+pub(crate) fn values(
+    path: &Path,
+    reader: &skinrig_recorder::SessionReader,
+    header: &skinrig_model::RunHeader,
+) -> Result<BTreeMap<String, String>, Failure> {
+    facts::facts(path, reader, header).map(|facts| facts.values)
 }
 
 /// Compares skins and returns the results as JSON. If `out` names a page, also writes the page and the results file.

@@ -136,14 +136,32 @@ impl SessionReader {
         from_seq: u64,
         mut each: impl FnMut(ChunkMeta, &[u8]),
     ) -> Result<(), RecorderError> {
+        self.for_each_chunk_while(camera, from_seq, |meta, bytes| {
+            each(meta, bytes);
+            true
+        })
+    }
+
+    /// [`Self::for_each_chunk`] that ends after the first chunk for which `each` returns false.
+    ///
+    /// # Errors
+    /// At the first damaged chunk, after passing on all earlier ones.
+    pub fn for_each_chunk_while(
+        &self,
+        camera: CameraId,
+        from_seq: u64,
+        mut each: impl FnMut(ChunkMeta, &[u8]) -> bool,
+    ) -> Result<(), RecorderError> {
         let restarts = self.restarts(camera)?;
         let lost = self.lost_times(camera)?;
         let mut next = from_seq;
         while let Some((mut meta, bytes)) = self.chunk_at_or_after(camera, next)? {
             meta.restart_us = restarts.get(&meta.seq).copied();
             meta.lost_time = lost.get(&meta.seq).copied();
-            each(meta, &bytes);
             next = meta.seq + 1;
+            if !each(meta, &bytes) {
+                break;
+            }
         }
         Ok(())
     }
