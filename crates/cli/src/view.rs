@@ -16,7 +16,7 @@ use crate::args::ViewArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::remote::{Reply, Request, RunRequest, ask};
 use crate::rig::gates;
-use crate::{analyses, compare, control, paths, prototypes};
+use crate::{analyses, compare, control, paths, prototypes, sessions};
 
 /// Serves a folder of sessions until ctrl-C.
 ///
@@ -92,13 +92,20 @@ impl Lab for Program {
 
     fn request(&self, session: &Path, request: &str) -> Result<String, LabError> {
         let name = request.replace('_', "-");
-        let what = RunRequest::from_str(&name, false).map_err(LabError)?;
-        let after = control::request(session, what).map_err(told)?;
+        let what = RunRequest::from_str(&name, false).map_err(|_| {
+            LabError(format!(
+                "request: expected pause, pause_now, resume, stop, abort or halt, found `{}`",
+                request.escape_debug()
+            ))
+        })?;
+        let session = sessions::find_running(session).map_err(told)?;
+        let after = control::request(&session, what).map_err(told)?;
         Ok(after.map_or_else(|| State::Finished.name().to_owned(), |live| live.state))
     }
 
     fn note(&self, session: &Path, by: &str, text: &str) -> Result<(), LabError> {
-        control::add_note(session, by, text)
+        let session = sessions::find_running(session).map_err(told)?;
+        control::add_note(&session, by, text)
             .map(|_| ())
             .map_err(told)
     }

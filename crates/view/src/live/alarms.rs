@@ -44,13 +44,12 @@ pub(super) fn alarms(
             add("bad", format!("camera {}: {lost} bytes lost", k + 1));
         }
     }
-    let ended = |kind: InterruptionKind| kind.name();
-    if let Some(last) = looks.interruptions().last() {
+    // What the operator asked for is no alarm.
+    let faults = looks.interruptions().iter();
+    let mut faults = faults.filter(|i| i.kind == InterruptionKind::Fault);
+    if let Some(last) = faults.next_back() {
         let t = last.t.as_secs_f64();
-        add(
-            "warn",
-            format!("{} at {t:.1} s: {}", ended(last.kind), last.reason),
-        );
+        add("warn", format!("fault at {t:.1} s: {}", last.reason));
     }
     let failures = looks.failures_in_a_row();
     if failures >= FAILURES {
