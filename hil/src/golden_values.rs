@@ -30,74 +30,75 @@ const CLOCK_METRICS: [&str; 8] = [
     "reference_events",
 ];
 
-/// Adds the metrics of `analysis` to `found`, and evidence of problems that make them unreliable. `lost_bytes`: by camera.
-pub fn add(analysis: &Analysis, lost_bytes: [u64; 2], found: &mut Findings) {
-    evidence(analysis, lost_bytes, found);
+/// Adds the metrics of `analysis` to `findings`, and evidence of problems that make them unreliable.
+/// `lost_bytes` is by camera.
+pub fn add(analysis: &Analysis, lost_bytes: [u64; 2], findings: &mut Findings) {
+    evidence(analysis, lost_bytes, findings);
     if !analysis.is_valid() {
         // Without clocks no event can be assigned to a press.
         for metric in CLOCK_METRICS {
-            found.unmeasured(SKIN, metric);
+            findings.unmeasured(SKIN, metric);
         }
-        valid(analysis, found);
-        found.value(SKIN, "lost", lost(lost_bytes));
+        valid(analysis, findings);
+        findings.value(SKIN, "lost", lost(lost_bytes));
         return;
     }
     let scored = &analysis.scored;
-    estimate(found, "rmse", scored.rmse_mm, 1.0, PRESSES);
-    estimate(found, "repeat_std", scored.repeat_std_mm, 1.0, LOCATIONS);
+    estimate(findings, "rmse", scored.rmse_mm, 1.0, PRESSES);
+    estimate(findings, "repeat_std", scored.repeat_std_mm, 1.0, LOCATIONS);
     let contact = analysis.latency.as_ref().and_then(|l| l.from_contact);
     match contact {
-        Some(contact) => estimate(found, "latency", contact.median_ms, 1e-3, PRESSES),
+        Some(contact) => estimate(findings, "latency", contact.median_ms, 1e-3, PRESSES),
         None => {
-            found
+            findings
                 .unmeasured(SKIN, "latency")
-                .with_note("the contacts are not timed by a clock of their own");
+                .with_note("the contact times do not come from a clock of their own");
         }
     }
-    rates(analysis, found);
-    estimate(found, "located", scored.located_rate, 100.0, PRESSES);
-    valid(analysis, found);
-    references(analysis, found);
-    found.value(SKIN, "lost", lost(lost_bytes));
+    rates(analysis, findings);
+    estimate(findings, "located", scored.located_rate, 100.0, PRESSES);
+    valid(analysis, findings);
+    references(analysis, findings);
+    findings.value(SKIN, "lost", lost(lost_bytes));
 }
 
 fn lost([one, two]: [u64; 2]) -> f64 {
     (one + two) as f64
 }
 
-fn valid(analysis: &Analysis, found: &mut Findings) {
+fn valid(analysis: &Analysis, findings: &mut Findings) {
     let counts = analysis.counts;
     if counts.planned == 0 {
-        found.unmeasured(SKIN, "valid");
+        findings.unmeasured(SKIN, "valid");
         return;
     }
     let share = f64::from(counts.valid) / f64::from(counts.planned);
-    found
+    findings
         .value(SKIN, "valid", 100.0 * share)
         .with_samples(counts.planned as usize, PRESSES);
 }
 
-fn evidence(analysis: &Analysis, lost_bytes: [u64; 2], found: &mut Findings) {
+fn evidence(analysis: &Analysis, lost_bytes: [u64; 2], findings: &mut Findings) {
     for violation in &analysis.alignment.violations {
         let what = format!("the clocks of the session are not aligned: {violation}");
-        found.add_evidence(EvidenceKind::TriggerFault, "trigger box", what);
+        findings.add_evidence(EvidenceKind::TriggerFault, "trigger box", what);
     }
     for finding in &analysis.findings {
         let what = format!("{}; {}", finding.evidence, finding.advice);
         let camera = finding.camera.map(|c| ["camera1", "camera2"][c.index()]);
         let (kind, subject) = evidence_of(finding.fault, camera.unwrap_or("camera1"));
-        found.add_evidence(kind, subject, what);
+        findings.add_evidence(kind, subject, what);
     }
     for (camera, lost) in ["camera1", "camera2"].into_iter().zip(lost_bytes) {
         if lost > 0 {
             let what = format!("expected no lost data, found {lost} bytes lost");
-            found.add_evidence(EvidenceKind::DataLost, camera, what);
+            findings.add_evidence(EvidenceKind::DataLost, camera, what);
         }
     }
 }
 
-/// Kind of evidence and device of an audit finding. A camera or position that contradicts the rig file blames the rig, not
-/// the skin.
+/// Kind of evidence and device of an audit finding. Contradictions between the recording and the
+/// rig file are faults of the rig, not of the skin.
 const fn evidence_of(fault: Fault, camera: &'static str) -> (EvidenceKind, &'static str) {
     match fault {
         Fault::CameraBlind | Fault::NoEvents => (EvidenceKind::DeviceLost, camera),
@@ -126,10 +127,10 @@ const fn evidence_of(fault: Fault, camera: &'static str) -> (EvidenceKind, &'sta
     }
 }
 
-fn estimate(found: &mut Findings, metric: &'static str, e: Estimate, unit: f64, needs: u64) {
+fn estimate(findings: &mut Findings, metric: &'static str, e: Estimate, unit: f64, needs: u64) {
     let value = match e.value {
-        Some(value) => found.value(SKIN, metric, unit * value),
-        None => found.unmeasured(SKIN, metric),
+        Some(value) => findings.value(SKIN, metric, unit * value),
+        None => findings.unmeasured(SKIN, metric),
     };
     value.with_samples(e.n as usize, needs);
     value.interval = e
@@ -139,7 +140,7 @@ fn estimate(found: &mut Findings, metric: &'static str, e: Estimate, unit: f64, 
 }
 
 /// Event rates of both cameras together, over the valid presses.
-fn rates(analysis: &Analysis, found: &mut Findings) {
+fn rates(analysis: &Analysis, findings: &mut Findings) {
     let both = |of: fn(&PressResult, usize) -> Option<f64>| -> Vec<f64> {
         let valid = analysis
             .presses
@@ -157,38 +158,38 @@ fn rates(analysis: &Analysis, found: &mut Findings) {
         let n = rates.len();
         match Sample::of(&rates) {
             Some(sample) => {
-                let value = found
+                let value = findings
                     .value(SKIN, metric, sample.mean)
                     .with_samples(n, PRESSES);
                 value.interval = sample.interval();
             }
             None => {
-                found.unmeasured(SKIN, metric);
+                findings.unmeasured(SKIN, metric);
             }
         }
     }
 }
 
-/// Compares presses at the reference location, which is that of the first scored press: those at the start of the campaign with
-/// those at its end.
-fn references(analysis: &Analysis, found: &mut Findings) {
+/// Compares presses at the reference location (that of the first scored press) at the start of the
+/// campaign with those at its end.
+fn references(analysis: &Analysis, findings: &mut Findings) {
     let scored = |p: &&PressResult| p.role == PressRole::Score;
     let scored: Vec<&PressResult> = analysis.presses.iter().filter(scored).collect();
     let Some(first) = scored.first() else {
-        found.unmeasured(SKIN, "reference_shift");
-        found.unmeasured(SKIN, "reference_events");
+        findings.unmeasured(SKIN, "reference_shift");
+        findings.unmeasured(SKIN, "reference_events");
         return;
     };
-    let there = |p: &&&PressResult| p.planned.distance_mm(first.planned) <= SAME_LOCATION_MM;
-    let start: Vec<&PressResult> = scored.iter().take_while(there).copied().collect();
-    let end = scored.iter().rev().take_while(there).copied();
+    let is_reference = |p: &&&PressResult| p.planned.distance_mm(first.planned) <= SAME_LOCATION_MM;
+    let start: Vec<&PressResult> = scored.iter().take_while(is_reference).copied().collect();
+    let end = scored.iter().rev().take_while(is_reference).copied();
     let end: Vec<&PressResult> = end.take(scored.len() - start.len()).collect();
-    shift(&start, &end, found);
-    events(&start, &end, found);
+    shift(&start, &end, findings);
+    events(&start, &end, findings);
 }
 
 /// Distance between the mean estimates at start and end.
-fn shift(start: &[&PressResult], end: &[&PressResult], found: &mut Findings) {
+fn shift(start: &[&PressResult], end: &[&PressResult], findings: &mut Findings) {
     let estimates = |presses: &[&PressResult]| -> Vec<Point2> {
         presses.iter().filter_map(|p| p.estimate()).collect()
     };
@@ -200,11 +201,11 @@ fn shift(start: &[&PressResult], end: &[&PressResult], found: &mut Findings) {
         .into_iter()
         .map(|of: fn(&Point2) -> f64| Some((along(&start, of)?, along(&end, of)?)))
         .collect();
-    let few = start.len().min(end.len());
+    let n = start.len().min(end.len());
     let Some(axes) = axes else {
-        found
+        findings
             .unmeasured(SKIN, "reference_shift")
-            .with_samples(few, REFERENCES);
+            .with_samples(n, REFERENCES);
         return;
     };
     let square: f64 = axes.iter().map(|(a, b)| (b.mean - a.mean).powi(2)).sum();
@@ -213,17 +214,17 @@ fn shift(start: &[&PressResult], end: &[&PressResult], found: &mut Findings) {
         .iter()
         .map(|(a, b)| a.variance_of_mean() + b.variance_of_mean())
         .sum();
-    let value = found
+    let value = findings
         .value(SKIN, "reference_shift", shift_mm)
-        .with_samples(few, REFERENCES);
+        .with_samples(n, REFERENCES);
     if variance.is_finite() {
         let half = Z * variance.sqrt();
         value.interval = Some([(shift_mm - half).max(0.0), shift_mm + half]);
     }
 }
 
-/// Events of both cameras at the end as a percentage of those at the start.
-fn events(start: &[&PressResult], end: &[&PressResult], found: &mut Findings) {
+/// Events of both cameras at the end as a percentage of the start.
+fn events(start: &[&PressResult], end: &[&PressResult], findings: &mut Findings) {
     let counts = |presses: &[&PressResult]| -> Vec<f64> {
         let sums = presses.iter().map(|p| {
             let [one, two] = p.views;
@@ -232,22 +233,22 @@ fn events(start: &[&PressResult], end: &[&PressResult], found: &mut Findings) {
         sums.flatten().collect()
     };
     let (start, end) = (counts(start), counts(end));
-    let few = start.len().min(end.len());
+    let n = start.len().min(end.len());
     let ratio = Sample::of(&start)
         .zip(Sample::of(&end))
         .filter(|(a, _)| a.mean > 0.0);
     let Some((a, b)) = ratio else {
-        found
+        findings
             .unmeasured(SKIN, "reference_events")
-            .with_samples(few, REFERENCES);
+            .with_samples(n, REFERENCES);
         return;
     };
     let share = b.mean / a.mean;
-    // First order: relative variances add.
+    // Relative variances add to first order.
     let relative = a.variance_of_mean() / a.mean.powi(2) + b.variance_of_mean() / b.mean.powi(2);
-    let value = found
+    let value = findings
         .value(SKIN, "reference_events", 100.0 * share)
-        .with_samples(few, REFERENCES);
+        .with_samples(n, REFERENCES);
     if relative.is_finite() {
         let half = Z * share * relative.sqrt();
         value.interval = Some([100.0 * (share - half), 100.0 * (share + half)]);
@@ -299,7 +300,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn contradictions_of_the_rig_file_blame_the_rig() {
+    fn contradictions_of_the_rig_file_are_faults_of_the_rig() {
         let faults = [
             (Fault::CamerasSwapped, "camera2"),
             (Fault::OneCameraTwice, "camera2"),

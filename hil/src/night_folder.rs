@@ -25,7 +25,7 @@ pub struct NightFolder {
     path: PathBuf,
 }
 
-/// A folder cannot be created.
+/// The folder of a night could not be created.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: cannot create this folder: {source}", path.display())]
 pub struct CreateError {
@@ -77,7 +77,7 @@ impl NightFolder {
         &self.path
     }
 
-    /// Writes a file. Readers see the old version or the new one, never a part.
+    /// Writes a file atomically: readers see the old version or the new one, never a partial file.
     ///
     /// # Errors
     /// I/O errors.

@@ -1,8 +1,8 @@
-//! Where to look for a fault.
+//! Probable cause of a failed check: the part of the bench to investigate.
 
 use serde::{Deserialize, Serialize};
 
-/// What a failed check points to.
+/// Probable cause of a failed check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cause {

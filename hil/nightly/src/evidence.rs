@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// An observation.
+/// An observation during a check.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// What kind of observation.

@@ -6,14 +6,15 @@ use crate::night::{Attempt, Part};
 use crate::rules::{Case, Ruling, apply_rules};
 use crate::verdict::Verdict;
 
-/// The computer takes part in every check, so its evidence concerns every device.
+/// The computer takes part in every check, so evidence about it concerns every device.
 const COMPUTER: &str = "computer";
 
 /// Judges an attempt. `default_cause` applies to a broken limit without evidence.
 ///
-/// Each part is judged separately, so that evidence about one camera does not excuse the other. A part considers evidence about its
-/// own subject, about the computer, and about subjects that have no part (a check of the skin relies on all devices). A part without
-/// a broken limit and without evidence of its own considers all evidence: its measurement may have needed the other devices.
+/// Each part is judged separately, so that evidence about one camera does not excuse the other. A
+/// part considers evidence about its own subject, about the computer, and about subjects that have
+/// no part (a check of the skin relies on all devices). A part with neither a broken limit nor
+/// evidence of its own considers all evidence: its measurement may have needed the other devices.
 #[must_use]
 pub fn judge_attempt(
     (began_s, took_s): (f64, f64),
@@ -37,7 +38,8 @@ pub fn judge_attempt(
     }
 }
 
-/// Of two equally severe rulings, one that does not blame the computer wins, so that other faults stay visible.
+/// Sort key. Of two equally severe rulings, the one that does not blame the computer wins, so that
+/// other faults stay visible.
 fn severity(ruling: &Ruling) -> (Verdict, bool) {
     (ruling.verdict, ruling.cause != Some(Cause::Infrastructure))
 }
@@ -71,7 +73,7 @@ fn judge_empty(evidence: &[Evidence], default_cause: Cause) -> Ruling {
     })
 }
 
-/// When a failed check is repeated.
+/// How often a failed check is repeated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RepeatRule {
     /// Maximum number of repeats.
@@ -147,7 +149,7 @@ impl RepeatRule {
     }
 }
 
-/// Combined verdict of the attempts at a check.
+/// Combined verdict of the attempts to run a check.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CombinedVerdict {
     /// Verdict under the repeat rule.

@@ -22,7 +22,7 @@ pub enum Outcome {
     Passed,
     /// `failure`.
     Failure,
-    /// `error`: the test could not decide.
+    /// `error`: the test could not reach a verdict.
     Error,
     /// `skipped`.
     Skipped,
@@ -105,7 +105,7 @@ fn test_case(night: &Night, check: &CheckResult) -> TestCase {
     case
 }
 
-/// Zero for values that are no durations.
+/// Returns zero for negative and non-finite values.
 fn duration(seconds: f64) -> Duration {
     Duration::try_from_secs_f64(seconds).unwrap_or_default()
 }

@@ -102,7 +102,7 @@ pub struct CheckResult {
     pub witnesses: Vec<String>,
 }
 
-/// One attempt at a check.
+/// One attempt to run a check.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Attempt {
     /// Start, s after the start of the night.
@@ -117,7 +117,8 @@ pub struct Attempt {
     pub verdict: Verdict,
     /// Where to look; `None` when the verdict is good.
     pub cause: Option<Cause>,
-    /// Name of the rule behind the cause; `None`: a limit was broken, and no evidence explains it.
+    /// Name of the rule behind the cause; `None`: a limit was broken without evidence that explains
+    /// it.
     pub rule: Option<String>,
 }
 

@@ -12,11 +12,11 @@ pub struct Ruling {
     pub verdict: Verdict,
     /// Where to look; `None` when the verdict is good.
     pub cause: Option<Cause>,
-    /// Name of the applied rule; `None`: a limit was broken, and no evidence explains it.
+    /// Name of the applied rule; `None`: a limit was broken without evidence that explains it.
     pub rule: Option<&'static str>,
 }
 
-/// A rule: which evidence triggers it, and what follows.
+/// A rule: the evidence that triggers it, and the resulting cause and verdict.
 #[derive(Debug, Clone, Copy)]
 pub struct Rule {
     /// Name in results.
@@ -25,7 +25,8 @@ pub struct Rule {
     pub kinds: &'static [EvidenceKind],
     /// Where to look; `None`: the default cause of the check.
     pub cause: Option<Cause>,
-    /// Replaces a bad verdict. INCONCLUSIVE explains a missing measurement, never a broken limit.
+    /// Replaces a bad verdict. INCONCLUSIVE can explain a missing measurement, but never a broken
+    /// limit.
     pub verdict: Verdict,
     /// Explanation for the reader.
     pub reason: &'static str,
@@ -107,7 +108,8 @@ pub const GOLDEN_ON_A_BAD_RIG: Rule = Rule {
     reason: "a device that the golden campaign relies on was faulty in the same night",
 };
 
-/// Rule for presses of an arm that moves badly. It is triggered by other checks as well.
+/// Rule for presses by an arm that moves badly. It is triggered by other checks of the night, not
+/// by [`Evidence`].
 pub(crate) const TOUCH_ON_A_BAD_ARM: Rule = Rule {
     name: "touch-on-a-bad-arm",
     kinds: &[],
@@ -132,7 +134,7 @@ pub struct Case<'a> {
     pub evidence: &'a [&'a Evidence],
 }
 
-/// Applies the rules. A good verdict stands: evidence explains failures and does not create them.
+/// Applies the rules. A good verdict stands: evidence can explain a failure but cannot cause one.
 #[must_use]
 pub fn apply_rules(case: &Case<'_>) -> Ruling {
     let Case {
@@ -166,8 +168,9 @@ pub fn apply_rules(case: &Case<'_>) -> Ruling {
     )
 }
 
-/// Names of the checks of devices that the golden campaign uses. If one of them fails because of the rig, a golden skin beyond its
-/// limits says nothing about the skin. The drills run later and test the brakes only; the disk belongs to the computer.
+/// Names of the checks of devices that the golden campaign uses. If one of them fails because of
+/// the rig, a golden skin beyond its limits proves nothing about the skin. Drills are excluded:
+/// they run later and test only the brakes. The disk belongs to the computer.
 pub const WITNESSES: &[&str] = &[
     "identity",
     "settings",
@@ -184,7 +187,7 @@ pub const WITNESSES: &[&str] = &[
     "force_ceiling",
 ];
 
-/// Checks of the arm's free motion, and the check whose touches rely on it.
+/// Checks of the arm's free motion. The touches of `PRESS_CHECK` rely on them.
 const ARM_MOTION: [&str; 2] = ["repeatability", "step_response"];
 const PRESS_CHECK: &str = "depth";
 
@@ -213,7 +216,8 @@ pub fn apply_cross_check_rules(checks: &mut [CheckResult]) {
     }
 }
 
-/// A good press result of an arm that moves badly does not prove that the frame is right.
+/// Downgrades good press results of an arm that moves badly: they do not prove that the frame is
+/// right.
 fn downgrade_presses(checks: &mut [CheckResult]) {
     let moves_badly = |c: &&CheckResult| {
         ARM_MOTION.contains(&c.name.as_str()) && !c.verdict.is_good() && c.cause == Some(Cause::Rig)
@@ -223,9 +227,9 @@ fn downgrade_presses(checks: &mut [CheckResult]) {
     if witnesses.is_empty() {
         return;
     }
-    let made = |c: &&mut CheckResult| c.verdict.is_good() && c.skipped.is_none();
+    let is_good_run = |c: &&mut CheckResult| c.verdict.is_good() && c.skipped.is_none();
     let presses = checks.iter_mut().filter(|c| c.name == PRESS_CHECK);
-    for press in presses.filter(made) {
+    for press in presses.filter(is_good_run) {
         press.verdict = TOUCH_ON_A_BAD_ARM.verdict;
         press.cause = TOUCH_ON_A_BAD_ARM.cause;
         press.rule = Some(TOUCH_ON_A_BAD_ARM.name.to_owned());

@@ -9,7 +9,7 @@ use crate::cause::Cause;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "SCREAMING_SNAKE_CASE")]
 pub enum Verdict {
-    /// Not run, for a stated reason. Never outweighs another verdict.
+    /// Not run, for a stated reason. Any other verdict outweighs it.
     Skipped,
     /// Within its limit.
     Pass,
@@ -53,14 +53,14 @@ impl Verdict {
         matches!(self, Self::Skipped | Self::Pass | Self::Marginal)
     }
 
-    /// The worst of `children`. Without children nothing was measured: FAIL.
+    /// The worst of `children`. Without children the verdict is FAIL: nothing was measured.
     #[must_use]
     pub fn worst(children: impl IntoIterator<Item = Self>) -> Self {
         children.into_iter().max().unwrap_or(Self::Fail)
     }
 
-    /// Verdict on `value` (`None`: not measured) from `n` samples, of which at least `needed` are required, under `limit` (`None`:
-    /// recorded only, always PASS).
+    /// Verdict on `value` (`None`: not measured) from `n` samples, of which `needed` are required,
+    /// under `limit` (`None`: recorded only, always PASS).
     #[must_use]
     pub fn of_measurement(
         value: Option<f64>,
@@ -78,7 +78,7 @@ impl Verdict {
                 Side::Near => Self::Marginal,
                 Side::Beyond => Self::Fail,
             },
-            // Missing or not finite: the limit is not known to hold.
+            // A missing or non-finite value cannot show that the limit holds.
             _ => Self::Fail,
         }
     }
@@ -102,10 +102,10 @@ impl NightExit {
     /// Exit code from the verdict and cause of each check.
     #[must_use]
     pub fn of(checks: impl IntoIterator<Item = (Verdict, Option<Cause>)>) -> Self {
-        let made = checks.into_iter().filter(|(v, _)| *v != Verdict::Skipped);
-        let made: Vec<_> = made.collect();
-        let bad: Vec<_> = made.iter().filter(|(v, _)| !v.is_good()).collect();
-        if made.is_empty() {
+        let run = checks.into_iter().filter(|(v, _)| *v != Verdict::Skipped);
+        let run: Vec<_> = run.collect();
+        let bad: Vec<_> = run.iter().filter(|(v, _)| !v.is_good()).collect();
+        if run.is_empty() {
             // The exit code must not report success for a night in which nothing was checked.
             Self::Fail
         } else if bad.is_empty() {

@@ -9,7 +9,7 @@ use skinrig_nightly::trend::{Alarm, Report};
 use skinrig_recorder::{RecorderError, SessionReader};
 use skinrig_report::trend::Links;
 
-/// Reason for a missing session of an alarm.
+/// Why the session of an alarm is missing.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum NoEvidence {
     /// The night has no golden session.
@@ -34,7 +34,7 @@ pub(crate) enum NoEvidence {
     },
 }
 
-/// The files of an alarm.
+/// Files that belong to an alarm.
 #[derive(Debug)]
 pub(crate) struct AlarmEvidence {
     /// Folder of the history.
@@ -45,9 +45,10 @@ pub(crate) struct AlarmEvidence {
     pub session: Result<PathBuf, NoEvidence>,
 }
 
-/// Copies the session of every alarm once to `alarms/NIGHT/` beside the history. Returns one entry per alarm.
+/// Copies the session of every alarm to `alarms/NIGHT/` beside the history, unless it is there
+/// already. Returns one entry per alarm.
 pub(super) fn keep(history: &Path, report: &Report) -> Vec<AlarmEvidence> {
-    let one = |alarm: &Alarm| {
+    let preserve = |alarm: &Alarm| {
         let night = &report.nights[alarm.raised];
         let home = history::folder_of(history, &night.folder);
         let page = home.join(night_folder::PAGE);
@@ -62,10 +63,10 @@ pub(super) fn keep(history: &Path, report: &Report) -> Vec<AlarmEvidence> {
             session,
         }
     };
-    report.alarms.iter().map(one).collect()
+    report.alarms.iter().map(preserve).collect()
 }
 
-/// Puts a sealed session into `folder` if it is not there yet: a hard link where possible, otherwise a copy.
+/// Links or copies a sealed session into `folder`, unless it is there already.
 fn copy(session: &Path, folder: &Path) -> Result<PathBuf, NoEvidence> {
     let name = session.file_name().unwrap_or_default();
     let to = folder.join(name);
@@ -90,7 +91,7 @@ fn copy(session: &Path, folder: &Path) -> Result<PathBuf, NoEvidence> {
     }
 }
 
-/// `id` as part of a file name.
+/// Converts `id` to a safe file name.
 fn plain(id: &str) -> String {
     let safe = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
     let name: String = id.chars().map(|c| if safe(c) { c } else { '-' }).collect();
@@ -118,7 +119,7 @@ impl AlarmEvidence {
     }
 }
 
-/// A path, quoted for a shell.
+/// Quotes a path for a shell.
 fn quoted(path: &Path) -> String {
     let text = path.display().to_string();
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:+".contains(c);

@@ -11,7 +11,7 @@ use skinrig_protocol::suite::{Check, Suite};
 use skinrig_report::night;
 use skinrig_text::Paint;
 
-/// Shows and writes the night as it grows.
+/// Prints the progress of a night and saves its results.
 pub(super) struct Live {
     folder: NightFolder,
     display: Display,
@@ -29,7 +29,7 @@ enum Display {
 }
 
 impl Live {
-    /// For a night of `suite` in `folder`.
+    /// Progress of a night of `suite` in `folder`.
     #[must_use]
     pub(super) fn new(folder: NightFolder, suite: &Suite) -> Self {
         let terminal = io::stderr().is_terminal();
@@ -38,7 +38,7 @@ impl Live {
                 Some(suite.checks.len() as u64),
                 ProgressDrawTarget::stderr_with_hz(10),
             );
-            // The template is a constant; if it were wrong, the default style still counts checks.
+            // The template is a constant. If it were invalid, the default style would still count checks.
             if let Ok(style) =
                 ProgressStyle::with_template("{bar:20.cyan/blue} {pos}/{len} {elapsed}  {wide_msg}")
             {
@@ -59,7 +59,7 @@ impl Live {
         }
     }
 
-    /// Removes the live line and returns the first error in writing the night.
+    /// Removes the live line and returns the first error from writing the night.
     pub(super) fn finish(self) -> Option<io::Error> {
         if let Display::Bar(bar) = &self.display {
             bar.finish_and_clear();

@@ -1,4 +1,4 @@
-//! `skinrig hil`: a suite of checks on a bench.
+//! `skinrig hil`: runs suites of checks on a bench.
 
 pub(crate) mod accept;
 mod alarms;

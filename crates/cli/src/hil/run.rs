@@ -184,7 +184,7 @@ fn load(path: &Path) -> Result<Suite, Failure> {
     Suite::parse(&path.display().to_string(), &bytes).map_err(|found| Failure::findings(&found))
 }
 
-/// Rejects names in `--only` that are not checks of the suite.
+/// Rejects `--only` names that are not checks of the suite.
 fn known_checks(suite: &Suite, only: Option<&[String]>) -> Result<(), Failure> {
     for word in only.unwrap_or_default() {
         if !suite.checks.iter().any(|c| c.name == word) {
@@ -199,7 +199,7 @@ fn known_checks(suite: &Suite, only: Option<&[String]>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Inputs of the night's plan; reads and checks the golden protocol.
+/// Inputs of the night's plan. Reads and checks the golden protocol.
 fn plan_inputs(
     suite: &Suite,
     rig: &RigFile,

@@ -86,11 +86,11 @@ fn rebuild(path: &Path, nights: &Path) -> Result<(), Failure> {
     let cannot = |e| Failure::input(format!("--rebuild: {}: {e}", nights.display()));
     let entries = std::fs::read_dir(nights).map_err(cannot)?;
     let entries = entries.map(|e| e.map(|e| e.path().join(night_folder::JSON)));
-    let mut found: Vec<PathBuf> = entries.collect::<Result<_, _>>().map_err(cannot)?;
-    found.retain(|json| json.is_file());
-    found.sort();
-    let (mut new, mut known, mut left) = (0, 0, 0);
-    for json in &found {
+    let mut night_files: Vec<PathBuf> = entries.collect::<Result<_, _>>().map_err(cannot)?;
+    night_files.retain(|json| json.is_file());
+    night_files.sort();
+    let (mut new, mut known, mut skipped) = (0, 0, 0);
+    for json in &night_files {
         let night = history::read_night(json);
         let home = json.parent().unwrap_or(nights);
         match night.and_then(|night| history::append(path, &night, home)) {
@@ -99,20 +99,20 @@ fn rebuild(path: &Path, nights: &Path) -> Result<(), Failure> {
             Err(
                 e @ (HistoryError::InvalidNight { .. } | HistoryError::ConflictingNight { .. }),
             ) => {
-                left += 1;
+                skipped += 1;
                 errln!("warning: skipped: {e}");
             }
             Err(e) => return Err(Failure::input(e)),
         }
     }
-    if found.is_empty() {
+    if night_files.is_empty() {
         return Err(Failure::input(format!(
             "--rebuild: {}: expected folders with a {}, found none",
             nights.display(),
             night_folder::JSON
         )));
     }
-    errln!("{new} nights added, {known} already present, {left} skipped");
+    errln!("{new} nights added, {known} already present, {skipped} skipped");
     Ok(())
 }
 
@@ -132,7 +132,7 @@ fn is_unicode() -> bool {
     locale.is_some_and(|l| l.to_lowercase().replace('-', "").contains("utf8"))
 }
 
-/// Trends after a night.
+/// Trends up to a night.
 pub(super) struct After {
     pub report: Report,
     /// Links by alarm, relative to the night's folder.

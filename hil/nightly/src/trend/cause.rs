@@ -28,7 +28,7 @@ enum Component {
     Skin,
 }
 
-/// What a series describes, according to its check.
+/// Cause that a series points to, according to its check.
 #[must_use]
 pub(crate) fn series_cause(series: &str) -> Cause {
     let mut parts = series.split('/');
@@ -116,10 +116,10 @@ pub(super) fn attribute(before: &NightHead, after: &NightHead, series: &[&str]) 
 }
 
 fn changes(before: &NightHead, after: &NightHead) -> Vec<(Component, String)> {
-    let mut found = Vec::new();
+    let mut differences = Vec::new();
     let mut differ = |part, what: &str, a: &str, b: &str| {
         if a != b {
-            found.push((part, format!("{what} {a} -> {b}")));
+            differences.push((part, format!("{what} {a} -> {b}")));
         }
     };
     let (a, b) = (&before.versions, &after.versions);
@@ -152,7 +152,7 @@ fn changes(before: &NightHead, after: &NightHead) -> Vec<(Component, String)> {
     if let (Some(old), Some(new)) = (&a.skin, &b.skin) {
         differ(Component::Skin, "skin", old, new);
     }
-    found
+    differences
 }
 
 /// First digits of a digest.

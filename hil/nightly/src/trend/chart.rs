@@ -8,7 +8,8 @@ use super::history::{Acceptance, NightHead, Point, Series};
 use super::reference::{MAX_NIGHTS, MIN_NIGHTS, Reference, Sample};
 use super::run_length::Rule;
 
-/// Nights that a value waits before it joins the reference; a change that started with it is detected by then.
+/// Nights by which a value is delayed before it joins the reference. A change that starts with it
+/// is detected by then.
 const REFERENCE_DELAY: usize = 5;
 /// Consecutive nights within the limits that end an excursion.
 const RECOVERY_NIGHTS: usize = 5;
@@ -24,7 +25,7 @@ pub struct Chart {
     pub reference: Option<Reference>,
     /// Excursions, oldest first.
     pub excursions: Vec<Excursion>,
-    /// Indices of nights from which on the reference was learnt anew.
+    /// Indices of the nights at which the reference restarts.
     pub accepted: Vec<usize>,
 }
 
@@ -35,7 +36,8 @@ pub struct ChartPoint {
     pub night: usize,
     /// The value.
     pub value: f64,
-    /// Distance from the centre in standard deviations of a new night; `None` for nights that only train the reference.
+    /// Distance from the centre in standard deviations of a new night; `None` for nights that only
+    /// build the reference.
     pub score: Option<f64>,
 }
 
@@ -67,14 +69,16 @@ impl Direction {
     }
 }
 
-/// A period in which a series was off its reference.
+/// A period in which a series was outside its reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Excursion {
-    /// Direction of the change.
-    pub way: Direction,
     /// Index of the night that raised the alarm.
+    pub way: Direction,
+    /// Index of the last night of the excursion, which ends by recovery or acceptance; `None`:
+    /// still open.
     pub raised: usize,
-    /// Last night of the excursion, by return or acceptance; `None`: still open.
+    /// Index of the last night of the excursion, ended by recovery or acceptance; `None`: still
+    /// open.
     pub ended: Option<usize>,
     /// When the change began.
     pub change: ChangeWindow,
@@ -88,7 +92,7 @@ pub struct Excursion {
 struct ChartBuilder {
     is_count: bool,
     rules: [Rule; 2],
-    learnt: Vec<Sample>,
+    learned: Vec<Sample>,
     waiting: Vec<Sample>,
     reference: Option<Reference>,
     /// Scores against the current reference, oldest first.
@@ -110,7 +114,7 @@ pub fn chart(
     let mut builder = ChartBuilder {
         is_count: series.unit.is_empty() && series.points.iter().all(whole),
         rules,
-        learnt: Vec::new(),
+        learned: Vec::new(),
         waiting: Vec::new(),
         reference: None,
         scores: Vec::new(),
@@ -138,7 +142,7 @@ pub fn chart(
     chart
 }
 
-/// Nights from which on the series is learnt anew, oldest first.
+/// Nights at which the reference of the series restarts, oldest first.
 fn restarts(series: &str, nights: &[NightHead], accepted: &[Acceptance]) -> Vec<usize> {
     let concerns = |a: &&Acceptance| a.series.as_deref().is_none_or(|s| s == series);
     let place = |a: &Acceptance| nights.iter().position(|n| n.id == a.night);
@@ -151,7 +155,7 @@ fn restarts(series: &str, nights: &[NightHead], accepted: &[Acceptance]) -> Vec<
 impl ChartBuilder {
     fn restart(&mut self, chart: &mut Chart) {
         self.close(chart);
-        self.learnt.clear();
+        self.learned.clear();
         self.waiting.clear();
         self.reference = None;
         self.scores.clear();
@@ -181,22 +185,23 @@ impl ChartBuilder {
             return;
         };
         let rules = self.rules;
-        let fires =
-            |scores: &[f64], way: Direction| rules.iter().any(|r| r.fires(scores, way.sign()));
+        let raises_alarm = |scores: &[f64], way: Direction| {
+            rules.iter().any(|r| r.raises_alarm(scores, way.sign()))
+        };
         if let Some(at) = self.open {
             let way = chart.excursions[at].way;
             let limit = rules[0].limit.min(rules[1].limit);
             let mut recent = self.scores.iter().rev().take(RECOVERY_NIGHTS);
-            let back = recent.all(|z| way.sign() * z <= limit);
-            // Back within the limits, or beyond the opposite one.
-            if !back && !fires(&self.scores, way.other()) {
+            let is_back = recent.all(|z| way.sign() * z <= limit);
+            // The excursion ends within the limits, or beyond the opposite limit.
+            if !is_back && !raises_alarm(&self.scores, way.other()) {
                 return;
             }
             self.close(chart);
         }
         let Some(way) = [Direction::Up, Direction::Down]
             .into_iter()
-            .find(|way| fires(&self.scores, *way))
+            .find(|way| raises_alarm(&self.scores, *way))
         else {
             return;
         };
@@ -214,18 +219,18 @@ impl ChartBuilder {
 
     /// Adds a value to the reference once it has waited long enough and no excursion is open.
     fn learn(&mut self, sample: Sample) {
-        if self.learnt.len() < MIN_NIGHTS {
-            self.learnt.push(sample);
-        } else if self.learnt.len() < MAX_NIGHTS && self.open.is_none() {
+        if self.learned.len() < MIN_NIGHTS {
+            self.learned.push(sample);
+        } else if self.learned.len() < MAX_NIGHTS && self.open.is_none() {
             self.waiting.push(sample);
             if self.waiting.len() <= REFERENCE_DELAY {
                 return;
             }
-            self.learnt.push(self.waiting.remove(0));
+            self.learned.push(self.waiting.remove(0));
         } else {
             return;
         }
-        self.reference = Reference::of(&self.learnt, self.is_count);
+        self.reference = Reference::of(&self.learned, self.is_count);
     }
 
     /// Closes the open excursion.

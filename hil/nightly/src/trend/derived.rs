@@ -1,4 +1,5 @@
-//! Ratios of two metrics of the same night. Influences common to both (lamp, temperature, age of the skin) cancel.
+//! Ratios of two metrics of the same night. Influences on both metrics (lamp, temperature, age of
+//! the skin) cancel.
 
 use super::history::{History, Point, Series};
 use crate::verdict::Verdict;
@@ -15,7 +16,7 @@ pub struct Ratio {
     pub numerator: &'static str,
     /// Series of the denominator.
     pub denominator: &'static str,
-    /// Which influences cancel, and what moves the ratio.
+    /// Which influences cancel, and which changes move the ratio.
     pub rationale: &'static str,
 }
 

@@ -51,7 +51,7 @@ pub struct Series {
     pub name: String,
     /// Unit of the values; empty for counts.
     pub unit: String,
-    /// Oldest first; without a point for nights that did not request the metric.
+    /// Oldest first. Nights that did not request the metric have no point.
     pub points: Vec<Point>,
 }
 
@@ -76,12 +76,12 @@ pub struct Point {
     pub attempts: u32,
 }
 
-/// A known change that an operator accepted.
+/// A change that an operator accepted as known.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Acceptance {
     /// The series; `None`: all series.
     pub series: Option<String>,
-    /// ID of the night from which on the reference is learnt anew.
+    /// ID of the night at which the reference restarts.
     pub night: String,
     /// Why.
     pub reason: String,
@@ -112,7 +112,8 @@ impl NightHead {
 }
 
 impl Point {
-    /// The value, if it describes its subject: measured, from enough samples, with a rig that was not faulty. It may be beyond its limit.
+    /// The value, if it describes its subject: measured, from enough samples, with a rig that
+    /// worked. It may be beyond its limit.
     #[must_use]
     pub fn usable(&self) -> Option<f64> {
         let describes_subject = |verdict| {

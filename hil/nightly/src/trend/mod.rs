@@ -1,8 +1,9 @@
-//! Trends: which metrics moved over the nights, since when, and the probable cause.
+//! Trends: which metrics moved, since when, and the probable cause.
 //!
-//! Single nights are never compared with each other: each series has a reference ([`Reference`]), every night is scored against it,
-//! and runs of outliers raise an alarm ([`chart()`]). [`judge`] charts all series of a [`History`] with limits that keep the rate of
-//! false alarms low over all of them ([`run_length`]), and attributes each alarm to what changed in that night ([`cause`]).
+//! Nights are never compared with each other. Each series has a reference ([`Reference`]); every
+//! night is scored against it, and runs of outliers raise an alarm ([`chart()`]). [`judge`] charts
+//! all series of a [`History`], with limits that keep the rate of false alarms over all series low
+//! ([`run_length`]), and attributes each alarm to a change of that night ([`cause`]).
 
 pub mod cause;
 pub mod change;

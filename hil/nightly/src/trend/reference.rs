@@ -1,16 +1,18 @@
-//! Reference of a series: robust centre and spread of its normal nights.
+//! Reference of a series: robust centre and spread of its undisturbed nights.
 
 use serde::Serialize;
 use skinrig_model::quantile;
 
 /// Minimum number of nights of a reference.
 pub(crate) const MIN_NIGHTS: usize = 12;
-/// Maximum number of nights of a reference. Later nights are only compared with it, so that a slow drift is detected.
+/// Maximum number of nights of a reference. Later nights are only compared with it; otherwise the
+/// reference would follow a slow drift.
 pub(crate) const MAX_NIGHTS: usize = 100;
 
-/// Smallest spread as a share of the centre: without it, metrics that hardly vary would raise irrelevant alarms.
+/// Smallest spread as a share of the centre. Without it, metrics that hardly vary would raise
+/// irrelevant alarms.
 const MIN_RELATIVE_SPREAD: f64 = 0.005;
-/// Quantile used for the spread of the tails, and its position in standard deviations of a normal variable.
+/// Quantile used for the spread of the tails, and its value for a standard normal variable.
 const TAIL: f64 = 0.95;
 const TAIL_AT: f64 = 1.644_853_627;
 /// Standard deviation of a normal variable divided by its median absolute deviation.
@@ -25,11 +27,11 @@ pub struct Sample {
     pub value: f64,
     /// Half its 95 % interval, if known.
     pub half_interval: Option<f64>,
-    /// Number of trials, if the value is a share of them.
+    /// Number of trials, if the value is a percentage of successful trials.
     pub trials: Option<u64>,
 }
 
-/// Centre and spread of a series in normal nights.
+/// Centre and spread of a series in undisturbed nights.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Reference {
     /// Number of nights.
@@ -82,7 +84,7 @@ impl Reference {
     #[must_use]
     pub fn score(&self, value: f64) -> f64 {
         let n = self.nights as f64;
-        // Three consecutive nights decide: variance of their mean relative to that of independent nights.
+        // The quick rule needs three nights: variance of their mean relative to that of independent nights.
         let r = self.correlation;
         let alike = (3.0 + 4.0 * r + 2.0 * r * r) / 3.0;
         // Centre and spread are estimates, less certain with fewer nights. 1.6/n of a new score's variance comes from the median; the rest
@@ -103,7 +105,7 @@ fn spread_floor(samples: &[Sample], centre: f64, counts: bool) -> f64 {
     let n = samples.len() as f64;
     let mut floor = MIN_RELATIVE_SPREAD * centre.abs();
     if counts {
-        // Poisson: with the mean at its upper limit. Zero events in n nights allow a mean of 3/n at 95 %.
+        // Poisson, at the upper limit of its mean: zero events in n nights allow a mean of 3/n at 95 %.
         let sum: f64 = samples.iter().map(|s| s.value).sum();
         floor = floor.max(((sum + 3.0) / n).sqrt());
     }
@@ -123,7 +125,8 @@ fn spread_floor(samples: &[Sample], centre: f64, counts: bool) -> f64 {
     floor
 }
 
-/// Lag-1 correlation of clipped scores, so that one outlier has little effect. Adds 1/n to correct the bias of short series.
+/// Lag-1 correlation of scores, clipped so that one outlier has little effect. Adds 1/n to correct
+/// the bias of short series.
 fn correlation(scores: impl Iterator<Item = f64>) -> f64 {
     let scores: Vec<f64> = scores.map(|z| z.clamp(-2.5, 2.5)).collect();
     let n = scores.len() as f64;
@@ -171,7 +174,7 @@ mod tests {
         let none = Reference::of(&samples([0.0; 12]), true).unwrap();
         assert_eq!((none.above, none.score(0.0)), (0.5, 0.0));
         assert!(none.score(1.0) < 2.0 && none.score(4.0) > 6.0);
-        // A metric that has always been zero: any other value is far off, and nothing divides by zero.
+        // For a metric that was always zero, any other value is far off; no division by zero occurs.
         assert_eq!(of(&[0.0; 12]).score(4096.0), f64::INFINITY);
     }
 

@@ -10,8 +10,9 @@ use super::reference::MIN_NIGHTS;
 use super::run_length::{Rule, rules};
 use crate::cause::Cause;
 
-/// Design value of the nights between two false alarms over all series, for known references and independent normal scores. Real
-/// series deviate from that: the measured rate is about one in more than 100 nights (`docs/reference/nightly.md`).
+/// Designed number of nights between two false alarms over all series, for known references and
+/// independent normal scores. Real series deviate from that: the measured rate is about one in more
+/// than 100 nights (`docs/reference/nightly.md`).
 pub const NIGHTS_PER_FALSE_ALARM: f64 = 1200.0;
 
 /// Metrics without a stable level: free disk space shrinks by design and has its own limit.
@@ -24,7 +25,7 @@ pub struct Report {
     pub headline: String,
     /// Open alarms, those with the most series first.
     pub alarms: Vec<Alarm>,
-    /// Alarms that have ended by return or acceptance, newest first.
+    /// Alarms that ended by recovery or acceptance, newest first.
     pub past: Vec<Alarm>,
     /// One chart per series, those of open alarms first.
     pub charts: Vec<Chart>,
@@ -41,7 +42,7 @@ pub struct Alarm {
     pub id: String,
     /// Indices into [`Report::charts`].
     pub charts: Vec<usize>,
-    /// Night after which all series were back; `None` while one is still off.
+    /// Night after which all series had recovered; `None` while one has not.
     pub ended: Option<usize>,
     /// Index of the night that raised the alarm.
     pub raised: usize,
@@ -80,16 +81,16 @@ pub fn judge(history: &History) -> Report {
         .collect();
     // Open excursions first, the largest first; the others by name.
     charts.sort_by(|a, b| {
-        let off = |c: &Chart| c.open_excursion().is_some();
-        let far = |c: &Chart| {
+        let is_open = |c: &Chart| c.open_excursion().is_some();
+        let size = |c: &Chart| {
             c.open_excursion()
                 .and_then(relative)
                 .unwrap_or(f64::INFINITY)
                 .abs()
         };
-        let both = off(b).cmp(&off(a));
-        let farther = if off(a) && off(b) {
-            far(b).total_cmp(&far(a))
+        let both = is_open(b).cmp(&is_open(a));
+        let farther = if is_open(a) && is_open(b) {
+            size(b).total_cmp(&size(a))
         } else {
             std::cmp::Ordering::Equal
         };
@@ -114,18 +115,18 @@ fn alarms(charts: &[Chart], nights: &[NightHead]) -> (Vec<Alarm>, Vec<Alarm>) {
         .flat_map(|(at, c)| c.excursions.iter().map(move |e| (at, e)))
         .collect();
     all.sort_by_key(|(at, e)| (e.change.nights, *at));
-    let mut found: Vec<Alarm> = Vec::new();
+    let mut grouped: Vec<Alarm> = Vec::new();
     for (at, excursion) in all {
         let [first, last] = excursion.change.nights;
-        let meets = |a: &&mut Alarm| first <= a.since[1] && last >= a.since[0];
-        match found.iter_mut().find(meets) {
+        let overlaps = |a: &&mut Alarm| first <= a.since[1] && last >= a.since[0];
+        match grouped.iter_mut().find(overlaps) {
             Some(alarm) => {
                 alarm.charts.push(at);
                 alarm.raised = alarm.raised.min(excursion.raised);
                 alarm.ended = alarm.ended.zip(excursion.ended).map(|(a, b)| a.max(b));
                 alarm.since = [alarm.since[0].max(first), alarm.since[1].min(last)];
             }
-            None => found.push(Alarm {
+            None => grouped.push(Alarm {
                 id: String::new(),
                 charts: vec![at],
                 ended: excursion.ended,
@@ -135,7 +136,7 @@ fn alarms(charts: &[Chart], nights: &[NightHead]) -> (Vec<Alarm>, Vec<Alarm>) {
             }),
         }
     }
-    for alarm in &mut found {
+    for alarm in &mut grouped {
         alarm.charts.sort_unstable();
         alarm.id.clone_from(&nights[alarm.raised].id);
         let name = |c: &usize| charts[*c].series.name.as_str();
@@ -143,13 +144,14 @@ fn alarms(charts: &[Chart], nights: &[NightHead]) -> (Vec<Alarm>, Vec<Alarm>) {
         let before = &nights[alarm.since[0].saturating_sub(1)];
         alarm.attribution = cause::attribute(before, &nights[alarm.since[1]], &names);
     }
-    let (mut open, mut past): (Vec<_>, Vec<_>) = found.into_iter().partition(|a| a.ended.is_none());
+    let (mut open, mut past): (Vec<_>, Vec<_>) =
+        grouped.into_iter().partition(|a| a.ended.is_none());
     open.sort_by_key(|a| (std::cmp::Reverse(a.charts.len()), a.raised));
     past.sort_by_key(|a| std::cmp::Reverse(a.raised));
     (open, past)
 }
 
-/// Relative change; `None` if the level before was zero.
+/// Relative change; `None` if the level before the change was zero.
 #[must_use]
 pub fn relative(excursion: &Excursion) -> Option<f64> {
     let ratio = (excursion.after - excursion.before) / excursion.before.abs();
@@ -270,11 +272,11 @@ fn headline(charts: &[Chart], alarms: &[Alarm], nights: &[NightHead]) -> String 
     )
 }
 
-/// Number of reference nights of the series that has the most.
+/// Largest number of reference nights of any series.
 fn most_nights(charts: &[Chart]) -> usize {
-    let learnt = |c: &Chart| {
+    let count_nights = |c: &Chart| {
         let from = c.accepted.last().copied().unwrap_or(0);
         c.nights.iter().filter(|n| n.night >= from).count()
     };
-    charts.iter().map(learnt).max().unwrap_or(0)
+    charts.iter().map(count_nights).max().unwrap_or(0)
 }

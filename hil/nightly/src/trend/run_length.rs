@@ -5,9 +5,9 @@
 
 use serde::Serialize;
 
-/// Run that detects a large change.
+/// Run length that detects a large change, nights.
 pub const QUICK: usize = 3;
-/// Run that detects a smaller change.
+/// Run length that detects a smaller change, nights.
 pub(crate) const SLOW: usize = 9;
 
 /// Raises an alarm after a number of consecutive scores beyond a limit on the same side.
@@ -20,7 +20,7 @@ pub struct Rule {
 }
 
 impl Rule {
-    /// The rule with one false alarm per `every` nights when `series` two-sided charts use it together.
+    /// The rule with one false alarm per `every` nights, for `series` two-sided charts together.
     #[must_use]
     pub fn of(nights: usize, series: usize, every: f64) -> Self {
         let wanted = every * 2.0 * series.max(1) as f64;
@@ -42,17 +42,17 @@ impl Rule {
     /// Mean number of nights until an alarm on one side, for independent normal scores about `shift`.
     #[must_use]
     pub fn mean_run_length(self, shift: f64) -> f64 {
-        let beyond = 0.5 * libm::erfc((self.limit - shift) / std::f64::consts::SQRT_2);
-        let all = beyond.powf(self.nights as f64);
-        if beyond >= 1.0 {
+        let exceedance = 0.5 * libm::erfc((self.limit - shift) / std::f64::consts::SQRT_2);
+        let all = exceedance.powf(self.nights as f64);
+        if exceedance >= 1.0 {
             return self.nights as f64;
         }
-        (1.0 - all) / ((1.0 - beyond) * all)
+        (1.0 - all) / ((1.0 - exceedance) * all)
     }
 
-    /// Whether the last scores raise an alarm above the centre (`sign` 1) or below it (-1).
+    /// Whether the latest scores raise an alarm above the centre (`sign` 1) or below it (-1).
     #[must_use]
-    pub(crate) fn fires(self, scores: &[f64], sign: f64) -> bool {
+    pub(crate) fn raises_alarm(self, scores: &[f64], sign: f64) -> bool {
         let last = scores
             .len()
             .checked_sub(self.nights)
@@ -61,8 +61,8 @@ impl Rule {
     }
 }
 
-/// Rules for `series` charts: the quick one with one false alarm per `every` nights, the slow one with a hundredth of that, because
-/// correlated nights produce long runs.
+/// Rules for `series` charts. The quick one has one false alarm per `every` nights. The slow one
+/// has a hundredth of that rate, because correlated nights produce long runs.
 #[must_use]
 pub fn rules(series: usize, every: f64) -> [Rule; 2] {
     [
@@ -96,8 +96,8 @@ mod tests {
             nights: 3,
             limit: 2.0,
         };
-        assert!(rule.fires(&[0.0, 2.1, 9.0, 2.1], 1.0));
-        assert!(!rule.fires(&[0.0, 9.0, 9.0], 1.0) && !rule.fires(&[9.0, 9.0], 1.0));
-        assert!(rule.fires(&[-3.0; 3], -1.0) && !rule.fires(&[-3.0; 3], 1.0));
+        assert!(rule.raises_alarm(&[0.0, 2.1, 9.0, 2.1], 1.0));
+        assert!(!rule.raises_alarm(&[0.0, 9.0, 9.0], 1.0) && !rule.raises_alarm(&[9.0, 9.0], 1.0));
+        assert!(rule.raises_alarm(&[-3.0; 3], -1.0) && !rule.raises_alarm(&[-3.0; 3], 1.0));
     }
 }

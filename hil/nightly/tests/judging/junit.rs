@@ -1,4 +1,5 @@
-//! The JUnit document of a night: well-formed XML, elements in the order that readers require, counts that add up.
+//! Tests of the JUnit document of a night: well-formed XML, required order of elements, correct
+//! counts.
 
 use skinrig_model::Limit;
 use skinrig_nightly::junit::{Outcome, junit};
@@ -47,7 +48,7 @@ enum Tag {
     Close(String),
 }
 
-/// The elements of a document. Panics where it is not well-formed.
+/// Parses the elements of a document. Panics if it is not well-formed.
 fn elements(text: &str) -> Vec<Tag> {
     let mut rest = text
         .strip_prefix("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n")
@@ -55,7 +56,7 @@ fn elements(text: &str) -> Vec<Tag> {
     let mut tags = Vec::new();
     let mut open: Vec<String> = Vec::new();
     while let Some(at) = rest.find('<') {
-        plain(&rest[..at]);
+        assert_escaped(&rest[..at]);
         let end = rest[at..].find('>').expect("expected the end of a tag") + at;
         let tag = &rest[at + 1..end];
         rest = &rest[end + 1..];
@@ -71,7 +72,7 @@ fn elements(text: &str) -> Vec<Tag> {
             let (value, after) = after
                 .split_once('"')
                 .expect("expected the end of an attribute");
-            plain(value);
+            assert_escaped(value);
             attributes.push((key.to_owned(), value.to_owned()));
             list = after;
         }
@@ -88,8 +89,8 @@ fn elements(text: &str) -> Vec<Tag> {
     tags
 }
 
-/// Asserts that the text needs no escaping and has no character that XML forbids.
-fn plain(text: &str) {
+/// Asserts that the text is escaped and has no character that XML forbids.
+fn assert_escaped(text: &str) {
     for (at, _) in text.match_indices('&') {
         let entity = text[at + 1..].split(';').next().unwrap_or_default();
         assert!(["amp", "lt", "gt", "quot"].contains(&entity), "{text}");
@@ -133,7 +134,7 @@ fn document_is_well_formed_and_counts_add_up() {
         value(named("skipped")[0], "message"),
         "not &quot;here&quot; &amp; &lt;now&gt;"
     );
-    // Dates without a zone, as readers require.
+    // JUnit readers require timestamps without a time zone.
     assert_eq!(
         value(named("testsuite")[0], "timestamp"),
         "2026-11-20T02:00:00"
@@ -176,12 +177,12 @@ fn document_is_valid_against_the_schema() {
     let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("junit.xml");
     let text = junit(&night_with_every_verdict(), "bench-1").expect("write JUnit");
     std::fs::write(&file, text).expect("write a temporary file");
-    let done = std::process::Command::new(python)
+    let output = std::process::Command::new(python)
         .arg(folder.join("validate.py"))
         .arg(folder.join("junit.xsd"))
         .arg(&file)
         .output()
         .expect("start Python");
-    let said = String::from_utf8_lossy(&done.stderr);
-    assert!(done.status.success(), "{said}");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{stderr}");
 }

@@ -1,4 +1,5 @@
-//! Rules over evidence, attempts and repeats: verdict and cause of each kind of evidence, and properties that always hold.
+//! Tests of rules, attempts and repeats: verdict and cause of each kind of evidence, and
+//! invariants.
 
 mod junit;
 mod support;
@@ -109,7 +110,7 @@ fn evidence_on_one_camera_does_not_excuse_the_other() {
     let no_box = vec![evidence(EvidenceKind::Absent, "trigger box")];
     let judged = judge_attempt((0.0, 1.0), parts(), no_box, Cause::Rig);
     assert_eq!(judged.cause, Some(Cause::Infrastructure));
-    // A value that was not measured may have needed the other camera.
+    // An unmeasured value may have needed the other camera.
     let both = vec![
         part("camera1", vec![measured("offset", None, limit)]),
         part("camera2", vec![measured("drift", None, limit)]),
@@ -166,7 +167,8 @@ fn only_rig_witnesses_invalidate_the_golden_skin() {
     assert!(!WITNESSES.contains(&"golden"));
 }
 
-/// Friction shifts the force at which a touch is detected: a good depth check beside it is not evidence of a good frame.
+/// Friction shifts the force that triggers a touch, so a good depth check does not prove a good
+/// frame.
 #[test]
 fn touches_with_a_faulty_arm_are_inconclusive() {
     for (name, verdict, cause, expect_change) in [
@@ -205,13 +207,17 @@ fn documentation_lists_the_rules() {
     let docs = include_str!("../../../../docs/reference/nightly.md");
     for r in RULES.iter().chain(CROSS_CHECK_RULES) {
         let kinds: Vec<&str> = r.kinds.iter().map(|k| k.name()).collect();
-        let seen = if kinds.is_empty() {
+        let kinds = if kinds.is_empty() {
             "other checks".to_owned()
         } else {
             kinds.join(", ")
         };
         let cause = r.cause.map_or("what the check is about", Cause::name);
-        let row = format!("| `{}` | {seen} | {} | {cause} |", r.name, r.verdict.name());
+        let row = format!(
+            "| `{}` | {kinds} | {} | {cause} |",
+            r.name,
+            r.verdict.name()
+        );
         assert!(
             docs.contains(&row),
             "expected in docs/reference/nightly.md:\n{row}"
@@ -248,7 +254,7 @@ proptest! {
         }
     }
 
-    /// More evidence on an attempt never makes it good, and an attempt is good only when all its parts are.
+    /// More evidence never makes an attempt good, and an attempt is good only if all its parts are.
     #[test]
     fn an_attempt_is_good_only_when_all_its_parts_are(
         values in prop::collection::vec(prop::option::of(0.0..2.0f64), 1..5),
@@ -268,7 +274,8 @@ proptest! {
         prop_assert_eq!(with.verdict.is_good(), good);
     }
 
-    /// A check that failed once never becomes PASS, and MARGINAL only after enough passes in a row; no attempt is superfluous.
+    /// A check that failed once never becomes PASS, and becomes MARGINAL only after enough
+    /// consecutive passes. No attempt is superfluous.
     #[test]
     fn repeats_never_hide_a_failure(
         verdicts in prop::collection::vec(any_verdict(), 1..6),

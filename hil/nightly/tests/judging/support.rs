@@ -27,7 +27,7 @@ pub(crate) fn part(subject: &str, measurements: Vec<Measurement>) -> Part {
     }
 }
 
-/// Attempts that ended so.
+/// Attempts with these verdicts.
 pub(crate) fn attempts(verdicts: &[Verdict]) -> Vec<Attempt> {
     let one = |verdict: &Verdict| Attempt {
         began_s: 0.0,
@@ -56,7 +56,7 @@ pub(crate) fn check(name: &str, verdict: Verdict, cause: Option<Cause>) -> Check
     }
 }
 
-/// A finished night of these checks.
+/// A finished night with these checks.
 pub(crate) fn night(checks: Vec<CheckResult>) -> Night {
     let mut night = Night {
         version: 1,

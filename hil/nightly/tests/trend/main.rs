@@ -1,5 +1,5 @@
-//! Trends on simulated benches: rate of false alarms over all series, losses found within three nights, and the
-//! attribution of a change.
+//! Trends of simulated benches: rate of false alarms over all series, losses detected within three
+//! nights, and attribution of a change.
 //!
 //!     cargo test --release -p skinrig-nightly --test trend -- --ignored --nocapture
 //!
@@ -28,7 +28,8 @@ fn chart<'a>(report: &'a Report, series: &str) -> &'a Chart {
     report.charts.iter().find(named).unwrap()
 }
 
-/// Number of nights with a value from the loss until the chart of `series` raised an alarm; `None` after twenty.
+/// Number of nights with a value from the loss to the alarm of the chart of `series`; `None` after
+/// twenty nights.
 fn delay(seed: u64, series: &'static str, spread: f64, from: usize, factor: f64) -> Option<usize> {
     let mut bench = Bench::new(seed).spread(series, spread);
     bench.planted.push(Planted {
@@ -52,8 +53,8 @@ fn first_from(history: &History, day: usize) -> usize {
     history.nights.iter().position(|n| n.id >= id).unwrap()
 }
 
-/// Share of benches, %, on which the loss was found within `within` nights.
-fn found(seeds: u64, within: usize, one: impl Fn(u64) -> Option<usize>) -> f64 {
+/// Share of benches, %, whose loss was detected within `within` nights.
+fn share_detected(seeds: u64, within: usize, one: impl Fn(u64) -> Option<usize>) -> f64 {
     let hits = (0..seeds).filter(|seed| one(*seed).is_some_and(|d| d <= within));
     100.0 * hits.count() as f64 / seeds as f64
 }
@@ -69,15 +70,15 @@ fn unchanged_benches_raise_at_most_one_alarm_in_100_nights() {
 
 #[test]
 fn a_loss_of_15_percent_is_found_within_three_nights() {
-    // Spread from night to night: 3 %. Of 12 benches one may take longer.
-    let events = found(12, 3, |seed| delay(seed, EVENTS, 0.03, 110, 0.85));
+    // The spread between nights is 3 %. One of 12 benches may take longer.
+    let events = share_detected(12, 3, |seed| delay(seed, EVENTS, 0.03, 110, 0.85));
     assert!(events > 90.0, "{events} %");
-    let located = found(12, 3, |seed| delay(seed, LOCATED, 0.0, 40, 0.85));
+    let located = share_detected(12, 3, |seed| delay(seed, LOCATED, 0.0, 40, 0.85));
     assert!(located > 90.0, "{located} %");
 }
 
-/// 80 nights without gaps; from night 60 on these series are 25 % lower.
-fn quarter_off(planted: &[&'static str]) -> History {
+/// A history of 80 nights without gaps; from night 60 on, the series in `planted` are 25 % lower.
+fn with_quarter_lower(planted: &[&'static str]) -> History {
     let mut bench = Bench::new(3);
     bench.gaps = [0, 0];
     for series in planted {
@@ -92,7 +93,7 @@ fn quarter_off(planted: &[&'static str]) -> History {
 
 #[test]
 fn change_is_dated_and_attributed_by_simultaneous_changes() {
-    let skin = quarter_off(&[EVENTS, LOCATED]);
+    let skin = with_quarter_lower(&[EVENTS, LOCATED]);
     let report = judge(&skin);
     assert_eq!(report.alarms.len(), 1, "{}", report.headline);
     let alarm = &report.alarms[0];
@@ -113,7 +114,7 @@ fn change_is_dated_and_attributed_by_simultaneous_changes() {
     assert_eq!(report.alarms[0].attribution.cause, Some(Cause::Software));
     let changed = &report.alarms[0].attribution.changed;
     assert_eq!(changed, &["software 0.1.0 (aaaaaaa) -> 0.1.0 (bbbbbbb)"]);
-    // A version that changed at another time is not named.
+    // A version that changed at another time is not a cause.
     let mut earlier = skin;
     for night in &mut earlier.nights[40..] {
         night.versions.software = "0.1.0 (bbbbbbb)".to_owned();
@@ -121,13 +122,13 @@ fn change_is_dated_and_attributed_by_simultaneous_changes() {
     let cause = judge(&earlier).alarms[0].attribution.cause;
     assert_eq!(cause, Some(Cause::Skin));
 
-    let report = judge(&quarter_off(&["noise_lit/camera1/rate", EVENTS]));
+    let report = judge(&with_quarter_lower(&["noise_lit/camera1/rate", EVENTS]));
     assert_eq!(report.alarms[0].attribution.cause, Some(Cause::Rig));
 }
 
 #[test]
 fn an_accepted_change_starts_a_new_reference() {
-    let mut history = quarter_off(&[EVENTS]);
+    let mut history = with_quarter_lower(&[EVENTS]);
     history.accepted.push(Acceptance {
         series: None,
         night: nights::head(60).id,
@@ -169,7 +170,7 @@ fn reference_needs_enough_nights_and_skips_invalid_ones() {
         report.headline
     );
 
-    // Every night of the golden skin is INVALID, and a fifth of what it was.
+    // Every night of the golden skin is INVALID, with a fifth of the usual values.
     let mut bench = Bench::new(1);
     bench.gaps = [0, 1];
     let report = judge(&bench.history(30));
@@ -202,13 +203,13 @@ fn false_alarm_and_delay_table() {
             for within in [3, 10] {
                 let factor = 1.0 - f64::from(loss) / 100.0;
                 let spread = f64::from(spread) / 100.0;
-                let share = found(100, within, |s| delay(s, EVENTS, spread, from, factor));
+                let share = share_detected(100, within, |s| delay(s, EVENTS, spread, from, factor));
                 print!(" {share:.0} % |");
             }
         }
         println!();
     }
-    let located = found(100, 3, |seed| delay(seed, LOCATED, 0.0, 40, 0.85));
+    let located = share_detected(100, 3, |seed| delay(seed, LOCATED, 0.0, 40, 0.85));
     println!(
         "\nlocated share, 15 % lower after 40 nights: found within 3 nights on {located:.0} %\n"
     );
@@ -223,6 +224,6 @@ fn false_alarm_and_delay_table() {
     }
     assert!(total <= 1000, "more than one in 100 nights: {total}");
     assert!(most <= 10, "{counts:?}");
-    let quick = found(100, 3, |seed| delay(seed, EVENTS, 0.03, 120, 0.85));
+    let quick = share_detected(100, 3, |seed| delay(seed, EVENTS, 0.03, 120, 0.85));
     assert!(quick >= 90.0 && located >= 95.0, "{quick} %, {located} %");
 }

@@ -1,20 +1,23 @@
-//! Simulated nights of a bench, unchanged or with planted changes: values like those of a suite, from a seed.
+//! Simulates nights of a bench with typical values of a suite, unchanged or with planted changes.
+//! Seeded.
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use skinrig_nightly::trend::{History, NightHead, Point};
 use skinrig_nightly::{Verdict, Versions};
 
-/// Distribution of a metric of an unchanged bench.
+/// Distribution of a metric on an unchanged bench.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Kind {
     /// Always this value.
     Always(f64),
     /// Poisson counts with this mean.
     Count(f64),
-    /// Normal: mean, spread over the mean, correlation from night to night, share of the spread due to temperature.
+    /// Normal: mean, spread over the mean, correlation between consecutive nights, share of the
+    /// spread due to temperature.
     Normal(f64, f64, f64, f64),
-    /// Student's t with three degrees of freedom: mean, scale over the mean, correlation from night to night.
+    /// Student's t with three degrees of freedom: mean, scale over the mean, correlation between
+    /// consecutive nights.
     Heavy(f64, f64, f64),
     /// Log-normal: median, spread of the logarithm.
     Skewed(f64, f64),
@@ -24,7 +27,7 @@ pub(crate) enum Kind {
 
 use Kind::{Always, Count, Heavy, Normal, Share, Skewed};
 
-/// The metrics of both cameras.
+/// Metrics measured on each camera.
 const CAMERAS: &[(&str, &str, &str, Kind)] = &[
     ("identity", "differences", "", Always(0.0)),
     ("settings", "differences", "", Always(0.0)),
@@ -53,7 +56,7 @@ const CAMERAS: &[(&str, &str, &str, Kind)] = &[
     ("test_pattern", "gaps", "", Count(0.01)),
 ];
 
-/// All others.
+/// All other metrics.
 const OTHERS: &[(&str, &str, &str, &str, Kind)] = &[
     ("identity", "robot", "differences", "", Always(0.0)),
     ("identity", "trigger box", "differences", "", Always(0.0)),
@@ -181,14 +184,14 @@ pub(crate) struct Planted {
     pub factor: f64,
 }
 
-/// A bench whose nights are drawn in order.
+/// Draws the nights of a bench in order.
 pub(crate) struct Bench {
     random: Xoshiro256PlusPlus,
     metrics: Vec<Metric>,
     temperature: f64,
     /// Planted changes.
     pub planted: Vec<Planted>,
-    /// One night in `gaps[0]` is missing; one in `gaps[1]` is INVALID, with wrong values. 0: never.
+    /// One in `gaps[0]` nights is missing; one in `gaps[1]` is INVALID with wrong values. 0: none.
     pub gaps: [u64; 2],
 }
 
@@ -199,7 +202,7 @@ struct Metric {
     memory: f64,
 }
 
-/// A drawn value of a night.
+/// A value drawn for a night.
 pub(crate) struct Drawn<'a> {
     pub name: &'a str,
     pub unit: &'static str,
@@ -245,7 +248,7 @@ impl Bench {
         self
     }
 
-    /// The values of night number `at`; `None`: the night is missing.
+    /// Draws the values of night number `at`; `None`: the night is missing.
     pub(crate) fn night(&mut self, at: usize) -> Option<Vec<Drawn<'_>>> {
         let Self {
             random,
@@ -259,21 +262,25 @@ impl Bench {
         let (missing, invalid) = (one_in(gaps[0]), one_in(gaps[1]));
         let drawn = metrics.iter_mut().map(|metric| {
             let mut value = metric.draw(random, *temperature);
-            let hit = |p: &&Planted| metric.name.starts_with(p.series) && at >= p.from;
-            for p in planted.iter().filter(hit) {
+            let hits = |p: &&Planted| metric.name.starts_with(p.series) && at >= p.from;
+            for p in planted.iter().filter(hits) {
                 value *= p.factor;
             }
             // The lamps were off: the values are meaningless.
-            let odd = invalid && metric.name.starts_with("golden");
+            let is_wrong = invalid && metric.name.starts_with("golden");
             Drawn {
                 name: &metric.name,
                 unit: metric.unit,
-                value: if odd { value * 0.2 } else { value },
+                value: if is_wrong { value * 0.2 } else { value },
                 n: match metric.kind {
                     Share(_, of) => Some(of.into()),
                     _ => None,
                 },
-                verdict: if odd { Verdict::Invalid } else { Verdict::Pass },
+                verdict: if is_wrong {
+                    Verdict::Invalid
+                } else {
+                    Verdict::Pass
+                },
             }
         });
         let drawn: Vec<_> = drawn.collect();
@@ -307,7 +314,7 @@ impl Bench {
     }
 }
 
-/// Head of night number `at`; the number is in its name.
+/// Metadata of night number `at`; its ID contains the number.
 pub(crate) fn head(at: usize) -> NightHead {
     NightHead {
         id: format!("night-{at:04}"),
@@ -358,15 +365,15 @@ impl Metric {
             }
             Skewed(median, spread) => median * (spread * normal(random)).exp(),
             Share(percent, of) => {
-                let hit = (0..of)
+                let hits = (0..of)
                     .filter(|_| 100.0 * uniform(random) < percent)
                     .count();
-                100.0 * hit as f64 / f64::from(of)
+                100.0 * hits as f64 / f64::from(of)
             }
         }
     }
 
-    /// An autoregressive series of order one with the variance of the drawn steps.
+    /// Next value of a first-order autoregressive series whose variance is that of the steps.
     fn remember(&mut self, r: f64, step: f64) -> f64 {
         self.memory = r * self.memory + (1.0 - r * r).sqrt() * step;
         self.memory
@@ -382,7 +389,7 @@ fn normal(random: &mut Xoshiro256PlusPlus) -> f64 {
     radius * (std::f64::consts::TAU * uniform(random)).cos()
 }
 
-/// Knuth's product of uniform variables; means here are small.
+/// Draws by Knuth's product of uniform variables, which is fast enough for small means.
 fn poisson(random: &mut Xoshiro256PlusPlus, mean: f64) -> u32 {
     let (mut product, least, mut count) = (uniform(random), (-mean).exp(), 0);
     while product > least {
