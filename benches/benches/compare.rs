@@ -82,7 +82,7 @@ fn clustering(folder: &Path) {
     );
     let kev = PRESS_EVENTS as f64 / 1e3;
     if let Some(python) = &python {
-        table.baseline_told("scikit-learn DBSCAN, events", kev, || {
+        table.baseline_timed("scikit-learn DBSCAN, events", kev, || {
             seconds(python, "sklearn_events")
         });
         for (what, task) in [
@@ -91,7 +91,7 @@ fn clustering(folder: &Path) {
             ("numpy, sums over discs by sums along rows", "pixel_grid"),
             ("scipy, sums over discs by FFT", "pixel_grid_fft"),
         ] {
-            table.told(what, kev, || seconds(python, task));
+            table.row_timed(what, kev, || seconds(python, task));
         }
     }
     table.ours("this crate", kev, || {
@@ -174,7 +174,7 @@ fn repetition(folder: &Path) {
          Columns agree to 1e-9 px in every round",
     );
     if let [Some(assembled), Some(published)] = &python {
-        table.baseline_told("the public code's choices: clustering alone", mev, || {
+        table.baseline_timed("the public code's choices: clustering alone", mev, || {
             seconds(published, "clustering")
         });
         for (what, task) in [
@@ -183,7 +183,7 @@ fn repetition(folder: &Path) {
             ("h5py, discs by sums, scipy: one process", "one_process"),
             ("h5py, discs by sums: two processes", "two_processes"),
         ] {
-            table.told(what, mev, || seconds(assembled, task));
+            table.row_timed(what, mev, || seconds(assembled, task));
         }
     }
     table.ours("this crate", mev, || {
@@ -220,7 +220,7 @@ fn studies(folder: &Path) {
     let python = start("published.py", folder);
     let mut table = Table::new("detection latency of 289 presses", "press", &method);
     if let Some(python) = &python {
-        table.baseline_told("the public code's choices", presses, || {
+        table.baseline_timed("the public code's choices", presses, || {
             thresholds * seconds(python, "latency")
         });
     }

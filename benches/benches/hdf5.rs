@@ -77,7 +77,7 @@ fn measure(title: &str, path: &Path) {
     match Python::start(["-c", H5PY]) {
         Some(mut h5py) => {
             let what = format!("h5py {}, four arrays, unchecked", h5py.versions());
-            table.baseline_told(&what, mev, move || read(&mut h5py, path));
+            table.baseline_timed(&what, mev, move || read(&mut h5py, path));
         }
         None => println!(
             "h5py: not measured (no python3 with h5py; SKINRIG_BENCH_PYTHON names another)"

@@ -64,7 +64,7 @@ mod linux {
     }
 
     /// A rate, Mev/s per camera, and its trial.
-    type Found = Option<(f64, Trial)>;
+    type BestTrial = Option<(f64, Trial)>;
 
     /// Result of a trial.
     struct Trial {
@@ -107,13 +107,13 @@ mod linux {
         println!("\ntwo emulated cameras through libusb and the driver, trials of {seconds} s");
         println!("  plain file, one fsync at the end: {plain:.0} MB/s (best of 3), the baseline");
         for sink in [Sink::Nowhere, Sink::Session] {
-            let said = match sink {
+            let label = match sink {
                 Sink::Nowhere => "driver alone",
                 Sink::Session => "driver and session file",
             };
             let free = trial(folder.path(), sink, HIGHEST, Pacing::HostTime, seconds)?;
             println!(
-                "  {said}: {:.0} MB/s ({:.2} x) when the cameras wait for the host",
+                "  {label}: {:.0} MB/s ({:.2} x) when the cameras wait for the host",
                 free.mb_per_s(),
                 free.mb_per_s() / plain
             );
@@ -123,7 +123,7 @@ mod linux {
                 Some((rate, best)) => {
                     let mb = 2.0 * rate * BYTES_PER_EVENT;
                     println!(
-                        "  {said}: highest loss-free rate in real time 2 x {rate:.0} Mev/s = {mb:.0} MB/s of events ({:.2} x){}",
+                        "  {label}: highest loss-free rate in real time 2 x {rate:.0} Mev/s = {mb:.0} MB/s of events ({:.2} x){}",
                         best.mb_per_s() / plain,
                         if rate < HIGHEST {
                             ""
@@ -133,7 +133,7 @@ mod linux {
                     );
                     tell_threads(&best);
                 }
-                None => println!("  {said}: loses events at 2 x {STEP:.0} Mev/s already"),
+                None => println!("  {label}: loses events at 2 x {STEP:.0} Mev/s already"),
             }
             if let Some((rate, trial)) = beyond {
                 println!(
@@ -152,7 +152,7 @@ mod linux {
     }
 
     /// The highest rate without loss, to [`STEP`], each tried twice; and the lowest with loss.
-    fn search(folder: &Path, sink: Sink, seconds: f64) -> Result<[Found; 2], Box<dyn Error>> {
+    fn search(folder: &Path, sink: Sink, seconds: f64) -> Result<[BestTrial; 2], Box<dyn Error>> {
         let (mut low, mut high) = (0.0, HIGHEST);
         let (mut holds, mut loses) = (None, None);
         let mut rate = HIGHEST;
@@ -223,8 +223,8 @@ mod linux {
         if !output.status.success() {
             return Err(String::from_utf8_lossy(&output.stderr).into());
         }
-        let told: Value = serde_json::from_slice(&output.stdout)?;
-        let recording: BTreeMap<String, f64> = serde_json::from_value(told["threads"].clone())?;
+        let result: Value = serde_json::from_slice(&output.stdout)?;
+        let recording: BTreeMap<String, f64> = serde_json::from_value(result["threads"].clone())?;
         spent.extend(recording);
         let mut threads: Vec<(String, f64)> = spent.into_iter().collect();
         threads.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -238,8 +238,10 @@ mod linux {
         Ok(Trial {
             made,
             dropped,
-            lost: told["lost"].as_u64().ok_or("expected the bytes lost")?,
-            seconds: told["seconds"].as_f64().ok_or("expected the time taken")?,
+            lost: result["lost"].as_u64().ok_or("expected the bytes lost")?,
+            seconds: result["seconds"]
+                .as_f64()
+                .ok_or("expected the time taken")?,
             threads,
         })
     }
@@ -316,9 +318,9 @@ mod linux {
                 t: HostTime(0),
             })?;
         }
-        let told = json!({ "lost": lost, "seconds": begun.elapsed().as_secs_f64(),
+        let result = json!({ "lost": lost, "seconds": begun.elapsed().as_secs_f64(),
             "threads": spent });
-        println!("{told}");
+        println!("{result}");
         Ok(())
     }
 

@@ -81,7 +81,7 @@ fn main() {
         "presses of protocols/paper-meander.yaml through controller and devices, both cameras, bytes encoded and \
          scanned, nothing stored; plan and rig made anew each time",
     );
-    table.baseline_told("real time, by definition", 1.0, || 1.0);
+    table.baseline_timed("real time, by definition", 1.0, || 1.0);
     for (level, presses) in SimLevel::ALL.into_iter().zip([250, 250, 40]) {
         let (scales, simulated_s) = simulate(level, presses);
         println!(

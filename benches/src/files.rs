@@ -15,7 +15,7 @@ impl Files {
     /// Writes the events of both cameras.
     ///
     /// # Errors
-    /// When a file exists or cannot be written.
+    /// If a file exists or cannot be written.
     pub fn write(folder: &Path, events: &[Vec<CdEvent>; 2]) -> Result<Self, FormatsError> {
         let files = Self(folder.into());
         for (camera, events) in CameraId::ALL.into_iter().zip(events) {

@@ -82,8 +82,13 @@ impl<'a> Table<'a> {
         self
     }
 
-    /// Adds a row whose `work` returns its own duration in seconds: another process, or a known value.
-    pub fn told(&mut self, what: &str, units: f64, work: impl FnMut() -> f64 + 'a) -> &mut Self {
+    /// Adds a row whose `work` returns its own duration in seconds: of another process, or a known value.
+    pub fn row_timed(
+        &mut self,
+        what: &str,
+        units: f64,
+        work: impl FnMut() -> f64 + 'a,
+    ) -> &mut Self {
         self.push(what, units, false, work)
     }
 
@@ -93,7 +98,7 @@ impl<'a> Table<'a> {
     }
 
     /// Adds the baseline of the ratios, whose `work` returns its own duration in seconds.
-    pub fn baseline_told(
+    pub fn baseline_timed(
         &mut self,
         what: &str,
         units: f64,
@@ -209,11 +214,11 @@ mod tests {
     }
 
     #[test]
-    fn the_others_are_set_beside_ours_round_by_round() {
-        let mut table = Table::new("race", "op", "told");
+    fn ratios_to_ours_are_computed_round_by_round() {
+        let mut table = Table::new("race", "op", "timed");
         // The first round is the warm-up.
-        let mut told = [9.0, 1.0, 8.0, 3.0].into_iter();
-        table.told("theirs", 1.0, move || told.next().unwrap());
+        let mut durations = [9.0, 1.0, 8.0, 3.0].into_iter();
+        table.row_timed("theirs", 1.0, move || durations.next().unwrap());
         table.ours("ours", 1.0, || ());
         table.rows[1].work = Box::new(|| 0.5);
         let text = table.run(3);
@@ -222,9 +227,9 @@ mod tests {
     }
 
     #[test]
-    fn a_told_time_counts_as_it_is_told() {
-        let mut table = Table::new("told", "op", "told");
-        table.baseline_told("a known thing", 10.0, || 2.0);
+    fn a_returned_duration_is_used_unchanged() {
+        let mut table = Table::new("timed", "op", "timed");
+        table.baseline_timed("a known thing", 10.0, || 2.0);
         let text = table.run(2);
         assert!(
             text.contains("5.0 op/s") && text.contains("2.0000 s"),

@@ -1,6 +1,6 @@
-//! Peak resident memory of this process and bytes that it read, where the system reports them.
+//! Peak resident memory of this process and bytes that it read, if the system reports them.
 
-/// Resets the peak resident memory, where the system can.
+/// Resets the peak resident memory, if the system supports it.
 pub fn reset_peak() {
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }

@@ -12,7 +12,7 @@ pub fn interpreter() -> Command {
     Command::new(std::env::var("SKINRIG_BENCH_PYTHON").unwrap_or_else(|_| "python3".into()))
 }
 
-/// A running program that answers every line on its input with a line of JSON.
+/// A running program that answers every input line with a line of JSON.
 #[derive(Debug)]
 pub struct Python {
     child: Child,
@@ -21,8 +21,8 @@ pub struct Python {
 }
 
 impl Python {
-    /// Starts the interpreter with these arguments. `None` when there is none or the program ends at once, as for want
-    /// of a package; its first line says what it runs on.
+    /// Starts the interpreter with these arguments. `None` if there is none or the program ends immediately, for example because of
+    /// a missing package. The first line of its output contains its versions.
     pub fn start(arguments: impl IntoIterator<Item = impl AsRef<OsStr>>) -> Option<Self> {
         let mut child = interpreter()
             .args(arguments)
@@ -41,16 +41,16 @@ impl Python {
         })
     }
 
-    /// What the program runs on.
+    /// Versions of the interpreter and its packages.
     #[must_use]
     pub fn versions(&self) -> &str {
         &self.versions
     }
 
-    /// The answer to a question.
+    /// Sends a request and returns the answer.
     ///
     /// # Errors
-    /// When the program has ended or its answer is not JSON: then what it said.
+    /// If the program has ended, or its answer is not JSON; the text contains that answer.
     pub fn ask(&mut self, question: &str) -> Result<Value, String> {
         let failed = |e: std::io::Error| e.to_string();
         let questions = self.child.stdin.as_mut().ok_or("a closed pipe")?;
@@ -63,7 +63,7 @@ impl Python {
 
 impl Drop for Python {
     fn drop(&mut self) {
-        // Its input ends, and so does it.
+        // Closing its input ends the program.
         drop(self.child.stdin.take());
         let _ = self.child.wait();
     }

@@ -1,5 +1,5 @@
 //! A seeded recording of one repetition of the published experiment, at its event rates: 289 presses 3 + 1/289 s
-//! apart, 7 M events per camera of which four fifths lie in the rows of the skin, a sixth of them outside presses.
+//! apart, 7 M events per camera, four fifths of them in the rows of the skin, a sixth of those outside presses.
 //!
 //! Counts and densities follow a real-rate recording: 20 thousand events per period in the rows of the skin, half as many
 //! different pixels, 800 events within 10 px of an event of a press, 3 % noise.
@@ -23,20 +23,20 @@ pub(crate) const PERIOD_EVENTS: usize = 24_000;
 const FIRST_S: f64 = 15.0;
 /// From contact to release, s.
 pub const TOUCH_S: f64 = 0.55;
-/// The cameras' clocks began this long before the host's, s.
+/// Start of the cameras' clocks before the host's, s.
 const CLOCK_LEADS_S: [f64; 2] = [7.0, 5.3];
-/// The rows in which the skin is seen.
+/// The rows that show the skin.
 const SKIN_ROWS: (u16, u16) = (185, 360);
 
 /// Random numbers and the pixels' sensitivities.
 pub struct Random {
     rng: Xoshiro256PlusPlus,
-    /// Per pixel, 0..1: the unevenness of skin and sensor, which makes some pixels fire again and again.
+    /// Sensitivity per pixel, 0..1: skin and sensor are uneven, so that some pixels fire repeatedly.
     gain: Vec<f32>,
 }
 
 impl Random {
-    /// Always the same.
+    /// A generator with this seed.
     #[must_use]
     pub fn seeded(seed: u64) -> Self {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -47,18 +47,18 @@ impl Random {
         }
     }
 
-    /// From 0 to 1.
+    /// Uniform in 0..1.
     pub fn unit(&mut self) -> f64 {
         unit(&mut self.rng)
     }
 
-    /// About normal, at most 3.5 standard deviations.
+    /// Approximately normal, at most 3.5 standard deviations.
     fn normal(&mut self) -> f64 {
         let sum: f64 = (0..4).map(|_| self.unit()).sum();
         (sum - 2.0) * 3f64.sqrt()
     }
 
-    /// A pixel of a press that is seen at `column`: most at the two sides of the dent, some around it.
+    /// A pixel of a press at `column`: mostly at the two sides of the dent, some around it.
     pub fn touched(&mut self, column: f64) -> (u16, u16) {
         loop {
             let (x, y) = match self.unit() {
@@ -71,7 +71,7 @@ impl Random {
                 }
                 _ => (column + 90.0 * self.normal(), 272.0 + 24.0 * self.normal()),
             };
-            if let Some(pixel) = self.seen(x, y) {
+            if let Some(pixel) = self.firing_pixel(x, y) {
                 return pixel;
             }
         }
@@ -83,7 +83,7 @@ impl Random {
             let (low, high) = SKIN_ROWS;
             let y = f64::from(low) + f64::from(high + 1 - low) * self.unit();
             let x = 640.0 * self.unit();
-            if let Some(pixel) = self.seen(x, y) {
+            if let Some(pixel) = self.firing_pixel(x, y) {
                 return pixel;
             }
         }
@@ -103,8 +103,8 @@ impl Random {
         )
     }
 
-    /// The pixel at a place, when it lies in the rows of the skin and happens to fire.
-    fn seen(&mut self, x: f64, y: f64) -> Option<(u16, u16)> {
+    /// The pixel at a position, if it is in the rows of the skin and fires.
+    fn firing_pixel(&mut self, x: f64, y: f64) -> Option<(u16, u16)> {
         let (low, high) = (f64::from(SKIN_ROWS.0), f64::from(SKIN_ROWS.1 + 1));
         if !(0.0..640.0).contains(&x) || !(low..high).contains(&y) {
             return None;
@@ -128,7 +128,7 @@ fn unit(rng: &mut Xoshiro256PlusPlus) -> f64 {
     (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// Where a press is, and when it touches on the host's clock: the grid of the published experiment, 4 mm apart.
+/// Location and contact time of a press on the host's clock: the grid of the published experiment, 4 mm apart.
 fn press(i: u32) -> (Point2, f64) {
     let (line, place) = (i / 17, i % 17);
     let place = if line % 2 == 0 { place } else { 16 - place };
@@ -139,7 +139,7 @@ fn press(i: u32) -> (Point2, f64) {
     (at, FIRST_S + PERIOD_S * f64::from(i))
 }
 
-/// What is known of the session besides its events: three sync presses and the grid, every other press calibrates. No
+/// Session without its events: three sync presses and the grid, every other press calibrates. No
 /// trigger marks, as in the published recordings, so that the clocks are aligned by event rates.
 #[must_use]
 pub fn input() -> SessionInput {
@@ -179,7 +179,7 @@ pub fn input() -> SessionInput {
     input
 }
 
-/// The same with the trigger marks of a bench, as skinrig records them: the clocks are known without a look at the events.
+/// The same with the trigger marks of a bench, as recorded by skinrig: the clocks are aligned without the events.
 #[must_use]
 pub fn marked_input() -> SessionInput {
     let mut input = input();
@@ -215,7 +215,7 @@ pub fn events(input: &SessionInput) -> [Vec<CdEvent>; 2] {
                 continue;
             };
             let contact_s = timing.contact.0 as f64 * 1e-9 + CLOCK_LEADS_S[k];
-            // The dent is seen a little beside its place: there is an error to measure.
+            // The image of the dent is slightly off its location, so that there is an error to measure.
             let column = camera.column_of_point(at).unwrap_or(320.0) + 6.0 * random.normal();
             let place = outcome.attempt.press.index();
             let events_here = if place < 3 {
@@ -227,7 +227,7 @@ pub fn events(input: &SessionInput) -> [Vec<CdEvent>; 2] {
                 let (after_s, pixel) = match random.unit() {
                     p if p < 0.18 => (PERIOD_S * random.unit(), random.elsewhere()),
                     p if p < 0.25 => (PERIOD_S * random.unit(), random.idle()),
-                    // The skin comes to rest slowly.
+                    // The skin relaxes slowly.
                     p if p < 0.40 => {
                         let after_s = TOUCH_S - 0.5 * random.unit().max(0.02).ln();
                         (after_s, random.touched(column))
@@ -242,7 +242,7 @@ pub fn events(input: &SessionInput) -> [Vec<CdEvent>; 2] {
     })
 }
 
-/// Pixels of the events of one press, as they lie in one period: `count` of them.
+/// Pixels of the events of one press within one period: `count` of them.
 pub fn press_pixels(count: usize) -> impl Iterator<Item = (u16, u16)> {
     let mut random = Random::seeded(7);
     (0..count).map(move |_| match random.unit() {

@@ -1,4 +1,4 @@
-//! The head of a session that holds nothing but camera bytes, and what a plain file takes.
+//! Header of a session with camera bytes only, and a plain file for comparison.
 
 use std::fs::File;
 use std::io::Write;
@@ -9,7 +9,7 @@ use skinrig_model::{
     StreamFormat,
 };
 
-/// A header with one press that nobody makes.
+/// A header with one press that is never made.
 #[must_use]
 pub fn header() -> RunHeader {
     let text = "{}".to_owned();
@@ -45,10 +45,10 @@ pub fn header() -> RunHeader {
     }
 }
 
-/// Writes `chunk` so many times and waits until it is on the disk.
+/// Writes `chunk` this many times and waits until it is on disk.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// If the file cannot be written.
 pub fn plain_file(path: &Path, chunk: &[u8], times: u64) -> std::io::Result<()> {
     let mut file = File::create(path)?;
     for _ in 0..times {

@@ -1,11 +1,12 @@
-//! Writes a simulated history, to look at the trends without waiting for months: `cargo run -p skinrig-hil --example simulated_history
-//! -- FOLDER`. 120 nights; from night 90 on a lamp gives less, from night 112 on the skin gives less.
+//! Writes a simulated history of 120 nights, to view trends without waiting for months: `cargo run
+//! -p skinrig-hil --example simulated_history -- FOLDER`. A lamp weakens at night 90, the skin at
+//! night 112.
 #![expect(
     clippy::unwrap_used,
-    reason = "an example that cannot write has nothing to say"
+    reason = "an example may panic if it cannot write"
 )]
 
-#[path = "../../crates/nightly/tests/trend/nights.rs"]
+#[path = "../nightly/tests/trend/nights.rs"]
 #[expect(dead_code, reason = "written for tests, which use more of it")]
 mod nights;
 
@@ -37,15 +38,15 @@ fn main() {
             continue;
         };
         let night = night(at, &drawn);
-        let home = folder.join(&night.id);
-        std::fs::create_dir_all(&home).unwrap();
+        let night_folder = folder.join(&night.id);
+        std::fs::create_dir_all(&night_folder).unwrap();
         let json = serde_json::to_string_pretty(&night).unwrap();
-        std::fs::write(home.join("night.json"), json).unwrap();
-        append(&folder.join("history.sqlite"), &night, &home).unwrap();
+        std::fs::write(night_folder.join("night.json"), json).unwrap();
+        append(&folder.join("history.sqlite"), &night, &night_folder).unwrap();
     }
 }
 
-/// The night of these values.
+/// A night with these values.
 fn night(at: usize, drawn: &[Drawn<'_>]) -> Night {
     let head = head(at);
     let mut versions = head.versions;
@@ -53,8 +54,8 @@ fn night(at: usize, drawn: &[Drawn<'_>]) -> Night {
         versions.firmware = vec![("camera1".to_owned(), "4.0".to_owned())];
     }
     let mut checks: Vec<CheckResult> = Vec::new();
-    for one in drawn {
-        let mut names = one.name.split('/');
+    for value in drawn {
+        let mut names = value.name.split('/');
         let mut name = || names.next().unwrap().to_owned();
         let (check, subject, metric) = (name(), name(), name());
         let at = checks.iter().position(|c| c.name == check);
@@ -68,20 +69,20 @@ fn night(at: usize, drawn: &[Drawn<'_>]) -> Night {
             parts.push(Part {
                 subject,
                 measurements: Vec::new(),
-                verdict: one.verdict,
+                verdict: value.verdict,
             });
             parts.len() - 1
         });
-        let limit = (one.name == "golden/skin/located").then(|| Limit::at_least(80.0));
+        let limit = (value.name == "golden/skin/located").then(|| Limit::at_least(80.0));
         parts[at].measurements.push(Measurement {
             metric,
-            value: Some(one.value),
-            unit: one.unit.to_owned(),
+            value: Some(value.value),
+            unit: value.unit.to_owned(),
             interval: None,
-            n: one.n,
+            n: value.n,
             needs: 0,
             limit,
-            verdict: one.verdict,
+            verdict: value.verdict,
             note: None,
         });
     }
@@ -108,7 +109,7 @@ fn night(at: usize, drawn: &[Drawn<'_>]) -> Night {
     }
 }
 
-/// A check that was made once, without values yet.
+/// A check with one attempt and no values.
 fn blank(name: String) -> CheckResult {
     CheckResult {
         title: name.clone(),

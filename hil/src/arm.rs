@@ -1,4 +1,5 @@
-//! Arm control for checks: limits from the rig file, motion under the same guard as in runs, always retracted and braked at the end.
+//! Arm control for checks: applies the rig file's limits and the guard that runs use, and always
+//! retracts and brakes the arm at the end.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -17,13 +18,14 @@ use crate::findings::Findings;
 use crate::run_evidence;
 use crate::test_volume::{CLEARANCE_MM, TestVolume};
 
-/// Position tolerance at the end of a move, mm. Small enough, because checks measure the exact position themselves.
+/// Position tolerance at the end of a move, mm. It may be coarse: checks measure the exact position
+/// themselves.
 const TOLERANCE_MM: f64 = 0.5;
 /// Time within the tolerance that ends a move.
 const SETTLE_TIME: HostDuration = HostDuration::from_millis(50);
-/// Speed of the rise from an unknown position and of the descent to the skin, mm/s.
+/// Speed limit for rising from an unknown position and for descending to the skin, mm/s.
 const SLOW_MM_S: f64 = 10.0;
-/// A braked robot reports its position within this time.
+/// Time limit for the first position sample of a braked robot.
 const POSITION_TIMEOUT: HostDuration = HostDuration::from_millis(100);
 /// Touch search when the rig file has none: the same as in `skinrig jog`.
 const DEFAULT_SEARCH: TouchSearch = TouchSearch {
@@ -34,7 +36,7 @@ const DEFAULT_SEARCH: TouchSearch = TouchSearch {
     tare: HostDuration::from_millis(300),
 };
 
-/// Lowest region that a check needs.
+/// How low a check may move the tip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Reach {
     /// Never below clearance height.
@@ -47,22 +49,22 @@ pub(crate) enum Reach {
 pub struct Arm<'a> {
     jog: Jog<'a>,
     stop: &'a dyn Fn() -> bool,
-    /// Where the arm may go.
+    /// Where the arm may move.
     pub volume: &'a TestVolume,
     /// How it searches for the surface.
     pub search: TouchSearch,
     robot_limits: MotionLimits,
 }
 
-/// The measurement that a check makes with the arm.
+/// A measurement with the arm.
 type Work<'w> = &'w mut dyn FnMut(&mut Arm<'_>, &mut Findings) -> Result<(), Problem>;
 
 /// Arms the robot, raises it to clearance height if needed, runs `work`, then retracts and brakes the robot even after an error.
-/// Each of `metrics` that `work` did not measure becomes unmeasured.
+/// Marks each of `metrics` that `work` did not measure as unmeasured.
 pub(crate) fn with_arm(
     bench: &mut dyn Bench,
     reach: Reach,
-    found: &mut Findings,
+    findings: &mut Findings,
     metrics: &[&'static str],
     work: Work<'_>,
 ) {
@@ -72,15 +74,15 @@ pub(crate) fn with_arm(
         _ => DEFAULT_SEARCH,
     };
     let result = match TestVolume::from_rig(rig, today()) {
-        Ok(volume) => with_robot(bench, reach, (&volume, search), found, work),
+        Ok(volume) => with_robot(bench, reach, (&volume, search), findings, work),
         Err(problem) => Err(problem),
     };
     if let Err(problem) = result {
-        found.evidence.push(*problem);
+        findings.evidence.push(*problem);
     }
     for metric in metrics {
-        if !found.values.iter().any(|v| v.metric == *metric) {
-            found.unmeasured("robot", metric);
+        if !findings.values.iter().any(|v| v.metric == *metric) {
+            findings.unmeasured("robot", metric);
         }
     }
 }
@@ -96,7 +98,7 @@ fn with_robot(
     bench: &mut dyn Bench,
     reach: Reach,
     (volume, search): (&TestVolume, TouchSearch),
-    found: &mut Findings,
+    findings: &mut Findings,
     work: Work<'_>,
 ) -> Result<(), Problem> {
     let (timing_slack, control, stop) =
@@ -113,7 +115,7 @@ fn with_robot(
         &mut *devices.clock,
         &setup,
         &context,
-        found,
+        findings,
         work,
     );
     if result
@@ -195,7 +197,7 @@ fn arm_and_work(
     clock: &mut dyn Clock,
     setup: &ArmSetup<'_>,
     context: &ArmContext<'_>,
-    found: &mut Findings,
+    findings: &mut Findings,
     work: Work<'_>,
 ) -> Result<(), Problem> {
     // A braked arm sinks and may rest on the skin. Arming measures the force at rest, which must happen in free air.
@@ -211,7 +213,7 @@ fn arm_and_work(
         search: context.search,
         robot_limits: setup.robot_limits,
     };
-    let result = work(&mut arm, found);
+    let result = work(&mut arm, findings);
     let ended = arm.jog.finish();
     drop(arm);
     let Err(e) = ended else { return result };
@@ -219,7 +221,7 @@ fn arm_and_work(
     if !matches!(e, ControllerError::Device(DeviceError::Lost { .. }))
         && let Err(second) = retract(robot, clock, setup)
     {
-        found.evidence.push(*second);
+        findings.evidence.push(*second);
     }
     result.and(Err(from_controller(e)))
 }
@@ -249,7 +251,7 @@ fn retract(
     jog.finish().map(drop).map_err(from_controller)
 }
 
-/// Limits of the guard in the skin frame, and of the robot itself.
+/// Limits for the guard, in the skin frame, and for the robot itself.
 fn limits(
     volume: &TestVolume,
     reach: Reach,
@@ -288,13 +290,13 @@ fn limits(
     (run, robot_limits)
 }
 
-/// Controller settings that tolerate emulated devices being late by `timing_slack`.
+/// Controller settings that tolerate emulated devices that are late by `timing_slack`.
 fn settings(timing_slack: HostDuration) -> ControllerSettings {
     let usual = ControllerSettings::default();
     ControllerSettings {
         late_after: usual.late_after.max(timing_slack),
         stale_after: usual.stale_after.max(HostDuration(timing_slack.0 / 5)),
-        // After a delay the arm's samples arrive in bursts.
+        // The arm's samples arrive in bursts after a delay.
         speed_over: usual.speed_over.max(HostDuration(timing_slack.0 / 25)),
         ..usual
     }
@@ -340,18 +342,18 @@ impl Arm<'_> {
         self.jog.send(target, speed).map_err(from_controller)
     }
 
-    /// Collects samples for `span`, or until `enough` is true for one.
+    /// Collects samples for `span`, or until `enough` returns true for a sample.
     ///
     /// # Errors
-    /// [`Problem`] from the watchdog or the robot. `seen` keeps the samples up to then.
+    /// [`Problem`] from the watchdog or the robot. `samples` keeps the samples collected before it.
     pub fn watch(
         &mut self,
         span: HostDuration,
-        seen: &mut Vec<PoseSample>,
+        samples: &mut Vec<PoseSample>,
         mut enough: impl FnMut(&PoseSample) -> bool,
     ) -> Result<(), Problem> {
         let stop = self.stop;
-        let watched = self.jog.watch(span, seen, |s| enough(s) || stop());
+        let watched = self.jog.watch(span, samples, |s| enough(s) || stop());
         watched.map_err(from_controller)?;
         if stop() { Err(suite_stopped()) } else { Ok(()) }
     }
@@ -375,7 +377,7 @@ impl Arm<'_> {
                         search.band_mm, at.measured.z_mm
                     ),
                 )
-                .next("check that the skin is mounted, then touch it off second with `skinrig jog`"),
+                .next("check that the skin is mounted, then touch it off again with `skinrig jog`"),
             )),
         }
     }
@@ -408,7 +410,8 @@ impl Arm<'_> {
         self.jog.hold().map_err(from_controller)
     }
 
-    /// Switches the motors off; the arm cannot be armed again. Returns the time of the command.
+    /// Switches the motors off; the arm cannot be armed again afterwards. Returns the time of the
+    /// command.
     ///
     /// # Errors
     /// [`Problem`] from the robot.

@@ -15,7 +15,7 @@ use crate::findings::Findings;
 /// Evidence that explains why an operation failed. Boxed because it is large and rare.
 pub type Problem = Box<Evidence>;
 
-/// An open device, or why it could not be opened.
+/// An open device, or the reason why it could not be opened.
 pub type Slot<T> = Result<Box<T>, Problem>;
 
 /// The devices of a bench. Each is opened separately, so that a missing one does not prevent checks of the others.
@@ -82,7 +82,7 @@ pub trait Bench {
 
     /// Closes every device, starts another process that holds the arm in free air, and kills that process.
     ///
-    /// # Errors
+    /// [`Problem`] when the drill fails to run.
     /// [`Problem`] when the drill could not be carried out.
     fn watchdog_drill(&mut self) -> Result<DrillResult, Problem>;
 
@@ -92,20 +92,22 @@ pub trait Bench {
     /// [`Problem`] when there is no usable session.
     fn run_golden(&mut self, protocol: &Path) -> Result<GoldenRun, Problem>;
 
-    /// Folder for sessions; its disk is the one that is checked.
+    /// Folder for sessions. The check `disk` tests the disk that holds it.
     fn folder(&self) -> &Path;
 
-    /// Firmware of every device opened so far: name in results and version.
+    /// Firmware version of every device opened so far, by device name.
     fn firmware(&self) -> Vec<(String, String)> {
         Vec::new()
     }
 
-    /// Whether the suite must end soon, after ctrl-C or SIGTERM. Checks poll this while they wait or move, and return what they have.
+    /// Whether the suite must end soon, after ctrl-C or SIGTERM. Checks poll this while they wait
+    /// or move, and return what they have measured.
     fn stop_requested(&self) -> bool {
         false
     }
 
-    /// [`stop_requested`](Self::stop_requested) as a function, for callers that borrow the bench's devices.
+    /// [`stop_requested`](Self::stop_requested) as a function, for callers that already borrow the
+    /// bench's devices.
     fn stop_signal(&self) -> Box<dyn Fn() -> bool> {
         Box::new(|| false)
     }

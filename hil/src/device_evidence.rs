@@ -38,7 +38,7 @@ pub fn from_error(error: &DeviceError) -> Problem {
         DeviceError::ReadBack { role, .. } => (EvidenceKind::ReadBack, *role),
         DeviceError::Refused { role, .. } => (EvidenceKind::Refused, *role),
         DeviceError::State { role, .. } => (EvidenceKind::State, *role),
-        // A real bench never replays and never leaves a call pending: both are bugs in skinrig.
+        // Neither can happen on a real bench: both are bugs in skinrig.
         DeviceError::Diverged { role, .. } | DeviceError::Pending { role, .. } => {
             (EvidenceKind::Software, *role)
         }
@@ -53,7 +53,7 @@ pub fn silent(role: DeviceRole, what: impl Into<String>) -> Problem {
     Box::new(Evidence::new(kind, subject(role), what).next(next_step(kind, role)))
 }
 
-/// Next step for a device with this kind of evidence.
+/// Next step for evidence of this kind about this device.
 const fn next_step(kind: EvidenceKind, role: DeviceRole) -> &'static str {
     match (kind, role) {
         (EvidenceKind::DeviceLost, DeviceRole::Indenter) => {

@@ -21,20 +21,20 @@ pub struct Value {
     pub note: Option<String>,
 }
 
-/// Findings of one attempt at a check.
+/// Findings of one attempt to run a check.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Findings {
     /// In the order of measurement.
     pub values: Vec<Value>,
     /// In the order of observation.
     pub evidence: Vec<Evidence>,
-    /// Why the check cannot run on this bench; it is then SKIPPED.
+    /// Why the check cannot run on this bench. The check is then SKIPPED.
     pub not_applicable: Option<String>,
     /// Session of the golden campaign, if the check ran one.
     pub golden: Option<GoldenRecord>,
 }
 
-/// What the night keeps of a golden campaign besides its metrics.
+/// Data of a golden campaign that the night keeps besides the metrics.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GoldenRecord {
     /// The session and its report, relative to the night's folder.
@@ -51,7 +51,7 @@ impl Findings {
         self.push(subject, metric, Some(value))
     }
 
-    /// Records that `metric` could not be measured on `subject`.
+    /// Records that `metric` of `subject` could not be measured.
     pub fn unmeasured(&mut self, subject: &str, metric: &'static str) -> &mut Value {
         self.push(subject, metric, None)
     }

@@ -12,7 +12,8 @@ use crate::device_evidence::{self, COMPUTER, SKIN};
 
 const ROBOT: &str = device_evidence::subject(DeviceRole::Indenter);
 
-/// Evidence from a finished run: why it ended early, secondary problems, and faults of presses that stayed invalid.
+/// Evidence from a finished run: why it ended early, secondary problems, and faults of presses
+/// without a valid attempt.
 #[must_use]
 pub fn from_report(report: &RunReport) -> Vec<Evidence> {
     let problems = report.problems.iter().map(|p| &p.error);
@@ -32,7 +33,7 @@ pub fn from_report(report: &RunReport) -> Vec<Evidence> {
     once
 }
 
-/// Faults of the last attempts at invalid presses, merged into one entry per evidence kind and device.
+/// Faults of the last attempts at invalid presses, merged by kind of evidence and device.
 fn from_press_faults(report: &RunReport) -> Vec<Evidence> {
     let mut last: BTreeMap<PressId, Vec<(u32, &PressFault)>> = BTreeMap::new();
     for (attempt, fault) in &report.press_faults {
@@ -101,7 +102,7 @@ pub fn from_error(error: &ControllerError) -> Vec<Evidence> {
     }]
 }
 
-/// Next step, for errors that do not name one themselves.
+/// Next step for errors whose text has none.
 const fn next_step(error: &ControllerError) -> Option<&'static str> {
     Some(match error {
         ControllerError::PoseStream { .. }
@@ -188,7 +189,7 @@ mod tests {
         rows.into_iter().map(|e| (e.kind, e.subject)).collect()
     }
 
-    /// Only the types decide: misleading serial numbers and details change nothing.
+    /// Evidence depends on types only; misleading serial numbers and details change nothing.
     #[test]
     fn evidence_depends_on_types_and_not_on_text() {
         let misleading = "recorder: disk full: operator: refused: lost: trigger box camera 1";

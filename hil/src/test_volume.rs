@@ -1,4 +1,4 @@
-//! Volume in which a check may move the arm: points above the skin, verified against the rig file before any motion.
+//! The volume in which a check may move the arm, verified against the rig file before any motion.
 
 use skinrig_model::{Point2, Point3, RigidTransform, Robot, Skin};
 use skinrig_nightly::{Evidence, EvidenceKind};
@@ -16,7 +16,7 @@ const HEIGHT_RANGE_MM: f64 = 8.0;
 const POINT_OFFSET_MM: f64 = 8.0;
 /// Margin around the points for the paths between them and for the final rise, mm.
 pub(crate) const MARGIN_MM: f64 = 5.0;
-/// Distance of the press points from the origin of a frame that was not touch_off off, mm.
+/// Distance of the press points from the origin of a frame without a touch-off, mm.
 const ORIGIN_OFFSET_MM: f64 = 5.0;
 
 /// The volume in which checks move the tip.
@@ -40,7 +40,7 @@ impl TestVolume {
     pub(crate) fn from_rig(rig: &RigFile, today: i64) -> Result<Self, Problem> {
         let age_days = today - rig.frame.date.days_since_1970();
         let most_h = rig.preflight.touch_off_max_age.as_secs_f64() / 3600.0;
-        // As in preflight: a date has no hour, and in another time zone today may be tomorrow.
+        // Tolerate a day in either direction, as preflight does: a date has no hour, and time zones differ.
         let recent = (-1..=(most_h / 24.0).ceil() as i64).contains(&age_days);
         if rig.kind == RigKind::Bench && !recent {
             let found = rig.frame.date;
@@ -87,7 +87,7 @@ impl TestVolume {
         ]
     }
 
-    /// Top of the volume, mm.
+    /// Height of the top of the volume, mm.
     #[must_use]
     pub fn top_mm(&self) -> f64 {
         AIR_HEIGHT_MM + HEIGHT_RANGE_MM + MARGIN_MM
@@ -129,7 +129,7 @@ impl TestVolume {
     }
 }
 
-/// Center and press points.
+/// Centre and press points of the skin.
 fn press_points(rig: &RigFile) -> (Point2, Vec<Point2>) {
     let Some(touch_off) = &rig.frame.touch_off else {
         let around = [(0.0, 0.0), (ORIGIN_OFFSET_MM, 0.0), (0.0, ORIGIN_OFFSET_MM)];
@@ -141,7 +141,7 @@ fn press_points(rig: &RigFile) -> (Point2, Vec<Point2>) {
         touch_off.points.iter().map(|p| of(&p.skin.plane())).sum()
     };
     let centre = Point2::new(sum(|p| p.x_mm) / n, sum(|p| p.y_mm) / n);
-    let inside = |p: Point2| {
+    let move_inward = |p: Point2| {
         let radius_mm = p.distance_mm(centre);
         let scale = (1.0 - rig.tip.size_mm / radius_mm).max(0.0);
         Point2::new(
@@ -149,7 +149,7 @@ fn press_points(rig: &RigFile) -> (Point2, Vec<Point2>) {
             centre.y_mm + scale * (p.y_mm - centre.y_mm),
         )
     };
-    let press_points = touch_off.points.iter().map(|p| inside(p.skin.plane()));
+    let press_points = touch_off.points.iter().map(|p| move_inward(p.skin.plane()));
     (centre, press_points.collect())
 }
 

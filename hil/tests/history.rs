@@ -1,5 +1,6 @@
-//! The history file: nights are added once, read back unchanged, and only into an intact history.
-#![expect(clippy::unwrap_used, reason = "a test that fails must say so")]
+//! Tests of the history file: each night is stored once and read back unchanged, and damaged files
+//! are rejected.
+#![expect(clippy::unwrap_used, reason = "a failing test may panic")]
 
 use std::path::Path;
 

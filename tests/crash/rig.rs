@@ -18,7 +18,7 @@ fn spoilt(folder: &Path) -> std::path::PathBuf {
     let said = expect(run, 3);
     for part in [
         "3 of 12 presses are invalid because of the rig, not the skin: press 10: camera 1 sent no bytes",
-        "take these presses again with `skinrig resume ",
+        "repeat these presses with `skinrig resume ",
     ] {
         assert!(said.contains(part), "expected {part:?} in {said}");
     }

@@ -1,4 +1,4 @@
-//! Names of analyses. A session's own settings give the official one; everything else is a variant with files of its own beside it.
+//! Names and files of analyses. The official one uses the session's own settings; any other is a variant with its own files.
 
 mod stored;
 mod summary;
@@ -15,24 +15,24 @@ use crate::paths::{beside, folder_of};
 pub(crate) use self::stored::stored;
 pub(crate) use self::summary::{SummaryError, summary};
 
-/// Stands before the name of a variant in the names of its files.
+/// Precedes the variant's name in its file names.
 const MARK: &str = ".analysis-";
-/// The end of every file of results.
+/// Suffix of every results file.
 const RESULTS: &str = ".results.json";
-/// Longest name.
-const MOST_CHARS: usize = 60;
+/// Longest name, in characters.
+const MAX_CHARS: usize = 60;
 
-/// The results of a session's analysis with this name; `None`: the official one.
+/// Path of the results of the analysis `name`; `None` is the official one.
 pub(crate) fn results_path(session: &Path, name: Option<&str>) -> PathBuf {
     path(session, name, RESULTS)
 }
 
-/// Its report.
+/// Path of its report.
 pub(crate) fn report_path(session: &Path, name: Option<&str>) -> PathBuf {
     path(session, name, ".report.html")
 }
 
-/// The page of what speed costs; its results have the same name with another ending.
+/// Path of its trade-off page; the results of the trade-off have the same name with another ending.
 pub(crate) fn tradeoff_path(session: &Path, name: Option<&str>) -> PathBuf {
     path(session, name, ".tradeoff.html")
 }
@@ -44,15 +44,15 @@ fn path(session: &Path, name: Option<&str>, ending: &str) -> PathBuf {
     }
 }
 
-/// Why a text is not a name of a variant.
+/// Invalid name of a variant.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum NameError {
     /// The name of the session's own analysis.
     #[error("expected another name: `official` is the analysis with the session's own settings")]
     Official,
-    /// Too long, or with characters that do not belong in the name of a file.
+    /// Empty, too long, or with other characters than the name may have.
     #[error(
-        "expected 1 to {MOST_CHARS} of a-z, 0-9, `.`, `_`, `=`, `-`, a letter or digit first, found `{}`",
+        "expected 1 to {MAX_CHARS} of a-z, 0-9, `.`, `_`, `=`, `-`, a letter or digit first, found `{}`",
         found.escape_debug()
     )]
     Characters {
@@ -61,14 +61,14 @@ pub(crate) enum NameError {
     },
 }
 
-/// A name of an analysis, as `--name` and `--analysis` take it.
+/// Parses the name of a variant, for `--name` and `--analysis`.
 ///
 /// # Errors
-/// [`NameError`] for what is none.
+/// [`NameError`] for an invalid name.
 pub(crate) fn parse(text: &str) -> Result<String, NameError> {
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "._=-".contains(c);
     let first = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
-    let fits = text.len() <= MOST_CHARS && text.starts_with(first) && text.chars().all(plain);
+    let fits = text.len() <= MAX_CHARS && text.starts_with(first) && text.chars().all(plain);
     match (fits, text) {
         (true, "official") => Err(NameError::Official),
         (true, _) => Ok(text.to_owned()),
@@ -78,8 +78,8 @@ pub(crate) fn parse(text: &str) -> Result<String, NameError> {
     }
 }
 
-/// The name of a variant that nobody named: by what it changes.
-pub(crate) fn own_name(changed: &[String], reference_code: bool) -> String {
+/// Default name of a variant, built from the settings it changes.
+pub(crate) fn default_name(changed: &[String], reference_code: bool) -> String {
     let reference = reference_code.then(|| "reference-code".to_owned());
     let words = changed
         .iter()
@@ -92,7 +92,7 @@ pub(crate) fn own_name(changed: &[String], reference_code: bool) -> String {
     if parse(&exact).is_ok() {
         return exact;
     }
-    // Not every change can stand in a file's name: a digest keeps those apart that look alike.
+    // Characters that a file name cannot hold are replaced; a digest keeps similar names distinct.
     let mut name = String::new();
     for c in exact.to_lowercase().chars() {
         let plain = c.is_ascii_alphanumeric() || "._=".contains(c);
@@ -105,7 +105,7 @@ pub(crate) fn own_name(changed: &[String], reference_code: bool) -> String {
     let mut name: String = name
         .trim_start_matches(['.', '_', '=', '-'])
         .chars()
-        .take(MOST_CHARS - 9)
+        .take(MAX_CHARS - 9)
         .collect();
     if name.is_empty() {
         name.push('x');
@@ -118,13 +118,13 @@ pub(crate) fn own_name(changed: &[String], reference_code: bool) -> String {
     name
 }
 
-/// An analysis that lies beside a session.
+/// An analysis stored beside a session.
 pub(crate) struct AnalysisFile {
     /// Its name; `None`: the official one.
     pub name: Option<String>,
-    /// Its file of results.
+    /// Its results file.
     pub results: PathBuf,
-    /// What it says in short, or why that cannot be told.
+    /// Its summary, or why there is none.
     pub summary: Result<Summary, SummaryError>,
 }
 
@@ -160,18 +160,18 @@ pub(crate) fn all(session: &Path, session_id: &str) -> Vec<AnalysisFile> {
         .collect()
 }
 
-/// What a variant that lies beside a session changed.
+/// Reads what the variant `name` of a session changes.
 ///
 /// # Errors
-/// [`Failure::input`] when there is none of that name.
+/// [`Failure::input`] when no variant has that name.
 pub(crate) fn variant(session: &Path, session_id: &str, name: &str) -> Result<Variant, Failure> {
     let found = summary(session, session_id, Some(name)).map(|s| s.variant);
     found.ok().flatten().ok_or_else(|| {
         let others: Vec<String> = all(session, session_id).into_iter().filter_map(|a| a.name).collect();
         let there = if others.is_empty() { "none".to_owned() } else { others.join(", ") };
         Failure::input(format!(
-            "{0}: expected an analysis with the name `{name}`, found {there}\n  next: `skinrig analyze {0} --set KEY=VALUE --name {name}` \
-             makes one, `skinrig show {0}` lists them",
+            "{0}: expected an analysis named `{name}`, found {there}\n  next: `skinrig analyze {0} --set KEY=VALUE --name {name}` \
+             creates it, `skinrig show {0}` lists all",
             session.display()
         ))
     })
@@ -182,10 +182,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_variant_is_named_by_what_it_changes() {
+    fn a_variant_is_named_after_its_changes() {
         let name = |changed: &[&str], reference| {
             let changed: Vec<String> = changed.iter().map(|c| (*c).to_owned()).collect();
-            own_name(&changed, reference)
+            default_name(&changed, reference)
         };
         assert_eq!(name(&["analysis.min_samples=5"], false), "min_samples=5");
         assert_eq!(name(&[], true), "reference-code");
@@ -193,7 +193,7 @@ mod tests {
             name(&["analysis.bin=2px", "analysis.seed=3"], true),
             "reference-code_bin=2px_seed=3"
         );
-        // What cannot stand in a name is told apart all the same.
+        // Changes with characters that a name cannot hold still get distinct names.
         let (a, b) = (
             name(&["analysis.eps=5 px"], false),
             name(&["analysis.eps=5/px"], false),
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn names_make_plain_files_beside_the_session() {
+    fn files_of_an_analysis_are_beside_the_session() {
         for wrong in [
             "",
             "Official",

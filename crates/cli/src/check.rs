@@ -17,8 +17,8 @@ pub struct Checked {
     pub plan: Plan,
 }
 
-/// What is wrong with a protocol, and its plan when it could be made.
-struct Refused {
+/// Findings about a protocol that was rejected, and its plan if it compiled.
+struct Rejection {
     found: Diagnostics,
     planned: Option<Checked>,
 }
@@ -28,18 +28,19 @@ struct Refused {
 /// # Errors
 /// [`Failure::input`] with every finding at once.
 pub fn load(path: &Path, overrides: &[String]) -> Result<Checked, Failure> {
-    read(path, overrides)?.map_err(|refused| Failure::findings(&refused.found))
+    read(path, overrides)?.map_err(|rejection| Failure::findings(&rejection.found))
 }
 
-/// As [`load`], for the text of a protocol that lies in no file.
+/// Like [`load`], for protocol text that is not in a file.
 ///
 /// # Errors
 /// [`Failure::input`] with every finding at once.
 pub(crate) fn load_text(name: &str, text: &str, overrides: &[String]) -> Result<Checked, Failure> {
-    parse(name, text.as_bytes(), overrides)?.map_err(|refused| Failure::findings(&refused.found))
+    parse(name, text.as_bytes(), overrides)?
+        .map_err(|rejection| Failure::findings(&rejection.found))
 }
 
-fn read(path: &Path, overrides: &[String]) -> Result<Result<Checked, Box<Refused>>, Failure> {
+fn read(path: &Path, overrides: &[String]) -> Result<Result<Checked, Box<Rejection>>, Failure> {
     let bytes = regular::read_text(path).map_err(|e| {
         Failure::input(format!("{}: cannot read the protocol: {e}", path.display()))
     })?;
@@ -50,26 +51,26 @@ fn parse(
     name: &str,
     bytes: &[u8],
     overrides: &[String],
-) -> Result<Result<Checked, Box<Refused>>, Failure> {
+) -> Result<Result<Checked, Box<Rejection>>, Failure> {
     let loader = regular::read_text;
     let protocol = match Protocol::parse(name, bytes, overrides, &loader) {
         Ok(protocol) => protocol,
         Err(found) => {
             let planned = None;
-            return Ok(Err(Box::new(Refused { found, planned })));
+            return Ok(Err(Box::new(Rejection { found, planned })));
         }
     };
     let plan = protocol.compile();
-    let held = protocol.check(&plan);
-    if held.is_ok() {
+    let result = protocol.check(&plan);
+    if result.is_ok() {
         let outline = &protocol.surroundings.outline;
         skinrig_analysis::check::before_recording(&plan.presses, &protocol.analysis, outline)
             .map_err(|e| Failure::input(format!("{name}: {e}")))?;
     }
     let checked = Checked { protocol, plan };
-    Ok(match held {
+    Ok(match result {
         Ok(()) => Ok(checked),
-        Err(found) => Err(Box::new(Refused {
+        Err(found) => Err(Box::new(Rejection {
             found,
             planned: Some(checked),
         })),
@@ -83,13 +84,13 @@ fn parse(
 pub fn check(args: &ProtocolArgs, json: bool) -> Outcome {
     let checked = match read(&args.protocol, &args.overrides)? {
         Ok(checked) => checked,
-        Err(refused) if json => {
+        Err(rejection) if json => {
             crate::terminal::print_json(&serde_json::json!({
-                "protocol": args.protocol, "findings": refused.found.list(),
+                "protocol": args.protocol, "findings": rejection.found.list(),
             }));
             return Ok(Exit::Input);
         }
-        Err(refused) => return Err(Failure::findings(&refused.found)),
+        Err(rejection) => return Err(Failure::findings(&rejection.found)),
     };
     let summary = checked.plan.summary();
     if json {
@@ -115,22 +116,22 @@ pub fn plan(args: &PlanArgs, json: bool) -> Outcome {
     let Some(protocol) = &args.protocol else {
         return Err(Failure::input("expected a protocol file, found none"));
     };
-    // A plan that breaks its limits is drawn too: that is when its picture is wanted.
+    // Also draw a plan that breaks its limits, to show where it does.
     let read = read(protocol, &args.overrides)?;
     let drawn = match &read {
         Ok(checked) => Some(checked),
-        Err(refused) => refused.planned.as_ref(),
+        Err(rejection) => rejection.planned.as_ref(),
     };
     if let (Some(file), Some(Checked { protocol, plan })) = (&args.svg, drawn) {
         std::fs::write(file, path_svg(plan, &protocol.surroundings)).map_err(|e| {
             Failure::internal(format!("{}: cannot write the path: {e}", file.display()))
         })?;
     }
-    let checked = read.map_err(|refused| Failure::findings(&refused.found))?;
+    let checked = read.map_err(|rejection| Failure::findings(&rejection.found))?;
     let summary = checked.plan.summary();
     if json {
         crate::terminal::print_json(&serde_json::json!({
-            "sha256": checked.plan.digest(), "summary": summary, "plan": as_read(&checked.plan)?,
+            "sha256": checked.plan.digest(), "summary": summary, "plan": with_numbers(&checked.plan)?,
         }));
         return Ok(Exit::Ok);
     }
@@ -147,9 +148,9 @@ pub fn plan(args: &PlanArgs, json: bool) -> Outcome {
     Ok(Exit::Ok)
 }
 
-/// The plan as JSON for people: presses, repetitions and locations by their numbers. The stored plan, which the digest is of, holds
-/// indices.
-fn as_read(plan: &Plan) -> Result<serde_json::Value, Failure> {
+/// The plan as JSON with presses, repetitions and locations numbered from 1, as people count them. The stored plan, of which the
+/// digest is taken, holds indices.
+fn with_numbers(plan: &Plan) -> Result<serde_json::Value, Failure> {
     let mut value = serde_json::to_value(plan).map_err(Failure::internal)?;
     let rows = value["presses"].as_array_mut().into_iter().flatten();
     for (row, press) in rows.zip(&plan.presses) {

@@ -8,7 +8,7 @@ use crate::exit::{Exit, Outcome};
 /// Prints the completions of a shell.
 ///
 /// # Errors
-/// None; they are made from the arguments.
+/// Never.
 pub(crate) fn completions(args: &CompletionsArgs) -> Outcome {
     let mut script = Vec::new();
     let mut command = visible(&crate::args::command());

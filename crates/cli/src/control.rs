@@ -1,4 +1,4 @@
-//! `skinrig control` and `skinrig note`: the operator's hand on a run from another terminal.
+//! `skinrig control` and `skinrig note`: requests to a run from another terminal.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -11,41 +11,40 @@ use crate::host::user_name;
 use crate::remote::{Live, RemoteError, Reply, Request, RunRequest, ask};
 use crate::sessions;
 
-/// The controller hears a request at its next tick; one that takes this long hangs.
+/// The controller reads requests at every tick; a run that takes longer than this hangs.
 const ACKNOWLEDGE_WITHIN: Duration = Duration::from_secs(10);
-/// Between two questions to the run.
+/// Interval between status queries.
 const ASK_EVERY: Duration = Duration::from_millis(20);
 
-/// Hands a request to the run of a session, and waits until the run has acknowledged it.
+/// Sends a request to a session's run and waits for the acknowledgement.
 ///
 /// # Errors
-/// [`Failure::input`] when nobody runs it, [`Failure::rig`] when the run does not hear, [`Failure::limit`] when the
-/// request has not had its effect within `--wait`.
+/// [`Failure::input`] when no run writes the session, [`Failure::rig`] when the run does not acknowledge the request,
+/// [`Failure::limit`] when the request has not taken effect within `--wait`.
 pub(crate) fn control(args: &ControlArgs, json: bool) -> Outcome {
     let session = sessions::find_running(&args.session)?;
-    let number = handed(&session, &Request::Control(args.what))?;
-    let acknowledged = wait(&session, ACKNOWLEDGE_WITHIN, |live| live.heard >= number)?;
-    let after = match (acknowledged, args.wait) {
-        (WaitOutcome::Late(live), _) => return Err(no_acknowledgement(&live)),
-        (WaitOutcome::Until(_), Some(seconds)) => {
+    let acknowledged = request(&session, args.what)?;
+    let after = match args.wait {
+        Some(seconds) => {
             let within = Duration::try_from_secs_f64(seconds)
                 .map_err(|e| Failure::input(format!("--wait: {e}")))?;
             match wait(&session, within, |live| has_effect(args.what, &live.state))? {
-                WaitOutcome::Late(live) => {
+                WaitOutcome::TimedOut(live) => {
                     return Err(Failure::limit(format!(
                         "acknowledged, but not done within {seconds} s: the run is {}; it will follow as soon as it can",
                         live.state
                     )));
                 }
-                other => other,
+                WaitOutcome::Done(live) => Some(live),
+                WaitOutcome::Ended => None,
             }
         }
-        (other, _) => other,
+        None => acknowledged,
     };
-    let state = match after {
-        WaitOutcome::Until(live) | WaitOutcome::Late(live) => live.state,
-        WaitOutcome::Ended => return ended(args.what, &session, json),
+    let Some(live) = after else {
+        return ended(args.what, &session, json);
     };
+    let state = live.state;
     if json {
         crate::terminal::print_json(&serde_json::json!({
             "session": session, "request": args.what, "heard": true, "state": state,
@@ -56,14 +55,27 @@ pub(crate) fn control(args: &ControlArgs, json: bool) -> Outcome {
     Ok(Exit::Ok)
 }
 
-/// The run ended: what was asked for, or too early for it.
+/// Sends a request to a session's run. Returns the run's status after the acknowledgement; `None` if the run has ended.
+///
+/// # Errors
+/// As [`control`].
+pub(crate) fn request(session: &Path, what: RunRequest) -> Result<Option<Box<Live>>, Failure> {
+    let number = send(session, &Request::Control(what))?;
+    match wait(session, ACKNOWLEDGE_WITHIN, |live| live.heard >= number)? {
+        WaitOutcome::Done(live) => Ok(Some(live)),
+        WaitOutcome::TimedOut(live) => Err(no_acknowledgement(&live)),
+        WaitOutcome::Ended => Ok(None),
+    }
+}
+
+/// Result for a run that ended: success if the request was to end it, otherwise an error.
 fn ended(what: RunRequest, session: &Path, json: bool) -> Outcome {
     if !matches!(
         what,
         RunRequest::Stop | RunRequest::Abort | RunRequest::Halt
     ) {
         return Err(Failure::input(format!(
-            "{}: the run has ended meanwhile\n  next: `skinrig status {0}` tells how",
+            "{}: the run has already ended\n  next: `skinrig status {0}` shows how",
             session.display()
         )));
     }
@@ -77,7 +89,7 @@ fn ended(what: RunRequest, session: &Path, json: bool) -> Outcome {
     Ok(Exit::Ok)
 }
 
-/// True when a run in `state` is where `what` leads to.
+/// True when a run in `state` has done what was requested.
 fn has_effect(what: RunRequest, state: &str) -> bool {
     match what {
         RunRequest::Pause | RunRequest::PauseNow => matches!(state, "paused" | "finished"),
@@ -86,7 +98,7 @@ fn has_effect(what: RunRequest, state: &str) -> bool {
     }
 }
 
-/// Hands the run of a session a remark, and waits until it is written.
+/// Adds a note to a running session and waits until it is stored.
 ///
 /// # Errors
 /// As [`control`].
@@ -97,29 +109,39 @@ pub(crate) fn note(args: &NoteArgs, json: bool) -> Outcome {
         None => user_name(),
     };
     let text = args.text.join(" ");
-    let request = Request::Note {
-        by: by.clone(),
-        text: text.clone(),
-    };
-    let number = handed(&session, &request)?;
-    match wait(&session, ACKNOWLEDGE_WITHIN, |live| live.noted >= number)? {
-        WaitOutcome::Until(_) if json => crate::terminal::print_json(&serde_json::json!({
+    let is_running = add_note(&session, &by, &text)?;
+    if !is_running {
+        outln!("{}: noted; the run has ended", session.display());
+    } else if json {
+        crate::terminal::print_json(&serde_json::json!({
             "session": session, "by": by, "note": text, "written": true,
-        })),
-        WaitOutcome::Until(_) => outln!("{}: noted", session.display()),
-        WaitOutcome::Late(live) => return Err(no_acknowledgement(&live)),
-        // Written at the end of the run, or lost with a run that was killed: the session tells.
-        WaitOutcome::Ended if is_noted(&session, &format!("{by}: {text}")) => {
-            outln!("{}: noted; the run has ended", session.display());
-        }
-        WaitOutcome::Ended => {
-            return Err(Failure::input(format!(
-                "{}: the run ended before the note was written",
-                session.display()
-            )));
-        }
+        }));
+    } else {
+        outln!("{}: noted", session.display());
     }
     Ok(Exit::Ok)
+}
+
+/// Adds a note to a session's run and waits until it is stored. Returns false if the run has ended since.
+///
+/// # Errors
+/// As [`control`].
+pub(crate) fn add_note(session: &Path, by: &str, text: &str) -> Result<bool, Failure> {
+    let request = Request::Note {
+        by: by.to_owned(),
+        text: text.to_owned(),
+    };
+    let number = send(session, &request)?;
+    match wait(session, ACKNOWLEDGE_WITHIN, |live| live.noted >= number)? {
+        WaitOutcome::Done(_) => Ok(true),
+        WaitOutcome::TimedOut(live) => Err(no_acknowledgement(&live)),
+        // Written at the end of the run, or lost if the run was killed: check the session.
+        WaitOutcome::Ended if is_noted(session, &format!("{by}: {text}")) => Ok(false),
+        WaitOutcome::Ended => Err(Failure::input(format!(
+            "{}: the run ended before the note was written",
+            session.display()
+        ))),
+    }
 }
 
 fn is_noted(session: &Path, note: &str) -> bool {
@@ -127,51 +149,51 @@ fn is_noted(session: &Path, note: &str) -> bool {
     notes.is_ok_and(|notes| notes.iter().any(|n| n.text == note))
 }
 
-/// Hands `request` to the run; its number.
-fn handed(session: &Path, request: &Request) -> Result<u64, Failure> {
+/// Sends `request` to the run and returns its number.
+fn send(session: &Path, request: &Request) -> Result<u64, Failure> {
     match ask(session, request) {
         Ok(Reply::Handed(number)) => Ok(number),
         Ok(Reply::Refused(why)) => Err(Failure::input(format!("{}: {why}", session.display()))),
         Ok(Reply::Live(_)) => Err(Failure::internal(
-            "the run answered another question: expected one of this version of skinrig",
+            "expected the number of the request, found the run's status: is the run of another version of skinrig?",
         )),
         Err(error) => Err(remote_failure(session, error)),
     }
 }
 
-/// Nobody answered.
+/// The failure for a run that did not answer.
 fn remote_failure(session: &Path, error: RemoteError) -> Failure {
     let session = session.display();
     match error {
         RemoteError::Failed(why) => Failure::internal(format!("{session}: {why}")),
         RemoteError::NotListening => Failure::internal(format!(
-            "{session}: its run does not listen\n  next: press ctrl-C in its own terminal, or send SIGTERM to its process, \
+            "{session}: its run does not accept requests\n  next: press ctrl-C in its own terminal, or send SIGTERM to its process, \
              which counts as one ctrl-C; to stop the arm at once press the force button on its base"
         )),
     }
 }
 
-/// The run does not look at what it is asked.
+/// The failure for a run that did not acknowledge a request in time.
 fn no_acknowledgement(live: &Live) -> Failure {
     Failure::rig(format!(
-        "the run ({}) has not acknowledged the request within {} s; it may still\n  next: look at the arm; to stop it at once press the \
+        "the run ({}) has not acknowledged the request within {} s; it may do so later\n  next: look at the arm; to stop it at once press the \
          force button on its base",
         live.state,
         ACKNOWLEDGE_WITHIN.as_secs()
     ))
 }
 
-/// What waiting came to.
+/// Outcome of the wait.
 enum WaitOutcome {
-    /// It is so.
-    Until(Box<Live>),
-    /// It is still not so.
-    Late(Box<Live>),
-    /// The run ended before.
+    /// The condition holds.
+    Done(Box<Live>),
+    /// Timed out: the condition still does not hold.
+    TimedOut(Box<Live>),
+    /// The run ended first.
     Ended,
 }
 
-/// Asks the run again and again until `done`, its end, or `within` is over.
+/// Polls the run until `done` holds, the run ends, or `within` has passed.
 fn wait(
     session: &Path,
     within: Duration,
@@ -180,9 +202,9 @@ fn wait(
     let from = Instant::now();
     loop {
         match ask(session, &Request::Status) {
-            Ok(Reply::Live(live)) if done(&live) => return Ok(WaitOutcome::Until(live)),
+            Ok(Reply::Live(live)) if done(&live) => return Ok(WaitOutcome::Done(live)),
             Ok(Reply::Live(live)) if from.elapsed() >= within => {
-                return Ok(WaitOutcome::Late(live));
+                return Ok(WaitOutcome::TimedOut(live));
             }
             Ok(Reply::Live(_)) => {}
             Ok(other) => return Err(Failure::internal(format!("unexpected answer {other:?}"))),
@@ -201,7 +223,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_request_has_a_state_that_it_leads_to() {
+    fn every_request_leads_to_its_state() {
         for (what, state) in [
             (RunRequest::Pause, "paused"),
             (RunRequest::PauseNow, "paused"),

@@ -1,4 +1,4 @@
-//! `skinrig devices`: what is connected, what keeps it from being used, and the next step.
+//! `skinrig devices`: connected devices, what prevents their use, and the next step.
 
 use std::path::Path;
 use std::time::Duration;
@@ -17,32 +17,32 @@ use crate::exit::{Exit, Outcome};
 use crate::hil::lease::{holder_of, path};
 use crate::rig::bench;
 
-/// How long a trigger box may take to say hello: opening its port resets it.
+/// Timeout of the trigger box's hello; opening its port resets it.
 const HELLO: Duration = Duration::from_secs(4);
-/// The same for a simulated processor that has to wait for a real one.
+/// The same for an emulated box, whose simulated processor competes for a real one.
 const EMULATED_HELLO: Duration = Duration::from_secs(20);
 
-/// One thing that was found, or that should have been.
+/// One device, found or expected.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub(crate) struct Line {
     /// `robot`, `camera`, `trigger box` or `port`.
     pub device: &'static str,
     /// Model and place.
     pub what: String,
-    /// Its serial number, where it told one.
+    /// Its serial number, if known.
     pub serial: Option<String>,
     /// `ready`, `busy`, `not permitted`, `other device`, `other firmware`, `absent`, `not asked` or `faulty`.
     pub state: &'static str,
     /// More about the state.
     pub detail: String,
-    /// What the rig file wants of it, for example `camera1`.
+    /// Its role in the rig file, for example `camera1`.
     pub role: Option<String>,
     /// What to do next.
     pub next_step: Option<String>,
-    /// What a device that is ready says of its firmware.
+    /// Firmware version reported by a ready device.
     #[serde(skip)]
     pub firmware: Option<String>,
-    /// Bus and address of a USB device that was found as such.
+    /// Bus and address, if found on USB.
     #[serde(skip)]
     pub usb: Option<(u8, u8)>,
 }
@@ -56,7 +56,7 @@ impl Line {
 /// `skinrig devices`.
 ///
 /// # Errors
-/// [`crate::exit::Failure`] for a rig file that cannot be read. Nothing connected is no error.
+/// [`crate::exit::Failure`] for a rig file that cannot be read. It is no error if no device is connected.
 pub(crate) fn devices(args: &DevicesArgs, json: bool) -> Outcome {
     let rig = args.rig.as_deref().map(bench::load).transpose()?;
     let lines = survey(rig.as_ref());
@@ -72,8 +72,8 @@ pub(crate) fn devices(args: &DevicesArgs, json: bool) -> Outcome {
     Ok(Exit::Ok)
 }
 
-/// Everything that is connected, and what the rig file misses. Nothing moves; opening the box's port resets it, which is not done
-/// while somebody holds the bench.
+/// Lists connected devices and the devices of the rig file that are missing. Nothing moves. Opening the trigger box's port resets
+/// the box, so the port stays closed while the bench is in use.
 pub(crate) fn survey(rig: Option<&RigFile>) -> Vec<Line> {
     let mut lines = robots(rig);
     lines.extend(cameras(rig));
@@ -100,7 +100,7 @@ fn print(lines: &[Line], rig: Option<&RigFile>) {
     }
     if lines.iter().all(|l| l.state != "ready") {
         outln!(
-            "\nno device is ready. The simulated rig needs none: `skinrig run protocols/demo.yaml`; docs/how-to/bench.md tells how to wire a bench"
+            "\nno device is ready. The simulated rig needs none: `skinrig run protocols/demo.yaml`; docs/how-to/bench.md describes how to wire a bench"
         );
     }
 }
@@ -141,14 +141,14 @@ fn robots(rig: Option<&RigFile>) -> Vec<Line> {
         .map(|f| {
             let (state, detail) = match &f.availability {
                 Availability::Free => ("ready", String::new()),
-                Availability::Busy => ("busy", "another program holds it".to_owned()),
+                Availability::Busy => ("busy", "in use by another program".to_owned()),
                 Availability::NotPermitted => ("not permitted", String::new()),
                 Availability::OtherModel => ("other device", "not an omega.3".to_owned()),
                 Availability::Failed(e) => ("faulty", e.to_string()),
             };
             Line {
                 serial: f.serial.map(|s| s.to_string()),
-                // One that does not tell its number is 65535 to the library.
+                // The library reports 65535 for a device without a serial number.
                 role: (wanted == Some(f.serial.unwrap_or(SERIAL_UNKNOWN)))
                     .then(|| "robot".to_owned()),
                 firmware: f.firmware.clone(),
@@ -161,7 +161,7 @@ fn robots(rig: Option<&RigFile>) -> Vec<Line> {
             }
         })
         .collect();
-    missing(
+    add_missing(
         &mut lines,
         "robot",
         "omega.3",
@@ -205,7 +205,7 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
                         FoundState::Busy => line(
                             &place("camera"),
                             "busy",
-                            "another program holds it".to_owned(),
+                            "in use by another program".to_owned(),
                         ),
                         FoundState::NoPermission => {
                             line(&place("camera"), "not permitted", String::new())
@@ -227,7 +227,7 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
         .into_iter()
         .zip(rig.iter().flat_map(|r| &r.cameras))
     {
-        missing(
+        add_missing(
             &mut lines,
             "camera",
             &format!("camera, model {}", camera.model),
@@ -247,17 +247,17 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
     lines
 }
 
-/// Adds a line for each camera that is not an EVK1 and that this build drives; their places.
+/// Adds a line for each supported camera that is not an EVK1; returns bus and address of each.
 #[cfg(feature = "evk4")]
 fn other_cameras(lines: &mut Vec<Line>, wanted: &dyn Fn(&str) -> Option<String>) -> Vec<(u8, u8)> {
     use skinrig_evk4::FoundState;
 
     let known = crate::rig::evt3_camera::evk1_places();
     let mut places = Vec::new();
-    // Without USB the EVK1's own list says so.
+    // A USB failure is reported by the EVK1's list.
     for found in skinrig_evk4::enumerate(&known).unwrap_or_default() {
         let (bus, device) = found.place;
-        // What else shares their USB numbers is an EVK1's business.
+        // Other devices with the same USB IDs are left to the EVK1's list.
         if let FoundState::Ready(model, serial) = found.state {
             places.push(found.place);
             lines.push(Line {
@@ -275,15 +275,15 @@ fn other_cameras(lines: &mut Vec<Line>, wanted: &dyn Fn(&str) -> Option<String>)
     places
 }
 
-/// This build drives none.
+/// This build supports no other cameras.
 #[cfg(not(feature = "evk4"))]
 fn other_cameras(_: &mut Vec<Line>, _: &dyn Fn(&str) -> Option<String>) -> Vec<(u8, u8)> {
     Vec::new()
 }
 
-/// Adds a line for a device that the rig file wants and that is not among `lines`. One that was found but did not tell its
-/// serial number, because it is busy for example, may be it.
-fn missing(
+/// Adds a line for a device of the rig file that is not among `lines`. A device without a known serial number, for example
+/// because it is busy, may be the expected one.
+fn add_missing(
     lines: &mut Vec<Line>,
     device: &'static str,
     model: &str,
@@ -293,32 +293,33 @@ fn missing(
         Some((role, serial)) => (Some(role.to_owned()), Some(serial)),
         None => (None, None),
     };
-    let there = match &role {
+    let is_present = match &role {
         Some(role) => lines.iter().any(|l| l.role.as_ref() == Some(role)),
         None => !lines.is_empty(),
     };
-    if there {
+    if is_present {
         return;
     }
-    let may_be_it = |l: &&Line| {
+    let is_candidate = |l: &&Line| {
         l.device == device
             && l.serial.is_none()
             && matches!(l.state, "busy" | "not permitted" | "faulty")
     };
-    let unasked: Vec<&'static str> = lines.iter().filter(may_be_it).map(|l| l.state).collect();
-    let (state, detail, next_step) = match unasked.first() {
+    let candidates: Vec<&'static str> =
+        lines.iter().filter(is_candidate).map(|l| l.state).collect();
+    let (state, detail, next_step) = match candidates.first() {
         None => (
             "absent",
             String::new(),
-            "plug it in, switch it on; or correct its serial number in the rig file",
+            "plug it in and switch it on, or correct its serial number in the rig file",
         ),
         Some(first) => (
             "not asked",
             format!(
-                "may be one that is {first}: {} of that kind did not tell a serial number",
-                unasked.len()
+                "may be one that is {first}: {} of that kind without a known serial number",
+                candidates.len()
             ),
-            "see to that one first, then look again",
+            "fix that one first, then repeat this command",
         ),
     };
     lines.push(Line {
@@ -333,7 +334,7 @@ fn missing(
     });
 }
 
-/// The box of the rig file is asked; other serial ports are only listed, for bytes sent to a stranger may move something.
+/// Queries the rig file's trigger box. Other serial ports are only listed: bytes sent to an unknown device may move something.
 fn trigger_boxes(rig: Option<&RigFile>) -> Vec<Line> {
     let port = rig
         .and_then(|r| r.trigger_box.as_ref())
@@ -343,7 +344,7 @@ fn trigger_boxes(rig: Option<&RigFile>) -> Vec<Line> {
         _ => HELLO,
     };
     let mut lines = Vec::new();
-    // Opening the port resets the box: not in the middle of somebody's run.
+    // Opening the port resets the box, which would disturb a run.
     let holder = rig.and_then(holder);
     let open = if let (Some(holder), Some(port)) = (&holder, &port) {
         lines.push(Line {
@@ -403,7 +404,7 @@ fn trigger_boxes(rig: Option<&RigFile>) -> Vec<Line> {
                 what: path,
                 state: "not asked",
                 next_step: Some(
-                    "if this is the trigger box, name the port in the rig file: only ports that are named are opened".to_owned(),
+                    "if this is the trigger box, name the port in the rig file; other ports are never opened".to_owned(),
                 ),
                 ..Line::default()
             });
@@ -412,7 +413,7 @@ fn trigger_boxes(rig: Option<&RigFile>) -> Vec<Line> {
     lines
 }
 
-/// Who holds the lease of the bench at this moment.
+/// Current holder of the bench's lease.
 fn holder(rig: &RigFile) -> Option<String> {
     match lease::inspect(&path(rig)) {
         Ok(LeaseState::Held { owner, .. }) => Some(holder_of(owner.as_deref())),
@@ -420,7 +421,7 @@ fn holder(rig: &RigFile) -> Option<String> {
     }
 }
 
-/// Serial ports under their lasting names, sorted.
+/// Serial ports by their persistent names, sorted.
 fn serial_ports(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let mut ports: Vec<String> = entries.map(|e| e.path().display().to_string()).collect();
@@ -443,25 +444,25 @@ mod tests {
         }
     }
 
-    /// What is said of camera 1 beside `found`.
-    fn said_beside(found: Line) -> Option<&'static str> {
+    /// State of camera 1 when `found` is the only camera.
+    fn state_beside(found: Line) -> Option<&'static str> {
         let mut lines = vec![found];
         let wanted = Some(("camera1", "00001753".to_owned()));
-        missing(&mut lines, "camera", "EVK1", wanted);
+        add_missing(&mut lines, "camera", "EVK1", wanted);
         lines.get(1).map(|l| l.state)
     }
 
     #[test]
     fn a_device_that_may_be_the_busy_one_is_not_called_absent() {
         for state in ["busy", "not permitted", "faulty"] {
-            assert_eq!(said_beside(camera(state, None, None)), Some("not asked"));
+            assert_eq!(state_beside(camera(state, None, None)), Some("not asked"));
         }
         let other = camera("ready", Some("00001754"), Some("camera2"));
-        assert_eq!(said_beside(other), Some("absent"));
+        assert_eq!(state_beside(other), Some("absent"));
         let it = camera("ready", Some("00001753"), Some("camera1"));
-        assert_eq!(said_beside(it), None);
+        assert_eq!(state_beside(it), None);
         assert_eq!(
-            said_beside(camera("other device", None, None)),
+            state_beside(camera("other device", None, None)),
             Some("absent")
         );
     }

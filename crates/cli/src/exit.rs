@@ -8,28 +8,28 @@ use skinrig_protocol::Diagnostics;
 use skinrig_recorder::RecorderError;
 use skinrig_results::ResultsError;
 
-/// How the program ended. The numbers are part of the interface and do not change.
+/// Exit status of the program. The numbers are part of the interface and do not change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Exit {
-    /// Everything asked for was done.
+    /// Success.
     Ok,
     /// A fault of skinrig itself, or of the machine (disk full, no permission).
     Internal,
     /// Bad input: command line, protocol, schedule, data file or session file.
     Input,
-    /// A check before a run failed, or a device, the trigger line or the recorder during it; or the run came to its end with presses
-    /// that the rig cost. The session up to there is kept.
+    /// A check before a run failed, or a device, the trigger line or the recorder during it; or the run finished with presses
+    /// lost to rig faults. The recorded part of the session is kept.
     Rig,
     /// A stated limit was not met: `--max-rmse`, `verify`, the alignment of the clocks (an INVALID session).
     Limit,
-    /// The operator stopped or aborted the run; the session up to there is kept.
+    /// The operator stopped or aborted the run; the recorded part of the session is kept.
     Stopped,
-    /// What a suite of checks found; `hil run` has codes of its own.
+    /// Result of a suite of checks; `hil run` has its own codes.
     Night(NightExit),
 }
 
 impl Exit {
-    /// The number that the system is told.
+    /// Exit code of the process.
     #[must_use]
     pub const fn code(self) -> u8 {
         match self {
@@ -48,9 +48,9 @@ impl Exit {
         0  done\n  \
         1  fault of skinrig or of this machine\n  \
         2  bad input: command line, protocol, schedule, data or session file\n  \
-        3  rig fault, a failed check before a run, or presses that the rig cost (what was recorded is kept)\n  \
+        3  rig fault, a failed check before a run, or presses lost to rig faults (recorded data are kept)\n  \
         4  a limit was not met (--max-rmse, verify, an INVALID session)\n  \
-        5  stopped by the operator (the session up to there is kept)";
+        5  stopped by the operator (recorded data are kept)";
 }
 
 impl Termination for Exit {
@@ -59,18 +59,18 @@ impl Termination for Exit {
     }
 }
 
-/// What a command failed with: a message for the user and the code to end with.
+/// Failure of a command: a message for the user and an exit code.
 #[derive(Debug)]
 pub struct Failure {
-    /// The code to end with.
+    /// The exit code.
     pub exit: Exit,
     /// Complete message for standard error, without the end of line.
     pub message: String,
-    /// True if a file is no session, or a damaged one.
+    /// True if a file is not a session or is damaged.
     pub is_damage: bool,
 }
 
-/// True if `error` says that a file is no session, or a damaged one.
+/// True if `error` means that a file is not a session or is damaged.
 fn is_damage(error: &RecorderError) -> bool {
     matches!(
         error,
@@ -111,7 +111,7 @@ impl Failure {
         Self::new(Exit::Internal, message)
     }
 
-    /// A session that could not be read: bad input, unless it was the machine that failed.
+    /// A session that could not be read: bad input, unless the machine failed.
     pub fn session(error: RecorderError) -> Self {
         let is_damage = is_damage(&error);
         let failure = if error.is_system_failure() {

@@ -14,7 +14,7 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::paths::{SESSION_SUFFIX, beside};
 use crate::results::{self, Choices, Results};
 
-/// Writes what was asked for and names the files.
+/// Writes the requested formats and prints the paths of the files.
 ///
 /// # Errors
 /// [`Failure::input`] for an unreadable session; [`Failure::internal`] when a file cannot be written.
@@ -24,7 +24,7 @@ pub(crate) fn export(args: &ExportArgs, json: bool) -> Outcome {
     let is_bundle = args.kinds.contains(&ExportKind::Bundle);
     if is_bundle && (args.kinds.len() > 1 || !args.only.is_empty()) {
         return Err(Failure::input(
-            "--to bundle: expected it alone, for a bundle has a place for each thing\n  next: a second `skinrig export`",
+            "--to bundle: expected no other format and no --only\n  next: use a second `skinrig export` for those",
         ));
     }
     let folder = folder(args, if is_bundle { ".bundle" } else { ".export" })?;
@@ -45,13 +45,13 @@ pub(crate) fn export(args: &ExportArgs, json: bool) -> Outcome {
     Ok(Exit::Ok)
 }
 
-/// The folder that was named; beside the session one of its own when none was.
+/// The folder given with `--out`, else one beside the session.
 fn folder(args: &ExportArgs, ending: &str) -> Result<Folder, Failure> {
     let path = args
         .out
         .clone()
         .unwrap_or_else(|| beside(&args.session, ending));
-    // A link in its place, in a folder from a stranger, would lead anywhere.
+    // In an untrusted folder a link could lead anywhere.
     if args.out.is_none() && path.is_symlink() {
         return Err(Failure::internal(format!(
             "{}: expected a folder or a new path, found a link\n  next: choose another folder with --out",
@@ -70,7 +70,7 @@ fn refused(e: ExportError) -> Failure {
     }
 }
 
-/// The tables that were asked for, the small ones first.
+/// The requested tables, small ones first.
 fn tables(only: &[ExportTable]) -> Vec<TableName> {
     let wanted = |table: &TableName| {
         let group = match table {
@@ -84,7 +84,7 @@ fn tables(only: &[ExportTable]) -> Vec<TableName> {
     TableName::ALL.into_iter().filter(wanted).collect()
 }
 
-/// Each format that was asked for once.
+/// Each requested format once.
 fn kinds(asked: &[ExportKind]) -> Vec<ExportKind> {
     let all = [
         ExportKind::Parquet,
@@ -97,7 +97,7 @@ fn kinds(asked: &[ExportKind]) -> Vec<ExportKind> {
     all.into_iter().filter(wanted).collect()
 }
 
-/// Everything but a bundle.
+/// Exports all formats except a bundle.
 fn files(
     args: &ExportArgs,
     reader: &SessionReader,
@@ -105,7 +105,7 @@ fn files(
     folder: &Folder,
 ) -> Result<Vec<PathBuf>, Failure> {
     let (kinds, tables) = (kinds(&args.kinds), tables(&args.only));
-    // A name that is taken is found before an hour of work.
+    // Report a taken name before an hour of work, not after.
     let endings: Vec<String> = kinds
         .iter()
         .flat_map(|kind| endings(*kind, &tables))
@@ -122,7 +122,7 @@ fn files(
     let source = Source {
         reader,
         header,
-        analysis: results.as_ref().map(found),
+        analysis: results.as_ref().map(analysis_and_legs),
     };
     let mut written = Vec::new();
     for kind in &kinds {
@@ -131,7 +131,7 @@ fn files(
     Ok(written)
 }
 
-fn found(results: &Results) -> (&Analysis, &[LegStart]) {
+fn analysis_and_legs(results: &Results) -> (&Analysis, &[LegStart]) {
     (&results.analysis, &results.legs)
 }
 
@@ -145,7 +145,7 @@ fn without_analysis(failure: Failure) -> Failure {
     }
 }
 
-/// What the names of the files end in.
+/// Suffixes of the files.
 fn endings(kind: ExportKind, tables: &[TableName]) -> Vec<String> {
     let each = |end: &str| {
         tables
@@ -197,12 +197,12 @@ fn one_kind(
         ExportKind::Hdf5 => cameras(&folder, "hdf5", |camera, path| {
             skinrig_export::write_hdf5(source.reader, source.header, camera, path)
         }),
-        // A bundle is made of the others, and `all` stands for them.
+        // A bundle consists of the other formats, and `all` is expanded before.
         ExportKind::Bundle | ExportKind::All => Ok(Vec::new()),
     }
 }
 
-/// A file for each camera.
+/// Writes one file per camera.
 fn cameras(
     folder: &Folder,
     end: &str,
@@ -213,7 +213,7 @@ fn cameras(
         .collect()
 }
 
-/// What a bundle holds besides the session itself and what people said of it later: all of it follows from the session.
+/// Writes the files of a bundle that follow from the session: all but the session itself and its tags.
 ///
 /// # Errors
 /// [`Failure::input`] for a session that cannot be analysed; [`Failure::internal`] when a file cannot be written.
@@ -224,7 +224,7 @@ pub(crate) fn derived(
     folder: &Folder,
 ) -> Result<Vec<PathBuf>, Failure> {
     let mut results = results::analyze_shown(session, Choices::default())?;
-    // Measured on some machine at some time: it does not follow from the session.
+    // Measured on one machine at one time: it does not follow from the session.
     results.tradeoff = None;
     let (json, html) = results::documents(&results)?;
     let mut written = Vec::new();
@@ -240,12 +240,12 @@ pub(crate) fn derived(
     let source = Source {
         reader,
         header,
-        analysis: Some(found(&results)),
+        analysis: Some(analysis_and_legs(&results)),
     };
     for (kind, tables) in [
         (ExportKind::Raw, &BUNDLED[..]),
         (ExportKind::Parquet, &BUNDLED),
-        // The path of the robot is long, and a table of numbers only.
+        // No poses as CSV: the table is long and holds only numbers.
         (ExportKind::Csv, &BUNDLED[..2]),
     ] {
         written.extend(one_kind(kind, &source, tables, folder).map_err(refused)?);
@@ -255,10 +255,10 @@ pub(crate) fn derived(
 
 /// The tables of a bundle.
 const BUNDLED: [TableName; 3] = [TableName::Presses, TableName::Results, TableName::Pose];
-/// What people said of the session later.
+/// Suffix of the file of tags and notes.
 pub(crate) const TAGS: &str = ".tags.jsonl";
 
-/// The session, what was found in it, its camera streams and its tables, in a folder that `verify` proves.
+/// Writes the session, its results, camera streams and tables into a folder that `verify` can check.
 fn bundle(
     session: &Path,
     reader: &SessionReader,
@@ -267,8 +267,8 @@ fn bundle(
 ) -> Result<Vec<PathBuf>, Failure> {
     if reader.seal().map_err(Failure::session)?.is_none() {
         return Err(Failure::input(format!(
-            "{}: expected a sealed session for a bundle, found one that is under way or was cut off\n  next: `skinrig resume` \
-             goes on with it and seals it",
+            "{}: expected a sealed session for a bundle, found one that is still running or was cut off\n  next: `skinrig resume` \
+            continues and seals it",
             session.display()
         )));
     }

@@ -1,6 +1,6 @@
-//! Faults on purpose that meet the records of a run: the process is gone, the disk is full. Those of devices: [`crate::rig::planted`].
+//! Injected faults that affect the records of a run: killed process, full disk. For device faults see [`crate::rig::planted`].
 //!
-//! Gone means at once and without a word, as by `kill -9` or a power cut: no thread goes on, nothing is closed.
+//! A kill takes effect at once, like `kill -9` or a power cut: no thread continues, nothing is closed.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use skinrig_model::Record;
 use skinrig_protocol::{FaultKind, FaultPhase, FaultTime, PlantedFault};
 use skinrig_recorder::{RecorderError, WriteFailure};
 
-/// Counts the records of a run and makes its faults.
+/// Counts the records of a run and injects its faults.
 #[derive(Debug, Clone, Default)]
 pub struct FaultInjector {
     faults: Vec<PlantedFault>,
@@ -20,7 +20,7 @@ pub struct FaultInjector {
 }
 
 impl FaultInjector {
-    /// Makes those of these faults that meet records.
+    /// An injector for those of these faults that affect records.
     #[must_use]
     pub fn new(faults: &[PlantedFault]) -> Self {
         Self {
@@ -33,10 +33,10 @@ impl FaultInjector {
         }
     }
 
-    /// The next record is about to be taken.
+    /// Called before each record is taken.
     ///
     /// # Errors
-    /// What a full disk answers, from its time on.
+    /// The error of a full disk, once that fault is due.
     pub fn before(&mut self, record: &Record) -> Result<(), SinkFault> {
         self.records += 1;
         let streams = matches!(
@@ -58,7 +58,7 @@ impl FaultInjector {
                 _ => false,
             };
             match fault.kind {
-                FaultKind::Killed if due => gone(),
+                FaultKind::Killed if due => die(),
                 FaultKind::DiskFull if due => self.full = true,
                 _ => {}
             }
@@ -69,7 +69,7 @@ impl FaultInjector {
         Ok(())
     }
 
-    /// The session is about to be sealed.
+    /// Called before the session is sealed.
     ///
     /// # Errors
     /// On a full disk.
@@ -77,7 +77,7 @@ impl FaultInjector {
         let killed =
             |fault: &PlantedFault| fault.kind == FaultKind::Killed && fault.when == FaultTime::Seal;
         if self.faults.iter().any(killed) {
-            gone();
+            die();
         }
         if self.full {
             return Err(RecorderError::WriteFailed(WriteFailure::System(Arc::new(
@@ -93,9 +93,9 @@ impl FaultInjector {
 }
 
 /// SQLite's message for a full disk.
-const FULL: &str = "database or disk is full (a fault on purpose)";
+const FULL: &str = "database or disk is full (injected fault)";
 
 /// Ends the process without unwinding.
-fn gone() -> ! {
+fn die() -> ! {
     std::process::abort()
 }

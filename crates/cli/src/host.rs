@@ -1,8 +1,8 @@
-//! This machine and who works at it, as the system names them.
+//! Names of this machine and its user.
 
 use crate::remote::MOST_NAME_CHARS;
 
-/// The name under which somebody is logged in.
+/// Login name of the user; `operator` if unknown.
 pub(crate) fn user_name() -> String {
     let name = ["USER", "LOGNAME", "USERNAME"]
         .into_iter()
@@ -14,7 +14,7 @@ pub(crate) fn user_name() -> String {
         .collect()
 }
 
-/// The machine's name as the system gives it; `unknown` where it gives none.
+/// Host name of the machine; `unknown` if the system has none.
 pub(crate) fn host_name() -> String {
     std::fs::read_to_string("/etc/hostname")
         .ok()

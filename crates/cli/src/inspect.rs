@@ -1,4 +1,4 @@
-//! `skinrig inspect`: what is in a RAW, HDF5 or session file.
+//! `skinrig inspect`: contents of a RAW, HDF5 or session file.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::exit::{Exit, Failure, Outcome};
 /// Inspects a file.
 ///
 /// # Errors
-/// [`Failure::input`] when the file is none of the known kinds or cannot be read to its end.
+/// [`Failure::input`] when the file is of no known kind or cannot be read to its end.
 pub(crate) fn inspect(args: &InspectArgs, as_json: bool) -> Outcome {
     if !(args.gap > 0.0 && args.gap.is_finite()) {
         return Err(Failure::input(format!(

@@ -9,6 +9,7 @@ mod args;
 pub mod check;
 mod compare;
 mod completions;
+mod conclusion;
 mod control;
 mod devices;
 mod doctor;
@@ -48,6 +49,7 @@ mod tradeoff;
 mod tradeoff_file;
 mod verify;
 mod version;
+mod view;
 mod watch;
 mod whole_file;
 
@@ -58,19 +60,19 @@ use clap::Parser;
 use crate::args::{Cli, Command};
 use crate::exit::{Exit, Outcome};
 
-/// Parses these words (the first is the program's name) and runs nothing.
+/// Parses a command line (the first word is the program's name) without running it.
 ///
 /// # Errors
-/// What clap finds wrong with them; help and version are such an error too.
+/// Errors of clap, which include help and version.
 pub fn parse(words: &[&str]) -> Result<(), clap::Error> {
     Cli::try_parse_from(words).map(|_| ())
 }
 
-/// Runs the program with these arguments (the first is its own name) and says how it ended.
+/// Runs the program with these arguments (the first is its own name) and returns its exit status.
 pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     signals::take_file_limits_as_errors();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
-    let cli = match args::parse(tag::spelled_out(arguments.clone())) {
+    let cli = match args::parse(tag::expand_removals(arguments.clone())) {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version are not errors; clap prints them to standard output.
@@ -117,6 +119,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Jog(a) => jog::jog(a),
         Command::Hil(a) => hil::hil(a, &command_line(arguments), json),
         Command::Watch(a) => watch::watch(a, json),
+        Command::View(a) => view::view(a, json),
         Command::Prototypes(a) => prototypes::prototypes(a, json),
         Command::Tag(a) => tag::tag(a, json),
         Command::Sessions(a) => sessions::sessions(a, json),

@@ -1,4 +1,4 @@
-//! Owns what other programs call instead of the command line: the same steps, without a terminal.
+//! Functions for other programs: the same steps as the command line, without a terminal.
 
 use std::path::{Path, PathBuf};
 
@@ -15,13 +15,15 @@ use crate::exit::Failure;
 use crate::results::{self, Choices};
 use crate::signals::Operator;
 use crate::terminal::Output;
-use crate::{analyses, check, compare, run};
+use crate::{analyses, check, compare, conclusion, run};
 
-/// The official analysis of a session for its tables, without the bulk data for figures, and its further legs as aligned. Taken
-/// from the results beside the session if they are its own and of this version of the analysis; else it is analysed.
+pub use crate::view::Program;
+
+/// Returns the official analysis of a session for its tables, without the bulk data for figures, and its later legs as aligned.
+/// Reads the results beside the session if they belong to it and to this version of the analysis; otherwise analyses the session.
 ///
 /// # Errors
-/// [`Failure::input`] for files that are no readable session, and for one that cannot be analysed.
+/// [`Failure::input`] for a session that cannot be read or analysed.
 pub fn analysis_for_tables(
     path: &Path,
     reader: &SessionReader,
@@ -40,7 +42,7 @@ pub fn analysis_for_tables(
     Ok((analysis, legs))
 }
 
-/// The text of the results of a session's analysis beside it, with this name (`None`: the official one).
+/// Reads the text of the results of the analysis `name` beside a session (`None`: the official one).
 ///
 /// # Errors
 /// [`Failure::input`] if there are none, or if they belong to another session or variant.
@@ -56,7 +58,7 @@ pub fn stored_results(
     } else {
         analyses::summary(session, session_id, None).map_err(|e| {
             Failure::input(format!(
-                "{0}: expected results beside it, found none that can be used: {e}\n  next: `skinrig analyze {0}` makes them",
+                "{0}: expected results beside it, found none that can be used: {e}\n  next: `skinrig analyze {0}` writes them",
                 session.display()
             ))
         })?;
@@ -75,7 +77,7 @@ pub fn variants(session: &Path, session_id: &str) -> Vec<String> {
 /// Analyses a session; with `save` also writes the results and the report beside it, as `skinrig analyze` does.
 ///
 /// # Errors
-/// [`Failure::input`] for files that are no readable session, and settings that do not parse; [`Failure::internal`] when a file
+/// [`Failure::input`] for an unreadable session and for settings that do not parse; [`Failure::internal`] when a file
 /// cannot be written.
 pub fn analyze(session: &Path, choices: Choices<'_>, save: bool) -> Result<Value, Failure> {
     if let Some(name) = choices.name {
@@ -88,7 +90,7 @@ pub fn analyze(session: &Path, choices: Choices<'_>, save: bool) -> Result<Value
     Ok(skinrig_report::json(&results.report_input()))
 }
 
-/// What `skinrig compare` is asked for; see its help.
+/// Options of `skinrig compare`; see its help.
 #[derive(Debug, Clone, Default)]
 pub struct CompareOptions {
     /// Session files, folders of sessions, or names of prototypes.
@@ -101,11 +103,11 @@ pub struct CompareOptions {
     pub margins: Vec<String>,
     /// Error threshold of the pass rate, mm.
     pub within_mm: Option<f64>,
-    /// Keys of blocking differences to go on in spite of.
+    /// Keys of blocking differences to override.
     pub despite: Vec<String>,
     /// The variant to compare.
     pub analysis: Option<String>,
-    /// Where to write the page and its results; nowhere without.
+    /// Where to write the page and its results; `None` writes neither.
     pub out: Option<PathBuf>,
 }
 
@@ -133,12 +135,12 @@ pub fn compare(options: CompareOptions) -> Result<Value, Failure> {
     })
 }
 
-/// Where the protocol of a simulation is.
+/// Source of a simulation's protocol.
 #[derive(Debug, Clone)]
 pub enum ProtocolSource {
-    /// In a file.
+    /// A file.
     File(PathBuf),
-    /// In this text.
+    /// The text itself.
     Text(String),
 }
 
@@ -151,22 +153,22 @@ pub struct Simulation {
     pub overrides: Vec<String>,
     /// Folder for the session file.
     pub folder: PathBuf,
-    /// Simulation level; the cheapest that the protocol's scene needs without.
+    /// Simulation level; `None` is the cheapest that the protocol's scene needs.
     pub level: Option<String>,
-    /// Seed; the protocol's without.
+    /// Seed; `None` is the protocol's.
     pub seed: Option<u64>,
-    /// For the session's header.
+    /// Command line for the session's header.
     pub command_line: String,
 }
 
-/// Name of a protocol that lies in no file.
+/// Name of a protocol that is not in a file.
 const NO_FILE: &str = "protocol.yaml";
 
 /// Runs a campaign on the simulated rig, through the controller and the recorder, and returns the path of the sealed session.
 /// `control` can end it, as ctrl-C ends `skinrig run`.
 ///
 /// # Errors
-/// [`Failure::findings`] for the protocol, [`Failure::rig`] for a fault on purpose, code 5 after a stop.
+/// [`Failure::findings`] for the protocol, [`Failure::rig`] for an injected fault, code 5 after a stop.
 pub fn simulate(simulation: Simulation, control: ControlHandle) -> Result<PathBuf, Failure> {
     let Simulation {
         protocol,
@@ -200,7 +202,7 @@ pub fn simulate(simulation: Simulation, control: ControlHandle) -> Result<PathBu
     };
     let operator = Operator::elsewhere(control);
     let (session, report) = run::simulated(&args, checked, &command_line, output, &operator)?;
-    match run::end_of(&session, &report)? {
+    match conclusion::end_of(&session, &report)? {
         None => Ok(session),
         Some(stopped) => Err(Failure::stopped(stopped)),
     }

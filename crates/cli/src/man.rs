@@ -8,7 +8,7 @@ use clap::Command;
 use crate::args::ManArgs;
 use crate::exit::{Exit, Failure, Outcome};
 
-/// Writes `skinrig.1` and a page of each command.
+/// Writes `skinrig.1` and a page for each command.
 ///
 /// # Errors
 /// [`Failure::input`] when the folder cannot be written.
@@ -16,7 +16,7 @@ pub(crate) fn man(args: &ManArgs, json: bool) -> Outcome {
     let failure = |e| {
         let folder = args.folder.display();
         Failure::input(format!(
-            "{folder}: expected a folder that can be written: {e}\n  next: choose another folder"
+            "{folder}: expected a writable folder: {e}\n  next: choose another folder"
         ))
     };
     fs::create_dir_all(&args.folder).map_err(failure)?;

@@ -1,4 +1,4 @@
-//! Where a session and the files beside it live, and what they are called.
+//! Paths and names of sessions and the files beside them.
 
 use std::path::{Path, PathBuf};
 
@@ -9,11 +9,11 @@ use crate::exit::Failure;
 /// The ending of every session file.
 pub(crate) const SESSION_SUFFIX: &str = ".session.sqlite";
 
-/// A new session's path in `folder` (made when missing): `<UTC time>-<protocol>-<prototype>.session.sqlite`,
-/// with a number when that name is taken.
+/// Path of a new session in `folder` (created if missing): `<UTC time>-<protocol>-<prototype>.session.sqlite`,
+/// with a number if that name is taken.
 ///
 /// # Errors
-/// [`Failure::internal`] when the folder cannot be made.
+/// [`Failure::internal`] when the folder cannot be created.
 pub(crate) fn new_session(
     folder: &Path,
     started: DateTime<Utc>,
@@ -22,7 +22,7 @@ pub(crate) fn new_session(
 ) -> Result<PathBuf, Failure> {
     std::fs::create_dir_all(folder).map_err(|e| {
         Failure::internal(format!(
-            "cannot make the sessions folder {}: {e}\n  next: choose another one with --sessions",
+            "cannot create the sessions folder {}: {e}\n  next: choose another one with --sessions",
             folder.display()
         ))
     })?;
@@ -52,7 +52,7 @@ pub(crate) fn beside(session: &Path, suffix: &str) -> PathBuf {
     session.with_file_name(format!("{stem}{suffix}"))
 }
 
-/// The folder of a session; the present one for a bare name.
+/// The folder of a session; the current folder for a bare name.
 #[must_use]
 pub(crate) fn folder_of(session: &Path) -> &Path {
     let folder = session.parent().filter(|p| !p.as_os_str().is_empty());
@@ -118,7 +118,7 @@ mod tests {
                 assert_eq!(path.parent(), Some(dir.path()), "{name:?}");
                 let file = path.file_name().unwrap().to_str().unwrap();
                 let plain = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
-                // The time in front keeps it from being an option, a hidden file or a device of Windows.
+                // The leading time prevents options, hidden files and device names of Windows.
                 assert!(
                     file.starts_with("19700101T000000Z-") && file.chars().all(plain),
                     "{file}"
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn results_lie_beside_the_session() {
+    fn results_are_beside_the_session() {
         let session = Path::new("s/x.session.sqlite");
         assert_eq!(
             beside(session, ".report.html"),

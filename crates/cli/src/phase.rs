@@ -1,4 +1,4 @@
-//! What a terminal shows while a command computes: the phase, how much it has read, and since when.
+//! Progress of a computation on the terminal: phase, bytes read, elapsed time.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -6,14 +6,14 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
-/// A phase is redrawn this often.
+/// Redraw interval.
 const REDRAW_EVERY: Duration = Duration::from_millis(100);
 
-/// A phase of a command, shown on standard error until it is dropped; nothing is shown where that is no terminal.
+/// A phase of a command, shown on standard error until it is dropped; shows nothing if that is not a terminal.
 pub(crate) struct Phase(ProgressBar);
 
 impl Phase {
-    /// A phase that cannot tell how far it is.
+    /// A phase of unknown length.
     pub(crate) fn begin(text: &str) -> Self {
         Self::draw(text, "{spinner} {msg}, {elapsed}", |style| style)
     }
@@ -25,7 +25,7 @@ impl Phase {
                 "read",
                 move |_: &ProgressState, out: &mut dyn std::fmt::Write| {
                     let megabytes = bytes.load(Ordering::Relaxed) / 1_000_000;
-                    // Nothing can be done about a terminal that takes no text.
+                    // A terminal that takes no text cannot be helped.
                     let _ = write!(out, "{megabytes} MB");
                 },
             )

@@ -1,4 +1,4 @@
-//! What a terminal shows while a run goes on: a live bar on a terminal, plain lines elsewhere.
+//! Progress of a run: a live bar on a terminal, plain lines elsewhere.
 
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use skinrig_controller::{Progress, ProgressTracker};
 use skinrig_model::{CameraId, HostDuration, PlannedPress, PressHistory, PressRole, Record};
 
-/// A bar is redrawn at most this often.
+/// Shortest interval between redraws of the bar.
 const REDRAW_EVERY: Duration = Duration::from_millis(100);
 
 /// Shows a run from its records.
@@ -23,7 +23,7 @@ enum Display {
     Bar(ProgressBar),
     /// A line on standard error each time another tenth of the presses is done.
     Lines { tenths: usize },
-    /// Nothing: another program runs this.
+    /// Nothing: called by another program.
     Hidden,
 }
 
@@ -54,7 +54,7 @@ impl ProgressView {
         }
     }
 
-    /// A view that shows nothing, and counts.
+    /// A view that counts but shows nothing.
     #[must_use]
     pub(crate) fn hidden(expected: HostDuration) -> Self {
         Self {
@@ -113,7 +113,7 @@ impl ProgressView {
             }
             Display::Lines { tenths } => {
                 let planned = self.tracker.progress().planned.max(1);
-                // Presses that are given up at the end are no progress.
+                // Presses given up at the end do not count as progress.
                 let made = done - self.tracker.progress().missed;
                 let reached = made * 10 / planned;
                 if reached > *tenths {
@@ -129,7 +129,7 @@ impl ProgressView {
         }
     }
 
-    /// Takes the bar away; what was shown as lines stays.
+    /// Removes the bar; printed lines stay.
     pub(crate) fn finish(&mut self) {
         if let Display::Bar(bar) = &self.display {
             bar.finish_and_clear();
@@ -152,7 +152,7 @@ fn where_and_when(tracker: &ProgressTracker, waited: Duration) -> String {
     format!("press {}{press}{paused}  eta {eta}", tracker.press_label())
 }
 
-/// How long the user still waits, and the rig time that passes meanwhile where that is another one.
+/// Remaining time for the user, and the remaining rig time if the rig runs at another pace.
 #[must_use]
 pub(crate) fn eta_text(
     elapsed: HostDuration,
@@ -185,12 +185,12 @@ fn streams(tracker: &ProgressTracker) -> String {
     } else {
         String::new()
     };
-    let few = |n: usize, what: &str| match n {
+    let count = |n: usize, what: &str| match n {
         0 => String::new(),
         n => format!("  {n} {what}"),
     };
     let ended =
-        few(p.invalid, "invalid") + &few(p.excluded, "excluded") + &few(p.retaken, "taken again");
+        count(p.invalid, "invalid") + &count(p.excluded, "excluded") + &count(p.retaken, "retaken");
     format!(
         "camera 1 {}, camera 2 {} kev/s  trigger {} sent, {}+{} seen{ended}{lost}",
         rate(CameraId::One),
@@ -213,7 +213,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_eta_is_what_the_user_waits() {
+    fn the_eta_is_the_users_waiting_time() {
         let s = HostDuration::from_secs_f64;
         let eta = |waited| eta_text(s(100.0), Some(s(200.0)), Duration::from_secs(waited));
         assert_eq!(eta(1), "0:00:02 (0:03:20 of rig time)");

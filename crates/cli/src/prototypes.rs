@@ -1,4 +1,4 @@
-//! `skinrig prototypes`: which skin got how good, over all sessions of a folder.
+//! `skinrig prototypes`: results of each prototype over all sessions of a folder.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -14,7 +14,7 @@ use crate::args::PrototypesArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::sessions::{copies, originals};
 
-/// Sessions in a sparkline, the last ones.
+/// Number of sessions in a sparkline, the latest ones.
 const SPARKS: usize = 16;
 
 /// A session of a prototype.
@@ -25,21 +25,21 @@ struct Point {
     tags: Vec<String>,
     /// `None` without usable results.
     rmse_mm: Option<Estimate>,
-    /// Why there are none.
+    /// Why there are no usable results.
     without: Option<String>,
-    /// What the analysis changed of the session's own settings; none: it is the official one.
+    /// Changes of the session's own settings; `None` for the official analysis.
     #[serde(skip_serializing_if = "Option::is_none")]
     variant: Option<Variant>,
     /// Values that were overridden when the session was recorded.
     overrides: Vec<String>,
 }
 
-/// Sessions that can be laid beside one another: one prototype, one protocol, one kind of rig.
+/// Comparable sessions: one prototype, one protocol, one kind of rig.
 #[derive(Debug, Serialize)]
 struct Series {
     protocol: String,
     rig_kind: String,
-    /// The least RMSE.
+    /// The smallest RMSE.
     best: Option<Estimate>,
     /// The newest RMSE.
     last: Option<Estimate>,
@@ -59,7 +59,7 @@ struct Prototype {
 /// Lists the prototypes of a folder.
 ///
 /// # Errors
-/// [`Failure::input`] when the folder cannot be read, or has no session of the prototype that was named.
+/// [`Failure::input`] when the folder cannot be read, or has no session of the named prototype.
 pub(crate) fn prototypes(args: &PrototypesArgs, json: bool) -> Outcome {
     let mut sessions = list(&args.folder).map_err(Failure::session)?;
     if let Some(wanted) = &args.prototype {
@@ -80,7 +80,16 @@ pub(crate) fn prototypes(args: &PrototypesArgs, json: bool) -> Outcome {
     Ok(Exit::Ok)
 }
 
-/// By prototype, then by protocol and kind of rig; the sessions of each in their order.
+/// The prototypes of a folder by their official analyses, as JSON.
+///
+/// # Errors
+/// As [`prototypes`].
+pub(crate) fn document(folder: &std::path::Path) -> Result<serde_json::Value, Failure> {
+    let sessions = list(folder).map_err(Failure::session)?;
+    serde_json::to_value(gather(&sessions, None)).map_err(Failure::internal)
+}
+
+/// Groups sessions by prototype, then by protocol and kind of rig; keeps their order.
 fn gather(sessions: &[SessionSummary], analysis: Option<&str>) -> Vec<Prototype> {
     type Groups = BTreeMap<(String, String), Vec<Point>>;
     let mut all: BTreeMap<String, (usize, String, Groups)> = BTreeMap::new();
@@ -102,7 +111,7 @@ fn gather(sessions: &[SessionSummary], analysis: Option<&str>) -> Vec<Prototype>
         last.clone_from(started_at);
         let found = summary(&session.path, session_id, analysis);
         let (rmse_mm, without) = match &found {
-            Ok(found) if !found.valid => (None, Some("INVALID: not to be used".to_owned())),
+            Ok(found) if !found.valid => (None, Some("INVALID: do not use".to_owned())),
             Ok(found) if found.rmse_mm.value.is_none() => {
                 (None, Some("no scored press located".to_owned()))
             }
@@ -192,7 +201,7 @@ fn print(all: &[Prototype], each: bool) {
             if each {
                 series.points.iter().for_each(print_point);
             } else {
-                // The two numbers of the line: what stands behind them is said.
+                // Show what was changed for the two numbers of the line.
                 let value = |p: &&Point, e: Option<Estimate>| e.is_some() && p.rmse_mm == e;
                 let best = series.points.iter().find(|p| value(p, series.best));
                 let last = series.points.iter().rev().find(|p| value(p, series.last));
@@ -222,7 +231,7 @@ fn print_point(point: &Point) {
     print_changes("    ", point);
 }
 
-/// What was changed for the number of a session: by the analysis, and when it was recorded.
+/// Prints what the analysis changed, and what was overridden when the session was recorded.
 fn print_changes(indent: &str, point: &Point) {
     if let Some(variant) = &point.variant {
         outln!("{indent}{variant}");
@@ -255,12 +264,12 @@ fn interval(estimate: Option<Estimate>) -> String {
     }
 }
 
-/// A block for each value between the least and the greatest of them.
+/// One block per value, scaled between the smallest and the largest.
 fn spark(values: &[f64]) -> String {
-    let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let share = |value: &f64| match most - least {
-        span if span > 0.0 => Some((value - least) / span),
+    let min = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let max = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let share = |value: &f64| match max - min {
+        span if span > 0.0 => Some((value - min) / span),
         _ => Some(0.5),
     };
     sparkline(values.iter().map(share), Blocks::Unicode)

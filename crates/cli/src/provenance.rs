@@ -1,4 +1,4 @@
-//! Where a session's numbers come from, gathered for the report.
+//! Reads the provenance of a session's numbers for the report.
 
 use crate::rig::bench::TOLERATED;
 use chrono::DateTime;
@@ -104,7 +104,7 @@ pub(crate) fn provenance(
     })
 }
 
-/// The name of the rig. It says that mismatches were let pass also when only a later leg did so.
+/// Name of the rig, marked if mismatches were tolerated, even if only in a later leg.
 fn rig_name(reader: &SessionReader, header: &RunHeader) -> Result<String, RecorderError> {
     let mut name = header.rig_name.clone();
     let devices = reader.devices()?;
@@ -116,10 +116,10 @@ fn rig_name(reader: &SessionReader, header: &RunHeader) -> Result<String, Record
     Ok(name)
 }
 
-/// A leg that was cut off went on to at most this long before the next one's origin: the recorder leaves one to two seconds.
+/// Assumed pause between the end of a leg that was cut off and the next one's origin, s: the recorder leaves one to two seconds.
 const PAUSE_S: f64 = 1.5;
 
-/// The legs as the report tells of them.
+/// The legs, for the report.
 fn legs(reader: &SessionReader, header: &RunHeader) -> Result<Vec<LegRow>, RecorderError> {
     let rows = reader.legs()?;
     let civil = |text: &str| DateTime::parse_from_rfc3339(text).ok();
@@ -143,17 +143,17 @@ fn legs(reader: &SessionReader, header: &RunHeader) -> Result<Vec<LegRow>, Recor
         }
         None => "cut off".to_owned(),
     };
-    let told = rows.iter().enumerate().map(|(i, leg)| LegRow {
+    let leg_rows = rows.iter().enumerate().map(|(i, leg)| LegRow {
         number: leg.number,
         started: leg.began.started_at.clone(),
         start_s: leg.origin.as_secs_f64(),
         end: end(i),
         apart_s: apart_s(i).filter(|_| is_civil),
     });
-    Ok(told.collect())
+    Ok(leg_rows.collect())
 }
 
-/// Attempts that were made, did not end well, and were replaced: sync presses that a further leg makes anew are none.
+/// Attempts that failed and were replaced. Sync presses that a further leg repeats do not count.
 fn retaken(reader: &SessionReader) -> Result<Vec<RetakeRow>, RecorderError> {
     let mut rows = Vec::new();
     for (planned, attempts) in reader.presses()? {

@@ -1,4 +1,4 @@
-//! A session file as a recording: what a replayed rig reads.
+//! A session file as the recording that a replayed rig reads.
 
 use std::collections::VecDeque;
 use std::path::Path;
@@ -13,7 +13,7 @@ use skinrig_sim::replay::{Recording, RecordingError};
 
 /// Poses are read in pieces of this length.
 const POSE_WINDOW: HostDuration = HostDuration::from_millis(2_000);
-/// Poses are looked for this long after the last command of a session without an end.
+/// In a session without an end, poses are read up to this long after the last command.
 const UNENDED: HostDuration = HostDuration::from_millis(60_000);
 
 /// A session file, streamed.
@@ -90,7 +90,7 @@ impl Recording for SessionRecording {
         while self.poses_from <= self.poses_end {
             let to = self.poses_from + POSE_WINDOW;
             let poses = self.reader.poses(self.poses_from, to).map_err(unreadable)?;
-            // Both ends belong to a piece.
+            // A piece includes both ends.
             self.poses_from = to + HostDuration(1);
             if !poses.is_empty() {
                 return Ok(Some(poses));

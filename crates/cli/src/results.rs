@@ -1,4 +1,4 @@
-//! `skinrig analyze` and `skinrig report`, and the end of `run` and `import`: from a session to its results.
+//! `skinrig analyze` and `skinrig report`, and the last step of `run` and `import`: analyses a session and writes its results.
 
 use std::path::{Path, PathBuf};
 
@@ -17,20 +17,20 @@ use crate::tradeoff_file::TradeoffFileError;
 
 /// The results of one session.
 pub struct Results {
-    /// Where the session is.
+    /// Path of the session.
     pub session: PathBuf,
     /// The numbers.
     pub analysis: Analysis,
-    /// Where the session's further legs begin, as the analysis moved them.
+    /// Start of each further leg, as aligned by the analysis.
     pub legs: Vec<LegStart>,
-    /// Where they come from.
+    /// Their provenance.
     pub provenance: Provenance,
-    /// The tradeoff that lies beside the session, or why it cannot be read.
+    /// The trade-off stored beside the session, or why it cannot be read.
     pub tradeoff: Option<Result<Tradeoff, TradeoffFileError>>,
 }
 
 impl Results {
-    /// As the report crate takes it.
+    /// The input of the report crate.
     #[must_use]
     pub(crate) fn report_input(&self) -> ReportInput<'_> {
         ReportInput {
@@ -47,11 +47,11 @@ impl Results {
 /// How to analyse a session.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Choices<'a> {
-    /// Overrides of the settings it was recorded with.
+    /// Overrides of the session's own settings.
     pub overrides: &'a [String],
-    /// Make the choices of the public code before them, and judge its way too.
+    /// Make the choices of the public code first, and evaluate its method too.
     pub reference_code: bool,
-    /// What the variant is to be called.
+    /// Name of the variant.
     pub name: Option<&'a str>,
 }
 
@@ -65,7 +65,7 @@ impl<'a> Choices<'a> {
 }
 
 fn variant(choices: Choices<'_>) -> Variant {
-    let own = || analyses::own_name(choices.overrides, choices.reference_code);
+    let own = || analyses::default_name(choices.overrides, choices.reference_code);
     Variant {
         name: choices.name.map_or_else(own, str::to_owned),
         changed: choices.overrides.to_vec(),
@@ -73,10 +73,10 @@ fn variant(choices: Choices<'_>) -> Variant {
     }
 }
 
-/// Opens a session with the settings it was recorded with or with others, aligned; and how the settings differ.
+/// Opens and aligns a session, with its own settings or others; also returns how the settings differ.
 ///
 /// # Errors
-/// [`Failure::input`] for files that are no readable session or settings that do not parse.
+/// [`Failure::input`] for an unreadable session or settings that do not parse.
 pub(crate) fn open(
     path: &Path,
     choices: Choices<'_>,
@@ -87,16 +87,16 @@ pub(crate) fn open(
     Ok((session.read_input()?.align(), variant))
 }
 
-/// Analyses a session, with the settings it was recorded with or with others.
+/// Analyses a session, with its own settings or others.
 ///
 /// # Errors
-/// [`Failure::input`] for files that are no readable session or settings that do not parse.
+/// [`Failure::input`] for an unreadable session or settings that do not parse.
 pub fn analyze_session(path: &Path, choices: Choices<'_>) -> Result<Results, Failure> {
     let (aligned, variant) = open(path, choices)?;
     complete(path, aligned, variant)
 }
 
-/// As [`analyze_session`], with its progress on the terminal.
+/// Like [`analyze_session`], with its progress on the terminal.
 pub(crate) fn analyze_shown(path: &Path, choices: Choices<'_>) -> Result<Results, Failure> {
     let (aligned, variant) = open(path, choices)?;
     let _phase = Phase::reading("analysing", aligned.events.bytes_read());
@@ -125,7 +125,7 @@ fn complete(
     })
 }
 
-/// Writes the results beside the session (or to `json_path`) and the report; returns both paths. A variant has files of its own.
+/// Writes the results beside the session (or to `json_path`) and the report; returns both paths. A variant has its own files.
 ///
 /// # Errors
 /// [`Failure::internal`] when a file cannot be written.
@@ -135,17 +135,17 @@ pub(crate) fn write_results(
     html_path: Option<&Path>,
 ) -> Result<(PathBuf, PathBuf), Failure> {
     let name = results.provenance.variant.as_ref().map(|v| v.name.as_str());
-    let own_place = || analyses::results_path(&results.session, name);
-    let json_path = json_path.map_or_else(own_place, Path::to_owned);
-    let own_place = || analyses::report_path(&results.session, name);
-    let html_path = html_path.map_or_else(own_place, Path::to_owned);
+    let default_path = || analyses::results_path(&results.session, name);
+    let json_path = json_path.map_or_else(default_path, Path::to_owned);
+    let default_path = || analyses::report_path(&results.session, name);
+    let html_path = html_path.map_or_else(default_path, Path::to_owned);
     let (json, html) = documents(results)?;
     write(&json_path, json.as_bytes())?;
     write(&html_path, html.as_bytes())?;
     Ok((json_path, html_path))
 }
 
-/// As [`write_results`], with its phase on the terminal.
+/// Like [`write_results`], with its phase on the terminal.
 pub(crate) fn write_shown(
     results: &Results,
     json_path: Option<&Path>,
@@ -158,7 +158,7 @@ pub(crate) fn write_shown(
 /// The results as JSON and the report.
 ///
 /// # Errors
-/// [`Failure::internal`] when one cannot be put together.
+/// [`Failure::internal`] when one cannot be generated.
 pub(crate) fn documents(results: &Results) -> Result<(String, String), Failure> {
     let input = results.report_input();
     let json =
@@ -167,14 +167,12 @@ pub(crate) fn documents(results: &Results) -> Result<(String, String), Failure> 
     Ok((json, html))
 }
 
-/// Writes a whole file or none: a full disk leaves no half of it.
+/// Writes a whole file or none: a full disk leaves no partial file.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     crate::whole_file::write(path, bytes).map_err(|e| {
         let next = match e.kind() {
-            std::io::ErrorKind::StorageFull => {
-                "free space there, or choose another place with --out"
-            }
-            _ => "choose another place with --out",
+            std::io::ErrorKind::StorageFull => "free some space, or choose another path with --out",
+            _ => "choose another path with --out",
         };
         Failure::internal(format!(
             "{}: cannot write: {e}\n  next: {next}",
@@ -222,12 +220,12 @@ pub fn check_limit(results: &Results, max_rmse_mm: Option<f64>) -> Outcome {
     let analysis = &results.analysis;
     if !analysis.is_valid() {
         let next = if analysis.alignment.is_usable() {
-            "mend what the audit names (its findings say what to do), and import or analyse again"
+            "fix what the audit reports (each finding has a next step), then import or analyse again"
         } else {
             "see the alignment certificate in the report; limits are below `analysis.alignment`"
         };
         return Err(Failure::limit(format!(
-            "the session is INVALID: none of its numbers is to be used\n  {}\n  next: {next}",
+            "the session is INVALID: do not use its numbers\n  {}\n  next: {next}",
             analysis.invalid_because().join("\n  ")
         )));
     }
@@ -261,14 +259,14 @@ pub fn analyze(args: &AnalyzeArgs, output: Output) -> Outcome {
         not_official(&official, out, variant)?;
     }
     let html = args.out.as_ref().map(|out| out.with_extension("html"));
-    let older = replaced(&results, args.out.as_deref());
+    let older = replacement_note(&results, args.out.as_deref());
     let paths = write_shown(&results, args.out.as_deref(), html.as_deref())?;
     older.iter().for_each(|note| errln!("{note}"));
     print_results(&results, output, &paths);
     check_limit(&results, args.max_rmse)
 }
 
-/// A variant in the place of the `official` file would be taken for it.
+/// Rejects `out` if the variant would replace the `official` results.
 pub(crate) fn not_official(official: &Path, out: &Path, variant: &Variant) -> Result<(), Failure> {
     let place = |path: &Path| {
         let folder = crate::paths::folder_of(path).canonicalize().ok();
@@ -278,14 +276,14 @@ pub(crate) fn not_official(official: &Path, out: &Path, variant: &Variant) -> Re
         return Ok(());
     }
     Err(Failure::input(format!(
-        "--out {}: expected another place for the variant `{}`, found that of the official results\n  next: leave --out out",
+        "--out {}: expected another path for the variant `{}`, found that of the official results\n  next: leave --out out",
         out.display(),
         variant.name
     )))
 }
 
-/// A remark when results of another version of the analysis are about to be replaced.
-fn replaced(results: &Results, out: Option<&Path>) -> Option<String> {
+/// A note if results of another version of the analysis are about to be replaced.
+fn replacement_note(results: &Results, out: Option<&Path>) -> Option<String> {
     let name = results.provenance.variant.as_ref().map(|v| v.name.as_str());
     let id = &results.provenance.session_id;
     let before = analyses::summary(&results.session, id, name)
@@ -318,7 +316,7 @@ pub fn report(args: &ReportArgs, json: bool) -> Outcome {
         name: Some(&v.name),
     });
     let results = analyze_shown(&args.session, choices)?;
-    let older = replaced(&results, None);
+    let older = replacement_note(&results, None);
     let paths = write_shown(&results, None, args.out.as_deref())?;
     older.iter().for_each(|note| errln!("{note}"));
     if json {

@@ -1,4 +1,4 @@
-//! `skinrig resume`: a session that was cut off or not finished goes on in a further leg.
+//! `skinrig resume`: continues an unfinished session in a further leg.
 
 use std::path::{Path, PathBuf};
 
@@ -16,6 +16,7 @@ use skinrig_protocol::{Plan, Protocol, Route};
 use skinrig_recorder::{DeviceRow, RecorderError, SessionReader, SessionWriter};
 
 use crate::args::ResumeArgs;
+use crate::conclusion::{close, conclude};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::fault::FaultInjector;
 use crate::hil::lease;
@@ -24,14 +25,13 @@ use crate::paths;
 use crate::progress::ProgressView;
 use crate::rig::tolerated::ToleratedMismatches;
 use crate::rig::{self, bench, gates, planted};
-use crate::run::{close, conclude};
 use crate::signals::Operator;
 use crate::sink::{ReplayExpectations, SessionSink};
 use crate::terminal::Output;
 use skinrig_results::Rescan;
 use skinrig_results::RigDocument;
 
-/// An unfinished session as it lies there.
+/// Content of an unfinished session.
 struct UnfinishedSession {
     header: RunHeader,
     document: RigDocument,
@@ -45,11 +45,11 @@ struct UnfinishedSession {
 /// `skinrig resume`.
 ///
 /// # Errors
-/// [`Failure`] with the code that says what kind.
+/// [`Failure`] with the exit code of its kind.
 pub(crate) fn resume(args: &ResumeArgs, command_line: &str, output: Output) -> Outcome {
     let operator = Operator::listen().map_err(Failure::internal)?;
     let session = &args.session;
-    // From here on nobody else writes it, and it is what was recorded.
+    // From here on this process is the only writer, and the content is verified.
     let writer = match SessionWriter::resume(session, &mut Rescan::default()) {
         Err(RecorderError::AlreadyCompleted { .. }) => return only_seal(session),
         opened => opened.map_err(refusal)?,
@@ -77,14 +77,14 @@ pub(crate) fn resume(args: &ResumeArgs, command_line: &str, output: Output) -> O
         command_line: command_line.to_owned(),
     };
     let (session, report) = if wanted.contains(&true) {
-        go_on(args, &found, &wanted, header, writer, &operator)?
+        run_leg(args, &found, &wanted, header, writer, &operator)?
     } else {
         (session.clone(), end_only(&found, header, writer)?)
     };
     conclude(&session, &report, args.no_analysis, None, output)
 }
 
-/// Why a session cannot go on: what is wrong with it, item by item, or why it cannot be read.
+/// Why a session cannot be resumed: a list of its problems, or why it cannot be read.
 fn refusal(error: RecorderError) -> Failure {
     match error {
         RecorderError::Unsound {
@@ -113,7 +113,7 @@ fn refusal(error: RecorderError) -> Failure {
     }
 }
 
-/// Every press has its outcome, and how the run ended is in the session: that is not made a better end afterwards.
+/// Message for a session whose presses all have outcomes; a further leg would not change how the run ended.
 fn nothing_left(session: &Path, end: &RunEnd) -> String {
     let reason = match end.reason() {
         None => end.name().to_owned(),
@@ -125,7 +125,7 @@ fn nothing_left(session: &Path, end: &RunEnd) -> String {
     )
 }
 
-/// Reads what a further leg needs, and refuses what none can have.
+/// Reads what a further leg needs; rejects sessions that cannot have one.
 fn read(session: &Path) -> Result<UnfinishedSession, Failure> {
     let refused = |expected: &str, found: String, next: &str| {
         let session = session.display();
@@ -137,7 +137,7 @@ fn read(session: &Path) -> Result<UnfinishedSession, Failure> {
     let header = reader.header().map_err(Failure::session)?;
     if !header.is_of_a_rig() {
         return Err(refused(
-            "a session that a rig recorded",
+            "a session recorded by a rig",
             format!(
                 "one that was {}: there are no presses to make",
                 header.rig_kind
@@ -145,7 +145,7 @@ fn read(session: &Path) -> Result<UnfinishedSession, Failure> {
             "import or replay the recording again",
         ));
     }
-    let verify = "`skinrig verify` says what is damaged";
+    let verify = "`skinrig verify` shows what is damaged";
     for (what, text, digest) in [
         ("protocol", &header.protocol_text, &header.protocol_sha256),
         ("plan", &header.plan_json, &header.plan_sha256),
@@ -188,13 +188,13 @@ fn read(session: &Path) -> Result<UnfinishedSession, Failure> {
     })
 }
 
-/// What is there and what will be done, for people.
+/// State of the session and remaining work, for the terminal.
 fn describe(session: &Path, found: &UnfinishedSession, wanted: &[bool]) -> String {
     let ended = match &found.end {
         None => "cut off".to_owned(),
         Some(RunEnd::Stopped(reason)) => format!("stopped: {reason}"),
         Some(RunEnd::Faulted(reason)) => format!("faulted: {reason}"),
-        Some(RunEnd::Completed) => "completed, with presses spoiled by the rig".to_owned(),
+        Some(RunEnd::Completed) => "completed, with presses lost to rig faults".to_owned(),
     };
     let all = || found.plan.presses.iter().zip(&found.histories).zip(wanted);
     let valid = all().filter(|((_, h), _)| h.verdict == Some(PressVerdict::Valid));
@@ -237,8 +237,8 @@ fn names(presses: &[&PlannedPress]) -> String {
     }
 }
 
-/// Opens the rig of the session and presses what is left.
-fn go_on(
+/// Opens the rig of the session and makes the remaining presses.
+fn run_leg(
     args: &ResumeArgs,
     found: &UnfinishedSession,
     wanted: &[bool],
@@ -248,7 +248,7 @@ fn go_on(
 ) -> Result<(PathBuf, RunReport), Failure> {
     let protocol = protocol_of(found)?;
     let rest = rest_of(&protocol, &found.plan, wanted)?;
-    let Opened {
+    let OpenedRig {
         rig,
         preflight,
         notes,
@@ -280,7 +280,7 @@ fn go_on(
     closed
 }
 
-/// The session's own protocol, read again: its text is in the session, files that it names are where they were.
+/// Parses the session's own protocol again: its text is in the session, files that it names are read from their paths.
 fn protocol_of(found: &UnfinishedSession) -> Result<Protocol, Failure> {
     let header = &found.header;
     let loader = skinrig_formats::regular::read_text;
@@ -293,7 +293,7 @@ fn protocol_of(found: &UnfinishedSession) -> Result<Protocol, Failure> {
     .map_err(|found| Failure::findings(&found))
 }
 
-/// What is left of the plan: straight ways where nothing is in them, else those of the plan.
+/// The remaining plan: with straight paths where they are free, else with the planned ones.
 fn rest_of(protocol: &Protocol, plan: &Plan, wanted: &[bool]) -> Result<Plan, Failure> {
     let is_wanted = |id: skinrig_model::PressId| wanted.get(id.index() as usize) == Some(&true);
     let straight = plan.remaining(is_wanted, Route::Straight);
@@ -301,13 +301,13 @@ fn rest_of(protocol: &Protocol, plan: &Plan, wanted: &[bool]) -> Result<Plan, Fa
         return Ok(straight);
     }
     let planned = plan.remaining(is_wanted, Route::AsPlanned);
-    let held = protocol.check(&planned);
-    held.map_err(|found| Failure::findings(&found))?;
+    let checked = protocol.check(&planned);
+    checked.map_err(|found| Failure::findings(&found))?;
     Ok(planned)
 }
 
-/// Where the simulated skin was pressed in earlier legs. An attempt that is made again does not count: it meets the contact that it would
-/// have met.
+/// Where the simulated skin was pressed in earlier legs. An attempt that is repeated does not count, so that it meets the same
+/// contact again.
 fn pressed_before(found: &UnfinishedSession, wanted: &[bool]) -> Vec<Point2> {
     let all = found.plan.presses.iter().zip(&found.histories).zip(wanted);
     all.flat_map(|((press, history), wanted)| {
@@ -317,31 +317,31 @@ fn pressed_before(found: &UnfinishedSession, wanted: &[bool]) -> Vec<Point2> {
     .collect()
 }
 
-/// The rig of a session.
-struct Opened {
+/// The opened rig of a session.
+struct OpenedRig {
     rig: Rig,
     preflight: Preflight,
-    /// What is to be remarked about it.
+    /// Notes for the session.
     notes: Vec<String>,
-    /// A bench, ours until the session is closed.
+    /// The bench, held until the session is closed; `None` for the simulated rig.
     bench: Option<OpenBench>,
 }
 
-/// What stays with an opened bench.
+/// State of an opened bench.
 struct OpenBench {
     tolerated: ToleratedMismatches,
     file: RigFile,
     _lease: Lease,
 }
 
-/// The rig of the session, opened.
+/// Opens the rig of the session.
 fn open_rig(
     args: &ResumeArgs,
     found: &UnfinishedSession,
     protocol: Protocol,
     rest: &Plan,
     wanted: &[bool],
-) -> Result<Opened, Failure> {
+) -> Result<OpenedRig, Failure> {
     let folder = paths::folder_of(&args.session);
     let header = &found.header;
     let summary = rest.summary();
@@ -376,8 +376,8 @@ fn open_rig(
         preflight
             .caller_checks
             .insert(0, gates::recorder(&args.session));
-        let notes = planted::told(faults).into_iter().collect();
-        return Ok(Opened {
+        let notes = planted::label(faults).into_iter().collect();
+        return Ok(OpenedRig {
             rig,
             preflight,
             notes,
@@ -407,7 +407,7 @@ fn open_rig(
     preflight
         .caller_checks
         .insert(0, gates::recorder(&args.session));
-    Ok(Opened {
+    Ok(OpenedRig {
         rig,
         preflight,
         notes,
@@ -419,7 +419,7 @@ fn open_rig(
     })
 }
 
-/// The rig file must be of the session's bench: its kind, its place of the skin, and limits that bear the plan.
+/// Checks that the rig file is of the session's bench: same kind, same skin frame, and limits that allow the plan.
 fn same_bench(file: &RigFile, found: &UnfinishedSession) -> Result<(), Failure> {
     let differs = |what: &str, expected: String, found: String| {
         Failure::input(format!(
@@ -462,7 +462,7 @@ fn same_bench(file: &RigFile, found: &UnfinishedSession) -> Result<(), Failure> 
     Ok(())
 }
 
-/// The devices must be those that the session was begun with; with leave, what differs is remarked.
+/// Checks that the devices are those of the session; if `others` are allowed, returns a note for each.
 fn same_devices(rig: &Rig, known: &[DeviceRow], others: bool) -> Result<Vec<String>, Failure> {
     let [one, two] = &rig.cameras;
     let mut notes = Vec::new();
@@ -490,7 +490,7 @@ fn same_devices(rig: &Rig, known: &[DeviceRow], others: bool) -> Result<Vec<Stri
     )))
 }
 
-/// Every press has its outcome and only the end is missing: it is written, and no device is touched.
+/// Writes the missing end of a session whose presses all have outcomes; uses no device.
 fn end_only(
     found: &UnfinishedSession,
     header: ResumeHeader,
@@ -528,11 +528,13 @@ fn end_only(
     })
 }
 
-/// The session has its end and lacks only its seal.
+/// Adds the missing seal of a session that has ended.
 fn only_seal(session: &Path) -> Outcome {
     let writer = SessionWriter::open_ended(session, &mut Rescan::default()).map_err(refusal)?;
-    let tell = || errln!("{}", crate::sink::HELD_OPEN);
-    writer.finish_with_notice(tell).map_err(Failure::internal)?;
+    let notify = || errln!("{}", crate::sink::HELD_OPEN);
+    writer
+        .finish_with_notice(notify)
+        .map_err(Failure::internal)?;
     outln!(
         "{}: ended; only its seal was missing, and has been added\n  next: skinrig analyze {0}",
         session.display()
@@ -546,7 +548,7 @@ mod tests {
     use skinrig_sim::{SimConfig, simulated_rig};
 
     #[test]
-    fn another_device_is_refused_or_remarked() {
+    fn another_device_is_rejected_or_noted() {
         let rig = |seed| simulated_rig(&SimConfig::new(seed, SimLevel::Kinematic));
         let (before, now) = (rig(1), rig(2));
         let row = |role, identity| DeviceRow {
@@ -564,14 +566,14 @@ mod tests {
         let same = &known[1..3];
         assert_eq!(same_devices(&now, same, false).unwrap(), [""; 0]);
         let serials = |of: &Rig| of.cameras[1].identity().serial;
-        let remark = format!(
+        let note = format!(
             "camera 2: expected serial {}, as in the session, found {}",
             serials(&before),
             serials(&now)
         );
-        assert_eq!(same_devices(&now, &known, true).unwrap(), [remark.as_str()]);
+        assert_eq!(same_devices(&now, &known, true).unwrap(), [note.as_str()]);
         let refused = same_devices(&now, &known, false).unwrap_err().message;
-        assert!(refused.contains(&remark), "{refused}");
+        assert!(refused.contains(&note), "{refused}");
         assert!(refused.contains("--allow-other-device"), "{refused}");
     }
 }

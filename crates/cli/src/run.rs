@@ -3,31 +3,31 @@
 use std::path::{Path, PathBuf};
 
 use chrono::{DateTime, SecondsFormat, Utc};
-use skinrig_controller::{ControllerError, Preflight, Problem, Run, RunReport, SinkFault};
+use skinrig_controller::{Preflight, Run, RunReport};
 use skinrig_device::Rig;
 use skinrig_model::{
-    AnalysisSettings, CameraId, HostDuration, HostTime, InterruptionKind, PressRole, PressVerdict,
-    RunEnd, RunHeader, SimLevel,
+    AnalysisSettings, CameraId, HostDuration, HostTime, InterruptionKind, PressVerdict, RunHeader,
+    SimLevel,
 };
 use skinrig_protocol::{Plan, PlantedFault, Protocol};
 use skinrig_recorder::{RecorderError, SessionReader, SessionWriter};
 
 use crate::args::RunArgs;
 use crate::check;
-use crate::exit::{Exit, Failure, Outcome};
+use crate::conclusion::{close, conclude};
+use crate::exit::{Failure, Outcome};
 use crate::fault::FaultInjector;
 use crate::hil::lease;
 use crate::host::host_name;
 use crate::paths;
 use crate::progress::ProgressView;
-use crate::results::{self};
 use crate::rig::{self, RepeatedOperator, bench, gates, planted};
 use crate::signals::Operator;
 use crate::sink::{ReplayExpectations, SessionSink};
 use crate::terminal::Output;
 use skinrig_results::RigDocument;
 
-/// What is to be recorded, before the rig adds what it knows.
+/// Header data of a session that do not depend on the rig.
 pub(crate) struct Intent<'a> {
     /// The protocol or schedule, byte for byte.
     pub text: &'a str,
@@ -41,27 +41,27 @@ pub(crate) struct Intent<'a> {
     pub overrides: &'a [String],
     /// Seed of the run.
     pub seed: u64,
-    /// Which prototype.
+    /// Name of the prototype.
     pub prototype: &'a str,
-    /// Who.
+    /// Name of the operator.
     pub operator: &'a str,
-    /// How to analyse it.
+    /// Settings of the analysis.
     pub analysis: &'a AnalysisSettings,
     /// The command line.
     pub command_line: &'a str,
     /// Rig time that the plan should take.
     pub expected: HostDuration,
-    /// What is known of the presses beforehand.
+    /// Facts about the presses that are known before the run.
     pub known: ReplayExpectations,
-    /// Faults on purpose.
+    /// Injected faults.
     pub faults: &'a [PlantedFault],
 }
 
-/// Records `plan` on `rig` into a new session in `folder`, after the `preflight` when there is one: an import and a
-/// replay have no devices to check.
+/// Records `plan` on `rig` into a new session in `folder`, after the `preflight`; imports and replays have none, because
+/// they have no devices to check.
 ///
 /// # Errors
-/// [`Failure::internal`] when the session cannot be made. A rig or recorder fault during the run is in the report.
+/// [`Failure::internal`] when the session cannot be created. A rig or recorder fault during the run is in the report.
 pub(crate) fn record(
     intent: &Intent<'_>,
     plan: &Plan,
@@ -111,53 +111,7 @@ pub(crate) fn record(
     close(sink, path, report, operator)
 }
 
-/// Seals the session, and tells what went wrong besides. Gives the path under which it is kept: another one when it was moved or
-/// removed meanwhile.
-pub(crate) fn close(
-    sink: SessionSink,
-    mut path: PathBuf,
-    mut report: RunReport,
-    operator: &Operator,
-) -> Result<(PathBuf, RunReport), Failure> {
-    let mut lost = None;
-    if let Err(error) = sink.seal() {
-        let is_complete = matches!(error, RecorderError::HeldOpen { .. });
-        match &error {
-            RecorderError::Rescued { to, .. } => path = shortest(to),
-            RecorderError::Lost { .. } => lost = Some(error.to_string()),
-            _ => {}
-        }
-        let error = ControllerError::from(SinkFault::Rejected(error.to_string()));
-        if report.end == RunEnd::Completed && !is_complete {
-            report.end = RunEnd::Faulted(error.to_string());
-            report.causes.push(error);
-        } else if !report.causes.contains(&error) {
-            // Of a complete run all is on the disk: that its seal is put off is no fault of the run.
-            report.problems.push(Problem { doing: "", error });
-        }
-    }
-    operator.run_is_over();
-    for problem in &report.problems {
-        if !report.causes.contains(&problem.error) {
-            errln!("warning: {problem}");
-        }
-    }
-    match lost {
-        Some(lost) => Err(Failure::rig(format!(
-            "{lost}\n  next: begin again with `skinrig run`, and leave a session where it is until its run has ended"
-        ))),
-        None => Ok((path, report)),
-    }
-}
-
-/// A path as people would type it here.
-fn shortest(path: &Path) -> PathBuf {
-    let here = std::env::current_dir().ok();
-    let below = here.and_then(|here| path.strip_prefix(here).ok().map(Path::to_path_buf));
-    below.unwrap_or_else(|| path.to_owned())
-}
-
-/// A new session file under a name that nobody else took meanwhile.
+/// Creates a new session file; retries if another process took the name.
 fn new_session(
     intent: &Intent<'_>,
     started: DateTime<Utc>,
@@ -169,14 +123,14 @@ fn new_session(
             Ok(writer) => return Ok((path, writer)),
             Err(RecorderError::Exists { .. }) => {}
             Err(error) => {
-                // A session without so much as a header is no session: nothing is lost with it.
+                // A file without a header holds no data: remove it.
                 for ending in ["", "-wal", "-shm"] {
                     let mut file = path.clone().into_os_string();
                     file.push(ending);
                     let _ = std::fs::remove_file(file);
                 }
                 return Err(Failure::internal(format!(
-                    "{error}\n  next: choose a folder that can be written, with space, with --sessions"
+                    "{error}\n  next: choose a writable folder with enough space with --sessions"
                 )));
             }
         }
@@ -225,13 +179,13 @@ fn header(
 /// `skinrig run`.
 ///
 /// # Errors
-/// [`Failure`] with the code that says what kind.
+/// [`Failure`] with the exit code of its kind.
 pub(crate) fn run(args: &RunArgs, command_line: &str, output: Output) -> Outcome {
     // Before any device is opened: from then on a robot may be live.
     let operator = Operator::listen().map_err(Failure::internal)?;
     let (session, report) = match (&args.replay, &args.protocol) {
         (Some(recording), _) => replay(recording, &args.sessions, command_line, &operator)?,
-        (None, Some(protocol)) => fresh(args, protocol, command_line, output, &operator)?,
+        (None, Some(protocol)) => new_run(args, protocol, command_line, output, &operator)?,
         (None, None) => {
             return Err(Failure::input(
                 "expected a protocol file or --replay SESSION",
@@ -241,134 +195,7 @@ pub(crate) fn run(args: &RunArgs, command_line: &str, output: Output) -> Outcome
     conclude(&session, &report, args.no_analysis, args.max_rmse, output)
 }
 
-/// Analyses a recorded session, prints its results, and turns the run's end into an exit code.
-///
-/// # Errors
-/// [`Failure`] with the code that says what kind.
-pub(crate) fn conclude(
-    session: &Path,
-    report: &RunReport,
-    no_analysis: bool,
-    max_rmse_mm: Option<f64>,
-    output: Output,
-) -> Outcome {
-    let analysed = if no_analysis && output.json {
-        crate::terminal::print_json(&serde_json::json!({ "files": { "session": session } }));
-        Ok(Exit::Ok)
-    } else if no_analysis {
-        outln!("{}", session.display());
-        Ok(Exit::Ok)
-    } else {
-        analyse(session, max_rmse_mm, output)
-    };
-    // How the run ended comes first: a failing analysis must not hide a fault of the rig.
-    let ended = end_of(session, report);
-    if matches!(ended, Ok(None)) {
-        return analysed;
-    }
-    if let Err(failure) = analysed {
-        errln!("{}", failure.message);
-    }
-    match ended? {
-        Some(stopped) => {
-            errln!("{stopped}");
-            Ok(Exit::Stopped)
-        }
-        None => Ok(Exit::Ok),
-    }
-}
-
-/// How the run of `session` ended; the operator's stop as the line that says so, `None` when all is well.
-///
-/// # Errors
-/// [`Failure::rig`] for a fault, and for presses that the rig cost.
-pub(crate) fn end_of(session: &Path, report: &RunReport) -> Result<Option<String>, Failure> {
-    let kept = format!("everything recorded so far is kept: {}", session.display());
-    match &report.end {
-        RunEnd::Completed => match cost_by_the_rig(session)? {
-            Some(cost) => Err(Failure::rig(format!(
-                "{cost}\n  the session is kept: {}\n  next: put right what they name (device, cable, disk), then take these presses \
-                 again with `skinrig resume {0}`",
-                session.display()
-            ))),
-            None => Ok(None),
-        },
-        RunEnd::Stopped(reason) => Ok(Some(format!(
-            "stopped: {reason}; {kept}\n  next: {}",
-            go_on(session)
-        ))),
-        RunEnd::Faulted(reason) => Err(Failure::rig(format!(
-            "{reason}\n  {kept}\n  next: put right what is named above (device, cable, file, disk space), then {}; \
-             `skinrig show` lists what was kept",
-            go_on(session)
-        ))),
-    }
-}
-
-/// The presses of a completed session that the rig or the operator cost, in words; `None` when there are none, or when no rig can take
-/// them again.
-fn cost_by_the_rig(session: &Path) -> Result<Option<String>, Failure> {
-    const NAMED: usize = 3;
-    let reader = SessionReader::open(session).map_err(Failure::session)?;
-    let header = reader.header().map_err(Failure::session)?;
-    let histories = reader.history().map_err(Failure::session)?;
-    if !header.is_of_a_rig() {
-        return Ok(None);
-    }
-    let plan: Plan = serde_json::from_str(&header.plan_json).map_err(|e| {
-        Failure::rig(format!(
-            "{0}: expected the plan that was just carried out, found: {e}
-  next: `skinrig verify {0}`",
-            session.display()
-        ))
-    })?;
-    let wanted = plan.wanted(&histories);
-    let all = plan.presses.iter().zip(&histories).zip(wanted);
-    let cost: Vec<_> = all
-        .filter(|((press, _), wanted)| *wanted && press.role != PressRole::Sync)
-        .map(|((press, known), _)| {
-            let reason = known.verdict.as_ref().and_then(PressVerdict::reason);
-            format!("{}: {}", press.id, reason.unwrap_or("no verdict".into()))
-        })
-        .collect();
-    if cost.is_empty() {
-        return Ok(None);
-    }
-    let mut words = format!(
-        "all of the plan was done, but {} of {} presses are invalid because of the rig, not the skin: {}",
-        cost.len(),
-        plan.presses.len(),
-        cost.iter()
-            .take(NAMED)
-            .cloned()
-            .collect::<Vec<_>>()
-            .join("; ")
-    );
-    if cost.len() > NAMED {
-        words += &format!("; and {} more", cost.len() - NAMED);
-    }
-    Ok(Some(words))
-}
-
-/// The next step of a session that was not finished: a rig can go on, an import or a replay begins anew.
-fn go_on(session: &Path) -> String {
-    let header = SessionReader::open(session).and_then(|reader| reader.header());
-    match header {
-        Ok(header) if header.is_of_a_rig() => {
-            format!("continue with `skinrig resume {}`", session.display())
-        }
-        _ => "run again".to_owned(),
-    }
-}
-
-fn analyse(session: &Path, max_rmse_mm: Option<f64>, output: Output) -> Outcome {
-    let results = results::analyze_shown(session, results::Choices::default())?;
-    let written = results::write_shown(&results, None, None)?;
-    results::print_results(&results, output, &written);
-    results::check_limit(&results, max_rmse_mm)
-}
-
-fn fresh(
+fn new_run(
     args: &RunArgs,
     protocol: &Path,
     command_line: &str,
@@ -416,19 +243,19 @@ pub(crate) fn simulated(
         };
         outln!("rig       simulated ({level}{needed_for}), seed {seed}\n");
     }
-    if let Some(told) = planted::told(&faults) {
-        errln!("warning: {told}\n");
+    if let Some(label) = planted::label(&faults) {
+        errln!("warning: {label}\n");
     }
     let mut rig = rig::simulated(&protocol, level, seed, args.real_time, &faults);
     if level < protocol.scene.level {
-        // In the name, so that no report of this session can be read without it.
+        // In the name, so that every report of this session shows it.
         let short = format!(
             "{level}, less than the scene needs: {}",
             protocol.scene.level
         );
         rig.name = rig.name.replacen(level.name(), &short, 1);
         errln!(
-            "warning: --level {level} is less than the protocol's scene needs ({}): what needs it is not in the data\n",
+            "warning: --level {level} is less than the protocol's scene needs ({}): the data lack what needs that level\n",
             protocol.scene.level
         );
     }
@@ -447,7 +274,7 @@ pub(crate) fn simulated(
     )
 }
 
-/// Runs a protocol on the bench of a rig file, within what the bench bears.
+/// Runs a protocol on the bench of a rig file, within the limits of the bench.
 fn on_bench(
     args: &RunArgs,
     mut protocol: Protocol,
@@ -468,7 +295,7 @@ fn on_bench(
         let mut failure = Failure::findings(&found);
         let l = &file.limits;
         failure.message.push_str(&format!(
-            "\n  {} allows at most {} mm/s, {} N and {} mm; the tighter of its limits and the protocol's hold",
+            "\n  {} allows at most {} mm/s, {} N and {} mm; the tighter of its limits and the protocol's apply",
             file.file_name, l.max_speed_mm_s, l.max_force_n, l.max_depth_mm
         ));
         failure
@@ -480,7 +307,7 @@ fn on_bench(
         outln!("{summary}");
         outln!("rig       {}\n", bench::display_name(&file));
     }
-    // Until the session is closed.
+    // Held until the session is closed.
     let _lease = lease::take(&file, &format!("run {}", protocol.name))?;
     let (rig, tolerated) = bench::open(&file, &protocol)?;
     let preflight = gates::of_bench(&file, &rig, &args.sessions, summary.duration_s);
@@ -497,7 +324,7 @@ fn on_bench(
     recorded
 }
 
-/// What a run of `protocol` is to record.
+/// Header data for a run of `protocol`.
 pub(crate) fn intent_of<'a>(
     protocol: &'a Protocol,
     seed: u64,
@@ -529,7 +356,7 @@ fn replay(
 ) -> Result<(PathBuf, RunReport), Failure> {
     let reader = SessionReader::open(recording).map_err(Failure::session)?;
     let header = reader.header().map_err(Failure::session)?;
-    // A replay repeats one run of the plan on the tape's own clocks; a further leg begins in the middle of the plan.
+    // A replay repeats one run of the plan on the recorded clocks; a further leg starts in the middle of the plan.
     let legs = reader.legs().map_err(Failure::session)?.len();
     if legs > 1 {
         return Err(Failure::input(format!(
@@ -575,7 +402,7 @@ fn replay(
     record(&intent, &plan, rig, folder, None, operator)
 }
 
-/// What the recording says that no device can: schedule, exclusions, and what the operator did.
+/// Facts from the recording that no device provides: schedule, exclusions, and the operator's actions.
 fn expectations(reader: &SessionReader) -> Result<ReplayExpectations, RecorderError> {
     let outcomes = reader.last_outcomes()?;
     let outcomes = || outcomes.iter().flatten();
@@ -583,7 +410,7 @@ fn expectations(reader: &SessionReader) -> Result<ReplayExpectations, RecorderEr
         PressVerdict::Excluded(rule) => Some((o.attempt.press, rule.clone())),
         _ => None,
     });
-    // Of a schedule, since the attempt began; what was measured is measured again.
+    // Scheduled times only, relative to the start of the attempt; measured times are measured again.
     let presses = reader.presses()?;
     let attempts = presses.iter().filter_map(|(_, attempts)| attempts.last());
     let timings = attempts.filter_map(|attempt| {

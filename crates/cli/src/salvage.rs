@@ -2,19 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-use skinrig_recorder::{SESSION_SUFFIX, SalvageReport, salvage as bring_back};
+use skinrig_recorder::{SESSION_SUFFIX, SalvageReport, salvage as recover};
 use skinrig_text::{Column, Table};
 
 use crate::args::SalvageArgs;
 use crate::exit::{Exit, Failure, Outcome};
 
-/// Copies what is whole of a damaged session into a new one, and tells what is not.
+/// Copies the intact part of a damaged session into a new one, and lists what was lost.
 ///
 /// # Errors
-/// [`Failure::input`] when nothing of a session is found or the new file exists; [`Failure::limit`] when something is lost.
+/// [`Failure::input`] when the file holds no session data or the new file exists; [`Failure::limit`] when something is lost.
 pub(crate) fn salvage(args: &SalvageArgs, json: bool) -> Outcome {
     let to = args.out.clone().unwrap_or_else(|| beside(&args.session));
-    let report = bring_back(&args.session, &to).map_err(Failure::session)?;
+    let report = recover(&args.session, &to).map_err(Failure::session)?;
     if json {
         let mut value = serde_json::to_value(&report).map_err(Failure::internal)?;
         value["whole"] = report.is_whole().into();
@@ -45,7 +45,7 @@ fn beside(session: &Path) -> PathBuf {
 
 fn print(report: &SalvageReport) {
     let columns = Table::new([Column::left(16), Column::right(9), Column::right(9)]);
-    outln!("{}", columns.row(["table", "rows back", "missing"]));
+    outln!("{}", columns.row(["table", "recovered", "missing"]));
     for table in &report.tables {
         let missing = match table.missing {
             0 => "-".to_owned(),

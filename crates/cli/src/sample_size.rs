@@ -1,4 +1,4 @@
-//! `skinrig plan --detect`: locations x repetitions that show a difference, from the variance of a session.
+//! `skinrig plan --detect`: locations x repetitions needed to show a difference, from the variance of a session.
 
 use std::path::Path;
 
@@ -13,13 +13,13 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::progress::clock_text;
 use crate::results::{Choices, analyze_shown};
 
-/// Fewer locations than this say little about their variance: its 95 % interval spans a factor of 6 or more.
+/// Below this number of locations the estimated variance is poor: its 95 % interval spans a factor of 6 or more.
 const FEW_LOCATIONS: u32 = 12;
 
-/// Proposes what to press on each of two skins so that a difference in RMSE is found.
+/// Proposes the presses on each of two skins that show a difference in RMSE.
 ///
 /// # Errors
-/// [`Failure::input`] for a session that cannot be analysed, without presses that score, or that says too little.
+/// [`Failure::input`] for a session that cannot be analysed, has no scored presses, or has too few data.
 pub(crate) fn propose(
     difference_mm: f64,
     session: &Path,
@@ -48,7 +48,7 @@ pub(crate) fn propose(
     Ok(Exit::Ok)
 }
 
-/// Lengths of the errors of the presses that make the RMSE, mm.
+/// Error lengths of the scored presses, mm.
 fn errors(analysis: &Analysis) -> Result<Sample, skinrig_compare::statistics::SampleFault> {
     let scored = analysis
         .presses
@@ -95,7 +95,7 @@ fn print(plan: &PowerPlan, session: &Path) {
             seconds,
         } = proposal;
         let time = seconds.map_or_else(
-            || "not known".to_owned(),
+            || "unknown".to_owned(),
             |s| clock_text(HostDuration::from_secs_f64(s)),
         );
         outln!(
@@ -113,9 +113,7 @@ fn print(plan: &PowerPlan, session: &Path) {
     outln!("from {}", session.display());
     outln!("  RMSE {value:.3} mm at {locations} locations");
     if locations < FEW_LOCATIONS {
-        outln!(
-            "  so few locations that these variances are uncertain themselves: take more than proposed"
-        );
+        outln!("  with so few locations these variances are uncertain: use more than proposed");
     }
     outln!(
         "  standard deviation between locations {:.3} mm",
@@ -138,7 +136,7 @@ fn print(plan: &PowerPlan, session: &Path) {
     );
 }
 
-/// A share in percent without the dust of its binary form.
+/// A percentage without the rounding errors of its binary form.
 fn shown(percent: f64) -> f64 {
     (percent * 1e6).round() * 1e-6
 }

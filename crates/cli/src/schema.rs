@@ -6,7 +6,7 @@ use crate::exit::{Exit, Outcome};
 /// Prints a JSON Schema.
 ///
 /// # Errors
-/// None; the schemas are built in.
+/// Never.
 pub(crate) fn schema(args: &SchemaArgs) -> Outcome {
     let schema = match args.kind {
         SchemaKind::Protocol => skinrig_protocol::schema_json(),

@@ -1,4 +1,4 @@
-//! `skinrig sessions`, and which session of a folder is meant.
+//! `skinrig sessions`, and finding sessions in a folder.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -56,10 +56,10 @@ pub(crate) fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
     Ok(Exit::Ok)
 }
 
-/// The session at `place`: the file itself; of a folder the one that is being written, else the one that was written last.
+/// The session at `place`: the file itself, or in a folder the session being recorded, else the one written last.
 ///
 /// # Errors
-/// [`Failure::input`] when there is none, or when several are being written.
+/// [`Failure::input`] when there is none, or when several are being recorded.
 pub(crate) fn find(place: &Path) -> Result<PathBuf, Failure> {
     if !place.is_dir() {
         return Ok(place.to_owned());
@@ -81,10 +81,10 @@ pub(crate) fn find(place: &Path) -> Result<PathBuf, Failure> {
     }
 }
 
-/// The session at `place` that a process writes at this moment.
+/// The running session at `place`.
 ///
 /// # Errors
-/// [`Failure::input`] that says what the session is instead.
+/// [`Failure::input`] with the actual state of the session.
 pub(crate) fn find_running(place: &Path) -> Result<PathBuf, Failure> {
     let session = find(place)?;
     if writer_of(&session).is_some() {
@@ -92,26 +92,26 @@ pub(crate) fn find_running(place: &Path) -> Result<PathBuf, Failure> {
     }
     let shown = session.display();
     let state = SessionReader::open(&session).and_then(|reader| {
-        let legs = reader.legs()?; // a session without a header is none
+        let legs = reader.legs()?; // fails without a header
         Ok((reader.seal()?.is_some(), reader.end()?.is_some(), legs))
     });
     Err(Failure::input(match state {
         Ok((true, ..)) => format!(
             "{shown}: expected a running session, found a sealed one, which never changes\n  next: `skinrig tag {shown} --note \
-             TEXT` writes a remark beside it; `skinrig resume {shown}` goes on with one that was stopped"
+             TEXT` adds a note beside it; `skinrig resume {shown}` continues one that was stopped"
         ),
         Ok(_) => format!(
-            "{shown}: expected a running session, found one that no program is running\n  next: `skinrig resume {shown}` goes on \
-             with it"
+            "{shown}: expected a running session, found one that no program is running\n  next: `skinrig resume {shown}` continues \
+            it"
         ),
         Err(e) => e.to_string(),
     }))
 }
 
-/// The sessions of `prototype` in `folder`, oldest first: its name exactly as the protocols write it.
+/// The sessions of `prototype` in `folder`, oldest first; the name must match exactly.
 ///
 /// # Errors
-/// [`Failure::input`] when the folder cannot be read, or has none of them: then which prototypes there are.
+/// [`Failure::input`] when the folder cannot be read; when it has none of them, with the prototypes that it has.
 pub(crate) fn of_prototype(folder: &Path, prototype: &str) -> Result<Vec<PathBuf>, Failure> {
     let all = list(folder).map_err(Failure::session)?;
     let of = |s: &&SessionSummary| s.prototype() == Some(prototype);
@@ -132,9 +132,9 @@ pub(crate) fn of_prototype(folder: &Path, prototype: &str) -> Result<Vec<PathBuf
     )))
 }
 
-/// Of several files of one session, which copies are, the one that stands for it: a sealed one goes before one that is not (what `salvage`
-/// brings back is never sealed), the shorter name before the longer.
-fn stands_for<'a>(copies: &[&'a SessionSummary]) -> Option<&'a SessionSummary> {
+/// The representative of several copies of one session: sealed before unsealed (`salvage` never seals), then the shorter path
+/// before the longer.
+fn representative<'a>(copies: &[&'a SessionSummary]) -> Option<&'a SessionSummary> {
     let rank = |s: &&&SessionSummary| {
         let sealed = matches!(s.state, SessionState::Readable { sealed: true, .. });
         (!sealed, s.path.as_os_str().len(), s.path.clone())
@@ -152,12 +152,12 @@ fn by_id(all: &[SessionSummary]) -> BTreeMap<&str, Vec<&SessionSummary>> {
     groups
 }
 
-/// The sessions of a list in its order, each once: copies of a session (`skinrig salvage` makes one) are no sessions of their own.
+/// The sessions of a list in its order, without copies of the same session (`skinrig salvage` creates one).
 #[must_use]
 pub(crate) fn originals(all: &[SessionSummary]) -> Vec<&SessionSummary> {
     let kept: BTreeSet<&Path> = by_id(all)
         .values()
-        .filter_map(|copies| stands_for(copies).map(|s| s.path.as_path()))
+        .filter_map(|copies| representative(copies).map(|s| s.path.as_path()))
         .collect();
     let broken = |s: &SessionSummary| matches!(s.state, SessionState::Broken { .. });
     all.iter()
@@ -165,22 +165,22 @@ pub(crate) fn originals(all: &[SessionSummary]) -> Vec<&SessionSummary> {
         .collect()
 }
 
-/// A remark on every copy that `originals` leaves out.
+/// A note on every copy that [`originals`] leaves out.
 #[must_use]
 pub(crate) fn copies(all: &[SessionSummary]) -> Vec<String> {
-    let mut remarks = Vec::new();
+    let mut notes = Vec::new();
     for copies in by_id(all).values() {
-        let Some(kept) = stands_for(copies) else {
+        let Some(kept) = representative(copies) else {
             continue;
         };
         for copy in copies.iter().filter(|s| s.path != kept.path) {
             let (copy, kept) = (copy.path.display(), kept.path.display());
-            remarks.push(format!(
+            notes.push(format!(
                 "{copy} is a copy of the session {kept}; it is not counted again"
             ));
         }
     }
-    remarks
+    notes
 }
 
 fn none_in(folder: &Path) -> Failure {
@@ -190,7 +190,7 @@ fn none_in(folder: &Path) -> Failure {
     ))
 }
 
-/// The session files of a folder, in no order.
+/// The session files of a folder, unsorted.
 ///
 /// # Errors
 /// [`Failure::input`] when it cannot be read.
@@ -207,7 +207,7 @@ pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     Ok(found)
 }
 
-/// When a session was last written, its log included.
+/// Time of the last write to a session or its log.
 fn written(session: &Path) -> Option<SystemTime> {
     let mut log = session.as_os_str().to_owned();
     log.push("-wal");
@@ -222,7 +222,7 @@ fn line(table: &Table, session: &SessionSummary) -> String {
         .unwrap_or_default();
     match &session.state {
         SessionState::Empty if writer_of(&session.path).is_some() => format!("beginning: {file}"),
-        SessionState::Empty => format!("empty: {file}: without a record in it; remove it"),
+        SessionState::Empty => format!("empty: {file}: it has no records; remove it"),
         SessionState::Broken { reason } => format!("broken: {file}: {reason}"),
         SessionState::Readable {
             started_at,
@@ -244,15 +244,15 @@ fn line(table: &Table, session: &SessionSummary) -> String {
                 (None, _) if writer_of(&session.path).is_some() => "  (under way)".to_owned(),
                 (None, _) => "  (cut off)".to_owned(),
             };
-            let mut said = match annotations.tags.is_empty() {
+            let mut notes = match annotations.tags.is_empty() {
                 true => String::new(),
                 false => format!("  [{}]", crate::tag::words(annotations)),
             };
             if !annotations.notes.is_empty() {
-                said += &format!("  {} note(s)", annotations.notes.len());
+                notes += &format!("  {} note(s)", annotations.notes.len());
             }
             if let Some(problem) = tags_problem {
-                said += &format!("  tags unreadable: {problem}");
+                notes += &format!("  tags unreadable: {problem}");
             }
             table.row([
                 cut(started_at, 19),
@@ -261,7 +261,7 @@ fn line(table: &Table, session: &SessionSummary) -> String {
                 rig_name,
                 &format!("{}/{}", presses.valid, presses.planned),
                 &format!("{:.1}", session.size_bytes as f64 / 1e6),
-                &format!("{file}{state}{said}"),
+                &format!("{file}{state}{notes}"),
             ])
         }
     }

@@ -1,7 +1,7 @@
-//! ctrl-C: once stops after the current press, twice aborts, three times halts. A polite end by the system (SIGTERM)
-//! and a terminal that goes away (SIGHUP) count as a ctrl-C: the robot must not stay in the skin. Who started the
-//! program with `nohup` said that it outlives its terminal: then SIGHUP stays ignored. Every other signal that would end the
-//! program without a word counts too, SIGQUIT (ctrl-\) and a used up limit of processor time as two: those retract at once.
+//! ctrl-C and other signals: once stops after the current press, twice aborts, three times halts. SIGTERM and a closed terminal
+//! (SIGHUP) count as one ctrl-C, because the robot must not stay in the skin. With `nohup` the program is meant to outlive its
+//! terminal, so SIGHUP stays ignored. Every other signal that would end the program silently counts too; SIGQUIT (ctrl-\) and an
+//! exceeded limit of processor time count as two, which retracts at once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
@@ -12,7 +12,7 @@ use crate::exit::Exit;
 
 static PRESSED: AtomicU8 = AtomicU8::new(0);
 
-/// The operator at this terminal, with a hand on the run from before the first device is opened. Clones are the same one.
+/// The operator at this terminal, who can end the run from before the first device is opened. Clones share their state.
 #[derive(Clone)]
 pub(crate) struct Operator {
     control: ControlHandle,
@@ -22,44 +22,44 @@ pub(crate) struct Operator {
     attended: bool,
 }
 
-/// The system refused the handler of signals, or its thread.
+/// The signal handler or its thread cannot be set up.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot listen for ctrl-C: {0}")]
 pub(crate) struct SignalError(#[from] std::io::Error);
 
-/// What ctrl-C is answered with, once, twice and three times.
-type Words = [&'static str; 3];
+/// Messages for the first, second and third ctrl-C.
+type Messages = [&'static str; 3];
 
-const OF_RUN: Words = [
+const OF_RUN: Messages = [
     "stopping after this press; ctrl-C again retracts and stops now",
     "retracting and stopping now; ctrl-C again switches the motors off where the tip is",
     "switching the motors off where the tip is, and closing the session",
 ];
 
-const OF_SUITE: Words = [
+const OF_SUITE: Messages = [
     "ending the suite with this check; later checks stay open. ctrl-C again aborts a golden campaign",
     "retracting, and ending the suite; ctrl-C again switches the motors off where the tip is",
     "switching the motors off where the tip is, and ending the suite",
 ];
 
 impl Operator {
-    /// Listens from now on. What is asked for before the run begins is heard when it does.
+    /// Handles signals from now on. A request before the run starts takes effect when it does.
     ///
     /// # Errors
-    /// As `on_ctrl_c`.
+    /// As [`on_ctrl_c`].
     pub(crate) fn listen() -> Result<Self, SignalError> {
-        Self::answering(OF_RUN, false)
+        Self::with_messages(OF_RUN, false)
     }
 
-    /// As [`listen`](Self::listen), for a suite of checks: it goes on when a run in it is over.
+    /// Like [`listen`](Self::listen), for a suite of checks, which continues after each run.
     ///
     /// # Errors
     /// As [`on_ctrl_c`].
     pub(crate) fn of_suite() -> Result<Self, SignalError> {
-        Self::answering(OF_SUITE, true)
+        Self::with_messages(OF_SUITE, true)
     }
 
-    /// An operator at no terminal: `control` alone ends the run, signals keep their meaning, and no progress is shown.
+    /// An operator without a terminal: only `control` ends the run, signals keep their default effect, and no progress is shown.
     pub(crate) fn elsewhere(control: ControlHandle) -> Self {
         Self {
             control,
@@ -70,23 +70,23 @@ impl Operator {
         }
     }
 
-    fn answering(words: Words, of_suite: bool) -> Result<Self, SignalError> {
+    fn with_messages(messages: Messages, of_suite: bool) -> Result<Self, SignalError> {
         let flag = || Arc::new(AtomicBool::new(false));
         let (control, over, asked) = (ControlHandle::new(), flag(), flag());
-        let (hand, is_over, is_asked) = (control.clone(), Arc::clone(&over), Arc::clone(&asked));
+        let (halter, is_over, is_asked) = (control.clone(), Arc::clone(&over), Arc::clone(&asked));
         on_ctrl_c(move |times| {
             if is_over.load(Ordering::SeqCst) {
-                // Nothing moves any more and the session is closed.
+                // The robot is at rest and the session is closed.
                 std::process::exit(i32::from(Exit::Stopped.code()));
             }
             is_asked.store(true, Ordering::SeqCst);
-            if let Some(words) = words.get(usize::from(times) - 1) {
-                errln!("\n{words}");
+            if let Some(messages) = messages.get(usize::from(times) - 1) {
+                errln!("\n{messages}");
             }
             match times {
-                1 => hand.stop(),
-                2 => hand.abort(),
-                3 => hand.halt(),
+                1 => halter.stop(),
+                2 => halter.abort(),
+                3 => halter.halt(),
                 _ => errln!(
                     "\nclosing the session; if nothing happens, press the force button of the robot"
                 ),
@@ -101,39 +101,39 @@ impl Operator {
         })
     }
 
-    /// The hand on the run.
+    /// The handle that controls the run.
     #[must_use]
     pub(crate) const fn control(&self) -> &ControlHandle {
         &self.control
     }
 
-    /// True if there is a terminal to show the run on.
+    /// True if the operator is at a terminal.
     #[must_use]
     pub(crate) const fn is_attended(&self) -> bool {
         self.attended
     }
 
-    /// Whether ctrl-C was pressed, or the system asked for an end.
+    /// True if ctrl-C was pressed or another signal requested an end.
     #[must_use]
     pub(crate) fn asked(&self) -> bool {
         self.asked.load(Ordering::SeqCst)
     }
 
-    /// The run is over and its session closed: from now on ctrl-C leaves the program. Within a suite it does not.
+    /// Called when the run is over and its session closed: from now on ctrl-C exits the program, except within a suite.
     pub(crate) fn run_is_over(&self) {
         self.over.store(!self.of_suite, Ordering::SeqCst);
     }
 }
 
-/// Calls `react` with 1, 2, 3, ... each time ctrl-C is pressed, from a thread of its own, until the program ends.
+/// Calls `react` with 1, 2, 3, ... each time ctrl-C is pressed, on a separate thread, until the program ends.
 ///
 /// # Errors
-/// When the system refuses the thread or the handler.
+/// When the thread or the handler cannot be set up.
 pub(crate) fn on_ctrl_c(react: impl Fn(u8) + Send + 'static) -> Result<(), SignalError> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_io()
         .build()?;
-    // Registered here, so that no signal finds the program without a handler once this returns.
+    // Registered here, so that every signal has a handler once this returns.
     let mut signals = {
         let _inside = runtime.enter();
         Signals::new()?
@@ -143,8 +143,11 @@ pub(crate) fn on_ctrl_c(react: impl Fn(u8) + Send + 'static) -> Result<(), Signa
         .spawn(move || {
             runtime.block_on(async {
                 loop {
-                    let least = signals.next().await;
-                    let pressed = PRESSED.load(Ordering::SeqCst).saturating_add(1).max(least);
+                    let min_presses = signals.next().await;
+                    let pressed = PRESSED
+                        .load(Ordering::SeqCst)
+                        .saturating_add(1)
+                        .max(min_presses);
                     PRESSED.store(pressed, Ordering::SeqCst);
                     react(pressed);
                 }
@@ -153,7 +156,7 @@ pub(crate) fn on_ctrl_c(react: impl Fn(u8) + Send + 'static) -> Result<(), Signa
     Ok(())
 }
 
-/// What asks for an end, each with the count of ctrl-C that it is at least.
+/// Signals that request an end, each with the smallest number of ctrl-C presses that it stands for.
 #[cfg(unix)]
 struct Signals(Vec<(tokio::signal::unix::Signal, u8)>);
 
@@ -180,8 +183,9 @@ impl Signals {
         if !hangup_is_ignored() {
             wanted.push((Signal::HUP, 1));
         }
-        let listen =
-            |(kind, least): (Signal, u8)| Ok((signal(SignalKind::from_raw(kind.as_raw()))?, least));
+        let listen = |(kind, min_presses): (Signal, u8)| {
+            Ok((signal(SignalKind::from_raw(kind.as_raw()))?, min_presses))
+        };
         Ok(Self(
             wanted
                 .into_iter()
@@ -190,12 +194,12 @@ impl Signals {
         ))
     }
 
-    /// Waits for the next one; the gravest first.
+    /// Waits for the next one; the most urgent first.
     async fn next(&mut self) -> u8 {
         std::future::poll_fn(|context| {
-            for (signal, least) in &mut self.0 {
+            for (signal, min_presses) in &mut self.0 {
                 if signal.poll_recv(context).is_ready() {
-                    return std::task::Poll::Ready(*least);
+                    return std::task::Poll::Ready(*min_presses);
                 }
             }
             std::task::Poll::Pending
@@ -204,8 +208,8 @@ impl Signals {
     }
 }
 
-/// Makes a file that grows beyond the limit of the process (`ulimit -f`) an error of the write, as a full disk is one. Without
-/// this the system ends the program by SIGXFSZ, with the robot wherever it is.
+/// Turns exceeding the file size limit of the process (`ulimit -f`) into a write error, like a full disk. Otherwise SIGXFSZ would
+/// end the program, wherever the robot is.
 pub(crate) fn take_file_limits_as_errors() {
     #[cfg(unix)]
     {
@@ -213,16 +217,16 @@ pub(crate) fn take_file_limits_as_errors() {
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_io()
             .build();
-        // What cannot be listened to keeps its meaning; no command works less well for it.
+        // Without a handler the signal keeps its default effect; commands still work.
         let Ok(runtime) = runtime else { return };
         let _inside = runtime.enter();
-        // The handler stays for the rest of the process; nobody needs to hear from it.
+        // The handler stays for the rest of the process; its notifications are not needed.
         let _ = signal(SignalKind::from_raw(rustix::process::Signal::XFSZ.as_raw()));
     }
 }
 
-/// True when the parent left SIGHUP ignored, as `nohup` does. Linux tells it without a system call that Rust calls
-/// unsafe: bit n - 1 of `SigIgn` in proc_pid_status(5). Elsewhere it is not known, and SIGHUP stops the run.
+/// True when the parent left SIGHUP ignored, as `nohup` does. Linux reports it without an unsafe system call: bit n - 1 of
+/// `SigIgn` in proc_pid_status(5). Elsewhere it is unknown, and SIGHUP stops the run.
 #[cfg(unix)]
 fn hangup_is_ignored() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -236,7 +240,7 @@ fn ignored_signals(status: &str) -> Option<u64> {
     u64::from_str_radix(mask.trim(), 16).ok()
 }
 
-/// What asks for an end.
+/// Events that request an end.
 #[cfg(windows)]
 struct Signals(tokio::signal::windows::CtrlC);
 
@@ -249,7 +253,7 @@ impl Signals {
     async fn next(&mut self) -> u8 {
         match self.0.recv().await {
             Some(()) => 1,
-            // The system has no more of them.
+            // No further events will come.
             None => std::future::pending().await,
         }
     }

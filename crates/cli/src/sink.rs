@@ -1,4 +1,4 @@
-//! The consumer of a run's records: the session file first, then the terminal.
+//! Takes a run's records: writes them to the session file, then updates the terminal.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,22 +14,22 @@ use crate::progress::ProgressView;
 use crate::remote::Remote;
 use crate::rig::gates;
 
-/// What the rig cannot know about its presses, but an import or the replay of one can.
+/// Facts about presses that no device provides, but an import or its replay does.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ReplayExpectations {
     /// Times and positions come from a schedule; nothing was measured.
     pub scheduled: bool,
-    /// When each scheduled press happens, each moment as the time since its attempt began. The controller sees its poses
-    /// at intervals; a schedule is exact.
+    /// Exact times of each scheduled press, relative to the start of its attempt. The controller samples poses at intervals,
+    /// which is less exact.
     pub timings: BTreeMap<PressId, PressTiming>,
-    /// Presses that are left out, with the rule that says so.
+    /// Excluded presses, each with its rule.
     pub excluded: BTreeMap<PressId, String>,
     /// When and how the operator ended the recorded run.
     pub interruption: Option<(HostTime, InterruptionKind)>,
 }
 
 impl ReplayExpectations {
-    /// Adds to the outcome of an attempt that began at `begun` what no device can say.
+    /// Completes the outcome of an attempt that began at `begun` with these facts.
     fn complete(&self, outcome: &mut PressOutcome, begun: HostTime) {
         outcome.scheduled |= self.scheduled;
         let scheduled = self.timings.get(&outcome.attempt.press);
@@ -43,22 +43,22 @@ impl ReplayExpectations {
     }
 }
 
-/// Told once when the seal has to wait.
+/// Printed once if the seal has to wait.
 pub(crate) const HELD_OPEN: &str = "note: another program has the session open; waiting for it, to seal the session (60 s at most)";
 
-/// Writes every record to the session file and shows it.
+/// Writes every record to the session file and shows progress.
 pub(crate) struct SessionSink {
     writer: SessionWriter,
     view: ProgressView,
     known: ReplayExpectations,
-    /// When the present attempt began.
+    /// Start of the current attempt.
     begun: HostTime,
-    /// Where the session lies, when its free space matters.
+    /// Folder of the session, if its free space is monitored.
     folder: Option<PathBuf>,
-    /// Remarks to be written once the leg has begun.
+    /// Notes to write once the leg has begun.
     notes: Vec<String>,
     fault_injector: FaultInjector,
-    /// The hand on the run from other terminals; goes away last, when the session is closed.
+    /// Control from other terminals; dropped last, when the session is closed.
     remote: Option<Remote>,
 }
 
@@ -82,33 +82,33 @@ impl SessionSink {
         }
     }
 
-    /// Tells the free space of `folder` when it is asked for.
+    /// Reports the free space of `folder` on request.
     #[must_use]
     pub(crate) fn on_disk_of(mut self, folder: &Path) -> Self {
         self.folder = Some(folder.to_owned());
         self
     }
 
-    /// Writes these remarks right after the first record.
+    /// Writes these notes right after the first record.
     #[must_use]
     pub(crate) fn with_notes(mut self, notes: Vec<String>) -> Self {
         self.notes = notes;
         self
     }
 
-    /// Listens to other terminals for the session at `session`. A run that cannot goes on, and says so.
+    /// Accepts requests from other terminals for `session`. If that fails, the run continues with a warning.
     #[must_use]
     pub(crate) fn controlled(mut self, session: &Path, control: &ControlHandle) -> Self {
         match Remote::open(session, control) {
             Ok(remote) => self.remote = Some(remote),
             Err(why) => self.view.say(&format!(
-                "warning: this run does not listen to other terminals ({why}); ctrl-C works"
+                "warning: this run cannot be controlled from other terminals ({why}); ctrl-C works"
             )),
         }
         self
     }
 
-    /// With faults on purpose.
+    /// Injects faults.
     #[must_use]
     pub(crate) fn with_faults(mut self, fault_injector: FaultInjector) -> Self {
         self.fault_injector = fault_injector;
@@ -127,16 +127,16 @@ impl SessionSink {
 }
 
 impl SessionSink {
-    /// Remarks that the run had to wait for the disk, which is where data are lost next.
-    fn tell_waits(&mut self, t: HostTime) -> Result<(), SinkFault> {
+    /// Adds a note if the run had to wait for the disk, because data loss is likely then.
+    fn note_waits(&mut self, t: HostTime) -> Result<(), SinkFault> {
         let load = self.writer.load();
         if load.waits == 0 {
             return Ok(());
         }
         let mb = |bytes: usize| bytes as f64 / 1e6;
         let text = format!(
-            "recorder: expected room for every record, found none {} times: up to {:.1} of {:.1} MB waited for the disk, the run \
-             waited too, and data in the drivers; what they lost is counted per camera",
+            "recorder: expected room for every record, found none {} times: up to {:.1} of {:.1} MB waited for the disk, so did \
+            the run and data in the drivers; their losses are counted per camera",
             load.waits,
             mb(load.most_bytes),
             mb(load.limit_bytes)
@@ -147,7 +147,7 @@ impl SessionSink {
     }
 }
 
-/// What an error of the recorder means to the controller.
+/// The recorder's error as a fault for the controller.
 #[must_use]
 pub fn fault_of(error: &RecorderError) -> SinkFault {
     match error {
@@ -177,9 +177,9 @@ impl RecordSink for SessionSink {
         }
         self.fault_injector.before(&record)?;
         if let Record::Ended { t, .. } = &record {
-            self.tell_waits(*t)?;
+            self.note_waits(*t)?;
         }
-        // What is shown as done is on the disk. Bulk data, whose copy would cost, are only counted.
+        // Show a record only after it is on the disk. Bulk data, which are expensive to copy, are only counted.
         let is_bulk = matches!(&record, Record::Chunk(_) | Record::Poses(_));
         let shown = if is_bulk {
             self.view.update(&record);

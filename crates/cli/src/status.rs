@@ -1,4 +1,4 @@
-//! `skinrig status`: how a run is going, or how it ended, from the session file and from the run itself.
+//! `skinrig status`: progress or end of a run, from the session file and from the run itself.
 
 use std::path::Path;
 
@@ -14,16 +14,16 @@ use crate::remote::{Live, RemoteError, Reply, Request, ask};
 use crate::rig::gates;
 use crate::sessions;
 
-/// So many of the last outcomes, interruptions and notes are told.
-const LAST: usize = 5;
+/// Number of latest outcomes, interruptions and notes shown.
+const SHOWN: usize = 5;
 
-/// Tells how a session is going.
+/// Prints the state of a session.
 ///
 /// # Errors
-/// [`Failure::input`] when there is no readable session.
+/// [`Failure::input`] if there is no readable session.
 pub(crate) fn status(args: &StatusArgs, as_json: bool) -> Outcome {
     let session = sessions::find(&args.session)?;
-    // The writer first: a run that ends in between has then left its end in the file.
+    // Look for the writer first: if the run ends in between, its end is then in the file.
     let writer = writer_of(&session);
     let (live, silence) = match ask(&session, &Request::Status) {
         Ok(Reply::Live(live)) => (Some(live), None),
@@ -31,8 +31,8 @@ pub(crate) fn status(args: &StatusArgs, as_json: bool) -> Outcome {
         Err(RemoteError::Failed(why)) => (None, Some(why.to_string())),
         Ok(Reply::Handed(_)) | Err(RemoteError::NotListening) => (None, None),
     };
-    let filed = match filed(&session) {
-        Ok(filed) => filed,
+    let stored = match stored(&session) {
+        Ok(stored) => stored,
         // The first records of a run are not yet on the disk.
         Err(RecorderError::Empty { .. }) if writer.is_some() => json!({}),
         Err(e) => return Err(Failure::session(e)),
@@ -41,8 +41,8 @@ pub(crate) fn status(args: &StatusArgs, as_json: bool) -> Outcome {
         "session": session, "writer": writer, "live": live, "silence": silence,
         "disk_free_bytes": gates::free_bytes(paths::folder_of(&session)).ok().map(|b| b as u64),
     });
-    if let (Some(d), Value::Object(filed)) = (d.as_object_mut(), filed) {
-        d.extend(filed);
+    if let (Some(d), Value::Object(stored)) = (d.as_object_mut(), stored) {
+        d.extend(stored);
     }
     if as_json {
         crate::terminal::print_json(&d);
@@ -52,8 +52,8 @@ pub(crate) fn status(args: &StatusArgs, as_json: bool) -> Outcome {
     Ok(Exit::Ok)
 }
 
-/// What the session file says, as far as it is on the disk.
-fn filed(session: &Path) -> Result<Value, RecorderError> {
+/// State of the session according to its file, as far as it is on the disk.
+fn stored(session: &Path) -> Result<Value, RecorderError> {
     let reader = SessionReader::open(session)?;
     let header = reader.header()?;
     let end = reader.end()?.map(|(_, end)| end);
@@ -65,9 +65,9 @@ fn filed(session: &Path) -> Result<Value, RecorderError> {
         .filter_map(|a| a.outcome)
         .filter(|o| !matches!(o.verdict, PressVerdict::Missed(_)))
         .collect();
-    // A press that was taken again by a further leg comes before later ones in the plan.
+    // A press that a further leg repeated precedes later ones in the plan.
     outcomes.sort_by_key(|o| o.timing.map(|t| t.release));
-    let last = |n: usize| n.saturating_sub(LAST);
+    let last = |n: usize| n.saturating_sub(SHOWN);
     let outcomes: Vec<_> = outcomes[last(outcomes.len())..]
         .iter()
         .map(|o| {
@@ -99,7 +99,7 @@ fn filed(session: &Path) -> Result<Value, RecorderError> {
     }))
 }
 
-/// In words, what the session is now.
+/// The current state of the session, in words.
 fn state(d: &Value, live: Option<&Live>) -> String {
     let session = d["session"].as_str().unwrap_or_default();
     let next = match d["rig_kind"].as_str() {
@@ -143,7 +143,7 @@ fn print(d: &Value, live: Option<&Live>) {
     );
     match live {
         Some(live) => print_live(live),
-        None => print_filed(&d["totals"]),
+        None => print_stored(&d["totals"]),
     }
     let lost = d["totals"]["lost_bytes"].as_u64().unwrap_or(0);
     outln!("lost      {lost} bytes of the camera streams in the session file");
@@ -166,10 +166,10 @@ fn print(d: &Value, live: Option<&Live>) {
             o["verdict"].as_str().unwrap_or("-")
         );
     }
-    let told = d["last_interruptions"].as_array().map_or(0, Vec::len) as u64;
+    let listed = d["last_interruptions"].as_array().map_or(0, Vec::len) as u64;
     let all = d["interruption_count"].as_u64().unwrap_or(0);
-    if all > told {
-        outln!("          {} earlier interruptions", all - told);
+    if all > listed {
+        outln!("          {} earlier interruptions", all - listed);
     }
     for row in d["last_interruptions"].as_array().into_iter().flatten() {
         let word = |i: usize| row[i].as_str().unwrap_or("").to_owned();
@@ -195,7 +195,7 @@ fn print_live(live: &Live) {
         format!(" ({block}, at ({x:.1}, {y:.1}) mm)")
     });
     outln!(
-        "press     {} of {}{press}; {} done: {} valid, {} invalid, {} missed, {} excluded; {} taken again",
+        "press     {} of {}{press}; {} done: {} valid, {} invalid, {} missed, {} excluded; {} retaken",
         live.press.as_ref().map_or(0, |p| p.number),
         live.planned,
         live.done,
@@ -228,7 +228,7 @@ fn print_live(live: &Live) {
     );
 }
 
-fn print_filed(totals: &Value) {
+fn print_stored(totals: &Value) {
     let of = |block: &str, key: &str| totals[block][key].as_u64().unwrap_or(0);
     let both = |key: &str| of("presses", key) + of("sync", key);
     outln!(

@@ -2,7 +2,7 @@
 
 use crate::exit::{Exit, Failure, Outcome};
 
-/// Waits on standard input for the driver's goodbye or its death.
+/// Waits on standard input until the driver exits, normally or not.
 ///
 /// # Errors
 /// [`Failure::rig`] when the arm could not be braked: it may be live.

@@ -1,4 +1,4 @@
-//! `skinrig tag`: what people say of a session when it is over, in a log beside it.
+//! `skinrig tag`: tags and notes that people add to a finished session, in a log beside it.
 
 use std::ffi::OsString;
 
@@ -10,19 +10,19 @@ use skinrig_recorder::{
 use crate::args::TagArgs;
 use crate::exit::{Exit, Failure, Outcome};
 
-/// Writes it down, and tells what was said so far.
+/// Adds and removes tags and notes, and prints all of them.
 ///
 /// # Errors
-/// [`Failure::input`] for what is no tag, no session, or no log of it.
+/// [`Failure::input`] for an invalid tag, session or log.
 pub(crate) fn tag(args: &TagArgs, json: bool) -> Outcome {
-    // As `show`: which session of a folder is meant is not to be guessed, for what is said of it stays.
+    // As in `show`, the file must be given: never guess the session of a folder, because annotations are permanent.
     let session = args.session.clone();
     let session_id = SessionReader::open(&session)
         .and_then(|reader| reader.session_id())
         .map_err(Failure::session)?;
     let (add, remove) = checked(&args.tags, &args.remove)?;
-    let asked = !add.is_empty() || !remove.is_empty() || args.note.is_some();
-    let all = if asked {
+    let has_changes = !add.is_empty() || !remove.is_empty() || args.note.is_some();
+    let all = if has_changes {
         let annotation = Annotation {
             session_id,
             at: Utc::now().to_rfc3339_opts(SecondsFormat::Secs, true),
@@ -60,16 +60,16 @@ pub(crate) fn words(all: &Annotations) -> String {
     }
 }
 
-/// The command line with every `-TAG` of `skinrig tag` as `--remove=TAG`: a parser of options takes it for letters.
+/// Rewrites every `-TAG` of `skinrig tag` as `--remove=TAG`; the option parser would split it into letters.
 #[must_use]
-pub(crate) fn spelled_out(arguments: Vec<OsString>) -> Vec<OsString> {
+pub(crate) fn expand_removals(arguments: Vec<OsString>) -> Vec<OsString> {
     let command = |a: &OsString| !a.to_string_lossy().starts_with('-');
     let at = arguments.iter().skip(1).position(command);
     let Some(at) = at.filter(|at| arguments[at + 1] == "tag") else {
         return arguments;
     };
     let mut is_value = false;
-    let spell = |(i, word): (usize, OsString)| {
+    let expand = |(i, word): (usize, OsString)| {
         let text = word.to_string_lossy().into_owned();
         let own = text.strip_prefix('-').filter(|tag| {
             i > at + 1 && !is_value && is_valid_tag(tag) && !matches!(*tag, "h" | "V")
@@ -77,15 +77,15 @@ pub(crate) fn spelled_out(arguments: Vec<OsString>) -> Vec<OsString> {
         is_value = matches!(text.as_str(), "--note" | "--by" | "--remove");
         own.map_or(word, |tag| format!("--remove={tag}").into())
     };
-    arguments.into_iter().enumerate().map(spell).collect()
+    arguments.into_iter().enumerate().map(expand).collect()
 }
 
-/// Tags to give and to take away, each once.
+/// Validates the tags to add and to remove; returns each once.
 fn checked(add: &[String], remove: &[String]) -> Result<(Vec<String>, Vec<String>), Failure> {
     if let Some(wrong) = add.iter().chain(remove).find(|tag| !is_valid_tag(tag)) {
         return Err(Failure::input(format!(
             "expected a tag of 1 to 40 of a-z, 0-9, `.`, `_`, `-`, found `{}`\n  next: \
-             a remark of any words goes after --note",
+             for free text use --note",
             wrong.escape_debug()
         )));
     }
@@ -108,14 +108,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_minus_takes_a_tag_away() {
-        let spelled = |line: &str| -> String {
-            let words = spelled_out(line.split(' ').map(OsString::from).collect());
+    fn a_minus_removes_a_tag() {
+        let expanded = |line: &str| -> String {
+            let words = expand_removals(line.split(' ').map(OsString::from).collect());
             let words: Vec<_> = words.iter().map(|w| w.to_string_lossy()).collect();
             words.join(" ")
         };
         assert_eq!(
-            spelled("skinrig --json tag s good -bad --note -x -v2 --by Ann"),
+            expanded("skinrig --json tag s good -bad --note -x -v2 --by Ann"),
             "skinrig --json tag s good --remove=bad --note -x --remove=v2 --by Ann"
         );
         for line in [
@@ -124,12 +124,12 @@ mod tests {
             "skinrig",
             "skinrig tag s -A",
         ] {
-            assert_eq!(spelled(line), line);
+            assert_eq!(expanded(line), line);
         }
     }
 
     #[test]
-    fn what_is_no_tag_is_refused() {
+    fn invalid_tags_are_rejected() {
         let own = |all: &[&str]| -> Vec<String> { all.iter().map(|t| (*t).to_owned()).collect() };
         let (add, remove) = checked(&own(&["good-skin", "v2", "v2"]), &own(&["bad"])).unwrap();
         assert_eq!((add, remove), (own(&["good-skin", "v2"]), own(&["bad"])));

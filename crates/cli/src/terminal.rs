@@ -1,8 +1,8 @@
-//! Lines to standard output and standard error, whose readers may go away.
+//! Writes lines to standard output and standard error, whose readers may disconnect.
 //!
-//! `println!` panics when its reader has gone. Here a closed pipe (`skinrig show ... | head`) is no fault, and
-//! nothing that happens to the terminal ever stops a run. Any other fault of standard output, a full disk for
-//! example, is remembered, so that the program can end with an error.
+//! `println!` panics on a closed pipe. Here a closed pipe (`skinrig show ... | head`) is not an error, and no failure of the
+//! terminal stops a run. Any other error of standard output, for example a full disk, is recorded, so that the program can
+//! exit with an error.
 
 use std::borrow::Cow;
 use std::fmt::Arguments;
@@ -23,7 +23,7 @@ pub struct Output {
 
 static OUTPUT_FAILED: AtomicBool = AtomicBool::new(false);
 
-/// `text` with everything written out that a terminal would obey, but for the colours of this program.
+/// Escapes everything in `text` that a terminal would interpret, except the colours of this program.
 fn harmless(text: &str) -> Cow<'_, str> {
     if !text.contains(is_hidden) {
         return Cow::Borrowed(text);
@@ -31,7 +31,7 @@ fn harmless(text: &str) -> Cow<'_, str> {
     let mut parts = text.split('\u{1b}');
     let mut out = visible(parts.next().unwrap_or_default()).into_owned();
     for part in parts {
-        // No text can hide, move or erase anything with our own styles.
+        // Our own styles cannot hide, move or erase anything.
         out.push_str(if starts_with_style(part) {
             "\u{1b}"
         } else {
@@ -42,7 +42,7 @@ fn harmless(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// True if `stream` is a terminal whose reader has not asked for no colour (`NO_COLOR`, <https://no-color.org>).
+/// True if `stream` is a terminal and colour is not disabled (`NO_COLOR`, <https://no-color.org>).
 pub(crate) fn is_coloured(stream: &impl IsTerminal) -> bool {
     let unwanted = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
     stream.is_terminal() && !unwanted
@@ -61,7 +61,7 @@ pub(crate) fn out(text: Arguments<'_>) {
     }
 }
 
-/// Writes to standard error; there is nowhere to report a fault of it.
+/// Writes to standard error; its errors cannot be reported anywhere.
 pub(crate) fn err(text: Arguments<'_>) {
     let text = text.to_string();
     let _ = std::io::stderr()
@@ -69,7 +69,7 @@ pub(crate) fn err(text: Arguments<'_>) {
         .write_all(harmless(&text).as_bytes());
 }
 
-/// Whether something that was to go to standard output did not, for another reason than a reader that went away.
+/// True if writing to standard output failed for another reason than a closed pipe.
 pub(crate) fn output_failed() -> bool {
     OUTPUT_FAILED.load(Ordering::Relaxed)
 }
@@ -88,7 +88,7 @@ macro_rules! errln {
     };
 }
 
-/// Prints a JSON value for programs, and its end of line.
+/// Prints a JSON value and a line break.
 pub(crate) fn print_json(value: &serde_json::Value) {
     // Pretty printing of a `Value` cannot fail.
     let text = serde_json::to_string_pretty(value).unwrap_or_default();
@@ -100,7 +100,7 @@ mod tests {
     use super::harmless;
 
     #[test]
-    fn a_terminal_obeys_our_colours_and_nothing_else() {
+    fn a_terminal_interprets_only_our_colours() {
         assert_eq!(
             harmless("\u{1b}[33mwarning\u{1b}[0m: x"),
             "\u{1b}[33mwarning\u{1b}[0m: x"

@@ -1,4 +1,4 @@
-//! `skinrig tradeoff`: what speed costs in accuracy, measured on a session.
+//! `skinrig tradeoff`: the trade-off between speed and accuracy, measured on a session.
 
 use rustix::time::{ClockId, clock_gettime};
 use skinrig_analysis::AnalysisError;
@@ -31,7 +31,7 @@ impl From<CostKind> for Cost {
     }
 }
 
-/// A demand and what meets it.
+/// A requirement and the choice that meets it.
 struct Recommendation<'a> {
     question: String,
     row: Option<&'a Row>,
@@ -55,10 +55,10 @@ fn recommendations<'a>(result: &'a Tradeoff, args: &TradeoffArgs) -> Vec<Recomme
     target.into_iter().chain(budget).collect()
 }
 
-/// An answer with what it was chosen for, and the lines of the protocol that select it. `own` says what a variant changes.
-fn print_answer(answer: &Recommendation<'_>, own: Option<&str>) {
-    outln!("{}:", answer.question);
-    let Some(row) = answer.row else {
+/// Prints a recommendation with its requirement and the lines of the protocol that select it. `own` lists the changes of a variant.
+fn print_recommendation(recommendation: &Recommendation<'_>, own: Option<&str>) {
+    outln!("{}:", recommendation.question);
+    let Some(row) = recommendation.row else {
         outln!("  none of the choices tried\n");
         return;
     };
@@ -93,7 +93,7 @@ const fn cost_name(cost: CostKind) -> &'static str {
     }
 }
 
-/// Where a session comes from, for people.
+/// The rig of a session, in words.
 fn rig_in_words(header: &RunHeader) -> String {
     let name = &header.rig_name;
     if Origin::of(header) == Some(Origin::Simulated) {
@@ -106,8 +106,8 @@ fn rig_in_words(header: &RunHeader) -> String {
 /// `skinrig tradeoff`.
 ///
 /// # Errors
-/// What keeps a session from being analysed, files that cannot be written, and [`Failure::limit`] when nothing meets
-/// a demand.
+/// When the session cannot be analysed or a file cannot be written; [`Failure::limit`] when no choice meets a
+/// requirement.
 pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
     let choices = Choices {
         overrides: &args.overrides,
@@ -168,7 +168,7 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
         let own = variant.as_ref().map(|v| v.changed.join(", "));
         recommendations
             .iter()
-            .for_each(|a| print_answer(a, own.as_deref()));
+            .for_each(|a| print_recommendation(a, own.as_deref()));
         let table = terminal_table(
             &result,
             if output.verbose {
@@ -186,7 +186,7 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
     match recommendations.iter().find(|a| a.row.is_none()) {
         None => Ok(Exit::Ok),
         Some(unmet) => Err(Failure::limit(format!(
-            "expected a choice that is {}, found none among the {} tried\n  next: a weaker demand, or --full",
+            "expected a choice that is {}, found none among the {} tried\n  next: relax the requirement, or try --full",
             unmet.question,
             result.rows.len()
         ))),

@@ -1,4 +1,4 @@
-//! The file of a tradeoff beside a session.
+//! Reads the trade-off results beside a session.
 
 use std::fmt;
 use std::io;
@@ -12,7 +12,7 @@ use crate::analyses::tradeoff_path;
 /// Values of the document's `format` and `format_version`.
 pub(crate) const FORMAT: (&str, u32) = ("skinrig-tradeoff", 1);
 
-/// Why the tradeoff beside a session cannot be used.
+/// The trade-off results beside a session cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum TradeoffFileError {
     /// The file cannot be read.
@@ -23,8 +23,8 @@ pub enum TradeoffFileError {
         /// Error of the operating system.
         source: io::Error,
     },
-    /// The file is not such a document.
-    #[error("{}", Self::anew(path, source))]
+    /// The file is not a trade-off document.
+    #[error("{}", Self::wrong_format(path, source))]
     Parse {
         /// The file.
         path: PathBuf,
@@ -32,7 +32,7 @@ pub enum TradeoffFileError {
         source: serde_json::Error,
     },
     /// The document has another format or version.
-    #[error("{}", Self::anew(path, &format_args!("found {format} version {version}")))]
+    #[error("{}", Self::wrong_format(path, &format_args!("found {format} version {version}")))]
     Version {
         /// The file.
         path: PathBuf,
@@ -44,9 +44,9 @@ pub enum TradeoffFileError {
 }
 
 impl TradeoffFileError {
-    fn anew(path: &Path, found: &dyn fmt::Display) -> String {
+    fn wrong_format(path: &Path, found: &dyn fmt::Display) -> String {
         format!(
-            "{}: expected {} version {}, {found}; next: `skinrig tradeoff` writes it anew",
+            "{}: expected {} version {}, {found}; next: `skinrig tradeoff` rewrites it",
             path.display(),
             FORMAT.0,
             FORMAT.1
@@ -54,7 +54,7 @@ impl TradeoffFileError {
     }
 }
 
-/// The tradeoff that an earlier `skinrig tradeoff` left beside a session: `None` where there is none, and why it cannot be read.
+/// Reads the results of an earlier `skinrig tradeoff` beside a session; `None` if there are none.
 pub(crate) fn beside_session(session: &Path) -> Option<Result<Tradeoff, TradeoffFileError>> {
     let path = tradeoff_path(session, None).with_extension("json");
     let text = match std::fs::read_to_string(&path) {
@@ -73,7 +73,7 @@ pub(crate) fn beside_session(session: &Path) -> Option<Result<Tradeoff, Tradeoff
     })
 }
 
-/// What is read of the document again.
+/// The part of the document that is read.
 #[derive(Deserialize)]
 struct Document {
     format: String,

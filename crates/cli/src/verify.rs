@@ -1,4 +1,4 @@
-//! `skinrig verify`: a session, or a bundle with one.
+//! `skinrig verify`: checks a session or a bundle.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -12,10 +12,10 @@ use crate::export;
 use crate::phase::Phase;
 use skinrig_results::Rescan;
 
-/// Recomputes everything in a session, and holds the files of a bundle against its manifest.
+/// Recomputes everything in a session, and compares the files of a bundle with its manifest.
 ///
 /// # Errors
-/// [`Failure::input`] for a file that is no session and a folder that is no bundle; [`Failure::limit`] when something does not match.
+/// [`Failure::input`] if the file is not a session or the folder is not a bundle; [`Failure::limit`] if something does not match.
 pub(crate) fn verify(args: &SessionArg, json: bool) -> Outcome {
     if args.session.is_dir() {
         return bundle(&args.session, json);
@@ -23,7 +23,7 @@ pub(crate) fn verify(args: &SessionArg, json: bool) -> Outcome {
     session(&args.session, json)
 }
 
-/// Every file of a bundle, then the session in it.
+/// Checks every file of a bundle, then its session.
 fn bundle(folder: &Path, json: bool) -> Outcome {
     let mut report = verify_bundle(folder).map_err(Failure::input)?;
     if report.problems.is_empty() {
@@ -40,9 +40,11 @@ fn bundle(folder: &Path, json: bool) -> Outcome {
         }
         let session = recheck(&inside, &mut Rescan::default()).map_err(Failure::session)?;
         report.problems.extend(session.problems);
-        // A manifest can be written anew, the session's seal not: everything else must follow from it.
+        // A manifest can be forged, the session's seal cannot: everything else must follow from the session.
         if report.problems.is_empty() {
-            report.problems.extend(made_anew(folder, &report)?);
+            report
+                .problems
+                .extend(compare_with_rebuilt(folder, &report)?);
         }
     }
     let (name, problems) = (folder.display(), report.problems.len());
@@ -61,9 +63,7 @@ fn bundle(folder: &Path, json: bool) -> Outcome {
                 report.files - 1
             );
             if report.names.iter().any(|n| n.ends_with(export::TAGS)) {
-                outln!(
-                    "{name}: but for the tags: people wrote them later, and no seal covers them"
-                );
+                outln!("{name}: except the tags, which people added later and no seal covers");
             }
         }
     }
@@ -76,16 +76,16 @@ fn bundle(folder: &Path, json: bool) -> Outcome {
     }
 }
 
-/// Makes everything that a bundle derives from its session once more, in a folder of its own, and holds the files against that.
-fn made_anew(folder: &Path, report: &BundleReport) -> Result<Vec<String>, Failure> {
+/// Derives the files of a bundle from its session again, in a scratch folder, and compares them with the bundle's.
+fn compare_with_rebuilt(folder: &Path, report: &BundleReport) -> Result<Vec<String>, Failure> {
     let place = scratch()?;
-    let found = held_against(folder, report, &place);
-    // What is left there is no fault of the bundle.
+    let found = compare_rebuilt_files(folder, report, &place);
+    // Leftovers in the scratch folder are not a fault of the bundle.
     let _ = std::fs::remove_dir_all(&place);
     found
 }
 
-fn held_against(
+fn compare_rebuilt_files(
     folder: &Path,
     report: &BundleReport,
     place: &Path,
@@ -106,13 +106,13 @@ fn held_against(
             .unwrap_or_default()
             .to_string_lossy()
             .into_owned();
-        let there = folder.join(&name);
+        let bundled = folder.join(&name);
         if !report.names.contains(&name) {
             problems.push(format!("{name}: expected this file, found none"));
-        } else if !same_bytes(&file, &there).map_err(Failure::internal)? {
+        } else if !same_bytes(&file, &bundled).map_err(Failure::internal)? {
             problems.push(format!(
-                "{name}: expected what the sealed session gives, found something else; a bundle of another version than \
-                 {software} has to be exported again"
+                "{name}: expected the content that follows from the sealed session, found other content; a bundle of another version \
+                than {software} must be exported again"
             ));
         }
         known.insert(name);
@@ -125,7 +125,7 @@ fn held_against(
     Ok(problems)
 }
 
-/// A new folder for files that are taken away again.
+/// Creates a scratch folder.
 fn scratch() -> Result<PathBuf, Failure> {
     let place = std::env::temp_dir();
     for n in 0..1000 {
@@ -137,7 +137,7 @@ fn scratch() -> Result<PathBuf, Failure> {
         }
     }
     Err(Failure::internal(format!(
-        "{}: expected room for a folder, found none",
+        "{}: expected to create a scratch folder, found all 1000 names taken",
         place.display()
     )))
 }

@@ -1,6 +1,6 @@
-//! Which build of skinrig this is: in sessions, nights and reports, and in `skinrig --version`.
+//! Version and build of skinrig, as stored in sessions, nights and reports, and shown by `skinrig --version`.
 
-/// Version, commit and, where the sources were changed since, a digest of the changes: `0.1.0 (commit 0123abcd)`.
+/// Version, commit and, if the sources were changed since, a digest of the changes: `0.1.0 (commit 0123abcd)`.
 pub(crate) const VERSION: &str =
     concat!(env!("CARGO_PKG_VERSION"), " (", env!("SKINRIG_BUILD"), ")");
 

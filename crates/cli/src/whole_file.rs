@@ -1,21 +1,21 @@
-//! A file that is there whole or not at all, also while other processes write the same one.
+//! Writes files atomically, even while other processes write the same one.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What lies between a file's name and the number of its unfinished copy.
+/// Separates a file's name from the number of its unfinished copy.
 const PARTIAL: &str = ".partial-";
 
-/// Puts `bytes` at `path` in one step: into a file of this writer's own beside it, to the disk, and over what was there. Of several
-/// writers the last one's file stays, whole.
+/// Replaces the file at `path` in one step: writes `bytes` to a temporary file beside it, syncs it to the disk and renames it. With
+/// several writers, the complete file of the last one stays.
 ///
 /// # Errors
-/// What the system says; then nothing of it is left behind, and what was at `path` is still there.
+/// The error of the system; then the file at `path` is unchanged and no temporary file is left.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    remove_left_over(path);
-    let (partial, mut file) = own(path)?;
+    remove_leftovers(path);
+    let (partial, mut file) = create_partial(path)?;
     let written = file
         .write_all(bytes)
         .and_then(|()| file.sync_all())
@@ -26,9 +26,9 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     written
 }
 
-/// A new file beside `path`, locked for as long as it is open, that nobody else writes.
-fn own(path: &Path) -> io::Result<(PathBuf, File)> {
-    // Never the same name again: who is about to remove one copy must not meet the next one.
+/// Creates a temporary file beside `path` that only this writer uses, locked while it is open.
+fn create_partial(path: &Path) -> io::Result<(PathBuf, File)> {
+    // Never reuse a name: a process about to remove one copy must not remove the next one.
     static COPIES: AtomicU64 = AtomicU64::new(0);
     let process = std::process::id();
     loop {
@@ -36,7 +36,7 @@ fn own(path: &Path) -> io::Result<(PathBuf, File)> {
         let mut name = path.as_os_str().to_owned();
         name.push(format!("{PARTIAL}{process}-{n}"));
         let partial = PathBuf::from(name);
-        // Never through a link that a stranger put there.
+        // Never follow a link that another user planted.
         let file = match OpenOptions::new()
             .write(true)
             .create_new(true)
@@ -45,17 +45,17 @@ fn own(path: &Path) -> io::Result<(PathBuf, File)> {
             Err(e) if e.kind() == io::ErrorKind::AlreadyExists => continue,
             other => other?,
         };
-        // Without locks on this file system nobody removes it either.
+        // On a file system without locks no process removes it either.
         let _ = file.lock();
-        // Before it was locked, somebody may have taken it for left over.
+        // Before it was locked, another process may have removed it as a leftover.
         if partial.exists() {
             return Ok((partial, file));
         }
     }
 }
 
-/// Removes what processes left that were ended while they wrote: their copies are locked no more.
-fn remove_left_over(path: &Path) {
+/// Removes copies left by processes that were killed while writing; these are no longer locked.
+fn remove_leftovers(path: &Path) {
     let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else {
         return;
     };
@@ -70,7 +70,7 @@ fn remove_left_over(path: &Path) {
         if !is_copy || entry.file_type().is_ok_and(|t| !t.is_file()) {
             continue;
         }
-        // Held until it is removed: its writer, if it is about to lock it, then sees that it is gone.
+        // Keep the lock until it is removed: a writer about to lock it then notices the removal.
         if let Ok(file) = File::open(entry.path())
             && file.try_lock().is_ok()
         {
@@ -84,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn many_writers_of_one_file_leave_one_of_their_files() {
+    fn concurrent_writers_leave_one_complete_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.json");
         let text = |n: usize| format!("{n}").repeat(100_000);
@@ -104,18 +104,18 @@ mod tests {
     }
 
     #[test]
-    fn what_an_ended_writer_left_is_removed_and_what_another_one_writes_is_not() {
+    fn leftovers_of_a_killed_writer_are_removed_but_not_files_being_written() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.json");
         let left = folder.path().join("x.json.partial-4-0");
         fs::write(&left, "half").unwrap();
-        let (others, held) = own(&path).unwrap();
+        let (others, held) = create_partial(&path).unwrap();
         write(&path, b"whole").unwrap();
         assert!(!left.exists() && others.exists());
         drop(held);
         write(&path, b"again").unwrap();
         assert!(!others.exists());
-        // Where it cannot be put, nothing is left.
+        // After a failed write, nothing is left.
         let taken = folder.path().join("folder");
         fs::create_dir_all(taken.join("full")).unwrap();
         assert!(write(&taken, b"x").is_err());

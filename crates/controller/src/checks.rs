@@ -115,7 +115,7 @@ pub fn identity_checks(
 /// Settings whose read-back differs from the written value; read-only values are ignored.
 pub fn differing(settings: &[Setting]) -> impl Iterator<Item = &Setting> {
     let written = settings.iter().filter(|s| s.was_requested());
-    written.filter(|s| !same(&s.requested, &s.read_back))
+    written.filter(|s| !is_same(&s.requested, &s.read_back))
 }
 
 /// All checks of a configured device: its identity, required values and settings read back, and the robot's state.
@@ -133,7 +133,7 @@ pub(crate) fn device_checks(
                 format!("{role}: {name}"),
                 value.as_str(),
                 found.map_or("not reported", |s| s.read_back.as_str()),
-                found.is_some_and(|s| same(value, &s.read_back)),
+                found.is_some_and(|s| is_same(value, &s.read_back)),
                 "find out what changed, or accept the value in the rig file after testing it",
             )
             .about(CheckKind::ReadBack(role)),
@@ -188,7 +188,7 @@ fn read_back(role: DeviceRole, settings: &[Setting]) -> PreflightCheck {
 }
 
 /// Equal as texts, or as numbers in single precision.
-fn same(wanted: &str, found: &str) -> bool {
+fn is_same(wanted: &str, found: &str) -> bool {
     if wanted == found {
         return true;
     }
@@ -221,8 +221,8 @@ mod tests {
         for found in ["13.0", "3.01", "3.0.1", "v3", ""] {
             assert!(!contains_version(found, "3.0"), "{found}");
         }
-        assert!(same("0.14", "0.14000000059604645") && same("evt2", "evt2"));
-        assert!(!same("0.14", "0.15") && !same("on", "off") && !same("", "0"));
+        assert!(is_same("0.14", "0.14000000059604645") && is_same("evt2", "evt2"));
+        assert!(!is_same("0.14", "0.15") && !is_same("on", "off") && !is_same("", "0"));
     }
 
     #[test]

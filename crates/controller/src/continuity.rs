@@ -122,20 +122,23 @@ mod tests {
     fn a_forward_jump_differs_from_late_bytes() {
         let limit = HostDuration::from_millis(250);
         let mut stream = Continuity::default();
-        let mut see = |host_ms, camera_ms| stream.observe(&chunk(host_ms, camera_ms), limit);
-        assert_eq!(see(1_000, Some(77_000)), StreamTiming::InStep);
+        let mut observe = |host_ms, camera_ms| stream.observe(&chunk(host_ms, camera_ms), limit);
+        assert_eq!(observe(1_000, Some(77_000)), StreamTiming::InStep);
         // A minute without bytes, while the clocks drift apart.
-        assert_eq!(see(61_000, Some(137_010)), StreamTiming::InStep);
-        assert_eq!(see(62_000, None), StreamTiming::InStep);
+        assert_eq!(observe(61_000, Some(137_010)), StreamTiming::InStep);
+        assert_eq!(observe(62_000, None), StreamTiming::InStep);
         // Late and back in time: no jump.
-        assert_eq!(see(63_000, Some(138_710)), StreamTiming::Late(300_000));
+        assert_eq!(observe(63_000, Some(138_710)), StreamTiming::Late(300_000));
         assert_eq!(
-            see(63_100, Some(138_720)),
+            observe(63_100, Some(138_720)),
             StreamTiming::InStep,
-            "told once"
+            "reported once"
         );
-        assert_eq!(see(64_000, Some(140_010)), StreamTiming::InStep);
-        assert_eq!(see(65_000, Some(141_310)), StreamTiming::Stepped(300_000));
+        assert_eq!(observe(64_000, Some(140_010)), StreamTiming::InStep);
+        assert_eq!(
+            observe(65_000, Some(141_310)),
+            StreamTiming::Stepped(300_000)
+        );
     }
 
     /// Late bytes carry the time at which the camera sent them.

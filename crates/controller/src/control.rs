@@ -30,7 +30,7 @@ pub struct ControlHandle {
 struct Shared {
     bits: AtomicU8,
     /// Number of requests made, and of those that the controller has acknowledged.
-    asked: AtomicU64,
+    made: AtomicU64,
     acknowledged: AtomicU64,
     /// Index of the state in [`State::ALL`].
     state: AtomicU8,
@@ -103,7 +103,7 @@ impl ControlHandle {
     /// [`requests_acknowledged`](Self::requests_acknowledged) has reached the value that this returned after it.
     #[must_use]
     pub fn requests_made(&self) -> u64 {
-        self.shared.asked.load(Ordering::Acquire)
+        self.shared.made.load(Ordering::Acquire)
     }
 
     /// Number of requests that the controller has handled.
@@ -161,8 +161,8 @@ impl ControlHandle {
     }
 
     /// Acknowledges the first `requests` requests.
-    pub(crate) fn acknowledge(&self, asked: u64) {
-        self.shared.acknowledged.fetch_max(asked, Ordering::AcqRel);
+    pub(crate) fn acknowledge(&self, made: u64) {
+        self.shared.acknowledged.fetch_max(made, Ordering::AcqRel);
     }
 
     /// Publishes the state of the run.
@@ -184,10 +184,10 @@ impl ControlHandle {
             Some((b & !clear) | set)
         });
         // After the bit, so that a reader of the number finds the request.
-        self.shared.asked.fetch_add(1, Ordering::AcqRel);
+        self.shared.made.fetch_add(1, Ordering::AcqRel);
     }
 
-    /// Takes all pending requests, most urgent first. A halt stays pending, so that every later check sees it.
+    /// Takes all pending requests, most urgent first. A halt stays pending, so that every later check finds it.
     pub(crate) fn take(&self) -> impl Iterator<Item = Request> + use<> {
         let bits = self.shared.bits.fetch_and(HALT, Ordering::AcqRel);
         [
@@ -261,9 +261,9 @@ mod tests {
         assert_eq!(hand.notes_recorded(), MAX_NOTES as u64);
         assert_eq!(hand.note("next".into()), Ok(MAX_NOTES as u64 + 1));
         // Another thread is adding one: the controller tries again later.
-        let held = hand.shared.notes.lock().unwrap();
+        let guard = hand.shared.notes.lock().unwrap();
         assert_eq!(hand.take_notes().len(), 0);
-        drop(held);
+        drop(guard);
         assert_eq!(hand.take_notes(), ["next"]);
     }
 

@@ -157,7 +157,7 @@ pub enum ControllerError {
         faults: Vec<PressFault>,
     },
     /// A preflight check failed; nothing was powered.
-    #[error("preflight: {} failed: {}", count(.failed), joined(&words(.failed)))]
+    #[error("preflight: {} failed: {}", count(.failed), joined(&descriptions(.failed)))]
     Preflight {
         /// Each failed check. Not empty.
         failed: Vec<PreflightCheck>,
@@ -222,7 +222,7 @@ pub enum ControllerError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NotAtRest {
     /// The tip may be in contact.
-    #[error("the tip did not reach clearance height: check where it is")]
+    #[error("the tip did not reach clearance height: check its position")]
     NotClear,
     /// The motors may be on.
     #[error("the robot did not confirm that it is disarmed: switch it off by hand")]
@@ -256,7 +256,7 @@ fn count(failed: &[PreflightCheck]) -> String {
 }
 
 /// Description of each failed check.
-fn words(failed: &[PreflightCheck]) -> Vec<String> {
+fn descriptions(failed: &[PreflightCheck]) -> Vec<String> {
     let one = |c: &PreflightCheck| {
         format!(
             "{}: expected {}, found {}; {}",

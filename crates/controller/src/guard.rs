@@ -24,7 +24,7 @@ pub struct Floor {
 }
 
 /// Owns the indenter. Accepts targets in the skin frame, rejects motions that violate the limits of the run, returns poses in the
-/// skin frame, and passes them to its watchdog. After a trip the robot holds or brakes before the caller is told.
+/// skin frame, and passes them to its watchdog. After a trip the robot holds or brakes before `poll` returns the error.
 pub struct GuardedIndenter<'a> {
     inner: Box<dyn Indenter + 'a>,
     robot_from_skin: RigidTransform<Robot, Skin>,
@@ -107,8 +107,8 @@ impl<'a> GuardedIndenter<'a> {
 
     /// Powers the motors.
     ///
+    /// # Errors
     /// The error of the robot.
-    /// What the robot answers.
     pub fn arm(&mut self) -> Result<(), ControllerError> {
         self.inner.arm()?;
         self.armed = true;

@@ -25,7 +25,7 @@ const TRACE_EVERY: HostDuration = HostDuration::from_millis(100);
 /// Height of the retraction at the end, mm; less at the edge of the workspace.
 const RETRACT_MM: f64 = 10.0;
 
-/// Returns true once the operator wants everything to stop.
+/// Returns true once the operator has requested a stop.
 pub(crate) type StopCheck<'a> = &'a dyn Fn() -> bool;
 
 /// A manually moved robot. Dropping it holds, retracts and disarms.
@@ -67,7 +67,7 @@ pub enum TouchOutcome {
 impl<'a> Jog<'a> {
     /// Configures the robot's limits, powers it, and waits for its pose. All coordinates, including those of `limits`, are in the
     /// robot frame, since the pose of the skin is still to be found by touching off. Nothing goes below the `floor`. Of `control`, only a
-    /// halt is handled: it disarms at once and ends the current call with [`ControllerError::Halted`].
+    /// halt is handled: it disarms immediately and ends the current call with [`ControllerError::Halted`].
     ///
     /// # Errors
     /// The error of the robot; [`ControllerError::PoseStream`] if it reports no pose. The robot is then disarmed.

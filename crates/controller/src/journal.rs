@@ -174,14 +174,14 @@ impl<'a> Journal<'a> {
         attempt: AttemptId,
         t: HostTime,
     ) -> Result<(), ControllerError> {
-        let told = self.emit(Record::Intent { attempt, t });
-        if !was_rejected(&told) {
+        let emitted = self.emit(Record::Intent { attempt, t });
+        if !was_rejected(&emitted) {
             if let Some(attempts) = self.attempts.get_mut(attempt.press.index() as usize) {
                 *attempts = attempt.number;
             }
             self.set(attempt.press, PressState::InProgress);
         }
-        told
+        emitted
     }
 
     /// Ends an attempt.
@@ -191,11 +191,11 @@ impl<'a> Journal<'a> {
             _ => PressState::Invalid,
         };
         let press = outcome.attempt.press;
-        let told = self.emit(Record::Outcome(outcome));
-        if !was_rejected(&told) {
+        let emitted = self.emit(Record::Outcome(outcome));
+        if !was_rejected(&emitted) {
             self.set(press, state);
         }
-        told
+        emitted
     }
 
     /// Marks every press that was never attempted as missed.

@@ -136,8 +136,9 @@ pub(crate) fn check_plan(
                         format!("{:?}, {} mm", press.at, press.depth_mm),
                     ));
                 }
-                let there = above.is_some_and(|a| a.plane().distance_mm(press.at) <= SAME_PLACE_MM);
-                if !there {
+                let is_above =
+                    above.is_some_and(|a| a.plane().distance_mm(press.at) <= SAME_PLACE_MM);
+                if !is_above {
                     return Err(plan_error(
                         name,
                         "a travel to above the press first",
@@ -163,7 +164,7 @@ pub(crate) fn check_plan(
         }
     }
     if let Some(i) = (0..seen.len()).find(|i| seen[*i] != wanted[*i]) {
-        let step = |there: bool| if there { "a step" } else { "no step" };
+        let step = |is_above: bool| if is_above { "a step" } else { "no step" };
         return Err(plan_error(
             "steps",
             format!("{} for {}", step(wanted[i]), PressId::from_index(i as u32)),

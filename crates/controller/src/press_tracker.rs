@@ -208,8 +208,8 @@ impl PressTracker {
             if !rising {
                 self.hold(s);
             } else if rising && self.retract.is_none() {
-                let held = *self.hold_set_point_mm.get_or_insert(s.commanded.z_mm);
-                if s.commanded.z_mm > held + MOVED_MM {
+                let hold_mm = *self.hold_set_point_mm.get_or_insert(s.commanded.z_mm);
+                if s.commanded.z_mm > hold_mm + MOVED_MM {
                     self.retract = Some(s.t);
                 }
             }

@@ -1,4 +1,4 @@
-//! What the preflight sees of the camera streams: whether their clocks advance, and whether the test mark arrives.
+//! Checks of the camera streams in the preflight: whether their clocks advance, and whether the test mark arrives.
 
 use skinrig_model::pulse::{LOOPBACK, decode_marks};
 use skinrig_model::{
@@ -100,7 +100,7 @@ impl StreamProbe {
 
     /// Description of the edges on `channel` and elsewhere.
     fn describe(&self, camera: CameraId, channel: u8) -> String {
-        let here = self.on(camera, channel);
+        let edges_here = self.on(camera, channel);
         let mut channels: Vec<u8> = self.edges[camera.index()]
             .iter()
             .map(|e| e.channel)
@@ -108,12 +108,12 @@ impl StreamProbe {
         channels.sort_unstable();
         channels.dedup();
         channels.retain(|c| *c != channel);
-        let decoded = decode_marks(&here);
+        let decoded = decode_marks(&edges_here);
         let what = match decoded.marks.as_slice() {
-            [] if here.is_empty() => format!("no edge on channel {channel}"),
+            [] if edges_here.is_empty() => format!("no edge on channel {channel}"),
             [] => format!(
                 "no mark on channel {channel}, but {} edges: {} periodic trains, {} edges of no train",
-                here.len(),
+                edges_here.len(),
                 decoded.syncs.len(),
                 decoded.stray_edges
             ),

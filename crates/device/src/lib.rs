@@ -1,8 +1,8 @@
 //! Device interfaces: small traits, capabilities as data, and a clock.
 //!
-//! All calls return at once: a real driver owns its device on a separate thread and exchanges messages with it ([`detached`]); a simulated
+//! All calls return immediately: a real driver owns its device on a separate thread and exchanges messages with it ([`detached`]); a simulated
 //! device computes everything up to the clock's current time. The controller polls. Positions are in the *robot* frame; only the
-//! controller knows the skin.
+//! controller uses the skin frame.
 
 pub mod camera;
 pub mod clock;

@@ -36,7 +36,7 @@ pub fn check_limits(
     for axis in 0..3 {
         let (low, high) = (can.workspace_min_mm[axis], can.workspace_max_mm[axis]);
         let (min, max) = (limits.min_mm[axis], limits.max_mm[axis]);
-        // NaN fails every comparison and is therefore refused.
+        // NaN fails every comparison and is therefore rejected.
         if !(low <= min && min < max && max <= high) {
             return Err(refused(
                 serial,

@@ -94,7 +94,8 @@ impl Drop for CsvFiles {
     }
 }
 
-/// True for a text that a spreadsheet would interpret as a formula (OWASP, CSV injection); it is written with a leading `'`.
+/// True for text that a spreadsheet would interpret as a formula (OWASP, CSV injection). Such text
+/// is written with a leading `'`.
 fn starts_formula(text: &str) -> bool {
     text.starts_with(['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'])
 }

@@ -82,7 +82,8 @@ impl Drop for NpzFile {
     }
 }
 
-/// numpy's type name of a field: an optional number is a float with NaN, an optional text is empty if missing.
+/// numpy's type name of a field. Optional numbers become floats with NaN, and a missing text is
+/// empty.
 fn dtype(kind: Kind) -> String {
     match kind {
         Kind::Int => "<i8".into(),
@@ -107,7 +108,7 @@ fn header(layout: &Layout, rows: u64) -> Vec<u8> {
     }
     text.push('\n');
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-    // A version 1 header holds 65 535 bytes: a thousand columns.
+    // A version 1 header holds 65,535 bytes, enough for a thousand columns.
     bytes.extend((text.len() as u16).to_le_bytes());
     bytes.extend(text.as_bytes());
     bytes

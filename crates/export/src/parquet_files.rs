@@ -163,7 +163,7 @@ fn column_of(column: &mut ColumnWriter<'_>, values: &Values) -> Result<(), Parqu
             w.write_batch(&some, Some(&levels), None)
         }
         _ => Err(ParquetError::General(
-            "values of another kind than their column".into(),
+            "values do not match the type of their column".into(),
         )),
     };
     written.map(drop)

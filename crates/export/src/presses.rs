@@ -10,7 +10,7 @@ use crate::error::ExportError;
 use crate::source::{Source, TableName};
 use crate::table::{Table, Values};
 
-/// A press with all data on it.
+/// A press with all its data.
 struct Row<'a> {
     planned: PlannedPress,
     attempts: Vec<AttemptRow>,
@@ -180,7 +180,8 @@ fn view(table: &mut Columns<'_>, source: &Source<'_>, camera: usize) {
     });
 }
 
-/// A host time on the recorded clock of `camera`: the analysis shifts further legs onto the line of the first.
+/// Converts a host time to the recorded clock of `camera`. The analysis shifts later legs onto the
+/// clock of the first, which this undoes.
 fn recorded_us(source: &Source<'_>, clock: &ClockFit, camera: usize, t: HostTime) -> f64 {
     let legs = source.analysis.map_or(&[][..], |(_, legs)| legs);
     let leg = legs.iter().rev().find(|leg| leg.origin <= t);

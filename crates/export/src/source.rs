@@ -53,7 +53,7 @@ pub struct Source<'a> {
     pub reader: &'a SessionReader,
     /// Its header.
     pub header: &'a RunHeader,
-    /// Its analysis, and its further legs as aligned by the analysis. Without it, columns of presses that depend on an
-    /// analysis are empty, and so is the table of results.
+    /// Its analysis, and its later legs as aligned by the analysis. Without it, press columns that
+    /// need an analysis are empty, and so is the table of results.
     pub analysis: Option<(&'a Analysis, &'a [LegStart])>,
 }

@@ -42,7 +42,7 @@ impl EventBatch {
             .extend(events.iter().map(|e| e.polarity == Polarity::On));
     }
 
-    /// Takes the rows so far, leaving none.
+    /// Returns the rows collected so far and clears them.
     fn take(&mut self) -> [Values; 4] {
         let Self { t_us, x, y, on } = std::mem::take(self);
         [
@@ -54,8 +54,8 @@ impl EventBatch {
     }
 }
 
-/// Number of events. Chunk facts give it, except for old sessions with losses, whose decoder ignored losses: these are
-/// decoded again.
+/// Number of events, from the chunk facts. Sessions with losses are decoded again, because the decoder
+/// of old versions ignored losses.
 fn count(
     reader: &SessionReader,
     format: StreamFormat,

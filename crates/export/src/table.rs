@@ -91,7 +91,7 @@ pub trait TableWriter {
     /// When its file cannot be created.
     fn begin(&mut self, layout: &Layout, rows: u64) -> Result<(), ExportError>;
 
-    /// Appends rows: values of all columns in order, equally many of each.
+    /// Appends rows. `batch` has the values of every column in order, with equal lengths.
     ///
     /// # Errors
     /// When they cannot be written.

@@ -1,5 +1,5 @@
-//! Output of the writers after success, with an obstacle, and after an abort.
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
+//! Tests of the writers: output after success, with an obstacle, and after an abort.
+#![expect(clippy::unwrap_used, reason = "a failing test may panic")]
 
 use std::path::Path;
 
@@ -57,7 +57,11 @@ fn files_get_their_names_when_they_are_whole() {
     csv.begin(&layout(), 2).unwrap();
     assert_eq!(names(dir.path()), ["s.demo.csv.partial"]);
     drop(csv);
-    assert_eq!(names(dir.path()), [""; 0], "nothing of one that broke off");
+    assert_eq!(
+        names(dir.path()),
+        [""; 0],
+        "an aborted export must leave no file"
+    );
 
     let mut csv = CsvFiles::new(folder(false));
     all(&mut csv, 2).unwrap();

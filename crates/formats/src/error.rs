@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::raw::HeaderProblem;
 
-/// An error of this crate. Messages name the file, the place in it, what was expected and what was found.
+/// An error of this crate. Messages name the file, the location in it, and the expected and found values.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum FormatsError {
@@ -54,7 +54,7 @@ pub enum FormatsError {
         path: PathBuf,
         /// What is valid there.
         expected: String,
-        /// What was found, and the next step.
+        /// Actual content, and the next step.
         found: String,
     },
     /// One dataset of a container does not fit.
@@ -64,9 +64,9 @@ pub enum FormatsError {
         path: PathBuf,
         /// The dataset's path inside the file.
         dataset: String,
-        /// What is valid there.
+        /// Valid content.
         expected: String,
-        /// What was found.
+        /// Actual content.
         found: String,
     },
     /// One value of a dataset is impossible.
@@ -78,9 +78,9 @@ pub enum FormatsError {
         dataset: String,
         /// Index of the value, 0 for the first.
         row: u64,
-        /// What is valid there.
+        /// Valid content.
         expected: String,
-        /// What was found.
+        /// Actual content.
         found: String,
     },
     /// A line of a RAW header.
@@ -91,15 +91,15 @@ pub enum FormatsError {
     Header {
         /// The file.
         path: PathBuf,
-        /// Where the line begins, bytes; the header's end for what is missing.
+        /// Offset of the line, bytes; the header's end for a missing line.
         offset: u64,
-        /// The key; empty when the line has none.
+        /// The key; empty if the line has none.
         key: String,
-        /// What was expected and found.
+        /// Expected and found values.
         #[source]
         problem: HeaderProblem,
     },
-    /// A key or value that a RAW header cannot hold.
+    /// A key or value that a RAW header cannot contain.
     #[error(
         "header key `{key}`: expected a unique key without spaces, and text in one line, found {value:?}"
     )]
@@ -116,9 +116,9 @@ pub enum FormatsError {
         path: PathBuf,
         /// The line, 1 for the first.
         line: u64,
-        /// What is valid there.
+        /// Valid content.
         expected: String,
-        /// What was found.
+        /// Actual content.
         found: String,
     },
 }

@@ -14,21 +14,21 @@ use crate::stream::{Discontinuity, EventSink, Geometry, StreamStats};
 /// Gaps and discontinuities beyond this number are counted but not listed.
 pub(crate) const LIST_LIMIT: usize = 100;
 
-/// Kind of a file, by its first bytes.
+/// Kind of a file, according to its first bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileKind {
     /// Prophesee RAW: text that begins with `% `.
     Raw,
     /// HDF5.
     Hdf5,
-    /// SQLite, as sessions are.
+    /// SQLite, the format of sessions.
     Sqlite,
     /// None of these.
     Unknown,
 }
 
 impl FileKind {
-    /// Looks at the first bytes of `path`.
+    /// Reads the first bytes of `path`.
     ///
     /// # Errors
     /// [`FormatsError::Io`].
@@ -53,9 +53,9 @@ pub struct Inspection {
     pub kind: FileKind,
     /// Keys and values of the header, in file order; for HDF5 the program that wrote the file.
     pub header: Vec<(String, String)>,
-    /// How words encode events; `None` for HDF5.
+    /// Word format; `None` for HDF5.
     pub format: Option<StreamFormat>,
-    /// The sensor's size, when the file states it.
+    /// The sensor's size, if the file states it.
     pub geometry: Option<Geometry>,
     /// The sensors: one in RAW files, one or more in HDF5.
     pub streams: Vec<StreamInspection>,
@@ -64,19 +64,19 @@ pub struct Inspection {
 /// Statistics of one sensor.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StreamInspection {
-    /// Its name in an HDF5 container; empty when it is the only one.
+    /// Its name in an HDF5 container; empty if it is the only one.
     pub name: String,
-    /// Counts of everything.
+    /// Counts.
     pub stats: StreamStats,
     /// Time of the first timed word or row, µs.
     pub first_us: Option<u64>,
     /// Time of the last timed word or row, µs.
     pub last_us: Option<u64>,
-    /// Seconds that had been added to the camera's time (HDF5).
+    /// Seconds added to the camera's time (HDF5).
     pub ts_offset_s: Option<f64>,
     /// Silences longer than the threshold: no CD event and no trigger edge. At most `LIST_LIMIT` of them.
     pub gaps: Vec<Gap>,
-    /// Number of such silences.
+    /// Total number of silences.
     pub gap_count: u64,
     /// Steps of the time base that are neither progress nor a wrap. At most `LIST_LIMIT` of them; all are
     /// counted in `stats`.
@@ -106,7 +106,7 @@ impl StreamInspection {
         }
     }
 
-    /// Takes the counts and times of the decoder that fed it.
+    /// Takes the counts and times of the decoder.
     pub fn finish(&mut self, decoder: &crate::Decoder) {
         self.stats = decoder.stats();
         self.first_us = decoder.first_us();

@@ -1,8 +1,8 @@
 //! Press-position tables: CSV with a header that has at least `x` and `y`.
 //!
-//! The published table is in metres and ends in a row of empty cells (`,,`). Rows without any value are
+//! The published table is in metres and ends with a row of empty cells (`,,`). Rows without any value are
 //! allowed only after the last press; they are reported with their lines and do not count as presses. A row with some
-//! values must have x and y, and z when the table has that column.
+//! values must have x and y, and z if the table has that column.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -40,13 +40,13 @@ pub struct PressPosition {
     pub x_mm: f64,
     /// mm.
     pub y_mm: f64,
-    /// mm; `None` when the table has no z column.
+    /// mm; `None` if the table has no z column.
     pub z_mm: Option<f64>,
     /// Line of the file, 1 for the header.
     pub line: u64,
 }
 
-/// A table of presses in their order.
+/// A table of presses in order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PositionTable {
     /// The presses.
@@ -70,9 +70,9 @@ impl PositionTable {
     /// Reads a table from `source`; `path` is its name in messages.
     ///
     /// # Errors
-    /// [`FormatsError::Table`] with the line: a missing or doubled column, a cell that is empty, no number, not
+    /// [`FormatsError::Table`] with the line: a missing or doubled column, a cell that is empty, not a number, not
     /// finite or farther than 10 m away, a row with another number of cells, a press after a blank row, or no
-    /// press at all.
+    /// press.
     pub fn parse(
         mut source: impl Read,
         path: &Path,
@@ -104,7 +104,7 @@ impl PositionTable {
         let mut blank_lines: Vec<u64> = Vec::new();
         for record in reader.records() {
             let record = record.map_err(|e| table.csv(&e))?;
-            // The reader's position is before the empty lines that it passed over.
+            // The reader's position is before the empty lines that it skipped.
             let line = record.position().map_or(0, |at| {
                 let rest = text.get(at.byte() as usize..).unwrap_or_default();
                 let ends = rest.iter().take_while(|b| matches!(b, b'\r' | b'\n'));
@@ -143,7 +143,7 @@ impl PositionTable {
                 });
             }
         }
-        // The CSV reader passes over lines without any character.
+        // The CSV reader skips empty lines.
         let lines = text
             .strip_suffix(b"\n")
             .unwrap_or(&text)
@@ -168,7 +168,7 @@ impl PositionTable {
     }
 }
 
-/// Builds errors that name the table.
+/// Builds errors with the name of the table.
 struct Table {
     path: PathBuf,
 }

@@ -46,16 +46,16 @@ fn special(_kind: std::fs::FileType) -> &'static str {
 /// Opens a regular file for reading.
 ///
 /// # Errors
-/// As [`check`], and when it cannot be opened.
+/// As [`check`], and if it cannot be opened.
 pub fn open(path: &Path) -> io::Result<File> {
     check(path)?;
     File::open(path)
 }
 
-/// Reads a text file of at most `MAX_TEXT_BYTES` whole.
+/// Reads a whole text file of at most `MAX_TEXT_BYTES`.
 ///
 /// # Errors
-/// As [`open`], when reading fails, and for a longer file.
+/// As [`open`], if reading fails, and for a longer file.
 pub fn read_text(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?
@@ -73,18 +73,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn folders_devices_and_long_texts_are_refused() {
+    fn folders_devices_and_long_texts_are_rejected() {
         let folder = tempfile::tempdir().unwrap();
-        let said = |path: &Path| read_text(path).unwrap_err().to_string();
-        assert!(said(folder.path()).contains("found a folder"));
+        let error = |path: &Path| read_text(path).unwrap_err().to_string();
+        assert!(error(folder.path()).contains("found a folder"));
         #[cfg(unix)]
-        assert!(said(Path::new("/dev/zero")).contains("found a device"));
+        assert!(error(Path::new("/dev/zero")).contains("found a device"));
         let long = folder.path().join("long");
         File::create(&long)
             .unwrap()
             .set_len(MAX_TEXT_BYTES + 1)
             .unwrap();
-        assert!(said(&long).contains("a longer one"));
+        assert!(error(&long).contains("a longer one"));
         std::fs::write(&long, "a: 1").unwrap();
         assert_eq!(read_text(&long).unwrap(), b"a: 1");
     }

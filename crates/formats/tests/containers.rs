@@ -1,4 +1,4 @@
-//! bimvee containers: fixtures of three hickle versions, what the writer makes, and bad files.
+//! bimvee containers: fixtures of three hickle versions, the writer's output, and bad files.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ fn read_within(
     }
 }
 
-/// What `make_fixtures.py` writes.
+/// The content written by `make_fixtures.py`.
 fn expected(shift: u64) -> Vec<CdEvent> {
     (0..64)
         .map(|i| CdEvent {
@@ -53,7 +53,7 @@ fn message(error: &FormatsError, path: &Path) -> String {
 }
 
 fn failure(path: &Path, choice: Option<&str>) -> String {
-    let error = read(path, choice).expect_err("a bad container must be refused");
+    let error = read(path, choice).expect_err("a bad container must be rejected");
     message(&error, path)
 }
 
@@ -92,7 +92,7 @@ fn several_dictionaries_need_a_choice() {
                  `data/left/dvs`, `data/right/dvs`: choose one of them"
             )
         );
-        assert!(failure(&path, Some("left")).contains("called `left`, found `data/left/dvs`"));
+        assert!(failure(&path, Some("left")).contains("named `left`, found `data/left/dvs`"));
     }
     let list = fixture("hickle5-list.hdf5");
     assert_eq!(read(&list, Some("0")).unwrap(), expected(0));
@@ -130,7 +130,7 @@ fn other_containers_are_named() {
     ));
 }
 
-/// A flat file without hickle's decoration, from columns of any content.
+/// A flat file without hickle's attributes, with arbitrary columns.
 fn plain(path: &Path, ts: &[f64], x: &[i64], y: &[i64], pol: Option<&[u8]>) {
     let file = H5File::create(path).unwrap();
     let dataset = file.new_dataset::<f64>().shape([ts.len()]).create("ts");
@@ -202,7 +202,7 @@ fn single_events_outside_the_sensor_are_delivered_and_counted() {
     let at = |row: usize| (events[row].x, events[row].y);
     assert_eq!((at(12), at(1)), ((640, 2), (1, 480)));
     assert_eq!((at(19_999).0, at(10_000).0), (u16::MAX, u16::MAX));
-    // Above one in a hundred it is another sensor's recording.
+    // Above one percent, it is another sensor's recording.
     x[..400].fill(700);
     let path = dir.path().join("other.hdf5");
     plain(&path, &ts, &x, &y, Some(&pol));
@@ -249,7 +249,7 @@ fn a_truncated_file_is_an_error_at_every_length() {
         std::fs::write(&path, &whole[..length]).unwrap();
         match read(&path, None) {
             Err(_) => {}
-            // Only what no event depends on may be missing.
+            // Only parts without events may be missing.
             Ok(events) => assert_eq!(events, expected(0), "cut at {length}"),
         }
     }
@@ -269,7 +269,7 @@ fn events(n: u64) -> Vec<CdEvent> {
 }
 
 #[test]
-fn what_is_written_comes_back() {
+fn written_events_read_back() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("out.hdf5");
     let all = events(150_000);

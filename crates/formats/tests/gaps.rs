@@ -1,4 +1,4 @@
-//! Bytes that are missing, and marked as missing: what comes out beside them is what the whole stream says, or nothing.
+//! Streams with missing bytes that are reported as lost: all decoded events match the complete stream.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use proptest::prelude::*;
@@ -13,7 +13,7 @@ const FORMATS: [StreamFormat; 4] = [
     StreamFormat::Evt3,
 ];
 
-/// Events and edges in time order, each with how it follows the one before.
+/// Events and edges in time order, with random intervals.
 fn events() -> impl Strategy<Value = Vec<CdEvent>> {
     let step = prop_oneof![8 => 0_u64..50, 1 => 0_u64..40_000];
     let event = (step, 0_u16..640, 0_u16..480, any::<bool>());
@@ -39,7 +39,7 @@ fn is_edge(e: &CdEvent) -> bool {
     e.x % 10 == 3
 }
 
-/// As a camera sends them: a time base word only when it is due.
+/// Encodes like a camera: a time base word only when it is due.
 fn encode(format: StreamFormat, events: &[CdEvent]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let start = events[0].t_us;
@@ -58,28 +58,28 @@ fn encode(format: StreamFormat, events: &[CdEvent]) -> Vec<u8> {
             }
             StreamFormat::Evt2 => evt2.cd(*e, &mut bytes).unwrap(),
             StreamFormat::Evt3 => {
-                let mut put = |word: u16| bytes.extend(word.to_le_bytes());
+                let mut push_word = |word: u16| bytes.extend(word.to_le_bytes());
                 let now = ((e.t_us >> 12) as u16 & 0xfff, e.t_us as u16 & 0xfff);
                 if high.replace(u64::from(now.0)) != Some(u64::from(now.0)) {
-                    put(0x8000 | now.0);
+                    push_word(0x8000 | now.0);
                     low = Some(0);
                 }
                 if low.replace(now.1) != Some(now.1) {
-                    put(0x6000 | now.1);
+                    push_word(0x6000 | now.1);
                 }
                 let bit = u16::from(bit);
                 if is_edge(e) {
-                    put(0xa600 | bit);
+                    push_word(0xa600 | bit);
                     continue;
                 }
                 if row.replace(e.y) != Some(e.y) {
-                    put(e.y);
+                    push_word(e.y);
                 }
                 if e.x % 3 == 0 {
-                    put(0x2000 | bit << 11 | e.x);
+                    push_word(0x2000 | bit << 11 | e.x);
                 } else {
-                    put(0x3000 | bit << 11 | e.x);
-                    put(0x4001);
+                    push_word(0x3000 | bit << 11 | e.x);
+                    push_word(0x4001);
                 }
             }
             _ => {
@@ -88,17 +88,19 @@ fn encode(format: StreamFormat, events: &[CdEvent]) -> Vec<u8> {
                 } else {
                     0
                 };
-                let mut put = |word: u64| bytes.extend(word.rotate_left(turn).to_le_bytes());
+                let mut push_word = |word: u64| bytes.extend(word.rotate_left(turn).to_le_bytes());
                 let now = e.t_us >> 6 & 0xfff_ffff;
                 if high.replace(now) != Some(now) {
-                    put(8 << 60 | now << 32);
+                    push_word(8 << 60 | now << 32);
                 }
                 let (low, bit) = ((e.t_us & 63) << 54, u64::from(bit));
                 if is_edge(e) {
-                    put(10 << 60 | low | 6 << 40 | bit << 32);
+                    push_word(10 << 60 | low | 6 << 40 | bit << 32);
                 } else {
                     let column = u64::from(e.x) & !31;
-                    put(bit << 60 | low | column << 43 | u64::from(e.y) << 32 | 1 << (e.x & 31));
+                    push_word(
+                        bit << 60 | low | column << 43 | u64::from(e.y) << 32 | 1 << (e.x & 31),
+                    );
                 }
             }
         }
@@ -106,14 +108,14 @@ fn encode(format: StreamFormat, events: &[CdEvent]) -> Vec<u8> {
     bytes
 }
 
-/// What a stream gives: events, edges.
-type Found = (Vec<CdEvent>, Vec<TriggerEdge>);
+/// Decoded events and edges.
+type Decoded = (Vec<CdEvent>, Vec<TriggerEdge>);
 
-fn push(decoder: &mut Decoder, bytes: &[u8], found: &mut Found) {
+fn push(decoder: &mut Decoder, bytes: &[u8], found: &mut Decoded) {
     decoder.push_cd(bytes, &mut found.0, &mut found.1);
 }
 
-/// True when `part` is what is left of `whole` after something was taken out.
+/// True if `part` is `whole` with some elements removed.
 fn is_within<T: PartialEq>(part: &[T], whole: &[T]) -> bool {
     let mut rest = whole.iter();
     part.iter().all(|item| rest.any(|w| w == item))
@@ -122,29 +124,29 @@ fn is_within<T: PartialEq>(part: &[T], whole: &[T]) -> bool {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Any bytes removed at any places, whatever pieces the rest comes in: every event and edge that comes out is one of the whole
-    /// stream, with its time and place. All come out up to the first loss, and from the first time base word after the last.
+    /// Any bytes removed anywhere, and the rest split anyhow: every decoded event and edge belongs to the complete
+    /// stream, at its time and position. All are decoded up to the first loss, and from the first time base word after the last.
     #[test]
-    fn what_comes_out_beside_losses_is_true(
+    fn events_around_losses_match_the_stream(
         events in events(),
         format in prop::sample::select(FORMATS.to_vec()),
         cuts in prop::collection::vec((any::<prop::sample::Index>(), 1_usize..200), 1..4),
         piece in 1_usize..50,
     ) {
         let bytes = encode(format, &events);
-        let mut whole = Found::default();
+        let mut whole = Decoded::default();
         push(&mut Decoder::new(format), &bytes, &mut whole);
         prop_assert_eq!(whole.0.len() + whole.1.len(), events.len());
 
         let mut cuts: Vec<(usize, usize)> = cuts
             .iter()
-            // Behind the first time base word: without any, nothing tells how often the counter had wrapped.
+            // After the first time base word: without one, the number of wraps is unknown.
             .map(|(at, n)| ((8 + at.index(bytes.len())).min(bytes.len()), *n))
             .collect();
         cuts.sort_unstable();
         let (mut decoder, mut scanner) = (Decoder::new(format), Scanner::new(format));
-        let (mut found, mut counted, mut from) = (Found::default(), (0, Vec::new()), 0);
-        let mut take = |decoder: &mut Decoder, scanner: &mut Scanner, part: &[u8], found: &mut Found| {
+        let (mut found, mut counted, mut from) = (Decoded::default(), (0, Vec::new()), 0);
+        let mut take = |decoder: &mut Decoder, scanner: &mut Scanner, part: &[u8], found: &mut Decoded| {
             for part in part.chunks(piece) {
                 push(decoder, part, found);
                 let (facts, edges) = scanner.push(part);
@@ -152,7 +154,7 @@ proptest! {
                 counted.1.extend(edges);
             }
         };
-        let mut before = Found::default();
+        let mut before = Decoded::default();
         push(&mut Decoder::new(format), &bytes[..cuts[0].0], &mut before);
         for (at, n) in cuts {
             if at < from {
@@ -171,13 +173,13 @@ proptest! {
         prop_assert!(is_within(&found.1, &whole.1), "{format}: edges {:?}", found.1);
         prop_assert!(found.0.starts_with(&before.0) && found.1.starts_with(&before.1));
         prop_assert_eq!(counted, (found.0.len() as u64, found.1.clone()));
-        // A decoder of the rest alone, from its first whole word on, finds as many events and edges.
+        // A decoder of the rest alone, from its first whole word, finds as many events and edges.
         let word = match format {
             StreamFormat::Evt2 => 4,
             StreamFormat::Evt3 => 2,
             _ => 8,
         };
-        let mut rest = Found::default();
+        let mut rest = Decoded::default();
         push(&mut Decoder::new(format), &bytes[from.next_multiple_of(word).min(bytes.len())..], &mut rest);
         if format != StreamFormat::Evt3 {
             prop_assert_eq!((found.0.len() - kept.0, found.1.len() - kept.1), (rest.0.len(), rest.1.len()));
@@ -185,7 +187,7 @@ proptest! {
     }
 }
 
-/// Two losses with no whole word between them are one.
+/// Two losses without a whole word between them count as one.
 #[test]
 fn losses_within_one_word_add_up() {
     let event = |t_us, x| CdEvent {
@@ -197,7 +199,7 @@ fn losses_within_one_word_add_up() {
     let events = [event(70, 1), event(80, 2), event(200, 4), event(300, 5)];
     let bytes = encode(StreamFormat::Evt2, &events);
     let mut decoder = Decoder::new(StreamFormat::Evt2);
-    let mut found = Found::default();
+    let mut found = Decoded::default();
     push(&mut decoder, &bytes[..6], &mut found);
     decoder.lost(3);
     push(&mut decoder, &bytes[9..10], &mut found);

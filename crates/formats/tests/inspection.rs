@@ -1,4 +1,4 @@
-//! What `inspect` finds in RAW and HDF5 files, and how it refuses others.
+//! Results of `inspect` for RAW and HDF5 files, and rejection of others.
 
 use std::path::Path;
 
@@ -90,7 +90,7 @@ fn an_hdf5_file_is_described() {
 }
 
 #[test]
-fn other_files_are_refused_by_kind() {
+fn other_files_are_rejected_by_kind() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("x");
     for (bytes, kind, text) in [
@@ -111,10 +111,10 @@ fn other_files_are_refused_by_kind() {
 }
 
 #[test]
-fn the_sample_recordings_are_read_whole() {
+fn the_sample_recordings_are_read_completely() {
     let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/sample-grid");
     if !shared.exists() {
-        println!("skipped: {} is not here", shared.display());
+        println!("skipped: {} not found", shared.display());
         return;
     }
     for camera in 1..=2 {

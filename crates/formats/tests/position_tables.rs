@@ -38,7 +38,7 @@ fn columns_are_found_by_name_and_the_rest_is_listed() {
 }
 
 #[test]
-fn bad_tables_are_refused_with_file_and_line() {
+fn bad_tables_are_rejected_with_file_and_line() {
     for (text, expected) in [
         ("", "p.csv:1: expected a column `x`, found columns "),
         (

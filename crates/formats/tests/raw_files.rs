@@ -1,4 +1,4 @@
-//! RAW files: headers of old and new tools, and what the writer makes.
+//! RAW files: headers of old and new tools, and the writer's output.
 
 use std::path::Path;
 
@@ -85,7 +85,7 @@ fn byte_order_and_format_follow_the_keys() {
 }
 
 #[test]
-fn bad_headers_are_refused_with_offset_and_key() {
+fn bad_headers_are_rejected_with_offset_and_key() {
     for (text, expected) in [
         (
             "",
@@ -172,7 +172,7 @@ fn a_written_file_reads_back_unmodified() {
 }
 
 #[test]
-fn values_that_would_not_read_back_are_refused() {
+fn values_that_would_not_read_back_are_rejected() {
     for (key, value) in [
         ("a b", "x"),
         ("end", "x"),

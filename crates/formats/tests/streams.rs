@@ -1,4 +1,4 @@
-//! Laws of the stream codecs: round trips, independence of splits, counts, and a real recording.
+//! Properties of the stream codecs: round trips, independence of splits, counts, and a real recording.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::path::Path;
@@ -89,7 +89,7 @@ fn encode(start: u64, items: &[Item], cadence_us: u64) -> Vec<u8> {
     bytes
 }
 
-/// The same items as EVT2.1 or EVT3 words, the plainest way.
+/// The same items as EVT2.1 or EVT3 words, in the simplest encoding.
 fn encode_plainly(format: StreamFormat, items: &[Item]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let wide = |w: u64| {
@@ -133,7 +133,7 @@ fn encode_plainly(format: StreamFormat, items: &[Item]) -> Vec<u8> {
     bytes
 }
 
-/// `bytes` cut into pieces whose lengths cycle through `sizes`.
+/// `bytes` split into pieces whose lengths cycle through `sizes`.
 fn pieces<'a>(mut bytes: &'a [u8], sizes: &[usize]) -> Vec<&'a [u8]> {
     let mut parts = Vec::new();
     for size in sizes.iter().cycle() {
@@ -150,7 +150,7 @@ fn pieces<'a>(mut bytes: &'a [u8], sizes: &[usize]) -> Vec<&'a [u8]> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Whatever came before, and wherever in a word it broke off.
+    /// After any data, split anywhere in a word.
     #[test]
     fn a_restarted_decoder_is_a_fresh_one_moved_by_the_origin(
         (start, before) in items(),
@@ -204,7 +204,7 @@ proptest! {
         sizes in prop::collection::vec(1_usize..5000, 1..5),
     ) {
         for format in &FORMATS[1..] {
-            // A short counter cannot tell where it starts: what comes back is later by whole ranges.
+            // A short counter has an unknown start: decoded times are later by whole ranges.
             let range = if *format == StreamFormat::Evt3 { 1 << 24 } else { 1 << 34 };
             let bytes = encode_plainly(*format, &items);
             let (found, decoder) = decode(*format, &pieces(&bytes, &sizes));
@@ -258,7 +258,7 @@ proptest! {
         words in prop::collection::vec((0_u32..40, any::<u32>()), 0..3000),
         quiet in 0_u32..36,
     ) {
-        // Mostly events and progress of the time base in some proportion, and now and then what is neither:
+        // Mostly events and progress of the time base in some proportion, and occasionally something else:
         // another type, a pixel outside, a step back, a step of half of the range or more.
         let mut high = 0x0fff_ff00_u32;
         let bytes: Vec<u8> = words
@@ -316,14 +316,14 @@ proptest! {
     }
 }
 
-/// Chunks of nothing but events, as a busy camera sends them, whose ends fall beside the decoder's own block.
+/// Chunks of events only, as from a busy camera, whose ends do not align with the decoder's own block.
 #[test]
 fn a_chunk_that_ends_just_behind_a_block_is_decoded_whole() {
     for events in (1_000..1_060).chain(2_040..2_070) {
         let time = 0x8000_0001_u32.to_le_bytes();
         let event = (3_u32 << 11 | 5).to_le_bytes();
         let chunk: Vec<u8> = std::iter::repeat_n(event, events).flatten().collect();
-        // The time base comes first, so that the chunk begins with an empty block and whole groups.
+        // The time base is first, so that the chunk begins with an empty block and whole groups.
         let (seen, decoder) = decode(StreamFormat::Evt2, &[&time, &chunk]);
         assert_eq!(
             decoder.stats().cd_events(),

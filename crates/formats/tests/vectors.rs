@@ -216,7 +216,7 @@ fn all_vectors_decode_whole_and_at_every_split() {
 }
 
 #[test]
-fn the_scanner_counts_what_the_decoder_delivers() {
+fn the_scanner_and_the_decoder_have_equal_counts() {
     for (name, format, hex, expected) in VECTORS {
         let bytes = bytes_of(hex);
         for size in 1..=bytes.len() {

@@ -20,7 +20,7 @@ pub const SENSOR_HEIGHT: u16 = 480;
 pub struct CameraModel {
     /// Optical centre, skin frame, mm.
     pub position: Point2,
-    /// Where the axis points before skew: the skin centre.
+    /// Point that the axis passes through before skew: the skin centre.
     pub aim: Point2,
     /// Rotation of the axis away from `aim`, degrees, clockwise positive.
     pub skew_deg: f64,
@@ -63,7 +63,7 @@ impl CameraModel {
         -libm::atan2(ax * by - ay * bx, ax * bx + ay * by).to_degrees()
     }
 
-    /// The fractional column at which `p` appears, or `None` outside the field of view (columns 0..=640). Where a
+    /// The fractional column at which `p` appears, or `None` outside the field of view (columns 0..=640). If a
     /// strong distortion folds the image, so that two columns show `p`, the one nearer the axis.
     #[must_use]
     pub fn column_of_point(&self, p: Point2) -> Option<f64> {
@@ -87,7 +87,7 @@ impl CameraModel {
         Some(half + half * 0.5 * (low + high))
     }
 
-    /// The `s` up to which the angle grows: 1, the sensor's edge, or where a strong distortion turns it back.
+    /// The `s` up to which the angle grows: 1, the sensor's edge, or the fold of a strong distortion.
     fn fold(&self) -> f64 {
         let grows = |s: f64| self.lens.angle_deg(s).1 >= 0.0;
         if grows(1.0) {
@@ -148,7 +148,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn published_angles_come_out() {
+    fn angles_match_the_published_ones() {
         let [one, two] = StereoGeometry::PAPER.cameras;
         assert!((one.angle_of_column_deg(480.0) - 30.741_512_001).abs() < 1e-8);
         assert!((two.angle_of_column_deg(362.0) - 6.328_884_298).abs() < 1e-8);

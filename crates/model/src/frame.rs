@@ -2,7 +2,7 @@
 //!
 //! *Skin* frame: millimetres, x and y in the plane of the skin, z out of the skin (up); z = 0 is the
 //! touched surface, an indentation of 2 mm ends at z = -2. *Robot* frame: millimetres in the robot's own
-//! axes. A conversion reads `skin_from_robot`: it takes robot coordinates and gives skin coordinates.
+//! axes. A conversion reads `skin_from_robot`: it converts robot coordinates to skin coordinates.
 
 use std::marker::PhantomData;
 
@@ -46,7 +46,7 @@ impl Point2 {
     }
 }
 
-/// A coordinate in a file, mm: nothing on a bench is further away than a metre.
+/// A coordinate in a file, mm: everything on a bench is within a metre.
 const COORDINATE: Shape =
     Shape::Quantity(&[Dimension::Length], ValueRange::between(-1000.0, 1000.0));
 
@@ -127,7 +127,7 @@ impl<F> Point3<F> {
         (dx * dx + dy * dy + dz * dz).sqrt()
     }
 
-    /// True when no coordinate is NaN or infinite.
+    /// True if no coordinate is NaN or infinite.
     #[must_use]
     pub fn is_finite(self) -> bool {
         self.to_array().iter().all(|c| c.is_finite())
@@ -135,7 +135,7 @@ impl<F> Point3<F> {
 }
 
 impl Point3<Skin> {
-    /// The point's shadow on the skin's plane.
+    /// The point projected onto the skin's plane.
     #[must_use]
     pub const fn plane(self) -> Point2 {
         Point2::new(self.x_mm, self.y_mm)
@@ -167,7 +167,7 @@ impl<To, From> PartialEq for RigidTransform<To, From> {
 }
 
 impl<To, From> RigidTransform<To, From> {
-    /// Both frames coincide.
+    /// The transform between coinciding frames.
     #[must_use]
     pub const fn identity() -> Self {
         Self::translation(0.0, 0.0, 0.0)
@@ -204,7 +204,7 @@ impl<To, From> RigidTransform<To, From> {
         Point3::new(row(0), row(1), row(2))
     }
 
-    /// The transform the other way.
+    /// The transform in the other direction.
     #[must_use]
     pub fn inverse(&self) -> RigidTransform<From, To> {
         let r = self.rotation;

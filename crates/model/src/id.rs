@@ -1,4 +1,4 @@
-//! Identifiers: which camera, which planned press, which attempt at it.
+//! Identifiers of cameras, planned presses, locations, repetitions and attempts.
 
 use std::fmt;
 
@@ -31,7 +31,7 @@ impl CameraId {
         }
     }
 
-    /// The number that people use: 1 or 2.
+    /// The number for display: 1 or 2.
     #[must_use]
     pub const fn number(self) -> u8 {
         self.index() as u8 + 1
@@ -54,24 +54,24 @@ impl fmt::Display for CameraId {
     }
 }
 
-/// Makes a type for one kind of number that people read: it prints itself counted from 1, and is an index from 0 inside.
+/// Defines an identifier that is displayed counted from 1 and is an index from 0 inside.
 macro_rules! numbered {
     ($(#[$doc:meta])* $name:ident, $word:literal) => {
         $(#[$doc])*
         ///
-        /// Shown (`Display`) and serialized with its number, from 1. Where a stored format holds the index instead, the field says so
+        /// Displayed and serialized with its number, from 1. Fields of stored formats with the index instead use
         /// with [`as_index`].
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
         pub struct $name(u32);
 
         impl $name {
-            /// The one at `index`, counted from 0.
+            /// The identifier with this index, counted from 0.
             #[must_use]
             pub const fn from_index(index: u32) -> Self {
                 Self(index)
             }
 
-            /// The one with `number`, counted from 1; `None` for 0.
+            /// The identifier with this number, counted from 1; `None` for 0.
             #[must_use]
             pub const fn from_number(number: u32) -> Option<Self> {
                 match number.checked_sub(1) {
@@ -80,13 +80,13 @@ macro_rules! numbered {
                 }
             }
 
-            /// Counted from 0: the position in lists, and what the session file stores.
+            /// Counted from 0: the position in lists, and the number in session files.
             #[must_use]
             pub const fn index(self) -> u32 {
                 self.0
             }
 
-            /// Counted from 1: what people read and write.
+            /// Counted from 1: the number for display.
             #[must_use]
             pub const fn number(self) -> u32 {
                 self.0.saturating_add(1)
@@ -141,15 +141,15 @@ numbered! {
     LocationId, "location"
 }
 
-/// A number that can be stored as an index, counted from 0.
+/// An identifier that can be stored as an index, counted from 0.
 pub trait Indexed: Copy {
-    /// The one at `index`.
+    /// The identifier with this index, counted from 0.
     fn from_index(index: u32) -> Self;
     /// Counted from 0.
     fn index(self) -> u32;
 }
 
-/// For `#[serde(with = "as_index")]`: the field is stored as an index, counted from 0, as plans always were.
+/// For `#[serde(with = "as_index")]`: stores a field as an index, counted from 0, as in plans.
 pub mod as_index {
     use serde::{Deserialize, Deserializer, Serializer};
 
@@ -171,7 +171,7 @@ pub mod as_index {
         u32::deserialize(from).map(T::from_index)
     }
 
-    /// The same for a number that may be absent.
+    /// The same for an optional identifier.
     pub mod option {
         use serde::{Deserialize, Deserializer, Serialize, Serializer};
 

@@ -2,13 +2,13 @@
 //!
 //! The paper's lens (section "Geometric Triangulation", constants of the public code) is
 //! `theta = s * H * exp(-W |s|)`. The others are the classical projections of fisheye and pinhole lenses, each with
-//! one coefficient of radial distortion, `s' = s (1 + W (s² - 1))`: the sensor's edge stays where it is, so that the
+//! one coefficient of radial distortion, `s' = s (1 + W (s² - 1))`: the sensor's edge keeps its angle, so that the
 //! half field of view H and W describe different things.
 
 use serde::{Deserialize, Serialize};
 use skinrig_settings::Choice;
 
-/// How a column becomes an angle before distortion. See [`LensModel`].
+/// Projection from a column to an angle before distortion. See [`LensModel`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum LensKind {
@@ -30,7 +30,7 @@ pub enum LensKind {
 #[serde(tag = "lens", rename_all = "snake_case")]
 pub enum LensModel {
     /// The paper's: `theta = s * H * exp(-W |s|)`. Increasing on the sensor for `W < 1`; `|W| < 1` is the range of
-    /// the public code. The edge is seen at `H * exp(-W)`.
+    /// the public code. The sensor's edge is at `H * exp(-W)`.
     Exponential {
         /// The half field of view H of the undistorted lens, degrees (paper: 60).
         half_fov_deg: f64,
@@ -70,7 +70,7 @@ pub enum LensModel {
 /// The angle of a column and its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LensAngle {
-    /// Angle from the optical axis, degrees; NaN where the lens has none.
+    /// Angle from the optical axis, degrees; NaN if undefined.
     pub deg: f64,
     /// By `s`, degrees.
     pub by_s: f64,
@@ -93,7 +93,7 @@ impl LensModel {
         }
     }
 
-    /// Which projection it is.
+    /// Its projection.
     #[must_use]
     pub const fn kind(&self) -> LensKind {
         match self {
@@ -123,7 +123,7 @@ impl LensModel {
         Self::new(self.kind(), half_fov_deg, w)
     }
 
-    /// A lens of this kind: itself, or the undistorted one that sees the sensor's edge at the same angle.
+    /// A lens of this kind: itself, or the undistorted one with the same angle at the sensor's edge.
     #[must_use]
     pub fn as_kind(&self, kind: LensKind) -> Self {
         if self.kind() == kind {
@@ -133,8 +133,8 @@ impl LensModel {
         }
     }
 
-    /// True when the coefficients are within the range in which the angle grows with the column everywhere on the
-    /// sensor: the lens can be inverted there. The ranges are with the variants.
+    /// True if the coefficients are within the range in which the angle grows with the column everywhere on the
+    /// sensor, so that the lens can be inverted. The variants state their ranges.
     #[must_use]
     pub fn is_monotone(&self) -> bool {
         let (half_fov_deg, w) = self.coefficients();
@@ -222,8 +222,8 @@ mod tests {
     ];
 
     #[test]
-    fn the_projections_are_those_of_the_textbook() {
-        // At half of the way to an edge of 60°: 60/2, atan(tan 60 / 2), 2 atan(tan 30 / 2), 2 asin(sin 30 / 2).
+    fn the_projections_match_the_textbook() {
+        // Halfway to an edge of 60°: 60/2, atan(tan 60 / 2), 2 atan(tan 30 / 2), 2 asin(sin 30 / 2).
         let wanted = [30.0, 30.0, 40.893_394_649, 32.204_227_504, 28.955_024_372];
         for (kind, wanted) in KINDS.into_iter().zip(wanted) {
             let lens = LensModel::new(kind, 60.0, 0.0);
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn the_stored_form_of_the_papers_lens_stays() {
+    fn the_stored_form_of_the_papers_lens_is_unchanged() {
         let lens = LensModel::new(LensKind::Exponential, 60.0, -0.17);
         let stored = r#"{"lens":"exponential","half_fov_deg":60.0,"w":-0.17}"#;
         assert_eq!(serde_json::to_string(&lens).unwrap(), stored);

@@ -1,7 +1,7 @@
 //! The vocabulary shared by all of skinrig: units, frames, ids, clocks, events and session records.
 //!
-//! Pure values. Nothing here reads a file, a wall clock or a device, and nothing depends on another
-//! skinrig crate. Every quantity names its unit in its type or its name: `*_mm`, `*_us`, `*_n` (newton),
+//! Plain values: no files, wall clocks or devices, and no other skinrig crate but `skinrig-settings`.
+//! Every quantity names its unit in its type or its name: `*_mm`, `*_us`, `*_n` (newton),
 //! `*_hz`, `*_deg`.
 
 pub mod camera;

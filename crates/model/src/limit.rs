@@ -1,4 +1,4 @@
-//! A stated limit on a measured value, and which side of it a value is on.
+//! A limit on a measured value, and the side of it that a value is on.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,15 +6,15 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limit {
-    /// The smallest value that is good.
+    /// Smallest good value.
     pub at_least: Option<f64>,
-    /// The largest value that is good.
+    /// Largest good value.
     pub at_most: Option<f64>,
-    /// How near to a limit a good value is marginal; 0: never.
+    /// A good value closer to a limit than this is marginal; 0: never.
     pub margin: f64,
 }
 
-/// Which side of its limit a value is on.
+/// Side of a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
     /// Good, and farther than the margin from the limit.
@@ -26,7 +26,7 @@ pub enum Side {
 }
 
 impl Limit {
-    /// A limit from above without a margin.
+    /// An upper limit without a margin.
     #[must_use]
     pub const fn at_most(value: f64) -> Self {
         Self {
@@ -36,7 +36,7 @@ impl Limit {
         }
     }
 
-    /// A limit from below without a margin.
+    /// A lower limit without a margin.
     #[must_use]
     pub const fn at_least(value: f64) -> Self {
         Self {
@@ -52,7 +52,7 @@ impl Limit {
         Self { margin, ..self }
     }
 
-    /// Where `value` is. A value on the limit is good; NaN is beyond every limit.
+    /// Side of `value`. A value on the limit is good; NaN is beyond every limit.
     #[must_use]
     pub fn side(&self, value: f64) -> Side {
         let room_below = self.at_least.map_or(f64::INFINITY, |least| value - least);

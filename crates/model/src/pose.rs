@@ -8,13 +8,13 @@ use crate::time::HostTime;
 /// One sample of the pose stream (at least 1 kHz of rig time).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PoseSample {
-    /// When it was measured.
+    /// Time of the measurement.
     pub t: HostTime,
     /// The set point at that time, skin frame, mm.
     pub commanded: Point3<Skin>,
     /// The measured tip position, skin frame, mm.
     pub measured: Point3<Skin>,
-    /// Force on the tip along the skin's normal as the device reports it, N; positive pushes the tip out.
-    /// `NaN` when the device does not measure or estimate one.
+    /// Force on the tip along the skin's normal as reported by the device, N; positive pushes the tip out.
+    /// `NaN` if the device does not measure or estimate it.
     pub force_n: f64,
 }

@@ -8,11 +8,11 @@ use crate::device_role::DeviceRole;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CheckVerdict {
-    /// Found as expected.
+    /// As expected.
     Passed,
     /// Failed: the run is not armed.
     Failed,
-    /// Not checked; `found` says why.
+    /// Not checked; `found` states the reason.
     Skipped,
 }
 
@@ -58,13 +58,13 @@ pub enum CheckKind {
 /// One check before a run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PreflightCheck {
-    /// What was checked, for example `trigger loop-back, camera 1`.
+    /// Name of the check, for example `trigger loop-back, camera 1`.
     pub check: String,
     /// Expected value.
     pub expected: String,
     /// Found value, or reason why it was not checked.
     pub found: String,
-    /// How it ended.
+    /// Result of the check.
     pub verdict: CheckVerdict,
     /// Next step after a failed check; empty for others.
     pub next_step: String,
@@ -114,13 +114,13 @@ impl PreflightCheck {
         }
     }
 
-    /// The same check, about this.
+    /// The same check with this subject.
     #[must_use]
     pub fn about(self, kind: CheckKind) -> Self {
         Self { kind, ..self }
     }
 
-    /// True when it failed.
+    /// True if it failed.
     #[must_use]
     pub const fn failed(&self) -> bool {
         matches!(self.verdict, CheckVerdict::Failed)

@@ -17,9 +17,9 @@ use crate::time::{HostDuration, HostTime};
 pub enum PressRole {
     /// Marks the start, so that camera clocks can be aligned without triggers.
     Sync,
-    /// Its truth may be used to fit the camera geometry.
+    /// Its ground truth may be used to fit the camera geometry.
     Calibrate,
-    /// Its truth is used only to score.
+    /// Its ground truth is used only for scoring.
     Score,
 }
 
@@ -35,23 +35,23 @@ impl PressRole {
     }
 }
 
-/// One press of the plan. Stored plans hold its three numbers as indices, counted from 0.
+/// One press of the plan. Stored plans contain its three numbers as indices, counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PlannedPress {
     /// Position in the plan.
     #[serde(with = "as_index")]
     pub id: PressId,
-    /// Purpose of the experiment.
+    /// Role of the press.
     pub role: PressRole,
-    /// Which repetition; the first for sync presses.
+    /// Repetition; the first for sync presses.
     #[serde(with = "as_index")]
     pub repetition: RepetitionId,
-    /// Which location of the path; the first for sync presses.
+    /// Location of the path; the first for sync presses.
     #[serde(with = "as_index")]
     pub location: LocationId,
-    /// Where, skin frame.
+    /// Position, skin frame.
     pub at: Point2,
-    /// How deep below the touched surface, mm, positive.
+    /// Depth below the touched surface, mm, positive.
     pub depth_mm: f64,
 }
 
@@ -87,17 +87,17 @@ impl PressTiming {
     }
 }
 
-/// How a press ended, without its reason.
+/// Verdict on a press, without its reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// Done as planned, and everything it needs was recorded.
+    /// Done as planned, with all its data recorded.
     Valid,
     /// Never attempted.
     Missed,
-    /// Attempted, but what happened is not what was planned, or data were lost in its window.
+    /// Attempted, but it deviated from the plan, or data were lost in its window.
     Invalid,
-    /// Done, but left out of the metrics by a stated rule.
+    /// Done, but excluded from the metrics by a stated rule.
     Excluded,
 }
 
@@ -124,13 +124,13 @@ impl fmt::Display for Verdict {
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(tag = "verdict", content = "reason", rename_all = "snake_case")]
 pub enum PressVerdict {
-    /// Done as planned, and everything it needs was recorded.
+    /// Done as planned, with all its data recorded.
     Valid,
     /// Never attempted (the run stopped before it).
     Missed(String),
-    /// Attempted, but what happened is not what was planned, or data were lost in its window.
+    /// Attempted, but it deviated from the plan, or data were lost in its window.
     Invalid(InvalidReason),
-    /// Done, but left out of the metrics by a stated rule.
+    /// Done, but excluded from the metrics by a stated rule.
     Excluded(String),
 }
 
@@ -152,20 +152,20 @@ impl PressVerdict {
         }
     }
 
-    /// What stands for the outcome of an attempt that leg `leg` of a session began and did not live to end: whether the robot
-    /// pressed is not known.
+    /// Verdict on an attempt in leg `leg` of a session that has no recorded outcome: whether the robot
+    /// pressed is unknown.
     #[must_use]
     pub const fn cut_off(leg: u32) -> Self {
         Self::Invalid(InvalidReason::LegEnded { leg })
     }
 
-    /// True for an attempt that did not come to its end; nothing can be said of its press.
+    /// True for an attempt that did not finish; the state of its press is unknown.
     #[must_use]
     pub const fn is_cut_off(&self) -> bool {
         matches!(self, Self::Invalid(reason) if reason.is_cut_off())
     }
 
-    /// Why, for everything but `Valid`.
+    /// Reason of any verdict but `Valid`.
     #[must_use]
     pub fn reason(&self) -> Option<Cow<'_, str>> {
         match self {
@@ -181,39 +181,39 @@ impl PressVerdict {
 pub struct PressHistory {
     /// Attempts so far; 0: none.
     pub attempts: u32,
-    /// How many of them count against the limit of retakes: all but those that ended for what passes
-    /// ([`PressFaultKind::is_of_the_place`]), which the rig or the operator cost, and which are given back.
+    /// Number of attempts that count against the limit of retakes. Attempts with only transient faults
+    /// (see [`PressFaultKind::is_of_the_place`]), caused by the rig or the operator, do not count.
     pub spent: u32,
-    /// The verdict of the last one; absent when there was none, or when it was cut off.
+    /// Verdict on the last attempt; `None` without attempts, or if it was cut off.
     pub verdict: Option<PressVerdict>,
-    /// True when the last one is invalid for nothing but what passes: the rig or the operator cost it.
+    /// True if the last attempt has only transient faults, caused by the rig or the operator.
     pub given_back: bool,
-    /// True when the plan has been executed to its end since: then only what was given back is taken again.
+    /// True if the plan was completed since: only presses with `given_back` are then retaken.
     pub plan_done: bool,
 }
 
 /// The measured result of one attempt.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PressOutcome {
-    /// Which attempt at which press.
+    /// The attempt.
     pub attempt: AttemptId,
-    /// How it ended.
+    /// Verdict on the attempt.
     pub verdict: PressVerdict,
     /// Kinds of the faults that made it invalid, in the order of the verdict's reason; empty for other verdicts and in sessions
     /// of older schemas.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<PressFaultKind>,
-    /// When; absent when the attempt broke off before its moments were known.
+    /// Phase times; `None` if the attempt ended before they were known.
     pub timing: Option<PressTiming>,
     /// The mean measured tip position during the hold, skin frame: the ground truth of localisation.
     pub measured_at: Option<Point2>,
     /// The mean measured depth during the hold below the surface, touched or known, mm, positive.
     pub measured_depth_mm: Option<f64>,
-    /// Height at which the surface was touched, skin frame, mm; absent when it was not searched or not found.
+    /// Height of the touched surface, skin frame, mm; `None` if it was not searched or not found.
     pub touched_mm: Option<f64>,
-    /// The largest force seen, N, when the device reports forces.
+    /// Largest measured force, N, if the device reports forces.
     pub peak_force_n: Option<f64>,
-    /// True when timing and position come from a schedule (an imported dataset without a pose stream),
-    /// false when they were measured.
+    /// True if timing and position come from a schedule (an imported dataset without a pose stream),
+    /// false if they were measured.
     pub scheduled: bool,
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::text::UnknownName;
 
-/// Kind of fault that made an attempt invalid. Programs decide by it; people read the reason beside it.
+/// Kind of fault that made an attempt invalid, for programs; the reason beside it is for display.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PressFaultKind {
@@ -73,8 +73,8 @@ impl PressFaultKind {
         }
     }
 
-    /// True for what the skin or the robot is like at that place: pressing it again would only wear it. False for what
-    /// passes: lost data, a late motion, an operator who broke the press off, the end of the run.
+    /// True for faults of the skin or the robot at that location: another press would only wear it. False for transient
+    /// faults: lost data, a late motion, an interruption by the operator, the end of the run.
     #[must_use]
     pub const fn is_of_the_place(self) -> bool {
         matches!(

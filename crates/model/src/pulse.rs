@@ -1,16 +1,16 @@
 //! Trigger trains: coded pulses on the trigger line that identify themselves.
 //!
-//! # On the wire
+//! # Signal
 //!
 //! A train is 32 pulses ([`PULSES_PER_TRAIN`]). Pulse `k = 0..32` rises `k *` 400 µs (`PULSE_PERIOD_US`) after
-//! the train's first rising edge; its width tells its meaning:
+//! the train's first rising edge; its width encodes its value:
 //!
-//! | pulse | width | what |
+//! | pulse | width | meaning |
 //! |---|---|---|
-//! | 0 | 300 µs | start; its rising edge is the instant that the train stands for |
+//! | 0 | 300 µs | start; its rising edge is the time of the train |
 //! | 1..=3 | 100 µs for 0, 200 µs for 1 | kind, most significant bit first: 1..=5 a mark ([`MarkKind::code`]), 6 a sync train ([`SYNC_CODE`]); 0 and 7 are never sent |
-//! | 4..=20 | likewise | 17 bits, most significant first: the press of a mark, or the running number of a sync train modulo 2^17 |
-//! | 21..=31 | likewise | 11 check bits, most significant first: `check_bits` of the 20 data bits |
+//! | 4..=20 | same | 17 bits, most significant first: the press of a mark, or the running number of a sync train modulo 2^17 |
+//! | 21..=31 | same | 11 check bits, most significant first: `check_bits` of the 20 data bits |
 //!
 //! Afterwards the line stays low until 34 periods ([`PulseTrain::DURATION_US`], 13.6 ms) have passed since the
 //! first edge. All widths are far above the 500 ns minimum of the camera's trigger input.
@@ -20,8 +20,8 @@
 //! The 31 bits are a word of the even-weight BCH(31, 21) code with generator
 //! `(x + 1)(x^10 + x^9 + x^8 + x^6 + x^5 + x^3 + 1)`, the code of POCSAG paging (ITU-R M.584): any two words
 //! differ in at least 6 bits. Check bits are XORed with `CHECK_MASK`, because the code is cyclic: without the
-//! mask a train read one pulse late could again be a word; with it every such shift is at least 4 bits away from
-//! all words. [`decode_marks`] says what that buys.
+//! mask a train read one pulse late could be a word again; with it every such shift is at least 4 bits away from
+//! all words. [`decode_marks`] states the resulting error rates.
 
 mod decode;
 
@@ -34,9 +34,9 @@ use crate::time::HostTime;
 
 /// Width of the start pulse, µs.
 pub(crate) const START_WIDTH_US: u64 = 300;
-/// Width of a pulse that means 1, µs.
+/// Width of a pulse for 1, µs.
 pub(crate) const ONE_WIDTH_US: u64 = 200;
-/// Width of a pulse that means 0, µs.
+/// Width of a pulse for 0, µs.
 pub(crate) const ZERO_WIDTH_US: u64 = 100;
 /// Distance of two rising edges of a train, µs.
 pub(crate) const PULSE_PERIOD_US: u64 = 400;
@@ -50,14 +50,14 @@ pub const PULSES_PER_TRAIN: u64 = 1 + (DATA_BITS + CHECK_BITS) as u64;
 pub(crate) const CHECK_MASK: u32 = 0x7FD;
 /// Generator of the code, x^11 + x^8 + x^7 + x^5 + x^4 + x^3 + x + 1.
 const GENERATOR: u32 = 0x9BB;
-/// The kind code of a *sync* train, which names no press: its 17 bits are the box's running number of sync trains,
-/// modulo 2^17. The box sends them by itself, so that clocks are tied together between presses too.
+/// Kind code of a *sync* train, which names no press: its 17 bits are the box's running number of sync trains,
+/// modulo 2^17. The box sends them by itself, to align the clocks between presses too.
 pub const SYNC_CODE: u32 = 6;
 /// The largest press id that a mark can carry, and the largest count of a sync train.
 pub const MAX_MARKED_PRESS: u32 = (1 << 17) - 1;
 /// The last press that a mark can name.
 pub const LAST_MARKED_PRESS: PressId = PressId::from_index(MAX_MARKED_PRESS);
-/// How far a measured width or period may be off and still be read, µs.
+/// Largest readable error of a measured width or period, µs.
 pub(crate) const TOLERANCE_US: u64 = 40;
 
 /// A moment of a press that can be marked on the trigger line.
@@ -135,30 +135,30 @@ impl fmt::Display for MarkKind {
     }
 }
 
-/// A mark: this moment of this press.
+/// A mark of one moment of one press.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Mark {
-    /// Which moment.
+    /// Moment of the press.
     pub kind: MarkKind,
-    /// Of which press; at most [`LAST_MARKED_PRESS`].
+    /// The press; at most [`LAST_MARKED_PRESS`].
     pub press: PressId,
 }
 
-/// The mark that is sent to test the trigger line before a run. No press has its number: a plan has at most
-/// [`MAX_MARKED_PRESS`] presses, and theirs come before it.
+/// Mark that tests the trigger line before a run. Its number belongs to no press, because a plan has at most
+/// [`MAX_MARKED_PRESS`] presses with smaller numbers.
 pub const LOOPBACK: Mark = Mark {
     kind: MarkKind::Approach,
     press: LAST_MARKED_PRESS,
 };
 
-/// A mark that the trigger box was told to send.
+/// A mark sent by the trigger box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SentMark {
-    /// What was sent.
+    /// The mark.
     pub mark: Mark,
     /// The rising edge of its start pulse on the host clock.
     pub t: HostTime,
-    /// Half width of the interval in which that instant certainly lies, ns.
+    /// Half width of the interval that certainly contains that time, ns.
     pub uncertainty_ns: i64,
 }
 
@@ -173,7 +173,7 @@ pub enum Label {
 }
 
 impl Label {
-    /// The 20 data bits, or `None` when the number does not fit.
+    /// The 20 data bits, or `None` if the number does not fit.
     #[must_use]
     pub fn data(self) -> Option<u32> {
         let (code, number) = match self {
@@ -217,12 +217,12 @@ pub(crate) const fn check_bits(data: u32) -> u32 {
 /// A label as a train of pulses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PulseTrain {
-    /// Data and check bits, the first one sent on top.
+    /// Data and check bits; the first one sent is the most significant.
     bits: u32,
 }
 
 impl PulseTrain {
-    /// The train of `mark`, or `None` when its press id does not fit.
+    /// The train of `mark`, or `None` if its press number does not fit.
     #[must_use]
     pub fn new(mark: Mark) -> Option<Self> {
         Self::of(Label::Mark(mark))
@@ -234,7 +234,7 @@ impl PulseTrain {
         Self::with_data((SYNC_CODE << 17) | (count & MAX_MARKED_PRESS))
     }
 
-    /// The train of `label`, or `None` when its number does not fit.
+    /// The train of `label`, or `None` if its number does not fit.
     #[must_use]
     pub fn of(label: Label) -> Option<Self> {
         label.data().map(Self::with_data)
@@ -246,13 +246,13 @@ impl PulseTrain {
         }
     }
 
-    /// The 31 data and check bits, the first one sent on top.
+    /// The 31 data and check bits; the first one sent is the most significant.
     #[must_use]
     pub const fn bits(self) -> u32 {
         self.bits
     }
 
-    /// (offset of the rising edge from the train's instant, width) of each pulse, µs.
+    /// (offset of the rising edge from the train's time, width) of each pulse, µs.
     pub fn pulses(self) -> impl Iterator<Item = (u64, u64)> {
         (0..PULSES_PER_TRAIN).map(move |k| {
             let one = (self.bits >> (PULSES_PER_TRAIN - 1 - k)) & 1 == 1;
@@ -265,17 +265,17 @@ impl PulseTrain {
         })
     }
 
-    /// (offset from the train's instant in µs, true for rising) of each edge, in order.
+    /// (offset from the train's time in µs, true for rising) of each edge, in order.
     pub fn edges(self) -> impl Iterator<Item = (u64, bool)> {
         self.pulses()
             .flat_map(|(offset, width)| [(offset, true), (offset + width, false)])
     }
 
-    /// How long a train occupies the line, µs: its pulses and two periods of rest.
+    /// Time that a train occupies the line, µs: its pulses and two idle periods.
     pub const DURATION_US: u64 = (PULSES_PER_TRAIN + 2) * PULSE_PERIOD_US;
 }
 
-/// A mark found on a camera's trigger input.
+/// A mark decoded from a camera's trigger input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SeenMark {
     /// Decoded mark.
@@ -284,7 +284,7 @@ pub struct SeenMark {
     pub t_us: u64,
 }
 
-/// A sync train found on a camera's trigger input.
+/// A sync train decoded from a camera's trigger input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SeenSync {
     /// Running number, modulo 2^17.
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn known_trains_look_like_this_on_the_wire() {
+    fn known_trains_have_these_pulses() {
         let widths = |train: PulseTrain| -> String {
             train
                 .pulses()
@@ -326,7 +326,7 @@ mod tests {
                 press: PressId::from_index(press),
             })
         };
-        // Vectors for anyone who sends trains: S, 3 bits of kind, 17 of the number, 11 of check.
+        // Test vectors for other senders: S, 3 bits of kind, 17 of the number, 11 of check.
         assert_eq!(
             mark(MarkKind::Approach, 0).map(widths).as_deref(),
             Some("S0010000000000000000000001111001")
@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn a_press_id_that_does_not_fit_is_refused() {
+    fn a_press_number_that_does_not_fit_is_rejected() {
         let mark = Mark {
             kind: MarkKind::Contact,
             press: PressId::from_index(MAX_MARKED_PRESS + 1),

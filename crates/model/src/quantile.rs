@@ -18,7 +18,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_are_those_of_numpy() {
+    fn quantiles_match_numpy() {
         let values = [1.0, 2.0, 4.0, 8.0];
         for (q, expected) in [
             (0.0, 1.0),
@@ -34,7 +34,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_has_no_quantile() {
+    fn an_empty_list_has_no_quantile() {
         assert_eq!(quantile(&[], 0.5), None);
         for q in [-0.1, 1.1, f64::NAN] {
             assert_eq!(quantile(&[1.0], q), None, "{q}");

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(from = "String", into = "String")]
 pub enum InvalidReason {
-    /// The program was gone before the outcome: whether the robot pressed is unknown.
+    /// The program ended before the outcome: whether the robot pressed is unknown.
     LegEnded {
         /// Leg of the session that made the attempt.
         leg: u32,
@@ -27,10 +27,10 @@ pub enum InvalidReason {
 }
 
 impl InvalidReason {
-    /// Start of the text of an attempt that did not come to its end.
+    /// Start of the text of an attempt that did not finish.
     pub const CUT_OFF: &'static str = "cut off: ";
 
-    /// True if the attempt did not come to its end: nothing is known about its press.
+    /// True if the attempt did not finish: the state of its press is unknown.
     #[must_use]
     pub const fn is_cut_off(&self) -> bool {
         matches!(self, Self::LegEnded { .. } | Self::RunEnded { .. })
@@ -87,9 +87,9 @@ impl From<InvalidReason> for String {
 pub enum StopReason {
     /// The operator stopped it after a press.
     Stop,
-    /// The operator aborted it: the tip retracted at once.
+    /// The operator aborted it: the tip retracted immediately.
     Abort,
-    /// The operator switched the motors off: the tip stayed where it was.
+    /// The operator switched the motors off: the tip stayed in place.
     Halt,
     /// A reason recorded by another program.
     Other {
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn verdicts_and_ends_are_stored_as_before() {
+    fn stored_forms_of_verdicts_and_ends_are_unchanged() {
         for (verdict, text) in [
             (
                 PressVerdict::cut_off(1),

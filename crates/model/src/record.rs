@@ -1,4 +1,4 @@
-//! Records: everything that happens in a run, in the order in which it happened.
+//! Records: all events of a run, in order.
 //!
 //! The controller emits them; terminal, log and recorder consume them. They are the only interface
 //! between the running experiment and its storage.
@@ -20,9 +20,9 @@ use crate::trigger_box::BoxReport;
 /// Identity of a device.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DeviceIdentity {
-    /// Maker and model, for example `Prophesee EVK1 Gen3.1`; simulated and replayed devices say so.
+    /// Maker and model, for example `Prophesee EVK1 Gen3.1`; simulated and replayed devices are marked as such.
     pub model: String,
-    /// Serial number as the device gives it.
+    /// Serial number as reported by the device.
     pub serial: String,
     /// Firmware or library version.
     pub firmware: String,
@@ -40,14 +40,14 @@ pub struct Setting {
 }
 
 impl Setting {
-    /// In place of what was asked for: the value was only read.
+    /// In place of a requested value: the value was only read.
     pub const AS_FOUND: &str = "as found";
 
-    /// In place of a requested value: a mismatch that was let pass; `read_back` says what was expected and found, and the name what
-    /// accepts it.
+    /// In place of a requested value: an accepted mismatch; `read_back` contains the expected and the found value, and `name` the
+    /// setting that accepts it.
     pub const TOLERATED: &str = "tolerated";
 
-    /// Whether a value was asked for, so that another one that is read back is a difference.
+    /// Whether a value was requested, so that a different read-back is a mismatch.
     #[must_use]
     pub fn was_requested(&self) -> bool {
         self.requested != Self::AS_FOUND && self.requested != Self::TOLERATED
@@ -59,7 +59,7 @@ impl Setting {
 pub struct RunHeader {
     /// The protocol as the user wrote it, byte for byte.
     pub protocol_text: String,
-    /// Where it came from (a file name, or `built-in`).
+    /// Its source (a file name, or `built-in`).
     pub protocol_name: String,
     /// Lower-case hex SHA-256 of `protocol_text`.
     pub protocol_sha256: String,
@@ -81,11 +81,11 @@ pub struct RunHeader {
     pub robot_from_skin: RigidTransform<Robot, Skin>,
     /// Stream format of each camera (index 0: camera 1).
     pub stream_formats: [StreamFormat; 2],
-    /// Which prototype is pressed.
+    /// The prototype under test.
     pub prototype: String,
     /// The operator.
     pub operator: String,
-    /// Civil time of the start, RFC 3339; for people.
+    /// Civil time of the start, RFC 3339; for display.
     pub started_at: String,
     /// Host name.
     pub host: String,
@@ -98,7 +98,7 @@ pub struct RunHeader {
 }
 
 impl RunHeader {
-    /// True when a rig pressed, which can press again; false for an import and a replay of what was recorded before.
+    /// True for a rig that can press again; false for an import and for a replay of an earlier recording.
     #[must_use]
     pub fn is_of_a_rig(&self) -> bool {
         !matches!(self.rig_kind.as_str(), "imported" | "replayed")
@@ -111,7 +111,7 @@ impl RunHeader {
 pub struct ResumeHeader {
     /// Operator of this leg.
     pub operator: String,
-    /// Civil time of this leg's start, RFC 3339; for people.
+    /// Civil time of this leg's start, RFC 3339; for display.
     pub started_at: String,
     /// Host name.
     pub host: String,
@@ -121,7 +121,7 @@ pub struct ResumeHeader {
     pub command_line: String,
 }
 
-/// A motion command as the controller gave it to the indenter.
+/// A motion command from the controller to the indenter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MotionCommand {
     /// Straight-line target, skin frame, mm.
@@ -136,7 +136,7 @@ pub struct MotionCommand {
 pub enum InterruptionKind {
     /// Waits after the current press.
     Pause,
-    /// Break the current press off, retract, and wait.
+    /// Interrupt the current press, retract, and wait.
     PauseNow,
     /// Continues after a pause.
     Resume,
@@ -144,7 +144,7 @@ pub enum InterruptionKind {
     Stop,
     /// Retract now, disarm, keep the data.
     Abort,
-    /// Motors off at once, without retraction; keep the data.
+    /// Motors off immediately, without retraction; keep the data.
     Halt,
     /// A device or the recorder failed.
     Fault,
@@ -177,7 +177,7 @@ impl InterruptionKind {
     }
 }
 
-/// How a run ended.
+/// End of a run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "status", content = "reason", rename_all = "snake_case")]
 pub enum RunEnd {
@@ -185,7 +185,7 @@ pub enum RunEnd {
     Completed,
     /// The operator stopped or aborted it.
     Stopped(StopReason),
-    /// A device, a limit or the recorder ended it: the causes in words, separated by `; `.
+    /// A device, a limit or the recorder ended it: the causes as text, separated by `; `.
     Faulted(String),
 }
 
@@ -200,7 +200,7 @@ impl RunEnd {
         }
     }
 
-    /// Why, for everything but `Completed`.
+    /// Reason of any end but `Completed`.
     #[must_use]
     pub fn reason(&self) -> Option<&str> {
         match self {
@@ -217,9 +217,9 @@ pub enum Record {
     /// The first record of every run.
     Started(Box<RunHeader>),
     /// The first record of every further *leg*: another process resumes the session. Its host clock, its cameras' clocks
-    /// and its chunk numbers begin anew; the recorder joins them to those before.
+    /// and its chunk numbers start again; the recorder joins them to the earlier ones.
     Resumed(Box<ResumeHeader>),
-    /// A device answered and was configured.
+    /// A device responded and was configured.
     Device {
         /// Its role.
         role: DeviceRole,
@@ -228,29 +228,29 @@ pub enum Record {
         /// Its settings as read back.
         settings: Vec<Setting>,
     },
-    /// What was checked before the robot is armed; nothing is armed when one of them failed.
+    /// Checks before the robot is armed; if one of them failed, nothing is armed.
     Preflight(Vec<PreflightCheck>),
     /// A press is about to be attempted. Durable before the robot moves for it.
     Intent {
-        /// Which attempt.
+        /// The attempt.
         attempt: AttemptId,
-        /// When.
+        /// Time.
         t: HostTime,
     },
     /// A motion command was given.
     Command {
-        /// When.
+        /// Time.
         t: HostTime,
-        /// What.
+        /// The command.
         command: MotionCommand,
     },
     /// Samples of the pose stream, in time order.
     Poses(Vec<PoseSample>),
     /// The trigger box sent a mark.
     MarkSent(SentMark),
-    /// What the trigger box reported on its own clock, in the order in which it came.
+    /// Reports of the trigger box on its own clock, in the order of arrival.
     BoxReports {
-        /// When it was taken from the box.
+        /// Time at which they were read from the box.
         t: HostTime,
         /// The reports.
         reports: Vec<BoxReport>,
@@ -259,29 +259,29 @@ pub enum Record {
     Chunk(RawChunk),
     /// An attempt ended. Durable together with all chunks up to its end.
     Outcome(PressOutcome),
-    /// A press of the plan that was not attempted, and why. Emitted at the end of a broken-off run.
+    /// A press of the plan that was not attempted, and the reason. Emitted at the end of an interrupted run.
     Missed(AttemptId, String),
     /// The run deviated from its plan.
     Interruption {
-        /// What.
+        /// Kind.
         kind: InterruptionKind,
-        /// When.
+        /// Time.
         t: HostTime,
-        /// In words.
+        /// Reason for display.
         reason: String,
     },
-    /// A remark by the operator or by skinrig.
+    /// A note by the operator or by skinrig.
     Note {
-        /// When.
+        /// Time.
         t: HostTime,
-        /// The remark.
+        /// The note.
         text: String,
     },
     /// The last record.
     Ended {
-        /// When.
+        /// Time.
         t: HostTime,
-        /// How.
+        /// End of the run.
         end: RunEnd,
     },
 }

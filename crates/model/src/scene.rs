@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::text::UnknownName;
 
-/// How much of the rig is simulated. Ordered from cheap to dear; each level contains the ones before it.
+/// Levels of simulation, from cheap to expensive; each level contains the ones before it.
 #[derive(
     Debug,
     Clone,
@@ -85,11 +85,11 @@ pub enum SceneNeed {
     Motion,
     /// Trigger edges and clock fits.
     Triggers,
-    /// Data volume and event rates of realistic size and course.
+    /// Data volume and event rates of realistic size and time course.
     EventRates,
     /// Polarity of press and release bursts.
     Polarity,
-    /// Localisation end to end; errors come from stated, injected-free sampling noise of the centroid.
+    /// Localisation end to end; errors come from a stated sampling noise of the centroid.
     Localisation,
     /// Localisation errors that emerge from optics: bias over the skin, dependence on depth and distance.
     OpticalError,
@@ -134,7 +134,7 @@ impl SceneNeed {
     }
 }
 
-/// The cheapest level that satisfies every need; [`SimLevel::Kinematic`] when there is none.
+/// The cheapest level that satisfies every need; [`SimLevel::Kinematic`] without needs.
 #[must_use]
 pub fn cheapest_level(needs: &[SceneNeed]) -> SimLevel {
     needs

@@ -1,4 +1,4 @@
-//! Settings of an analysis: everything that can change its numbers, each declared once.
+//! Settings of an analysis: everything that affects its numbers, each declared once.
 
 use serde::{Deserialize, Serialize};
 use skinrig_settings::{Choice, Collector, Field, Setting, Settings, ValueRange};
@@ -14,33 +14,33 @@ const NANOSECOND_MS: f64 = 1e-6;
 const WINDOW_MARGIN_MS: ValueRange = ValueRange::between(0.0, 10_000.0);
 const SHARE: ValueRange = ValueRange::between(0.0, 1.0);
 
-/// Which clustered events make the centroid of a press.
+/// Clustered events that form the centroid of a press.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum CentroidRule {
-    /// The largest cluster, as the paper says.
+    /// The largest cluster, as in the paper.
     #[default]
     LargestCluster,
-    /// All events that are not noise, as the public code does.
+    /// All events that are not noise, as in the public code.
     AllClusters,
 }
 
-/// What turns the events of a press in one camera into a column.
+/// Method that turns the events of a press in one camera into a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum Estimator {
-    /// Mean of the clustered events, as the paper says.
+    /// Mean of the clustered events, as in the paper.
     #[default]
     Dbscan,
     /// Median column of all events.
     ColumnMedian,
     /// Peak of the histogram of columns, smoothed by `eps`, between pixels.
     HistogramPeak,
-    /// A running histogram of 40 columns that forgets, in constant memory.
+    /// A running histogram of 40 columns with exponential forgetting, in constant memory.
     Streaming,
 }
 
-/// Width of the floating-point numbers of an estimator. Estimators that count in whole numbers do not depend on it.
+/// Width of an estimator's floating-point numbers. Estimators that count in whole numbers do not depend on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum Precision {
@@ -51,7 +51,7 @@ pub enum Precision {
     F32,
 }
 
-/// Which nested camera model is calibrated.
+/// Nested camera model to calibrate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum CalibrationModel {
@@ -65,7 +65,7 @@ pub enum CalibrationModel {
     Full,
     /// The 8 and a scale of the field of view per camera: 10.
     FullScale,
-    /// The smallest of them that no larger one beats at locations left out of the fit, by more than noise explains.
+    /// The smallest of them that no larger one beats at held-out locations by more than noise explains.
     #[default]
     Auto,
 }
@@ -100,7 +100,7 @@ impl Locator {
     }
 }
 
-/// How the least number of clustered events of a press is found.
+/// Rule for the least number of clustered events of a press.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum ThresholdRule {
@@ -111,25 +111,25 @@ pub enum ThresholdRule {
     Fixed,
 }
 
-/// Where a press window is anchored.
+/// Anchor of a press window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum WindowAnchor {
     /// From `window_before` before the measured contact to `window_after` after the measured release.
     #[default]
     Touch,
-    /// About the middle between contact and release, as the public code does.
+    /// About the middle between contact and release, as in the public code.
     Middle,
 }
 
-/// Where the background rate of the latency detector is taken from.
+/// Source of the background rate of the latency detector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum Background {
-    /// Idle time before the press, as the paper says.
+    /// Idle time before the press, as in the paper.
     #[default]
     Before,
-    /// 1.5 s to 2.4 s after the middle of the press, as the public code does.
+    /// 1.5 s to 2.4 s after the middle of the press, as in the public code.
     After,
 }
 
@@ -166,7 +166,7 @@ pub struct LatencySettings {
     /// Bins in a row above the threshold; the paper's 3.
     #[setting(default = "3", min = 1, max = 1000)]
     pub consecutive: u32,
-    /// The thresholds h that are tried.
+    /// The thresholds h to try.
     #[setting(default)]
     pub thresholds: ThresholdGrid,
     /// The threshold with the fewest false alarms is chosen among those that detect at least this share; the paper's 0.95.
@@ -175,7 +175,7 @@ pub struct LatencySettings {
     /// A detection counts when it lies within this of the median onset; the paper's 100 ms.
     #[setting(default = "100 ms", min = NANOSECOND_MS, max = 10_000.0)]
     pub window_ms: f64,
-    /// Where the background rate is taken from.
+    /// Source of the background rate.
     #[setting(default = "before")]
     pub background: Background,
     /// The same study on thinned events.
@@ -199,16 +199,16 @@ pub struct ThresholdGrid {
     pub count: u32,
 }
 
-/// What differs from the study on all events.
+/// Differences from the study on all events.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default)]
 #[settings(name = "reduced")]
 pub struct ReducedLatencySettings {
-    /// Of the events of a trial and of its background one in this many is used, chosen at random; the paper's 1024
+    /// One in this many events of a trial and of its background is used, chosen at random; the paper's 1024
     /// ("Data Ablation and Latency Distribution Analysis").
     #[setting(default = "1024", min = 1, max = 1_048_576)]
     pub factor: u32,
-    /// The thresholds h that are tried.
+    /// The thresholds h to try.
     #[setting(default)]
     pub thresholds: ReducedThresholdGrid,
     /// The threshold with the fewest false alarms is chosen among those that detect at least this share; the public code's 0.85.
@@ -235,7 +235,7 @@ pub struct ReducedThresholdGrid {
 impl ThresholdGrid {
     fn in_order(self, field: &Field, out: &mut Collector) -> Option<Self> {
         if self.from > self.to {
-            out.error(field.span, field.path.as_str(), "no thresholds are left")
+            out.error(field.span, field.path.as_str(), "the thresholds are empty")
                 .expected("the first threshold at or below the last")
                 .found(format!("{} to {}", self.from, self.to));
             return None;
@@ -262,14 +262,14 @@ impl From<ReducedThresholdGrid> for ThresholdGrid {
 #[serde(default)]
 #[settings(name = "cmre")]
 pub struct CmreSettings {
-    /// Side of a square cell. The virtual grid of the skin that defined the measure: 5 mm.
+    /// Side of a square cell. The measure is defined on a virtual grid of 5 mm.
     #[setting(default = "5 mm", min = 0.5, max = 100.0)]
     pub cell_mm: f64,
-    /// Standard deviation of the estimate's Gaussian; the public code's 1 mm. Below a micrometre it is no contact map.
+    /// Standard deviation of the estimate's Gaussian; the public code's 1 mm. At least 1 micrometre.
     #[setting(default = "1 mm", min = 0.001, max = 1000.0)]
     pub sigma_mm: f64,
-    /// SR of the public code, a length whose meaning and value are not given; 5 mm makes the documented scores (one cell off about
-    /// 0.02).
+    /// SR of the public code, a length whose meaning and value are not given; 5 mm reproduces the documented scores (one cell off
+    /// is about 0.02).
     #[setting(default = "5 mm", min = 0.001, max = 1000.0)]
     pub sr_mm: f64,
 }
@@ -279,19 +279,19 @@ pub struct CmreSettings {
 #[serde(default)]
 #[settings(name = "alignment")]
 pub struct AlignmentSettings {
-    /// Largest RMS residual of sync trains and marks about a camera's clock. Trigger inputs show whole microseconds, optocouplers
+    /// Largest RMS residual of sync trains and marks about a camera's clock. Trigger inputs resolve whole microseconds; optocouplers
     /// add some.
     #[setting(default = "10 us", min = 1e-3, max = 1e6)]
     pub max_residual_us: f64,
-    /// Largest half width of the 95 % interval of a camera's clock over the trigger box's, at a press: a quarter of the latency
+    /// Largest half width of the 95 % interval of a camera's clock relative to the trigger box's, at a press: a quarter of the latency
     /// study's bin.
     #[setting(default = "50 us", min = 1e-3, max = 1e6)]
     pub max_camera_interval_us: f64,
-    /// Largest half width of the certain interval of the host's clock over the trigger box's, at a press: a tenth of the margin of
-    /// a press window.
+    /// Largest half width of the certain interval of the host's clock relative to the trigger box's, at a press: a tenth of the
+    /// margin of a press window.
     #[setting(default = "5 ms", min = 1e-3, max = 1e6)]
     pub max_host_interval_us: f64,
-    /// Largest rate difference between two clocks, parts per million: a ceramic resonator's and a crystal's, twice.
+    /// Largest rate difference between two clocks, parts per million: twice that of a ceramic resonator and a crystal.
     #[setting(
         default = "10000",
         key = "max_drift",
@@ -300,25 +300,25 @@ pub struct AlignmentSettings {
         max = 1e6
     )]
     pub max_drift_ppm: f64,
-    /// Largest share of the edges sent that a camera did not see. Labels and intervals are proven for 20 %.
+    /// Largest share of the sent edges that a camera misses. Labels and intervals are proven for 20 %.
     #[setting(default = "0.3", range = SHARE)]
     pub max_lost: f64,
-    /// Largest share, of the edges sent, of edges that a camera saw twice or that nobody sent. Labels and intervals are proven for
+    /// Largest share, relative to the sent edges, of doubled or spurious edges at a camera. Labels and intervals are proven for
     /// 5 %.
     #[setting(default = "0.15", range = SHARE)]
     pub max_spurious: f64,
-    /// Least share of held-out trains within the 95 % interval stated for them, by more than chance (3 standard errors).
+    /// Least share of held-out trains within their 95 % interval, by more than chance (3 standard errors).
     #[setting(default = "0.85", range = SHARE)]
     pub min_coverage: f64,
-    /// A press further than this from the nearest train or mark that a camera saw, or from the nearest exchange with the trigger
-    /// box, is not timed and does not count: beyond it a rate that changes by 20 ppm, as a cheap crystal's does over tens of
+    /// Largest time from a press to the nearest train or mark at a camera, or to the nearest exchange with the trigger box. A press
+    /// beyond it is not timed and does not count: a rate that changes by 20 ppm, as a cheap crystal's does over tens of
     /// kelvins, moves the clock by more than `max_camera_interval`.
     #[setting(default = "2.5 s", min = 1e-3, max = 86_400e6)]
     pub max_tie_distance_us: f64,
-    /// The robot's poses are stamped late by at most this: one interval of a 1 kHz stream. Stated, not measured.
+    /// Largest delay of the robot's pose times: one interval of a 1 kHz stream. Stated, not measured.
     #[setting(default = "1 ms", max = 1e6)]
     pub robot_delay_us: f64,
-    /// Where clocks are aligned by event rates: least share of the planned presses that are found, and of the bursts among them that
+    /// If clocks are aligned by event rates: least share of the planned presses that are found, and of the bursts among them that
     /// are planned presses.
     #[setting(default = "0.5", range = SHARE)]
     pub min_explained: f64,
@@ -327,12 +327,12 @@ pub struct AlignmentSettings {
     pub min_log_odds: f64,
 }
 
-/// Settings of the analysis; every key is optional. A session recorded before a setting existed gets that setting's default.
+/// Settings of the analysis; every key is optional. Sessions recorded before a setting existed use its default.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default)]
 #[settings(name = "analysis", finish = Self::finish)]
 pub struct AnalysisSettings {
-    /// Rows of each camera that are kept, both ends included; the public code's 185 to 360 and 200 to 355.
+    /// Rows of each camera that are used, both ends included; the public code's 185 to 360 and 200 to 355.
     #[setting(key = "crop", default = "{}", value = Crop::default().rows_of_both(), shape = Crop::SHAPE, read = Crop::read, show = Crop::show)]
     pub crop_v: [(u16, u16); 2],
     /// The press window begins this long before the measured contact.
@@ -341,47 +341,47 @@ pub struct AnalysisSettings {
     /// The press window ends this long after the measured release.
     #[setting(default = "50 ms", range = WINDOW_MARGIN_MS)]
     pub window_after_ms: f64,
-    /// Neighbourhood radius of DBSCAN; the paper's 10 px. The neighbourhood search is laid out for up to 50 px.
+    /// Neighbourhood radius of DBSCAN; the paper's 10 px. The neighbourhood search supports up to 50 px.
     #[setting(default = "10 px", above = 0.0, max = 50.0)]
     pub eps_px: f64,
     /// Core threshold of DBSCAN, events; the paper's 10.
     #[setting(default = "10", min = 1, max = 1_000_000)]
     pub min_samples: u32,
-    /// Which clustered events make the centroid of a press.
+    /// Clustered events that form the centroid of a press.
     #[setting(default = "largest_cluster")]
     pub centroid: CentroidRule,
-    /// What turns the events of a press into a column; `skinrig tradeoff` measures what each is worth.
+    /// Method that turns the events of a press into a column; `skinrig tradeoff` compares them.
     #[setting(default = "dbscan")]
     pub estimator: Estimator,
     /// Width of the estimator's floating-point numbers; `dbscan` and `column_median` count in whole numbers and do not depend on it.
     #[setting(default = "f64")]
     pub precision: Precision,
-    /// After this time the streaming estimator has forgotten all but 1/e of an event.
+    /// Time constant of the streaming estimator: the weight of an event falls to 1/e.
     #[setting(default = "100 ms", min = 0.1, max = 60_000.0)]
     pub forget_ms: f64,
-    /// Only one event in this many is used, chosen at random; 1: all.
+    /// One in this many events is used, chosen at random; 1: all.
     #[setting(default = "1", min = 1, max = 1_048_576)]
     pub thinning: u32,
-    /// Side of the square bins of pixels that the estimator sees: 1, 2, 4, 8 or 16 px.
+    /// Side of the square pixel bins of the estimator: 1, 2, 4, 8 or 16 px.
     #[setting(default = "1 px", min = 1, max = 16)]
     pub bin_px: u16,
-    /// The press window ends this long after the measured contact, if it is not over before; when absent only the release ends it.
+    /// The press window ends at most this long after the measured contact; absent: only the release ends it.
     #[setting(min = NANOSECOND_MS, max = 60_000.0)]
     pub window_after_contact_ms: Option<f64>,
-    /// Where the press window is anchored.
+    /// Anchor of the press window.
     #[setting(default = "touch")]
     pub window_anchor: WindowAnchor,
-    /// How the least number of clustered events of a press is found.
+    /// Rule for the least number of clustered events of a press.
     #[setting(default = "calibrated")]
     pub cluster_threshold: ThresholdRule,
-    /// A press with fewer clustered events than this in either camera is excluded; the least value of a calibrated threshold; 0
+    /// A press with fewer clustered events in either camera is excluded; a calibrated threshold is never lower. 0
     /// turns a fixed rule off.
     #[setting(default = "20", max = 1_000_000)]
     pub min_cluster_events: u32,
-    /// Presses left out by hand, by their number in the report and everywhere else (from 1, sync presses counted).
+    /// Presses excluded by hand, by their number in the report (from 1, sync presses counted).
     #[setting(default = "[]")]
     pub exclude_press_numbers: Vec<PressId>,
-    /// In recordings of earlier versions only: presses left out by hand, counted from 0. New files use `exclude_press_numbers`.
+    /// In recordings of earlier versions only: presses excluded by hand, counted from 0. New files use `exclude_press_numbers`.
     #[doc(hidden)]
     #[serde(skip)]
     #[setting(max = 10_000_000)]
@@ -390,24 +390,24 @@ pub struct AnalysisSettings {
     /// the rule off.
     #[setting(default = "5", max = 1000.0)]
     pub min_response_sigma: f64,
-    /// A press whose rays meet at less than this sine is excluded as nearly parallel. At a sine of 1 every press would be excluded.
+    /// A press whose rays meet at less than this sine is excluded as nearly parallel. A sine of 1 would exclude every press.
     #[setting(default = "0.05", max = 0.999)]
     pub min_ray_sine: f64,
-    /// Leave estimates outside the outline out of the headline metrics; they are always counted.
+    /// Excludes estimates outside the outline from the headline metrics; they are always counted.
     #[setting(default = "true")]
     pub exclude_outside: bool,
-    /// Which parameters of the camera geometry are calibrated.
+    /// Parameters of the camera geometry to calibrate.
     #[setting(default = "auto")]
     pub calibration: CalibrationModel,
-    /// The lens that is calibrated: how the distance of a column from the middle becomes an angle.
+    /// The lens to calibrate: how a column's distance from the middle becomes an angle.
     #[setting(default = "exponential")]
     pub lens: LensKind,
     /// What turns the columns of both cameras into a position; learnt from the calibration presses alone.
     #[setting(default = "auto")]
     pub locator: Locator,
-    /// The least that a failed press counts in the RMSE with failures counted; when absent the RMS distance of the scored presses
-    /// from their mean: the error of an answer that knows nothing. Raised to the RMSE of the presses with an estimate where that is
-    /// more.
+    /// Least error of a failed press in the RMSE with failures counted; absent: the RMS distance of the scored presses
+    /// from their mean, the error of a constant estimate. Raised to the RMSE of the presses with an estimate if that is
+    /// larger.
     #[setting(above = 0.0, max = 1000.0)]
     pub failure_penalty_mm: Option<f64>,
     /// Error up to which a press counts as within.
@@ -416,8 +416,8 @@ pub struct AnalysisSettings {
     /// Bits per event in the data rates; the paper's 21.
     #[setting(default = "21", above = 0.0, max = 1024.0)]
     pub bits_per_event: f64,
-    /// Most scored presses whose events are kept for the studies of data reduction and latency, chosen at random; 0 leaves the
-    /// studies out.
+    /// Most scored presses whose events are kept for the studies of data reduction and latency, chosen at random; 0 omits the
+    /// studies.
     #[setting(default = "300", max = 100_000)]
     pub study_presses: u32,
     /// The data-reduction study.
@@ -443,7 +443,7 @@ pub struct AnalysisSettings {
     pub rate_bin_ms: f64,
 }
 
-/// Rows that are kept, both ends included.
+/// Rows that are used, both ends included.
 #[derive(Settings)]
 #[settings(name = "crop")]
 struct Crop {
@@ -465,7 +465,7 @@ impl Crop {
         for (key, [first, last]) in [("camera1", crop.camera1_px), ("camera2", crop.camera2_px)] {
             if first > last {
                 let at = field.at(key);
-                out.error(at.span, at.path.as_str(), "no rows are left")
+                out.error(at.span, at.path.as_str(), "the range of rows is empty")
                     .expected("the first row at or above the last")
                     .found(format!("{first} px to {last} px"));
                 return None;
@@ -484,7 +484,7 @@ impl AnalysisSettings {
     /// Sides of the bins of pixels that divide both sides of the sensor, px.
     pub const BIN_SIDES_PX: [u16; 5] = [1, 2, 4, 8, 16];
 
-    /// True for a press that is left out by hand.
+    /// True for a press that is excluded by hand.
     #[must_use]
     pub fn excludes(&self, press: PressId) -> bool {
         self.exclude_press_numbers.contains(&press)
@@ -496,7 +496,7 @@ impl AnalysisSettings {
             out.error(
                 at.span,
                 at.path.as_str(),
-                "bins that do not divide the sensor",
+                "the bins do not divide the sensor",
             )
             .expected("1, 2, 4, 8 or 16 px")
             .found(format!("{} px", self.bin_px));
@@ -510,9 +510,7 @@ impl AnalysisSettings {
             let numbers: Vec<String> = presses.iter().map(|p| p.number().to_string()).collect();
             let at = field.at("exclude_presses");
             out.error(at.span, at.path.as_str(), "this key counts presses from 0")
-                .expected(
-                    "`exclude_press_numbers`, which counts them from 1 as everything else does",
-                )
+                .expected("`exclude_press_numbers`, which counts them from 1")
                 .found("`exclude_presses` of earlier versions")
                 .help(format!(
                     "write `exclude_press_numbers: [{}]`",
@@ -525,16 +523,16 @@ impl AnalysisSettings {
     }
 }
 
-/// What the rig looks like to an analysis: the part of `RunHeader::rig_json` that it needs.
+/// Rig geometry for an analysis: part of `RunHeader::rig_json`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RigGeometry {
     /// The skin's outline.
     pub outline: SkinOutline,
-    /// The nominal (drawn or measured, not calibrated) camera geometry: where calibration starts.
+    /// The nominal (drawn or measured, not calibrated) camera geometry: the start of the calibration.
     pub nominal: StereoGeometry,
-    /// The camera trigger channel that carries the marks; `None` when the rig has no trigger line.
+    /// The camera trigger channel that carries the marks; `None` without a trigger line.
     pub trigger_channel: Option<u8>,
-    /// For each camera, how long after an edge at its trigger input it stamps it, whole µs; 0 where nobody measured it.
+    /// Delay per camera from an edge at its trigger input to its time stamp, whole µs; 0 if not measured.
     #[serde(default)]
     pub trigger_delay_us: [u16; 2],
 }

@@ -29,7 +29,7 @@ pub struct SkinOutline {
     pub radius_mm: f64,
 }
 
-/// An outline that has a name.
+/// A predefined outline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Choice)]
 enum KnownOutline {
     /// The published skin: 100 x 100 mm about (10, 2) mm, right corners chamfered by 20 mm, left corners rounded with 25 mm.
@@ -77,12 +77,12 @@ impl SkinOutline {
     };
 
     /// Signed distance-like clearance of `p` from the outline in mm: positive inside. Inside the outline it
-    /// is the exact distance to the nearest edge or arc; outside it is only known to be negative. Negative infinity
-    /// for a point with a coordinate that is no number: it is nowhere, and not inside.
+    /// is the exact distance to the nearest edge or arc; outside only its sign is meaningful. Negative infinity
+    /// for a point with a NaN coordinate, which counts as outside.
     #[must_use]
     pub fn clearance_mm(&self, p: Point2) -> f64 {
         if p.x_mm.is_nan() || p.y_mm.is_nan() {
-            return f64::NEG_INFINITY; // the minima below would pass over it
+            return f64::NEG_INFINITY; // the minima below would ignore it
         }
         let (hx, hy) = (self.width_mm / 2.0, self.height_mm / 2.0);
         let x = p.x_mm - self.centre.x_mm;

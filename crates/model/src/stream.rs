@@ -14,7 +14,7 @@ use crate::time::HostTime;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StreamFormat {
-    /// 32-bit words; what an EVK1 Gen3.1 sends.
+    /// 32-bit words, as sent by an EVK1 Gen3.1.
     Evt2,
     /// 64-bit vectorised words, little-endian.
     Evt21,
@@ -57,12 +57,12 @@ impl FromStr for StreamFormat {
     }
 }
 
-/// What a chunk contains, found by decoding it once in stream order.
+/// Contents of a chunk, determined by decoding it once in stream order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct ChunkFacts {
     /// Number of CD events.
     pub cd_events: u64,
-    /// How many of them are ON.
+    /// Number of those that are ON.
     pub on_events: u64,
     /// Number of trigger edges.
     pub trigger_edges: u64,
@@ -72,47 +72,47 @@ pub struct ChunkFacts {
     pub last_us: Option<u64>,
 }
 
-/// A run of bytes of one camera, exactly as they came.
+/// Consecutive bytes of one camera, exactly as received.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RawChunk {
-    /// Which camera.
+    /// The camera.
     pub camera: CameraId,
     /// 0, 1, 2, ... without gaps, per camera.
     pub seq: u64,
-    /// When the last byte reached the host.
+    /// Arrival of the last byte at the host.
     pub host_time: HostTime,
-    /// Bytes known to be lost between the previous chunk and this one; exact, or but for whole words: where the next word begins
-    /// is known. After a loss these bytes go on with a decoder that carries nothing over, see [`Self::facts`].
+    /// Bytes known to be lost between the previous chunk and this one; exact, or exact except for whole words, so that the next
+    /// word boundary is known. After a loss these bytes are decoded with a new decoder, see [`Self::facts`].
     pub lost_before: u64,
-    /// The camera time after which they were lost, µs, when the device knows it to be before the last time of the chunks before,
-    /// as from a counter that is read now and then. `None`: they were lost after those.
+    /// Camera time after which they were lost, µs, if the device knows it to be before the end of the previous chunks,
+    /// for example from a counter that is read periodically. `None`: they were lost after those chunks.
     pub lost_from_us: Option<u64>,
     /// The bytes. A word may be split between two chunks.
     pub bytes: Vec<u8>,
-    /// What the device's decoder saw in these bytes. After a loss it carries no torn word and no old time over: events before
+    /// Contents of these bytes. After a loss the decoder carries no partial word and no time over: events before
     /// the next time base word have no time and are not counted.
     pub facts: ChunkFacts,
     /// The trigger edges in these bytes, in stream order.
     pub triggers: Vec<TriggerEdge>,
 }
 
-/// The time that was lost with bytes of a camera, on its clock.
+/// Time lost together with bytes of a camera, on its clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct LostTime {
-    /// The last time known to be good before the loss, µs; `None`: there is none.
+    /// Last good time before the loss, µs; `None` if there is none.
     pub from_us: Option<u64>,
-    /// The first time after it, µs; `None`: none came.
+    /// First time after it, µs; `None` if there is none.
     pub to_us: Option<u64>,
 }
 
 impl LostTime {
-    /// How long it was, when both ends are known.
+    /// Its length, if both ends are known.
     #[must_use]
     pub fn span_us(self) -> Option<u64> {
         self.to_us?.checked_sub(self.from_us?)
     }
 
-    /// Both ends, as far as they are known: `(from_us, to_us)`, 0 and the largest number where there is none.
+    /// Both ends `(from_us, to_us)`; 0 and the largest number where unknown.
     #[must_use]
     pub fn bounds_us(self) -> (u64, u64) {
         (self.from_us.unwrap_or(0), self.to_us.unwrap_or(u64::MAX))

@@ -19,8 +19,8 @@ impl std::fmt::Display for UnknownName {
 
 impl std::error::Error for UnknownName {}
 
-/// True for characters that do something instead of showing something: controls (C0, DEL, C1), the bidirectional formatting characters
-/// and the line separators of Unicode. A line feed and a tab are none of them.
+/// True for characters with an effect instead of a glyph: controls (C0, DEL, C1), the bidirectional formatting characters
+/// and the line separators of Unicode. A line feed and a tab are not among them.
 #[must_use]
 pub const fn is_hidden(c: char) -> bool {
     match c {
@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn characters_that_act_are_written_out() {
+    fn control_characters_are_written_out() {
         assert_eq!(visible("plain: é 日本 µm\n\tx"), "plain: é 日本 µm\n\tx");
         assert_eq!(visible("a\u{1b}[2Jb"), "a\\u{1b}[2Jb");
         assert_eq!(visible("\u{202e}gpj.exe"), "\\u{202e}gpj.exe");

@@ -1,8 +1,8 @@
 //! Time on the rig's own clock, and spans of it.
 //!
-//! Three kinds of clock exist in a session and are never mixed: the *host* clock of the rig (this
+//! A session has three kinds of clocks, which are never mixed: the *host* clock of the rig (this
 //! module, integer nanoseconds since the session's start), each *camera* clock (integer microseconds,
-//! `u64`, unrelated origin, drifting), and the civil clock (text in the session header, for people only).
+//! `u64`, unrelated origin, drifting), and the civil clock (text in the session header, for display only).
 
 use std::fmt;
 use std::ops::{Add, AddAssign, Sub};
@@ -41,7 +41,7 @@ impl HostTime {
 }
 
 impl HostDuration {
-    /// No time at all.
+    /// Zero.
     pub const ZERO: Self = Self(0);
 
     /// A span of whole milliseconds.

@@ -1,12 +1,12 @@
-//! Reports of a trigger box on its own clock: the ties between host, box and cameras.
+//! Reports of a trigger box on its own clock, which tie host, box and cameras together.
 
 use serde::{Deserialize, Serialize};
 
 use crate::pulse::Mark;
 use crate::time::HostTime;
 
-/// An instant on the trigger box's own clock, µs since it was switched on or reset. Unwrapped: it never goes back
-/// unless the box was reset, which [`BoxReport::Reset`] tells.
+/// Time on the trigger box's own clock, µs since power-on or reset. Unwrapped: it never goes back
+/// unless the box was reset, which [`BoxReport::Reset`] reports.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
 )]
@@ -20,7 +20,7 @@ pub struct BoxTime {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "what", rename_all = "snake_case")]
 pub enum BoxReport {
-    /// The box read its clock between two instants of the host: `sent <= box time <= received`, certainly.
+    /// The box read its clock between two host times: certainly `sent <= box time <= received`.
     Exchange {
         /// Before the first byte of the request left the host.
         sent: HostTime,
@@ -31,28 +31,28 @@ pub enum BoxReport {
     },
     /// The start pulse of a mark's train rose.
     Mark {
-        /// Which mark.
+        /// The mark.
         mark: Mark,
-        /// When.
+        /// Time.
         at: BoxTime,
     },
     /// The start pulse of a periodic sync train rose.
     Sync {
         /// Running number, modulo 2^17.
         count: u32,
-        /// When.
+        /// Time.
         at: BoxTime,
     },
     /// An edge at the box's input (a contact switch or an optical gate).
     Input {
         /// True for a rising edge.
         rising: bool,
-        /// When.
+        /// Time.
         at: BoxTime,
     },
-    /// The box lost its clock (power, watchdog, reset button): times before and after this do not compare.
+    /// The box lost its clock (power, watchdog, reset button): times before and after this cannot be compared.
     Reset {
-        /// Host time at which the reset was noticed.
+        /// Host time of the detection.
         noticed: HostTime,
     },
 }

@@ -34,7 +34,7 @@ impl Protocol {
         protocol(name, bytes, overrides, loader, false)
     }
 
-    /// Reads the protocol of a recording, which may use keys that a new one may not (`analysis.exclude_presses`). Otherwise as
+    /// Reads the protocol of a recording, which may contain keys that are invalid in a new one (`analysis.exclude_presses`). Otherwise as
     /// [`Protocol::parse`].
     ///
     /// # Errors
@@ -76,10 +76,10 @@ fn protocol(
         }
         (None, true) => {
             let span = Span::default();
-            out.error(span, "", "the file could not be understood")
+            out.error(span, "", "the file could not be compiled")
                 .expected("a protocol")
-                .found("an input that passed every check and still has no meaning")
-                .help("this is a defect of skinrig; please report it with the file");
+                .found("a file that passes every check but yields no protocol")
+                .help("this is a bug in skinrig: please report it with the file");
         }
         _ => {}
     }
@@ -89,7 +89,7 @@ fn protocol(
     }
 }
 
-/// Every part is read even when another one failed, so that all findings appear at once.
+/// Reads every part even if another one failed, so that all findings appear at once.
 fn assemble(
     root: &Field,
     folder: &Path,
@@ -104,10 +104,10 @@ fn assemble(
         (_, Some(Some(depth))) => Some(vec![*depth]),
         _ => None,
     };
-    // What could be read is held against each other, also beside keys that could not: their findings are in `out` already.
-    let told = &mut Collector::default();
-    let limits = LimitKeys::read_parts(root.at("limits"), told);
-    let motion = MotionKeys::read_parts(root.at("motion"), told);
+    // Cross-checks need only the values that were read; findings of these parts are in `out` already.
+    let discarded = &mut Collector::default();
+    let limits = LimitKeys::read_parts(root.at("limits"), discarded);
+    let motion = MotionKeys::read_parts(root.at("motion"), discarded);
     depths_within(root, limits.max_depth_mm, out);
     check_motion(
         &motion,
@@ -218,7 +218,7 @@ fn assemble(
     })
 }
 
-/// No press and no sync press is deeper than the limit.
+/// Checks that no press and no sync press is deeper than the limit.
 fn depths_within(root: &Field, max_mm: Option<f64>, out: &mut Collector) {
     let Some(max_mm) = max_mm else { return };
     let listed = root.get("depths").map_or(&[][..], Field::items).iter();
@@ -238,7 +238,7 @@ fn depths_within(root: &Field, max_mm: Option<f64>, out: &mut Collector) {
     }
 }
 
-/// Holds the motion against itself, the fastest allowed speed and the depths.
+/// Checks that the motion is consistent and within the limits of speed and depth.
 fn check_motion(
     motion: &MotionParts,
     max_speed_mm_s: Option<f64>,
@@ -335,7 +335,7 @@ fn sync(keys: &SyncKeys, outline: SkinOutline, depths_mm: &[f64]) -> Option<Sync
     })
 }
 
-/// The band in which a touch is believed lies below clearance height and above the floor.
+/// Checks that the search band is below clearance height and above the floor.
 fn band_fits(
     surface: &Surface,
     f: &Field,
@@ -364,7 +364,7 @@ fn band_fits(
     }
 }
 
-/// Whether everything fits into its period, and marks do not overlap. Needs the plan.
+/// Checks that each press fits into its period and that marks do not overlap. Needs the plan.
 fn check_timing(protocol: &Protocol, root: &Field, out: &mut Collector) {
     let plan = protocol.compile();
     if let Some(late) = timing::first_misfit(&plan) {
@@ -383,7 +383,7 @@ fn check_timing(protocol: &Protocol, root: &Field, out: &mut Collector) {
         };
         out.error(span, path, "the presses do not fit into their time")
             .expected(format!(
-                "at least {:.3} s: what {} takes with {:.0} % in reserve (motion {:.3} s, hold and settling {:.3} s, travel to the next {:.3} s)",
+                "at least {:.3} s: the time of {} plus {:.0} % reserve (motion {:.3} s, hold and settling {:.3} s, travel to the next {:.3} s)",
                 late.needed_s,
                 late.press,
                 (timing::FIT_RESERVE - 1.0) * 100.0,

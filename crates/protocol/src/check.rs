@@ -10,24 +10,24 @@ use crate::plan::{Plan, PressStep, Step};
 use crate::surface::{Surface, TouchSearch};
 use crate::timing;
 
-/// A segment of motion that must not be made.
+/// A segment of motion that breaks a limit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Violation {
-    /// The press that it belongs to, or that it leads to; `None` when no press follows.
+    /// Press that the segment belongs or leads to; `None` if no press follows.
     pub press: Option<PressId>,
     /// Index into [`Plan::steps`].
     pub step: usize,
-    /// Which part of the motion.
+    /// Part of the motion.
     pub segment: Segment,
-    /// What is wrong.
+    /// The problem.
     pub message: String,
-    /// What would have been accepted.
+    /// Accepted values.
     pub expected: String,
-    /// What the plan asks for.
+    /// Value in the plan.
     pub found: String,
-    /// How far past the limit, in the unit of the limit; 0 where that has no measure.
+    /// Distance past the limit, in the limit's unit; 0 if it has no measure.
     pub excess: f64,
-    /// The key of the protocol to change.
+    /// Key of the protocol to change.
     pub key: &'static str,
 }
 
@@ -35,7 +35,7 @@ pub struct Violation {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Segment {
-    /// From where the tip waits to the first location.
+    /// From the home position to the first location.
     FromHome,
     /// Lateral motion.
     Travel,
@@ -78,9 +78,9 @@ impl fmt::Display for Violation {
     }
 }
 
-/// Checks every segment of `plan`: travel, approach, press and retract, and the travel from `home` when it is known.
+/// Checks every segment of `plan`: travel, approach, press and retract, and the travel from `home` if it is known.
 ///
-/// Each is held against the workspace, the true outline with its margin, the keep-outs, the clearance height for
+/// Compares each with the workspace, the true outline and its margin, the keep-outs, the clearance height for
 /// lateral motion, and the limits of speed, depth and force. An empty list means that the plan may run.
 #[must_use]
 pub fn check(plan: &Plan, around: &Surroundings, home: Option<Point3<Skin>>) -> Vec<Violation> {
@@ -178,8 +178,8 @@ impl Checker<'_> {
         });
     }
 
-    /// Sets by how much the last violation exceeds its limit.
-    fn by(&mut self, excess: f64) {
+    /// Sets the excess of the last violation over its limit.
+    fn excess(&mut self, excess: f64) {
         if let Some(last) = self.found.last_mut() {
             last.excess = excess;
         }
@@ -252,7 +252,7 @@ impl Checker<'_> {
                     format!("{v:.3} mm"),
                     key,
                 );
-                self.by((min[k] - v).max(v - max[k]));
+                self.excess((min[k] - v).max(v - max[k]));
             }
         }
     }
@@ -267,7 +267,7 @@ impl Checker<'_> {
                 format!("{v} mm/s"),
                 key,
             );
-            self.by(v - max);
+            self.excess(v - max);
         }
     }
 
@@ -340,12 +340,12 @@ impl Checker<'_> {
                     ),
                     key,
                 );
-                self.by(keep_out.margin_mm - distance);
+                self.excess(keep_out.margin_mm - distance);
             }
         }
     }
 
-    /// The search for the surface stays below clearance height, in the workspace and above the floor.
+    /// Checks that the surface search stays below clearance height, in the workspace and above the floor.
     fn search(&mut self, at: Point2, search: &TouchSearch) {
         let limits = self.plan.limits;
         let room = limits
@@ -360,7 +360,7 @@ impl Checker<'_> {
                 format!("{band} mm"),
                 "press.band",
             );
-            self.by(band - room);
+            self.excess(band - room);
         }
         self.workspace(Segment::Approach, at.at_height(-band), "press.band");
         self.speed(Segment::Approach, search.speed_mm_s, "press.speed");
@@ -375,7 +375,7 @@ impl Checker<'_> {
         }
     }
 
-    /// The place lies within the outline, its margin kept.
+    /// Checks that a location is inside the outline by the margin.
     fn on_skin(&mut self, at: Point2, key: &'static str) {
         let inside = self.around.outline.clearance_mm(at);
         let margin = self.around.margin_mm;
@@ -392,11 +392,11 @@ impl Checker<'_> {
                 found,
                 key,
             );
-            self.by(margin - inside);
+            self.excess(margin - inside);
         }
     }
 
-    /// The points of the surface check, and the paths between them.
+    /// Checks the points of the surface check and the paths between them.
     fn surface_check(&mut self, home: Option<Point3<Skin>>) {
         let Some(check) = &self.plan.surface_check else {
             return;
@@ -465,7 +465,7 @@ impl Checker<'_> {
                 format!("{depth} mm"),
                 if sync { "sync.depth" } else { "depth" },
             );
-            self.by(depth - limits.max_depth_mm);
+            self.excess(depth - limits.max_depth_mm);
         }
         self.on_skin(at, key);
         self.keep_outs(Segment::Press, at, at, -depth, key);

@@ -129,8 +129,8 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    /// Goes above `to` unless the tip is known to be there. The first travel is always written: where the robot
-    /// really stands before the run is not the plan's to know.
+    /// Moves above `to` unless the tip is known to be there. The first travel is always written: the plan does not contain
+    /// the robot's position before the run.
     fn travel(&mut self, to: Point2) {
         let to = to.at_height(self.protocol.limits.clearance_mm);
         if to == self.position && !self.steps.is_empty() {

@@ -13,9 +13,9 @@ use skinrig_settings::{Field, Shape, Value};
 /// An injected fault of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PlantedFault {
-    /// What goes wrong.
+    /// Kind of the fault.
     pub kind: FaultKind,
-    /// When.
+    /// Time of the fault.
     pub when: FaultTime,
 }
 
@@ -62,11 +62,11 @@ pub enum FaultKind {
     RecorderSlow,
     /// The disk is full.
     DiskFull,
-    /// The process dies, as by `kill -9`.
+    /// The process is killed, as by `kill -9`.
     Killed,
 }
 
-/// Every kind by its name.
+/// Names of all kinds.
 const KINDS: [(&str, FaultKind); 27] = {
     use CameraId::{One, Two};
     use FaultKind as K;
@@ -145,7 +145,7 @@ pub enum FaultPhase {
     Contact,
     /// The tip rests in the skin.
     Hold,
-    /// The tip is sent up out of the skin.
+    /// The tip moves up out of the skin.
     Retract,
     /// The tip rests above the skin again.
     Between,
@@ -168,7 +168,7 @@ const PHASES: [(&str, FaultPhase); 9] = [
 ];
 
 impl FaultTime {
-    /// The valid times of `kind`, if this is not one of them.
+    /// The valid times of `kind` if this one is invalid.
     fn misfit(self, kind: FaultKind) -> Option<&'static str> {
         use FaultPhase as P;
         let fits = match self {
@@ -189,7 +189,7 @@ impl FaultTime {
 
 const OF_DEVICES: &str = "`preflight`, `arming`, `time:SECONDS`, or `travel:N`, `press:N`, `contact:N`, `hold:N`, `retract:N`, `between:N`";
 
-/// Why a text is no fault.
+/// Reason why a text is not a fault.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NoFault {
     expected: String,
@@ -307,7 +307,7 @@ pub(crate) fn faults(f: &Field, out: &mut Collector) -> Option<Vec<PlantedFault>
                 help,
             }) => {
                 let error = out
-                    .error(item.span, item.path.clone(), "no fault that can be made")
+                    .error(item.span, item.path.clone(), "not a valid fault")
                     .expected(expected)
                     .found(found);
                 if let Some(help) = help {
@@ -317,7 +317,7 @@ pub(crate) fn faults(f: &Field, out: &mut Collector) -> Option<Vec<PlantedFault>
             }
         }
     });
-    // All are read, so that all findings appear at once.
+    // Read all items, so that all findings appear at once.
     read.collect::<Vec<_>>().into_iter().collect()
 }
 
@@ -354,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_made_is_refused_with_what_can() {
+    fn invalid_faults_list_the_valid_ones() {
         for (text, told) in [
             ("", "a kind out of camera1-unplugged"),
             ("camera1-stall@hold:1", "did you mean `camera1-stalled`?"),

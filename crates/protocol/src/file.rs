@@ -1,4 +1,4 @@
-//! What every file that was read keeps of its text.
+//! Hexadecimal hashes of files.
 
 /// Lower-case hex.
 pub(crate) fn hex(bytes: &[u8]) -> String {

@@ -56,10 +56,10 @@ pub(crate) fn places(root: &Field, sources: &Sources) -> BTreeMap<&'static str, 
 }
 
 impl Protocol {
-    /// Holds every segment of `plan`, the plan of this protocol, against the limits; see [`check()`].
+    /// Checks every segment of `plan`, the plan of this protocol, against the limits; see [`check()`].
     ///
     /// # Errors
-    /// [`Diagnostics`] with one finding for each limit and key: how often it is broken, the worst case and a few
+    /// [`Diagnostics`] with one finding for each limit and key: number of violations, the worst case and a few
     /// examples.
     pub fn check(&self, plan: &Plan) -> Result<(), Diagnostics> {
         let violations = check(plan, &self.surroundings, Some(self.motion.home));

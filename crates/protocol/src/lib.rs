@@ -6,8 +6,8 @@
 //! 3. [`check()`] checks every segment of the plan against workspace, skin outline, keep-outs and limits.
 //! 4. [`Plan::summary`] and [`path_svg`] display it.
 //!
-//! [`Schedule`] describes a recording that was made without skinrig, for imports; [`RigFile`] a bench; [`Limits`] how much
-//! is a difference in a comparison; [`Suite`] what a bench is checked for. The keys of each language stand in a table, which
+//! [`Schedule`] describes a recording made without skinrig, for imports; [`RigFile`] a bench; [`Limits`] the margins
+//! of a comparison; [`Suite`] the checks of a bench. The keys of each language are declared in a table, which
 //! also yields its JSON Schema ([`schema_json`], [`schedule_schema_json`], [`rig_schema_json`], [`limits_schema_json`],
 //! [`suite_schema_json`]).
 

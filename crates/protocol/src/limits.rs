@@ -123,9 +123,9 @@ pub enum MarginError {
     },
     /// The value is not a valid margin of the metric.
     Value {
-        /// What is valid.
+        /// Valid values.
         expected: String,
-        /// What was found.
+        /// Actual value.
         found: String,
     },
 }
@@ -153,7 +153,7 @@ impl std::error::Error for MarginError {}
 pub struct Margin {
     /// As typed, for example `rmse`.
     pub metric: &'static str,
-    /// In mm, s, Hz, ev/s, B/s, percentage points, or a bare number: as the metric's unit is.
+    /// In the metric's unit: mm, s, Hz, ev/s, B/s, percentage points, or a bare number.
     pub value: f64,
 }
 
@@ -223,7 +223,7 @@ impl Limits {
         }
     }
 
-    /// Sets one margin, in place of the file's if it has one.
+    /// Sets one margin; replaces that of the file.
     pub fn set(&mut self, margin: Margin) {
         self.margins.retain(|m| m.metric != margin.metric);
         self.margins.push(margin);

@@ -139,7 +139,7 @@ fn csv(
             out.error(
                 file.span,
                 file.path.as_str(),
-                "the file is no text of reasonable size",
+                "not a text file of acceptable size",
             )
             .expected(format!(
                 "UTF-8 text of at most {} bytes",
@@ -208,14 +208,14 @@ fn csv_points(
     let mut clean = true;
     for (row, (start, line)) in lines.iter().enumerate().skip(1) {
         if line.is_empty() && row + 1 == lines.len() {
-            continue; // what follows the last line break
+            continue; // empty text after the last line break
         }
         let span = Span::new(source, *start, start + line.len());
         if line.split(',').all(|c| c.trim().is_empty()) {
             if !skip_blank {
                 out.error(span, "", format!("row {row} is blank"))
                     .expected("numbers in the columns `x` and `y`")
-                    .found("nothing but blanks")
+                    .found("only blanks")
                     .help("remove the row, or write `skip_blank_rows: true` in the protocol");
                 clean = false;
             }
@@ -230,7 +230,7 @@ fn csv_points(
         match (value(columns[0]), value(columns[1])) {
             (Ok(x), Ok(y)) => points.push(Point2::new(x, y)),
             (Err(text), _) | (_, Err(text)) => {
-                out.error(span, "", format!("row {row} holds no location"))
+                out.error(span, "", format!("row {row} is not a location"))
                     .expected("numbers within 1000 mm in the columns `x` and `y`")
                     .found(quote(text));
                 clean = false;
@@ -245,11 +245,11 @@ fn unit(rng: &mut Xoshiro256PlusPlus) -> f64 {
     (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// Darts thrown in a row without a hit before the search gives up.
+/// Consecutive misses after which the search gives up.
 const MOST_MISSES: u32 = 20_000;
 
-/// Dart throwing: uniform points of the enclosing rectangle from `xoshiro256++(seed)`, x before y; a dart counts
-/// when it lies inside the outline by the margins, outside every keep-out, and far enough from every other.
+/// Dart throwing: uniform points of the enclosing rectangle from `xoshiro256++(seed)`, x before y; a point counts
+/// if it lies inside the outline by the margins, outside every keep-out, and far enough from every other.
 fn random(
     keys: &Random,
     f: &Field,

@@ -32,7 +32,7 @@ pub struct PressPhases {
 }
 
 impl PressPhases {
-    /// The moments of a press since the begin of its downward motion, as host times from 0.
+    /// The moments of a press from the start of its downward motion, as host times from 0.
     #[must_use]
     pub fn since_approach(&self) -> PressTiming {
         let at = |moment: HostDuration| HostTime(moment.0 - self.approach.0);
@@ -46,7 +46,7 @@ impl PressPhases {
         }
     }
 
-    /// From the begin of the downward motion to the return to clearance height, s.
+    /// From the start of the downward motion to the return to clearance height, s.
     pub(crate) fn length_s(&self) -> f64 {
         self.clear.as_secs_f64() - self.approach.as_secs_f64()
     }
@@ -64,7 +64,7 @@ impl PressPhases {
         }
     }
 
-    /// The moments of the mapping `field` follow one another.
+    /// Checks that the moments of the mapping `field` are in order.
     pub(crate) fn check_order(field: &Field, out: &mut Collector) {
         let parts = Self::read_parts(field, &mut Collector::default());
         let moments = [

@@ -1,7 +1,7 @@
 //! The plan: a flat list of small typed steps, each with limits and a deadline, as pure data.
 //!
 //! A plan is compiled from a protocol before any device is opened. It holds everything the controller
-//! needs and nothing that it must compute: seeds are resolved, orders shuffled, positions absolute.
+//! needs, already computed: seeds are resolved, orders shuffled, positions absolute.
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::{
@@ -21,7 +21,7 @@ use crate::suspend::Suspend;
 pub struct Plan {
     /// Version of this layout.
     pub version: u32,
-    /// Name of the protocol, for people.
+    /// Name of the protocol, for display.
     pub name: String,
     /// Seed of everything random in the run.
     pub seed: u64,
@@ -30,10 +30,10 @@ pub struct Plan {
     /// Outline of the skin and keep-outs; `None` if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surroundings: Option<Surroundings>,
-    /// Limits on retakes of a press. Not written when it is the default.
+    /// Limits on retakes of a press. Omitted if default.
     #[serde(default, skip_serializing_if = "Retakes::is_default")]
     pub retakes: Retakes,
-    /// Number of consecutive invalid presses that ends the run; 0: no limit. Not written when it is the default.
+    /// Number of consecutive invalid presses that ends the run; 0: no limit. Omitted if default.
     #[serde(
         default = "default_invalid_in_a_row",
         skip_serializing_if = "is_default_invalid_in_a_row"
@@ -47,7 +47,7 @@ pub struct Plan {
     pub suspend: Suspend,
     /// Every planned press; `presses[i].id == PressId::from_index(i)`, and the stored `id` is `i`.
     pub presses: Vec<PlannedPress>,
-    /// What to do, in order.
+    /// The steps, in order.
     pub steps: Vec<Step>,
 }
 
@@ -91,10 +91,10 @@ pub struct RunLimits {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum OnTrip {
-    /// Hold, rise straight up off the skin, disarm; brake at once when the feedback cannot be trusted.
+    /// Hold, rise straight up off the skin, disarm; brake immediately if the feedback is unreliable.
     #[default]
     Retract,
-    /// Brake at once, wherever the tip is.
+    /// Brake immediately, wherever the tip is.
     Brake,
 }
 
@@ -110,7 +110,7 @@ impl OnTrip {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "step", rename_all = "snake_case")]
 pub enum Step {
-    /// A repetition begins; its press periods count from this instant. The sync presses, when there are
+    /// A repetition begins; its press periods count from this instant. The sync presses, if
     /// any, have their own block with `repetition: None`.
     Begin {
         /// Which repetition; `None` for the sync block.
@@ -128,7 +128,7 @@ pub enum Step {
     },
     /// One press, from clearance height and back to it.
     Press(PressStep),
-    /// Stay where you are.
+    /// Wait in place.
     Pause {
         /// How long.
         duration: HostDuration,
@@ -145,10 +145,10 @@ pub struct PressStep {
     pub at: Point2,
     /// How deep below the surface, mm, positive.
     pub depth_mm: f64,
-    /// How the surface is found.
+    /// Source of the surface height.
     #[serde(default, skip_serializing_if = "Surface::is_known")]
     pub surface: Surface,
-    /// The downward motion begins this long after the last `Begin`; at once when that is past or `None`.
+    /// The downward motion begins this long after the last `Begin`; immediately if that is past or `None`.
     pub start_after_begin: Option<HostDuration>,
     /// Speed from clearance height to the surface, mm/s.
     pub approach_speed_mm_s: f64,
@@ -160,6 +160,6 @@ pub struct PressStep {
     pub retract_speed_mm_s: f64,
     /// Moments that emit a mark on the trigger line.
     pub marks: Vec<MarkKind>,
-    /// Longest time from the downward motion's begin to settled at clearance height.
+    /// Longest time from the start of the downward motion to settled at clearance height.
     pub deadline: HostDuration,
 }

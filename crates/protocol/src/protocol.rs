@@ -111,15 +111,15 @@ pub struct Scene {
     pub needs: Vec<SceneNeed>,
     /// True if the protocol sets the level explicitly.
     pub level_is_named: bool,
-    /// The skin, where it is not the published one.
+    /// The skin, if it differs from the published one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub skin: Option<SimulatedSkin>,
-    /// Camera 1 and camera 2 as drawn, where they are not at the published places.
+    /// Camera 1 and camera 2 as drawn, if they are not at the published positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cameras: Option<[CameraModel; 2]>,
 }
 
-/// What distinguishes one simulated skin from another. Defaults and sources: the optical model's constants.
+/// Properties of a simulated skin. Defaults and sources: the optical model's constants.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SimulatedSkin {
     /// Thickness, mm, 0.5 to 50.

@@ -1,8 +1,8 @@
 //! The choices of the public analysis code as overrides of a protocol's `analysis`.
 
-/// Overrides that select what the public code chose where it departs from the paper or from the defaults here: all
-/// clusters make the centroid, a press window is one whole period about the middle of the press, nothing is left out by
-/// a threshold, a response or an angle, data reduction with a core threshold of one event, the background after the
+/// Overrides that select the public code's choices where it departs from the paper or from the defaults here: all
+/// clusters make the centroid, a press window is one whole period about the middle of the press, no threshold, response or
+/// angle excludes anything, data reduction has a core threshold of one event, the background is taken after the
 /// press, thresholds 17 to 19, and 3 to 8 at 1/1024 of the events. Each has its source in `docs/reference/paper.md`.
 ///
 /// The calibration stays the protocol's: the block that judges as published fits the paper's eight parameters itself.

@@ -8,14 +8,14 @@ use crate::timing;
 /// Path of the tip between two wanted presses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Route {
-    /// Straight, at clearance height: a new way, to be held against keep-outs by [`crate::check()`].
+    /// Straight, at clearance height: a new path that [`crate::check()`] must compare with the keep-outs.
     Straight,
-    /// Along every travel of the plan: longer, and allowed because the plan is.
+    /// Along every travel of the plan: longer, and already checked with the plan.
     AsPlanned,
 }
 
 impl Plan {
-    /// Presses of a resumed run, given their histories: those that [`Retakes::wants`](crate::Retakes::wants), and
+    /// Presses of a resumed run, given their histories: those selected by [`Retakes::wants`](crate::Retakes::wants), and
     /// before them all sync presses. Empty if only sync presses are left.
     #[must_use]
     pub fn wanted(&self, histories: &[PressHistory]) -> Vec<bool> {
@@ -35,7 +35,7 @@ impl Plan {
     }
 
     /// The same plan with only the steps that `wanted` presses need, in their order. The first press of a repetition starts at
-    /// once, and presses that are left out leave no time between the others. All presses stay listed.
+    /// once, and omitted presses leave no time between the others. All presses stay listed.
     #[must_use]
     pub fn remaining(&self, wanted: impl Fn(PressId) -> bool, route: Route) -> Self {
         let is_wanted = |step: &Step| matches!(step, Step::Press(p) if wanted(p.press));
@@ -49,7 +49,7 @@ impl Plan {
                     let rest = self.steps.iter().skip(n + 1);
                     rest.take_while(|s| !same(s)).any(is_wanted)
                 };
-                let kept = match step {
+                let is_kept = match step {
                     Step::Begin { .. } => leads(|s| matches!(s, Step::Begin { .. })),
                     Step::Pause { .. } => n > first && leads(|s| matches!(s, Step::Pause { .. })),
                     Step::Travel { .. } => {
@@ -57,7 +57,7 @@ impl Plan {
                     }
                     Step::Press(p) => wanted(p.press),
                 };
-                if kept {
+                if is_kept {
                     steps.push(step.clone());
                 }
             }
@@ -71,27 +71,27 @@ impl Plan {
         rest
     }
 
-    /// Takes the slots of presses that are left out away from those after them.
+    /// Moves presses forward by the slots of the omitted presses before them.
     fn close_gaps(&self, rest: &mut Self, wanted: impl Fn(PressId) -> bool) {
         let mut earlier = vec![HostDuration::ZERO; self.presses.len()];
-        // The slot that was left out last, and what all of the block left out amount to.
+        // Start of the last omitted slot, and the total time omitted in the block.
         let mut open: Option<HostDuration> = None;
-        let mut gone = HostDuration::ZERO;
+        let mut omitted = HostDuration::ZERO;
         for step in &self.steps {
             match step {
-                Step::Begin { .. } => (open, gone) = (None, HostDuration::ZERO),
+                Step::Begin { .. } => (open, omitted) = (None, HostDuration::ZERO),
                 Step::Press(p) => {
                     let Some(start) = p.start_after_begin else {
                         continue;
                     };
                     if let Some(from) = open.take() {
-                        gone = gone + HostDuration(start.0 - from.0);
+                        omitted = omitted + HostDuration(start.0 - from.0);
                     }
                     if !wanted(p.press) {
                         open = Some(start);
                     }
                     if let Some(earlier) = earlier.get_mut(p.press.index() as usize) {
-                        *earlier = gone;
+                        *earlier = omitted;
                     }
                 }
                 Step::Travel { .. } | Step::Pause { .. } => {}
@@ -99,17 +99,17 @@ impl Plan {
         }
         for step in &mut rest.steps {
             if let Step::Press(p) = step
-                && let (Some(start), Some(gone)) = (
+                && let (Some(start), Some(omitted)) = (
                     &mut p.start_after_begin,
                     earlier.get(p.press.index() as usize).copied(),
                 )
             {
-                start.0 -= gone.0;
+                start.0 -= omitted.0;
             }
         }
     }
 
-    /// Travels that became longer get a later deadline; the first one begins anywhere in the workspace.
+    /// Extends the deadlines of travels that became longer; the first one begins anywhere in the workspace.
     fn allow_time(&mut self) {
         let limits = self.limits;
         let corner = |[x, y, z]: [f64; 3]| Point3::<Skin>::new(x, y, z);

@@ -1,4 +1,4 @@
-//! When a press is taken again.
+//! Conditions for retaking a press.
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::{PressHistory, PressVerdict};
@@ -17,7 +17,7 @@ pub struct Retakes {
 }
 
 impl Retakes {
-    /// No press is taken again: a recording has each one as often as it has it.
+    /// No retakes.
     pub const NONE: Self = Self {
         per_press: 0,
         per_session: 0,
@@ -27,9 +27,9 @@ impl Retakes {
         *self == Self::default()
     }
 
-    /// Whether a resumed run takes a press with this history (again): when it is neither valid nor excluded, and either did not
-    /// come to its end or has an attempt left. Attempts that the rig or the operator cost are given back; when the plan was done
-    /// already, only presses whose last attempt was are taken again.
+    /// Whether a resumed run takes a press with this history (again): if it is neither valid nor excluded, and either was cut off
+    /// or has an attempt left. Attempts lost to the rig or the operator do not count. If the plan was completed
+    /// before, only presses whose last attempt was lost in this way are taken again.
     #[must_use]
     pub fn wants(&self, history: &PressHistory) -> bool {
         match &history.verdict {

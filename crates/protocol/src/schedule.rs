@@ -24,11 +24,11 @@ pub struct Schedule {
     pub sha256: String,
     /// Short name of the recording.
     pub name: String,
-    /// What was recorded.
+    /// Contents of the recording.
     pub description: Option<String>,
     /// Operator of the recording.
     pub operator: String,
-    /// Which skin was pressed.
+    /// The skin that was pressed.
     pub prototype: Prototype,
     /// Sync presses at the start.
     pub sync: Option<ScheduledSync>,
@@ -44,7 +44,7 @@ pub struct Schedule {
     pub depth_mm: f64,
     /// The moments of a press relative to its press time.
     pub phases: PressPhases,
-    /// What one unit of the CSV's columns is in mm.
+    /// One unit of the CSV's columns in mm.
     pub csv_unit_mm: f64,
     /// Whether blank rows of the CSV are skipped.
     pub csv_skip_blank_rows: bool,
@@ -89,7 +89,7 @@ pub enum ScheduledRoles {
 }
 
 impl ScheduledRoles {
-    /// How many repetitions there are.
+    /// Number of repetitions.
     #[must_use]
     pub fn repetitions(&self) -> u32 {
         match self {
@@ -120,9 +120,9 @@ impl ScheduledRoles {
     "expected {expected} press positions, `presses_per_repetition` of {schedule}, found {found}; correct the key or use the recording's own CSV"
 )]
 pub struct PositionCount {
-    /// As the schedule says.
+    /// Number in the schedule.
     pub expected: u32,
-    /// What was given.
+    /// Number in the recording.
     pub found: usize,
     /// The schedule's file.
     pub schedule: String,
@@ -137,7 +137,7 @@ impl Schedule {
         Self::read(name, bytes, overrides, false)
     }
 
-    /// Reads the schedule of a recording, which may use keys that a new one may not (`analysis.exclude_presses`).
+    /// Reads the schedule of a recording, which may contain keys that are invalid in a new one (`analysis.exclude_presses`).
     ///
     /// # Errors
     /// [`Diagnostics`] with every finding at once.
@@ -172,19 +172,18 @@ impl Schedule {
         }
     }
 
-    /// Whether the press is one of those that the schedule uses; sync presses always are.
+    /// Whether the schedule uses the press; always true for sync presses.
     #[must_use]
     pub fn is_used(&self, press: &PlannedPress) -> bool {
         press.role == PressRole::Sync || press.location.index() < self.presses_used
     }
 
     /// Every planned press in order, sync presses first, with its press time. `positions` are the rows of the CSV
-    /// in mm, skin frame. Time 0 is the moment at which the first press's downward motion begins.
+    /// in mm, skin frame. Time 0 is the start of the first press's downward motion.
     ///
     /// Press `i` of repetition `r` comes at `first + r * (presses_per_repetition * period + pause) + i * period`
     /// (times of the published recording: public code); `first` is `sync.pause_after` after the last sync press.
-    /// Presses that are recorded but not used are planned too (see [`Schedule::is_used`]): they are in the
-    /// recording, and the clock alignment needs them.
+    /// Recorded but unused presses are planned too (see [`Schedule::is_used`]), because the clock alignment needs them.
     ///
     /// # Errors
     /// [`PositionCount`] when the number of positions is not `presses_per_repetition`.
@@ -246,7 +245,7 @@ impl Schedule {
     }
 }
 
-/// Every part is read even when another one failed, so that all findings appear at once.
+/// Reads every part even if another one failed, so that all findings appear at once.
 fn assemble(root: &Field, out: &mut Collector) -> Option<Schedule> {
     let keys = ScheduleKeys::read_parts(root, out);
     if let (Some(used), Some(count)) = (keys.presses_used.flatten(), keys.presses_per_repetition)

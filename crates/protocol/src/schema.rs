@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Map, Value, json};
 use skinrig_settings::{Dimension, Need, Settings, Shape, Table, ValueRange, Word, expectation};
 
-/// The JSON Schema of a protocol, for editors: documentation, completion, checks while typing.
+/// The JSON Schema of a protocol, for documentation, completion and checks in editors.
 #[must_use]
 pub fn schema_json() -> String {
     render(crate::keys::ProtocolKeys::TABLE, "skinrig protocol")
@@ -35,7 +35,7 @@ pub fn suite_schema_json() -> String {
     render(crate::suite::Suite::TABLE, "skinrig suite")
 }
 
-/// The JSON Schema of the files of a table, for editors: documentation, completion, checks while typing.
+/// The JSON Schema of the files of a table, for documentation, completion and checks in editors.
 fn render(table: &'static Table, title: &str) -> String {
     let mut definitions = BTreeMap::new();
     let mut root = object(table, &mut definitions);
@@ -101,7 +101,7 @@ fn object(table: &'static Table, definitions: &mut Definitions) -> Map<String, V
     object
 }
 
-/// A default as JSON; lists and mappings by their own defaults.
+/// A default as JSON. Lists and mappings get their defaults from their own schemas.
 fn plain_default(shape: &Shape, text: &str) -> Value {
     match shape {
         Shape::Map(_) | Shape::Named(_) => json!({}),

@@ -15,7 +15,7 @@ pub(crate) const PRESS_EVENTS_PER_S: f64 = 28_570.0;
 pub(crate) const IDLE_EVENTS_PER_S: f64 = 9_140.0;
 /// Bytes of an event in EVT2.
 pub const BYTES_PER_EVENT: f64 = 4.0;
-/// Distance of two TIME_HIGH words of an EVT2 stream, µs, as the vendor's encoder writes them. The cadence of the
+/// Time between two TIME_HIGH words of an EVT2 stream, µs, as the vendor's encoder writes them. The cadence of the
 /// camera itself is not documented.
 pub(crate) const TIME_HIGH_PERIOD_US: f64 = 16.0;
 
@@ -61,7 +61,7 @@ impl Plan {
     /// The plan as canonical JSON, as stored in a session.
     #[must_use]
     pub fn to_json(&self) -> String {
-        // Plain data without maps: serialisation has no way to fail.
+        // Plain data without maps cannot fail to serialise.
         serde_json::to_string(self).unwrap_or_default()
     }
 

@@ -23,11 +23,11 @@ impl Surface {
     }
 }
 
-/// How the surface is searched: from clearance height to `band_mm` above the frame's surface at the approach's speed,
-/// then down at `speed_mm_s` until the force is `threshold_n` above the one in free air.
+/// Settings of the surface search: from clearance height to `band_mm` above the frame's surface at the approach's speed,
+/// then down at `speed_mm_s` until the force is `threshold_n` above that in free air.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
 pub struct TouchSearch {
-    /// With `touch`: a force this far above the one in free air is a contact. Friction hides less than about 0.1 N.
+    /// With `touch`: a force this far above that in free air is a contact. Friction hides less than about 0.1 N.
     #[setting(default = "0.2 N", above = 0, max = 12)]
     pub threshold_n: f64,
     /// With `touch`: this many samples in a row must be above the threshold.
@@ -48,7 +48,7 @@ pub struct TouchSearch {
 #[derive(Settings)]
 #[settings(name = "press", builds(Surface, PressKeys::surface))]
 struct PressKeys {
-    /// Where the surface is.
+    /// Source of the surface height.
     #[setting(default = "known")]
     surface: SurfaceWord,
     #[setting(flatten)]

@@ -20,7 +20,7 @@ pub struct SurfaceCheck {
     /// When to touch.
     #[setting(key = "at", default = "start", through = CheckTime)]
     pub each_repetition: bool,
-    /// How a touch is found.
+    /// Settings of a touch.
     #[setting(skip)]
     pub search: TouchSearch,
 }
@@ -40,7 +40,7 @@ impl From<CheckTime> for bool {
 }
 
 impl SurfaceCheck {
-    /// The check with the touch that `press` asks for. `field` is the mapping that it was read from.
+    /// The check with the touch settings of `press`. `field` is the mapping of the check.
     pub(crate) fn touching(
         self,
         press: Option<&Surface>,

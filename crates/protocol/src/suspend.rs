@@ -5,7 +5,7 @@ use skinrig_model::HostDuration;
 
 use skinrig_settings::{Choice, Collector, Field, Setting, Settings, ValueRange};
 
-/// Conditions under which the run waits at clearance height until they are over.
+/// Conditions that suspend the run at clearance height until they are over.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
 pub struct Suspend {
     /// An event storm: the rate of either camera.
@@ -24,11 +24,11 @@ pub struct Suspend {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[setting(shape = FreeSpace::SHAPE, read = FreeSpace::threshold)]
     pub disk_free: Option<Threshold>,
-    /// Temperature of either camera; a camera that does not report it is not watched. The camera's maker states the limit.
+    /// Temperature of either camera; a camera that does not report it is not monitored. The camera's maker states the limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[setting(shape = Heat::SHAPE, read = Heat::threshold)]
     pub temperature: Option<Threshold>,
-    /// What becomes of the press under way.
+    /// How the current press is handled.
     #[setting(default = "finish")]
     pub press: UnderWay,
     /// How long every condition must be over before the run continues.
@@ -39,8 +39,8 @@ pub struct Suspend {
     pub give_up_after: HostDuration,
 }
 
-/// Two levels: one that suspends, and another, on the calm side of it, at which the condition is over. In events per second,
-/// bytes per second, bytes or °C, whichever the condition measures.
+/// Two levels: one that suspends, and another, on the safe side of it, at which the condition is over. In events per second,
+/// bytes per second, bytes or °C, depending on the condition.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Threshold {
     /// A value beyond this suspends.
@@ -73,11 +73,11 @@ impl Threshold {
     }
 }
 
-/// What becomes of the press under way when the run is suspended.
+/// How the current press is handled when the run is suspended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum UnderWay {
-    /// Finish it; what was recorded decides its outcome.
+    /// Finish it; its outcome depends on the recorded data.
     #[default]
     Finish,
     /// Break it off; its outcome is invalid.
@@ -93,7 +93,7 @@ impl Suspend {
 const AMOUNT: ValueRange = ValueRange::from_zero(1e15);
 const DEGREES: ValueRange = ValueRange::between(-40.0, 150.0);
 
-/// The side of its first level on which a condition suspends.
+/// Side of the first level on which a condition suspends.
 #[derive(Clone, Copy, PartialEq)]
 enum Side {
     Above,
@@ -113,7 +113,7 @@ fn threshold(
         Side::Below => (trip < resume, "`resume_above` larger than `below`"),
     };
     if !in_order {
-        let message = "the two levels leave no room between them";
+        let message = "the two levels are not apart";
         out.error(f.span, f.path.as_str(), message)
             .expected(expected)
             .found(format!("{resume} and {trip}"));

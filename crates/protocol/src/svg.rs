@@ -10,7 +10,7 @@ use crate::summary::counted;
 
 /// Millimetres around the skin for axes and legend.
 const BORDER_MM: f64 = 14.0;
-/// Locations up to which every one is numbered; beyond it line ends and every tenth.
+/// Up to this many locations, each is numbered; beyond it, line ends and every tenth.
 const NUMBER_ALL: usize = 120;
 
 /// The path of `plan` as an SVG, seen from above: x to the right, y up, 6 px per mm, light and dark by the viewer's
@@ -45,7 +45,7 @@ pub fn path_svg(plan: &Plan, around: &Surroundings) -> String {
     let legend = 22.0;
     let full = [width + 2.0 * BORDER_MM, height + 2.0 * BORDER_MM + legend];
     let mut svg = String::new();
-    let mut put = |text: String| {
+    let mut write = |text: String| {
         svg.push_str(&text);
         svg.push('\n');
     };
@@ -56,7 +56,7 @@ pub fn path_svg(plan: &Plan, around: &Surroundings) -> String {
             high.y_mm - p.y_mm + BORDER_MM,
         )
     };
-    put(format!(
+    write(format!(
         r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {:.1} {:.1}" width="{:.0}" height="{:.0}" role="img" aria-label="press path of {}">"#,
         full[0],
         full[1],
@@ -64,37 +64,37 @@ pub fn path_svg(plan: &Plan, around: &Surroundings) -> String {
         full[1] * 6.0,
         escape(&plan.name)
     ));
-    put(STYLE.to_owned());
-    put(r#"<rect class="paper" width="100%" height="100%"/>"#.to_owned());
-    put(format!(
+    write(STYLE.to_owned());
+    write(r#"<rect class="paper" width="100%" height="100%"/>"#.to_owned());
+    write(format!(
         r#"<polygon class="skin" points="{}"/>"#,
         points(&corners, &at)
     ));
-    grid(&mut put, low, high, &at);
+    grid(&mut write, low, high, &at);
     for keep_out in &around.keep_outs {
         let title = escape(&keep_out.name);
         match &keep_out.area {
             Area::Circle { centre, radius_mm } => {
                 let (x, y) = at(*centre);
                 if keep_out.margin_mm > 0.0 {
-                    put(format!(
+                    write(format!(
                         r#"<circle class="margin" cx="{x:.2}" cy="{y:.2}" r="{:.2}"/>"#,
                         radius_mm + keep_out.margin_mm
                     ));
                 }
-                put(format!(
+                write(format!(
                     r#"<circle class="keepout" cx="{x:.2}" cy="{y:.2}" r="{radius_mm:.2}"><title>{title}</title></circle>"#
                 ));
             }
             Area::Polygon(corners) => {
                 if keep_out.margin_mm > 0.0 {
-                    put(format!(
+                    write(format!(
                         r#"<polygon class="margin" style="stroke-width:{:.2}" points="{}"/>"#,
                         2.0 * keep_out.margin_mm,
                         points(corners, &at)
                     ));
                 }
-                put(format!(
+                write(format!(
                     r#"<polygon class="keepout" points="{}"><title>{title}</title></polygon>"#,
                     points(corners, &at)
                 ));
@@ -103,7 +103,7 @@ pub fn path_svg(plan: &Plan, around: &Surroundings) -> String {
     }
     let visits = first_visits(plan);
     if visits.len() > 1 {
-        put(format!(
+        write(format!(
             r#"<polyline class="path" points="{}"/>"#,
             points(&visits, &at)
         ));
@@ -118,7 +118,7 @@ pub fn path_svg(plan: &Plan, around: &Surroundings) -> String {
             n if n == visits.len() => "press last",
             _ => "press",
         };
-        put(format!(
+        write(format!(
             r#"<circle class="{class}" cx="{x:.2}" cy="{y:.2}" r="{radius:.2}"><title>{number}: ({:.2}, {:.2}) mm</title></circle>"#,
             p.x_mm, p.y_mm
         ));
@@ -129,7 +129,7 @@ pub fn path_svg(plan: &Plan, around: &Surroundings) -> String {
             || ends_line
             || number % 10 == 0
         {
-            put(format!(
+            write(format!(
                 r#"<text class="number" font-size="{text:.2}" x="{:.2}" y="{:.2}">{number}</text>"#,
                 x + radius * 0.9,
                 y - radius * 0.9
@@ -140,7 +140,7 @@ pub fn path_svg(plan: &Plan, around: &Surroundings) -> String {
     if let Some(press) = sync.clone().next() {
         let (x, y) = at(press.at);
         let s = radius * 2.2;
-        put(format!(
+        write(format!(
             r#"<path class="sync" d="M{:.2} {y:.2}h{:.2}M{x:.2} {:.2}v{:.2}"/>"#,
             x - s,
             2.0 * s,
@@ -151,7 +151,7 @@ pub fn path_svg(plan: &Plan, around: &Surroundings) -> String {
     let mut y = BORDER_MM + height + 11.0;
     let mut line = |mark: &str, text: &str| {
         let mark = mark.replace("{y}", &format!("{:.2}", y - 0.9));
-        put(format!(
+        write(format!(
             r#"{mark}<text class="legend" x="{:.1}" y="{y:.2}">{}</text>"#,
             BORDER_MM + 6.0,
             escape(text)
@@ -186,7 +186,7 @@ pub fn path_svg(plan: &Plan, around: &Surroundings) -> String {
             "keep-out areas with their margins",
         );
     }
-    put("</svg>".to_owned());
+    write("</svg>".to_owned());
     svg
 }
 
@@ -203,7 +203,7 @@ const STYLE: &str = "<style>\n\
 </style>";
 
 fn grid(
-    put: &mut impl FnMut(String),
+    write: &mut impl FnMut(String),
     low: Point2,
     high: Point2,
     at: &impl Fn(Point2) -> (f64, f64),
@@ -218,10 +218,10 @@ fn grid(
         let v = k as f64 * step;
         let (x, top) = at(Point2::new(v, high.y_mm));
         let (_, bottom) = at(Point2::new(v, low.y_mm));
-        put(format!(
+        write(format!(
             r#"<line class="grid" x1="{x:.2}" y1="{top:.2}" x2="{x:.2}" y2="{bottom:.2}"/>"#
         ));
-        put(format!(
+        write(format!(
             r#"<text class="axis" text-anchor="middle" x="{x:.2}" y="{:.2}">{v:.0}</text>"#,
             bottom + 4.0
         ));
@@ -230,23 +230,23 @@ fn grid(
         let v = k as f64 * step;
         let (left, y) = at(Point2::new(low.x_mm, v));
         let (right, _) = at(Point2::new(high.x_mm, v));
-        put(format!(
+        write(format!(
             r#"<line class="grid" x1="{left:.2}" y1="{y:.2}" x2="{right:.2}" y2="{y:.2}"/>"#
         ));
-        put(format!(
+        write(format!(
             r#"<text class="axis" text-anchor="end" x="{:.2}" y="{:.2}">{v:.0}</text>"#,
             left - 1.5,
             y + 0.9
         ));
     }
     let (right, bottom) = at(Point2::new(high.x_mm, low.y_mm));
-    put(format!(
+    write(format!(
         r#"<text class="axis" text-anchor="end" x="{:.2}" y="{:.2}">x, mm</text>"#,
         right + 12.0,
         bottom + 4.0
     ));
     let (left, top) = at(Point2::new(low.x_mm, high.y_mm));
-    put(format!(
+    write(format!(
         r#"<text class="axis" x="{:.2}" y="{:.2}">y, mm</text>"#,
         left - 9.0,
         top - 4.0
@@ -263,7 +263,7 @@ fn points(list: &[Point2], at: &impl Fn(Point2) -> (f64, f64)) -> String {
     text
 }
 
-/// Where the first repetition presses at its first depth, in its order; repeated places once.
+/// Locations of the first repetition at its first depth, in order; repeated ones once.
 fn first_visits(plan: &Plan) -> Vec<Point2> {
     let mut seen = std::collections::HashSet::new();
     plan.presses
@@ -274,7 +274,7 @@ fn first_visits(plan: &Plan) -> Vec<Point2> {
         .collect()
 }
 
-/// True when the path changes its direction at place `k`.
+/// True if the path changes direction at location `k`.
 fn turns(visits: &[Point2], k: usize) -> bool {
     let (Some(a), Some(b), Some(c)) = (
         k.checked_sub(1).and_then(|i| visits.get(i)),
@@ -287,7 +287,7 @@ fn turns(visits: &[Point2], k: usize) -> bool {
     visits.len() > NUMBER_ALL && cross.abs() > 1e-6
 }
 
-/// Distance of the two closest of the first few hundred places, mm; sets the size of dots and numbers.
+/// Distance of the two closest of the first few hundred locations, mm; sets the size of dots and numbers.
 fn closest_pair_mm(visits: &[Point2]) -> f64 {
     let some = visits.get(..visits.len().min(600)).unwrap_or(&[]);
     let mut nearest = f64::INFINITY;

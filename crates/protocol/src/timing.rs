@@ -1,23 +1,23 @@
-//! How long the steps of a plan take: estimates for deadlines, feasibility and summaries.
+//! Estimated durations of the steps of a plan, for deadlines, feasibility and summaries.
 //!
-//! The estimate moves along each straight line with a trapezoidal speed profile of an assumed acceleration. Only
-//! deadlines, the check of periods and printed durations rest on it; nothing that is measured does.
+//! The estimate moves along each straight line with a trapezoidal speed profile of an assumed acceleration. It affects
+//! deadlines, the check of periods and printed durations only, never measured values.
 
 use skinrig_model::{HostDuration, MarkKind, Point3, Skin};
 
 use crate::plan::{Plan, PressStep, RunLimits, Step};
 use crate::surface::Surface;
 
-/// Acceleration assumed for estimates, mm/s². A choice of this project, far below what a haptic robot reaches.
+/// Acceleration assumed for estimates, mm/s². Chosen by this project, far below the limits of a haptic robot.
 pub(crate) const ASSUMED_ACCELERATION_MM_S2: f64 = 1000.0;
-/// A period must be this many times the estimated time of what happens in it.
+/// A period must be this many times the estimated time of its press.
 pub(crate) const FIT_RESERVE: f64 = 1.1;
 /// A deadline is this many times the estimate ...
 pub(crate) const DEADLINE_FACTOR: f64 = 3.0;
 /// ... plus this, s.
 pub(crate) const DEADLINE_SLACK_S: f64 = 1.0;
 
-/// Speed of motions that are no step of the plan, mm/s: the controller's default; never more than the plan's own limit.
+/// Speed of motions that are not steps of the plan, mm/s: the controller's default; never more than the plan's own limit.
 pub(crate) const OWN_SPEED_MM_S: f64 = 20.0;
 
 /// Time of a straight motion from rest to rest, s.
@@ -31,10 +31,10 @@ pub(crate) fn motion_s(distance_mm: f64, speed_mm_s: f64) -> f64 {
     }
 }
 
-/// The estimated moments of a press, s after its begin, in order: the marks, without the end.
+/// Estimated moments of a press, s after its start, in order: the marks, without the end.
 pub(crate) fn moments_s(limits: &RunLimits, press: &PressStep) -> [(MarkKind, f64); 5] {
     let settle = limits.settle_time.as_secs_f64();
-    // The mean case: a touched surface lies where the frame puts it.
+    // Mean case: a touched surface lies at the frame's surface.
     let contact = match press.surface {
         Surface::Known => motion_s(limits.clearance_mm, press.approach_speed_mm_s) + settle,
         Surface::Touch(t) => {
@@ -54,9 +54,9 @@ pub(crate) fn moments_s(limits: &RunLimits, press: &PressStep) -> [(MarkKind, f6
     ]
 }
 
-/// The estimated time of a press in motion and at rest (hold and three times settling), s.
+/// Estimated time of a press in motion and at rest (hold and three times settling), s.
 pub(crate) fn press_s(limits: &RunLimits, press: &PressStep) -> (f64, f64) {
-    // The worst case: a touched surface is found at the lower end of its band.
+    // Worst case: a touched surface is found at the lower end of its band.
     let (search, tare) = match press.surface {
         Surface::Known => (0.0, 0.0),
         Surface::Touch(t) => (
@@ -75,13 +75,13 @@ pub(crate) fn press_s(limits: &RunLimits, press: &PressStep) -> (f64, f64) {
     (motion, still)
 }
 
-/// The estimated time of a travel with settling, s.
+/// Estimated time of a travel with settling, s.
 pub(crate) fn travel_s(limits: &RunLimits, distance_mm: f64, speed_mm_s: f64) -> f64 {
     motion_s(distance_mm, speed_mm_s) + limits.settle_time.as_secs_f64()
 }
 
-/// The estimated time of all checks of the surface, s: one before the first press, and one after each repetition when
-/// that is asked for. The mean case: the surface lies where the frame says.
+/// Estimated time of all surface checks, s: one before the first press, and one after each repetition if
+/// configured. Mean case: the surface lies at the frame's surface.
 pub(crate) fn surface_checks_s(plan: &Plan) -> f64 {
     let Some(check) = &plan.surface_check else {
         return 0.0;
@@ -97,7 +97,7 @@ pub(crate) fn surface_checks_s(plan: &Plan) -> f64 {
         Step::Press(p) => Some(p.at),
         _ => None,
     });
-    // From about where the presses are to every point, and back.
+    // From near the presses to every point, and back.
     let stops = || first_press.iter().chain(&check.points);
     let next = stops().skip(1).chain(stops().take(1));
     let ways: f64 = stops()
@@ -115,12 +115,12 @@ pub(crate) fn surface_checks_s(plan: &Plan) -> f64 {
     times as f64 * (ways + check.points.len() as f64 * touch)
 }
 
-/// The deadline for something that should take `estimate_s`.
+/// Deadline for a step with this estimated duration.
 pub(crate) fn deadline(estimate_s: f64) -> HostDuration {
     HostDuration::from_secs_f64(estimate_s * DEADLINE_FACTOR + DEADLINE_SLACK_S)
 }
 
-/// Presses that differ in more than their place, to check timing once for each kind.
+/// Presses that differ in more than their location, to check timing once for each kind.
 pub(crate) fn distinct_presses(plan: &Plan) -> Vec<&PressStep> {
     let mut kinds: Vec<&PressStep> = Vec::new();
     for step in &plan.steps {
@@ -133,7 +133,7 @@ pub(crate) fn distinct_presses(plan: &Plan) -> Vec<&PressStep> {
     kinds
 }
 
-/// A press that does not fit between its begin and the next one's.
+/// A press that does not fit between its start and the next one's.
 pub(crate) struct Misfit {
     pub sync: bool,
     pub press: String,
@@ -144,7 +144,7 @@ pub(crate) struct Misfit {
     pub travel_s: f64,
 }
 
-/// The press that is furthest from fitting between its begin and the next one's, if any.
+/// The press that exceeds its period most, if any.
 pub(crate) fn first_misfit(plan: &Plan) -> Option<Misfit> {
     let mut worst: Option<Misfit> = None;
     let mut sync = false;

@@ -1,4 +1,4 @@
-//! Suites: the shipped one reads, and what is wrong with one is told at once, with its place.
+//! Suites: the shipped one parses, and all faults of an invalid one are reported at once, each with its location.
 #![expect(clippy::unwrap_used, reason = "a test")]
 
 use skinrig_model::Limit;
@@ -39,7 +39,7 @@ fn the_shipped_suite_states_a_limit_for_every_check() {
 }
 
 #[test]
-fn every_fault_of_a_suite_is_told_with_its_place() {
+fn every_fault_of_a_suite_is_reported_with_its_location() {
     let text = "\
 skinrig_suite: 1
 name: bad
@@ -52,7 +52,7 @@ checks:
     drift: {at_least: 5 ppm, at_most: 1 ppm}
     residual: {margin: 1 us}
 ";
-    let said = findings(text);
+    let message = findings(text);
     for part in [
         "suite.yaml:3:9",
         "add `differences: {at_most: 0}`",
@@ -62,15 +62,15 @@ checks:
         "suite.yaml:10:",
         "at least one of `at_most` or `at_least`",
     ] {
-        assert!(said.contains(part), "no {part} in:\n{said}");
+        assert!(message.contains(part), "no {part} in:\n{message}");
     }
 }
 
 #[test]
-fn another_files_language_is_named() {
-    let said = findings("skinrig_rig: 1\nname: x\n");
+fn a_file_in_another_language_is_recognised() {
+    let message = findings("skinrig_rig: 1\nname: x\n");
     assert!(
-        said.contains("a rig file, which belongs to `--rig`"),
-        "{said}"
+        message.contains("a rig file, which belongs to `--rig`"),
+        "{message}"
     );
 }

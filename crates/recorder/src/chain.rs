@@ -96,11 +96,11 @@ async fn check_previous_seal(
         (None, None) => return Ok(None),
         (Some(row), Some(tree)) => (row, tree),
         (row, _) => {
-            let words = ["in its row", "in previous_seal"];
+            let locations = ["in its row", "in previous_seal"];
             let (expected, found) = if row.is_some() {
-                (words[1], words[0])
+                (locations[1], locations[0])
             } else {
-                (words[0], words[1])
+                (locations[0], locations[1])
             };
             let problems = format!(
                 "expected the removed seal {expected} and {found}, found it only {expected}"

@@ -13,7 +13,7 @@
 //!
 //! Let `base` be the value of the TIME_HIGH word before the run (literal, or the last of an earlier token).
 //! Word `k` of the run then has the value `base + ((phase + 1 + k) >> shift)` modulo 2^28. A chunk is stored unchanged if it
-//! contains a word of type 0xB, has a length that is no multiple of 4, or does not shrink.
+//! contains a word of type 0xB, has a length that is not a multiple of 4, or does not shrink.
 
 use std::fmt;
 
@@ -107,10 +107,10 @@ fn best_run(words: &[[u8; 4]], base: u32) -> (usize, u32, u32) {
         }
     } else if first == base {
         // `base` repeats: the number of further repeats gives the phase.
-        let again = words.iter().take(4).take_while(|w| **w == words[0]).count() as u32;
+        let repeats = words.iter().take(4).take_while(|w| **w == words[0]).count() as u32;
         for shift in 1..=MAX_SHIFT {
-            if again < 1 << shift {
-                consider((1 << shift) - 1 - again, shift);
+            if repeats < 1 << shift {
+                consider((1 << shift) - 1 - repeats, shift);
             }
         }
     }
@@ -244,7 +244,7 @@ mod tests {
         words.into_iter().flat_map(u32::to_le_bytes).collect()
     }
 
-    fn there_and_back(raw: &[u8]) -> Option<usize> {
+    fn round_trip(raw: &[u8]) -> Option<usize> {
         let folded = fold(raw)?;
         assert_eq!(unfold(&folded, raw.len()).unwrap(), raw);
         Some(folded.len())
@@ -256,16 +256,16 @@ mod tests {
         let four = bytes((0..1000).map(|k| 0x8000_0000 | (9 + k / 4)));
         let two = bytes((0..1000).map(|k| 0x8000_0000 | (9 + k / 2)));
         for raw in [once, four, two] {
-            assert_eq!(there_and_back(&raw), Some(8));
+            assert_eq!(round_trip(&raw), Some(8));
         }
         // An event in the middle of a group of four: the run continues with its phase.
         let mut words: Vec<u32> = (0..100).map(|k| 0x8000_0000 | (9 + k / 4)).collect();
         words.insert(50, 0x1000_0000);
-        assert_eq!(there_and_back(&bytes(words)), Some(16));
+        assert_eq!(round_trip(&bytes(words)), Some(16));
     }
 
     #[test]
-    fn the_layout_is_the_documented_one() {
+    fn the_layout_matches_the_documentation() {
         let raw = bytes([
             0x8000_0007,
             0x8000_0008,
@@ -332,13 +332,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_come_back(raw in proptest::collection::vec(any::<u8>(), 0..400)) {
-            there_and_back(&raw);
+        fn any_bytes_round_trip(raw in proptest::collection::vec(any::<u8>(), 0..400)) {
+            round_trip(&raw);
         }
 
         #[test]
-        fn streams_rich_in_time_words_come_back(runs in proptest::collection::vec(word(), 0..30)) {
-            there_and_back(&bytes(runs.concat()));
+        fn streams_of_many_time_words_round_trip(runs in proptest::collection::vec(word(), 0..30)) {
+            round_trip(&bytes(runs.concat()));
         }
 
         #[test]

@@ -276,7 +276,7 @@ mod tests {
 
     /// A new column changes the result of `SELECT *` for earlier states: such a table needs a column list per schema.
     #[test]
-    fn earlier_states_are_read_with_the_columns_that_they_had() {
+    fn earlier_states_use_the_columns_of_their_schema() {
         let folder = tempfile::tempdir().unwrap();
         let runtime = tokio::runtime::Builder::new_current_thread()
             .build()
@@ -288,14 +288,14 @@ mod tests {
                 let path = folder.path().join(format!("{version}-now.session.sqlite"));
                 let mut now = schema::create(&path).await.unwrap();
                 for table in &TABLES {
-                    let there = has_table(&mut old, table.name).await.unwrap();
+                    let exists = has_table(&mut old, table.name).await.unwrap();
                     assert_eq!(
-                        there,
+                        exists,
                         table.since <= version,
                         "{} in schema {version}",
                         table.name
                     );
-                    if !there {
+                    if !exists {
                         continue;
                     }
                     let way = table.earlier.iter().rev().find(|(s, _)| *s <= version);

@@ -128,7 +128,7 @@ pub enum RecorderError {
     Displaced {
         /// The session file, or its log.
         path: PathBuf,
-        /// What happened to it.
+        /// Current state of the file.
         found: String,
     },
     /// A file of a session was moved or removed during the run; all records were saved.

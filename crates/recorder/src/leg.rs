@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_leg_begins_at_a_whole_second_after_all_that_is_recorded() {
+    fn a_leg_begins_at_a_whole_second_after_all_records() {
         for (last, next) in [
             (None, Some(0)),
             (Some(-5), Some(2_000)),
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn a_time_beyond_the_end_is_refused() {
+    fn a_time_beyond_the_end_is_rejected() {
         let offset = LegOffset {
             origin_ns: 2_000_000_000,
             ..LegOffset::default()

@@ -145,9 +145,9 @@ impl Shared {
         queue.bytes += bytes;
         queue.most_bytes = queue.most_bytes.max(queue.bytes);
         queue.taken += 1;
-        let mine = queue.taken;
+        let number = queue.taken;
         self.changed.notify_all();
-        while durable && queue.durable < mine {
+        while durable && queue.durable < number {
             if let Some(failure) = &queue.failed {
                 return Err(RecorderError::WriteFailed(failure.clone()));
             }

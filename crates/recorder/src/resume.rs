@@ -16,7 +16,7 @@ use crate::reader::SessionReader;
 use crate::verify::{ChunkScanner, VerifyReport, verify};
 use crate::{chain, schema};
 
-/// What the writer of a new leg needs.
+/// Start values for the writer of a new leg.
 pub(crate) struct LegStart {
     /// Number of the leg, from 2.
     pub number: u32,
@@ -105,9 +105,10 @@ async fn clear_seal(conn: &mut SqliteConnection) -> Result<(), Fault> {
 }
 
 fn lock(path: &Path) -> Result<WriterLock, RecorderError> {
-    // Roll back before locking: the lock file must not lie beside a file that is no session, and a rollback needs the file unlocked.
+    // Roll back before locking: no lock file may be created beside a file that is not a session, and a rollback needs the file
+    // unlocked.
     match SessionReader::open(path).and_then(|reader| reader.session_id()) {
-        // The following check reports what is wrong and what to do about it.
+        // The following check reports the damage and the next step.
         Ok(_) | Err(RecorderError::Damaged { .. } | RecorderError::Sql { .. }) => {
             WriterLock::take(path)
         }

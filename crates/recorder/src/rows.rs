@@ -24,7 +24,7 @@ pub struct DeviceRow {
 pub struct LegRow {
     /// 1, 2, 3, ...
     pub number: u32,
-    /// Who started it, when, and with which software.
+    /// Operator, start time and software.
     pub began: ResumeHeader,
     /// Start of its host clock on the session's. All times of earlier legs are before it.
     pub origin: HostTime,

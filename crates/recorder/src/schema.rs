@@ -144,7 +144,7 @@ fn allow_writing(path: &Path) -> std::io::Result<()> {
     std::fs::set_permissions(path, permissions)
 }
 
-/// Rolls back a transaction whose writer was killed; until then nobody can read the file.
+/// Rolls back a transaction whose writer was killed; until then the file cannot be read.
 async fn roll_back(path: &Path) -> Result<(), RecorderError> {
     let fault = |e: sqlx::Error| Fault::from(e).at(path, "rolling back an interrupted write");
     let mut conn = writable(path).connect().await.map_err(fault)?;
@@ -191,8 +191,12 @@ pub(crate) async fn open(path: &Path) -> Result<SqliteConnection, RecorderError>
         .await
         .map_err(|e| Fault::from(e).at(path, "opening it"))?;
     let schema = check_schema(&mut conn).await;
-    let made = schema.map_err(|fault| fault.at(path, "reading its schema"))?;
-    if made { Ok(conn) } else { Err(empty(path)) }
+    let has_schema = schema.map_err(|fault| fault.at(path, "reading its schema"))?;
+    if has_schema {
+        Ok(conn)
+    } else {
+        Err(empty(path))
+    }
 }
 
 fn empty(path: &Path) -> RecorderError {
@@ -355,7 +359,7 @@ mod tests {
 
     /// Schema 10 recreates the table of legs, although archived seals refer to its rows.
     #[test]
-    fn legs_and_what_refers_to_them_survive_their_new_table() {
+    fn legs_and_their_references_survive_the_migration() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("old.session.sqlite");
         let runtime = tokio::runtime::Builder::new_current_thread()
@@ -400,7 +404,7 @@ mod tests {
 
     /// A sealed session of schema 1 can be read and verified as before: later tables are not part of it.
     #[test]
-    fn sessions_of_the_first_schema_stay_sound() {
+    fn sessions_of_the_first_schema_stay_valid() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("old.session.sqlite");
         let runtime = tokio::runtime::Builder::new_current_thread()
@@ -485,7 +489,7 @@ mod tests {
     }
 
     #[test]
-    fn a_journal_that_names_another_file_is_not_played() {
+    fn a_journal_that_names_another_file_is_rejected() {
         let folder = tempfile::tempdir().unwrap();
         let victim = folder.path().join("victim");
         let path = folder.path().join("a.session.sqlite");

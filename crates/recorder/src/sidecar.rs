@@ -17,7 +17,7 @@ pub(crate) fn sidecar_path(path: &Path, ending: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// Rejects a session that is no regular file, or has a special file beside it. Reading a pipe or a device may block forever, and
+/// Rejects a session that is not a regular file, or has a special file beside it. Reading a pipe or a device may block forever, and
 /// a link in an untrusted folder would redirect writes to any other file.
 pub(crate) fn reject_special_files(path: &Path) -> Result<(), RecorderError> {
     let not = |found: String| {

@@ -1,4 +1,4 @@
-//! Tags and remarks that people add to a finished session, in a log beside the sealed file.
+//! Tags and remarks added to a finished session, in a log beside the sealed file.
 //!
 //! A sealed session never changes, and no hash covers these annotations. `NAME.tags.jsonl` holds one line of JSON per annotation
 //! with author and time. Lines are only appended, each in a single write, so that two people can tag the same session. The current

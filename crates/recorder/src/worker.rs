@@ -16,7 +16,7 @@ use crate::query::Fault;
 use crate::queue::{CloseMode, Shared, WriterTask};
 use crate::{rescue, seal};
 
-/// Longest time until records are committed that neither durability nor size has committed before.
+/// Longest time until a commit if no durable record or full transaction triggers one earlier.
 const COMMIT_AFTER: Duration = Duration::from_millis(500);
 const SEAL_RETRY_INTERVAL: Duration = Duration::from_millis(20);
 
@@ -171,21 +171,21 @@ async fn seal_session(mut journal: Journal, shared: &Shared) -> Result<Sealed, R
         .await
         .map_err(|e| sql(e.into()))?;
     // Readers usually leave within moments; SQLite's own timeout does not apply here.
-    let patience = shared.seal_timeout();
+    let timeout = shared.seal_timeout();
     let from = Instant::now();
     let mode: String = loop {
         let asked = sqlx::query_scalar("PRAGMA journal_mode = DELETE");
         match asked.fetch_one(&mut conn).await {
             Ok(mode) => break mode,
             Err(e) if !is_held(&e) => return Err(sql(e.into())),
-            Err(_) if from.elapsed() < patience => {
+            Err(_) if from.elapsed() < timeout => {
                 shared.mark_held_open();
                 std::thread::sleep(SEAL_RETRY_INTERVAL);
             }
             Err(e) => {
                 return Err(RecorderError::HeldOpen {
                     path: path.clone(),
-                    waited: patience,
+                    waited: timeout,
                     found: e.to_string(),
                 });
             }

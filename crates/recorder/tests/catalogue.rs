@@ -1,11 +1,11 @@
 //! Listing a folder reads the head of each session and not its plan, its journal or its camera bytes.
 //!
-//! A program of its own: the bytes that a process reads are counted for all of its threads together.
+//! A separate program, because the read bytes are counted for all threads of the process.
 #![cfg(target_os = "linux")]
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
+#![expect(clippy::unwrap_used, reason = "a test")]
 
 #[path = "session/common.rs"]
-#[expect(dead_code, reason = "only the session of it is used here")]
+#[expect(dead_code, reason = "only part of it is used here")]
 mod common;
 
 use std::io::Read;
@@ -15,13 +15,13 @@ use skinrig_model::{Record, RunHeader};
 use skinrig_recorder::{SessionState, SessionWriter, list};
 
 const SESSIONS: usize = 300;
-/// As a campaign of thousands of presses has it.
+/// As in a campaign of thousands of presses.
 const PLAN_BYTES: usize = 4 << 20;
-/// Pages of 64 KiB: the first, the schema's, and one or two of each small table that a list shows.
+/// Pages of 64 KiB: the first, the schema's, and one or two of each small table in a listing.
 const MOST_PAGES: u64 = 16;
 const PAGE_BYTES: u64 = 65_536;
 
-/// Bytes that this process has read by system calls so far.
+/// Bytes read by system calls of this process so far.
 fn read_so_far() -> u64 {
     let mut text = String::new();
     let mut counters = std::fs::File::open("/proc/self/io").unwrap();
@@ -31,7 +31,7 @@ fn read_so_far() -> u64 {
 }
 
 #[test]
-fn three_hundred_sessions_are_listed_by_a_few_pages_of_each() {
+fn a_listing_reads_a_few_pages_per_session() {
     let folder = tempfile::tempdir().unwrap();
     let first = folder.path().join("0.session.sqlite");
     let mut writer = SessionWriter::create(&first).unwrap();
@@ -66,5 +66,8 @@ fn three_hundred_sessions_are_listed_by_a_few_pages_of_each() {
         ));
         assert!(session.size_bytes > PLAN_BYTES as u64);
     }
-    assert!((1..=MOST_PAGES).contains(&pages), "{pages} pages of each");
+    assert!(
+        (1..=MOST_PAGES).contains(&pages),
+        "{pages} pages per session"
+    );
 }

@@ -13,9 +13,9 @@ const TEMPLATES: [(&str, &str); 2] = [
     ("frame.html", include_str!("../assets/frame/frame.html")),
     ("macros.html", include_str!("../assets/frame/macros.html")),
 ];
-const STYLE: &str = include_str!("../assets/frame/page.css");
+pub(crate) const STYLE: &str = include_str!("../assets/frame/page.css");
 /// Comes before the page's own script.
-const SCRIPT: &str = include_str!("../assets/frame/theme.js");
+pub(crate) const SCRIPT: &str = include_str!("../assets/frame/theme.js");
 
 /// Additions of one kind of page to the frame.
 pub(crate) struct Frame<'a> {

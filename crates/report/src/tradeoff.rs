@@ -20,7 +20,7 @@ use crate::svg::FIGURE_CSS;
 const TEMPLATE: &str = include_str!("../assets/tradeoff/page.html");
 const CSS: &str = include_str!("../assets/tradeoff/page.css");
 
-/// Which rows a table has.
+/// Rows of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rows {
     /// The session's own settings and the choices on a front.

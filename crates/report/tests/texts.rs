@@ -115,7 +115,7 @@ fn an_invalid_session_says_so_in_the_place_of_every_metric() {
     let hero = &hero[..hero.find("</div>").unwrap()];
     assert!(hero.contains("INVALID") && !hero.contains(&rmse), "{hero}");
 
-    // So does a finding that invalidates the errors.
+    // A finding that invalidates the errors has the same effect.
     analysis.alignment.status = skinrig_analysis::result::AlignmentStatus::Valid;
     analysis.alignment.violations.clear();
     analysis.findings = support::studies::findings();
@@ -195,7 +195,7 @@ fn the_summary_answers_first_in_few_lines() {
     assert!(found.contains("do        check which camera"), "{found}");
 }
 
-/// What only the full table has must not be what a reader of the summary needed to know.
+/// The summary must contain everything that a reader needs; only details are left to the full table.
 #[test]
 fn the_summary_shows_what_qualifies_the_answer() {
     let mut analysis = support::analysis(16, 10);

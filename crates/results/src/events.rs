@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use skinrig_analysis::{EventSource, EventSourceError, LegStart};
 use skinrig_formats::{Decoder, Geometry, Scanner};
@@ -18,7 +18,13 @@ pub struct SessionEvents {
     /// Time shift of each further leg, by its recorded start.
     moves: [BTreeMap<u64, i64>; 2],
     bytes_read: Arc<AtomicU64>,
+    stop: Option<Arc<AtomicBool>>,
 }
+
+/// A pass over the events that was told to stop.
+#[derive(Debug, thiserror::Error)]
+#[error("reading the events was stopped")]
+pub struct Stopped;
 
 impl SessionEvents {
     /// Events of `path`, whose cameras send `formats`, in the camera times of its aligned `legs`.
@@ -31,7 +37,15 @@ impl SessionEvents {
             formats,
             moves: [0, 1].map(|k| legs.iter().map(|leg| recorded(leg, k)).collect()),
             bytes_read: Arc::default(),
+            stop: None,
         }
+    }
+
+    /// Ends each pass with [`Stopped`], at the next chunk, once `stop` is set. The file is closed then.
+    #[must_use]
+    pub fn stopping_on(mut self, stop: Arc<AtomicBool>) -> Self {
+        self.stop = Some(stop);
+        self
     }
 
     /// Camera bytes read so far, over all passes; for the display of progress.
@@ -50,7 +64,12 @@ impl EventSource for SessionEvents {
         let reader = SessionReader::open(&self.path)?;
         let moves = &self.moves[camera.index()];
         let mut legs = LegDecoder::new(self.formats[camera.index()]);
-        let read = reader.for_each_chunk(camera, 0, |meta, bytes| {
+        let is_stopped = || {
+            self.stop
+                .as_ref()
+                .is_some_and(|s| s.load(Ordering::Relaxed))
+        };
+        reader.for_each_chunk_while(camera, 0, |meta, bytes| {
             if let Some(origin_us) = meta.restart_us {
                 legs.restart(
                     origin_us,
@@ -61,8 +80,12 @@ impl EventSource for SessionEvents {
             legs.for_each_slice(bytes, each);
             let read = bytes.len() as u64;
             self.bytes_read.fetch_add(read, Ordering::Relaxed);
-        });
-        Ok(read?)
+            !is_stopped()
+        })?;
+        if is_stopped() {
+            return Err(Stopped.into());
+        }
+        Ok(())
     }
 }
 

@@ -1,4 +1,4 @@
-//! What is wrong with an input: every finding with its place, what was expected, what was found, what to do.
+//! Diagnostics of an input: every finding with its location, expected and found values, and help.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -8,20 +8,20 @@ use skinrig_text::{Paint, Style, width};
 
 use crate::source::{Location, Sources, Span};
 
-/// One finding. Findings are always errors: nothing in an input is repaired in silence.
+/// One finding. Findings are always errors: no input is repaired silently.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Diagnostic {
-    /// What is wrong, in a few words, lower case.
+    /// The problem, in a few words, lower case.
     pub message: String,
     /// The key path, for example `path.meander.pitch`; empty for the file as a whole.
     pub path: String,
-    /// Where.
+    /// Location.
     pub location: Location,
-    /// What would have been accepted.
+    /// Accepted values.
     pub expected: Option<String>,
-    /// What was found.
+    /// Actual value.
     pub found: Option<String>,
-    /// What to do next: a fix to type, or a "did you mean".
+    /// Next step: a fix to type, or a "did you mean".
     pub help: Option<String>,
 }
 
@@ -43,8 +43,8 @@ impl Diagnostics {
         &self.list
     }
 
-    /// The findings as text for people: for each one the place, the line underlined, expected, found, help.
-    /// With `color`, ANSI escapes mark severity, places and fixes.
+    /// The findings as text: for each one the location, the underlined line, expected, found, help.
+    /// With `color`, ANSI escapes mark severity, locations and fixes.
     #[must_use]
     pub fn render(&self, color: bool) -> String {
         let paint = Paint::new(color);
@@ -108,7 +108,7 @@ impl Diagnostic {
         ));
         let before: String = text.chars().take(column - 1).collect();
         let marked: String = text.chars().skip(column - 1).take(*length).collect();
-        // A place behind the last character has no width of its own.
+        // A location after the last character has no width of its own.
         let carets = "^".repeat(width(&marked).max(1));
         out.push_str(&format!(
             "{margin} {bar} {}{}\n",
@@ -129,7 +129,7 @@ impl Diagnostic {
     }
 }
 
-/// How many findings are kept of one input; a file full of nonsense stops here.
+/// Most findings kept for one input.
 const MOST_FINDINGS: usize = 100;
 
 /// Collects findings about some sources.
@@ -148,7 +148,7 @@ pub struct Collector {
 pub struct Finding<'a>(Option<&'a mut Diagnostic>);
 
 impl Finding<'_> {
-    /// What would have been accepted.
+    /// Sets the accepted values.
     pub fn expected(mut self, text: impl Into<String>) -> Self {
         if let Some(d) = self.0.as_mut() {
             d.expected = Some(text.into());
@@ -156,7 +156,7 @@ impl Finding<'_> {
         self
     }
 
-    /// What was found.
+    /// Sets the actual value.
     pub fn found(mut self, text: impl Into<String>) -> Self {
         if let Some(d) = self.0.as_mut() {
             d.found = Some(text.into());
@@ -164,7 +164,7 @@ impl Finding<'_> {
         self
     }
 
-    /// What to do next.
+    /// Sets the next step.
     pub fn help(mut self, text: impl Into<String>) -> Self {
         if let Some(d) = self.0.as_mut() {
             d.help = Some(text.into());
@@ -172,7 +172,7 @@ impl Finding<'_> {
         self
     }
 
-    /// What to do next, when there is something to say.
+    /// Sets the next step, if any.
     pub(crate) fn maybe_help(self, text: Option<String>) -> Self {
         match text {
             Some(text) => self.help(text),
@@ -182,7 +182,7 @@ impl Finding<'_> {
 }
 
 impl Collector {
-    /// No findings yet.
+    /// A collector without findings.
     pub fn new(sources: Sources) -> Self {
         Self {
             sources,
@@ -224,13 +224,13 @@ impl Collector {
         }
     }
 
-    /// How many findings there are.
+    /// Number of findings.
     #[must_use]
     pub fn count(&self) -> usize {
         self.found.len()
     }
 
-    /// True when nothing is wrong so far.
+    /// True if there are no findings so far.
     #[must_use]
     pub fn is_clean(&self) -> bool {
         self.found.is_empty()
@@ -246,7 +246,7 @@ impl Collector {
     }
 }
 
-/// The candidate that looks most like `word`, when one is close enough to be a slip.
+/// The candidate most similar to `word`, if it is close enough to be a typing error.
 pub fn closest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     const LONGEST: usize = 64;
     if word.len() > LONGEST {
@@ -265,7 +265,7 @@ pub fn closest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(_, c)| c)
 }
 
-/// `did you mean X?` for the candidate that looks most like `word`.
+/// `did you mean X?` for the most similar candidate.
 pub fn did_you_mean<'a>(
     word: &str,
     candidates: impl IntoIterator<Item = &'a str>,
@@ -288,7 +288,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn carets_stand_below_wide_and_combining_characters() {
+    fn carets_align_with_wide_and_combining_characters() {
         for (text, marked, carets) in [
             ("name: skin", "skin", "      ^^^^"),
             ("皮膚: 一号", "一号", "      ^^^^"),

@@ -1,20 +1,20 @@
-//! Values that were read, each with its place.
+//! Parsed values, each with its location.
 
 use crate::quantity::Dimension;
 use crate::source::Span;
 
-/// A value that was read, and where it stands.
+/// A parsed value with its location.
 #[derive(Debug, Clone)]
 pub struct Field {
-    /// Its place in the text.
+    /// Location in the text.
     pub span: Span,
-    /// Its key path, for example `path.meander.pitch`.
+    /// Key path, for example `path.meander.pitch`.
     pub path: String,
     /// The value.
     pub value: Value,
 }
 
-/// A value that was read; its shape and range are as its key says.
+/// A parsed value; its shape and range match the declaration of its key.
 #[derive(Debug, Clone)]
 pub enum Value {
     /// A text.
@@ -31,7 +31,7 @@ pub enum Value {
     Word(&'static str),
     /// The items of a list or tuple.
     List(Vec<Field>),
-    /// First and last number, each with the place of the text that named it.
+    /// First and last number, each with the location of its text.
     Numbers(Vec<(u32, u32, Span)>),
     /// The entries of a mapping.
     Map(Vec<(String, Field)>),
@@ -47,7 +47,7 @@ impl Field {
             .map(|(_, f)| f)
     }
 
-    /// The field at a key path below this one, or the innermost mapping around it: the place to point at.
+    /// The field at a key path below this one, or the innermost mapping around it, as the location of a finding.
     #[must_use]
     pub fn at(&self, path: &str) -> &Self {
         let mut field = self;

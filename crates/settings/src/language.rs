@@ -7,11 +7,11 @@ use crate::shape::Table;
 use crate::source::{Sources, Span};
 use crate::yaml;
 
-/// Decodes a file, applies the overrides (`key.path=value`) and reads it by its table. The field holds what could be read, the
-/// collector what is wrong.
+/// Decodes a file, applies the overrides (`key.path=value`) and reads it by its table. The field contains the readable values, the
+/// collector the findings.
 ///
 /// # Errors
-/// [`Diagnostics`] when nothing can be read: no UTF-8, no YAML, a file of another language, an empty file.
+/// [`Diagnostics`] if nothing can be read: not UTF-8, not YAML, a file of another language, an empty file.
 pub fn open(
     name: &str,
     bytes: &[u8],
@@ -74,7 +74,7 @@ pub fn open(
     Ok((out, field))
 }
 
-/// Our languages: name of the table, key of the version, and what a file of it is in another one's place.
+/// Our languages: name of the table, key of the version, and description of such a file in messages.
 const LANGUAGES: [(&str, &str, &str); 5] = [
     ("protocol", "skinrig", "a protocol"),
     (
@@ -95,7 +95,7 @@ const LANGUAGES: [(&str, &str, &str); 5] = [
     ),
 ];
 
-/// The key by which a file of `table` says which language it is in.
+/// The version key of the language of `table`.
 fn version_key(table: &Table) -> &'static str {
     LANGUAGES
         .iter()
@@ -103,16 +103,16 @@ fn version_key(table: &Table) -> &'static str {
         .map_or("skinrig", |(_, key, _)| key)
 }
 
-/// The version key of another language, where the file has that and not its own, and what the file then is.
+/// The version key of another language, if the file has that and not its own, and the description of such a file.
 fn other_language(root: &yaml::Node, table: &Table) -> Option<(Span, &'static str)> {
     let yaml::Kind::Map(entries) = &root.kind else {
         return None;
     };
-    let given = |key: &str| entries.iter().find(|e| e.key == key);
-    if given(version_key(table)).is_some() {
+    let entry_of = |key: &str| entries.iter().find(|e| e.key == key);
+    if entry_of(version_key(table)).is_some() {
         return None;
     }
     LANGUAGES
         .iter()
-        .find_map(|(_, key, what)| given(key).map(|e| (e.key_span, *what)))
+        .find_map(|(_, key, what)| entry_of(key).map(|e| (e.key_span, *what)))
 }

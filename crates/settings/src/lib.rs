@@ -1,9 +1,9 @@
-//! Files of settings. Each key is declared once, by the struct that holds it; text is read with places and help.
+//! Settings files. Each key is declared once, by the struct that contains it; text is parsed with locations and help.
 //!
 //! A struct with `#[derive(Settings)]` is a mapping of a YAML file: a field gives the key's name, unit, range, default and
-//! documentation. From that one declaration come the reader ([`open`]), `--set`, the JSON Schema (by [`Settings::TABLE`]), the
-//! `Default` of the struct, the check of a value that was built in code ([`Settings::out_of_range`]) and
-//! the rows of a page that shows it ([`Settings::rows`]). An enum with `#[derive(Choice)]` is a key with a choice of words.
+//! documentation. This one declaration yields the reader ([`open`]), `--set`, the JSON Schema (by [`Settings::TABLE`]), the
+//! `Default` of the struct, the check of a value built in code ([`Settings::out_of_range`]) and
+//! its rows for display ([`Settings::rows`]). An enum with `#[derive(Choice)]` is a key with a choice of words.
 //!
 //! ```
 //! use skinrig_settings::{Choice, Settings};

@@ -5,7 +5,7 @@ use crate::shape::{Shape, Table};
 use crate::source::Span;
 use crate::yaml::{self, Entry, Kind, Node, join};
 
-/// Applies the overrides in order. What is wrong with one is reported at its own text.
+/// Applies the overrides in order. Findings point into the text of the override.
 pub(crate) fn apply(
     root: &mut Node,
     table: &'static Table,
@@ -49,13 +49,13 @@ fn apply_one(
             },
         }
     } else {
-        // The value is YAML of its own, at its place in the argument.
+        // The value is parsed as YAML, at its position in the argument.
         let padded = format!("{}{value}", " ".repeat(start));
         let part = out.sources.add("--set", padded);
         let node = yaml::parse(out, part);
         out.move_findings(part, source);
         let mut node = node?;
-        resource(&mut node, part, source);
+        change_source(&mut node, part, source);
         node
     };
     let mut node = root;
@@ -88,7 +88,7 @@ fn apply_one(
 }
 
 /// Moves the spans of a tree from source `from` to the same bytes of source `to`.
-fn resource(node: &mut Node, from: usize, to: usize) {
+fn change_source(node: &mut Node, from: usize, to: usize) {
     let fix = |span: &mut Span| {
         if span.source == from {
             span.source = to;
@@ -96,18 +96,18 @@ fn resource(node: &mut Node, from: usize, to: usize) {
     };
     fix(&mut node.span);
     match &mut node.kind {
-        Kind::List(items) => items.iter_mut().for_each(|n| resource(n, from, to)),
+        Kind::List(items) => items.iter_mut().for_each(|n| change_source(n, from, to)),
         Kind::Map(entries) => {
             for e in entries {
                 fix(&mut e.key_span);
-                resource(&mut e.value, from, to);
+                change_source(&mut e.value, from, to);
             }
         }
         Kind::Null | Kind::Refused | Kind::Scalar { .. } => {}
     }
 }
 
-/// The shape of the key that `keys` lead to.
+/// The shape of the key at the path `keys`.
 fn find(
     table: &'static Table,
     keys: &[(&str, Span)],

@@ -1,12 +1,12 @@
-//! Quantities: a number with its unit, as people write them.
+//! Quantities: a number with its unit.
 //!
 //! `4 mm`, `0.4 cm`, `1.5e-1 s`, `20 mm/s`, `2 N`, `30 deg`, `1 kHz`, `10 px`. The space is optional. A quotient by a
-//! whole number keeps a value exact that has no short decimal form: `868 s / 289`. A bare number is an error: it
-//! could be anything.
+//! whole number keeps a value exact that has no short decimal form: `868 s / 289`. A bare number is an error, because
+//! its unit is unknown.
 
 use crate::diagnostic::closest;
 
-/// What a quantity measures. Values are kept in the unit that the variant names.
+/// Dimension of a quantity. Values are stored in the unit that the variant states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dimension {
     /// Millimetres.
@@ -44,7 +44,7 @@ pub enum Dimension {
 }
 
 impl Dimension {
-    /// The accepted units, each with its size in the unit that values are kept in; the usual one first.
+    /// The accepted units, each with its size in the stored unit; the usual one first.
     #[must_use]
     pub const fn units(self) -> &'static [(&'static str, f64)] {
         match self {
@@ -133,7 +133,7 @@ impl Dimension {
         }
     }
 
-    /// The unit that people usually write.
+    /// The unit in common use.
     #[must_use]
     pub fn usual_unit(self) -> &'static str {
         self.units().first().map_or("", |(unit, _)| unit)
@@ -163,32 +163,32 @@ impl Dimension {
     }
 }
 
-/// A value and what it measures.
+/// A value with its dimension.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantity {
     /// In the unit of the dimension, which its variant names. Finite.
     pub value: f64,
-    /// What it measures.
+    /// Its dimension.
     pub dimension: Dimension,
 }
 
-/// Why a text is no quantity of a wanted dimension: fragments for "expected", "found" and "help".
+/// Reason why a text is not a quantity of an expected dimension: fragments for "expected", "found" and "help".
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct QuantityError {
-    /// What is wrong, a few words.
+    /// The problem, in a few words.
     pub message: String,
-    /// What would have been accepted.
+    /// Accepted values.
     pub expected: String,
-    /// What was found.
+    /// Actual value.
     pub found: String,
-    /// What to type instead, when it can be told.
+    /// Suggested text, if there is one.
     pub help: Option<String>,
 }
 
 /// Reads `text` as a quantity of one of the `wanted` dimensions (at least one).
 ///
 /// # Errors
-/// [`QuantityError`] for anything else: a bare number, an unknown or a wrong unit, no number, not finite.
+/// [`QuantityError`] for anything else: a bare number, an unknown or unexpected unit, not a number, not finite.
 pub fn parse(text: &str, wanted: &[Dimension]) -> Result<Quantity, QuantityError> {
     let text = text.trim();
     let expected = expectation(wanted);
@@ -213,13 +213,15 @@ pub fn parse(text: &str, wanted: &[Dimension]) -> Result<Quantity, QuantityError
             let found = format!("`{}`", divisor.chars().take(30).collect::<String>());
             let help =
                 Some("write a quotient as `868 s / 289`, by a whole number above 0".to_owned());
-            return Err(fail("the divisor is no whole number above 0", found, help));
+            return Err(fail(
+                "the divisor is not a whole number above 0",
+                found,
+                help,
+            ));
         }
     };
     if unit.is_empty() {
-        let help = Some(format!(
-            "write `{shown} {usual}`, or the unit that is meant"
-        ));
+        let help = Some(format!("write `{shown} {usual}`, or the intended unit"));
         return Err(fail(
             "the unit is missing",
             format!("the bare number `{shown}`"),
@@ -287,7 +289,7 @@ fn expectation(wanted: &[Dimension]) -> String {
     each.join(" or ")
 }
 
-/// The number at the start of `text` and what follows it, without spaces between.
+/// The number at the start of `text` and the rest, without spaces between.
 pub(crate) fn split_number(text: &str) -> (Option<f64>, &str) {
     let bytes = text.as_bytes();
     let digits = |from: usize| {
@@ -322,7 +324,7 @@ pub(crate) fn split_number(text: &str) -> (Option<f64>, &str) {
 /// Text after a `/` that is not a whole number above 0.
 struct BadDivisor<'a>(&'a str);
 
-/// A unit and the divisor after it, 1 when there is none. `mm/s` is a unit, `s / 289` a quotient.
+/// A unit and the divisor after it, 1 without a divisor. `mm/s` is a unit, `s / 289` a quotient.
 fn split_divisor(rest: &str) -> Result<(&str, f64), BadDivisor<'_>> {
     let Some((unit, divisor)) = rest.rsplit_once('/') else {
         return Ok((rest.trim(), 1.0));
@@ -372,7 +374,7 @@ mod tests {
         assert_eq!(error("4").message, "the unit is missing");
         assert_eq!(
             error("4").help.unwrap(),
-            "write `4 mm`, or the unit that is meant"
+            "write `4 mm`, or the intended unit"
         );
         assert_eq!(error("4 s").found, "a time, `4 s`");
         assert_eq!(error("4 mmm").help.unwrap(), "did you mean `4 mm`?");
@@ -404,7 +406,7 @@ mod tests {
         }
 
         #[test]
-        fn written_values_come_back(value in -1e6f64..1e6) {
+        fn written_values_read_back(value in -1e6f64..1e6) {
             prop_assert_eq!(parse(&format!("{value} mm"), &[Dimension::Length]).unwrap().value, value);
         }
     }

@@ -1,18 +1,18 @@
 //! Ranges of values.
 
-/// The values that a setting may have, in the unit of the setting.
+/// The allowed values of a setting, in the unit of the setting.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ValueRange {
     /// Smallest value.
     pub min: f64,
-    /// True when `min` itself is not allowed.
+    /// True if `min` itself is excluded.
     pub above: bool,
-    /// Largest value, itself allowed.
+    /// Largest value, included.
     pub max: f64,
 }
 
 impl ValueRange {
-    /// From `min` to `max`, both allowed.
+    /// From `min` to `max`, both included.
     #[must_use]
     pub const fn between(min: f64, max: f64) -> Self {
         Self {
@@ -38,7 +38,7 @@ impl ValueRange {
         Self::above(0.0, max)
     }
 
-    /// From 0 to `max`, both allowed.
+    /// From 0 to `max`, both included.
     #[must_use]
     pub const fn from_zero(max: f64) -> Self {
         Self::between(0.0, max)
@@ -65,7 +65,7 @@ impl ValueRange {
         }
     }
 
-    /// In words, for messages: `more than 0 px and at most 50 px`. `unit` may be empty.
+    /// Description for messages: `more than 0 px and at most 50 px`. `unit` may be empty.
     #[must_use]
     pub fn describe(&self, unit: &str) -> String {
         let unit = if unit.is_empty() {

@@ -1,4 +1,4 @@
-//! Reads a node tree by its table: every structural error at once, and the values that could be read.
+//! Reads a node tree by its table: reports every structural error, and returns the readable values.
 
 use crate::diagnostic::{Collector, closest, did_you_mean, one_of};
 use crate::field::{Field, Value};
@@ -8,7 +8,7 @@ use crate::shape::{Key, Need, Shape, Table, Word};
 use crate::source::{Sources, Span};
 use crate::yaml::{Kind, Node, join, quote};
 
-/// Reads `node` as a mapping of `table`. Entries that could not be read are absent from the result.
+/// Reads `node` as a mapping of `table`. Unreadable entries are absent from the result.
 pub(crate) fn read_table(
     node: &Node,
     table: &'static Table,
@@ -18,7 +18,7 @@ pub(crate) fn read_table(
     let entries = match &node.kind {
         Kind::Map(entries) => entries,
         Kind::Refused => return None,
-        // `key:` with nothing after it is a mapping without keys; its required keys will be missed.
+        // `key:` with nothing after it is a mapping without keys; its required keys are reported as missing.
         Kind::Null if !path.is_empty() => {
             out.error(node.span, path, "the value is missing")
                 .expected(format!("a mapping with {}", key_names(table)))
@@ -34,10 +34,10 @@ pub(crate) fn read_table(
     };
     let mut values = Vec::with_capacity(table.keys.len());
     for entry in entries {
-        let here = join(path, &entry.key);
+        let key_path = join(path, &entry.key);
         let Some(key) = table.keys.iter().find(|k| k.name == entry.key) else {
             let names = table.keys.iter().map(|k| k.name);
-            out.error(entry.key_span, here, "unknown key")
+            out.error(entry.key_span, key_path, "unknown key")
                 .expected(key_names(table))
                 .found(quote(&entry.key))
                 .maybe_help(did_you_mean(&entry.key, names));
@@ -51,12 +51,12 @@ pub(crate) fn read_table(
         } else {
             entry.value.clone()
         };
-        if let Some(field) = read(&place, &key.shape, &here, out) {
+        if let Some(field) = read(&place, &key.shape, &key_path, out) {
             values.push((entry.key.clone(), field));
         }
     }
     let head = head_of(node, out);
-    let given = |name: &str| entries.iter().any(|e| e.key == name);
+    let is_given = |name: &str| entries.iter().any(|e| e.key == name);
     // A misspelt key is reported once, as an unknown key.
     let misspelt = |names: &[&'static str]| {
         let mut unknown = entries
@@ -64,7 +64,7 @@ pub(crate) fn read_table(
             .filter(|e| !table.keys.iter().any(|k| k.name == e.key));
         unknown.any(|e| closest(&e.key, names.iter().copied()).is_some())
     };
-    for key in table.keys.iter().filter(|k| !given(k.name)) {
+    for key in table.keys.iter().filter(|k| !is_given(k.name)) {
         match key.need {
             Need::Required if !misspelt(&[key.name]) => {
                 out.error(head, join(path, key.name), "a required key is missing")
@@ -86,11 +86,11 @@ pub(crate) fn read_table(
         }
     }
     for group in table.exactly_one {
-        let given: Vec<_> = entries
+        let given_entries: Vec<_> = entries
             .iter()
             .filter(|e| group.contains(&e.key.as_str()))
             .collect();
-        match given.as_slice() {
+        match given_entries.as_slice() {
             [_] => {}
             [] if misspelt(group) => {}
             [] => none_given(table, group, "exactly one", head, path, out),
@@ -102,14 +102,17 @@ pub(crate) fn read_table(
                         "only one of these keys may be given",
                     )
                     .expected(format!("exactly one of {}", one_of(group.iter().copied())))
-                    .found(one_of(given.iter().map(|e| e.key.as_str())).replace(" or ", " and "))
+                    .found(
+                        one_of(given_entries.iter().map(|e| e.key.as_str()))
+                            .replace(" or ", " and "),
+                    )
                     .help("remove all but one");
                 }
             }
         }
     }
     let any: Vec<&'static str> = table.at_least_one().collect();
-    if !any.is_empty() && !any.iter().any(|name| given(name)) && !misspelt(&any) {
+    if !any.is_empty() && !any.iter().any(|name| is_given(name)) && !misspelt(&any) {
         none_given(table, &any, "at least one", head, path, out);
     }
     Some(Field {
@@ -119,7 +122,7 @@ pub(crate) fn read_table(
     })
 }
 
-/// None of the keys of a group is there.
+/// Reports that no key of a group is given.
 fn none_given(
     table: &Table,
     group: &[&'static str],
@@ -141,7 +144,7 @@ fn none_given(
         .maybe_help(help);
 }
 
-/// The first line of a mapping, to point at when something is missing from it.
+/// The first line of a mapping, as the location of a missing key.
 fn head_of(node: &Node, out: &Collector) -> Span {
     match &node.kind {
         Kind::Map(entries) => entries.first().map_or(node.span, |e| e.key_span),
@@ -317,14 +320,14 @@ fn whole(
             .expected(expected)
             .found(quote(text)),
         Ok(_) => out
-            .error(node.span, path, "a text where a number is wanted")
+            .error(node.span, path, "a text instead of a number")
             .expected(expected)
             .found(format!("\"{text}\""))
             .help("remove the quotes"),
         Err(_) => {
             let help = match quantity::split_number(text) {
                 (Some(n), rest) if !rest.is_empty() && n.fract() == 0.0 => {
-                    Some(format!("counts carry no unit: write `{n}`"))
+                    Some(format!("counts have no unit: write `{n}`"))
                 }
                 (Some(_), "") => None,
                 _ => None,
@@ -441,7 +444,7 @@ fn key_names(table: &Table) -> String {
     }
 }
 
-/// A shape in words, for "expected".
+/// Description of a shape, for "expected".
 #[must_use]
 pub fn expectation(shape: &Shape) -> String {
     match shape {
@@ -474,14 +477,14 @@ pub fn expectation(shape: &Shape) -> String {
     }
 }
 
-/// An entry of a mapping as it could be typed: `depth: 4 mm`.
+/// An entry of a mapping, ready to type: `depth: 4 mm`.
 fn entry_example(key: &Key) -> String {
     let declared = key.example.map(str::to_owned);
     let value = declared.unwrap_or_else(|| example(&key.shape));
     format!("{}: {value}", key.name)
 }
 
-/// A value of this shape as it could be typed.
+/// A value of this shape, ready to type.
 #[must_use]
 pub fn example(shape: &Shape) -> String {
     match shape {

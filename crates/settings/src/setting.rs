@@ -1,4 +1,4 @@
-//! Types that can be the value of a key, and structs that declare the keys of a mapping.
+//! Types for the value of a key, and structs that declare the keys of a mapping.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -14,8 +14,8 @@ pub trait Settings: Sized {
     /// Its keys.
     const TABLE: &'static Table;
 
-    /// Reads a mapping that was read by [`Settings::TABLE`]. `None` when a required key is missing or a check fails; each
-    /// reason is in `out`.
+    /// Converts a mapping that was read by [`Settings::TABLE`]. `None` if a required key is missing or a check fails; the
+    /// reasons are in `out`.
     fn from_mapping(field: &Field, out: &mut Collector) -> Option<Self>;
 
     /// Adds one row per value, nested mappings included. `path` is the key path of this mapping, empty for a whole file.
@@ -29,7 +29,7 @@ pub trait Settings: Sized {
         rows
     }
 
-    /// The first value outside its declared range, of a value that was built in code instead of being read.
+    /// The first value outside its declared range, for a value built in code.
     #[must_use]
     fn out_of_range(&self) -> Option<OutOfRange> {
         self.rows().into_iter().find_map(|row| {
@@ -42,7 +42,7 @@ pub trait Settings: Sized {
     }
 }
 
-/// A value as it is typed in a file.
+/// A value as typed in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Row {
     /// Key path, for example `latency.bin`.
@@ -51,7 +51,7 @@ pub struct Row {
     pub doc: &'static str,
     /// The value with its unit, for example `0.2 ms`; empty for an optional key that is absent.
     pub value: String,
-    /// The declared range, when the value is outside it.
+    /// The declared range, if the value is outside it.
     pub expected: Option<String>,
 }
 
@@ -66,18 +66,18 @@ pub struct OutOfRange {
     pub found: String,
 }
 
-/// A type that can be the value of a key.
+/// A type for the value of a key.
 pub trait Setting: Sized {
     /// The form of the value.
     const SHAPE: Shape;
 
-    /// The value of a field that was read by [`Setting::SHAPE`]. `None` when a check fails; the reason is in `out`.
+    /// Converts a field that was read by [`Setting::SHAPE`]. `None` if a check fails; the reason is in `out`.
     fn from_field(field: &Field, out: &mut Collector) -> Option<Self>;
 
-    /// The value as it is typed.
+    /// The value as typed.
     fn text(&self) -> String;
 
-    /// Adds the rows of the value at the key path `key`: one, unless it is a mapping.
+    /// Adds the rows of the value at the key path `key`: one, or several for a mapping.
     fn add_rows(&self, key: &str, doc: &'static str, rows: &mut Vec<Row>) {
         rows.push(Row {
             key: key.to_owned(),
@@ -142,7 +142,7 @@ impl Setting for bool {
     }
 }
 
-/// Values by free names, such as biases.
+/// Values with free names, such as biases.
 impl Setting for BTreeMap<String, i64> {
     const SHAPE: Shape = Shape::Named(&Shape::Whole {
         min: i32::MIN as i64,
@@ -166,14 +166,14 @@ impl Setting for BTreeMap<String, i64> {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Numbers(pub Vec<NumberSpan>);
 
-/// The numbers from `first` to `last`, and the place of the text that names them.
+/// The numbers from `first` to `last`, and the location of their text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NumberSpan {
     /// First number, at least 1.
     pub first: u32,
     /// Last number, at least `first`.
     pub last: u32,
-    /// Its place.
+    /// Location of the text.
     pub span: Span,
 }
 
@@ -198,8 +198,8 @@ impl Setting for Numbers {
     }
 }
 
-/// A quantity of a dimension's own unit in another unit, of which `per` make one: seconds to milliseconds with 1000. Times are
-/// rounded to whole nanoseconds, which removes the last-bit noise of the factor.
+/// Converts a quantity from its dimension's own unit to another unit, of which `per` make one: seconds to milliseconds with 1000.
+/// Times are rounded to whole nanoseconds, which removes the last-bit noise of the factor.
 #[must_use]
 pub fn in_unit(value: f64, per: f64) -> f64 {
     const STEPS: f64 = 1e9;

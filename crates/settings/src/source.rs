@@ -1,4 +1,4 @@
-//! Source texts and places in them: the protocol file, each `--set` argument, a CSV of points.
+//! Source texts and locations in them: the protocol file, each `--set` argument, a CSV of points.
 
 /// A range of bytes of one source text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -33,7 +33,7 @@ pub struct Sources {
     list: Vec<Source>,
 }
 
-/// A place as people read it. Lines and columns count from 1; columns count characters.
+/// A location for display. Lines and columns count from 1; columns count characters.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Location {
     /// Name of the file, or `--set` for a value given on the command line.
@@ -42,12 +42,12 @@ pub struct Location {
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
-    /// How many characters are meant, at least 1; never past the end of the line.
+    /// Length in characters, at least 1; never past the end of the line.
     pub length: usize,
     /// The line without its line break; tabs shown as one space each. Of a very long line only the part around the
     /// column.
     pub text: String,
-    /// Column of the first character of `text`; 1 but for very long lines.
+    /// Column of the first character of `text`; 1 except for very long lines.
     pub text_column: usize,
 }
 
@@ -71,7 +71,7 @@ impl Sources {
         self.list.get(source).map_or("", |s| s.text.as_str())
     }
 
-    /// Where `span` lies, for people.
+    /// The location of `span`, for display.
     pub fn locate(&self, span: Span) -> Location {
         let Some(source) = self.list.get(span.source) else {
             return Location {
@@ -117,7 +117,7 @@ impl Sources {
     }
 }
 
-/// Longest part of a line that is kept for people, characters.
+/// Longest part of a line for display, characters.
 const WIDEST: usize = 120;
 
 /// The nearest character boundary at or below `at`.

@@ -1,7 +1,7 @@
-//! YAML text to a tree of nodes that know where they stand.
+//! Parses YAML text to a tree of nodes with their locations.
 //!
 //! Protocols use plain YAML: one document, mappings with text keys, lists and scalars. Aliases, tags and merge
-//! keys are refused, so a file means what it shows and its size bounds the work.
+//! keys are rejected, so a file contains no hidden content and its size limits the work.
 
 use serde_yaml::granit_parser::{self, Event, Parser, ScalarStyle, options};
 
@@ -15,19 +15,19 @@ const DEEPEST: usize = 32;
 /// Most keys of one mapping; the largest of a protocol has about twenty.
 const MOST_KEYS: usize = 200;
 
-/// A value and where it stands.
+/// A value and its location.
 #[derive(Debug, Clone)]
 pub(crate) struct Node {
     pub span: Span,
     pub kind: Kind,
 }
 
-/// What a node is.
+/// Kind of a node.
 #[derive(Debug, Clone)]
 pub(crate) enum Kind {
     /// Nothing after the colon, or `null` or `~`.
     Null,
-    /// Something that protocols do not use, already told; nothing more is to be said about it.
+    /// A rejected construct, already reported.
     Refused,
     /// Text as written; `plain` when it was not quoted.
     Scalar { text: String, plain: bool },
@@ -46,7 +46,7 @@ pub(crate) struct Entry {
 }
 
 impl Node {
-    /// A few words about the node, for "found".
+    /// A short description of the node, for "found".
     pub(crate) fn describe(&self) -> String {
         match &self.kind {
             Kind::Null => "nothing".to_owned(),
@@ -78,7 +78,7 @@ pub fn quote(text: &str) -> String {
 /// The text of a file.
 ///
 /// # Errors
-/// The first wrong byte and what was found there: more than [`LARGEST_TEXT`] bytes, no UTF-8.
+/// Position and description of the first error: more than [`LARGEST_TEXT`] bytes, or not UTF-8.
 pub fn decode(bytes: &[u8]) -> Result<&str, (usize, String)> {
     if bytes.len() > LARGEST_TEXT {
         return Err((0, format!("a file of {} bytes", bytes.len())));
@@ -90,7 +90,7 @@ pub fn decode(bytes: &[u8]) -> Result<&str, (usize, String)> {
     })
 }
 
-/// Parses source number `source`. `None` when the text is no YAML; the reason is in `collector`.
+/// Parses source number `source`. `None` if the text is not YAML; the reason is in `collector`.
 pub(crate) fn parse(collector: &mut Collector, source: usize) -> Option<Node> {
     let text = collector.sources.text(source).to_owned();
     let body = text.strip_prefix('\u{feff}').unwrap_or(&text);
@@ -109,7 +109,7 @@ pub(crate) fn parse(collector: &mut Collector, source: usize) -> Option<Node> {
         collector,
         path: Vec::new(),
     };
-    // A tree with findings of its own is returned too: the other errors are worth showing at once.
+    // Also returns a tree with findings: the other errors are reported together with them.
     reader.document()
 }
 
@@ -119,7 +119,7 @@ struct Reader<'a, 'c> {
     shift: usize,
     source: usize,
     collector: &'c mut Collector,
-    /// Keys and list places from the root to the present node.
+    /// Keys and list positions from the root to the current node.
     path: Vec<String>,
 }
 
@@ -140,7 +140,7 @@ impl<'a> Reader<'a, '_> {
             Some(Err(error)) => {
                 let at = error.marker().byte_offset().unwrap_or(self.text.len());
                 let at = at.min(self.text.len());
-                // The scanner often stops before the tab that it stumbles over.
+                // The scanner often stops before the offending tab.
                 let at = indenting_tab(self.text, at).unwrap_or(at);
                 let help = syntax_help(self.text, at);
                 self.collector
@@ -161,7 +161,7 @@ impl<'a> Reader<'a, '_> {
         Span::new(self.source, start + self.shift, end + self.shift)
     }
 
-    /// The key path of the present node.
+    /// The key path of the current node.
     fn here(&self) -> String {
         self.path
             .iter()
@@ -179,7 +179,7 @@ impl<'a> Reader<'a, '_> {
                     self.collector
                         .error(span, "", "more than one YAML document")
                         .expected("one document in the file")
-                        .found("the begin of another one")
+                        .found("the start of another one")
                         .help("remove the line `---`, or split the file");
                     return None;
                 }
@@ -193,7 +193,7 @@ impl<'a> Reader<'a, '_> {
         }))
     }
 
-    /// The node that begins with `event`.
+    /// The node that starts with `event`.
     fn node(&mut self, event: Event<'a>, span: Span) -> Option<Node> {
         if let Some(tag) = event.tag() {
             let written = tag.original();
@@ -314,7 +314,6 @@ impl<'a> Reader<'a, '_> {
     }
 }
 
-/// What to do about a syntax error near byte `at`, where it can be told.
 /// The first tab that indents the line of `at` or the next one.
 fn indenting_tab(text: &str, at: usize) -> Option<usize> {
     let mut start = text.get(..at)?.rfind('\n').map_or(0, |i| i + 1);
@@ -328,6 +327,7 @@ fn indenting_tab(text: &str, at: usize) -> Option<usize> {
     None
 }
 
+/// Help for a syntax error near byte `at`, if its cause is recognised.
 fn syntax_help(text: &str, at: usize) -> Option<String> {
     let start = text.get(..at)?.rfind('\n').map_or(0, |i| i + 1);
     let line = text.get(start..)?.lines().next().unwrap_or("");
@@ -341,7 +341,7 @@ fn syntax_help(text: &str, at: usize) -> Option<String> {
         return Some("close the bracket that is opened in this line".to_owned());
     }
     (!word.is_empty()).then(|| {
-        "keys of one mapping stand in the same column; texts that contain `: ` or ` #` need quotes"
+        "align the keys of a mapping in the same column; texts that contain `: ` or ` #` need quotes"
             .to_owned()
     })
 }

@@ -1,4 +1,4 @@
-//! Presses the paper's grid on the optical skin and prints what comes out.
+//! Presses the paper's grid on the optical skin and prints the resulting events.
 //!
 //! Event counts, rates, localisation error with the true camera geometry, speed:
 //!

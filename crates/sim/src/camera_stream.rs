@@ -21,7 +21,7 @@ pub(crate) struct Streaming {
     /// Whether the events come from pixels, to which a region of interest applies.
     pub has_region: bool,
     pub encoder: evt2::Encoder,
-    /// Trigger edges to encode, with the time at which the camera sees them.
+    /// Trigger edges to encode, with the camera's time of each.
     pub edges: VecDeque<LineEdge>,
     pub tips: Vec<TipSample>,
     pub events: Vec<PixelEvent>,

@@ -123,7 +123,7 @@ pub struct SimConfig {
     pub start: Point3<Skin>,
     /// Rows of each camera that see the skin (public code: 185..=360 and 200..=355).
     pub skin_rows: [(u16, u16); 2],
-    /// Side length of the tip's square end, mm. The paper says "cubic tip" without a size (assumed).
+    /// Side length of the tip's square end, mm. The paper states "cubic tip" without a size (assumed).
     pub tip_side_mm: f64,
     /// Thickness of the skin, mm (paper: 4).
     pub skin_thickness_mm: f64,

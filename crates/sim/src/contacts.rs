@@ -100,14 +100,14 @@ mod tests {
     }
 
     #[test]
-    fn what_was_pressed_elsewhere_and_in_which_order_changes_nothing() {
+    fn contacts_elsewhere_and_their_order_have_no_effect() {
         let (grid, mut turned) = (grid(), grid());
         turned.reverse();
         let mut back = draws(&Contacts::default(), &turned);
         back.reverse();
         let alone = |place: &Point2| draws(&Contacts::default(), &[*place])[0];
         for (place, drawn) in grid.iter().zip(draws(&Contacts::default(), &grid)) {
-            // Places nearer to one another than a square share one, and are told apart by their number.
+            // Places nearer to one another than a square share one, and differ by their number.
             if alone(place) != drawn {
                 assert!(back.contains(&drawn));
             }
@@ -117,7 +117,7 @@ mod tests {
             panic!("three draws");
         };
         assert_ne!(first, again, "the same place again is another contact");
-        // A run in two parts meets what the same run in one go meets.
+        // A run in two parts meets the same contacts as in one part.
         let whole = draws(&Contacts::default(), &grid);
         let rest = draws(&Contacts::after(&grid[..30]), &grid[30..]);
         assert_eq!(rest, whole[30..]);

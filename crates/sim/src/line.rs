@@ -156,7 +156,7 @@ impl Line {
             let report = report(self.time(start_ns));
             self.syncs = (self.syncs + 1) & skinrig_model::pulse::MAX_MARKED_PRESS;
             self.tell(start_ns, report);
-            self.put(train, start_ns, None);
+            self.add_train(train, start_ns, None);
             self.busy_until_ns = start_ns + TRAIN_NS;
             self.sync_after_ns = self.busy_until_ns;
         }
@@ -185,7 +185,7 @@ impl Line {
             Some(MarkFault::Delayed) => (Some(rise_ns + late_ns), None),
         };
         for at_ns in [first, second].into_iter().flatten() {
-            self.put(train, at_ns, Some(self.marks));
+            self.add_train(train, at_ns, Some(self.marks));
         }
         self.marks += 1;
         // No other train overlaps this one.
@@ -225,7 +225,7 @@ impl Line {
     }
 
     /// Puts a train on both inputs; `mark` is its index among the marks.
-    fn put(&mut self, train: PulseTrain, rise_ns: i64, mark: Option<u32>) {
+    fn add_train(&mut self, train: PulseTrain, rise_ns: i64, mark: Option<u32>) {
         for camera in CameraId::ALL {
             let i = camera.index();
             let (noise, random) = (self.noise[i], &mut self.random[i]);
@@ -236,9 +236,9 @@ impl Line {
                 let pulse = k / 2;
                 let t_ns = rise_ns + self.clock.world_ns(offset_us as i64 * 1_000);
                 let edge = LineEdge { t_ns, rising };
-                let gone = strikes(noise.lost)
+                let is_lost = strikes(noise.lost)
                     || mark.is_some_and(|n| self.lost_pulses.contains(&(camera, n, pulse)));
-                if !gone {
+                if !is_lost {
                     seen.push(edge);
                 }
                 if strikes(noise.doubled) {

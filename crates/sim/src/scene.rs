@@ -51,13 +51,13 @@ pub struct SceneConfig {
     pub start: u64,
     /// The skin.
     pub outline: SkinOutline,
-    /// Which camera.
+    /// The camera.
     pub camera_id: CameraId,
     /// The camera's true geometry, which a calibration estimates.
     pub camera: CameraModel,
     /// Rows that see the skin's edge from inside, inclusive (public code: camera 1 185..=360, camera 2 200..=355). Other rows see the mould.
     pub skin_rows: (u16, u16),
-    /// Side length of the tip's square end, mm. The paper says "cubic tip" without a size: configurable.
+    /// Side length of the tip's square end, mm. The paper states "cubic tip" without a size: configurable.
     pub tip_side_mm: f64,
     /// Thickness of the skin, mm (paper: 4).
     pub skin_thickness_mm: f64,
@@ -66,7 +66,7 @@ pub struct SceneConfig {
 }
 
 impl SceneConfig {
-    /// Seed of values drawn anew at every start.
+    /// Seed of values drawn again at every start.
     #[must_use]
     pub(crate) const fn seed_of_start(&self) -> u64 {
         match self.start {
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn in_the_dark_nobody_sees_a_press_and_hot_pixels_stay() {
+    fn in_the_dark_presses_are_invisible_and_hot_pixels_stay() {
         let (lit, dark) = (press(0, true), press(0, false));
         for (lit, dark) in lit.iter().zip(&dark) {
             assert!(5 * dark.len() < lit.len(), "{} {}", dark.len(), lit.len());

@@ -132,7 +132,7 @@ impl TriggerBox for SimTriggerBox {
         let latency = low + (self.latencies.unit() * (high - low) as f64) as i64;
         let until = now + self.capabilities().train_duration;
         world.line.send(mark, train, now.0 + latency, until.0);
-        // The host knows only that the edge rose between the shortest and the longest latency.
+        // For the host, the edge rose at any time between the shortest and the longest latency.
         let half = (high - low).div_euclid(2) + 1;
         Ok(SentMark {
             mark,

@@ -125,7 +125,7 @@ impl World {
         let t_ns = self.grid * GRID_NS;
         let position = self.true_tip();
         let rate = (self.last_z_mm - position.z_mm) / (GRID_NS as f64 * 1e-9);
-        // When the straight path from the last grid point to this one crossed a height.
+        // Time at which the straight path from the last grid point to this one crossed a height.
         let passed = |z_mm: f64| {
             let ahead = (position.z_mm - z_mm) / (position.z_mm - self.last_z_mm);
             t_ns - (ahead.clamp(0.0, 1.0) * GRID_NS as f64) as i64
@@ -177,7 +177,7 @@ impl World {
         self.grid
     }
 
-    /// Whether the trigger `when` has occurred.
+    /// Whether the fault trigger `when` has occurred.
     #[must_use]
     pub(crate) fn has_occurred(&self, when: FaultTrigger) -> bool {
         self.occurred_at(when)
@@ -211,7 +211,7 @@ impl World {
         self.force_limit_n = limit_n;
     }
 
-    /// True when only a rise is allowed: the robot stopped because of its force limit, and has not been told to
+    /// True if only a rise is allowed: the robot stopped because of its force limit, and has not been commanded to
     /// rise since, or it still presses too hard.
     #[must_use]
     pub const fn must_rise(&self) -> bool {
@@ -234,18 +234,18 @@ impl World {
         self.motion.move_to(target, speed_mm_s);
     }
 
-    /// Brings the robot to rest.
+    /// Stops the robot in place.
     pub fn hold(&mut self) {
         self.rising = false;
         self.motion.hold();
     }
 
-    /// Takes all samples that nobody has taken yet.
+    /// Takes all samples not yet taken.
     pub(crate) fn take_samples(&mut self, out: &mut Vec<RobotSample>) {
         out.extend(self.samples.drain(..));
     }
 
-    /// From now on keeps tips for camera `index`, from the present grid point. Gives that grid point.
+    /// Starts keeping tips for camera `index`, from the current grid point, which it returns.
     pub fn watch(&mut self, index: usize) -> i64 {
         self.wanted[index] = Some(self.grid);
         let present = TipSample {
@@ -260,14 +260,14 @@ impl World {
         self.grid
     }
 
-    /// Camera `index` needs no more tips.
+    /// Stops keeping tips for camera `index`.
     pub(crate) fn unwatch(&mut self, index: usize) {
         self.wanted[index] = None;
         self.forget();
     }
 
-    /// The tips from grid index `from` to the present, both included; marks them as seen by camera
-    /// `index`, which next time begins with the last of them.
+    /// The tips from grid index `from` to the present, both included; marks them as read by camera
+    /// `index`, whose next call begins with the last of them.
     pub(crate) fn tips_since(&mut self, index: usize, from: i64, out: &mut Vec<TipSample>) {
         out.clear();
         let skip = usize::try_from(from - self.tips_from).unwrap_or(0);
@@ -307,15 +307,15 @@ impl Shared {
         }
     }
 
-    /// The present.
+    /// The current time.
     #[must_use]
     pub fn now(&self) -> HostTime {
         self.clock.now()
     }
 
-    /// The world, brought to the present.
+    /// The world, advanced to the current time.
     pub fn world(&self) -> MutexGuard<'_, World> {
-        // A panic elsewhere leaves the world in a state that is still good enough to disarm in.
+        // After a panic elsewhere, the world is still good enough to disarm.
         let mut world = self.world.lock().unwrap_or_else(PoisonError::into_inner);
         world.advance_to(self.clock.now());
         world

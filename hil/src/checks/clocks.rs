@@ -17,58 +17,58 @@ use crate::streams::Streams;
 
 const METRICS: &[&str] = &["drift", "residual"];
 
-/// Interval of the marks, which fits between the box's own trains.
+/// Interval of the marks; they must fit between the trains that the box sends by itself.
 const PERIOD: HostDuration = HostDuration::from_millis(200);
 /// Streaming time before the first mark and after the last.
 const MARGIN: HostDuration = HostDuration::from_millis(300);
 /// Trains needed for a useful confidence interval of the slope.
 const MIN_TRAINS: u64 = 10;
-/// Smallest residual that counts as an outlier, µs: both clocks have a resolution of 1 µs.
+/// Smallest residual that counts as an outlier, µs: both clocks tick in microseconds.
 const RESIDUAL_FLOOR_US: f64 = 1.0;
 
 /// Runs the check.
-pub(super) fn clocks(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn clocks(check: &Check, bench: &mut dyn Bench, findings: &mut Findings) {
     let Measure::Clocks { duration } = check.measure else {
         return;
     };
     if bench.rig().trigger_box.is_none() {
-        found.not_applicable = Some("the rig file has no `trigger_box`".to_owned());
+        findings.not_applicable = Some("the rig file has no `trigger_box`".to_owned());
         return;
     }
     let channels = bench.rig().cameras.each_ref().map(|c| c.trigger_channel);
     let mut edges = Edges::default();
     let mut streams = Streams::start(bench, &mut |_, _| Ok(()));
-    let see = &mut |chunk: &RawChunk| edges.add(chunk);
-    streams.pass(MARGIN, see);
+    let on_chunk = &mut |chunk: &RawChunk| edges.add(chunk);
+    streams.pass(MARGIN, on_chunk);
     let (mut n, mut next) = (0, streams.now());
     let end = next + duration;
-    while next <= end && streams.send(mark(n), see) {
+    while next <= end && streams.send(mark(n), on_chunk) {
         (n, next) = (n + 1, next + PERIOD);
         let rest = next - streams.now();
-        streams.pass(rest, see);
+        streams.pass(rest, on_chunk);
     }
-    streams.pass(MARGIN, see);
+    streams.pass(MARGIN, on_chunk);
     let reports = streams.reports().to_vec();
     let is_cut_off = next <= end;
-    let seen = streams.finish(found, METRICS, see);
+    let stats = streams.finish(findings, METRICS, on_chunk);
     let sent_trains = sent_trains(&reports);
     let mut train_times = [BTreeMap::new(), BTreeMap::new()];
     for camera in CameraId::ALL {
-        if seen[camera.index()].is_none() {
+        if stats[camera.index()].is_none() {
             continue;
         }
         let on = edges.on_channel(camera, channels[camera.index()]);
         let received = received_trains(&on);
         if is_cut_off {
             for metric in METRICS {
-                found.unmeasured(device_evidence::camera_subject(camera), metric);
+                findings.unmeasured(device_evidence::camera_subject(camera), metric);
             }
         } else {
-            measure_camera(camera, &sent_trains, &received, found);
+            measure_camera(camera, &sent_trains, &received, findings);
         }
         train_times[camera.index()] = received;
     }
-    offset(&train_times, found);
+    offset(&train_times, findings);
 }
 
 /// Times of the trains on the box's clock since its last reset, by label, µs.
@@ -96,7 +96,7 @@ fn measure_camera(
     camera: CameraId,
     sent_trains: &BTreeMap<Label, u64>,
     received: &BTreeMap<Label, u64>,
-    found: &mut Findings,
+    findings: &mut Findings,
 ) {
     let subject = device_evidence::camera_subject(camera);
     let both: Vec<(u64, u64)> = sent_trains
@@ -104,9 +104,9 @@ fn measure_camera(
         .filter_map(|(label, box_us)| Some((*box_us, *received.get(label)?)))
         .collect();
     let n = both.len();
-    // Relative to the first pair, to keep precision with large counters.
+    // Relative to the first pair, because large counters would lose precision as f64.
     let Some(&(box_origin, camera_origin)) = both.first() else {
-        return too_few_trains(subject, sent_trains.len(), n, found);
+        return too_few_trains(subject, sent_trains.len(), n, findings);
     };
     let relative = |us: u64, zero: u64| us.wrapping_sub(zero) as i64 as f64;
     let pairs: Vec<Pair> = both
@@ -117,17 +117,17 @@ fn measure_camera(
         })
         .collect();
     let Some(line) = fit_line(&pairs, RESIDUAL_FLOOR_US) else {
-        return too_few_trains(subject, sent_trains.len(), n, found);
+        return too_few_trains(subject, sent_trains.len(), n, findings);
     };
     let half_ppm = student_quantile(0.975, line.n() as f64 - 2.0) * line.drift_se * 1e6;
     let drift_ppm = line.drift * 1e6;
-    let drift = found
+    let drift = findings
         .value(subject, "drift", drift_ppm)
         .with_samples(n, MIN_TRAINS);
     drift.interval = Some([drift_ppm - half_ppm, drift_ppm + half_ppm]);
     let residual_s = rms_us(&line, &pairs) * 1e-6;
     let rejected = n - line.n();
-    let residual = found
+    let residual = findings
         .value(subject, "residual", residual_s)
         .with_samples(n, MIN_TRAINS);
     if rejected > 0 {
@@ -137,34 +137,34 @@ fn measure_camera(
     }
 }
 
-/// RMS residual of all pairs, including rejected outliers: a clock jump must show.
+/// RMS residual of all pairs. It includes outliers, so that a clock jump is visible.
 fn rms_us(line: &Line, pairs: &[Pair]) -> f64 {
     let squares = pairs.iter().map(|p| line.residual_us(*p).powi(2));
     (squares.sum::<f64>() / pairs.len() as f64).sqrt()
 }
 
-/// Too few trains for a fit.
-fn too_few_trains(subject: &str, sent: usize, n: usize, found: &mut Findings) {
+/// Records that a fit has too few trains.
+fn too_few_trains(subject: &str, sent: usize, n: usize, findings: &mut Findings) {
     for metric in METRICS {
-        found.unmeasured(subject, metric);
+        findings.unmeasured(subject, metric);
     }
     let what = format!("expected the {sent} trains that the box sent, found {n} decoded");
     let next =
         "check the trigger cable, its channel in the rig file, and levels (docs/how-to/bench.md)";
-    found
+    findings
         .evidence
         .push(Evidence::new(EvidenceKind::TriggerFault, subject, what).next(next));
 }
 
-/// Time of camera 1 minus time of camera 2, at the first train seen by both.
-fn offset(train_times: &[BTreeMap<Label, u64>; 2], found: &mut Findings) {
+/// Time of camera 1 minus time of camera 2, at the first train that both received.
+fn offset(train_times: &[BTreeMap<Label, u64>; 2], findings: &mut Findings) {
     let [one, two] = train_times;
     let both = one
         .iter()
         .filter_map(|(label, t1)| Some((*t1, *two.get(label)?)));
     if let Some((t1, t2)) = both.min() {
         let offset_s = t1.wrapping_sub(t2) as i64 as f64 * 1e-6;
-        found
+        findings
             .value(
                 device_evidence::camera_subject(CameraId::One),
                 "offset",

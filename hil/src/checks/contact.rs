@@ -13,57 +13,66 @@ use crate::test_volume::motion_refused;
 const ROBOT: &str = "robot";
 /// Indentation speed, mm/s.
 const INDENTATION_MM_S: f64 = 2.0;
-/// Hold time before the depth is measured; the driver's position correction finishes within it.
+/// Hold time before the depth is measured. The driver's position correction finishes within it.
 const SETTLE: HostDuration = HostDuration::from_millis(1_000);
 /// Averaging time of depths and forces.
 const AVERAGING: HostDuration = HostDuration::from_millis(200);
-/// Largest sag in free air under a reduced force limit, mm. Beyond it the motors do not carry the arm's weight.
+/// Largest sag in free air under a reduced force limit, mm. With more, the motors do not carry the
+/// arm's weight.
 const MAX_SAG_MM: f64 = 0.5;
-/// Share of the force limit that counts as reaching it.
+/// Share of the force limit that counts as having reached it.
 const LIMIT_SHARE: f64 = 0.9;
 
 /// Runs the check.
-pub(super) fn depth(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn depth(check: &Check, bench: &mut dyn Bench, findings: &mut Findings) {
     let Measure::Depth { depth_mm, presses } = check.measure else {
         return;
     };
-    if skip_without_skin(bench, found) {
+    if skip_without_skin(bench, findings) {
         return;
     }
     let metrics = &["surface", "error"];
-    with_arm(bench, Reach::Skin, found, metrics, &mut |arm, found| {
-        check_depth_limit(arm, depth_mm)?;
-        let (mut surface_mm, mut squares, mut n) = (0.0_f64, 0.0, 0);
-        for at in arm.volume.press_points.clone() {
-            for _ in 0..presses {
-                arm.go_above(at)?;
-                let touched_mm = arm.touch()?;
-                let mut seen = Vec::new();
-                let bottom = at.at_height(touched_mm - depth_mm);
-                arm.send(bottom, INDENTATION_MM_S)?;
-                let down = HostDuration::from_secs_f64(
-                    (arm.search.band_mm * 2.0 + depth_mm) / INDENTATION_MM_S,
-                );
-                arm.watch(HostDuration(down.0 + SETTLE.0), &mut seen, |_| false)?;
-                arm.go(at.at_height(arm.search.band_mm), INDENTATION_MM_S)?;
-                let reached_mm = touched_mm - mean(last(&seen, AVERAGING)).z_mm;
-                squares += (reached_mm - depth_mm).powi(2);
-                surface_mm = surface_mm.max(touched_mm.abs());
-                n += 1;
+    with_arm(
+        bench,
+        Reach::Skin,
+        findings,
+        metrics,
+        &mut |arm, findings| {
+            check_depth_limit(arm, depth_mm)?;
+            let (mut surface_mm, mut squares, mut n) = (0.0_f64, 0.0, 0);
+            for at in arm.volume.press_points.clone() {
+                for _ in 0..presses {
+                    arm.go_above(at)?;
+                    let touched_mm = arm.touch()?;
+                    let mut samples = Vec::new();
+                    let bottom = at.at_height(touched_mm - depth_mm);
+                    arm.send(bottom, INDENTATION_MM_S)?;
+                    let down = HostDuration::from_secs_f64(
+                        (arm.search.band_mm * 2.0 + depth_mm) / INDENTATION_MM_S,
+                    );
+                    arm.watch(HostDuration(down.0 + SETTLE.0), &mut samples, |_| false)?;
+                    arm.go(at.at_height(arm.search.band_mm), INDENTATION_MM_S)?;
+                    let reached_mm = touched_mm - mean(last(&samples, AVERAGING)).z_mm;
+                    squares += (reached_mm - depth_mm).powi(2);
+                    surface_mm = surface_mm.max(touched_mm.abs());
+                    n += 1;
+                }
             }
-        }
-        found.value(ROBOT, "surface", surface_mm).with_samples(n, 3);
-        let error_mm = (squares / n as f64).sqrt();
-        found.value(ROBOT, "error", error_mm).with_samples(n, 3);
-        Ok(())
-    });
+            findings
+                .value(ROBOT, "surface", surface_mm)
+                .with_samples(n, 3);
+            let error_mm = (squares / n as f64).sqrt();
+            findings.value(ROBOT, "error", error_mm).with_samples(n, 3);
+            Ok(())
+        },
+    );
 }
 
 /// Marks the check as not applicable if the rig has no skin mounted.
-fn skip_without_skin(bench: &dyn Bench, found: &mut Findings) -> bool {
+fn skip_without_skin(bench: &dyn Bench, findings: &mut Findings) -> bool {
     let off = bench.rig().robot.sample_is_off;
     if off {
-        found.not_applicable = Some("the rig file says `robot.sample_is_off: true`".to_owned());
+        findings.not_applicable = Some("the rig file says `robot.sample_is_off: true`".to_owned());
     }
     off
 }
@@ -86,70 +95,77 @@ fn check_depth_limit(arm: &Arm<'_>, depth_mm: f64) -> Result<(), Problem> {
 }
 
 /// Runs the check.
-pub(super) fn force_ceiling(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn force_ceiling(check: &Check, bench: &mut dyn Bench, findings: &mut Findings) {
     let Measure::ForceCeiling { force_n, depth_mm } = check.measure else {
         return;
     };
-    if skip_without_skin(bench, found) {
+    if skip_without_skin(bench, findings) {
         return;
     }
     let metrics = &["peak", "trips"];
-    with_arm(bench, Reach::Skin, found, metrics, &mut |arm, found| {
-        check_depth_limit(arm, depth_mm)?;
-        let at = arm.volume.centre;
-        let [high, ..] = arm.volume.air_points();
-        arm.go(high, super::robot::TRAVEL_MM_S)?;
-        let settings = arm.limit_force(Some(force_n))?;
-        check_carries_arm(arm, force_n)?;
-        arm.go_above(at)?;
-        let mut seen = Vec::new();
-        arm.send(at.at_height(-depth_mm), INDENTATION_MM_S)?;
-        let down = HostDuration::from_secs_f64((depth_mm + arm.search.band_mm) / INDENTATION_MM_S);
-        let pressed = arm.watch(HostDuration(down.0 + SETTLE.0), &mut seen, |_| false);
-        let peak_n = peak_n(&seen);
-        let trips = match pressed {
-            // The robot switched its motors off: one way to enforce a limit.
-            Err(problem) if problem.kind == EvidenceKind::State => {
-                found.evidence.push(*problem);
-                1.0
-            }
-            Err(problem) => return Err(problem),
-            Ok(()) => {
-                arm.go(at.at_height(arm.search.band_mm), INDENTATION_MM_S)?;
-                arm.limit_force(None)?;
-                0.0
-            }
-        };
-        let enough = peak_n >= LIMIT_SHARE * force_n;
-        let read_back = settings.iter().find(|s| s.name == "max_force_n");
-        let read_back = read_back.map_or("nothing", |s| s.read_back.as_str());
-        let lowest_mm = seen.iter().map(|s| -s.measured.z_mm).fold(0.0, f64::max);
-        found
+    with_arm(
+        bench,
+        Reach::Skin,
+        findings,
+        metrics,
+        &mut |arm, findings| {
+            check_depth_limit(arm, depth_mm)?;
+            let at = arm.volume.centre;
+            let [high, ..] = arm.volume.air_points();
+            arm.go(high, super::robot::TRAVEL_MM_S)?;
+            let settings = arm.limit_force(Some(force_n))?;
+            check_carries_arm(arm, force_n)?;
+            arm.go_above(at)?;
+            let mut samples = Vec::new();
+            arm.send(at.at_height(-depth_mm), INDENTATION_MM_S)?;
+            let down =
+                HostDuration::from_secs_f64((depth_mm + arm.search.band_mm) / INDENTATION_MM_S);
+            let pressed = arm.watch(HostDuration(down.0 + SETTLE.0), &mut samples, |_| false);
+            let peak_n = peak_n(&samples);
+            let trips = match pressed {
+                // The robot enforced the limit by switching its motors off.
+                Err(problem) if problem.kind == EvidenceKind::State => {
+                    findings.evidence.push(*problem);
+                    1.0
+                }
+                Err(problem) => return Err(problem),
+                Ok(()) => {
+                    arm.go(at.at_height(arm.search.band_mm), INDENTATION_MM_S)?;
+                    arm.limit_force(None)?;
+                    0.0
+                }
+            };
+            let enough = peak_n >= LIMIT_SHARE * force_n;
+            let read_back = settings.iter().find(|s| s.name == "max_force_n");
+            let read_back = read_back.map_or("nothing", |s| s.read_back.as_str());
+            let lowest_mm = samples.iter().map(|s| -s.measured.z_mm).fold(0.0, f64::max);
+            findings
             .value(ROBOT, "peak", peak_n)
             .with_samples(usize::from(enough), 1)
             .with_note(format!(
                 "limit {force_n} N, read back {read_back}; commanded {depth_mm} mm, reached {lowest_mm:.2} mm"
             ));
-        found.value(ROBOT, "trips", trips).with_samples(1, 1);
-        if !enough {
-            let what = format!(
-                "expected a force of about {force_n} N, found {peak_n:.2} N: the skin is too soft at this depth"
-            );
-            let next = "increase `depth` of the check, or reduce `force`";
-            let few = Evidence::new(EvidenceKind::TooLittle, ROBOT, what);
-            found.evidence.push(few.next(next));
-        }
-        Ok(())
-    });
+            findings.value(ROBOT, "trips", trips).with_samples(1, 1);
+            if !enough {
+                let what = format!(
+                    "expected a force of about {force_n} N, found {peak_n:.2} N: the skin is too soft at this depth"
+                );
+                let next = "increase `depth` of the check, or reduce `force`";
+                let few = Evidence::new(EvidenceKind::TooLittle, ROBOT, what);
+                findings.evidence.push(few.next(next));
+            }
+            Ok(())
+        },
+    );
 }
 
 /// Verifies in free air, where sagging is harmless, that the motors carry the arm under the force limit.
 fn check_carries_arm(arm: &mut Arm<'_>, force_n: f64) -> Result<(), Problem> {
     let from = arm.pose()?.measured;
-    let mut seen = Vec::new();
-    let sinks = |s: &PoseSample| from.z_mm - s.measured.z_mm > MAX_SAG_MM;
-    arm.watch(SETTLE, &mut seen, sinks)?;
-    if !seen.iter().any(sinks) {
+    let mut samples = Vec::new();
+    let is_sinking = |s: &PoseSample| from.z_mm - s.measured.z_mm > MAX_SAG_MM;
+    arm.watch(SETTLE, &mut samples, is_sinking)?;
+    if !samples.iter().any(is_sinking) {
         return Ok(());
     }
     arm.limit_force(None)?;
@@ -161,7 +177,7 @@ fn check_carries_arm(arm: &mut Arm<'_>, force_n: f64) -> Result<(), Problem> {
     ))
 }
 
-fn peak_n(seen: &[PoseSample]) -> f64 {
-    let forces = seen.iter().map(|s| s.force_n.abs());
+fn peak_n(samples: &[PoseSample]) -> f64 {
+    let forces = samples.iter().map(|s| s.force_n.abs());
     forces.filter(|f| f.is_finite()).fold(0.0, f64::max)
 }

@@ -14,13 +14,13 @@ use crate::findings::Findings;
 
 /// Bytes per write and per read.
 const BLOCK: usize = 4 << 20;
-/// No block is written after this time: a disk this slow has failed, whatever the amount.
+/// Writing stops after this time: a slower disk fails, whatever the amount.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(120);
 /// Required free space as a multiple of the amount: a check must not fill the disk.
 const RESERVE: f64 = 1.1;
 
 /// Runs the check.
-pub(super) fn disk(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn disk(check: &Check, bench: &mut dyn Bench, findings: &mut Findings) {
     let Measure::Disk { amount_b } = check.measure else {
         return;
     };
@@ -33,9 +33,9 @@ pub(super) fn disk(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
         });
     let free_b = match free {
         Ok(free_b) => free_b,
-        Err(problem) => return found.failed(*problem, COMPUTER, &["write_rate", "free"]),
+        Err(problem) => return findings.failed(*problem, COMPUTER, &["write_rate", "free"]),
     };
-    found
+    findings
         .value(COMPUTER, "free", free_b)
         .with_note(folder.display().to_string());
     if free_b < amount_b * RESERVE {
@@ -46,12 +46,12 @@ pub(super) fn disk(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
             free_b / 1e6
         );
         let evidence = Evidence::new(EvidenceKind::Disk, COMPUTER, what).next(FREE_SPACE_STEP);
-        return found.failed(evidence, COMPUTER, &["write_rate"]);
+        return findings.failed(evidence, COMPUTER, &["write_rate"]);
     }
     match write_and_read(&folder, amount_b as u64) {
         Ok(timing) => {
             let read_mb_s = timing.bytes as f64 / timing.read_s.max(1e-9) / 1e6;
-            found
+            findings
                 .value(COMPUTER, "write_rate", timing.bytes as f64 / timing.write_s.max(1e-9))
                 .with_note(format!(
                     "{:.0} MB, synced after {:.3} s; read back at {read_mb_s:.0} MB/s, possibly from the cache",
@@ -59,7 +59,7 @@ pub(super) fn disk(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
                     timing.write_s
                 ));
         }
-        Err(problem) => found.failed(*problem, COMPUTER, &["write_rate"]),
+        Err(problem) => findings.failed(*problem, COMPUTER, &["write_rate"]),
     }
 }
 
@@ -72,7 +72,7 @@ struct DiskTiming {
     read_s: f64,
 }
 
-/// A file that is unlinked while open: the system deletes it when the handle closes, even after a crash.
+/// A file without a name: the system deletes it when the handle closes, even after a crash.
 struct UnlinkedFile {
     file: File,
     /// Former path, for messages.

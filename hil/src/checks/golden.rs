@@ -6,28 +6,28 @@ use crate::bench::Bench;
 use crate::findings::{Findings, GoldenRecord};
 
 /// Runs the check. The bench runs and analyses the campaign; metrics that it did not measure become unmeasured.
-pub(super) fn golden(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn golden(check: &Check, bench: &mut dyn Bench, findings: &mut Findings) {
     let Measure::Golden { protocol } = &check.measure else {
         return;
     };
     if bench.rig().robot.sample_is_off {
-        found.not_applicable = Some("the rig file says `robot.sample_is_off: true`".to_owned());
+        findings.not_applicable = Some("the rig file says `robot.sample_is_off: true`".to_owned());
         return;
     }
     match bench.run_golden(protocol) {
         Ok(run) => {
-            *found = run.findings;
-            found.golden = Some(GoldenRecord {
+            *findings = run.findings;
+            findings.golden = Some(GoldenRecord {
                 files: run.files,
                 skin: run.skin,
                 analysis_version: run.analysis_version,
             });
         }
-        Err(why) => found.evidence.push(*why),
+        Err(why) => findings.evidence.push(*why),
     }
     for metric in check.metrics {
-        if !found.values.iter().any(|v| v.metric == metric.name) {
-            found.unmeasured("skin", metric.name);
+        if !findings.values.iter().any(|v| v.metric == metric.name) {
+            findings.unmeasured("skin", metric.name);
         }
     }
 }

@@ -13,30 +13,33 @@ use crate::findings::Findings;
 const METRICS: &[&str] = &["differences"];
 
 /// Runs the check.
-pub(super) fn identity(_check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn identity(_check: &Check, bench: &mut dyn Bench, findings: &mut Findings) {
     let expected = ExpectedDevice::of_rig(bench.rig());
     let devices = bench.devices();
-    let mut check = |role: DeviceRole, answer: Result<DeviceIdentity, Problem>| {
+    let mut check = |role: DeviceRole, identity: Result<DeviceIdentity, Problem>| {
         let subject = device_evidence::subject(role);
-        match answer {
+        match identity {
             Ok(identity) => {
                 let expected_device = expected.iter().find(|e| e.role == role);
-                compare(role, expected_device, &identity, found);
+                compare(role, expected_device, &identity, findings);
             }
-            Err(problem) => found.failed(*problem, subject, METRICS),
+            Err(problem) => findings.failed(*problem, subject, METRICS),
         }
     };
     let robot = devices.robot.as_ref().map(|d| d.identity());
     check(DeviceRole::Indenter, robot.map_err(Clone::clone));
     for camera in CameraId::ALL {
-        let answer = devices.cameras[camera.index()]
+        let identity = devices.cameras[camera.index()]
             .as_ref()
             .map(|d| d.identity());
-        check(DeviceRole::of_camera(camera), answer.map_err(Clone::clone));
+        check(
+            DeviceRole::of_camera(camera),
+            identity.map_err(Clone::clone),
+        );
     }
     if let Some(slot) = &devices.trigger_box {
-        let answer = slot.as_ref().map(|d| d.identity());
-        check(DeviceRole::TriggerBox, answer.map_err(Clone::clone));
+        let identity = slot.as_ref().map(|d| d.identity());
+        check(DeviceRole::TriggerBox, identity.map_err(Clone::clone));
     }
 }
 
@@ -45,7 +48,7 @@ fn compare(
     role: DeviceRole,
     expected_device: Option<&ExpectedDevice>,
     identity: &DeviceIdentity,
-    found: &mut Findings,
+    findings: &mut Findings,
 ) {
     let subject = device_evidence::subject(role);
     let checks = identity_checks(role, expected_device, identity);
@@ -56,7 +59,9 @@ fn compare(
             check.check, check.expected, check.found
         );
         let evidence = Evidence::new(EvidenceKind::OtherDevice, subject, what);
-        found.evidence.push(evidence.next(check.next_step.as_str()));
+        findings
+            .evidence
+            .push(evidence.next(check.next_step.as_str()));
     }
     let count = differences.count();
     let DeviceIdentity {
@@ -64,7 +69,7 @@ fn compare(
         serial,
         firmware,
     } = identity;
-    found
+    findings
         .value(subject, "differences", count as f64)
         .with_note(format!("{model}, serial {serial}, {firmware}"));
 }

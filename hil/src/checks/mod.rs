@@ -1,4 +1,4 @@
-//! The checks of a suite. They use devices through their traits alone.
+//! The checks of a suite. They use devices only through their traits.
 
 mod clocks;
 mod contact;
@@ -21,7 +21,7 @@ use crate::findings::Findings;
 
 /// Runs one attempt at `check`. Devices may stay open; the robot is braked and the cameras are stopped afterwards.
 pub fn run(check: &Check, bench: &mut dyn Bench) -> Findings {
-    let mut found = Findings::default();
+    let mut findings = Findings::default();
     let run: fn(&Check, &mut dyn Bench, &mut Findings) = match &check.measure {
         Measure::Identity => identity::identity,
         Measure::Settings => settings::settings,
@@ -40,11 +40,11 @@ pub fn run(check: &Check, bench: &mut dyn Bench) -> Findings {
         Measure::WatchdogDrill => drills::watchdog,
         Measure::StopDrill => drills::stop,
     };
-    run(check, bench, &mut found);
-    found
+    run(check, bench, &mut findings);
+    findings
 }
 
-/// Cause of a broken limit when there is no evidence.
+/// Cause of a broken limit without other evidence.
 #[must_use]
 pub const fn default_cause(measure: &Measure) -> Cause {
     match measure {

@@ -1,4 +1,5 @@
-//! Decodes camera streams for checks: events per pixel, time base jumps, and the order of a test pattern.
+//! Decodes camera streams for checks: counts events per pixel and time base jumps, and follows a
+//! test pattern.
 
 use skinrig_device::CameraCapabilities;
 use skinrig_formats::{Decoder, Discontinuity, EventSink, Geometry};
@@ -27,7 +28,8 @@ pub(super) struct Counts {
     pub scan: Option<Scan>,
 }
 
-/// A scan: each event is one row below the last, and after the last row at the top of the next column.
+/// A scan: each event is one row below the previous one; after the last row the next column starts
+/// at the top.
 pub(super) struct Scan {
     columns: u32,
     rows: u32,
@@ -93,7 +95,7 @@ impl Reader {
     pub(super) fn push(&mut self, chunk: &RawChunk) {
         if chunk.lost_before > 0 {
             self.decoder.lost(chunk.lost_before);
-            // Lost data is counted as such: accept any position afterwards.
+            // Data loss is counted separately, so accept any position after it.
             if let Some(scan) = &mut self.counts.scan {
                 scan.next = None;
             }
@@ -107,24 +109,26 @@ pub(super) fn watch(
     streams: Streams<'_>,
     [settle, duration]: [HostDuration; 2],
     mut readers: [Option<Reader>; 2],
-    found: &mut Findings,
+    findings: &mut Findings,
     metrics: &[&'static str],
 ) -> Vec<(CameraId, StreamStats, Reader)> {
     let mut streams = streams.without_box();
-    let see = |readers: &mut [Option<Reader>; 2], chunk: &RawChunk| {
+    let on_chunk = |readers: &mut [Option<Reader>; 2], chunk: &RawChunk| {
         if let Some(reader) = &mut readers[chunk.camera.index()] {
             reader.push(chunk);
         }
     };
-    streams.pass(settle, &mut |chunk| see(&mut readers, chunk));
-    streams.start_counting(&mut |chunk| see(&mut readers, chunk));
+    streams.pass(settle, &mut |chunk| on_chunk(&mut readers, chunk));
+    streams.start_counting(&mut |chunk| on_chunk(&mut readers, chunk));
     for reader in readers.iter_mut().flatten() {
         reader.counts.counting = true;
     }
-    streams.pass(duration, &mut |chunk| see(&mut readers, chunk));
-    let seen = streams.finish(found, metrics, &mut |chunk| see(&mut readers, chunk));
-    let each = CameraId::ALL.into_iter().zip(seen).zip(readers);
-    each.filter_map(|((camera, seen), reader)| Some((camera, seen?, reader?)))
+    streams.pass(duration, &mut |chunk| on_chunk(&mut readers, chunk));
+    let stats = streams.finish(findings, metrics, &mut |chunk| {
+        on_chunk(&mut readers, chunk)
+    });
+    let each = CameraId::ALL.into_iter().zip(stats).zip(readers);
+    each.filter_map(|((camera, stats), reader)| Some((camera, stats?, reader?)))
         .collect()
 }
 

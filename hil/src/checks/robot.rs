@@ -17,44 +17,54 @@ const REST: HostDuration = HostDuration::from_millis(1_000);
 const AVERAGING: HostDuration = HostDuration::from_millis(100);
 /// Distance from which a point is approached, mm.
 const APPROACH_MM: f64 = 4.0;
-/// Distance from the target within which the tip has settled, mm.
+/// Largest distance from the target at which the tip counts as settled, mm.
 const SETTLE_TOLERANCE_MM: f64 = 0.1;
-/// Distance from the target within which the set point has arrived, mm.
+/// Largest distance from the target at which the set point counts as arrived, mm.
 const SET_POINT_TOLERANCE_MM: f64 = 1e-3;
 
 /// Runs the check.
-pub(super) fn robot_state(_: &Check, bench: &mut dyn Bench, found: &mut Findings) {
-    with_arm(bench, Reach::Air, found, &["creep"], &mut |arm, found| {
-        let mut seen = Vec::new();
-        arm.watch(REST, &mut seen, |_| false)?;
-        if let Some(creep_mm) = creep_mm(&seen) {
-            found
-                .value(ROBOT, "creep", creep_mm)
-                .with_samples(seen.len(), MIN_SAMPLES);
-        }
-        Ok(())
-    });
-    let faults = |kind: &EvidenceKind| {
+pub(super) fn robot_state(_: &Check, bench: &mut dyn Bench, findings: &mut Findings) {
+    with_arm(
+        bench,
+        Reach::Air,
+        findings,
+        &["creep"],
+        &mut |arm, findings| {
+            let mut samples = Vec::new();
+            arm.watch(REST, &mut samples, |_| false)?;
+            if let Some(creep_mm) = creep_mm(&samples) {
+                findings
+                    .value(ROBOT, "creep", creep_mm)
+                    .with_samples(samples.len(), MIN_SAMPLES);
+            }
+            Ok(())
+        },
+    );
+    let is_fault = |kind: &EvidenceKind| {
         use EvidenceKind as K;
         matches!(kind, K::State | K::ReadBack | K::Refused | K::Trip)
     };
-    let n = found.evidence.iter().filter(|e| faults(&e.kind)).count();
-    // Without a robot its faults are unknown.
-    if n == found.evidence.len() {
-        found.value(ROBOT, "faults", n as f64);
+    let n = findings
+        .evidence
+        .iter()
+        .filter(|e| is_fault(&e.kind))
+        .count();
+    // Faults are unknown if the robot is missing.
+    if n == findings.evidence.len() {
+        findings.value(ROBOT, "faults", n as f64);
     } else {
-        found.unmeasured(ROBOT, "faults");
+        findings.unmeasured(ROBOT, "faults");
     }
 }
 
-/// Samples needed to locate a tip at rest.
+/// Samples needed to locate a resting tip.
 const MIN_SAMPLES: u64 = 50;
 
-/// Largest distance of the mean position from its first value, mm.
-fn creep_mm(seen: &[PoseSample]) -> Option<f64> {
-    let begin = seen.first()?.t;
+/// Largest distance between the first mean position and any later one, mm.
+fn creep_mm(samples: &[PoseSample]) -> Option<f64> {
+    let begin = samples.first()?.t;
     let window = |s: &PoseSample| (s.t - begin).0 / AVERAGING.0;
-    let positions = seen.chunk_by(|a, b| window(a) == window(b)).map(mean);
+    let positions = samples.chunk_by(|a, b| window(a) == window(b)).map(mean);
     let positions: Vec<Point3<Skin>> = positions.collect();
     let first = *positions.first()?;
     Some(
@@ -65,7 +75,7 @@ fn creep_mm(seen: &[PoseSample]) -> Option<f64> {
     )
 }
 
-/// Mean position of a non-empty list.
+/// Mean position of a non-empty list of samples.
 pub(super) fn mean(samples: &[PoseSample]) -> Point3<Skin> {
     let n = samples.len() as f64;
     let mut sum = [0.0; 3];
@@ -79,7 +89,7 @@ pub(super) fn mean(samples: &[PoseSample]) -> Point3<Skin> {
 }
 
 /// Runs the check.
-pub(super) fn repeatability(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn repeatability(check: &Check, bench: &mut dyn Bench, findings: &mut Findings) {
     let Measure::Repeatability {
         approaches,
         speed_mm_s,
@@ -88,29 +98,38 @@ pub(super) fn repeatability(check: &Check, bench: &mut dyn Bench, found: &mut Fi
         return;
     };
     let metrics = &["spread", "error"];
-    with_arm(bench, Reach::Air, found, metrics, &mut |arm, found| {
-        let points = arm.volume.air_points();
-        let mut positions = vec![Vec::new(); points.len()];
-        for approach in 0..approaches {
-            for (target, positions) in points.iter().zip(&mut positions) {
-                let from = approach_start(*target, approach, approaches);
-                positions.push(approach_from(arm, from, *target, speed_mm_s)?);
+    with_arm(
+        bench,
+        Reach::Air,
+        findings,
+        metrics,
+        &mut |arm, findings| {
+            let points = arm.volume.air_points();
+            let mut positions = vec![Vec::new(); points.len()];
+            for approach in 0..approaches {
+                for (target, positions) in points.iter().zip(&mut positions) {
+                    let from = approach_start(*target, approach, approaches);
+                    positions.push(approach_from(arm, from, *target, speed_mm_s)?);
+                }
             }
-        }
-        let n = positions.iter().map(Vec::len).sum::<usize>();
-        let spread_mm = spread_mm(&positions);
-        found.value(ROBOT, "spread", spread_mm).with_samples(n, 10);
-        let off = points
-            .iter()
-            .zip(&positions)
-            .flat_map(|(target, positions)| positions.iter().map(|p| p.distance_mm(*target)));
-        let error_mm = off.sum::<f64>() / n as f64;
-        found.value(ROBOT, "error", error_mm).with_samples(n, 10);
-        Ok(())
-    });
+            let n = positions.iter().map(Vec::len).sum::<usize>();
+            let spread_mm = spread_mm(&positions);
+            findings
+                .value(ROBOT, "spread", spread_mm)
+                .with_samples(n, 10);
+            let errors_mm = points
+                .iter()
+                .zip(&positions)
+                .flat_map(|(target, positions)| positions.iter().map(|p| p.distance_mm(*target)));
+            let error_mm = errors_mm.sum::<f64>() / n as f64;
+            findings.value(ROBOT, "error", error_mm).with_samples(n, 10);
+            Ok(())
+        },
+    );
 }
 
-/// Start of approach `n` of `of`: from another side each time, alternately from above and from below.
+/// Start of approach `n` of `of`: from a different side each time, alternately from above and from
+/// below.
 fn approach_start(target: Point3<Skin>, n: u32, of: u32) -> Point3<Skin> {
     let (sin, cos) = (std::f64::consts::TAU * f64::from(n) / f64::from(of)).sin_cos();
     let up = if n.is_multiple_of(2) { 1.0 } else { -1.0 };
@@ -128,16 +147,18 @@ fn approach_from(
 ) -> Result<Point3<Skin>, Problem> {
     arm.go(from, speed_mm_s)?;
     arm.go(target, speed_mm_s)?;
-    let mut seen = vec![arm.pose()?];
-    arm.watch(HostDuration(3 * AVERAGING.0), &mut seen, |_| false)?;
-    Ok(mean(last(&seen, AVERAGING)))
+    let mut samples = vec![arm.pose()?];
+    arm.watch(HostDuration(3 * AVERAGING.0), &mut samples, |_| false)?;
+    Ok(mean(last(&samples, AVERAGING)))
 }
 
-/// Samples of the last `span`; not empty unless `seen` is.
-pub(super) fn last(seen: &[PoseSample], span: HostDuration) -> &[PoseSample] {
-    let Some(end) = seen.last() else { return seen };
-    let first = seen.partition_point(|s| end.t - s.t > span);
-    &seen[first..]
+/// Samples of the last `span`; not empty unless `samples` is.
+pub(super) fn last(samples: &[PoseSample], span: HostDuration) -> &[PoseSample] {
+    let Some(end) = samples.last() else {
+        return samples;
+    };
+    let first = samples.partition_point(|s| end.t - s.t > span);
+    &samples[first..]
 }
 
 /// Pooled standard deviation about the means over all axes, mm: root of the sum of squares over the degrees of freedom.
@@ -159,41 +180,49 @@ fn spread_mm(positions: &[Vec<Point3<Skin>>]) -> f64 {
 }
 
 /// Runs the check.
-pub(super) fn step_response(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn step_response(check: &Check, bench: &mut dyn Bench, findings: &mut Findings) {
     let Measure::StepResponse { distance_mm, steps } = check.measure else {
         return;
     };
     let metrics = &["settling", "overshoot", "error"];
-    with_arm(bench, Reach::Air, found, metrics, &mut |arm, found| {
-        let [centre, ..] = arm.volume.air_points();
-        let mut responses = Vec::new();
-        arm.go(centre, TRAVEL_MM_S)?;
-        let mut from = centre;
-        for n in 0..steps {
-            let target = if n.is_multiple_of(2) {
-                step_target(centre, distance_mm, n / 2)
-            } else {
-                centre
-            };
-            let response = measure_step(arm, from, target)?;
-            responses.extend(response);
-            from = target;
-        }
-        let n = responses.len();
-        let most = |of: fn(&Response) -> f64| responses.iter().map(of).fold(0.0, f64::max);
-        let mut settling: Vec<f64> = responses.iter().map(|r| r.settling_s).collect();
-        settling.sort_by(f64::total_cmp);
-        if let Some(median) = settling.get(n / 2) {
-            found.value(ROBOT, "settling", *median).with_samples(n, 3);
-            found
-                .value(ROBOT, "overshoot", most(|r| r.overshoot_mm))
-                .with_samples(n, 3);
-            found
-                .value(ROBOT, "error", most(|r| r.error_mm))
-                .with_samples(n, 3);
-        }
-        Ok(())
-    });
+    with_arm(
+        bench,
+        Reach::Air,
+        findings,
+        metrics,
+        &mut |arm, findings| {
+            let [centre, ..] = arm.volume.air_points();
+            let mut responses = Vec::new();
+            arm.go(centre, TRAVEL_MM_S)?;
+            let mut from = centre;
+            for n in 0..steps {
+                let target = if n.is_multiple_of(2) {
+                    step_target(centre, distance_mm, n / 2)
+                } else {
+                    centre
+                };
+                let response = measure_step(arm, from, target)?;
+                responses.extend(response);
+                from = target;
+            }
+            let n = responses.len();
+            let most = |of: fn(&Response) -> f64| responses.iter().map(of).fold(0.0, f64::max);
+            let mut settling: Vec<f64> = responses.iter().map(|r| r.settling_s).collect();
+            settling.sort_by(f64::total_cmp);
+            if let Some(median) = settling.get(n / 2) {
+                findings
+                    .value(ROBOT, "settling", *median)
+                    .with_samples(n, 3);
+                findings
+                    .value(ROBOT, "overshoot", most(|r| r.overshoot_mm))
+                    .with_samples(n, 3);
+                findings
+                    .value(ROBOT, "error", most(|r| r.error_mm))
+                    .with_samples(n, 3);
+            }
+            Ok(())
+        },
+    );
 }
 
 /// Target of step `n`: alternately along +x, +y, -x and -y.
@@ -216,43 +245,45 @@ fn measure_step(
     from: Point3<Skin>,
     target: Point3<Skin>,
 ) -> Result<Option<Response>, Problem> {
-    let mut seen = Vec::new();
+    let mut samples = Vec::new();
     let t = arm.send(target, TRAVEL_MM_S)?;
-    let there =
+    let has_arrived =
         move |s: &PoseSample| s.t > t && s.commanded.distance_mm(target) <= SET_POINT_TOLERANCE_MM;
-    arm.watch(HostDuration::from_millis(5_000), &mut seen, there)?;
-    arm.watch(REST, &mut seen, |_| false)?;
-    Ok(evaluate_step(&seen, from, target, there))
+    arm.watch(HostDuration::from_millis(5_000), &mut samples, has_arrived)?;
+    arm.watch(REST, &mut samples, |_| false)?;
+    Ok(evaluate_step(&samples, from, target, has_arrived))
 }
 
 /// Evaluates the samples of a step. `None`: the set point never arrived.
 fn evaluate_step(
-    seen: &[PoseSample],
+    samples: &[PoseSample],
     from: Point3<Skin>,
     target: Point3<Skin>,
-    there: impl Fn(&PoseSample) -> bool,
+    has_arrived: impl Fn(&PoseSample) -> bool,
 ) -> Option<Response> {
-    let end = seen.iter().position(there)?;
-    let after = &seen[end..];
+    let end = samples.iter().position(has_arrived)?;
+    let after = &samples[end..];
     let (begin, last_seen) = (after.first()?.t, after.last()?.t);
-    let away = |s: &PoseSample| s.measured.distance_mm(target);
-    let outside = after.iter().rposition(|s| away(s) > SETTLE_TOLERANCE_MM);
+    let error_mm = |s: &PoseSample| s.measured.distance_mm(target);
+    let outside = after
+        .iter()
+        .rposition(|s| error_mm(s) > SETTLE_TOLERANCE_MM);
     let settled = match outside.map(|n| after.get(n + 1)) {
         None => begin,
         Some(Some(s)) => s.t,
         Some(None) => last_seen,
     };
-    let way_mm = target.distance_mm(from);
-    let beyond = |s: &PoseSample| {
+    let distance_mm = target.distance_mm(from);
+    let overshoot_mm = |s: &PoseSample| {
         let parts = (0..3).map(|i| {
             let of = |p: Point3<Skin>| p.to_array()[i];
-            (of(s.measured) - of(target)) * (of(target) - of(from)) / way_mm
+            (of(s.measured) - of(target)) * (of(target) - of(from)) / distance_mm
         });
         parts.sum::<f64>()
     };
     Some(Response {
         settling_s: (settled - begin).as_secs_f64(),
-        overshoot_mm: seen.iter().map(beyond).fold(0.0, f64::max),
+        overshoot_mm: samples.iter().map(overshoot_mm).fold(0.0, f64::max),
         error_mm: mean(last(after, AVERAGING)).distance_mm(target),
     })
 }

@@ -18,7 +18,7 @@ const PATTERN: &[&str] = &["received", "lost", "gaps"];
 const SETTLE: HostDuration = HostDuration::from_millis(500);
 
 /// Runs the check.
-pub(super) fn idle(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn idle(check: &Check, bench: &mut dyn Bench, findings: &mut Findings) {
     let Measure::Idle { duration } = check.measure else {
         return;
     };
@@ -28,21 +28,21 @@ pub(super) fn idle(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
         Ok(())
     };
     let streams = Streams::start(bench, &mut prepare);
-    for (camera, seen, reader) in watch(streams, [SETTLE, duration], readers, found, IDLE) {
+    for (camera, stats, reader) in watch(streams, [SETTLE, duration], readers, findings, IDLE) {
         let subject = device_evidence::camera_subject(camera);
-        let Some(span_s) = seen.span_s() else {
+        let Some(span_s) = stats.span_s() else {
             for metric in IDLE {
-                found.unmeasured(subject, metric);
+                findings.unmeasured(subject, metric);
             }
             continue;
         };
-        found.value(subject, "data_rate", seen.bytes as f64 / span_s);
-        losses(subject, &seen, reader.counts.jumps, 0, found);
+        findings.value(subject, "data_rate", stats.bytes as f64 / span_s);
+        losses(subject, &stats, reader.counts.jumps, 0, findings);
     }
 }
 
 /// Runs the check.
-pub(super) fn test_pattern(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn test_pattern(check: &Check, bench: &mut dyn Bench, findings: &mut Findings) {
     let Measure::TestPattern {
         duration,
         rate_ev_s,
@@ -61,19 +61,19 @@ pub(super) fn test_pattern(check: &Check, bench: &mut dyn Bench, found: &mut Fin
         Ok(())
     };
     let streams = Streams::start(bench, &mut prepare);
-    let watched = watch(streams, [SETTLE, duration], readers, found, PATTERN);
-    disable_test_pattern(bench, found);
+    let watched = watch(streams, [SETTLE, duration], readers, findings, PATTERN);
+    disable_test_pattern(bench, findings);
     let refused = |e: &&Evidence| e.kind == EvidenceKind::Refused;
-    if scans == [None, None] && found.evidence.iter().filter(refused).count() == scans.len() {
-        let whats = found.evidence.iter().map(|e| e.what.as_str());
-        found.not_applicable = Some(whats.collect::<Vec<_>>().join("; "));
+    if scans == [None, None] && findings.evidence.iter().filter(refused).count() == scans.len() {
+        let whats = findings.evidence.iter().map(|e| e.what.as_str());
+        findings.not_applicable = Some(whats.collect::<Vec<_>>().join("; "));
         return;
     }
-    for (camera, seen, reader) in watched {
+    for (camera, stats, reader) in watched {
         let subject = device_evidence::camera_subject(camera);
-        let (Some(span_s), Some(scan)) = (seen.span_s(), scans[camera.index()]) else {
+        let (Some(span_s), Some(scan)) = (stats.span_s(), scans[camera.index()]) else {
             for metric in PATTERN {
-                found.unmeasured(subject, metric);
+                findings.unmeasured(subject, metric);
             }
             continue;
         };
@@ -81,42 +81,42 @@ pub(super) fn test_pattern(check: &Check, bench: &mut dyn Bench, found: &mut Fin
         let events = reader.counts.events;
         let followed = reader.counts.scan;
         let (columns, rows) = followed.as_ref().map_or((0, 0), |s| s.largest);
-        found
+        findings
             .value(subject, "received", events as f64 / expected * 100.0)
             .with_note(format!(
                 "{events} of {expected:.0} events at {:.0} events/s; largest column {columns}, largest row {rows} of {} x {}",
                 scan.rate_ev_s, scan.columns, scan.rows
             ));
         let breaks = followed.map_or(0, |s| s.breaks);
-        losses(subject, &seen, reader.counts.jumps, breaks, found);
+        losses(subject, &stats, reader.counts.jumps, breaks, findings);
     }
 }
 
 /// Adds lost bytes and gaps: losses, time base jumps and breaks of the test pattern.
-fn losses(subject: &str, seen: &StreamStats, jumps: u64, breaks: u64, found: &mut Findings) {
-    let lost = found.value(subject, "lost", seen.lost_bytes as f64);
-    if !seen.notes.is_empty() {
-        lost.with_note(seen.notes.join("; "));
+fn losses(subject: &str, stats: &StreamStats, jumps: u64, breaks: u64, findings: &mut Findings) {
+    let lost = findings.value(subject, "lost", stats.lost_bytes as f64);
+    if !stats.notes.is_empty() {
+        lost.with_note(stats.notes.join("; "));
     }
-    let gaps = seen.losses + jumps + breaks;
-    found.value(subject, "gaps", gaps as f64);
+    let gaps = stats.losses + jumps + breaks;
+    findings.value(subject, "gaps", gaps as f64);
     if gaps > 0 {
         let what = format!(
             "expected a stream without gaps, found {} losses with {} bytes in total, {jumps} time base jumps and {breaks} breaks of the test pattern",
-            seen.losses, seen.lost_bytes
+            stats.losses, stats.lost_bytes
         );
         let next = "check the cable, the port (USB 3, no hub) and what else runs on this computer";
-        found
+        findings
             .evidence
             .push(Evidence::new(EvidenceKind::DataLost, subject, what).next(next));
     }
 }
 
 /// Switches the test pattern off on both cameras; a failure becomes evidence.
-fn disable_test_pattern(bench: &mut dyn Bench, found: &mut Findings) {
+fn disable_test_pattern(bench: &mut dyn Bench, findings: &mut Findings) {
     for camera in bench.devices().cameras.iter_mut().flatten() {
         if let Err(e) = camera.test_pattern(None) {
-            found.evidence.push(*device_evidence::from_error(&e));
+            findings.evidence.push(*device_evidence::from_error(&e));
         }
     }
 }

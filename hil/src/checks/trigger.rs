@@ -17,18 +17,19 @@ use crate::streams::Streams;
 
 const METRICS: &[&str] = &["lost_pulses", "extra_pulses", "unread_trains", "jitter"];
 
-/// Minimum pause after a train: the box may send one of its own.
+/// Minimum pause after a train, so that the box can send a train of its own.
 const PAUSE: HostDuration = HostDuration::from_millis(15);
-/// Streaming time before the first train and after the last, for start-up bursts and late reports.
+/// Streaming time before the first train and after the last; skips start-up bursts and receives
+/// late reports.
 const MARGIN: HostDuration = HostDuration::from_millis(300);
 /// Trains needed for a verdict: with fewer there is no fit, and pulses are indistinguishable from noise.
 const MIN_TRAINS: u64 = 3;
-/// Rising edges needed for the jitter: two trains.
+/// Rising edges needed for the jitter, as many as two trains have.
 const MIN_EDGES: u64 = 64;
-/// Resolution of a camera's time, s.
+/// Resolution of the camera clock, s.
 const TICK_S: f64 = 1e-6;
 
-/// The `n`-th mark of a check. All marks differ, and consecutive ones in many bits.
+/// The `n`-th mark of a check. All marks differ, and consecutive ones differ in many bits.
 pub(super) fn mark(n: u32) -> Mark {
     /// Odd, so that 2^17 consecutive marks have different numbers.
     const STRIDE: u32 = 52_361;
@@ -63,48 +64,48 @@ impl Edges {
 }
 
 /// Runs the check.
-pub(super) fn trigger_loopback(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
+pub(super) fn trigger_loopback(check: &Check, bench: &mut dyn Bench, findings: &mut Findings) {
     let Measure::TriggerLoopback { trains } = check.measure else {
         return;
     };
     if bench.rig().trigger_box.is_none() {
-        found.not_applicable = Some("the rig file has no `trigger_box`".to_owned());
+        findings.not_applicable = Some("the rig file has no `trigger_box`".to_owned());
         return;
     }
     let channels = bench.rig().cameras.each_ref().map(|c| c.trigger_channel);
     let mut edges = Edges::default();
     let mut streams = Streams::start(bench, &mut |_, _| Ok(()));
-    let see = &mut |chunk: &RawChunk| edges.add(chunk);
-    streams.pass(MARGIN, see);
+    let on_chunk = &mut |chunk: &RawChunk| edges.add(chunk);
+    streams.pass(MARGIN, on_chunk);
     let mut sent = Vec::new();
     for n in 0..trains {
-        if !streams.send(mark(n), see) {
+        if !streams.send(mark(n), on_chunk) {
             break;
         }
         sent.push(mark(n));
-        streams.pass(PAUSE, see);
+        streams.pass(PAUSE, on_chunk);
     }
-    streams.pass(MARGIN, see);
+    streams.pass(MARGIN, on_chunk);
     let reports = trim_to_marks(streams.reports(), &sent);
     let reports_complete = streams.box_reports_are_complete() && !has_missing_syncs(&reports);
-    let seen = streams.finish(found, METRICS, see);
+    let stats = streams.finish(findings, METRICS, on_chunk);
     if reports.iter().any(|r| matches!(r, BoxReport::Reset { .. })) {
         let what = "expected the box's clock to continue, found a reset of the box";
         let subject = device_evidence::subject(skinrig_model::DeviceRole::TriggerBox);
         let next = "check the box's power and its cable";
-        found
+        findings
             .evidence
             .push(Evidence::new(EvidenceKind::TriggerFault, subject, what).next(next));
     }
     for camera in CameraId::ALL {
-        if seen[camera.index()].is_none() {
+        if stats[camera.index()].is_none() {
             continue;
         }
         let subject = device_evidence::camera_subject(camera);
-        // If the box's reports are incomplete, a missing train may be lost or may never have been sent.
+        // Without complete reports, a missing train may be lost or may never have been sent.
         if sent.len() < trains as usize || !reports_complete {
             for metric in METRICS {
-                let value = found.unmeasured(subject, metric);
+                let value = findings.unmeasured(subject, metric);
                 if !reports_complete {
                     value.with_note("the box did not report every train that it sent");
                 }
@@ -114,7 +115,7 @@ pub(super) fn trigger_loopback(check: &Check, bench: &mut dyn Bench, found: &mut
         let channel = channels[camera.index()];
         let line =
             LineQuality::measure(&sent, &reports, &edges.on_channel(camera, channel), channel);
-        line.report(subject, &edges.other_channels(camera, channel), found);
+        line.report(subject, &edges.other_channels(camera, channel), findings);
     }
 }
 
@@ -126,14 +127,14 @@ struct LineQuality {
     extra_edges: u64,
     /// Jitter, s, and the number of edges behind it.
     jitter: Option<(f64, u64)>,
-    /// Why no clock could be fitted, in which case pulses are only counted.
+    /// Why the camera clock could not be fitted. Pulses are then only counted, not matched.
     unfitted: Option<NoCameraClock>,
 }
 
 impl LineQuality {
     fn measure(sent: &[Mark], reports: &[BoxReport], edges: &[TriggerEdge], channel: u8) -> Self {
         let read = decode_marks(edges);
-        // In the order of sending: a train decoded out of order counts as unread.
+        // A train decoded out of order counts as unread.
         let mut turn = sent.iter();
         let read_in_turn = read
             .marks
@@ -165,14 +166,14 @@ impl LineQuality {
         }
     }
 
-    fn report(self, subject: &str, other_channels: &[u8], found: &mut Findings) {
+    fn report(self, subject: &str, other_channels: &[u8], findings: &mut Findings) {
         let trains = self.sent;
         for (metric, count) in [
             ("lost_pulses", self.lost_pulses),
             ("extra_pulses", self.extra_edges),
             ("unread_trains", self.unread as u64),
         ] {
-            let value = found
+            let value = findings
                 .value(subject, metric, count as f64)
                 .with_samples(trains, MIN_TRAINS);
             if let Some(why) = &self.unfitted {
@@ -183,11 +184,11 @@ impl LineQuality {
             Some((jitter_s, n)) => {
                 // Standard error of a standard deviation from n nearly normal samples.
                 let half = 1.96 * jitter_s / (2.0 * n as f64).sqrt();
-                let value = found.value(subject, "jitter", jitter_s);
+                let value = findings.value(subject, "jitter", jitter_s);
                 value.with_samples(n as usize, MIN_EDGES).interval =
                     Some([(jitter_s - half).max(0.0), jitter_s + half]);
             }
-            None => drop(found.unmeasured(subject, "jitter")),
+            None => drop(findings.unmeasured(subject, "jitter")),
         }
         if self.lost_pulses + self.extra_edges + self.unread as u64 == 0 {
             return;
@@ -203,13 +204,14 @@ impl LineQuality {
             what += &format!("; edges on channel {other_channels:?}");
         }
         let next = "check the trigger cable, its channel in the rig file, and levels (docs/how-to/bench.md)";
-        found
+        findings
             .evidence
             .push(Evidence::new(EvidenceKind::TriggerFault, subject, what).next(next));
     }
 }
 
-/// `reports` without trains before the first sent mark and after the last: the cameras may have seen only parts of those.
+/// `reports` without trains before the first sent mark and after the last one: the cameras may have
+/// received only parts of those.
 fn trim_to_marks(reports: &[BoxReport], sent: &[Mark]) -> Vec<BoxReport> {
     let is_ours = |r: &BoxReport| matches!(r, BoxReport::Mark { mark, .. } if sent.contains(mark));
     let (first, last) = (

@@ -88,7 +88,7 @@ pub enum HistoryError {
     },
 }
 
-/// A failed query, before the file is added.
+/// A failed query, before the path of the file is known.
 #[derive(Debug)]
 pub(super) enum QueryError {
     Sql(Box<sqlx::Error>),

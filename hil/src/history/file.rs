@@ -35,7 +35,7 @@ static MIGRATOR: LazyLock<Migrator> = LazyLock::new(|| {
 /// How long to wait for another writer. A write takes milliseconds.
 const BUSY: Duration = Duration::from_secs(30);
 
-/// Opens a history after checking its first page. `create`: start an empty one if the file does not exist.
+/// Opens a history after checking its first page. `create`: whether to create a missing file.
 pub(super) async fn open(path: &Path, create: bool) -> Result<SqliteConnection, HistoryError> {
     let is_new = !check_first_page(path)?;
     if is_new && !create {
@@ -64,7 +64,7 @@ pub(super) async fn open(path: &Path, create: bool) -> Result<SqliteConnection, 
 pub(super) async fn begin(
     conn: &mut SqliteConnection,
 ) -> Result<Transaction<'_, Sqlite>, QueryError> {
-    // Lock at the first statement: of two programs that create a file together, one creates the schema and the other waits.
+    // Lock at the first statement: if two programs create a file at the same time, one creates the schema while the other waits.
     let mut all = conn.begin_with("BEGIN IMMEDIATE").await?;
     let done = MIGRATOR.run(&mut *all).await;
     done.map_err(sqlx::Error::from)?;
@@ -72,7 +72,7 @@ pub(super) async fn begin(
 }
 
 async fn check_integrity(conn: &mut SqliteConnection) -> Result<(), QueryError> {
-    // Check for invalid UTF-8 in the schema, on which the SQLite client would panic.
+    // The SQLite client would panic on invalid UTF-8 in the schema.
     let sql = "SELECT CAST(coalesce(sql, '') AS BLOB) AS sql FROM sqlite_schema";
     for row in sqlx::query(sql).fetch_all(&mut *conn).await? {
         let text: Vec<u8> = row.try_get("sql")?;
@@ -114,7 +114,7 @@ fn check_first_page(path: &Path) -> Result<bool, HistoryError> {
     let mut page = Vec::new();
     file.take(100).read_to_end(&mut page).map_err(io)?;
     if page.is_empty() {
-        // Another program has just created it.
+        // Another program created it but has not written yet.
         return Ok(false);
     }
     if page.len() < 100 || !page.starts_with(b"SQLite format 3\0") {

@@ -28,7 +28,7 @@ pub enum AppendOutcome {
     AlreadyPresent,
 }
 
-/// Which nights to read. An empty field means that of the newest night.
+/// Selects nights. Empty fields match the newest night.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Filter {
     /// Name of the bench.
@@ -56,8 +56,8 @@ pub fn append(path: &Path, night: &Night, folder: &Path) -> Result<AppendOutcome
     let sha256 = write::digest(night).map_err(fault)?;
     runtime(path)?.block_on(async {
         let mut conn = file::open(path, true).await?;
-        let mut all = file::begin(&mut conn).await.map_err(fault)?;
-        match write::known(&mut all, &head).await.map_err(fault)? {
+        let mut tx = file::begin(&mut conn).await.map_err(fault)?;
+        match write::stored_digest(&mut tx, &head).await.map_err(fault)? {
             Some(known) if known == sha256 => return Ok(AppendOutcome::AlreadyPresent),
             Some(_) => {
                 return Err(HistoryError::ConflictingNight {
@@ -68,10 +68,10 @@ pub fn append(path: &Path, night: &Night, folder: &Path) -> Result<AppendOutcome
             }
             None => {}
         }
-        write::night(&mut all, night, &head, &sha256)
+        write::night(&mut tx, night, &head, &sha256)
             .await
             .map_err(fault)?;
-        all.commit().await.map_err(|e| fault(e.into()))?;
+        tx.commit().await.map_err(|e| fault(e.into()))?;
         Ok(AppendOutcome::Added)
     })
 }
@@ -110,7 +110,7 @@ pub fn load(path: &Path, filter: &Filter) -> Result<History, HistoryError> {
                 filter.rig.as_deref().unwrap_or("any bench")
             ),
             found: if found.is_empty() {
-                "none at all".to_owned()
+                "no nights".to_owned()
             } else {
                 found
             },
@@ -123,7 +123,7 @@ pub fn load(path: &Path, filter: &Filter) -> Result<History, HistoryError> {
     })
 }
 
-/// Accepts a change: from its night on the affected series are learnt anew.
+/// Accepts a change: the reference of the affected series restarts at its night.
 ///
 /// # Errors
 /// Those of [`suites`], and [`HistoryError::NotFound`] if the history does not have the night or the series.
@@ -153,10 +153,10 @@ pub fn accept(path: &Path, history: &History, acceptance: &Acceptance) -> Result
     let fault = |fault: QueryError| fault.at(path, "adding an acceptance");
     runtime(path)?.block_on(async {
         let mut conn = file::open(path, false).await?;
-        let mut all = file::begin(&mut conn).await.map_err(fault)?;
-        let done = write::acceptance(&mut all, &night.rig, acceptance).await;
+        let mut tx = file::begin(&mut conn).await.map_err(fault)?;
+        let done = write::acceptance(&mut tx, &night.rig, acceptance).await;
         done.map_err(fault)?;
-        all.commit().await.map_err(|e| fault(e.into()))
+        tx.commit().await.map_err(|e| fault(e.into()))
     })
 }
 

@@ -18,21 +18,21 @@ pub(super) fn digest(night: &Night) -> Result<String, QueryError> {
 }
 
 /// Digest of the stored night with this name, if any.
-pub(super) async fn known(
-    all: &mut Rows<'_>,
+pub(super) async fn stored_digest(
+    tx: &mut Rows<'_>,
     head: &NightHead,
 ) -> Result<Option<String>, QueryError> {
     let found = sqlx::query_scalar("SELECT sha256 FROM night WHERE rig = ? AND night_id = ?")
         .bind(&head.rig)
         .bind(&head.id)
-        .fetch_optional(&mut **all)
+        .fetch_optional(&mut **tx)
         .await?;
     Ok(found)
 }
 
 /// Inserts a night with all its checks.
 pub(super) async fn night(
-    all: &mut Rows<'_>,
+    tx: &mut Rows<'_>,
     night: &Night,
     head: &NightHead,
     sha256: &str,
@@ -57,34 +57,34 @@ pub(super) async fn night(
     .bind(&head.folder)
     .bind(&head.golden)
     .bind(sha256)
-    .fetch_one(&mut **all)
+    .fetch_one(&mut **tx)
     .await?;
     for (device, version) in &versions.firmware {
         sqlx::query("INSERT INTO firmware (night, device, version) VALUES (?, ?, ?)")
             .bind(id)
             .bind(device)
             .bind(version)
-            .execute(&mut **all)
+            .execute(&mut **tx)
             .await?;
     }
     for check in &night.checks {
-        self::check(all, id, check).await?;
+        self::check(tx, id, check).await?;
     }
     Ok(())
 }
 
-async fn check(all: &mut Rows<'_>, night: i64, check: &CheckResult) -> Result<(), QueryError> {
+async fn check(tx: &mut Rows<'_>, night: i64, check: &CheckResult) -> Result<(), QueryError> {
     sqlx::query("INSERT INTO check_made (night, name, verdict, attempts) VALUES (?, ?, ?, ?)")
         .bind(night)
         .bind(&check.name)
         .bind(check.verdict.name())
         .bind(whole(check.attempts.len() as u64))
-        .execute(&mut **all)
+        .execute(&mut **tx)
         .await?;
     for (attempt, made) in (1..).zip(&check.attempts) {
         for part in &made.parts {
             for m in &part.measurements {
-                measurement(all, (night, &check.name, attempt), part, m).await?;
+                measurement(tx, (night, &check.name, attempt), part, m).await?;
             }
         }
     }
@@ -92,7 +92,7 @@ async fn check(all: &mut Rows<'_>, night: i64, check: &CheckResult) -> Result<()
 }
 
 async fn measurement(
-    all: &mut Rows<'_>,
+    tx: &mut Rows<'_>,
     (night, check, attempt): (i64, &str, i64),
     part: &Part,
     m: &Measurement,
@@ -119,14 +119,14 @@ async fn measurement(
     .bind(m.n.map(whole))
     .bind(m.verdict.name())
     .bind(part.verdict.name())
-    .execute(&mut **all)
+    .execute(&mut **tx)
     .await?;
     Ok(())
 }
 
 /// Inserts an acceptance.
 pub(super) async fn acceptance(
-    all: &mut Rows<'_>,
+    tx: &mut Rows<'_>,
     rig: &str,
     acceptance: &Acceptance,
 ) -> Result<(), QueryError> {
@@ -139,12 +139,12 @@ pub(super) async fn acceptance(
     .bind(&acceptance.reason)
     .bind(&acceptance.by)
     .bind(&acceptance.at)
-    .execute(&mut **all)
+    .execute(&mut **tx)
     .await?;
     Ok(())
 }
 
-/// Sample counts never reach 2^63.
+/// Converts a count; counts never reach 2^63.
 fn whole(count: u64) -> i64 {
     i64::try_from(count).unwrap_or(i64::MAX)
 }

@@ -8,11 +8,11 @@ use super::owner::Entry;
 
 /// Environment variable that names the folder of leases.
 pub const VARIABLE: &str = "SKINRIG_LEASES";
-/// Default folders for leases; the second is for systems where only root can write to the first.
+/// Default folders for leases. Where only root can write to the first, the second is used.
 const SHARED: [&str; 2] = ["/run/lock", "/var/lock"];
 
-/// The folder of leases: the one in [`VARIABLE`], or one that every user of this computer can write to. A folder in the user's home
-/// would not keep two users apart.
+/// The folder of leases: the one in [`VARIABLE`], or one that every user of this computer can write
+/// to. A folder in the user's home would not exclude other users.
 #[must_use]
 pub fn folder() -> PathBuf {
     if let Some(named) = std::env::var_os(VARIABLE).filter(|v| !v.is_empty()) {
@@ -35,8 +35,8 @@ fn is_world_writable(_folder: &Path) -> bool {
 
 /// Opens the file at `path`, or creates it with write access for every user.
 ///
-/// Only the first open may create it: in a folder with the sticky bit, Linux rejects `O_CREAT` on an existing file of another user
-/// (`fs.protected_regular`).
+/// The first call creates it, later ones must not: in a folder with the sticky bit, Linux rejects
+/// `O_CREAT` on an existing file of another user (`fs.protected_regular`).
 pub(super) fn open(path: &Path) -> io::Result<File> {
     for _ in 0..2 {
         match OpenOptions::new().read(true).write(true).open(path) {
@@ -78,7 +78,7 @@ fn make_world_writable(_file: &File) -> io::Result<()> {
 pub(super) fn read(file: &mut File) -> io::Result<Option<Entry>> {
     let mut text = String::new();
     file.seek(SeekFrom::Start(0))?;
-    // A lease has a few hundred bytes. A larger file is not a lease.
+    // A lease has a few hundred bytes, so a larger file is not a lease.
     file.take(1 << 16).read_to_string(&mut text)?;
     Ok(serde_json::from_str(&text).ok())
 }

@@ -30,7 +30,8 @@ pub struct LeaseTiming {
     pub heartbeat: Duration,
     /// How long another computer watches for a heartbeat before the lease expires.
     pub expiry: Duration,
-    /// A lock held for longer than this is a holder's; a shorter one belongs to a program that only inspects the lease.
+    /// A lock that lasts longer than this is a holder's. Programs that only inspect a lease lock it
+    /// for less.
     pub lock_wait: Duration,
 }
 
@@ -70,7 +71,7 @@ pub enum LeaseError {
 
 fn holder(owner: Option<&Owner>) -> String {
     owner.map_or_else(
-        || "a program that is just taking it".to_owned(),
+        || "a program that is just acquiring it".to_owned(),
         |o| o.to_string(),
     )
 }
@@ -111,30 +112,30 @@ impl Lease {
     /// # Errors
     /// [`LeaseError::Held`] or [`LeaseError::File`].
     pub fn take(path: &Path, owner: Owner, timing: LeaseTiming) -> Result<Self, LeaseError> {
-        let wrong = |cause| LeaseError::File {
+        let file_error = |cause| LeaseError::File {
             path: path.to_owned(),
             cause,
         };
-        let mut file = file::open(path).map_err(wrong)?;
-        if !lock(&file, timing.lock_wait).map_err(wrong)? {
+        let mut file = file::open(path).map_err(file_error)?;
+        if !lock(&file, timing.lock_wait).map_err(file_error)? {
             let held = file::read(&mut file).ok().flatten();
             return Err(LeaseError::Held {
                 owner: held.map(|e| Box::new(e.owner)),
                 path: path.to_owned(),
             });
         }
-        let left = file::read(&mut file).map_err(wrong)?;
-        let left = left.filter(|e| !e.released);
-        if let Some(entry) = &left
+        let previous = file::read(&mut file).map_err(file_error)?;
+        let previous = previous.filter(|e| !e.released);
+        if let Some(entry) = &previous
             && entry.owner.host != owner.host
-            && has_heartbeat(&mut file, entry, timing).map_err(wrong)?
+            && has_heartbeat(&mut file, entry, timing).map_err(file_error)?
         {
             return Err(LeaseError::Held {
                 owner: Some(Box::new(entry.owner.clone())),
                 path: path.to_owned(),
             });
         }
-        let note = left.map(|e| {
+        let note = previous.map(|e| {
             format!(
                 "taken over from {}, which ended without releasing it; its last heartbeat was at {}",
                 e.owner, e.beat_at
@@ -148,10 +149,10 @@ impl Lease {
             beat_at: now(),
             released: false,
         };
-        file::write(&mut file, &entry).map_err(wrong)?;
+        file::write(&mut file, &entry).map_err(file_error)?;
         if let Some(note) = &note {
             let line = format!("{}: {note}", entry.owner);
-            file::log(path, &line).map_err(wrong)?;
+            file::log(path, &line).map_err(file_error)?;
         }
         let shared = Arc::new(Shared {
             path: path.to_owned(),
@@ -167,7 +168,7 @@ impl Lease {
                     thread.beat();
                 }
             })
-            .map_err(wrong)?;
+            .map_err(file_error)?;
         Ok(Self {
             shared,
             stop: Some(stop),
@@ -188,7 +189,8 @@ impl Lease {
         &self.shared.path
     }
 
-    /// Whether another program took it, which is possible only if this computer stopped its heartbeat for a long time.
+    /// Whether another program took the lease. That is possible only after this computer missed
+    /// heartbeats for longer than the expiry.
     #[must_use]
     pub fn is_lost(&self) -> bool {
         self.shared.lost.load(Ordering::SeqCst)
@@ -223,7 +225,8 @@ impl Shared {
         self.file.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Increments the counter, unless another program took the lease. A failed read or write is retried at the next heartbeat.
+    /// Increments the counter, unless another program took the lease. The next heartbeat repeats a
+    /// failed read or write.
     fn beat(&self) {
         let mut held = self.lock_file();
         let (file, entry) = &mut *held;
@@ -241,7 +244,7 @@ impl Shared {
     }
 }
 
-/// Tries to lock the file, for as long as another program may only be inspecting it.
+/// Tries to lock the file for `lock_wait`: another program may hold a short lock to inspect it.
 fn lock(file: &File, lock_wait: Duration) -> io::Result<bool> {
     let until = Instant::now() + lock_wait;
     loop {
@@ -302,7 +305,7 @@ pub fn inspect(path: &Path) -> io::Result<LeaseState> {
         }
         opened => opened?,
     };
-    // A shared lock for a moment: a holder keeps an exclusive one.
+    // A short shared lock fails if a holder has its exclusive lock.
     let held = match file.try_lock_shared() {
         Ok(()) => {
             file.unlock()?;
@@ -338,6 +341,6 @@ fn now() -> String {
 /// Distinguishes two leases taken by one process.
 fn nonce() -> String {
     use std::sync::atomic::AtomicU64;
-    static TAKEN: AtomicU64 = AtomicU64::new(0);
-    format!("{}-{}", now(), TAKEN.fetch_add(1, Ordering::SeqCst))
+    static COUNTER: AtomicU64 = AtomicU64::new(0);
+    format!("{}-{}", now(), COUNTER.fetch_add(1, Ordering::SeqCst))
 }

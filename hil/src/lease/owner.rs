@@ -13,9 +13,10 @@ pub struct Owner {
     pub host: String,
     /// Process ID.
     pub pid: u32,
-    /// Start of the process in kernel ticks since boot: distinguishes it from a later process with the same ID.
+    /// Start of the process in kernel ticks since boot. It distinguishes the process from a later
+    /// one with the same ID.
     pub process_started: Option<u64>,
-    /// Its command: `hil run nightly`.
+    /// Its command, such as `hil run nightly`.
     pub what: String,
     /// Start of the lease, RFC 3339, UTC.
     pub since: String,
@@ -76,9 +77,9 @@ pub(super) struct Entry {
     pub version: u32,
     /// The current or last holder.
     pub owner: Owner,
-    /// Unique per lease, so that a holder notices when another program has taken it.
+    /// Unique per lease. A holder detects a takeover by a changed token.
     pub token: String,
-    /// Counts heartbeats. Another computer watches whether it changes, so that clocks are never compared.
+    /// Counts heartbeats. Another computer watches it change, so clocks are never compared.
     pub beats: u64,
     /// Time of the last heartbeat by the holder's clock; for display only.
     pub beat_at: String,

@@ -20,13 +20,13 @@ use plan::PlanInputs;
 pub struct SuiteRunner<'a> {
     /// The suite.
     pub suite: &'a Suite,
-    /// Names of the checks to run; the others are SKIPPED. `None` runs all.
+    /// Names of the checks to run; the others are SKIPPED. `None` runs all checks.
     pub only: Option<&'a [String]>,
-    /// Inputs of the time estimates that the suite does not contain.
+    /// Inputs of the time estimates that are not part of the suite.
     pub inputs: PlanInputs,
-    /// Clock that measures the budget.
+    /// Clock for the budget.
     pub clock: &'a dyn Clock,
-    /// Runs one attempt at a check: [`checks::run`].
+    /// Runs one attempt of a check; [`checks::run`] by default.
     pub make: &'a dyn Fn(&Check, &mut dyn Bench) -> Findings,
 }
 
@@ -156,12 +156,12 @@ impl NightRun<'_, '_> {
             return result;
         }
         if let Some((evidence, witnesses)) = self.blocked_by(check, planned) {
-            let found = Findings {
+            let findings = Findings {
                 evidence,
                 ..Findings::default()
             };
             let now_s = self.elapsed().as_secs_f64();
-            let attempt = self.judge(check, found, now_s);
+            let attempt = self.judge(check, findings, now_s);
             return CheckResult {
                 witnesses,
                 ..with_attempts(result, RepeatRule::NEVER, vec![attempt])
@@ -174,14 +174,14 @@ impl NightRun<'_, '_> {
             self.observer
                 .attempt_started(&self.night, check, attempts.len() + 1);
             let began_s = self.elapsed().as_secs_f64();
-            let found = self.make(check);
-            if let Some(reason) = found.not_applicable {
+            let findings = self.make(check);
+            if let Some(reason) = findings.not_applicable {
                 return CheckResult {
                     skipped: Some(reason),
                     ..result
                 };
             }
-            attempts.push(self.judge(check, found, began_s));
+            attempts.push(self.judge(check, findings, began_s));
             if !rule.should_repeat(&attempts) {
                 break;
             }
@@ -195,7 +195,7 @@ impl NightRun<'_, '_> {
                     Some("not repeated: the remaining budget is needed for the remaining checks");
                 break;
             }
-            // Reopening may find a device that was missing, or free one that is stuck.
+            // Reopening may find a missing device or recover one that hangs.
             self.bench.close();
         }
         let mut result = with_attempts(result, rule, attempts);
@@ -210,14 +210,14 @@ impl NightRun<'_, '_> {
     fn make(&mut self, check: &Check) -> Findings {
         let (make, bench) = (self.runner.make, &mut *self.bench);
         let outcome = catch_unwind(AssertUnwindSafe(|| make(check, bench)));
-        let mut found = outcome.unwrap_or_else(|panic| {
+        let mut findings = outcome.unwrap_or_else(|panic| {
             let message = panic
                 .downcast_ref::<&str>()
                 .map(|s| (*s).to_owned())
                 .or_else(|| panic.downcast_ref::<String>().cloned())
                 .unwrap_or_else(|| "no message".to_owned());
-            let mut found = Findings::default();
-            found.evidence.push(
+            let mut findings = Findings::default();
+            findings.evidence.push(
                 Evidence::new(
                     EvidenceKind::Software,
                     "computer",
@@ -225,34 +225,34 @@ impl NightRun<'_, '_> {
                 )
                 .next("report this as a bug in skinrig, with the night's folder"),
             );
-            // The devices that the check used are in an unknown state.
+            // The check's devices are in an unknown state.
             let closed = catch_unwind(AssertUnwindSafe(|| self.bench.close()));
             if closed.is_err() {
-                found.add_evidence(
+                findings.add_evidence(
                     EvidenceKind::Software,
                     "computer",
                     "the devices could not be closed",
                 );
             }
-            found
+            findings
         });
-        if let Some(record) = found.golden.take() {
+        if let Some(record) = findings.golden.take() {
             self.night.golden = Some(record.files);
             self.night.versions.skin = record.skin;
             self.night.versions.analysis = record.analysis_version;
         }
-        found
+        findings
     }
 
     /// Turns the findings of an attempt into its verdict.
-    fn judge(&mut self, check: &Check, mut found: Findings, began_s: f64) -> Attempt {
+    fn judge(&mut self, check: &Check, mut findings: Findings, began_s: f64) -> Attempt {
         if self.bench.stop_requested() {
             let (kind, what) = if self.bench.lease_is_lost() {
                 (EvidenceKind::Lease, "another program took the bench")
             } else {
                 (EvidenceKind::Stopped, "the suite was stopped")
             };
-            found.add_evidence(
+            findings.add_evidence(
                 kind,
                 "computer",
                 format!("{what} during this check or before it"),
@@ -261,10 +261,10 @@ impl NightRun<'_, '_> {
             self.night.ended_early.get_or_insert_with(reason);
         }
         let has_box = self.bench.rig().trigger_box.is_some();
-        let parts = parts::group_by_device(check, &mut found, has_box);
+        let parts = parts::group_by_device(check, &mut findings, has_box);
         let took_s = self.elapsed().as_secs_f64() - began_s;
         let default_cause = checks::default_cause(&check.measure);
-        judge::judge_attempt((began_s, took_s), parts, found.evidence, default_cause)
+        judge::judge_attempt((began_s, took_s), parts, findings.evidence, default_cause)
     }
 
     /// Evidence against running `check`, and the names of the checks that provide it; `None` if it can run.
@@ -299,7 +299,7 @@ impl NightRun<'_, '_> {
             bad.name,
             bad.verdict.name()
         );
-        // The evidence of the failed check explains this one too. Without any, report the arm's state.
+        // Copy the evidence of the failed check. If it has none, report the arm's state.
         let mut evidence: Vec<Evidence> = bad
             .attempts
             .iter()

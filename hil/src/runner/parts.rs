@@ -1,4 +1,5 @@
-//! The runner: groups the values of an attempt by device and adds their limits. Expected values that are missing become unmeasured.
+//! The runner: groups the values of an attempt by device, adds their limits, and marks missing
+//! values as unmeasured.
 
 use skinrig_nightly::{Evidence, EvidenceKind, Measurement, Part, Verdict};
 use skinrig_protocol::suite::{Check, Measure};
@@ -43,12 +44,12 @@ fn expected_subjects(measure: &Measure, metric: &str, has_box: bool) -> &'static
     }
 }
 
-/// The parts of an attempt. A metric that is unknown or measured twice is a bug in a check: it becomes evidence in
-/// `found.evidence` and no part.
-pub(super) fn group_by_device(check: &Check, found: &mut Findings, has_box: bool) -> Vec<Part> {
+/// Groups the values of an attempt. An unknown metric, or one measured twice, is a bug in a check:
+/// it goes to `found.evidence` and to no part.
+pub(super) fn group_by_device(check: &Check, findings: &mut Findings, has_box: bool) -> Vec<Part> {
     let mut faults = Vec::new();
     let mut parts: Vec<Part> = Vec::new();
-    for value in &found.values {
+    for value in &findings.values {
         let known = check.metrics.iter().any(|m| m.name == value.metric);
         let twice = has_measurement(&parts, &value.subject, value.metric);
         if !known || twice {
@@ -91,7 +92,7 @@ pub(super) fn group_by_device(check: &Check, found: &mut Findings, has_box: bool
         }
     }
     for what in faults {
-        found
+        findings
             .evidence
             .push(Evidence::new(EvidenceKind::Software, "computer", what));
     }

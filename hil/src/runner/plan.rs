@@ -1,4 +1,5 @@
-//! The runner: estimated duration of each check, and which checks must be good before others may run.
+//! The runner: estimates the duration of each check and lists the checks that must be good before
+//! others may run.
 
 use skinrig_model::HostDuration;
 use skinrig_nightly::judge::RepeatRule;
@@ -8,24 +9,24 @@ use skinrig_protocol::suite::{Check, Measure, Suite};
 const DEVICES_S: f64 = 4.0;
 /// One coded train and the pause after it, s.
 const TRAIN_S: f64 = 0.1;
-/// Settling after one move in free air, without the travel itself, s.
+/// Settling after one move in free air, without the travel, s.
 const MOVE_S: f64 = 1.0;
-/// Travel to one of the five points in free air and away from it, mm.
-const WAY_MM: f64 = 60.0;
+/// Distance to one of the five points in free air and back, mm.
+const TRAVEL_MM: f64 = 60.0;
 /// One slow press: touch search, hold and rise, s.
 const PRESS_S: f64 = 8.0;
 /// Touch-off points assumed when the rig file has none.
 const POINTS: usize = 3;
 /// A drill with a helper process, s.
 const DRILL_S: f64 = 20.0;
-/// Write rate of a disk that is barely fast enough, bytes/s.
+/// Write rate of the slowest acceptable disk, bytes/s.
 const DISK_B_S: f64 = 60e6;
 /// Safety factor on the planned duration of a golden campaign.
-const GOLDEN_MORE: f64 = 1.25;
+const GOLDEN_SAFETY_FACTOR: f64 = 1.25;
 /// Preflight, analysis and report of a golden campaign, s.
-const GOLDEN_BESIDES_S: f64 = 30.0;
+const GOLDEN_OVERHEAD_S: f64 = 30.0;
 
-/// Inputs of the time estimates that the suite does not contain.
+/// Inputs of the time estimates that are not part of the suite.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PlanInputs {
     /// Planned duration of the golden protocol.
@@ -53,8 +54,8 @@ pub(crate) fn estimated_duration(check: &Check, inputs: &PlanInputs) -> HostDura
         Measure::Repeatability {
             approaches,
             speed_mm_s,
-        } => 5.0 * f64::from(*approaches) * (WAY_MM / speed_mm_s + 2.0 * MOVE_S),
-        // Out, one second of rest, and back.
+        } => 5.0 * f64::from(*approaches) * (TRAVEL_MM / speed_mm_s + 2.0 * MOVE_S),
+        // A move out, one second of rest, and a move back.
         Measure::StepResponse { steps, .. } => f64::from(*steps) * (1.0 + 2.0 * MOVE_S),
         Measure::Depth { presses, .. } => {
             let points = inputs.touch_points.unwrap_or(POINTS);
@@ -63,7 +64,7 @@ pub(crate) fn estimated_duration(check: &Check, inputs: &PlanInputs) -> HostDura
         Measure::ForceCeiling { .. } => PRESS_S,
         Measure::Golden { .. } => {
             let plan_s = inputs.golden.map_or(0.0, HostDuration::as_secs_f64);
-            plan_s * GOLDEN_MORE + GOLDEN_BESIDES_S
+            plan_s * GOLDEN_SAFETY_FACTOR + GOLDEN_OVERHEAD_S
         }
         Measure::WatchdogDrill => DRILL_S,
         Measure::StopDrill => 2.0 * MOVE_S,
@@ -71,9 +72,10 @@ pub(crate) fn estimated_duration(check: &Check, inputs: &PlanInputs) -> HostDura
     HostDuration::from_secs_f64(measuring_s + DEVICES_S)
 }
 
-/// How often a failed check of this suite is repeated. Three kinds are never repeated: the golden skin, because repeating presses
-/// until they pass would bias the result and its protocol has its own retakes; the force ceiling and the drills, because an arm that
-/// did not stop must not move again unattended.
+/// How often a failed check of this suite is repeated. Two kinds are never repeated. The golden
+/// campaign has its own retakes, and repeating presses until they pass would bias the result. After
+/// a failed force ceiling check or drill, the arm may not have stopped, so it must not move again
+/// unattended.
 #[must_use]
 pub(crate) const fn repeat_rule(suite: &Suite, measure: &Measure) -> RepeatRule {
     match measure {
@@ -88,8 +90,8 @@ pub(crate) const fn repeat_rule(suite: &Suite, measure: &Measure) -> RepeatRule 
     }
 }
 
-/// Checks that must be good, if they are part of the night, before this one may move the arm: an arm that ignores commands must not
-/// travel, and an arm that does not limit its force must not press.
+/// Checks that must be good before this one may move the arm, if they are part of the night: an arm
+/// that ignores commands must not travel, and an arm without a force limit must not press.
 #[must_use]
 pub(crate) const fn prerequisites(measure: &Measure) -> &'static [&'static str] {
     match measure {

@@ -1,4 +1,5 @@
-//! Streaming cameras and trigger box of a check: started in order, polled, and always stopped. Every wait has a time limit.
+//! The streaming cameras and the trigger box during a check: started in order, polled, and always
+//! stopped. Every wait has a time limit.
 
 mod stats;
 
@@ -15,11 +16,11 @@ pub(crate) use self::stats::StreamStats;
 
 /// Interval between two polls of the devices.
 const STEP: HostDuration = HostDuration::from_millis(10);
-/// Interval at which partly filled chunks are fetched.
+/// Interval at which partly filled chunks are fetched too.
 const FLUSH_EVERY: HostDuration = HostDuration::from_millis(200);
-/// Time within which a box that is sending its own train becomes free.
-const LINE_WITHIN: HostDuration = HostDuration::from_millis(1_000);
-/// A poll that is later than this is evidence of an overloaded computer.
+/// Time limit for a box to finish a train of its own.
+const LINE_TIMEOUT: HostDuration = HostDuration::from_millis(1_000);
+/// A poll delayed by more than this is evidence of an overloaded computer.
 const MAX_POLL_DELAY: HostDuration = HostDuration::from_millis(1_000);
 
 /// The streaming devices of a bench. Dropping this value stops the cameras.
@@ -106,7 +107,7 @@ impl<'a> Streams<'a> {
             .and_then(|()| camera.configure(settings).map(drop))
             .and_then(|()| prepare(id, camera))
             .and_then(|()| camera.start());
-        // Earlier notes do not concern this stream.
+        // Discard notes about earlier streams.
         camera.take_notes(&mut Vec::new());
         started.map_err(|e| device_evidence::from_error(&e))
     }
@@ -135,33 +136,35 @@ impl<'a> Streams<'a> {
         self.box_problem.is_none() && self.box_read_error.is_none()
     }
 
-    /// Ignores faults of the trigger box: in a check of the cameras alone they would excuse a camera's fault.
+    /// Ignores faults of the trigger box. In a check of the cameras alone they would hide faults of
+    /// the cameras.
     pub(crate) fn without_box(mut self) -> Self {
         self.box_is_needed = false;
         self
     }
 
     /// Starts counting.
-    pub(crate) fn start_counting(&mut self, see: &mut dyn FnMut(&RawChunk)) {
-        self.poll_devices(true, see);
+    pub(crate) fn start_counting(&mut self, on_chunk: &mut dyn FnMut(&RawChunk)) {
+        self.poll_devices(true, on_chunk);
         self.measuring = true;
         self.cameras
             .iter_mut()
             .for_each(CameraStream::start_counting);
     }
 
-    /// Polls the devices for `span`, or until the suite must end, and passes each chunk to `see`.
-    pub(crate) fn pass(&mut self, span: HostDuration, see: &mut dyn FnMut(&RawChunk)) {
+    /// Polls the devices for `span`, or until the suite must end, and passes each chunk to `on_chunk`.
+    pub(crate) fn pass(&mut self, span: HostDuration, on_chunk: &mut dyn FnMut(&RawChunk)) {
         let end = self.now() + span;
         while self.now() < end && !(self.stop)() {
-            self.step(end, see);
+            self.step(end, on_chunk);
         }
     }
 
-    /// Sends a mark as soon as the line is free, and polls the devices until its train is over. Returns false if the mark was not sent:
-    /// the box failed ([`Self::finish`] adds the evidence), or the suite must end.
-    pub(crate) fn send(&mut self, mark: Mark, see: &mut dyn FnMut(&RawChunk)) -> bool {
-        let until = self.now() + LINE_WITHIN + self.timing_slack;
+    /// Sends a mark as soon as the line is free, and polls the devices until its train has ended. Returns
+    /// false if the mark was not sent, because the box failed ([`Self::finish`] adds the evidence) or the
+    /// suite must end.
+    pub(crate) fn send(&mut self, mark: Mark, on_chunk: &mut dyn FnMut(&RawChunk)) -> bool {
+        let until = self.now() + LINE_TIMEOUT + self.timing_slack;
         while self.box_problem.is_none() && !(self.stop)() {
             let Some(Ok(trigger)) = &mut self.devices.trigger_box else {
                 return false;
@@ -170,25 +173,26 @@ impl<'a> Streams<'a> {
                 Ok(sent) => {
                     let over = sent.t + trigger.capabilities().train_duration;
                     while self.now() < over {
-                        self.step(over, see);
+                        self.step(over, on_chunk);
                     }
                     return true;
                 }
-                Err(DeviceError::Pending { .. }) => self.step(self.now() + STEP, see),
-                Err(DeviceError::State { .. }) if self.now() < until => self.step(until, see),
+                Err(DeviceError::Pending { .. }) => self.step(self.now() + STEP, on_chunk),
+                Err(DeviceError::State { .. }) if self.now() < until => self.step(until, on_chunk),
                 Err(e) => self.box_problem = Some(device_evidence::from_error(&e)),
             }
         }
         false
     }
 
-    /// Waits until the streams of both cameras pass the present or stall, then stops the cameras and counts their last data. Failures
-    /// go to `found`, with `metrics` unmeasured on the failed camera.
+    /// Waits until both camera streams reach the time of this call or stall, then stops the cameras
+    /// and counts their last data. Adds failures to `findings`, with `metrics` unmeasured on the
+    /// failed camera.
     pub(crate) fn finish(
         mut self,
-        found: &mut Findings,
+        findings: &mut Findings,
         metrics: &[&'static str],
-        see: &mut dyn FnMut(&RawChunk),
+        on_chunk: &mut dyn FnMut(&RawChunk),
     ) -> [Option<StreamStats>; 2] {
         let end = self.now();
         while CameraId::ALL
@@ -196,7 +200,7 @@ impl<'a> Streams<'a> {
             .any(|c| self.is_live(*c) && self.cameras[c.index()].advanced_at <= end)
         {
             self.flushed_at = self.flushed_at.min(end - FLUSH_EVERY);
-            self.step(self.now() + STEP, see);
+            self.step(self.now() + STEP, on_chunk);
         }
         for camera in CameraId::ALL {
             if let Ok(device) = &mut self.devices.cameras[camera.index()] {
@@ -209,7 +213,7 @@ impl<'a> Streams<'a> {
                         .get_or_insert_with(|| device_evidence::from_error(&e));
                 }
             }
-            self.forward_chunks(see);
+            self.forward_chunks(on_chunk);
         }
         if let (Some(problem), Some(slot)) = (&self.box_problem, &mut self.devices.trigger_box) {
             *slot = Err(problem.clone());
@@ -217,7 +221,7 @@ impl<'a> Streams<'a> {
         let box_problems = [self.box_problem.take(), self.box_read_error.take()];
         let box_problems = box_problems.into_iter().filter(|_| self.box_is_needed);
         let others = box_problems.chain([self.host_late.take()]);
-        found.evidence.extend(others.flatten().map(|t| *t));
+        findings.evidence.extend(others.flatten().map(|t| *t));
         CameraId::ALL.map(|camera| {
             let stream = std::mem::take(&mut self.cameras[camera.index()]);
             match stream.problem {
@@ -227,7 +231,7 @@ impl<'a> Streams<'a> {
                         // A lost camera must be reopened; the bench does that for the next check.
                         self.devices.cameras[camera.index()] = Err(problem.clone());
                     }
-                    found.failed(*problem, device_evidence::camera_subject(camera), metrics);
+                    findings.failed(*problem, device_evidence::camera_subject(camera), metrics);
                     None
                 }
             }
@@ -235,7 +239,7 @@ impl<'a> Streams<'a> {
     }
 
     /// Waits for the next poll, at most until `end`, and polls.
-    fn step(&mut self, end: HostTime, see: &mut dyn FnMut(&RawChunk)) {
+    fn step(&mut self, end: HostTime, on_chunk: &mut dyn FnMut(&RawChunk)) {
         let due = (self.now() + STEP).min(end);
         self.devices.clock.wait_until(due);
         let now = self.now();
@@ -250,11 +254,11 @@ impl<'a> Streams<'a> {
                 .next("find out what else ran at that time (`journalctl`, backups, sleep)");
             self.host_late = Some(Box::new(evidence));
         }
-        self.poll_devices(now - self.flushed_at >= FLUSH_EVERY, see);
+        self.poll_devices(now - self.flushed_at >= FLUSH_EVERY, on_chunk);
     }
 
-    /// Fetches data from the devices: everything if `all`, otherwise full chunks only.
-    fn poll_devices(&mut self, all: bool, see: &mut dyn FnMut(&RawChunk)) {
+    /// Fetches data from the devices: full chunks, and partly filled ones too if `all`.
+    fn poll_devices(&mut self, all: bool, on_chunk: &mut dyn FnMut(&RawChunk)) {
         let now = self.now();
         if all {
             self.flushed_at = now;
@@ -271,7 +275,7 @@ impl<'a> Streams<'a> {
                 true => device.flush(&mut self.chunks),
                 false => device.poll(&mut self.chunks),
             };
-            self.forward_chunks(see);
+            self.forward_chunks(on_chunk);
             let stream = &mut self.cameras[i];
             let fetched = match fetched {
                 Err(DeviceError::Pending { .. }) => Ok(()), // a later poll fetches the rest
@@ -287,11 +291,11 @@ impl<'a> Streams<'a> {
     }
 
     /// Counts the new chunks and passes them on.
-    fn forward_chunks(&mut self, see: &mut dyn FnMut(&RawChunk)) {
+    fn forward_chunks(&mut self, on_chunk: &mut dyn FnMut(&RawChunk)) {
         let now = self.devices.clock.now();
         for chunk in self.chunks.drain(..) {
             self.cameras[chunk.camera.index()].add_chunk(&chunk, now, self.measuring);
-            see(&chunk);
+            on_chunk(&chunk);
         }
     }
 
@@ -306,7 +310,7 @@ impl<'a> Streams<'a> {
                 self.box_problem
                     .get_or_insert_with(|| device_evidence::from_error(&e));
             }
-            // Unreadable data on its line; the stream of reports continues.
+            // Unreadable data on the line; later reports may still be readable.
             Err(e) => {
                 self.box_read_error
                     .get_or_insert_with(|| device_evidence::from_error(&e));
@@ -318,7 +322,7 @@ impl<'a> Streams<'a> {
 impl Drop for Streams<'_> {
     fn drop(&mut self) {
         for camera in self.devices.cameras.iter_mut().flatten() {
-            // `finish` stopped them already; without it, the error that ended the check has been reported.
+            // After `finish` they are stopped already; otherwise the check has reported its error.
             let _ = camera.stop(&mut self.chunks);
         }
     }

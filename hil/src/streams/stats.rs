@@ -5,7 +5,8 @@ use skinrig_model::{CameraId, DeviceRole, HostDuration, HostTime, RawChunk};
 use crate::bench::Problem;
 use crate::device_evidence;
 
-/// Time without progress of the camera clock that counts as a stall. Every format repeats its time base within milliseconds.
+/// Time without progress of the camera clock that counts as a stall. Every format repeats its time
+/// base every few milliseconds.
 const STALLED_AFTER: HostDuration = HostDuration::from_millis(2_000);
 
 /// Counts of a camera's stream since counting started.
@@ -36,7 +37,7 @@ impl StreamStats {
 #[derive(Default)]
 pub(super) struct CameraStream {
     pub stats: StreamStats,
-    /// Why it no longer streams.
+    /// Why the camera stopped streaming.
     pub problem: Option<Problem>,
     /// Latest camera time, µs.
     latest_us: Option<u64>,
@@ -72,7 +73,8 @@ impl CameraStream {
         }
     }
 
-    /// Evidence of a stall, if the camera time has not advanced for too long. `timing_slack` extends the limit for emulated devices.
+    /// Evidence of a stall if the camera time has not advanced for too long. `timing_slack` extends
+    /// the limit for emulated devices.
     pub(crate) fn check_stall(
         &self,
         camera: CameraId,

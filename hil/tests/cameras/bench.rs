@@ -63,7 +63,7 @@ impl SimBench {
         found
     }
 
-    /// Rate difference between a camera's clock and the box's, ppm.
+    /// Rate of a camera's clock relative to the box's, ppm.
     pub(crate) fn drift_ppm(&self, camera: CameraId) -> f64 {
         let of = |purpose, index, origin_s, ppm| {
             let mut random = Stream::new(self.config.seed, purpose, index);
@@ -77,21 +77,21 @@ impl SimBench {
     }
 }
 
-/// The only value of `metric` on `subject`.
+/// The value of `metric` on `subject`; panics unless there is exactly one.
 pub(crate) fn value<'a>(found: &'a Findings, subject: &str, metric: &str) -> &'a Value {
     let is_it = |v: &&Value| v.subject == subject && v.metric == metric;
     let mut values = found.values.iter().filter(is_it);
     let first = values
         .next()
-        .unwrap_or_else(|| panic!("no {subject} {metric} in {found:#?}"));
+        .unwrap_or_else(|| panic!("expected {subject} {metric}, found {found:#?}"));
     assert!(
         values.next().is_none(),
-        "two of {subject} {metric} in {found:#?}"
+        "expected one {subject} {metric}, found {found:#?}"
     );
     first
 }
 
-/// The measured number of `metric` on `subject`.
+/// The measured number of `metric` on `subject`; panics if it was not measured.
 pub(crate) fn number(found: &Findings, subject: &str, metric: &str) -> f64 {
     let value = value(found, subject, metric).value;
     value.unwrap_or_else(|| panic!("{subject} {metric} unmeasured in {found:#?}"))

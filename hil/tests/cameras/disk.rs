@@ -37,7 +37,7 @@ impl Drop for Folder {
 #[test]
 fn what_is_written_comes_back_and_nothing_stays() {
     let folder = Folder::new("disk-well");
-    let inner = folder.0.join("sessions"); // to be made first
+    let inner = folder.0.join("sessions"); // does not exist yet
     let found = bench(&inner).run_check(DISK);
     assert_eq!(found.evidence, []);
     assert!(number(&found, "computer", "write_rate") > 0.0);

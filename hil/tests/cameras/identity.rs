@@ -9,7 +9,7 @@ use crate::bench::{SimBench, kinds_and_subjects, number, value};
 const IDENTITY: &str = "identity: {differences: {at_most: 0}}";
 const SETTINGS: &str = "settings: {differences: {at_most: 0}}";
 
-/// A bench whose rig file names the simulated devices.
+/// A bench whose rig file has the identity of the simulated devices.
 fn known(faults: Vec<Fault>) -> SimBench {
     use skinrig_hil::Bench as _;
     let mut bench = SimBench::new(SimLevel::Kinematic, faults);

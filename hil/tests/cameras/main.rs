@@ -1,4 +1,5 @@
-//! Checks of cameras, trigger box and disk on simulated devices: results close to the truth, and each fault attributed correctly.
+//! Tests the checks of cameras, trigger box and disk on simulated devices: results close to the
+//! true values, and each fault with the right cause.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod bench;

@@ -29,7 +29,7 @@ fn lost(when: FaultTrigger) -> Fault {
 
 #[test]
 fn a_quiet_stream_has_its_rate_and_no_gap() {
-    // Only the time base: one word of 4 bytes every 16 µs.
+    // The stream has only its time base: one word of 4 bytes every 16 µs.
     let found = SimBench::new(SimLevel::Kinematic, Vec::new()).run_check(IDLE);
     assert_eq!(found.evidence, []);
     for camera in CAMERAS {
@@ -58,7 +58,7 @@ fn lost_bytes_are_counted_on_their_camera() {
 fn a_stalled_camera_ends_the_wait() {
     let stalled = Fault::CameraStalled {
         camera: CameraId::Two,
-        when: at(2.3), // so late that only the end of the check notices it
+        when: at(2.3), // so late that only the end of the check can detect it
     };
     for (check, metric) in [(IDLE, "gaps"), (PATTERN, "received"), (LIT, "rate")] {
         let mut faults = vec![stalled.clone()];
@@ -121,7 +121,7 @@ fn noise_and_hot_pixels_are_those_of_the_scene() {
         let hottest = number(&found, camera, "hottest");
         assert!(
             (hottest / g.hottest_hz - 1.0).abs() < 0.3,
-            "{hottest} of {}",
+            "hottest pixel: {hottest} ev/s, expected about {}",
             g.hottest_hz
         );
         let rate = value(&found, camera, "rate");

@@ -129,7 +129,7 @@ fn without_a_box_the_checks_do_not_apply_and_a_lost_box_is_reported() {
                 kinds_and_subjects(&lost),
                 [(EvidenceKind::DeviceLost, "trigger box")]
             );
-            // The offset between the cameras is known from the box's own trains.
+            // The box's own trains give the offset between the cameras.
             let of_cameras = lost.values.iter().filter(|v| v.metric != "offset");
             assert!(of_cameras.clone().all(|v| v.value.is_none()), "{lost:?}");
             assert!(of_cameras.count() >= 4, "{lost:?}");
@@ -151,7 +151,7 @@ fn drifts_are_those_of_the_clocks_within_the_stated_interval() {
             "{drift:?}, {truth}"
         );
         assert!(drift.n >= Some(50), "{drift:?}");
-        // One edge with a uniform delay of 0 to 2.5 µs, and whole µs on both clocks.
+        // Each edge has a uniform delay of 0 to 2.5 µs, and both clocks tick in microseconds.
         let residual = number(&found, camera, "residual");
         assert!((0.4e-6..1.5e-6).contains(&residual), "{residual}");
     }

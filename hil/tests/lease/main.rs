@@ -1,4 +1,4 @@
-//! The lease of a bench between processes: one holder at a time, released even when it dies.
+//! Tests of a bench's lease across processes: one holder at a time, and release at exit or death.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up must fail")]
 
 use std::io::{BufRead, BufReader, Write};
@@ -11,10 +11,10 @@ use skinrig_hil::lease::{Lease, LeaseError, LeaseState, LeaseTiming, Owner, insp
 
 /// Environment variable that passes the lease's path to a child process.
 const LEASE: &str = "SKINRIG_TEST_LEASE";
-/// Time limit for anything that must happen.
+/// Time limit of every wait.
 const TIMEOUT: Duration = Duration::from_secs(60);
 
-/// Fast enough for tests; they poll for a heartbeat and never sleep.
+/// Short intervals for tests; the tests poll for a heartbeat and never sleep.
 const TIMING: LeaseTiming = LeaseTiming {
     heartbeat: Duration::from_millis(20),
     expiry: Duration::from_millis(500),
@@ -93,13 +93,13 @@ fn clocks_do_not_matter_on_one_computer() {
     let folder = tempfile::tempdir().unwrap();
     let path = path_of(folder.path(), "omega3-7");
     for beat_at in ["1970-01-01T00:00:00.000Z", "2999-01-01T00:00:00.000Z"] {
-        // The holder's clock was set back or forward: it still has the lock and therefore the bench.
+        // The holder's clock was changed, but it still has the lock and therefore the lease.
         let lease = take(&path, "hil run nightly").unwrap();
         rewrite(&path, |e| e["beat_at"] = beat_at.into());
         assert!(matches!(take(&path, "jog"), Err(LeaseError::Held { .. })));
         assert!(!lease.is_lost());
         drop(lease);
-        // The holder died, with its last heartbeat at any time: the bench is free at once, and the takeover is reported.
+        // After the holder's death the bench is free at once, whatever the time of its last heartbeat, and the next holder reports the takeover.
         rewrite(&path, |e| {
             e["released"] = false.into();
             e["beat_at"] = beat_at.into();
@@ -115,7 +115,7 @@ fn clocks_do_not_matter_on_one_computer() {
     }
 }
 
-/// Locks of another computer may be invisible here: then its heartbeat decides.
+/// Locks of another computer may be invisible here. In that case its heartbeat decides.
 #[test]
 fn a_holder_on_another_computer_keeps_the_lease_while_it_sends_heartbeats() {
     let folder = tempfile::tempdir().unwrap();
@@ -143,7 +143,7 @@ fn a_holder_on_another_computer_keeps_the_lease_while_it_sends_heartbeats() {
     assert!(refused.to_string().contains("on there"), "{refused}");
     stop.send(()).unwrap();
     beating.join().unwrap();
-    // The heartbeat stopped: the holder is gone.
+    // The heartbeat has stopped, so the holder has ended.
     let lease = take(&path, "jog").unwrap();
     assert!(lease.note().unwrap().contains("on there"));
 }
@@ -175,14 +175,14 @@ fn an_unusable_lease_file_is_reported() {
     let path = path_of(&folder.path().join("not made"), "omega3-7");
     let refused = take(&path, "jog").unwrap_err().to_string();
     assert!(refused.contains("SKINRIG_LEASES"), "{refused}");
-    // A damaged file belongs to no holder.
+    // A damaged file names no holder.
     let path = path_of(folder.path(), "omega3-7");
     std::fs::write(&path, "{\"owner\": 12").unwrap();
     assert_eq!(inspect(&path).unwrap(), LeaseState::Free { last: None });
     assert_eq!(take(&path, "jog").unwrap().note(), None);
 }
 
-/// Another process that wants the lease.
+/// Another process that tries to take the lease.
 struct Rival {
     child: Child,
     stdin: ChildStdin,
@@ -190,7 +190,7 @@ struct Rival {
 }
 
 impl Rival {
-    /// Starts it; it waits for `go`.
+    /// Starts the process, which waits for `go`.
     fn start(path: &Path) -> Self {
         let mut child = Command::new(std::env::current_exe().unwrap())
             .args(["--exact", "rival", "--ignored", "--nocapture"])
@@ -204,7 +204,7 @@ impl Rival {
         let (sender, lines) = channel();
         std::thread::spawn(move || {
             for line in stdout.lines().map_while(Result::ok) {
-                // The test harness prints lines of its own.
+                // Skip lines printed by the test harness.
                 if let Some(word) = line.split("rival: ").nth(1) {
                     let _ = sender.send(word.to_owned());
                 }
@@ -245,7 +245,7 @@ fn rival() {
     lines.next();
     let lease = take(Path::new(&path), "rival");
     println!("rival: {}", if lease.is_ok() { "taken" } else { "refused" });
-    // Until the parent closes its pipe or kills it.
+    // Wait until the parent closes the pipe or kills this process.
     lines.next();
 }
 

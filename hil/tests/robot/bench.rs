@@ -16,7 +16,7 @@ use skinrig_sim::{Fault, SimConfig, simulated_rig};
 
 const RIG: &str = include_str!("../../rigs/emulated.yaml");
 
-/// Reopens its devices after a close and counts how often.
+/// A bench that reopens its devices after a close and counts the openings.
 pub(crate) struct SimBench {
     pub rig: RigFile,
     config: SimConfig,

@@ -1,4 +1,4 @@
-//! Robot checks on simulated devices: results of a healthy robot and of each fault.
+//! Tests of the robot checks on simulated devices: results of a healthy robot, and of each fault.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod bench;
@@ -28,7 +28,7 @@ fn kinds(found: &Findings) -> Vec<EvidenceKind> {
     found.evidence.iter().map(|e| e.kind).collect()
 }
 
-/// Whether the arm is braked, in which state it rejects commands.
+/// Whether the arm is braked; a braked arm rejects commands.
 fn is_braked(bench: &mut SimBench) -> bool {
     use skinrig_hil::bench::Bench;
     let devices = bench.devices();

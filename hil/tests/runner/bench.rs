@@ -17,7 +17,7 @@ use skinrig_protocol::suite::{Check, Light, Suite};
 
 const RIG: &str = include_str!("../../rigs/emulated.yaml");
 
-/// A clock that tests advance by hand.
+/// A clock that only the test advances.
 #[derive(Clone, Default)]
 pub(crate) struct ManualClock(Arc<AtomicI64>);
 
@@ -101,7 +101,7 @@ impl Bench for DevicelessBench {
 
 type Step = Box<dyn Fn(&mut Findings)>;
 
-/// Scripted findings, attempt by attempt; a check without a script finds nothing.
+/// Scripted findings for each attempt. A check without a script has no findings.
 #[derive(Default)]
 pub(crate) struct Script(RefCell<BTreeMap<&'static str, VecDeque<Step>>>);
 

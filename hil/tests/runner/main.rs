@@ -1,4 +1,4 @@
-//! Runs of a suite with scripted findings and a manual clock.
+//! Tests of a suite's run with scripted findings and a manual clock.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up must fail")]
 
 mod bench;
@@ -213,7 +213,7 @@ fn a_check_that_does_not_fit_the_budget_is_not_started() {
     assert_eq!(state.attempts[0].evidence[0].kind, EvidenceKind::TimeOut);
     assert_eq!(night.exit, NightExit::Infrastructure);
     assert_eq!(progress.started.len(), 1);
-    // Published after every check, finished only at the end.
+    // The night is published after every check, and is finished only at the end.
     assert_eq!(progress.published, [(1, false), (2, false), (2, true)]);
 }
 

@@ -77,7 +77,7 @@ def test_errors_have_the_text_of_the_command_line(tmp_path, session_path):
     with pytest.raises(skinrig.InputError) as error:
         skinrig.simulate(SMALL, tmp_path, {"depth": "9 mm"})
     assert told(error) == run("run", SMALL, "--sessions", tmp_path, "--set", "depth=9 mm", code=2)[1]
-    with pytest.raises(skinrig.InputError, match="`skinrig analyze .* makes them"):
+    with pytest.raises(skinrig.InputError, match="`skinrig analyze .* writes them"):
         skinrig.Session(session_path).analysis()
     with pytest.raises(skinrig.InputError) as error:
         skinrig.Session(session_path).analysis("five")

@@ -30,7 +30,7 @@ def test_results_of_another_session_are_not_used(analysed_path, exported, tmp_pa
     other.with_name(other.name.replace(".session.sqlite", ".results.json")).write_bytes(results.read_bytes())
     session = skinrig.Session(other)
     assert not session.presses.error_mm.equals(table(exported, "presses").error_mm)
-    with pytest.raises(skinrig.InputError, match="results of another session"):
+    with pytest.raises(skinrig.InputError, match="results beside it belong to another session"):
         session.analysis()
 
 

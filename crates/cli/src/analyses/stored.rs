@@ -18,16 +18,16 @@ struct Document {
 struct Origin {
     session_id: String,
     #[serde(default)]
-    variant: Option<Named>,
+    variant: Option<VariantName>,
 }
 
 #[derive(Deserialize)]
-struct Named {
+struct VariantName {
     name: String,
 }
 
-/// The results of a session's analysis with this name (`None`: the official one), if they are its own and of this version of the
-/// analysis. Without the bulk data for figures.
+/// Reads the results of the analysis `name` (`None`: the official one), without the bulk data for figures. Returns `None` if they
+/// are missing, belong to another session or analysis, or come from another version of the analysis.
 pub(crate) fn stored(session: &Path, session_id: &str, name: Option<&str>) -> Option<Analysis> {
     let text = std::fs::read(results_path(session, name)).ok()?;
     // Another version may have other fields, and then does not parse.

@@ -1,4 +1,4 @@
-//! Owns the summary at the end of a file of results.
+//! Reads the summary at the end of a results file.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -9,7 +9,7 @@ use skinrig_report::Summary;
 
 use super::results_path;
 
-/// The summary stands so near to the end of a file of results.
+/// The summary is within this many bytes of the end of a results file.
 const TAIL_BYTES: u64 = 1 << 16;
 
 /// Why the results of an analysis beside a session cannot be used.
@@ -25,16 +25,20 @@ pub(crate) enum SummaryError {
         name: String,
     },
     /// The results belong to another session.
-    #[error("results of another session lie beside it")]
+    #[error("the results beside it belong to another session")]
     OtherSession,
     /// The results belong to another variant.
-    #[error("results of the analysis `{found}` lie in their place: analyze it again")]
+    #[error(
+        "expected the results of this analysis, found those of `{found}`: analyze the session again"
+    )]
     OtherVariant {
         /// Name of that variant.
         found: String,
     },
     /// The results are the official ones.
-    #[error("results with the session's own settings lie in their place: analyze it again")]
+    #[error(
+        "expected the results of this analysis, found the official ones: analyze the session again"
+    )]
     Official,
     /// The results have no summary, or one that does not parse.
     #[error("results of an older skinrig: analyze the session again")]
@@ -44,11 +48,10 @@ pub(crate) enum SummaryError {
     Io(#[from] io::Error),
 }
 
-/// What the results of an analysis beside a session say in short, from their last bytes. Those of another session or another analysis
-/// in that place are refused.
+/// Reads the summary of an analysis from the last bytes of its results. Rejects results of another session or analysis.
 ///
 /// # Errors
-/// [`SummaryError`] when there are none or they are not its own.
+/// [`SummaryError`] when the results are missing, unreadable, or of another session or analysis.
 pub(crate) fn summary(
     session: &Path,
     session_id: &str,
@@ -82,7 +85,7 @@ fn read_summary(path: &Path) -> Result<Summary, SummaryError> {
     file.seek(SeekFrom::Start(length.saturating_sub(TAIL_BYTES)))?;
     let mut tail = Vec::new();
     file.take(TAIL_BYTES).read_to_end(&mut tail)?;
-    // A key of the outermost object; within a text of JSON no line ends.
+    // A key of the outermost object: a JSON string never contains a line break.
     let key = b"\n  \"summary\": ";
     let at = tail.windows(key.len()).position(|w| w == key);
     let text = &tail[at.ok_or(SummaryError::Older(None))? + key.len()..];

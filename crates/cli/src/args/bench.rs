@@ -1,4 +1,4 @@
-//! Arguments of what plans, runs and watches: the commands about a bench.
+//! Arguments of the commands that plan, run and watch experiments.
 
 use std::path::PathBuf;
 
@@ -27,12 +27,12 @@ pub struct PlanArgs {
     #[arg(long, value_name = "FILE", conflicts_with = "detect")]
     pub svg: Option<PathBuf>,
 
-    /// Power analysis: what to press to find a difference.
+    /// Power analysis: the presses needed to find a difference.
     #[command(flatten)]
     pub detect: DetectArgs,
 }
 
-/// What to press on two skins to find a difference between them.
+/// Options of the power analysis: the presses needed to find a difference between two skins.
 #[derive(Debug, Args)]
 pub struct DetectArgs {
     /// Propose the locations and repetitions that would show an RMSE difference this large between two skins, for example "1 mm".
@@ -76,7 +76,7 @@ pub(crate) struct RunArgs {
     pub rig: Option<PathBuf>,
 
     /// Accept mismatches of the rig's cameras (status bytes, resets, transfers, register read-backs), and print the rig file keys that
-    /// accept them for good. The session records it.
+    /// accept them permanently. The session records it.
     #[arg(long, requires = "rig")]
     pub tolerant: bool,
 
@@ -199,8 +199,8 @@ pub(crate) struct JogArgs {
     #[arg(long, value_name = "FILE")]
     pub log: Option<PathBuf>,
 
-    /// Let the tip go deeper below the surface of the rig file's frame than its `limits.max_depth`, down to the end of the
-    /// workspace: for touching off a skin that lies elsewhere. It is logged.
+    /// Let the tip go deeper below the frame's surface than the rig file's `limits.max_depth`, down to the end of the
+    /// workspace, to touch off a skin that is mounted elsewhere. The log records it.
     #[arg(long)]
     pub beyond_frame: bool,
 
@@ -223,4 +223,21 @@ pub(crate) struct WatchArgs {
     /// How often to refresh.
     #[arg(long, value_name = "TIME", default_value = "1 s", value_parser = time_s)]
     pub every: f64,
+}
+
+/// Arguments of `view`.
+#[derive(Debug, Args)]
+pub(crate) struct ViewArgs {
+    /// A folder of sessions, or the session that the page opens first; its folder is the shelf.
+    #[arg(default_value = "sessions")]
+    pub session: PathBuf,
+
+    /// Open this address of this computer instead, as ADDRESS or ADDRESS:PORT: other computers that reach it and have the link can read,
+    /// over an unencrypted connection [default: 127.0.0.1 and a free port].
+    #[arg(long, value_name = "ADDRESS", value_parser = crate::view::address)]
+    pub bind: Option<std::net::SocketAddr>,
+
+    /// Let pages pause, resume, stop, abort and annotate runs, with the rights of `skinrig control`.
+    #[arg(long)]
+    pub control: bool,
 }

@@ -1,4 +1,4 @@
-//! Arguments of what turns sessions into results.
+//! Arguments of the commands that turn sessions into results.
 
 use std::path::PathBuf;
 
@@ -22,8 +22,8 @@ pub struct AnalyzeArgs {
     #[arg(long, value_name = "NAME", value_parser = crate::analyses::parse)]
     pub name: Option<String>,
 
-    /// Make the choices of the public analysis code (docs/reference/paper.md lists them) and report its numbers beside; `--set`
-    /// still wins.
+    /// Make the same choices as the public analysis code (docs/reference/paper.md lists them) and report its numbers too; `--set`
+    /// takes precedence.
     #[arg(long)]
     pub reference_code: bool,
 
@@ -47,12 +47,12 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "DIR", default_value = "sessions")]
     pub sessions: PathBuf,
 
-    /// The limits file, which says what counts as a difference [default: `limits.yaml` in the current folder, if it exists].
+    /// The limits file, which defines what counts as a difference [default: `limits.yaml` in the current folder, if it exists].
     #[arg(long, value_name = "FILE")]
     pub limits: Option<PathBuf>,
 
-    /// The largest difference of a metric that is none, for example `rmse=0.5mm`; goes before the file's. Can be given several
-    /// times.
+    /// The largest difference of a metric that does not count, for example `rmse=0.5mm`; overrides the limits file. Can be given
+    /// several times.
     #[arg(long = "margin", value_name = "METRIC=MARGIN", value_parser = Margin::parse)]
     pub margins: Vec<Margin>,
 
@@ -73,7 +73,7 @@ pub(crate) struct CompareArgs {
     pub out: Option<PathBuf>,
 }
 
-/// What accuracy is traded against.
+/// Cost that is traded against accuracy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum CostKind {
     /// CPU time per press.

@@ -1,4 +1,4 @@
-//! Arguments of what lists, shows and converts files.
+//! Arguments of the commands that list, show and convert files.
 
 use std::path::PathBuf;
 
@@ -135,7 +135,7 @@ pub(crate) enum ExportKind {
 }
 
 impl ExportKind {
-    /// Whether it holds tables.
+    /// True for formats that hold tables.
     #[must_use]
     pub(crate) const fn is_tabular(self) -> bool {
         matches!(self, Self::Parquet | Self::Npz | Self::Csv)
@@ -145,7 +145,7 @@ impl ExportKind {
 /// Which tables `export` writes; docs/reference/exports.md describes their columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ExportTable {
-    /// One row per press: what both cameras saw and where the skin was estimated to be touched.
+    /// One row per press: events of both cameras and the estimated location.
     Presses,
     /// One row per metric.
     Results,
@@ -207,7 +207,7 @@ pub(crate) enum SchemaKind {
 /// `new`.
 #[derive(Debug, Args)]
 pub(crate) struct NewArgs {
-    /// What it is for.
+    /// What the protocol is for.
     #[arg(value_enum)]
     pub kind: ProtocolKind,
     /// The file to write [default: the kind's name in this folder].

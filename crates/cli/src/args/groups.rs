@@ -1,4 +1,4 @@
-//! The list of commands in the help, grouped by the task a user has in mind.
+//! The list of commands in the help, grouped by task.
 
 use clap::{Command, CommandFactory, FromArgMatches};
 
@@ -10,7 +10,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
     (
         "Record",
         &[
-            "run", "resume", "import", "watch", "status", "control", "note",
+            "run", "resume", "import", "watch", "view", "status", "control", "note",
         ],
     ),
     (
@@ -30,7 +30,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
 /// Parses a command line; the help lists commands by group.
 ///
 /// # Errors
-/// Whatever clap finds wrong, and the help when it was asked for.
+/// Errors of clap, including the help that `--help` requests.
 pub(crate) fn parse<I, T>(words: I) -> Result<Cli, clap::Error>
 where
     I: IntoIterator<Item = T>,
@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_command_stands_in_one_group() {
+    fn every_command_is_in_one_group() {
         let command = Cli::command();
         let visible = command.get_subcommands().filter(|c| !c.is_hide_set());
         let mut visible: Vec<&str> = visible.map(Command::get_name).collect();
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn help_shows_the_groups_and_no_heap() {
+    fn help_lists_commands_by_group() {
         let help = parse(["skinrig", "--help"]).unwrap_err().to_string();
         for (heading, _) in GROUPS {
             assert!(help.contains(&format!("{heading}:\n")), "{help}");

@@ -1,4 +1,4 @@
-//! The command line as the user types it: the commands, and what several of them take.
+//! The command line: commands, and the arguments that several of them share.
 
 mod bench;
 mod doctor;
@@ -13,7 +13,7 @@ use clap::{Args, Parser, Subcommand};
 
 pub(crate) use self::bench::{
     ControlArgs, DetectArgs, DevicesArgs, JogArgs, NoteArgs, PlanArgs, ResumeArgs, RunArgs,
-    StatusArgs, WatchArgs,
+    StatusArgs, ViewArgs, WatchArgs,
 };
 pub(crate) use self::doctor::DoctorArgs;
 pub(crate) use self::evaluate::{AnalyzeArgs, CompareArgs, CostKind, ReportArgs, TradeoffArgs};
@@ -34,7 +34,7 @@ pub(crate) struct Cli {
     #[arg(long, global = true)]
     pub json: bool,
 
-    /// Print all figures of an analysis instead of the answer alone
+    /// Print all figures of an analysis, not only the answer
     #[arg(short, long, global = true)]
     pub verbose: bool,
 
@@ -46,14 +46,14 @@ pub(crate) struct Cli {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Make a lab's folder: protocols to copy from, rig file, suites of checks, schemas for editors.
+    /// Create a lab folder: protocols to copy from, rig file, suites of checks, schemas for editors.
     #[command(
         after_help = "Example:\n  skinrig init lab && cd lab && skinrig run protocols/demo.yaml\n\n\
-        Files that are there are kept; schemas are renewed."
+        Existing files are kept; schemas are updated."
     )]
     Init(InitArgs),
 
-    /// Write a protocol to begin with.
+    /// Write a starter protocol.
     #[command(after_help = "Examples:\n  skinrig new depth-sweep\n  \
         skinrig new own-outline protocols/round-skin.yaml")]
     New(NewArgs),
@@ -79,12 +79,12 @@ pub(crate) enum Command {
         three times switches the motors off where the tip is. The session is closed and stays readable.")]
     Run(RunArgs),
 
-    /// Continue a session that was interrupted, stopped or ended by a fault, or retake presses that a rig fault cost.
+    /// Continue a session that was interrupted, stopped or ended by a fault, or retake presses lost to a rig fault.
     #[command(
         after_help = "Examples:\n  skinrig resume sessions/NAME.session.sqlite\n  \
         skinrig resume sessions/NAME.session.sqlite --rig hil/rigs/NAME.yaml\n\n\
-        The rig is checked and the sync presses are repeated. Then every press without an outcome is made; one that was\n\
-        interrupted becomes a new attempt. A valid press is never repeated."
+        The rig is checked and the sync presses are repeated. Then every press without an outcome is made; an interrupted\n\
+        press gets a new attempt. A valid press is never repeated."
     )]
     Resume(ResumeArgs),
 
@@ -130,6 +130,12 @@ pub(crate) enum Command {
         skinrig watch sessions/NAME.session.sqlite --once")]
     Watch(WatchArgs),
 
+    /// Show sessions in the browser, live and afterwards: press map, events, poses, the folder's shelf.
+    #[command(after_help = "Examples:\n  skinrig view sessions/\n  \
+        skinrig view sessions/NAME.session.sqlite --control\n\n\
+        Prints a link with a random token. Only this computer can open it, unless --bind names another address.")]
+    View(ViewArgs),
+
     /// List recorded sessions.
     #[command(after_help = "Examples:\n  skinrig sessions sessions/\n  \
         skinrig sessions --prototype \"skin 7\" --tag good-skin")]
@@ -144,7 +150,7 @@ pub(crate) enum Command {
     #[command(
         after_help = "Examples:\n  skinrig tag sessions/NAME.session.sqlite good-skin -bad\n  \
         skinrig tag sessions/NAME.session.sqlite --note \"the lamp had been replaced\"\n\n\
-        Without tags and notes, prints those the session has. A tag has 1 to 40 of a-z, 0-9, `.`, `_`, `-`."
+        Without tags and notes, prints those of the session. A tag has 1 to 40 of a-z, 0-9, `.`, `_`, `-`."
     )]
     Tag(TagArgs),
 
@@ -175,7 +181,7 @@ pub(crate) enum Command {
     )]
     Compare(CompareArgs),
 
-    /// Measure the trade of speed for accuracy on a session: estimators, windows, thinning, bins, rows.
+    /// Measure the trade-off between speed and accuracy on a session: estimators, windows, thinning, bins, rows.
     #[command(
         after_help = "Examples:\n  skinrig tradeoff sessions/NAME.session.sqlite\n  \
         skinrig tradeoff sessions/NAME.session.sqlite --target-rmse 6mm --budget 100us"
@@ -218,7 +224,7 @@ pub(crate) enum Command {
     #[command(after_help = "Example:\n  skinrig schema > skinrig.schema.json")]
     Schema(SchemaArgs),
 
-    /// Print the completions of a shell: commands, options and their values with the Tab key.
+    /// Print shell completions: the Tab key completes commands, options and their values.
     #[command(
         after_help = "Examples:\n  skinrig completions bash > ~/.local/share/bash-completion/completions/skinrig\n  \
                       skinrig completions zsh > ~/.zfunc/_skinrig        (with ~/.zfunc in fpath)\n  \
@@ -226,7 +232,7 @@ pub(crate) enum Command {
     )]
     Completions(CompletionsArgs),
 
-    /// Write a manual page of each command.
+    /// Write a manual page for each command.
     #[command(after_help = "Example:\n  skinrig man ~/.local/share/man/man1 && man skinrig-run")]
     Man(ManArgs),
 

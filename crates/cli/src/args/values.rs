@@ -1,9 +1,9 @@
-//! Values with units and ranges, as the command line takes them.
+//! Parsers of command line values with units and ranges.
 
 use skinrig_settings::Dimension;
 use skinrig_settings::quantity::{self, QuantityError};
 
-/// Why a word of the command line is not a value of its option.
+/// Invalid value of a command line option.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(super) enum ValueError {
     /// Not a number, or not above 0.
@@ -26,7 +26,7 @@ pub(super) enum ValueError {
     Percent { found: String },
 }
 
-/// A limit that something can be above or below.
+/// A limit above 0, mm.
 pub(super) fn limit_mm(text: &str) -> Result<f64, ValueError> {
     match text.parse::<f64>() {
         Ok(mm) if mm > 0.0 && mm.is_finite() => Ok(mm),
@@ -77,7 +77,7 @@ pub(super) fn share(text: &str) -> Result<f64, ValueError> {
     }
 }
 
-/// A share of presses.
+/// A percentage from 0 to 100.
 pub(super) fn percent(text: &str) -> Result<f64, ValueError> {
     match text.trim_end_matches('%').trim().parse::<f64>() {
         Ok(value) if (0.0..=100.0).contains(&value) => Ok(value),

@@ -1,4 +1,4 @@
-//! Owns the facts of a session that a comparison looks at.
+//! Collects the facts of a session that a comparison checks.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,8 +12,8 @@ use skinrig_recorder::SessionReader;
 use crate::exit::Failure;
 use skinrig_results::{Origin, RigDocument};
 
-/// Keys of a protocol that are compared elsewhere, or that name it only.
-const NOT_OF_PROTOCOL: [&str; 10] = [
+/// Protocol keys that are compared elsewhere, or that only label the protocol.
+const IGNORED_KEYS: [&str; 10] = [
     "file_name",
     "text",
     "sha256",
@@ -106,7 +106,7 @@ fn level(rig_name: &str) -> String {
     named.map_or("none", |(level, _)| level).to_owned()
 }
 
-/// The protocol key by key. One that cannot be read any more (a schedule, a file that is not there) has its name and the
+/// The protocol by key. A protocol that no longer parses (a schedule, or a file is missing) is reduced to its name and the
 /// digest of its plan.
 fn protocol(header: &RunHeader) -> Value {
     let no_file = |p: &Path| Err(std::io::Error::other(p.display().to_string()));
@@ -119,11 +119,11 @@ fn protocol(header: &RunHeader) -> Value {
     let hold_ms = read.motion.hold.0 as f64 * 1e-6;
     value["motion"]["hold"] = Value::from(format!("{hold_ms} ms"));
     if let Some(map) = value.as_object_mut() {
-        NOT_OF_PROTOCOL.iter().for_each(|key| {
+        IGNORED_KEYS.iter().for_each(|key| {
             map.remove(*key);
         });
         if let Some(prototype) = map.get_mut("prototype").and_then(Value::as_object_mut) {
-            // Which skin it is, is what is compared.
+            // The identity of the skin is the subject of the comparison.
             prototype.retain(|key, _| key == "tip");
         }
     }

@@ -1,4 +1,4 @@
-//! Owns what `compare` is given: session files, folders or prototypes, and the results of each session.
+//! Resolves the arguments of `compare` (session files, folders, prototypes) and reads the results of each session.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -13,8 +13,8 @@ use crate::exit::Failure;
 use crate::results::{Choices, analyze_shown};
 use crate::sessions::{copies, originals};
 
-/// Most skins that are compared at once: letters A to H.
-const MOST: usize = 8;
+/// Most skins in one comparison: letters A to H.
+const MAX_SKINS: usize = 8;
 
 /// A skin and the files of its sessions.
 pub(super) struct SkinSessions {
@@ -22,32 +22,32 @@ pub(super) struct SkinSessions {
     pub paths: Vec<PathBuf>,
 }
 
-/// Every skin that was asked for.
+/// Resolves each skin argument.
 pub(super) fn subjects(args: &CompareArgs) -> Result<Vec<SkinSessions>, Failure> {
-    if args.skins.len() > MOST {
+    if args.skins.len() > MAX_SKINS {
         return Err(Failure::input(format!(
-            "expected at most {MOST} skins, found {}\n  next: compare them in groups with a common first one",
+            "expected at most {MAX_SKINS} skins, found {}\n  next: compare them in groups with a common first one",
             args.skins.len()
         )));
     }
     let letters = 'A'..;
     let found = args.skins.iter().zip(letters);
     found
-        .map(|(text, letter)| one(text, letter, &args.sessions, args.analysis.as_deref()))
+        .map(|(text, letter)| skin_sessions(text, letter, &args.sessions, args.analysis.as_deref()))
         .collect()
 }
 
-fn one(
+fn skin_sessions(
     text: &str,
     letter: char,
     folder: &Path,
     analysis: Option<&str>,
 ) -> Result<SkinSessions, Failure> {
-    let place = Path::new(text);
-    let (name, paths) = if place.is_dir() {
-        (None, readable(place, None)?)
-    } else if place.is_file() {
-        (None, vec![place.to_owned()])
+    let path = Path::new(text);
+    let (name, paths) = if path.is_dir() {
+        (None, session_paths(path, None)?)
+    } else if path.is_file() {
+        (None, vec![path.to_owned()])
     } else if text.contains(std::path::MAIN_SEPARATOR)
         || text.ends_with(crate::paths::SESSION_SUFFIX)
     {
@@ -56,12 +56,12 @@ fn one(
              next: `skinrig sessions` lists what is there"
         )));
     } else {
-        (Some(text), readable(folder, Some(text))?)
+        (Some(text), session_paths(folder, Some(text))?)
     };
     if paths.is_empty() {
         let (what, wanted) = match name {
             Some(name) => (folder.display(), format!("sessions of prototype `{name}`")),
-            None => (place.display(), "sessions".to_owned()),
+            None => (path.display(), "sessions".to_owned()),
         };
         return Err(Failure::input(format!(
             "{what}: expected {wanted}, found none\n  next: `skinrig sessions {what}` lists what is there; --sessions \
@@ -86,8 +86,8 @@ fn one(
     })
 }
 
-/// The sessions of a folder, of one prototype or all; a broken file there is an error, not skipped.
-fn readable(folder: &Path, prototype: Option<&str>) -> Result<Vec<PathBuf>, Failure> {
+/// The sessions of a folder, of one prototype or all. A broken file is an error; it is not skipped.
+fn session_paths(folder: &Path, prototype: Option<&str>) -> Result<Vec<PathBuf>, Failure> {
     let all = list(folder).map_err(Failure::session)?;
     let mut wanted = all;
     wanted.retain(|s| prototype.is_none() || s.prototype() == prototype);

@@ -1,4 +1,4 @@
-//! Owns the margins of a comparison: from the file of limits and from the command line.
+//! Margins of a comparison, from the limits file and the command line.
 
 use std::path::Path;
 
@@ -8,10 +8,10 @@ use skinrig_protocol::Limits;
 use crate::args::CompareArgs;
 use crate::exit::Failure;
 
-/// The file that is read when it is there and no other is named.
+/// Default limits file, read if it exists.
 const FILE: &str = "limits.yaml";
 
-/// What the command line asks for.
+/// Options of the comparison; the command line overrides the limits file.
 pub(super) fn choices(args: &CompareArgs) -> Result<ComparisonOptions, Failure> {
     let named = args.limits.as_deref();
     let file = named.or_else(|| Some(Path::new(FILE)).filter(|p| p.is_file()));
@@ -19,7 +19,7 @@ pub(super) fn choices(args: &CompareArgs) -> Result<ComparisonOptions, Failure> 
         let name = path.display().to_string();
         let bytes = skinrig_formats::regular::read_text(path).map_err(|e| {
             Failure::input(format!(
-                "{name}: cannot read: {e}\n  next: name a file of limits with --limits"
+                "{name}: cannot read: {e}\n  next: name a limits file with --limits"
             ))
         })?;
         Limits::parse(&name, &bytes).map_err(|found| Failure::findings(&found))

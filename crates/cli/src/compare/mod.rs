@@ -1,9 +1,10 @@
-//! `skinrig compare`: which skin is better, whether that may be asked, and why.
+//! `skinrig compare`: whether skins are comparable, which one is better, and why.
 
 mod facts;
 mod inputs;
 mod margins;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use skinrig_analysis::{Analysis, AnalysisError};
@@ -16,14 +17,14 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::phase::Phase;
 use crate::results::{Choices, open, write};
 
-/// The name of the page when none is given.
+/// Default file name of the page.
 const PAGE: &str = "comparison.html";
 
 /// `skinrig compare`.
 ///
 /// # Errors
-/// [`Failure::input`] for what is no session or prototype, for limits that do not parse, and for skins that may not be
-/// compared; [`Failure::internal`] when a file cannot be written.
+/// [`Failure::input`] for an unknown session or prototype, for limits that do not parse, and for skins that are not
+/// comparable; [`Failure::internal`] when a file cannot be written.
 pub(crate) fn compare(args: &CompareArgs, json: bool) -> Outcome {
     let (found, result) = compared(args)?;
     let blocked = refusal(&result, args);
@@ -53,7 +54,19 @@ pub(crate) fn compare(args: &CompareArgs, json: bool) -> Outcome {
     Err(Failure::input(blocked.unwrap_or_default()))
 }
 
-/// The comparison as the document of its results; written as `skinrig compare` does when `out` names a page.
+/// Settings of a session by key, as used in comparisons.
+///
+/// # Errors
+/// If the session cannot be read.
+pub(crate) fn values(
+    path: &Path,
+    reader: &skinrig_recorder::SessionReader,
+    header: &skinrig_model::RunHeader,
+) -> Result<BTreeMap<String, String>, Failure> {
+    facts::facts(path, reader, header).map(|facts| facts.values)
+}
+
+/// Compares skins and returns the results as JSON. If `out` names a page, also writes the page and the results file.
 ///
 /// # Errors
 /// As [`compare`].
@@ -73,10 +86,14 @@ fn compared(args: &CompareArgs) -> Result<(Vec<inputs::SkinSessions>, Comparison
     let choices = margins::choices(args)?;
     let found = inputs::subjects(args)?;
     let subjects: Vec<Subject> = found.iter().map(|f| f.subject.clone()).collect();
-    // Without their right to be compared nothing is analysed again.
+    // Only comparable skins are analysed again.
     let allowed = skinrig_compare::differences(&subjects, &choices.overrides);
-    let may = allowed.iter().all(|d| d.next.is_none() || d.overridden);
-    let exchanged = if may { exchanged(&found)? } else { Vec::new() };
+    let is_comparable = allowed.iter().all(|d| d.next.is_none() || d.overridden);
+    let exchanged = if is_comparable {
+        swap_settings(&found)?
+    } else {
+        Vec::new()
+    };
     let phase = Phase::begin("comparing");
     let result = compare_skins(&subjects, &exchanged, &choices);
     drop(phase);
@@ -97,7 +114,7 @@ fn write_page(
     Ok(results)
 }
 
-/// Beside the first session.
+/// Default path of the page: beside the first session.
 fn beside(found: &[inputs::SkinSessions]) -> PathBuf {
     let folder = found
         .first()
@@ -106,7 +123,7 @@ fn beside(found: &[inputs::SkinSessions]) -> PathBuf {
     folder.unwrap_or_default().join(PAGE)
 }
 
-/// Why the skins may not be compared, and what to do; `None` when they may. Also for a key to lift that lifts nothing.
+/// Why the skins are not comparable, and the next step; `None` if they are. Also rejects a `--despite` key that no rule has.
 fn refusal(result: &Comparison, args: &CompareArgs) -> Option<String> {
     let lines: Vec<String> = result
         .blocking()
@@ -122,7 +139,7 @@ fn refusal(result: &Comparison, args: &CompareArgs) -> Option<String> {
                 .as_deref()
                 .unwrap_or("see docs/reference/comparison.md");
             format!(
-                "{}: {} ({})\n  next: {next}, or go on in spite of it with --despite {}",
+                "{}: {} ({})\n  next: {next}, or override it with --despite {}",
                 d.what,
                 d.reason,
                 values.join(", "),
@@ -132,21 +149,22 @@ fn refusal(result: &Comparison, args: &CompareArgs) -> Option<String> {
         .collect();
     if !lines.is_empty() {
         return Some(format!(
-            "these skins may not be compared\n  {}",
+            "these skins are not comparable\n  {}",
             lines.join("\n  ")
         ));
     }
-    let idle = args.despite.iter().find(|key| {
+    let unknown = args.despite.iter().find(|key| {
         let known = skinrig_compare::RULES.iter().any(|r| r.key == key.as_str());
         !known && !result.differences.iter().any(|d| d.key == key.as_str())
     });
-    idle.map(|key| {
+    unknown.map(|key| {
         format!("--despite {key}: expected the key of a blocking difference, found one that no rule has\n  next: leave it out, or see docs/reference/comparison.md")
     })
 }
 
-/// Each skin but the first, analysed with the settings of the first, and the first with its; where they differ.
-fn exchanged(found: &[inputs::SkinSessions]) -> Result<Reanalyses, Failure> {
+/// For each skin but the first: the first analysed with its settings, and the skin with those of the first; `None` where they
+/// agree.
+fn swap_settings(found: &[inputs::SkinSessions]) -> Result<Reanalyses, Failure> {
     let Some((first, others)) = found.split_first() else {
         return Ok(Vec::new());
     };
@@ -155,7 +173,7 @@ fn exchanged(found: &[inputs::SkinSessions]) -> Result<Reanalyses, Failure> {
         .iter()
         .map(|other| match (own(first), own(other)) {
             (Some(a), Some(b)) if !same_numbers(&a, &b) => {
-                Ok(Some([again(first, &b)?, again(other, &a)?]))
+                Ok(Some([reanalyse(first, &b)?, reanalyse(other, &a)?]))
             }
             _ => Ok(None),
         })
@@ -169,7 +187,7 @@ fn settings_of(subject: &Subject) -> Option<AnalysisSettings> {
         .map(|s| s.analysis.settings.clone())
 }
 
-/// True when the settings locate presses alike: what studies and intervals do is no cause.
+/// True when both settings locate presses alike; studies and intervals do not matter.
 fn same_numbers(a: &AnalysisSettings, b: &AnalysisSettings) -> bool {
     let plain = |s: &AnalysisSettings| AnalysisSettings {
         exclude_press_numbers: Vec::new(),
@@ -178,7 +196,7 @@ fn same_numbers(a: &AnalysisSettings, b: &AnalysisSettings) -> bool {
     plain(a) == plain(b)
 }
 
-/// The settings without studies: what remains decides where presses are found.
+/// The settings that decide where presses are located; studies are disabled.
 fn only_locating(settings: AnalysisSettings) -> AnalysisSettings {
     let plain = AnalysisSettings::default();
     AnalysisSettings {
@@ -196,8 +214,11 @@ fn only_locating(settings: AnalysisSettings) -> AnalysisSettings {
     }
 }
 
-/// The sessions of a skin, analysed with other settings; studies are left out.
-fn again(found: &inputs::SkinSessions, settings: &AnalysisSettings) -> Result<Subject, Failure> {
+/// Analyses the sessions of a skin with other settings, without studies.
+fn reanalyse(
+    found: &inputs::SkinSessions,
+    settings: &AnalysisSettings,
+) -> Result<Subject, Failure> {
     let mut subject = found.subject.clone();
     for (session, path) in subject.sessions.iter_mut().zip(&found.paths) {
         let (aligned, _) = open(path, Choices::default())?;

@@ -1,16 +1,16 @@
-//! Who may open a file for reading and writing: owner, group, others, and the list beside them by which a desktop's login gives
-//! devices to whoever sits in front (udev's `uaccess`).
+//! Permission to read and write a file: owner, group, others, and the access list through which a desktop login grants devices
+//! to its user (udev's `uaccess`).
 
 use std::path::Path;
 
-/// Whoever runs this program.
+/// The user that runs this program.
 #[derive(Debug, Clone)]
 pub(super) struct User {
     /// Effective user.
     pub uid: u32,
     /// Its name, or its number.
     pub name: String,
-    /// Groups, the effective one too.
+    /// Groups, including the effective one.
     pub groups: Vec<u32>,
     /// Effective capabilities, by bit (`capabilities(7)`).
     pub capabilities: u64,
@@ -21,7 +21,7 @@ pub(super) const CAP_IPC_LOCK: u64 = 1 << 14;
 /// `CAP_SYS_NICE`: may take any priority.
 pub(super) const CAP_SYS_NICE: u64 = 1 << 23;
 
-/// A file's rights.
+/// Owner and permissions of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Node {
     /// Owner.
@@ -51,7 +51,7 @@ const TAG_MASK: u16 = 0x10;
 const READ_WRITE: u32 = 0o6;
 
 impl Node {
-    /// The rights of the file at `path`, links followed; `None` without a file.
+    /// Reads the permissions of the file at `path`, following links; `None` if it does not exist.
     #[cfg(unix)]
     pub(super) fn of(path: &Path) -> Option<Self> {
         use std::os::unix::fs::MetadataExt;
@@ -65,13 +65,13 @@ impl Node {
         })
     }
 
-    /// Rights are told otherwise here.
+    /// Not available on this system.
     #[cfg(not(unix))]
     pub fn of(_path: &Path) -> Option<Self> {
         None
     }
 
-    /// Whether `user` may read and write.
+    /// True if `user` may read and write.
     pub(crate) fn is_open_to(&self, user: &User) -> bool {
         if user.uid == 0 {
             return true;
@@ -81,7 +81,7 @@ impl Node {
             return all(self.mode >> 6);
         }
         let entry = |tag: u16| self.list.iter().filter(move |e| e.tag == tag);
-        // With a list the group's bits of the mode are its mask, and the owning group has an entry of its own.
+        // With a list, the group bits of the mode are the mask, and the owning group has its own entry.
         let mask = entry(TAG_MASK).next().map_or(0o7, |e| u32::from(e.bits));
         if let Some(own) = entry(TAG_USER).find(|e| e.id == user.uid) {
             return all(u32::from(own.bits) & mask);
@@ -95,14 +95,14 @@ impl Node {
         if user.groups.contains(&self.gid) {
             groups.push(owning);
         }
-        // Whoever is in a group that the file knows is not one of the others.
+        // The bits for others apply only to users in none of the file's groups.
         if groups.is_empty() {
             return all(self.mode);
         }
         groups.into_iter().any(|bits| all(bits & mask))
     }
 
-    /// Whether the file's own group may read and write.
+    /// True if the file's own group may read and write.
     pub(crate) const fn is_open_to_group(&self) -> bool {
         (self.mode >> 3) & READ_WRITE == READ_WRITE
     }
@@ -122,7 +122,7 @@ fn list_of(_path: &Path) -> Vec<Entry> {
     Vec::new()
 }
 
-/// Entries of an access list as the kernel hands it out: version 2 (4 bytes), then tag (2), bits (2), id (4) of each, all
+/// Parses an access list in the kernel's format: version 2 (4 bytes), then tag (2), bits (2), id (4) of each entry, all
 /// little-endian (`linux/posix_acl_xattr.h`).
 fn entries(bytes: &[u8]) -> Vec<Entry> {
     let Some(([2, 0, 0, 0], rest)) = bytes.split_first_chunk() else {
@@ -174,7 +174,7 @@ mod tests {
         }
     }
 
-    /// What `setfacl -m u:1000:rw` leaves on a file of mode 0600.
+    /// Access list after `setfacl -m u:1000:rw` on a file of mode 0600.
     const ONE_USER: &[u8] = &[
         2, 0, 0, 0, // version
         1, 0, 6, 0, 255, 255, 255, 255, // owner
@@ -185,11 +185,11 @@ mod tests {
     ];
 
     #[test]
-    fn the_user_in_front_of_the_screen_is_let_in_by_the_list_alone() {
+    fn the_access_list_alone_admits_a_desktop_user() {
         let given = node(0o660, entries(ONE_USER));
         assert!(given.is_open_to(&user(1000, &[1000])));
         assert!(!given.is_open_to(&user(1001, &[1001])));
-        // The mode shows the mask, and not what the group may.
+        // The mode shows the mask, not the permissions of the group.
         assert!(!given.is_open_to(&user(1001, &[46])));
         let mut masked = ONE_USER.to_vec();
         masked[4 + 3 * 8 + 2] = 4;

@@ -1,4 +1,4 @@
-//! Whether somebody else holds the bench: devices that are busy, and by whom; a run that writes here.
+//! Checks that the bench is free: its lease, busy devices and the processes that use them, runs in the sessions folder.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use crate::sessions;
 
 const AREA: &str = "bench";
 
-/// All findings about others.
+/// All findings about other users of the bench.
 pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
     let busy: Vec<Finding> = case
         .survey
@@ -28,54 +28,54 @@ pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
     let mut findings = Vec::new();
     findings.extend(case.lease.map(leased));
     if busy.is_empty() && !case.survey.left_alone {
-        findings.push(check(AREA, "devices", "held by nobody else").ok("nobody"));
+        findings.push(check(AREA, "devices", "not in use").ok("free"));
     }
     findings.push(run(case));
     findings.extend(busy);
     findings
 }
 
-/// Whether somebody holds the lease at `path` at this moment.
+/// True if the lease at `path` is held.
 pub(super) fn is_held(path: &Path) -> bool {
     matches!(lease::inspect(path), Ok(LeaseState::Held { .. }))
 }
 
 fn leased(path: &Path) -> Finding {
-    let check = check(AREA, "lease", "held by nobody");
+    let check = check(AREA, "lease", "free");
     match lease::inspect(path) {
         Err(e) => check.not_checked(format!("cannot read {}: {e}", path.display())),
-        Ok(LeaseState::Free { last: None }) => check.ok("free; nobody ever took it"),
+        Ok(LeaseState::Free { last: None }) => check.ok("free; never taken"),
         Ok(LeaseState::Free { last: Some(last) }) => check.ok(format!("free; last: {last}")),
         Ok(LeaseState::Held { owner, .. }) => check.problem(
-            owner.map_or_else(|| "somebody is just taking it".to_owned(), |o| o.to_string()),
-            "let it end: `skinrig hil lease` shows who it is, `skinrig status` how a run is going",
+            owner.map_or_else(|| "it is just being taken".to_owned(), |o| o.to_string()),
+            "wait until it is free: `skinrig hil lease` shows the holder, `skinrig status` the progress of a run",
         ),
         Ok(LeaseState::Abandoned { owner, beat_at }) => check.warning(
-            format!("{owner} ended without releasing it, or runs on another computer; last sign of life {beat_at}"),
-            "look at the arm before it is moved again; whoever takes the bench next takes it over",
+            format!("{owner} ended without releasing it, or runs on another computer; last heartbeat {beat_at}"),
+            "look at the arm before moving it; the next command that needs the bench takes the lease over",
         ),
     }
 }
 
 fn held(case: &Case<'_>, line: &Line) -> Finding {
-    let check = check(AREA, name_of(line), "held by nobody else");
+    let check = check(AREA, name_of(line), "not in use");
     let node = match (line.device, line.usb) {
         (_, Some((bus, device))) => Some(format!("/dev/bus/usb/{bus:03}/{device:03}")),
         ("robot", None) => usb::list(case.machine).ok().and_then(|all| {
             let robot = all.iter().find(|d| d.vendor == USB_VENDOR);
             robot.map(usb::UsbDevice::node)
         }),
-        // A port has two names: the lasting one is a link beside the other's folder.
+        // A port has two names; the persistent one is a link to the other.
         _ => Some(port_of(case.machine, &line.what)),
     };
     let holder = node.and_then(|node| holder(case.machine, &node));
     match holder {
         Some((pid, command)) => check.problem(
-            format!("process {pid} holds it: {command}"),
-            "let it end; `skinrig status` tells how a run is going, `skinrig control SESSIONS stop` ends it after the press",
+            format!("in use by process {pid}: {command}"),
+            "wait until it ends; `skinrig status` shows the progress of a run, `skinrig control SESSIONS stop` ends it after the press",
         ),
         None => check.problem(
-            "another program holds it, which this user may not see",
+            "in use by another program, which this user may not see",
             "end it; `sudo fuser -v /dev/bus/usb/*/* /dev/ttyACM* /dev/ttyUSB*` names it",
         ),
     }
@@ -92,7 +92,7 @@ fn port_of(machine: &Machine, path: &str) -> String {
     }
 }
 
-/// The process that has this file open, and its command line, as far as this user may look.
+/// The process that has this file open, and its command line, if this user may see it.
 fn holder(machine: &Machine, node: &str) -> Option<(u32, String)> {
     let me = std::process::id();
     let processes = machine.names("/proc").ok()?;
@@ -115,12 +115,12 @@ fn holder(machine: &Machine, node: &str) -> Option<(u32, String)> {
         })
 }
 
-/// A run under way in the same folder may be on this bench.
+/// A run that writes to the same folder may use this bench.
 fn run(case: &Case<'_>) -> Finding {
     let folder = case.sessions.display();
     let check = check(AREA, "runs", format!("no run under way in {folder}"));
     if !case.sessions.is_dir() {
-        return check.ok(format!("{folder} is not there yet"));
+        return check.ok(format!("{folder} does not exist yet"));
     }
     let running = sessions::files(case.sessions)
         .into_iter()

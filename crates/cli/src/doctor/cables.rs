@@ -1,4 +1,4 @@
-//! Whether everything is plugged in, and well: devices of the rig file, hubs, controllers, USB speed.
+//! Checks the connections: devices of the rig file, hubs, controllers, USB speed.
 
 use skinrig_omega3::enumerate::USB_VENDOR;
 use skinrig_protocol::rig::RigKind;
@@ -11,9 +11,9 @@ use crate::devices::Line;
 
 const AREA: &str = "cables";
 const SPEED: &str = "USB speed";
-/// What a camera needs, Mbit/s: its words at 50 Mev/s are 200 MB/s.
+/// Speed that a camera needs, Mbit/s: at 50 Mev/s it sends 200 MB/s.
 const CAMERA_MBIT: u64 = 5000;
-/// What the robot has, Mbit/s (USB 2.0 high speed).
+/// Speed of the robot, Mbit/s (USB 2.0 high speed).
 const ROBOT_MBIT: u64 = 480;
 
 /// All findings about cables.
@@ -42,7 +42,7 @@ pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
     findings
 }
 
-/// Whether what the rig file names is there; without one, what is.
+/// Checks that the devices of the rig file are connected; without a rig file, lists those that are.
 fn connected(case: &Case<'_>, devices: Option<&[UsbDevice]>) -> Vec<Finding> {
     let Some(rig) = case.rig else {
         return unnamed(case);
@@ -56,14 +56,14 @@ fn connected(case: &Case<'_>, devices: Option<&[UsbDevice]>) -> Vec<Finding> {
     let finding = |role: &str| {
         let check = check(AREA, role, format!("{} is connected", wanted(case, role)));
         let Some(line) = case.survey.role(role) else {
-            // Without its library a robot has no line.
+            // Without its library, the robot is not in the survey.
             return match on_bus(USB_VENDOR) {
-                _ if role != "robot" || library => check.not_checked("nobody looked"),
+                _ if role != "robot" || library => check.not_checked("not queried"),
                 Some(false) if rig.kind == RigKind::Bench => check.problem(
                     "no device of Force Dimension (USB vendor 1451) on the bus",
                     "plug the robot in and switch it on",
                 ),
-                _ => check.not_checked("without its library the robot cannot be asked"),
+                _ => check.not_checked("the robot cannot be queried without its library"),
             };
         };
         let next = || line.next_step.clone().unwrap_or_default();
@@ -76,7 +76,7 @@ fn connected(case: &Case<'_>, devices: Option<&[UsbDevice]>) -> Vec<Finding> {
         }
     };
     let mut findings: Vec<Finding> = roles.iter().map(|role| finding(role)).collect();
-    // What does not answer does not tell whether it is the one that is missing.
+    // A device that does not respond may be the missing one.
     let nameless = |l: &&Line| l.role.is_none() && is_faulty(l);
     findings.extend(case.survey.lines.iter().filter(nameless).map(fault));
     findings
@@ -84,10 +84,10 @@ fn connected(case: &Case<'_>, devices: Option<&[UsbDevice]>) -> Vec<Finding> {
 
 fn unnamed(case: &Case<'_>) -> Vec<Finding> {
     let mut findings =
-        vec![check(AREA, "devices", "those of the rig file").not_checked("no rig file names them")];
+        vec![check(AREA, "devices", "those of the rig file").not_checked("no rig file given")];
     for line in &case.survey.lines {
         if line.state == "ready" {
-            findings.push(check(AREA, name_of(line), "answers").ok(line.what.as_str()));
+            findings.push(check(AREA, name_of(line), "responds").ok(line.what.as_str()));
         } else if is_faulty(line) {
             findings.push(fault(line));
         }
@@ -95,13 +95,13 @@ fn unnamed(case: &Case<'_>) -> Vec<Finding> {
     findings
 }
 
-/// A machine without USB is no fault of a cable; among the permissions it is told.
+/// A machine without USB is not a cable fault; the permissions report it.
 fn is_faulty(line: &Line) -> bool {
     line.state == "faulty" && line.what != "USB"
 }
 
 fn fault(line: &Line) -> Finding {
-    let check = check(AREA, name_of(line), "answers as it should");
+    let check = check(AREA, name_of(line), "responds correctly");
     let next = line.next_step.clone();
     check.problem(
         with_detail(line),
@@ -116,7 +116,7 @@ fn with_detail(line: &Line) -> String {
     }
 }
 
-/// What the rig file names for a role.
+/// The device that the rig file names for a role.
 fn wanted(case: &Case<'_>, role: &str) -> String {
     let Some(rig) = case.rig else {
         return role.to_owned();
@@ -142,7 +142,7 @@ fn hub(line: &Line, device: Option<&UsbDevice>) -> Finding {
         None => check.not_checked("the kernel does not list it"),
         Some(UsbDevice { hub: Some(hub), .. }) => check.warning(
             format!("behind the hub at {hub}"),
-            "plug the camera into the computer itself: a hub shares its rate, and adds a cable that may fail",
+            "plug the camera into the computer itself: a hub shares its bandwidth and adds a cable that may fail",
         ),
         Some(_) => check.ok("none"),
     }
@@ -152,17 +152,17 @@ fn controllers(seen: &[(&Line, Option<&UsbDevice>)]) -> Finding {
     let check = check(
         AREA,
         "cameras: controllers",
-        "each camera on a USB controller of its own",
+        "each camera on its own USB controller",
     );
     let of = |(_, device): &(&Line, Option<&UsbDevice>)| device.and_then(|d| d.controller.clone());
     match seen.iter().map(of).collect::<Vec<_>>().as_slice() {
         [Some(one), Some(two)] if one == two => check.warning(
             format!("both on {one}"),
-            "plug one camera into a port of another controller (`lsusb -t` shows the tree), or add one: both at full rate lose data \
-             on one",
+            "plug one camera into a port of another controller (`lsusb -t` shows the tree), or add one: two cameras at full rate lose data \
+            on one controller",
         ),
         [Some(one), Some(two)] => check.ok(format!("{one} and {two}")),
-        [_, _] => check.not_checked("the kernel does not tell the controllers"),
+        [_, _] => check.not_checked("the kernel does not report the controllers"),
         other => check.not_checked(format!("{} cameras on the bus", other.len())),
     }
 }
@@ -179,7 +179,7 @@ fn camera_speed(line: &Line, device: Option<&UsbDevice>) -> Finding {
             format!("{mbit} Mbit/s"),
             "use a USB 3 port (blue, or marked SS) and a USB 3 cable; push the plug home: half in, it is a USB 2 plug",
         ),
-        None => check.not_checked("the kernel does not tell its speed"),
+        None => check.not_checked("the kernel does not report its speed"),
     }
 }
 
@@ -190,9 +190,9 @@ fn robot_speed(devices: &[UsbDevice]) -> Finding {
         Some(Some(mbit)) if mbit >= ROBOT_MBIT => check.ok(format!("{mbit} Mbit/s")),
         Some(Some(mbit)) => check.warning(
             format!("{mbit} Mbit/s"),
-            "use another port and cable: the regulation asks the arm thousands of times a second",
+            "use another port and cable: the control loop polls the arm thousands of times a second",
         ),
-        Some(None) => check.not_checked("the kernel does not tell its speed"),
+        Some(None) => check.not_checked("the kernel does not report its speed"),
         None => check.not_checked("no device of Force Dimension (USB vendor 1451) on the bus"),
     }
 }

@@ -1,4 +1,4 @@
-//! What `skinrig doctor` examines.
+//! Input of the checks of `skinrig doctor`.
 
 use std::path::Path;
 
@@ -8,11 +8,11 @@ use super::machine::Machine;
 use super::survey::Survey;
 use crate::rig::inputs::Input;
 
-/// What is examined.
+/// Input of the checks.
 pub(super) struct Case<'a> {
     pub machine: &'a Machine,
     pub rig: Option<&'a RigFile>,
-    /// What the rig file names on this computer.
+    /// Files and programs of this computer that the rig file names.
     pub inputs: &'a [Input],
     pub survey: &'a Survey,
     pub sessions: &'a Path,

@@ -1,4 +1,4 @@
-//! The computer's clocks: the time of day by which nights are told apart, and the counter by which events are stamped.
+//! Checks the computer's clocks: the time of day, which dates nights, and the counter, which timestamps events.
 
 use super::case::Case;
 use super::finding::{Finding, check};
@@ -11,8 +11,8 @@ pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
     vec![time_of_day(case), counter(case)]
 }
 
-/// What can be told without the network: systemd-timesyncd leaves a file when it has synchronised; of other daemons only that they
-/// run.
+/// Checks synchronisation without using the network: systemd-timesyncd creates a file when it has synchronised; other daemons only
+/// show that they run.
 fn time_of_day(case: &Case<'_>) -> Finding {
     let check = check(AREA, "time of day", "synchronised (NTP)");
     let has = |path: &str| case.machine.has(path);
@@ -29,7 +29,7 @@ fn time_of_day(case: &Case<'_>) -> Finding {
     ] {
         if files.into_iter().any(has) {
             return check.not_checked_yet(
-                format!("{daemon} runs; it alone knows whether it has synchronised"),
+                format!("{daemon} runs; skinrig cannot see whether it has synchronised"),
                 ask,
             );
         }
@@ -38,12 +38,12 @@ fn time_of_day(case: &Case<'_>) -> Finding {
         return check.not_checked("there is no /run");
     }
     check.warning(
-        "no sign of it",
+        "no sign of synchronisation",
         "sudo timedatectl set-ntp true; `timedatectl` shows whether it worked",
     )
 }
 
-/// Slow counters cost microseconds at every look, and some jump.
+/// Reading a slow counter takes microseconds, and some counters jump.
 fn counter(case: &Case<'_>) -> Finding {
     let check = check(
         AREA,
@@ -55,7 +55,7 @@ fn counter(case: &Case<'_>) -> Finding {
         Ok(source) if ["hpet", "acpi_pm", "jiffies", "refined-jiffies"].contains(&source.as_str()) => {
             check.warning(
                 source,
-                "the kernel distrusts the processor's counter: `journalctl -k | grep -i clocksource` says why; update the BIOS",
+                "the kernel distrusts the processor's counter: `journalctl -k | grep -i clocksource` shows why; update the BIOS",
             )
         }
         Ok(source) => check.ok(source),

@@ -1,4 +1,4 @@
-//! Room and kind of the disk that sessions go to. How fast it writes is measured elsewhere.
+//! Checks free space and file system of the sessions folder. The preflight measures write speed.
 
 use std::path::{Path, PathBuf};
 
@@ -7,19 +7,19 @@ use super::finding::{Finding, check};
 use crate::rig::gates::size;
 
 const AREA: &str = "disk";
-/// Left after a session, bytes; and both cameras together, bytes/s: the defaults of `preflight` in a rig file.
+/// Space left after a session, bytes, and rate of both cameras together, bytes/s: the defaults of `preflight` in a rig file.
 const MIN_FREE_B: f64 = 2e9;
 const DATA_RATE_B_S: f64 = 20e6;
-/// A session as long as this should fit, s. The preflight knows the length of the protocol and asks for no more than it needs.
+/// A session of this length should fit, s. The preflight uses the length of the protocol instead.
 const ROOM_FOR_S: f64 = 3600.0;
 
 /// All findings about the disk.
 pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
-    // The folder may have to be made first.
+    // The folder may not exist yet: check the nearest one that does.
     let absolute = std::path::absolute(case.sessions).unwrap_or_else(|_| case.sessions.to_owned());
-    let there = absolute.ancestors().find(|f| f.exists());
-    let there = there.unwrap_or(Path::new("/"));
-    vec![space(case, there), file_system(case, there)]
+    let existing = absolute.ancestors().find(|f| f.exists());
+    let existing = existing.unwrap_or(Path::new("/"));
+    vec![space(case, existing), file_system(case, existing)]
 }
 
 fn space(case: &Case<'_>, folder: &Path) -> Finding {
@@ -51,30 +51,30 @@ fn space(case: &Case<'_>, folder: &Path) -> Finding {
     }
 }
 
-/// A file system on which sessions do not belong, and why.
+/// Why a file system is unsuitable for sessions; `None` if it is suitable.
 fn unfit(kind: &str) -> Option<&'static str> {
     Some(match kind {
-        "tmpfs" | "ramfs" => "it lies in memory and is gone when the computer is switched off",
+        "tmpfs" | "ramfs" => "it is in memory and is lost when the computer is switched off",
         "nfs" | "nfs4" | "cifs" | "smb3" | "smbfs" | "9p" | "afs" | "ceph" | "glusterfs"
         | "lustre" | "fuse.sshfs" | "fuse.rclone" => {
-            "it lies behind a network, whose pauses become lost data; SQLite's log does not work across machines"
+            "it is behind a network, whose pauses lose data; SQLite's log does not work across machines"
         }
-        "vfat" | "msdos" => "a file ends at 4 GB there",
+        "vfat" | "msdos" => "a file cannot exceed 4 GB",
         "fuseblk" | "fuse.ntfs-3g" | "fuse.exfat" => {
-            "a program of its own writes it, slowly, and a cut of power may cost more than the last write"
+            "it is written slowly, by a separate program, and a power cut may lose more than the last write"
         }
         _ => return None,
     })
 }
 
 fn file_system(case: &Case<'_>, folder: &Path) -> Finding {
-    let check = check(AREA, "file system", "a local disk that may be written");
+    let check = check(AREA, "file system", "a writable local disk");
     let mounts = match case.machine.text("/proc/self/mountinfo") {
         Ok(mounts) => mounts,
         Err(why) => return check.not_checked(why),
     };
     let folder = std::fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
-    // The last of several mounts on one place covers the others.
+    // The last of several mounts at one point hides the others.
     let under = mounts
         .lines()
         .filter_map(Mount::parse)
@@ -82,10 +82,10 @@ fn file_system(case: &Case<'_>, folder: &Path) -> Finding {
         .enumerate()
         .max_by_key(|(i, m)| (m.point.components().count(), *i));
     let Some((_, mount)) = under else {
-        return check.not_checked(format!("no mount holds {}", folder.display()));
+        return check.not_checked(format!("no mount contains {}", folder.display()));
     };
     let found = format!("{} at {}", mount.kind, mount.point.display());
-    let next = "give another folder with --sessions";
+    let next = "choose another folder with --sessions";
     match unfit(&mount.kind) {
         _ if mount.read_only => check.problem(format!("{found}, read-only"), next),
         Some(why) => check.warning(format!("{found}: {why}"), next),
@@ -110,7 +110,7 @@ impl Mount {
         let kind = system.next()?.to_owned();
         let super_options = system.nth(1).unwrap_or("");
         Some(Self {
-            // White space and backslashes are written in octal.
+            // White space and backslashes are octal escapes.
             point: point
                 .replace("\\040", " ")
                 .replace("\\011", "\t")

@@ -1,4 +1,4 @@
-//! What the doctor says: one finding per check, as a table for people and as JSON for programs.
+//! Findings of the doctor, one per check, as a table for people and as JSON for programs.
 
 use std::fmt;
 
@@ -8,19 +8,19 @@ use skinrig_text::{Column, Table, widest};
 
 use crate::rig::bench::display_name;
 
-/// How a check ended.
+/// Result of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub(super) enum Verdict {
     /// As it should be.
     #[serde(rename = "ok")]
     Ok,
-    /// The bench works, and may fail in a long night.
+    /// The bench works but may fail during a long night.
     #[serde(rename = "warning")]
     Warning,
-    /// The bench cannot work like this.
+    /// The bench does not work.
     #[serde(rename = "problem")]
     Problem,
-    /// Nobody can tell; the finding says why.
+    /// The check was not possible; the finding states why.
     #[serde(rename = "not checked")]
     NotChecked,
 }
@@ -36,31 +36,31 @@ impl Verdict {
     }
 }
 
-/// One check and how it ended.
+/// One check and its result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub(super) struct Finding {
     /// `rig file`, `permissions`, `cables`, `USB speed`, `versions`, `disk`, `real time`, `power`, `clock` or `bench`.
     pub area: &'static str,
     /// What was checked.
     pub check: String,
-    /// How it ended.
+    /// Its result.
     pub verdict: Verdict,
     /// What was expected.
     pub expected: String,
-    /// What was found; of what was not checked, why.
+    /// What was found, or why the check was not possible.
     pub found: String,
-    /// What to do next, a command where there is one.
+    /// Next step, a command if there is one.
     pub next_step: Option<String>,
 }
 
-/// A check that is still to end.
+/// A check without its result.
 pub(super) struct Check {
     area: &'static str,
     check: String,
     expected: String,
 }
 
-/// A check of `area` that expects `expected`.
+/// Starts a check of `area`.
 pub(super) fn check(
     area: &'static str,
     check: impl Into<String>,
@@ -97,12 +97,12 @@ impl Check {
         self.end(Verdict::Problem, found, Some(next.into()))
     }
 
-    /// `why` takes the place of what was found.
+    /// Not checked, for the reason `why`.
     pub(crate) fn not_checked(self, why: impl fmt::Display) -> Finding {
         self.end(Verdict::NotChecked, why.to_string(), None)
     }
 
-    /// Not checked, and what would let it be.
+    /// Not checked, with the step that makes the check possible.
     pub(crate) fn not_checked_yet(
         self,
         why: impl Into<String>,
@@ -112,12 +112,12 @@ impl Check {
     }
 }
 
-/// How many findings ended so.
+/// Number of findings with this verdict.
 fn count(findings: &[Finding], verdict: Verdict) -> usize {
     findings.iter().filter(|f| f.verdict == verdict).count()
 }
 
-/// For programs.
+/// The findings as JSON.
 pub(super) fn json(rig: Option<&RigFile>, findings: &[Finding]) -> serde_json::Value {
     serde_json::json!({
         "rig": rig.map(|r| &r.name),
@@ -129,11 +129,11 @@ pub(super) fn json(rig: Option<&RigFile>, findings: &[Finding]) -> serde_json::V
     })
 }
 
-/// For people: area by area; what was expected is told where something else was found.
+/// The findings as a table, by area. States what was expected only where a check did not pass.
 pub(super) fn table(rig: Option<&RigFile>, findings: &[Finding]) -> String {
     let mut out = match rig {
         Some(rig) => format!("rig       {}\n", display_name(rig)),
-        None => "rig       none (--rig FILE also checks what the file says)\n".to_owned(),
+        None => "rig       none (--rig FILE also checks against a rig file)\n".to_owned(),
     };
     let widest = widest(findings.iter().map(|f| f.check.as_str()));
     let table = Table::new([Column::left(11), Column::left(widest)]).indent(2);

@@ -1,4 +1,4 @@
-//! Whether what the rig file names on this computer is there: bias files, lamp programs.
+//! Checks the files and programs that the rig file names: bias files, lamp programs.
 
 use super::case::Case;
 use super::finding::{Finding, check};

@@ -1,4 +1,4 @@
-//! The machine as its files tell it: `/sys`, `/proc`, `/etc`, `/run` and `/dev` below one folder.
+//! Reads the state of the machine from `/sys`, `/proc`, `/etc`, `/run` and `/dev` below one root folder.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -6,19 +6,19 @@ use std::path::{Path, PathBuf};
 
 use super::access::{Node, User};
 
-/// Why the machine's files do not tell something.
+/// Missing or unreadable information about the machine.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum MachineError {
     /// A file or folder cannot be read.
     #[error("cannot read {path}: {source}")]
     Unreadable {
-        /// As the kernel names it.
+        /// Absolute path.
         path: String,
         /// Error of the operating system.
         source: io::Error,
     },
-    /// The status of this process names no user.
-    #[error("/proc/self/status does not tell the user")]
+    /// The status of this process has no user.
+    #[error("/proc/self/status has no user ID")]
     NoUser,
 }
 
@@ -29,7 +29,7 @@ impl MachineError {
     }
 }
 
-/// A machine.
+/// A machine, real or planted by a test.
 pub(super) struct Machine {
     root: PathBuf,
     /// Free bytes of a folder.
@@ -37,7 +37,7 @@ pub(super) struct Machine {
 }
 
 impl Machine {
-    /// The one that this program runs on.
+    /// The machine that this program runs on.
     pub(super) fn this() -> Self {
         Self {
             root: PathBuf::from("/"),
@@ -45,7 +45,7 @@ impl Machine {
         }
     }
 
-    /// One that was planted in `root`, with so much free space everywhere.
+    /// A machine planted in `root`, with this free space everywhere.
     #[cfg(test)]
     pub(super) fn planted(root: &Path, free_b: fn(&Path) -> io::Result<f64>) -> Self {
         Self {
@@ -54,22 +54,22 @@ impl Machine {
         }
     }
 
-    /// Where `path`, which begins with `/`, lies.
+    /// Location of the absolute path `path` below the root folder.
     pub(super) fn path(&self, path: &str) -> PathBuf {
         self.root.join(path.trim_start_matches('/'))
     }
 
-    /// A file without the white space at its ends.
+    /// Content of a file, trimmed.
     ///
     /// # Errors
     /// [`MachineError::Unreadable`].
     pub(super) fn text(&self, path: &str) -> Result<String, MachineError> {
-        // Opened and read as such: what stands in for a bus on a test bench knows no other way.
+        // Open and read the path itself: the stand-in for a bus on a test bench supports nothing else.
         let bytes = std::fs::read(self.path(path)).map_err(MachineError::of(path))?;
         Ok(String::from_utf8_lossy(&bytes).trim().to_owned())
     }
 
-    /// A number in a file of its own.
+    /// Content of a file that holds one number.
     pub(super) fn number(&self, path: &str) -> Option<u64> {
         self.text(path).ok()?.parse().ok()
     }
@@ -88,22 +88,22 @@ impl Machine {
         Ok(names)
     }
 
-    /// Whether there is something at `path`.
+    /// True if `path` exists.
     pub(super) fn has(&self, path: &str) -> bool {
         self.path(path).exists()
     }
 
-    /// Where a symbolic link points, as it is written.
+    /// Target of a symbolic link, unresolved.
     pub(super) fn link(&self, path: &str) -> Option<PathBuf> {
         std::fs::read_link(self.path(path)).ok()
     }
 
-    /// Who may open the file at `path`.
+    /// Owner and permissions of the file at `path`.
     pub(super) fn node(&self, path: &str) -> Option<Node> {
         Node::of(&self.path(path))
     }
 
-    /// A file of lines `key<colon>value`, such as `/proc/self/status`.
+    /// Content of a file with lines `key<colon>value`, such as `/proc/self/status`.
     ///
     /// # Errors
     /// [`MachineError::Unreadable`].
@@ -115,10 +115,10 @@ impl Machine {
             .collect())
     }
 
-    /// Who runs this program.
+    /// The user that runs this program.
     ///
     /// # Errors
-    /// [`MachineError`] when the status of this process does not tell.
+    /// [`MachineError`] when the status of this process is unreadable or has no user.
     pub(super) fn user(&self) -> Result<User, MachineError> {
         let status = self.table("/proc/self/status")?;
         let ids = |key: &str| -> Vec<u32> {
@@ -127,7 +127,7 @@ impl Machine {
                 .filter_map(|id| id.parse().ok())
                 .collect()
         };
-        // Real, effective, saved, of the file system.
+        // In this order: real, effective, saved, file system.
         let (Some(&uid), Some(&gid)) = (ids("Uid").get(1), ids("Gid").get(1)) else {
             return Err(MachineError::NoUser);
         };

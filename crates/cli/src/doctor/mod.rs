@@ -1,7 +1,7 @@
-//! `skinrig doctor`: whether this machine is fit for the bench, and what to do about what is not.
+//! `skinrig doctor`: checks that this machine is ready for the bench, with a next step for each problem.
 //!
-//! Devices are asked as `skinrig devices` asks them; everything else is read from files of the system below one folder, so
-//! that tests can plant a machine. What cannot be checked says why, and is neither good nor bad.
+//! Devices are queried as in `skinrig devices`; everything else is read from system files below one folder, so that tests can
+//! plant a machine. A check that is not possible states why, and counts as neither good nor bad.
 
 mod access;
 mod bench;
@@ -35,11 +35,11 @@ use survey::Survey;
 /// `skinrig doctor`.
 ///
 /// # Errors
-/// [`crate::exit::Failure`] for a rig file that cannot be read. Problems are no error: they are [`Exit::Rig`].
+/// [`crate::exit::Failure`] for a rig file that cannot be read. Problems are not an error: they exit with [`Exit::Rig`].
 pub(crate) fn doctor(args: &DoctorArgs, json: bool) -> Outcome {
     let rig = args.rig.as_deref().map(rig_bench::load).transpose()?;
     let lease = rig.as_ref().map(lease::path);
-    // Asking costs the trigger box a reset, which nobody who holds the bench must suffer.
+    // Querying the trigger box resets it, which would disturb the holder of the bench.
     let survey = if lease.as_deref().is_some_and(bench::is_held) {
         Survey::of_a_held_bench(rig.as_ref())
     } else {
@@ -65,7 +65,7 @@ pub(crate) fn doctor(args: &DoctorArgs, json: bool) -> Outcome {
     })
 }
 
-/// Everything, in the order in which it is told.
+/// All findings, in the order of the report.
 fn examine(case: &Case<'_>) -> Vec<Finding> {
     let mut findings = inputs::findings(case);
     findings.extend(permissions::findings(case));

@@ -1,4 +1,4 @@
-//! Whether this user may open the devices: USB nodes of cameras and robot, the serial port of the trigger box.
+//! Checks that this user may open the devices: USB nodes of cameras and robot, the serial port of the trigger box.
 
 use std::path::Path;
 
@@ -13,14 +13,14 @@ use super::usb;
 use crate::devices::Line;
 
 const AREA: &str = "permissions";
-/// Puts the rules of this repository in force.
+/// Installs the udev rules of this repository.
 const INSTALL_RULES: &str = "sudo cp hil/udev/70-skinrig.rules /etc/udev/rules.d/ && sudo udevadm control --reload && sudo udevadm \
      trigger; then plug the device in again";
 
-/// All findings about rights.
+/// All findings about permissions.
 pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
     let user = case.machine.user();
-    let mut findings = vec![who(user.as_ref())];
+    let mut findings = vec![user_finding(user.as_ref())];
     let user = user.ok();
     findings.extend(cameras(case, user.as_ref()));
     findings.extend(robot(case, user.as_ref()));
@@ -28,11 +28,11 @@ pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
     findings
 }
 
-fn who(user: Result<&User, &MachineError>) -> Finding {
-    let check = check(AREA, "user", "an ordinary user with rights of its own");
+fn user_finding(user: Result<&User, &MachineError>) -> Finding {
+    let check = check(AREA, "user", "an ordinary user, not root");
     match user {
         Ok(user) if user.uid == 0 => check.warning(
-            "root, who may open everything: whether the bench's user may is not told",
+            "root may open everything, so the permissions of the bench's user are not checked",
             "run it as the user of the bench",
         ),
         Ok(user) => check.ok(format!("{} (uid {})", user.name, user.uid)),
@@ -61,13 +61,13 @@ fn cameras(case: &Case<'_>, user: Option<&User>) -> Vec<Finding> {
             .usb
             .map(|(bus, device)| format!("/dev/bus/usb/{bus:03}/{device:03}"));
         let node = node.unwrap_or_default();
-        let (rights, next) = shut(case, user, &node);
+        let (rights, next) = access_denied(case, user, &node);
         check.problem(format!("refused: {node}{rights}"), next)
     };
     lines.iter().map(finding).collect()
 }
 
-/// The library tells when it is refused. Without it the file of the device does.
+/// Uses the library's answer; without the library, the permissions of the device file.
 fn robot(case: &Case<'_>, user: Option<&User>) -> Vec<Finding> {
     let check = || check(AREA, "robot", "may be opened");
     let devices = usb::list(case.machine);
@@ -82,19 +82,19 @@ fn robot(case: &Case<'_>, user: Option<&User>) -> Vec<Finding> {
     vec![match (node, user) {
         (node, _) if asked("not permitted") => {
             let node = node.unwrap_or_default();
-            let (rights, next) = shut(case, user, &node);
+            let (rights, next) = access_denied(case, user, &node);
             check().problem(format!("refused: {node}{rights}"), next)
         }
         _ if asked("ready") || asked("busy") => check().ok("opened"),
         (Some(node), Some(user)) => match case.machine.node(&node) {
             Some(rights) if rights.is_open_to(user) => check().ok(node),
             Some(_) => {
-                let (rights, next) = shut(case, Some(user), &node);
+                let (rights, next) = access_denied(case, Some(user), &node);
                 check().problem(format!("{node}{rights}"), next)
             }
             None => check().not_checked(format!("there is no {node}")),
         },
-        (Some(node), None) => check().not_checked(format!("{node}: the user is not known")),
+        (Some(node), None) => check().not_checked(format!("{node}: the user is unknown")),
         (None, _) => check().not_checked(match devices {
             Ok(_) => "no device of Force Dimension (USB vendor 1451) on the bus".to_owned(),
             Err(why) => why.to_string(),
@@ -111,7 +111,7 @@ fn serial_port(case: &Case<'_>, user: Option<&User>) -> Vec<Finding> {
     let state = case.survey.role("trigger_box").map(|l| l.state);
     vec![match state {
         Some("not permitted") => {
-            let (rights, next) = shut(case, user, port);
+            let (rights, next) = access_denied(case, user, port);
             check().problem(format!("refused: {port}{rights}"), next)
         }
         None if case.survey.left_alone => check().not_checked(LEFT_ALONE),
@@ -120,8 +120,8 @@ fn serial_port(case: &Case<'_>, user: Option<&User>) -> Vec<Finding> {
     }]
 }
 
-/// Whose the file is, and what opens it to this user: the one group that is missing, else the rules.
-fn shut(case: &Case<'_>, user: Option<&User>, node: &str) -> (String, String) {
+/// Group and mode of a file, and how to gain access: join the group that may open it, else install the udev rules.
+fn access_denied(case: &Case<'_>, user: Option<&User>, node: &str) -> (String, String) {
     let rights = Some(node)
         .filter(|n| Path::new(n).is_absolute())
         .and_then(|n| case.machine.node(n));

@@ -1,4 +1,4 @@
-//! What saves power at the wrong moment: sleep, and slow processors.
+//! Checks power saving: sleep and processor frequency.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -31,11 +31,11 @@ fn sleep(case: &Case<'_>) -> Finding {
     if masked {
         check.ok("sleep.target is masked")
     } else if !case.machine.has("/run/systemd/system") {
-        check.not_checked("no systemd here: see what your system does after an idle hour")
+        check.not_checked("no systemd: check what your system does after an idle hour")
     } else {
         check.warning(
-            format!("it can ({kinds}), and nothing forbids it for good"),
-            "sudo systemctl mask sleep.target; or run by hil/systemd, whose unit holds sleep off while it runs",
+            format!("it can ({kinds}), and sleep.target is not masked"),
+            "sudo systemctl mask sleep.target; or run through hil/systemd, whose unit prevents sleep while it runs",
         )
     }
 }
@@ -59,11 +59,11 @@ fn governor(case: &Case<'_>) -> Finding {
     }
     let found: Vec<String> = counts.iter().map(|(g, n)| format!("{g} on {n}")).collect();
     match counts.keys().map(String::as_str).collect::<Vec<_>>()[..] {
-        [] => check.not_checked("this kernel does not steer its processors' speed"),
+        [] => check.not_checked("this kernel does not control the processor frequency"),
         ["performance"] => check.ok(found.join(", ")),
         _ => check.warning(
             found.join(", "),
-            "sudo cpupower frequency-set -g performance; lasting: your distribution's power profile",
+            "sudo cpupower frequency-set -g performance; permanently: your distribution's power profile",
         ),
     }
 }

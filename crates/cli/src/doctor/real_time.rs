@@ -1,4 +1,4 @@
-//! Whether this process may keep real time: priority, locked memory, USB buffers, memory.
+//! Checks the real-time limits of this process: priority, locked memory, USB buffers, memory.
 
 use std::collections::BTreeMap;
 
@@ -11,8 +11,8 @@ use super::machine::MachineError;
 use crate::rig::gates::size;
 
 const AREA: &str = "real time";
-/// Share of the last minute in which something waited for memory, percent.
-const MOST_PRESSURE_PERCENT: f64 = 1.0;
+/// Largest acceptable share of the last minute spent waiting for memory, percent.
+const MAX_PRESSURE_PERCENT: f64 = 1.0;
 
 /// All findings about real time.
 pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
@@ -29,7 +29,7 @@ pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
 /// `/proc/self/limits`, or why it cannot be read.
 type Limits = Result<String, MachineError>;
 
-/// Why a limit of this process is not known.
+/// A limit of this process is unknown.
 #[derive(Debug, thiserror::Error)]
 enum LimitError<'a> {
     /// The limits cannot be read.
@@ -39,11 +39,11 @@ enum LimitError<'a> {
     #[error("{name}: {found}")]
     NotANumber { name: &'a str, found: &'a str },
     /// The limit is missing.
-    #[error("/proc/self/limits does not tell `{name}`")]
+    #[error("/proc/self/limits has no line `{name}`")]
     Missing { name: &'a str },
 }
 
-/// The soft limit of a line of `/proc/self/limits`, `u64::MAX` without one.
+/// Soft limit in the line `name` of `/proc/self/limits`; `u64::MAX` if unlimited.
 fn soft<'a>(limits: &'a Limits, name: &'a str) -> Result<u64, LimitError<'a>> {
     let text = limits.as_ref().map_err(LimitError::Unreadable)?;
     let line = text.lines().find_map(|l| l.strip_prefix(name));
@@ -57,9 +57,9 @@ fn soft<'a>(limits: &'a Limits, name: &'a str) -> Result<u64, LimitError<'a>> {
     }
 }
 
-/// The robot's library asks for a priority of its regulation's thread and locks memory (its imports `pthread_setschedparam` and
-/// `mlockall`); without these rights it runs without.
-fn raise(case: &Case<'_>) -> String {
+/// The robot's library raises the priority of its control thread and locks memory (it imports `pthread_setschedparam` and
+/// `mlockall`); without permission it does neither.
+fn raise_limits(case: &Case<'_>) -> String {
     let user = case
         .machine
         .user()
@@ -70,7 +70,7 @@ fn raise(case: &Case<'_>) -> String {
     )
 }
 
-fn may(case: &Case<'_>, capability: u64) -> bool {
+fn has_capability(case: &Case<'_>, capability: u64) -> bool {
     let user = case.machine.user();
     user.is_ok_and(|u| u.capabilities & capability != 0)
 }
@@ -84,8 +84,8 @@ fn priority(case: &Case<'_>, limits: &Limits) -> Finding {
     match soft(limits, "Max realtime priority") {
         Err(why) => check.not_checked(why),
         Ok(n) if n > 0 => check.ok(format!("up to {}", n.min(99))),
-        Ok(_) if may(case, CAP_SYS_NICE) => check.ok("by CAP_SYS_NICE"),
-        Ok(_) => check.warning("none", raise(case)),
+        Ok(_) if has_capability(case, CAP_SYS_NICE) => check.ok("by CAP_SYS_NICE"),
+        Ok(_) => check.warning("none", raise_limits(case)),
     }
 }
 
@@ -94,12 +94,12 @@ fn locked_memory(case: &Case<'_>, limits: &Limits) -> Finding {
     match soft(limits, "Max locked memory") {
         Err(why) => check.not_checked(why),
         Ok(u64::MAX) => check.ok("unlimited"),
-        Ok(_) if may(case, CAP_IPC_LOCK) => check.ok("by CAP_IPC_LOCK"),
-        Ok(bytes) => check.warning(size(bytes as f64), raise(case)),
+        Ok(_) if has_capability(case, CAP_IPC_LOCK) => check.ok("by CAP_IPC_LOCK"),
+        Ok(bytes) => check.warning(size(bytes as f64), raise_limits(case)),
     }
 }
 
-/// The kernel gives all of a machine's USB transfers so much memory together.
+/// The kernel limits the total memory of USB transfers.
 fn usb_buffers(case: &Case<'_>) -> Finding {
     let config = Evk1Config::default();
     let need_b = 2 * config.transfers * config.transfer_bytes;
@@ -116,19 +116,19 @@ fn usb_buffers(case: &Case<'_>) -> Finding {
         Some(mb) if mb >= need_mb => check.ok(format!("{mb} MiB")),
         Some(mb) => check.problem(
             format!("{mb} MiB"),
-            format!("echo 64 | sudo tee {file}; lasting: usbcore.usbfs_memory_mb=64 on the kernel's command line"),
+            format!("echo 64 | sudo tee {file}; permanently: usbcore.usbfs_memory_mb=64 on the kernel's command line"),
         ),
     }
 }
 
-/// What the cameras' backlogs take at worst, twice: the recorder needs as much again.
+/// Twice the largest backlog of both cameras: the recorder needs as much again.
 fn memory(case: &Case<'_>) -> Finding {
     let need_b = (4 * Evk1Config::default().backlog_bytes) as f64;
     let check = check(AREA, "memory", format!("{} available", size(need_b)));
     match case.machine.table("/proc/meminfo") {
         Err(why) => check.not_checked(why),
         Ok(table) => match kib(&table, "MemAvailable") {
-            None => check.not_checked("/proc/meminfo does not tell MemAvailable"),
+            None => check.not_checked("/proc/meminfo has no line MemAvailable"),
             Some(bytes) if bytes >= need_b => check.ok(size(bytes)),
             Some(bytes) => check.warning(
                 size(bytes),
@@ -143,12 +143,12 @@ fn kib(table: &BTreeMap<String, String>, key: &str) -> Option<f64> {
     number.parse::<f64>().ok().map(|kib| kib * 1024.0)
 }
 
-/// Swapping shows as time that something waited for memory (`/proc/pressure`).
+/// Swapping shows as time spent waiting for memory (`/proc/pressure`).
 fn pressure(case: &Case<'_>) -> Finding {
     let check: Check = check(
         AREA,
         "memory pressure",
-        format!("at most {MOST_PRESSURE_PERCENT} % of the last minute spent waiting for memory"),
+        format!("at most {MAX_PRESSURE_PERCENT} % of the last minute spent waiting for memory"),
     );
     let text = match case.machine.text("/proc/pressure/memory") {
         Ok(text) => text,
@@ -157,11 +157,11 @@ fn pressure(case: &Case<'_>) -> Finding {
     let some = text.lines().find(|l| l.starts_with("some "));
     let word = some.and_then(|l| l.split(' ').find_map(|w| w.strip_prefix("avg60=")));
     match word.and_then(|w| w.parse::<f64>().ok()) {
-        None => check.not_checked("/proc/pressure/memory does not tell it"),
-        Some(percent) if percent <= MOST_PRESSURE_PERCENT => check.ok(format!("{percent} %")),
+        None => check.not_checked("/proc/pressure/memory has no avg60"),
+        Some(percent) if percent <= MAX_PRESSURE_PERCENT => check.ok(format!("{percent} %")),
         Some(percent) => check.warning(
             format!("{percent} %"),
-            "find out who takes the memory (`ps --sort=-rss -eo pid,rss,comm | head`), and end it; a pause of the disk becomes lost data",
+            "end the program that uses most memory (`ps --sort=-rss -eo pid,rss,comm | head`); pauses for swapping lose data",
         ),
     }
 }

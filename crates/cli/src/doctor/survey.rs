@@ -1,22 +1,22 @@
-//! What the drivers say when they are asked: devices, and the robot's library.
+//! Queries the drivers: devices, and the robot's library.
 
 use skinrig_omega3::load::{self, LoadError};
 use skinrig_protocol::rig::RigFile;
 
 use crate::devices::{self, Line};
 
-/// What was found by asking.
+/// Result of the query.
 pub(super) struct Survey {
-    /// As `skinrig devices` lists it.
+    /// Devices, as `skinrig devices` lists them.
     pub lines: Vec<Line>,
     /// The robot's library.
     pub library: Library,
-    /// Somebody else holds the bench: no device was asked.
+    /// True if the bench is in use: no device was queried.
     pub left_alone: bool,
 }
 
-/// Why a device of a held bench was not asked.
-pub(super) const LEFT_ALONE: &str = "somebody holds the bench: its devices were left alone";
+/// Why the devices of a bench in use were not queried.
+pub(super) const LEFT_ALONE: &str = "the bench is in use, so its devices were not queried";
 
 /// The robot's library.
 pub(super) enum Library {
@@ -27,14 +27,14 @@ pub(super) enum Library {
         /// What the operator should know about that version.
         advice: Option<String>,
     },
-    /// There is none in this many places.
+    /// Not found in this many places.
     Absent(usize),
-    /// There is one, and it cannot be used.
+    /// Found but unusable, for this reason.
     Unusable(String),
 }
 
 impl Survey {
-    /// Asks everything that is there.
+    /// Queries all devices and the library.
     pub(super) fn make(rig: Option<&RigFile>) -> Self {
         Self {
             lines: devices::survey(rig),
@@ -43,7 +43,7 @@ impl Survey {
         }
     }
 
-    /// Looks for the library alone.
+    /// Queries the library only.
     pub(crate) fn of_a_held_bench(rig: Option<&RigFile>) -> Self {
         let library = match load::load(rig.and_then(|r| r.robot.library.as_deref())) {
             Ok(loaded) => Library::Loaded {
@@ -60,12 +60,12 @@ impl Survey {
         }
     }
 
-    /// What plays this role of the rig file.
+    /// The device with this role in the rig file.
     pub(super) fn role(&self, role: &str) -> Option<&Line> {
         self.lines.iter().find(|l| l.role.as_deref() == Some(role))
     }
 
-    /// Cameras that are on the bus, whatever keeps them from being used.
+    /// Cameras on the bus, usable or not.
     pub(super) fn cameras(&self) -> impl Iterator<Item = &Line> {
         let seen = |l: &&Line| l.device == "camera" && l.usb.is_some();
         self.lines
@@ -75,7 +75,7 @@ impl Survey {
     }
 }
 
-/// What a line is called in findings: its role, else what and where it is.
+/// Name of a device in findings: its role, else its kind and serial number or place.
 pub(super) fn name_of(line: &Line) -> String {
     match (&line.role, &line.serial) {
         (Some(role), _) => role.clone(),

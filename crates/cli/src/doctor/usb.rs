@@ -1,4 +1,4 @@
-//! The USB tree as the kernel tells it under `/sys/bus/usb/devices`.
+//! The USB tree that the kernel shows under `/sys/bus/usb/devices`.
 
 use super::machine::{Machine, MachineError};
 
@@ -10,25 +10,25 @@ const DEVICES: &str = "/sys/bus/usb/devices";
 pub(super) struct UsbDevice {
     /// USB vendor.
     pub vendor: u16,
-    /// Bus and address on it, as libusb tells them.
+    /// Bus and address, as in libusb.
     pub place: (u8, u8),
     /// Mbit/s.
     pub speed_mbit: Option<u64>,
     /// The hub between it and the computer, as the kernel names it.
     pub hub: Option<String>,
-    /// The controller of its bus. A controller's USB 2 and USB 3 halves are two buses and have the same.
+    /// The controller of its bus. The USB 2 and USB 3 halves of a controller are two buses with the same name here.
     pub controller: Option<String>,
 }
 
 impl UsbDevice {
-    /// The file by which it is opened.
+    /// Path of the device file.
     pub(super) fn node(&self) -> String {
         let (bus, address) = self.place;
         format!("/dev/bus/usb/{bus:03}/{address:03}")
     }
 }
 
-/// Every device but hubs of the controllers themselves.
+/// Lists all devices except root hubs.
 ///
 /// # Errors
 /// When the kernel's list cannot be read.
@@ -48,7 +48,7 @@ fn device(machine: &Machine, name: &str) -> Option<UsbDevice> {
         place,
         speed_mbit: of("speed").and_then(|speed| speed.parse().ok()),
         hub: name.rsplit_once('.').map(|(hub, _)| hub.to_owned()),
-        // A bus has the name of its controller for a serial number.
+        // The serial number of a bus is the name of its controller.
         controller: machine.text(&format!("{DEVICES}/usb{bus}/serial")).ok(),
     })
 }

@@ -1,4 +1,4 @@
-//! Versions of library and firmwares against the rig file, and against what this build was written for.
+//! Compares versions of library and firmwares with the rig file and with those that this build supports.
 
 use skinrig_controller::contains_version;
 use skinrig_protocol::rig::RigFile;
@@ -10,7 +10,7 @@ use super::survey::Library;
 use crate::devices::Line;
 
 const AREA: &str = "versions";
-/// The robot's firmware that first had a watchdog (Force Dimension's documentation of `dhdSetWatchdog`).
+/// First firmware of the robot with a watchdog (Force Dimension's documentation of `dhdSetWatchdog`).
 const WATCHDOG_SINCE: f64 = 3.0;
 const ACCEPT: &str =
     "install the expected version, or accept this one in the rig file after testing it";
@@ -62,20 +62,20 @@ fn library(case: &Case<'_>) -> Finding {
 fn robot(case: &Case<'_>) -> Finding {
     let key = |rig: &RigFile| rig.robot.firmware.clone();
     let mut finding = firmware(case, "robot", "robot.firmware", key);
-    let told = line_of(case, "robot").and_then(|l| l.firmware.as_deref());
-    let old = told
+    let reported = line_of(case, "robot").and_then(|l| l.firmware.as_deref());
+    let old = reported
         .and_then(|v| v.parse().ok())
         .is_some_and(|v: f64| v < WATCHDOG_SINCE);
     if old && finding.verdict == super::finding::Verdict::Ok {
         finding = check(AREA, "robot", format!("{WATCHDOG_SINCE:.1} or later, which has a watchdog")).warning(
             finding.found,
-            "ask Force Dimension for an update: without the watchdog nothing in the device brakes the arm when this computer dies",
+            "ask Force Dimension for an update: without the watchdog the device does not brake the arm when this computer crashes",
         );
     }
     finding
 }
 
-/// The device of a role; without a rig file the only one of its kind.
+/// The device with a role; without a rig file, the first robot whose firmware is known.
 fn line_of<'a>(case: &Case<'a>, role: &str) -> Option<&'a Line> {
     case.survey.role(role).or_else(|| {
         let kind = if role == "robot" { "robot" } else { "" };
@@ -88,7 +88,7 @@ fn line_of<'a>(case: &Case<'a>, role: &str) -> Option<&'a Line> {
     })
 }
 
-/// What a device says of its firmware against what the rig file expects under `key`.
+/// Compares the firmware of a device with the version that the rig file expects under `key`.
 fn firmware(
     case: &Case<'_>,
     role: &str,
@@ -103,22 +103,22 @@ fn firmware(
     };
     let check = check(AREA, role, expected);
     match line_of(case, role).and_then(|l| l.firmware.as_deref()) {
-        None => check.not_checked("it was not asked"),
+        None => check.not_checked("not queried"),
         Some(found) if wanted.is_none_or(|w| contains_version(found, &w)) => check.ok(found),
         Some(found) => check.problem(found, ACCEPT),
     }
 }
 
 fn trigger_box(case: &Case<'_>) -> Finding {
-    let written_for = format!("firmware {FIRMWARE_VERSION} with protocol {PROTOCOL_VERSION}");
+    let supported = format!("firmware {FIRMWARE_VERSION} with protocol {PROTOCOL_VERSION}");
     let wanted = |rig: &RigFile| rig.trigger_box.as_ref()?.firmware.clone();
     let flash = |line: &Line| line.next_step.clone().unwrap_or_default();
     match case.survey.role("trigger_box") {
         Some(line) if line.state == "other firmware" => {
-            box_check(&written_for).problem(line.detail.as_str(), flash(line))
+            box_check(&supported).problem(line.detail.as_str(), flash(line))
         }
         Some(line) if line.firmware.is_some() && case.rig.and_then(wanted).is_none() => {
-            box_check(&written_for).ok(line.detail.as_str())
+            box_check(&supported).ok(line.detail.as_str())
         }
         _ => firmware(case, "trigger_box", "trigger_box.firmware", wanted),
     }

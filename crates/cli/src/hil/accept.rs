@@ -1,4 +1,4 @@
-//! `skinrig hil accept`: a change that somebody knows of is taken as it is, with a reason.
+//! `skinrig hil accept`: records that an operator accepts a change, with a reason.
 
 use chrono::{SecondsFormat, Utc};
 use skinrig_hil::history::{self, Filter};
@@ -14,28 +14,28 @@ use crate::host::user_name;
 /// [`Failure::input`] for a series or a night that the history does not have, or without a reason.
 pub(crate) fn accept(args: &HilAcceptArgs, json: bool) -> Outcome {
     if args.reason.trim().is_empty() {
-        return Err(Failure::input("--reason: expected why, found nothing"));
+        return Err(Failure::input("--reason: expected a reason, found nothing"));
     }
     let filter = Filter {
         rig: args.rig.clone(),
         suite: args.suite.clone(),
     };
     let history = history::load(&args.history, &filter).map_err(Failure::input)?;
-    let said = Acceptance {
+    let acceptance = Acceptance {
         series: args.series.clone(),
         night: args.night.clone(),
         reason: args.reason.trim().to_owned(),
         by: args.by.clone().unwrap_or_else(user_name),
         at: Utc::now().to_rfc3339_opts(SecondsFormat::Secs, true),
     };
-    history::accept(&args.history, &history, &said).map_err(Failure::input)?;
+    history::accept(&args.history, &history, &acceptance).map_err(Failure::input)?;
     if json {
-        crate::terminal::print_json(&serde_json::to_value(&said).map_err(Failure::internal)?);
+        crate::terminal::print_json(&serde_json::to_value(&acceptance).map_err(Failure::internal)?);
     } else {
         outln!(
-            "{}: learnt anew from night {} on",
-            said.series.as_deref().unwrap_or("all series"),
-            said.night
+            "{}: the reference restarts at night {}",
+            acceptance.series.as_deref().unwrap_or("all series"),
+            acceptance.night
         );
     }
     Ok(Exit::Ok)

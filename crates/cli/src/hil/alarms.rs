@@ -1,17 +1,15 @@
-//! What is kept of an alarm: the golden session of the night that raised it, beside the history, where it stays when old nights are
-//! cleared away.
+//! Preserves the golden session of a night that raised an alarm, beside the history, so that old nights can be deleted.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use skinrig_hil::history;
+use skinrig_hil::night_folder;
 use skinrig_nightly::trend::{Alarm, Report};
 use skinrig_recorder::{RecorderError, SessionReader};
 use skinrig_report::trend::Links;
 
-use super::folder;
-
-/// Why there is no session of an alarm.
+/// Why the session of an alarm is missing.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum NoEvidence {
     /// The night has no golden session.
@@ -36,23 +34,24 @@ pub(crate) enum NoEvidence {
     },
 }
 
-/// The files of an alarm.
+/// Files that belong to an alarm.
 #[derive(Debug)]
 pub(crate) struct AlarmEvidence {
-    /// The folder of the history.
+    /// Folder of the history.
     home: PathBuf,
-    /// The page of the night that raised it.
+    /// Page of the night that raised it.
     page: Option<PathBuf>,
-    /// The session that shows it, or why there is none.
+    /// Golden session of that night.
     pub session: Result<PathBuf, NoEvidence>,
 }
 
-/// Keeps the session of every alarm in `alarms/NIGHT/` beside the history, once; one entry per alarm.
+/// Copies the session of every alarm to `alarms/NIGHT/` beside the history, unless it is there
+/// already. Returns one entry per alarm.
 pub(super) fn keep(history: &Path, report: &Report) -> Vec<AlarmEvidence> {
-    let one = |alarm: &Alarm| {
+    let preserve = |alarm: &Alarm| {
         let night = &report.nights[alarm.raised];
         let home = history::folder_of(history, &night.folder);
-        let page = home.join(folder::PAGE);
+        let page = home.join(night_folder::PAGE);
         let kept = history::folder_of(history, "alarms").join(plain(&alarm.id));
         let session = match &night.golden {
             Some(golden) => copy(&home.join(golden), &kept),
@@ -64,10 +63,10 @@ pub(super) fn keep(history: &Path, report: &Report) -> Vec<AlarmEvidence> {
             session,
         }
     };
-    report.alarms.iter().map(one).collect()
+    report.alarms.iter().map(preserve).collect()
 }
 
-/// Puts a sealed session into `folder`, unless it is there: as a second name of the file where that can be, else as a copy.
+/// Links or copies a sealed session into `folder`, unless it is there already.
 fn copy(session: &Path, folder: &Path) -> Result<PathBuf, NoEvidence> {
     let name = session.file_name().unwrap_or_default();
     let to = folder.join(name);
@@ -92,7 +91,7 @@ fn copy(session: &Path, folder: &Path) -> Result<PathBuf, NoEvidence> {
     }
 }
 
-/// An id as a part of a file name.
+/// Converts `id` to a safe file name.
 fn plain(id: &str) -> String {
     let safe = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
     let name: String = id.chars().map(|c| if safe(c) { c } else { '-' }).collect();
@@ -100,7 +99,7 @@ fn plain(id: &str) -> String {
 }
 
 impl AlarmEvidence {
-    /// As links of a page in `folder`; `None`: of no page.
+    /// Links for a page in `folder`; without a folder, no links to files.
     pub(super) fn links(&self, folder: Option<&Path>) -> Links {
         let session = self.session.as_ref().ok();
         let commands = session.map_or_else(Vec::new, |path| {
@@ -120,7 +119,7 @@ impl AlarmEvidence {
     }
 }
 
-/// A path as a shell takes it.
+/// Quotes a path for a shell.
 fn quoted(path: &Path) -> String {
     let text = path.display().to_string();
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:+".contains(c);
@@ -131,7 +130,8 @@ fn quoted(path: &Path) -> String {
     }
 }
 
-/// The link to `path` from a page in `folder`: relative when it lies below, or both lie in `home`, so that all can be moved together.
+/// Link to `path` from a page in `folder`: relative if `path` is below `folder` or both are in `home`, so that they can be moved
+/// together.
 fn href(home: &Path, folder: &Path, path: &Path) -> String {
     let full = |p: &Path| {
         let p = if p.as_os_str().is_empty() {

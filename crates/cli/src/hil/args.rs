@@ -15,7 +15,7 @@ pub(crate) struct HilArgs {
 /// The commands of `hil`.
 #[derive(Debug, Subcommand)]
 pub(crate) enum HilCommand {
-    /// Run a suite's checks on a bench against limits stated in advance, and tell rig, skin and software causes apart.
+    /// Run a suite's checks on a bench against limits stated in advance, and attribute failures to rig, skin, computer or software.
     #[command(
         after_help = "Examples:\n  skinrig hil run hil/nightly.yaml --rig hil/rigs/NAME.yaml\n  \
         skinrig hil run hil/nightly.yaml --rig hil/rigs/NAME.yaml --only identity,trigger_loopback\n\n\
@@ -25,7 +25,7 @@ pub(crate) enum HilCommand {
         2  bad input: command line, suite, rig file, golden protocol; a plan that does not fit the suite's budget\n  \
         3  infrastructure: computer, disk, cable, permission; another program or another suite holds the bench\n  \
         4  INVALID: a device of the rig was at fault, so the night says nothing about the skin\n\n\
-        ctrl-C ends the suite with the check under way; what was not measured is INCONCLUSIVE. docs/reference/nightly.md has the rules."
+        ctrl-C ends the suite after the current check; checks without a measurement are INCONCLUSIVE. docs/reference/nightly.md has the rules."
     )]
     Run(HilRunArgs),
 
@@ -43,7 +43,7 @@ pub(crate) enum HilCommand {
         0  nothing moved, or there are too few nights to say\n  \
         1  an alarm: something moved and is still off\n  \
         2  bad input: no history, another program's file, a bench or series that it does not have\n\n\
-        docs/reference/nightly.md says how an alarm is raised, and how seldom a false one."
+        docs/reference/nightly.md explains the rules for alarms and their false alarm rate."
     )]
     Trend(HilTrendArgs),
 
@@ -125,7 +125,8 @@ pub(crate) struct HilTrendArgs {
     #[arg(long, value_name = "NAME")]
     pub suite: Option<String>,
 
-    /// First add this folder's nights that are missing from the history, from their results; this rebuilds a lost history.
+    /// Before judging, add the nights of this folder that are missing from the history; this
+    /// rebuilds a lost history from the results of its nights.
     #[arg(long, value_name = "DIR")]
     pub rebuild: Option<PathBuf>,
 
@@ -137,7 +138,7 @@ pub(crate) struct HilTrendArgs {
 /// Arguments of `hil accept`.
 #[derive(Debug, Args)]
 pub(crate) struct HilAcceptArgs {
-    /// The series, as `hil trend` calls it.
+    /// Name of the series, as `hil trend` shows it.
     #[arg(required_unless_present = "all", conflicts_with = "all")]
     pub series: Option<String>,
 

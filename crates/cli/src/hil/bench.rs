@@ -1,4 +1,4 @@
-//! The bench of a rig file for a suite of checks: production drivers, each opened by itself.
+//! Implements `Bench` for a rig file: production drivers, each device opened separately.
 
 use std::io;
 use std::path::Path;
@@ -15,14 +15,14 @@ use skinrig_protocol::CameraRequest;
 use skinrig_protocol::rig::{Drill, RigFile, RigKind};
 use skinrig_protocol::suite::Light;
 
-use super::real_bench::{RealBench, closed, patience, software, subject};
+use super::real_bench::{RealBench, closed, software, subject, timing_slack_of};
 use super::{drill, golden, trouble};
 use crate::rig::bench;
 
-/// How long a program that switches the lamps may take.
-const LAMPS_WITHIN: Duration = Duration::from_secs(10);
-/// Between two looks at it.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
+/// Time limit for a program that switches the lamps.
+const LAMPS_TIMEOUT: Duration = Duration::from_secs(10);
+/// Polling interval for that program.
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 impl Bench for RealBench {
     fn rig(&self) -> &RigFile {
@@ -83,7 +83,7 @@ impl Bench for RealBench {
     }
 
     fn close(&mut self) {
-        // Every driver brings its device to rest when it is dropped.
+        // Every driver stops its device when it is dropped.
         self.devices = None;
     }
 
@@ -108,8 +108,8 @@ impl Bench for RealBench {
             Light::Lit => &lamps.lit,
         };
         switch(words).map(|()| true).map_err(|why| {
-            let what = format!("the lamps' program `{}`: {why}", words.join(" "));
-            let next = "call it by hand, and correct `hil.light` in the rig file";
+            let what = format!("lamp program `{}`: {why}", words.join(" "));
+            let next = "run it by hand, then correct `hil.light` in the rig file";
             Box::new(Evidence::new(EvidenceKind::State, "computer", what).next(next))
         })
     }
@@ -155,11 +155,11 @@ impl Bench for RealBench {
     }
 
     fn timing_slack(&self) -> HostDuration {
-        patience(self.rig.kind)
+        timing_slack_of(self.rig.kind)
     }
 }
 
-/// Why the lamps' program did not switch them.
+/// Why the lamp program failed.
 #[derive(Debug, thiserror::Error)]
 enum LampsError {
     /// The rig file names no program.
@@ -175,7 +175,7 @@ enum LampsError {
     #[error("expected success, found {0}")]
     Failed(ExitStatus),
     /// It takes too long.
-    #[error("expected an end within {LAMPS_WITHIN:?}")]
+    #[error("expected an end within {LAMPS_TIMEOUT:?}")]
     Late,
 }
 
@@ -188,12 +188,12 @@ fn switch(words: &[String]) -> Result<(), LampsError> {
         .stdout(Stdio::null())
         .spawn()
         .map_err(LampsError::Start)?;
-    let until = Instant::now() + LAMPS_WITHIN;
+    let until = Instant::now() + LAMPS_TIMEOUT;
     loop {
         match child.try_wait() {
             Ok(Some(status)) if status.success() => return Ok(()),
             Ok(Some(status)) => return Err(LampsError::Failed(status)),
-            Ok(None) if Instant::now() < until => std::thread::sleep(LOOK_EVERY),
+            Ok(None) if Instant::now() < until => std::thread::sleep(POLL_INTERVAL),
             Ok(None) => {
                 let _ = child.kill();
                 let _ = child.wait();

@@ -1,4 +1,4 @@
-//! The drill of the watchdog on a real driver: a second process holds the arm in free air and is killed.
+//! The watchdog drill on a real driver: a second process holds the arm in free air and is killed.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
@@ -18,35 +18,36 @@ use crate::rig::bench;
 
 /// The hidden command that holds the arm.
 const HOLD: &str = "hold-arm";
-/// It holds within this time: opened, armed, risen and travelled.
-const HOLDS_WITHIN: Duration = Duration::from_secs(60);
-/// The robot can be opened again within this time.
-const OPENS_WITHIN: Duration = Duration::from_secs(20);
-/// The killed process is left alone for so long: its watchdog (at most 32 ms) and its supervisor have braked the arm by then, and who
-/// opens the robot earlier brakes it himself.
-const LEFT_ALONE: Duration = Duration::from_millis(300);
-/// Between two looks.
-const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// A braked robot tells where it is within this time.
-const SEEN_WITHIN: Duration = Duration::from_secs(2);
+/// Time limit until the process holds the arm: open, arm, rise and travel.
+const HOLD_TIMEOUT: Duration = Duration::from_secs(60);
+/// Time limit until the robot can be opened again.
+const REOPEN_TIMEOUT: Duration = Duration::from_secs(20);
+/// Wait after the kill. The watchdog (at most 32 ms) and the supervisor of the killed process brake
+/// the arm in this time. Opening the robot earlier would brake it too, and spoil the drill.
+const BRAKING_TIME: Duration = Duration::from_millis(300);
+/// Polling interval of waits.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
+/// Time limit for the first position sample of a braked robot.
+const POSITION_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Lets another process hold the arm, kills it, and opens the robot again to see what became of it. Every device is closed.
+/// Starts another process that holds the arm, kills it, and reopens the robot to measure the
+/// result. All devices must be closed.
 ///
 /// # Errors
-/// [`Problem`] when it could not be done.
+/// [`Problem`] when the drill could not be carried out.
 pub(super) fn watchdog(bench: &mut RealBench) -> Result<DrillResult, Problem> {
     let mut holder = Holder::start(&bench.rig().file_name)?;
-    let held = holder.holds(bench)?;
+    let held = holder.wait_until_held(bench)?;
     let killed = Instant::now();
     holder.kill()?;
-    std::thread::sleep(LEFT_ALONE);
-    // Whoever of watchdog and supervisor brakes it, from here on nobody else does.
+    std::thread::sleep(BRAKING_TIME);
+    // So far, only the watchdog or the supervisor can have braked the arm.
     let (mut omega, after) = reopen(bench, killed)?;
     let live = omega.remarks().contains(&Remark::MotorsWereLive);
     let why = omega.remarks().iter();
     let why = why.filter(|r| matches!(r, Remark::MotorsWentOff(_)));
     let note = why.map(ToString::to_string).next();
-    let at = place(&mut omega)?;
+    let at = position(&mut omega)?;
     Ok(DrillResult {
         braked_within_s: (!live).then_some(after.as_secs_f64()),
         drop_mm: at.distance_mm(held),
@@ -54,7 +55,8 @@ pub(super) fn watchdog(bench: &mut RealBench) -> Result<DrillResult, Problem> {
     })
 }
 
-/// The process that holds the arm. Its standard input is its parent's life: when that ends it lets go of the arm and ends.
+/// The process that holds the arm. When its standard input closes, or its parent dies, it releases
+/// the arm and ends.
 struct Holder {
     child: Child,
     lines: Receiver<String>,
@@ -68,35 +70,35 @@ impl Holder {
             .args([HOLD, "--rig", rig])
             .stdin(Stdio::piped())
             .stdout(Stdio::piped());
-        // A ctrl-C in the terminal is for its parent.
+        // A ctrl-C in the terminal must reach only its parent.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command.spawn().map_err(|e| software(&e))?;
-        let (tell, lines) = channel();
-        let said = child.stdout.take();
+        let (sender, lines) = channel();
+        let stdout = child.stdout.take();
         let reader = std::thread::Builder::new()
             .name("drill".to_owned())
             .spawn(move || {
-                let lines = said.into_iter().flat_map(|s| BufReader::new(s).lines());
+                let lines = stdout.into_iter().flat_map(|s| BufReader::new(s).lines());
                 for line in lines.map_while(Result::ok) {
-                    if tell.send(line).is_err() {
-                        return; // nobody listens any more
+                    if sender.send(line).is_err() {
+                        return; // the receiver was dropped
                     }
                 }
             });
         let holder = Self { child, lines };
-        // Dropped, the holder is killed.
+        // If the thread fails to start, dropping the holder kills the process.
         reader.map(|_| holder).map_err(|e| software(&e))
     }
 
-    /// Waits until it says where it holds the arm.
-    fn holds(&mut self, bench: &RealBench) -> Result<Point3<Robot>, Problem> {
-        let until = Instant::now() + HOLDS_WITHIN;
+    /// Waits until the process reports the position at which it holds the arm.
+    fn wait_until_held(&mut self, bench: &RealBench) -> Result<Point3<Robot>, Problem> {
+        let until = Instant::now() + HOLD_TIMEOUT;
         loop {
-            match self.lines.recv_timeout(LOOK_EVERY) {
+            match self.lines.recv_timeout(POLL_INTERVAL) {
                 Ok(line) => {
-                    if let Some(place) = line.strip_prefix(HOLDING).and_then(point) {
-                        return Ok(place);
+                    if let Some(position) = line.strip_prefix(HOLDING).and_then(point) {
+                        return Ok(position);
                     }
                 }
                 Err(RecvTimeoutError::Timeout) => {}
@@ -105,7 +107,7 @@ impl Holder {
                     return Err(robot(
                         EvidenceKind::State,
                         format!(
-                            "expected the arm to be held in free air, found that its holder ended with {status}"
+                            "expected the arm to be held in free air, but the process that holds it ended with {status}"
                         ),
                     ));
                 }
@@ -113,19 +115,19 @@ impl Holder {
             if bench.stop_requested() {
                 return Err(robot(
                     EvidenceKind::Stopped,
-                    "broken off: everything is to end".to_owned(),
+                    "stopped: the suite must end".to_owned(),
                 ));
             }
             if Instant::now() >= until {
                 return Err(robot(
                     EvidenceKind::TimeOut,
-                    format!("expected the arm to be held in free air within {HOLDS_WITHIN:?}"),
+                    format!("expected the arm to be held in free air within {HOLD_TIMEOUT:?}"),
                 ));
             }
         }
     }
 
-    /// As the system does it: no way to let go of anything.
+    /// Kills the process, so that it cannot release the arm.
     fn kill(mut self) -> Result<(), Problem> {
         self.child.kill().map_err(|e| software(&e))?;
         self.child.wait().map(drop).map_err(|e| software(&e))
@@ -134,54 +136,54 @@ impl Holder {
 
 impl Drop for Holder {
     fn drop(&mut self) {
-        // Either fails only when it is gone already; the supervisor brakes the arm of one that did not let go.
+        // These calls fail only if the process has already ended. If it does not release the arm in time, its supervisor brakes it.
         drop(self.child.stdin.take());
-        let until = Instant::now() + LETS_GO_WITHIN;
+        let until = Instant::now() + RELEASE_TIMEOUT;
         while matches!(self.child.try_wait(), Ok(None)) && Instant::now() < until {
-            std::thread::sleep(LOOK_EVERY);
+            std::thread::sleep(POLL_INTERVAL);
         }
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// One that was told to let go retracts and brakes within this time.
-const LETS_GO_WITHIN: Duration = Duration::from_secs(5);
+/// Time limit for a process that must release the arm: it retracts and brakes.
+const RELEASE_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Opens the robot as soon as it lets itself be opened; gives how long after `killed` that was.
+/// Reopens the robot as soon as possible. Returns the time since `killed`.
 fn reopen(bench: &RealBench, killed: Instant) -> Result<(Omega, Duration), Problem> {
     let rig = bench.rig();
     loop {
         let config = bench::omega_config(rig).map_err(|f| software(&f.message))?;
         match bench::omega(config, RealClock::start()) {
             Ok(omega) => return Ok((omega, killed.elapsed())),
-            Err(e) if killed.elapsed() >= OPENS_WITHIN => return Err(trouble::robot(&e, rig)),
-            // The dead process may still hold it, or the supervisor that brakes it.
-            Err(_) => std::thread::sleep(LOOK_EVERY),
+            Err(e) if killed.elapsed() >= REOPEN_TIMEOUT => return Err(trouble::robot(&e, rig)),
+            // The dead process or its supervisor may still have it open.
+            Err(_) => std::thread::sleep(POLL_INTERVAL),
         }
     }
 }
 
-/// Where the braked tip is.
-fn place(omega: &mut Omega) -> Result<Point3<Robot>, Problem> {
-    let until = Instant::now() + SEEN_WITHIN;
-    let mut seen = Vec::new();
+/// Position of the braked tip.
+fn position(omega: &mut Omega) -> Result<Point3<Robot>, Problem> {
+    let until = Instant::now() + POSITION_TIMEOUT;
+    let mut samples = Vec::new();
     while Instant::now() < until {
         omega
-            .poll(&mut seen)
+            .poll(&mut samples)
             .map_err(|e| skinrig_hil::device_evidence::from_error(&e))?;
-        if let Some(sample) = seen.first() {
+        if let Some(sample) = samples.first() {
             return Ok(sample.measured);
         }
         std::thread::sleep(Duration::from_millis(5));
     }
     Err(robot(
         EvidenceKind::DeviceLost,
-        format!("expected the robot to tell where it is within {SEEN_WITHIN:?}, found nothing"),
+        format!("expected a position from the robot within {POSITION_TIMEOUT:?}, found none"),
     ))
 }
 
-/// `x y z`, mm.
+/// Parses `x y z`, mm.
 fn point(words: &str) -> Option<Point3<Robot>> {
     let mut numbers = words.split_whitespace().map(str::parse::<f64>);
     let mut next = || numbers.next()?.ok().filter(|n| n.is_finite());
@@ -191,7 +193,7 @@ fn point(words: &str) -> Option<Point3<Robot>> {
 fn robot(kind: EvidenceKind, what: String) -> Problem {
     Box::new(
         Evidence::new(kind, "robot", what)
-            .next("see what the holder said above; then `skinrig doctor`"),
+            .next("read the messages of `hold-arm` above, then run `skinrig doctor`"),
     )
 }
 

@@ -1,16 +1,15 @@
-//! The golden campaign: a protocol through controller, recorder and analysis, in the night's folder.
+//! Runs the golden campaign: a protocol through controller, recorder and analysis, in the night's folder.
 
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
 use skinrig_hil::findings::Findings;
-use skinrig_hil::run_evidence;
 use skinrig_hil::{Bench, GoldenRun, Problem};
+use skinrig_hil::{golden_values, run_evidence};
 use skinrig_model::RunEnd;
 use skinrig_nightly::{Evidence, EvidenceKind, Golden};
 use skinrig_protocol::{Plan, Protocol};
 
-use super::golden_numbers::numbers;
 use super::real_bench::RealBench;
 use crate::exit::Failure;
 use crate::results::{self, Choices};
@@ -20,7 +19,7 @@ use crate::{check, run};
 /// Closes every device and runs the golden campaign.
 ///
 /// # Errors
-/// [`Problem`] when there is no session to speak of.
+/// [`Problem`] if nothing was recorded.
 pub(super) fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Problem> {
     let (protocol, plan) = protocol(bench, file)?;
     let folder = bench.folder().to_owned();
@@ -36,7 +35,7 @@ pub(super) fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Pr
         Some(preflight),
         bench.operator(),
     )
-    .map_err(|f| trouble(EvidenceKind::Disk, "computer", &f))?;
+    .map_err(|f| problem(EvidenceKind::Disk, "computer", &f))?;
     let mut findings = Findings::default();
     if let RunEnd::Stopped(why) = &report.end {
         findings.add_evidence(EvidenceKind::TimeOut, "robot", why.text());
@@ -52,28 +51,27 @@ pub(super) fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Pr
         analysis_version: skinrig_analysis::result::ANALYSIS_VERSION,
         findings,
     };
-    match analysed(&session) {
+    match analyze(&session) {
         Ok((results, html)) => {
             golden.files.report = Some(html);
             let json = serde_json::to_vec(&results.analysis).unwrap_or_default();
             golden.files.results_sha256 = Some(hex(&Sha256::digest(json)));
             let lost = results.provenance.lost_bytes;
-            numbers(&results.analysis, lost, &mut golden.findings);
+            golden_values::add(&results.analysis, lost, &mut golden.findings);
         }
-        // Nothing is measured then.
         Err(failure) => {
             golden
                 .findings
                 .evidence
-                .push(*trouble(EvidenceKind::Audit, "skin", &failure))
+                .push(*problem(EvidenceKind::Audit, "skin", &failure))
         }
     }
     Ok(golden)
 }
 
-/// The protocol within what the bench bears, and its plan.
+/// The protocol, tightened to the limits of the bench, and its plan.
 fn protocol(bench: &RealBench, file: &Path) -> Result<(Protocol, Plan), Problem> {
-    let refused = |f: Failure| trouble(EvidenceKind::Refused, "skin", &f);
+    let refused = |f: Failure| problem(EvidenceKind::Refused, "skin", &f);
     let mut protocol = check::load(file, &[]).map_err(refused)?.protocol;
     bench::tighten(&mut protocol, bench.rig());
     let mut plan = protocol.compile();
@@ -84,7 +82,7 @@ fn protocol(bench: &RealBench, file: &Path) -> Result<(Protocol, Plan), Problem>
     Ok((protocol, plan))
 }
 
-fn analysed(session: &Path) -> Result<(results::Results, String), Failure> {
+fn analyze(session: &Path) -> Result<(results::Results, String), Failure> {
     let results = results::analyze_session(session, Choices::default())?;
     let (_, html) = results::write_results(&results, None, None)?;
     Ok((results, name(&html)))
@@ -99,6 +97,6 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
-fn trouble(kind: EvidenceKind, subject: &str, failure: &Failure) -> Problem {
+fn problem(kind: EvidenceKind, subject: &str, failure: &Failure) -> Problem {
     Box::new(Evidence::new(kind, subject, failure.message.as_str()))
 }

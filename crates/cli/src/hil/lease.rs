@@ -1,4 +1,5 @@
-//! The lease of a bench, taken by everything here that moves its robot; and `skinrig hil lease`, which shows it.
+//! Takes the lease of a bench for every command that moves its robot, and shows leases (`skinrig
+//! hil lease`).
 
 use std::path::PathBuf;
 
@@ -11,10 +12,11 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::host::host_name;
 use crate::rig::bench;
 
-/// Takes the bench of `rig`, to do `what` on it. Hold on to it until every device is closed.
+/// Takes the lease of `rig` for the command `what`. Keep it until every device is closed.
 ///
 /// # Errors
-/// [`Failure::rig`] (3) when somebody else holds it: who, since when, and what to do.
+/// [`Failure::rig`] (3) when another program holds it. The message names the holder and the next
+/// step.
 pub(crate) fn take(rig: &RigFile, what: &str) -> Result<Lease, Failure> {
     let owner = Owner::this_process(user(), host_name(), what.to_owned());
     let lease = Lease::take(&path(rig), owner, LeaseTiming::default()).map_err(Failure::rig)?;
@@ -24,8 +26,9 @@ pub(crate) fn take(rig: &RigFile, what: &str) -> Result<Lease, Failure> {
     Ok(lease)
 }
 
-/// The file of the lease. The robot names it: two rig files for one robot share it. Stand-ins all have one serial number; what
-/// tells them apart is the library that each is reached through, and their leases lie beside it and go with it.
+/// Path of the lease file. It is named after the robot, so that two rig files for one robot share
+/// it. Emulated robots all have the same serial number: their leases are named after their library
+/// and stored beside it.
 pub(crate) fn path(rig: &RigFile) -> PathBuf {
     let robot = &rig.robot;
     let name = format!("{}-{}", robot.model, robot.serial);
@@ -42,7 +45,7 @@ pub(crate) fn path(rig: &RigFile) -> PathBuf {
     lease::path_of(&folder, &format!("{name}-emulated-{short}"))
 }
 
-/// The login name, as far as the environment tells it.
+/// Login name from the environment; `unknown` if it has none.
 fn user() -> String {
     ["USER", "LOGNAME", "USERNAME"]
         .iter()
@@ -57,28 +60,28 @@ fn user() -> String {
 pub(crate) fn lease(args: &HilLeaseArgs, json: bool) -> Outcome {
     let paths = match &args.rig {
         Some(file) => vec![path(&bench::load(file)?)],
-        None => all()?,
+        None => lease_paths()?,
     };
     let mut shown = Vec::new();
     for path in &paths {
-        let standing = lease::inspect(path)
+        let state = lease::inspect(path)
             .map_err(|e| Failure::rig(format!("{}: cannot be read: {e}", path.display())))?;
         if json {
-            shown.push(described(path, &standing));
+            shown.push(to_json(path, &state));
         } else {
-            outln!("{}\n  {}", path.display(), words(&standing));
+            outln!("{}\n  {}", path.display(), describe(&state));
         }
     }
     if json {
         crate::terminal::print_json(&serde_json::json!({ "leases": shown }));
     } else if paths.is_empty() {
-        outln!("no lease was ever taken in {}", lease::folder().display());
+        outln!("no leases in {}", lease::folder().display());
     }
     Ok(Exit::Ok)
 }
 
-/// Every lease of this computer.
-fn all() -> Result<Vec<PathBuf>, Failure> {
+/// Paths of all leases on this computer.
+fn lease_paths() -> Result<Vec<PathBuf>, Failure> {
     let folder = lease::folder();
     let listed = std::fs::read_dir(&folder)
         .map_err(|e| Failure::rig(format!("{}: cannot be read: {e}", folder.display())))?;
@@ -93,36 +96,36 @@ fn all() -> Result<Vec<PathBuf>, Failure> {
     Ok(paths)
 }
 
-/// Who holds a lease; there is no name in the moment before the holder wrote it.
+/// Describes the holder of a lease. A new holder locks the file before it writes its name.
 pub(crate) fn holder_of(owner: Option<&Owner>) -> String {
     owner.map_or_else(
-        || "somebody who is just taking it".to_owned(),
+        || "a program that is just acquiring it".to_owned(),
         ToString::to_string,
     )
 }
 
-fn words(standing: &LeaseState) -> String {
-    match standing {
-        LeaseState::Free { last: None } => "free; nobody ever took it".to_owned(),
+fn describe(state: &LeaseState) -> String {
+    match state {
+        LeaseState::Free { last: None } => "free; never taken".to_owned(),
         LeaseState::Free { last: Some(last) } => format!("free; last: {last}"),
         LeaseState::Held { owner, beat_at } => {
             let who = holder_of(owner.as_deref());
             let beat = beat_at.as_ref();
-            let beat = beat.map_or(String::new(), |b| format!("; last sign of life {b}"));
+            let beat = beat.map_or(String::new(), |b| format!("; last heartbeat {b}"));
             format!("held by {who}{beat}")
         }
         LeaseState::Abandoned { owner, beat_at } => {
             let end = match owner.is_running(&host_name()) {
-                Some(false) => "which died without releasing it",
-                _ => "whose lock is not seen here; who takes it watches for a sign of life first",
+                Some(false) => "which ended without releasing it",
+                _ => "whose lock is invisible here; taking the lease first waits for a heartbeat",
             };
-            format!("left by {owner}, {end}; last sign of life {beat_at}")
+            format!("abandoned by {owner}, {end}; last heartbeat {beat_at}")
         }
     }
 }
 
-fn described(path: &std::path::Path, standing: &LeaseState) -> serde_json::Value {
-    let (state, owner, beat_at) = match standing {
+fn to_json(path: &std::path::Path, state: &LeaseState) -> serde_json::Value {
+    let (state, owner, beat_at) = match state {
         LeaseState::Free { last } => ("free", last.as_ref(), None),
         LeaseState::Held { owner, beat_at } => ("held", owner.as_ref(), beat_at.as_ref()),
         LeaseState::Abandoned { owner, beat_at } => ("left", Some(owner), Some(beat_at)),

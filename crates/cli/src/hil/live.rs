@@ -1,26 +1,24 @@
-//! What a terminal shows while a suite runs, and the night kept after every check.
+//! Shows a running suite in the terminal and writes the night after every check.
 
 use std::io::{self, IsTerminal};
-use std::path::PathBuf;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use skinrig_hil::NightObserver;
+use skinrig_hil::night_folder::NightFolder;
 use skinrig_nightly::Night;
 use skinrig_protocol::suite::{Check, Suite};
 use skinrig_report::night;
 use skinrig_text::Paint;
 
-use super::folder;
-
-/// Shows the night as it grows, and writes it down.
+/// Prints the progress of a night and saves its results.
 pub(super) struct Live {
-    folder: PathBuf,
+    folder: NightFolder,
     display: Display,
     paint: Paint,
     total: usize,
-    told: usize,
-    unwritten: Option<io::Error>,
+    shown: usize,
+    write_error: Option<io::Error>,
 }
 
 enum Display {
@@ -31,16 +29,16 @@ enum Display {
 }
 
 impl Live {
-    /// For a night of `suite` that is kept in `folder`.
+    /// Progress of a night of `suite` in `folder`.
     #[must_use]
-    pub(super) fn new(folder: PathBuf, suite: &Suite) -> Self {
+    pub(super) fn new(folder: NightFolder, suite: &Suite) -> Self {
         let terminal = io::stderr().is_terminal();
         let display = if terminal {
             let bar = ProgressBar::with_draw_target(
                 Some(suite.checks.len() as u64),
                 ProgressDrawTarget::stderr_with_hz(10),
             );
-            // The template is a constant; should it ever be wrong, the default style still counts checks.
+            // The template is a constant. If it were invalid, the default style would still count checks.
             if let Ok(style) =
                 ProgressStyle::with_template("{bar:20.cyan/blue} {pos}/{len} {elapsed}  {wide_msg}")
             {
@@ -56,20 +54,20 @@ impl Live {
             display,
             paint: paint(&io::stderr()),
             total: suite.checks.len(),
-            told: 0,
-            unwritten: None,
+            shown: 0,
+            write_error: None,
         }
     }
 
-    /// Takes the live line away, and tells the first fault in writing the night down.
+    /// Removes the live line and returns the first error from writing the night.
     pub(super) fn finish(self) -> Option<io::Error> {
         if let Display::Bar(bar) = &self.display {
             bar.finish_and_clear();
         }
-        self.unwritten
+        self.write_error
     }
 
-    fn say(&self, text: &str) {
+    fn print(&self, text: &str) {
         match &self.display {
             Display::Bar(bar) => bar.suspend(|| errln!("{text}")),
             Display::Lines => errln!("{text}"),
@@ -77,7 +75,7 @@ impl Live {
     }
 }
 
-/// The styles of `stream`.
+/// Styles for `stream`.
 pub(super) fn paint(stream: &impl IsTerminal) -> Paint {
     Paint::new(crate::terminal::is_coloured(stream))
 }
@@ -96,17 +94,17 @@ impl NightObserver for Live {
     }
 
     fn check_finished(&mut self, night: &Night) {
-        if let Err(e) = folder::write_json(&self.folder, night) {
-            self.unwritten.get_or_insert(e);
+        if let Err(e) = self.folder.write_json(night) {
+            self.write_error.get_or_insert(e);
         }
         let width = self.total.to_string().len();
-        for check in night.checks.iter().skip(self.told) {
-            self.told += 1;
+        for check in night.checks.iter().skip(self.shown) {
+            self.shown += 1;
             let line = night::line(check, self.paint);
-            self.say(&format!("{:>width$}/{}  {line}", self.told, self.total));
+            self.print(&format!("{:>width$}/{}  {line}", self.shown, self.total));
         }
         if let Display::Bar(bar) = &self.display {
-            bar.set_position(self.told as u64);
+            bar.set_position(self.shown as u64);
         }
     }
 }

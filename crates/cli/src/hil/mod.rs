@@ -1,13 +1,11 @@
-//! `skinrig hil`: a suite of checks on a bench.
+//! `skinrig hil`: runs suites of checks on a bench.
 
 pub(crate) mod accept;
 mod alarms;
 pub(crate) mod args;
 pub(crate) mod bench;
 mod drill;
-mod folder;
 mod golden;
-mod golden_numbers;
 pub(crate) mod hold;
 pub(crate) mod lease;
 mod live;
@@ -22,7 +20,7 @@ use args::{HilArgs, HilCommand};
 /// `skinrig hil`.
 ///
 /// # Errors
-/// [`crate::exit::Failure`] with the code that says what kind.
+/// See the commands.
 pub(crate) fn hil(args: &HilArgs, command_line: &str, json: bool) -> Outcome {
     match &args.command {
         HilCommand::Lease(a) => lease::lease(a, json),

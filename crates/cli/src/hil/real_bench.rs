@@ -1,4 +1,4 @@
-//! The bench of a rig file: its devices, opened when they are asked for.
+//! State of a bench with real drivers: its rig file, and devices that are opened when needed.
 
 use super::trouble;
 use crate::exit::Failure;
@@ -14,7 +14,7 @@ use skinrig_protocol::Protocol;
 use skinrig_protocol::rig::{CameraKind, RigFile, RigKind};
 use std::path::PathBuf;
 
-/// A bench with drivers behind it.
+/// A bench with real drivers.
 pub(crate) struct RealBench {
     pub(super) rig: RigFile,
     pub(super) folder: PathBuf,
@@ -24,12 +24,12 @@ pub(crate) struct RealBench {
     pub(super) devices: Option<Devices>,
     pub(super) tolerated: ToleratedMismatches,
     pub(super) firmware: Vec<(String, String)>,
-    // Last, so that it is released when every device is closed.
+    // Declared last, so that it is released after every device is closed.
     pub(super) lease: Option<Lease>,
 }
 
 impl RealBench {
-    /// The bench of `rig`, with nothing opened yet. What it records goes into `folder`.
+    /// The bench of `rig`, with all devices closed. Sessions go to `folder`.
     #[must_use]
     pub(super) fn new(
         rig: RigFile,
@@ -50,7 +50,7 @@ impl RealBench {
         }
     }
 
-    /// The same, which is ours as long as this lease is.
+    /// Adds the lease. The bench keeps it until dropped.
     #[must_use]
     pub(super) fn holding(self, lease: Lease) -> Self {
         Self {
@@ -59,28 +59,28 @@ impl RealBench {
         }
     }
 
-    /// Whoever sits at this terminal.
+    /// Control and stop requests from the terminal.
     #[must_use]
     pub(super) const fn operator(&self) -> &Operator {
         &self.operator
     }
 
-    /// The arguments as one line.
+    /// The command line that started this program.
     #[must_use]
     pub(super) fn command_line(&self) -> &str {
         &self.command_line
     }
 
-    /// Prints the lines of the rig file that accept what was let pass.
+    /// Prints the rig file lines that accept the tolerated mismatches.
     pub(crate) fn propose(&self) {
         self.tolerated.propose(&self.rig);
     }
 
-    /// Opens every device and puts them together as the rig of a run of `protocol`, with a clock that begins with it. Nothing is
-    /// left with the bench.
+    /// Opens every device and assembles the rig for a run of `protocol`, with a new clock. The
+    /// bench keeps no device.
     ///
     /// # Errors
-    /// Why the first of them could not be opened.
+    /// The first device error.
     pub(crate) fn take_rig(&mut self, protocol: &Protocol) -> Result<Rig, Problem> {
         self.close();
         self.clock = RealClock::start();
@@ -114,7 +114,7 @@ impl RealBench {
         }
     }
 
-    /// `held` cameras of this bench are open already: busy for everybody else.
+    /// Opens a camera. `held` cameras are already open here, so they do not count as busy.
     pub(super) fn open_camera(&mut self, camera: CameraId, held: usize) -> Slot<dyn EventCamera> {
         let setup = &self.rig.cameras[camera.index()];
         let subject = subject(camera);
@@ -137,15 +137,15 @@ impl RealBench {
     }
 }
 
-/// How late stand-ins may be that share this computer's processors.
-pub(super) fn patience(kind: RigKind) -> HostDuration {
+/// Extra delay to tolerate from emulated devices that share this computer's processors.
+pub(super) fn timing_slack_of(kind: RigKind) -> HostDuration {
     match kind {
         RigKind::Emulated => bench::SLOW_LATE,
         RigKind::Bench => HostDuration::ZERO,
     }
 }
 
-/// What a camera is called in results.
+/// Name of a camera in results.
 pub(super) fn subject(camera: CameraId) -> &'static str {
     match camera {
         CameraId::One => "camera1",
@@ -153,12 +153,12 @@ pub(super) fn subject(camera: CameraId) -> &'static str {
     }
 }
 
-/// A slot of which nobody has asked yet.
+/// Initial content of a slot whose device was not opened yet.
 pub(super) fn closed(subject: &str) -> Problem {
     Box::new(Evidence::new(EvidenceKind::State, subject, "not opened"))
 }
 
-/// What is wrong with this program.
+/// Evidence of a fault in this program.
 pub(super) fn software(subject: &str, failure: &Failure) -> Problem {
     Box::new(Evidence::new(
         EvidenceKind::Software,

@@ -1,4 +1,4 @@
-//! `skinrig hil run`: a suite on a bench, from its plan to its results.
+//! `skinrig hil run`: runs a suite on a bench and writes its results.
 
 use std::io;
 use std::path::Path;
@@ -6,6 +6,7 @@ use std::path::Path;
 use chrono::{SecondsFormat, Utc};
 use skinrig_device::RealClock;
 use skinrig_hil::history::HistoryError;
+use skinrig_hil::night_folder::{self, NightFolder};
 use skinrig_hil::runner::plan::PlanInputs;
 use skinrig_hil::{Bench as _, SuiteRunner};
 use skinrig_model::HostDuration;
@@ -21,7 +22,7 @@ use super::args::HilRunArgs;
 use super::live::{self, Live};
 use super::real_bench::RealBench;
 use super::trend::After;
-use super::{folder, lease, trend};
+use super::{lease, trend};
 use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::host::host_name;
@@ -31,9 +32,9 @@ use crate::signals::Operator;
 /// `skinrig hil run`.
 ///
 /// # Errors
-/// [`Failure`] before the night begins: 2 for what was asked for, 3 for what the computer does not let us.
+/// [`Failure`] before the night begins: 2 for bad input, 3 for the rig or the computer.
 pub(crate) fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
-    // Before any device is opened: from then on a robot may be live.
+    // Signals are handled before any device opens, because a robot may be live from then on.
     let operator = Operator::of_suite().map_err(Failure::rig)?;
     let suite = load(&args.suite)?;
     let mut rig = bench::load(&args.rig)?;
@@ -61,7 +62,8 @@ pub(crate) fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome 
     }
     let lease = lease::take(&rig, &format!("hil run {}", suite.name))?;
     let started = Utc::now();
-    let (id, folder) = folder::make(&args.out, started, &suite.name)?;
+    let folder = NightFolder::create(&args.out, started, &suite.name)
+        .map_err(|e| Failure::rig(format!("{e}\n  next: choose a writable folder with --out")))?;
     if !json {
         outln!(
             "{} on {}: about {} of {}\n{}\n",
@@ -69,17 +71,17 @@ pub(crate) fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome 
             bench::display_name(&rig),
             span(planned.as_secs_f64()),
             span(suite.budget.as_secs_f64()),
-            folder.display()
+            folder.path().display()
         );
     }
     let started = started.to_rfc3339_opts(SecondsFormat::Secs, true);
-    let mut night = blank(id, &suite, &rig, started);
+    let mut night = blank(folder.id().to_owned(), &suite, &rig, started);
     night.lease_note = lease.note().map(str::to_owned);
     let mut live = Live::new(folder.clone(), &suite);
-    let mut bench = RealBench::new(rig, folder.clone(), operator, command_line).holding(lease);
+    let mut bench =
+        RealBench::new(rig, folder.path().to_owned(), operator, command_line).holding(lease);
     let night = runner.run(night, &mut bench, &mut live);
-    let unwritten = live.finish();
-    // Nothing is open any more.
+    let write_error = live.finish();
     bench.close();
     bench.propose();
     drop(bench);
@@ -89,82 +91,86 @@ pub(crate) fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome 
     } else {
         let paint = live::paint(&io::stdout());
         outln!("{}", night::tree(&night, paint).trim_end());
-        outln!("{}", folder.join(folder::PAGE).display());
+        outln!("{}", folder.path().join(night_folder::PAGE).display());
     }
-    match unwritten.map_or(trends, |e| Err(KeepError::Night(e))) {
+    match write_error.map_or(trends, |e| Err(KeepError::Night(e))) {
         Ok(None) => Ok(Exit::Night(night.exit)),
-        // Trends say what moved; whether the night is good is said by its limits alone.
+        // The exit code depends on the limits alone, not on trends.
         Ok(Some(trends)) => {
             match trends {
                 Ok(after) if !json => {
                     outln!("{}", sentence(&after.report));
-                    outln!("{}", folder.join(folder::TRENDS).display());
+                    outln!("{}", folder.path().join(night_folder::TRENDS).display());
                 }
                 Ok(_) => {}
                 Err(why) => errln!(
                     "warning: no trends for this night: --history: {why}\n  \
-                     next: once that is mended, `skinrig hil trend HISTORY --rebuild {}` adds this night",
+                     next: fix this, then add the night with `skinrig hil trend HISTORY --rebuild {}`",
                     args.out.display()
                 ),
             }
             Ok(Exit::Night(night.exit))
         }
         Err(why) => Err(Failure::rig(format!(
-            "{}: {why}\n  next: free some space, or choose another folder with --out; what was measured is above",
-            folder.display()
+            "{}: {why}\n  next: free disk space or choose another folder with --out; the measurements are printed above",
+            folder.path().display()
         ))),
     }
 }
 
-/// What the trends say, when they were asked for, or why they say nothing.
+/// Trends after the night, if a history was given.
 type TrendOutcome = Option<Result<After, HistoryError>>;
 
-/// Why a night is not written in all its forms.
+/// A file of the night could not be written.
 #[derive(Debug, thiserror::Error)]
 enum KeepError {
-    /// The night as JSON.
+    /// JSON.
     #[error(transparent)]
     Night(io::Error),
-    /// Another file of the night.
+    /// Another file.
     #[error("{name}: {source}")]
     File {
         name: &'static str,
         source: io::Error,
     },
-    /// A page that cannot be put together.
+    /// Rendering a page failed.
     #[error(transparent)]
     Page(#[from] ReportError),
-    /// JUnit XML that cannot be put together.
+    /// Rendering JUnit XML failed.
     #[error(transparent)]
     Junit(#[from] junit::SerializeError),
 }
 
-/// Writes the finished night in its other forms, and adds it to the history.
-fn keep(night: &Night, folder: &Path, history: Option<&Path>) -> Result<TrendOutcome, KeepError> {
+/// Writes the page and JUnit XML of the finished night, and adds it to the history.
+fn keep(
+    night: &Night,
+    folder: &NightFolder,
+    history: Option<&Path>,
+) -> Result<TrendOutcome, KeepError> {
     let write = |name: &'static str, text: &str| {
-        folder::write(folder, name, text).map_err(|source| KeepError::File { name, source })
+        folder
+            .write(name, text)
+            .map_err(|source| KeepError::File { name, source })
     };
     let page = |trends: Trends<'_>| {
         let page = night::html(night, trends)?;
-        write(folder::PAGE, &page)
+        write(night_folder::PAGE, &page)
     };
-    write(folder::JUNIT, &junit::junit(night, &host_name())?)?;
+    write(night_folder::JUNIT, &junit::junit(night, &host_name())?)?;
     let Some(history) = history else {
         page(Trends::NotRequested)?;
         return Ok(None);
     };
-    // There before the history is touched: whatever is wrong with that, the night has its page.
-    page(Trends::Unavailable(
-        "the program ended before it had read them",
-    ))?;
-    let after = trend::after(history, night, folder);
+    // The page exists even if reading the history fails.
+    page(Trends::Unavailable("the program ended before reading them"))?;
+    let after = trend::after(history, night, folder.path());
     match &after {
         Ok(after) => {
-            write(folder::TRENDS, &after.page()?)?;
+            write(night_folder::TRENDS, &after.page()?)?;
             page(Trends::Available {
                 report: &after.report,
                 links: &after.links,
-                page: folder::TRENDS,
+                page: night_folder::TRENDS,
             })?;
         }
         Err(why) => page(Trends::Unavailable(&why.to_string()))?,
@@ -178,7 +184,7 @@ fn load(path: &Path) -> Result<Suite, Failure> {
     Suite::parse(&path.display().to_string(), &bytes).map_err(|found| Failure::findings(&found))
 }
 
-/// Every word of `--only` is a check of the suite.
+/// Rejects `--only` names that are not checks of the suite.
 fn known_checks(suite: &Suite, only: Option<&[String]>) -> Result<(), Failure> {
     for word in only.unwrap_or_default() {
         if !suite.checks.iter().any(|c| c.name == word) {
@@ -193,7 +199,7 @@ fn known_checks(suite: &Suite, only: Option<&[String]>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What the plan of the night relies on; reads and checks the golden protocol.
+/// Inputs of the night's plan. Reads and checks the golden protocol.
 fn plan_inputs(
     suite: &Suite,
     rig: &RigFile,
@@ -218,7 +224,7 @@ fn plan_inputs(
     Ok(inputs)
 }
 
-/// A night of which nothing is known but who and when.
+/// A night before its first check.
 fn blank(id: String, suite: &Suite, rig: &RigFile, started: String) -> Night {
     Night {
         version: NIGHT_VERSION,

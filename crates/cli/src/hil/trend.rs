@@ -1,9 +1,10 @@
-//! `skinrig hil trend`: what moved over the nights, since when, and why, probably.
+//! `skinrig hil trend`: metrics that changed over the nights, since when, and the probable cause.
 
 use std::path::{Path, PathBuf};
 
 use glob::{Pattern, PatternError};
 use skinrig_hil::history::{self, AppendOutcome, Filter, HistoryError};
+use skinrig_hil::night_folder;
 use skinrig_nightly::trend::{Acceptance, History, Report, judge};
 use skinrig_nightly::{Night, NightExit};
 use skinrig_report::ReportError;
@@ -11,14 +12,13 @@ use skinrig_report::trend::{Links, Style, page, terminal};
 
 use super::alarms;
 use super::args::HilTrendArgs;
-use super::folder;
 use crate::exit::{Exit, Failure, Outcome};
 
 /// `skinrig hil trend`.
 ///
 /// # Errors
-/// [`Failure::input`] for a file that is no history, a bench or a series that is not in it; [`Failure::internal`] when something
-/// cannot be written.
+/// [`Failure::input`] if the file is not a history, or lacks the bench or the series; [`Failure::internal`] if a file cannot be
+/// written.
 pub(crate) fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
     if let Some(folder) = &args.rebuild {
         rebuild(&args.history, folder)?;
@@ -27,14 +27,14 @@ pub(crate) fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
     let pattern = args.series.as_deref().unwrap_or("*");
     let series = series(pattern).map_err(|e| {
         Failure::input(format!(
-            "--series: expected part of the name of a series, or a pattern with `*`, found `{pattern}`: {e}"
+            "--series: expected part of a series name or a pattern with `*`, found `{pattern}`: {e}"
         ))
     })?;
     let shown = |name: &str| series.matches(name);
     if args.series.is_some() && !report.charts.iter().any(|c| shown(&c.series.name)) {
         return Err(Failure::input(format!(
-            "--series: expected part of the name of a series, or a pattern with `*`, found `{pattern}`, which none of {} has; \
-             without --series all are listed",
+            "--series: expected part of a series name or a pattern with `*`, found `{pattern}`, which matches none of {} series\n  \
+             next: omit --series to list all",
             report.charts.len()
         )));
     }
@@ -85,12 +85,12 @@ fn judged(args: &HilTrendArgs) -> Result<(History, Report), Failure> {
 fn rebuild(path: &Path, nights: &Path) -> Result<(), Failure> {
     let cannot = |e| Failure::input(format!("--rebuild: {}: {e}", nights.display()));
     let entries = std::fs::read_dir(nights).map_err(cannot)?;
-    let entries = entries.map(|e| e.map(|e| e.path().join(folder::JSON)));
-    let mut found: Vec<PathBuf> = entries.collect::<Result<_, _>>().map_err(cannot)?;
-    found.retain(|json| json.is_file());
-    found.sort();
-    let (mut new, mut known, mut left) = (0, 0, 0);
-    for json in &found {
+    let entries = entries.map(|e| e.map(|e| e.path().join(night_folder::JSON)));
+    let mut night_files: Vec<PathBuf> = entries.collect::<Result<_, _>>().map_err(cannot)?;
+    night_files.retain(|json| json.is_file());
+    night_files.sort();
+    let (mut new, mut known, mut skipped) = (0, 0, 0);
+    for json in &night_files {
         let night = history::read_night(json);
         let home = json.parent().unwrap_or(nights);
         match night.and_then(|night| history::append(path, &night, home)) {
@@ -99,24 +99,24 @@ fn rebuild(path: &Path, nights: &Path) -> Result<(), Failure> {
             Err(
                 e @ (HistoryError::InvalidNight { .. } | HistoryError::ConflictingNight { .. }),
             ) => {
-                left += 1;
-                errln!("warning: left out: {e}");
+                skipped += 1;
+                errln!("warning: skipped: {e}");
             }
             Err(e) => return Err(Failure::input(e)),
         }
     }
-    if found.is_empty() {
+    if night_files.is_empty() {
         return Err(Failure::input(format!(
             "--rebuild: {}: expected folders with a {}, found none",
             nights.display(),
-            folder::JSON
+            night_folder::JSON
         )));
     }
-    errln!("{new} nights added, {known} were there, {left} left out");
+    errln!("{new} nights added, {known} already present, {skipped} skipped");
     Ok(())
 }
 
-/// Pattern for names of series: with `*` it matches a whole name, without one any part of it.
+/// Pattern for series names: with `*` it matches the whole name, otherwise any part of it.
 fn series(pattern: &str) -> Result<Pattern, PatternError> {
     if pattern.contains('*') {
         Pattern::new(pattern)
@@ -125,29 +125,29 @@ fn series(pattern: &str) -> Result<Pattern, PatternError> {
     }
 }
 
-/// Whether the terminal takes more than ASCII, by the locale's own variables, strongest first.
+/// Whether the locale of the terminal is UTF-8.
 fn is_unicode() -> bool {
     let set = |key| std::env::var(key).ok().filter(|v| !v.is_empty());
     let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(set);
     locale.is_some_and(|l| l.to_lowercase().replace('-', "").contains("utf8"))
 }
 
-/// What the trends say after a night.
+/// Trends up to a night.
 pub(super) struct After {
     pub report: Report,
-    /// One per alarm, of a page in the night's folder.
+    /// Links by alarm, relative to the night's folder.
     pub links: Vec<Links>,
     accepted: Vec<Acceptance>,
 }
 
 impl After {
-    /// The page of all charts, for the night's folder.
+    /// Page of all charts, for the night's folder.
     pub(super) fn page(&self) -> Result<String, ReportError> {
         page(&self.report, &self.links, &self.accepted)
     }
 }
 
-/// Adds a night, whose files are in `home`, to the history in `path`, and judges all nights up to it.
+/// Adds a night, whose files are in `home`, to the history at `path`, and judges all nights up to it.
 pub(super) fn after(path: &Path, night: &Night, home: &Path) -> Result<After, HistoryError> {
     history::append(path, night, home)?;
     let filter = Filter {

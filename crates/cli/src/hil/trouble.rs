@@ -1,5 +1,5 @@
-//! Why a device could not be opened, as evidence: what the driver says, and a second look at bus or port where it says only
-//! that nobody is there.
+//! Evidence of devices that could not be opened. If the driver only reports a missing device,
+//! enumerates bus or port again to find the reason.
 
 use skinrig_device::DeviceError;
 use skinrig_evk1::{Evk1Error, FoundState, UsbError};
@@ -11,13 +11,14 @@ use skinrig_protocol::rig::{BoxSetup, RigFile};
 use skinrig_trigger_box::serial::SerialConnector;
 use skinrig_trigger_box::{Connector, OpenError};
 
-const DEVICES: &str = "`skinrig devices` shows what is connected, and docs/how-to/bench.md how";
+const DEVICES: &str =
+    "run `skinrig devices` to list connected devices; docs/how-to/bench.md shows the connections";
 
-fn trouble(kind: EvidenceKind, subject: &str, what: &dyn std::fmt::Display) -> Problem {
+fn evidence(kind: EvidenceKind, subject: &str, what: &dyn std::fmt::Display) -> Problem {
     Box::new(Evidence::new(kind, subject, what.to_string()).next(DEVICES))
 }
 
-/// Why the robot could not be opened.
+/// Evidence from an error in opening the robot.
 pub(super) fn robot(error: &OmegaError, rig: &RigFile) -> Problem {
     let kind = match error {
         OmegaError::Load(_) | OmegaError::Thread(_) | OmegaError::Supervisor(_) => {
@@ -29,10 +30,10 @@ pub(super) fn robot(error: &OmegaError, rig: &RigFile) -> Problem {
         OmegaError::ReadBack { .. } => EvidenceKind::ReadBack,
         OmegaError::Call { .. } | OmegaError::TimedOut { .. } => EvidenceKind::DeviceLost,
     };
-    trouble(kind, "robot", error)
+    evidence(kind, "robot", error)
 }
 
-/// The robot of the rig file is not among those that are free: what is there?
+/// Enumerates the robots to find out why none that is free matches the rig file.
 fn robot_not_found(rig: &RigFile) -> EvidenceKind {
     let listed = skinrig_omega3::load::load(rig.robot.library.as_deref())
         .ok()
@@ -50,7 +51,7 @@ fn robot_not_found(rig: &RigFile) -> EvidenceKind {
     }
 }
 
-/// Why a camera, called `subject` in results, could not be opened.
+/// Evidence from an error in opening a camera. `subject` is its name in results.
 pub(super) fn camera(error: &Evk1Error, subject: &str, held: usize) -> Problem {
     let kind = match error {
         Evk1Error::NotFound { .. } => camera_not_found(held),
@@ -65,10 +66,10 @@ pub(super) fn camera(error: &Evk1Error, subject: &str, held: usize) -> Problem {
         Evk1Error::Refused { .. } => EvidenceKind::Refused,
         _ => EvidenceKind::State,
     };
-    trouble(kind, subject, error)
+    evidence(kind, subject, error)
 }
 
-/// No camera with this serial number answers: is there one that may not be asked?
+/// Enumerates the cameras to find out why none that is free has the serial number.
 fn camera_not_found(held: usize) -> EvidenceKind {
     let states: Vec<_> = skinrig_evk1::enumerate()
         .unwrap_or_default()
@@ -88,7 +89,7 @@ fn camera_not_found(held: usize) -> EvidenceKind {
     }
 }
 
-/// Why the trigger box could not be opened.
+/// Evidence from an error in opening the trigger box.
 pub(super) fn trigger_box(error: &DeviceError, setup: &BoxSetup) -> Problem {
     let kind = match error {
         DeviceError::Lost { .. } => match SerialConnector::new(&setup.port).connect() {
@@ -97,12 +98,12 @@ pub(super) fn trigger_box(error: &DeviceError, setup: &BoxSetup) -> Problem {
             Err(OpenError::NotPermitted(_)) => EvidenceKind::NotPermitted,
             Err(OpenError::Other { .. }) | Ok(_) => EvidenceKind::DeviceLost,
         },
-        // Another box, or another firmware.
+        // A different box or firmware.
         DeviceError::Refused { .. } => EvidenceKind::OtherDevice,
         DeviceError::ReadBack { .. } => EvidenceKind::ReadBack,
         DeviceError::State { .. } => EvidenceKind::State,
         DeviceError::Silent { .. } => EvidenceKind::DeviceLost,
         DeviceError::Diverged { .. } | DeviceError::Pending { .. } => EvidenceKind::Software,
     };
-    trouble(kind, "trigger box", error)
+    evidence(kind, "trigger box", error)
 }

@@ -19,7 +19,7 @@ use skinrig_sim::SimClock;
 
 /// A chunk is closed at this size, bytes.
 const CHUNK_BYTES: usize = 1 << 20;
-/// Or when it spans this much camera time, µs: less than any press takes, so that each press sees bytes arrive.
+/// Or when it spans this much camera time, µs: shorter than any press, so that bytes arrive during each press.
 const CHUNK_SPAN_US: u64 = 400_000;
 /// Chunks that may wait between the reading thread and the run.
 const QUEUE: usize = 4;
@@ -29,7 +29,7 @@ const LATE_START_US: u64 = 60_000_000;
 /// time words gives no reason for more.
 const TIME_HIGH_EVERY_US: u64 = 64;
 
-/// Why a recording cannot be read to its end.
+/// A recording cannot be read to its end.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum RecordingError {
     /// The file is damaged, or has events that EVT2 cannot hold.
@@ -62,14 +62,14 @@ pub(crate) enum RecordingError {
     },
 }
 
-/// The system refused the thread that reads a recording.
+/// The thread that reads a recording cannot be started.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot start a reading thread: {0}")]
 pub(crate) struct ThreadError(#[from] io::Error);
 
 type Item = Result<(Vec<u8>, ChunkFacts, Vec<TriggerEdge>), RecordingError>;
 
-/// Where the reading thread puts what it reads.
+/// Input side of the queue, used by the reading thread.
 pub(crate) struct ChunkFeed {
     queue: SyncSender<Item>,
     scanner: Scanner,
@@ -78,12 +78,12 @@ pub(crate) struct ChunkFeed {
     chunk_from_us: u64,
 }
 
-/// The run ended before the file did; reading on is pointless.
+/// The run ended before the file, so reading stops.
 #[derive(Debug)]
 pub(super) struct RunEnded;
 
 impl ChunkFeed {
-    /// Takes the next events of a container without words of its own, in time order.
+    /// Encodes the next events of a container that stores no words, in time order.
     ///
     /// # Errors
     /// [`RunEnded`]; [`ChunkFeed::fail`] has been called when an event cannot be encoded.
@@ -110,7 +110,7 @@ impl ChunkFeed {
                 self.send()?;
                 self.chunk_from_us = end;
             }
-            // Outside the sensor in any case: EVT2 has room for no larger number.
+            // Events outside the sensor stay outside: EVT2 holds no larger coordinates.
             let event = CdEvent {
                 x: event.x.min(evt2::MAX_COORDINATE),
                 y: event.y.min(evt2::MAX_COORDINATE),
@@ -127,7 +127,7 @@ impl ChunkFeed {
         Ok(())
     }
 
-    /// Takes the next bytes of a stream that is recorded as it is.
+    /// Takes the next bytes of a stream that is recorded unchanged.
     ///
     /// # Errors
     /// [`RunEnded`].
@@ -260,7 +260,7 @@ impl FileCamera {
         }
     }
 
-    /// The file is read to its end: all is well unless the schedule goes on long after it.
+    /// Called at the end of the file: an error if the schedule continues long after it.
     fn ended(&self, until_us: Option<u64>) -> Result<(), DeviceError> {
         match until_us {
             Some(now_us) if now_us > self.reached_us + LATE_START_US => Err(self.lost(format!(

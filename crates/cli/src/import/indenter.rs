@@ -139,8 +139,8 @@ impl Indenter for ScheduledIndenter {
 
     fn hold(&mut self) -> Result<(), DeviceError> {
         let now = self.clock.now();
-        let here = self.position_at(now);
-        (self.from, self.to, self.since) = (here, here, now);
+        let position = self.position_at(now);
+        (self.from, self.to, self.since) = (position, position, now);
         Ok(())
     }
 

@@ -26,22 +26,23 @@ use skinrig_protocol::Schedule;
 use skinrig_sim::SimClock;
 
 use crate::args::ImportArgs;
+use crate::conclusion::conclude;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::run::{Intent, conclude, record};
+use crate::run::{Intent, record};
 use crate::signals::Operator;
 use crate::sink::ReplayExpectations;
 use crate::terminal::Output;
 use camera::{ChunkFeed, FileCamera, RecordingError};
 use indenter::ScheduledIndenter;
 
-/// Presses closer together than this are no path, mm: less than any indenter's tip.
+/// Smallest plausible extent of the presses, mm: less than any indenter's tip.
 const SMALLEST_PATH_MM: f64 = 1.0;
 
 /// Imports a dataset.
 ///
 /// # Errors
-/// [`Failure::input`] for files that are not what they should be, also when one breaks off inside: what was read up to there is
-/// kept. [`Failure::rig`] when the session cannot be written.
+/// [`Failure::input`] for wrong or damaged files; if a file breaks off, the part before is kept. [`Failure::rig`] when the
+/// session cannot be written.
 pub(crate) fn import(args: &ImportArgs, command_line: &str, output: Output) -> Outcome {
     let name = args.schedule.to_string_lossy();
     for file in [&args.camera1, &args.camera2, &args.presses] {
@@ -69,7 +70,7 @@ pub(crate) fn import(args: &ImportArgs, command_line: &str, output: Output) -> O
     };
     let plan = plan::compile(&schedule, presses, &times);
 
-    refuse_one_file_twice(args)?;
+    reject_same_file(args)?;
     let clock = SimClock::new();
     let (one, about_one) = open(CameraId::One, &args.camera1, args.stream1.clone(), &clock)?;
     let (two, about_two) = open(CameraId::Two, &args.camera2, args.stream2.clone(), &clock)?;
@@ -121,7 +122,7 @@ pub(crate) fn import(args: &ImportArgs, command_line: &str, output: Output) -> O
         .iter()
         .any(|c| matches!(c, ControllerError::Device(_)));
     conclude(&session, &report, args.no_analysis, None, output).map_err(|failure| {
-        // No rig took part: what a camera did not deliver is missing or broken in its file.
+        // An import uses no rig: a camera error means that its file is damaged or too short.
         if unreadable {
             Failure {
                 exit: Exit::Input,
@@ -134,7 +135,7 @@ pub(crate) fn import(args: &ImportArgs, command_line: &str, output: Output) -> O
 }
 
 fn read_positions(path: &Path, schedule: &Schedule) -> Result<Vec<Point2>, Failure> {
-    // The table knows metres and millimetres; any other unit is a multiple of the latter.
+    // The table supports metres and millimetres; any other unit is scaled from millimetres.
     let (unit, scale) = match schedule.csv_unit_mm {
         1000.0 => (LengthUnit::Metre, 1.0),
         mm => (LengthUnit::Millimetre, mm),
@@ -149,7 +150,7 @@ fn read_positions(path: &Path, schedule: &Schedule) -> Result<Vec<Point2>, Failu
             )));
         }
         errln!(
-            "note: {}: blank line(s) {:?} are no presses",
+            "note: {}: skipped blank line(s) {:?}",
             path.display(),
             table.blank_lines
         );
@@ -159,18 +160,18 @@ fn read_positions(path: &Path, schedule: &Schedule) -> Result<Vec<Point2>, Failu
         .iter()
         .map(|p| Point2::new(p.x_mm * scale, p.y_mm * scale))
         .collect();
-    plausible(path, schedule, &points)?;
+    check_positions(path, schedule, &points)?;
     Ok(points)
 }
 
-/// A wrong unit puts all presses on one spot, or off the skin.
-fn plausible(path: &Path, schedule: &Schedule, points: &[Point2]) -> Result<(), Failure> {
+/// Rejects positions off the skin or all on one spot, which a wrong unit causes.
+fn check_positions(path: &Path, schedule: &Schedule, points: &[Point2]) -> Result<(), Failure> {
     let next =
         "next: is `csv.unit` of the schedule the unit of this file, and `rig.outline` this skin?";
     let outline = schedule.rig.outline;
     if let Some((row, p)) = (0u32..).zip(points).find(|(_, p)| !outline.contains(**p)) {
         return Err(Failure::input(format!(
-            "{}: {} at ({:.3}, {:.3}) mm: expected a place on the skin, found one beside it\n  {next}",
+            "{}: {} at ({:.3}, {:.3}) mm: expected a location on the skin, found one outside it\n  {next}",
             path.display(),
             LocationId::from_index(row),
             p.x_mm,
@@ -196,7 +197,7 @@ fn file_name(path: &Path) -> String {
         .unwrap_or_default()
 }
 
-/// Lower-case hex SHA-256 of a file: its identity in the session, wherever it lay.
+/// Lower-case hex SHA-256 of a file, which identifies it in the session.
 fn sha256_of(path: &Path) -> Result<String, Failure> {
     let unreadable = |e| Failure::input(format!("{}: cannot read it: {e}", path.display()));
     let mut file = std::fs::File::open(path).map_err(unreadable)?;
@@ -211,11 +212,11 @@ fn sha256_of(path: &Path) -> Result<String, Failure> {
     Ok(hash.finalize().iter().map(|b| format!("{b:02x}")).collect())
 }
 
-/// Both cameras from one file is a slip of the keyboard, unless two streams of it are named.
-fn refuse_one_file_twice(args: &ImportArgs) -> Result<(), Failure> {
+/// Rejects one file for both cameras, unless two of its streams are named.
+fn reject_same_file(args: &ImportArgs) -> Result<(), Failure> {
     let same = match (args.camera1.canonicalize(), args.camera2.canonicalize()) {
         (Ok(one), Ok(two)) => one == two,
-        // Opening it says what is wrong.
+        // Opening the file reports the error.
         _ => false,
     };
     if same && args.stream1 == args.stream2 {
@@ -228,7 +229,7 @@ fn refuse_one_file_twice(args: &ImportArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Opens one camera's file and starts reading it; also what the session keeps about the file.
+/// Opens one camera's file and starts reading it; also returns what the session stores about the file.
 fn open(
     camera: CameraId,
     path: &Path,
@@ -245,7 +246,7 @@ fn open(
     let kind = FileKind::detect(&path).map_err(Failure::input)?;
     let opened = match kind {
         FileKind::Hdf5 => {
-            // Opened here once, so that a wrong file is refused before a session is made.
+            // Open it here first, so that a wrong file is rejected before the session is created.
             let container = Container::open(&path).map_err(Failure::input)?;
             let entry = container
                 .choose(stream.as_deref())

@@ -1,4 +1,4 @@
-//! The file that remembers a jog: every order, every answer, and the tip ten times a second.
+//! The log of a jog: every command, every reply, and the tip position ten times a second.
 
 use std::fs::File;
 use std::io::Write;
@@ -19,11 +19,11 @@ impl Log {
     /// A new log at `path`, which must not exist.
     ///
     /// # Errors
-    /// [`Failure::internal`] when it cannot be made.
+    /// [`Failure::internal`] when it cannot be created.
     pub(super) fn create(path: &Path) -> Result<Self, Failure> {
         let refused = |e: std::io::Error| {
             Failure::internal(format!(
-                "cannot write the log {}: {e}\n  next: give another place with --log",
+                "cannot write the log {}: {e}\n  next: choose another file with --log",
                 path.display()
             ))
         };
@@ -37,7 +37,7 @@ impl Log {
         })
     }
 
-    /// Where it is.
+    /// Path of the log.
     #[must_use]
     pub(super) fn path(&self) -> &Path {
         &self.path
@@ -47,13 +47,13 @@ impl Log {
     pub(super) fn line(&mut self, t: HostTime, kind: &str, text: &str) {
         let text = text.replace('\n', " | ");
         let written = writeln!(self.file, "{:.3}\t{kind}\t{text}", t.as_secs_f64());
-        // A log that fails must not leave the robot where it is: said once, and the orders go on.
+        // A log that fails must not strand the robot: warn once and continue.
         if written.is_err() && !std::mem::replace(&mut self.broken, true) {
             errln!("warning: cannot write the log {}", self.path.display());
         }
     }
 
-    /// Writes where the tip was.
+    /// Writes the positions of the tip.
     pub(crate) fn path_of_tip(&mut self, trace: &[PoseSample]) {
         for p in trace {
             let [x, y, z] = p.measured.to_array();

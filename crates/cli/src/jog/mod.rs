@@ -1,4 +1,4 @@
-//! `skinrig jog`: moves the robot by hand, under the guard of runs, and records touched points.
+//! `skinrig jog`: moves the robot with typed commands, under the same guard as runs, and records touched points.
 
 mod log;
 mod order;
@@ -33,15 +33,15 @@ use order::Order;
 use points::NamedPoint;
 use refusal::{InputError, Refusal};
 
-/// Between two looks at the robot while nobody types.
+/// Interval between polls of the robot while there is no input.
 const IDLE: Duration = Duration::from_millis(10);
-/// Speed until another one is asked for, mm/s.
+/// Initial speed, mm/s.
 const FIRST_SPEED_MM_S: f64 = 5.0;
-/// How deep below its surface the tip may go in the simulated skin, mm.
+/// Depth limit below the surface of the simulated skin, mm.
 const SIMULATED_DEPTH_MM: f64 = 6.0;
-/// How close to its target a motion ends, mm.
+/// Position tolerance at the end of a motion, mm.
 const TOLERANCE_MM: f64 = 0.1;
-/// How the surface is touched when the rig file does not say.
+/// Touch search if the rig file sets none.
 const SEARCH: TouchSearch = TouchSearch {
     threshold_n: 0.2,
     samples: 5,
@@ -50,7 +50,7 @@ const SEARCH: TouchSearch = TouchSearch {
     tare: HostDuration::from_millis(300),
 };
 
-/// What is moved, and within what.
+/// The robot and its limits.
 struct Bench {
     name: String,
     indenter: Box<dyn Indenter>,
@@ -93,7 +93,7 @@ fn open(args: &JogArgs) -> Result<(Bench, Option<Lease>), Failure> {
     Ok((bench, Some(lease)))
 }
 
-/// The simulated rig at the speed of a real one where somebody types, at full speed where a file is piped in.
+/// The simulated rig: in real time at a terminal, at full speed with piped input.
 fn simulated() -> Bench {
     let config = SimConfig::new(1, SimLevel::Kinematic);
     let mut rig = simulated_rig(&config);
@@ -116,13 +116,13 @@ fn simulated() -> Bench {
     }
 }
 
-/// Coordinates are the robot's own: where the skin lies is what a touch-off is to find out. How deep the tip may go below the
-/// surface of the frame that is known so far, is the floor's business.
+/// Limits in robot coordinates, because the location of the skin is not known before a touch-off. [`Floor`] limits the depth below
+/// the surface of the current frame.
 fn limits(bench: &Bench) -> (RunLimits, MotionLimits) {
     let run = RunLimits {
         workspace_min_mm: bench.min_mm,
         workspace_max_mm: bench.max_mm,
-        // In these coordinates the workspace says how low the tip may go.
+        // In these coordinates the workspace limits the depth.
         clearance_mm: bench.min_mm[2],
         max_depth_mm: (-bench.min_mm[2]).max(f64::MIN_POSITIVE),
         max_speed_mm_s: bench.max_speed_mm_s,
@@ -154,23 +154,25 @@ pub(crate) fn jog(args: &JogArgs) -> Outcome {
     let stop = Arc::new(AtomicBool::new(false));
     let pressed = Arc::clone(&stop);
     let control = ControlHandle::new();
-    let hand = control.clone();
+    let halter = control.clone();
     signals::on_ctrl_c(move |times| {
         pressed.store(true, Ordering::SeqCst);
         match times {
-            1 => errln!("\nholding, rising, disarming; ctrl-C twice more switches the motors off"),
+            1 => errln!(
+                "\nholding, retracting, disarming; ctrl-C twice more switches the motors off"
+            ),
             2 => errln!("\nctrl-C once more switches the motors off where the tip is"),
             3 => {
                 errln!("\nswitching the motors off");
-                hand.halt();
+                halter.halt();
             }
-            // Something hangs; the supervisor brakes an arm that nobody commands any more.
+            // Something hangs; after the exit the supervisor brakes the arm.
             _ => std::process::exit(i32::from(Exit::Stopped.code())),
         }
     })
     .map_err(Failure::internal)?;
 
-    // Opened with the hand on ctrl-C: from here on the arm may be live.
+    // Opened after the ctrl-C handler is set: from here on the arm may be live.
     let (bench, _lease) = open(args)?;
     let (run, robot) = limits(&bench);
     let skin_from_robot = bench.robot_from_skin.inverse();
@@ -191,7 +193,7 @@ pub(crate) fn jog(args: &JogArgs) -> Outcome {
         },
     )
     .map_err(Failure::rig)?;
-    let mut table = Table {
+    let mut console = Console {
         jog,
         stop,
         search: bench.search,
@@ -201,10 +203,10 @@ pub(crate) fn jog(args: &JogArgs) -> Outcome {
         last_touch: None,
         points: Vec::new(),
     };
-    let identity = table.jog.identity();
+    let identity = console.jog.identity();
     outln!(
         "{}: {} {}; coordinates in the robot's frame; `help` lists the commands; ctrl-C holds, retracts and disarms;\n\
-         as do {} s without a typed line (--idle)\nlog       {}",
+         so do {} s without input (--idle)\nlog       {}",
         bench.name,
         identity.model,
         identity.serial,
@@ -212,26 +214,26 @@ pub(crate) fn jog(args: &JogArgs) -> Outcome {
         log.path().display()
     );
     let started = format!("{}: {} {}", bench.name, identity.model, identity.serial);
-    log.line(table.jog.now(), "start", &started);
+    log.line(console.jog.now(), "start", &started);
     if args.beyond_frame {
-        let words = "--beyond-frame: only the workspace says how low the tip may go";
-        log.line(table.jog.now(), "limit", words);
+        let words = "--beyond-frame: only the workspace limits the depth";
+        log.line(console.jog.now(), "limit", words);
         outln!("limit     {words}");
     } else {
         let words = format!("{} mm below the frame's surface", floor.max_depth_mm);
-        log.line(table.jog.now(), "limit", &words);
-        outln!("limit     {words} (--beyond-frame for a skin that lies lower)");
+        log.line(console.jog.now(), "limit", &words);
+        outln!("limit     {words} (--beyond-frame for a lower skin)");
     }
-    for note in table.jog.take_notes() {
-        log.line(table.jog.now(), "note", &note);
+    for note in console.jog.take_notes() {
+        log.line(console.jog.now(), "note", &note);
         outln!("note      {note}");
     }
-    let outcome = table.listen(&mut log);
-    let ended = table.jog.finish();
-    log.path_of_tip(&table.jog.take_trace());
-    let t = table.jog.now();
-    if !table.points.is_empty() {
-        let block = table.block();
+    let outcome = console.execute_input(&mut log);
+    let ended = console.jog.finish();
+    log.path_of_tip(&console.jog.take_trace());
+    let t = console.jog.now();
+    if !console.points.is_empty() {
+        let block = console.block();
         log.line(t, "points", &block);
         outln!("{block}");
     }
@@ -263,25 +265,25 @@ fn words(p: &PoseSample) -> String {
     format!("({x:.3}, {y:.3}, {z:.3}) mm, force {:.2} N", p.force_n)
 }
 
-/// The robot and what was typed so far.
-struct Table {
+/// The robot and the state of the typed commands.
+struct Console {
     jog: Jog<'static>,
     stop: Arc<AtomicBool>,
     search: TouchSearch,
     speed_mm_s: f64,
-    /// Nobody typed for so long: nobody is there, and a live arm is left alone no longer.
+    /// Time without input after which the arm is disarmed.
     idle: Duration,
     skin_from_robot: RigidTransform<Skin, Robot>,
     last_touch: Option<Point3<Robot>>,
     points: Vec<NamedPoint>,
 }
 
-impl Table {
-    /// Follows orders until the end of input, `quit`, ctrl-C, an idle time or a fault.
-    fn listen(&mut self, log: &mut Log) -> Outcome {
+impl Console {
+    /// Executes commands until the end of input, `quit`, ctrl-C, the idle timeout or a fault.
+    fn execute_input(&mut self, log: &mut Log) -> Outcome {
         let interactive = std::io::stdin().is_terminal();
         let lines = read_lines()?;
-        let mut heard = Instant::now();
+        let mut last_input = Instant::now();
         loop {
             if self.stop.load(Ordering::SeqCst) {
                 log.line(self.jog.now(), "ctrl-C", "");
@@ -291,13 +293,13 @@ impl Table {
                 Ok(line) => line,
                 Err(RecvTimeoutError::Disconnected) => return Ok(Exit::Ok),
                 Err(RecvTimeoutError::Timeout) => {
-                    let looked = self.jog.look();
+                    let polled = self.jog.look();
                     log.path_of_tip(&self.jog.take_trace());
-                    match looked {
+                    match polled {
                         Err(ControllerError::Halted) => continue,
                         other => other.map_err(Failure::rig)?,
                     };
-                    if heard.elapsed() < self.idle {
+                    if last_input.elapsed() < self.idle {
                         continue;
                     }
                     let why = format!("no input for {} s", self.idle.as_secs_f64());
@@ -312,17 +314,17 @@ impl Table {
             let answer = match order::parse(&line) {
                 Ok(None) => continue,
                 Ok(Some(Order::Quit)) => return Ok(Exit::Ok),
-                Ok(Some(order)) => self.obey(order),
+                Ok(Some(order)) => self.execute(order),
                 Err(e) => Err(Refusal::Input(e.into())),
             };
             log.path_of_tip(&self.jog.take_trace());
-            heard = Instant::now(); // a long motion is no idle time
+            last_input = Instant::now(); // a long motion does not count as idle
             match answer {
                 Ok(text) => {
                     log.line(self.jog.now(), "answer", &text);
                     outln!("{text}");
                 }
-                // The next turn ends it: whoever halts has stopped.
+                // The next turn of the loop ends it: a halt also sets the stop flag.
                 Err(Refusal::Rig(ControllerError::Halted)) => {
                     log.line(self.jog.now(), "ctrl-C", "motors off");
                 }
@@ -333,7 +335,7 @@ impl Table {
                 Err(Refusal::Input(e)) => {
                     log.line(self.jog.now(), "refused", &e.to_string());
                     if !interactive {
-                        // Nobody looks: what comes after a line that was not obeyed may rely on it.
+                        // Later lines of a piped file may depend on the line that failed.
                         return Err(Failure::input(format!("`{line}`: {e}")));
                     }
                     errln!("refused: {e}");
@@ -342,7 +344,7 @@ impl Table {
         }
     }
 
-    fn obey(&mut self, order: Order) -> Result<String, Refusal> {
+    fn execute(&mut self, order: Order) -> Result<String, Refusal> {
         let stop = Arc::clone(&self.stop);
         let stop = move || stop.load(Ordering::SeqCst);
         match order {
@@ -401,9 +403,9 @@ impl Table {
         };
         self.points.retain(|p| p.name != name);
         let [x, y, z] = robot.to_array();
-        let said = format!("point {name} at ({x:.3}, {y:.3}, {z:.3}) mm");
+        let text = format!("point {name} at ({x:.3}, {y:.3}, {z:.3}) mm");
         self.points.push(NamedPoint { name, skin, robot });
-        Ok(said)
+        Ok(text)
     }
 
     fn block(&self) -> String {
@@ -412,18 +414,18 @@ impl Table {
     }
 }
 
-/// The lines of standard input, read on a thread of its own so that the robot is looked at meanwhile.
+/// Reads lines of standard input on a separate thread, so that the robot is polled meanwhile.
 fn read_lines() -> Result<Receiver<String>, Failure> {
-    let (tell, hear) = sync_channel(16);
+    let (sender, receiver) = sync_channel(16);
     std::thread::Builder::new()
         .name("jog-input".to_owned())
         .spawn(move || {
             for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-                if tell.send(line).is_err() {
-                    return; // nobody listens any more
+                if sender.send(line).is_err() {
+                    return; // the receiver is gone
                 }
             }
         })
-        .map(|_| hear)
+        .map(|_| receiver)
         .map_err(|e| Failure::internal(format!("cannot read standard input: {e}")))
 }

@@ -1,43 +1,43 @@
-//! What the operator types, as orders.
+//! Parser of the commands that the operator types.
 
 use skinrig_settings::Dimension;
 use skinrig_settings::quantity::{self, QuantityError};
 
-/// One line.
+/// A typed command.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Order {
-    /// Along one axis, 0 to 2, by so many mm.
+    /// Move along an axis, 0 to 2, by a distance, mm.
     By(usize, f64),
-    /// Straight to a point, mm.
+    /// Move straight to a point, mm.
     To([f64; 3]),
-    /// Speed of the motions to come, mm/s.
+    /// Set the speed of later motions, mm/s.
     Speed(f64),
-    /// Where is the tip?
+    /// Print the position of the tip.
     Where,
-    /// Slowly down, at most so many mm.
+    /// Move slowly down until contact, at most this distance, mm.
     Touch(f64),
-    /// The last touch is this point; where it lies on the skin, mm, when that is said.
+    /// Name the last touched point; optionally with its position on the skin, mm.
     Point(String, Option<[f64; 3]>),
     /// Print the touched points as a block for the rig file.
     Points,
-    /// What can be typed.
+    /// Print the commands.
     Help,
-    /// The end.
+    /// End the jog.
     Quit,
 }
 
-/// What can be typed.
+/// List of the commands.
 pub(crate) const HELP: &str = "\
 x +1mm | y -0.5mm | z +10mm   move along one axis
 to 0 0 5 mm                   move straight to a point
-speed 5mm/s                   speed of the moves to come
+speed 5mm/s                   speed of later moves
 where                         where the tip is
-touch [5mm]                   slowly down, at most so far, until the force rises; then off again
-point NAME [at 10 2 0 mm]     the last touch is this point (where it lies on the skin)
+touch [5mm]                   slowly down, at most this far, until the force rises; then lift off
+point NAME [at 10 2 0 mm]     name the last touched point (with its position on the skin)
 points                        the touched points as a block for the rig file
-quit                          hold, rise, disarm";
+quit                          hold, retract, disarm";
 
-/// Why a line is not an order.
+/// Invalid command.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(crate) enum OrderError {
     /// The first word is unknown.
@@ -48,10 +48,10 @@ pub(crate) enum OrderError {
         /// The word.
         found: String,
     },
-    /// An order without arguments has one.
+    /// A command without arguments got one.
     #[error("expected nothing after `{word}`, found `{found}`")]
     Argument {
-        /// The order.
+        /// The command.
         word: String,
         /// What follows it.
         found: String,
@@ -65,13 +65,13 @@ pub(crate) enum OrderError {
         /// The speed, mm/s.
         mm_s: f64,
     },
-    /// A way of 0 or below.
-    #[error("expected a way above 0, found {mm} mm")]
+    /// A distance of 0 or below.
+    #[error("expected a distance above 0, found {mm} mm")]
     Way {
-        /// The way, mm.
+        /// The distance, mm.
         mm: f64,
     },
-    /// Not the name of a point, or more than that.
+    /// Invalid name of a point, or extra words.
     #[error(
         "expected `point NAME` or `point NAME at 10 2 0 mm`, the name of letters, digits, - and _, found `{found}`"
     )]
@@ -87,13 +87,13 @@ pub(crate) enum OrderError {
     },
 }
 
-/// How far `touch` goes down when it is not said, mm.
+/// Default distance of `touch`, mm.
 const TOUCH_WAY_MM: f64 = 5.0;
 
-/// Reads a line; `None` for a blank one and a comment.
+/// Parses a line; `None` for blank lines and comments.
 ///
 /// # Errors
-/// [`OrderError`]: what was expected and found.
+/// [`OrderError`] for an invalid command.
 pub(super) fn parse(line: &str) -> Result<Option<Order>, OrderError> {
     let line = line.split('#').next().unwrap_or("").trim();
     let (word, rest) = match line.split_once(char::is_whitespace) {
@@ -161,14 +161,14 @@ fn length(text: &str) -> Result<f64, OrderError> {
     measured(text, Dimension::Length)
 }
 
-/// Three lengths: each with its unit, or one unit for all at the end. Commas may stand between.
+/// Three lengths: each with its unit, or one unit for all at the end. Commas between them are allowed.
 fn triple(text: &str) -> Result<[f64; 3], OrderError> {
     let flat = text.replace(',', " ");
     let words: Vec<&str> = flat.split_whitespace().collect();
     let one = |a: &str, unit: &str| length(&format!("{a}{unit}"));
     match words.as_slice() {
         [x, y, z] => {
-            // `0 0 5mm`: the last unit holds for those without one.
+            // `0 0 5mm`: the last unit applies to the numbers without one.
             let unit = z.trim_start_matches(|c: char| !c.is_alphabetic() && c != 'µ');
             let each = |a: &str| {
                 let has_unit = a.ends_with(char::is_alphabetic);
@@ -189,7 +189,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_mean_what_they_say() {
+    fn commands_are_parsed() {
         let order = |line: &str| parse(line).unwrap();
         assert_eq!(order("x +1mm"), Some(Order::By(0, 1.0)));
         assert_eq!(order("  z -0.5 mm # down"), Some(Order::By(2, -0.5)));

@@ -1,15 +1,15 @@
-//! Touched points as the block that a rig file wants.
+//! Formats touched points as a block for the rig file.
 
 use skinrig_model::{Point3, Robot};
 
 /// A touched point.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct NamedPoint {
-    /// As the operator called it.
+    /// Name given by the operator.
     pub name: String,
-    /// Where it lies on the skin, mm, when the operator said so.
+    /// Position on the skin, mm, if the operator gave it.
     pub skin: Option<[f64; 3]>,
-    /// Where the tip was.
+    /// Position of the tip.
     pub robot: Point3<Robot>,
 }
 
@@ -29,7 +29,7 @@ pub(super) fn block(points: &[NamedPoint], date: &str) -> String {
         ));
     }
     if points.len() < 3 {
-        out.push_str("    # a frame needs at least three points that do not lie on one line\n");
+        out.push_str("    # a frame needs at least three points that are not on one line\n");
     }
     out
 }

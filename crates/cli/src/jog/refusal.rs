@@ -1,22 +1,22 @@
-//! Owns the reasons for which an order is not obeyed.
+//! Reasons for rejecting a command.
 
 use skinrig_controller::{ControllerError, GuardError};
 use skinrig_device::DeviceError;
 
 use super::order::OrderError;
 
-/// Why an order was not obeyed.
+/// Why a command was not executed.
 pub(super) enum Refusal {
-    /// It may not be; the robot is as it was.
+    /// Invalid or not allowed; the robot did not move.
     Input(InputError),
     /// The robot failed.
     Rig(ControllerError),
 }
 
-/// What is wrong with an order.
+/// Error in a command.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum InputError {
-    /// The line is no order.
+    /// The line is not a command.
     #[error(transparent)]
     Order(#[from] OrderError),
     /// `point` without a touch before it.
@@ -24,14 +24,14 @@ pub(super) enum InputError {
     NoTouch,
     /// The motion would go below the floor.
     #[error(
-        "{0}\n  next: check where the skin is; if it lies lower than the rig file's frame says, start `skinrig jog` \
+        "{0}\n  next: check where the skin is; if it is lower than in the rig file's frame, start `skinrig jog` \
          with --beyond-frame"
     )]
     Floor(#[source] GuardError),
     /// The motion breaks another limit.
     #[error(transparent)]
     Guard(GuardError),
-    /// The robot refuses it.
+    /// The robot rejects it.
     #[error(transparent)]
     Device(DeviceError),
 }
@@ -39,7 +39,7 @@ pub(super) enum InputError {
 impl From<ControllerError> for Refusal {
     fn from(e: ControllerError) -> Self {
         match e {
-            // The robot is silent: no matter of what was typed.
+            // A fault of the robot, not of the command.
             ControllerError::Guard(
                 GuardError::StalePose { .. } | GuardError::NotArmed | GuardError::Tripped { .. },
             ) => Self::Rig(e),

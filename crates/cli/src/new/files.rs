@@ -1,20 +1,20 @@
-//! The files that travel inside the program, and the kinds of protocols that `skinrig new` writes.
+//! Starter files embedded in the program, and the kinds of protocols that `skinrig new` writes.
 
 use std::borrow::Cow;
 
 use clap::ValueEnum;
 
-/// A file to begin with.
+/// A starter file.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StarterFile {
-    /// Its place in a lab's folder.
+    /// Path in the lab folder.
     pub(super) path: &'static str,
     content: Content,
 }
 
 #[derive(Debug, Clone, Copy)]
 enum Content {
-    /// Written by hand; the user's own once it is there.
+    /// Written by hand; belongs to the user once written.
     Text(&'static str),
     /// Generated from this version's declarations of settings.
     Generated(fn() -> String),
@@ -52,7 +52,7 @@ impl StarterFile {
     }
 }
 
-/// A file of the repository that stands at the same place in a lab's folder.
+/// A file of the repository with the same path in the lab folder.
 macro_rules! same {
     ($path:literal) => {
         StarterFile::text($path, include_str!(concat!("../../../../", $path)))
@@ -69,13 +69,13 @@ const OWN_OUTLINE: StarterFile = same!("protocols/own-outline.yaml");
 const OWN_CAMERAS: StarterFile = same!("protocols/own-cameras.yaml");
 const OTHER_SKIN: StarterFile = same!("protocols/other-skin.yaml");
 
-/// For editors, beside protocols.
+/// Schema of protocols, for editors.
 pub(super) const PROTOCOL_SCHEMA: StarterFile = StarterFile::generated(
     "protocols/skinrig.schema.json",
     skinrig_protocol::schema_json,
 );
 
-/// What `skinrig init` writes: the paths of the repository, so that every documented command holds there too.
+/// Files that `skinrig init` writes, at the paths of the repository so that documented commands work in the lab folder.
 pub(super) const LAB: &[StarterFile] = &[
     DEMO,
     CAMPAIGN,
@@ -109,12 +109,12 @@ pub(super) const LAB: &[StarterFile] = &[
     ),
 ];
 
-/// Kinds of protocols to begin with.
+/// Kinds of starter protocols.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ProtocolKind {
     /// The published experiment: 250 locations, ten repetitions
     Campaign,
-    /// The same presses on every skin that is to be compared
+    /// The same presses on every skin, for a comparison
     Comparison,
     /// Five depths at scattered locations, in random order
     DepthSweep,
@@ -124,7 +124,7 @@ pub(crate) enum ProtocolKind {
     Rings,
     /// A skin of your own shape, with an area to keep out of
     OwnOutline,
-    /// Cameras at places of your own, simulated
+    /// Simulated cameras at positions of your own
     OwnCameras,
     /// A simulated skin that differs from the published one
     OtherSkin,
@@ -133,7 +133,7 @@ pub(crate) enum ProtocolKind {
 }
 
 impl ProtocolKind {
-    /// The word for it on the command line.
+    /// Its name on the command line.
     pub(super) fn name(self) -> String {
         self.to_possible_value()
             .map(|value| value.get_name().to_owned())

@@ -1,4 +1,4 @@
-//! `skinrig new` and `skinrig init`: files to begin with, which travel inside the program.
+//! `skinrig new` and `skinrig init`: starter files, which are embedded in the program.
 
 mod files;
 
@@ -11,22 +11,22 @@ use self::files::{LAB, PROTOCOL_SCHEMA, StarterFile};
 use crate::args::{InitArgs, NewArgs};
 use crate::exit::{Exit, Failure, Outcome};
 
-/// What became of one file.
+/// Outcome of writing a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 enum Written {
-    /// It was not there.
+    /// Created.
     New,
-    /// It was there and is generated: it now has the content of this version.
+    /// Existing generated file, replaced by the content of this version.
     Updated,
-    /// It was there and stays as it is.
+    /// Existing file, unchanged.
     Kept,
 }
 
 /// Writes one protocol of a kind, and the schema for editors beside it. Never overwrites a protocol.
 ///
 /// # Errors
-/// [`Failure::input`] when the file is there already or cannot be written.
+/// [`Failure::input`] when the file already exists or cannot be written.
 pub(crate) fn new(args: &NewArgs, json: bool) -> Outcome {
     let template = args.kind.file();
     let file = match &args.file {
@@ -40,7 +40,7 @@ pub(crate) fn new(args: &NewArgs, json: bool) -> Outcome {
     fs::create_dir_all(folder).map_err(|e| unwritable(folder, &e))?;
     if write(&file, template)? == Written::Kept {
         return Err(Failure::input(format!(
-            "{}: expected a file that is not there yet\n  next: name another, such as `skinrig new {} OTHER.yaml`",
+            "{}: expected a new file, found an existing one\n  next: choose another name, such as `skinrig new {} OTHER.yaml`",
             file.display(),
             args.kind.name(),
         )));
@@ -58,16 +58,16 @@ pub(crate) fn new(args: &NewArgs, json: bool) -> Outcome {
         outln!("{}", path.display());
     }
     outln!(
-        "next: put in who and which skin (`operator`, `prototype.id`), then `skinrig check {}`",
+        "next: set `operator` and `prototype.id`, then `skinrig check {}`",
         file.display()
     );
     Ok(Exit::Ok)
 }
 
-/// Makes a lab's folder: protocols, rig file, suites, schemas, and a folder for sessions. Keeps what is there; renews schemas.
+/// Creates a lab folder: protocols, rig file, suites, schemas, and a folder for sessions. Keeps existing files; updates schemas.
 ///
 /// # Errors
-/// [`Failure::input`] when something cannot be written.
+/// [`Failure::input`] when a file cannot be written.
 pub(crate) fn init(args: &InitArgs, json: bool) -> Outcome {
     let folder = args.folder.as_path();
     let mut files = Vec::new();
@@ -89,7 +89,7 @@ pub(crate) fn init(args: &InitArgs, json: bool) -> Outcome {
     }
     let kept = match (count(Written::Kept), count(Written::Updated)) {
         (0, 0) => String::new(),
-        (kept, updated) => format!(", {updated} renewed, {kept} kept as they are"),
+        (kept, updated) => format!(", {updated} updated, {kept} kept"),
     };
     outln!(
         "{}: {} files written{kept}",
@@ -97,7 +97,7 @@ pub(crate) fn init(args: &InitArgs, json: bool) -> Outcome {
         count(Written::New)
     );
     outln!("protocols/       campaigns to copy from; `skinrig new --help` lists them");
-    outln!("hil/rigs/        bench.yaml: copy it and put in what `skinrig devices` shows");
+    outln!("hil/rigs/        bench.yaml: copy it and fill in what `skinrig devices` shows");
     outln!("hil/             suites of checks: first-contact.yaml, nightly.yaml");
     outln!("sessions/        where recordings go");
     let enter = if folder == Path::new(".") {
@@ -109,7 +109,7 @@ pub(crate) fn init(args: &InitArgs, json: bool) -> Outcome {
     Ok(Exit::Ok)
 }
 
-/// Writes a file where there is none; renews one that is generated.
+/// Creates a missing file; updates a generated one.
 fn write(path: &Path, file: StarterFile) -> Result<Written, Failure> {
     let content = file.content();
     match OpenOptions::new().write(true).create_new(true).open(path) {
@@ -132,7 +132,7 @@ fn write(path: &Path, file: StarterFile) -> Result<Written, Failure> {
 
 fn unwritable(path: &Path, e: &std::io::Error) -> Failure {
     Failure::input(format!(
-        "{}: expected a place that can be written: {e}\n  next: choose another folder",
+        "{}: expected a writable path: {e}\n  next: choose another folder",
         path.display()
     ))
 }

@@ -1,4 +1,4 @@
-//! What a run shows of itself to other terminals, and what it takes from them.
+//! State of a run for other terminals, and their requests to it.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -10,10 +10,10 @@ use super::error::ServerError;
 use super::server::Server;
 use super::wire::{Live, Reply, Request, RunRequest};
 
-/// How often bulk data renew what is shown.
-const RENEW_EVERY: Duration = Duration::from_millis(100);
+/// Shortest interval between updates caused by bulk data.
+const UPDATE_EVERY: Duration = Duration::from_millis(100);
 
-/// Where the controller's thread leaves a copy of the run's progress.
+/// A copy of the run's progress, updated by the controller's thread.
 #[derive(Debug)]
 pub(crate) struct Board {
     progress: Arc<Mutex<Progress>>,
@@ -22,7 +22,7 @@ pub(crate) struct Board {
 }
 
 impl Board {
-    /// A board of a run that nothing is known of yet.
+    /// A board for a run without progress.
     #[must_use]
     pub(crate) fn new(control: ControlHandle) -> Self {
         Self {
@@ -37,7 +37,7 @@ impl Board {
     pub(crate) fn answer(&self, request: Request) -> Reply {
         match request {
             Request::Status => Reply::Live(Box::new(self.live())),
-            // Whoever ends a run that is over would otherwise wait for an answer that never comes.
+            // The acknowledgement of a request to a finished run would never come.
             _ if self.control.state() == State::Finished => {
                 Reply::Refused("expected a run under way, found one that has ended".to_owned())
             }
@@ -61,7 +61,7 @@ impl Board {
 
     fn live(&self) -> Live {
         let c = &self.control;
-        // What was heard first: a state that is read later is at least as new.
+        // Read the acknowledgements first: a state that is read later is at least as new.
         let counts = [c.requests_acknowledged(), c.notes_recorded()];
         let [heard, noted] = counts;
         let progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
@@ -75,37 +75,37 @@ impl Board {
     }
 }
 
-/// The side of the run: listens, and is told the progress. Dropped, it listens no more.
+/// The run's end of the connection: answers other terminals until it is dropped.
 pub(crate) struct Remote {
     progress: Arc<Mutex<Progress>>,
-    renewed: Option<Instant>,
+    updated: Option<Instant>,
     _server: Server,
 }
 
 impl Remote {
-    /// Listens for the session at `session`, which this process writes.
+    /// Listens for requests to `session`, which this process writes.
     ///
     /// # Errors
-    /// Why that is not possible; the run does without.
+    /// [`ServerError`] when that is not possible; the run continues without it.
     pub(crate) fn open(session: &Path, control: &ControlHandle) -> Result<Self, ServerError> {
         let board = Board::new(control.clone());
         let progress = Arc::clone(&board.progress);
         let server = Server::open(session, move |request| board.answer(request))?;
         Ok(Self {
             progress,
-            renewed: None,
+            updated: None,
             _server: server,
         })
     }
 
-    /// Renews what is shown, `bulk` data from time to time only; leaves it when somebody reads it at this instant.
+    /// Updates the progress; for `bulk` data only from time to time. Skips the update while another terminal reads.
     pub(crate) fn show(&mut self, progress: &Progress, bulk: bool) {
-        if bulk && self.renewed.is_some_and(|t| t.elapsed() < RENEW_EVERY) {
+        if bulk && self.updated.is_some_and(|t| t.elapsed() < UPDATE_EVERY) {
             return;
         }
         if let Ok(mut shown) = self.progress.try_lock() {
             shown.clone_from(progress);
-            self.renewed = Some(Instant::now());
+            self.updated = Some(Instant::now());
         }
     }
 }
@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn requests_go_to_the_hand_and_back_comes_their_number() {
+    fn requests_reach_the_controller_and_return_their_number() {
         let control = ControlHandle::new();
         let board = Board::new(control.clone());
         assert_eq!(

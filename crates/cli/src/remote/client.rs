@@ -5,7 +5,7 @@ use std::path::Path;
 use super::error::RemoteError;
 use super::wire::{Reply, Request};
 
-/// Asks the run that writes the session at `session`.
+/// Sends a request to the run that writes `session`, and returns its reply.
 ///
 /// # Errors
 /// [`RemoteError`].
@@ -18,12 +18,12 @@ pub(crate) fn ask(session: &Path, request: &Request) -> Result<Reply, RemoteErro
 
     for place in super::place::places(session).map_err(ExchangeError::Place)? {
         match UnixStream::connect(&place) {
-            Ok(stream) => return talk(stream, request),
+            Ok(stream) => return exchange(stream, request),
             Err(e) => match e.kind() {
                 ErrorKind::PermissionDenied => {
                     return Err(ExchangeError::OtherUser { place }.into());
                 }
-                // Nothing there, nobody behind it, no socket, or an address that is too long for one.
+                // No file, no listener, not a socket, or a path too long for a socket.
                 _ => continue,
             },
         }
@@ -39,18 +39,21 @@ pub fn ask(_session: &Path, _request: &Request) -> Result<Reply, RemoteError> {
 }
 
 #[cfg(unix)]
-fn talk(stream: std::os::unix::net::UnixStream, request: &Request) -> Result<Reply, RemoteError> {
+fn exchange(
+    stream: std::os::unix::net::UnixStream,
+    request: &Request,
+) -> Result<Reply, RemoteError> {
     use std::io::{ErrorKind, Read, Write};
     use std::time::Duration;
 
     use super::error::ExchangeError;
 
-    /// Longest wait for an answer: others may be before us.
+    /// Longest wait for a reply: other requests may come first.
     const ANSWER_WITHIN: Duration = Duration::from_secs(5);
 
     super::place::check_peer(&stream, super::place::may_answer).map_err(ExchangeError::Peer)?;
-    let mut said = Vec::new();
-    let mut talked = || -> std::io::Result<()> {
+    let mut reply = Vec::new();
+    let mut transfer = || -> std::io::Result<()> {
         let mut stream = &stream;
         stream.set_read_timeout(Some(ANSWER_WITHIN))?;
         stream.set_write_timeout(Some(ANSWER_WITHIN))?;
@@ -58,16 +61,16 @@ fn talk(stream: std::os::unix::net::UnixStream, request: &Request) -> Result<Rep
         line.push(b'\n');
         stream.write_all(&line)?;
         let most = super::wire::MOST_REPLY_BYTES as u64;
-        stream.take(most).read_to_end(&mut said)?;
+        stream.take(most).read_to_end(&mut reply)?;
         Ok(())
     };
-    match talked() {
-        // The run ended while we asked.
+    match transfer() {
+        // The run ended during the exchange.
         Err(e) if matches!(e.kind(), ErrorKind::BrokenPipe | ErrorKind::ConnectionReset) => {
             Err(RemoteError::NotListening)
         }
         Err(e) => Err(ExchangeError::NoAnswer(e).into()),
-        Ok(()) if said.is_empty() => Err(RemoteError::NotListening),
-        Ok(()) => Ok(serde_json::from_slice(&said).map_err(ExchangeError::Unreadable)?),
+        Ok(()) if reply.is_empty() => Err(RemoteError::NotListening),
+        Ok(()) => Ok(serde_json::from_slice(&reply).map_err(ExchangeError::Unreadable)?),
     }
 }

@@ -1,9 +1,9 @@
-//! Owns the errors between a run and other terminals.
+//! Errors of the connection between a run and other terminals.
 
 use std::io;
 use std::path::PathBuf;
 
-/// Why a run gave no answer.
+/// A run did not answer.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum RemoteError {
     /// No program is listening: there is no run, or it was killed.
@@ -14,10 +14,10 @@ pub(crate) enum RemoteError {
     Failed(#[from] ExchangeError),
 }
 
-/// Why the exchange with a listening program failed.
+/// The exchange with a listening program failed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ExchangeError {
-    /// The session has no place for a socket.
+    /// The session has no path for a socket.
     #[error(transparent)]
     Place(io::Error),
     /// The socket belongs to another user.
@@ -26,21 +26,21 @@ pub(crate) enum ExchangeError {
         /// The socket.
         place: PathBuf,
     },
-    /// The other end is not who it should be.
+    /// The other end is rejected.
     #[error(transparent)]
     Peer(#[from] PeerError),
     /// Sending or receiving failed.
     #[error("no answer from the run: {0}")]
     NoAnswer(#[source] io::Error),
-    /// The answer is not one of this version.
-    #[error("an unreadable answer: {0}")]
+    /// The reply is not of this version.
+    #[error("expected a reply of this version of skinrig, found other bytes: {0}")]
     Unreadable(#[source] serde_json::Error),
 }
 
-/// Why the other end of a socket may not take part.
+/// The other end of a socket is rejected.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum PeerError {
-    /// The kernel does not tell its user.
+    /// The kernel does not report its user.
     #[error("cannot identify the other end: {0}")]
     Unidentified(#[source] io::Error),
     /// It is another user.
@@ -53,20 +53,20 @@ pub(crate) enum PeerError {
     },
 }
 
-/// Why a run cannot listen to other terminals.
+/// A run cannot listen for requests.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ServerError {
-    /// The system refuses the thread, or the session's folder is gone.
+    /// The thread cannot be started, or the session's folder is missing.
     #[error(transparent)]
     System(#[from] io::Error),
-    /// No place takes the socket.
+    /// The socket can be created at neither path.
     #[error("{}: {beside_error}; {}: {own_error}", beside.display(), own.display())]
     Bind {
-        /// The place beside the session.
+        /// The path beside the session.
         beside: PathBuf,
         /// Why it cannot be used.
         beside_error: io::Error,
-        /// The place in the user's own folder.
+        /// The path in the user's folder.
         own: PathBuf,
         /// Why it cannot be used.
         #[source]

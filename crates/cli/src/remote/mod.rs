@@ -1,8 +1,8 @@
-//! The hand on a run from another terminal: a socket of the file system beside the session, and what goes over it.
+//! Control of a run from another terminal, over a Unix socket beside the session.
 //!
-//! One line of JSON asks, one answers. Only the user of the run (and root) gets in; there is no network port. The controller
-//! never waits for any of it: requests are bits of its [`ControlHandle`](skinrig_controller::ControlHandle), remarks a short
-//! queue, and what is told of the run is a copy that it leaves behind when nobody is reading.
+//! A request and its reply are one line of JSON each. Only the user of the run and root may connect; there is no network port. The
+//! controller never waits for a terminal: requests are bits of its [`ControlHandle`](skinrig_controller::ControlHandle), notes go
+//! through a short queue, and the progress is a copy that it updates while no terminal reads it.
 
 mod board;
 mod client;
@@ -18,14 +18,14 @@ pub(crate) use client::ask;
 pub(crate) use error::RemoteError;
 pub(crate) use wire::{Live, MOST_NAME_CHARS, Reply, Request, RunRequest};
 
-/// No sockets of the file system here.
+/// This system has no Unix sockets.
 #[cfg(not(unix))]
 mod server {
     use std::path::Path;
 
     use super::{Reply, Request, ServerError};
 
-    /// Nothing listens.
+    /// Never opened.
     pub(crate) struct Server;
 
     impl Server {

@@ -1,4 +1,4 @@
-//! Where the socket of a session lies, and who may use it.
+//! Path of a session's socket, and which users may connect.
 
 use std::fs;
 use std::io;
@@ -10,9 +10,9 @@ use sha2::{Digest, Sha256};
 
 use super::error::PeerError;
 
-/// The places of the socket of `session`, the preferred one first: beside it; where that cannot be (the address of a socket
-/// is at most about 100 bytes long, and not every file system has sockets) in a folder of the user's own, under a name made
-/// of the session's path. None depends on the environment, so that every terminal finds the same.
+/// Paths of the socket of `session`, the preferred one first: beside it, or, where that is impossible (the path of a socket is
+/// at most about 100 bytes long, and not every file system has sockets), in a folder of the user, under a name derived from the
+/// session's path. Neither depends on the environment, so that every terminal finds the same.
 ///
 /// # Errors
 /// When the session's folder cannot be found.
@@ -25,15 +25,15 @@ pub(super) fn places(session: &Path) -> io::Result<[PathBuf; 2]> {
     Ok([PathBuf::from(beside), own_folder().join(name)])
 }
 
-/// The folder of the user's own for sockets that cannot lie beside their session.
+/// The user's folder for sockets that cannot be beside their session.
 pub(crate) fn own_folder() -> PathBuf {
     PathBuf::from(format!("/tmp/skinrig-{}", me()))
 }
 
-/// Makes the folder of the user's own, and refuses one that others can reach.
+/// Creates the user's folder; rejects one that other users can access.
 ///
 /// # Errors
-/// When it cannot be made, or somebody else made it.
+/// When it cannot be created, or belongs to another user.
 pub(crate) fn make_own_folder() -> io::Result<()> {
     let folder = own_folder();
     match fs::DirBuilder::new().mode(0o700).create(&folder) {
@@ -43,7 +43,7 @@ pub(crate) fn make_own_folder() -> io::Result<()> {
     let found = fs::symlink_metadata(&folder)?;
     if !found.is_dir() || found.uid() != me() || found.mode() & 0o077 != 0 {
         return Err(io::Error::other(format!(
-            "{}: expected a folder of this user alone, found another",
+            "{}: expected a folder that only this user can access, found another",
             folder.display()
         )));
     }
@@ -54,11 +54,11 @@ fn me() -> u32 {
     rustix::process::geteuid().as_raw()
 }
 
-/// Whether the other end may do what it does, by who it is as the kernel knows it. On systems that do not tell, the permissions of
-/// the socket alone keep strangers out.
+/// Checks the user at the other end, as reported by the kernel. On systems that do not report it, only the permissions of the
+/// socket keep other users out.
 ///
 /// # Errors
-/// [`PeerError`]: what the stranger is told.
+/// [`PeerError`] if the user is rejected.
 pub(crate) fn check_peer(stream: &UnixStream, may: fn(u32, u32) -> bool) -> Result<(), PeerError> {
     #[cfg(target_os = "linux")]
     {
@@ -79,12 +79,12 @@ pub(crate) fn check_peer(stream: &UnixStream, may: fn(u32, u32) -> bool) -> Resu
     Ok(())
 }
 
-/// Who may ask a run of `me`: its own user and root.
+/// True if `peer` may control a run of `me`: the same user, and root.
 pub(crate) const fn may_ask(peer: u32, me: u32) -> bool {
     peer == me || peer == 0
 }
 
-/// Whose run `me` may ask: its own, and root any.
+/// True if `me` may trust a run of `peer`: its own, and root any.
 pub(crate) const fn may_answer(peer: u32, me: u32) -> bool {
     peer == me || me == 0
 }
@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn strangers_are_refused() {
+    fn other_users_are_rejected() {
         assert!(may_ask(1000, 1000) && may_ask(0, 1000));
         assert!(!may_ask(1001, 1000) && !may_ask(1000, 0));
         assert!(may_answer(1000, 1000) && may_answer(1000, 0));
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn every_way_to_a_session_gives_the_same_places() {
+    fn every_path_to_a_session_gives_the_same_sockets() {
         let folder = tempfile::tempdir().unwrap();
         let session = folder.path().join("a.session.sqlite");
         fs::write(&session, "").unwrap();

@@ -1,4 +1,4 @@
-//! The thread that listens for other terminals, and one for each that asks, for a short time: none waits for another.
+//! Listens for requests of other terminals; a short-lived thread serves each one, so that none waits for another.
 
 use std::fs;
 use std::io::{self, Read, Write};
@@ -14,28 +14,28 @@ use super::error::ServerError;
 use super::place;
 use super::wire::{MOST_REQUEST_BYTES, Reply, Request, RequestError};
 
-/// Who asks must have asked within this time.
+/// Time limit for a caller to send its request.
 const ASK_WITHIN: Duration = Duration::from_millis(300);
-/// So many may ask at once; beyond, the next one waits for the last of them.
+/// Callers served at once; a further one is served on the listening thread, so that the next ones wait.
 const MOST_AT_ONCE: usize = 256;
-/// Between two tries to take in a caller when the system refuses (no free file descriptor).
+/// Pause after the system failed to accept a caller (no free file descriptor).
 const TRY_AGAIN: Duration = Duration::from_millis(100);
 
-/// Listens until it is dropped; the socket goes away with it.
+/// Listens until it is dropped, which removes the socket.
 #[derive(Debug)]
 pub(crate) struct Server {
     path: PathBuf,
-    /// Device and inode of the socket, so that nobody else's is removed.
+    /// Device and inode of the socket, so that no other one is removed.
     id: (u64, u64),
-    over: Arc<AtomicBool>,
+    stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Server {
-    /// Listens for the session at `session`, whose only writer is this process: a socket that lies there is left over.
+    /// Listens for requests to `session`. This process is its only writer, so an existing socket is a leftover.
     ///
     /// # Errors
-    /// Why no place of a socket can be used.
+    /// [`ServerError`] when no socket can be created.
     pub(super) fn open(
         session: &Path,
         answer: impl FnMut(Request) -> Reply + Send + 'static,
@@ -57,18 +57,18 @@ impl Server {
             },
         };
         let id = identity(&path)?;
-        let over = Arc::new(AtomicBool::new(false));
-        let is_over = Arc::clone(&over);
+        let stop = Arc::new(AtomicBool::new(false));
+        let is_stopped = Arc::clone(&stop);
         let thread = std::thread::Builder::new()
             .name("control".to_owned())
             .spawn(move || {
                 for caller in listener.incoming() {
-                    if is_over.load(Ordering::Acquire) {
+                    if is_stopped.load(Ordering::Acquire) {
                         return;
                     }
                     match caller {
-                        // A caller that goes away or says nonsense is none of the run's business.
-                        Ok(stream) => hand_over(stream, &answer),
+                        // A caller that disconnects or sends nonsense does not affect the run.
+                        Ok(stream) => spawn_serve(stream, &answer),
                         Err(_) => std::thread::sleep(TRY_AGAIN),
                     }
                 }
@@ -76,7 +76,7 @@ impl Server {
         Ok(Self {
             path,
             id,
-            over,
+            stop,
             thread: Some(thread),
         })
     }
@@ -84,8 +84,8 @@ impl Server {
 
 impl Drop for Server {
     fn drop(&mut self) {
-        self.over.store(true, Ordering::Release);
-        // A last caller wakes the thread. Where the socket was removed it sleeps on, and ends with the process.
+        self.stop.store(true, Ordering::Release);
+        // Connect once to wake the thread. If the socket was removed, the thread sleeps until the process ends.
         let woken = identity(&self.path).is_ok_and(|id| id == self.id)
             && UnixStream::connect(&self.path).is_ok();
         if let Some(thread) = self.thread.take()
@@ -99,8 +99,8 @@ impl Drop for Server {
     }
 }
 
-/// Serves a caller on a thread of its own, so that one that is slow or says nothing keeps nobody waiting.
-fn hand_over<A>(stream: UnixStream, answer: &Arc<Mutex<A>>)
+/// Serves a caller on its own thread, so that a slow or silent one does not delay others.
+fn spawn_serve<A>(stream: UnixStream, answer: &Arc<Mutex<A>>)
 where
     A: FnMut(Request) -> Reply + Send + 'static,
 {
@@ -109,7 +109,7 @@ where
     }
     let answer = Arc::clone(answer);
     let serving = std::thread::Builder::new().name("control-caller".to_owned());
-    // Refused by the system: the caller hears nothing, and may ask again.
+    // If the thread cannot be started, the caller gets no reply and may try again.
     let _ = serving.spawn(move || drop(serve(stream, &answer)));
 }
 
@@ -129,11 +129,11 @@ fn identity(path: &Path) -> io::Result<(u64, u64)> {
     fs::symlink_metadata(path).map(|m| (m.dev(), m.ino()))
 }
 
-/// Hears one request and answers it.
+/// Reads one request and answers it.
 fn serve(mut stream: UnixStream, answer: &Mutex<impl FnMut(Request) -> Reply>) -> io::Result<()> {
     let reply = match place::check_peer(&stream, place::may_ask) {
         Err(why) => Reply::Refused(why.to_string()),
-        Ok(()) => match hear(&mut stream)? {
+        Ok(()) => match read_request(&mut stream)? {
             Err(why) => Reply::Refused(why.to_string()),
             Ok(request) => {
                 let mut answer = answer.lock().unwrap_or_else(PoisonError::into_inner);
@@ -147,8 +147,8 @@ fn serve(mut stream: UnixStream, answer: &Mutex<impl FnMut(Request) -> Reply>) -
     stream.write_all(&line)
 }
 
-/// Reads one line within the time and length that a caller has.
-fn hear(stream: &mut UnixStream) -> io::Result<Result<Request, RequestError>> {
+/// Reads one line within the limits on time and length.
+fn read_request(stream: &mut UnixStream) -> io::Result<Result<Request, RequestError>> {
     let until = Instant::now() + ASK_WITHIN;
     let (mut line, mut block) = (Vec::new(), [0; 1024]);
     loop {
@@ -159,7 +159,7 @@ fn hear(stream: &mut UnixStream) -> io::Result<Result<Request, RequestError>> {
         stream.set_read_timeout(Some(left))?;
         let n = match stream.read(&mut block) {
             Err(e) if e.kind() == io::ErrorKind::Interrupted => continue,
-            // The time is over.
+            // Timed out: the next turn returns.
             Err(e)
                 if matches!(
                     e.kind(),
@@ -205,10 +205,10 @@ mod tests {
     const PAUSE: Request = Request::Control(RunRequest::Pause);
 
     #[test]
-    fn a_socket_that_was_left_over_is_replaced_and_the_own_one_removed() {
+    fn a_leftover_socket_is_replaced_and_the_own_one_removed() {
         let (folder, session) = session();
         let place = &place::places(&session).unwrap()[0];
-        // A process that was killed leaves the socket, and nobody behind it.
+        // A killed process leaves its socket without a listener.
         drop(UnixListener::bind(place).unwrap());
         assert!(matches!(
             ask(&session, &PAUSE),
@@ -226,10 +226,10 @@ mod tests {
     }
 
     #[test]
-    fn where_no_socket_can_lie_beside_the_session_there_is_another_place() {
+    fn without_a_socket_beside_the_session_there_is_another_path() {
         let (_folder, session) = session();
         let [beside, own] = place::places(&session).unwrap();
-        // Something else lies there, and stays.
+        // Another file has that name, and stays.
         fs::write(&beside, "mine").unwrap();
         let running = server(&session);
         assert_eq!(ask(&session, &PAUSE).unwrap(), Reply::Handed(7));
@@ -237,7 +237,7 @@ mod tests {
         drop(running);
         assert!(!own.exists());
         assert_eq!(fs::read(&beside).unwrap(), b"mine");
-        // A path that is longer than an address may be.
+        // A path too long for a socket.
         let deep = session.parent().unwrap().join("d".repeat(120));
         fs::create_dir(&deep).unwrap();
         let far = deep.join("a.session.sqlite");
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn hostile_callers_are_refused_and_the_next_one_is_heard() {
+    fn hostile_callers_are_rejected_and_the_next_one_is_served() {
         let (_folder, session) = session();
         let running = server(&session);
         let place = &place::places(&session).unwrap()[0];
@@ -257,15 +257,15 @@ mod tests {
             // The server may hang up before all is written.
             let _ = stream.write_all(bytes);
             let _ = stream.shutdown(std::net::Shutdown::Write);
-            let mut said = Vec::new();
-            let _ = stream.read_to_end(&mut said);
-            String::from_utf8(said).unwrap()
+            let mut reply = Vec::new();
+            let _ = stream.read_to_end(&mut reply);
+            String::from_utf8(reply).unwrap()
         };
         assert!(call(b"\xff\0\n").contains("refused"));
         assert!(call(b"").contains("without an end"));
         assert!(call(&[b'x'; 500]).contains("without an end"));
         call(&vec![b'['; 50 * MOST_REQUEST_BYTES]);
-        // Forty that say nothing, for each of which the others would wait 300 ms, and one that is gone at once.
+        // Forty silent callers, each of which could delay the others by 300 ms, and one that disconnects at once.
         let silent: Vec<_> = (0..40)
             .map(|_| UnixStream::connect(place).unwrap())
             .collect();

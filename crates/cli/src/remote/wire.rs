@@ -1,4 +1,4 @@
-//! What is asked of a run from another terminal, and what it answers: one line of JSON each, of bounded length.
+//! Requests to a run from another terminal, and its replies: one line of JSON each, of bounded length.
 
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
@@ -7,14 +7,14 @@ use skinrig_model::CameraId;
 
 /// Longest request, bytes.
 pub(crate) const MOST_REQUEST_BYTES: usize = 16 * 1024;
-/// Longest answer, bytes.
+/// Longest reply, bytes.
 pub(crate) const MOST_REPLY_BYTES: usize = 64 * 1024;
-/// Longest remark, characters.
+/// Longest note, characters.
 pub(crate) const MOST_NOTE_CHARS: usize = 2_000;
 /// Longest name of an operator, characters.
 pub(crate) const MOST_NAME_CHARS: usize = 64;
 
-/// What the operator asks of the run; `docs/reference/runs.md` says what each does.
+/// A request of the operator; `docs/reference/runs.md` describes each one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum RunRequest {
@@ -32,7 +32,7 @@ pub(crate) enum RunRequest {
     Halt,
 }
 
-/// A question.
+/// A request.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub(crate) enum Request {
@@ -44,18 +44,18 @@ pub(crate) enum Request {
     Note {
         /// Its author.
         by: String,
-        /// The remark.
+        /// Its text.
         text: String,
     },
 }
 
-/// The answer.
+/// A reply.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Reply {
     /// The state of the run.
     Live(Box<Live>),
-    /// Accepted; the number of the request or remark.
+    /// Accepted; the number of the request or note.
     Handed(u64),
     /// Refused, with the reason.
     Refused(String),
@@ -68,9 +68,9 @@ pub(crate) struct Live {
     pub state: String,
     /// Requests made so far, by ctrl-C or from another terminal.
     pub asked: u64,
-    /// How many of them the controller has heard.
+    /// How many of them the controller has acknowledged.
     pub heard: u64,
-    /// Remarks written.
+    /// Notes written.
     pub noted: u64,
     /// Presses of the plan.
     pub planned: usize,
@@ -82,7 +82,7 @@ pub(crate) struct Live {
     pub invalid: usize,
     /// How many of them were missed.
     pub missed: usize,
-    /// How many of them a rule leaves out.
+    /// How many of them a rule excludes.
     #[serde(default)]
     pub excluded: usize,
     /// Attempts beyond the first at a press, in this leg.
@@ -95,7 +95,7 @@ pub(crate) struct Live {
     pub elapsed_s: f64,
     /// Rig time still to go, s.
     pub eta_s: Option<f64>,
-    /// Time on the wall since the leg began, s.
+    /// Wall time since the leg began, s.
     pub waited_s: f64,
     /// Marks that the trigger box sent.
     pub marks_sent: u64,
@@ -112,7 +112,7 @@ pub(crate) struct LivePress {
     pub role: skinrig_model::PressRole,
     /// Its repetition, from 1.
     pub repetition: u32,
-    /// Its place, skin frame, mm.
+    /// Its location, skin frame, mm.
     pub at_mm: [f64; 2],
 }
 
@@ -129,7 +129,7 @@ pub(crate) struct LiveCamera {
     pub marks_seen: u64,
 }
 
-/// Why what a caller sent is not a request.
+/// Invalid request.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum RequestError {
     /// The caller sent nothing in time.
@@ -165,7 +165,7 @@ pub(crate) enum RequestError {
 }
 
 impl Request {
-    /// Reads a request, which may be anything that anybody wrote.
+    /// Parses a request from untrusted bytes.
     ///
     /// # Errors
     /// [`RequestError`].
@@ -190,7 +190,7 @@ impl Request {
 }
 
 impl Live {
-    /// From what the terminal of the run shows.
+    /// The reply for a run with this progress.
     #[must_use]
     pub(crate) fn of(p: &Progress, state: State, counts: [u64; 3], waited_s: f64) -> Self {
         let [asked, heard, noted] = counts;
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_request_is_refused() {
+    fn invalid_requests_are_rejected() {
         let long = format!(
             r#"{{"note":{{"by":"Ann","text":"{}"}}}}"#,
             "x".repeat(MOST_NOTE_CHARS + 1)

@@ -1,4 +1,4 @@
-//! A bench from its rig file: the drivers opened, identified, and put together as a rig.
+//! Opens the devices of a rig file and assembles them into a rig.
 
 use std::path::Path;
 use std::time::Duration;
@@ -37,15 +37,15 @@ pub fn load(path: &Path) -> Result<RigFile, Failure> {
         .map_err(|found| Failure::findings(&found))
 }
 
-/// Lets mismatches of the cameras pass, each told with the key of the rig file that accepts it.
+/// Tolerates mismatches of the cameras; each is reported with the rig file key that accepts it.
 pub fn tolerate(rig: &mut RigFile) {
     for camera in &mut rig.cameras {
         camera.tolerant = true;
     }
 }
 
-/// Holds the plan of `protocol` within what the bench bears: the tighter limit holds, and a protocol that does not say
-/// how the surface is found takes the bench's way.
+/// Restricts `protocol` to the limits of the bench: the tighter limit applies, and a protocol without a method to find the
+/// surface uses the bench's.
 pub(crate) fn tighten(protocol: &mut Protocol, rig: &RigFile) {
     let (limits, bench) = (&mut protocol.limits, &rig.limits);
     limits.max_speed_mm_s = limits.max_speed_mm_s.min(bench.max_speed_mm_s);
@@ -54,15 +54,15 @@ pub(crate) fn tighten(protocol: &mut Protocol, rig: &RigFile) {
     protocol.surface = protocol.surface.or(rig.surface);
 }
 
-/// Opens every device of `rig`, and tells what is let pass of them. The robot stays braked.
+/// Opens every device of `rig`, and returns the record of tolerated mismatches. The robot stays braked.
 ///
 /// # Errors
-/// [`Failure::input`] when the file says that the sample is off: a run presses it, and an arm that lost its power must not
-/// sweep through it. [`Failure::rig`] naming the device that could not be opened and the next step.
+/// [`Failure::input`] when the sample is off according to the file: a run presses the sample, and an arm that lost its power
+/// must not sweep through it. [`Failure::rig`] with the device that could not be opened and the next step.
 pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<(Rig, ToleratedMismatches), Failure> {
     refuse_without_sample(rig)?;
     let clock = RealClock::start();
-    // Settings first: a bad bias file is no reason to have opened a device.
+    // Settings first: a bad bias file is reported before any device is opened.
     let camera_settings = [
         camera_settings(&rig.cameras[0], &protocol.cameras[0])?,
         camera_settings(&rig.cameras[1], &protocol.cameras[1])?,
@@ -89,7 +89,7 @@ pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<(Rig, ToleratedMismatc
     Ok((rig, tolerated))
 }
 
-/// Open devices as the rig of a run.
+/// Assembles open devices into the rig of a run.
 ///
 /// # Errors
 /// [`Failure::internal`].
@@ -115,10 +115,10 @@ pub(crate) fn assemble(
     })
 }
 
-/// Refuses a bench whose sample is off.
+/// Rejects a bench whose sample is off.
 ///
 /// # Errors
-/// [`Failure::input`]: what presses the sample needs it, and an arm that lost its power must not sweep through it.
+/// [`Failure::input`]: presses need the sample, and an arm that lost its power must not sweep through it.
 pub(crate) fn refuse_without_sample(rig: &RigFile) -> Result<(), Failure> {
     if !rig.robot.sample_is_off {
         return Ok(());
@@ -130,20 +130,20 @@ pub(crate) fn refuse_without_sample(rig: &RigFile) -> Result<(), Failure> {
     )))
 }
 
-/// A pose this old still tells where a robot is that is moved by hand, or that shares a processor with everything else.
+/// Largest age of a valid pose when jogging, or when the robot is emulated and shares a processor with other work.
 pub(crate) const SLOW_STALE: HostDuration = HostDuration::from_millis(1_000);
 
-/// So long may a run on stand-ins not look while the tip is low.
+/// Longest gap between checks of an emulated rig while the tip is low.
 pub(crate) const SLOW_LATE: HostDuration = HostDuration::from_millis(5_000);
 
-/// Over so long a speed is taken of an arm that, held up by other work on this computer, catches up in bursts.
+/// Averaging time for the speed of an emulated arm, which catches up in bursts when other work delays it.
 const SLOW_SPEED: HostDuration = HostDuration::from_millis(200);
 
-/// How patient a run is with a rig of this kind: stand-ins share the processors of this computer.
+/// Controller settings for a rig of this kind; emulated devices get longer timeouts because they share this computer's processors.
 #[must_use]
 pub fn settings(kind: &str) -> ControllerSettings {
     let mut settings = ControllerSettings::default();
-    // What is imported came when its times say, and may be sparse.
+    // Imported data arrive at their own times and may be sparse.
     if kind == "imported" {
         settings.camera_lag = None;
     }
@@ -157,10 +157,10 @@ pub fn settings(kind: &str) -> ControllerSettings {
     settings
 }
 
-/// In the name of a rig whose mismatches were let pass.
+/// Marks the name of a rig whose mismatches are tolerated.
 pub const TOLERATED: &str = ", mismatches tolerated";
 
-/// The bench's name, which always says when it is emulated.
+/// Name of the bench, which always includes its kind.
 #[must_use]
 pub fn display_name(rig: &RigFile) -> String {
     let kind = rig.kind.name();
@@ -168,14 +168,14 @@ pub fn display_name(rig: &RigFile) -> String {
     if !name.contains(kind) {
         name = format!("{name} ({kind})");
     }
-    // In the name, so that no report of such a session can be read without it.
+    // In the name, so that every report of such a session shows it.
     if rig.cameras.iter().any(|c| c.tolerant) {
         name.push_str(TOLERATED);
     }
     name
 }
 
-/// What analyses need to know of the bench.
+/// Geometry of the bench, for analyses.
 fn geometry(rig: &RigFile, outline: SkinOutline) -> RigGeometry {
     let [one, two] = &rig.cameras;
     RigGeometry {
@@ -183,13 +183,13 @@ fn geometry(rig: &RigFile, outline: SkinOutline) -> RigGeometry {
         nominal: StereoGeometry {
             cameras: [one.geometry, two.geometry],
         },
-        // The same on both cameras: the rig file was checked.
+        // The same on both cameras: the parser of rig files checks this.
         trigger_channel: rig.trigger_box.as_ref().map(|_| one.trigger_channel),
         trigger_delay_us: [one.trigger_delay_us, two.trigger_delay_us],
     }
 }
 
-/// Opens the robot alone.
+/// Opens only the robot.
 ///
 /// # Errors
 /// [`Failure::rig`].
@@ -199,7 +199,7 @@ pub(crate) fn open_robot(rig: &RigFile, clock: RealClock) -> Result<Box<dyn Inde
     ))
 }
 
-/// The robot's driver, which tells its remarks.
+/// Opens the robot's driver and prints its remarks.
 pub(crate) fn omega(config: OmegaConfig, clock: RealClock) -> Result<Omega, OmegaError> {
     let omega = Omega::open(config, clock)?;
     for remark in omega.remarks() {
@@ -247,7 +247,7 @@ pub(crate) fn omega_config(rig: &RigFile) -> Result<OmegaConfig, Failure> {
     }
     if robot.supervisor {
         let program = std::env::current_exe()
-            .map_err(|e| Failure::internal(format!("cannot tell where this program lies: {e}")))?;
+            .map_err(|e| Failure::internal(format!("cannot find the path of this program: {e}")))?;
         config.supervisor = Some(SupervisorCommand {
             program,
             arguments: vec![SUPERVISE.to_owned()],
@@ -256,7 +256,7 @@ pub(crate) fn omega_config(rig: &RigFile) -> Result<OmegaConfig, Failure> {
     Ok(config)
 }
 
-/// The hidden command that brakes the arm when this program dies.
+/// The hidden command that brakes the arm if this program dies.
 const SUPERVISE: &str = "supervise-arm";
 
 const fn axis(of: DeviceAxis) -> Axis {
@@ -270,10 +270,10 @@ const fn axis(of: DeviceAxis) -> Axis {
     }
 }
 
-/// How long a device of a rig of this kind may take to answer before it counts as silent.
+/// Timeouts of the devices of a rig of this kind.
 const fn timeouts(kind: RigKind) -> Timeouts {
     match kind {
-        // Stand-ins share the processors of this computer; beyond the time limit of the emulated box.
+        // Emulated devices share the processors of this computer; longer than the timeout of the emulated box.
         RigKind::Emulated => Timeouts {
             running: HostDuration::from_millis(12_000),
             set_up: HostDuration::from_millis(60_000),
@@ -282,10 +282,10 @@ const fn timeouts(kind: RigKind) -> Timeouts {
     }
 }
 
-/// The camera on a thread of its own: none of its calls holds up whoever moves the robot.
+/// Runs the camera on its own thread, so that none of its calls delays the motion of the robot.
 ///
 /// # Errors
-/// [`DeviceError::Lost`] when there is no thread to be had.
+/// [`DeviceError::Lost`] when the thread cannot be started.
 pub(crate) fn detached_camera(
     device: Box<dyn EventCamera>,
     kind: RigKind,
@@ -295,10 +295,10 @@ pub(crate) fn detached_camera(
     Ok(Box::new(detached))
 }
 
-/// As [`detached_camera`], the trigger box.
+/// Like [`detached_camera`], for the trigger box.
 ///
 /// # Errors
-/// As there.
+/// As for [`detached_camera`].
 pub(crate) fn detached_box(
     device: Box<dyn TriggerBox>,
     kind: RigKind,
@@ -416,7 +416,7 @@ pub(crate) fn trigger_box(
     config.serial.clone_from(&setup.serial);
     config.max_drift_ppm = setup.max_drift_ppm;
     if kind == RigKind::Emulated {
-        // A simulated processor that has to wait for a real one answers late.
+        // A simulated processor competes for a real one and answers late.
         config.reply_timeout = Duration::from_millis(500);
         config.command_timeout = Duration::from_secs(10);
         config.hello_timeout = Duration::from_secs(20);
@@ -449,7 +449,7 @@ mod tests {
 
     #[cfg(not(feature = "evk4"))]
     #[test]
-    fn a_camera_that_this_build_does_not_drive_is_refused_with_the_build_that_does() {
+    fn an_unsupported_camera_is_rejected_with_the_build_that_supports_it() {
         let second = "serial: \"00001754\"";
         let text = EXAMPLE.replacen(second, &format!("{second}\n    model: evk4"), 1);
         let rig = RigFile::parse("rig.yaml", text.as_bytes(), &|_| None).ok();
@@ -459,16 +459,16 @@ mod tests {
             let clock = RealClock::start();
             open_camera(c, RigKind::Bench, CameraId::Two, clock, &mut tolerated).err()
         });
-        let said = refused.flatten().map(|e| e.message).unwrap_or_default();
-        assert!(said.contains("found `evk4`"), "{said}");
+        let message = refused.flatten().map(|e| e.message).unwrap_or_default();
+        assert!(message.contains("found `evk4`"), "{message}");
         assert!(
-            said.contains("cargo build --release -p skinrig --features evk4"),
-            "{said}"
+            message.contains("cargo build --release -p skinrig --features evk4"),
+            "{message}"
         );
     }
 
     #[test]
-    fn what_the_robots_driver_would_refuse_is_refused_in_the_rig_file() {
+    fn the_rig_file_rejects_what_the_robots_driver_would_reject() {
         for (key, largest, more) in [
             ("max_speed", "100 mm/s", "100.1 mm/s"),
             ("effector_mass", "1 kg", "1.01 kg"),

@@ -1,4 +1,4 @@
-//! Cameras other than the EVK1, in builds that drive them (feature `evk4`).
+//! Cameras other than the EVK1, in builds that support them (feature `evk4`).
 
 use skinrig_device::{EventCamera, RealClock};
 use skinrig_model::CameraId;
@@ -6,14 +6,14 @@ use skinrig_protocol::rig::CameraSetup;
 
 use crate::exit::Failure;
 
-/// How a build that drives them is made.
+/// Command for a build that supports them.
 #[cfg(any(test, not(feature = "evk4")))]
 const BUILD: &str = "cargo build --release -p skinrig --features evk4";
 
 /// The camera of `setup`.
 ///
 /// # Errors
-/// [`Failure::input`] in a build that does not drive it. Whether it is connected shows when it starts.
+/// [`Failure::input`]: this build does not support the camera.
 #[cfg(not(feature = "evk4"))]
 pub fn open(
     setup: &CameraSetup,
@@ -29,7 +29,7 @@ pub fn open(
 /// The camera of `setup`.
 ///
 /// # Errors
-/// [`Failure::input`] for a model that no driver knows; [`Failure::rig`] when no such camera is connected.
+/// [`Failure::input`] for a model without a driver; [`Failure::rig`] when no such camera is connected.
 #[cfg(feature = "evk4")]
 pub fn open(
     setup: &CameraSetup,
@@ -46,11 +46,11 @@ pub fn open(
     };
     let found = skinrig_evk4::enumerate(&evk1_places())
         .map_err(|e| Failure::rig(format!("{camera}: cannot list USB devices: {e}")))?;
-    let is_it = |state: &FoundState| match state {
+    let matches_setup = |state: &FoundState| match state {
         FoundState::Ready(of, serial) => *of == model && *serial == setup.serial,
         _ => false,
     };
-    if !found.iter().any(|f| is_it(&f.state)) {
+    if !found.iter().any(|f| matches_setup(&f.state)) {
         return Err(Failure::rig(format!(
             "{camera}: expected a {} with serial number {}, found none that is free\n  \
              next: `skinrig devices` shows what is connected",
@@ -68,7 +68,7 @@ pub fn open(
     )))
 }
 
-/// Where EVK1 are plugged in that can be opened: others leave them alone.
+/// Bus and address of each EVK1 that can be opened; other drivers ignore those.
 #[cfg(feature = "evk4")]
 #[must_use]
 pub(crate) fn evk1_places() -> Vec<(u8, u8)> {

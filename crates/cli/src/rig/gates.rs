@@ -1,4 +1,4 @@
-//! What the program itself checks before a run: disk, frame, recorder; and whom the rig file expects.
+//! Checks that the program makes before a run: disk, frame, recorder, devices expected by the rig file.
 
 use std::io;
 use std::path::Path;
@@ -10,39 +10,39 @@ use skinrig_model::{CheckKind, CheckVerdict, HostDuration, PreflightCheck};
 use skinrig_protocol::rig::{Frame, PreflightLimits, RigFile, RigKind};
 use skinrig_text::{Column, Table, widest};
 
-/// Space that must be left on the disk after a session of the simulated rig, bytes.
+/// Free disk space required after a session of the simulated rig, bytes.
 const SIMULATED_RESERVE_B: f64 = 200e6;
-/// A simulated session is given this many times the bytes that its plan leads to expect.
+/// Disk space required for a simulated session, as a multiple of the expected size.
 const SIMULATED_ROOM: f64 = 2.0;
-/// How long the simulated rig may take to show that clocks advance and marks come back.
+/// Time limit for clocks to advance and marks to come back on the simulated rig.
 const SIMULATED_WITHIN: HostDuration = HostDuration::from_millis(2_000);
 
 /// The preflight of a bench.
 #[must_use]
 pub(crate) fn of_bench(file: &RigFile, rig: &Rig, folder: &Path, expected_s: f64) -> Preflight {
     let limits = &file.preflight;
-    let mut made = vec![disk(
+    let mut checks = vec![disk(
         folder,
         limits.data_rate_b_s * expected_s,
         limits.min_free_disk_b,
     )];
-    made.extend(match file.kind {
+    checks.extend(match file.kind {
         RigKind::Bench => frame(&file.frame, limits),
         RigKind::Emulated => vec![PreflightCheck::skipped(
             "frame",
             "touched points",
-            "the emulated skin lies where the rig file says",
+            "the emulated skin is where the rig file states",
         )],
     });
     if file.cameras.iter().any(|c| c.tolerant) {
-        made.push(PreflightCheck::skipped(
+        checks.push(PreflightCheck::skipped(
             "mismatches",
-            "every camera mismatch refused",
-            "--tolerant: they are let pass; the devices' settings name each with the key that accepts it",
+            "every camera mismatch rejected",
+            "--tolerant accepts them; the devices' settings list each one with the key that accepts it",
         ));
     }
     Preflight {
-        caller_checks: made,
+        caller_checks: checks,
         expected: ExpectedDevice::of_rig(file),
         clocks_within: Some(limits.clocks_within),
         loopback: loopback(rig, limits.loopback_within),
@@ -59,7 +59,7 @@ pub fn of_simulated(rig: &Rig, folder: &Path, expected_b: f64) -> Preflight {
             PreflightCheck::skipped(
                 "frame",
                 "touched points",
-                "the simulated skin lies where it is said to",
+                "the simulated skin is at its nominal position",
             ),
         ],
         expected: Vec::new(),
@@ -68,12 +68,12 @@ pub fn of_simulated(rig: &Rig, folder: &Path, expected_b: f64) -> Preflight {
     }
 }
 
-/// The recorder's line of the table: `session` was created, and took the run's header.
+/// The recorder's line of the table: `session` was created and holds the run's header.
 #[must_use]
 pub fn recorder(session: &Path) -> PreflightCheck {
     PreflightCheck::new(
         "recorder",
-        "a new session file that can be written",
+        "a new, writable session file",
         session.display().to_string(),
         true,
         "",
@@ -90,23 +90,23 @@ fn loopback(rig: &Rig, within: HostDuration) -> Option<Loopback> {
     })
 }
 
-/// Room for the session, and some left.
+/// Checks the free space: the session plus a reserve.
 fn disk(folder: &Path, session_b: f64, reserve_b: f64) -> PreflightCheck {
     let need_b = session_b + reserve_b;
     let expected = format!(
-        "{} free: about {} for the session, {} to be left",
+        "{} free: about {} for the session, {} in reserve",
         size(need_b),
         size(session_b),
         size(reserve_b)
     );
     let next = "free some space, or choose another folder with --sessions";
-    // The folder may have to be made first.
-    let there = folder
+    // The folder may not exist yet: check the nearest one that does.
+    let existing = folder
         .ancestors()
         .find(|f| f.exists())
         .filter(|f| !f.as_os_str().is_empty())
         .unwrap_or(Path::new("."));
-    match free_bytes(there) {
+    match free_bytes(existing) {
         Ok(free_b) => PreflightCheck::new("disk", expected, size(free_b), free_b >= need_b, next),
         Err(e) => PreflightCheck::new("disk", expected, e.to_string(), false, next),
     }
@@ -114,24 +114,24 @@ fn disk(folder: &Path, session_b: f64, reserve_b: f64) -> PreflightCheck {
 }
 
 #[cfg(unix)]
-/// Free bytes in `folder`, for whoever may write there.
+/// Free bytes in `folder` for ordinary users.
 ///
 /// # Errors
-/// What the system answers.
+/// The error of the system.
 pub fn free_bytes(folder: &Path) -> io::Result<f64> {
     let room = rustix::fs::statvfs(folder)?;
     Ok(room.f_bavail as f64 * room.f_frsize as f64)
 }
 
 #[cfg(not(unix))]
-/// Free bytes cannot be asked for here.
+/// Not supported on this system.
 ///
 /// # Errors
 /// Always.
 pub fn free_bytes(_folder: &Path) -> io::Result<f64> {
     Err(io::Error::new(
         io::ErrorKind::Unsupported,
-        "free space cannot be asked for on this system",
+        "free space cannot be determined on this system",
     ))
 }
 
@@ -144,21 +144,21 @@ pub fn size(bytes: f64) -> String {
     }
 }
 
-/// How old the frame is, and how well the touched points fit.
+/// Checks the age of the frame and the fit of the touched points.
 fn frame(frame: &Frame, limits: &PreflightLimits) -> Vec<PreflightCheck> {
     let days = Utc::now().timestamp().div_euclid(86_400) - frame.date.days_since_1970();
-    let most_h = limits.touch_off_max_age.as_secs_f64() / 3600.0;
+    let max_h = limits.touch_off_max_age.as_secs_f64() / 3600.0;
     let age = PreflightCheck::new(
         "frame: age",
-        format!("measured at most {most_h:.0} h ago"),
+        format!("measured at most {max_h:.0} h ago"),
         match days {
             0 => format!("{}, today", frame.date),
             d if d < 0 => format!("{}, in the future", frame.date),
             d => format!("{}, {d} days ago", frame.date),
         },
-        // A date has no hour: a day counts from its beginning, and one of tomorrow may be another time zone's today.
-        (-1..=(most_h / 24.0).ceil() as i64).contains(&days),
-        "touch the skin again with `skinrig jog`, and put the block that it prints into the rig file",
+        // A date has no hour: a day counts from its start, and tomorrow may be today in another time zone.
+        (-1..=(max_h / 24.0).ceil() as i64).contains(&days),
+        "touch the skin again with `skinrig jog`, and copy the block that it prints into the rig file",
     );
     let fit = match &frame.touch_off {
         Some(touched) => PreflightCheck::new(
@@ -178,7 +178,7 @@ fn frame(frame: &Frame, limits: &PreflightLimits) -> Vec<PreflightCheck> {
     [age, fit].map(|c| c.about(CheckKind::Frame)).into()
 }
 
-/// What a run shows of its preflight: one line when no check failed, else [`table`].
+/// The preflight as shown by a run: one line if no check failed, else [`table`].
 #[must_use]
 pub(crate) fn report(checks: &[PreflightCheck]) -> String {
     if checks.iter().any(PreflightCheck::failed) {
@@ -195,7 +195,7 @@ pub(crate) fn report(checks: &[PreflightCheck]) -> String {
     line + "; `skinrig show SESSION` lists them"
 }
 
-/// The table for people: check, expected, found, verdict, and under a failed check the next step.
+/// The table for the terminal: verdict, check, expected, found, and the next step below a failed check.
 #[must_use]
 pub fn table(checks: &[PreflightCheck]) -> String {
     let column = |of: fn(&PreflightCheck) -> &str| {
@@ -242,7 +242,7 @@ mod tests {
             full.failed() && full.next_step.contains("--sessions"),
             "{full:?}"
         );
-        // A folder that is still to be made lies on the disk of the one above it.
+        // A folder that does not exist yet is on the disk of its nearest existing parent.
         assert!(!disk(Path::new("no/such/folder"), 1.0, 1.0).failed());
     }
 
@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_tells_what_to_do_about_a_failed_check() {
+    fn the_table_has_a_next_step_for_a_failed_check() {
         let checks = [
             PreflightCheck::new("disk", "1 GB", "2 GB", true, "make room"),
             PreflightCheck::new(

@@ -1,4 +1,4 @@
-//! What a rig file names on this computer: bias files and lamp programs. Looked at before anything is opened or moved.
+//! Files and programs that a rig file names: bias files and lamp programs. Checked before anything is opened or moved.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -9,20 +9,20 @@ use skinrig_protocol::rig::RigFile;
 use super::bench;
 use crate::exit::Failure;
 
-/// Something that a rig file names, and whether it can be used.
+/// A file or program that a rig file names, and whether it is usable.
 #[derive(Debug)]
 pub struct Input {
     /// The key that names it.
     pub key: String,
-    /// What has to be there.
+    /// What is expected there.
     pub expected: String,
-    /// What is there.
+    /// The usable path, or why it is unusable.
     pub found: Result<PathBuf, UnusableInput>,
-    /// What to do when it cannot be used.
+    /// Next step if it is unusable.
     pub next: String,
 }
 
-/// Why what a rig file names cannot be used.
+/// A file or program that a rig file names is unusable.
 #[derive(Debug, thiserror::Error)]
 pub enum UnusableInput {
     /// The bias file cannot be read.
@@ -62,7 +62,7 @@ pub fn all(rig: &RigFile) -> Vec<Input> {
             let read = bench::camera_settings(setup, &CameraRequest::default());
             inputs.push(Input {
                 key: format!("cameras.{name}.bias_file"),
-                expected: "a bias file that can be read".to_owned(),
+                expected: "a readable bias file".to_owned(),
                 found: read.map(|_| file.clone()).map_err(UnusableInput::BiasFile),
                 next: "correct the path, which is relative to the rig file, or remove the key"
                     .to_owned(),
@@ -83,10 +83,10 @@ pub fn all(rig: &RigFile) -> Vec<Input> {
     inputs
 }
 
-/// Refuses a rig file that names what cannot be used.
+/// Rejects a rig file that names unusable files or programs.
 ///
 /// # Errors
-/// [`Failure::input`] naming all of it.
+/// [`Failure::input`] with all of them.
 pub fn check(rig: &RigFile) -> Result<(), Failure> {
     let wrong: Vec<String> = all(rig)
         .into_iter()
@@ -104,8 +104,8 @@ pub fn check(rig: &RigFile) -> Result<(), Failure> {
     Err(Failure::input(wrong.join("\n")))
 }
 
-/// The file that running `words` would start, as the system looks for it: a name with a slash is a path, any other one is
-/// looked for in the folders of `path`.
+/// The file that running `words` would start, found as the system does: a name with a slash is a path, any other name is
+/// searched in the folders of `path`.
 fn program(words: &[String], path: Option<&std::ffi::OsStr>) -> Result<PathBuf, UnusableInput> {
     let Some(name) = words.first().filter(|name| !name.is_empty()) else {
         return Err(UnusableInput::NoProgram);
@@ -137,7 +137,7 @@ fn runnable(file: &Path) -> Result<(), UnusableInput> {
     };
     match std::fs::metadata(file) {
         Err(e) => Err(unusable(e)),
-        Ok(there) if !there.is_file() => Err(UnusableInput::NotAFile {
+        Ok(metadata) if !metadata.is_file() => Err(UnusableInput::NotAFile {
             file: file.to_owned(),
         }),
         Ok(_) => access(file, Access::EXEC_OK).map_err(|e| unusable(e.into())),
@@ -179,8 +179,8 @@ mod tests {
         assert_eq!(program(&full, None).unwrap(), file);
         set_mode(&file, 0o644);
         assert!(error(&words("lamp")).contains("denied"));
-        let here = folder.path().display().to_string();
-        assert!(error(&words(&here)).contains("not a file"));
+        let folder_path = folder.path().display().to_string();
+        assert!(error(&words(&folder_path)).contains("not a file"));
         assert!(program(&[], path).is_err());
     }
 
@@ -190,10 +190,10 @@ mod tests {
     }
 
     #[test]
-    fn everything_that_is_missing_is_named_with_its_key() {
+    fn every_missing_input_is_named_with_its_key() {
         let text = EXAMPLE.replace("/usr/local/bin/lamp", "/nowhere/lamp");
         let rig = RigFile::parse("rigs/rig.yaml", text.as_bytes(), &|_| None).unwrap();
-        let said = check(&rig).unwrap_err().message;
+        let message = check(&rig).unwrap_err().message;
         for word in [
             "rigs/rig.yaml: cameras.camera1.bias_file",
             "camera1.bias",
@@ -201,7 +201,7 @@ mod tests {
             "hil.light.lit",
             "/nowhere/lamp",
         ] {
-            assert!(said.contains(word), "{word} is not in {said}");
+            assert!(message.contains(word), "{word} is not in {message}");
         }
     }
 }

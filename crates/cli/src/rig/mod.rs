@@ -1,4 +1,4 @@
-//! Which rig a run uses: simulated, a bench, or a recording served as one.
+//! The rig of a run: simulated, a bench, or a replayed recording.
 
 pub mod bench;
 pub mod evt3_camera;
@@ -22,7 +22,7 @@ use crate::exit::Failure;
 use crate::recording::SessionRecording;
 use skinrig_results::RigDocument;
 
-/// The simulated rig for `protocol`, with those faults on purpose that meet devices; its name tells all of them.
+/// The simulated rig for `protocol`, with the injected device faults; its name lists all `faults`.
 #[must_use]
 pub fn simulated(
     protocol: &Protocol,
@@ -34,7 +34,7 @@ pub fn simulated(
     simulated_after(protocol, level, seed, real_time, faults, Vec::new())
 }
 
-/// The same rig for a further leg: its skin was pressed at these places before.
+/// Like [`simulated`], for a further leg: the skin was pressed at these locations before.
 #[must_use]
 pub(crate) fn simulated_after(
     protocol: &Protocol,
@@ -64,7 +64,7 @@ pub(crate) fn simulated_after(
     }
     config.faults = planted::of_devices(faults);
     let mut rig = simulated_rig(&config);
-    planted::tell(&mut rig, faults);
+    planted::mark_name(&mut rig, faults);
     for (settings, request) in rig.camera_settings.iter_mut().zip(&protocol.cameras) {
         requests::apply(settings, request);
     }
@@ -88,15 +88,15 @@ pub fn replayed(path: &Path, header: &RunHeader, document: &RigDocument) -> Resu
     Ok(replayed_rig(recorded, Box::new(recording)))
 }
 
-/// The operator of a recorded run, repeated: a clock that asks for the recorded stop or abort when its time comes.
+/// Repeats the operator of a recorded run: a clock that requests the recorded stop or abort at its time.
 pub(crate) struct RepeatedOperator {
     /// The replayed clock.
     pub clock: Box<dyn Clock>,
     /// When the recorded run was interrupted.
     pub at: HostTime,
-    /// How.
+    /// Kind of the interruption.
     pub kind: InterruptionKind,
-    /// Where requests go.
+    /// Receives the request.
     pub control: ControlHandle,
 }
 

@@ -1,4 +1,4 @@
-//! Faults on purpose on the simulated rig: what each kind is there, when it strikes, and a name that tells of them.
+//! Injected faults of the simulated rig: effect and time of each kind, and the label in the rig's name.
 
 use skinrig_device::Rig;
 use skinrig_model::HostTime;
@@ -9,16 +9,16 @@ use crate::exit::Failure;
 
 /// Words of 4 bytes that a camera loses.
 const LOST_WORDS: u64 = 2_000;
-/// How far a camera's clock is set forward, µs.
+/// Forward step of a camera's clock, µs.
 const CLOCK_STEP_US: u32 = 300_000;
-/// The share of its usual swiftness that a slow robot keeps, percent.
+/// Speed of a slow robot, percent of the usual one.
 const SLOW_PERCENT: u32 = 4;
-/// How far the height that the robot reports is off, µm.
+/// Error of the reported height, µm.
 const HEIGHT_OFF_UM: i32 = 500;
-/// How long a slow recorder holds the run up, ms.
+/// Delay by a slow recorder, ms.
 const HELD_UP_MS: u32 = 800;
 
-/// Those of the faults that meet devices, as the simulated rig makes them.
+/// The device faults among `faults`, as the simulated rig injects them.
 #[must_use]
 pub fn of_devices(faults: &[PlantedFault]) -> Vec<Fault> {
     faults.iter().filter_map(of_device).collect()
@@ -71,7 +71,7 @@ fn of_device(fault: &PlantedFault) -> Option<Fault> {
     })
 }
 
-/// Numbers count from 1 for people, from 0 there.
+/// Converts numbers, which count from 1 on the command line and from 0 in the simulated rig.
 fn when(time: FaultTime) -> Option<FaultTrigger> {
     Some(match time {
         FaultTime::Preflight => FaultTrigger::At(HostTime::ZERO),
@@ -93,30 +93,30 @@ fn when(time: FaultTime) -> Option<FaultTrigger> {
     })
 }
 
-/// Puts the faults into the name of the rig, so that nothing of the session can be read without them.
-pub fn tell(rig: &mut Rig, faults: &[PlantedFault]) {
-    if let Some(told) = told(faults) {
-        rig.name = format!("{}, {told}", rig.name);
+/// Adds the faults to the name of the rig, so that every view of the session shows them.
+pub fn mark_name(rig: &mut Rig, faults: &[PlantedFault]) {
+    if let Some(label) = label(faults) {
+        rig.name = format!("{}, {label}", rig.name);
     }
 }
 
 /// `FAULTS ON PURPOSE: ...`; `None` without any.
 #[must_use]
-pub fn told(faults: &[PlantedFault]) -> Option<String> {
+pub fn label(faults: &[PlantedFault]) -> Option<String> {
     let names: Vec<String> = faults.iter().map(ToString::to_string).collect();
     (!names.is_empty()).then(|| format!("FAULTS ON PURPOSE: {}", names.join(", ")))
 }
 
-/// A bench takes no faults on purpose.
+/// Rejects injected faults on a bench.
 ///
 /// # Errors
-/// [`Failure::input`] when there are some.
+/// [`Failure::input`] if `faults` is not empty.
 pub fn refuse(faults: &[PlantedFault], bench: &str) -> Result<(), Failure> {
-    match told(faults) {
+    match label(faults) {
         None => Ok(()),
-        Some(told) => Err(Failure::input(format!(
-            "{bench}: expected a protocol and a command line without faults, because only the simulated rig makes them on \
-             purpose, found {told}\n  next: leave out `faults:` and --fault, or leave out --rig"
+        Some(label) => Err(Failure::input(format!(
+            "{bench}: expected a protocol and a command line without faults, because only the simulated rig injects \
+            them, found {label}\n  next: leave out `faults:` and --fault, or leave out --rig"
         ))),
     }
 }

@@ -1,9 +1,9 @@
-//! What a protocol asks of the cameras.
+//! Camera settings that a protocol requests.
 
 use skinrig_device::{CameraSettings, Roi};
 use skinrig_protocol::CameraRequest;
 
-/// The protocol's wishes on top of the rig's own settings.
+/// Applies the protocol's requests on top of the rig's settings.
 pub(super) fn apply(settings: &mut CameraSettings, request: &CameraRequest) {
     settings.biases.extend(request.biases.clone());
     if let Some([x, y, width, height]) = request.roi {

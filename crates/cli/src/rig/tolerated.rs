@@ -1,4 +1,4 @@
-//! What `--tolerant` let pass of a rig, and the lines of its rig file that accept it.
+//! Mismatches that `--tolerant` accepted, and the lines of the rig file that accept them permanently.
 
 use std::collections::BTreeSet;
 
@@ -6,17 +6,17 @@ use skinrig_evk1::{Accept, Mismatches};
 use skinrig_model::CameraId;
 use skinrig_protocol::rig::{CameraSetup, RigFile};
 
-/// What was let pass so far; goes on growing while the cameras run.
+/// Mismatches tolerated so far; more are added while the cameras run.
 #[derive(Debug, Clone, Default)]
 pub struct ToleratedMismatches(Vec<(CameraId, Mismatches)>);
 
 impl ToleratedMismatches {
-    /// Also what this camera shows.
-    pub(crate) fn add(&mut self, camera: CameraId, seen: Mismatches) {
-        self.0.push((camera, seen));
+    /// Adds the mismatches of a camera.
+    pub(crate) fn add(&mut self, camera: CameraId, mismatches: Mismatches) {
+        self.0.push((camera, mismatches));
     }
 
-    /// Prints the lines of `rig` that accept what was let pass, when anything was.
+    /// Prints the lines for `rig` that accept the tolerated mismatches, if there were any.
     pub(crate) fn propose(&self, rig: &RigFile) {
         if let Some(lines) = self.lines(rig) {
             errln!(
@@ -26,29 +26,33 @@ impl ToleratedMismatches {
         }
     }
 
-    /// Those lines, in the place where they belong, together with what the rig file accepts already.
+    /// Those lines, under their keys, together with what the rig file already accepts.
     fn lines(&self, rig: &RigFile) -> Option<String> {
         let mut lines = String::new();
         for camera in CameraId::ALL {
             let of_camera = self.0.iter().filter(|(c, _)| *c == camera);
-            let seen: BTreeSet<Accept> = of_camera
-                .flat_map(|(_, seen)| seen.all())
+            let mismatches: BTreeSet<Accept> = of_camera
+                .flat_map(|(_, mismatches)| mismatches.all())
                 .map(|mismatch| mismatch.key)
                 .collect();
-            if !seen.is_empty() {
+            if !mismatches.is_empty() {
                 let setup = &rig.cameras[camera.index()];
-                lines += &format!("  camera{}:\n{}", camera.index() + 1, keys(setup, &seen));
+                lines += &format!(
+                    "  camera{}:\n{}",
+                    camera.index() + 1,
+                    keys(setup, &mismatches)
+                );
             }
         }
         (!lines.is_empty()).then(|| format!("cameras:\n{}", lines.trim_end()))
     }
 }
 
-fn keys(setup: &CameraSetup, seen: &BTreeSet<Accept>) -> String {
+fn keys(setup: &CameraSetup, mismatches: &BTreeSet<Accept>) -> String {
     let mut statuses: BTreeSet<u8> = setup.read_status.iter().copied().collect();
     let mut registers: BTreeSet<u32> = setup.read_back_exceptions.iter().copied().collect();
     let (mut reset, mut transfers) = (false, false);
-    for key in seen {
+    for key in mismatches {
         match key {
             Accept::ReadStatus(status) => drop(statuses.insert(*status)),
             Accept::ReadBack(address) => drop(registers.insert(*address)),
@@ -58,19 +62,22 @@ fn keys(setup: &CameraSetup, seen: &BTreeSet<Accept>) -> String {
     }
     let list = |items: Vec<String>| items.join(", ");
     let mut lines = String::new();
-    if seen.iter().any(|k| matches!(k, Accept::ReadStatus(_))) {
+    if mismatches
+        .iter()
+        .any(|k| matches!(k, Accept::ReadStatus(_)))
+    {
         let items = statuses.iter().map(|s| format!("\"{s:#04x}\"")).collect();
         lines += &format!("    read_status: [{}]\n", list(items));
     }
-    if seen.iter().any(|k| matches!(k, Accept::ReadBack(_))) {
+    if mismatches.iter().any(|k| matches!(k, Accept::ReadBack(_))) {
         let items = registers.iter().map(|a| format!("\"{a:#06x}\"")).collect();
         lines += &format!("    read_back_exceptions: [{}]\n", list(items));
     }
-    for (told, key) in [
+    for (is_tolerated, key) in [
         (reset, Accept::FailedReset),
         (transfers, Accept::FailedTransfers),
     ] {
-        if told {
+        if is_tolerated {
             lines += &format!("    {key}\n");
         }
     }

@@ -1,4 +1,4 @@
-//! Owns what `skinrig show` tells about a session; serialized as it is for `--json`.
+//! Description of a session for `skinrig show`; serialized unchanged for `--json`.
 
 use std::path::{Path, PathBuf};
 
@@ -73,7 +73,7 @@ pub(super) struct Leg {
     pub cut_off: Vec<String>,
 }
 
-/// A device with its settings: name, asked for, read back.
+/// A device with its settings: name, requested value, value read back.
 #[derive(Serialize)]
 pub(super) struct Device {
     pub role: &'static str,
@@ -97,7 +97,7 @@ pub(super) struct Camera {
     pub losses: Vec<LostBytes>,
 }
 
-/// What a camera lost, and when.
+/// Bytes that a camera lost, and when.
 #[derive(Serialize)]
 pub(super) struct LostBytes {
     pub chunk: u64,
@@ -107,34 +107,34 @@ pub(super) struct LostBytes {
     pub time: String,
 }
 
-/// An analysis whose results lie beside the session.
+/// An analysis whose results are beside the session.
 #[derive(Serialize)]
 pub(super) struct Analysis {
     /// `None`: the official one.
     pub name: Option<String>,
     pub results: PathBuf,
     #[serde(flatten)]
-    pub found: Found,
+    pub found: AnalysisContent,
 }
 
-/// What its file says.
+/// Content of its results file.
 #[derive(Serialize)]
 #[serde(untagged)]
-pub(super) enum Found {
+pub(super) enum AnalysisContent {
     /// Its numbers.
     Summary {
         rmse_mm: Estimate,
         valid: bool,
         faults: Vec<String>,
         analysis_version: u32,
-        /// What a variant changes.
+        /// Changes of a variant.
         changes: Option<String>,
     },
-    /// Why it has none.
+    /// Why the numbers cannot be read.
     Trouble { trouble: String },
 }
 
-/// A press by its last attempt.
+/// A press with the result of its last attempt.
 #[derive(Serialize)]
 pub(super) struct Press {
     pub press: PressId,
@@ -303,14 +303,14 @@ fn analyses(session: &Path, id: &str) -> Vec<Analysis> {
         name: listed.name,
         results: listed.results,
         found: match listed.summary {
-            Ok(summary) => Found::Summary {
+            Ok(summary) => AnalysisContent::Summary {
                 rmse_mm: summary.rmse_mm,
                 valid: summary.valid,
                 faults: summary.faults,
                 analysis_version: summary.analysis_version,
                 changes: summary.variant.map(|v| v.to_string()),
             },
-            Err(why) => Found::Trouble {
+            Err(why) => AnalysisContent::Trouble {
                 trouble: why.to_string(),
             },
         },

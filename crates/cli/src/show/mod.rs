@@ -10,7 +10,7 @@ use description::Description;
 /// Describes a session.
 ///
 /// # Errors
-/// [`Failure::input`] when the file is no readable session.
+/// [`Failure::input`] when the file is not a readable session.
 pub(crate) fn show(args: &ShowArgs, json: bool) -> Outcome {
     let session = Description::read(args).map_err(Failure::session)?;
     if json {

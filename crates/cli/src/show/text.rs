@@ -1,13 +1,13 @@
-//! Owns how `skinrig show` prints a session for people.
+//! Prints the description of a session for `skinrig show`.
 
 use skinrig_model::HostDuration;
 use skinrig_recorder::PressTally;
 
-use super::description::{Analysis, Camera, Description, Device, Found, Leg, Press};
+use super::description::{Analysis, AnalysisContent, Camera, Description, Device, Leg, Press};
 use crate::progress::clock_text;
 use crate::rig::gates;
 
-/// How many losses of a camera are listed.
+/// Most losses listed per camera.
 const MAX_LOSSES: usize = 5;
 
 pub(super) fn print(d: &Description) {
@@ -61,7 +61,7 @@ fn end(d: &Description) {
     }
 }
 
-/// Legs, unless there is one that says nothing more than the session itself.
+/// Prints the legs, unless there is only one that adds nothing.
 fn legs(legs: &[Leg], being_written: bool) {
     if let [only] = legs
         && only.cut_off.is_empty()
@@ -112,11 +112,11 @@ fn presses(p: &PressTally, sync: u64) {
 fn analysis(analysis: &Analysis) {
     let name = analysis.name.as_deref().unwrap_or("official");
     let (rmse, faults, changes, version) = match &analysis.found {
-        Found::Trouble { trouble } => {
+        AnalysisContent::Trouble { trouble } => {
             outln!("analysis   {name}  {trouble}");
             return;
         }
-        Found::Summary {
+        AnalysisContent::Summary {
             valid: false,
             faults,
             changes,
@@ -124,13 +124,13 @@ fn analysis(analysis: &Analysis) {
             ..
         } => {
             let why = if faults.is_empty() {
-                ": clocks not known"
+                ": clocks unknown"
             } else {
                 ""
             };
             (format!("INVALID{why}"), faults, changes, analysis_version)
         }
-        Found::Summary {
+        AnalysisContent::Summary {
             rmse_mm,
             faults,
             changes,
@@ -155,7 +155,7 @@ fn analysis(analysis: &Analysis) {
     outln!("analysis   {name}  {rmse}  analysis version {version}");
     if !faults.is_empty() {
         let faults = faults.join(", ");
-        outln!("           found: {faults}; the report says what to do");
+        outln!("           found: {faults}; the report has the next steps");
     }
     if let Some(changes) = changes {
         outln!("           {changes}");

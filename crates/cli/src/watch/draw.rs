@@ -1,4 +1,4 @@
-//! A frame as text: some 80 columns, no control characters.
+//! Draws a frame as text: about 80 columns, no control characters.
 
 use skinrig_model::text::is_hidden;
 use skinrig_model::{HostDuration, PressRole};
@@ -8,10 +8,10 @@ use crate::progress::{clock_text, eta_text};
 use crate::remote::Live;
 use crate::rig::gates;
 
-/// Largest map, columns and rows.
-const MOST: [usize; 2] = [36, 18];
+/// Maximum size of the map, columns and rows.
+const MAX_CELLS: [usize; 2] = [36, 18];
 
-/// The frame.
+/// The frame as text.
 #[must_use]
 pub(super) fn text(frame: &Frame) -> String {
     let p = &frame.presses;
@@ -55,7 +55,7 @@ pub(super) fn text(frame: &Frame) -> String {
         let faults = frame.faults.iter();
         lines.extend(faults.map(|f| format!("  {:>10.3} s  {}: {}", f.t_s, f.kind, f.reason)));
     }
-    // What stands in files from strangers moves no cursor.
+    // Text from untrusted files must not move the cursor.
     let plain = |line: String| line.replace(|c: char| c.is_control() || is_hidden(c), " ");
     lines.into_iter().map(plain).collect::<Vec<_>>().join("\n")
 }
@@ -69,7 +69,7 @@ fn of_run(live: &Live) -> Vec<String> {
         };
         let [x, y] = p.at_mm;
         lines.push(format!(
-            "now      press {} of {} ({block}) at ({x:.1}, {y:.1}) mm; {} taken again",
+            "now      press {} of {} ({block}) at ({x:.1}, {y:.1}) mm; {} retaken",
             p.number, live.planned, live.retaken
         ));
     }
@@ -112,9 +112,9 @@ fn latest(press: &Latest) -> String {
     )
 }
 
-/// The places of the path from above, y up: one character each, or some places together where there are too many.
+/// Map of the locations from above, y up: one character each, or several locations per character if there are too many.
 fn map(frame: &Frame) -> Vec<String> {
-    let axis = |k: usize| Axis::new(frame.places.iter().map(|p| p.at_mm[k]), MOST[k]);
+    let axis = |k: usize| Axis::new(frame.places.iter().map(|p| p.at_mm[k]), MAX_CELLS[k]);
     let (Some(x), Some(y)) = (axis(0), axis(1)) else {
         return Vec::new();
     };
@@ -157,7 +157,7 @@ fn mark(place: &Place) -> &'static str {
     }
 }
 
-/// Where along one axis of the map a place goes.
+/// Maps coordinates along one axis to cells.
 struct Axis {
     from: f64,
     span: f64,
@@ -182,7 +182,7 @@ impl Axis {
             return 0;
         }
         let last = (self.cells - 1) as f64;
-        // Nothing is outside but what is not finite, which becomes 0.
+        // Only non-finite values are outside; they become 0.
         ((value - self.from) / self.span * last)
             .round()
             .clamp(0.0, last) as usize
@@ -194,7 +194,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_place_says_how_far_it_is() {
+    fn each_place_shows_its_progress() {
         let place = |planned, valid, failed| Place {
             at_mm: [0.0; 2],
             planned,

@@ -1,4 +1,4 @@
-//! What there is to see of a run at one instant.
+//! State of a run at one instant.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -15,30 +15,30 @@ use crate::paths;
 use crate::remote::{Live, RemoteError, Reply, Request, ask};
 use crate::rig::gates;
 
-/// So many of the latest presses are shown.
+/// Number of latest presses shown.
 const LATEST: usize = 6;
-/// So many of the latest faults and other interruptions.
+/// Number of latest faults and other interruptions shown.
 const FAULTS: usize = 4;
 
-/// So long a session is left alone that may be being sealed: three times as long as its writer waits for readers, and some.
-const LEFT_ALONE: Duration = Duration::from_secs(10);
+/// How long to keep a session closed that may be being sealed: more than three times as long as its writer waits for readers.
+const SEAL_GRACE: Duration = Duration::from_secs(10);
 
 /// A run at one instant.
 #[derive(Debug, Serialize)]
 pub(super) struct Frame {
     /// The file.
     pub session: PathBuf,
-    /// In a word or some.
+    /// State in words.
     pub state: String,
-    /// Who writes the session, if anybody does.
+    /// The process that writes the session, if any.
     pub writer: Option<String>,
-    /// Whether it is sealed.
+    /// True if it is sealed.
     pub sealed: bool,
-    /// What the run tells of itself; `None` when nobody answers.
+    /// State reported by the run; `None` if it does not answer.
     pub live: Option<Box<Live>>,
-    /// Which prototype.
+    /// Name of the prototype.
     pub prototype: String,
-    /// Which protocol.
+    /// Name of the protocol.
     pub protocol: String,
     /// Name of the rig.
     pub rig: String,
@@ -46,7 +46,7 @@ pub(super) struct Frame {
     pub started_at: String,
     /// Calibrating and scored presses.
     pub presses: PressTally,
-    /// Places of the path and how far they are.
+    /// Locations of the path with their progress.
     pub places: Vec<Place>,
     /// The latest attempts, oldest first.
     pub latest: Vec<Latest>,
@@ -54,20 +54,20 @@ pub(super) struct Frame {
     pub faults: Vec<Fault>,
     /// Interruptions so far.
     pub fault_count: usize,
-    /// Bytes free where the session lies.
+    /// Free bytes in the session's folder.
     pub disk_free_bytes: Option<u64>,
 }
 
-/// A place of the path.
+/// A location of the path.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Place {
-    /// Where, skin frame, mm.
+    /// Position, skin frame, mm.
     pub at_mm: [f64; 2],
     /// Presses planned there.
     pub planned: u32,
     /// How many of them are valid.
     pub valid: u32,
-    /// How many ended otherwise.
+    /// How many of them ended otherwise.
     pub failed: u32,
 }
 
@@ -78,29 +78,29 @@ pub(crate) struct Latest {
     pub press: u32,
     /// Number of the attempt, from 1.
     pub attempt: u32,
-    /// Where, skin frame, mm.
+    /// Position, skin frame, mm.
     pub at_mm: [f64; 2],
-    /// How it ended.
+    /// Verdict of the attempt.
     pub verdict: String,
-    /// Why, when not well.
+    /// Reason of a verdict other than valid.
     pub reason: Option<String>,
-    /// What each camera saw of it.
+    /// Signal in each camera.
     pub cameras: [Option<Signal>; 2],
 }
 
-/// Something that broke the normal course.
+/// A fault or another interruption.
 #[derive(Debug, Serialize)]
 pub(super) struct Fault {
-    /// When, session time, s.
+    /// Session time, s.
     pub t_s: f64,
-    /// What.
+    /// Kind of the interruption.
     pub kind: String,
-    /// In words.
+    /// Reason in words.
     pub reason: String,
 }
 
 impl Frame {
-    /// Nothing more will happen.
+    /// True if the session is sealed or its run has ended.
     pub(super) fn is_over(&self) -> bool {
         self.sealed || self.writer.is_none()
     }
@@ -109,11 +109,11 @@ impl Frame {
 /// Follows one session.
 pub(super) struct Follower {
     session: PathBuf,
-    /// What never changes: read once.
+    /// Constant data, read once.
     head: Option<SessionInfo>,
-    /// What was found of attempts before.
+    /// Signals of attempts measured before.
     signals: BTreeMap<AttemptId, [Option<Signal>; 2]>,
-    /// Since when somebody writes the session whose run does not answer, or has ended.
+    /// Since when the session has a writer whose run does not answer or has ended.
     silent: Option<Instant>,
 }
 
@@ -126,7 +126,7 @@ struct SessionInfo {
 }
 
 impl Follower {
-    /// Of the session at this path.
+    /// Follows the session at this path.
     pub(super) fn new(session: PathBuf) -> Self {
         Self {
             session,
@@ -136,15 +136,15 @@ impl Follower {
         }
     }
 
-    /// Whether the session is perhaps being sealed, for which its writer needs the file for itself: then it is left alone for a
+    /// True if the session may be being sealed, for which its writer needs exclusive access: then the file is not opened for a
     /// while.
-    fn leaves_alone(&mut self, live: Option<&Live>, writer: Option<&str>) -> bool {
-        let goes_on = live.is_some_and(|live| live.state != State::Finished.name());
-        if goes_on || writer.is_none() {
+    fn may_be_sealing(&mut self, live: Option<&Live>, writer: Option<&str>) -> bool {
+        let is_running = live.is_some_and(|live| live.state != State::Finished.name());
+        if is_running || writer.is_none() {
             self.silent = None;
             return false;
         }
-        self.silent.get_or_insert_with(Instant::now).elapsed() < LEFT_ALONE
+        self.silent.get_or_insert_with(Instant::now).elapsed() < SEAL_GRACE
     }
 
     /// The file.
@@ -152,8 +152,8 @@ impl Follower {
         &self.session
     }
 
-    /// A look at the run; `None` when nothing new is known. The file is open for the length of it only, and with `patience` not at
-    /// all while it may be being sealed.
+    /// Reads the state of the run; `None` if there is nothing new. The file is open only during the call, and with `patience` it is
+    /// not opened while it may be being sealed.
     pub(super) fn look(
         &mut self,
         writer: Option<&str>,
@@ -163,7 +163,7 @@ impl Follower {
             Ok(Reply::Live(live)) => Some(live),
             Ok(_) | Err(RemoteError::NotListening | RemoteError::Failed(_)) => None,
         };
-        if self.leaves_alone(live.as_deref(), writer) && patience {
+        if self.may_be_sealing(live.as_deref(), writer) && patience {
             return Ok(None);
         }
         let reader = SessionReader::open(&self.session)?;
@@ -177,16 +177,15 @@ impl Follower {
         let (tally, _) = reader.tallies()?;
         let latest = latest(&presses);
         if let Some(head) = &self.head {
-            let unseen =
+            let is_new =
                 |o: &&(&PlannedPress, &PressOutcome)| !self.signals.contains_key(&o.1.attempt);
-            let unseen: Vec<&PressOutcome> = latest.iter().filter(unseen).map(|o| o.1).collect();
-            if !unseen.is_empty() {
-                self.signals
-                    .extend(signals(&reader, head.formats, &unseen)?);
+            let new: Vec<&PressOutcome> = latest.iter().filter(is_new).map(|o| o.1).collect();
+            if !new.is_empty() {
+                self.signals.extend(signals(&reader, head.formats, &new)?);
             }
         }
         drop(reader);
-        let told = |(planned, outcome): &(&PlannedPress, &PressOutcome)| Latest {
+        let row = |(planned, outcome): &(&PlannedPress, &PressOutcome)| Latest {
             press: planned.id.number(),
             attempt: outcome.attempt.number,
             at_mm: [planned.at.x_mm, planned.at.y_mm],
@@ -198,7 +197,7 @@ impl Follower {
                 .copied()
                 .unwrap_or_default(),
         };
-        let latest: Vec<Latest> = latest.iter().map(told).collect();
+        let latest: Vec<Latest> = latest.iter().map(row).collect();
         let fault_count = interruptions.len();
         let faults = interruptions
             .into_iter()
@@ -257,7 +256,7 @@ fn state(live: Option<&Live>, writer: Option<&str>, end: Option<&RunEnd>, sealed
     }
 }
 
-/// The attempts that ended last, oldest first; presses that were given up are none.
+/// The attempts that ended last, oldest first, without missed presses.
 fn latest(presses: &[(PlannedPress, Vec<AttemptRow>)]) -> Vec<(&PlannedPress, &PressOutcome)> {
     let mut all: Vec<(&PlannedPress, &PressOutcome)> = presses
         .iter()
@@ -265,12 +264,12 @@ fn latest(presses: &[(PlannedPress, Vec<AttemptRow>)]) -> Vec<(&PlannedPress, &P
         .filter_map(|(planned, attempt)| Some((planned, attempt.outcome.as_ref()?)))
         .filter(|(_, outcome)| !matches!(outcome.verdict, PressVerdict::Missed(_)))
         .collect();
-    // A press that was taken again by a further leg comes before later ones in the plan.
+    // A press that a further leg repeated precedes later ones in the plan.
     all.sort_by_key(|(_, outcome)| outcome.timing.map(|t| t.release));
     all.split_off(all.len().saturating_sub(LATEST))
 }
 
-/// The places of the path in the order of their first press; sync presses are no part of it.
+/// The locations of the path in the order of their first press, without sync presses.
 fn places(presses: &[(PlannedPress, Vec<AttemptRow>)]) -> Vec<Place> {
     let mut places: Vec<Place> = Vec::new();
     let mut known: BTreeMap<[u64; 2], usize> = BTreeMap::new();

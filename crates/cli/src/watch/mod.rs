@@ -1,7 +1,7 @@
-//! `skinrig watch`: a run as it goes on, in another terminal.
+//! `skinrig watch`: follows a run in another terminal.
 //!
-//! It reads: the session file, opened anew for each look and closed again at once, so that a run that ends can seal it; and what the
-//! run tells of itself to whoever asks. Nothing it does or does not do reaches the run.
+//! It only reads: the session file, which it opens for each frame and closes at once, so that the run can seal it, and the state
+//! that the run reports on request. It cannot affect the run.
 
 mod draw;
 mod frame;
@@ -19,22 +19,22 @@ use crate::sessions;
 
 use frame::{Follower, Frame};
 
-/// Cursor to the upper left corner, and all below it is empty.
+/// Moves the cursor to the upper left corner and clears the screen.
 const CLEAR: &str = "\u{1b}[H\u{1b}[J";
 
-/// Shows a run until it has ended and its session is sealed, or nobody runs it any more.
+/// Shows a run until its session is sealed or its process has ended.
 ///
 /// # Errors
-/// [`Failure::input`] for what is no session; with `--once` also when there is none yet.
+/// [`Failure::input`] if the file is not a session; with `--once` also if there is none yet.
 pub(crate) fn watch(args: &WatchArgs, json: bool) -> Outcome {
     let every = Duration::try_from_secs_f64(args.every)
         .map_err(|e| Failure::input(format!("--every: {e}")))?;
-    let mut told = false;
+    let mut is_announced = false;
     let mut follower = None;
     loop {
         let frame = match follower.as_mut() {
             Some(follower) => look(follower, args.once)?,
-            None => match found(&args.session)? {
+            None => match find_session(&args.session)? {
                 Some(session) => look(follower.insert(Follower::new(session)), args.once)?,
                 None => None,
             },
@@ -52,8 +52,8 @@ pub(crate) fn watch(args: &WatchArgs, json: bool) -> Outcome {
                     args.session.display()
                 )));
             }
-            None if !told && follower.is_none() => {
-                told = true;
+            None if !is_announced && follower.is_none() => {
+                is_announced = true;
                 errln!(
                     "{}: no session yet; waiting for a run to start (ctrl-C quits)",
                     args.session.display()
@@ -65,8 +65,8 @@ pub(crate) fn watch(args: &WatchArgs, json: bool) -> Outcome {
     }
 }
 
-/// The session that is meant, once there is one.
-fn found(place: &Path) -> Result<Option<PathBuf>, Failure> {
+/// The session to watch, once there is one.
+fn find_session(place: &Path) -> Result<Option<PathBuf>, Failure> {
     let mut folder = match place.is_dir() {
         true => std::fs::read_dir(place).map_err(Failure::input)?,
         false => return Ok(place.exists().then(|| place.to_owned())),
@@ -85,9 +85,9 @@ fn found(place: &Path) -> Result<Option<PathBuf>, Failure> {
     }
 }
 
-/// The next frame; `None` when there is nothing new, as before the first records of the run are on the disk.
+/// The next frame; `None` if there is nothing new, for example before the first records of the run are on the disk.
 fn look(follower: &mut Follower, once: bool) -> Result<Option<Frame>, Failure> {
-    // The writer first: a run that ends in between has then left its end in the file.
+    // Look for the writer first: if the run ends in between, its end is then in the file.
     let writer = writer_of(follower.session());
     match follower.look(writer.as_deref(), !once) {
         Ok(frame) => Ok(frame),

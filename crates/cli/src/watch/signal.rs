@@ -1,4 +1,4 @@
-//! How well a press stands out of the noise: the event rate while the skin was touched over the rate before it.
+//! Signal-to-noise ratio of a press: the event rate during contact over the rate before it.
 
 use std::collections::BTreeMap;
 
@@ -7,12 +7,12 @@ use skinrig_formats::{Decoder, Scanner};
 use skinrig_model::{AttemptId, CameraId, PressOutcome, StreamFormat};
 use skinrig_recorder::{ChunkMeta, RecorderError, SessionReader};
 
-/// Looked at before a press, µs.
+/// Time before a press over which noise is measured, µs.
 const IDLE_US: i64 = 300_000;
-/// Chunks looked at, of each camera: a press ends a chunk.
+/// Number of latest chunks read per camera: a press ends a chunk.
 const CHUNKS: u32 = 8;
 
-/// What a camera saw of a press.
+/// Event rates of a camera for one press.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct Signal {
     /// Events per second from contact to release.
@@ -22,22 +22,22 @@ pub(super) struct Signal {
 }
 
 impl Signal {
-    /// Signal over noise; with no noise at all that of one event.
+    /// Signal over noise; without noise, over one event.
     #[must_use]
     pub(super) fn ratio(self) -> f64 {
         self.press_per_s / self.idle_per_s.max(1e6 / IDLE_US as f64)
     }
 }
 
-/// Two stretches of a camera's time in which events are counted, from and to, µs.
+/// Two intervals of a camera's time in which events are counted, from and to, µs.
 struct Count {
     attempt: AttemptId,
     spans: [(i64, i64); 2],
     events: [u64; 2],
 }
 
-/// What the cameras saw of these presses, as far as the last chunks tell. The clocks are laid on one another by the least delay
-/// between the last event of a chunk and its arrival: good to some milliseconds.
+/// Signals of these presses, as far as the last chunks cover them. The clocks are aligned by the smallest delay between the last
+/// event of a chunk and its arrival, which is accurate to a few milliseconds.
 pub(super) fn signals(
     reader: &SessionReader,
     formats: [StreamFormat; 2],
@@ -48,7 +48,7 @@ pub(super) fn signals(
     for camera in CameraId::ALL {
         let k = camera.index();
         let mut last = reader.last_chunks(camera, CHUNKS)?;
-        // Before the beginning of a leg another clock held.
+        // Chunks before the start of the leg have another clock.
         if let Some(leg) = last.iter().rposition(|c| c.restart_us.is_some()) {
             last.drain(..leg);
         }
@@ -90,7 +90,7 @@ fn counts(
             let [approach, contact, release] =
                 [timing.approach, timing.contact, timing.release].map(|t| t.0 / 1000 - ahead_us);
             let spans = [(contact, release), (approach - IDLE_US, approach)];
-            // Else some of it is in chunks that were not looked at.
+            // Skip presses that the chunks do not cover completely.
             (spans[1].0 >= begin_us && release <= end_us).then_some(Count {
                 attempt: outcome.attempt,
                 spans,
@@ -109,7 +109,7 @@ fn counts(
     let wanted: Vec<ChunkMeta> = chunks.iter().filter(touches).copied().collect();
     for chunk in wanted {
         let bytes = reader.chunk_bytes(chunk.camera, chunk.seq)?;
-        // Decoded by itself a chunk has times of its own; both end with the same word.
+        // A chunk decoded alone has its own time origin; align it by its last word.
         let alone = Scanner::new(format).push(&bytes).0.last_us;
         let (Some(alone), Some((_, last))) = (alone, times(&chunk)) else {
             continue;

@@ -92,6 +92,6 @@ fn a_bundle_is_exported_alone() {
     let lab = Lab::new();
     let session = text(&lab.record("s", &[]));
     let export = ["export", &session, "--to", "bundle", "--to", "csv"];
-    skinrig(&export).code(2).complains(&["alone"]);
+    skinrig(&export).code(2).complains(&["no other format"]);
     assert_eq!(files(&lab.path("s"), "").len(), 1);
 }

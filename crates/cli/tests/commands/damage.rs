@@ -131,7 +131,7 @@ fn what_is_whole_of_a_damaged_session_is_salvaged_and_analysed() {
     let said = said
         .code(4)
         .complains(&["some data are lost", "skinrig show"]);
-    assert!(said.out.contains("rows back"), "{said:#?}");
+    assert!(said.out.contains("recovered"), "{said:#?}");
     let shown = skinrig(&["show", &out]);
     assert!(matches!(shown.code, Some(0 | 2)), "{shown:#?}");
     assert_ne!(std::fs::read(&session).unwrap(), bytes);

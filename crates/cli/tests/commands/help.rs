@@ -2,7 +2,7 @@
 
 use crate::support::{ROOT, skinrig};
 
-const COMMANDS: [&str; 28] = [
+const COMMANDS: [&str; 29] = [
     "init",
     "new",
     "doctor",
@@ -27,6 +27,7 @@ const COMMANDS: [&str; 28] = [
     "tradeoff",
     "compare",
     "watch",
+    "view",
     "prototypes",
     "tag",
     "completions",

@@ -133,7 +133,7 @@ fn what_cannot_go_on_is_refused_and_left_as_it_is() {
     for kind in ["imported", "replayed"] {
         let other = |header: &mut RunHeader| header.rig_kind = kind.to_owned();
         let path = begun(&lab, &format!("{kind}.session.sqlite"), &session, other);
-        refused(&path, &["expected a session that a rig recorded", kind]);
+        refused(&path, &["expected a session recorded by a rig", kind]);
     }
     let whole = lab.record("whole", &[]);
     let before = std::fs::read(&whole).unwrap();

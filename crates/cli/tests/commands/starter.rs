@@ -34,9 +34,11 @@ fn every_new_protocol_passes_its_check_and_none_is_overwritten() {
         at(&folder, &["new", kind, &file]).code(0);
         at(&folder, &["check", &file]).code(0);
         std::fs::write(lab.path(&file), "mine").unwrap();
-        at(&folder, &["new", kind, &file])
-            .code(2)
-            .complains(&[&file, "not there yet", "next:"]);
+        at(&folder, &["new", kind, &file]).code(2).complains(&[
+            &file,
+            "found an existing one",
+            "next:",
+        ]);
         assert_eq!(std::fs::read_to_string(lab.path(&file)).unwrap(), "mine");
     }
     // The schema that their first line names.
@@ -64,7 +66,7 @@ fn a_new_lab_runs_and_keeps_what_is_its_own() {
     std::fs::write(&own, "mine").unwrap();
     std::fs::write(&schema, "old").unwrap();
     let told = at(&here, &["init"]).code(0).out;
-    assert!(told.contains("0 files written, 1 renewed"), "{told}");
+    assert!(told.contains("0 files written, 1 updated"), "{told}");
     assert_eq!(std::fs::read_to_string(&own).unwrap(), "mine");
     assert_ne!(std::fs::read_to_string(&schema).unwrap(), "old");
     std::fs::write(lab.path("file"), "").unwrap();

@@ -116,7 +116,7 @@ fn a_variant_lies_beside_the_official_analysis_and_is_taken_only_when_asked_for(
     // Nothing puts a variant into the official place, and what lies there is not taken for official.
     skinrig(&["analyze", &s, "--set", CHANGE, "--out", &text(&official)])
         .code(2)
-        .complains(&["place"]);
+        .complains(&["expected another path for the variant"]);
     skinrig(&["analyze", &s, "--name", "official"]).code(2);
     let variant = only(&lab.path("s"), ".analysis-all.results.json");
     std::fs::copy(variant, &official).unwrap();
@@ -192,7 +192,8 @@ fn an_export_made_again_is_done() {
     std::fs::write(&path, manifest.to_string()).unwrap();
     let said = skinrig(&["verify", &bundle]).code(4);
     assert!(
-        said.out.contains("expected what the sealed session gives"),
+        said.out
+            .contains("expected the content that follows from the sealed session"),
         "{said:#?}"
     );
 }

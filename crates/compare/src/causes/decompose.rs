@@ -98,7 +98,7 @@ fn error_budget(of: &SkinPresses, locations: &[usize]) -> ErrorBudget {
         }
     }
     let slope = if alone > 0.0 { together / alone } else { 0.0 };
-    // An error of the ground truth pulls position errors the other way: a positive slope is chance.
+    // Ground-truth errors shift position errors in the opposite direction, so a positive slope is chance.
     let slope = slope.min(0.0);
     let robot = slope * slope * alone / n;
     let left = |o: &PressFactors| [0, 1].map(|k| o.fitted[k] - slope * (o.off_plan[k] - off[k]));

@@ -75,18 +75,18 @@ pub fn causes(
     resamples: u32,
     seed: u64,
 ) -> Option<Causes> {
-    const MIN_PLACES: usize = 4;
+    const MIN_LOCATIONS: usize = 4;
     let pair = [a.clone(), b.clone()];
     let locations = Locations::of(&pair);
     let shared = locations.shared([a, b]);
     let of = |subject: &Subject| SkinPresses::of(subject, &locations, &shared);
     let mut own = [of(a), of(b)];
     let both: Vec<u32> = own[0].locations().filter(|p| own[1].has(*p)).collect();
-    if both.len() < MIN_PLACES {
+    if both.len() < MIN_LOCATIONS {
         return None;
     }
     own.iter_mut().for_each(|p| p.keep(&both));
-    // PressFactors pair under the settings of B, one under those of A: within a pair only the skins differ.
+    // One pair under the settings of B, one under those of A: within a pair only the skins differ.
     let variants: Vec<[SkinPresses; 2]> = match reanalysis {
         None => vec![own],
         Some(reanalysis) => {

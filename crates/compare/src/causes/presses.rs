@@ -19,7 +19,7 @@ pub(super) struct PressFactors {
     pub used: [f64; 2],
     /// Error with a geometry fitted to the scored presses, mm.
     pub fitted: [f64; 2],
-    /// FactorMeasurement minus planned position, mm.
+    /// Measured minus planned position, mm.
     pub off_plan: [f64; 2],
     /// Mean over cameras of 1 / (events added by the press).
     pub per_event: f64,
@@ -39,7 +39,7 @@ pub(super) struct SkinPresses {
 }
 
 /// Fitting `p` parameters to `n` calibration presses adds `p / 2n` of their scatter on average; up to twice that is chance.
-const CHANCE: f64 = 2.0;
+const CHANCE_FACTOR: f64 = 2.0;
 
 impl SkinPresses {
     pub(super) fn of(subject: &Subject, locations: &Locations, shared: &BTreeSet<u32>) -> Self {
@@ -60,7 +60,7 @@ impl SkinPresses {
         }
         let cost = |s: &Session| {
             let c = s.analysis.calibration.as_ref()?;
-            Some(CHANCE * c.names.len() as f64 / (2.0 * f64::from(c.n.max(1))))
+            Some(CHANCE_FACTOR * c.names.len() as f64 / (2.0 * f64::from(c.n.max(1))))
         };
         let costs = subject.sessions.iter().map(|s| cost(s).unwrap_or(0.0));
         Self {
@@ -115,9 +115,10 @@ struct RefittedGeometry {
     inflation: f64,
 }
 
-/// Fits a geometry to the scored presses as if they were calibration presses: a diagnosis of the calibration, never a score.
-/// Residuals of `n` presses (two numbers each) under `p` fitted parameters are too small by `sqrt(1 - p / 2n)`; the
-/// inflation corrects this. Falls back to the session's geometry with too few presses.
+/// Fits a geometry to the scored presses as if they were calibration presses. This diagnoses the
+/// calibration and never scores. Residuals of `n` presses (two numbers each) under `p` fitted
+/// parameters are too small by `sqrt(1 - p / 2n)`; the inflation corrects this. Falls back to the
+/// session's geometry with too few presses.
 fn refit_geometry(session: &Session, attempts: &[Attempt<'_>]) -> RefittedGeometry {
     let used = session.analysis.geometry;
     let presses: Vec<PressResult> = attempts

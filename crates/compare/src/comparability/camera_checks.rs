@@ -9,7 +9,7 @@ const IDLE_FACTOR: f64 = 1.25;
 /// Calibrated parameters that differ by more standard errors indicate moved cameras.
 const MOVED_SIGMAS: f64 = 4.0;
 
-/// Ambient light is not recorded, but idle event rates are.
+/// Compares idle event rates, because ambient light itself is not recorded.
 pub(super) fn ambient(subjects: &[Subject], locations: &Locations) -> Option<Difference> {
     let idle = |s: &Subject| {
         let rate = |p: &Attempt<'_>| {

@@ -218,7 +218,8 @@ fn check_seeds(subjects: &[Subject]) -> Option<Difference> {
     })
 }
 
-/// Fires when all skins are unsealed: equal values are no difference for the rules.
+/// Reports unsealed skins. It also fires when all skins are unsealed, which the rules do not see as
+/// a difference.
 fn check_unsealed(subjects: &[Subject]) -> Option<Difference> {
     let sealed = |s: &Session| s.facts.values.get("session.sealed").cloned();
     let all = subjects

@@ -66,7 +66,7 @@ pub struct Components {
     pub repetitions: [f64; 2],
 }
 
-/// Presses required for a decision, assuming that the measured difference is the true one.
+/// Presses required for a decision, if the measured difference is the true one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "status", rename_all = "snake_case")]
 pub enum PressesNeeded {
@@ -76,7 +76,8 @@ pub enum PressesNeeded {
     More(RequiredDesign),
     /// The difference is too close to the border for any practical number of presses.
     OutOfReach,
-    /// The values do not vary, as when every press was located: nothing tells how many more would decide.
+    /// The values do not vary, as when every press was located, so the required number of presses
+    /// is unknown.
     Unknown,
 }
 

@@ -31,7 +31,8 @@ pub struct Pair {
     pub adjusted: Option<Adjusted>,
 }
 
-/// A comparison corrected for its family: the probability of any false claim in the family stays below alpha.
+/// A comparison corrected for its family: the probability of any false claim in the family is below
+/// alpha.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Adjusted {
     /// Number of comparisons in the family.

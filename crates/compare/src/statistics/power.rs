@@ -22,7 +22,7 @@ pub struct MetricVariance {
     pub locations: u32,
 }
 
-/// Difference to detect, and with which certainty.
+/// Difference to detect, and the required certainty.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Target {
     /// Difference to detect, in the unit of the metric.

@@ -8,7 +8,7 @@ use skinrig_analysis::distributions::student_quantile;
 /// Upper limit of the search for locations.
 const MAX_LOCATIONS: u32 = 100_000;
 
-/// Presses required for a decision, assuming the measured difference and variance.
+/// Presses required for a decision, if the measured difference and variance are the true ones.
 pub(super) fn presses_needed(
     verdict: Verdict,
     question: &Question,
@@ -66,7 +66,7 @@ fn required_design(
     if allowed(MAX_LOCATIONS) < variance {
         return None;
     }
-    // As many as now did not decide.
+    // The present number did not decide.
     let (mut low, mut high) = (now.max(1) + 1, MAX_LOCATIONS);
     while low < high {
         let middle = low.midpoint(high);

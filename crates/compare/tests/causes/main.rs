@@ -1,6 +1,7 @@
-//! A planted cause in a simulated pair is identified, and without a planted cause none is reported.
+//! Tests the causes of simulated pairs: a planted cause is identified, and without one none is
+//! reported.
 #![expect(clippy::unwrap_used, reason = "tests")]
-#![expect(clippy::print_stdout, reason = "a pair that is named wrongly is shown")]
+#![expect(clippy::print_stdout, reason = "shows pairs with a wrong cause")]
 
 mod planted;
 
@@ -21,11 +22,11 @@ const PLANTS: [(PlantedCause, Factor); 6] = [
 
 /// Number of correct reports for each planted cause over the seeds.
 fn count_correct(seeds: std::ops::Range<u64>) -> [u32; PLANTS.len()] {
-    let mut right = [0; PLANTS.len()];
+    let mut correct = [0; PLANTS.len()];
     for seed in seeds {
         let first = record(2 * seed, PlantedCause::Nothing);
         let a = first.skin('A', None);
-        for ((plant, factor), right) in PLANTS.iter().zip(&mut right) {
+        for ((plant, factor), correct) in PLANTS.iter().zip(&mut correct) {
             let second = record(2 * seed + 1, *plant);
             let b = second.skin('B', None);
             let others = match plant {
@@ -41,7 +42,7 @@ fn count_correct(seeds: std::ops::Range<u64>) -> [u32; PLANTS.len()] {
             let sum: f64 = found.contributions.iter().map(|c| c.mm2.value).sum();
             assert!((sum - found.change_mm2.value).abs() < 1e-9, "{found:#?}");
             if found.carried_by == Some(*factor) {
-                *right += 1;
+                *correct += 1;
             } else {
                 let parts = found.contributions.iter();
                 let parts: Vec<_> = parts.map(|c| (c.factor, c.mm2.value)).collect();
@@ -54,7 +55,7 @@ fn count_correct(seeds: std::ops::Range<u64>) -> [u32; PLANTS.len()] {
             }
         }
     }
-    right
+    correct
 }
 
 #[test]
@@ -65,13 +66,13 @@ fn the_planted_cause_is_named() {
 #[test]
 #[ignore = "200 seeds take minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig-compare --test causes -- --ignored"]
 fn the_planted_cause_is_named_in_95_of_100_pairs() {
-    let right = count_correct(1_000..1_200);
-    println!("right of 200, in the order of the plants: {right:?}");
-    assert!(right.iter().all(|n| *n >= 190), "{right:?}");
+    let correct = count_correct(1_000..1_200);
+    println!("correct reports of 200, in the order of `PLANTS`: {correct:?}");
+    assert!(correct.iter().all(|n| *n >= 190), "{correct:?}");
 }
 
 #[test]
-fn where_nothing_was_planted_nothing_is_named() {
+fn without_a_planted_cause_none_is_reported() {
     for seed in 500..504 {
         let [a, b] = [(0, 'A'), (1, 'B')]
             .map(|(k, letter)| record(2 * seed + k, PlantedCause::Nothing).skin(letter, None));

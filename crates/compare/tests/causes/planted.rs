@@ -1,4 +1,5 @@
-//! A simulated session with one planted cause: plan, clocks and events of the geometric level, without devices.
+//! Simulates a session with one planted cause: plan, clocks and events of the geometric level,
+//! without devices.
 
 use skinrig_analysis::{Analysis, SessionInput, analyze};
 use skinrig_compare::{Facts, Session, Subject};
@@ -13,7 +14,8 @@ use skinrig_sim::scene::{GRID_NS, PixelModel, TipSample};
 
 /// Period of the presses, ms.
 const PERIOD_MS: i64 = 1_400;
-/// The first press, ms; the tip then goes down for 100 ms, stays for 100 ms and comes up for 100 ms.
+/// Start of the first press, ms. The tip moves down for 100 ms, stays for 100 ms and moves up for
+/// 100 ms.
 const FIRST_MS: i64 = 600;
 const SIDE: u32 = 5;
 const DEPTH_MM: f64 = 2.0;
@@ -33,7 +35,7 @@ pub(crate) enum PlantedCause {
     Spread(f64),
     /// Standard deviation of the robot's position about the measured one, per axis, mm.
     Robot(f64),
-    /// The analysis uses one event in this many.
+    /// The analysis uses one in this many events.
     Settings(u32),
 }
 
@@ -98,7 +100,7 @@ pub(crate) fn record(seed: u64, plant: PlantedCause) -> SimulatedSession {
             -14.0 + 11.0 * f64::from(place / SIDE),
             -20.0 + 11.0 * f64::from(place % SIDE),
         );
-        // The robot goes to its target except for the unmeasured scatter.
+        // The robot reaches its target except for an unmeasured scatter.
         let scatter = if let PlantedCause::Robot(mm) = plant {
             mm
         } else {
@@ -131,7 +133,7 @@ pub(crate) fn record(seed: u64, plant: PlantedCause) -> SimulatedSession {
 }
 
 impl SimulatedSession {
-    /// Analyses it as a skin, with its own settings or another thinning.
+    /// Analyses the session as a skin, with its own settings or another thinning.
     pub(crate) fn skin(&self, letter: char, thinning: Option<u32>) -> Subject {
         let mut input = self.input.clone();
         input.settings.thinning = thinning.unwrap_or(input.settings.thinning);

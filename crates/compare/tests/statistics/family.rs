@@ -1,4 +1,4 @@
-//! Comparing several prototypes at once.
+//! Tests comparisons of several prototypes at once.
 
 use skinrig_compare::statistics::{
     Better, ComparisonError, Pair, PairSelection, Question, Sample, Settings, Verdict, compare_all,
@@ -18,7 +18,7 @@ fn settings() -> Settings {
     }
 }
 
-/// Skins pressed at the same 12 locations, each this much worse than the first.
+/// Skins pressed at the same 12 locations, each worse than the first by its shift.
 fn skins(seed: u64, shifts: &[f64]) -> Vec<Sample> {
     let mut draws = Draws::new(11, seed);
     let shared: Vec<f64> = (0..12).map(|_| draws.normal()).collect();
@@ -96,7 +96,7 @@ fn a_family_against_a_reference_finds_the_worse_one() {
 }
 
 #[test]
-fn what_cannot_be_compared_takes_no_part() {
+fn incomparable_samples_are_left_out() {
     let mut skins = skins(1, &[0.0, 3.0]);
     skins.push(Sample::mean([]).unwrap());
     let pairs = compare_all(&skins, PairSelection::All, &QUESTION, &settings()).unwrap();

@@ -1,4 +1,5 @@
-//! Properties of all samples: swapping them mirrors the result, order does not matter, units carry through.
+//! Tests properties of all samples: swapping them mirrors the result, order does not matter, units
+//! carry through.
 
 use proptest::prelude::*;
 use skinrig_compare::statistics::{
@@ -57,7 +58,7 @@ fn all_finite(c: &Comparison) -> bool {
         && c.components.between.is_finite()
 }
 
-/// Presses: their location and value.
+/// Presses as (location, value).
 type Lines = Vec<(u32, f64)>;
 
 /// Presses of a few locations on two skins, with a planted difference.
@@ -159,7 +160,7 @@ proptest! {
 }
 
 #[test]
-fn a_clear_difference_is_found_and_a_skin_equals_its_like() {
+fn a_clear_difference_is_found_and_equal_skins_are_equivalent() {
     let question = Question {
         better: Better::Lower,
         margin: Some(0.5),

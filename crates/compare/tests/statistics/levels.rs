@@ -103,12 +103,12 @@ fn levels_hold(trial: Trial) {
     };
     let (none, border) = levels(trial);
     assert!(trial.holds(none, border), "{trial:?}\n{none:?}\n{border:?}");
-    // Nor may it pass by never claiming anything.
+    // A method that never claims anything must fail too.
     assert!(
         none.covered < 0.995 && border.differ > 0.1,
         "{none:?}\n{border:?}"
     );
-    // Half of the same populations suffice to show it.
+    // Half of the populations suffice to show that the naive method fails.
     let naive = Trial {
         naive: true,
         populations: trial.populations / 2,

@@ -1,5 +1,5 @@
-//! Statistics of the comparison, on skins with a known truth.
-#![expect(clippy::unwrap_used, reason = "a test that cannot compare must fail")]
+//! Tests the statistics of the comparison on skins with known true values.
+#![expect(clippy::unwrap_used, reason = "a failing test may panic")]
 
 mod family;
 mod laws;

@@ -1,4 +1,4 @@
-//! Simulated skins: locations with their own errors, repetitions with noise, and a known truth.
+//! Simulates skins: locations with their own errors, repetitions with noise, and known true values.
 
 use skinrig_analysis::seeded;
 use skinrig_compare::statistics::{Better, Count, Kind, Position, Sample};
@@ -80,7 +80,7 @@ impl SimulatedPair {
         }
     }
 
-    /// With a difference as large as a typical margin.
+    /// The pair with a difference as large as a typical margin.
     pub(crate) fn shifted(self) -> Self {
         let shift = match self.kind {
             Kind::Share => 0.9,

@@ -1,4 +1,4 @@
-//! Proposed designs have the requested power.
+//! Tests that proposed designs have the requested power.
 
 use skinrig_compare::statistics::power::{Target, measure, plan};
 use skinrig_compare::statistics::{
@@ -8,7 +8,7 @@ use skinrig_compare::statistics::{
 use crate::levels::Trial;
 use crate::populations::{Draws, NOISE, OWN, SHARED, SimulatedPair};
 
-/// A session with so many locations that its variances are known.
+/// A session with enough locations to know its variances.
 fn pilot(kind: Kind) -> Sample {
     let pair = SimulatedPair {
         locations: 2000,
@@ -29,7 +29,7 @@ fn target(difference: f64) -> Target {
 }
 
 #[test]
-fn variances_are_taken_apart() {
+fn variance_components_are_recovered() {
     let found = measure(&pilot(Kind::Mean)).unwrap();
     let between = SHARED * SHARED + OWN * OWN;
     assert!((found.between - between).abs() < 0.1 * between, "{found:?}");
@@ -38,7 +38,7 @@ fn variances_are_taken_apart() {
 }
 
 #[test]
-fn a_plan_has_the_power_it_was_asked_for() {
+fn a_plan_has_the_requested_power() {
     for kind in [Kind::Mean, Kind::Rms] {
         let pair = SimulatedPair::new(kind).shifted();
         let [a, b] = pair.truth();
@@ -108,7 +108,7 @@ fn a_target_out_of_range_is_refused() {
     }
 }
 
-/// `copies` of the same 10 locations: the same difference and variance, known more precisely.
+/// `copies` times the same 10 locations: the same difference and variance, known more precisely.
 fn copies(copies: u32, shift: f64) -> [Sample; 2] {
     let mut sides: [Vec<(u32, f64)>; 2] = [Vec::new(), Vec::new()];
     for copy in 0..copies {
@@ -125,7 +125,7 @@ fn copies(copies: u32, shift: f64) -> [Sample; 2] {
 }
 
 #[test]
-fn what_is_said_to_decide_decides() {
+fn a_required_design_decides() {
     let settings = Settings::default();
     for (shift, margin) in [(0.5, None), (-0.3, Some(1.0))] {
         let question = Question {
@@ -152,7 +152,8 @@ fn what_is_said_to_decide_decides() {
     }
 }
 
-/// Every press of both skins was located: the interval is too wide for the margin, and no difference can be shown.
+/// If every press of both skins was located, the interval is too wide for the margin and no
+/// difference can be shown.
 #[test]
 fn values_that_do_not_vary_promise_no_verdict() {
     let side = || {

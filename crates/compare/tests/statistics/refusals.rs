@@ -1,4 +1,5 @@
-//! Samples that cannot be compared: each reason has its own type and message, and no result is NaN.
+//! Tests samples that cannot be compared: each reason has its own type and message, and no result
+//! is NaN.
 
 use skinrig_compare::statistics::{
     Better, ComparisonError, Count, Note, Pairing, Position, Question, Sample, SampleFault,
@@ -10,7 +11,7 @@ const LOWER: Question = Question {
     margin: Some(0.5),
 };
 
-/// Errors at `places`, 3 repetitions each, all different.
+/// Errors at locations `places`, with 3 different repetitions each.
 fn errors(places: std::ops::Range<u32>) -> Sample {
     let value = |i: u32, r: u32| 2.0 + 0.05 * f64::from((7 * i * i + 3 * r) % 11);
     Sample::rms(places.flat_map(|i| (0..3).map(move |r| (i, value(i, r))))).unwrap()
@@ -26,7 +27,7 @@ fn times(missed: u32) -> Sample {
 }
 
 #[test]
-fn nothing_to_compare_has_its_reason() {
+fn an_impossible_comparison_states_its_reason() {
     let empty = Sample::rms([]).unwrap();
     let found = refusal(&errors(0..9), &empty);
     assert_eq!(
@@ -53,7 +54,7 @@ fn nothing_to_compare_has_its_reason() {
 }
 
 #[test]
-fn no_spread_is_no_interval() {
+fn without_spread_there_is_no_interval() {
     let found = refusal(&errors(0..9), &errors(0..9));
     assert!(
         matches!(found, ComparisonError::NoSpread { locations: 9, .. }),
@@ -89,7 +90,7 @@ fn no_spread_is_no_interval() {
 }
 
 #[test]
-fn all_or_nothing_is_not_certainty() {
+fn a_share_of_0_or_1_still_has_an_interval() {
     let all = |success: bool| Sample::share((0..20).map(|i| (i / 2, success)));
     let question = Question {
         better: Better::Higher,
@@ -115,7 +116,7 @@ fn a_median_among_misses_is_beyond_the_window() {
     let found = refusal(&times(3), &times(11));
     let expected = "the 50 % percentile of B lies beyond the window: 11 of 20 trials were missed";
     assert!(found.to_string().starts_with(expected), "{found}");
-    // Fewer than half are missed: there is a median, although the misses count.
+    // Fewer than half are missed, so there is a median; misses still count.
     let found = compare(&times(0), &times(6), &LOWER, &Settings::default()).unwrap();
     assert!(found.b.value > found.a.value, "{found:?}");
     assert!(matches!(
@@ -158,7 +159,7 @@ fn unequal_repetitions_do_not_pass_for_a_difference() {
 }
 
 #[test]
-fn values_that_are_none_make_no_sample() {
+fn non_finite_values_are_rejected() {
     let nan = Sample::mean([(3, f64::NAN)]).unwrap_err();
     assert_eq!(
         nan.to_string(),

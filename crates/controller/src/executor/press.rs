@@ -21,14 +21,14 @@ impl Executor<'_> {
         if let Some(after) = step.start_after_begin {
             self.wait_at_clearance(self.series.due(after))?;
         }
-        let mut again = self.attempt_press(step)?;
+        let mut retake = self.attempt_press(step)?;
         let first_ended = self.now();
         let mut retakes = 0;
-        while again && self.series.may_retake(retakes) {
+        while retake && self.series.may_retake(retakes) {
             self.safe_point()?;
             retakes += 1;
             self.series.count_retake();
-            again = self.attempt_press(step)?;
+            retake = self.attempt_press(step)?;
         }
         // Retakes do not shorten the time until the next press.
         self.series.delay(self.now() - first_ended);
@@ -217,13 +217,13 @@ impl Executor<'_> {
             return Ok(false);
         };
         let judged = judge(press, fault);
-        let again = judged.should_retake();
+        let retake = judged.should_retake();
         self.series.end_attempt(press.attempt(), judged.faults);
-        let told = self.journal.outcome(judged.outcome);
-        if !was_rejected(&told) {
+        let recorded = self.journal.outcome(judged.outcome);
+        if !was_rejected(&recorded) {
             self.trackers.end_press();
         }
-        told?;
-        Ok(again)
+        recorded?;
+        Ok(retake)
     }
 }

@@ -24,15 +24,15 @@ impl Executor<'_> {
         for at in &check.points {
             let found = self.touch_point(check, *at)?;
             let sound = matches!(found, Ok(mm) if mm.abs() <= check.tolerance_mm);
-            let words = found.map_or_else(|why| why.to_string(), |mm| format!("{mm:.3} mm"));
+            let result = found.map_or_else(|why| why.to_string(), |mm| format!("{mm:.3} mm"));
             let name = format!("surface at ({}, {}) mm, {when}", at.x_mm, at.y_mm);
             if !sound {
-                failed.push(format!("{name}: expected {expected}, found {words}"));
+                failed.push(format!("{name}: expected {expected}, found {result}"));
             }
             rows.push(PreflightCheck::new(
                 name,
                 expected.as_str(),
-                words,
+                result,
                 sound,
                 NEXT,
             ));

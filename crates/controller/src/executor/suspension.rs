@@ -66,18 +66,18 @@ impl Executor<'_> {
             if !self.suspender.monitors_temperature(camera) {
                 continue;
             }
-            let told = match self.cameras.temperature_c(camera) {
+            let temperature = match self.cameras.temperature_c(camera) {
                 Err(DeviceError::Pending { .. }) => continue, // read in the next window
                 other => other?,
             };
-            if told.is_none() {
+            if temperature.is_none() {
                 self.suspender.stop_monitoring_temperature(camera);
                 let text = format!(
                     "suspend.temperature: {camera} cannot measure its temperature: not monitored"
                 );
                 self.journal.note(t, text)?;
             }
-            found[camera.index()] = told;
+            found[camera.index()] = temperature;
         }
         Ok(found)
     }

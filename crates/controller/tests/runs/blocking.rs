@@ -1,8 +1,8 @@
-//! Devices whose calls block, each call for ever and for 10 s, on threads of their own: the loop goes on, the arm comes off the skin,
+//! Devices on threads of their own whose calls block forever or for 10 s: the loop continues, the arm leaves the skin,
 //! and the cause names the device.
 //!
-//! The rig's clock stands still until every device has answered or is held in a call, so that nothing here depends on how fast
-//! threads are.
+//! The rig's clock stands still until every device has answered or is held in a call, so that no result depends on thread
+//! scheduling.
 
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -20,15 +20,15 @@ use crate::mock::*;
 
 /// How long a call blocks, ms.
 const LONG_MS: i64 = 10_000;
-/// And one that never comes back.
-const FOR_EVER_MS: i64 = i64::MAX / MS;
+/// Duration of a call that never returns, ms.
+const FOREVER_MS: i64 = i64::MAX / MS;
 
 const TIMEOUTS: Timeouts = Timeouts {
     running: HostDuration::from_millis(2_000),
     set_up: HostDuration::from_millis(3_000),
 };
 
-/// One call of one device.
+/// A device call that can block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Site {
     Send,
@@ -62,7 +62,7 @@ impl Site {
         }
     }
 
-    /// Whether a run makes this call while the tip is in the skin.
+    /// Whether a run makes this call while the tip is in contact.
     const fn in_contact(self) -> bool {
         !matches!(
             self,
@@ -71,24 +71,24 @@ impl Site {
     }
 }
 
-/// Blocks one call of a device, once; in contact where a run makes it there.
+/// Blocks one call of a device, once; in contact if a run makes it there.
 #[derive(Clone)]
 struct Blocking {
     world: Shared,
     role: DeviceRole,
-    /// Which call, and for how long, ms.
+    /// The call that blocks, and its duration, ms.
     site: Option<(Site, i64)>,
-    /// The call that blocks comes back then, ns; 0 while none does.
+    /// Time at which the blocked call returns, ns; 0 if none is blocked.
     until: Arc<AtomicI64>,
-    /// The thread of the control loop, which no call may hold.
+    /// The thread of the control loop, which must not make the call.
     control: ThreadId,
 }
 
 impl Blocking {
     fn pass(&mut self, site: Site) {
         if thread::current().id() == self.control {
-            let held = format!("{site:?} of {} was called by the control loop", self.role);
-            lock(&self.world).violations.push(held);
+            let violation = format!("{site:?} of {} was called by the control loop", self.role);
+            lock(&self.world).violations.push(violation);
         }
         let low = lock(&self.world).tip[2] < -1.0;
         let ours = |(s, _): &mut (Site, i64)| *s == site && (low || !site.in_contact());
@@ -96,11 +96,11 @@ impl Blocking {
             return;
         };
         if thread::current().id() == self.control {
-            return; // told above; a test that never ends says less
+            return; // already a violation; blocking here would hang the test
         }
         let until = lock(&self.world).t.saturating_add(ms.saturating_mul(MS));
         self.until.store(until, Ordering::Release);
-        if ms == FOR_EVER_MS {
+        if ms == FOREVER_MS {
             loop {
                 thread::park();
             }
@@ -173,7 +173,7 @@ impl TriggerBox for BlockingBox {
     }
 }
 
-/// Notes how long the robot was not looked at while it was armed.
+/// Measures the longest time between polls of the armed robot.
 struct WatchedIndenter(MockIndenter, Arc<AtomicI64>, i64);
 
 impl Indenter for WatchedIndenter {
@@ -210,10 +210,10 @@ impl Indenter for WatchedIndenter {
     }
 }
 
-/// The calls of a device that are under way, and until when it is held in one, ns.
+/// The calls of a device in progress, and the time until which one blocks, ns.
 type HeldDevice = (Calls, Arc<AtomicI64>);
 
-/// The rig's clock, which goes on when every device has answered or is held in a call.
+/// The rig's clock, which advances once every device has answered or is held in a call.
 #[derive(Clone)]
 struct SettledClock {
     world: Shared,
@@ -236,7 +236,7 @@ impl Clock for SettledClock {
     }
 }
 
-/// Presses that hold long enough for a device to be found silent in contact.
+/// Presses whose hold is long enough to detect a silent device in contact.
 fn slow_plan() -> Plan {
     let mut plan = plan();
     for step in &mut plan.steps {
@@ -248,7 +248,7 @@ fn slow_plan() -> Plan {
             ));
         }
     }
-    // Asks for temperatures, and flushes, in contact.
+    // Reads temperatures, and flushes, in contact.
     let hot = Threshold {
         trip: 60.0,
         resume: 50.0,
@@ -261,17 +261,17 @@ fn slow_plan() -> Plan {
     plan
 }
 
-struct Told {
+struct RunResult {
     report: RunReport,
     records: Vec<Record>,
-    /// Longest time without a look at the armed robot, ns.
+    /// Longest time between polls of the armed robot, ns.
     gap_ns: i64,
     ever_armed: bool,
     violations: Vec<String>,
     ended_ms: i64,
 }
 
-fn run(site: Option<(Site, i64)>, detached: bool) -> Told {
+fn run(site: Option<(Site, i64)>, detached: bool) -> RunResult {
     let plan = slow_plan();
     let world = World::shared(
         Faults {
@@ -302,7 +302,7 @@ fn run(site: Option<(Site, i64)>, detached: bool) -> Told {
             until: Arc::default(),
             control: thread::current().id(),
         };
-        let told = |calls: Calls, b: &Blocking| {
+        let register = |calls: Calls, b: &Blocking| {
             let device = (calls, Arc::clone(&b.until));
             clock.devices.lock().expect("devices").push(device);
         };
@@ -311,21 +311,21 @@ fn run(site: Option<(Site, i64)>, detached: bool) -> Told {
             let device = BlockingCamera(MockCamera(world.clone(), camera), b.clone());
             let device = DetachedCamera::new(Box::new(device), Box::new(clock.clone()), TIMEOUTS);
             let device = device.expect("a thread");
-            told(device.calls(), &b);
+            register(device.calls(), &b);
             rig.cameras[camera.index()] = Box::new(device);
         }
         let b = blocking(DeviceRole::TriggerBox);
         let device = BlockingBox(MockTriggerBox(world.clone()), b.clone());
         let device = DetachedBox::new(Box::new(device), Box::new(clock.clone()), TIMEOUTS);
         let device = device.expect("a thread");
-        told(device.calls(), &b);
+        register(device.calls(), &b);
         rig.trigger_box = Some(Box::new(device));
     }
     let mut sink = Sink::default();
     let control = lock(&world).control.clone();
     let report = Run::new(&plan, header(&plan), rig, &control, &mut sink).execute();
     let world = lock(&world);
-    Told {
+    RunResult {
         report,
         records: sink.records,
         gap_ns: gap.load(Ordering::Acquire),
@@ -343,43 +343,43 @@ fn silent(error: &ControllerError) -> Option<DeviceRole> {
 }
 
 #[test]
-fn no_call_that_blocks_holds_up_the_loop() {
+fn a_blocked_call_does_not_delay_the_loop() {
     for site in Site::ALL {
-        for ms in [FOR_EVER_MS, LONG_MS] {
+        for ms in [FOREVER_MS, LONG_MS] {
             let case = format!("{site:?} for {ms} ms");
-            let told = run(Some((site, ms)), true);
-            let report = &told.report;
-            assert_eq!(told.violations, Vec::<String>::new(), "{case}");
+            let result = run(Some((site, ms)), true);
+            let report = &result.report;
+            assert_eq!(result.violations, Vec::<String>::new(), "{case}");
             assert!(report.disarmed, "{case}: {report:?}");
             assert!(
-                told.gap_ns <= 5 * MS,
+                result.gap_ns <= 5 * MS,
                 "{case}: {} ns without a look",
-                told.gap_ns
+                result.gap_ns
             );
             match site {
                 _ if site.in_contact() => {
                     let causes: Vec<_> = report.causes.iter().map(silent).collect();
                     assert_eq!(causes, [Some(site.role())], "{case}: {report:?}");
                     assert!(report.retracted, "{case}: {report:?}");
-                    // In the first press: found silent after 2 s of a hold of 4 s, and off the skin at once.
+                    // In the first press: detected after 2 s of a hold of 4 s, and off the skin at once.
                     assert_eq!([report.valid, report.invalid], [0, 1], "{case}: {report:?}");
-                    let block = told.ended_ms - TIMEOUTS.running.0 / MS;
-                    assert!(block < 2_500, "{case}: ended at {} ms", told.ended_ms);
+                    let block = result.ended_ms - TIMEOUTS.running.0 / MS;
+                    assert!(block < 2_500, "{case}: ended at {} ms", result.ended_ms);
                 }
-                // Nothing was powered.
+                // The robot was never powered.
                 Site::Configure | Site::Start => {
                     let causes: Vec<_> = report.causes.iter().map(silent).collect();
                     assert_eq!(causes, [Some(site.role())], "{case}: {report:?}");
-                    assert!(!told.ever_armed, "{case}");
+                    assert!(!result.ever_armed, "{case}");
                 }
-                // Everything is over.
+                // The run has already ended.
                 _ => {
                     assert_eq!(report.end, RunEnd::Completed, "{case}: {report:?}");
                     assert_eq!(report.valid, 3, "{case}: {report:?}");
                     let named = match site {
                         Site::Stop => report.problems.iter().any(|p| silent(&p.error) == Some(site.role())),
-                        _ => told.records.iter().any(
-                            |r| matches!(r, Record::Note { text, .. } if text.starts_with("trigger box: what it lost is not known")),
+                        _ => result.records.iter().any(
+                            |r| matches!(r, Record::Note { text, .. } if text.starts_with("trigger box: its losses are unknown")),
                         ),
                     };
                     assert!(named, "{case}: {report:?}");
@@ -389,16 +389,16 @@ fn no_call_that_blocks_holds_up_the_loop() {
     }
 }
 
-/// On the ordinary path a thread costs the robot and the marks nothing: the same commands, marks and moments, at the same times after
-/// the first command. (Setting the devices up takes a look at the clock longer.)
+/// Without faults, device threads do not change robot commands or marks: the same commands, marks and moments, at the same times
+/// after the first command. (Device setup takes one more poll.)
 #[test]
-fn devices_on_threads_of_their_own_change_no_command_and_no_mark() {
+fn device_threads_change_no_command_and_no_mark() {
     let is_travel = |command: &MotionCommand| command.speed_mm_s == 100.0;
-    let instants = |told: &Told| -> Vec<(i64, String)> {
+    let instants = |result: &RunResult| -> Vec<(i64, String)> {
         let mut all = Vec::new();
-        for record in &told.records {
+        for record in &result.records {
             match record {
-                // The verdict on a press waits a look longer for the cameras, and the travel to the next one for the verdict.
+                // The verdict on a press waits one more poll for the cameras, and so does the travel to the next one.
                 Record::Command { command, .. } if is_travel(command) && !all.is_empty() => {}
                 Record::Command { t, command } => all.push((t.0, format!("{command:?}"))),
                 Record::MarkSent(sent) => all.push((sent.t.0, format!("{:?}", sent.mark))),
@@ -423,10 +423,10 @@ fn devices_on_threads_of_their_own_change_no_command_and_no_mark() {
     };
     let (inline, apart) = (run(None, false), run(None, true));
     assert_eq!(apart.violations, Vec::<String>::new());
-    for told in [&inline, &apart] {
-        assert_eq!(told.report.end, RunEnd::Completed, "{:?}", told.report);
-        assert_eq!(told.report.valid, 3, "{:?}", told.report);
-        assert_eq!(told.report.problems, Vec::new());
+    for result in [&inline, &apart] {
+        assert_eq!(result.report.end, RunEnd::Completed, "{:?}", result.report);
+        assert_eq!(result.report.valid, 3, "{:?}", result.report);
+        assert_eq!(result.report.problems, Vec::new());
     }
     assert_eq!(instants(&apart), instants(&inline));
 }

@@ -1,4 +1,4 @@
-//! Runs that break off: at every device call, at every record, at every tick of the operator.
+//! Runs interrupted at every device call, at every record and at every tick.
 
 use crate::course::*;
 use crate::mock::*;
@@ -14,20 +14,24 @@ fn every_device_call_may_fail() {
     std::panic::set_hook(Box::new(move |info| {
         let text = info.payload().downcast_ref::<String>();
         if !text.is_some_and(|t| t.starts_with("mock ") || t.starts_with("sink ")) {
-            hook(info); // what no mock intends stays visible
+            hook(info); // unintended panics stay visible
         }
     }));
     for failure in [Failure::Once, Failure::Forever, Failure::Panic] {
         for k in 1..=total {
-            let told = run(Faults {
+            let result = run(Faults {
                 at_call: Some((k, failure)),
                 ..faults()
             });
             let case = format!("call {k} of {total}, {failure:?}");
-            told.check(&case);
-            let told_of =
-                matches!(told.report.end, RunEnd::Faulted(_)) || !told.report.problems.is_empty();
-            assert!(told_of, "{case}: a failure is told: {:?}", told.report);
+            result.check(&case);
+            let is_reported = matches!(result.report.end, RunEnd::Faulted(_))
+                || !result.report.problems.is_empty();
+            assert!(
+                is_reported,
+                "{case}: the failure is reported: {:?}",
+                result.report
+            );
         }
     }
 }
@@ -46,16 +50,17 @@ fn every_record_may_be_refused() {
                 fail: Some((k, failure)),
                 ..Sink::default()
             };
-            let told = run_plan(&plan(), faults(), START, sink);
+            let result = run_plan(&plan(), faults(), START, sink);
             let case = format!("record {k} of {total}, {failure:?}");
-            told.check_rig(&case);
+            result.check_rig(&case);
             assert!(
-                matches!(told.report.end, RunEnd::Faulted(_)) || !told.report.problems.is_empty(),
+                matches!(result.report.end, RunEnd::Faulted(_))
+                    || !result.report.problems.is_empty(),
                 "{case}: {:?}",
-                told.report
+                result.report
             );
-            // A sink that recovers has every press once; a lost outcome is told again as invalid.
-            let records = || told.records.iter();
+            // A sink that recovers has every press once; a lost outcome is repeated as invalid.
+            let records = || result.records.iter();
             let ends = records().filter_map(|r| match r {
                 Record::Outcome(outcome) => Some(outcome.attempt),
                 Record::Missed(attempt, _) => Some(*attempt),
@@ -73,11 +78,11 @@ fn every_record_may_be_refused() {
                 (ends.len(), begun.len()),
                 "{case}: twice"
             );
-            let is_begin = matches!(told.records.get(k), Some(Record::Intent { .. }));
+            let is_begin = matches!(result.records.get(k), Some(Record::Intent { .. }));
             if failure == SinkFailure::Forever {
-                assert!(ends.len() <= 3 && told.records.len() == k, "{case}");
+                assert!(ends.len() <= 3 && result.records.len() == k, "{case}");
             } else if failure == SinkFailure::Late && is_begin {
-                // The press was not made, and its intent stands.
+                // The press was not made, but its intent is recorded.
                 assert_eq!((ends.len(), begun.len()), (2, 3), "{case}");
             } else {
                 assert_eq!(ends.len(), 3, "{case}");
@@ -92,22 +97,22 @@ fn the_operator_may_interrupt_at_every_tick() {
     assert!(ticks > 200, "{ticks}");
     let (mut broken_off, mut halted_in_skin) = (0, 0);
     for tick in 1..=ticks {
-        for press in Press::REQUESTS {
-            let told = run(Faults {
+        for press in OperatorAction::REQUESTS {
+            let result = run(Faults {
                 operator: Some((tick, press)),
                 ..faults()
             });
             let case = format!("{press:?} at tick {tick} of {ticks}");
-            told.check(&case);
+            result.check(&case);
             match press {
-                Press::Pause => {
-                    assert_eq!(told.report.end, RunEnd::Completed, "{case}");
-                    assert_eq!(told.report.valid, 3, "{case}");
+                OperatorAction::Pause => {
+                    assert_eq!(result.report.end, RunEnd::Completed, "{case}");
+                    assert_eq!(result.report.valid, 3, "{case}");
                 }
-                Press::PauseNow => {
-                    assert_eq!(told.report.end, RunEnd::Completed, "{case}");
-                    assert_eq!(told.report.missed, 0, "{case}");
-                    let broken = told
+                OperatorAction::PauseNow => {
+                    assert_eq!(result.report.end, RunEnd::Completed, "{case}");
+                    assert_eq!(result.report.missed, 0, "{case}");
+                    let broken = result
                         .outcomes()
                         .into_iter()
                         .filter_map(|o| match &o.verdict {
@@ -122,34 +127,37 @@ fn the_operator_may_interrupt_at_every_tick() {
                         "{case}: {broken:?}"
                     );
                 }
-                Press::Halt => {
-                    if told.report.end == RunEnd::Completed {
+                OperatorAction::Halt => {
+                    if result.report.end == RunEnd::Completed {
                         assert!(tick >= ticks - 1, "{case}");
                         continue;
                     }
-                    let w = lock(&told.world);
+                    let w = lock(&result.world);
                     halted_in_skin += usize::from(w.tip[2] < -1.0);
-                    assert!(told.report.disarmed && told.report.invalid <= 1, "{case}");
+                    assert!(
+                        result.report.disarmed && result.report.invalid <= 1,
+                        "{case}"
+                    );
                     assert!(
                         w.ticks <= tick + 1,
                         "{case}: motors off within a tick, found {}",
                         w.ticks
                     );
                 }
-                Press::Stop => {
-                    // The press under way is finished, none is broken off.
-                    assert_eq!(told.report.invalid, 0, "{case}: {:?}", told.outcomes());
-                    if told.report.end == RunEnd::Completed {
-                        assert_eq!(told.report.valid, 3, "{case}");
+                OperatorAction::Stop => {
+                    // The press in progress is finished; none is interrupted.
+                    assert_eq!(result.report.invalid, 0, "{case}: {:?}", result.outcomes());
+                    if result.report.end == RunEnd::Completed {
+                        assert_eq!(result.report.valid, 3, "{case}");
                     }
                 }
-                Press::Note => unreachable!("has a test of its own"),
-                Press::Abort => {
+                OperatorAction::Note => unreachable!("has a test of its own"),
+                OperatorAction::Abort => {
                     let wanted = RunEnd::Stopped(StopReason::Abort);
                     // At the very last ticks nothing is left to abort.
-                    if told.report.end != RunEnd::Completed {
-                        assert_eq!(told.report.end, wanted, "{case}");
-                        assert!(told.report.invalid <= 1, "{case}");
+                    if result.report.end != RunEnd::Completed {
+                        assert_eq!(result.report.end, wanted, "{case}");
+                        assert!(result.report.invalid <= 1, "{case}");
                     }
                 }
             }
@@ -161,11 +169,11 @@ fn the_operator_may_interrupt_at_every_tick() {
 
 #[test]
 fn a_pause_does_not_shorten_the_period_after_it() {
-    let told = run(Faults {
-        operator: Some((130, Press::Pause)),
+    let result = run(Faults {
+        operator: Some((130, OperatorAction::Pause)),
         ..faults()
     });
-    let intents: Vec<i64> = told
+    let intents: Vec<i64> = result
         .records
         .iter()
         .filter_map(|r| match r {
@@ -173,7 +181,7 @@ fn a_pause_does_not_shorten_the_period_after_it() {
             _ => None,
         })
         .collect();
-    let kinds: Vec<InterruptionKind> = told
+    let kinds: Vec<InterruptionKind> = result
         .records
         .iter()
         .filter_map(|r| match r {
@@ -182,42 +190,42 @@ fn a_pause_does_not_shorten_the_period_after_it() {
         })
         .collect();
     assert_eq!(kinds, [InterruptionKind::Pause, InterruptionKind::Resume]);
-    assert_eq!(told.report.valid, 3);
+    assert_eq!(result.report.valid, 3);
     let gaps = [intents[1] - intents[0], intents[2] - intents[1]];
     assert_eq!(gaps[1], 503, "{gaps:?}");
     assert!(gaps[0] > 1000, "{gaps:?}");
 }
 
 #[test]
-fn a_halt_breaks_off_the_retraction_of_an_abort() {
-    let kinds = |told: &Told| -> Vec<InterruptionKind> {
+fn a_halt_cancels_the_retraction_of_an_abort() {
+    let kinds = |result: &RunResult| -> Vec<InterruptionKind> {
         let kind = |r: &Record| match r {
             Record::Interruption { kind, .. } => Some(*kind),
             _ => None,
         };
-        told.records.iter().filter_map(kind).collect()
+        result.records.iter().filter_map(kind).collect()
     };
-    // Before the plan's first press nothing retracts, so the first tick whose abort finds the tip in the skin is sought.
+    // Before the plan's first press nothing retracts, so search for the first tick whose abort finds the tip in the skin.
     let ticks = lock(&run(faults()).world).ticks;
     let mut ended = Vec::new();
     for tick in (1..ticks).step_by(20) {
         let abort = Faults {
-            operator: Some((tick, Press::Abort)),
+            operator: Some((tick, OperatorAction::Abort)),
             ..faults()
         };
         let rises = lock(&run(abort.clone()).world).ticks - tick;
         if rises < 10 {
             continue;
         }
-        let told = run(Faults {
+        let result = run(Faults {
             halt_after: Some(5),
             ..abort
         });
         let case = format!("abort at tick {tick}, halt 5 ticks later");
-        told.check_rig(&case);
-        assert!(told.report.disarmed && !told.report.retracted, "{case}");
-        assert!(lock(&told.world).ticks <= tick + 6, "{case}");
-        ended.push(kinds(&told));
+        result.check_rig(&case);
+        assert!(result.report.disarmed && !result.report.retracted, "{case}");
+        assert!(lock(&result.world).ticks <= tick + 6, "{case}");
+        ended.push(kinds(&result));
     }
     let both = [InterruptionKind::Abort, InterruptionKind::Halt];
     assert!(

@@ -1,4 +1,4 @@
-//! Whole runs on a scripted rig: the good course, and every way it can break off.
+//! Whole runs on a scripted rig: a run without faults, and the checks for every run.
 
 use crate::mock::*;
 use skinrig_controller::{Run, RunReport};
@@ -8,25 +8,25 @@ use skinrig_protocol::plan::Plan;
 
 pub(crate) const START: [f64; 3] = [-5.0, 3.0, 20.0];
 
-pub(crate) struct Told {
+pub(crate) struct RunResult {
     pub world: Shared,
     pub records: Vec<Record>,
     pub report: RunReport,
 }
 
-pub(crate) fn run_plan(plan: &Plan, faults: Faults, start: [f64; 3], sink: Sink) -> Told {
+pub(crate) fn run_plan(plan: &Plan, faults: Faults, start: [f64; 3], sink: Sink) -> RunResult {
     let world = World::shared(faults, start);
     let control = lock(&world).control.clone();
     let mut sink = sink;
     let report = Run::new(plan, header(plan), rig(&world), &control, &mut sink).execute();
-    Told {
+    RunResult {
         world,
         records: sink.records,
         report,
     }
 }
 
-pub(crate) fn run(faults: Faults) -> Told {
+pub(crate) fn run(faults: Faults) -> RunResult {
     run_plan(&plan(), faults, START, Sink::default())
 }
 
@@ -38,7 +38,7 @@ pub(crate) fn faults() -> Faults {
     }
 }
 
-impl Told {
+impl RunResult {
     pub(crate) fn outcomes(&self) -> Vec<&PressOutcome> {
         let mut found = Vec::new();
         for r in &self.records {
@@ -66,7 +66,7 @@ impl Told {
         self.report.end.reason().unwrap_or("completed")
     }
 
-    /// What must hold after every run whose sink took all records.
+    /// Invariants of every run whose sink accepted all records.
     pub(crate) fn check(&self, case: &str) {
         self.check_rig(case);
         let n = self.report.planned as u32;
@@ -98,17 +98,17 @@ impl Told {
             matches!(self.records.last(), Some(Record::Ended { end, .. }) if *end == self.report.end),
             "{case}: the end is the last record"
         );
-        let told = |any: &[InterruptionKind]| {
+        let result = |any: &[InterruptionKind]| {
             self.records
                 .iter()
                 .any(|r| matches!(r, Record::Interruption { kind, .. } if any.contains(kind)))
         };
         use InterruptionKind as K;
         if self.report.end == RunEnd::Completed {
-            // A stop that came during the last press is told, too.
-            assert!(!told(&[K::Abort, K::Halt, K::Fault]), "{case}");
+            // A stop requested during the last press is recorded, too.
+            assert!(!result(&[K::Abort, K::Halt, K::Fault]), "{case}");
         } else {
-            assert!(told(&[K::Stop, K::Abort, K::Halt, K::Fault]), "{case}");
+            assert!(result(&[K::Stop, K::Abort, K::Halt, K::Fault]), "{case}");
         }
         let mut last = HostTime(-1);
         for r in &self.records {
@@ -120,7 +120,7 @@ impl Told {
         }
     }
 
-    /// What must hold of the rig after every run.
+    /// Invariants of the rig after every run.
     pub(crate) fn check_rig(&self, case: &str) {
         let w = lock(&self.world);
         let r = &self.report;
@@ -146,14 +146,14 @@ impl Told {
 
 #[test]
 fn a_good_run() {
-    let told = run(faults());
-    told.check("good");
-    assert_eq!(told.report.end, RunEnd::Completed, "{:?}", told.report);
-    assert_eq!(told.verdicts(), ["valid"; 3], "{:?}", told.outcomes());
-    assert_eq!(told.report.problems, Vec::new());
-    let w = lock(&told.world);
+    let result = run(faults());
+    result.check("good");
+    assert_eq!(result.report.end, RunEnd::Completed, "{:?}", result.report);
+    assert_eq!(result.verdicts(), ["valid"; 3], "{:?}", result.outcomes());
+    assert_eq!(result.report.problems, Vec::new());
+    let w = lock(&result.world);
     let limits = w.limits.as_ref().map(|l| (l.min_mm, l.max_mm));
-    // Skin x -40..60, y -50..55, z -3..40, each 0.05 wider, turned by a quarter and shifted.
+    // Skin x -40..60, y -50..55, z -3..40, each 0.05 wider, rotated by 90 degrees and shifted.
     let (min, max) = limits.unwrap_or_default();
     for (found, wanted) in min
         .iter()
@@ -162,7 +162,7 @@ fn a_good_run() {
     {
         assert!((found - wanted).abs() < 1e-9, "{min:?} {max:?}");
     }
-    for (o, planned) in told.outcomes().iter().zip(plan().presses) {
+    for (o, planned) in result.outcomes().iter().zip(plan().presses) {
         let t = o.timing.as_ref().map(|t| {
             [
                 t.approach, t.contact, t.at_depth, t.retract, t.release, t.clear,
@@ -182,7 +182,7 @@ fn a_good_run() {
         assert!((30 * MS..=32 * MS).contains(&hold), "{hold}");
     }
     // Each downward motion begins in its slot.
-    let slots: Vec<i64> = told
+    let slots: Vec<i64> = result
         .records
         .iter()
         .filter_map(|r| match r {
@@ -209,17 +209,17 @@ fn bytes_poses_and_marks_precede_the_outcome() {
 }
 
 fn check_order(train_ms: i64) {
-    let told = run(Faults {
+    let result = run(Faults {
         train_ms,
         ..faults()
     });
-    assert_eq!(told.report.valid, 3);
+    assert_eq!(result.report.valid, 3);
     let mut line_until = HostTime::ZERO;
     let mut counts = [0; 3];
     let mut seen_to = HostTime::ZERO;
     let mut bytes_to = [HostTime::ZERO; 2];
     let mut moved_for = None;
-    for r in &told.records {
+    for r in &result.records {
         match r {
             Record::Poses(block) => seen_to = block.last().map_or(seen_to, |p| p.t),
             Record::Chunk(c) => bytes_to[c.camera.index()] = c.host_time,
@@ -251,12 +251,12 @@ fn check_order(train_ms: i64) {
 
 #[test]
 fn marks_wait_for_a_busy_line() {
-    let told = run(Faults {
+    let result = run(Faults {
         train_ms: 120,
         ..faults()
     });
-    told.check("busy line"); // the mock calls a mark on a busy line a violation
-    let kinds: Vec<MarkKind> = told
+    result.check("busy line"); // the mock calls a mark on a busy line a violation
+    let kinds: Vec<MarkKind> = result
         .records
         .iter()
         .filter_map(|r| match r {
@@ -268,15 +268,15 @@ fn marks_wait_for_a_busy_line() {
         kinds,
         [MarkKind::Contact, MarkKind::AtDepth, MarkKind::Release].repeat(3)
     );
-    assert_eq!(told.verdicts(), ["valid"; 3]);
+    assert_eq!(result.verdicts(), ["valid"; 3]);
 }
 
 #[test]
-fn from_an_unknown_start_it_goes_up_first() {
-    let told = run_plan(&plan(), faults(), [20.0, 30.0, -1.0], Sink::default());
-    told.check("low start");
-    assert_eq!(told.report.valid, 3);
-    let w = lock(&told.world);
+fn from_an_unknown_start_the_tip_rises_first() {
+    let result = run_plan(&plan(), faults(), [20.0, 30.0, -1.0], Sink::default());
+    result.check("low start");
+    assert_eq!(result.report.valid, 3);
+    let w = lock(&result.world);
     let (target, speed, _) = w.commands[0];
     assert!((target[0] - 20.0).abs() < 1e-9 && (target[1] - 30.0).abs() < 1e-9);
     assert!((target[2] - 5.0).abs() < 1e-9 && speed <= 20.0);

@@ -1,4 +1,4 @@
-//! Presses that do not count, and faults of motion that end the run.
+//! Invalid presses, and motion faults that end the run.
 
 use crate::course::*;
 use crate::mock::*;
@@ -8,14 +8,14 @@ use skinrig_protocol::plan::Step;
 
 #[test]
 fn a_press_that_does_not_arrive_is_invalid_and_the_next_one_is_done() {
-    // Something hard 1.2 mm below the surface during the second press.
-    let told = run(Faults {
+    // An obstacle 1.2 mm below the surface during the second press.
+    let result = run(Faults {
         floor_mm: Some((700, -1.2, 1900)),
         ..faults()
     });
-    told.check("floor");
-    assert_eq!(told.verdicts(), ["valid", "invalid", "valid"]);
-    let reason = told.invalid_reason(1);
+    result.check("floor");
+    assert_eq!(result.verdicts(), ["valid", "invalid", "valid"]);
+    let reason = result.invalid_reason(1);
     assert!(
         reason.contains("expected to settle within 0.05 mm of (10.000, 2.000, -2.000) mm"),
         "{reason}"
@@ -24,9 +24,9 @@ fn a_press_that_does_not_arrive_is_invalid_and_the_next_one_is_done() {
         reason.contains("found (10.000, 2.000, -1.200) mm"),
         "{reason}"
     );
-    assert_eq!(told.report.end, RunEnd::Completed);
-    // Never at depth: no truth is reported.
-    assert!(told.outcomes()[1].measured_at.is_none() && told.outcomes()[1].timing.is_none());
+    assert_eq!(result.report.end, RunEnd::Completed);
+    // Never at depth: no ground truth is reported.
+    assert!(result.outcomes()[1].measured_at.is_none() && result.outcomes()[1].timing.is_none());
 }
 
 #[test]
@@ -36,14 +36,15 @@ fn a_tip_that_gives_way_during_the_hold_is_invalid() {
         .timing
         .map(|t| t.at_depth.0 / MS)
         .unwrap_or_default();
-    let told = run(Faults {
+    let result = run(Faults {
         floor_mm: Some((at_depth + 10, -1.9, at_depth + 15)),
         ..faults()
     });
-    told.check("gives way");
-    assert_eq!(told.verdicts(), ["valid", "invalid", "valid"]);
+    result.check("gives way");
+    assert_eq!(result.verdicts(), ["valid", "invalid", "valid"]);
     assert!(
-        told.invalid_reason(1)
+        result
+            .invalid_reason(1)
             .starts_with("hold: expected within 0.05 mm")
     );
 }
@@ -62,24 +63,24 @@ fn lost_bytes_invalidate_their_press() {
             Record::Chunk(c) if c.camera == CameraId::Two => Some(c.seq),
             _ => None,
         });
-    let told = run(Faults {
+    let result = run(Faults {
         loss: chunk.map(|seq| (CameraId::Two, seq, 7)),
         ..faults()
     });
-    told.check("loss");
-    assert_eq!(told.verdicts(), ["valid", "invalid", "valid"]);
-    assert_eq!(told.invalid_reason(1), "camera 2 lost 7 bytes");
+    result.check("loss");
+    assert_eq!(result.verdicts(), ["valid", "invalid", "valid"]);
+    assert_eq!(result.invalid_reason(1), "camera 2 lost 7 bytes");
 }
 
-/// When the hold of a press ended and when the tip was clear, ms.
-fn hold_and_clear(told: &Told, n: usize) -> (i64, i64) {
-    let timing = told.outcomes()[n].timing.expect("a press that was made");
+/// End of the hold of a press and time at which the tip was clear, ms.
+fn hold_and_clear(result: &RunResult, n: usize) -> (i64, i64) {
+    let timing = result.outcomes()[n].timing.expect("a completed press");
     (timing.retract.0 / MS, timing.clear.0 / MS)
 }
 
-/// Data on their way for 300 ms: what is lost of a press becomes known after its end, and spoils this press and not the next.
+/// Data in transit for 300 ms: losses become known after the end of their press, and invalidate this press and not the next.
 #[test]
-fn a_loss_that_is_told_late_spoils_the_press_that_it_was_in() {
+fn a_loss_reported_late_invalidates_its_own_press() {
     let slow = Faults {
         delay: Some((0, 300)),
         ..faults()
@@ -89,15 +90,15 @@ fn a_loss_that_is_told_late_spoils_the_press_that_it_was_in() {
     assert_eq!(good.verdicts(), ["valid", "valid", "valid"]);
     let (retract, clear) = hold_and_clear(&good, 1);
     assert!(clear - retract < 300, "{retract}..{clear}");
-    let told = run(Faults {
+    let result = run(Faults {
         lost_at_ms: Some(clear - 10),
         ..slow
     });
-    told.check("late loss");
-    assert_eq!(told.verdicts(), ["valid", "invalid", "valid"]);
-    assert_eq!(told.invalid_reason(1), "camera 2 lost 8 bytes");
-    // Nothing is known of it by the clock of arrival alone when the tip is clear.
-    let arrival = told.records.iter().find_map(|r| match r {
+    result.check("late loss");
+    assert_eq!(result.verdicts(), ["valid", "invalid", "valid"]);
+    assert_eq!(result.invalid_reason(1), "camera 2 lost 8 bytes");
+    // At the time when the tip is clear, the loss has not arrived.
+    let arrival = result.records.iter().find_map(|r| match r {
         Record::Chunk(c) if c.lost_before > 0 => Some(c.host_time.0 / MS),
         _ => None,
     });
@@ -105,14 +106,14 @@ fn a_loss_that_is_told_late_spoils_the_press_that_it_was_in() {
 }
 
 #[test]
-fn data_that_come_too_late_are_told_from_lost_ones() {
-    let told = run(Faults {
+fn late_data_differ_from_lost_data() {
+    let result = run(Faults {
         delay: Some((0, 3_000)),
         ..faults()
     });
-    told.check("too late");
-    for n in 0..told.outcomes().len() {
-        let reason = told.invalid_reason(n);
+    result.check("too late");
+    for n in 0..result.outcomes().len() {
+        let reason = result.invalid_reason(n);
         assert!(
             reason.starts_with("data late: camera 2: expected data up to")
                 && reason.contains("within 1.000000 s"),
@@ -122,7 +123,7 @@ fn data_that_come_too_late_are_told_from_lost_ones() {
 }
 
 #[test]
-fn a_slow_recorder_delays_but_breaks_nothing() {
+fn a_slow_recorder_only_delays() {
     let mut plan = plan();
     for step in &mut plan.steps {
         if let Step::Press(p) = step {
@@ -132,7 +133,7 @@ fn a_slow_recorder_delays_but_breaks_nothing() {
     let world = World::shared(faults(), START);
     let control = lock(&world).control.clone();
     let mut sink = Sink {
-        slow: Some((world.clone(), 150)), // longer than a pose may be old
+        slow: Some((world.clone(), 150)), // longer than the age limit of a pose
         ..Sink::default()
     };
     let report = Run::new(&plan, header(&plan), rig(&world), &control, &mut sink).execute();
@@ -145,51 +146,54 @@ fn a_slow_recorder_delays_but_breaks_nothing() {
 
 #[test]
 fn too_much_force_ends_the_run() {
-    let told = run(Faults {
+    let result = run(Faults {
         stiffness_n_mm: 4.5,
         ..faults()
     });
-    told.check("force");
-    assert_eq!(told.verdicts(), ["invalid"]);
+    result.check("force");
+    assert_eq!(result.verdicts(), ["invalid"]);
     assert!(
-        told.end_reason()
+        result
+            .end_reason()
             .starts_with("force: expected at most 8 N, found 8."),
         "{}",
-        told.end_reason()
+        result.end_reason()
     );
-    assert_eq!((told.report.invalid, told.report.missed), (1, 2));
+    assert_eq!((result.report.invalid, result.report.missed), (1, 2));
 }
 
 #[test]
 fn an_obstructed_travel_ends_the_run() {
-    let told = run(Faults {
+    let result = run(Faults {
         stuck_sideways_ms: Some(50),
         ..faults()
     });
-    told.check("stuck");
+    result.check("stuck");
     assert!(
-        told.end_reason()
+        result
+            .end_reason()
             .starts_with("travel (step 1): expected to settle"),
         "{}",
-        told.end_reason()
+        result.end_reason()
     );
-    assert_eq!(told.report.missed, 3);
+    assert_eq!(result.report.missed, 3);
 }
 
 #[test]
 fn a_silent_pose_stream_stops_all_motion() {
-    let told = run(Faults {
+    let result = run(Faults {
         poses_end_ms: Some(400),
         ..faults()
     });
     assert!(
-        told.end_reason()
+        result
+            .end_reason()
             .contains("expected a pose sample no older than 0.100000 s"),
         "{}",
-        told.end_reason()
+        result.end_reason()
     );
-    let w = lock(&told.world);
-    assert!(!w.armed && told.report.disarmed && !told.report.retracted);
+    let w = lock(&result.world);
+    assert!(!w.armed && result.report.disarmed && !result.report.retracted);
     let last = w.commands.last().map_or(0, |c| c.2);
     assert!(last <= 501 * MS, "commanded blindly at {last}");
 }

@@ -1,4 +1,4 @@
-//! Runs that never arm, and runs that their caller drops.
+//! Runs that never arm, and runs dropped by their caller.
 
 use skinrig_model::*;
 use skinrig_protocol::plan::{Plan, Step};
@@ -7,7 +7,7 @@ use crate::course::{START, faults, run_plan};
 use crate::mock::*;
 
 #[test]
-fn plans_that_do_not_hold_together_never_arm() {
+fn inconsistent_plans_never_arm() {
     type Change = fn(&mut Plan);
     let broken: [(&str, Change); 7] = [
         ("no travel", |p| {
@@ -35,22 +35,22 @@ fn plans_that_do_not_hold_together_never_arm() {
     for (case, change) in broken {
         let mut plan = plan();
         change(&mut plan);
-        let told = run_plan(&plan, faults(), START, Sink::default());
-        assert!(matches!(told.report.end, RunEnd::Faulted(_)), "{case}");
-        assert_eq!(told.report.missed, 3, "{case}");
-        let w = lock(&told.world);
+        let result = run_plan(&plan, faults(), START, Sink::default());
+        assert!(matches!(result.report.end, RunEnd::Faulted(_)), "{case}");
+        assert_eq!(result.report.missed, 3, "{case}");
+        let w = lock(&result.world);
         assert!(!w.ever_armed && w.commands.is_empty(), "{case}");
         drop(w);
-        told.check(case);
+        result.check(case);
     }
 }
 
 #[test]
-fn what_a_camera_says_about_its_stream_is_recorded() {
+fn notes_of_a_camera_are_recorded() {
     let remark = Some((CameraId::Two, "the time base jumped".to_owned()));
     let faults = Faults { remark, ..faults() };
-    let told = run_plan(&plan(), faults, START, Sink::default());
-    let notes: Vec<&str> = (told.records.iter())
+    let result = run_plan(&plan(), faults, START, Sink::default());
+    let notes: Vec<&str> = (result.records.iter())
         .filter_map(|r| match r {
             Record::Note { text, .. } if text.contains("camera") => Some(text.as_str()),
             _ => None,
@@ -60,13 +60,13 @@ fn what_a_camera_says_about_its_stream_is_recorded() {
 }
 
 #[test]
-fn what_the_trigger_box_says_about_the_run_is_recorded() {
+fn notes_of_the_trigger_box_are_recorded() {
     let box_remark = Some("2 edges were late".to_owned());
     let faults = Faults {
         box_remark,
         ..faults()
     };
-    let told = run_plan(&plan(), faults, START, Sink::default());
-    let said = |r: &&Record| matches!(r, Record::Note { text, .. } if text == "trigger box: 2 edges were late");
-    assert_eq!(told.records.iter().filter(said).count(), 1);
+    let result = run_plan(&plan(), faults, START, Sink::default());
+    let is_note = |r: &&Record| matches!(r, Record::Note { text, .. } if text == "trigger box: 2 edges were late");
+    assert_eq!(result.records.iter().filter(is_note).count(), 1);
 }

@@ -1,7 +1,7 @@
-//! Does anything escape the guard? Arbitrary commands, feedback and failures over a robot that checks all that reaches it.
+//! Checks that no command escapes the guard: arbitrary commands, feedback and failures, with a robot that checks all commands.
 //!
-//! The robot keeps its own books of what it delivered and was told, from the words of the limits and not from the guard's
-//! code. `every_sequence` runs a bounded number of cases; `millions_of_sequences` as many as `SKINRIG_FUZZ_CASES` says.
+//! The robot keeps its own model of delivered samples and received commands, based on the limits and not on the guard's
+//! code. `every_sequence` runs a bounded number of cases; `millions_of_sequences` the number in `SKINRIG_FUZZ_CASES`.
 
 use std::sync::{Arc, Mutex, MutexGuard};
 
@@ -16,26 +16,26 @@ use skinrig_protocol::plan::{OnTrip, RunLimits};
 
 use crate::mock::{LIMITS, MS, robot_from_skin};
 
-/// What the robot is told and what it delivers next.
+/// A command to the robot, or its next feedback.
 #[derive(Debug, Clone)]
 enum Act {
     Command([f64; 3], f64),
-    /// Straight up or down from where the tip was last seen, by this much.
+    /// Straight up or down from the last reported tip position, by this much, at this speed.
     Vertical(f64, f64),
     Arm,
     Disarm,
     Hold,
-    /// Time passes, ms, and good samples come.
+    /// Time passes, ms, with good samples.
     Good(u8),
-    /// Time passes, ms, and nobody looks.
+    /// Time passes, ms, without polling.
     Blind(u16),
-    /// A look that brings nothing new.
+    /// A poll without new samples.
     Nothing,
     /// One sample with a coordinate replaced.
     Coordinate(usize, f64),
     /// One sample with this force.
     Force(f64),
-    /// One sample this many ms off its time: doubled, reordered, or from the future.
+    /// One sample this many ms off its time: repeated, reordered, or from the future.
     Shifted(i16),
     /// The next call to the robot fails.
     Fail,
@@ -67,9 +67,9 @@ fn act() -> impl Strategy<Value = Act> {
     ]
 }
 
-/// The robot's own books, skin frame.
+/// The robot's own model, skin frame.
 #[derive(Default)]
-struct Books {
+struct RobotModel {
     now: i64,
     armed: bool,
     tip: [f64; 3],
@@ -77,31 +77,31 @@ struct Books {
     speed: f64,
     moved_to: i64,
     fail_next: bool,
-    /// Samples for the next look.
+    /// Samples for the next poll.
     waiting: Vec<RobotSample>,
-    /// The newest sample that was delivered with sound form: when and where.
+    /// Time and position of the newest well-formed sample that was delivered.
     newest: Option<(i64, [f64; 3])>,
-    /// Something was delivered, or has come of age, that forbids all motion but a rise; or all motion.
+    /// A delivered or stale sample forbids all motion but a rise; or, if blind, all motion.
     tripped: bool,
     blind: bool,
     on_trip: OnTrip,
-    /// What the robot was told since the last look.
-    told: Vec<&'static str>,
+    /// Commands since the last poll.
+    received: Vec<&'static str>,
     commands: u32,
     escapes: Vec<String>,
 }
 
-type Shared = Arc<Mutex<Books>>;
+type Shared = Arc<Mutex<RobotModel>>;
 
-fn lock(books: &Shared) -> MutexGuard<'_, Books> {
-    books
+fn lock(model: &Shared) -> MutexGuard<'_, RobotModel> {
+    model
         .lock()
         .unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
-impl Books {
+impl RobotModel {
     fn call(&mut self, what: &'static str) -> Result<(), DeviceError> {
-        self.told.push(what);
+        self.received.push(what);
         if std::mem::take(&mut self.fail_next) {
             return Err(DeviceError::Lost {
                 role: DeviceRole::Indenter,
@@ -147,10 +147,10 @@ impl Books {
         self.escapes.push(format!("{what}, at {t} ns"));
     }
 
-    /// What must hold of every motion that reaches the robot.
+    /// Invariants of every motion that reaches the robot.
     fn check(&mut self, target: [f64; 3], speed: f64) {
         let tolerance = LIMITS.position_tolerance_mm;
-        let near = 1e-6; // there and back between the frames
+        let near = 1e-6; // rounding of the frame transforms
         if !self.armed {
             self.escape("a motion while disarmed".to_owned());
         }
@@ -188,7 +188,7 @@ impl Books {
         }
     }
 
-    /// Delivers what waits, and notes what it shows.
+    /// Delivers the waiting samples, and records their effect on the limits.
     fn deliver(&mut self, out: &mut Vec<RobotSample>) {
         let mut sound = true;
         for s in std::mem::take(&mut self.waiting) {
@@ -200,7 +200,7 @@ impl Books {
                 sound = false;
             }
             if !sound {
-                continue; // nothing after it is believed
+                continue; // later samples are discarded
             }
             self.tripped |= self.armed && s.force_n > LIMITS.max_force_n;
             self.newest = Some((s.t.0, at));
@@ -210,9 +210,9 @@ impl Books {
     }
 }
 
-struct Robotic(Shared);
+struct CheckedRobot(Shared);
 
-impl Indenter for Robotic {
+impl Indenter for CheckedRobot {
     fn identity(&self) -> DeviceIdentity {
         DeviceIdentity {
             model: "model".into(),
@@ -221,7 +221,7 @@ impl Indenter for Robotic {
         }
     }
     fn capabilities(&self) -> IndenterCapabilities {
-        crate::mock::can()
+        crate::mock::capabilities()
     }
     fn configure(&mut self, _: &MotionLimits) -> Result<Vec<Setting>, DeviceError> {
         Ok(vec![])
@@ -245,7 +245,7 @@ impl Indenter for Robotic {
     fn poll(&mut self, samples: &mut Vec<RobotSample>) -> Result<(), DeviceError> {
         let mut b = lock(&self.0);
         let answer = b.call("poll");
-        b.told.clear();
+        b.received.clear();
         b.deliver(samples);
         answer
     }
@@ -263,9 +263,9 @@ impl Indenter for Robotic {
     }
 }
 
-struct BooksClock(Shared);
+struct ModelClock(Shared);
 
-impl Clock for BooksClock {
+impl Clock for ModelClock {
     fn now(&self) -> HostTime {
         HostTime(lock(&self.0).now)
     }
@@ -275,23 +275,23 @@ impl Clock for BooksClock {
     }
 }
 
-/// One case. Gives how many motions reached the robot, so that a guard that refuses all is found out.
+/// Runs one case. Returns the number of motions that reached the robot, to detect a guard that rejects all.
 fn play(acts: &[Act], on_trip: OnTrip) -> Result<u32, TestCaseError> {
     let limits = RunLimits { on_trip, ..LIMITS };
-    let books: Shared = Arc::new(Mutex::new(Books {
+    let model: Shared = Arc::new(Mutex::new(RobotModel {
         tip: [0.0, 0.0, 10.0],
         target: [0.0, 0.0, 10.0],
         on_trip,
-        ..Books::default()
+        ..RobotModel::default()
     }));
-    let clock = BooksClock(books.clone());
+    let clock = ModelClock(model.clone());
     let settings = ControllerSettings::default();
-    let inner = Box::new(Robotic(books.clone()));
+    let inner = Box::new(CheckedRobot(model.clone()));
     let mut guard = GuardedIndenter::new(inner, robot_from_skin(), limits, &settings);
     let mut poses = Vec::new();
     for act in acts {
-        step(act, &mut guard, &books, &clock, &mut poses)?;
-        let b = lock(&books);
+        step(act, &mut guard, &model, &clock, &mut poses)?;
+        let b = lock(&model);
         prop_assert!(b.escapes.is_empty(), "{:?}: {:?}", act, b.escapes);
         prop_assert!(
             b.armed || !guard.is_armed(),
@@ -300,15 +300,15 @@ fn play(acts: &[Act], on_trip: OnTrip) -> Result<u32, TestCaseError> {
         );
     }
     prop_assert!(poses.is_sorted_by(|a, b| a.t < b.t));
-    let b = lock(&books);
+    let b = lock(&model);
     Ok(b.commands)
 }
 
 fn step(
     act: &Act,
     guard: &mut GuardedIndenter<'_>,
-    books: &Shared,
-    clock: &BooksClock,
+    model: &Shared,
+    clock: &ModelClock,
     poses: &mut Vec<skinrig_model::PoseSample>,
 ) -> TestCaseResult {
     let now = clock.now();
@@ -325,12 +325,12 @@ fn step(
         Act::Arm => drop(guard.arm()),
         Act::Disarm => drop(guard.disarm()),
         Act::Hold => drop(guard.hold()),
-        Act::Blind(ms) => lock(books).advance(i64::from(ms), true),
-        Act::Fail => lock(books).fail_next = true,
-        Act::Good(ms) => lock(books).advance(i64::from(ms), true),
-        Act::Nothing => lock(books).advance(7, false),
+        Act::Blind(ms) => lock(model).advance(i64::from(ms), true),
+        Act::Fail => lock(model).fail_next = true,
+        Act::Good(ms) => lock(model).advance(i64::from(ms), true),
+        Act::Nothing => lock(model).advance(7, false),
         Act::Coordinate(i, v) => {
-            let mut b = lock(books);
+            let mut b = lock(model);
             b.advance(9, true);
             let mut s = b.sample(b.now, b.tip, 0.0);
             let wrong = if i < 3 {
@@ -344,13 +344,13 @@ fn step(
             b.waiting.push(s);
         }
         Act::Force(force_n) => {
-            let mut b = lock(books);
+            let mut b = lock(model);
             b.advance(9, true);
             let s = b.sample(b.now, b.tip, force_n);
             b.waiting.push(s);
         }
         Act::Shifted(ms) => {
-            let mut b = lock(books);
+            let mut b = lock(model);
             b.advance(9, true);
             let s = b.sample(b.now + i64::from(ms) * MS, b.tip, 0.0);
             b.waiting.push(s);
@@ -363,17 +363,17 @@ fn step(
     if !looks {
         return Ok(());
     }
-    let (was_armed, before) = (guard.is_armed(), lock(books).tripped);
+    let (was_armed, before) = (guard.is_armed(), lock(model).tripped);
     let answer = guard.poll(clock, poses);
-    let b = lock(books);
-    let held = b.told.contains(&"hold") || b.told.contains(&"disarm");
+    let b = lock(model);
+    let is_held = b.received.contains(&"hold") || b.received.contains(&"disarm");
     if was_armed && answer.is_err() {
         prop_assert!(
-            held,
-            "{:?}: {:?}, and the robot was told {:?}",
+            is_held,
+            "{:?}: {:?}, and the robot received {:?}",
             act,
             answer,
-            b.told
+            b.received
         );
     }
     if was_armed && b.blind {
@@ -384,10 +384,10 @@ fn step(
             answer
         );
         prop_assert!(
-            b.told.contains(&"disarm") && !guard.is_armed(),
+            b.received.contains(&"disarm") && !guard.is_armed(),
             "{:?}: {:?}",
             act,
-            b.told
+            b.received
         );
     }
     if was_armed && b.tripped && !before {
@@ -399,16 +399,16 @@ fn step(
         );
         let brake = b.on_trip == OnTrip::Brake;
         prop_assert!(
-            !brake || b.told.contains(&"disarm"),
+            !brake || b.received.contains(&"disarm"),
             "{:?}: {:?}",
             act,
-            b.told
+            b.received
         );
     }
-    // The watchdog trips on more than the books know (speed, depth): then, too, only the way up is open.
+    // The watchdog trips on more than the model covers (speed, depth): only the way up is open then, too.
     drop(b);
     if matches!(answer, Err(ControllerError::Watchdog(_))) && was_armed {
-        lock(books).tripped = true;
+        lock(model).tripped = true;
     }
     Ok(())
 }
@@ -436,7 +436,7 @@ fn cases(count: u32) {
         "{}",
         answer.map_or_else(|e| e.to_string(), |()| String::new())
     );
-    // A guard that lets nothing through would pass as well.
+    // A guard that rejects everything would pass as well.
     assert!(
         moved.get() > u64::from(count) / 4,
         "{} motions in {count} cases",

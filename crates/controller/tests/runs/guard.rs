@@ -1,4 +1,4 @@
-//! Arbitrary commands: nothing forbidden reaches the robot, and everything allowed does.
+//! Arbitrary commands: no forbidden motion reaches the robot, and every allowed one does.
 
 use proptest::prelude::*;
 use skinrig_controller::{
@@ -12,16 +12,16 @@ use crate::mock::*;
 #[derive(Debug, Clone)]
 enum Act {
     Command([f64; 3], f64),
-    /// Rig time goes on, ms, and the pose stream is read.
+    /// Rig time passes, ms, and the pose stream is read.
     Look(i64),
-    /// Rig time goes on, ms, unseen.
+    /// Rig time passes, ms, without polling.
     Blind(i64),
     Hold,
     Arm,
     Disarm,
 }
 
-/// A post of 4 mm about (30, 0), 10 mm high, beside which 1 mm stay free.
+/// A post of 4 mm about (30, 0), 10 mm high, with a margin of 1 mm.
 fn around() -> Surroundings {
     Surroundings {
         keep_outs: vec![KeepOut {
@@ -46,7 +46,7 @@ fn guarded() -> (Shared, GuardedIndenter<'static>) {
     (world, guard)
 }
 
-/// What the surroundings allow, in words of its own: by points on the way.
+/// Whether the surroundings allow a motion, checked independently by points on its path.
 fn allows(from: [f64; 3], to: [f64; 3]) -> bool {
     let sideways = (from[0] - to[0]).hypot(from[1] - to[1]);
     if sideways <= 0.05 && to[2] - from[2] >= sideways {
@@ -93,7 +93,7 @@ proptest! {
         let (world, guard) = guarded();
         let mut guard = guard.with_surroundings(Some(around()));
         let mut poses = Vec::new();
-        // Time since the pose stream was last read, and the lowest height seen.
+        // Time since the pose stream was last read, and the lowest reported height.
         let (mut unseen, mut lowest_mm) = (0, f64::INFINITY);
         // Where the tip went down below clearance height.
         let mut foot: Option<[f64; 2]> = None;
@@ -142,7 +142,7 @@ proptest! {
                     unseen = 0;
                     lowest_mm = poses.iter().map(|p| p.measured.z_mm).fold(lowest_mm, f64::min);
                     if let Err(why) = seen {
-                        // Only this is a fault here: nobody looked for too long while the tip may have been low.
+                        // Only this is a fault here: too long between polls while the tip may have been low.
                         let is_late = matches!(
                             why,
                             ControllerError::Watchdog(WatchdogTrip::Late { found, .. }) if found == gap
@@ -166,7 +166,7 @@ proptest! {
 }
 
 #[test]
-fn refusals_say_what_was_expected() {
+fn rejections_state_the_limit() {
     let (world, mut guard) = guarded();
     let mut poses = Vec::new();
     assert!(guard.arm().is_ok());
@@ -179,7 +179,7 @@ fn refusals_say_what_was_expected() {
             other => format!("{other:?}"),
         }
     };
-    let said = [
+    let messages = [
         ask(0.0, 0.0, -2.0, 200.0, 60),
         ask(0.0, 99.0, 10.0, 20.0, 60),
         ask(1.0, 0.0, 2.0, 20.0, 60),
@@ -187,7 +187,7 @@ fn refusals_say_what_was_expected() {
         ask(f64::NAN, 0.0, 6.0, 20.0, 60),
     ];
     assert_eq!(
-        said,
+        messages,
         [
             "expected a speed above 0 and at most 100 mm/s, found 200 mm/s",
             "expected a target with y from -50 to 55 mm, found 99 mm",
@@ -207,9 +207,9 @@ fn refusals_say_what_was_expected() {
     assert!(lock(&world).commands.is_empty());
 }
 
-/// Below clearance height the tip moves up and down where it went down, however small the steps aside are.
+/// Below clearance height the tip moves only vertically where it went down, however small the lateral steps are.
 #[test]
-fn many_small_steps_aside_are_one_large_one() {
+fn many_small_lateral_steps_count_as_one_large_step() {
     let (world, mut guard) = guarded();
     let mut poses = Vec::new();
     assert!(guard.arm().is_ok());
@@ -236,6 +236,6 @@ fn many_small_steps_aside_are_one_large_one() {
             "{z}: {refused:?}"
         );
     }
-    // Up, along and down again is another place.
+    // Up, along and down again is another location.
     assert!(go(0.04, 6.0).is_ok() && go(5.0, 6.0).is_ok() && go(5.0, -1.0).is_ok());
 }

@@ -1,4 +1,4 @@
-//! The robot moved by hand, on the simulated rig: the floor of the frame, and the operator's halt.
+//! Manual motion on the simulated rig: the floor of the frame, and the operator's halt.
 
 use skinrig_controller::{
     ControlHandle, ControllerError, ControllerSettings, Floor, GuardError, Jog,
@@ -10,9 +10,9 @@ use skinrig_protocol::plan::{OnTrip, RunLimits};
 use skinrig_sim::config::SimConfig;
 use skinrig_sim::rig::simulated_rig;
 
-const NOBODY: fn() -> bool = || false;
+const NEVER_STOP: fn() -> bool = || false;
 
-/// A jog in the robot's own coordinates, whose floor is `max_depth_mm` below the skin. The skin's surface is at z = -15 mm.
+/// A jog in the robot frame, whose floor is `max_depth_mm` below the skin. The skin's surface is at z = -15 mm.
 fn jog(max_depth_mm: Option<f64>, control: &ControlHandle) -> Jog<'static> {
     let rig = simulated_rig(&SimConfig::new(1, SimLevel::Kinematic));
     let can = rig.indenter.capabilities();
@@ -57,12 +57,12 @@ fn jog(max_depth_mm: Option<f64>, control: &ControlHandle) -> Jog<'static> {
 
 fn down_to(jog: &mut Jog<'_>, z_mm: f64) -> Result<f64, ControllerError> {
     let here = jog.look()?.commanded;
-    jog.go(here.plane().at_height(z_mm), 10.0, &NOBODY)?;
+    jog.go(here.plane().at_height(z_mm), 10.0, &NEVER_STOP)?;
     Ok(jog.look()?.measured.z_mm)
 }
 
 #[test]
-fn nothing_goes_deeper_than_the_frame_allows_unless_it_is_told_to() {
+fn the_floor_limits_every_motion_unless_disabled() {
     let control = ControlHandle::new();
     let mut low = jog(Some(2.0), &control);
     assert!((down_to(&mut low, -16.9).unwrap() + 16.9).abs() < 0.1);
@@ -77,10 +77,10 @@ fn nothing_goes_deeper_than_the_frame_allows_unless_it_is_told_to() {
         band_mm: 1.0,
         tare: HostDuration::from_millis(300),
     };
-    // Also when it would find the surface before.
-    let touched = low.touch(search, 9.0, &NOBODY);
+    // Also if it would find the surface earlier.
+    let touched = low.touch(search, 9.0, &NEVER_STOP);
     assert!(touched.is_err_and(|e| is_floor(&e)));
-    low.touch(search, 6.5, &NOBODY).unwrap();
+    low.touch(search, 6.5, &NEVER_STOP).unwrap();
     low.finish().unwrap();
 
     let mut free = jog(None, &control);
@@ -89,11 +89,11 @@ fn nothing_goes_deeper_than_the_frame_allows_unless_it_is_told_to() {
 }
 
 #[test]
-fn a_halt_leaves_the_tip_where_it_is() {
+fn a_halt_leaves_the_tip_in_place() {
     let control = ControlHandle::new();
     let mut moved = jog(Some(5.0), &control);
     down_to(&mut moved, -12.0).unwrap();
-    // On the way down the motors go off: no retraction.
+    // During the downward motion the motors switch off: no retraction.
     let here = moved.look().unwrap().commanded;
     let target: Point3<Skin> = here.plane().at_height(-17.0);
     let halting = || {
@@ -108,7 +108,7 @@ fn a_halt_leaves_the_tip_where_it_is() {
     assert!((left.measured.z_mm + 12.0).abs() < 0.5, "{left:?}");
     assert!(moved.look().is_err() || moved.look().unwrap().measured.z_mm < -11.0);
 
-    // Also when it comes during the rise at the end.
+    // Also during the rise at the end.
     let control = ControlHandle::new();
     let mut rising = jog(None, &control);
     down_to(&mut rising, -12.0).unwrap();

@@ -1,4 +1,4 @@
-//! The preflight on the simulated rig: what is checked, and that a failed check powers nothing.
+//! The preflight on the simulated rig: its checks, and that a failed check prevents power-on.
 
 use skinrig_controller::{ControlHandle, ExpectedDevice, Loopback, Preflight, Run, RunReport};
 use skinrig_model::*;
@@ -43,7 +43,7 @@ fn run(faults: Vec<Fault>, preflight: Preflight) -> (RunReport, Vec<PreflightChe
             _ => None,
         })
         .collect();
-    assert_eq!(tables.len(), 1, "one table, whatever happens");
+    assert_eq!(tables.len(), 1, "one table in every case");
     (report, tables.concat(), sink.records)
 }
 
@@ -53,7 +53,7 @@ fn failed(checks: &[PreflightCheck]) -> Vec<&str> {
 }
 
 #[test]
-fn a_sound_rig_passes_every_check_and_runs() {
+fn a_healthy_rig_passes_every_check_and_runs() {
     let (report, checks, records) = run(Vec::new(), full());
     assert_eq!((report.end, report.valid), (RunEnd::Completed, 3));
     let names: Vec<&str> = checks.iter().map(|c| c.check.as_str()).collect();
@@ -76,7 +76,7 @@ fn a_sound_rig_passes_every_check_and_runs() {
         ]
     );
     assert_eq!(failed(&checks), [""; 0]);
-    // The mark of the test is not one of the session's.
+    // The test mark is not part of the session.
     let sent = records.iter().filter_map(|r| match r {
         Record::MarkSent(s) => Some(s.mark),
         _ => None,
@@ -90,7 +90,7 @@ fn a_sound_rig_passes_every_check_and_runs() {
     );
 }
 
-/// The run must end before anything is powered: no command, every press missed, the failed checks named.
+/// The run must end before power-on: no command, every press missed, the failed checks named.
 fn refused(faults: Vec<Fault>, preflight: Preflight, expected: &[&str]) {
     let (report, checks, records) = run(faults, preflight);
     assert_eq!(failed(&checks), expected);
@@ -115,7 +115,7 @@ fn a_lost_trigger_line_is_found_before_the_robot_is_powered() {
     };
     let broken = (0..4).map(start_pulse).collect();
     refused(broken, full(), &["camera 2: trigger loop-back"]);
-    // One damaged train is told, and costs no run.
+    // One damaged train is reported, but does not fail the run.
     let (report, checks, _) = run(vec![start_pulse(0)], full());
     assert_eq!((report.end, failed(&checks)), (RunEnd::Completed, vec![]));
     let last = checks.last().unwrap();
@@ -129,7 +129,7 @@ fn a_lost_trigger_line_is_found_before_the_robot_is_powered() {
 }
 
 #[test]
-fn another_device_and_another_version_are_refused() {
+fn an_unexpected_device_or_version_is_rejected() {
     let mut preflight = full();
     preflight.expected = vec![
         ExpectedDevice {
@@ -157,7 +157,7 @@ fn another_device_and_another_version_are_refused() {
 }
 
 #[test]
-fn what_the_caller_found_and_what_a_device_refuses_end_it_too() {
+fn failed_checks_of_the_caller_and_rejected_settings_end_the_run() {
     let mut preflight = full();
     preflight.caller_checks = vec![PreflightCheck::new(
         "disk",

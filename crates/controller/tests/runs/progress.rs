@@ -1,4 +1,4 @@
-//! What a terminal learns from the records of a run.
+//! Progress of a run from its records.
 
 use skinrig_controller::ProgressTracker;
 use skinrig_model::*;
@@ -6,13 +6,13 @@ use skinrig_model::*;
 use crate::course::{faults, run};
 
 #[test]
-fn a_run_is_followed_by_its_records() {
-    let told = run(faults());
+fn progress_follows_the_records() {
+    let result = run(faults());
     let expected = HostDuration::from_millis(1700);
     let mut tracker = ProgressTracker::new(Some(expected));
     let mut labels = Vec::new();
     let mut last_eta = None;
-    for record in &told.records {
+    for record in &result.records {
         let done = tracker.progress().done;
         let p = tracker.update(record);
         assert!(p.done >= done && p.done == p.valid + p.invalid + p.missed);
@@ -65,7 +65,7 @@ fn rates_count_the_events_between_chunks() {
 }
 
 #[test]
-fn marks_are_seen_across_chunks_and_strays_are_not() {
+fn marks_are_counted_across_chunks_and_stray_edges_are_not() {
     let mark = Mark {
         kind: MarkKind::Contact,
         press: PressId::from_index(77),
@@ -104,6 +104,6 @@ fn marks_are_seen_across_chunks_and_strays_are_not() {
         }));
         seen.push(p.cameras[0].marks_seen);
     }
-    // A train is certain as soon as no more than three of its bits are missing: the first after 60 edges.
+    // A train is complete once no more than three of its bits are missing: the first after 60 edges.
     assert_eq!(seen, [0, 0, 1, 1, 1, 1, 2]);
 }

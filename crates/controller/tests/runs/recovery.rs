@@ -1,4 +1,4 @@
-//! A robot that was braked in contact rises first, whatever a pose in contact looks like; and only straight up, and no deeper.
+//! A robot that was braked in contact rises first, straight up and no deeper, whatever its pose.
 
 use skinrig_controller::{
     ControllerError, ControllerSettings, WatchLimits, Watchdog, WatchdogTrip,
@@ -6,11 +6,11 @@ use skinrig_controller::{
 use skinrig_model::{HostTime, Point3, PoseSample, RunEnd};
 use skinrig_protocol::plan::OnTrip;
 
-use crate::course::{Told, faults, run_plan};
+use crate::course::{RunResult, faults, run_plan};
 use crate::mock::*;
 
-/// A run that begins with the tip there, on a robot that sinks so far when its brakes open.
-fn from(start: [f64; 3], sinks_mm: f64, on_trip: OnTrip) -> Told {
+/// A run that starts with this tip position, on a robot that sinks this far when its brakes open.
+fn from(start: [f64; 3], sinks_mm: f64, on_trip: OnTrip) -> RunResult {
     let mut plan = plan();
     plan.limits.on_trip = on_trip;
     let faults = Faults {
@@ -21,7 +21,7 @@ fn from(start: [f64; 3], sinks_mm: f64, on_trip: OnTrip) -> Told {
     run_plan(&plan, faults, start, Sink::default())
 }
 
-/// In contact, at the limit of depth (3.05 mm with its tolerance), below it, beside the plan, and at the workspace's edge.
+/// In contact, at the depth limit (3.05 mm with its tolerance), below it, away from the plan, and at the workspace's edge.
 #[test]
 fn a_braked_arm_in_contact_rises_before_anything_else() {
     let starts = [
@@ -35,10 +35,10 @@ fn a_braked_arm_in_contact_rises_before_anything_else() {
     ];
     for start in starts {
         for on_trip in [OnTrip::Retract, OnTrip::Brake] {
-            let told = from(start, 0.03, on_trip);
-            let case = format!("{start:?} {on_trip:?}: {:?}", told.report.causes);
-            assert_eq!(told.report.end, RunEnd::Completed, "{case}");
-            let w = lock(&told.world);
+            let result = from(start, 0.03, on_trip);
+            let case = format!("{start:?} {on_trip:?}: {:?}", result.report.causes);
+            assert_eq!(result.report.end, RunEnd::Completed, "{case}");
+            let w = lock(&result.world);
             let at_edge = start[0] > 60.0 || start[0] < -40.0;
             assert!(at_edge || w.violations.is_empty(), "{case}");
             let (first, ..) = w.commands[0];
@@ -49,24 +49,24 @@ fn a_braked_arm_in_contact_rises_before_anything_else() {
     }
 }
 
-/// Beyond the tolerance a tip in contact that sinks further is stopped, as ever.
+/// Beyond the tolerance a tip in contact that sinks further still trips the watchdog.
 #[test]
-fn a_tip_that_goes_deeper_than_it_was_found_trips() {
+fn a_tip_that_sinks_below_its_start_trips() {
     for start_mm in [-3.04, -3.4] {
-        let told = from([10.0, 2.0, start_mm], 0.08, OnTrip::Retract);
+        let result = from([10.0, 2.0, start_mm], 0.08, OnTrip::Retract);
         let depth = |e: &ControllerError| {
             matches!(e, ControllerError::Watchdog(WatchdogTrip::Depth { .. }))
         };
         assert!(
-            told.report.causes.iter().any(depth),
+            result.report.causes.iter().any(depth),
             "{:?}",
-            told.report.causes
+            result.report.causes
         );
-        assert!(told.report.retracted && told.report.disarmed);
+        assert!(result.report.retracted && result.report.disarmed);
     }
 }
 
-/// Once it was clear the whole limit holds again.
+/// Once the tip was clear, the normal depth limit applies.
 #[test]
 fn the_slack_ends_at_clearance_height() {
     let mut watchdog = Watchdog::new(WatchLimits::of(&LIMITS, &ControllerSettings::default()));

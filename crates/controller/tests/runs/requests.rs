@@ -1,4 +1,4 @@
-//! What the operator's hand learns: that a request was heard, that a remark was written, where the run is.
+//! Acknowledgement of requests, recording of notes, and the visible state of a run.
 
 use skinrig_controller::{Run, State};
 use skinrig_model::{Record, RunEnd};
@@ -6,7 +6,7 @@ use skinrig_model::{Record, RunEnd};
 use crate::course::{START, faults, run, run_plan};
 use crate::mock::*;
 
-fn with(tick: u64, press: Press) -> crate::course::Told {
+fn with(tick: u64, press: OperatorAction) -> crate::course::RunResult {
     let asking = Faults {
         operator: Some((tick, press)),
         ..faults()
@@ -15,22 +15,26 @@ fn with(tick: u64, press: Press) -> crate::course::Told {
 }
 
 #[test]
-fn a_remark_at_any_tick_is_written_once_and_changes_nothing() {
+fn a_note_at_any_tick_is_recorded_once_and_changes_nothing() {
     let good = run(faults());
     let ticks = lock(&good.world).ticks;
     for tick in 1..=ticks {
-        let told = with(tick, Press::Note);
-        assert_eq!(told.report, good.report, "tick {tick}");
+        let result = with(tick, OperatorAction::Note);
+        assert_eq!(result.report, good.report, "tick {tick}");
         let of_operator = |r: &&Record| matches!(r, Record::Note { text, .. } if text == NOTE);
-        let notes: Vec<_> = told.records.iter().filter(of_operator).collect();
+        let notes: Vec<_> = result.records.iter().filter(of_operator).collect();
         assert_eq!(notes.len(), 1, "tick {tick}");
-        assert_eq!(told.records.len(), good.records.len() + 1, "tick {tick}");
-        assert_eq!(lock(&told.world).control.notes_recorded(), 1, "tick {tick}");
+        assert_eq!(result.records.len(), good.records.len() + 1, "tick {tick}");
+        assert_eq!(
+            lock(&result.world).control.notes_recorded(),
+            1,
+            "tick {tick}"
+        );
     }
 }
 
 #[test]
-fn a_remark_to_a_run_that_fails_at_once_is_written() {
+fn a_note_to_a_run_that_fails_immediately_is_recorded() {
     let failing = Faults {
         at_call: Some((1, Failure::Once)),
         ..faults()
@@ -46,15 +50,15 @@ fn a_remark_to_a_run_that_fails_at_once_is_written() {
 }
 
 #[test]
-fn every_request_is_heard_whenever_it_comes() {
+fn every_request_is_acknowledged_at_any_time() {
     let ticks = lock(&run(faults()).world).ticks;
     for tick in (1..=ticks).step_by(7) {
-        for press in Press::REQUESTS {
-            let told = with(tick, press);
-            let control = lock(&told.world).control.clone();
+        for press in OperatorAction::REQUESTS {
+            let result = with(tick, press);
+            let control = lock(&result.world).control.clone();
             assert_eq!(control.state(), State::Finished, "{press:?} at {tick}");
-            // Once the motors are off there is nothing left to hear.
-            let late = tick + 10 > lock(&told.world).ticks;
+            // Once the motors are off, there is nothing left to acknowledge.
+            let late = tick + 10 > lock(&result.world).ticks;
             assert!(
                 late || control.requests_acknowledged() == control.requests_made(),
                 "{press:?} at {tick}: {} of {}",

@@ -1,11 +1,11 @@
-//! Presses that are taken again: at once in place, and by a run that goes on with a session.
+//! Retakes: immediately in place, and by a resumed run.
 
 use skinrig_controller::{ProgressTracker, Resume, Run};
 use skinrig_model::*;
 use skinrig_protocol::plan::{Plan, Step};
 use skinrig_protocol::{Retakes, Route};
 
-use crate::course::{START, Told, faults, run_plan};
+use crate::course::{RunResult, START, faults, run_plan};
 use crate::mock::*;
 
 fn retaking(per_press: u32, per_session: u32) -> Plan {
@@ -19,21 +19,21 @@ fn retaking(per_press: u32, per_session: u32) -> Plan {
 }
 
 /// Press and number of each intent, with its time in ms.
-fn intents(told: &Told) -> Vec<(u32, u32, i64)> {
+fn intents(result: &RunResult) -> Vec<(u32, u32, i64)> {
     let intent = |r: &Record| match r {
         Record::Intent { attempt, t } => Some((attempt.press.index(), attempt.number, t.0 / MS)),
         _ => None,
     };
-    told.records.iter().filter_map(intent).collect()
+    result.records.iter().filter_map(intent).collect()
 }
 
 /// Press, number and verdict of each outcome.
-fn outcomes(told: &Told) -> Vec<(u32, u32, &'static str)> {
+fn outcomes(result: &RunResult) -> Vec<(u32, u32, &'static str)> {
     let outcome = |r: &Record| match r {
         Record::Outcome(o) => Some((o.attempt.press.index(), o.attempt.number, o.verdict.name())),
         _ => None,
     };
-    told.records.iter().filter_map(outcome).collect()
+    result.records.iter().filter_map(outcome).collect()
 }
 
 /// A chunk of camera 2 during the second press.
@@ -51,15 +51,15 @@ fn chunk_of_the_second_press() -> u64 {
 }
 
 #[test]
-fn a_press_with_lost_data_is_taken_again_at_once() {
+fn a_press_with_lost_data_is_retaken_immediately() {
     let losing = Faults {
         loss: Some((CameraId::Two, chunk_of_the_second_press(), 7)),
         ..faults()
     };
-    let told = run_plan(&retaking(2, 20), losing, START, Sink::default());
+    let result = run_plan(&retaking(2, 20), losing, START, Sink::default());
     let valid = "valid";
     assert_eq!(
-        outcomes(&told),
+        outcomes(&result),
         [
             (0, 1, valid),
             (1, 1, "invalid"),
@@ -67,15 +67,15 @@ fn a_press_with_lost_data_is_taken_again_at_once() {
             (2, 1, valid)
         ]
     );
-    assert_eq!((told.report.valid, told.report.invalid), (3, 0));
-    assert_eq!(told.report.end, RunEnd::Completed);
-    // The period from the retake to the next press is not shorter than from a press that needed none.
-    let t = intents(&told);
+    assert_eq!((result.report.valid, result.report.invalid), (3, 0));
+    assert_eq!(result.report.end, RunEnd::Completed);
+    // The period from the retake to the next press is no shorter than without a retake.
+    let t = intents(&result);
     let took = t[2].2 - t[1].2;
     assert_eq!(t[3].2 - t[1].2, 503 + took, "{t:?}");
-    // The terminal counts presses, not attempts.
+    // The progress counts presses, not attempts.
     let mut tracker = ProgressTracker::new(None);
-    for record in &told.records {
+    for record in &result.records {
         let p = tracker.update(record);
         assert!(p.done == p.valid + p.invalid + p.missed && p.done <= 3);
     }
@@ -84,37 +84,37 @@ fn a_press_with_lost_data_is_taken_again_at_once() {
 }
 
 #[test]
-fn a_press_that_the_operator_broke_off_is_taken_again_after_the_pause() {
+fn a_press_interrupted_by_the_operator_is_retaken_after_the_pause() {
     let good = intents(&run_plan(&plan(), faults(), START, Sink::default()));
     let ticks = lock(&run_plan(&plan(), faults(), START, Sink::default()).world).ticks;
     let mut broken = 0;
     for tick in 1..=ticks {
         let paused = Faults {
-            operator: Some((tick, Press::PauseNow)),
+            operator: Some((tick, OperatorAction::PauseNow)),
             ..faults()
         };
-        let told = run_plan(&retaking(2, 20), paused, START, Sink::default());
-        let r = &told.report;
+        let result = run_plan(&retaking(2, 20), paused, START, Sink::default());
+        let r = &result.report;
         assert_eq!((r.valid, &r.end), (3, &RunEnd::Completed), "tick {tick}");
-        broken += usize::from(intents(&told).len() > good.len());
+        broken += usize::from(intents(&result).len() > good.len());
     }
     assert!(broken > 20, "{broken} of {ticks} ticks are within a press");
 }
 
 #[test]
-fn the_protocol_limits_how_often() {
-    // Something hard 1.2 mm below the surface, from the first press on.
+fn the_protocol_limits_retakes() {
+    // An obstacle 1.2 mm below the surface, from the first press on.
     let blocked = || Faults {
         floor_mm: Some((0, -1.2, i64::MAX)),
         ..faults()
     };
     let attempts = |per_press, per_session| {
         let plan = retaking(per_press, per_session);
-        let told = run_plan(&plan, blocked(), START, Sink::default());
-        assert_eq!(told.report.end, RunEnd::Completed);
-        assert_eq!((told.report.invalid, told.report.valid), (3, 0));
+        let result = run_plan(&plan, blocked(), START, Sink::default());
+        assert_eq!(result.report.end, RunEnd::Completed);
+        assert_eq!((result.report.invalid, result.report.valid), (3, 0));
         let mut counts = [0; 3];
-        for (press, number, _) in intents(&told) {
+        for (press, number, _) in intents(&result) {
             counts[press as usize] += 1;
             assert_eq!(number, counts[press as usize]);
         }
@@ -126,7 +126,7 @@ fn the_protocol_limits_how_often() {
 }
 
 #[test]
-fn what_the_skin_did_is_not_taken_again() {
+fn faults_of_the_skin_are_not_retaken() {
     let good = run_plan(&plan(), faults(), START, Sink::default());
     let at_depth = good.records.iter().find_map(|r| match r {
         Record::Outcome(o) if o.attempt.press == PressId::from_index(1) => {
@@ -139,16 +139,16 @@ fn what_the_skin_did_is_not_taken_again() {
         floor_mm: Some((at_depth + 10, -1.9, at_depth + 15)),
         ..faults()
     };
-    let told = run_plan(&retaking(2, 20), gives_way, START, Sink::default());
+    let result = run_plan(&retaking(2, 20), gives_way, START, Sink::default());
     assert_eq!(
-        outcomes(&told),
+        outcomes(&result),
         [(0, 1, "valid"), (1, 1, "invalid"), (2, 1, "valid")]
     );
 }
 
 #[test]
 fn a_run_that_ends_during_a_press_cuts_it_off() {
-    let told = run_plan(
+    let result = run_plan(
         &plan(),
         Faults {
             stiffness_n_mm: 4.5,
@@ -157,11 +157,11 @@ fn a_run_that_ends_during_a_press_cuts_it_off() {
         START,
         Sink::default(),
     );
-    let cut_off = told.records.iter().any(|r| {
+    let cut_off = result.records.iter().any(|r| {
         matches!(r, Record::Outcome(o) if o.verdict.is_cut_off()
             && o.verdict.reason().is_some_and(|r| r.contains("force: expected at most 8 N")))
     });
-    assert!(cut_off, "{:?}", told.report);
+    assert!(cut_off, "{:?}", result.report);
 }
 
 fn history(attempts: u32, verdict: Option<PressVerdict>) -> PressHistory {
@@ -180,7 +180,7 @@ fn with_sync() -> Plan {
     plan
 }
 
-fn resume(plan: &Plan, rest: &Plan, histories: &[PressHistory], faults: Faults) -> Told {
+fn resume(plan: &Plan, rest: &Plan, histories: &[PressHistory], faults: Faults) -> RunResult {
     let world = World::shared(faults, START);
     let control = lock(&world).control.clone();
     let mut sink = Sink::default();
@@ -196,7 +196,7 @@ fn resume(plan: &Plan, rest: &Plan, histories: &[PressHistory], faults: Faults) 
             histories: histories.to_vec(),
         })
         .execute();
-    Told {
+    RunResult {
         world,
         records: sink.records,
         report,
@@ -217,44 +217,49 @@ fn cut_off_in_the_second_press() -> [PressHistory; 3] {
 }
 
 #[test]
-fn a_resumed_run_goes_on_at_the_press_that_was_cut_off() {
+fn a_resumed_run_continues_at_the_press_that_was_cut_off() {
     let histories = cut_off_in_the_second_press();
     let plan = plan();
     let rest = rest_of(&plan, &histories);
-    let told = resume(&plan, &rest, &histories, faults());
-    assert!(matches!(told.records[0], Record::Resumed(_)));
-    assert!(!told.records.iter().any(|r| matches!(r, Record::Started(_))));
-    let r = &told.report;
+    let result = resume(&plan, &rest, &histories, faults());
+    assert!(matches!(result.records[0], Record::Resumed(_)));
+    assert!(
+        !result
+            .records
+            .iter()
+            .any(|r| matches!(r, Record::Started(_)))
+    );
+    let r = &result.report;
     assert_eq!(r.end, RunEnd::Completed, "{r:?}");
     assert_eq!((r.planned, r.valid, r.invalid, r.missed), (3, 3, 0, 0));
-    assert_eq!(outcomes(&told), [(1, 2, "valid"), (2, 1, "valid")]);
-    // The first slot comes at once (the plan's first one is at 300 ms), the next one a period later.
-    let t = intents(&told);
+    assert_eq!(outcomes(&result), [(1, 2, "valid"), (2, 1, "valid")]);
+    // The first slot starts at once (the plan's first one is at 300 ms), the next one a period later.
+    let t = intents(&result);
     assert_eq!(t[1].2 - t[0].2, 503);
-    // The robot goes to the places of the presses that are taken, sideways at clearance height alone.
-    let w = lock(&told.world);
+    // The robot goes only to the locations of the remaining presses, with lateral motion at clearance height.
+    let w = lock(&result.world);
     assert_eq!(w.violations, Vec::<String>::new());
     let sideways: Vec<_> = w.commands.iter().filter(|c| c.0[2] == 5.0).collect();
     assert_eq!(sideways[0].0, [10.0, 2.0, 5.0]);
 }
 
 #[test]
-fn sync_presses_come_again_and_stay_valid_when_they_do_not() {
+fn sync_presses_repeat_and_stay_valid_otherwise() {
     let plan = with_sync();
     let histories = cut_off_in_the_second_press();
     let rest = rest_of(&plan, &histories);
-    let told = resume(&plan, &rest, &histories, faults());
+    let result = resume(&plan, &rest, &histories, faults());
     let all = [(0, 2, "valid"), (1, 2, "valid"), (2, 1, "valid")];
-    assert_eq!(outcomes(&told), all);
-    // Stopped before anything is pressed: what was valid is not lost, what was cut off is not missed.
+    assert_eq!(outcomes(&result), all);
+    // Stopped before any press: valid presses stay valid, and cut-off ones do not become missed.
     let stopped = Faults {
-        operator: Some((1, Press::Stop)),
+        operator: Some((1, OperatorAction::Stop)),
         ..faults()
     };
-    let told = resume(&plan, &rest, &histories, stopped);
-    let r = &told.report;
+    let result = resume(&plan, &rest, &histories, stopped);
+    let r = &result.report;
     assert_eq!((r.valid, r.invalid, r.missed), (1, 1, 1), "{r:?}");
-    let missed: Vec<_> = told
+    let missed: Vec<_> = result
         .records
         .iter()
         .filter_map(|r| match r {
@@ -276,23 +281,23 @@ fn a_resumed_run_survives_every_failing_call() {
             at_call: Some((k, Failure::Once)),
             ..faults()
         };
-        let told = resume(&plan, &rest, &histories, failing);
-        told.check_rig(&format!("call {k} of {total}"));
+        let result = resume(&plan, &rest, &histories, failing);
+        result.check_rig(&format!("call {k} of {total}"));
     }
 }
 
 #[test]
-fn a_plan_that_is_not_what_is_left_is_refused() {
+fn a_plan_other_than_the_remaining_one_is_rejected() {
     let histories = cut_off_in_the_second_press();
     let plan = plan();
     let rest = rest_of(&plan, &histories);
     let refused = |rest: &Plan, histories: &[PressHistory], words: &str| {
-        let told = resume(&plan, rest, histories, faults());
-        match &told.report.end {
+        let result = resume(&plan, rest, histories, faults());
+        match &result.report.end {
             RunEnd::Faulted(reason) => assert!(reason.contains(words), "{reason}"),
             other => panic!("expected a fault, found {other:?}"),
         }
-        assert!(!lock(&told.world).ever_armed);
+        assert!(!lock(&result.world).ever_armed);
     };
     refused(&plan, &histories, "expected no step for press 1");
     refused(&rest, &[], "expected those of 3 presses, found 0");

@@ -1,4 +1,4 @@
-//! What goes wrong on the simulated rig, at every stage of a press: how the real controller ends there.
+//! Faults of the simulated rig at every stage of a press, and how the real controller ends the run.
 
 use skinrig_controller::{ControlHandle, Run, RunReport};
 use skinrig_model::*;
@@ -10,13 +10,13 @@ use skinrig_sim::rig::simulated_rig;
 use crate::mock::{MS, Sink, header};
 use crate::simulated::paced_plan;
 
-/// What a run left behind.
-struct Told {
+/// Report and records of a run.
+struct RunResult {
     report: RunReport,
     records: Vec<Record>,
 }
 
-fn run(plan: &Plan, config: &SimConfig) -> Told {
+fn run(plan: &Plan, config: &SimConfig) -> RunResult {
     let mut sink = Sink::default();
     let header = RunHeader {
         robot_from_skin: config.robot_from_skin,
@@ -24,13 +24,13 @@ fn run(plan: &Plan, config: &SimConfig) -> Told {
     };
     let rig = simulated_rig(config);
     let report = Run::new(plan, header, rig, &ControlHandle::new(), &mut sink).execute();
-    Told {
+    RunResult {
         report,
         records: sink.records,
     }
 }
 
-impl Told {
+impl RunResult {
     fn end(&self) -> &str {
         self.report.end.reason().unwrap_or("completed")
     }
@@ -43,7 +43,7 @@ impl Told {
         blocks.map(|p| p.measured.z_mm).next().unwrap_or(f64::NAN)
     }
 
-    /// Every planned press ends once, and the counts of the report say the same.
+    /// Every planned press ends once, consistent with the counts of the report.
     fn check_presses(&self, case: &str) {
         let r = &self.report;
         assert_eq!(r.planned, r.valid + r.invalid + r.missed, "{case}: {r:?}");
@@ -57,7 +57,7 @@ impl Told {
         }
     }
 
-    /// Off the skin and without power, as the poses themselves show.
+    /// Off the skin and without power, according to the poses.
     fn check_safe(&self, case: &str) {
         let r = &self.report;
         assert!(r.disarmed && r.retracted, "{case}: {r:?}");
@@ -72,24 +72,28 @@ impl Told {
 #[test]
 fn too_much_force_ends_at_clearance_height() {
     for level in [SimLevel::Kinematic, SimLevel::Geometric] {
-        // From a touch to just below what a press of 2 mm needs (1.2 N at rest, more on the way).
+        // From a touch to just below the force of a press of 2 mm (1.2 N at rest, more in motion).
         for limit_n in [0.1, 0.3, 0.5, 0.8, 1.0, 1.1, 1.2] {
             for seed in [1, 2, 3] {
                 let mut plan = paced_plan();
                 plan.limits.max_force_n = limit_n;
-                let told = run(&plan, &SimConfig::new(seed, level));
+                let result = run(&plan, &SimConfig::new(seed, level));
                 let case = format!("{level:?}, {limit_n} N, seed {seed}");
                 let wanted = format!("force: expected at most {limit_n} N, found ");
-                assert!(told.end().starts_with(&wanted), "{case}: {}", told.end());
-                told.check_presses(&case);
-                told.check_safe(&case);
-                assert_eq!(told.report.problems, Vec::new(), "{case}");
+                assert!(
+                    result.end().starts_with(&wanted),
+                    "{case}: {}",
+                    result.end()
+                );
+                result.check_presses(&case);
+                result.check_safe(&case);
+                assert_eq!(result.report.problems, Vec::new(), "{case}");
             }
         }
     }
 }
 
-/// Instants in a good run, named: within the travel, and within each phase of two presses.
+/// Named times in a good run: within the travel, and within each phase of two presses.
 fn instants(plan: &Plan, seed: u64) -> Vec<(String, FaultTrigger)> {
     let good = run(plan, &SimConfig::new(seed, SimLevel::Kinematic));
     assert_eq!(good.report.end, RunEnd::Completed, "{:?}", good.report);
@@ -169,10 +173,10 @@ fn every_fault_at_every_stage_ends_safely() {
     for (case, fault) in cases {
         let mut config = SimConfig::new(seed, SimLevel::Kinematic);
         config.faults = vec![fault.clone()];
-        let told = run(&plan, &config);
-        told.check_presses(&case);
-        let r = &told.report;
-        let end = told.end();
+        let result = run(&plan, &config);
+        result.check_presses(&case);
+        let r = &result.report;
+        let end = result.end();
         let robot_gone = matches!(fault, Fault::IndenterLost(_));
         match fault {
             Fault::IndenterReadBack | Fault::CameraReadBack(_) => {
@@ -181,10 +185,10 @@ fn every_fault_at_every_stage_ends_safely() {
             }
             Fault::IndenterLost(_) | Fault::CameraUnplugged { .. } | Fault::TriggerBoxLost(_) => {
                 assert!(matches!(r.end, RunEnd::Faulted(_)), "{case}: {r:?}");
-                assert!(end.contains("sim-00000005-"), "{case}, who: {end}");
+                assert!(end.contains("sim-00000005-"), "{case}, device: {end}");
             }
             Fault::Sluggish { .. } => {
-                // Late, never elsewhere: a press is invalid, or a travel ends the run.
+                // Late, but in position: a press is invalid, or a travel ends the run.
                 assert!(r.valid < r.planned || r.end == RunEnd::Completed, "{case}");
             }
             Fault::CameraBytesLost { .. }
@@ -193,8 +197,8 @@ fn every_fault_at_every_stage_ends_safely() {
             | Fault::DeadPress { .. } => {
                 assert_eq!(r.end, RunEnd::Completed, "{case}: {r:?}");
             }
-            // Whole runs with each of them, into a session and its analysis, are in the table of docs/reference/runs.md.
-            other => panic!("{case}: expected a fault with an expectation here, found {other:?}"),
+            // docs/reference/runs.md lists whole runs with each of them, with session and analysis.
+            other => panic!("{case}: expected a fault handled above, found {other:?}"),
         }
         if let RunEnd::Faulted(_) = r.end {
             assert!(
@@ -206,7 +210,7 @@ fn every_fault_at_every_stage_ends_safely() {
             assert!(!r.disarmed, "{case}: {r:?}");
             assert!(end.contains("switch it off by hand"), "{case}: {end}");
         } else if r.missed < r.planned {
-            told.check_safe(&case);
+            result.check_safe(&case);
         } else {
             assert!(r.disarmed && r.retracted, "{case}: {r:?}");
         }

@@ -50,7 +50,7 @@ fn presses_on_the_simulated_rig_are_valid_and_reproducible() {
     };
     let records = run();
     let mut outcomes = 0;
-    let (mut sent, mut told) = (Vec::new(), Vec::new());
+    let (mut sent, mut result) = (Vec::new(), Vec::new());
     let mut edges = [Vec::new(), Vec::new()];
     let mut intents = Vec::new();
     for r in &records {
@@ -68,7 +68,7 @@ fn presses_on_the_simulated_rig_are_valid_and_reproducible() {
             }
             Record::MarkSent(s) => sent.push(s.mark),
             Record::BoxReports { reports, .. } => {
-                told.extend(reports.iter().filter_map(|r| match r {
+                result.extend(reports.iter().filter_map(|r| match r {
                     BoxReport::Mark { mark, .. } => Some(*mark),
                     _ => None,
                 }));
@@ -83,9 +83,9 @@ fn presses_on_the_simulated_rig_are_valid_and_reproducible() {
         [intents[1] - intents[0], intents[2] - intents[1]],
         [2000 * MS; 2]
     );
-    // The box told of every mark, and both cameras saw it.
+    // The box reported every mark, and both cameras received it.
     assert_eq!(sent.len(), 9);
-    assert_eq!(told, sent);
+    assert_eq!(result, sent);
     for edges in edges {
         let seen = pulse::decode_marks(&edges);
         assert_eq!(seen.stray_edges, 0);

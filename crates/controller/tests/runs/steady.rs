@@ -1,4 +1,4 @@
-//! Encoder noise: a healthy robot's readings refuse no motion, and a robot that is aside is named as that.
+//! Encoder noise: readings of a healthy robot reject no motion, and a robot off its position is identified as the fault.
 
 use skinrig_controller::{ControllerError, PressFault, Run, RunReport};
 use skinrig_model::*;
@@ -6,16 +6,16 @@ use skinrig_protocol::plan::{Plan, Step};
 
 use crate::mock::*;
 
-/// Keeps nothing.
-struct Nowhere;
+/// Discards all records.
+struct DiscardSink;
 
-impl skinrig_controller::RecordSink for Nowhere {
+impl skinrig_controller::RecordSink for DiscardSink {
     fn accept(&mut self, _record: Record) -> Result<(), skinrig_controller::SinkFault> {
         Ok(())
     }
 }
 
-/// So many short presses, at two places in turn.
+/// This many short presses, alternating between two locations.
 fn presses(n: usize) -> Plan {
     let mut plan = plan();
     let steps = std::mem::take(&mut plan.steps);
@@ -51,15 +51,15 @@ fn run(plan: &Plan, encoders: (u64, i64, f64)) -> (RunReport, Vec<String>) {
     };
     let world = World::shared(faults, [0.0, 0.0, 10.0]);
     let control = lock(&world).control.clone();
-    let report = Run::new(plan, header(plan), rig(&world), &control, &mut Nowhere).execute();
+    let report = Run::new(plan, header(plan), rig(&world), &control, &mut DiscardSink).execute();
     let violations = lock(&world).violations.clone();
     (report, violations)
 }
 
-/// Readings within one count of a tip that rests up to two of five counts aside, and in free air a jolt of six counts in one
-/// reading of 200: what settles is pressed. 10,000 presses.
+/// Readings within one count of a tip that rests up to two of five counts off, and in free air a jolt of six counts in one
+/// reading of 200: every settled motion leads to a press. 10,000 presses.
 #[test]
-fn noisy_encoders_refuse_no_motion() {
+fn noisy_encoders_reject_no_motion() {
     let presses_each = 500;
     let plan = presses(presses_each);
     let mut pressed = 0;
@@ -79,9 +79,9 @@ fn noisy_encoders_refuse_no_motion() {
     assert_eq!(pressed, 10_000);
 }
 
-/// Beyond what counts as settled the run ends, and the robot is named, not a refused motion.
+/// Beyond the settling tolerance the run ends with the robot as the cause, not a rejected motion.
 #[test]
-fn a_tip_that_rests_aside_is_the_robots_fault() {
+fn a_tip_that_rests_off_target_is_a_fault_of_the_robot() {
     let plan = presses(4);
     for aside_mm in [0.06, 0.2] {
         let (report, _) = run(&plan, (7, 0, aside_mm));
@@ -94,9 +94,9 @@ fn a_tip_that_rests_aside_is_the_robots_fault() {
     }
 }
 
-/// Noise beyond the tolerance never settles: a fault of the robot as well.
+/// Noise beyond the tolerance never settles: also a fault of the robot.
 #[test]
-fn encoders_beyond_the_tolerance_are_the_robots_fault() {
+fn noise_beyond_the_tolerance_is_a_fault_of_the_robot() {
     let (report, violations) = run(&presses(4), (3, 12, 0.0));
     let refused = |e: &ControllerError| matches!(e, ControllerError::Guard(_));
     assert!(

@@ -1,4 +1,4 @@
-//! Suspensions: no chatter, one row each way, and an end to the waiting.
+//! Suspensions: no chatter, one record per transition, and a limit on the wait.
 
 use proptest::prelude::*;
 use skinrig_controller::suspend::{Hysteresis, Transition};
@@ -17,8 +17,8 @@ const STORM: Threshold = Threshold {
 const RESUME_AFTER: HostDuration = HostDuration::from_millis(500);
 
 proptest! {
-    /// Whatever the value does: turns alternate, a trip needs `lasting` beyond the one level and a clearing `resume_after`
-    /// on the calm side of the other, both without a break.
+    /// For any values: transitions alternate, a trip needs `lasting` beyond the first level and a clearing needs `resume_after`
+    /// on the safe side of the second, both without interruption.
     #[test]
     fn turns_alternate_and_last(values in prop::collection::vec(
         prop_oneof![4 => 0.0..200.0f64, 1 => Just(f64::NAN), 4 => 90.0..110.0f64, 4 => 50.0..70.0f64], 1..200,
@@ -42,7 +42,7 @@ proptest! {
         }
     }
 
-    /// Between the two levels nothing changes, however long.
+    /// Between the two levels nothing changes, for any duration.
     #[test]
     fn the_band_is_quiet(values in prop::collection::vec(60.01..=100.0f64, 1..200), begin in any::<bool>()) {
         let mut follow = Hysteresis::new(STORM, RESUME_AFTER);
@@ -59,7 +59,7 @@ proptest! {
 }
 
 #[test]
-fn small_values_may_be_the_bad_ones() {
+fn small_values_can_trip() {
     let dark = Threshold {
         trip: 5.0,
         resume: 6.0,
@@ -100,11 +100,11 @@ impl RecordSink for Disk {
     }
 }
 
-/// A run whose disk is full for some time: rows of interruptions, how it ended, valid presses.
+/// A run whose disk is full for some time: records of interruptions, its end, and the number of valid presses.
 fn run(
     low_ms: std::ops::Range<i64>,
     press: UnderWay,
-    operator: Option<(u64, Press)>,
+    operator: Option<(u64, OperatorAction)>,
 ) -> (Vec<(InterruptionKind, i64, String)>, RunEnd, usize) {
     let mut plan = plan();
     plan.suspend = Suspend {
@@ -140,7 +140,7 @@ fn run(
 }
 
 #[test]
-fn a_full_disk_suspends_and_the_run_goes_on() {
+fn a_full_disk_suspends_and_the_run_continues() {
     let (rows, end, valid) = run(500..5_000, UnderWay::Finish, None);
     assert_eq!((end, valid), (RunEnd::Completed, 3), "{rows:?}");
     let [(pause, at, why), (resume, then, because)] = rows.as_slice() else {
@@ -176,10 +176,10 @@ fn a_disk_that_stays_full_ends_the_run() {
     assert!(valid < 3);
 }
 
-/// What begins while the operator has the run wait is not over when they let it go on.
+/// A condition that begins during the operator's pause still applies when they resume.
 #[test]
-fn what_began_during_a_pause_suspends_after_it() {
-    let pause = Some((100, Press::Pause)); // at 0.5 s; a second later they resume
+fn a_condition_that_began_during_a_pause_suspends_after_it() {
+    let pause = Some((100, OperatorAction::Pause)); // at 0.5 s; resumes a second later
     let (rows, end, valid) = run(600..8_000, UnderWay::Finish, pause);
     assert_eq!((end, valid), (RunEnd::Completed, 3), "{rows:?}");
     let words: Vec<&str> = rows.iter().map(|(_, _, why)| why.as_str()).collect();
@@ -188,7 +188,7 @@ fn what_began_during_a_pause_suspends_after_it() {
     assert!(words[3].starts_with("no longer suspended"), "{rows:?}");
 }
 
-/// The camera that tells is watched, once a second; the one that cannot is asked once, and the session says so.
+/// A camera with a thermometer is monitored once a second; one without is read once, and the session notes it.
 #[test]
 fn a_hot_camera_suspends_until_it_is_cool() {
     let mut plan = plan();
@@ -205,17 +205,17 @@ fn a_hot_camera_suspends_until_it_is_cool() {
         hot_ms: Some(500..6_000),
         ..faults()
     };
-    let told = run_plan(&plan, hot, START, Sink::default());
+    let result = run_plan(&plan, hot, START, Sink::default());
     let mut rows = Vec::new();
     let mut notes = Vec::new();
-    for record in &told.records {
+    for record in &result.records {
         match record {
             Record::Interruption { kind, t, reason } => rows.push((*kind, t.0 / MS, reason)),
             Record::Note { text, .. } if text.contains("temperature") => notes.push(text),
             _ => {}
         }
     }
-    assert_eq!(told.report.end, RunEnd::Completed, "{rows:?}");
+    assert_eq!(result.report.end, RunEnd::Completed, "{rows:?}");
     let [
         (InterruptionKind::Pause, at, why),
         (InterruptionKind::Resume, then, because),
@@ -236,19 +236,19 @@ fn a_hot_camera_suspends_until_it_is_cool() {
         notes,
         ["suspend.temperature: camera 2 cannot measure its temperature: not monitored"]
     );
-    let world = lock(&told.world);
+    let world = lock(&result.world);
     let seconds = u32::try_from(world.t / (1_000 * MS)).unwrap();
-    assert_eq!(world.asked_heat[1], 1);
-    assert!((2..=seconds + 1).contains(&world.asked_heat[0]));
+    assert_eq!(world.temperature_reads[1], 1);
+    assert!((2..=seconds + 1).contains(&world.temperature_reads[0]));
 }
 
 #[test]
-fn a_camera_without_a_limit_is_not_asked() {
+fn a_camera_without_a_limit_is_not_read() {
     let hot = Faults {
         hot_ms: Some(0..i64::MAX),
         ..faults()
     };
-    let told = run_plan(&plan(), hot, START, Sink::default());
-    assert_eq!(told.report.end, RunEnd::Completed);
-    assert_eq!(lock(&told.world).asked_heat, [0, 0]);
+    let result = run_plan(&plan(), hot, START, Sink::default());
+    assert_eq!(result.report.end, RunEnd::Completed);
+    assert_eq!(lock(&result.world).temperature_reads, [0, 0]);
 }

@@ -1,4 +1,4 @@
-//! Presses that find the surface by touch, on the simulated rig whose skin does not lie where the frame says.
+//! Presses that find the surface by touch, on a simulated rig whose skin is off the frame's surface.
 
 use skinrig_controller::{ControlHandle, Resume, Run};
 use skinrig_model::*;
@@ -30,7 +30,7 @@ fn touching_plan() -> Plan {
     plan
 }
 
-/// Runs the plan with the skin `off_mm` above the place where the frame says it is.
+/// Runs the plan with the skin `off_mm` above the frame's surface.
 fn run(off_mm: f64, plan: &Plan) -> (RunEnd, Vec<PressOutcome>, Vec<PoseSample>) {
     let config = SimConfig::new(5, SimLevel::Kinematic);
     let mut rig = simulated_rig(&config);
@@ -61,13 +61,13 @@ fn the_depth_counts_from_the_touched_surface() {
         assert_eq!(outcomes.len(), 3);
         for o in outcomes {
             assert_eq!(o.verdict, PressVerdict::Valid, "{off_mm}: {o:?}");
-            // 0.15 N are 0.25 mm of a skin of 0.6 N/mm; noise and viscosity take or give a little.
+            // 0.15 N are 0.25 mm of a skin of 0.6 N/mm, plus or minus noise and viscosity.
             let touched = o.touched_mm.unwrap();
             let late = off_mm - touched;
             assert!((0.1..0.3).contains(&late), "{off_mm}: {touched}");
             let depth = o.measured_depth_mm.unwrap();
             assert!((depth - 2.0).abs() < 0.03, "{depth}");
-            // The contact is the moment of the touch, on the way down at the touched height.
+            // The contact is the time of the touch, on the way down at the touched height.
             let contact = o.timing.unwrap().contact;
             let at = poses.iter().find(|p| p.t == contact).unwrap();
             assert_eq!(at.measured.z_mm, touched);
@@ -76,7 +76,7 @@ fn the_depth_counts_from_the_touched_surface() {
 }
 
 #[test]
-fn a_surface_outside_its_band_is_refused_and_the_run_goes_on() {
+fn a_surface_outside_its_band_is_rejected_and_the_run_continues() {
     for (off_mm, words) in [
         (1.5, "found contact immediately"),
         (-1.5, "found none down to"),
@@ -90,12 +90,12 @@ fn a_surface_outside_its_band_is_refused_and_the_run_goes_on() {
             assert_eq!((o.touched_mm, o.measured_depth_mm), (None, None));
         }
         let lowest = poses.iter().map(|p| p.measured.z_mm).fold(9.0, f64::min);
-        assert!(lowest > -1.1, "it never indents: {lowest}");
+        assert!(lowest > -1.1, "no indentation: {lowest}");
     }
 }
 
 #[test]
-fn the_floor_stays_where_it_is() {
+fn a_touched_surface_does_not_move_the_floor() {
     let mut plan = touching_plan();
     plan.limits.max_depth_mm = 2.5;
     let (end, outcomes, poses) = run(-0.6, &plan);
@@ -109,7 +109,7 @@ fn the_floor_stays_where_it_is() {
 }
 
 #[test]
-fn a_search_that_makes_no_sense_never_moves() {
+fn an_invalid_search_never_moves() {
     for spoil in [
         (|s: &mut TouchSearch| s.band_mm = 5.0) as fn(&mut TouchSearch),
         |s| s.threshold_n = 9.0,
@@ -141,7 +141,7 @@ fn checked_plan(each_repetition: bool) -> Plan {
     plan
 }
 
-/// What the check of the surface told, with the skin `off_mm` above the frame's.
+/// Records of a run with a surface check, with the skin `off_mm` above the frame's surface.
 fn checked(off_mm: f64, each_repetition: bool) -> (RunEnd, Vec<Record>) {
     let plan = checked_plan(each_repetition);
     let mut rig = simulated_rig(&SimConfig::new(5, SimLevel::Kinematic));
@@ -224,7 +224,7 @@ fn a_surface_in_place_is_checked_and_pressed() {
 
 #[test]
 fn a_further_leg_checks_the_surface_before_it_presses() {
-    // Who resumes may have mounted the skin anew: 0.8 mm higher than at the session's begin.
+    // The operator may have remounted the skin: 0.8 mm higher than at the start of the session.
     for (off_mm, ends_well) in [(0.15, true), (0.8, false)] {
         let plan = checked_plan(false);
         let cut_off = PressHistory {
@@ -292,11 +292,11 @@ fn invalid_presses_in_a_row_end_the_run() {
 }
 
 #[test]
-fn a_robot_that_cannot_reach_the_deepest_touch_is_refused() {
+fn a_robot_that_cannot_reach_the_deepest_touch_is_rejected() {
     let mut plan = touching_plan();
     let (end, ..) = run(0.0, &plan);
     assert_eq!(end, RunEnd::Completed);
-    // The presses alone would fit: 2 mm below a surface up to 1 mm below the frame's need 3 mm.
+    // The presses alone would fit: 2 mm below a surface up to 1 mm below the frame's require 3 mm.
     let mut rig = simulated_rig(&SimConfig::new(5, SimLevel::Kinematic));
     let low_mm = rig.indenter.capabilities().workspace_min_mm[2];
     plan.limits.max_depth_mm = 3.0;

@@ -1,16 +1,16 @@
-//! The consumer of records loses what it has: noticed within half a second of the rig's time, wherever the run is.
+//! A sink that loses its records: detected within half a second of the rig's time, at every stage of a run.
 
 use crate::course::{START, faults};
 use crate::mock::*;
 use skinrig_controller::{ControllerError, RecordSink, Run, RunReport, SinkFault};
 use skinrig_model::*;
 
-/// A sink whose records are gone from some time on, which it says only when it is asked. ms of the rig's clock.
+/// A sink whose records vanish at some time, which only `check` reports. ms of the rig's clock.
 struct Vanishing {
     sink: Sink,
     world: Shared,
     gone_ms: i64,
-    asked_ms: Vec<i64>,
+    checked_ms: Vec<i64>,
 }
 
 impl RecordSink for Vanishing {
@@ -20,7 +20,7 @@ impl RecordSink for Vanishing {
 
     fn check(&mut self) -> Result<(), SinkFault> {
         let ms = lock(&self.world).t / MS;
-        self.asked_ms.push(ms);
+        self.checked_ms.push(ms);
         if ms < self.gone_ms {
             return Ok(());
         }
@@ -28,7 +28,7 @@ impl RecordSink for Vanishing {
     }
 }
 
-fn run(gone_ms: i64, operator: Option<(u64, Press)>) -> (Vanishing, RunReport) {
+fn run(gone_ms: i64, operator: Option<(u64, OperatorAction)>) -> (Vanishing, RunReport) {
     let plan = plan();
     let world = World::shared(
         Faults {
@@ -42,25 +42,25 @@ fn run(gone_ms: i64, operator: Option<(u64, Press)>) -> (Vanishing, RunReport) {
         sink: Sink::default(),
         world: world.clone(),
         gone_ms,
-        asked_ms: Vec::new(),
+        checked_ms: Vec::new(),
     };
     let report = Run::new(&plan, header(&plan), rig(&world), &control, &mut sink).execute();
     (sink, report)
 }
 
-/// Twice what is promised of the time between two looks: 0.5 s and the tick in which it comes.
+/// Longest time between two checks: 0.5 s and one tick.
 const WITHIN_MS: i64 = 500 + 10;
 
 #[test]
-fn what_is_gone_is_noticed_within_half_a_second() {
+fn lost_records_are_detected_within_half_a_second() {
     let (whole, report) = run(i64::MAX, None);
     assert_eq!(report.end, RunEnd::Completed);
     let end_ms = report.ended_at.0 / MS;
-    assert!(whole.asked_ms.len() as i64 > end_ms / WITHIN_MS - 2);
+    assert!(whole.checked_ms.len() as i64 > end_ms / WITHIN_MS - 2);
     for operator in [
         None,
-        Some((150, Press::Pause)),
-        Some((150, Press::PauseNow)),
+        Some((150, OperatorAction::Pause)),
+        Some((150, OperatorAction::PauseNow)),
     ] {
         for gone_ms in (0..end_ms - WITHIN_MS).step_by(20) {
             let (sink, report) = run(gone_ms, operator);
@@ -68,8 +68,8 @@ fn what_is_gone_is_noticed_within_half_a_second() {
             let fault = SinkFault::Rejected("the file is gone".into());
             assert_eq!(report.causes, [ControllerError::Sink(fault)], "{case}");
             assert!(report.retracted && report.disarmed, "{case}: {report:?}");
-            // One failed answer ends it; the end is written all the same.
-            let noticed_ms = *sink.asked_ms.last().unwrap();
+            // One failed check ends the run; its last records are still written.
+            let noticed_ms = *sink.checked_ms.last().unwrap();
             assert!(noticed_ms - gone_ms <= WITHIN_MS, "{case}: {noticed_ms}");
             let records = &sink.sink.records;
             assert!(

@@ -1,4 +1,4 @@
-//! The watchdog, alone and in a run: every cause trips within two ticks of rig time, and nothing else does.
+//! The watchdog, alone and in a run: every cause trips within two ticks of rig time, and nothing else trips it.
 
 use proptest::prelude::*;
 use skinrig_controller::{ControllerSettings, WatchLimits, Watchdog, WatchdogTrip};
@@ -23,7 +23,7 @@ fn sample(ms: i64, at: [f64; 3], force_n: f64) -> PoseSample {
     }
 }
 
-/// The trip of samples 1 ms apart, looked at after each.
+/// The trip of samples 1 ms apart, checked after each.
 fn trip_of(samples: impl IntoIterator<Item = ([f64; 3], f64)>) -> Option<(i64, WatchdogTrip)> {
     let mut watchdog = Watchdog::new(limits());
     watchdog.start();
@@ -37,7 +37,7 @@ fn trip_of(samples: impl IntoIterator<Item = ([f64; 3], f64)>) -> Option<(i64, W
     None
 }
 
-/// What a position may change by within the 5 ms over which a speed is taken, and the sample before them.
+/// Largest change of position within the 5 ms over which speed is measured, plus the sample before them.
 const JUMP_MM: f64 = 1.25 * LIMITS.max_speed_mm_s * 6e-3 + LIMITS.position_tolerance_mm;
 
 proptest! {
@@ -45,7 +45,7 @@ proptest! {
 
     /// Motions within the limits, with noise far below the tolerance, never trip.
     #[test]
-    fn what_keeps_the_limits_never_trips(
+    fn samples_within_the_limits_never_trip(
         speed in 0.0..=100.0f64, way in prop::array::uniform3(-1.0..1.0f64),
         noise in prop::collection::vec(prop::array::uniform3(-0.01..0.01f64), 1..200), force in 0.0..=8.0f64,
     ) {
@@ -54,14 +54,14 @@ proptest! {
             let at = std::array::from_fn(|k| way[k] / length * speed * 1e-3 * i as f64 + noise[k]);
             (at, if i % 7 == 0 { f64::NAN } else { force })
         });
-        // The floor is 3 mm down: those that go there are another law.
+        // The floor is 3 mm down; another test covers positions below it.
         let kept: Vec<_> = samples.take_while(|(at, _): &([f64; 3], f64)| at[2] > -3.0).collect();
         prop_assert_eq!(trip_of(kept), None);
     }
 
-    /// A limit that is broken at a sample trips at that sample, whatever came before it.
+    /// A violated limit trips at its sample, after any earlier samples.
     #[test]
-    fn what_breaks_a_limit_trips_at_once(calm in 6usize..60, which in 0..3, by in 1.001..50.0f64) {
+    fn a_violated_limit_trips_immediately(calm in 6usize..60, which in 0..3, by in 1.001..50.0f64) {
         let bad = match which {
             0 => ([0.0; 3], 8.0 * by),
             1 => ([0.0, 0.0, -0.12 * by - 3.0], 0.0),
@@ -83,8 +83,8 @@ proptest! {
 }
 
 #[test]
-fn a_slow_creep_is_no_speed_and_a_sustained_one_is() {
-    // 180 mm/s: each step stays within what two samples may differ by, five of them do not.
+fn only_sustained_motion_counts_as_speed() {
+    // 180 mm/s: each step is within the tolerance of two samples, five of them are not.
     let creep = |step_mm: f64| trip_of((0..50).map(|i| ([step_mm * f64::from(i), 0.0, 10.0], 0.0)));
     assert_eq!(creep(0.1), None);
     assert!(matches!(creep(0.16), Some((_, WatchdogTrip::Speed { .. }))));
@@ -96,14 +96,14 @@ fn ages_gaps_and_forms() {
     watchdog.start();
     let at = |z| [0.0, 0.0, z];
     let ms = |t: i64| HostTime(t * MS);
-    assert_eq!(watchdog.check_poll(ms(5000)), Ok(())); // nothing is known yet
+    assert_eq!(watchdog.check_poll(ms(5000)), Ok(())); // no sample yet
     assert_eq!(watchdog.check_sample(&sample(5001, at(-2.0), 0.0)), Ok(()));
     assert_eq!(watchdog.check_poll(ms(5101)), Ok(()));
     assert!(matches!(
         watchdog.check_poll(ms(5102)),
         Err(WatchdogTrip::Stale { .. })
     ));
-    // The way out is open, but not to the blind.
+    // Upward motion stays allowed, except with unreliable feedback.
     assert_eq!(watchdog.check_sample(&sample(5103, at(-2.0), 99.0)), Ok(()));
     assert_eq!(watchdog.check_poll(ms(5104)), Ok(()));
     assert!(matches!(
@@ -126,13 +126,13 @@ fn ages_gaps_and_forms() {
         watchdog.check_poll(ms(7001)),
         Err(WatchdogTrip::Late { .. })
     ));
-    // At clearance height nobody is in danger.
+    // At clearance height there is no danger.
     watchdog.start();
     assert_eq!(watchdog.check_sample(&sample(8000, at(5.0), 0.0)), Ok(()));
     assert_eq!(watchdog.check_poll(ms(8000)), Ok(()));
     assert_eq!(watchdog.check_sample(&sample(9900, at(5.0), 0.0)), Ok(()));
     assert_eq!(watchdog.check_poll(ms(9900)), Ok(()));
-    // A sample from the future would stay fresh for ever.
+    // A sample from the future would never become stale.
     assert_eq!(
         watchdog.check_sample(&sample(9_999_999, at(5.0), 0.0)),
         Ok(())
@@ -153,17 +153,20 @@ fn too_deep_from_the_start_may_rise() {
 #[test]
 fn every_cause_ends_the_press_within_two_ticks() {
     let causes = [
-        (Strike::Force, "force: expected at most 8 N"),
-        (Strike::Sink, "depth: expected at most 3.05 mm"),
-        (Strike::Slide, "speed: expected at most 100 mm/s"),
-        (Strike::Nan, "pose stream: expected finite coordinates"),
-        (Strike::Twice, "pose stream: expected a sample after"),
+        (FeedbackFault::Force, "force: expected at most 8 N"),
+        (FeedbackFault::Sink, "depth: expected at most 3.05 mm"),
+        (FeedbackFault::Slide, "speed: expected at most 100 mm/s"),
         (
-            Strike::Silence,
+            FeedbackFault::Nan,
+            "pose stream: expected finite coordinates",
+        ),
+        (FeedbackFault::Twice, "pose stream: expected a sample after"),
+        (
+            FeedbackFault::Silence,
             "pose stream: expected a pose sample no older",
         ),
         (
-            Strike::Late,
+            FeedbackFault::Late,
             "loop: expected a poll of the robot at least every",
         ),
     ];
@@ -176,13 +179,13 @@ fn every_cause_ends_the_press_within_two_ticks() {
                 strike: Some(strike),
                 ..faults()
             };
-            let told = run_plan(&plan, broken, START, Sink::default());
-            let RunEnd::Faulted(reason) = &told.report.end else {
-                panic!("{case}: {:?}", told.report);
+            let result = run_plan(&plan, broken, START, Sink::default());
+            let RunEnd::Faulted(reason) = &result.report.end else {
+                panic!("{case}: {:?}", result.report);
             };
             assert!(reason.starts_with(words), "{case}: {reason}");
-            assert!(told.report.disarmed, "{case}");
-            let verdicts = told.records.iter().filter_map(|r| match r {
+            assert!(result.report.disarmed, "{case}");
+            let verdicts = result.records.iter().filter_map(|r| match r {
                 Record::Outcome(o) => {
                     Some((o.verdict.name(), o.verdict.reason().unwrap_or_default()))
                 }
@@ -196,9 +199,9 @@ fn every_cause_ends_the_press_within_two_ticks() {
                 "{case}: {verdicts:?}"
             );
 
-            let w = lock(&told.world);
+            let w = lock(&result.world);
             let settings = ControllerSettings::default();
-            let grace = if strike == Strike::Silence {
+            let grace = if strike == FeedbackFault::Silence {
                 settings.stale_after.0
             } else {
                 0
@@ -206,9 +209,12 @@ fn every_cause_ends_the_press_within_two_ticks() {
             let broken_at = w.broken_at.unwrap_or(i64::MAX).saturating_add(grace);
             let in_time = broken_at.saturating_add(2 * settings.tick.0);
             let within = |t: i64| t >= broken_at && t <= in_time;
-            let blind = matches!(strike, Strike::Nan | Strike::Twice | Strike::Silence);
+            let blind = matches!(
+                strike,
+                FeedbackFault::Nan | FeedbackFault::Twice | FeedbackFault::Silence
+            );
             let brakes = blind || on_trip == OnTrip::Brake;
-            let first = w.told.iter().find(|(t, _)| *t >= broken_at);
+            let first = w.robot_calls.iter().find(|(t, _)| *t >= broken_at);
             let expected = if brakes { "disarm" } else { "hold" };
             assert!(
                 first.is_some_and(|(t, what)| within(*t) && *what == expected),

@@ -106,10 +106,11 @@ fn camera_stream(
         pass(clock.as_mut(), HostDuration::from_millis(300), || {
             camera.poll(&mut all).expect("camera: poll");
         });
+        let at = clock.now();
         answered(clock.as_mut(), || camera.flush(&mut all)).expect("camera: flush");
-        let (after, at) = (all.len(), clock.now());
+        let after = all.len();
         answered(clock.as_mut(), || camera.flush(&mut all)).expect("camera: flush again");
-        // On a real clock, bytes arrive between any two calls.
+        // Bytes arrive between two calls on a real clock, and while an unfinished first call waits for its reply.
         assert!(
             all.len() == after || clock.now() > at,
             "camera: a second flush at the same time must be empty (round {round})"
@@ -141,7 +142,7 @@ fn camera_pattern(
     assert_eq!(pixels, Ok(None), "camera: no pattern is always possible");
     let wanted = |rate_ev_s| Some(TestPattern { rate_ev_s });
     let scan = match camera.test_pattern(wanted(200e3)) {
-        Ok(scan) => scan.expect("camera: a pattern that is made must be told"),
+        Ok(scan) => scan.expect("camera must report its test pattern"),
         Err(DeviceError::Refused { .. }) => return,
         Err(e) => panic!("camera: a pattern must be made or refused: {e}"),
     };

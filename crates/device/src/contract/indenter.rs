@@ -164,7 +164,7 @@ fn indenter_refusals(
         );
     }
 
-    // A refused command does not affect the current motion.
+    // A rejected command does not affect the current motion.
     let [target, other] = options.targets;
     let speed = options.speed_mm_s;
     robot

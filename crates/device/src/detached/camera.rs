@@ -30,7 +30,7 @@ impl DetachedCamera {
     /// Moves a stopped camera to a separate thread.
     ///
     /// # Errors
-    /// [`DeviceError::Lost`] when the thread cannot be started.
+    /// [`DeviceError::Lost`] if the thread cannot be started.
     pub fn new(
         device: Device,
         clock: Box<dyn Clock>,

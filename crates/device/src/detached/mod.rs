@@ -1,7 +1,7 @@
 //! Devices on separate threads, so that a blocking call never delays the control of the robot.
 //!
 //! A driver's call may block: a serial line that accepts no bytes, a control transfer that never completes. [`DetachedCamera`] and
-//! [`DetachedBox`] wrap such a driver so that calls return at once. Calls run on the device's thread; an unfinished call returns
+//! [`DetachedBox`] wrap such a driver so that calls return immediately. Calls run on the device's thread; an unfinished call returns
 //! [`DeviceError::Pending`], and after its [`Timeouts`] [`DeviceError::Silent`]. Simulated and replayed devices do not need this.
 
 mod camera;
@@ -55,16 +55,16 @@ impl Calls {
 }
 
 /// Guard of one unfinished call; counted until dropped.
-struct Counted(Calls);
+struct CallGuard(Calls);
 
-impl Counted {
+impl CallGuard {
     fn new(calls: &Calls) -> Self {
         calls.0.fetch_add(1, Ordering::AcqRel);
         Self(calls.clone())
     }
 }
 
-impl Drop for Counted {
+impl Drop for CallGuard {
     fn drop(&mut self) {
         self.0.0.fetch_sub(1, Ordering::AcqRel);
     }
@@ -147,7 +147,7 @@ impl<D: Send + 'static> Worker<D> {
         call: impl FnOnce(&mut D) -> T + Send + 'static,
     ) -> Result<Call<T>, DeviceError> {
         let (tell, reply) = mpsc::channel();
-        let counted = Counted::new(&self.calls);
+        let counted = CallGuard::new(&self.calls);
         let job: Job<D> = Box::new(move |device| {
             // Sending fails if the caller is gone.
             let _ = tell.send(call(device));
@@ -186,7 +186,7 @@ impl<D: Send + 'static> Worker<D> {
         }
     }
 
-    /// Sends a call and waits for the reply. Fails at once if an earlier call is overdue.
+    /// Sends a call and waits for the reply. Fails immediately if an earlier call is overdue.
     fn wait<T: Send + 'static>(
         &mut self,
         doing: &'static str,
@@ -216,7 +216,7 @@ impl<D: Send + 'static> Worker<D> {
 }
 
 impl<D> Drop for Worker<D> {
-    /// Waits until the thread has closed the device, so that it can be reopened at once. Does not wait for a thread that hangs in a
+    /// Waits until the thread has closed the device, so that it can be reopened immediately. Does not wait for a thread that hangs in a
     /// call.
     fn drop(&mut self) {
         self.jobs = None;

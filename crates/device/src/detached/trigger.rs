@@ -20,7 +20,7 @@ impl DetachedBox {
     /// Moves a box to a separate thread.
     ///
     /// # Errors
-    /// [`DeviceError::Lost`] when the thread cannot be started.
+    /// [`DeviceError::Lost`] if the thread cannot be started.
     pub fn new(
         device: Device,
         clock: Box<dyn Clock>,
@@ -54,7 +54,7 @@ impl TriggerBox for DetachedBox {
     fn send(&mut self, mark: Mark) -> Answer<SentMark> {
         match self.worker.answer(&mut self.sending)? {
             Some((asked, answer)) if asked == mark => return answer,
-            // The reply to a mark whose caller gave up; the box reports that train anyway.
+            // Reply to a mark whose caller has stopped waiting; the box reports that train anyway.
             Some(_) | None => {}
         }
         if self.sending.is_none() {
@@ -84,10 +84,10 @@ impl TriggerBox for DetachedBox {
     }
 
     fn take_notes(&mut self) -> Vec<String> {
-        let told = self.worker.wait("notes", |d| d.take_notes());
-        told.unwrap_or_else(|e| {
+        let notes = self.worker.wait("notes", |d| d.take_notes());
+        notes.unwrap_or_else(|e| {
             vec![format!(
-                "what it lost is not known ({e}): look at the alignment certificate"
+                "its losses are unknown ({e}): check the alignment certificate"
             )]
         })
     }

@@ -4,7 +4,7 @@ use std::fmt;
 
 /// An error code, which the library keeps per thread.
 ///
-/// The documentation rarely says which call sets which code: expect any code from any call.
+/// The documentation rarely states which call sets which code: expect any code from any call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ErrorCode(pub i32);
 

@@ -126,7 +126,7 @@ macro_rules! struct_of {
             /// [`Missing`] with all required functions for which `lookup` returned `None`.
             ///
             /// # Safety
-            /// Each address that `lookup` returns must be that of a function of the name asked for, of an
+            /// Each address that `lookup` returns must be that of a function with the requested name, of an
             /// SDK of at least [`SdkVersion::OLDEST`](crate::SdkVersion::OLDEST), in a library that is
             /// never unloaded while the result or a copy of it is in use.
             pub unsafe fn resolve(

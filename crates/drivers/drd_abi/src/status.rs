@@ -38,7 +38,7 @@ pub enum StatusField {
     WristInit = 12,
     /// 1: redundant encoders agree; 0: they disagree, or there are none; -1 on some devices: there are none.
     Redundancy = 13,
-    /// Why forces last went off, see [`ForceOffCause`].
+    /// Cause of the last loss of force, see [`ForceOffCause`].
     ForceOffCause = 14,
     /// Mechanical locks (since 3.7.1).
     Locks = 15,
@@ -130,7 +130,7 @@ impl StatusVector {
         self.get(field) == Some(1)
     }
 
-    /// Why forces last went off; `None` if this version does not report it.
+    /// Cause of the last loss of force; `None` if this version does not report it.
     #[must_use]
     pub fn force_off_cause(&self) -> Option<ForceOffCause> {
         self.get(StatusField::ForceOffCause)

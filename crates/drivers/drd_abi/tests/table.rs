@@ -1,4 +1,4 @@
-//! The table against the layout of the interface, and what a loader meets in libraries of other versions.
+//! The table compared with the interface, and resolution in libraries of other versions.
 
 use std::collections::BTreeSet;
 use std::ffi::{CStr, c_void};
@@ -9,13 +9,13 @@ use skinrig_drd_abi::{
     StatusVector,
 };
 
-/// Stands where a function would; resolving never calls it.
-fn somewhere() -> NonNull<c_void> {
+/// Stand-in for a function; resolving never calls it.
+fn stand_in() -> NonNull<c_void> {
     NonNull::dangling()
 }
 
 #[test]
-fn a_name_stands_once_and_is_none_of_those_we_never_touch() {
+fn names_are_unique_and_exclude_forbidden_functions() {
     let names: BTreeSet<&str> = SYMBOLS.iter().map(|s| s.name).collect();
     assert_eq!(names.len(), SYMBOLS.len());
     assert!(
@@ -32,7 +32,7 @@ fn a_name_stands_once_and_is_none_of_those_we_never_touch() {
 }
 
 #[test]
-fn every_call_to_a_device_ends_with_its_signed_id_and_returns_no_rust_bool() {
+fn device_calls_end_with_a_signed_id_and_return_no_rust_bool() {
     for symbol in SYMBOLS {
         let (arguments, result) = symbol.signature.rsplit_once("->").unwrap();
         assert!(
@@ -70,9 +70,9 @@ fn every_call_to_a_device_ends_with_its_signed_id_and_returns_no_rust_bool() {
 }
 
 #[test]
-fn all_missing_functions_are_told_at_once_and_optional_ones_may_be_absent() {
+fn all_missing_functions_are_reported_together_and_optional_ones_may_be_absent() {
     let lacks = ["drdStop", "dhdGetStatus"];
-    let lookup = |name: &'static CStr| (!lacks.contains(&name.to_str().unwrap())).then(somewhere);
+    let lookup = |name: &'static CStr| (!lacks.contains(&name.to_str().unwrap())).then(stand_in);
     // SAFETY: nothing is called through the result.
     let missing = unsafe { Functions::resolve(lookup) }.unwrap_err();
     assert_eq!(missing.0, lacks);
@@ -86,7 +86,7 @@ fn all_missing_functions_are_told_at_once_and_optional_ones_may_be_absent() {
             .iter()
             .find(|s| s.name == name.to_str().unwrap())
             .unwrap();
-        (symbol.need == Need::Required).then(somewhere)
+        (symbol.need == Need::Required).then(stand_in)
     };
     // SAFETY: nothing is called through the result.
     let functions = unsafe { Functions::resolve(required) }.unwrap();
@@ -102,7 +102,7 @@ fn versions_compare_number_by_number() {
 }
 
 #[test]
-fn a_short_status_vector_shows_what_it_lacks() {
+fn missing_words_of_a_short_status_vector_are_none() {
     let mut status = StatusVector::new();
     let written = [1, 1, 1, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -1, 3];
     // SAFETY: the vector takes `STATUS_CAPACITY` words, more than these 15.

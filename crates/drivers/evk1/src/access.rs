@@ -25,7 +25,7 @@ impl<'a> Registers<'a> {
         }
     }
 
-    /// Accepts mismatches allowed by `tolerance`; mismatches that are only tolerated go to `seen`.
+    /// Accepts mismatches allowed by `tolerance`; adds mismatches that are only tolerated to `seen`.
     #[must_use]
     pub(crate) fn tolerating(self, tolerance: &Tolerance, seen: &Mismatches) -> Self {
         Self {

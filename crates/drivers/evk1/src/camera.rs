@@ -99,13 +99,13 @@ struct Overflow {
 }
 
 impl Overflow {
-    /// Whether data may have been lost since, given the counter value `hits`. A saturated counter cannot tell.
+    /// Whether data may have been lost since, given the counter value `hits`. True for a saturated counter.
     const fn lost(self, hits: u16) -> bool {
         hits != self.hits || hits == u16::MAX
     }
 }
 
-/// Interval at which the overflow counter is read while streaming. A flush, as before judging a recording, reads it at once.
+/// Interval at which the overflow counter is read while streaming. A flush, for example before a verdict, reads it immediately.
 const OVERFLOW_PERIOD: HostDuration = HostDuration::from_millis(1_000);
 
 impl Evk1 {
@@ -124,7 +124,7 @@ impl Evk1 {
         let usb = open_serial(serial, clock, &config.tolerance)?;
         let mut opened = Self::open(Box::new(usb), camera, config, Box::new(clock))?;
         if serial.starts_with(BY_PORT) {
-            // What it tells of itself, if anything, was not asked for.
+            // Findings while listing were not requested.
             opened.identity.serial = serial.to_owned();
         }
         Ok(opened)
@@ -148,7 +148,7 @@ impl Evk1 {
         // Data left by an earlier program would come first, with other times.
         reset(transport.as_mut(), &config.tolerance, &seen)?;
         let mut registers = registers_of(transport.as_mut(), &config, &seen);
-        // Its value says nothing, and the sensor may be without power.
+        // Its value is not meaningful yet, and the sensor may be unpowered.
         registers.read_unpowered(CHIP_ID)?;
         sequences::initialise(&mut registers, identity.fpga_version)?;
         pattern::clear(&mut registers)?;
@@ -237,7 +237,7 @@ impl Evk1 {
         if self.gone {
             return Ok(());
         }
-        // The sensor must never stay powered, whatever failed.
+        // The sensor must never stay powered, whichever step failed.
         let mut done = FirstError::default();
         done.after(back.map_err(|e| e.during("stopping the stream")));
         let mut registers = registers_of(self.transport.as_mut(), &self.config, &self.seen);
@@ -411,7 +411,7 @@ impl Evk1 {
         Ok(())
     }
 
-    /// Reverts a failed start: transfers, time base, and the noise filter, which would drop everything and be taken for the configured
+    /// Reverts a failed start: transfers, time base, and the noise filter, which would drop everything and pass for the configured
     /// setting at the next start. Ignores further errors, because the first one is more informative.
     fn undo_start(&mut self) {
         let filter = self.settings.as_ref().and_then(Checked::noise_filter);

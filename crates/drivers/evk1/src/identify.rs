@@ -76,7 +76,7 @@ pub enum FoundState {
 }
 
 impl Found {
-    /// What to do next, if anything.
+    /// Next step, if any.
     #[must_use]
     pub fn next_step(&self) -> Option<String> {
         match &self.state {

@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rates_are_steps_of_the_generator_and_others_are_refused() {
+    fn only_rates_of_the_generator_are_accepted() {
         let of = |rate_ev_s| ratio(TestPattern { rate_ev_s }).ok();
         assert_eq!(of(1e6), Some(10));
         assert_eq!(of(50e6), Some(512));

@@ -2,8 +2,8 @@
 //!
 //! Source: the register maps of OpenEB 3.1.2 (`hal_psee_plugins`, `ccam3_single_gen3_tep_register_control`,
 //! `ccam2_system_monitor_trigger_ext_adc`, `stereo_fx3_hostif`, `ccam3_single_gen31_sensorif`). Addresses are opaque
-//! names of 32-bit registers, not byte addresses. Defaults are those that the maps list; what a real device holds
-//! after power-up is not public, so nothing relies on them but models of the device. A bit whose default is not public
+//! names of 32-bit registers, not byte addresses. Defaults are those in the maps; the contents of a real device
+//! after power-up are not public, so only models of the device use them. A bit whose default is not public
 //! counts as 0.
 
 /// One 32-bit register.
@@ -11,19 +11,19 @@
 pub struct Register {
     /// Its name in the public register map.
     pub name: &'static str,
-    /// Its address, transferred whole.
+    /// Its complete address.
     pub address: u32,
     /// Its nominal default.
     pub default: u32,
-    /// The bits that read back as they were written. The others are strobes, counters, or bits that the device may
+    /// The bits that read back as written. The others are strobes, counters, or bits that the device may
     /// clear by itself.
     pub stable: u32,
 }
 
-/// Some bits of a register.
+/// A bit field of a register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Field {
-    /// The register that holds it.
+    /// The register of the field.
     pub register: Register,
     /// Its name in the public register map.
     pub name: &'static str,
@@ -52,7 +52,7 @@ impl Field {
         (word & self.mask()) >> self.low
     }
 
-    /// `word` with the field set to `value`; higher bits of `value` are not looked at.
+    /// `word` with the field set to `value`; higher bits of `value` are ignored.
     #[must_use]
     pub const fn put(self, word: u32, value: u32) -> u32 {
         word & !self.mask() | (value << self.low) & self.mask()
@@ -125,16 +125,16 @@ pub const STEREO_MERGE_ENABLE: Field = bit(CCAM2_CONTROL, "STEREO_MERGE_ENABLE",
 /// Drop events outside the window of `OUT_OF_FOV_FILTER_X` and `_Y`.
 pub(crate) const ENABLE_OUT_OF_FOV: Field = bit(CCAM2_CONTROL, "ENABLE_OUT_OF_FOV", 11);
 
-/// Write strobes; what they read back is not public.
+/// Write strobes; their read-back values are not public.
 pub(crate) const TRIGGERS: Register = volatile("TRIGGERS", 0x000a, 0, 0);
 /// Resets the FPGA's registers and time base: 0, then 1.
 pub(crate) const SOFT_RESET: Field = bit(TRIGGERS, "SOFT_RESET", 0);
 
-/// By its name, how often a FIFO overflowed. No public code reads it.
+/// Number of FIFO overflows, judging by its name. No public code reads it.
 pub const OVERFLOW_HITCOUNT: Register = volatile("OVERFLOW_HITCOUNT", 0x0018, 0, 0);
 /// The low half of the serial number.
 pub(crate) const SERIAL_LSB: Register = volatile("SERIAL_LSB", 0x001c, 0, 0);
-/// What is printed as the serial number.
+/// High half of the serial number, which is the printed one.
 pub const SERIAL_MSB: Register = volatile("SERIAL_MSB", 0x0020, 0, 0);
 
 /// Columns that pass the field-of-view filter.
@@ -161,7 +161,7 @@ pub(crate) const EXT_TEMP_CONTROL: Register = register("EXT_TEMP_CONTROL", 0x014
 /// Reads the board's temperature sensor.
 pub(crate) const EXT_TEMP_MONITOR_SPI_EN: Field =
     bit(EXT_TEMP_CONTROL, "EXT_TEMP_MONITOR_SPI_EN", 2);
-/// The board's temperature; a sign is not known.
+/// The board's temperature; whether it is signed is not public.
 pub const EVK_EXT_TEMP_VALUE: Register = volatile("EVK_EXT_TEMP_VALUE", 0x014c, 0, 0);
 /// In 1/4096 °C.
 pub const TEMPERATURE: Field = field(EVK_EXT_TEMP_VALUE, "EVK_EXT_TEMP_VALUE", 0, 22);
@@ -204,7 +204,7 @@ pub(crate) const ROI_TD_SHADOW_TRIGGER: Field = bit(ROI_CTRL, "roi_td_shadow_tri
 
 /// Readout of change detection.
 pub(crate) const READOUT_CTRL: Register = register("readout_ctrl", 0x0208, 0x4000_0bff);
-/// Readout of the exposure measurement, laid out like [`READOUT_CTRL`].
+/// Readout of the exposure measurement, with the same layout as [`READOUT_CTRL`].
 pub(crate) const ROE_CTRL: Register = register("roe_ctrl", 0x0244, 0x4000_03ff);
 
 /// `ro_act_pdy_ctrl` of [`READOUT_CTRL`] or [`ROE_CTRL`].
@@ -225,11 +225,11 @@ pub(crate) const fn act_pux(of: Register) -> Field {
     field(of, "ro_act_pux_ctrl", 11, 3)
 }
 
-/// Illumination meter: bits 25:0 count, bit 29 tells that the count is valid.
+/// Illumination meter: bits 25:0 count, bit 29 marks a valid count.
 pub(crate) const LIFO_CTRL: Register = volatile("lifo_ctrl", 0x0214, 0, 0xc000_0000);
 /// Illumination meter.
 pub(crate) const LIFO_EN: Field = bit(LIFO_CTRL, "lifo_en", 31);
-/// What chip it is; the default is that of the variant with exposure measurement, which is the one listed.
+/// Chip ID; the default is that of the variant with exposure measurement, the only one listed.
 pub const CHIP_ID: Register = volatile("chip_id", 0x0218, 0x9020_0c03, 0);
 /// Spare bits of the sensor.
 pub const SPARE_CTRL: Register = register("spare_ctrl", 0x021c, 0);
@@ -267,7 +267,7 @@ pub(crate) const NFL_PERIOD_CNT_THRESH: Field = field(NFL_THRESH, "period_cnt_th
 /// Number of bias generators.
 pub(crate) const BIAS_GENERATORS: usize = 27;
 
-/// What the 27 bias generators are given before anything else; also what a model of the device may start from.
+/// Initial values of the 27 bias generators; also the initial state of a device model.
 pub(crate) const BIAS_INIT: [u32; BIAS_GENERATORS] = [
     0x5900_009f,
     0x5900_009f,
@@ -305,7 +305,7 @@ const BIAS_NAMES: [&str; BIAS_GENERATORS] = [
     "bgen_24", "bgen_25", "bgen_26",
 ];
 
-/// Bias generator `n`, 0..=26. The map lists no defaults; 0 stands for them.
+/// Bias generator `n`, 0..=26. The map lists no defaults; 0 is used instead.
 ///
 /// # Panics
 /// For a larger `n`.
@@ -349,14 +349,14 @@ pub(crate) const fn roi_y(n: usize) -> Register {
     register("td_roi_y", 0x0500 + 4 * n as u32, 0)
 }
 
-/// The four bits beyond the map of columns; they stay 0.
+/// The four bits beyond the map of columns; always 0.
 pub(crate) const ROI_X_END: Register = register("td_roi_x20", 0x0450, 0);
-/// The four bits beyond the map of rows; they stay 0.
+/// The four bits beyond the map of rows; always 0.
 pub(crate) const ROI_Y_END: Register = register("td_roi_y15", 0x053c, 0);
 
-/// The FPGA's pattern generator, which takes the sensor's place.
+/// The FPGA's pattern generator, which replaces the sensor.
 pub const TEST_PATTERN_CONTROL: Register = register("IF/TEST_PATTERN_CONTROL", 0x0740, 0);
-/// It makes events.
+/// Enables event generation.
 pub const PATTERN_ENABLE: Field = bit(TEST_PATTERN_CONTROL, "ENABLE", 0);
 /// 0: column after column; 1: the diagonal.
 pub(crate) const PATTERN_TYPE: Field = bit(TEST_PATTERN_CONTROL, "TYPE", 4);
@@ -364,9 +364,9 @@ pub(crate) const PATTERN_TYPE: Field = bit(TEST_PATTERN_CONTROL, "TYPE", 4);
 pub(crate) const PATTERN_PIXEL_TYPE: Field = bit(TEST_PATTERN_CONTROL, "PIXEL_TYPE", 8);
 /// The events' polarity.
 pub(crate) const PATTERN_PIXEL_POLARITY: Field = bit(TEST_PATTERN_CONTROL, "PIXEL_POLARITY", 12);
-/// The first of two periods that take turns.
+/// The first of two alternating periods.
 pub const TEST_PATTERN_N_PERIOD: Register = register("IF/TEST_PATTERN_N_PERIOD", 0x0744, 0);
-/// The second.
+/// The second period.
 pub const TEST_PATTERN_P_PERIOD: Register = register("IF/TEST_PATTERN_P_PERIOD", 0x0748, 0);
 
 /// `VALID_RATIO` of [`TEST_PATTERN_N_PERIOD`] or [`TEST_PATTERN_P_PERIOD`]: clock cycles of 10 ns with an event, of 1024.
@@ -397,11 +397,11 @@ pub(crate) const FPGA_BUILD_DATE: Register = volatile("FPGA_BUILD_DATE", 0x0808,
 
 // ---- host interface, base 0x1400
 
-/// Whether the FPGA closes packets that are not full.
+/// Whether the FPGA closes partly filled packets.
 pub const PKT_END_ENABLE: Register = register("PKT_END_ENABLE", 0x1400, 0x0000_0001);
-/// After how long it does, µs.
+/// Time after which it closes them, µs.
 pub const PKT_END_INTERVAL_US: Register = register("PKT_END_INTERVAL_US", 0x1404, 0x0400);
-/// After how much data it does.
+/// Amount of data after which it closes them.
 pub(crate) const PKT_END_DATA_COUNT: Register = register("PKT_END_DATA_COUNT", 0x1408, 0x0400);
 
 const SINGLE: &[Register] = &[
@@ -447,7 +447,7 @@ const SINGLE: &[Register] = &[
     PKT_END_DATA_COUNT,
 ];
 
-/// Every register that the driver reads or writes, and the host interface's: what a model of the device must hold.
+/// Every register that the driver accesses, and those of the host interface: the registers of a device model.
 pub fn all() -> impl Iterator<Item = Register> {
     SINGLE
         .iter()

@@ -157,14 +157,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_rectangle_says_so() {
+    fn other_shapes_are_described_as_such() {
         let mut map = Map::ALL;
         map.columns[3] = 0;
         assert_eq!(map.describe(), "608 columns and 480 rows, not a rectangle");
     }
 
     #[test]
-    fn regions_outside_are_refused() {
+    fn regions_outside_are_rejected() {
         for (x, width) in [(0, 0), (639, 2), (640, 1), (1, u16::MAX)] {
             let roi = Roi {
                 x,

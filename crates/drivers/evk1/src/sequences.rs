@@ -1,8 +1,8 @@
-//! The ordered sequences of register accesses that bring a camera up, start it, stop it and close it.
+//! Sequences of register accesses that initialise, start, stop and close a camera.
 //!
 //! Source: OpenEB 3.1.2, `hal_psee_plugins/src/devices/gen31` (`gen31_fx3_facilities_builder`, `gen31_evk1_fpga`,
 //! `gen31_system_control`, `gen31_sensor_if_ctrl`, `gen31_sensor`, `gen31_digital`, `gen31_analog`,
-//! `gen31_roi_command`) and `src/boards/fx3/fx3_libusb_board_command`. The order is theirs; reading back is ours.
+//! `gen31_roi_command`) and `src/boards/fx3/fx3_libusb_board_command`. The order is theirs; the read-back is ours.
 
 use std::time::Duration;
 
@@ -14,14 +14,14 @@ use crate::error::{Evk1Error, FirstError};
 use crate::registers as r;
 use crate::roi::Map;
 
-/// Start-up burst of the pixels, which the noise filter swallows.
+/// Start-up burst of the pixels, which the noise filter removes.
 pub(crate) const SWALLOW: Duration = Duration::from_millis(500);
 
-/// FPGA version from which a trigger output exists, as in register `FPGA_VERSION`.
+/// First FPGA version with a trigger output, as in register `FPGA_VERSION`.
 pub(crate) const TRIGGER_OUT_SINCE: u32 = 0x0003_0000;
 
-/// Powers the sensor down and resets the FPGA, whatever was running. The sensor's own register is not read back: the
-/// sensor may be without power.
+/// Powers the sensor down and resets the FPGA, from any state. The sensor's own register is not read back, because the
+/// sensor may be unpowered.
 ///
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
@@ -47,7 +47,7 @@ fn soft_reset(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
     registers.set(r::SOFT_RESET, 1)
 }
 
-/// Powers the FPGA's side and the sensor up: VDDC, VDDD, clock, VDDA. The camera is standalone then.
+/// Powers up the FPGA's side and the sensor: VDDC, VDDD, clock, VDDA. The camera is then standalone.
 ///
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
@@ -81,7 +81,7 @@ pub fn init_fpga(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
     Ok(())
 }
 
-/// Sets the sensor up, its pixels held in reset. The contrast biases work in voltage mode throughout: in current mode
+/// Initialises the sensor with its pixels held in reset. The contrast biases stay in voltage mode throughout: in current mode
 /// the sensor overheats.
 ///
 /// # Errors
@@ -128,8 +128,8 @@ pub fn init_sensor(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
     registers.set(r::ROI_TD_SHADOW_TRIGGER, 1)
 }
 
-/// Brings the facilities into a known state: no trigger inputs, no trigger output, all pixels in the region. The
-/// region must be written: a fresh sensor has half of its pixels off.
+/// Sets the facilities to a known state: no trigger inputs, no trigger output, all pixels in the region. The
+/// region must be written, because half of a fresh sensor's pixels are off.
 ///
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
@@ -148,7 +148,7 @@ pub(crate) fn init_facilities(
     Map::ALL.write(registers)
 }
 
-/// Everything from whatever was running to a camera that can be started.
+/// Brings the camera from any state to one in which it can be started.
 ///
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
@@ -160,7 +160,7 @@ pub fn initialise(registers: &mut Registers<'_>, fpga_version: u32) -> Result<()
 }
 
 /// Starts the time base and releases the pixels while the noise filter drops everything; calls `wait` for the
-/// start-up burst; gives the filter back its setting. Transfers must be queued before.
+/// start-up burst; then restores the filter's setting. Transfers must be queued before.
 ///
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
@@ -187,7 +187,7 @@ pub fn start(
     registers.set(r::NFL_EN, enabled)
 }
 
-/// Holds the pixels in reset and stops the time base. Transfers must have been taken back before.
+/// Holds the pixels in reset and stops the time base. Transfers must be cancelled before.
 ///
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
@@ -198,11 +198,11 @@ pub fn stop(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
     done.outcome()
 }
 
-/// Longest wait for bytes that may not be there.
+/// Longest wait for bytes that may not exist.
 const READ_LIMIT: Duration = Duration::from_millis(100);
 
-/// Longest time for emptying the buffers. A camera that still sends its time base never lets a read come back empty,
-/// and sends too little to reach a bound in bytes soon.
+/// Longest time for emptying the buffers. If the camera still sends its time base, no read ever returns empty,
+/// and a limit in bytes would take too long.
 const EMPTYING_LIMIT: HostDuration = HostDuration::from_millis(2000);
 
 fn read_events(registers: &mut Registers<'_>, buffer: &mut [u8]) -> Result<usize, Evk1Error> {
@@ -210,12 +210,12 @@ fn read_events(registers: &mut Registers<'_>, buffer: &mut [u8]) -> Result<usize
     read.map_err(|e| e.during("emptying the event endpoint"))
 }
 
-/// Empties what a stopped stream has left in the buffers between sensor and host, which would come first at the next
-/// start, with times of its own; returns the number of bytes. The public driver leaves them there.
+/// Empties the buffers between sensor and host after a stop; their data would otherwise precede the next
+/// start, with old times. Returns the number of bytes. The public driver does not empty them.
 ///
 /// # Errors
-/// [`Evk1Error::Usb`]; [`Evk1Error::StillSending`] when bytes still come after 2 s on `clock`, or after more of them
-/// than any buffer on the way holds.
+/// [`Evk1Error::Usb`]; [`Evk1Error::StillSending`] if bytes still arrive after 2 s on `clock`, or after more bytes
+/// than all buffers contain.
 pub(crate) fn clear_left_over(
     registers: &mut Registers<'_>,
     clock: &dyn Clock,
@@ -235,8 +235,8 @@ pub(crate) fn clear_left_over(
     }
 }
 
-/// Powers down, and empties what is left in the camera's and the host's buffers: up to 8 rounds, ended by a round
-/// that brings nothing, by 300 000 bytes, or by 2 s on `clock`: what comes then is left there.
+/// Powers down, and empties the buffers of the camera and the host: up to 8 rounds, until a round without
+/// data, 300 000 bytes, or 2 s on `clock`. Later data stay there.
 ///
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].

@@ -1,4 +1,4 @@
-//! The settings of a camera: checked as a whole, written in an order that keeps the camera's rules, read back.
+//! The settings of a camera: checked together, written in a valid order, read back.
 
 use skinrig_device::{CameraSettings, NoiseFilter, SyncMode};
 use skinrig_model::Setting;
@@ -10,7 +10,7 @@ use crate::registers::{ATIS_CONTROL, EXT_TRIGGERS_ENABLE, NFL_CTRL, NFL_THRESH};
 use crate::roi::Map;
 use crate::{noise_filter, sync, triggers};
 
-/// Settings that the camera can take.
+/// Validated settings.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Checked {
     settings: CameraSettings,
@@ -22,7 +22,7 @@ impl Checked {
     /// Checks all of `settings`; nothing is written.
     ///
     /// # Errors
-    /// [`Evk1Error::Refused`] naming the first that the camera cannot take.
+    /// [`Evk1Error::Refused`] with the first setting that the camera does not support.
     pub fn new(settings: &CameraSettings) -> Result<Self, Evk1Error> {
         triggers::check(&settings.trigger_channels, settings.sync)?;
         noise_filter::check(settings.noise_filter)?;
@@ -33,7 +33,7 @@ impl Checked {
         })
     }
 
-    /// Whose time base the camera follows.
+    /// Time base that the camera follows.
     #[must_use]
     pub fn sync(&self) -> SyncMode {
         self.settings.sync
@@ -45,20 +45,20 @@ impl Checked {
         &self.settings.trigger_channels
     }
 
-    /// The noise filter, if there is to be one.
+    /// The noise filter; `None`: off.
     #[must_use]
     pub fn noise_filter(&self) -> Option<NoiseFilter> {
         self.settings.noise_filter
     }
 
-    /// Writes everything; the camera is stopped.
+    /// Writes everything; the camera must be stopped.
     ///
     /// # Errors
     /// [`Evk1Error::Refused`] for a master whose trigger output is on, before anything is written;
     /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
     pub fn write(&self, registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
         sync::check(self.sync(), triggers::read_out(registers)?)?;
-        // Whichever mode it comes from and goes to, the auxiliary input is off meanwhile.
+        // The auxiliary input is off while the mode changes.
         triggers::write(registers, &[])?;
         sync::write(registers, self.sync())?;
         triggers::write(registers, self.trigger_channels())?;
@@ -67,11 +67,11 @@ impl Checked {
         noise_filter::write(registers, self.settings.noise_filter)
     }
 
-    /// Reads everything from the registers and compares it with what was written, except where a register is known to
-    /// read differently: there the settings say what was found.
+    /// Reads everything from the registers and compares it with the written values, except for registers with a
+    /// known deviation: their settings contain the value read.
     ///
     /// # Errors
-    /// [`Evk1Error::Setting`] naming the first that differs; [`Evk1Error::Usb`].
+    /// [`Evk1Error::Setting`] with the first that differs; [`Evk1Error::Usb`].
     pub fn read_back(&self, registers: &mut Registers<'_>) -> Result<Vec<Setting>, Evk1Error> {
         let mut all = Vec::new();
         let mut add = |name: &str, requested: String, read_back: String, excused: bool| {
@@ -83,7 +83,7 @@ impl Checked {
                     found: read_back,
                 });
             }
-            // What reads differently by leave is a fact, and no difference.
+            // An accepted deviation is reported as a value, not as a difference.
             all.push(match differs {
                 false => Setting {
                     name: name.to_owned(),

@@ -1,4 +1,4 @@
-//! Whose time base a camera follows.
+//! Sync modes: the time base that a camera follows.
 
 use skinrig_device::SyncMode;
 
@@ -49,7 +49,7 @@ pub fn write(registers: &mut Registers<'_>, mode: SyncMode) -> Result<(), Evk1Er
     registers.set(USE_EXT_START, external)
 }
 
-/// The name of the mode that is set.
+/// The name of the current mode.
 ///
 /// # Errors
 /// [`Evk1Error::Usb`].

@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn jumps_are_told_from_progress_and_wraps() {
+    fn jumps_differ_from_progress_and_wraps() {
         let mut watch = Watch::default();
         let mut jumps = Vec::new();
         let mut stream = vec![high(RANGE - 1), high(RANGE - 1), high(0), high(1)];

@@ -247,12 +247,15 @@ mod tests {
             for name in model.biases() {
                 let mut settings = StreamSettings::default();
                 settings.biases.insert((*name).to_owned(), 7);
-                let (before, said) = match model {
-                    Model::Evk4 => (evk4(&defaults).biases, evk4(&settings).biases).said(),
-                    _ => (evk3_hd(&defaults).biases, evk3_hd(&settings).biases).said(),
+                let (before, report) = match model {
+                    Model::Evk4 => (evk4(&defaults).biases, evk4(&settings).biases).report(),
+                    _ => (evk3_hd(&defaults).biases, evk3_hd(&settings).biases).report(),
                 };
-                assert_ne!(before, said, "{name}");
-                assert!(said.contains(&format!(" {name}: 7")), "{name} in {said}");
+                assert_ne!(before, report, "{name}");
+                assert!(
+                    report.contains(&format!(" {name}: 7")),
+                    "{name} in {report}"
+                );
             }
         }
         assert!(!evk4(&defaults).enable_external_trigger);
@@ -267,17 +270,17 @@ mod tests {
     }
 
     trait Said {
-        fn said(&self) -> (String, String);
+        fn report(&self) -> (String, String);
     }
 
     impl<T: std::fmt::Debug> Said for (T, T) {
-        fn said(&self) -> (String, String) {
+        fn report(&self) -> (String, String) {
             (format!("{:?}", self.0), format!("{:?}", self.1))
         }
     }
 
     #[test]
-    fn a_machine_without_these_cameras_says_so() {
+    fn a_machine_without_these_cameras_is_reported() {
         for model in Model::ALL {
             assert_eq!(stated(model), sensor(model), "{}", model.word());
             let mut link = Neuromorphic::new(model, "FFFFFFFF");

@@ -1,4 +1,4 @@
-//! The adapter over a scripted link: nothing here knows a camera.
+//! The adapter over a scripted link, without a camera.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -25,7 +25,7 @@ impl Clock for JumpingClock {
     }
 }
 
-/// A camera that sends a packet every millisecond: a time, a row, an event and a trigger edge. Its time goes on.
+/// A camera that sends a packet every millisecond: a time, a row, an event and a trigger edge. Its clock keeps running over stops.
 #[derive(Clone, Default)]
 struct Script {
     clock: JumpingClock,
@@ -159,7 +159,7 @@ fn the_adapter_keeps_the_contract() {
 }
 
 #[test]
-fn what_a_model_lacks_is_refused_in_its_own_words() {
+fn unsupported_settings_are_rejected_by_name() {
     let refused = |model: Model, spoil: &dyn Fn(&mut CameraSettings)| {
         let mut all = settings(model);
         spoil(&mut all);
@@ -180,7 +180,7 @@ fn what_a_model_lacks_is_refused_in_its_own_words() {
 }
 
 #[test]
-fn chunks_hold_the_facts_of_their_words() {
+fn chunks_have_the_facts_of_their_words() {
     let script = Script::default();
     let mut camera = started(&script);
     script.clock.clone().wait_until(HostTime(10 * MS));
@@ -207,7 +207,7 @@ fn chunks_hold_the_facts_of_their_words() {
 }
 
 #[test]
-fn what_the_link_dropped_is_stated_before_the_chunk_that_follows() {
+fn dropped_packets_are_reported_in_the_next_chunk() {
     let script = Script {
         drops: Some((5, 8)),
         ..Script::default()
@@ -216,15 +216,15 @@ fn what_the_link_dropped_is_stated_before_the_chunk_that_follows() {
     script.clock.clone().wait_until(HostTime(10 * MS));
     let mut chunks = Vec::new();
     camera.stop(&mut chunks).unwrap();
-    let told: Vec<_> = chunks
+    let losses: Vec<_> = chunks
         .iter()
         .map(|c| (c.seq, c.lost_before, c.facts.cd_events))
         .collect();
-    assert_eq!(told, [(0, 0, 5), (1, 3 * PACKET as u64, 2)]);
+    assert_eq!(losses, [(0, 0, 5), (1, 3 * PACKET as u64, 2)]);
 }
 
 #[test]
-fn what_was_dropped_after_the_last_packet_is_stated_at_stop() {
+fn packets_dropped_at_the_end_are_reported_at_stop() {
     let script = Script {
         drops_rest: Some(6),
         ..Script::default()
@@ -233,19 +233,19 @@ fn what_was_dropped_after_the_last_packet_is_stated_at_stop() {
     script.clock.clone().wait_until(HostTime(10 * MS));
     let mut chunks = Vec::new();
     camera.stop(&mut chunks).unwrap();
-    let told: Vec<_> = chunks
+    let losses: Vec<_> = chunks
         .iter()
         .map(|c| (c.seq, c.lost_before, c.facts.cd_events, c.host_time))
         .collect();
     let lost = 4 * PACKET as u64;
     assert_eq!(
-        told,
+        losses,
         [(0, 0, 6, HostTime(6 * MS)), (1, lost, 0, HostTime(10 * MS))]
     );
 }
 
 #[test]
-fn a_link_that_ends_is_told_after_what_it_brought() {
+fn the_end_of_the_link_is_reported_after_its_data() {
     let script = Script {
         ends: Some(4),
         ..Script::default()

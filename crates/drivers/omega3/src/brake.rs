@@ -56,7 +56,7 @@ fn also(direct: Option<&CallError>) -> String {
 /// Brakes the arm: stops the regulation; if that fails, or the status still shows live motors, switches the force off directly; then
 /// waits and retries. Returns the number of attempts.
 ///
-/// The documentation does not say what the library does when asked to stop a regulation that this process did not start, so a success
+/// The documentation does not specify what the library does when asked to stop a regulation that this process did not start, so a success
 /// counts only if the status confirms it.
 ///
 /// # Errors

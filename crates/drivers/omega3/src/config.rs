@@ -12,7 +12,7 @@ pub struct OmegaConfig {
     pub library: Option<PathBuf>,
     /// Serial number of this bench's robot; any other is rejected. `None` accepts the only free robot.
     pub serial: Option<u16>,
-    /// Type numbers to accept besides 33 (omega.3); legacy firmware is said to report 110.
+    /// Type numbers to accept besides 33 (omega.3); legacy firmware reportedly returns 110.
     pub also_accept_types: Vec<i32>,
     /// Mounting of the robot and its effector.
     pub mount: Mount,
@@ -253,7 +253,7 @@ pub enum Initialise {
 }
 
 /// Requirement on redundant encoders (word 13 of the status vector). According to public sources, 0 means that their check failed *or
-/// that there are none*; some devices report -1 for none. No source says that an omega.3 has them.
+/// that there are none*; some devices report -1 for none. No source states that an omega.3 has them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RedundantEncoders {
     /// Accept and record any value; 0 also becomes a remark.
@@ -437,8 +437,8 @@ mod tests {
     #[test]
     fn the_defaults_are_valid_and_invalid_values_are_named() {
         assert_eq!(OmegaConfig::default().check(), Ok(()));
-        type Spoil = fn(&mut OmegaConfig);
-        let spoilt: [(&str, Spoil); 11] = [
+        type Change = fn(&mut OmegaConfig);
+        let spoilt: [(&str, Change); 11] = [
             ("envelope.least_ratio", |c| c.envelope.max_ratio = 0.01),
             ("envelope.min_mm", |c| c.envelope.min_mm[2] = f64::NAN),
             ("envelope.max_force_n", |c| c.envelope.max_force_n = 13.0),

@@ -55,7 +55,7 @@ impl From<CallError> for Availability {
 }
 
 impl Found {
-    /// What to do before it can be used; `None` if it is free.
+    /// Next step before it can be used; `None` if it is free.
     #[must_use]
     pub fn next_step(&self) -> Option<String> {
         Some(match &self.availability {

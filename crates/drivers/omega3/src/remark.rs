@@ -13,7 +13,7 @@ pub enum Remark {
     MemoryNotChecked,
     /// The motors were live when the robot was opened; the driver braked it.
     MotorsWereLive,
-    /// Reason for which the motors last went off.
+    /// Reason of the last power-off of the motors.
     MotorsWentOff(ForceOffCause),
     /// Status word 13 is 0: no redundant encoders, or their check failed.
     NoRedundantEncoders,

@@ -22,7 +22,7 @@ pub struct Handshake {
     pub boot: u16,
 }
 
-/// Why there is no usable box on a line.
+/// Reason why there is no usable box on a line.
 #[derive(Debug, thiserror::Error)]
 pub enum HandshakeError {
     /// The line failed, or there was no reply.

@@ -18,7 +18,7 @@ pub(crate) struct Shared {
     lost_reports: u64,
     /// Faults that were not yet reported; each is reported once.
     faults: Vec<DeviceError>,
-    /// Why the line is down; `None` if it is up.
+    /// Reason why the line is down; `None` if it is up.
     pub down: Option<String>,
     pub contradictions: u64,
     /// Number of resets of the box.

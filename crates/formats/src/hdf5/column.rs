@@ -25,8 +25,8 @@ macro_rules! buffers {
                 }
             }
 
-            /// Reads `rows` values from `start` on and stores them in `out`; what does not fit becomes
-            /// `u16::MAX`, which no valid value has. Gives the first row with a value that is no whole number.
+            /// Reads `rows` values from `start` on and stores them in `out`. Values that do not fit become
+            /// `u16::MAX`, which is never valid. Returns the first row whose value is not a whole number.
             fn read(
                 &mut self,
                 dataset: &H5Dataset,
@@ -40,7 +40,7 @@ macro_rules! buffers {
                         let mut beyond = 0;
                         for (out, value) in out.iter_mut().zip(&*values) {
                             *out = *value as u16;
-                            // 0 for every value that a u16 holds; the sign extends.
+                            // 0 for every value that fits u16; the sign extends.
                             beyond |= *value as u64 >> 16;
                         }
                         if beyond != 0 {
@@ -54,12 +54,12 @@ macro_rules! buffers {
                     Self::F32(values) => {
                         values.resize(out.len(), 0.0);
                         dataset.read_slice_into(values, &[start], &[out.len()])?;
-                        return Ok(whole(values.iter().map(|v| f64::from(*v)), out));
+                        return Ok(store_whole(values.iter().map(|v| f64::from(*v)), out));
                     }
                     Self::F64(values) => {
                         values.resize(out.len(), 0.0);
                         dataset.read_slice_into(values, &[start], &[out.len()])?;
-                        return Ok(whole(values.iter().copied(), out));
+                        return Ok(store_whole(values.iter().copied(), out));
                     }
                 }
                 Ok(None)
@@ -77,20 +77,20 @@ macro_rules! buffers {
     };
 }
 
-/// Stores floating-point values as whole numbers; gives the first row that is none.
-fn whole(values: impl Iterator<Item = f64>, out: &mut [u16]) -> Option<usize> {
+/// Stores floating-point values as whole numbers; returns the first row whose value is not one.
+fn store_whole(values: impl Iterator<Item = f64>, out: &mut [u16]) -> Option<usize> {
     let mut broken = None;
     for (row, (value, out)) in values.zip(out).enumerate() {
         if value.is_nan() || value.fract() != 0.0 {
             broken = broken.or(Some(row));
         }
-        // Saturates; negative numbers are no pixels either.
+        // Saturates; negative numbers are invalid pixels too.
         *out = if value < 0.0 { u16::MAX } else { value as u16 };
     }
     broken
 }
 
-/// A datatype in words, for messages.
+/// Description of a datatype, for messages.
 pub(super) fn type_name(datatype: &DatatypeMessage) -> String {
     match datatype {
         DatatypeMessage::FixedPoint { size, signed, .. } => {
@@ -106,7 +106,7 @@ pub(super) fn type_name(datatype: &DatatypeMessage) -> String {
         DatatypeMessage::Compound { .. } => "compound values".to_owned(),
         DatatypeMessage::Enum { base, .. } => format!("an enumeration of {}", type_name(base)),
         DatatypeMessage::Opaque { size, .. } => format!("opaque values of {size} bytes"),
-        _ => "values that are no numbers".to_owned(),
+        _ => "values that are not numbers".to_owned(),
     }
 }
 

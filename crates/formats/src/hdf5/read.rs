@@ -1,4 +1,4 @@
-//! Reading the events of one dvs dictionary, batch by batch.
+//! Reads the events of one dvs dictionary, batch by batch.
 
 use std::path::PathBuf;
 
@@ -11,25 +11,25 @@ use super::tree::{Container, DvsEntry, open_followed};
 use crate::error::FormatsError;
 use crate::stream::Geometry;
 
-/// Largest share of events outside the sensor that still looks like this sensor's recording. Cameras and converters
-/// let a few events in 10^7 slip one pixel beyond the edge; another sensor's recording has tens of percent there.
+/// Largest share of events outside the sensor in a recording of this sensor. Cameras and converters
+/// put a few events in 10^7 one pixel beyond the edge; in another sensor's recording, tens of percent are outside.
 const MAX_OUTSIDE_SHARE: f64 = 0.01;
-/// The largest time that is accepted: ten years, s. Larger values are not seconds.
+/// Largest accepted time: ten years, s. Larger values are not seconds.
 const MAX_TS_S: f64 = 315_360_000.0;
 
-/// Rows that are read from the file at once: reading costs some time per call, in a chunked file more the more
-/// chunks it has.
+/// Rows per read from the file: each call costs time, in a chunked file more with more
+/// chunks.
 const SLAB_ROWS: usize = 4 * BATCH_ROWS;
-/// Rows that are delivered at once: such a batch, 16 kB, stays in the first-level cache.
+/// Rows per delivered batch: 16 kB, which stay in the first-level cache.
 const DELIVERED_ROWS: usize = 1024;
 /// `2^52`: the sum of this and a number from 0 to `2^52` has the number, rounded, in its lower 52 bits.
 const ROUNDING: f64 = 4_503_599_627_370_496.0;
 
 impl Container {
-    /// Reads the events of the dictionary called `choice`, or of the only one.
+    /// Reads the events of the dictionary `choice`, or of the only one.
     ///
     /// # Errors
-    /// As [`Self::choose`], and when a dataset has a type that events cannot have.
+    /// As [`Self::choose`], and for a dataset whose type cannot represent events.
     pub fn events(
         &self,
         choice: Option<&str>,
@@ -101,13 +101,13 @@ impl EventReader {
 
     /// The next events, in time order; an empty slice at the end. Times are rounded to the nearest µs, and to an
     /// even one from the middle between two. Events outside the sensor are delivered as they are and counted by
-    /// [`Self::outside`]; a coordinate that 16 bits cannot hold becomes `u16::MAX`.
+    /// [`Self::outside`]; a coordinate that does not fit 16 bits becomes `u16::MAX`.
     ///
     /// # Errors
     /// [`FormatsError::Row`] for a time that is NaN, infinite, negative or before its predecessor, and for a polarity
     /// that is not 0 or 1; for a pixel outside the sensor once more than 1 % of the rows read have one.
-    /// [`FormatsError::Dataset`] for rows that the file does not have, as when it is truncated. No event of the rows
-    /// that were read together is delivered.
+    /// [`FormatsError::Dataset`] for missing rows, for example in a truncated file. No event of the rows
+    /// of that read is delivered.
     pub fn next_batch(&mut self) -> Result<&[CdEvent], FormatsError> {
         self.events.clear();
         if self.next_row == self.slab_end {
@@ -159,14 +159,14 @@ impl EventReader {
         self.outside
     }
 
-    /// Rows in all.
+    /// Total number of rows.
     #[must_use]
     pub fn rows(&self) -> u64 {
         self.rows as u64
     }
 
-    /// Checks the rows from `start` on. All values are looked at without branches; only bad rows are searched for
-    /// the first of them.
+    /// Checks the rows from `start` on. All values are checked without branches; only if one is bad, the first bad
+    /// row is searched.
     fn check(&mut self, start: usize) -> Result<(), FormatsError> {
         let Geometry { width, height } = self.geometry;
         let ts = &self.ts_s;

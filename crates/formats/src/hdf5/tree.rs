@@ -1,4 +1,4 @@
-//! Finding dvs dictionaries in an HDF5 tree.
+//! Finds dvs dictionaries in an HDF5 tree.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,12 +7,12 @@ use rust_hdf5::{DatatypeMessage, H5Dataset, H5File};
 
 use crate::error::FormatsError;
 
-/// The fields that make a dvs dictionary.
+/// The fields of a dvs dictionary.
 pub(super) const FIELDS: [&str; 4] = ["ts", "x", "y", "pol"];
 
-/// How many times smaller than its content deflate can make it (zlib's technical details: 1032).
+/// Largest compression ratio of deflate (zlib's technical details: 1032).
 const MOST_INFLATED: u64 = 1032;
-/// Chunks of so many bytes are read from a file of any size: 16 MiB, sixteen times the largest that h5py chooses.
+/// Chunks of up to this size are read from a file of any size: 16 MiB, sixteen times the largest that h5py chooses.
 const ALWAYS_HELD: u64 = 16 << 20;
 
 /// An open HDF5 file with at least one dvs dictionary.
@@ -26,11 +26,11 @@ pub struct Container {
 /// One dvs dictionary: the events of one sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DvsEntry {
-    /// The keys that lead to it, such as `data/left/dvs`; empty when the file holds just one dictionary.
+    /// Its key path, such as `data/left/dvs`; empty if the file contains only one dictionary.
     pub name: String,
     /// Rows of `ts`.
     pub events: u64,
-    /// Seconds that had been added to the camera's time; `None` when the file does not say.
+    /// Seconds added to the camera's time; `None` if the file does not contain them.
     pub ts_offset_s: Option<f64>,
     /// Paths of ts, x, y and pol in the file, in this order.
     pub(super) fields: [String; 4],
@@ -40,8 +40,8 @@ impl Container {
     /// Opens `path` and finds its dvs dictionaries, without reading events.
     ///
     /// # Errors
-    /// When the file is not readable HDF5, or holds no dvs dictionary: then the message says what it is
-    /// instead, or which dataset is missing.
+    /// If the file is not readable HDF5, or contains no dvs dictionary: the message then describes its content
+    /// or names the missing dataset.
     pub fn open(path: &Path) -> Result<Self, FormatsError> {
         crate::regular::open(path).map_err(FormatsError::io(path))?;
         let file = H5File::open(path).map_err(FormatsError::hdf5(path))?;
@@ -122,10 +122,10 @@ impl Container {
         &self.writer
     }
 
-    /// The dictionary called `choice`, or the only one when `choice` is `None`.
+    /// The dictionary `choice`, or the only one if `choice` is `None`.
     ///
     /// # Errors
-    /// When the name does not exist, or a choice is needed: the message lists the names.
+    /// If the name does not exist, or a choice is needed: the message lists the names.
     pub fn choose(&self, choice: Option<&str>) -> Result<&DvsEntry, FormatsError> {
         let list = || {
             let names: Vec<_> = self
@@ -146,7 +146,7 @@ impl Container {
                 let found = entries.iter().find(|e| e.name == name);
                 found.ok_or_else(|| FormatsError::Container {
                     path: self.path.clone(),
-                    expected: format!("a dictionary of events called `{name}`"),
+                    expected: format!("a dictionary of events named `{name}`"),
                     found: list(),
                 })
             }
@@ -154,7 +154,7 @@ impl Container {
     }
 }
 
-/// Opens a dataset; one that is a reference to a shared object leads to that object.
+/// Opens a dataset, or the shared object that it refers to.
 pub(super) fn open_followed(
     file: &H5File,
     path: &Path,
@@ -188,7 +188,7 @@ pub(super) fn open_followed(
     }
 }
 
-/// The dataset, when its chunks are no larger than this file can fill: a reader allocates a whole chunk before reading it.
+/// The dataset, if its chunks are no larger than this file can fill: a reader allocates a whole chunk before reading it.
 fn holdable(opened: H5Dataset, path: &Path, dataset: &str) -> Result<H5Dataset, FormatsError> {
     let file_bytes = std::fs::metadata(path)
         .map_err(FormatsError::io(path))?
@@ -244,7 +244,7 @@ fn unquoted(link: &str) -> Option<&str> {
         .find_map(|q| link.strip_prefix(*q)?.strip_suffix(*q))
 }
 
-/// Parent path and field name of a dataset, whatever hickle version laid it out.
+/// Parent path and field name of a dataset in any hickle version.
 fn split(name: &str) -> (String, String) {
     let mut links: Vec<&str> = name.split('/').filter(|l| !l.is_empty()).collect();
     if links.len() > 1 && matches!(links.last(), Some(&"data" | &"data_0")) {

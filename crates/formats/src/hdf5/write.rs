@@ -1,4 +1,4 @@
-//! Writing events as a bimvee container, in the layout of hickle 5.
+//! Writes events as a bimvee container, in the layout of hickle 5.
 
 use std::path::{Path, PathBuf};
 
@@ -9,15 +9,15 @@ use skinrig_model::{CdEvent, Polarity};
 use super::BATCH_ROWS;
 use crate::error::FormatsError;
 
-/// The hickle version whose layout is written.
+/// The hickle version whose layout is used.
 const HICKLE_VERSION: &str = "5.0.3";
 /// Rows per chunk of a column.
 const CHUNK_ROWS: usize = BATCH_ROWS;
 const TYPES: &str = "hickle_types_table";
 
 /// Writes the events of one sensor as a flat dvs dictionary: `ts` (f64 seconds), `x` and `y` (u16), `pol`
-/// (h5py's boolean) and `tsOffset` (f64 seconds). Columns grow in chunks, so that neither the number of events
-/// nor the memory has to be known.
+/// (h5py's boolean) and `tsOffset` (f64 seconds). Columns grow in chunks, so that the number of events need not be known
+/// and memory stays bounded.
 pub struct EventWriter {
     path: PathBuf,
     file: H5File,
@@ -39,11 +39,11 @@ struct Columns {
 }
 
 impl EventWriter {
-    /// Creates `path`. Times are written relative to `origin_us`, and `tsOffset` says so: bimvee's
+    /// Creates `path`. Times are written relative to `origin_us`, and `tsOffset` states that: bimvee's
     /// `camera time = ts - tsOffset` holds for camera times in µs.
     ///
     /// # Errors
-    /// When the file exists or cannot be made.
+    /// If the file exists or cannot be created.
     pub fn create(path: &Path, origin_us: u64) -> Result<Self, FormatsError> {
         std::fs::File::create_new(path).map_err(FormatsError::io(path))?;
         let hdf5 = |e| FormatsError::hdf5(path)(e);
@@ -67,7 +67,7 @@ impl EventWriter {
     ///
     /// # Errors
     /// [`FormatsError::OutOfOrder`] for an event before its predecessor or before the origin; none of the
-    /// events is written then. [`FormatsError::Hdf5`] when the file cannot be written.
+    /// events is written then. [`FormatsError::Hdf5`] if the file cannot be written.
     pub fn append(&mut self, events: &[CdEvent]) -> Result<(), FormatsError> {
         let mut written_us = self.last_us;
         for event in events {
@@ -106,7 +106,7 @@ impl EventWriter {
     /// Completes the file and returns the number of events in it. Without this call the file is not readable.
     ///
     /// # Errors
-    /// [`FormatsError::Hdf5`] when the file cannot be written.
+    /// [`FormatsError::Hdf5`] if the file cannot be written.
     pub fn finish(self) -> Result<u64, FormatsError> {
         drop(self.columns);
         self.file.close().map_err(FormatsError::hdf5(&self.path))?;
@@ -114,7 +114,7 @@ impl EventWriter {
     }
 }
 
-/// Makes the tree: types table, group, and the empty columns.
+/// Creates the tree: types table, group, and the empty columns.
 fn layout(file: &H5File, ts_offset_s: f64) -> Result<Columns, rust_hdf5::Hdf5Error> {
     file.set_attr_string("HICKLE_VERSION", HICKLE_VERSION)?;
     file.set_attr_string("HICKLE_PYTHON_VERSION", "3")?;
@@ -179,7 +179,7 @@ fn layout(file: &H5File, ts_offset_s: f64) -> Result<Columns, rust_hdf5::Hdf5Err
     Ok(columns)
 }
 
-/// The attributes by which hickle turns a dataset back into a dictionary's value.
+/// The attributes by which hickle converts a dataset back into a dictionary's value.
 fn describe(
     dataset: &H5Dataset,
     index: i64,

@@ -22,17 +22,17 @@ pub struct RawHeader {
     pub entries: Vec<(String, String)>,
     /// True when the header ends with `% end`.
     pub has_end: bool,
-    /// Bytes of the header: where the words begin.
+    /// Length of the header in bytes: the offset of the first word.
     pub length: u64,
-    /// How the words encode events.
+    /// Word format.
     pub format: StreamFormat,
-    /// The sensor's size: as stated, or known from the camera's system ID; `None` when neither is there.
+    /// The sensor's size: as stated, or known from the camera's system ID; `None` without either.
     pub geometry: Option<Geometry>,
 }
 
 /// State while reading a header.
 #[derive(Default)]
-struct Meaning {
+struct ParsedKeys {
     format: Option<String>,
     evt: Option<String>,
     legacy_order: Option<bool>,
@@ -43,14 +43,14 @@ struct Meaning {
 }
 
 impl RawHeader {
-    /// Parses the header at the beginning of `bytes`, which must hold all of it, or the whole file.
+    /// Parses the header at the beginning of `bytes`, which must contain all of it, or the whole file.
     ///
     /// # Errors
-    /// [`FormatsError::Header`] with byte offset and key: no header, text that is not UTF-8, numbers that are
-    /// none, keys that contradict each other, or no statement of the format.
+    /// [`FormatsError::Header`] with byte offset and key: no header, text that is not UTF-8, invalid
+    /// numbers, contradictory keys, or a missing format.
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self, FormatsError> {
         let mut entries = Vec::new();
-        let mut meaning = Meaning::default();
+        let mut keys = ParsedKeys::default();
         let (mut at, mut has_end) = (0, false);
         while !has_end && bytes[at..].starts_with(b"% ") {
             let error = |key: &str, problem| FormatsError::Header {
@@ -78,7 +78,7 @@ impl RawHeader {
                 if entries.len() == MAX_LINES {
                     return Err(error(key, HeaderProblem::ManyLines));
                 }
-                meaning.take(key, &value).map_err(|mismatch| {
+                keys.take(key, &value).map_err(|mismatch| {
                     let found = value.clone();
                     error(key, HeaderProblem::Value { mismatch, found })
                 })?;
@@ -96,11 +96,11 @@ impl RawHeader {
             let start = String::from_utf8_lossy(&bytes[..bytes.len().min(8)]).into_owned();
             return Err(error("", HeaderProblem::Missing { start }));
         }
-        let format = meaning
+        let format = keys
             .stream_format()
             .map_err(|why| error("format", HeaderProblem::Format(why)))?;
         Ok(Self {
-            geometry: meaning.geometry(),
+            geometry: keys.geometry(),
             entries,
             has_end,
             length: at as u64,
@@ -108,7 +108,7 @@ impl RawHeader {
         })
     }
 
-    /// The value of `key`, the last one when it occurs twice.
+    /// The value of `key`, the last one if it occurs twice.
     #[must_use]
     pub fn get(&self, key: &str) -> Option<&str> {
         let found = self.entries.iter().rev().find(|(k, _)| k == key);
@@ -122,8 +122,8 @@ impl RawHeader {
     }
 }
 
-impl Meaning {
-    /// Takes one entry; the error says what was expected.
+impl ParsedKeys {
+    /// Processes one entry; the error states the expected value.
     fn take(&mut self, key: &str, value: &str) -> Result<(), ValueMismatch> {
         match key {
             "format" => {
@@ -229,7 +229,7 @@ impl Meaning {
     }
 }
 
-/// Takes a stated size, which must not contradict an earlier one.
+/// Stores a stated size, which must not contradict an earlier one.
 fn set_size(size: &mut Option<u16>, text: &str, side: &'static str) -> Result<(), ValueMismatch> {
     let value = text
         .trim()

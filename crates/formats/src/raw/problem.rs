@@ -1,8 +1,8 @@
-//! Owns what can be wrong with the text header of a RAW file.
+//! Errors in the text header of a RAW file.
 
 use super::header::{MAX_LINE, MAX_LINES};
 
-/// What is wrong with a line of a RAW header, or with all of it.
+/// Error in a line of a RAW header, or in all of it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum HeaderProblem {
@@ -12,10 +12,10 @@ pub enum HeaderProblem {
         /// The first characters of the file.
         start: String,
     },
-    /// The line does not end in time.
+    /// The line is too long.
     #[error("expected a line of at most {MAX_LINE} bytes, found no end of line")]
     LongLine,
-    /// The line has bytes that are no text.
+    /// The line is not UTF-8.
     #[error("expected text in UTF-8, found {found:?}")]
     NotUtf8 {
         /// The beginning of the line.
@@ -36,12 +36,12 @@ pub enum HeaderProblem {
         /// The value.
         found: String,
     },
-    /// The header does not say how the words encode events.
+    /// The header does not state the word format.
     #[error("expected one of EVT2, EVT21, EVT3 in `format` or `evt`, found {0}")]
     Format(#[source] FormatProblem),
 }
 
-/// What a header value should be, but is not.
+/// Expected form of an invalid header value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ValueMismatch {
     /// The options of `format` are not pairs.
@@ -75,7 +75,7 @@ pub enum ValueMismatch {
     },
 }
 
-/// Why a header does not give the format of the words.
+/// Reason why a header does not give the word format.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum FormatProblem {
     /// The `format` is unknown.
@@ -98,7 +98,7 @@ pub enum FormatProblem {
         /// Value of `evt`.
         evt: String,
     },
-    /// Nothing states or implies the format.
+    /// No key states or implies the format.
     #[error("neither key, and no system_ID that implies it")]
     Unstated,
 }

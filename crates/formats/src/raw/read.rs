@@ -1,4 +1,4 @@
-//! Reading a RAW file piece by piece.
+//! Reads a RAW file piece by piece.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};

@@ -1,4 +1,4 @@
-//! Writing a RAW file: a header that old and new vendor tools read, then the camera's bytes unmodified.
+//! Writes a RAW file: a header for old and new vendor tools, then the camera's bytes unmodified.
 
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
@@ -12,7 +12,7 @@ use crate::stream::Geometry;
 /// Values of a header.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RawMetadata {
-    /// How the words encode events.
+    /// Word format.
     pub format: StreamFormat,
     /// The sensor's size.
     pub geometry: Geometry,
@@ -24,7 +24,7 @@ pub struct RawMetadata {
     pub system_id: u32,
     /// Generation of the sensor, `3.1`.
     pub sensor_generation: String,
-    /// Further keys, such as `firmware_version`.
+    /// Additional keys, such as `firmware_version`.
     pub more: Vec<(String, String)>,
 }
 
@@ -47,7 +47,7 @@ impl RawMetadata {
     ///
     /// # Errors
     /// [`FormatsError::HeaderValue`] for a key or value that would not read back: empty, with a line break or
-    /// runs of spaces, or a key that this header already has.
+    /// multiple spaces, or a key that this header already has.
     pub fn header(&self) -> Result<String, FormatsError> {
         let Geometry { width, height } = self.geometry;
         let (name, version, order) = match self.format {

@@ -1,4 +1,4 @@
-//! From the wrapping time base of a stream to a continuous camera time.
+//! Converts the wrapping time base of a stream to a continuous camera time.
 
 use super::stats::Discontinuity;
 
@@ -7,13 +7,13 @@ use super::stats::Discontinuity;
 pub(super) enum Step {
     /// Progress, or the first word.
     Forward,
-    /// The counter passed its end.
+    /// A wrap of the counter.
     Wrap,
-    /// Neither.
+    /// A discontinuity.
     Jump(Discontinuity),
 }
 
-/// A counter of `BITS` bits whose unit is `2^SHIFT` µs, continued past its end.
+/// A counter of `BITS` bits whose unit is `2^SHIFT` µs, unwrapped.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct TimeBase<const BITS: u32, const SHIFT: u32> {
     high: u32,
@@ -28,7 +28,7 @@ impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
     pub(crate) const HALF: u32 = 1 << (BITS - 1);
     const RANGE_US: u64 = 1 << (BITS + SHIFT);
 
-    /// A counter of which nothing was seen yet; its times count from `origin_us`.
+    /// A counter before the first word; its times count from `origin_us`.
     pub(crate) const fn starting_at(origin_us: u64) -> Self {
         Self {
             high: 0,
@@ -38,7 +38,7 @@ impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
         }
     }
 
-    /// True once a time base word was seen, and none can have been lost since.
+    /// True if a time base word has been received since the start or the last loss.
     pub(super) const fn known(&self) -> bool {
         self.known && !self.stale
     }
@@ -53,7 +53,7 @@ impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
         self.epoch_us + ((self.high as u64) << SHIFT)
     }
 
-    /// µs of the origin and of all passed ranges.
+    /// Origin plus all completed ranges, µs.
     pub(crate) const fn epoch_us(&self) -> u64 {
         self.epoch_us
     }
@@ -63,7 +63,7 @@ impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
         self.high
     }
 
-    /// Moves on to `high`, which the caller knows to be ordinary progress.
+    /// Advances to `high`; the caller has checked that it is ordinary progress.
     pub(super) const fn advance(&mut self, high: u32) {
         self.high = high;
     }
@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn steps_are_told_apart() {
+    fn steps_are_distinguished() {
         let mut base = TimeBase::<12, 12>::default();
         assert_eq!(base.set(4000), Step::Forward);
         assert_eq!(base.set(4000), Step::Forward);

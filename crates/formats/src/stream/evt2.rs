@@ -18,21 +18,21 @@ pub(crate) const TIME_HIGH_BITS: u32 = 28;
 /// Range of the stream's time, µs.
 pub const RANGE_US: u64 = 1 << 34;
 
-/// Words that are looked at together, as bytes.
+/// Bytes of a group of words.
 type Group = [[u8; 4]; GROUP];
 const GROUP: usize = 16;
-/// Words that are looked at in one step. Groups are surveyed lane by lane, which compiles to vector instructions.
+/// Words per group. Groups are checked lane by lane, which compiles to vector instructions.
 const LANES: usize = 4;
 /// Set in a time base word and in no CD word.
 const TIME_HIGH_FLAG: u32 = 1 << 31;
-/// Steps of the time base below this, in its unit, are progress beyond doubt.
+/// Steps of the time base below this, in its unit, are certainly progress.
 const SURE_STEP: u32 = TimeBase::<TIME_HIGH_BITS, 6>::HALF;
 
-/// A run of plain words on its way through the fast loop: CD events on the sensor and ordinary progress of the
-/// time base, which is nearly everything that a camera sends.
+/// A run of plain words in the fast loop: CD events on the sensor and ordinary progress of the
+/// time base, which are nearly all words of a camera.
 ///
-/// A group of words is checked and counted without a branch that depends on a single word: events and time
-/// base words alternate at random in a quiet stream, and a wrong guess of the processor costs more than a word.
+/// A group of words is checked and counted without a branch per word: events and time
+/// base words alternate at random in a quiet stream, and a branch misprediction costs more than a word.
 struct Run {
     width: u32,
     height: u32,
@@ -58,7 +58,7 @@ impl Run {
         }
     }
 
-    /// Bits that no plain word has: not 0 for a word of another type, or of a pixel outside the sensor.
+    /// Bits that no plain word has: nonzero for a word of another type, or of a pixel outside the sensor.
     #[inline]
     fn foreign_bits(&self, w: u32) -> u32 {
         // The highest bit is set when x < width and y < height.
@@ -67,7 +67,7 @@ impl Run {
         (!(inside | w) & 0x8000_0000) | (w & 0x6000_0000) | (w & w >> 3 & 0x1000_0000)
     }
 
-    /// Takes a group if it is plain; its events go to `out`.
+    /// Processes a group if it is plain; its events go to `out`.
     #[inline]
     fn group<const KEEP: bool>(&mut self, group: &Group, out: &mut [CdEvent; GROUP]) -> bool {
         let (mut foreign, mut any, mut all) = ([0; LANES], [0; LANES], [u32::MAX; LANES]);
@@ -105,7 +105,7 @@ impl Run {
         self.count_on(group);
     }
 
-    /// Takes a group of time base words if they are in order.
+    /// Processes a group of time base words if they are in order.
     #[inline]
     fn time_only(&mut self, group: &Group) -> bool {
         let high = |k: usize| u32::from_le_bytes(group[k]) ^ TIME_HIGH_FLAG;
@@ -123,7 +123,7 @@ impl Run {
         in_order
     }
 
-    /// Takes a group of both kinds if its time base words are in order.
+    /// Processes a group of both kinds if its time base words are in order.
     #[inline]
     fn mixed<const KEEP: bool>(&mut self, group: &Group, out: &mut [CdEvent; GROUP]) -> bool {
         let (mut high, mut steps, mut events) = (self.high, 0, 0);
@@ -137,8 +137,8 @@ impl Run {
             };
             steps |= high.wrapping_sub(previous);
             if KEEP {
-                // A time base word is written too, and overwritten by the next event. The remainder changes
-                // nothing, as there are at most GROUP - 1 events before the last word.
+                // A time base word is written too, and overwritten by the next event. The rest is
+                // harmless, as there are at most GROUP - 1 events before the last word.
                 let base_us = self.epoch_us + (u64::from(high) << 6);
                 out[events % GROUP] = Self::event(w, base_us);
             }
@@ -164,7 +164,7 @@ impl Run {
         self.on += u64::from(on.iter().sum::<u32>());
     }
 
-    /// Takes one word if it is plain.
+    /// Processes one word if it is plain.
     fn word<const KEEP: bool>(&mut self, w: u32, buffer: &mut [CdEvent; BLOCK]) -> bool {
         if self.foreign_bits(w) != 0 {
             return false;
@@ -190,12 +190,12 @@ impl Run {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Words {
     base: TimeBase<TIME_HIGH_BITS, 6>,
-    /// Time and subtype of an OTHER word whose first CONTINUED word is still to come.
+    /// Time and subtype of an OTHER word whose first CONTINUED word has not arrived.
     other: Option<(u64, u16)>,
 }
 
 impl Words {
-    /// As at the start of a stream whose times count from `origin_us`.
+    /// State at the start of a stream whose times count from `origin_us`.
     pub(super) fn restart(&mut self, origin_us: u64) {
         *self = Self {
             base: TimeBase::starting_at(origin_us),
@@ -225,7 +225,7 @@ impl Words {
                     continue;
                 }
             }
-            // The input is at its end, or the next word is not plain.
+            // The end of the input, or the next word is not plain.
             let Some((word, rest)) = bytes.split_first_chunk() else {
                 return;
             };
@@ -264,7 +264,7 @@ impl Words {
             words += GROUP;
         }
         if !full {
-            // What precedes a word that is not plain fits; the last words of the input, fewer than a group, may not.
+            // The words before one that is not plain fit; the last words of the input, fewer than a group, may not.
             for word in &all[words..] {
                 if KEEP && run.events == BLOCK {
                     full = true;

@@ -27,7 +27,7 @@ impl Words {
         }
     }
 
-    /// As at the start of a stream whose times count from `origin_us`.
+    /// State at the start of a stream whose times count from `origin_us`.
     pub(super) fn restart(&mut self, origin_us: u64) {
         self.base = TimeBase::starting_at(origin_us);
     }

@@ -1,32 +1,32 @@
-//! The EVT2 encoder: events in, the bytes that a camera would send out.
+//! The EVT2 encoder: converts events to the bytes that a camera would send.
 
 use skinrig_model::{CdEvent, Polarity, TriggerEdge};
 
 use crate::error::FormatsError;
 
-/// How often a camera repeats its time base, µs, also when nothing happens. Recordings and the published
+/// Interval at which a camera repeats its time base, µs, even without events. Recordings and the published
 /// examples show 16 µs; the sensor's documentation does not state it.
 pub const TIME_HIGH_CADENCE_US: u64 = 16;
 
-/// Largest column or row that the format's 11 bits hold.
+/// Largest column or row in the format's 11 bits.
 pub const MAX_COORDINATE: u16 = 2047;
 
 /// Writes an EVT2 stream: CD events, trigger edges, and a TIME_HIGH word at every multiple of the cadence.
 ///
-/// Items must come in time order; an item between two TIME_HIGH words is written between them. Times may
-/// pass the 34 bits of the format, the written time base then wraps as a camera's does.
+/// Items must be in time order; an item between two TIME_HIGH words is written between them. Times may
+/// exceed the 34 bits of the format; the written time base then wraps like a camera's.
 #[derive(Debug, Clone)]
 pub struct Encoder {
     cadence_us: u64,
-    /// When the next TIME_HIGH word is due, µs.
+    /// Time of the next TIME_HIGH word, µs.
     next_us: u64,
-    /// No item may lie before this, µs.
+    /// Earliest time of the next item, µs.
     reached_us: u64,
 }
 
 impl Encoder {
-    /// An encoder whose stream begins at `first_time_us`, with the usual cadence. Its first word will be the
-    /// TIME_HIGH word in force at that time.
+    /// An encoder whose stream begins at `first_time_us`, with the usual cadence. Its first word is the
+    /// TIME_HIGH word for that time.
     #[must_use]
     pub const fn new(first_time_us: u64) -> Self {
         Self {
@@ -51,7 +51,7 @@ impl Encoder {
         })
     }
 
-    /// The time that the stream has reached, µs: nothing earlier can be written.
+    /// Time that the stream has reached, µs: items must not be earlier.
     #[must_use]
     pub const fn reached_us(&self) -> u64 {
         self.reached_us
@@ -60,7 +60,7 @@ impl Encoder {
     /// Writes one CD event.
     ///
     /// # Errors
-    /// [`FormatsError::OutOfOrder`] when it lies before what was written, [`FormatsError::OutOfRange`] for a
+    /// [`FormatsError::OutOfOrder`] if it is earlier than the stream, [`FormatsError::OutOfRange`] for a
     /// coordinate above 2047. Nothing is written then.
     #[inline]
     pub fn cd(&mut self, event: CdEvent, out: &mut Vec<u8>) -> Result<(), FormatsError> {
@@ -80,7 +80,7 @@ impl Encoder {
     /// Writes one trigger edge.
     ///
     /// # Errors
-    /// [`FormatsError::OutOfOrder`] when it lies before what was written, [`FormatsError::OutOfRange`] for a
+    /// [`FormatsError::OutOfOrder`] if it is earlier than the stream, [`FormatsError::OutOfRange`] for a
     /// channel above 31. Nothing is written then.
     pub fn trigger(&mut self, edge: TriggerEdge, out: &mut Vec<u8>) -> Result<(), FormatsError> {
         check("trigger channel", 31, edge.channel.into())?;
@@ -91,11 +91,11 @@ impl Encoder {
         Ok(())
     }
 
-    /// Lets time pass: writes the TIME_HIGH words that are due up to and including `t_us`. A later item may
-    /// have this very time.
+    /// Advances the time: writes the TIME_HIGH words up to and including `t_us`. A later item may
+    /// have the same time.
     ///
     /// # Errors
-    /// [`FormatsError::OutOfOrder`] when `t_us` lies before what was written.
+    /// [`FormatsError::OutOfOrder`] if `t_us` is earlier than the stream.
     #[inline]
     pub fn advance_to(&mut self, t_us: u64, out: &mut Vec<u8>) -> Result<(), FormatsError> {
         if t_us < self.reached_us {

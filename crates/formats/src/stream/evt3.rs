@@ -2,12 +2,12 @@
 //!
 //! Layout (EVK1 reference, section 4.3; Prophesee's published EVT 3.0 format): type in bits 15:12. ADDR_Y 0x0
 //! sets the row, ADDR_X 0x2 is one event, VECT_BASE_X 0x3 sets column and polarity of the vectors VECT_12 0x4
-//! and VECT_8 0x5, whose bits are events and which move the column on by 12 and 8. TIME_LOW 0x6 and TIME_HIGH
+//! and VECT_8 0x5, whose bits are events and which advance the column by 12 and 8. TIME_LOW 0x6 and TIME_HIGH
 //! 0x8 hold 12 bits of time each; a changed TIME_HIGH sets the low part to 0. EXT_TRIGGER 0xA carries channel
 //! 11:8 and edge 0. OTHERS 0xE is followed by 12 + 12 + 4 bits of payload. Time wraps every 16.777216 s.
 //!
-//! Every vector word stands for itself. Sensors send vectors in groups 12 + 12 + 8, and the camera vendor's
-//! own library waits for whole groups and ignores a lone vector; taking words one by one gives the same events
+//! Every vector word is decoded on its own. Sensors send vectors in groups 12 + 12 + 8, and the camera vendor's
+//! library waits for whole groups and ignores a lone vector. Decoding single words gives the same events
 //! for whole groups and loses none at the edges of a recording.
 
 use skinrig_model::{CdEvent, Polarity, TriggerEdge};
@@ -26,12 +26,12 @@ pub const RANGE_US: u64 = 1 << 24;
 pub(super) struct Words {
     base: TimeBase<TIME_HIGH_BITS, 12>,
     low: u16,
-    /// Words were lost, and no TIME_LOW came behind a TIME_HIGH since: whether that one had changed is unknown.
+    /// Words were lost, and no TIME_LOW has followed a TIME_HIGH since: whether that one changed is unknown.
     low_is_lost: bool,
     y: Option<u16>,
     /// Column and polarity of the next vector.
     vector: Option<(u16, Polarity)>,
-    /// An OTHERS word whose payload is not complete.
+    /// An OTHERS word with an incomplete payload.
     other: Option<Other>,
 }
 
@@ -44,7 +44,7 @@ struct Other {
 }
 
 impl Words {
-    /// As at the start of a stream whose times count from `origin_us`.
+    /// State at the start of a stream whose times count from `origin_us`.
     pub(super) fn restart(&mut self, origin_us: u64) {
         *self = Self {
             base: TimeBase::starting_at(origin_us),
@@ -180,7 +180,7 @@ impl Words {
         }
     }
 
-    /// Counts events whose time, row or column is not known.
+    /// Counts events whose time, row or column is unknown.
     fn drop_events(&self, events: u32, output: &mut Output) {
         if self.knows_time() {
             output.stats.dropped_before_address += u64::from(events);

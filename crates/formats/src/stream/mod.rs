@@ -1,4 +1,4 @@
-//! Event streams as cameras send them: one decoder and one scanner over all word formats.
+//! Event streams of cameras: one decoder and one scanner for all word formats.
 
 mod clock;
 pub mod evt2;
@@ -33,7 +33,7 @@ pub struct Decoder {
     output: Output,
     partial: [u8; 8],
     partial_len: usize,
-    /// Bytes that are still to come of a word whose beginning is lost.
+    /// Bytes still to arrive of a word whose beginning is lost.
     torn_len: usize,
 }
 
@@ -111,7 +111,7 @@ impl Decoder {
         }
     }
 
-    /// Starts a new stream, as after a restart of the device. No state carries over; times
+    /// Starts a new stream, for example after a restart of the device. No state carries over; times
     /// count from `origin_us`, which the caller chooses after the earlier times. Counts continue.
     pub fn restart(&mut self, origin_us: u64) {
         self.output.stats.trailing_bytes += self.partial_len as u64;
@@ -119,10 +119,10 @@ impl Decoder {
         self.words.restart(origin_us);
     }
 
-    /// Bytes were lost here: `bytes` of them, exactly or but for whole words, so that it is known where the next word begins. The
-    /// word that they tore is let go, and so is what a lost time base word (or EVT3 address) would have changed: events and
+    /// Reports a loss: `bytes` were lost here, exactly or except for whole words, so that the next word boundary is known. The
+    /// incomplete word is discarded, and so is everything that a lost time base word (or EVT3 address) would have changed: events and
     /// edges up to the next one have no time and are counted in [`StreamStats::dropped_before_time`], never stamped with the
-    /// old one. Camera time goes on through a loss of less than half of its range: 2.4 h, EVT3 8 s.
+    /// old one. Camera time continues through a loss of less than half of its range: 2.4 h, EVT3 8 s.
     pub fn lost(&mut self, bytes: u64) {
         if bytes == 0 {
             return;
@@ -140,14 +140,14 @@ impl Decoder {
         self.words.lost();
     }
 
-    /// Decodes `bytes` and hands everything found to `sink`, in stream order; CD events come in slices of at
-    /// most a few thousand, so that they stay in the processor's cache. This is the fast way to use events
+    /// Decodes `bytes` and passes everything to `sink`, in stream order; CD events come in slices of at
+    /// most a few thousand, so that they stay in the processor's cache. This is the fast way to process events
     /// once.
     pub fn push(&mut self, bytes: &[u8], sink: &mut impl EventSink) {
         self.feed::<true>(bytes, sink);
     }
 
-    /// Decodes `bytes` and hands the CD events to `on_slice`, without the triggers.
+    /// Decodes `bytes` and passes the CD events to `on_slice`, without the triggers.
     pub fn for_each_slice(&mut self, bytes: &[u8], on_slice: impl FnMut(&[CdEvent])) {
         self.push(bytes, &mut sink::CdSlices(on_slice));
     }

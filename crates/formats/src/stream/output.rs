@@ -94,7 +94,7 @@ impl Output {
         sink.on_monitoring(monitoring);
     }
 
-    /// Adds one time base word, which set the time `now_us` if that is known.
+    /// Adds one time base word, which set the time to `now_us`, if known.
     pub(super) fn time_high(&mut self, step: Step, now_us: Option<u64>, sink: &mut impl EventSink) {
         self.stats.time_high += 1;
         if let Some(now_us) = now_us {

@@ -1,4 +1,4 @@
-//! Counting what a chunk contains without keeping its events.
+//! Counts the content of a chunk without keeping its events.
 
 use skinrig_model::{CdEvent, ChunkFacts, StreamFormat, TriggerEdge};
 
@@ -6,8 +6,8 @@ use super::Decoder;
 use super::sink::EventSink;
 use super::stats::{Geometry, StreamStats};
 
-/// Scans a stream chunk by chunk and reports the content of each. It is a [`Decoder`] that keeps no
-/// events, and therefore faster; its counts are those of the decoder.
+/// Scans a stream chunk by chunk and reports the content of each. It is a faster [`Decoder`] without
+/// events; its counts equal the decoder's.
 #[derive(Debug, Clone)]
 pub struct Scanner {
     decoder: Decoder,
@@ -42,7 +42,7 @@ impl Scanner {
         self.decoder.lost(bytes);
     }
 
-    /// Starts a new stream, as after a restart of the device: see [`Decoder::restart`].
+    /// Starts a new stream, for example after a restart of the device: see [`Decoder::restart`].
     pub fn restart(&mut self, origin_us: u64) {
         self.decoder.restart(origin_us);
     }

@@ -17,7 +17,7 @@ pub struct Monitoring {
 
 /// Receives the output of a decoder, in stream order.
 pub trait EventSink {
-    /// One or more CD events. Their times need not be sorted: a sensor is not bound to it.
+    /// One or more CD events. Their times need not be sorted, because sensors do not guarantee it.
     fn on_cd(&mut self, events: &[CdEvent]);
     /// An edge on a trigger input.
     fn on_trigger(&mut self, edge: TriggerEdge);
@@ -27,7 +27,7 @@ pub trait EventSink {
     fn on_discontinuity(&mut self, _step: Discontinuity) {}
 }
 
-/// Passes CD events to a closure and drops the rest.
+/// Passes CD events to a closure and discards the rest.
 pub(super) struct CdSlices<F>(pub F);
 
 impl<F: FnMut(&[CdEvent])> EventSink for CdSlices<F> {

@@ -23,7 +23,7 @@ impl Geometry {
         height: 2048,
     };
 
-    /// True when the pixel exists.
+    /// True if the pixel exists.
     #[must_use]
     pub const fn contains(self, x: u16, y: u16) -> bool {
         x < self.width && y < self.height
@@ -56,12 +56,12 @@ pub struct StreamStats {
     pub address: u64,
     /// Monitoring words (OTHER) and the words that continue them.
     pub monitoring: u64,
-    /// Words that were skipped, by their type code: inertial data, codes without a meaning for a single CD
+    /// Skipped words, by their type code: inertial data, codes without a meaning for a single CD
     /// sensor, and continuations without a beginning.
     pub skipped: [u64; 16],
     /// Events and triggers before the first time base word, of the stream and after each loss.
     pub dropped_before_time: u64,
-    /// EVT3 events before the row or the vector base that they refer to was known.
+    /// EVT3 events without a known row or vector base.
     pub dropped_before_address: u64,
     /// Steps of the time base that are neither progress nor a wrap.
     pub discontinuities: u64,
@@ -69,7 +69,7 @@ pub struct StreamStats {
     pub wraps: u64,
     /// CD events outside the sensor; not delivered.
     pub out_of_geometry: u64,
-    /// Bytes that do not make a whole word: at the end, and on both sides of a loss.
+    /// Bytes that do not form a whole word: at the end, and on both sides of a loss.
     pub trailing_bytes: u64,
 }
 

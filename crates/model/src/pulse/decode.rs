@@ -6,49 +6,49 @@ use super::{
 };
 use crate::event::TriggerEdge;
 
-/// Bits of a train that may be unreadable; the 28 others then still contradict any other word in 3 places.
+/// Most unreadable bits of a train; the 28 others then still differ from any other word in 3 places.
 const MOST_ERASED: u32 = 3;
 
-/// What [`decode_marks`] found on one channel.
+/// Trains that [`decode_marks`] decoded on one channel.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct DecodedMarks {
     /// Trains that named a press, in time order.
     pub marks: Vec<SeenMark>,
     /// Periodic trains, in time order.
     pub syncs: Vec<SeenSync>,
-    /// Edges that belong to no train that could be read: spurious ones, doubled ones, and those of damaged trains.
+    /// Edges that belong to no readable train: spurious ones, doubled ones, and those of damaged trains.
     pub stray_edges: u64,
-    /// Edges missing in the trains that were read.
+    /// Edges missing from the decoded trains.
     pub lost_edges: u64,
 }
 
-/// A train as it was seen, whatever it may say.
+/// A received train, before error correction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ReadTrain {
     /// Rising edge of its start pulse on the camera's clock, µs; inferred from the first rising edge that is there.
     pub t_us: u64,
-    /// Data and check bits, the first one sent on top (see [`PulseTrain::bits`]); 0 where unreadable.
+    /// Data and check bits, the first one sent most significant (see [`PulseTrain::bits`]); 0 where unreadable.
     pub bits: u32,
-    /// The bits that are unreadable: their falling edge is lost, or there are two of them.
+    /// Unreadable bits: their falling edge is lost or doubled.
     pub erased: u32,
-    /// Edges that are where the train has them.
+    /// Edges at the positions of the train.
     pub edges_seen: u32,
 }
 
 /// Finds the trains among the edges of one channel.
 ///
-/// Total: any edges give labels or strays. A train is read only when its name is certain, which means all of:
-/// - the start pulse's falling edge, the only one of its width, is there;
-/// - no edge where the pulse before the first one or the pulse after the last one would have one, so that the train is
+/// Total: any edges give labels or strays. A train is decoded only if its label is certain:
+/// - the falling edge of the start pulse, the only one of its width, is present;
+/// - there is no edge at the positions of a pulse before the first one or after the last one, so that the train is
 ///   not read some pulses late or early;
-/// - at most 3 of its 31 bits are unreadable (their falling edge lost, or two of them), and the code has a word that
+/// - at most 3 of its 31 bits are unreadable (falling edge lost or doubled), and the code has a word that
 ///   agrees with all the others;
-/// - no other reading of the same edges passes.
+/// - no other reading of the same edges is valid.
 ///
-/// The error that remains needs at least three bits, each with its own falling edge lost and a spurious one within
-/// the tolerance of the other width, in the places that another word demands. On a line that loses 20 % of its edges and
-/// invents 5 %, 7 % of the trains are read, and no wrong one was seen in 10^7 (see the tests). More can be read by
-/// who knows what was sent: see [`read_trains`].
+/// The remaining error needs at least three bits, each with its own falling edge lost and a spurious one within
+/// the tolerance of the other width, at the positions of another word. On a line that loses 20 % of its edges and
+/// adds 5 %, 7 % of the trains are decoded, without an error in 10^7 (see the tests). A caller with the list of sent trains can
+/// decode more: see [`read_trains`].
 #[must_use]
 pub fn decode_marks(edges: &[TriggerEdge]) -> DecodedMarks {
     let mut out = DecodedMarks::default();
@@ -57,13 +57,13 @@ pub fn decode_marks(edges: &[TriggerEdge]) -> DecodedMarks {
     let mut used = 0;
     while let Some((first, label)) = readings.next() {
         let mut certain = true;
-        // Everything that overlaps must say the same: a doubled start edge gives the same train twice.
-        // The next train may begin a whole duration later by the box's clock, and somewhat less by a camera's.
+        // All overlapping readings must have the same label: a doubled start edge gives the same train twice.
+        // The next train may begin a whole duration later by the box's clock, and slightly less by a camera's.
         let end = first
             .t_us
             .saturating_add(PulseTrain::DURATION_US - PULSE_PERIOD_US);
-        while let Some((other, says)) = readings.next_if(|(r, _)| r.t_us < end) {
-            certain &= says == label && other.t_us.abs_diff(first.t_us) <= 2 * TOLERANCE_US;
+        while let Some((other, other_label)) = readings.next_if(|(r, _)| r.t_us < end) {
+            certain &= other_label == label && other.t_us.abs_diff(first.t_us) <= 2 * TOLERANCE_US;
         }
         if !certain {
             continue;
@@ -80,9 +80,9 @@ pub fn decode_marks(edges: &[TriggerEdge]) -> DecodedMarks {
     out
 }
 
-/// Everything among the edges of one channel that may be a train, in time order: anything with the falling edge of a start
-/// pulse, and no edge where the pulse before the first or after the last would have one. Most of it is noise or the same
-/// train again, seen from a bit whose width looks like a start; what it says tells.
+/// All possible trains among the edges of one channel, in time order: anything with the falling edge of a start
+/// pulse, and no edge at the positions of a pulse before the first or after the last. Most are noise or the same
+/// train again, read from a bit whose width equals that of a start; their labels distinguish them.
 #[must_use]
 pub fn read_trains(edges: &[TriggerEdge]) -> Vec<ReadTrain> {
     let mut edges = edges.to_vec();
@@ -92,13 +92,13 @@ pub fn read_trains(edges: &[TriggerEdge]) -> Vec<ReadTrain> {
         .enumerate()
         .filter(|(_, e)| !e.rising)
         .filter_map(|(i, e)| {
-            // Nothing that belongs to the train is earlier than one period before its start.
+            // Edges of the train are at most one period earlier than its start.
             let from = e.t_us.checked_sub(START_WIDTH_US)?;
             let first = edges[..i]
                 .iter()
                 .rposition(|e| e.t_us < from.saturating_sub(PULSE_PERIOD_US + TOLERANCE_US))
                 .map_or(0, |k| k + 1);
-            // And nothing is later than the pulse that must not follow it.
+            // And not later than the pulse that must not follow it.
             let end = from.saturating_add(PulseTrain::DURATION_US - PULSE_PERIOD_US);
             let last = i + edges[i..].partition_point(|e| e.t_us <= end);
             read_train(&edges[first..last], from)
@@ -115,7 +115,7 @@ fn read_train(edges: &[TriggerEdge], start_us: u64) -> Option<ReadTrain> {
         return None;
     }
     let mut edges_seen = 1;
-    // Each rising edge that is there sets the place of the next, so that the clocks' rates need not agree.
+    // Each rising edge sets the position of the next, so that the clocks' rates may differ.
     let mut rise_us = start_us;
     let mut t_us = None;
     let (mut bits, mut erased) = (0u32, 0u32);
@@ -149,12 +149,12 @@ fn read_train(edges: &[TriggerEdge], start_us: u64) -> Option<ReadTrain> {
     })
 }
 
-/// The label whose word agrees with `bits` in all places that are not `erased`.
+/// The label whose word agrees with `bits` in all bits that are not `erased`.
 fn fill(bits: u32, erased: u32) -> Option<Label> {
     if erased.count_ones() > MOST_ERASED {
         return None;
     }
-    // All subsets of the erased places; the code's distance leaves at most one.
+    // All subsets of the erased bits; the code's distance leaves at most one.
     let mut subset = 0u32;
     loop {
         let word = bits | subset;
@@ -188,7 +188,7 @@ impl Line<'_> {
             .min_by_key(|t| t.abs_diff(at_us))
     }
 
-    /// True when any edge lies where a pulse that rises at `rise_us` would have one.
+    /// True if any edge lies at the positions of a pulse that rises at `rise_us`.
     fn has_pulse(&self, rise_us: u64) -> bool {
         self.near(rise_us, true).is_some()
             || [ZERO_WIDTH_US, ONE_WIDTH_US, START_WIDTH_US]
@@ -233,7 +233,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_label_survives_the_wire(code in 1u32..=6, number in 0..=MAX_MARKED_PRESS, t0 in 1000u64..1 << 40,
+        fn every_label_is_decoded(code in 1u32..=6, number in 0..=MAX_MARKED_PRESS, t0 in 1000u64..1 << 40,
                                          ppm in -5_000i64..5_000, jitter in prop::collection::vec(-15i64..15, 64)) {
             let label = Label::from_data((code << 17) | number).unwrap();
             let mut all = edges(label, t0);
@@ -249,7 +249,7 @@ mod tests {
         }
 
         #[test]
-        fn trains_without_a_pause_between_them_are_all_read(first in 0u32..100, ppm in -1_000i64..1_000, t0 in 1000u64..1 << 40) {
+        fn adjacent_trains_are_all_decoded(first in 0u32..100, ppm in -1_000i64..1_000, t0 in 1000u64..1 << 40) {
             let sent: Vec<Label> = (first..first + 4).map(mark).collect();
             let mut all = Vec::new();
             for (k, label) in sent.iter().enumerate() {
@@ -266,7 +266,7 @@ mod tests {
         }
 
         #[test]
-        fn one_lost_or_doubled_edge_spoils_no_label(at in 0usize..64, doubled: bool) {
+        fn one_lost_or_doubled_edge_damages_no_label(at in 0usize..64, doubled: bool) {
             let mut all = edges(mark(7), 10_000);
             if doubled {
                 let twin = TriggerEdge { t_us: all[at].t_us + 3, ..all[at] };
@@ -277,20 +277,20 @@ mod tests {
             all.extend(edges(Label::Sync(8), 10_000 + PulseTrain::DURATION_US));
             let seen = decode_marks(&all);
             let second = (10_000 + PulseTrain::DURATION_US, Label::Sync(8));
-            // Without the falling edge of its start pulse a train has no certain beginning.
+            // Without the falling edge of its start pulse, the start of a train is uncertain.
             let wanted = if at == 1 && !doubled { vec![second] } else { vec![(10_000, mark(7)), second] };
             prop_assert_eq!(labels(&seen), wanted);
         }
 
         #[test]
-        fn any_edges_are_taken(all in prop::collection::vec((any::<u64>(), any::<bool>()), 0..200)) {
+        fn any_edges_are_accepted(all in prop::collection::vec((any::<u64>(), any::<bool>()), 0..200)) {
             let all: Vec<_> = all.into_iter().map(|(t, rising)| TriggerEdge { t_us: t, channel: 0, rising }).collect();
             let seen = decode_marks(&all);
             prop_assert!(seen.stray_edges as usize <= all.len());
         }
     }
 
-    /// SplitMix64 (public domain, S. Vigna): enough for a line with faults.
+    /// SplitMix64 (public domain, S. Vigna): sufficient for a line with faults.
     struct Random(u64);
 
     impl Random {
@@ -303,8 +303,8 @@ mod tests {
         }
     }
 
-    /// Sends `trains` trains over a line that loses 20 % of the edges, invents 5 % and delays each by up to 5 µs;
-    /// returns how many were read rightly and how many wrongly.
+    /// Sends `trains` trains over a line that loses 20 % of the edges, adds 5 % and delays each by up to 5 µs;
+    /// returns the numbers of correctly and of wrongly decoded trains.
     fn noisy_line(trains: u64, seed: u64) -> (u64, u64) {
         let mut random = Random(seed);
         let (mut right, mut wrong) = (0, 0);
@@ -350,20 +350,20 @@ mod tests {
     }
 
     #[test]
-    fn no_label_is_wrong_on_a_line_that_loses_and_invents_edges() {
+    fn no_label_is_wrong_on_a_noisy_line() {
         let (right, wrong) = noisy_line(40_000, 1);
         assert_eq!(wrong, 0);
-        assert!(right > 1_000, "{right} of 40000 trains read");
+        assert!(right > 1_000, "{right} of 40000 trains decoded");
     }
 
     #[test]
     #[ignore = "10^7 trains take minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig-model -- --ignored"]
     fn no_label_is_wrong_in_ten_million_trains() {
         let (right, wrong) = noisy_line(10_000_000, 2);
-        assert_eq!(wrong, 0, "{right} read rightly");
+        assert_eq!(wrong, 0, "{right} decoded correctly");
     }
 
-    /// A train that begins without its first pulses, or ends without its last, is not read as another one.
+    /// A train without its first or last pulses is not read as another one.
     #[test]
     fn a_train_is_not_read_pulses_late() {
         for number in (0..MAX_MARKED_PRESS).step_by(37) {

@@ -79,7 +79,7 @@ impl Roi {
     }
 }
 
-/// A camera as drawn or measured.
+/// Position and orientation of a camera, drawn or measured.
 #[derive(Settings)]
 pub(crate) struct NominalCamera {
     /// Its optical centre.

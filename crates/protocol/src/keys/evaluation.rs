@@ -1,9 +1,9 @@
-//! Keys of the evaluation: what each repetition is for.
+//! Keys of the evaluation: the purpose of each repetition.
 
 use skinrig_model::{AnalysisSettings, CalibrationModel, PressRole};
 use skinrig_settings::{Collector, Field, Numbers, Settings};
 
-/// What each repetition is for. Repetitions are counted from 1; each one is in exactly one list.
+/// Purpose of each repetition. Repetitions are counted from 1; each one is in exactly one list.
 #[derive(Settings)]
 #[settings(parts = EvaluationParts)]
 pub(crate) struct Evaluation {
@@ -13,7 +13,7 @@ pub(crate) struct Evaluation {
     score: Numbers,
 }
 
-/// The role of each of `count` repetitions, by a mapping of [`Evaluation`].
+/// The role of each of `count` repetitions, from a mapping of [`Evaluation`].
 pub(crate) fn roles(field: &Field, count: u32, out: &mut Collector) -> Option<Vec<PressRole>> {
     let lists = Evaluation::read_parts(field, &mut Collector::default());
     let mut roles = vec![None; count as usize];
@@ -67,7 +67,7 @@ pub(crate) fn roles(field: &Field, count: u32, out: &mut Collector) -> Option<Ve
             "repetitions without a purpose",
         )
         .expected("every repetition in `calibrate` or `score`")
-        .found(format!("nothing about repetition {}", missing.join(", ")));
+        .found(format!("no purpose for repetition {}", missing.join(", ")));
         return None;
     }
     if !roles.contains(&Some(PressRole::Score)) {
@@ -79,7 +79,7 @@ pub(crate) fn roles(field: &Field, count: u32, out: &mut Collector) -> Option<Ve
     roles.into_iter().collect()
 }
 
-/// A calibration needs presses that may calibrate.
+/// Checks that a calibration has presses to use.
 pub(crate) fn calibration_possible(
     roles: &[PressRole],
     analysis: &AnalysisSettings,

@@ -1,4 +1,4 @@
-//! The declarations of protocols and schedules: each key once, with its unit, range, default and meaning.
+//! Declarations of protocols and schedules: each key once, with its unit, range, default and meaning.
 
 mod camera;
 mod evaluation;

@@ -39,7 +39,7 @@ pub(crate) struct MotionKeys {
     pub home: Option<Point3<Skin>>,
 }
 
-/// When a pose counts as settled.
+/// Condition for a settled pose.
 #[derive(Settings)]
 pub(crate) struct Settle {
     /// Largest distance from the target.
@@ -90,7 +90,7 @@ pub(crate) struct LimitKeys {
     /// Largest acceleration of the robot's set point; absent: that of the robot's setup.
     #[setting(above = 0.0, max = 10_000.0)]
     pub max_acceleration_mm_s2: Option<f64>,
-    /// This many invalid presses in a row end the run: something is wrong that more presses do not mend. 0: no limit.
+    /// This many consecutive invalid presses end the run, because they suggest a fault that more presses cannot fix. 0: no limit.
     #[setting(default = "5", max = 100_000)]
     pub max_consecutive_invalid: u32,
     /// Reaction of the robot to an exceeded limit.

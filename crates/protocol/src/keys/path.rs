@@ -84,7 +84,7 @@ pub(crate) struct Csv {
     pub file: String,
     /// Unit of the columns `x` and `y`.
     pub unit: LengthUnit,
-    /// Whether rows with nothing but blanks are skipped; otherwise they are errors.
+    /// Whether blank rows are skipped; otherwise they are errors.
     #[setting(default = "false")]
     pub skip_blank_rows: bool,
     /// How many locations are used, from the first; all when absent.
@@ -152,15 +152,15 @@ pub(crate) struct Between {
     pub pause: HostDuration,
 }
 
-/// In which order the presses of a repetition come.
+/// Order of the presses of a repetition.
 pub(crate) enum Order {
     /// The order of the path.
     Listed,
-    /// A random one.
+    /// A random order.
     Shuffled(Shuffled),
 }
 
-/// The order that has a name.
+/// Orders with a name.
 #[derive(Clone, Copy, Choice)]
 enum KnownOrder {
     /// The order of the path.

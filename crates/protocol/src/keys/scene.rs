@@ -6,7 +6,7 @@ use skinrig_settings::{Collector, Field, Settings};
 use super::camera::NominalCamera;
 use crate::protocol::{Scene, SimulatedSkin};
 
-/// What a scene is good for unless it says otherwise: event rates and where a press is seen.
+/// Default needs of a scene: event rates and the position of a press in the picture.
 const USUAL_NEEDS: [SceneNeed; 2] = [SceneNeed::EventRates, SceneNeed::Localisation];
 
 /// The simulated rig. The cheapest level that satisfies all of it is used.
@@ -40,7 +40,7 @@ pub(crate) struct SkinKeys {
     /// Time constant of that part.
     #[setting(default = "700 ms", above = 0.0, max = 60.0)]
     creep_time: HostDuration,
-    /// Brightness of the flanks of a dent, relative to a matt white flank: what a camera sees of a press.
+    /// Brightness of the flanks of a dent, relative to a matt white flank. Cameras detect a press by these flanks.
     #[setting(default = "1.8", min = 0.1, max = 10.0)]
     flank_brightness: f64,
 }

@@ -84,7 +84,7 @@ pub(crate) struct ScheduledSyncKeys {
 pub(crate) struct PositionsCsv {
     /// Unit of the columns `x` and `y`.
     pub unit: LengthUnit,
-    /// Whether rows with nothing but blanks are skipped; otherwise they are errors.
+    /// Whether blank rows are skipped; otherwise they are errors.
     #[setting(default = "false")]
     pub skip_blank_rows: bool,
 }
@@ -95,8 +95,8 @@ pub(crate) struct PositionsCsv {
 pub(crate) struct Evaluate {
     /// By repetition, as in a protocol.
     pub repetitions: Option<Evaluation>,
-    /// Within each repetition; for recordings with a single one. Neighbours calibrate each other's surroundings, so this says less
-    /// than repetitions do.
+    /// Within each repetition; for recordings with a single one. Neighbours calibrate each other's surroundings, so this is less
+    /// meaningful than repetitions.
     pub alternate: Option<Alternate>,
 }
 

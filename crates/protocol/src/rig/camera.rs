@@ -56,7 +56,7 @@ pub struct CameraSetup {
     /// Addresses of registers, such as `"0x0204"`, that your camera reads back differently; the vendor does not publish which do.
     #[setting(default = "[]", shape = ADDRESSES, read = addresses)]
     pub read_back_exceptions: Vec<u32>,
-    /// EVK1: further valid status bytes of register reads, such as `"0x00"`, besides 0x40. `--tolerant` shows which your camera
+    /// EVK1: further valid status bytes of register reads, such as `"0x00"`, besides 0x40. `--tolerant` lists those that your camera
     /// sends.
     #[setting(default = "[]", shape = ADDRESSES, read = bytes)]
     pub read_status: Vec<u8>,
@@ -128,11 +128,11 @@ impl fmt::Display for CameraKind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum SyncRole {
-    /// Its own.
+    /// Its own time base.
     Standalone,
-    /// Its own, given to the other camera.
+    /// Its own time base, shared with the other camera.
     Master,
-    /// The other camera's.
+    /// The other camera's time base.
     Slave,
 }
 
@@ -218,7 +218,7 @@ fn bytes(list: &Field, out: &mut Collector) -> Option<Vec<u8>> {
 
 fn geometry(f: &Field, out: &mut Collector) -> Option<CameraModel> {
     if f.get("aim").is_none() {
-        out.error(f.span, f.path.as_str(), "where the camera aims is missing")
+        out.error(f.span, f.path.as_str(), "the camera's aim is missing")
             .expected("`aim`: a rig file has no outline with a centre to aim at")
             .found("no such key")
             .help("add `aim: [10 mm, 2 mm]`, a point on the camera's axis");
@@ -275,7 +275,7 @@ impl CameraSetup {
 
     fn has_time_base(model: &CameraKind, field: &Field, out: &mut Collector) {
         if let (Some(gap), true) = (field.get("max_time_high_gap"), *model != CameraKind::Evk1) {
-            let message = "the camera's time base is not watched";
+            let message = "this camera's time base is not monitored";
             out.error(gap.span, gap.path.as_str(), message)
                 .expected("`max_time_high_gap` with `model: evk1` only")
                 .found(format!("`model: {model}`"));

@@ -1,4 +1,4 @@
-//! Calendar days, as people write them in rig files.
+//! Calendar dates in rig files.
 
 use std::fmt;
 
@@ -14,7 +14,7 @@ pub struct Date {
 }
 
 impl Date {
-    /// Reads `year-month-day` with four, two and two digits; `None` for anything that is no day.
+    /// Reads `year-month-day` with four, two and two digits; `None` for anything that is not a date.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let mut parts = text.split('-');
@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn days_count_on_and_what_is_no_day_is_refused() {
+    fn days_are_consecutive_and_invalid_dates_are_rejected() {
         let days = |text: &str| Date::parse(text).map(Date::days_since_1970);
         assert_eq!(days("1970-01-01"), Some(0));
         assert_eq!(days("2000-03-01"), Some(11_017));

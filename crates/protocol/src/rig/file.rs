@@ -1,4 +1,4 @@
-//! A whole rig file, with what must hold between its parts.
+//! A whole rig file, with the checks across its parts.
 
 use std::path::Path;
 
@@ -128,7 +128,7 @@ impl RigFile {
         }
     }
 
-    /// Every touched point, or the skin's origin, lies within the workspace.
+    /// Checks that every touched point, or the skin's origin, is inside the workspace.
     fn skin_is_inside(frame: &Frame, limits: &BenchLimits, root: &Field, out: &mut Collector) {
         let places: Vec<(&str, [f64; 3])> = match &frame.touch_off {
             Some(touched) => {
@@ -152,7 +152,7 @@ impl RigFile {
         }
     }
 
-    /// A trigger box needs a trigger input on both cameras.
+    /// Checks that both cameras have a trigger input if there is a trigger box.
     fn cameras_see_the_box(cameras: &[CameraSetup; 2], root: &Field, out: &mut Collector) {
         let Some(trigger_box) = root.get("trigger_box") else {
             return;

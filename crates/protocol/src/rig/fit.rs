@@ -35,7 +35,7 @@ pub(super) fn rigid<To, From>(
     ))
 }
 
-/// How far the farthest of `points` lies from their best line, mm; 0 when all lie on one.
+/// Distance of the farthest of `points` from their best line, mm; 0 if all lie on one.
 pub(super) fn off_line_mm(points: &[[f64; 3]]) -> f64 {
     let n = points.len() as f64;
     let points: Vec<Vector3<f64>> = points.iter().map(|p| Vector3::from(*p)).collect();
@@ -67,7 +67,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_motion_is_found_again(
+        fn any_motion_is_recovered(
             yaw in -180.0f64..180.0, pitch in -40.0f64..40.0, roll in -40.0f64..40.0,
             shift in prop::array::uniform3(-100.0f64..100.0),
             extra in prop::collection::vec(prop::array::uniform3(-50.0f64..50.0), 0..5),
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn points_on_a_line_are_seen() {
+    fn points_on_a_line_are_detected() {
         let line = [[0.0, 0.0, 0.0], [10.0, 5.0, 1.0], [20.0, 10.0, 2.0]];
         assert!(off_line_mm(&line) < 1e-9);
         let bent = [[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [5.0, 9.0, 0.0]];

@@ -1,4 +1,4 @@
-//! The pose of the skin: given, or fitted to touched points.
+//! The pose of the skin: stated, or fitted to touched points.
 
 use serde::Serialize;
 use skinrig_model::{Point3, RigidTransform, Robot, Skin};
@@ -23,7 +23,7 @@ pub struct Frame {
     pub robot_from_skin: RigidTransform<Robot, Skin>,
     /// When it was measured.
     pub date: Date,
-    /// The touched points that it was fitted to; `None` when it was given.
+    /// Touched points of the fit; `None` if the pose was stated.
     pub touch_off: Option<TouchOff>,
 }
 
@@ -96,7 +96,7 @@ struct TouchOffKeys {
     /// Date of the touches: year-month-day, for example `2026-11-20`.
     #[setting(example = "2026-11-20")]
     date: Date,
-    /// At least three points that do not lie on one line; four or more show slips better.
+    /// At least three points that do not lie on one line; four or more reveal slips better.
     #[setting(items = 3..=1000, example = THREE_POINTS)]
     points: Vec<TouchedKeys>,
     /// Largest distance of a point from the rigid fit.
@@ -127,7 +127,7 @@ impl FrameKeys {
         let frame = match (self.given, self.touch_off) {
             (Some(given), None) => given.frame(),
             (None, Some(touched)) => touched.frame(field.at("touch_off"), out)?,
-            (None, None) | (Some(_), Some(_)) => return None, // reported as exactly one of them
+            (None, None) | (Some(_), Some(_)) => return None, // reported by `exactly_one`
         };
         let up = frame.robot_from_skin.rotation[2][2].clamp(-1.0, 1.0);
         let tilt = up.acos().to_degrees();
@@ -209,7 +209,7 @@ impl TouchOffKeys {
 }
 
 impl TouchOff {
-    /// Whether every point is close enough to the fit; `list` is the mapping of the points.
+    /// Checks that every point is close enough to the fit; `list` is the mapping of the points.
     fn fits(&self, list: &Field, out: &mut Collector) -> bool {
         let worst = self
             .points

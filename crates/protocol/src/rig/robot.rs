@@ -139,9 +139,9 @@ impl DeviceAxis {
 
 #[derive(Clone, Copy, Choice)]
 enum EncoderRule {
-    /// Anything; it is recorded, and 0 is noted.
+    /// Any report; it is recorded, and a 0 is noted.
     Reported,
-    /// That they agree (1): for a robot that is known to have them.
+    /// A passed check (1): for a robot that is known to have redundant encoders.
     Required,
 }
 
@@ -236,7 +236,7 @@ impl RobotSetup {
 }
 
 impl MotorForce {
-    /// Whether a force limit can be set by a cap on the motors' torque; `field` is the mapping of `self`.
+    /// Checks that a cap on the motors' torque can set a force limit; `field` is the mapping of `self`.
     pub(super) fn check_limit(&self, limit_n: f64, field: &Field, out: &mut Collector) {
         let strongest = (1.0 - self.gravity_ratio) * self.per_ratio_n;
         let (expected, found) =

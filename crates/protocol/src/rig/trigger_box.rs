@@ -23,8 +23,8 @@ pub struct BoxSetup {
     /// Period of the coded sync trains, in whole milliseconds.
     #[setting(default = "100 ms", min = 18, max = 65_000)]
     pub sync_period_ms: u16,
-    /// Largest error of the box's clock, parts per million: an Arduino Uno has a ceramic resonator of 5000, a board with a
-    /// crystal 100.
+    /// Largest error of the box's clock, parts per million: 5000 for the ceramic resonator of an Arduino Uno, 100 for a
+    /// board with a crystal.
     #[setting(
         default = "5000",
         key = "max_drift_ppm",
@@ -62,7 +62,7 @@ pub enum BoxOutput {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum BoxInput {
-    /// Closes when the tip touches.
+    /// Contact switch that closes when the tip touches.
     Contact,
     /// A light gate that the tip interrupts.
     Optical,

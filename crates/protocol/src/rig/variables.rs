@@ -18,7 +18,7 @@ pub(super) fn mentioned(text: &str, environment: Environment<'_>) -> BTreeMap<St
         .collect()
 }
 
-/// A text with the value of every `${NAME}` in its place.
+/// A text with every `${NAME}` replaced by its value.
 pub(super) fn text(f: &Field, out: &mut Collector) -> Option<String> {
     let text = f.as_text()?;
     let mut done = String::new();
@@ -26,7 +26,7 @@ pub(super) fn text(f: &Field, out: &mut Collector) -> Option<String> {
     while let Some((before, after)) = rest.split_once("${") {
         done.push_str(before);
         let Some((name, after)) = after.split_once('}') else {
-            out.error(f.span, f.path.as_str(), "the variable has no end")
+            out.error(f.span, f.path.as_str(), "the variable is not closed")
                 .expected("`${NAME}`")
                 .found(format!("`{text}`"));
             return None;

@@ -8,7 +8,7 @@ const POSITIVE: ValueRange = ValueRange::above_zero(1e15);
 
 macro_rules! limit {
     ($name:ident, $table:literal, $unit:literal, $example:literal) => {
-        /// A limit, stated before anything is measured.
+        /// A limit, set before the measurement.
         #[derive(Settings)]
         #[settings(name = $table)]
         pub(super) struct $name {

@@ -14,7 +14,7 @@ pub(crate) fn shipped(name: &str) -> String {
     std::fs::read_to_string(folder().join(name)).unwrap()
 }
 
-/// A loader that knows no file.
+/// A loader that finds no file.
 pub(crate) fn nothing(_: &Path) -> std::io::Result<Vec<u8>> {
     Err(std::io::Error::from(std::io::ErrorKind::NotFound))
 }
@@ -25,7 +25,7 @@ pub(crate) fn parse(text: &str, overrides: &[&str]) -> Result<Protocol, Diagnost
     Protocol::parse("test.yaml", text.as_bytes(), &overrides, &nothing)
 }
 
-/// The demo with overrides; panics with the findings when it has any.
+/// The demo with overrides; panics with its findings if there are any.
 pub(crate) fn demo(overrides: &[&str]) -> Protocol {
     parse(&shipped("demo.yaml"), overrides).unwrap_or_else(|e| panic!("{e}"))
 }

@@ -1,4 +1,4 @@
-//! What users read when something is wrong.
+//! Diagnostics of invalid protocols and schedules.
 
 use crate::common::{parse, shipped};
 use proptest::prelude::*;
@@ -12,7 +12,7 @@ fn all_findings_of_a_file_at_once() {
     insta::assert_snapshot!("wrong", error.render(false));
 }
 
-/// The demo with one line replaced, and what must be said about it: place, message, and part of the rest.
+/// Checks the diagnostic of the demo with one line replaced: location, message, and part of the rest.
 fn finding(from: &str, to: &str, path: &str, message: &str, rest: &str) {
     let text = shipped("demo.yaml");
     assert!(text.contains(from), "{from}");
@@ -33,7 +33,7 @@ fn finding(from: &str, to: &str, path: &str, message: &str, rest: &str) {
     );
     assert!(
         error.to_string().contains(rest),
-        "{rest} is not said\n{error}"
+        "{rest} is missing\n{error}"
     );
     let line = 1 + text[..text.find(to.split('\n').next().unwrap()).unwrap()]
         .matches('\n')
@@ -257,9 +257,9 @@ fn csv_findings_point_into_the_csv() {
     assert_eq!(
         found,
         [
-            (file, 2, "row 1 holds no location"),
+            (file, 2, "row 1 is not a location"),
             (file, 3, "row 2 is blank"),
-            (file, 4, "row 3 holds no location")
+            (file, 4, "row 3 is not a location")
         ]
     );
     assert!(
@@ -372,7 +372,7 @@ fn a_suspension_needs_room_between_its_levels() {
     );
     for (levels, told) in [
         ("{above: 60 deg, resume_below: 50 degC}", "an angle"),
-        ("{above: 60 degC, resume_below: 60 °C}", "no room"),
+        ("{above: 60 degC, resume_below: 60 °C}", "not apart"),
         ("{above: 300 degC, resume_below: 60 °C}", "150"),
     ] {
         let error = hot(levels).unwrap_err().to_string();
@@ -402,7 +402,7 @@ fn the_other_language_and_anchors_are_named_once() {
 }
 
 #[test]
-fn schedules_report_in_the_same_way() {
+fn schedules_report_the_same_way() {
     let text = shipped("paper-recording.schedule.yaml")
         .replace("presses_used: 250", "presses_used: 300")
         .replace("contact: -275 ms", "contact: -275")
@@ -423,7 +423,7 @@ fn hostile_texts() {
     let many_keys: String = (0..100_000).map(|k| format!("k{k}: 1\n")).collect();
     let long_line = format!("name: {}\nskinrig: x", "y".repeat(3 << 20));
     let long_key = format!("{}: 1\n", "k".repeat(900));
-    for (text, said) in [
+    for (text, message) in [
         (String::new(), "the file is empty"),
         ("\u{feff}".to_owned(), "the file is empty"),
         ("# only a comment\r\n".to_owned(), "the file is empty"),
@@ -447,8 +447,8 @@ fn hostile_texts() {
     ] {
         let error = parse(&text, &[]).unwrap_err().to_string();
         let start: String = text.chars().take(30).collect();
-        let missing =
-            error.contains(said) || error.contains("not a whole number") && said == "the value";
+        let missing = error.contains(message)
+            || error.contains("not a whole number") && message == "the value";
         assert!(missing, "{start}: {error}");
         assert_eq!(
             error.matches("= expected").count(),
@@ -460,12 +460,12 @@ fn hostile_texts() {
         );
         assert!(error.len() < 100_000, "{start}: {} bytes", error.len());
     }
-    for (bytes, said) in [
+    for (bytes, message) in [
         (&b"name: a\noperator: \xff\n"[..], "byte 0xff"),
         (&b"\xff\xfes\0k\0"[..], "UTF-16"),
     ] {
         let error = Protocol::parse("x.yaml", bytes, &[], &crate::common::nothing).unwrap_err();
-        assert!(error.to_string().contains(said), "{error}");
+        assert!(error.to_string().contains(message), "{error}");
     }
     let huge = vec![b'#'; (4 << 20) + 1];
     let error = Protocol::parse("x.yaml", &huge, &[], &crate::common::nothing).unwrap_err();
@@ -484,7 +484,7 @@ proptest! {
         let _ = parse(&text, &[]);
     }
 
-    /// One damaged character anywhere in the demo: an answer, and every finding lies inside the file.
+    /// One damaged character anywhere in the demo: a result, and every finding lies inside the file.
     #[test]
     fn a_damaged_demo_gives_an_answer(at in any::<proptest::sample::Index>(), with in any::<char>()) {
         let text = shipped("demo.yaml");
@@ -512,7 +512,7 @@ proptest! {
 }
 
 #[test]
-fn a_tab_is_pointed_at_where_it_stands() {
+fn a_tab_is_reported_at_its_position() {
     let text = "skinrig: 1\nname: x\n\tpath: 3\n";
     let error = parse(text, &[]).unwrap_err();
     let place = &error.list()[0];
@@ -532,13 +532,13 @@ fn a_tab_is_pointed_at_where_it_stands() {
 }
 
 #[test]
-fn an_alias_is_told_once() {
+fn an_alias_is_reported_once() {
     let text = shipped("demo.yaml");
     let from = "operator:";
     let line = text.lines().find(|l| l.starts_with(from));
     let line = line.unwrap_or_else(|| panic!("the demo has no line `{from}`"));
     let text = text.replacen(line, "operator: *someone", 1);
     let error = parse(&text, &[]).unwrap_err();
-    let said: Vec<&str> = error.list().iter().map(|d| d.message.as_str()).collect();
-    assert_eq!(said, ["aliases are not used here"]);
+    let message: Vec<&str> = error.list().iter().map(|d| d.message.as_str()).collect();
+    assert_eq!(message, ["aliases are not used here"]);
 }

@@ -73,20 +73,20 @@ fn absent_settings_are_the_documented_defaults() {
 }
 
 #[test]
-fn the_public_codes_choices_can_be_selected() {
+fn the_choices_of_the_public_code_can_be_selected() {
     let settings = demo(&skinrig_protocol::REFERENCE_CODE).analysis;
     insta::assert_debug_snapshot!("reference_code", settings);
 }
 
 #[test]
-fn thresholds_run_upwards() {
+fn thresholds_increase() {
     let error = parse(
         &shipped("demo.yaml"),
         &["analysis.latency.thresholds.from=30"],
     )
     .unwrap_err();
     assert!(
-        error.to_string().contains("no thresholds are left"),
+        error.to_string().contains("the thresholds are empty"),
         "{error}"
     );
     assert!(error.to_string().contains("30 to 20"), "{error}");
@@ -96,7 +96,7 @@ fn thresholds_run_upwards() {
 }
 
 #[test]
-fn rings_hold_their_radius() {
+fn rings_keep_their_radius() {
     let protocol = parse(&shipped("circles.yaml"), &[]).unwrap();
     assert_eq!(protocol.locations.len(), 48);
     for (k, p) in protocol.locations.iter().enumerate() {
@@ -234,7 +234,7 @@ fn every_kind_of_damage_is_found() {
 }
 
 #[test]
-fn the_true_outline_counts_not_its_box() {
+fn presses_stay_inside_the_outline_not_its_bounding_box() {
     // (55, 47) lies inside the 100 x 100 mm box and outside the chamfer.
     let protocol = demo(&["path.meander.origin=[55 mm, 47 mm]", "path.meander.count=1"]);
     let found = check(
@@ -248,7 +248,7 @@ fn the_true_outline_counts_not_its_box() {
             .iter()
             .all(|v| v.message == "not on the skin" && v.key == "path")
     );
-    // The margin counts as well: 2 mm from the right edge, 3 mm wanted.
+    // The margin counts as well: 2 mm from the right edge, 3 mm required.
     let protocol = demo(&["path.meander.origin=[58 mm, 2 mm]", "path.meander.count=1"]);
     assert_eq!(
         check(&protocol.compile(), &protocol.surroundings, None).len(),
@@ -302,7 +302,7 @@ fn keep_outs_hold_for_presses_and_for_travel_between_them() {
 }
 
 #[test]
-fn the_way_from_home_is_checked() {
+fn the_travel_from_home_is_checked() {
     let text = shipped("demo.yaml").replace(
         "  hold: 150 ms",
         "  hold: 150 ms\n  home: [-50 mm, 2 mm, 20 mm]",
@@ -383,7 +383,7 @@ proptest! {
         prop_assert!(orders[0] != orders[1] && orders[1] != orders[2]);
     }
 
-    /// A plan is data: it goes through JSON without loss, and its digest with it.
+    /// Plans survive JSON unchanged, and so does their digest.
     #[test]
     fn plans_survive_json(pitch in 1.0f64..7.0, period in 1.5f64..9.0) {
         let plan = demo(&[&format!("path.meander.pitch={pitch} mm"), &format!("motion.period={period} s")]).compile();
@@ -392,7 +392,7 @@ proptest! {
         prop_assert_eq!(back.digest(), plan.digest());
     }
 
-    /// Whatever is moved out of the workspace or the outline is found.
+    /// Detects anything moved out of the workspace or the outline.
     #[test]
     fn nothing_outside_passes(x in -80.0f64..100.0, y in -90.0f64..95.0) {
         let protocol = demo(&[&format!("path.meander.origin=[{x} mm, {y} mm]"), "path.meander.count=1"]);

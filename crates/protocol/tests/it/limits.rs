@@ -1,4 +1,4 @@
-//! Limits of a comparison: the shipped file, its schema, margins one by one, and what users read when one is wrong.
+//! Limits of a comparison: the shipped file, its schema, single margins, and diagnostics.
 
 use skinrig_protocol::limits::{Limits, Margin};
 use skinrig_protocol::limits_schema_json;
@@ -7,7 +7,7 @@ use crate::common::shipped;
 use crate::validate::validate;
 
 #[test]
-fn the_shipped_limits_show_every_key_and_mean_what_they_show() {
+fn the_shipped_limits_show_every_key_with_its_value() {
     let text = shipped("comparison.limits.yaml");
     let limits = Limits::parse("comparison.limits.yaml", text.as_bytes()).unwrap();
     assert_eq!(
@@ -53,14 +53,14 @@ fn all_findings_of_a_file_at_once() {
 }
 
 #[test]
-fn a_margin_on_the_command_line_takes_the_place_of_the_files() {
+fn a_margin_on_the_command_line_replaces_that_of_the_file() {
     let text = "skinrig_limits: 1\nname: mine\nmargins: {rmse: 1 mm}\n";
     let mut limits = Limits::parse("limits.yaml", text.as_bytes()).unwrap();
     limits.set(Margin::parse("rmse = 0.05 cm").unwrap());
     limits.set(Margin::parse("taxels=20").unwrap());
     let margins: Vec<_> = limits.margins.iter().map(|m| (m.metric, m.value)).collect();
     assert_eq!(margins, [("rmse", 0.5), ("taxels", 20.0)]);
-    for (text, said) in [
+    for (text, message) in [
         ("rmse", "METRIC=MARGIN"),
         ("rsme=1mm", "did you mean `rmse`?"),
         ("rmse=1", "the bare number `1`"),
@@ -70,6 +70,6 @@ fn a_margin_on_the_command_line_takes_the_place_of_the_files() {
         ("taxels=NaN", "more than 0"),
     ] {
         let error = Margin::parse(text).unwrap_err();
-        assert!(error.to_string().contains(said), "{text}: {error}");
+        assert!(error.to_string().contains(message), "{text}: {error}");
     }
 }

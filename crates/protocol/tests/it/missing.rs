@@ -1,4 +1,4 @@
-//! The help for a missing key, applied as it is printed, mends the file.
+//! Following the printed help for a missing key fixes the file.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -22,7 +22,7 @@ fn files(names: &[&str]) -> Vec<(String, String)> {
     names.iter().map(|n| ((*n).to_owned(), text(n))).collect()
 }
 
-/// A file as block YAML of which every entry stands on lines of its own.
+/// A file as block YAML with every entry on a line of its own.
 fn block(value: &Value, indent: usize, out: &mut String) {
     let pad = " ".repeat(indent);
     for (key, value) in value.as_object().unwrap() {
@@ -47,7 +47,7 @@ fn block(value: &Value, indent: usize, out: &mut String) {
     }
 }
 
-/// The places of mappings in a file, with the groups of keys of which one must be there: a required key is a group of one.
+/// Paths of the mappings in a file, with the groups of keys of which one is required: a required key is a group of one.
 fn groups(
     schema: &Value,
     at: &Value,
@@ -96,7 +96,7 @@ fn groups(
     }
 }
 
-/// Puts `line` where the finding points: before the first entry of the mapping, or into an empty one.
+/// Inserts `line` at the finding: before the first entry of the mapping, or into an empty one.
 fn insert(text: &str, line: usize, column: usize, entry: &str) -> String {
     let lines: Vec<&str> = text.lines().collect();
     let target = lines[line - 1];
@@ -123,8 +123,8 @@ fn dotted(pointer: &str) -> String {
     path
 }
 
-/// Keys without an example that always fits: the number of repetitions decides what `evaluation` must hold.
-const UNMENDED: [&str; 5] = [
+/// Keys without an example that always fits: `evaluation` depends on the number of repetitions.
+const UNFIXED: [&str; 5] = [
     "skinrig protocol: evaluation",
     "skinrig protocol: evaluation.score",
     "skinrig schedule: evaluation",
@@ -132,11 +132,11 @@ const UNMENDED: [&str; 5] = [
     "skinrig schedule: evaluation.repetitions.score",
 ];
 
-/// Keys whose example leaves a finding about them, and keys that no file has.
-fn unmended(language: &Language) -> BTreeSet<String> {
+/// Keys whose example leaves a finding, and keys that no file has.
+fn unfixed(language: &Language) -> BTreeSet<String> {
     let schema: Value = serde_json::from_str(&language.schema).unwrap();
     let options = serde_yaml::options! { strict_booleans: true };
-    let (mut unmended, mut covered) = (BTreeSet::new(), BTreeSet::new());
+    let (mut unfixed, mut covered) = (BTreeSet::new(), BTreeSet::new());
     let title = schema["title"].as_str().unwrap();
     for (name, text) in &language.files {
         let file: Value = serde_yaml::from_str_with_options(text, options.clone()).unwrap();
@@ -167,7 +167,7 @@ fn unmended(language: &Language) -> BTreeSet<String> {
             let left = (language.parse)(name, &mended);
             let left = left.err().unwrap_or_default();
             if left.list().iter().any(|d| d.path.starts_with(&key)) {
-                unmended.insert(format!("{title}: {key}"));
+                unfixed.insert(format!("{title}: {key}"));
             }
             covered.extend(group.into_iter().map(|key| (table.clone(), key)));
         }
@@ -177,15 +177,15 @@ fn unmended(language: &Language) -> BTreeSet<String> {
         let doc = table["description"].as_str().unwrap().to_owned();
         for key in table["required"].as_array().into_iter().flatten() {
             if !covered.contains(&(doc.clone(), key.as_str().unwrap().to_owned())) {
-                unmended.insert(format!("{title}: no file has {key} of: {doc}"));
+                unfixed.insert(format!("{title}: no file has {key} of: {doc}"));
             }
         }
     }
-    unmended
+    unfixed
 }
 
 #[test]
-fn the_help_for_a_missing_key_mends_the_file() {
+fn the_help_for_a_missing_key_fixes_the_file() {
     let languages = [
         Language {
             schema: rig_schema_json(),
@@ -230,7 +230,7 @@ fn the_help_for_a_missing_key_mends_the_file() {
             },
         },
     ];
-    let found: BTreeSet<String> = languages.iter().flat_map(unmended).collect();
-    let known = UNMENDED.map(str::to_owned).into();
+    let found: BTreeSet<String> = languages.iter().flat_map(unfixed).collect();
+    let known = UNFIXED.map(str::to_owned).into();
     assert_eq!(found, known);
 }

@@ -1,4 +1,4 @@
-//! Laws of what is left of a plan when some of its presses are done.
+//! Properties of the remaining plan when some of its presses are done.
 
 use proptest::prelude::*;
 use skinrig_model::{HostDuration, PressHistory, PressId, PressRole, PressVerdict};
@@ -34,7 +34,7 @@ fn shipped_protocol(name: &str) -> Protocol {
 }
 
 #[test]
-fn all_of_a_plan_is_the_plan() {
+fn the_remaining_plan_of_all_presses_is_the_plan() {
     for name in [
         "demo",
         "paper-meander",
@@ -51,7 +51,7 @@ fn all_of_a_plan_is_the_plan() {
 }
 
 #[test]
-fn what_was_not_done_is_wanted_after_the_sync_presses() {
+fn missing_presses_follow_the_sync_presses() {
     let plan = shipped_protocol("quick-check").compile();
     let sync = plan.presses.iter().filter(|p| p.role == PressRole::Sync);
     let sync = sync.count();
@@ -64,8 +64,8 @@ fn what_was_not_done_is_wanted_after_the_sync_presses() {
     };
     let mut histories = vec![done; plan.presses.len()];
     let none = plan.wanted(&histories);
-    assert!(none.iter().all(|w| !w), "nothing is left to be done");
-    // A sync press alone is no reason to press at all.
+    assert!(none.iter().all(|w| !w), "no press is left");
+    // A sync press alone does not restart the run.
     histories[0].verdict = None;
     assert_eq!(plan.wanted(&histories), none);
     histories[sync].verdict = Some(PressVerdict::Invalid("cut off: no power".to_owned().into()));
@@ -75,7 +75,7 @@ fn what_was_not_done_is_wanted_after_the_sync_presses() {
 }
 
 #[test]
-fn a_press_is_final_when_it_is_good_or_has_no_attempt_left() {
+fn a_press_is_final_if_valid_or_without_attempts_left() {
     let wants = |spent, verdict| {
         let retakes = Retakes {
             per_press: 2,
@@ -99,9 +99,9 @@ fn a_press_is_final_when_it_is_good_or_has_no_attempt_left() {
     assert!(!wants(1, Some(PressVerdict::Excluded("rule".into()))));
 }
 
-/// After a run that came to its end only those presses are open that the rig or the operator cost.
+/// After a completed plan only presses lost to the rig or the operator are open.
 #[test]
-fn of_a_plan_that_is_done_only_what_was_given_back_is_wanted() {
+fn after_a_completed_plan_only_lost_presses_are_retaken() {
     let wants = |given_back, spent, verdict: PressVerdict| {
         Retakes::default().wants(&PressHistory {
             attempts: 3,
@@ -150,7 +150,7 @@ proptest! {
                 let planned = |p: &PressStep| {
                     let all = presses(&plan);
                     let at = all.iter().position(|q| q.press == p.press).unwrap();
-                    // What the plan leaves between this press and the one after it, wanted or not.
+                    // Time in the plan between this press and the next one, whether wanted or not.
                     all.get(at + 1).map(|next| HostDuration(start(next).0 - start(all[at]).0))
                 };
                 if plan.presses[block[0].press.index() as usize].role != PressRole::Sync {

@@ -1,4 +1,4 @@
-//! Rig files: the shipped ones, their schema, the frame that they stand for, and what users read when one is wrong.
+//! Rig files: the shipped ones, their schema, their frame, and diagnostics.
 
 use std::path::{Path, PathBuf};
 
@@ -28,7 +28,7 @@ fn example() -> String {
 }
 
 #[test]
-fn the_shipped_files_mean_what_they_show() {
+fn the_shipped_files_parse_to_their_values() {
     let rig = parse(&example()).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(rig.kind, RigKind::Bench);
     assert_eq!(rig.robot.watchdog_steps, 80);
@@ -109,7 +109,7 @@ fn all_findings_of_a_file_at_once() {
     insta::assert_snapshot!("wrong-rig", error.render(false));
 }
 
-/// The example with one text replaced, and what must be said about it.
+/// Checks the diagnostic of the example with one text replaced.
 fn finding(from: &str, to: &str, path: &str, message: &str, rest: &str) {
     let text = example();
     assert_eq!(text.matches(from).count(), 1, "{from}");
@@ -120,10 +120,10 @@ fn finding(from: &str, to: &str, path: &str, message: &str, rest: &str) {
         .filter(|d| d.path == path && d.message == message)
         .collect();
     assert_eq!(found.len(), 1, "{to}\n{error}");
-    assert_eq!(error.list().len(), 1, "more than was broken\n{error}");
+    assert_eq!(error.list().len(), 1, "more than one finding\n{error}");
     assert!(
         error.to_string().contains(rest),
-        "{rest} is not said\n{error}"
+        "{rest} is missing\n{error}"
     );
 }
 
@@ -149,7 +149,7 @@ fn a_camera_without_trigger_input_stands_alone() {
 }
 
 #[test]
-fn what_cannot_be_is_named() {
+fn invalid_values_are_reported() {
     let south_east = "skin: [50 mm, -35 mm, 0 mm], robot: [44.010 mm, -48.020 mm, -20.010 mm]";
     finding(
         south_east,
@@ -253,7 +253,7 @@ fn what_cannot_be_is_named() {
         "serial: \"00001754\"",
         "serial: \"00001754\"\n    model: evk4\n    max_time_high_gap: 1 ms",
         "cameras.camera2.max_time_high_gap",
-        "the camera's time base is not watched",
+        "this camera's time base is not monitored",
         "`model: evk4`",
     );
     finding(
@@ -312,7 +312,7 @@ fn touched_points_must_span_the_skin_and_not_its_mirror_image() {
         line.list()[0].message,
         "the points lie on one line, or nearly"
     );
-    // x and y exchanged in the skin's column: a rigid motion fits, but turns the skin upside down.
+    // x and y swapped in the skin's column: a rigid motion fits, but turns the skin upside down.
     let mirrored = three([
         "skin: [0 mm, 0 mm, 0 mm], robot: [0 mm, 0 mm, -20 mm]",
         "skin: [0 mm, 40 mm, 0 mm], robot: [40 mm, 0 mm, -20 mm]",
@@ -336,7 +336,7 @@ fn touched_points_must_span_the_skin_and_not_its_mirror_image() {
 }
 
 #[test]
-fn languages_are_told_apart() {
+fn languages_are_distinguished() {
     let error = Protocol::parse("rig.yaml", example().as_bytes(), &[], &nothing).unwrap_err();
     assert!(
         error

@@ -1,4 +1,4 @@
-//! Press times and roles of recordings that were made without skinrig.
+//! Press times and roles of recordings made without skinrig.
 
 use crate::common::shipped;
 use skinrig_model::{HostDuration, HostTime, Point2, PressRole};
@@ -27,7 +27,7 @@ fn times_of_the_published_recording() {
     assert_eq!(ns(times[2]) - ns(times[0]), 2_000_000_000);
     assert_eq!(ns(times[3]) - ns(times[2]), 3_000_000_000);
     assert_eq!(schedule.phases.at(times[0]).approach, HostTime::ZERO);
-    // 17 periods are 868 / 17 s; a repetition takes 868 s and pauses 3 s, whatever part of it is used.
+    // 17 periods are 868 / 17 s; a repetition takes 868 s and pauses 3 s, however many of its presses are used.
     assert_eq!(ns(times[3 + 17]) - ns(times[3]), 51_058_823_529);
     assert_eq!(ns(times[3 + 289]) - ns(times[3]), 871_000_000_000);
     assert_eq!(ns(times[3 + 9 * 289]) - ns(times[3]), 9 * 871_000_000_000);
@@ -56,7 +56,7 @@ fn times_of_the_published_recording() {
 }
 
 #[test]
-fn the_other_reading_of_the_sync_interval_is_one_key_away() {
+fn one_key_selects_the_other_sync_interval() {
     let schedule = schedule("paper-recording.schedule.yaml", &["sync.interval=2 s"]);
     let (_, times) = schedule.planned(&[Point2::default(); 289]).unwrap();
     assert_eq!(ns(times[3]) - ns(times[0]), 7_000_000_000);

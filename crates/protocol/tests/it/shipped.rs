@@ -19,7 +19,7 @@ const PROTOCOLS: [&str; 9] = [
 ];
 
 #[test]
-fn every_shipped_file_is_known_here() {
+fn every_shipped_file_is_listed() {
     let mut names: Vec<String> = std::fs::read_dir(folder())
         .unwrap()
         .map(|e| e.unwrap().file_name().into_string().unwrap())
@@ -60,7 +60,7 @@ fn plans_are_safe_and_unchanged() {
 }
 
 #[test]
-fn the_paper_campaign_is_the_papers() {
+fn the_paper_campaign_matches_the_paper() {
     let protocol = parse(&shipped("paper-meander.yaml"), &[]).unwrap();
     let plan = protocol.compile();
     assert_eq!(plan.presses.len(), 2503);
@@ -113,7 +113,7 @@ fn schedules_parse() {
 }
 
 #[test]
-fn pictures_hold_every_location() {
+fn pictures_show_every_location() {
     let protocol = parse(&shipped("demo.yaml"), &[]).unwrap();
     let svg = path_svg(&protocol.compile(), &protocol.surroundings);
     for number in 1..=81 {
@@ -164,9 +164,9 @@ fn shipped_files_fit_their_schemas() {
     }
 }
 
-/// Every key of the schema is known to the reader, and what the schema requires is required.
+/// The reader accepts every key of the schema and requires those that the schema requires.
 #[test]
-fn schema_and_reader_know_the_same_keys() {
+fn schema_and_reader_have_the_same_keys() {
     let schema: Value = serde_json::from_str(&schema_json()).unwrap();
     let expected = |text: &str| {
         let error = parse(text, &[]).unwrap_err();
@@ -189,12 +189,12 @@ fn schema_and_reader_know_the_same_keys() {
             "" => &schema,
             name => &schema["$defs"][name],
         };
-        let said = expected(text);
+        let message = expected(text);
         for key in object["properties"].as_object().unwrap().keys() {
-            assert!(said.contains(&format!("`{key}`")), "{key}: {said}");
+            assert!(message.contains(&format!("`{key}`")), "{key}: {message}");
         }
         let count = object["properties"].as_object().unwrap().len();
-        assert_eq!(said.matches('`').count(), 2 * count, "{said}");
+        assert_eq!(message.matches('`').count(), 2 * count, "{message}");
     }
     let missing = parse("x: 1\n", &[]).unwrap_err();
     for key in schema["required"].as_array().unwrap() {

@@ -1,17 +1,17 @@
-//! The check of the surface: what it may ask for, and what of the plan it changes.
+//! The surface check: its limits and its effect on the plan.
 
 use skinrig_protocol::{Surface, TouchSearch};
 
 use crate::common::{demo, parse, shipped};
 
 fn with(section: &str) -> Result<skinrig_protocol::Protocol, skinrig_protocol::Diagnostics> {
-    // Presses that touch take longer than the demo's.
+    // Touching presses take longer than the demo's.
     let slow = ["sync.interval=10s", "motion.period=10s"];
     parse(&format!("{}\n{section}\n", shipped("demo.yaml")), &slow)
 }
 
 #[test]
-fn a_plan_without_a_check_says_nothing_of_it() {
+fn a_plan_without_a_check_omits_it() {
     let text = serde_json::to_string(&demo(&[]).compile()).unwrap();
     assert!(!text.contains("surface_check") && !text.contains("max_consecutive_invalid"));
     let changed = demo(&["limits.max_consecutive_invalid=0"]).compile();
@@ -20,7 +20,7 @@ fn a_plan_without_a_check_says_nothing_of_it() {
 }
 
 #[test]
-fn a_check_touches_as_the_presses_do() {
+fn a_check_uses_the_touch_settings_of_the_presses() {
     let at = demo(&[]).locations[0];
     let points = format!(
         "surface_check: {{points: [[{} mm, {} mm]]}}",
@@ -33,7 +33,7 @@ fn a_check_touches_as_the_presses_do() {
     let plain = check(with(&points).unwrap());
     assert_eq!((plain.points.len(), plain.tolerance_mm), (1, 0.3));
     assert!(!plain.each_repetition);
-    // The defaults of `press`, as its own keys give them.
+    // The defaults of `press`.
     assert_eq!(plain.search, TouchSearch::default());
     let touch = with(&format!("{points}\npress: {{surface: touch}}")).unwrap();
     assert_eq!(touch.surface, Some(Surface::Touch(TouchSearch::default())));
@@ -70,7 +70,7 @@ fn the_time_of_the_checks_is_in_the_plans() {
     let none = lasts("").0;
     let (once, repetitions) = lasts("surface_check: {points: [[10 mm, 2 mm], [0 mm, 0 mm]]}");
     let each = lasts("surface_check: {points: [[10 mm, 2 mm], [0 mm, 0 mm]], at: each_repetition}");
-    // A touch searches 1 mm at 2 mm/s after 300 ms of tare, besides its ways.
+    // A touch searches 1 mm at 2 mm/s after 300 ms of tare, besides its travels.
     let check = once - none;
     assert!(check > 2.0 * 0.8 && check < 60.0, "{check}");
     assert!(((each.0 - none) - (1.0 + repetitions) * check).abs() < 1e-6);

@@ -1,8 +1,8 @@
-//! As much of a JSON Schema validator as the generated schemas need.
+//! A JSON Schema validator for the keywords of the generated schemas.
 
 use serde_json::Value;
 
-/// The few words of JSON Schema that the generated schemas use. `Err` names the first place that does not fit.
+/// Validates a value. `Err` names the first location that does not fit.
 pub(crate) fn validate(
     schema: &Value,
     value: &Value,

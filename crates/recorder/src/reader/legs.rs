@@ -114,10 +114,10 @@ fn began_from(row: &sqlx::sqlite::SqliteRow) -> Result<ResumeHeader, Fault> {
     })
 }
 
-type Before = (Option<(HostTime, RunEnd)>, Option<[u8; 32]>);
+type PreviousLeg = (Option<(HostTime, RunEnd)>, Option<[u8; 32]>);
 
 /// A row of `leg`, and the end and tree hash of the previous leg.
-fn further_from(row: &sqlx::sqlite::SqliteRow) -> Result<(LegRow, Before), Fault> {
+fn further_from(row: &sqlx::sqlite::SqliteRow) -> Result<(LegRow, PreviousLeg), Fault> {
     let leg = LegRow {
         number: num(row, "number")?,
         began: began_from(row)?,

@@ -136,14 +136,32 @@ impl SessionReader {
         from_seq: u64,
         mut each: impl FnMut(ChunkMeta, &[u8]),
     ) -> Result<(), RecorderError> {
+        self.for_each_chunk_while(camera, from_seq, |meta, bytes| {
+            each(meta, bytes);
+            true
+        })
+    }
+
+    /// [`Self::for_each_chunk`] that ends after the first chunk for which `each` returns false.
+    ///
+    /// # Errors
+    /// At the first damaged chunk, after passing on all earlier ones.
+    pub fn for_each_chunk_while(
+        &self,
+        camera: CameraId,
+        from_seq: u64,
+        mut each: impl FnMut(ChunkMeta, &[u8]) -> bool,
+    ) -> Result<(), RecorderError> {
         let restarts = self.restarts(camera)?;
         let lost = self.lost_times(camera)?;
         let mut next = from_seq;
         while let Some((mut meta, bytes)) = self.chunk_at_or_after(camera, next)? {
             meta.restart_us = restarts.get(&meta.seq).copied();
             meta.lost_time = lost.get(&meta.seq).copied();
-            each(meta, &bytes);
             next = meta.seq + 1;
+            if !each(meta, &bytes) {
+                break;
+            }
         }
         Ok(())
     }
@@ -180,7 +198,7 @@ impl SessionReader {
         let (mut last_us, mut open) = (None, None::<Loss>);
         for chunk in self.chunk_index(camera)? {
             if chunk.lost_before > 0 {
-                let told_us = chunk.lost_time.and_then(|t| t.from_us);
+                let reported_us = chunk.lost_time.and_then(|t| t.from_us);
                 let loss = open.get_or_insert(Loss {
                     seq: chunk.seq,
                     bytes: 0,
@@ -191,7 +209,7 @@ impl SessionReader {
                 });
                 loss.bytes = loss.bytes.saturating_add(chunk.lost_before);
                 // A device may report an earlier start of the loss.
-                let from_us = [loss.time.from_us, told_us];
+                let from_us = [loss.time.from_us, reported_us];
                 loss.time.from_us = from_us.into_iter().flatten().min();
             }
             if let (Some(first), Some(last)) = (chunk.facts.first_us, chunk.facts.last_us) {

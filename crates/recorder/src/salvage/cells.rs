@@ -11,7 +11,7 @@ use super::pages::{Image, Pages};
 const MAX_BYTES: u64 = 256 << 20;
 /// Smallest page size that SQLite supports.
 const MIN_PAGE_BYTES: usize = 512;
-/// Most bytes of rows on a page, relative to its size. TableRows do not overlap, but damaged offsets may.
+/// Most bytes of rows on a page, relative to its size. Rows do not overlap, but damaged offsets may.
 const MAX_OVERLAP: usize = 4;
 
 /// A stored value.

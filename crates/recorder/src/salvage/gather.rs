@@ -61,8 +61,8 @@ pub(super) fn gather(pages: &mut Pages, shapes: &[TableShape]) -> io::Result<Vec
                 continue;
             };
             // A further leg deletes these rows, so older copies of the page are obsolete.
-            let taken_away = matches!(shape.kind.name, "run_end" | "table_digest");
-            if taken_away && pages.latest(image.page) != Some(image) {
+            let is_deleted = matches!(shape.kind.name, "run_end" | "table_digest");
+            if is_deleted && pages.latest(image.page) != Some(image) {
                 continue;
             }
             let row = shape.row(values, cell.rowid);

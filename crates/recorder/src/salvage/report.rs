@@ -10,7 +10,7 @@ use crate::error::RecorderError;
 /// Result of a salvage.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct SalvageReport {
-    /// Row counts by table, in schema order, without tables of which nothing is known.
+    /// Row counts by table, in schema order, without tables of unknown row counts.
     pub tables: Vec<SalvagedTable>,
     /// Lost camera bytes.
     pub lost: Vec<LostBytes>,
@@ -25,9 +25,9 @@ pub struct SalvageReport {
 pub struct SalvagedTable {
     /// Name of the table.
     pub name: String,
-    /// TableRows in the new file.
+    /// Rows in the new file.
     pub rows: u64,
-    /// TableRows known to be missing; more may be.
+    /// Rows known to be missing; there may be more.
     pub missing: u64,
 }
 

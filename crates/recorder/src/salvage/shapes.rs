@@ -142,7 +142,7 @@ pub(crate) struct TableShape {
     keyed: bool,
 }
 
-/// KeyPart of a row's key.
+/// Part of a row's key.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum KeyPart {
     Int(i64),

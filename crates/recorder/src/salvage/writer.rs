@@ -74,7 +74,7 @@ struct MissingRange {
 impl SalvageWriter<'_> {
     /// Writes all rows and a note about the salvage.
     pub(super) async fn fill(&mut self, name: &str) -> Result<(), SalvageError> {
-        // TableRows are kept even if their parent rows are lost.
+        // Keeps rows even if their parent rows are lost.
         sqlx::query("PRAGMA foreign_keys = OFF")
             .execute(&mut *self.conn)
             .await?;
@@ -317,7 +317,7 @@ impl SalvageWriter<'_> {
         Ok((range.last_seq - range.first_seq + 1) as u64)
     }
 
-    /// Drops gap rows of replaced chunks: more was lost than they state, and the replacement knows no times.
+    /// Drops gap rows of replaced chunks: more was lost than they state, and the replacements have no times.
     async fn drop_replaced_gaps(&mut self) -> Result<(), SalvageError> {
         for lost in &self.report.lost {
             sqlx::query("DELETE FROM gap WHERE camera = ? AND seq BETWEEN ? AND ?")
@@ -342,7 +342,7 @@ const RAW_BYTES: usize = 5;
 const MAX_MISSING: i64 = 1 << 20;
 /// Lost bytes if the number is unknown: the longest word.
 const UNKNOWN_LOSS_BYTES: i64 = 8;
-/// Largest believable loss in a row, bytes.
+/// Largest plausible loss in a row, bytes.
 const MAX_BYTES: i64 = 1 << 40;
 
 fn extend_range(

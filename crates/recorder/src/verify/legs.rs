@@ -14,11 +14,11 @@ pub(super) fn check(reader: &SessionReader, report: &mut VerifyReport) {
     if legs.len() == 1 {
         return;
     }
-    let told = order(&legs, report)
+    let result = order(&legs, report)
         .and_then(|()| chunks(reader, &legs, report))
         .and_then(|()| attempts(reader, &legs, report))
         .and_then(|()| resets(reader, &legs, report));
-    report.ok_or_add(told);
+    report.ok_or_add(result);
 }
 
 fn order(legs: &[LegRow], report: &mut VerifyReport) -> Result<(), RecorderError> {

@@ -24,7 +24,7 @@ pub struct VerifyReport {
 }
 
 impl VerifyReport {
-    /// True when nothing is wrong.
+    /// True without problems.
     #[must_use]
     pub fn is_sound(&self) -> bool {
         self.problems.is_empty()
@@ -43,7 +43,7 @@ impl VerifyReport {
         result.map_err(|e| self.add_error(e)).ok()
     }
 
-    /// Adds an error. A system failure is kept apart, because it is no problem of the file.
+    /// Adds an error. A system failure is kept apart, because it is not a problem of the file.
     pub(super) fn add_error(&mut self, error: RecorderError) {
         if error.is_system_failure() {
             self.system_failure.get_or_insert(error.to_string());

@@ -1,4 +1,4 @@
-//! What a further leg takes off and what it keeps: no damage is sealed anew, and every earlier seal can be proven from the rows.
+//! Resuming sealed sessions: no damage is sealed again, and every earlier seal can be verified from the rows.
 
 use std::path::Path;
 
@@ -26,8 +26,8 @@ fn writable(path: &Path) {
     std::fs::set_permissions(path, permissions).unwrap();
 }
 
-/// Goes on with the session; the writer is left unsealed unless `seal`.
-fn go_on(path: &Path, stop_after: usize, seal: bool) {
+/// Continues the session; the writer is left unsealed unless `seal`.
+fn resume(path: &Path, stop_after: usize, seal: bool) {
     let known = SessionReader::open(path).unwrap().history().unwrap();
     let mut writer = SessionWriter::resume(path, &mut Evt2::default()).unwrap();
     for record in further_leg(&known).into_iter().take(stop_after) {
@@ -52,9 +52,9 @@ fn change(path: &Path, statement: &'static str) {
     });
 }
 
-/// One flipped bit anywhere in a sealed, stopped session: it is refused, and stays as it is, damage and all.
+/// One flipped bit anywhere in a sealed, stopped session: resuming is rejected, and the file stays unchanged.
 #[test]
-fn no_flipped_bit_is_sealed_anew() {
+fn no_flipped_bit_is_sealed_again() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
     sealed(&path, PRESSES);
@@ -64,7 +64,7 @@ fn no_flipped_bit_is_sealed_anew() {
     for n in 0..48 {
         let bad = folder.path().join(format!("{n}.session.sqlite"));
         let mut bytes = whole.clone();
-        // Every third one anywhere, where most of a small session is nothing; the others where something is.
+        // Every third offset anywhere, since most of a small session is empty; the others in non-zero bytes.
         let at = match n % 3 {
             0 => next(&mut seed) as usize % bytes.len(),
             _ => used[next(&mut seed) as usize % used.len()],
@@ -84,17 +84,17 @@ fn no_flipped_bit_is_sealed_anew() {
         assert!(!bad.with_extension("sqlite-lock").exists());
         std::fs::remove_file(&bad).unwrap();
     }
-    go_on(&path, usize::MAX, true);
+    resume(&path, usize::MAX, true);
 }
 
-/// The rows of a leg that was sealed are held against that seal for ever, also while a later leg is not sealed.
+/// The rows of a sealed leg are compared with that seal permanently, even while a later leg is unsealed.
 #[test]
 fn earlier_legs_cannot_be_rewritten() {
     let folder = tempfile::tempdir().unwrap();
     let original = folder.path().join("a.session.sqlite");
     let first = sealed(&original, PRESSES);
     // Cut off in its third attempt.
-    go_on(&original, 14, false);
+    resume(&original, 14, false);
     let problems = |path: &Path| verify(path, &mut Evt2::default()).unwrap().problems;
     assert_eq!(problems(&original), [""; 0]);
     let legs = SessionReader::open(&original).unwrap().legs().unwrap();
@@ -156,7 +156,7 @@ fn earlier_legs_cannot_be_rewritten() {
             Err(RecorderError::Unsound { .. })
         ));
     }
-    // What the leg that goes on adds is its own.
+    // Rows added by the new leg are not covered.
     change(
         &original,
         "UPDATE device SET model = 'another' WHERE id = 3",
@@ -164,9 +164,9 @@ fn earlier_legs_cannot_be_rewritten() {
     assert_eq!(problems(&original), [""; 0]);
 }
 
-/// Several legs, some of them sealed and some cut off: every seal is proven.
+/// Several legs, some sealed and some cut off: every seal is verified.
 #[test]
-fn every_seal_of_many_legs_is_proven() {
+fn every_seal_of_many_legs_is_verified() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
     let mut trees = vec![Some(sealed(&path, PRESSES).tree_sha256)];
@@ -174,16 +174,16 @@ fn every_seal_of_many_legs_is_proven() {
         let cut_off = leg % 2 == 1;
         let known = SessionReader::open(&path).unwrap().history().unwrap();
         let mut writer = SessionWriter::resume(&path, &mut Evt2::default()).unwrap();
-        let mut told = further_leg(&known);
-        told.truncate(11);
-        for record in told {
+        let mut leg_records = further_leg(&known);
+        leg_records.truncate(11);
+        for record in leg_records {
             writer.accept(record).unwrap();
         }
         if cut_off {
             drop(writer);
             trees.push(None);
         } else {
-            // As the controller ends a stopped run: every attempt has its verdict, and the rest is missed.
+            // As at the end of a stopped run: every attempt has a verdict, and the remaining presses are missed.
             drop(writer);
             let mut stopped = SessionWriter::resume(&path, &mut Evt2::default()).unwrap();
             trees.push(None);
@@ -205,9 +205,9 @@ fn every_seal_of_many_legs_is_proven() {
     assert!(trees.iter().flatten().count() >= 3);
 }
 
-/// A sealed file that was left writable is made read-only again by whoever verifies it, and only when it is sound.
+/// Verification makes a sealed but writable file read-only, if it is sound.
 #[test]
-fn a_sealed_file_that_can_be_written_is_protected() {
+fn a_writable_sealed_file_is_made_read_only() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
     sealed(&path, PRESSES);
@@ -220,7 +220,7 @@ fn a_sealed_file_that_can_be_written_is_protected() {
     assert!(report.remarks.is_empty(), "{report:?}");
 }
 
-/// The hash of the file torn anywhere, as by a power cut: not sealed, not damaged, and sealed again to the same content.
+/// The file hash torn anywhere, as by a power cut: not sealed, not damaged, and sealed again with the same content.
 #[test]
 fn a_torn_file_hash_is_an_unfinished_seal() {
     let folder = tempfile::tempdir().unwrap();
@@ -246,14 +246,14 @@ fn a_torn_file_hash_is_an_unfinished_seal() {
         let report = verify(&torn, &mut Evt2::default()).unwrap();
         assert!(report.is_sound() && !report.sealed, "{written}: {report:?}");
         assert!(report.remarks[0].contains("interrupted"), "{report:?}");
-        let again = SessionWriter::open_ended(&torn, &mut Evt2::default()).unwrap();
-        assert_eq!(again.finish().unwrap().tree_sha256, whole.tree_sha256);
+        let reopened = SessionWriter::open_ended(&torn, &mut Evt2::default()).unwrap();
+        assert_eq!(reopened.finish().unwrap().tree_sha256, whole.tree_sha256);
         let report = verify(&torn, &mut Evt2::default()).unwrap();
         assert!(report.is_sound() && report.sealed, "{report:?}");
     }
 }
 
-/// A writer that ends before its header leaves nothing, at any of its steps, and nothing is never called damage.
+/// A writer that ends before its header leaves an empty session, at any step, which never counts as damaged.
 #[test]
 fn a_session_without_a_header_is_empty() {
     let folder = tempfile::tempdir().unwrap();
@@ -292,7 +292,7 @@ fn a_session_without_a_header_is_empty() {
     assert!(!report.is_sound());
 }
 
-/// As a new file is before its schema: a first page, and nothing on it.
+/// A new file before its schema: an empty first page.
 fn change_none(path: &Path) {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .build()

@@ -1,4 +1,4 @@
-//! A small session of every kind of record, and a scanner that knows just enough EVT2.
+//! A small session with every kind of record, and a minimal EVT2 scanner.
 
 use std::path::Path;
 
@@ -220,7 +220,7 @@ pub(crate) fn records(presses: u32) -> Vec<Record> {
 }
 
 /// All records of a further leg that makes the sync press again and every press that has no valid attempt: its clocks and its
-/// chunk numbers begin anew.
+/// chunk numbers start again.
 pub(crate) fn further_leg(known: &[PressHistory]) -> Vec<Record> {
     let mut out = vec![Record::Resumed(Box::new(ResumeHeader {
         operator: "another tester".into(),

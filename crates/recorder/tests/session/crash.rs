@@ -1,4 +1,4 @@
-//! A writer killed in the middle of its work: what it acknowledged is there, and the file says what was cut off.
+//! A writer killed in mid-operation: acknowledged records are stored, and the file marks what was cut off.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
@@ -10,10 +10,10 @@ use skinrig_recorder::{ChunkScanner, RecorderError, SessionReader, SessionWriter
 use crate::common::{ALIGNMENT_US, Evt2, further_leg, records, stream};
 
 const PRESSES: u32 = 8;
-/// Set in the child: how many records it writes with acknowledgement, and the session file.
+/// Set in the child: number of acknowledged records to write, and the session file.
 const CHILD: &str = "SKINRIG_TEST_KILLED_WRITER";
 
-/// The records up to the `acknowledged`th that is acknowledged.
+/// The records up to the `acknowledged`th acknowledged one.
 fn beginning(acknowledged: usize) -> Vec<Record> {
     let mut left = acknowledged;
     let mut out = Vec::new();
@@ -28,7 +28,7 @@ fn beginning(acknowledged: usize) -> Vec<Record> {
             return out;
         }
     }
-    panic!("fewer than {acknowledged} records are acknowledged");
+    panic!("fewer than {acknowledged} acknowledged records");
 }
 
 fn chunks(records: &[Record], camera: CameraId) -> impl Iterator<Item = &RawChunk> {
@@ -38,14 +38,14 @@ fn chunks(records: &[Record], camera: CameraId) -> impl Iterator<Item = &RawChun
     })
 }
 
-/// Bytes of the chunks that come after the acknowledged records, some 150 kB each.
+/// Bytes of the chunks after the acknowledged records, about 150 kB each.
 fn later_bytes(seq: u64) -> Vec<u8> {
     (0..16)
         .flat_map(|k| stream(ALIGNMENT_US + (16 * seq + k) * 20_000, 1250))
         .collect()
 }
 
-/// Writes the acknowledged records, then chunks of both cameras, each told on standard output, until it is killed.
+/// Writes the acknowledged records, then chunks of both cameras, reporting each on standard output, until it is killed.
 fn write_until_killed(path: &Path, acknowledged: usize) -> Result<(), RecorderError> {
     let mut writer = SessionWriter::create(path)?;
     let mut scanner = Evt2::default();
@@ -82,15 +82,15 @@ fn kill_after(path: &Path, acknowledged: usize, sent: usize) {
     let mut child = Command::new(std::env::current_exe().unwrap())
         .args([
             "--exact",
-            "crash::a_killed_writer_leaves_what_it_acknowledged",
+            "crash::a_killed_writer_leaves_all_acknowledged_records",
             "--nocapture",
         ])
         .env(CHILD, format!("{acknowledged} {}", path.display()))
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
-    let mut told = BufReader::new(child.stdout.take().unwrap());
-    let seen = told
+    let mut output = BufReader::new(child.stdout.take().unwrap());
+    let seen = output
         .by_ref()
         .lines()
         .filter(|line| line.as_ref().unwrap() == "sent")
@@ -102,7 +102,7 @@ fn kill_after(path: &Path, acknowledged: usize, sent: usize) {
 }
 
 #[test]
-fn a_killed_writer_leaves_what_it_acknowledged() {
+fn a_killed_writer_leaves_all_acknowledged_records() {
     if let Ok(task) = std::env::var(CHILD) {
         let (acknowledged, path) = task.split_once(' ').unwrap();
         return write_until_killed(Path::new(path), acknowledged.parse().unwrap()).unwrap();

@@ -1,4 +1,4 @@
-//! Any changed byte of a sealed session is found, and nothing panics on damaged files.
+//! Any changed byte of a sealed session is detected, and no damaged file causes a panic.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use skinrig_recorder::{RecorderError, SessionReader, SessionWriter, list, verify
 /// Bytes of a page of a session file.
 const PAGE: usize = 65536;
 
-/// Reads all that a reader can read; errors are fine.
+/// Reads everything that a reader can read; errors are allowed.
 fn read_all(path: &Path) {
     let Ok(reader) = SessionReader::open(path) else {
         return;
@@ -43,7 +43,7 @@ fn check(original: &[u8], offsets: impl Iterator<Item = usize>, bit: impl Fn(usi
         bytes[offset] ^= bit(offset);
         std::fs::write(&path, &bytes).unwrap();
         let report = verify(&path, &mut Evt2::default()).unwrap();
-        assert!(!report.is_sound(), "byte {offset} was changed unnoticed");
+        assert!(!report.is_sound(), "byte {offset} was changed undetected");
         if offset % 7 == 0 {
             read_all(&path);
             list(folder.path()).unwrap();
@@ -53,7 +53,7 @@ fn check(original: &[u8], offsets: impl Iterator<Item = usize>, bit: impl Fn(usi
 }
 
 #[test]
-fn planned_presses_are_those_of_the_plan_even_without_a_seal() {
+fn planned_presses_match_the_plan_even_without_a_seal() {
     let verify_with = |move_mm: f64| {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.session.sqlite");
@@ -74,7 +74,7 @@ fn planned_presses_are_those_of_the_plan_even_without_a_seal() {
 }
 
 #[test]
-fn a_sync_press_made_validly_twice_within_one_leg_is_found() {
+fn a_repeated_valid_sync_press_within_one_leg_is_detected() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("x.session.sqlite");
     let mut writer = SessionWriter::create(&path).unwrap();
@@ -103,7 +103,7 @@ fn a_sync_press_made_validly_twice_within_one_leg_is_found() {
 }
 
 #[test]
-fn any_flipped_byte_is_found() {
+fn any_flipped_byte_is_detected() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("good");
     sealed(&path, 3);
@@ -136,13 +136,13 @@ fn the_seals_own_page_is_covered() {
 }
 
 #[test]
-fn cut_and_extended_files_are_found() {
+fn truncated_and_extended_files_are_detected() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("good");
     sealed(&path, 3);
     let original = std::fs::read(&path).unwrap();
     let changed = folder.path().join("x.session.sqlite");
-    // A file that is cut to nothing is like one into which nothing was written: no session, and not sound either.
+    // A file truncated to zero bytes is like one without records: no session, and not sound either.
     std::fs::write(&changed, "").unwrap();
     let empty = verify(&changed, &mut Evt2::default());
     assert!(

@@ -1,5 +1,5 @@
-//! A session that is moved, removed or replaced while it is written: noticed, and kept in one file that goes on. The lock file beside it
-//! keeps nobody out by itself.
+//! A session that is moved, removed or replaced while it is written: the loss is detected, and all records are saved in one file that
+//! can be resumed. The lock file alone does not keep a second writer out.
 #![cfg(target_os = "linux")]
 
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use crate::common::{Evt2, further_leg, records, sealed};
 
 const PRESSES: u32 = 5;
 
-/// A session under way, two outcomes long.
+/// A session in progress with two outcomes.
 struct Run {
     root: tempfile::TempDir,
     path: PathBuf,
@@ -49,18 +49,19 @@ impl Run {
         self.path.parent().unwrap().to_owned()
     }
 
-    /// Found out; written to its end all the same; kept in one file, which is the session and goes on. Where.
+    /// Checks that the displacement is detected, and that the session is written to its end and saved in one file that can be
+    /// resumed. Returns its path.
     #[track_caller]
     fn into_rescued(mut self, found: &str) -> (tempfile::TempDir, PathBuf) {
-        let told = self.writer.check().unwrap_err();
-        assert!(matches!(told, RecorderError::Displaced { .. }), "{told}");
-        assert!(told.to_string().contains(found), "{told}");
+        let error = self.writer.check().unwrap_err();
+        assert!(matches!(error, RecorderError::Displaced { .. }), "{error}");
+        assert!(error.to_string().contains(found), "{error}");
         for record in std::mem::take(&mut self.rest) {
             self.writer.accept(record).unwrap();
         }
         let kept = match self.writer.finish() {
             Err(RecorderError::Rescued { to, displaced }) => {
-                assert_eq!(displaced.to_string(), told.to_string());
+                assert_eq!(displaced.to_string(), error.to_string());
                 to
             }
             other => panic!("{other:?}"),
@@ -87,13 +88,13 @@ impl Run {
 }
 
 #[test]
-fn a_renamed_file_is_found() {
+fn a_renamed_file_is_detected() {
     let run = begin();
     let new = run.folder().join("b.session.sqlite");
     std::fs::rename(&run.path, &new).unwrap();
     let (root, kept) = run.into_rescued("moved to");
     assert_eq!(kept, new);
-    // Nothing of its log is left under the old name.
+    // No log file is left under the old name.
     let left = std::fs::read_dir(root.path().join("sessions")).unwrap();
     let left: Vec<_> = left.map(|e| e.unwrap().file_name()).collect();
     assert_eq!(left, ["b.session.sqlite"]);
@@ -113,14 +114,14 @@ fn a_renamed_folder_is_followed() {
     let run = begin();
     let new = run.root.path().join("elsewhere");
     std::fs::rename(run.folder(), &new).unwrap();
-    // Somebody makes the folder anew.
+    // The folder is created again.
     std::fs::create_dir(run.folder()).unwrap();
     let (_root, kept) = run.into_rescued("moved to");
     assert_eq!(kept, new.join("a.session.sqlite"));
 }
 
 #[test]
-fn out_of_a_removed_folder_a_copy_is_made_above_it() {
+fn a_removed_folder_leads_to_a_copy_above_it() {
     let run = begin();
     std::fs::remove_dir_all(run.folder()).unwrap();
     let (root, kept) = run.into_rescued("it was removed");
@@ -151,7 +152,7 @@ fn another_file_in_its_place_is_left_alone() {
         sealed(&other, PRESSES);
         let bytes = std::fs::read(&other).unwrap();
         std::fs::rename(&other, &run.path).unwrap();
-        // The log is still that of the run: nobody may go on with what has its name now.
+        // The log still belongs to the run: the file now under this name must not be resumed.
         let refused = SessionWriter::resume(&run.path, &mut Evt2::default());
         assert!(
             matches!(refused, Err(RecorderError::InUse { .. })),
@@ -168,7 +169,7 @@ fn another_file_in_its_place_is_left_alone() {
 }
 
 #[test]
-fn the_next_free_name_is_taken() {
+fn the_next_free_name_is_used() {
     let run = begin();
     let first = run.folder().join("a.rescued.session.sqlite");
     std::fs::write(&first, "precious").unwrap();
@@ -183,7 +184,7 @@ fn the_next_free_name_is_taken() {
 }
 
 #[test]
-fn without_the_lock_file_nobody_else_gets_in() {
+fn a_second_writer_is_rejected_without_the_lock_file() {
     for replaced in [false, true] {
         let mut run = begin();
         let lock = beside(&run.path, "-lock");
@@ -212,7 +213,7 @@ fn without_the_lock_file_nobody_else_gets_in() {
     }
 }
 
-/// A sealed session is read-only and has no log; a leg of it is refused to others from its first instant on.
+/// A sealed session is read-only and has no log; a leg of it is locked from its first instant.
 #[test]
 fn a_leg_is_locked_before_it_begins() {
     let folder = tempfile::tempdir().unwrap();
@@ -221,7 +222,7 @@ fn a_leg_is_locked_before_it_begins() {
     let known = SessionReader::open(&path).unwrap().history().unwrap();
     let mut leg = SessionWriter::resume(&path, &mut Evt2::default()).unwrap();
     std::fs::remove_file(beside(&path, "-lock")).unwrap();
-    // Under another name, where there is no lock file at all.
+    // Under another name, without a lock file.
     let link = folder.path().join("b.session.sqlite");
     std::fs::hard_link(&path, &link).unwrap();
     let refused = || {

@@ -1,4 +1,4 @@
-//! The time that was lost with bytes: a row of its own, held against the times around it.
+//! Time lost with bytes: stored in its own row, and checked against the times around it.
 
 use crate::common::{Evt2, header};
 use skinrig_model::*;
@@ -27,8 +27,8 @@ fn chunk(seq: u64, lost: u64, times_us: &[u64], scanner: &mut Evt2) -> RawChunk 
     }
 }
 
-/// A session of camera 2 that lost bytes four times: between two times, before an empty chunk and again after it, at a time that the
-/// device knows to be earlier, and at the end.
+/// A session in which camera 2 lost bytes four times: between two times, before an empty chunk and again after it, at a time reported
+/// by the device as earlier, and at the end.
 fn lossy(path: &std::path::Path) {
     let mut writer = SessionWriter::create(path).unwrap();
     let mut accept = |record| writer.accept(record).unwrap();
@@ -76,15 +76,15 @@ fn change(path: &std::path::Path, statements: &[&'static str]) {
 }
 
 #[test]
-fn lost_time_is_told_from_the_last_time_to_the_next() {
+fn lost_time_extends_from_the_last_time_to_the_next() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
     lossy(&path);
     let reader = SessionReader::open(&path).unwrap();
     let losses = reader.losses(CAMERA).unwrap();
-    let told: Vec<_> = losses.iter().map(|l| (l.seq, l.bytes, l.time)).collect();
+    let reported: Vec<_> = losses.iter().map(|l| (l.seq, l.bytes, l.time)).collect();
     assert_eq!(
-        told,
+        reported,
         [
             (1, 8, time(1_280, 6_400)),
             (2, 20, time(6_400, 64_000)),
@@ -117,7 +117,7 @@ fn lost_time_is_told_from_the_last_time_to_the_next() {
 }
 
 #[test]
-fn a_gap_that_does_not_fit_its_surroundings_is_found() {
+fn a_gap_that_contradicts_its_surroundings_is_detected() {
     for (statement, words) in [
         ("UPDATE gap SET to_us = 70000 WHERE seq = 1", "to end with"),
         ("UPDATE gap SET to_us = NULL WHERE seq = 1", "to end with"),
@@ -142,9 +142,9 @@ fn a_gap_that_does_not_fit_its_surroundings_is_found() {
     }
 }
 
-/// A session from before the table: what was lost is inferred from the chunks, and its facts stand.
+/// In a session of an older schema, losses are inferred from the chunks, whose facts are unchanged.
 #[test]
-fn an_older_session_tells_its_gaps_as_before() {
+fn gaps_of_an_older_session_are_inferred() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
     lossy(&path);

@@ -1,4 +1,4 @@
-//! A session that goes on in a further leg: one line of time, every press counted once, sound at every instant.
+//! Sessions of several legs: one continuous time line, every press counted once, and sound at every instant.
 
 use proptest::prelude::*;
 use sha2::{Digest as _, Sha256};
@@ -16,8 +16,8 @@ fn sound(path: &std::path::Path, sealed: bool) {
     assert_eq!((report.problems, report.sealed), (vec![], sealed));
 }
 
-/// Goes on to the end and seals.
-fn go_on(path: &std::path::Path) -> Vec<Record> {
+/// Resumes to the end and seals.
+fn resume(path: &std::path::Path) -> Vec<Record> {
     let known = SessionReader::open(path).unwrap().history().unwrap();
     let leg = further_leg(&known);
     let mut writer = SessionWriter::resume(path, &mut Evt2::default()).unwrap();
@@ -38,12 +38,12 @@ fn is_sorted(times: impl IntoIterator<Item = HostTime>) -> bool {
     times.into_iter().is_sorted()
 }
 
-/// What a leg told comes back, moved by its origins and by nothing else.
-fn comes_back(reader: &SessionReader, leg: &LegRow, told: &[Record]) {
+/// Checks that the records of a leg are read back, shifted by its origins only.
+fn check_round_trip(reader: &SessionReader, leg: &LegRow, written: &[Record]) {
     let moved = |t: HostTime| HostTime(t.0 + leg.origin.0);
     let mut outcomes = Vec::new();
     let mut chunks = 0;
-    for record in told {
+    for record in written {
         match record {
             Record::Outcome(o) => outcomes.push(o.clone()),
             Record::Chunk(c) => {
@@ -65,10 +65,10 @@ fn comes_back(reader: &SessionReader, leg: &LegRow, told: &[Record]) {
     }
     assert!(chunks > 0);
     let presses = reader.presses().unwrap();
-    for mut told in outcomes {
-        let attempts = &presses[told.attempt.press.index() as usize].1;
-        let attempt = &attempts[told.attempt.number as usize - 1];
-        let timing = told.timing.as_mut().unwrap();
+    for mut written in outcomes {
+        let attempts = &presses[written.attempt.press.index() as usize].1;
+        let attempt = &attempts[written.attempt.number as usize - 1];
+        let timing = written.timing.as_mut().unwrap();
         assert_eq!(
             attempt.intent,
             Some(moved(HostTime(timing.approach.0 - 1_000_000)))
@@ -83,12 +83,12 @@ fn comes_back(reader: &SessionReader, leg: &LegRow, told: &[Record]) {
         ] {
             *moment = moved(*moment);
         }
-        assert_eq!(attempt.outcome.as_ref(), Some(&told));
+        assert_eq!(attempt.outcome.as_ref(), Some(&written));
     }
 }
 
-/// One line of time from the first leg to the last.
-fn one_line(reader: &SessionReader) {
+/// Checks that times are continuous from the first leg to the last.
+fn check_times(reader: &SessionReader) {
     let everything = (HostTime(i64::MIN), HostTime(i64::MAX));
     let poses = reader.poses(everything.0, everything.1).unwrap();
     assert!(is_sorted(poses.iter().map(|p| p.t)));
@@ -112,7 +112,7 @@ fn one_line(reader: &SessionReader) {
 }
 
 #[test]
-fn a_stopped_and_sealed_session_goes_on() {
+fn a_stopped_and_sealed_session_is_resumed() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
     let first = sealed(&path, PRESSES);
@@ -133,11 +133,11 @@ fn a_stopped_and_sealed_session_goes_on() {
             (1, Some(missed))
         ]
     );
-    // Opened and left again: still the sealed session.
+    // Opened and closed without a record: still the sealed session.
     drop(SessionWriter::resume(&path, &mut Evt2::default()).unwrap());
     sound(&path, true);
 
-    let second = go_on(&path);
+    let second = resume(&path);
     sound(&path, true);
     assert!(std::fs::metadata(&path).unwrap().permissions().readonly());
     assert_eq!(
@@ -157,9 +157,9 @@ fn a_stopped_and_sealed_session_goes_on() {
     assert_eq!((legs[1].devices_before, legs[1].preflight_before), (2, 3));
     assert_eq!(legs[1].origin.0 % 1_000_000_000, 0);
     assert_eq!(legs[1].end, reader.end().unwrap());
-    comes_back(&reader, &legs[0], &records(PRESSES));
-    comes_back(&reader, &legs[1], &second);
-    one_line(&reader);
+    check_round_trip(&reader, &legs[0], &records(PRESSES));
+    check_round_trip(&reader, &legs[1], &second);
+    check_times(&reader);
     let resets = reader
         .box_reports()
         .unwrap()
@@ -216,7 +216,7 @@ fn one_writer_at_a_time_and_the_header_of_a_leg_first() {
     sound(&path, false);
 }
 
-/// Runs statements on the file as it is.
+/// Runs statements on the unchanged file.
 fn with_file<T>(path: &std::path::Path, work: impl AsyncFnOnce(&mut SqliteConnection) -> T) -> T {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .build()
@@ -262,9 +262,9 @@ fn a_session_that_ended_without_its_seal_is_sealed() {
     ));
 }
 
-/// A process that ends between the rows of the seal and the file hash leaves the placeholder in its place.
+/// A process that ends between the rows of the seal and the file hash leaves the placeholder.
 #[test]
-fn a_seal_that_is_half_written_is_found_and_written_again() {
+fn a_half_written_seal_is_detected_and_rewritten() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
     let whole = sealed(&path, PRESSES);
@@ -276,7 +276,7 @@ fn a_seal_that_is_half_written_is_found_and_written_again() {
         .chain_update(whole.tree_sha256)
         .finalize();
     bytes[at..at + 32].copy_from_slice(&placeholder);
-    // Not yet read-only, as it is then.
+    // Still writable at that point.
     std::fs::remove_file(&path).unwrap();
     std::fs::write(&path, &bytes).unwrap();
     let report = verify(&path, &mut Evt2::default()).unwrap();
@@ -300,10 +300,10 @@ fn a_seal_that_is_half_written_is_found_and_written_again() {
     );
 }
 
-/// A process that ends in the middle of the step that takes the seal off leaves a file with pages of both states, and beside it what
-/// undoes them.
+/// A process that ends while it removes the seal leaves a file with pages of both states, and a journal beside it that
+/// restores them.
 #[test]
-fn a_leg_that_was_half_begun_is_undone() {
+fn a_half_begun_leg_is_rolled_back() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
     sealed(&path, 40);
@@ -339,13 +339,13 @@ fn a_leg_that_was_half_begun_is_undone() {
 }
 
 #[test]
-fn a_session_of_an_older_schema_goes_on() {
+fn a_session_of_an_older_schema_is_resumed() {
     for was_sealed in [false, true] {
-        older_schema_goes_on(was_sealed);
+        check_older_schema(was_sealed);
     }
 }
 
-fn older_schema_goes_on(was_sealed: bool) {
+fn check_older_schema(was_sealed: bool) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
     let mut writer = SessionWriter::create(&path).unwrap();
@@ -354,7 +354,7 @@ fn older_schema_goes_on(was_sealed: bool) {
         writer.accept(record).unwrap();
     }
     drop(writer);
-    // As schema 2 had it: preflight and legs came later.
+    // As in schema 2: later schemas added preflight and legs.
     with_file(&path, async |conn| {
         execute(
             conn,
@@ -379,14 +379,14 @@ fn older_schema_goes_on(was_sealed: bool) {
     }
     sound(&path, was_sealed);
     assert_eq!(SessionReader::open(&path).unwrap().legs().unwrap().len(), 1);
-    go_on(&path);
+    resume(&path);
     sound(&path, true);
     let reader = SessionReader::open(&path).unwrap();
     let legs = reader.legs().unwrap();
     assert_eq!(legs.len(), 2);
     assert_eq!(legs[0].tree_sha256.is_some(), was_sealed);
     assert_eq!(reader.header().unwrap(), header(PRESSES));
-    // The seal of the old schema is proven from the rows of the new one.
+    // The seal of the old schema is verified from the rows of the new one.
     let report = verify(&path, &mut Evt2::default()).unwrap();
     assert_eq!(report.remarks, [""; 0]);
 }
@@ -394,9 +394,9 @@ fn older_schema_goes_on(was_sealed: bool) {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
 
-    /// Left at any record, twice, and gone on with each time.
+    /// Interrupted at any record, twice, and resumed each time.
     #[test]
-    fn a_session_goes_on_from_any_record(first in 1usize..70, second in 1usize..70) {
+    fn a_session_is_resumed_from_any_record(first in 1usize..70, second in 1usize..70) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.session.sqlite");
         let begun = records(PRESSES);
@@ -436,13 +436,13 @@ proptest! {
         }
 
         drop(reader); // a session with a reader is not sealed
-        let last = go_on(&path);
+        let last = resume(&path);
         sound(&path, true);
         let reader = SessionReader::open(&path).unwrap();
         prop_assert_eq!(open(&reader), vec![]);
         let legs = reader.legs().unwrap();
         prop_assert_eq!(legs.len(), 3);
-        comes_back(&reader, &legs[2], &last);
+        check_round_trip(&reader, &legs[2], &last);
         let index = reader.chunk_index(CameraId::One).unwrap();
         let restarts = index.iter().filter(|m| m.restart_us.is_some()).count();
         let with_chunks = legs[1..].iter().enumerate().filter(|(k, leg)| {

@@ -1,4 +1,4 @@
-//! The session file as a whole: what goes in comes out, damage is found, other programs can read it.
+//! Whole session files: round trips, detection of damage, and access by other programs.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod chain;

@@ -1,4 +1,4 @@
-//! The Python of `docs/reference/session-file.md` reads the same events as the reader.
+//! The Python code in `docs/reference/session-file.md` reads the same events as the reader.
 
 use std::process::Command;
 
@@ -10,7 +10,7 @@ use crate::common::{ALIGNMENT_US, sealed};
 const DOC: &str = include_str!("../../../../docs/reference/session-file.md");
 
 #[test]
-fn the_documented_python_reads_a_presss_events() {
+fn the_documented_python_reads_the_events_of_a_press() {
     let has_numpy = Command::new("python3")
         .args(["-c", "import numpy"])
         .output();
@@ -63,7 +63,7 @@ for press in range(4):
             }
         })
         .unwrap();
-    // The last event of a chunk comes 16 µs before the chunk does; the time base has steps of 64 µs.
+    // The last event of a chunk is 16 µs before the end of the chunk; the time base has steps of 64 µs.
     let last = reader.chunk_index(CameraId::Two).unwrap();
     let lag = last
         .iter()

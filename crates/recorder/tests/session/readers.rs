@@ -1,4 +1,4 @@
-//! Others read a session while it is written: nobody meets a lock, and nobody is kept from the session for good.
+//! Concurrent readers of a session that is being written: none is blocked, and none blocks sealing permanently.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::SeqCst};
@@ -28,7 +28,7 @@ fn read_everything(path: &Path) -> Result<(), RecorderError> {
 }
 
 #[test]
-fn eight_readers_read_a_whole_session_and_none_meets_a_lock() {
+fn eight_readers_are_never_blocked() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
     let mut writer = SessionWriter::create(&path).unwrap();
@@ -57,7 +57,7 @@ fn eight_readers_read_a_whole_session_and_none_meets_a_lock() {
             })
             .collect();
         for record in all {
-            // The slowest of readers sees some of it.
+            // The slowest readers see some of it.
             if matches!(record, Record::Ended { .. }) {
                 while rounds.load(SeqCst) < 2 * READERS as u64 {
                     std::thread::yield_now();
@@ -74,9 +74,9 @@ fn eight_readers_read_a_whole_session_and_none_meets_a_lock() {
         (sealed, errors)
     });
     assert_eq!(errors, [""; 0]);
-    // With no instant between two readers the seal has to wait for the last of them.
+    // Without a pause between two readers, sealing waits for the last one.
     if let Err(refused) = sealed {
-        assert_refusal_says_what_to_do(&refused);
+        assert_next_step(&refused);
         SessionWriter::open_ended(&path, &mut Evt2::default())
             .unwrap()
             .finish()
@@ -86,19 +86,19 @@ fn eight_readers_read_a_whole_session_and_none_meets_a_lock() {
     assert!(report.sealed && report.is_sound(), "{report:?}");
 }
 
-fn assert_refusal_says_what_to_do(refused: &RecorderError) {
-    let said = refused.to_string();
+fn assert_next_step(refused: &RecorderError) {
+    let message = refused.to_string();
     for part in [
         "complete, but not sealed",
         "another program kept it open",
         "skinrig resume",
     ] {
-        assert!(said.contains(part), "{said}");
+        assert!(message.contains(part), "{message}");
     }
 }
 
 #[test]
-fn a_reader_that_stays_puts_the_seal_off_and_no_more() {
+fn a_reader_that_stays_open_only_delays_the_seal() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
     let mut writer = SessionWriter::create(&path).unwrap();
@@ -111,13 +111,13 @@ fn a_reader_that_stays_puts_the_seal_off_and_no_more() {
     for record in rest {
         writer.accept(record).unwrap();
     }
-    // How long it waits is a setting; 60 s for a run.
+    // The timeout is a setting; 60 s for a run.
     writer.set_seal_timeout(std::time::Duration::from_millis(100));
-    let mut told = 0;
-    let refused = writer.finish_with_notice(|| told += 1).unwrap_err();
-    assert_refusal_says_what_to_do(&refused);
-    assert_eq!(told, 1);
-    // It reads on what is all there, and so does everybody else.
+    let mut notices = 0;
+    let refused = writer.finish_with_notice(|| notices += 1).unwrap_err();
+    assert_next_step(&refused);
+    assert_eq!(notices, 1);
+    // The reader still reads everything, and so do others.
     assert_eq!(reader.presses().unwrap().len(), 3);
     read_everything(&path).unwrap();
     assert!(reader.end().unwrap().is_some() && reader.seal().unwrap().is_none());

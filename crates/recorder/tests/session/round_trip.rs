@@ -1,4 +1,4 @@
-//! What goes into a session comes out of it, sealed, growing, cut off or refused.
+//! Round trips of sealed, growing, interrupted and rejected sessions.
 
 use crate::common::{Evt2, header, records, sealed};
 use skinrig_model::*;
@@ -7,7 +7,7 @@ use skinrig_recorder::{
 };
 
 #[test]
-fn everything_comes_back() {
+fn all_records_round_trip() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
     let seal = sealed(&path, 6);
@@ -166,7 +166,7 @@ fn everything_comes_back() {
 }
 
 #[test]
-fn durable_records_are_readable_at_once_and_a_dropped_writer_leaves_a_session() {
+fn durable_records_are_readable_immediately_and_a_dropped_writer_leaves_a_session() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
     let mut writer = SessionWriter::create(&path).unwrap();
@@ -200,12 +200,16 @@ fn durable_records_are_readable_at_once_and_a_dropped_writer_leaves_a_session() 
     let report = verify(&path, &mut Evt2::default()).unwrap();
     assert_eq!((report.problems, report.sealed), (vec![], false));
     let reader = SessionReader::open(&path).unwrap();
-    assert_eq!(reader.notes().unwrap().len(), 1, "the last records too");
+    assert_eq!(
+        reader.notes().unwrap().len(),
+        1,
+        "including the last records"
+    );
     assert!(reader.end().unwrap().is_none() && reader.seal().unwrap().is_none());
 }
 
 #[test]
-fn wrong_order_is_refused_and_a_failed_write_stays_failed() {
+fn wrong_order_is_rejected_and_a_failed_write_is_permanent() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
     let mut writer = SessionWriter::create(&path).unwrap();
@@ -256,7 +260,7 @@ fn wrong_order_is_refused_and_a_failed_write_stays_failed() {
 }
 
 #[test]
-fn lost_chunks_and_nan_positions_are_never_taken() {
+fn missing_chunks_and_nan_positions_are_rejected() {
     let bad_chunk = RawChunk {
         camera: CameraId::One,
         seq: 1,
@@ -302,7 +306,7 @@ fn lost_chunks_and_nan_positions_are_never_taken() {
         drop(writer);
         if is_chunk {
             let notes = SessionReader::open(&path).unwrap().notes().unwrap();
-            assert_eq!(notes.len(), 1, "what came before it is kept");
+            assert_eq!(notes.len(), 1, "earlier records are kept");
         }
     }
 }
@@ -338,7 +342,7 @@ fn a_session_is_sealed_only_when_it_is_complete() {
 }
 
 #[test]
-fn other_files_are_told_apart() {
+fn other_files_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     assert!(matches!(
@@ -412,7 +416,7 @@ fn a_folder_is_listed_with_its_broken_files() {
         panic!()
     };
     assert_eq!((*sealed, end, presses.open()), (false, &None, 2));
-    assert_eq!(*totals, None, "nobody counted the rows of the whole file");
+    assert_eq!(*totals, None, "rows of unsealed files are not counted");
     assert!(
         matches!(&sessions[2].state, SessionState::Broken { reason } if reason.contains("less than 108"))
     );

@@ -1,4 +1,4 @@
-//! What is whole of a damaged session comes back, and what does not is told.
+//! Salvage: intact rows of a damaged session are recovered, and losses are reported.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -120,7 +120,7 @@ impl Case {
         )
     }
 
-    /// Salvages a damaged copy. Every row is in the new file or told to be lost; gives the number of rows that came back.
+    /// Salvages a damaged copy. Every row is recovered or reported as lost; returns the number of recovered rows.
     fn check(
         &self,
         damaged: &[u8],
@@ -139,23 +139,26 @@ impl Case {
             let lost = self.tables[name] != rows;
             hurt += usize::from(lost);
             back += rows.len();
-            assert!(!lost || !report.is_whole(), "{what}: {name} in silence");
+            assert!(
+                !lost || !report.is_whole(),
+                "{what}: {name} lost without a report"
+            );
         }
         let found = chunks(&to);
         let mut lost_chunks = false;
         for ((camera, seq), bytes) in &self.chunks {
-            let told = report
+            let reported = report
                 .lost
                 .iter()
                 .any(|l| l.camera == *camera && (l.first_seq..=l.last_seq).contains(seq));
-            lost_chunks |= told;
+            lost_chunks |= reported;
             match found.get(&(*camera, *seq)) {
-                Some(came) if told => assert!(came.is_empty(), "{what}"),
+                Some(came) if reported => assert!(came.is_empty(), "{what}"),
                 Some(came) => {
                     assert!(came == bytes, "{what}: {camera} chunk {seq} altered");
                     back += 1;
                 }
-                // The end of a stream cannot be missed by itself; the digest of the table tells.
+                // The loss of the end of a stream is visible only in the digest of the table.
                 None => assert!(
                     !report.is_whole(),
                     "{what}: {camera} chunk {seq} in silence"
@@ -167,7 +170,7 @@ impl Case {
 }
 
 #[test]
-fn a_sound_session_comes_back_whole() {
+fn an_intact_session_is_recovered_completely() {
     let (case, bytes) = Case::new(5);
     let (report, _, hurt) = case.check(&bytes, "sound");
     let report = report.unwrap();
@@ -183,7 +186,7 @@ fn a_sound_session_comes_back_whole() {
         notes.last().unwrap().text.ends_with("no known losses"),
         "{notes:?}"
     );
-    // Nothing is overwritten.
+    // Existing files are not overwritten.
     let again = salvage(&case.folder.path().join("from"), &to);
     assert!(
         matches!(again, Err(RecorderError::Exists { .. })),
@@ -195,7 +198,7 @@ fn a_sound_session_comes_back_whole() {
 fn a_damaged_byte_costs_one_table_at_most() {
     let (case, original) = Case::new(4);
     let mut bytes = original.clone();
-    // The head of every page, and places all over the file; a step that is coprime to the page.
+    // The head of every page, and offsets all over the file; with a step that is coprime to the page size.
     let heads = (0..original.len() / PAGE).map(|n| n * PAGE);
     let heads = heads.flat_map(|at| [at, at + 4, at + 9, at + 100]);
     for at in heads.chain((0..original.len()).step_by(39_119)) {
@@ -208,7 +211,7 @@ fn a_damaged_byte_costs_one_table_at_most() {
 }
 
 #[test]
-fn a_page_that_is_gone_costs_its_own_rows_only() {
+fn a_missing_page_costs_only_its_own_rows() {
     let (case, original) = Case::new(4);
     for page in 0..original.len() / PAGE {
         let mut bytes = original.clone();
@@ -220,7 +223,7 @@ fn a_page_that_is_gone_costs_its_own_rows_only() {
 }
 
 #[test]
-fn more_comes_back_of_a_longer_piece() {
+fn a_longer_part_yields_more_rows() {
     let (case, original) = Case::new(4);
     let (mut before, mut last) = (0, 0);
     for cut in (0..original.len())
@@ -249,8 +252,8 @@ fn a_damaged_byte_of_the_file_header_costs_nothing() {
     }
 }
 
-/// A run as a killed process leaves it: the last outcome is on the disk, nothing is moved out of the log.
-struct Cut {
+/// A run as left by a killed process: the last outcome is on disk, and the log was not checkpointed.
+struct KilledRun {
     folder: tempfile::TempDir,
     file: Vec<u8>,
     log: Vec<u8>,
@@ -259,7 +262,7 @@ struct Cut {
 
 const FRAME: usize = PAGE + 24;
 
-impl Cut {
+impl KilledRun {
     fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.session.sqlite");
@@ -293,7 +296,7 @@ impl Cut {
         (report, tables(&to))
     }
 
-    /// A frame of the log for page `number`, chained to `before`, with `commit` as its size after the commit.
+    /// A frame of the log for page `number`, chained to `before`, with `commit` as the size after the commit.
     fn frame(&self, before: [u32; 2], number: u32, commit: u32, page: &[u8]) -> Vec<u8> {
         let head = [number.to_be_bytes(), commit.to_be_bytes()].concat();
         let [mut a, mut b] = before;
@@ -321,7 +324,7 @@ fn word(bytes: &[u8], at: usize) -> u32 {
 
 #[test]
 fn a_damaged_byte_of_the_log_header_costs_nothing() {
-    let cut = Cut::new();
+    let cut = KilledRun::new();
     let (_, whole) = cut.salvage(&cut.log, "whole");
     for (at, bits) in (0..32).flat_map(|at| [(at, 0xFF), (at, 1)]) {
         let mut log = cut.log.clone();
@@ -333,10 +336,10 @@ fn a_damaged_byte_of_the_log_header_costs_nothing() {
 }
 
 #[test]
-fn what_was_never_committed_is_not_taken() {
-    let cut = Cut::new();
+fn uncommitted_pages_are_ignored() {
+    let cut = KilledRun::new();
     let (_, whole) = cut.salvage(&cut.log, "whole");
-    // The page with the answers of the preflight, altered: in the log its last image, in the file its only one.
+    // The page with the results of the preflight, altered: its last image is in the log, its only one in the file.
     let holds = |page: &[u8]| page.windows(4).any(|w| w == b"2 GB");
     let in_log = cut.log[32..]
         .chunks_exact(FRAME)
@@ -361,11 +364,11 @@ fn what_was_never_committed_is_not_taken() {
         }
         log
     };
-    // Written ahead of a commit that never came.
+    // Written ahead of a commit that was never made.
     let (report, left) = cut.salvage(&with(end, [0, 0, 0]), "ahead");
     assert!(report.is_whole(), "{report:?}");
     assert_eq!(left, whole);
-    // The same, when its beginning was written over since: what is there now does not lead to it.
+    // The same with an overwritten beginning: the current frames do not chain to it.
     let (report, left) = cut.salvage(&with([1, 2], [0, 0, 0]), "over");
     assert_eq!(report.findings.len(), 1, "{report:?}");
     assert_eq!(left, whole);
@@ -375,10 +378,10 @@ fn what_was_never_committed_is_not_taken() {
     assert_ne!(left["preflight"], whole["preflight"]);
 }
 
-/// A run that was cut off lies partly in the log. A damaged page there costs what it held, not what was written after it.
+/// An interrupted run is partly in the log. A damaged page there costs its own rows, not the later ones.
 #[test]
 fn a_damaged_log_costs_a_page() {
-    let cut = Cut::new();
+    let cut = KilledRun::new();
     let (report, whole) = cut.salvage(&cut.log, "whole");
     assert!(report.findings.is_empty(), "{report:?}");
     assert_eq!(whole["attempt"], cut.attempts);
@@ -391,7 +394,7 @@ fn a_damaged_log_costs_a_page() {
             .iter()
             .filter(|(name, rows)| whole[*name] != **rows)
             .count();
-        // The last one is the commit of all that was written with it.
+        // The last frame is the commit of all frames written with it.
         let is_commit = n + 1 == cut.log.len() / FRAME;
         assert!(differ <= 1 || is_commit, "frame {n} cost {differ} tables");
     }
@@ -404,7 +407,7 @@ fn a_damaged_log_costs_a_page() {
 }
 
 #[test]
-fn what_is_no_session_gives_nothing() {
+fn other_files_yield_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let [from, to] = ["from", "to"].map(|n| folder.path().join(n));
     assert!(matches!(
@@ -427,7 +430,7 @@ fn what_is_no_session_gives_nothing() {
     }
 }
 
-/// Runs statements on a session that is not sealed, and moves everything from the log to the file.
+/// Runs statements on an unsealed session, and checkpoints the log.
 fn alter(path: &Path, statements: &[&'static str]) {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .build()
@@ -446,7 +449,7 @@ fn alter(path: &Path, statements: &[&'static str]) {
 }
 
 #[test]
-fn rows_that_others_speak_of_are_told_to_be_missing() {
+fn missing_rows_that_others_refer_to_are_reported() {
     let (case, bytes) = Case::new(5);
     let [from, to] = ["from", "to"].map(|n| case.folder.path().join(n));
     for (statement, finding) in [
@@ -481,14 +484,14 @@ fn rows_that_others_speak_of_are_told_to_be_missing() {
         let _ = std::fs::remove_file(&to);
         alter(&from, &[statement]);
         let report = salvage(&from, &to).unwrap();
-        let told = report.findings.iter().filter(|f| f.starts_with(finding));
-        assert_eq!(told.count(), 1, "{statement}: {report:?}");
+        let reported = report.findings.iter().filter(|f| f.starts_with(finding));
+        assert_eq!(reported.count(), 1, "{statement}: {report:?}");
         assert!(!report.is_whole());
     }
 }
 
 #[test]
-fn missing_chunks_came_when_the_one_before_them_did_but_not_before_their_leg() {
+fn missing_chunks_get_the_time_of_the_previous_one_within_their_leg() {
     let folder = tempfile::tempdir().unwrap();
     let [from, to] = ["from", "to"].map(|n| folder.path().join(n));
     sealed(&from, 5);
@@ -500,15 +503,15 @@ fn missing_chunks_came_when_the_one_before_them_did_but_not_before_their_leg() {
     writer.finish().unwrap();
     let reader = SessionReader::open(&from).unwrap();
     let before = reader.chunk_index(CameraId::One).unwrap();
-    // Of the five chunks of the first leg and those of the second: one within, and two where the legs meet.
+    // Of the five chunks of the first leg and those of the second: one within, and two at the boundary of the legs.
     alter(
         &from,
         &["DELETE FROM chunk WHERE camera = 1 AND seq IN (2, 4, 5)"],
     );
     let report = salvage(&from, &to).unwrap();
-    let told = report.tables.iter().filter(|t| t.missing > 0);
-    let told: Vec<_> = told.map(|t| (t.name.as_str(), t.missing)).collect();
-    assert_eq!(told, [("chunk", 3)]);
+    let reported = report.tables.iter().filter(|t| t.missing > 0);
+    let reported: Vec<_> = reported.map(|t| (t.name.as_str(), t.missing)).collect();
+    assert_eq!(reported, [("chunk", 3)]);
     let after = SessionReader::open(&to).unwrap();
     let after = after.chunk_index(CameraId::One).unwrap();
     assert_eq!(after[2].host_time, before[1].host_time);
@@ -522,8 +525,8 @@ fn missing_chunks_came_when_the_one_before_them_did_but_not_before_their_leg() {
     );
 }
 
-/// A page of a table with one row of `note` in it, of which most goes on to page `next`.
-fn note_that_goes_on(id: u8, text_bytes: u32, next: u32) -> Vec<u8> {
+/// A page with one row of `note`, most of which continues on page `next`.
+fn note_with_overflow(id: u8, text_bytes: u32, next: u32) -> Vec<u8> {
     let varint = |n: u32| {
         [21, 14, 7]
             .map(|s| (n >> s) as u8 | 0x80)
@@ -550,15 +553,15 @@ fn note_that_goes_on(id: u8, text_bytes: u32, next: u32) -> Vec<u8> {
     page
 }
 
-/// A page on which a row goes on, and then on page `next`.
-fn goes_on(next: u32) -> Vec<u8> {
+/// An overflow page that continues on page `next`.
+fn overflow_page(next: u32) -> Vec<u8> {
     let mut page = vec![b'a'; PAGE];
     page[..4].copy_from_slice(&next.to_be_bytes());
     page
 }
 
 #[test]
-fn rows_that_go_on_without_an_end_are_left_out() {
+fn rows_with_endless_overflow_chains_are_omitted() {
     let (case, sound) = Case::new(3);
     let [from, to] = ["from", "to"].map(|n| case.folder.path().join(n));
     let pages = (sound.len() / PAGE) as u32;
@@ -571,27 +574,27 @@ fn rows_that_go_on_without_an_end_are_left_out() {
         (report, longest.unwrap())
     };
     let whole = vec![
-        note_that_goes_on(9, 150_000, pages + 2),
-        goes_on(pages + 3),
-        goes_on(0),
+        note_with_overflow(9, 150_000, pages + 2),
+        overflow_page(pages + 3),
+        overflow_page(0),
     ];
     assert_eq!(last_note(whole).1, 150_000);
     let text_bytes = 30 << 16;
     let looping = vec![
-        note_that_goes_on(9, 10 << 16, pages + 2),
-        goes_on(pages + 2),
+        note_with_overflow(9, 10 << 16, pages + 2),
+        overflow_page(pages + 2),
     ];
     assert!(last_note(looping).1 < 1000);
     let huge = vec![
-        note_that_goes_on(9, 100 << 20, pages + 2),
-        goes_on(pages + 2),
+        note_with_overflow(9, 100 << 20, pages + 2),
+        overflow_page(pages + 2),
     ];
     assert!(last_note(huge).1 < 1000);
     // A hundred rows that share a chain of thirty pages.
     let mut shared: Vec<_> = (0..100)
-        .map(|i| note_that_goes_on(9 + i, text_bytes, pages + 101))
+        .map(|i| note_with_overflow(9 + i, text_bytes, pages + 101))
         .collect();
-    shared.extend((1..=31).map(|i| goes_on(pages + 101 + i)));
+    shared.extend((1..=31).map(|i| overflow_page(pages + 101 + i)));
     let (report, _) = last_note(shared);
     assert!(
         report

@@ -42,7 +42,7 @@ fn head(input: &ReportInput<'_>, paint: Paint) -> String {
     use crate::page::findings::fault;
     let (a, p) = (input.analysis, &input.provenance);
     let mut out = String::new();
-    // What is wrong stands before every number.
+    // Print problems before any number.
     if !a.findings.is_empty() {
         let names: Vec<String> = a.findings.iter().map(fault).collect();
         let text = wrap("FAULT     ", &plain(&names.join("; ")));

@@ -12,7 +12,7 @@ pub(crate) struct StructAttributes {
     pub version: Option<String>,
     /// Functions and the fields that each needs.
     pub checks: Vec<(Path, Vec<Ident>)>,
-    /// The type that is built from the struct, and the function that does.
+    /// The type built from the struct, and the function that builds it.
     pub builds: Option<(Type, Path)>,
     pub finish: Option<Path>,
     pub no_default: bool,
@@ -147,7 +147,7 @@ impl FieldAttributes {
         Ok(out)
     }
 
-    /// The declared range as a `ValueRange`, in the unit of the field; `otherwise` when nothing is declared.
+    /// The declared range as a `ValueRange`, in the unit of the field; `otherwise` without a declared range.
     pub(crate) fn range(&self, otherwise: TokenStream) -> TokenStream {
         if let Some(range) = &self.range {
             return quote::quote!(#range);
@@ -169,7 +169,7 @@ impl FieldAttributes {
     }
 }
 
-/// The text of a literal, which a macro may have put into a group.
+/// The text of a literal, possibly grouped by a macro.
 fn text(value: &Expr) -> Option<String> {
     match value {
         Expr::Lit(lit) => match &lit.lit {

@@ -73,7 +73,7 @@ pub(crate) fn settings(input: &DeriveInput) -> Result<TokenStream> {
     let parts_struct = attributes.parts.map(|parts| {
         let reads = reads.clone();
         let (idents, types) = (&idents, types);
-        let doc = format!("What could be read of a [`{ident}`].");
+        let doc = format!("The readable fields of a [`{ident}`].");
         quote! {
             #[doc = #doc]
             #visibility struct #parts {
@@ -81,7 +81,7 @@ pub(crate) fn settings(input: &DeriveInput) -> Result<TokenStream> {
             }
 
             impl #ident {
-                /// Reads each key, also when others cannot be read.
+                /// Reads each key, even if others cannot be read.
                 #visibility fn read_parts(
                     field: &::skinrig_settings::Field,
                     out: &mut ::skinrig_settings::Collector,
@@ -194,7 +194,7 @@ fn built(keys: &Ident, target: &Type, path: &Path) -> TokenStream {
     }
 }
 
-/// A struct whose keys stand in the mapping of another one.
+/// A struct whose keys belong to the mapping of another one.
 fn flattened(ident: Ident, ty: &Type) -> Parts {
     Parts {
         keys: Some(quote!(<#ty as ::skinrig_settings::Settings>::TABLE.keys)),

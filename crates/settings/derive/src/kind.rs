@@ -1,4 +1,4 @@
-//! What the type of a field says of its value: form, reader, text, range, default.
+//! Form, reader, text, range and default of a value, derived from the type of its field.
 
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
@@ -7,7 +7,7 @@ use syn::{Error, Expr, GenericArgument, LitStr, PathArguments, Result, Type};
 use crate::attributes::{FieldAttributes, pascal_case};
 use crate::unit::{SECONDS, Unit};
 
-/// What a value is, by the type of its field.
+/// Kind of a value, from the type of its field.
 pub(crate) enum Kind {
     /// `f64`, with its unit.
     Float(Option<Unit>),
@@ -70,7 +70,7 @@ impl Kind {
         })
     }
 
-    /// Whether the unit at the end of the field's name is one.
+    /// Whether the end of the field's name is a unit.
     pub(crate) fn is_measured(&self) -> bool {
         match self {
             Self::Float(_) | Self::Whole(..) => true,
@@ -156,7 +156,7 @@ impl Kind {
             Self::Duration(ty) => quote!(f.as_quantity().map(<#ty>::from_secs_f64)),
             Self::List(of) => {
                 let of = of.read();
-                // All items are read, so that the findings of each appear.
+                // Read all items, so that the findings of each appear.
                 quote!(f.items().iter().map(|f| #of).collect::<Vec<_>>()
                     .into_iter().collect::<Option<Vec<_>>>())
             }
@@ -188,7 +188,7 @@ impl Kind {
         }
     }
 
-    /// An expression of type `Option<String>`: the range, when the value at `v` is outside it.
+    /// An expression of type `Option<String>`: the range if the value at `v` is outside it.
     pub(crate) fn expected(&self, attributes: &FieldAttributes) -> TokenStream {
         let range = self.range(attributes);
         let describe = |number: TokenStream, unit: &str| {

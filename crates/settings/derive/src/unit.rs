@@ -1,4 +1,4 @@
-//! Units by the ends of field names.
+//! Units from the ends of field names.
 
 /// A unit that a field's name can end in.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -9,7 +9,7 @@ pub(crate) struct Unit {
     pub name: &'static str,
     /// Variant of `Dimension`.
     pub dimension: &'static str,
-    /// How many of it make one of the dimension's own unit.
+    /// Number of these units in the dimension's own unit.
     pub per: f64,
 }
 
@@ -22,7 +22,7 @@ const fn unit(suffix: &'static str, name: &'static str, dimension: &'static str,
     }
 }
 
-/// Longer ends before shorter ones that they contain.
+/// Longer suffixes before shorter ones that they contain.
 const UNITS: &[Unit] = &[
     unit("_mm_s3", "mm/s3", "Jerk", 1.0),
     unit("_mm_s2", "mm/s2", "Acceleration", 1.0),
@@ -59,7 +59,7 @@ pub(crate) fn of_text(text: &str) -> Option<Unit> {
     UNITS.iter().find(|u| u.name == text).copied()
 }
 
-/// The size of a typed unit in the own unit of `dimension`: the twin of `Dimension::units`, for the units that defaults use.
+/// The size of a typed unit in the own unit of `dimension`: mirrors `Dimension::units` for the units of defaults.
 fn size(dimension: &str, typed: &str) -> Option<f64> {
     let sizes: &[(&str, f64)] = match dimension {
         "Time" => &[
@@ -80,7 +80,7 @@ fn size(dimension: &str, typed: &str) -> Option<f64> {
 }
 
 impl Unit {
-    /// A typed quantity in this unit, computed as the reader does.
+    /// A typed quantity in this unit, computed like in the reader.
     pub(crate) fn value_of(self, text: &str) -> Option<f64> {
         let (number, typed) = text.trim().split_once(' ')?;
         let number: f64 = number.parse().ok()?;
@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_tells_its_unit_and_its_key() {
+    fn a_field_name_gives_unit_and_key() {
         for (name, unit, key) in [
             ("max_speed_mm_s", "mm/s", "max_speed"),
             ("window_before_ms", "ms", "window_before"),

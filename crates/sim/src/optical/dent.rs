@@ -42,7 +42,7 @@ impl DentShape {
         }
     }
 
-    /// Radius outside which the skin is taken as undisturbed, mm.
+    /// Radius outside which the skin counts as undisturbed, mm.
     fn reach_mm(&self) -> f64 {
         self.half_side_mm * core::f64::consts::SQRT_2 + FLANK_DECAYS * self.decay_mm
     }

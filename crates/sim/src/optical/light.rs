@@ -1,7 +1,7 @@
 //! The light in the undisturbed skin: emitters, fluence, and the light that each column of the camera receives.
 //!
-//! Light travels in the skin's plane (the 4 mm guide it). A column's light is what comes from the wall at the
-//! far end of its ray, where emitters sit, plus what the skin scatters into the ray on the way, plus stray
+//! Light travels in the skin's plane (the 4 mm guide it). A column's light comes from the wall at the
+//! far end of its ray, with its emitters, plus the light that the skin scatters into the ray, plus stray
 //! light.
 
 use skinrig_model::{CameraModel, Point2, SENSOR_WIDTH, SkinOutline};

@@ -84,7 +84,7 @@ impl OpticalModel {
     /// The model with other constants.
     ///
     /// # Errors
-    /// When a constant is outside its range.
+    /// If a constant is outside its range.
     pub fn with_config(
         scene: &SceneConfig,
         config: OpticalConfig,
@@ -93,7 +93,7 @@ impl OpticalModel {
         Ok(Self::build(scene, config))
     }
 
-    /// The model with constants that are known to be in their ranges.
+    /// The model with constants already checked.
     pub(crate) fn build(scene: &SceneConfig, config: OpticalConfig) -> Self {
         let light = Illumination::new(&scene.outline, &config);
         let columns = light::columns(&scene.camera, &scene.outline, &light, &config);

@@ -50,7 +50,7 @@ struct Pixel {
     /// Factors on the reference for an ON event, above 1, and an OFF event, below 1.
     on: f64,
     off: f64,
-    /// It emits when `x` falls below `low` or rises above `high`. Infinite while it is held.
+    /// It emits if `x` falls below `low` or rises above `high`. Infinite while it is held.
     low: f64,
     high: f64,
     /// In its refractory time; the reference is set when that ends.

@@ -21,30 +21,30 @@ pub trait Recording: Send {
     /// The next motion command, in time order.
     ///
     /// # Errors
-    /// [`RecordingError`] when it cannot be read.
+    /// [`RecordingError`] if it cannot be read.
     fn next_command(&mut self) -> Result<Option<(HostTime, MotionCommand)>, RecordingError>;
 
     /// The next block of poses, in time order, of any size above 0.
     ///
     /// # Errors
-    /// [`RecordingError`] when it cannot be read.
+    /// [`RecordingError`] if it cannot be read.
     fn next_poses(&mut self) -> Result<Option<Vec<PoseSample>>, RecordingError>;
 
     /// The next mark, in time order.
     ///
     /// # Errors
-    /// [`RecordingError`] when it cannot be read.
+    /// [`RecordingError`] if it cannot be read.
     fn next_mark(&mut self) -> Result<Option<SentMark>, RecordingError>;
 
     /// The next report of the trigger box with the time at which it was received, in that order.
     ///
     /// # Errors
-    /// [`RecordingError`] when it cannot be read.
+    /// [`RecordingError`] if it cannot be read.
     fn next_box_report(&mut self) -> Result<Option<(HostTime, BoxReport)>, RecordingError>;
 
     /// The next chunk of `camera`, in stream order.
     ///
     /// # Errors
-    /// [`RecordingError`] when it cannot be read.
+    /// [`RecordingError`] if it cannot be read.
     fn next_chunk(&mut self, camera: CameraId) -> Result<Option<RawChunk>, RecordingError>;
 }

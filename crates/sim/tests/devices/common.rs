@@ -35,14 +35,14 @@ pub(crate) fn ready(rig: &mut Rig) {
 
 /// Results of a run.
 #[derive(Default)]
-pub(crate) struct Take {
+pub(crate) struct RunData {
     pub samples: Vec<RobotSample>,
     pub chunks: [Vec<RawChunk>; 2],
     pub marks: Vec<SentMark>,
     pub reports: Vec<BoxReport>,
 }
 
-impl Take {
+impl RunData {
     /// The bytes of a camera as one string.
     pub(crate) fn bytes(&self, camera: CameraId) -> Vec<u8> {
         self.chunks[camera.index()]
@@ -72,23 +72,25 @@ impl Take {
     }
 }
 
-/// Presses 2 mm deep at each place, on a fixed schedule of 1.5 s per press; `ticks` are the polling intervals in µs, repeated cyclically.
+/// Presses 2 mm deep at each location, on a fixed schedule of 1.5 s per press; `ticks` are the polling intervals in µs, repeated.
 pub(crate) fn press_all(
     rig: &mut Rig,
     places: &[Point2],
     ticks: &[i64],
-) -> Result<Take, DeviceError> {
-    let mut take = Take::default();
+) -> Result<RunData, DeviceError> {
+    let mut take = RunData::default();
     let mut tick = ticks.iter().copied().cycle();
     let up = rig.robot_from_skin;
-    let mut wait = |rig: &mut Rig, take: &mut Take, until: HostTime| -> Result<(), DeviceError> {
-        while rig.clock.now() < until {
-            let next = rig.clock.now() + HostDuration::from_micros(tick.next().unwrap_or(1_000));
-            rig.clock.wait_until(next.min(until));
-            take.poll(rig)?;
-        }
-        Ok(())
-    };
+    let mut wait =
+        |rig: &mut Rig, take: &mut RunData, until: HostTime| -> Result<(), DeviceError> {
+            while rig.clock.now() < until {
+                let next =
+                    rig.clock.now() + HostDuration::from_micros(tick.next().unwrap_or(1_000));
+                rig.clock.wait_until(next.min(until));
+                take.poll(rig)?;
+            }
+            Ok(())
+        };
     for (n, &place) in places.iter().enumerate() {
         let start = HostTime(1_500_000_000 * n as i64);
         let at = |ms: i64| start + HostDuration::from_millis(ms);
@@ -110,7 +112,7 @@ pub(crate) fn press_all(
     Ok(take)
 }
 
-/// Places on the skin that both cameras see.
+/// Locations on the skin in view of both cameras.
 pub(crate) fn places(n: usize) -> Vec<Point2> {
     (0..n)
         .map(|k| Point2::new(-18.0 + 7.0 * (k % 7) as f64, -14.0 + 6.0 * (k % 6) as f64))
@@ -158,14 +160,14 @@ impl Recording for Log {
 }
 
 /// A device that records all calls.
-pub(crate) struct Noted<D> {
+pub(crate) struct LoggedDevice<D> {
     inner: D,
     log: Arc<Mutex<Log>>,
     clock: Box<dyn Clock>,
     skin_from_robot: RigidTransform<Skin, Robot>,
 }
 
-impl<D> Noted<D> {
+impl<D> LoggedDevice<D> {
     pub(crate) fn new(
         inner: D,
         log: &Arc<Mutex<Log>>,
@@ -181,7 +183,7 @@ impl<D> Noted<D> {
     }
 }
 
-impl Indenter for Noted<Box<dyn Indenter>> {
+impl Indenter for LoggedDevice<Box<dyn Indenter>> {
     fn identity(&self) -> DeviceIdentity {
         self.inner.identity()
     }
@@ -229,14 +231,14 @@ impl Indenter for Noted<Box<dyn Indenter>> {
     }
 }
 
-impl Noted<Box<dyn EventCamera>> {
+impl LoggedDevice<Box<dyn EventCamera>> {
     fn note(&mut self, chunks: &[RawChunk]) {
         let k = self.inner.camera().index();
         self.log.lock().unwrap().chunks[k].extend(chunks.iter().cloned());
     }
 }
 
-impl EventCamera for Noted<Box<dyn EventCamera>> {
+impl EventCamera for LoggedDevice<Box<dyn EventCamera>> {
     fn camera(&self) -> CameraId {
         self.inner.camera()
     }
@@ -277,7 +279,7 @@ impl EventCamera for Noted<Box<dyn EventCamera>> {
     }
 }
 
-impl TriggerBox for Noted<Box<dyn TriggerBox>> {
+impl TriggerBox for LoggedDevice<Box<dyn TriggerBox>> {
     fn identity(&self) -> DeviceIdentity {
         self.inner.identity()
     }
@@ -323,19 +325,19 @@ impl Clock for SharedClock {
 }
 
 /// `rig` with all devices recording into the returned log.
-pub(crate) fn noted(rig: Rig) -> (Rig, Arc<Mutex<Log>>) {
+pub(crate) fn with_log(rig: Rig) -> (Rig, Arc<Mutex<Log>>) {
     let log = Arc::new(Mutex::new(Log::default()));
     let clock = SharedClock::new(rig.clock);
     let place = rig.robot_from_skin;
     let own = || -> Box<dyn Clock> { Box::new(clock.clone()) };
     let rig = Rig {
-        indenter: Box::new(Noted::new(rig.indenter, &log, own(), place)),
-        cameras: rig
-            .cameras
-            .map(|c| -> Box<dyn EventCamera> { Box::new(Noted::new(c, &log, own(), place)) }),
+        indenter: Box::new(LoggedDevice::new(rig.indenter, &log, own(), place)),
+        cameras: rig.cameras.map(|c| -> Box<dyn EventCamera> {
+            Box::new(LoggedDevice::new(c, &log, own(), place))
+        }),
         trigger_box: rig
             .trigger_box
-            .map(|t| -> Box<dyn TriggerBox> { Box::new(Noted::new(t, &log, own(), place)) }),
+            .map(|t| -> Box<dyn TriggerBox> { Box::new(LoggedDevice::new(t, &log, own(), place)) }),
         clock: own(),
         ..rig
     };

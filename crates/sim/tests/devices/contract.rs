@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use crate::common::{LIMITS, Log, noted};
+use crate::common::{LIMITS, Log, with_log};
 use skinrig_device::contract::{self, IndenterContract};
 use skinrig_device::detached::Calls;
 use skinrig_device::{
@@ -45,7 +45,7 @@ fn both(mut suite: impl FnMut(&mut dyn FnMut() -> Rig)) {
     for level in [SimLevel::Kinematic, SimLevel::Geometric] {
         let logs: Arc<Mutex<Vec<Arc<Mutex<Log>>>>> = Arc::default();
         suite(&mut || {
-            let (rig, log) = noted(simulated_rig(&SimConfig::new(3, level)));
+            let (rig, log) = with_log(simulated_rig(&SimConfig::new(3, level)));
             logs.lock().unwrap().push(log);
             rig
         });

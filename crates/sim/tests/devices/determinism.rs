@@ -1,11 +1,11 @@
 //! Equal configurations give equal bytes at any polling rate; different seeds do not.
 
-use crate::common::{Take, places, press_all, ready};
+use crate::common::{RunData, places, press_all, ready};
 use proptest::prelude::*;
 use skinrig_model::{CameraId, SimLevel};
 use skinrig_sim::{SimConfig, simulated_rig};
 
-fn run(config: &SimConfig, ticks: &[i64]) -> Take {
+fn run(config: &SimConfig, ticks: &[i64]) -> RunData {
     let mut rig = simulated_rig(config);
     ready(&mut rig);
     let mut take = press_all(&mut rig, &places(2), ticks).unwrap();
@@ -23,7 +23,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(6))]
 
     #[test]
-    fn looking_does_not_change_the_world(ticks in prop::collection::vec(37i64..90_000, 1..40)) {
+    fn polling_does_not_change_the_world(ticks in prop::collection::vec(37i64..90_000, 1..40)) {
         let config = small_chunks(11, SimLevel::Geometric);
         let (often, seldom) = (run(&config, &[1_000]), run(&config, &ticks));
         prop_assert!(often.samples == seldom.samples);
@@ -50,7 +50,7 @@ fn seeds_matter_and_bytes_are_pinned() {
     let two = run(&SimConfig::new(2, SimLevel::Geometric), &[10_000]);
     assert_ne!(one.bytes(CameraId::One), two.bytes(CameraId::One));
     assert_ne!(one.bytes(CameraId::One), one.bytes(CameraId::Two));
-    // Equal on every machine: after a change, old seeds give other sessions.
+    // Equal on every machine: after a change, old seeds give different sessions.
     let prints = CameraId::ALL.map(|c| fingerprint(&one.bytes(c)));
     assert_eq!(prints.map(|p| format!("{p:016x}")), PINNED);
 }

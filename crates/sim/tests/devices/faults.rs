@@ -1,6 +1,6 @@
 //! Each injected fault shows as the documented error or count.
 
-use crate::common::{LIMITS, Take, places, press_all, ready};
+use crate::common::{LIMITS, RunData, places, press_all, ready};
 use skinrig_device::DeviceError;
 use skinrig_formats::Decoder;
 use skinrig_model::{
@@ -107,7 +107,7 @@ fn lost_bytes_are_counted() {
         when,
         words: 1_234,
     };
-    let run = |config: &SimConfig| -> Take {
+    let run = |config: &SimConfig| -> RunData {
         let mut rig = simulated_rig(config);
         ready(&mut rig);
         let mut take = press_all(&mut rig, &places(1), &[5_000]).unwrap();
@@ -361,7 +361,7 @@ fn too_much_force_stops_the_robot() {
         .iter()
         .map(|s| s.measured.z_mm)
         .fold(f64::MAX, f64::min);
-    assert!(deepest > at(-1.8).z_mm, "went on pressing to {deepest}");
+    assert!(deepest > at(-1.8).z_mm, "continued to press to {deepest}");
     assert!(matches!(
         rig.indenter.command(at(-3.0), 20.0),
         Err(DeviceError::Refused { .. })
@@ -371,7 +371,7 @@ fn too_much_force_stops_the_robot() {
 }
 
 #[test]
-fn what_finds_no_room_is_lost_and_counted() {
+fn overflowing_data_is_lost_and_counted() {
     let after = |buffer_bytes: usize, looks: i64| {
         let mut config = SimConfig::new(4, SimLevel::Geometric);
         config.camera_clock.buffer_bytes = buffer_bytes;

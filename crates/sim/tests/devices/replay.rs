@@ -1,6 +1,6 @@
 //! A recorded run, replayed through the same traits.
 
-use crate::common::{Log, Take, noted, places, press_all, ready};
+use crate::common::{Log, RunData, places, press_all, ready, with_log};
 use skinrig_device::{DeviceError, Rig};
 use skinrig_model::{DeviceRole, Point2, SimLevel, StreamFormat};
 use skinrig_sim::replay::{RecordedRig, replayed_rig};
@@ -12,8 +12,8 @@ fn config() -> SimConfig {
     config
 }
 
-fn recorded(at: &[Point2]) -> (Log, Take) {
-    let (mut rig, log) = noted(simulated_rig(&config()));
+fn recorded(at: &[Point2]) -> (Log, RunData) {
+    let (mut rig, log) = with_log(simulated_rig(&config()));
     ready(&mut rig);
     let mut take = press_all(&mut rig, at, &[5_000]).unwrap();
     take.poll(&mut rig).unwrap();
@@ -42,15 +42,15 @@ fn the_same_requests_give_the_same_records() {
     let (log, first) = recorded(&at);
     let mut rig = replay(&log);
     ready(&mut rig);
-    let mut again = press_all(&mut rig, &at, &[5_000]).unwrap();
-    again.poll(&mut rig).unwrap();
-    again.stop(&mut rig);
-    assert_eq!(first.marks, again.marks);
+    let mut replayed = press_all(&mut rig, &at, &[5_000]).unwrap();
+    replayed.poll(&mut rig).unwrap();
+    replayed.stop(&mut rig);
+    assert_eq!(first.marks, replayed.marks);
     assert!(!first.reports.is_empty());
-    assert_eq!(first.reports, again.reports);
-    assert_eq!(first.chunks, again.chunks);
-    assert_eq!(first.samples.len(), again.samples.len());
-    for (a, b) in first.samples.iter().zip(&again.samples) {
+    assert_eq!(first.reports, replayed.reports);
+    assert_eq!(first.chunks, replayed.chunks);
+    assert_eq!(first.samples.len(), replayed.samples.len());
+    for (a, b) in first.samples.iter().zip(&replayed.samples) {
         assert_eq!(a.t, b.t);
         assert!(a.measured.distance_mm(b.measured) < 1e-9);
         assert!(a.commanded.distance_mm(b.commanded) < 1e-9);
@@ -70,8 +70,8 @@ fn commands_set_the_clock_to_their_recorded_instants() {
     let (log, first) = recorded(&at);
     let mut rig = replay(&log);
     ready(&mut rig);
-    // A controller with another rhythm, which does not wait as long: the commands pull it along.
-    let mut again = Take::default();
+    // A controller with a different rhythm and shorter waits: the commands advance the clock.
+    let mut replayed = RunData::default();
     for (t, command) in log.commands.clone() {
         rig.clock
             .wait_until(skinrig_model::HostTime(t.0 - 1_000_000));
@@ -82,15 +82,15 @@ fn commands_set_the_clock_to_their_recorded_instants() {
             )
             .unwrap();
         assert_eq!(rig.clock.now(), t);
-        again.poll(&mut rig).unwrap();
+        replayed.poll(&mut rig).unwrap();
         assert_eq!(
-            again.samples.last().map(|s| s.t.0 / 1_000_000),
+            replayed.samples.last().map(|s| s.t.0 / 1_000_000),
             Some(t.0 / 1_000_000)
         );
     }
-    again.stop(&mut rig);
-    // Every command was given, so stopping hands over the rest.
-    assert_eq!(first.chunks, again.chunks);
+    replayed.stop(&mut rig);
+    // Every command was given, so stopping delivers the rest.
+    assert_eq!(first.chunks, replayed.chunks);
 }
 
 #[test]
@@ -112,7 +112,7 @@ fn a_wait_stops_once_at_a_recorded_command() {
 }
 
 #[test]
-fn another_request_is_a_divergence() {
+fn a_different_request_is_a_divergence() {
     let at = places(2);
     let (log, _) = recorded(&at);
     let other = [at[0], Point2::new(at[1].x_mm + 0.001, at[1].y_mm)];
@@ -132,17 +132,20 @@ fn another_request_is_a_divergence() {
 }
 
 #[test]
-fn beyond_its_end_a_recording_says_that_it_ends() {
+fn the_end_of_a_recording_is_an_error() {
     let at = places(2);
     let (log, _) = recorded(&at);
     let mut rig = replay(&log);
     ready(&mut rig);
     let more = [at.clone(), places(1)].concat();
     let error = press_all(&mut rig, &more, &[5_000]).err();
-    let told = error.map(|e| e.to_string()).unwrap_or_default();
-    assert!(told.contains("the recording ends here, at "), "{told}");
+    let message = error.map(|e| e.to_string()).unwrap_or_default();
+    assert!(
+        message.contains("the recording ends here, at "),
+        "{message}"
+    );
 
-    // Time goes on, but no pose comes any more.
+    // Time continues, but no more poses arrive.
     let mut rig = replay(&log);
     ready(&mut rig);
     press_all(&mut rig, &at, &[5_000]).unwrap();
@@ -150,6 +153,9 @@ fn beyond_its_end_a_recording_says_that_it_ends() {
     rig.clock
         .wait_until(skinrig_model::HostTime(end.0 + 60_000_000));
     let error = rig.indenter.poll(&mut Vec::new()).err();
-    let told = error.map(|e| e.to_string()).unwrap_or_default();
-    assert!(told.contains("the recording ends here, at "), "{told}");
+    let message = error.map(|e| e.to_string()).unwrap_or_default();
+    assert!(
+        message.contains("the recording ends here, at "),
+        "{message}"
+    );
 }

@@ -1,19 +1,19 @@
-//! What the simulated cameras send: time base, rates, polarity, place, triggers.
+//! Data of the simulated cameras: time base, rates, polarity, position, triggers.
 
-use crate::common::{Take, places, press_all, ready};
+use crate::common::{RunData, places, press_all, ready};
 use skinrig_formats::Decoder;
 use skinrig_model::{
     CameraId, CdEvent, Point2, Polarity, SimLevel, StreamFormat, TriggerEdge, pulse::decode_marks,
 };
 use skinrig_sim::{SimConfig, simulated_rig};
 
-fn decode(take: &Take, camera: CameraId) -> (Vec<CdEvent>, Vec<TriggerEdge>) {
+fn decode(take: &RunData, camera: CameraId) -> (Vec<CdEvent>, Vec<TriggerEdge>) {
     let (mut events, mut triggers) = (Vec::new(), Vec::new());
     Decoder::new(StreamFormat::Evt2).push_cd(&take.bytes(camera), &mut events, &mut triggers);
     (events, triggers)
 }
 
-fn run(config: &SimConfig, at: &[Point2]) -> Take {
+fn run(config: &SimConfig, at: &[Point2]) -> RunData {
     let mut rig = simulated_rig(config);
     ready(&mut rig);
     let mut take = press_all(&mut rig, at, &[10_000]).unwrap();
@@ -22,7 +22,7 @@ fn run(config: &SimConfig, at: &[Point2]) -> Take {
 }
 
 #[test]
-fn time_base_comes_every_16_us_also_when_idle() {
+fn time_base_words_come_every_16_us_even_when_idle() {
     let take = run(&SimConfig::new(5, SimLevel::Kinematic), &places(1));
     for camera in CameraId::ALL {
         let bytes = take.bytes(camera);
@@ -35,7 +35,7 @@ fn time_base_comes_every_16_us_also_when_idle() {
         // 1.5 s, 62,500 words per second.
         assert!((93_700..93_800).contains(&highs.len()), "{}", highs.len());
         assert!(highs.windows(2).all(|p| p[1] - p[0] <= 1));
-        // Each value four times, but for the first and last.
+        // Each value four times, except for the first and last.
         let full = highs.len() as u32 / 4;
         assert!((highs.last().unwrap() - highs[0]).abs_diff(full) <= 1);
         let (events, _) = decode(&take, camera);
@@ -73,7 +73,7 @@ fn marks_reach_both_cameras_and_fit_a_line() {
 }
 
 #[test]
-fn presses_show_where_and_when_they_should() {
+fn presses_appear_at_their_position_and_time() {
     let mut config = SimConfig::new(7, SimLevel::Geometric);
     config.geometric.dead_share = 0.0;
     let at = [Point2::new(10.0, 2.0)];
@@ -98,7 +98,7 @@ fn presses_show_where_and_when_they_should() {
         assert!(release.len() > 1_500, "{}", release.len());
         assert!(on(&press) < 0.35, "{}", on(&press));
         assert!(on(&release) > 0.6, "{}", on(&release));
-        // The median column is that of the contact.
+        // The median column equals that of the contact.
         let mut columns: Vec<u16> = press.iter().map(|e| e.x).collect();
         columns.sort_unstable();
         let median = f64::from(columns[columns.len() / 2]);
@@ -112,12 +112,12 @@ fn presses_show_where_and_when_they_should() {
 }
 
 #[test]
-fn rates_are_those_of_the_paper() {
+fn rates_match_the_paper() {
     // Twelve presses of 3 s, as in the campaign; both cameras together: press 28.6 kev/s over 0.55 s, idle 9.1 kev/s.
     let config = SimConfig::new(8, SimLevel::Geometric);
     let mut rig = simulated_rig(&config);
     ready(&mut rig);
-    let mut take = Take::default();
+    let mut take = RunData::default();
     let grid = places(12);
     let up = rig.robot_from_skin;
     let mut bounds = Vec::new();

@@ -67,8 +67,8 @@ pub struct BenchConfig {
 }
 
 impl Default for BenchConfig {
-    /// A bench with realistic crystals, tens of ppm apart. Box and camera 1 differ by 25 ppm, so that trains every 100 ms meet the camera's
-    /// microseconds alternately at only two phases.
+    /// A bench with realistic crystals, tens of ppm apart. Box and camera 1 differ by 25 ppm, so
+    /// that trains every 100 ms alternate between only two phases of the camera's microseconds.
     fn default() -> Self {
         Self {
             seed: 1,
@@ -78,7 +78,7 @@ impl Default for BenchConfig {
             camera_origin_us: [0, 7_000_000],
             box_ppm: 48.0,
             skin_n_m: 500.0,
-            // Without dead contacts, a press missing in a night is always a fault.
+            // Without dead contacts, a missing press always indicates a fault.
             dead_share: 0.0,
         }
     }
@@ -103,7 +103,7 @@ pub enum BenchError {
 
 /// A running bench. Dropping it ends everything on it.
 pub struct EmulatedBench {
-    // Declared first, so that no thread uses a device that is gone.
+    // Declared first, so that the threads end before the devices that they use.
     ties: Ties,
     arm: Arc<EmulatedArm>,
     bus: Arc<Bus>,

@@ -1,5 +1,5 @@
 //! Runs a command with access to an emulated bench: `emulated-bench [--seed N] [--level LEVEL] -- COMMAND ...`.
-#![expect(clippy::print_stderr, reason = "a program that owns its terminal")]
+#![expect(clippy::print_stderr, reason = "a program reports on its terminal")]
 
 use std::process::ExitCode;
 
@@ -53,7 +53,7 @@ mod linux {
         };
         let bench = EmulatedBench::start(&config)?;
         eprintln!(
-            "emulated bench: arm, two cameras and trigger box are up; nothing of this is hardware"
+            "emulated bench: arm, two cameras and trigger box are running; this is not hardware"
         );
         let status = bench.command(program)?.args(arguments).status()?;
         let code = status.code().and_then(|code| u8::try_from(code).ok());

@@ -36,7 +36,7 @@ pub enum Wire {
 /// A leaky wire loses every pulse with this index.
 pub(crate) const LEAKS_EVERY: u32 = 11;
 
-/// The connecting threads; dropping this value ends them.
+/// The threads that connect the devices. Dropping this value ends them.
 pub(crate) struct Ties {
     cut: Arc<AtomicBool>,
     wires: Arc<[AtomicU8; 2]>,
@@ -92,12 +92,12 @@ impl Drop for Ties {
     }
 }
 
-/// Reports the tip position to the cameras, which never simulate beyond the last report.
+/// Reports the tip position to the cameras, which never simulate past the last report.
 fn show_tip(arm: &ArmView, bus: &Bus, cut: &AtomicBool) {
     let world = bus.world();
     let source = world.source();
     while !cut.load(Ordering::Relaxed) {
-        // A dead firmware sends nothing; the run under test detects that by itself.
+        // If the firmware died, the run under test detects it itself.
         let Ok(state) = arm.state() else { break };
         let at_ns = i64::try_from(state.t_ns).unwrap_or(i64::MAX);
         world.tip(Tip {
@@ -110,7 +110,8 @@ fn show_tip(arm: &ArmView, bus: &Bus, cut: &AtomicBool) {
     world.leave(source);
 }
 
-/// Forwards the box's pulses to the cameras' inputs. The cameras wait for a board that lags on a busy computer.
+/// Forwards the box's pulses to the cameras' inputs. Cameras wait for a board that lags on a busy
+/// computer.
 fn carry_edges(mut edges: EdgeStream, bus: &Bus, wires: &[AtomicU8; 2], cut: &AtomicBool) {
     let world = bus.world();
     let source = world.source();

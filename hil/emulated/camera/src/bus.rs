@@ -96,7 +96,7 @@ impl Bus {
 
     /// A connection for controlling the devices.
     ///
-    /// # Errors
+    /// When the system fails.
     /// When the machine refuses.
     pub fn remote(&self) -> io::Result<Remote> {
         Remote::connect(self.root())
@@ -132,7 +132,8 @@ impl Drop for Bus {
     }
 }
 
-/// The preload library: from the variable `SKINRIG_USBSHIM`, otherwise next to this program, where Cargo puts it.
+/// Path of the preload library: from the variable `SKINRIG_USBSHIM`, otherwise next to this
+/// program, where Cargo puts it.
 ///
 /// # Errors
 /// [`BusError::NoShim`].
@@ -169,7 +170,7 @@ impl Inner {
         if self.lock().get(&name).is_some_and(|d| d.present) {
             return Err(BusError::Config {
                 expected: "a name for each device".into(),
-                found: format!("two times {name}"),
+                found: format!("two devices named {name}"),
             });
         }
         let ready = Readiness::create(&self.bed.node(at))?;

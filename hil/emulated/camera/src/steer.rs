@@ -194,7 +194,7 @@ impl Remote {
         }
     }
 
-    /// What a camera has counted.
+    /// Data delivered and counters of a camera.
     ///
     /// # Errors
     /// As [`order`](Self::order).
@@ -227,8 +227,8 @@ impl Remote {
         }
     }
 
-    /// Injects an edge at a trigger input at `at_ns` of the monotonic clock ([`now_ns`](crate::world::now_ns)). Send it ahead of time if it must
-    /// keep its place in the stream.
+    /// Injects an edge at a trigger input at `at_ns` of the monotonic clock
+    /// ([`now_ns`](crate::world::now_ns)). Send it early enough, or it arrives late in the stream.
     ///
     /// # Errors
     /// As [`order`](Self::order).
@@ -244,6 +244,6 @@ impl Remote {
 
 fn unexpected(answer: &Answer) -> io::Error {
     io::Error::other(format!(
-        "expected the answer to another order, found {answer:?}"
+        "expected the reply to the request, found {answer:?}"
     ))
 }

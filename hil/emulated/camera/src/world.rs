@@ -34,8 +34,8 @@ const LAMPS_OFF: &str = "lamps-off";
 /// Minimum lag of cameras behind the current time, ns.
 pub(crate) const LATENCY_NS: i64 = 2_000_000;
 
-/// How long tip positions are kept, ns: as long as a camera may lag behind a slow source. Without the positions of a press the camera would
-/// only see noise.
+/// How long tip positions are kept, ns: as long as a camera may lag behind a slow source. A camera
+/// without the positions of a press would send only noise.
 const REMEMBERED_NS: i64 = 60_000_000_000;
 
 /// How long unread edges are kept, ns.
@@ -144,7 +144,7 @@ impl World {
         state.next_source
     }
 
-    /// Announces that `source` sends nothing more from before `t_ns`.
+    /// Announces that `source` will send nothing from before `t_ns`.
     pub fn announce(&self, source: u64, t_ns: i64) {
         self.lock().announced.insert(source, t_ns);
         self.changed.notify_all();
@@ -306,7 +306,7 @@ impl World {
     }
 }
 
-/// Why a line of another process cannot be obeyed.
+/// Why a line of another process was rejected.
 #[derive(Debug, thiserror::Error)]
 enum LineError {
     #[error("expected a whole number, found `{word}` in `{line}`")]

@@ -126,8 +126,12 @@ impl EdgeStream {
         stream.set_read_timeout(Some(Duration::from_secs(20)))?;
         stream.write_all(orders.as_bytes())?;
         let mut lines = BufReader::new(stream.try_clone()?);
-        let bad =
-            |line: &str| io::Error::new(io::ErrorKind::InvalidData, format!("board said {line:?}"));
+        let bad = |line: &str| {
+            io::Error::new(
+                io::ErrorKind::InvalidData,
+                format!("expected a line of the board, found {line:?}"),
+            )
+        };
         let mut line = String::new();
         lines.read_line(&mut line)?;
         let clock = BoardClock::parse(&line).ok_or_else(|| bad(&line))?;
@@ -197,7 +201,10 @@ impl EdgeStream {
         (0..n)
             .map(|k| {
                 self.next(timeout)?.ok_or_else(|| {
-                    io::Error::new(io::ErrorKind::TimedOut, format!("{k} of {n} edges came"))
+                    io::Error::new(
+                        io::ErrorKind::TimedOut,
+                        format!("expected {n} edges, found {k}"),
+                    )
                 })
             })
             .collect()

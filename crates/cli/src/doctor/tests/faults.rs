@@ -1,4 +1,4 @@
-//! Faults of a planted machine: how each is made, the only finding that it gives, and words of the next step.
+//! Faults of a planted machine: how to make each one, its only finding, and words of the next step.
 
 use std::fs;
 
@@ -14,7 +14,7 @@ pub(super) type Fault = (
     &'static str,
 );
 
-/// A fault, the only finding that it makes, and words of the next step.
+/// Name, change, only finding, and words of the next step.
 pub(super) const FAULTS: &[Fault] = &[
     (
         "the lamps' program is not there",
@@ -136,14 +136,14 @@ pub(super) const FAULTS: &[Fault] = &[
             b.rig.as_mut().unwrap().robot.library_version = None;
             b.survey.library = Library::Loaded {
                 version: "3.7.3".to_owned(),
-                advice: Some("3.10 tells more".to_owned()),
+                advice: Some("3.10 reports more".to_owned()),
             };
         },
         ("versions", "robot library", Verdict::Warning),
-        "3.10 tells more",
+        "3.10 reports more",
     ),
     (
-        "a library that is none",
+        "an unusable library",
         |b| b.survey.library = Library::Unusable("expected SDK 3.7.1".to_owned()),
         ("versions", "robot library", Verdict::Problem),
         "SKINRIG_LIBDRD",

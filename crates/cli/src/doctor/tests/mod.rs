@@ -1,4 +1,4 @@
-//! A machine that is planted: healthy it has no finding, and each fault has its own and no other.
+//! Tests on a planted machine: a healthy one has no findings, and each fault has exactly its own.
 
 mod faults;
 
@@ -25,7 +25,7 @@ const CAMERA_2: &str = "sys/bus/usb/devices/4-2";
 const LEASE: &str = "skinrig-omega3-12345.lease";
 const ROBOT_NODE: &str = "dev/bus/usb/001/005";
 
-/// A planted machine and what its devices say.
+/// A planted machine with its devices.
 struct Bench {
     folder: TempDir,
     survey: Survey,
@@ -94,7 +94,7 @@ impl Bench {
         })
     }
 
-    /// What is wrong, and how the doctor calls it.
+    /// Area, check and verdict of each problem and warning.
     fn wrong(&self) -> Vec<(&'static str, String, Verdict)> {
         let all = self.findings().into_iter();
         all.filter(|f| matches!(f.verdict, Verdict::Problem | Verdict::Warning))
@@ -103,7 +103,7 @@ impl Bench {
     }
 }
 
-/// The program that switches the lamps off, as it is found.
+/// The program that switches the lamps off, found or not.
 fn lamp(found: Result<&str, UnusableInput>) -> Input {
     Input {
         key: "hil.light.dark".to_owned(),
@@ -125,7 +125,7 @@ fn ready(device: &'static str, role: &str, what: &str, firmware: &str) -> Line {
     }
 }
 
-/// A bench as it should be.
+/// A bench without faults.
 fn healthy() -> Bench {
     let rig = RIG.replace("firmware: \"1.0\"", "firmware: \"3.0\"");
     let mut cameras = [1, 2].map(|i| {
@@ -170,7 +170,7 @@ fn healthy() -> Bench {
     ] {
         b.write(&format!("sys/bus/usb/devices/usb{bus}/serial"), controller);
     }
-    // Nobody owns files here as this user: what it may comes from groups and the others' bits.
+    // This user owns no files: its permissions come from groups and the bits for others.
     b.write(
         "proc/self/status",
         "Name:\tskinrig\nUid:\t4242\t4242\t4242\t4242\nGid:\t4242\t4242\t4242\t4242\nGroups:\t4243 \nCapEff:\t0000000000000000\n",
@@ -214,7 +214,7 @@ fn healthy() -> Bench {
 }
 
 #[test]
-fn a_healthy_bench_has_nothing_to_look_at_and_nothing_unchecked() {
+fn a_healthy_bench_passes_every_check() {
     let other: Vec<_> = healthy()
         .findings()
         .into_iter()
@@ -224,7 +224,7 @@ fn a_healthy_bench_has_nothing_to_look_at_and_nothing_unchecked() {
 }
 
 #[test]
-fn each_fault_has_its_own_finding_and_no_other() {
+fn each_fault_has_exactly_its_own_finding() {
     for (name, fault, (area, check, verdict), next) in FAULTS {
         let mut bench = healthy();
         fault(&mut bench);
@@ -246,12 +246,12 @@ fn the_process_that_holds_a_device_is_named() {
     let held = findings.iter().find(|f| f.verdict == Verdict::Problem);
     assert_eq!(
         held.unwrap().found,
-        "process 4711 holds it: skinrig run demo.yaml"
+        "in use by process 4711: skinrig run demo.yaml"
     );
 }
 
 #[test]
-fn a_bench_that_somebody_holds_is_left_alone_and_its_holder_named() {
+fn devices_of_a_held_bench_are_not_queried_and_its_holder_is_named() {
     let mut bench = healthy();
     let owner = Owner::this_process(
         "bob".to_owned(),
@@ -273,7 +273,7 @@ fn a_bench_that_somebody_holds_is_left_alone_and_its_holder_named() {
 }
 
 #[test]
-fn without_the_library_the_robots_own_file_tells_who_may_open_it() {
+fn without_the_library_the_device_file_shows_the_robots_permissions() {
     for (mode, wrong) in [(0o666, 1), (0o660, 2)] {
         let mut bench = healthy();
         bench.mode(ROBOT_NODE, mode);
@@ -288,7 +288,7 @@ fn without_the_library_the_robots_own_file_tells_who_may_open_it() {
 }
 
 #[test]
-fn an_empty_machine_is_not_checked_and_says_why() {
+fn checks_of_an_empty_machine_state_why_they_are_not_possible() {
     let mut bench = healthy();
     bench.folder = tempfile::tempdir().unwrap();
     bench.rig = None;
@@ -297,7 +297,7 @@ fn an_empty_machine_is_not_checked_and_says_why() {
     bench.survey.library = Library::Absent(6);
     bench.free_b = |_| Err(io::Error::other("no such call"));
     let findings = bench.findings();
-    // Nobody writes into a folder that is not there, and nothing is held.
+    // A missing folder has no run, and no device is in use.
     for f in &findings {
         let fine = f.area == "bench" && f.verdict == Verdict::Ok;
         assert!(fine || f.verdict == Verdict::NotChecked, "{f:?}");
@@ -307,7 +307,7 @@ fn an_empty_machine_is_not_checked_and_says_why() {
 }
 
 #[test]
-fn the_table_and_the_keys_are_as_they_were() {
+fn table_and_json_are_pinned() {
     let mut bench = healthy();
     for name in [
         "a camera on a USB 2 cable",

@@ -215,7 +215,7 @@ fn an_accepted_change_is_learnt_anew_and_says_who_and_why() {
         ),
         (
             &[EVENTS, "--night", first, "--reason", " "],
-            "--reason: expected why",
+            "--reason: expected a reason",
         ),
         (&["--night", first, "--reason", "r"], "<SERIES>"),
         (
@@ -240,7 +240,7 @@ fn an_accepted_change_is_learnt_anew_and_says_who_and_why() {
     let said = nights.accept(&taken).code(0);
     assert_eq!(
         said.out.trim(),
-        format!("{EVENTS}: learnt anew from night {first} on")
+        format!("{EVENTS}: the reference restarts at night {first}")
     );
     let page = nights.lab.text("trends.html");
     let told = nights.trend(&["--html", &page]).code(0);

@@ -1,4 +1,4 @@
-//! Parts add up, and a single changed factor gets the whole change.
+//! Tests of the decomposition: parts add up, and a single changed factor gets the whole change.
 
 use super::*;
 

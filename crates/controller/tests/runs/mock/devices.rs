@@ -1,8 +1,8 @@
-//! The devices of the small rig: each call is counted, and may be made to fail.
+//! The devices of the small rig: each call is counted, and can fail.
 
 use super::*;
 
-/// Counts a call; fails it when it is its turn.
+/// Counts a call; fails it if its number is reached.
 pub(crate) fn call(world: &Shared, role: DeviceRole) -> Result<(), DeviceError> {
     let mut w = lock(world);
     w.calls += 1;
@@ -43,21 +43,24 @@ impl Clock for MockClock {
         let mut w = lock(&self.0);
         w.t = w.t.max(t.0);
         w.ticks += 1;
-        if w.faults.strike == Some(Strike::Late) && w.tip[2] < -1.0 && w.broken_at.is_none() {
+        if w.faults.strike == Some(FeedbackFault::Late) && w.tip[2] < -1.0 && w.broken_at.is_none()
+        {
             w.t += 1500 * MS;
             w.broken_at = Some(w.t);
         }
         if let Some((tick, press)) = w.faults.operator {
             if tick == w.ticks {
                 match press {
-                    Press::Pause => w.control.pause(),
-                    Press::PauseNow => w.control.pause_now(),
-                    Press::Stop => w.control.stop(),
-                    Press::Abort => w.control.abort(),
-                    Press::Halt => w.control.halt(),
-                    Press::Note => assert_eq!(w.control.note(NOTE.into()), Ok(1)),
+                    OperatorAction::Pause => w.control.pause(),
+                    OperatorAction::PauseNow => w.control.pause_now(),
+                    OperatorAction::Stop => w.control.stop(),
+                    OperatorAction::Abort => w.control.abort(),
+                    OperatorAction::Halt => w.control.halt(),
+                    OperatorAction::Note => assert_eq!(w.control.note(NOTE.into()), Ok(1)),
                 }
-            } else if matches!(press, Press::Pause | Press::PauseNow) && w.ticks == tick + 200 {
+            } else if matches!(press, OperatorAction::Pause | OperatorAction::PauseNow)
+                && w.ticks == tick + 200
+            {
                 w.control.resume();
             }
             if w.faults.halt_after.is_some_and(|n| tick + n == w.ticks) {
@@ -67,8 +70,8 @@ impl Clock for MockClock {
     }
 }
 
-/// What a scripted robot can do.
-pub(crate) fn can() -> IndenterCapabilities {
+/// Capabilities of a scripted robot.
+pub(crate) fn capabilities() -> IndenterCapabilities {
     IndenterCapabilities {
         workspace_min_mm: [-100.0; 3],
         workspace_max_mm: [100.0; 3],
@@ -87,7 +90,7 @@ impl Indenter for MockIndenter {
         identity("mock indenter")
     }
     fn capabilities(&self) -> IndenterCapabilities {
-        can()
+        capabilities()
     }
     fn configure(&mut self, limits: &MotionLimits) -> Result<Vec<Setting>, DeviceError> {
         call(&self.0, DeviceRole::Indenter)?;
@@ -136,7 +139,7 @@ impl Indenter for MockIndenter {
         w.advance();
         w.target = w.set_point;
         let t = w.t;
-        w.told.push((t, "hold"));
+        w.robot_calls.push((t, "hold"));
         Ok(())
     }
     fn disarm(&mut self) -> Result<(), DeviceError> {
@@ -145,7 +148,7 @@ impl Indenter for MockIndenter {
         w.advance();
         (w.armed, w.confirmed) = (false, true);
         let t = w.t;
-        w.told.push((t, "disarm"));
+        w.robot_calls.push((t, "disarm"));
         Ok(())
     }
 }
@@ -165,7 +168,7 @@ impl MockCamera {
             Some((camera, at, bytes)) if camera == self.1 && at == seq => bytes,
             _ => 0,
         };
-        // What comes now was sent earlier, and in order.
+        // Data that arrive now were sent earlier, in order.
         let sent_ms = match w.faults.delay {
             Some((from_ms, by_ms)) if self.1 == CameraId::Two => {
                 (w.t / MS).min(from_ms).max(w.t / MS - by_ms)
@@ -246,13 +249,13 @@ impl EventCamera for MockCamera {
         Ok(())
     }
     fn take_notes(&mut self, notes: &mut Vec<String>) {
-        let mine = |of: &mut (CameraId, String)| of.0 == self.1;
-        notes.extend(lock(&self.0).faults.remark.take_if(mine).map(|r| r.1));
+        let is_own = |of: &mut (CameraId, String)| of.0 == self.1;
+        notes.extend(lock(&self.0).faults.remark.take_if(is_own).map(|r| r.1));
     }
     fn temperature_c(&mut self) -> Result<Option<f64>, DeviceError> {
         call(&self.0, self.role())?;
         let mut w = lock(&self.0);
-        w.asked_heat[self.1.index()] += 1;
+        w.temperature_reads[self.1.index()] += 1;
         let hot_ms = w.faults.hot_ms.clone().filter(|_| self.1 == CameraId::One);
         let ms = w.t / MS;
         Ok(hot_ms.map(|hot| if hot.contains(&ms) { 70.0 } else { 30.0 }))

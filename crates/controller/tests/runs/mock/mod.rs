@@ -23,30 +23,30 @@ pub(crate) const MS: i64 = 1_000_000;
 /// How a numbered call fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Failure {
-    /// That call alone answers with an error.
+    /// That call alone fails.
     Once,
-    /// That call, and every later one to the same device.
+    /// That call, and every later one to the same device, fails.
     Forever,
     /// That call panics.
     Panic,
 }
 
-/// What the operator remarks.
+/// Text of the operator's note.
 pub(crate) const NOTE: &str = "Ann: the lamp flickers";
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Press {
+pub(crate) enum OperatorAction {
     Pause,
     PauseNow,
     Stop,
     Abort,
     Halt,
-    /// A remark.
+    /// A note.
     Note,
 }
 
-impl Press {
-    /// Every request; a remark requests nothing.
+impl OperatorAction {
+    /// Every request; a note is not a request.
     pub(crate) const REQUESTS: [Self; 5] = [
         Self::Pause,
         Self::PauseNow,
@@ -56,26 +56,26 @@ impl Press {
     ];
 }
 
-/// What goes wrong with the feedback.
+/// Fault of the robot's feedback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Strike {
+pub(crate) enum FeedbackFault {
     /// A force of 9 N.
     Force,
     /// The tip sinks 0.05 mm every millisecond.
     Sink,
     /// The tip slides 0.3 mm every millisecond.
     Slide,
-    /// A coordinate is no number.
+    /// A coordinate is NaN.
     Nan,
     /// The same sample twice.
     Twice,
-    /// No samples any more.
+    /// No more samples.
     Silence,
-    /// The clock jumps by 1.5 s, and the samples come after it.
+    /// The clock jumps by 1.5 s, and the samples follow.
     Late,
 }
 
-/// What is wrong with the world.
+/// Faults of the mock world.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Faults {
     pub at_call: Option<(u64, Failure)>,
@@ -85,27 +85,27 @@ pub(crate) struct Faults {
     pub poses_end_ms: Option<i64>,
     /// Bytes lost by a camera before its chunk with this number.
     pub loss: Option<(CameraId, u64, u64)>,
-    /// Cameras tell their time. From this time on, ms, what camera 2 sends takes so long, ms.
+    /// Cameras report their time. From this time on, ms, data of camera 2 take so long, ms.
     pub delay: Option<(i64, i64)>,
-    /// Camera 2 loses bytes at this time, ms, and tells so with the data that follow.
+    /// Camera 2 loses bytes at this time, ms, and reports this with the data that follow.
     pub lost_at_ms: Option<i64>,
-    /// Camera 1 tells its temperature: 70 °C in this time, ms, 30 °C otherwise.
+    /// Camera 1 reports its temperature: 70 °C in this time, ms, 30 °C otherwise.
     pub hot_ms: Option<std::ops::Range<i64>>,
-    /// A camera that has something to say about its stream, once.
+    /// A camera and a note from it, once.
     pub remark: Option<(CameraId, String)>,
-    /// What the trigger box has to say about the run, once.
+    /// A note from the trigger box, once.
     pub box_remark: Option<String>,
-    /// The tip stays where it is sideways from this time on, ms.
+    /// The tip is laterally stuck from this time on, ms.
     pub stuck_sideways_ms: Option<i64>,
-    /// What goes wrong once the tip is 1 mm deep.
-    pub strike: Option<Strike>,
-    /// The operator's hand at this tick.
-    pub operator: Option<(u64, Press)>,
+    /// Feedback fault once the tip is 1 mm deep.
+    pub strike: Option<FeedbackFault>,
+    /// The operator's action at this tick.
+    pub operator: Option<(u64, OperatorAction)>,
     /// A halt this many ticks after it.
     pub halt_after: Option<u64>,
-    /// The encoders' readings: seed, counts of 0.01 mm by which they are off at most, and how far the tip rests aside, mm.
+    /// Encoder noise: seed, largest error in counts of 0.01 mm, and lateral offset of the resting tip, mm.
     pub encoders: Option<(u64, i64, f64)>,
-    /// A braked tip in contact sinks so far when its brakes open, mm, until it has risen.
+    /// A braked tip in contact sinks this far when its brakes open, mm, until it has risen.
     pub sinks_mm: f64,
     /// N per mm of indentation.
     pub stiffness_n_mm: f64,
@@ -120,7 +120,7 @@ pub(crate) struct World {
     pub control: ControlHandle,
     pub armed: bool,
     pub ever_armed: bool,
-    /// A disarm was answered since the last arm.
+    /// A disarm succeeded since the last arm.
     pub confirmed: bool,
     pub dead: Option<DeviceRole>,
     pub tip: [f64; 3],
@@ -132,18 +132,18 @@ pub(crate) struct World {
     pub commands: Vec<([f64; 3], f64, i64)>,
     pub limits: Option<MotionLimits>,
     pub streaming: [bool; 2],
-    /// Cameras in the order in which they were started.
+    /// Cameras in start order.
     pub started: Vec<CameraId>,
     pub seq: [u64; 2],
-    /// How often each camera was asked for its temperature.
-    pub asked_heat: [u32; 2],
+    /// Number of temperature reads per camera.
+    pub temperature_reads: [u32; 2],
     pub line_until: i64,
     pub clearance_mm: f64,
-    /// When the strike began to break a limit.
+    /// Time at which the feedback fault first broke a limit.
     pub broken_at: Option<i64>,
     struck_for: i64,
-    /// What the robot was told besides motions: when, `hold` or `disarm`.
-    pub told: Vec<(i64, &'static str)>,
+    /// Commands to the robot besides motions: time, `hold` or `disarm`.
+    pub robot_calls: Vec<(i64, &'static str)>,
     samples: Vec<RobotSample>,
 }
 
@@ -153,7 +153,7 @@ pub(crate) fn lock(world: &Shared) -> MutexGuard<'_, World> {
     world.lock().unwrap_or_else(|e| e.into_inner())
 }
 
-/// Where the mock's skin lies: a quarter turn and a shift, so that mixed-up frames are seen.
+/// Pose of the mock's skin: rotated by 90 degrees and shifted, to detect mixed-up frames.
 pub(crate) fn robot_from_skin() -> RigidTransform<Robot, Skin> {
     RigidTransform::new(
         [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
@@ -184,12 +184,12 @@ impl World {
             streaming: [false; 2],
             started: vec![],
             seq: [0; 2],
-            asked_heat: [0; 2],
+            temperature_reads: [0; 2],
             line_until: 0,
             clearance_mm: 5.0,
             broken_at: None,
             struck_for: 0,
-            told: vec![],
+            robot_calls: vec![],
             samples: vec![],
         }))
     }
@@ -219,7 +219,7 @@ impl World {
                 tip[2] = tip[2].max(floor);
             }
             if self.armed && self.faults.sinks_mm > 0.0 {
-                // In turn: what sinks also swings back.
+                // Lateral motion and sinking alternate.
                 tip[2] -= if ms % 8 >= 4 {
                     self.faults.sinks_mm
                 } else {
@@ -251,7 +251,7 @@ impl World {
         }
     }
 
-    /// What the encoders tell of a tip: whole counts, each off by some of them at random.
+    /// Encoder reading of a tip position: whole counts, each with a random error.
     fn reading(&mut self, tip: [f64; 3]) -> [f64; 3] {
         const COUNT_MM: f64 = 0.01;
         let Some((random, counts, aside_mm)) = &mut self.faults.encoders else {
@@ -264,7 +264,7 @@ impl World {
             *random ^= *random << 17;
             *random
         };
-        // Now and then a jolt in free air, beyond the tolerance.
+        // Occasionally a jolt in free air, beyond the tolerance.
         let jolted = tip[2] > self.clearance_mm - COUNT_MM && draw() % 200 == 0;
         let jolt_mm = if jolted { 6.0 * COUNT_MM } else { 0.0 };
         [tip[0] + *aside_mm + jolt_mm, tip[1], tip[2]].map(|mm| {
@@ -273,7 +273,7 @@ impl World {
         })
     }
 
-    /// Keeps a sample, changed by the strike while the arm is low.
+    /// Stores a sample, changed by the feedback fault while the arm is low.
     fn deliver(&mut self, mut sample: RobotSample, mut tip: [f64; 3]) {
         let begins = self.armed && tip[2] < -1.0;
         let Some(strike) = self.faults.strike.filter(|_| self.struck_for > 0 || begins) else {
@@ -284,22 +284,22 @@ impl World {
         let n = self.struck_for as f64;
         let mut broken = true;
         match strike {
-            Strike::Force => sample.force_n = 9.0,
-            Strike::Sink => {
+            FeedbackFault::Force => sample.force_n = 9.0,
+            FeedbackFault::Sink => {
                 tip[2] -= 0.05 * n;
                 broken = tip[2] < -3.05;
             }
-            Strike::Slide => tip[0] += 0.3 * n,
-            Strike::Nan => tip[1] = f64::NAN,
-            Strike::Twice => self.samples.push(sample),
-            Strike::Silence => {}
-            Strike::Late => broken = false, // the clock tells
+            FeedbackFault::Slide => tip[0] += 0.3 * n,
+            FeedbackFault::Nan => tip[1] = f64::NAN,
+            FeedbackFault::Twice => self.samples.push(sample),
+            FeedbackFault::Silence => {}
+            FeedbackFault::Late => broken = false, // the clock shows it
         }
         sample.measured = robot_from_skin().apply(Point3::new(tip[0], tip[1], tip[2]));
         if broken {
             self.broken_at.get_or_insert(self.sampled_to);
         }
-        if strike != Strike::Silence {
+        if strike != FeedbackFault::Silence {
             self.samples.push(sample);
         }
     }

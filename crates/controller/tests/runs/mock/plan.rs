@@ -1,8 +1,8 @@
-//! What the small rig is asked to do, and who writes it down.
+//! Plan, header and sink of the small rig.
 
 use super::*;
 
-/// Three presses at two places.
+/// Three presses at two locations.
 pub(crate) fn plan() -> Plan {
     let places = [(10.0, 2.0), (10.0, 2.0), (14.0, -6.0)];
     let presses: Vec<PlannedPress> = places
@@ -88,17 +88,17 @@ pub(crate) enum SinkFailure {
     Once,
     Forever,
     Panic,
-    /// Takes the record, and says that it is late.
+    /// Accepts the record, but reports it as delayed.
     Late,
 }
 
-/// Keeps records; fails at the record with this number (from 0) when asked to.
+/// Stores records; can fail at the record with this number (from 0).
 #[derive(Default)]
 pub(crate) struct Sink {
     pub records: Vec<Record>,
     pub fail: Option<(usize, SinkFailure)>,
     pub offered: usize,
-    /// Takes this long for every record but poses, ms of the rig's clock.
+    /// Time taken for every record but poses, ms of the rig's clock.
     pub slow: Option<(Shared, i64)>,
 }
 

@@ -99,7 +99,7 @@ expected bias_diff_on >= bias_diff + 75 = 374 mV with bias_diff 299 mV and bias_
 
     proptest! {
         #[test]
-        fn what_is_written_reads_back(on in 394..=1800_i64, off in 0..=214_i64, fo in 1250..=1800_i64, pr in 975..=1800_i64) {
+        fn written_biases_read_back(on in 394..=1800_i64, off in 0..=214_i64, fo in 1250..=1800_i64, pr in 975..=1800_i64) {
             let wanted: Values = [("bias_diff_on", on), ("bias_diff_off", off), ("bias_fo", fo), ("bias_pr", pr)]
                 .map(|(n, v)| (n.to_owned(), v))
                 .into();

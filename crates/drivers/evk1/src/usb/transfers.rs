@@ -86,8 +86,8 @@ struct Job {
     shared: *const Shared,
 }
 
-// SAFETY: the transfer and its buffer belong to this job alone; libusb lets any thread submit, cancel and free a
-// transfer, and what `shared` points to is Sync.
+// SAFETY: the transfer and its buffer belong to this job alone; libusb allows any thread to submit, cancel and free a
+// transfer, and the target of `shared` is Sync.
 unsafe impl Send for Job {}
 
 impl Job {
@@ -106,8 +106,8 @@ impl Job {
         // `Evk1Config::check` holds both numbers far below the limits of these types.
         let length = config.transfer_bytes as i32;
         let timeout_ms = config.transfer_timeout.as_millis() as u32;
-        // SAFETY: the transfer was just allocated and is not submitted; the buffer has `length` bytes; both, and what
-        // `user_data` points to, live until `Drop`, which runs only while the transfer is not under way.
+        // SAFETY: the transfer was just allocated and is not submitted; the buffer has `length` bytes; both, and the target
+        // of `user_data`, live until `Drop`, which runs only while the transfer is not in flight.
         unsafe {
             libusb_fill_bulk_transfer(
                 transfer.as_ptr(),
@@ -130,8 +130,8 @@ impl Job {
 
 impl Drop for Job {
     fn drop(&mut self) {
-        // SAFETY: jobs are dropped only while their transfer is not under way (`Transfers::stop` forgets the others),
-        // so libusb and the callback use none of this any more; each pointer was made by its counterpart in `new`.
+        // SAFETY: jobs are dropped only while their transfer is not in flight (`Transfers::stop` leaks the others),
+        // so libusb and the callback no longer use any of this; `new` created each pointer with its counterpart.
         unsafe {
             libusb_free_transfer(self.transfer.as_ptr());
             drop(Box::from_raw(self.buffer.as_ptr()));
@@ -142,12 +142,12 @@ impl Drop for Job {
 
 /// Completion callback of libusb, on the thread that handles events.
 extern "system" fn completed(transfer: *mut libusb_transfer) {
-    // SAFETY: libusb hands over a transfer that `Job::new` filled: its `user_data` is a `Shared` that the job keeps
+    // SAFETY: libusb passes a transfer that `Job::new` filled: its `user_data` is a `Shared` that the job keeps
     // alive, and the job outlives the transfer's flight.
     let shared = unsafe { &*(*transfer).user_data.cast::<Shared>().cast_const() };
     let arrived = shared.clock.now();
-    // SAFETY: the transfer is not under way now, so its first `actual_length` bytes are initialised and nobody writes to
-    // them until it is submitted again below.
+    // SAFETY: the transfer is no longer in flight, so its first `actual_length` bytes are initialised and are not written
+    // until it is submitted again below.
     let (status, bytes) = unsafe {
         let length = usize::try_from((*transfer).actual_length).unwrap_or(0);
         let bytes = std::slice::from_raw_parts((*transfer).buffer.cast_const(), length);
@@ -199,7 +199,7 @@ extern "system" fn completed(transfer: *mut libusb_transfer) {
 
 /// Submits a filled, idle transfer; returns whether it is in flight.
 fn submit(transfer: *mut libusb_transfer) -> Result<bool, UsbError> {
-    // SAFETY: both callers hold the flight's lock and a transfer that `Job::new` filled and that is not under way.
+    // SAFETY: both callers hold the flight's lock and a transfer that `Job::new` filled and that is not in flight.
     match unsafe { libusb_submit_transfer(transfer) } {
         0 => Ok(true),
         code => Err(submit_error(code)),
@@ -289,7 +289,7 @@ impl Transfers {
         };
         self.shared.flight().ending = true;
         for job in &self.jobs {
-            // SAFETY: the transfer is allocated. One that is not under way gives an error, which says nothing new.
+            // SAFETY: the transfer is allocated. One that is not in flight returns an error, which needs no handling.
             unsafe { libusb_cancel_transfer(job.transfer.as_ptr()) };
         }
         let left = self.shared.wait(|f| f.count == 0).count;

@@ -60,7 +60,7 @@ fn a_camera_is_opened_by_serial_number_without_touching_others() {
         let others = remote.journal(FIRST).unwrap();
         assert!(others.iter().all(|r| r.is_in));
         assert_eq!(remote.journal("evk3").unwrap(), []);
-        // It is held now, and found so by whoever comes next.
+        // It is open now, and reported as busy to the next caller.
         let (config, clock) = (Evk1Config::default(), RealClock::start());
         let Err(error) = Evk1::open_serial(SECOND, CameraId::One, config, clock) else {
             panic!("opened twice");
@@ -72,9 +72,9 @@ fn a_camera_is_opened_by_serial_number_without_touching_others() {
 }
 
 #[test]
-fn an_empty_bus_names_what_to_check() {
+fn an_empty_bus_is_reported_with_the_next_step() {
     on_bus(
-        "devices::an_empty_bus_names_what_to_check",
+        "devices::an_empty_bus_is_reported_with_the_next_step",
         Vec::new(),
         |_| {
             assert_eq!(enumerate().unwrap(), []);
@@ -112,7 +112,7 @@ fn driver_waits_for_a_slow_start() {
 
 #[test]
 fn whole_driver_keeps_the_contract() {
-    // Whether a camera's time begins again at every start is not known; here it goes on.
+    // It is not published whether a camera's time restarts at every start; here it continues.
     let camera = Emulated {
         time_restarts: false,
         ..noise(FIRST)
@@ -158,7 +158,7 @@ fn only_known_registers_and_requests_are_used() {
             (0, 0)
         );
         assert_eq!(counters.starts, 1);
-        // Powered down in the end.
+        // Powered down at the end.
         assert_eq!(remote.register(FIRST, 0x0000).unwrap() & 0x7, 0);
     });
 }

@@ -26,7 +26,7 @@ fn pattern_events_are_complete_and_in_order_for_all_sensor_settings() {
     on_bus(test, vec![noise(FIRST).into()], |remote| {
         let value = |address| remote.register(FIRST, address).unwrap();
         let mut camera = open(FIRST);
-        // Both are the sensor's, and the pattern comes in its place.
+        // Both settings belong to the sensor, which the pattern replaces.
         let settings = CameraSettings {
             roi: Some(Roi {
                 x: 10,
@@ -68,7 +68,7 @@ fn pattern_events_are_complete_and_in_order_for_all_sensor_settings() {
             (rate_ev_s / scan.rate_ev_s - 1.0).abs() < 1e-3,
             "{rate_ev_s}"
         );
-        // The pixels are back with the next settings.
+        // The next settings restore the pixels.
         camera.configure(&CameraSettings::default()).unwrap();
         assert_eq!(value(0x0740) & 1, 0);
         assert_eq!(value(0x0008) >> 11 & 1, 1);

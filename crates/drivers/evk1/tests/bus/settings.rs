@@ -84,7 +84,7 @@ fn region_biases_and_filter_reach_the_registers_and_the_stream() {
             noise_filter: Some(NoiseFilter {
                 min_rate_ev_s: 10_000,
             }),
-            // No contrast threshold for OFF: none come (seen on a real EVK1, section 2.9).
+            // Without a contrast threshold for OFF there are no OFF events (seen on a real EVK1, section 2.9).
             biases: [("bias_diff_off".to_owned(), 0)].into(),
             roi: Some(Roi {
                 x: 100,

@@ -93,7 +93,7 @@ fn garbage_is_kept_unchanged() {
     });
 }
 
-/// The owner of the driver sleeps: transfers continue, so that the camera itself loses nothing, and the host counts
+/// The owner of the driver does not poll: transfers continue, so that the camera itself loses nothing, and the host counts
 /// its own losses.
 #[test]
 fn an_unpolled_driver_never_blocks_transfers() {
@@ -128,7 +128,7 @@ fn an_unpolled_driver_never_blocks_transfers() {
         assert!(lost > 6 << 20, "{lost}");
         assert_eq!(lost, camera.report().lost_bytes);
         assert_eq!(handed(), lost + bytes(&chunks).len() as u64);
-        // After a gap the stream goes on with a time.
+        // After a gap the stream continues with a time.
         for pair in chunks.windows(2) {
             if pair[1].lost_before > 0 && !pair[1].bytes.is_empty() {
                 assert_eq!(pair[1].bytes[3] >> 4, 8);
@@ -184,12 +184,12 @@ fn overflow_is_detected_by_its_counter() {
         assert!(camera.report().overflow_gaps > 0);
         let lost: u64 = chunks.iter().map(|c| c.lost_before).sum();
         assert_eq!(lost, camera.report().lost_bytes);
-        // Told with the time since which it was not known, and no event after it has a time from before.
-        let told: Vec<usize> = (0..chunks.len())
+        // Reported with the start of the unknown interval, and no event after it has a time from before.
+        let losses: Vec<usize> = (0..chunks.len())
             .filter(|n| chunks[*n].lost_before > 0)
             .collect();
-        assert!(told.iter().any(|n| chunks[*n].lost_from_us.is_some()));
-        for n in told {
+        assert!(losses.iter().any(|n| chunks[*n].lost_from_us.is_some()));
+        for n in losses {
             if let Some(after) = chunks[n..].iter().find(|c| !c.bytes.is_empty()) {
                 assert_eq!(after.bytes[3] >> 4, 8);
             }
@@ -201,7 +201,7 @@ fn overflow_is_detected_by_its_counter() {
         );
         let mut notes = Vec::new();
         camera.take_notes(&mut notes);
-        let said = notes.join("\n");
-        assert!(said.contains("overflow counter increased"), "{said}");
+        let text = notes.join("\n");
+        assert!(text.contains("overflow counter increased"), "{text}");
     });
 }

@@ -95,11 +95,11 @@ td_roi_x (0x040c): expected 0xffffffff after writing, found 0xffffffef: power th
         .unwrap();
     let read = camera.configure(&CameraSettings::default()).unwrap();
     let roi = read.iter().find(|s| s.name == "roi").unwrap();
-    // A fact by leave, and no difference that a preflight would refuse.
+    // An accepted deviation, not a difference that fails the preflight.
     assert!(!roi.was_requested(), "{roi:?}");
     let shown = "639 columns and 480 rows, not a rectangle (after writing all)";
     assert_eq!(roi.read_back, shown);
-    // The exception is for that register alone.
+    // The exception applies to that register alone.
     let other = (r::EXT_TRIGGERS_ENABLE.address, 1 << 6);
     bench.model().faults.stuck_at_zero.extend([other]);
     let settings = sync(SyncMode::Standalone, &[6]);

@@ -205,7 +205,7 @@ impl Model {
         let from = self.camera_us;
         let to = from + PACKET.0.unsigned_abs() / 1000;
         let pixels = self.get(r::ROI_TD_RSTN) == 1 && self.get(r::NFL_EN) == 0;
-        // The pattern comes behind the sensor and its filter.
+        // The pattern replaces the output of sensor and filter.
         let live = pixels || self.get(r::PATTERN_ENABLE) == 1;
         let mut bytes = Vec::new();
         if stands {
@@ -355,7 +355,7 @@ impl Transport for Bench {
         if model.never_silent {
             let waited = HostDuration(i64::try_from(limit.as_nanos()).unwrap());
             model.now += waited;
-            // Whoever reads for a minute has no limit of its own; the test ends all the same.
+            // A reader that reads for a minute has no limit of its own; fail instead of hanging.
             let n = if model.now < HostTime(60_000_000_000) {
                 4
             } else {

@@ -147,7 +147,7 @@ fn jumps_of_the_time_base_are_reported() {
     camera.flush(&mut chunks).unwrap();
     let last = chunks.last().unwrap().facts.last_us.unwrap();
     let high = 0x8000_0000 | (last / 64) as u32;
-    // One lost TIME_HIGH period is ordinary; two are not; nor is going back.
+    // One lost TIME_HIGH period is normal; two are not, nor is a backward step.
     bench
         .model()
         .send(&bytes(&[high + 1, high + 3, high + 2, high + 2]));
@@ -185,11 +185,11 @@ fn a_step_of_the_time_base_beyond_the_limit_is_a_loss_before_the_next_chunk() {
         .send(&bytes(&[high + 10, high + 21, high + 22, high + 21]));
     let mut chunks = Vec::new();
     camera.flush(&mut chunks).unwrap();
-    let told: Vec<_> = chunks
+    let reported: Vec<_> = chunks
         .iter()
         .map(|c| (c.lost_before, c.bytes.len()))
         .collect();
-    assert_eq!(told, [(0, 4), (4, 8), (4, 4)]);
+    assert_eq!(reported, [(0, 4), (4, 8), (4, 4)]);
     let seqs: Vec<u64> = chunks.iter().map(|c| c.seq).collect();
     let first = before.last().unwrap().seq + 1;
     assert_eq!(seqs, [first, first + 1, first + 2]);
@@ -239,8 +239,8 @@ fn a_step_of_the_overflow_counter_is_a_gap() {
     camera.poll(&mut chunks).unwrap();
     assert_eq!(chunks.len(), before, "not looked for yet");
     camera.flush(&mut chunks).unwrap();
-    let told = chunks.last().unwrap();
-    assert_eq!((told.lost_before, told.lost_from_us), (4, good_us));
+    let reported = chunks.last().unwrap();
+    assert_eq!((reported.lost_before, reported.lost_from_us), (4, good_us));
     let told_at = chunks.len();
     bench.pass(100);
     camera.flush(&mut chunks).unwrap();
@@ -321,7 +321,7 @@ fn ops() -> impl Strategy<Value = Vec<Op>> {
 }
 
 proptest! {
-    /// A stream of numbered words, split anywhere and taken at any time: every word taken is whole and in its
+    /// A stream of numbered words, split anywhere and taken at any time: every word is complete and in its
     /// place, and the gaps equal the reported losses.
     #[test]
     fn an_inbox_loses_whole_words_in_order_and_counts_them(ops in ops()) {
@@ -491,11 +491,11 @@ fn a_continuing_loss_counts_its_duration_once() {
     inbox.push(&[0; 11], HostTime(30));
     blocks.extend(inbox.finish().blocks);
     let losses: Vec<_> = blocks.iter().filter_map(|b| b.lost_before).collect();
-    let told: Vec<_> = losses
+    let reported: Vec<_> = losses
         .iter()
         .map(|l| (l.bytes, l.since.0, l.until.0))
         .collect();
-    assert_eq!(told, [(401, 10, 20), (3, 20, 30)]);
+    assert_eq!(reported, [(401, 10, 20), (3, 20, 30)]);
 }
 
 /// A failed transfer: the data before it is whole, a loss is reported, and the data after it begins with a whole word.
@@ -508,6 +508,6 @@ fn a_failed_transfer_is_a_loss_between_whole_words() {
     let blocks = inbox.finish().blocks;
     let bytes: Vec<&[u8]> = blocks.iter().map(|b| b.bytes.as_slice()).collect();
     assert_eq!(bytes, [&[1, 0, 0, 0], &[3, 0, 0, 0]]);
-    // The torn word, and one for what nobody has counted.
+    // The incomplete word, and one for the unknown loss.
     assert_eq!(blocks[1].lost_before.map(|l| l.bytes), Some(6));
 }

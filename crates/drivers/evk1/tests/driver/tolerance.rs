@@ -39,7 +39,7 @@ fn accepted_by(faults: &Faults, accepting: Evk1Config, key: &str) {
         .map(|m| m.key.to_string())
         .collect();
     assert_eq!(keys, [key]);
-    // It belongs to the device's facts of the session.
+    // It is part of the device's facts in the session.
     let settings = opened.configure(&CameraSettings::default()).unwrap();
     let named = settings
         .iter()

@@ -35,7 +35,7 @@ fn describe_gravity_load(envelope: &Envelope, mass_kg: Option<f64>, reported_n: 
     )
 }
 
-/// Describes the force cap in use, and what to do if it is too small to carry the arm.
+/// Describes the force cap in use, and the next step if it is too small to carry the arm.
 fn describe_force_cap(envelope: &Envelope, limits: &MotionLimits) -> String {
     format!(
         "The motors may use {:.3} of their torque: if the arm sinks, raise `limits.max_force` ({} N) or measure \
@@ -141,8 +141,8 @@ impl<C: Clock> Engine<C> {
 
     fn power_up(&mut self, limits: &MotionLimits) -> Result<(), DeviceError> {
         let (sdk, id) = (Arc::clone(&self.sdk), self.opened.id);
-        let here = sdk.position(id).map_err(|e| self.call_error(e))?;
-        if !here.position_m.iter().all(|c| c.is_finite()) {
+        let position = sdk.position(id).map_err(|e| self.call_error(e))?;
+        if !position.position_m.iter().all(|c| c.is_finite()) {
             return Err(self.wrong_state("at a known position", "without one (not a number)"));
         }
         let started = regulation::start(&*sdk, id, &self.config, limits);
@@ -150,8 +150,12 @@ impl<C: Clock> Engine<C> {
         let (khz, old_cause) = self.await_regulation()?;
         // A braked arm sinks: start from the position that the regulation holds now.
         let now = self.clock.now();
-        let here = sdk.regulated_position(id).map_err(|e| self.call_error(e))?;
-        let tip = self.config.mount.axes.point_from_metres(here.position_m);
+        let position = sdk.regulated_position(id).map_err(|e| self.call_error(e))?;
+        let tip = self
+            .config
+            .mount
+            .axes
+            .point_from_metres(position.position_m);
         if !tip.is_finite() {
             return Err(self.wrong_state("at a known position", "without one (not a number)"));
         }

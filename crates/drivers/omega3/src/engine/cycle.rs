@@ -122,7 +122,7 @@ impl<C: Clock> Engine<C> {
             return Err(Trip::RegulationEnded);
         }
         let now = clock.now();
-        // Arming is a blocking call, during which nobody polls.
+        // Arming is a blocking call, during which no polls occur.
         if stream.take_activity() || matches!(armed.tare, TareState::Averaging(_)) {
             armed.last_activity = now;
         } else if now - armed.last_activity > span(config.trips.max_unwatched) {

@@ -122,7 +122,7 @@ fn initialisation_requires_that_the_sample_is_off_and_ends_braked() {
 }
 
 #[test]
-fn redundant_encoders_are_reported_and_required_only_where_the_rig_says_so() {
+fn redundant_encoders_are_reported_and_required_only_if_configured() {
     use RedundantEncoders::{Reported, Required};
     // Status word 13; missing in SDKs that write fewer words.
     for (word, wanted, opens, remarked) in [
@@ -142,8 +142,8 @@ fn redundant_encoders_are_reported_and_required_only_where_the_rig_says_so() {
         match open(&sdk, &config, |_| Ok(())) {
             Ok(opened) => {
                 assert!(opens, "{word:?} {wanted:?}");
-                let there = opened.remarks.contains(&Remark::NoRedundantEncoders);
-                assert_eq!(there, remarked, "{word:?} {wanted:?}");
+                let is_remarked = opened.remarks.contains(&Remark::NoRedundantEncoders);
+                assert_eq!(is_remarked, remarked, "{word:?} {wanted:?}");
                 let recorded = opened.settings.iter().any(|s| {
                     s.name == "redundant_encoders"
                         && Some(&s.read_back) == word.map(|w| w.to_string()).as_ref()

@@ -49,7 +49,7 @@ fn a_hanging_call_times_out_and_the_arm_is_braked_from_another_thread() {
         assert!(text.contains(word), "{word} is not in {text}");
     }
     assert!(!sdk.with(|s| s.live));
-    // Every later request fails at once with the same error.
+    // Every later request fails immediately with the same error.
     assert_eq!(omega.arm(), Err(error));
     sdk.with(|s| s.hanging_call = None);
 }

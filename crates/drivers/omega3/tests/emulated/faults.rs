@@ -82,7 +82,7 @@ fn another_robot_is_never_used() {
 }
 
 #[test]
-fn an_uninitialised_arm_is_refused_unless_the_sample_is_off() {
+fn an_uninitialised_arm_is_rejected_unless_the_sample_is_off() {
     let arm = arm_like(&ArmConfig {
         initialised: false,
         ..ArmConfig::default()

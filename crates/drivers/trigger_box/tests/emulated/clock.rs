@@ -60,9 +60,9 @@ fn host_times_are_within_their_bounds_and_box_times_match_the_edges() {
         marks_in(r).len() == starts.len() && inputs.count() == 2
     });
     // The box's zero is some cycles after the board's, the same for all time stamps.
-    let told = marks_in(&reports);
-    let zero = starts[0] - told[0].1.us * CYCLES_PER_US;
-    for (start, (_, at)) in starts.iter().zip(&told) {
+    let reported = marks_in(&reports);
+    let zero = starts[0] - reported[0].1.us * CYCLES_PER_US;
+    for (start, (_, at)) in starts.iter().zip(&reported) {
         assert_eq!(start - zero, at.us * CYCLES_PER_US);
     }
     let inputs: Vec<(bool, u64)> = reports
@@ -139,10 +139,10 @@ fn a_mark_waits_for_a_running_sync_train() {
     assert_eq!(ask(sync(27)).outcome, Outcome::BadArgument);
     assert_eq!(ask(sync(28)).outcome, Outcome::Done);
     // Reported first edges, and whether the mark waited longer than the pause after another mark.
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     let end = Instant::now() + TIMEOUT;
-    while told.len() < 40 || !told.iter().any(|&(_, waited)| waited) {
-        let number = told.len() as u32 + 1;
+    while reported.len() < 40 || !reported.iter().any(|&(_, waited)| waited) {
+        let number = reported.len() as u32 + 1;
         let m = Request::Mark {
             number,
             mark: mark(number),
@@ -150,7 +150,7 @@ fn a_mark_waits_for_a_running_sync_train() {
         let reply = ask(m);
         if reply.outcome == Outcome::Done {
             let start = parse_mark(&reply.data).unwrap().0;
-            told.push((
+            reported.push((
                 start,
                 start.saturating_sub(reply.at.0) > 2_000 * CYCLES_PER_US,
             ));
@@ -169,7 +169,7 @@ fn a_mark_waits_for_a_running_sync_train() {
     let seen = decode_marks(&trigger_edges(&all, CAMERA_1));
     assert_eq!(counters.late_edges, 0);
     assert_eq!((seen.stray_edges, seen.lost_edges), (0, 0));
-    assert_eq!(seen.marks.len(), told.len());
+    assert_eq!(seen.marks.len(), reported.len());
     // The first count exceeded 17 bits by one.
     assert_eq!(seen.syncs[0].count, 0);
     let starts: Vec<u64> = all
@@ -180,8 +180,12 @@ fn a_mark_waits_for_a_running_sync_train() {
     assert!(starts.windows(2).all(|pair| pair[1] - pair[0] >= train));
     let is_mark = |cycle: u64| seen.marks.iter().any(|m| m.t_us == cycle / CYCLES_PER_US);
     let marks: Vec<u64> = starts.iter().copied().filter(|&c| is_mark(c)).collect();
-    for (&cycle, (ticks, waited)) in marks.iter().zip(&told) {
-        assert_eq!(cycle - marks[0], ticks - told[0].0, "reported time differs");
+    for (&cycle, (ticks, waited)) in marks.iter().zip(&reported) {
+        assert_eq!(
+            cycle - marks[0],
+            ticks - reported[0].0,
+            "reported time differs"
+        );
         let before = cycle.checked_sub(train);
         let behind = before.is_some_and(|c| starts.contains(&c) && !is_mark(c));
         assert!(behind || !waited, "waited without a reason");

@@ -22,8 +22,8 @@ fn run_marks(n: u32) {
     poll_until(&mut device, &mut reports, |r| {
         marks_in(r).len() >= n as usize
     });
-    let told: Vec<Mark> = marks_in(&reports).into_iter().map(|(m, _)| m).collect();
-    assert_eq!(told, (0..n).map(mark).collect::<Vec<_>>());
+    let reported: Vec<Mark> = marks_in(&reports).into_iter().map(|(m, _)| m).collect();
+    assert_eq!(reported, (0..n).map(mark).collect::<Vec<_>>());
     let counters = device.counters().unwrap();
     assert_eq!((counters.marks, counters.late_edges), (n, 0));
     assert_eq!((counters.overruns, counters.dropped_events), (0, 0));
@@ -123,7 +123,7 @@ fn a_noisy_input_does_not_affect_the_trains() {
     let mut edges = board.edges().unwrap();
     let mut ask = requester(&board);
     ask(Request::Arm { silence_ms: 0 });
-    let (mut marks, mut told, mut from) = (0, Vec::new(), 0);
+    let (mut marks, mut reported, mut from) = (0, Vec::new(), 0);
     // From far more edges than the processor can stamp, to fewer than are ignored.
     for gap_us in [2, 5, 9, 14, 23, 40, 61] {
         let soon = board.input(true).unwrap() + 8_000_000;
@@ -149,19 +149,19 @@ fn a_noisy_input_does_not_affect_the_trains() {
             // A slow host reads six events per mark, while the input would fill all free memory.
             let events = Events::parse(&ask(Request::Events { from }).data).unwrap();
             from = events.first + events.events.len() as u32;
-            told.extend(events.events);
+            reported.extend(events.events);
         }
     }
     loop {
         let events = Events::parse(&ask(Request::Events { from }).data).unwrap();
         from = events.first + events.events.len() as u32;
-        told.extend(events.events);
+        reported.extend(events.events);
         if from == events.next {
             break;
         }
     }
     let is_mark = |e: &&Event| matches!(e.kind, EventKind::Mark(_));
-    assert_eq!(told.iter().filter(is_mark).count(), marks as usize);
+    assert_eq!(reported.iter().filter(is_mark).count(), marks as usize);
     let counters = Counters::parse(&ask(Request::Status).data).unwrap();
     assert_eq!(counters.marks, marks);
     assert_eq!((counters.late_edges, counters.dropped_events), (0, 0));

@@ -45,8 +45,8 @@ fn on_a_noisy_line_every_mark_is_sent_once_or_reported() {
     // In order and never twice; a mark may be missing only after an error.
     let mut on_the_line = seen.marks.iter().map(|m| m.mark).peekable();
     for (mark, certain) in sent {
-        let there = on_the_line.next_if_eq(&mark).is_some();
-        assert!(there || !certain, "{mark:?} was confirmed but not sent");
+        let is_sent = on_the_line.next_if_eq(&mark).is_some();
+        assert!(is_sent || !certain, "{mark:?} was confirmed but not sent");
     }
     assert_eq!(on_the_line.next(), None, "an unrequested train");
     // The events arrived despite the noise too.

@@ -5,7 +5,7 @@
 #![expect(
     clippy::print_stdout,
     clippy::print_stderr,
-    reason = "a program that owns its terminal"
+    reason = "a program reports on its terminal"
 )]
 
 use std::process::ExitCode;

@@ -53,7 +53,7 @@ impl Source {
         })
     }
 
-    /// The time base starts.
+    /// Handles a start of the time base.
     pub(crate) fn start(&mut self, world: &World, from_ns: i64) {
         match self {
             Self::Silence | Self::Dense(_) => {}
@@ -63,7 +63,7 @@ impl Source {
         }
     }
 
-    /// The source that provides encoded words instead of events.
+    /// The source, if it provides encoded words instead of events.
     pub(crate) fn dense(&mut self) -> Option<&mut Dense> {
         match self {
             Self::Dense(dense) => Some(dense),

@@ -53,7 +53,8 @@ impl Scene {
         })
     }
 
-    /// Events start with the grid step after `from_ns`. Every start has its own noise.
+    /// Starts a run. Its first events occur at the grid step after `from_ns`; every run has its own
+    /// noise.
     pub(crate) fn start(&mut self, world: &World, from_ns: i64) {
         let t_ns = (from_ns / GRID_NS + 1) * GRID_NS;
         let first = TipSample {
@@ -64,7 +65,7 @@ impl Scene {
         self.running = Some(self.begin(world.is_lit(), first));
     }
 
-    /// New pixel models from here on: the same pixels with new noise.
+    /// New pixel models: the same pixels with new noise.
     fn begin(&mut self, lit: bool, last: TipSample) -> Running {
         let (scene, geometric) = (&self.scene, &self.config.geometric);
         let pixels: Box<dyn PixelModel> = match (self.config.level, lit) {

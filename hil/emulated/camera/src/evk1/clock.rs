@@ -81,7 +81,7 @@ pub(crate) enum TimeBase {
         /// Camera time at the start, µs.
         base_us: u64,
     },
-    /// Counts the pulses on the sync line since its own start.
+    /// Pulses on the sync line, counted since its own start.
     Counted {
         from_ns: i64,
         /// Pulses of the master's earlier runs.

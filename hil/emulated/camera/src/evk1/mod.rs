@@ -1,6 +1,7 @@
 //! The EVK1 Gen3.1: registers, requests, event filters, time base, and the thread that generates its stream.
 //!
-//! Written from the EVK1 reference alone and independent of the driver's register table, so that an error in one of them shows.
+//! Written from the EVK1 reference alone, independently of the driver's register table, so that an
+//! error in either shows.
 
 mod camera;
 mod clock;

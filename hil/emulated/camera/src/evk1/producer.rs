@@ -58,7 +58,7 @@ impl<'a> Producer<'a> {
     fn new(camera: &'a Evk1, mut run: Run, source: &'a mut Source) -> Self {
         let from_ns = run.from_ns;
         let first_us = run.time.at(from_ns, &camera.sync_line);
-        // Earlier edges are not seen.
+        // Discard edges from before the start.
         camera.world.take_edges(&camera.config.serial, from_ns);
         source.start(&camera.world, from_ns);
         Self {
@@ -206,7 +206,7 @@ impl<'a> Producer<'a> {
         debug_assert!(reached.is_ok(), "time ran backwards: {reached:?}");
     }
 
-    /// Edges that the camera sees before `until_ns`, and the number of late ones.
+    /// Edges due before `until_ns`, and the number of late ones.
     fn due_edges(&mut self, until_ns: i64, gates: &Gates) -> (Vec<TriggerEdge>, u64) {
         let Evk1 {
             config,
@@ -216,7 +216,7 @@ impl<'a> Producer<'a> {
         } = self.camera;
         let delay_ns = i64::from(config.trigger_delay_ns);
         for mut edge in world.take_edges(&config.serial, until_ns - delay_ns) {
-            // A late report from a slow source: the edge was before the camera looked.
+            // A late report from a slow source: the edge is from before the start.
             if edge.at_ns < self.run.from_ns {
                 continue;
             }

@@ -1,7 +1,8 @@
 //! The registers of an EVK1 Gen3.1 and their values at power-up (EVK1 reference, sections 2.1 to 2.5).
 //!
-//! Values are those of the public register map; those of a real device are not public. Registers that the reference does not list do not
-//! exist here: requests for them are rejected, so that a wrong address shows.
+//! Values are those of the public register map; those of a real device are not public. Registers
+//! that the reference does not list do not exist here: requests for them are rejected, which
+//! exposes wrong addresses.
 
 use std::collections::BTreeMap;
 

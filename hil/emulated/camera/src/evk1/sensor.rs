@@ -64,7 +64,7 @@ pub(crate) struct Gates {
     pub pixels: bool,
     /// Pattern generator that replaces the pixels.
     pub pattern: Option<Pattern>,
-    /// Whether the bias disables OFF events (seen on an EVK1 at code 0, section 2.9).
+    /// Whether the bias disables OFF events (observed on an EVK1 at code 0, section 2.9).
     pub no_off: bool,
     pub roi: Arc<Roi>,
     /// Noise filter: minimum events per period in µs (section 2.11).

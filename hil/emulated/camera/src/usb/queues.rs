@@ -82,7 +82,8 @@ pub(crate) struct Queues {
     capacity: usize,
 }
 
-/// Holder of a busy device's interface, outside the processes under test.
+/// ID of a program outside the processes under test that has claimed the interface of a busy
+/// device.
 const SOMEBODY: u64 = 0;
 
 impl Queues {
@@ -313,7 +314,7 @@ impl Queues {
         self.free() > bytes
     }
 
-    // ---- from whoever makes faults
+    // ---- fault injection
 
     /// Unplugs the cable: all transfers end, and new ones fail.
     pub(crate) fn unplug(&self) {
@@ -331,7 +332,8 @@ impl Queues {
         state.abort(Errno::PIPE);
     }
 
-    /// Ends the next transfer with more than `bytes` that much early; the following transfer has them.
+    /// Ends the next transfer that exceeds `bytes` by that many bytes early; the following transfer
+    /// has the rest.
     pub(crate) fn cut_next(&self, bytes: usize) {
         self.lock().cut = Some(bytes);
     }
@@ -341,7 +343,7 @@ impl Queues {
         self.lock().resets_fail = on;
     }
 
-    /// Fails the data transfer after `transfers` more ones, including its data.
+    /// Fails the data transfer after this many more `transfers`, and loses its data.
     pub(crate) fn break_after(&self, transfers: u32) {
         self.lock().broken = Some(transfers);
     }

@@ -136,7 +136,7 @@ impl TestBed {
         )
     }
 
-    /// Takes a device off the list; its file stays for those who have it open.
+    /// Removes a device from the list. Its file remains for processes that have it open.
     pub(crate) fn remove(&self, at: Address) -> io::Result<()> {
         let sys = self.root().join("sys");
         fs::remove_file(sys.join(format!("bus/usb/devices/1-{}", at.port)))?;

@@ -36,11 +36,11 @@ pub(crate) const URB_BYTES: usize = 56;
 const CONTROL: u8 = 2;
 const BULK: u8 = 3;
 
-/// `struct usbdevfs_urb`, kept as bytes so that it goes back as it came.
+/// `struct usbdevfs_urb`, kept as bytes so that unknown fields return unchanged.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Urb([u8; URB_BYTES]);
 
-/// What a URB asks for.
+/// Type of a URB's transfer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Transfer {
     Control,
@@ -68,7 +68,7 @@ impl Urb {
         u64::from_ne_bytes(self.field(16))
     }
 
-    /// Bytes asked for; none when the caller's number is negative.
+    /// Number of requested bytes; 0 if the caller's number is negative.
     pub(crate) fn length(&self) -> usize {
         usize::try_from(i32::from_ne_bytes(self.field(24))).unwrap_or(0)
     }
@@ -117,7 +117,7 @@ impl Setup {
         self.request_type & 0x80 != 0
     }
 
-    /// Defined by the device's maker.
+    /// Vendor request.
     pub(crate) const fn is_vendor(&self) -> bool {
         self.request_type & 0x60 == 0x40
     }

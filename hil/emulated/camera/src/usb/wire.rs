@@ -1,4 +1,5 @@
-//! The emulator's end of one open device: requests in, reads and writes of the process's memory out.
+//! The emulator's end of the connection to one open device: receives requests, reads and writes the
+//! process's memory.
 
 use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
@@ -9,13 +10,13 @@ const DONE: u64 = 3;
 const READ_MEM: u64 = 5;
 const WRITE_MEM: u64 = 6;
 
-/// More than any transfer: an address and a length beyond this are a fault of the process under test.
+/// Upper limit of a transfer, bytes. A larger request is a fault of the process under test.
 const LONGEST: usize = 64 << 20;
 
 /// One open device.
 pub(crate) struct Wire {
     stream: UnixStream,
-    /// Messages that go out with the next write.
+    /// Messages to send with the next write.
     held: Vec<u8>,
 }
 
@@ -79,7 +80,7 @@ impl Wire {
         Ok(bytes)
     }
 
-    /// Writes the process's memory, at the latest with the result.
+    /// Writes to the process's memory; sent with the result at the latest.
     pub(crate) fn write_memory(&mut self, address: u64, bytes: &[u8]) -> io::Result<()> {
         self.held
             .extend_from_slice(&message([WRITE_MEM, address, bytes.len() as u64]));
@@ -92,7 +93,7 @@ impl Wire {
         self.stream.write_all(bytes)
     }
 
-    /// Ends the `ioctl`.
+    /// Returns the result of the `ioctl`.
     pub(crate) fn done(&mut self, result: Result<(), rustix::io::Errno>) -> io::Result<()> {
         let words = match result {
             Ok(()) => [DONE, 0, 0],

@@ -89,7 +89,7 @@ impl Camera {
         Ok(n)
     }
 
-    /// Receives until `enough` is true for all data so far.
+    /// Receives until `enough` returns true for all data so far.
     pub(crate) fn until(&mut self, mut enough: impl FnMut(&Seen) -> bool) -> Seen {
         for _ in 0..20_000 {
             self.transfer().expect("bytes");
@@ -98,7 +98,7 @@ impl Camera {
                 return seen;
             }
         }
-        panic!("it was never enough: {:?}", Seen::of(&self.received));
+        panic!("condition not met by {:?}", Seen::of(&self.received));
     }
 }
 

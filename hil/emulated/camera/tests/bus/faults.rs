@@ -1,4 +1,4 @@
-//! Faults, which libusb must see as on a real bus.
+//! Tests of faults as libusb reports them.
 
 use rusb::Error;
 use skinrig_emulated_camera::config::Content;
@@ -47,7 +47,7 @@ fn an_unplugged_cable_ends_all_transfers_and_a_new_one_restarts_the_device() {
             assert!(devices().is_empty());
             remote.order(SERIAL, Order::Plug).unwrap();
             let camera = Camera::open(0);
-            assert_eq!(camera.read(0x0008), Ok(0x20), "powered up anew");
+            assert_eq!(camera.read(0x0008), Ok(0x20), "after a power-up");
             drop(camera);
             drop(running());
         },

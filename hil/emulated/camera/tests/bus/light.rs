@@ -49,7 +49,7 @@ fn noise_falls_when_the_lamps_are_off_and_comes_back() {
                 rates.push(events as f64 / (seen.last_us - from_us) as f64 * 1e6);
             }
             camera.stop();
-            // 1,800 events/s of background, of which a third remains, and 612 of hot pixels.
+            // 1,800 events/s of background, a third of which remain in the dark, and 612 of hot pixels.
             let [lit, dark, again] = rates[..] else {
                 panic!("{rates:?}")
             };

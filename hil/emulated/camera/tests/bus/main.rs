@@ -1,4 +1,5 @@
-//! The emulated bus and its cameras, tested through the real libusb by a client based on the EVK1 reference alone.
+//! Tests of the emulated bus and its cameras through the real libusb, with a client based on the
+//! EVK1 reference alone.
 #![cfg(target_os = "linux")]
 
 mod client;

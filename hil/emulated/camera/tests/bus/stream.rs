@@ -1,4 +1,4 @@
-//! Stream of a running camera.
+//! Tests of a running camera's stream.
 
 use skinrig_emulated_camera::Evk1Config;
 use skinrig_emulated_camera::config::{Content, Pacing};

@@ -15,7 +15,7 @@ const STANDALONE: u32 = 1 << 12;
 const MASTER: u32 = 1 << 12 | 1 << 14;
 const SLAVE: u32 = 1 << 14;
 
-/// Far enough ahead that an edge is known before its time, even on a busy computer.
+/// A time far enough ahead that an edge arrives before it, even on a busy computer.
 fn soon() -> i64 {
     now_ns() + 200_000_000
 }

@@ -19,7 +19,7 @@ fn main() -> ExitCode {
 
 #[expect(
     clippy::print_stderr,
-    reason = "a program tells its error on the terminal"
+    reason = "a program reports errors on its terminal"
 )]
 fn fail(message: &str) -> ExitCode {
     eprintln!("{message}");

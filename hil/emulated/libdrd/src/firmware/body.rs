@@ -61,7 +61,7 @@ impl Body {
         ]
         .into_iter()
         .fold(ZERO, add);
-        // Implicit viscous terms keep a brake of any strength stable; then dry friction, which reduces the speed and never reverses it.
+        // Implicit viscous terms keep a brake of any strength stable. Dry friction follows; it never reverses the speed.
         let viscous = config.viscous_friction_n_s_m
             + self.rub_n_s_m
             + if braking { config.brake_n_s_m } else { 0.0 };

@@ -1,7 +1,7 @@
 //! Calibration and the sweep of the end stops, during which the library moves the arm.
 //!
-//! The vendor's paths are not documented. The calibration goes to the centre of the workspace; the sweep goes to the ends of each axis,
-//! whether a sample is in the way or not.
+//! The vendor's paths are not documented. The calibration goes to the centre of the workspace; the
+//! sweep goes to the ends of each axis, even through a sample.
 
 use super::regulation::Regulation;
 use super::trajectory::Limits;

@@ -107,7 +107,7 @@ pub fn run(directory: &Path, tell_ready: bool) -> io::Result<()> {
 
 fn check(config: &ArmConfig) -> io::Result<()> {
     let fault = if config.arm_index >= config.devices.len() {
-        "arm_index: expected the place of one of the devices"
+        "arm_index: expected the index of one of the devices"
     } else if !(config.loop_khz > 0.0 && config.loop_khz <= 1000.0 / f64::from(STEP_US)) {
         "loop_khz: expected more than 0 and at most 4"
     } else if !(config.inertia_kg > 0.0 && config.resolution_m > 0.0 && config.reach_radius_m > 0.0)

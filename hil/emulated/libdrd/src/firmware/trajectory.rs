@@ -136,7 +136,7 @@ pub struct Follower {
     sum: f64,
 }
 
-/// Distance to the target that counts as arrived, for rounding, m.
+/// Distance to the target that counts as arrived despite rounding, m.
 const THERE_M: f64 = 1e-12;
 
 impl Follower {
@@ -154,7 +154,7 @@ impl Follower {
     /// Advances by `dt` seconds; returns whether the target is reached and held.
     pub fn follow(&mut self, target: f64, limits: Limits, dt: f64) -> bool {
         let left = target - self.raw;
-        // The largest speed that still allows a stop at the target, which this step must not pass.
+        // The largest speed that still allows a stop at the target and does not pass it in this step.
         let able = (2.0 * limits.amax * left.abs())
             .sqrt()
             .min(limits.vmax)
@@ -209,7 +209,7 @@ mod tests {
         jerk: 1.0,
     };
 
-    /// Largest speed, acceleration and jerk along a sampled way.
+    /// Largest speed, acceleration and jerk of sampled positions.
     fn extremes(ways: &[f64], dt: f64) -> [f64; 3] {
         let slope = |v: &[f64]| v.windows(2).map(|w| (w[1] - w[0]) / dt).collect::<Vec<_>>();
         let largest = |v: &[f64]| v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
@@ -249,7 +249,7 @@ mod tests {
         let mut ways = Vec::new();
         let mut there = false;
         for step in 0..40_000 {
-            // The target changes its mind twice on the way.
+            // The target changes twice on the way.
             let target = match step {
                 0..1000 => 0.01,
                 1000..2000 => -0.005,
@@ -259,7 +259,7 @@ mod tests {
             ways.push(axis.position);
         }
         assert!(there && (axis.position - 0.002).abs() < 1e-9, "{axis:?}");
-        // The last stretch comes down from above.
+        // The last part approaches from above.
         assert!(ways[2000] > 0.003);
         let overshoot = ways[2000..].iter().fold(0.0_f64, |m, x| m.max(0.002 - x));
         assert!(overshoot < 1e-6, "{overshoot} m");

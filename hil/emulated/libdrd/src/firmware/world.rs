@@ -25,7 +25,7 @@ pub enum Cause {
     Usb = 5,
 }
 
-/// The program that has the arm open.
+/// The process that has the arm open.
 #[derive(Debug, Clone, Copy)]
 pub struct Holder {
     /// Number of its connection.

@@ -1,4 +1,4 @@
-//! Each fault as seen by the driver.
+//! Tests of each fault as the driver observes it.
 
 use std::sync::mpsc;
 use std::thread;
@@ -9,7 +9,7 @@ use skinrig_drd_abi::{ForceOffCause, StatusField};
 
 use crate::support::{Bench, ID, WITHIN};
 
-/// A bench with the arm high up, at rest and regulated.
+/// A bench with the arm well above the sample, at rest and regulated.
 fn high_up() -> Bench {
     Bench::started(&ArmConfig {
         start_m: [0.0125, 0.0, 0.05],
@@ -79,7 +79,7 @@ fn calibration_and_start_fail_or_hang() {
         bench.arm.wait_until(WITHIN, |s| s.initialising).unwrap();
         assert!(
             result.recv_timeout(Duration::from_millis(300)).is_err(),
-            "it came back"
+            "expected the call to hang, found that it returned"
         );
         // Another thread can still make calls, and the power goes off.
         assert_eq!((sdk.dhdStop)(ID), 0);

@@ -95,7 +95,7 @@ fn without_a_watchdog_the_motors_stay_on_until_another_program_brakes() {
     let program = Program::start(&arm, 0);
     program.signal("-KILL");
     let gone = arm.wait_until(WITHIN, |s| !s.held).unwrap();
-    // Many times the longest watchdog later, the force is still the last one of the dead program.
+    // After many times the longest watchdog, the arm still applies the last force of the dead program.
     let later = arm
         .wait_until(WITHIN, |s| s.t_ns > gone.t_ns + 300_000_000)
         .unwrap();

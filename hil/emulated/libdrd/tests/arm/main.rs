@@ -2,7 +2,7 @@
 #![cfg(unix)]
 #![expect(
     clippy::unwrap_used,
-    reason = "a bench that does not come up must fail its test"
+    reason = "a bench that does not start must fail its test"
 )]
 
 mod faults;

@@ -61,7 +61,7 @@ fn gravity_compensation_follows_the_configured_tilt_and_mass() {
         tilt_deg: 90.0,
         ..ArmConfig::default()
     });
-    // By default the library compensates the wrong weight and direction, and the servo shows the difference as a force.
+    // By default the library assumes the wrong weight and direction; the servo force shows the difference.
     let weight_n = 0.12 * 9.81;
     let sideways =
         |n: f64| move |s: &drd::ArmState| (s.reported_force_n[0] - n).abs() < 0.05 && !s.moving;

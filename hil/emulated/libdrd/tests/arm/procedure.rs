@@ -30,7 +30,7 @@ fn a_press_from_open_to_close() {
         assert!(is_true((sdk.drdIsSupported)(ID)) && is_true((sdk.drdIsInitialized)(ID)));
         assert!(
             (sdk.drdIsSupported)(ID) > 1,
-            "a true that no Rust bool may hold"
+            "expected a byte that is not a valid Rust bool"
         );
         assert!(bench.status().is(StatusField::Brake));
 
@@ -52,7 +52,7 @@ fn a_press_from_open_to_close() {
         assert!(succeeded(bench.move_to(press_m)));
         let pressed = arm.wait_until(WITHIN, |s| !s.moving).unwrap();
         let [_, _, force] = bench.force();
-        // The forces of sample and servo balance, and the tip stops short of its target.
+        // The forces of sample and servo balance before the tip reaches its target.
         let contact_n = pressed.contact_force_n[2];
         assert!(
             contact_n > 1.0 && (tare - force - contact_n).abs() < 0.1,
@@ -101,7 +101,7 @@ fn the_library_exports_the_whole_table_and_nothing_that_is_never_used() {
     let path = drd::library_beside_this_executable().unwrap();
     // SAFETY: the library runs no code when it is loaded, unless it is to become a firmware.
     let library = unsafe { libloading::Library::new(path) }.unwrap();
-    // SAFETY: the address is only looked at.
+    // SAFETY: the address is never dereferenced.
     let has = |name: &str| unsafe { library.get::<*const ()>(name.as_bytes()) }.is_ok();
     for symbol in SYMBOLS {
         assert!(has(symbol.name), "{}", symbol.name);

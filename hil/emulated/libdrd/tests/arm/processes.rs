@@ -37,7 +37,7 @@ fn drives_the_arm_that_the_environment_names() {
         assert_eq!((sdk.drdOpenID)(0), 0);
         assert_eq!((sdk.drdStart)(ID), 0);
         assert!((sdk.drdMoveToPos)(0.0125, 0.0, 0.019, true, ID) >= 0);
-        // While it is regulated: an arm that is braked sinks.
+        // Keep regulating, because a braked arm sinks.
         let directory = std::env::var_os(ARM_VARIABLE).unwrap();
         let state = ArmView::attach(std::path::Path::new(&directory))
             .unwrap()
@@ -167,7 +167,7 @@ fn an_invalid_configuration_is_rejected() {
         .unwrap();
     assert!(!firmware.wait().unwrap().success());
     assert!(
-        said.contains("arm_index: expected the place of one of the devices"),
+        said.contains("arm_index: expected the index of one of the devices"),
         "{said}"
     );
 }

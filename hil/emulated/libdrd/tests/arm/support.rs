@@ -8,7 +8,7 @@ use std::time::Duration;
 use drd::{ArmConfig, EmulatedArm};
 use skinrig_drd_abi::{DeviceId, Functions, StatusVector};
 
-/// Longer than anything takes on a busy computer.
+/// Time limit of waits, longer than anything takes on a busy computer.
 pub const WITHIN: Duration = Duration::from_secs(30);
 
 /// The functions of the library at `path`, loaded for the rest of the process.

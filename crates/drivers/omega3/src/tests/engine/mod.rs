@@ -21,7 +21,7 @@ use crate::indenter::{capabilities, check_limits_of_run};
 use crate::open::open;
 use crate::stream::Stream;
 
-/// VirtualClock time that advances only during waits.
+/// Virtual time that advances only during waits.
 #[derive(Clone, Default)]
 struct VirtualClock(Arc<Mutex<i64>>);
 

@@ -37,7 +37,7 @@ fn at_the_force_limit_the_tip_stops_and_may_only_rise() {
 #[test]
 fn a_sideways_path_is_not_a_rise_however_far_the_arm_sags() {
     let bench = Bench::armed();
-    // The arm hanging_call 1 mm below its set point.
+    // The arm hangs 1 mm below its set point.
     bench
         .sdk
         .with(|s| (s.follows, s.position_m[2]) = (false, 0.009));

@@ -1,0 +1,35 @@
+// A session that is being recorded: what its follower sends, shown as it arrives, and control where the server allows it.
+import { listen, post } from '/app/api.js';
+import { $, el, number, problem } from '/app/dom.js';
+const ask = (about, name, said) => !about.control ? [] : [
+  ...['pause', 'pause_now', 'resume', 'stop', 'abort'].map(request => el('button', { type: 'button', onclick: async () => {
+    try { said.textContent = `the run is ${(await post('control', { session: name, request })).state}`; } catch (e) { said.textContent = e.message; }
+  } }, request.replace('_', ' '))),
+  el('form', { onsubmit: async event => {
+    event.preventDefault();
+    const form = new FormData(event.target);
+    try { await post('note', { session: name, by: form.get('by'), text: form.get('text') }); said.textContent = 'noted'; } catch (e) { said.textContent = e.message; }
+  } }, el('label', {}, 'Your name ', el('input', { type: 'text', name: 'by', required: true, maxlength: 64 })), ' ',
+  el('label', {}, 'Note ', el('input', { type: 'text', name: 'text', required: true, maxlength: 2000 })), ' ', el('button', { type: 'submit' }, 'Add note')),
+];
+export const live = (name, about, view, signal) => {
+  const alarms = el('div', { role: 'alert' }), state = el('p', { role: 'status' }), said = el('p', { role: 'status' });
+  const certificate = el('p'), notes = el('ul');
+  const card = el('section', { class: 'card', 'aria-label': 'Run' }, alarms, state, certificate, el('div', { class: 'transport' }, ask(about, name, said)), said, notes);
+  const on = {
+    alarms: all => alarms.replaceChildren(...all.map(a => el('p', { class: `notice ${a.level}` }, a.text))),
+    run: ({ run, writer, free_bytes: free }) => {
+      const r = run?.cameras?.map((c, k) => `camera ${k + 1} ${number((c.events_per_s ?? 0) / 1000, 1)} kev/s`).join(', ');
+      state.textContent = run ? `${run.state}: ${run.done} of ${run.planned} presses; ${r}; to go ${number(run.eta_s, 0)} s; disk ${number((free ?? 0) / 1e9, 1)} GB free`
+        : writer ? `written by ${writer}` : 'not running';
+      if (run?.tip_mm) view.tip(run.tip_mm);
+    },
+    presses: rows => view.presses(rows),
+    newest: n => view.pictures(n.pictures),
+    analysis: a => { certificate.textContent = `clock certificate: ${a.certificate.status}; ${a.calibrated ? 'error' : 'residual against the nominal geometry'} of ${a.n} scored presses: RMSE ${number(a.rmse_mm[0])} mm`; },
+    journal: j => notes.replaceChildren(...j.notes.map(([t, text]) => el('li', {}, `${number(t, 1)} s: ${text}`))),
+    over: ({ error }) => { state.textContent = error ?? 'the run has ended; reload for its playback'; },
+  };
+  listen({ session: name }, on, signal).catch(error => { if (!signal.aborted) alarms.replaceChildren(problem(error)); });
+  return card;
+};

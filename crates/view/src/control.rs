@@ -1,0 +1,53 @@
+//! Owns requests that reach a run: only of a server with control, and through the lab's own hand on it.
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use crate::folder::Folder;
+use crate::lab::Lab;
+use crate::problem::Problem;
+
+/// A request to the run that writes a session.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ControlRequest {
+    session: String,
+    request: String,
+}
+
+/// A note for a running session.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct NoteRequest {
+    session: String,
+    by: String,
+    text: String,
+}
+
+/// Rejects requests to a server without control.
+pub(crate) fn check(has_control: bool) -> Result<(), Problem> {
+    if has_control {
+        return Ok(());
+    }
+    Err(Problem::forbidden(
+        "this server only reads\n  next: start it with `skinrig view --control`",
+    ))
+}
+
+/// Hands the request to the run; its state after the acknowledgement.
+pub(crate) fn control(
+    lab: &dyn Lab,
+    folder: &Folder,
+    asked: &ControlRequest,
+) -> Result<Value, Problem> {
+    let session = folder.session(&asked.session)?;
+    let state = lab.request(&session, &asked.request)?;
+    Ok(json!({ "state": state }))
+}
+
+/// Stores the note.
+pub(crate) fn note(lab: &dyn Lab, folder: &Folder, asked: &NoteRequest) -> Result<Value, Problem> {
+    let session = folder.session(&asked.session)?;
+    lab.note(&session, &asked.by, &asked.text)?;
+    Ok(json!({ "written": true }))
+}

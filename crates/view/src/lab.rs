@@ -1,0 +1,87 @@
+//! Owns the interface to everything about a lab that is not in a session file.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Serialize;
+use serde_json::Value;
+use skinrig_analysis::Analysis;
+
+/// Why the lab cannot answer, as a complete message with a next step.
+#[derive(Debug, Clone, thiserror::Error)]
+#[error("{0}")]
+pub struct LabError(pub String);
+
+/// State that a run reports of itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunState {
+    /// Name of the controller's state, such as `running`.
+    pub state: String,
+    /// True once the run has ended and its session is being sealed.
+    pub is_over: bool,
+    /// Bytes of each camera known to be lost in this leg.
+    pub lost_bytes: [u64; 2],
+    /// The whole report, as `live` in `skinrig watch --json`.
+    pub report: Value,
+}
+
+/// An analysis whose results are beside a session.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AnalysisEntry {
+    /// Name of the variant; `None` for the official analysis.
+    pub name: Option<String>,
+    /// RMSE with its 95 % interval, mm.
+    pub rmse_mm: Option<[Option<f64>; 3]>,
+    /// False if its numbers must not be used.
+    pub is_valid: bool,
+    /// Changes of a variant, as `analysis.key=value`.
+    pub changes: Vec<String>,
+    /// Why the results cannot be used.
+    pub trouble: Option<String>,
+}
+
+/// Everything that the server asks of its surroundings. Calls may block; none comes from an async task.
+pub trait Lab: Send + Sync + 'static {
+    /// State of the run that writes `session`; `None` if none answers.
+    fn run(&self, session: &Path) -> Option<RunState>;
+
+    /// Hands a request (`pause`, `pause_now`, `resume`, `stop`, `abort` or `halt`) to the run that writes `session`, and returns the run's
+    /// state after its acknowledgement.
+    ///
+    /// # Errors
+    /// [`LabError`] for an unknown request, or if no run acknowledges it.
+    fn request(&self, session: &Path, request: &str) -> Result<String, LabError>;
+
+    /// Adds a note to the run that writes `session`, and waits until it is stored.
+    ///
+    /// # Errors
+    /// [`LabError`] for a note that is too long, or if no run stores it.
+    fn note(&self, session: &Path, by: &str, text: &str) -> Result<(), LabError>;
+
+    /// Stored results of this version of the analysis beside `session`; `None` for `name` is the official one. `None` if there are none.
+    fn analysis(&self, session: &Path, session_id: &str, name: Option<&str>) -> Option<Analysis>;
+
+    /// All analyses beside `session`, the official one first.
+    fn analyses(&self, session: &Path, session_id: &str) -> Vec<AnalysisEntry>;
+
+    /// Settings of a session by key, as a comparison of skins looks at them.
+    ///
+    /// # Errors
+    /// [`LabError`] if the session cannot be read.
+    fn facts(&self, session: &Path) -> Result<BTreeMap<String, String>, LabError>;
+
+    /// Prototypes of a folder with their series, as `skinrig prototypes --json`.
+    ///
+    /// # Errors
+    /// [`LabError`] if the folder cannot be read.
+    fn prototypes(&self, folder: &Path) -> Result<Value, LabError>;
+
+    /// Nights whose history is beside the sessions, newest first; none without a history.
+    ///
+    /// # Errors
+    /// [`LabError`] if there is a history that cannot be read.
+    fn nights(&self, folder: &Path) -> Result<Vec<Value>, LabError>;
+
+    /// Free bytes where `session` is; `None` if unknown.
+    fn free_bytes(&self, session: &Path) -> Option<u64>;
+}

@@ -1,0 +1,32 @@
+//! A local server and its page: a folder of sessions, each one live and afterwards.
+//!
+//! [`Server::open`] binds the port and prints nothing; [`Server::run`] serves until ctrl-C or SIGTERM. The server reads: sessions through
+//! [`SessionReader`](skinrig_recorder::SessionReader), opened anew for each answer so that a run can seal its session, and everything else
+//! through a [`Lab`], which the command line implements. It writes nothing, and reaches a run only if it was opened with control.
+//!
+//! - `access`: the token, and the checks against other pages and other names of this machine.
+//! - `routes`: the table of addresses. `assets`: the page itself.
+//! - `shelf`, `document`, `events`, `poses`, `clusters`, `download`, `differences`: one answer each.
+//! - `live`: one follower per running session, shared by all its pages.
+
+mod access;
+mod assets;
+mod clocks;
+mod clusters;
+mod control;
+mod differences;
+mod document;
+mod download;
+mod events;
+mod folder;
+mod lab;
+mod live;
+mod opened;
+mod poses;
+mod problem;
+mod routes;
+mod server;
+mod shelf;
+
+pub use lab::{AnalysisEntry, Lab, LabError, RunState};
+pub use server::{Options, ServeError, Server};

@@ -1,0 +1,113 @@
+//! Owns the thread that follows one session.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+use skinrig_recorder::{RecorderError, writer_of};
+
+use super::alarms;
+use super::estimates::Estimates;
+use super::looks::Looks;
+use super::parts::{Sender, publish};
+use crate::lab::{Lab, RunState};
+
+/// Between two questions to the run, and two looks at the state of the file.
+const TICK: Duration = Duration::from_millis(100);
+/// A session without pages is left after this.
+const UNWATCHED: Duration = Duration::from_secs(3);
+/// A session whose run does not answer, or has ended, may be being sealed, for which its writer needs the file alone: it is left alone
+/// for three times as long as the writer waits at first, and some.
+const LEFT_ALONE: Duration = Duration::from_secs(10);
+
+/// Since when a session may be being sealed.
+#[derive(Default)]
+struct Sealing(Option<Instant>);
+
+impl Sealing {
+    fn may_go_on(&mut self, run: Option<&RunState>, is_written: bool) -> bool {
+        if run.is_some_and(|run| !run.is_over) || !is_written {
+            self.0 = None;
+            return false;
+        }
+        self.0.get_or_insert_with(Instant::now).elapsed() < LEFT_ALONE
+    }
+}
+
+/// Follows the session at `path` until nobody writes or watches it any more; `leave` forgets it.
+pub(super) fn follow(
+    leave: impl Fn(&Path, bool) -> bool,
+    lab: &Arc<dyn Lab>,
+    path: &Path,
+    to: &Sender,
+) {
+    let stop = Arc::new(AtomicBool::new(false));
+    let mut looks = Looks::new(path);
+    let mut estimates = Estimates::new(path, &stop);
+    let mut sealing = Sealing::default();
+    let mut unwatched: Option<Instant> = None;
+    loop {
+        // The writer first: a run that ends in between has then left its end in the file.
+        let writer = writer_of(path);
+        let run = writer.as_ref().and_then(|_| lab.run(path));
+        let may_be_sealing = sealing.may_go_on(run.as_ref(), writer.is_some());
+        stop.store(may_be_sealing, Ordering::Relaxed);
+        let seen = if may_be_sealing {
+            Ok(())
+        } else {
+            looks.look(estimates.newest().as_deref(), to)
+        };
+        if writer.is_some() && !may_be_sealing {
+            estimates.renew(looks.outcomes());
+        }
+        if let Some(analysis) = estimates.newest() {
+            publish(to, "analysis", &crate::document::summary(&analysis));
+        }
+        let free_bytes = lab.free_bytes(path);
+        let alarms = alarms::alarms(
+            writer.is_some(),
+            run.as_ref(),
+            &looks,
+            estimates.newest().as_deref(),
+            free_bytes,
+        );
+        publish(to, "alarms", &alarms);
+        let report = run.as_ref().map(|run| &run.report);
+        publish(
+            to,
+            "run",
+            &json!({ "run": report, "writer": writer, "free_bytes": free_bytes }),
+        );
+        match seen {
+            Err(e) if writer.is_none() || !is_beginning(&e) => {
+                publish(to, "over", &json!({ "error": e.to_string() }));
+                break;
+            }
+            Ok(()) if writer.is_none() => {
+                publish(to, "over", &json!({}));
+                break;
+            }
+            _ => {}
+        }
+        if to.receiver_count() > 0 {
+            unwatched = None;
+        } else if unwatched.get_or_insert_with(Instant::now).elapsed() > UNWATCHED
+            && leave(path, false)
+        {
+            break;
+        }
+        std::thread::sleep(TICK);
+    }
+    stop.store(true, Ordering::Relaxed);
+    leave(path, true);
+}
+
+/// A run whose first records are not on the disk yet.
+fn is_beginning(error: &RecorderError) -> bool {
+    matches!(
+        error,
+        RecorderError::Empty { .. } | RecorderError::NotASession { .. }
+    )
+}
