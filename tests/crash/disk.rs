@@ -5,7 +5,7 @@
 //!
 //! A preloaded library (`disk.c`) injects the faults. This runs a sample; all several thousand cases run with
 //!
-//!     SKINRIG_DISK_FAULTS=all cargo test -p skinrig --test crash disk -- --nocapture
+//!     SKINRIG_DISK_FAULTS=all cargo test -p skinrig --test commands crash::disk -- --nocapture
 #![cfg(target_os = "linux")]
 #![expect(
     clippy::print_stderr,
@@ -22,7 +22,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use skinrig_model::RunEnd;
 use skinrig_recorder::{RecorderError, SessionReader};
 
-use crate::lab::{Dice, expect, journal, program, resume, session_in, words};
+use super::lab::{Dice, expect, journal, program, resume, session_in, words};
 
 const CAMPAIGN: &str = "tests/crash/disk.yaml";
 const KINDS: [&str; 6] = ["kill", "torn", "eio", "enospc", "full", "short"];

@@ -3,7 +3,7 @@
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 
-use crate::lab::{Dice, Uninterrupted, campaign, expect, goes_on, journal, resume, session_in};
+use super::lab::{Dice, Uninterrupted, campaign, expect, goes_on, journal, resume, session_in};
 
 /// Number of random kills.
 fn crashes() -> u64 {
@@ -17,7 +17,7 @@ fn killed(folder: &std::path::Path, fault: &str) -> bool {
     match output.status.code() {
         None => true,
         code => {
-            assert_eq!(code, Some(0), "{}", crate::lab::words(&output));
+            assert_eq!(code, Some(0), "{}", super::lab::words(&output));
             false
         }
     }
@@ -127,7 +127,7 @@ fn killed_again_while_it_goes_on() {
             .unwrap();
         let case = format!(
             "killed at {first}, then at {again}: {}",
-            crate::lab::words(&output)
+            super::lab::words(&output)
         );
         assert_eq!(output.status.code(), None, "{case}");
         goes_on(&session, 2, &case);

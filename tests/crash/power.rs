@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::lab::{Dice, Presses, campaign, goes_on, journal, program, session_in, words};
+use super::lab::{Dice, Presses, campaign, goes_on, journal, program, session_in, words};
 
 /// Length of the header of a write-ahead log, and of each of its frames besides the page (sqlite.org/fileformat2.html, 4.1
 /// and 4.2).

@@ -7,7 +7,7 @@ use std::process::Command;
 use skinrig_model::{PressRole, PressVerdict};
 use skinrig_recorder::SessionReader;
 
-use crate::lab::{
+use super::lab::{
     Presses, assert_kept, campaign, expect, journal, program, resume, session_in, words,
 };
 

@@ -5,9 +5,17 @@
 mod bundle;
 mod catalogue;
 mod compare;
+// Beside the other tests of the whole system; here because it starts the program.
+#[cfg(unix)]
+#[path = "../../../../tests/crash/mod.rs"]
+mod crash;
 mod damage;
 mod dataset;
 mod displaced;
+#[cfg(target_os = "linux")]
+mod doctor;
+#[cfg(target_os = "linux")]
+mod emulated_bench;
 mod evaluation;
 mod faults;
 mod help;
@@ -17,6 +25,8 @@ mod import_refusals;
 mod installed;
 mod interrupt;
 mod json;
+#[cfg(target_os = "linux")]
+mod nightly;
 mod numbering;
 mod operator;
 mod options;

@@ -58,7 +58,7 @@ fn has_an_outcome(sessions: &Path) -> bool {
 
 #[test]
 fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
-    let Some((_alone, bench)) = start() else {
+    let Some((_slot, bench)) = start() else {
         return;
     };
     let folder = tempfile::tempdir().unwrap();

@@ -179,7 +179,7 @@ impl Steps {
 
 #[test]
 fn the_steps_of_a_first_contact_show_what_they_must() {
-    let Some((_alone, bench)) = start() else {
+    let Some((_slot, bench)) = start() else {
         return;
     };
     let mut steps = Steps {

@@ -119,7 +119,7 @@ fn press(bench: &EmulatedBench, folder: &Path, presses: usize) -> Tally {
 }
 
 #[test]
-#[ignore = "an hour of real time: SKINRIG_CI_LONG=1 .ci/run, or SKINRIG_PRESSES=10000 SKINRIG_BENCHES=2 cargo test -p skinrig --test emulated_bench -- --ignored --nocapture thousands"]
+#[ignore = "an hour of real time: SKINRIG_CI_LONG=1 .ci/run, or SKINRIG_PRESSES=10000 SKINRIG_BENCHES=2 cargo test -p skinrig --test commands -- --ignored --nocapture thousands"]
 fn of_thousands_of_presses_under_load_no_motion_is_refused() {
     let (presses, benches) = (size("SKINRIG_PRESSES", 10_000), size("SKINRIG_BENCHES", 2));
     let _busy = Busy::all();
@@ -155,7 +155,7 @@ fn of_thousands_of_presses_under_load_no_motion_is_refused() {
 }
 
 #[test]
-#[ignore = "half an hour of real time: SKINRIG_CI_LONG=1 .ci/run, or SKINRIG_NIGHTS=20 SKINRIG_BENCHES=2 cargo test -p skinrig --test emulated_bench -- --ignored --nocapture nights"]
+#[ignore = "half an hour of real time: SKINRIG_CI_LONG=1 .ci/run, or SKINRIG_NIGHTS=20 SKINRIG_BENCHES=2 cargo test -p skinrig --test commands -- --ignored --nocapture nights"]
 fn nights_in_a_row_pass() {
     let (nights, benches) = (size("SKINRIG_NIGHTS", 20), size("SKINRIG_BENCHES", 2));
     let one = |_| {

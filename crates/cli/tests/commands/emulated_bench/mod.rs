@@ -1,42 +1,32 @@
 //! The emulated bench, end to end and in real time: production drivers over stand-ins for the hardware.
-#![cfg(target_os = "linux")]
-#![expect(
-    clippy::unwrap_used,
-    clippy::print_stderr,
-    reason = "a test that cannot run must fail, or say why it did not run"
-)]
 
-#[path = "emulated_bench/endurance.rs"]
 mod endurance;
-#[path = "emulated_bench/first_contact.rs"]
 mod first_contact;
-#[path = "emulated_bench/tolerant.rs"]
+mod slot;
 mod tolerant;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use serde_json::Value;
 use skinrig_emulated_bench::{BenchConfig, BenchError, EmulatedBench};
+
+pub(crate) use slot::Slot;
 
 const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
 /// Of the cameras' true geometry and their noise; the simulated bench takes it too.
 const SEED: u64 = 1;
 
-/// Two benches at once would be late for one another.
-static REAL_TIME: Mutex<()> = Mutex::new(());
-
-/// A bench that has the processors to itself; `None`, and why on standard error, on a machine that can have none.
-fn start() -> Option<(MutexGuard<'static, ()>, EmulatedBench)> {
-    let alone = REAL_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+/// A bench; `None`, and why on standard error, on a machine that can have none.
+fn start() -> Option<(Slot, EmulatedBench)> {
+    let slot = Slot::wait();
     let bench = EmulatedBench::start(&BenchConfig {
         seed: SEED,
         ..BenchConfig::default()
     });
     match bench {
-        Ok(bench) => Some((alone, bench)),
+        Ok(bench) => Some((slot, bench)),
         Err(BenchError::Box(reason)) => {
             eprintln!("skipped: no emulated bench: {reason}");
             None
@@ -118,7 +108,7 @@ fn results(folder: &Path) -> Value {
 fn the_quick_check_on_the_emulated_bench_agrees_with_the_simulated_one() {
     let folder = tempfile::tempdir().unwrap();
     let (emulated, simulated) = (folder.path().join("emulated"), folder.path().join("sim"));
-    let Some((_alone, bench)) = start() else {
+    let Some((_slot, bench)) = start() else {
         return;
     };
     let (emulated, said) = run_in_real_time(&bench, &emulated);
