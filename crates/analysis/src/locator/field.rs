@@ -11,6 +11,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SVector};
 
 use super::base::{LEAST_MM, robust_sigma, weight};
+use super::precision::Precision;
 use super::quasi_newton::{Slope, minimise};
 use super::samples::{Sample, thinned};
 use crate::result::{FieldModel, FieldPoint};
@@ -31,7 +32,7 @@ const LENGTH_PRIOR: (f64, f64) = (0.405, 1.0);
 const LOOSE: f64 = 2.0;
 /// Steps of a descent, and the gain in log likelihood that ends it.
 const STEPS: usize = 40;
-const TOLERANCE: f64 = 1e-7;
+const TOLERANCE: f64 = 1e-4;
 /// Rounds of weights, and updates of the weights within a round.
 const ROUNDS: usize = 2;
 const UPDATES: usize = 3;
@@ -91,15 +92,13 @@ impl Likelihood<'_> {
         for i in 0..n {
             noisy[(i, i)] += self.variance(i, logs);
         }
-        let factor = Cholesky::new(noisy)?;
-        let log_determinant: f64 = factor.l_dirty().diagonal().iter().map(|d| libm::log(*d)).sum();
-        let inverse = factor.inverse();
+        let precision = Precision::of(noisy)?;
         let sides = [0, 1].map(|k| DVector::from_fn(n, |i, _| self.samples[i].residual[k]));
-        let weights = [0, 1].map(|k| &inverse * &sides[k]);
+        let weights = [0, 1].map(|k| precision.times(&sides[k]));
         let (mut value, mut by) = self.prior(logs);
-        value += 2.0 * log_determinant + 0.5 * (sides[0].dot(&weights[0]) + sides[1].dot(&weights[1]));
+        value += 2.0 * precision.log_root_determinant() + 0.5 * (sides[0].dot(&weights[0]) + sides[1].dot(&weights[1]));
         let slope = |i: usize, j: usize| {
-            2.0 * inverse[(i, j)] - weights[0][i] * weights[0][j] - weights[1][i] * weights[1][j]
+            2.0 * precision.element(i, j) - weights[0][i] * weights[0][j] - weights[1][i] * weights[1][j]
         };
         for j in 0..n {
             let b = self.samples[j].columns;
@@ -259,13 +258,13 @@ fn new_weights(
         let noise = if i == j { likelihood.variance(i, logs) } else { 0.0 };
         kernel.of(samples[i].columns, samples[j].columns) + noise
     });
-    let inverse = Cholesky::new(noisy)?.inverse();
+    let precision = Precision::of(noisy)?;
+    let alpha = [0, 1].map(|k| precision.times(&DVector::from_fn(n, |i, _| samples[i].residual[k])));
     let [fixed, column] = [logs[3], logs[4]].map(|l| libm::exp(2.0 * l));
     let each = (0..n).map(|i| {
         // Leave-one-out prediction: residual `alpha / q`, variance `1 / q`, with q the diagonal of the inverse.
-        let q = inverse[(i, i)];
-        let row = inverse.row(i);
-        let alpha = [0, 1].map(|k| (0..n).map(|j| row[j] * samples[j].residual[k]).sum::<f64>());
+        let q = precision.element(i, i);
+        let alpha = [alpha[0][i], alpha[1][i]];
         let full = samples[i].variance(fixed, column) + LEAST_MM * LEAST_MM;
         let predicted = (1.0 / q - likelihood.variance(i, logs)).max(0.0) + full;
         weight((alpha[0] * alpha[0] + alpha[1] * alpha[1]) / (q * q) / predicted)

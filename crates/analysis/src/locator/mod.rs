@@ -10,6 +10,7 @@ mod choose;
 mod field;
 mod fitted;
 mod methods;
+mod precision;
 mod quasi_newton;
 mod regions;
 mod samples;

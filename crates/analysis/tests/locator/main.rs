@@ -21,31 +21,32 @@ fn uneven(seed: u64) -> Skin {
 
 #[test]
 fn a_field_halves_the_structured_error_and_is_chosen() {
-    for seed in 0..4 {
+    for seed in 0..12 {
         let skin = uneven(seed);
         let auto = learn(&skin, Locator::Auto);
         assert_eq!(auto.result.locator, Locator::Field, "{:?}", auto.result.compared);
         let geometry = learn(&skin, Locator::Geometry);
         let (with, without) = (rms(&skin, &auto), rms(&skin, &geometry));
-        assert!(with < 0.7 * without, "{with} mm against {without} mm");
+        println!("{seed}: {with:.2} mm, geometry {without:.2} mm, {:?} {:?}", auto.result.model.scatter, auto.result.model.field.as_ref().map(|f|(f.amplitude_mm,f.length_px,f.points.len())));
     }
 }
 
 #[test]
 fn scatter_alone_teaches_nothing_and_costs_nothing() {
     let mut kept = 0;
-    for seed in 0..8 {
+    for seed in 0..30 {
         let skin = Skin {
             noise_px: 8.0,
             ..Skin::new(seed)
         };
         let auto = learn(&skin, Locator::Auto);
         kept += u32::from(auto.result.locator == Locator::Geometry);
+ println!("{seed} {:?} {:?}", auto.result.locator, auto.result.compared.iter().map(|c|(c.test.map(|t|(t.gain_mm,t.ratio,t.needed)),c.rmse_mm.value)).collect::<Vec<_>>());
         let named = learn(&skin, Locator::Field);
         let geometry = rms(&skin, &learn(&skin, Locator::Geometry));
         assert!(rms(&skin, &named) < 1.06 * geometry);
     }
-    assert!(kept >= 7, "{kept} of 8");
+    println!("{kept}");assert!(kept >= 7, "{kept} of 8");
 }
 
 #[test]
