@@ -5,6 +5,7 @@ use sha2::{Digest, Sha256};
 
 use crate::result::{
     Analysis, CalibrationResult, LocationOutcome, Metrics, PressCounts, PressResult, PressView,
+    Region,
 };
 use skinrig_model::{
     AnalysisSettings, LocationId, Point2, PressId, PressRole, RepetitionId, StereoGeometry, Verdict,
@@ -37,6 +38,8 @@ struct Row<'a> {
     reason: Option<&'a str>,
     views: &'a [Option<PressView>; 2],
     location_outcome: &'a LocationOutcome,
+    region: &'a Option<Region>,
+    extrapolated: bool,
 }
 
 impl<'a> Row<'a> {
@@ -53,6 +56,8 @@ impl<'a> Row<'a> {
             reason: press.reason.as_deref(),
             views: &press.views,
             location_outcome: &press.location_outcome,
+            region: &press.region,
+            extrapolated: press.extrapolated,
         }
     }
 }

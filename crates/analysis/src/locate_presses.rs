@@ -5,7 +5,7 @@ use skinrig_model::{CameraId, PressRole, Verdict};
 use crate::calibrate::{SessionCalibration, calibrate_session};
 use crate::check;
 use crate::input::SessionInput;
-use crate::locator::{self, Effort, LocatorChoice};
+use crate::locator::{self, Effort, Fitted, LocatorChoice};
 use crate::result::{LocationOutcome, PressResult, PressView};
 use crate::sets::CalibrationSet;
 use crate::triangulate::locate;
@@ -28,6 +28,14 @@ pub(crate) struct LocatedPresses {
     pub presses: Vec<PressResult>,
     pub calibrated: SessionCalibration,
     pub locator: Option<LocatorChoice>,
+}
+
+impl LocatedPresses {
+    /// The locator; the rays of the geometry if nothing could be learnt.
+    pub(crate) fn fitted(&self) -> Fitted {
+        let learnt = self.locator.as_ref().map(|l| l.fitted.clone());
+        learnt.unwrap_or_else(|| Fitted::rays(self.calibrated.geometry))
+    }
 }
 
 /// Applies journal, data and rules to the presses, calibrates, learns to locate, and locates all presses.

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use skinrig_analysis::result::{ClockFit, LocationOutcome, PressResult, PressView};
+use skinrig_analysis::result::{ClockFit, PressResult, PressView};
 use skinrig_model::{HostTime, PlannedPress, PressTiming};
 use skinrig_recorder::AttemptRow;
 
@@ -29,16 +29,6 @@ impl Row<'_> {
 
     fn view(&self, camera: usize) -> Option<&PressView> {
         self.found?.views[camera].as_ref()
-    }
-
-    fn sine(&self) -> Option<f64> {
-        match self.found?.location_outcome {
-            LocationOutcome::Located { sine, .. }
-            | LocationOutcome::Outside { sine, .. }
-            | LocationOutcome::Parallel { sine }
-            | LocationOutcome::Behind { sine } => Some(sine),
-            LocationOutcome::Missing => None,
-        }
     }
 }
 
@@ -150,7 +140,15 @@ fn outcome(table: &mut Columns<'_>) {
         let (x, y) = r.found?.error_mm()?;
         Some(x.hypot(y))
     });
-    table.real("ray_sine", |r| r.sine());
+    table.real("ray_sine", |r| r.found?.location_outcome.sine());
+    let region = |r: &Row<'_>| r.found?.region;
+    table.real("region_major_mm", |r| Some(region(r)?.semi_axes_mm[0]));
+    table.real("region_minor_mm", |r| Some(region(r)?.semi_axes_mm[1]));
+    table.real("region_angle_deg", |r| Some(region(r)?.angle_deg));
+    table.count("extrapolated", |r| {
+        let found = r.found.filter(|f| f.estimate().is_some())?;
+        Some(i64::from(found.extrapolated))
+    });
 }
 
 /// Columns on the view of a camera.

@@ -72,7 +72,18 @@ pub enum CalibrationModel {
 
 /// What turns the columns of both cameras into a position.
 #[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default, Serialize, Deserialize, Choice,
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Hash,
+    PartialOrd,
+    Ord,
+    Default,
+    Serialize,
+    Deserialize,
+    Choice,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Locator {

@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use skinrig_analysis::result::{Analysis, Latency, OffSensor, PressResult};
+use skinrig_analysis::result::{Analysis, Latency, LocatorComparison, OffSensor, PressResult};
 use skinrig_analysis::rule::Rule;
 use skinrig_analysis::triangulate::locate;
-use skinrig_model::{CameraId, LocationId, Point2, PressId, PressRole, Verdict, quantile};
+use skinrig_model::{CameraId, LocationId, Locator, Point2, PressId, PressRole, Verdict, quantile};
 
-use crate::format::grouped;
+use crate::format::{grouped, number};
 
 /// True for the presses behind the headline: scored, valid, with truth and estimate.
 #[must_use]
@@ -273,12 +273,14 @@ pub fn residuals(analysis: &Analysis) -> Vec<Residual> {
         if columns.iter().any(Option::is_none) {
             return None;
         }
-        let start = locate(&calibration.start, &analysis.rig.outline, columns);
+        let outline = &analysis.rig.outline;
+        let start = locate(&calibration.start, outline, columns);
+        let after = locate(&analysis.geometry, outline, columns);
         Some(Residual {
             press: press.press,
             truth,
             before: start.estimate().filter(|p| finite(*p)),
-            after: press.estimate().filter(|p| finite(*p)),
+            after: after.estimate().filter(|p| finite(*p)),
         })
     };
     let calibrating = analysis
@@ -286,4 +288,39 @@ pub fn residuals(analysis: &Analysis) -> Vec<Residual> {
         .iter()
         .filter(|p| p.role == PressRole::Calibrate && p.verdict == Verdict::Valid);
     calibrating.filter_map(row).collect()
+}
+
+/// Display name of a locator.
+#[must_use]
+pub(crate) const fn locator_name(locator: Locator) -> &'static str {
+    match locator {
+        Locator::Auto => "automatic",
+        Locator::Geometry => "geometry alone",
+        Locator::Field => "geometry with a field",
+        Locator::Direct => "polynomial with a field",
+    }
+}
+
+/// The locator in use and what it gains, if it is not the geometry alone.
+#[must_use]
+pub(crate) fn locator_note(analysis: &Analysis) -> Option<String> {
+    let l = analysis.locator.as_ref()?;
+    if l.locator == Locator::Geometry {
+        return None;
+    }
+    let rmse = |of: &dyn Fn(&LocatorComparison) -> bool| {
+        let row = l.compared.iter().find(|c| of(c))?;
+        row.rmse_mm.value.map(|v| number(Some(v), 2))
+    };
+    let name = locator_name(l.locator);
+    let (own, alone) = (
+        rmse(&|c| c.chosen),
+        rmse(&|c| c.locator == Locator::Geometry),
+    );
+    Some(match (own, alone) {
+        (Some(own), Some(alone)) => {
+            format!("{name}: {own} mm at left-out locations; {alone} mm with the geometry alone")
+        }
+        _ => name.to_owned(),
+    })
 }

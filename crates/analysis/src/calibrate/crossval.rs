@@ -176,7 +176,8 @@ mod tests {
                 .map(|c| c.column_of_point(truth).unwrap() + 3.0 * seeded::signed_unit(&mut noise));
             out.push(CalibrationPress {
                 press: PressId::from_index(i),
-                location: i % 30, repetition: 0,
+                location: i % 30,
+                repetition: 0,
                 columns,
                 truth,
                 cluster_events: 100,

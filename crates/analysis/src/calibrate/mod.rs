@@ -28,15 +28,14 @@ use crate::seeded;
 use crate::sets::{CalibrationPress, CalibrationSet};
 pub use choose::{ModelChoice, choose};
 pub(crate) use choose::{SessionCalibration, calibrate_session};
-use parameters::{
-    MODELS, NAMES, Parameters, SPREAD, is_plausible, parameters_of, with_parameters,
-};
 pub(crate) use crossval::Folds;
 pub(crate) use paired::{Losses, select_model};
 pub(crate) use parameters::PARAMETERS;
+use parameters::{MODELS, NAMES, Parameters, is_plausible};
+pub(crate) use parameters::{SPREAD, parameters_of, with_parameters};
 pub use parameters::{model_name, parameter_count};
-use problem::{Measure, Problem};
 pub(crate) use problem::StereoModel;
+use problem::{Measure, Problem};
 pub(crate) use refit::{Refit, covariance};
 use solver::{Descent, minimise};
 

@@ -96,10 +96,7 @@ impl StereoModel {
 
     fn error_of(&self, truth: Point2, hit: &Intersection) -> Option<[f64; 2]> {
         let fixed = hit.sine.abs() >= PARALLEL_SINE && hit.range_mm.iter().all(|r| *r >= 0.0);
-        let error = [
-            hit.at.x_mm - truth.x_mm,
-            hit.at.y_mm - truth.y_mm,
-        ];
+        let error = [hit.at.x_mm - truth.x_mm, hit.at.y_mm - truth.y_mm];
         (fixed && error.iter().all(|e| e.is_finite())).then_some(error)
     }
 
@@ -328,7 +325,8 @@ mod tests {
         (0u32..12)
             .map(|i| CalibrationPress {
                 press: PressId::from_index(i),
-                location: i, repetition: 0,
+                location: i,
+                repetition: 0,
                 columns: [180.0 + 25.0 * f64::from(i), 410.0 - 9.0 * f64::from(i)],
                 truth: Point2::new(10.0, f64::from(i)),
                 cluster_events: 100,

@@ -159,7 +159,8 @@ mod tests {
                 let column = |c: skinrig_model::CameraModel| c.column_of_point(truth).unwrap();
                 CalibrationPress {
                     press: PressId::from_index(i),
-                    location: i, repetition: 0,
+                    location: i,
+                    repetition: 0,
                     columns: planted
                         .cameras
                         .map(|c| column(c) + 6.0 * seeded::signed_unit(&mut noise)),

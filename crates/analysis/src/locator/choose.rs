@@ -4,10 +4,10 @@ use rayon::prelude::*;
 use skinrig_model::{AnalysisSettings, CalibrationModel, Locator, StereoGeometry};
 
 use super::fitted::distance;
-use super::methods::{Hyperparameters, METHODS, Method, Start, Unfit};
+use super::methods::{Hyperparameters, METHODS, Method, Start, Unfit, method};
 use super::{Features, Fitted, regions};
 use crate::calibrate::{Folds, Losses, NO_FIX_ERROR_MM, Refit, SessionCalibration, covariance};
-use crate::calibrate::{select_model, root_mean_square};
+use crate::calibrate::{root_mean_square, select_model};
 use crate::metrics::{bootstrap_over_locations, root_mean_square as rms};
 use crate::result::{CalibrationResult, LocatorComparison, LocatorResult, LocatorTest};
 use crate::sets::CalibrationSet;
@@ -48,6 +48,23 @@ pub fn choose_locator(
     Learner::new(set, geometry, calibration, settings).choose(Effort::Full)
 }
 
+/// Errors of each press of `set`, estimate minus truth, mm, with `locator` fitted to the other locations; `None` for a press
+/// without position. `None` as a whole if there are too few locations. `geometry` and `calibration` come from the same
+/// presses.
+#[must_use]
+pub fn held_out_errors(
+    set: &CalibrationSet,
+    geometry: &StereoGeometry,
+    calibration: Option<&CalibrationResult>,
+    settings: &AnalysisSettings,
+    locator: Locator,
+) -> Option<Vec<Option<[f64; 2]>>> {
+    let learner = Learner::new(set, geometry, calibration, settings);
+    let candidate = learner.candidate(method(locator), Effort::Full);
+    let held = candidate.held_out?;
+    Some(held.into_iter().map(|h| h.error).collect())
+}
+
 /// [`choose_locator`] for a calibrated session. `None` never happens with a geometry that the analysis accepts.
 pub(crate) fn choose(
     set: &CalibrationSet,
@@ -71,6 +88,8 @@ struct Candidate {
 
 #[derive(Debug, Clone, Copy)]
 struct HeldOut {
+    /// Estimate minus truth, mm; `None` without a position.
+    error: Option<[f64; 2]>,
     error_mm: f64,
     distance: f64,
 }
@@ -250,8 +269,7 @@ impl<'a> Learner<'a> {
         let repetitions = Folds::by_repetition(self.set.sights());
         if repetitions.count() > 1 {
             let held = self.held_out(method, &repetitions, near.as_ref());
-            candidate.over_repetitions =
-                held.map(|held| held.iter().map(|h| h.error_mm).collect());
+            candidate.over_repetitions = held.map(|held| held.iter().map(|h| h.error_mm).collect());
         }
         candidate
     }
@@ -279,6 +297,7 @@ impl<'a> Learner<'a> {
             let of = |i: &usize| {
                 let press = &presses[*i];
                 let lost = HeldOut {
+                    error: None,
                     error_mm: NO_FIX_ERROR_MM,
                     distance: f64::INFINITY,
                 };
@@ -293,6 +312,7 @@ impl<'a> Learner<'a> {
                 let error = [x - press.truth.x_mm, y - press.truth.y_mm];
                 let reached = prediction.covariance.and_then(|c| distance(c, error));
                 HeldOut {
+                    error: Some(error),
                     error_mm: libm::hypot(error[0], error[1]).min(NO_FIX_ERROR_MM),
                     distance: reached.unwrap_or(f64::INFINITY),
                 }

@@ -1,13 +1,17 @@
 //! A fitted locator: from the features of a press to its position, region and flags.
 
 use nalgebra::DMatrix;
-use skinrig_model::{Locator, SkinOutline, StereoGeometry};
+use skinrig_model::{Locator, Point2, SkinOutline, StereoGeometry};
 
-use super::base::{Base, Covariance};
-use super::field::Field;
-use super::samples::response;
-use crate::result::{LocationOutcome, LocatorModel, Region};
+use super::inverse::Inverse;
+use super::rays::Rays;
+use super::reading::Reading;
+use super::robust::response;
+use crate::result::{Analysis, LocationOutcome, LocatorModel, Region};
 use crate::triangulate::locate;
+
+/// Symmetric 2 x 2 matrix: xx, xy, yy.
+pub(super) type Covariance = [f64; 3];
 
 /// Level of the regions of the press table.
 pub(super) const LEVEL: f64 = 0.95;
@@ -46,37 +50,78 @@ pub struct Fitted {
     locator: Locator,
     geometry: StereoGeometry,
     model: LocatorModel,
-    base: Base,
-    field: Option<Field>,
+    way: Way,
+}
+
+/// From columns to a position.
+#[derive(Debug, Clone)]
+enum Way {
+    Rays(Box<Rays>),
+    Inverse(Box<Inverse>),
 }
 
 impl Fitted {
     /// From its serialised form and the geometry of the analysis; `None` if the form contradicts itself.
     #[must_use]
     pub fn new(locator: Locator, geometry: StereoGeometry, model: LocatorModel) -> Option<Self> {
-        let base = match (&model.affine, &model.geometry_covariance) {
-            (Some(map), _) => Base::Affine(map.clone()),
-            (None, None) => Base::rays(&geometry, None),
-            (None, Some(rows)) => {
+        let covariance = match &model.geometry_covariance {
+            None => None,
+            Some(rows) => {
                 let size = rows.len();
                 if size != crate::calibrate::PARAMETERS || rows.iter().any(|r| r.len() != size) {
                     return None;
                 }
-                let covariance = DMatrix::from_fn(size, size, |i, j| rows[i][j]);
-                Base::rays(&geometry, Some(covariance))
+                Some(DMatrix::from_fn(size, size, |i, j| rows[i][j]))
             }
         };
-        let field = match &model.field {
-            Some(field) => Some(Field::new(field)?),
-            None => None,
+        let way = match (&model.cameras, &model.prior) {
+            (Some([one, two]), Some(prior)) => {
+                let reading = match (one.polynomial, two.polynomial) {
+                    (Some(one), Some(two)) => Reading::Column([one, two]),
+                    (None, None) => Reading::Bearing {
+                        geometry,
+                        covariance,
+                    },
+                    _ => return None,
+                };
+                let inverse = Inverse::new(reading, [&one.field, &two.field], prior)?;
+                Way::Inverse(Box::new(inverse))
+            }
+            (None, None) => Way::Rays(Box::new(Rays::new(&geometry, covariance))),
+            _ => return None,
         };
         Some(Self {
             locator,
             geometry,
             model,
-            base,
-            field,
+            way,
         })
+    }
+
+    /// The intersection of the rays of a geometry, without regions.
+    #[must_use]
+    pub fn rays(geometry: StereoGeometry) -> Self {
+        Self {
+            locator: Locator::Geometry,
+            geometry,
+            model: LocatorModel {
+                reference_events: 1.0,
+                scatter: None,
+                geometry_covariance: None,
+                cameras: None,
+                prior: None,
+                levels: Vec::new(),
+            },
+            way: Way::Rays(Box::new(Rays::new(&geometry, None))),
+        }
+    }
+
+    /// The locator of an analysis; the rays of its geometry if it holds none that can be read.
+    #[must_use]
+    pub fn of(analysis: &Analysis) -> Self {
+        let stored = analysis.locator.as_ref();
+        let learnt = stored.and_then(|l| Self::new(l.locator, analysis.geometry, l.model.clone()));
+        learnt.unwrap_or_else(|| Self::rays(analysis.geometry))
     }
 
     /// The locator.
@@ -112,8 +157,8 @@ impl Fitted {
         })
     }
 
-    /// Where a press is, as the rays and this locator say. The rays decide whether a press has a position, whatever the
-    /// locator, so that all locators are judged on the same presses; the position decides whether it is on the skin.
+    /// Where a press is, and what is known about the error. A field locates every press with two columns; the geometry only
+    /// those whose rays meet in front of both cameras. Either way the outcome holds the sine between the rays.
     #[must_use]
     pub fn outcome(
         &self,
@@ -122,11 +167,7 @@ impl Fitted {
         cluster_events: u32,
     ) -> (LocationOutcome, Option<Location>) {
         let rays = locate(&self.geometry, outline, columns);
-        let (LocationOutcome::Located { sine, .. } | LocationOutcome::Outside { sine, .. }) = rays
-        else {
-            return (rays, None);
-        };
-        let [Some(one), Some(two)] = columns else {
+        let (Some(sine), [Some(one), Some(two)]) = (rays.sine(), columns) else {
             return (rays, None);
         };
         let found = self.locate(&Features {
@@ -136,10 +177,10 @@ impl Fitted {
         let Some(location) = found else {
             return (rays, None);
         };
-        if self.locator == Locator::Geometry {
-            return (rays, Some(location));
+        if matches!(self.way, Way::Rays(_)) {
+            return (rays, rays.estimate().and(Some(location)));
         }
-        let at = skinrig_model::Point2::new(location.at[0], location.at[1]);
+        let at = Point2::new(location.at[0], location.at[1]);
         let outcome = if outline.contains(at) {
             LocationOutcome::Located { at, sine }
         } else {
@@ -149,24 +190,27 @@ impl Fitted {
     }
 
     pub(super) fn predict(&self, features: &Features) -> Option<Prediction> {
-        let anchor = self.base.anchor(features.columns)?;
-        let correction = self.field.as_ref().map(|f| f.correction(features.columns));
-        let by = correction.map_or([0.0; 2], |c| c.by);
-        let at = [anchor.at[0] + by[0], anchor.at[1] + by[1]];
+        let relative = response(features.cluster_events, self.model.reference_events);
+        let rays = match &self.way {
+            Way::Inverse(inverse) => return inverse.locate(features.columns, relative),
+            Way::Rays(rays) => rays,
+        };
+        let crossing = rays.crossing(features.columns)?;
         let covariance = self.model.scatter.map(|scatter| {
-            let relative = response(features.cluster_events, scatter.reference_events);
+            let fixed = scatter.fixed_mm * scatter.fixed_mm;
             let column_px2 = scatter.column_px * scatter.column_px * relative;
-            let (own, open) = correction.map_or((0.0, 1.0), |c| (c.variance_mm2, c.open));
-            // A field has already corrected errors of the parameters where it has seen presses.
-            let fixed = scatter.fixed_mm * scatter.fixed_mm + own;
-            let term = |i: usize| column_px2 * anchor.by_columns[i] + open * anchor.from_parameters[i];
+            let term = |i: usize| column_px2 * crossing.by_columns[i] + crossing.from_parameters[i];
             [fixed + term(0), term(1), fixed + term(2)]
         });
-        let finite = at.iter().chain(covariance.iter().flatten()).all(|v| v.is_finite());
+        let finite = crossing
+            .at
+            .iter()
+            .chain(covariance.iter().flatten())
+            .all(|v| v.is_finite());
         finite.then_some(Prediction {
-            at,
+            at: crossing.at,
             covariance,
-            extrapolated: correction.is_some_and(|c| c.extrapolated),
+            extrapolated: false,
         })
     }
 }
@@ -188,7 +232,10 @@ fn ellipse([xx, xy, yy]: Covariance, factor: f64) -> Option<Region> {
         semi_axes_mm: variances.map(|v| (v * factor).sqrt()),
         angle_deg: 0.5 * libm::atan2(2.0 * xy, xx - yy).to_degrees(),
     };
-    let usable = region.semi_axes_mm.iter().all(|a| a.is_finite() && *a > 0.0);
+    let usable = region
+        .semi_axes_mm
+        .iter()
+        .all(|a| a.is_finite() && *a > 0.0);
     usable.then_some(region)
 }
 

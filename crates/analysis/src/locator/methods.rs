@@ -3,11 +3,14 @@
 use nalgebra::DMatrix;
 use skinrig_model::{Locator, StereoGeometry};
 
-use super::base::{Base, affine};
-use super::field::{Logs, learn};
+use super::field::learn;
 use super::fitted::Fitted;
-use super::samples::{Sample, reference_events, samples, scatter};
-use crate::result::{LocatorModel, Scatter};
+use super::likelihood::Logs;
+use super::rays::Rays;
+use super::reading::{Reading, polynomials};
+use super::robust::reference_events;
+use super::samples::samples;
+use crate::result::{CameraField, LocatorModel, PositionPrior};
 use crate::sets::{CalibrationPress, CalibrationSet};
 
 /// What a method sees of a press.
@@ -39,8 +42,8 @@ pub enum Unfit {
         /// Number of the set.
         found: u32,
     },
-    /// The columns of the calibration presses lie on a line.
-    #[error("the columns of the calibration presses lie on a line")]
+    /// The calibration locations lie on a line or a conic.
+    #[error("the calibration locations lie on a line or a curve; spread them over the skin")]
     Line,
     /// The kernel is not positive definite, or the residuals are not finite.
     #[error("the residuals of the calibration presses determine no field")]
@@ -58,9 +61,9 @@ pub struct Start<'a> {
     pub(crate) near: Option<&'a Hyperparameters>,
 }
 
-/// Opaque hyperparameters of a field.
+/// Opaque hyperparameters of the fields of both cameras.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hyperparameters(Logs);
+pub struct Hyperparameters([Logs; 2]);
 
 /// A way to learn where presses are.
 pub trait Method: Sync {
@@ -82,7 +85,7 @@ pub trait Method: Sync {
 }
 
 /// All methods, simplest first.
-pub const METHODS: [&dyn Method; 3] = [&Geometry, &ResidualField, &DirectField];
+pub const METHODS: [&dyn Method; 3] = [&Geometry, &GeometryField, &DirectField];
 
 /// The method of a locator; for `Auto` the geometry.
 #[must_use]
@@ -92,8 +95,11 @@ pub fn method(locator: Locator) -> &'static dyn Method {
 }
 
 struct Geometry;
-struct ResidualField;
+struct GeometryField;
 struct DirectField;
+
+/// Smallest standard deviation of the prior along any direction, mm.
+const NARROWEST_MM: f64 = 1.0;
 
 const FEATURES: &[Feature] = &[Feature::Columns, Feature::ClusterEvents];
 
@@ -118,14 +124,14 @@ impl Method for Geometry {
         presses: &CalibrationSet,
         start: &Start<'_>,
     ) -> Result<(Fitted, Option<Hyperparameters>), Unfit> {
-        let base = Base::rays(&start.geometry, start.covariance.clone());
+        let rays = Rays::new(&start.geometry, start.covariance.clone());
         let presses = presses.sights();
-        let seen = samples(&base, presses);
         let model = LocatorModel {
-            affine: None,
-            field: None,
-            scatter: scatter(&seen, reference_events(presses)),
+            reference_events: reference_events(presses),
+            scatter: rays.scatter(presses),
             geometry_covariance: rows(start),
+            cameras: None,
+            prior: None,
             levels: Vec::new(),
         };
         let fitted = Fitted::new(Locator::Geometry, start.geometry, model);
@@ -133,7 +139,7 @@ impl Method for Geometry {
     }
 }
 
-impl Method for ResidualField {
+impl Method for GeometryField {
     fn locator(&self) -> Locator {
         Locator::Field
     }
@@ -155,15 +161,11 @@ impl Method for ResidualField {
         start: &Start<'_>,
     ) -> Result<(Fitted, Option<Hyperparameters>), Unfit> {
         enough(self.needs(), presses.sights())?;
-        let base = Base::rays(&start.geometry, start.covariance.clone());
-        let model = LocatorModel {
-            affine: None,
-            field: None,
-            scatter: None,
-            geometry_covariance: rows(start),
-            levels: Vec::new(),
+        let reading = Reading::Bearing {
+            geometry: start.geometry,
+            covariance: start.covariance.clone(),
         };
-        with_field(Locator::Field, presses.sights(), &base, start, model)
+        with_fields(Locator::Field, presses.sights(), &reading, start)
     }
 }
 
@@ -189,41 +191,58 @@ impl Method for DirectField {
         start: &Start<'_>,
     ) -> Result<(Fitted, Option<Hyperparameters>), Unfit> {
         enough(self.needs(), presses.sights())?;
-        let map = affine(presses.sights()).ok_or(Unfit::Line)?;
-        let base = Base::Affine(map.clone());
-        let model = LocatorModel {
-            affine: Some(map),
-            field: None,
-            scatter: None,
-            geometry_covariance: None,
-            levels: Vec::new(),
-        };
-        with_field(Locator::Direct, presses.sights(), &base, start, model)
+        let reading = Reading::Column(polynomials(presses.sights()).ok_or(Unfit::Line)?);
+        with_fields(Locator::Direct, presses.sights(), &reading, start)
     }
 }
 
-/// Adds the field on the residuals of `base`.
-fn with_field(
+/// Learns the fields of both cameras about `reading`.
+fn with_fields(
     locator: Locator,
     presses: &[CalibrationPress],
-    base: &Base,
+    reading: &Reading,
     start: &Start<'_>,
-    model: LocatorModel,
 ) -> Result<(Fitted, Option<Hyperparameters>), Unfit> {
-    let seen: Vec<Sample> = samples(base, presses);
-    let learnt = learn(&seen, start.near.map(|h| &h.0)).ok_or(Unfit::Degenerate)?;
-    let [fixed_mm, column_px] = learnt.scatter;
+    let field = |k: usize| {
+        let near = start.near.map(|h| &h.0[k]);
+        learn(&samples(reading, k, presses), near).ok_or(Unfit::Degenerate)
+    };
+    let [(one, logs_one), (two, logs_two)] = [field(0)?, field(1)?];
+    let polynomial = |k: usize| match reading {
+        Reading::Column(polynomials) => Some(polynomials[k]),
+        Reading::Bearing { .. } => None,
+    };
+    let bearings = matches!(reading, Reading::Bearing { .. });
+    let camera = |k: usize, field| CameraField {
+        polynomial: polynomial(k),
+        field,
+    };
     let model = LocatorModel {
-        field: Some(learnt.model),
-        scatter: Some(Scatter {
-            fixed_mm,
-            column_px,
-            reference_events: reference_events(presses),
-        }),
-        ..model
+        reference_events: reference_events(presses),
+        scatter: None,
+        geometry_covariance: rows(start).filter(|_| bearings),
+        cameras: Some([camera(0, one), camera(1, two)]),
+        prior: Some(prior(presses)),
+        levels: Vec::new(),
     };
     let fitted = Fitted::new(locator, start.geometry, model).ok_or(Unfit::Degenerate)?;
-    Ok((fitted, Some(Hyperparameters(learnt.logs))))
+    Ok((fitted, Some(Hyperparameters([logs_one, logs_two]))))
+}
+
+/// Where presses are expected: mean and covariance of the calibration positions.
+fn prior(presses: &[CalibrationPress]) -> PositionPrior {
+    let n = presses.len().max(1) as f64;
+    let mean = |of: &dyn Fn(&CalibrationPress) -> f64| presses.iter().map(of).sum::<f64>() / n;
+    let (x, y) = (mean(&|p| p.truth.x_mm), mean(&|p| p.truth.y_mm));
+    let least = NARROWEST_MM * NARROWEST_MM;
+    PositionPrior {
+        centre_mm: [x, y],
+        covariance_mm2: [
+            least + mean(&|p| (p.truth.x_mm - x).powi(2)),
+            mean(&|p| (p.truth.x_mm - x) * (p.truth.y_mm - y)),
+            least + mean(&|p| (p.truth.y_mm - y).powi(2)),
+        ],
+    }
 }
 
 fn rows(start: &Start<'_>) -> Option<Vec<Vec<f64>>> {

@@ -113,10 +113,15 @@ mod tests {
         assert_eq!(factor(&hundred, 100, 0.5), Some(51.0));
         // Twenty equal distances: one expected outside is too few, Student's tail counts.
         let few = factor(&[2.0; 20], 20, 0.95).unwrap();
-        assert!((few - 18.0 * (20f64.powf(1.0 / 9.0) - 1.0)).abs() < 1e-9, "{few}");
+        assert!(
+            (few - 18.0 * (20f64.powf(1.0 / 9.0) - 1.0)).abs() < 1e-9,
+            "{few}"
+        );
         assert_eq!(levels(&[1.0; 4], 4), []);
         // A tenth of the presses without position.
-        let open: Vec<f64> = (0..100).map(|i| if i % 10 == 0 { f64::INFINITY } else { 1.0 }).collect();
+        let open: Vec<f64> = (0..100)
+            .map(|i| if i % 10 == 0 { f64::INFINITY } else { 1.0 })
+            .collect();
         assert_eq!(factor(&open, 100, 0.95), None);
         assert_eq!(factor(&open, 100, 0.8), Some(1.0));
     }

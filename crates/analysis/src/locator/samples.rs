@@ -1,92 +1,75 @@
-//! What a field learns from: residuals of the calibration presses, and how much each of them counts.
+//! What a field learns from: for one camera, how far its columns are from those expected at the measured positions.
 
-use super::base::{Base, robust_sigma, weight};
-use crate::result::Scatter;
+use super::reading::Reading;
+use super::robust::{reference_events, response, scale, weight};
 use crate::sets::CalibrationPress;
 
 /// Maximum number of observations of a field. More presses are averaged by location, more locations are thinned evenly.
 const MOST: usize = 300;
 
-/// An observation.
+/// An observation of one camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sample {
     location: u32,
-    /// Columns, px.
-    pub columns: [f64; 2],
-    /// Truth minus base position, mm.
-    pub residual: [f64; 2],
-    /// Mean square change of a coordinate by the columns, mm²/px².
-    pub magnification: f64,
-    /// Variance of the columns relative to a press of median response.
+    /// Measured position, mm.
+    pub at: [f64; 2],
+    /// Column minus the one expected here, px.
+    pub residual: f64,
+    /// Variance of the column relative to a press of median response.
     pub response: f64,
     /// Number of presses behind it.
     pub count: f64,
 }
 
 impl Sample {
-    /// Variance of either coordinate under this scatter, mm².
-    pub(super) fn variance(&self, fixed_mm2: f64, column_px2: f64) -> f64 {
-        (fixed_mm2 + column_px2 * self.magnification * self.response) / self.count
-    }
-
-    /// Squared length of the residual, mm².
-    pub(super) fn square(&self) -> f64 {
-        self.residual[0] * self.residual[0] + self.residual[1] * self.residual[1]
+    /// Variance, px², under a fixed one and one that grows as events become fewer.
+    pub(super) fn variance(&self, fixed_px2: f64, column_px2: f64) -> f64 {
+        (fixed_px2 + column_px2 * self.response) / self.count
     }
 }
 
-/// Column variance of a press with this many cluster events relative to one with the median number.
-pub(super) fn response(cluster_events: u32, reference_events: f64) -> f64 {
-    reference_events / f64::from(cluster_events.max(1))
-}
-
-/// Median cluster events, at least 1.
-pub(super) fn reference_events(presses: &[CalibrationPress]) -> f64 {
-    let mut events: Vec<u32> = presses.iter().map(|p| p.cluster_events).collect();
-    events.sort_unstable();
-    f64::from(events.get(events.len() / 2).copied().unwrap_or(1).max(1))
-}
-
-/// The observations of `presses`, ordered by location, at most [`MOST`]. Presses that the base does not locate teach nothing.
-pub(super) fn samples(base: &Base, presses: &[CalibrationPress]) -> Vec<Sample> {
+/// The observations of camera `k`, ordered by location, at most [`MOST`].
+pub(super) fn samples(reading: &Reading, k: usize, presses: &[CalibrationPress]) -> Vec<Sample> {
     let reference = reference_events(presses);
     let mut sorted: Vec<&CalibrationPress> = presses.iter().collect();
     sorted.sort_by(|a, b| {
         let key = |p: &CalibrationPress| (p.location, p.repetition);
-        let columns = || a.columns[0].total_cmp(&b.columns[0]);
+        let columns = || a.columns[k].total_cmp(&b.columns[k]);
         key(a).cmp(&key(b)).then_with(columns)
     });
     let all: Vec<Sample> = sorted
         .into_iter()
         .filter_map(|p| {
-            let anchor = base.anchor(p.columns)?;
+            let at = [p.truth.x_mm, p.truth.y_mm];
+            let (value, slope) = reading.of_column(k, p.columns[k]);
             let sample = Sample {
                 location: p.location,
-                columns: p.columns,
-                residual: [p.truth.x_mm - anchor.at[0], p.truth.y_mm - anchor.at[1]],
-                magnification: 0.5 * (anchor.by_columns[0] + anchor.by_columns[2]),
+                at,
+                residual: (value - reading.expected(k, at).0) / slope,
                 response: response(p.cluster_events, reference),
                 count: 1.0,
             };
-            let numbers = [sample.square(), sample.magnification];
-            numbers.iter().all(|v| v.is_finite()).then_some(sample)
+            let finite = sample.residual.is_finite();
+            finite.then_some(sample)
         })
         .collect();
     if all.len() <= MOST {
         return all;
     }
-    let squares: Vec<f64> = all.iter().map(Sample::square).collect();
-    let variance = robust_sigma(&squares).powi(2);
+    let sigma = scale(all.iter().map(|s| s.residual));
     let means: Vec<Sample> = all
         .chunk_by(|a, b| a.location == b.location)
-        .map(|group| mean(group, variance))
+        .map(|group| mean(group, sigma))
         .collect();
     thinned(&means, MOST)
 }
 
 /// Mean of one location, with little weight on its outliers.
-fn mean(group: &[Sample], variance: f64) -> Sample {
-    let weights: Vec<f64> = group.iter().map(|s| weight(s.square() / variance)).collect();
+fn mean(group: &[Sample], sigma: f64) -> Sample {
+    let each = group.iter();
+    let weights: Vec<f64> = each
+        .map(|s| weight((s.residual / sigma).powi(2), 1.0))
+        .collect();
     let total: f64 = weights.iter().sum();
     let of = |value: &dyn Fn(&Sample) -> f64| {
         let pairs = group.iter().zip(&weights);
@@ -94,9 +77,8 @@ fn mean(group: &[Sample], variance: f64) -> Sample {
     };
     Sample {
         location: group[0].location,
-        columns: [0, 1].map(|k| of(&|s| s.columns[k])),
-        residual: [0, 1].map(|k| of(&|s| s.residual[k])),
-        magnification: of(&|s| s.magnification),
+        at: [0, 1].map(|i| of(&|s| s.at[i])),
+        residual: of(&|s| s.residual),
         response: of(&|s| s.response),
         count: total,
     }
@@ -105,14 +87,27 @@ fn mean(group: &[Sample], variance: f64) -> Sample {
 /// At most `most` of the samples, evenly spaced.
 pub(super) fn thinned<T: Clone>(all: &[T], most: usize) -> Vec<T> {
     let count = all.len().min(most);
-    (0..count).map(|i| all[i * all.len() / count].clone()).collect()
+    (0..count)
+        .map(|i| all[i * all.len() / count].clone())
+        .collect()
 }
 
-/// Scatter of the residuals without a field, by maximum likelihood; little weight on outliers. `None` without samples.
-pub(super) fn scatter(samples: &[Sample], reference_events: f64) -> Option<Scatter> {
-    super::field::scatter(samples).map(|[fixed_mm, column_px]| Scatter {
-        fixed_mm,
-        column_px,
-        reference_events,
-    })
+/// Samples of a smooth field with scatter and one outlier, for tests.
+#[cfg(test)]
+pub(super) fn planted(n: u32) -> Vec<Sample> {
+    let of = |i: u32| {
+        let at = [
+            -20.0 + 7.0 * f64::from(i % 6),
+            -15.0 + 6.0 * f64::from(i / 6),
+        ];
+        let scatter = f64::from((i * 7919) % 17) / 17.0 - 0.5;
+        Sample {
+            location: i,
+            at,
+            residual: (0.08 * at[0]).sin() + 0.3 * scatter + if i == 7 { 9.0 } else { 0.0 },
+            response: 0.5 * (1.0 + f64::from(i % 3)),
+            count: 1.0,
+        }
+    };
+    (0..n).map(of).collect()
 }

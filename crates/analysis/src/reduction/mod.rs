@@ -1,7 +1,7 @@
 //! The data-reduction study: localisation on thinned events.
 //!
-//! Everything except the number of events is fixed: one clustering for all factors, and the centroid rule, calibrated
-//! geometry and location rules of the settings. The study uses the retained scored presses that were executed as planned:
+//! Everything except the number of events is fixed: one clustering for all factors, and the centroid rule, locator
+//! and location rules of the settings. The study uses the retained scored presses that were executed as planned:
 //! valid ones, and those excluded by a rule on the data, but not those that the journal or the settings exclude by hand. A
 //! press is *located* if its rays meet where no location rule excludes it (behind a camera, parallel, outside the outline,
 //! depending on the settings). Rules on the number of events (threshold, response) do not apply: the study varies exactly
@@ -16,6 +16,7 @@ mod trials;
 
 use skinrig_model::PressRole;
 
+use crate::locator::Fitted;
 use crate::metrics::{bootstrap_over_locations, mean, quantile};
 use crate::press_events::RetainedPresses;
 use crate::result::{Analysis, Reduction, ReductionCurve, Thinning};
@@ -32,7 +33,7 @@ pub fn study(analysis: &Analysis, kept: &RetainedPresses) -> Option<Reduction> {
         return None;
     }
     let trials = Trials {
-        geometry: &analysis.geometry,
+        locator: &Fitted::of(analysis),
         outline: &analysis.rig.outline,
         settings,
         min_samples: match settings.reduction.min_samples {

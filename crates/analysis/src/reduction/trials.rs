@@ -1,13 +1,13 @@
 //! Locates thinned presses: each press, seed and factor.
 
 use rayon::prelude::*;
-use skinrig_model::{AnalysisSettings, CentroidRule, Point2, PressId, SkinOutline, StereoGeometry};
+use skinrig_model::{AnalysisSettings, CentroidRule, Point2, PressId, SkinOutline};
 
 use super::thinning::{ThinnedView, Thinner};
+use crate::locator::Fitted;
 use crate::press_events::{EventView, RetainedPress};
 use crate::result::{LocationOutcome, PressResult, Thinning};
 use crate::seeded;
-use crate::triangulate::locate;
 
 /// First random stream; no other part of an analysis uses these.
 const STREAMS: u64 = 1 << 63;
@@ -78,7 +78,7 @@ impl Outcome {
 
 /// Parameters for thinning, clustering and locating presses.
 pub(crate) struct Trials<'a> {
-    pub geometry: &'a StereoGeometry,
+    pub locator: &'a Fitted,
     pub outline: &'a SkinOutline,
     /// Crop, radius, seeds and factors.
     pub settings: &'a AnalysisSettings,
@@ -122,7 +122,7 @@ impl Trials<'_> {
         });
         let trial = |left: [ThinnedView; 2]| {
             let columns = left.map(|l| l.column);
-            let estimate = accept(&locate(self.geometry, self.outline, columns));
+            let estimate = accept(&self.locator.outcome(self.outline, columns, 0).0);
             let truth = attempt.truth;
             let per_s = |k: usize| match windows_s[k] {
                 s if s > 0.0 => f64::from(left[k].events) / s,

@@ -64,36 +64,43 @@ pub struct LocatorTest {
 /// Everything that a fitted locator needs besides the geometry.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LocatorModel {
-    /// Affine map from columns to positions; `None` where the rays are intersected.
-    pub affine: Option<AffineModel>,
-    /// Corrections of that position; `None` for the geometry alone.
-    pub field: Option<FieldModel>,
-    /// Scatter from press to press; `None` if too few presses determine it: no regions.
+    /// Median cluster events of the calibration presses, weaker camera.
+    pub reference_events: f64,
+    /// Scatter of the crossings of the rays; `None` with fields, or if too few presses determine it: no regions.
     pub scatter: Option<Scatter>,
     /// Covariance of the ten parameters of the geometry, row by row, as in [`super::CalibrationResult::names`]; `None` if
     /// unknown or not used.
     pub geometry_covariance: Option<Vec<Vec<f64>>>,
+    /// What each camera sees; `None` for the geometry alone.
+    pub cameras: Option<[CameraField; 2]>,
+    /// Where presses are expected; `None` for the geometry alone.
+    pub prior: Option<PositionPrior>,
     /// Squared size of a region of each level, in units of the predicted covariance, from held-out calibration presses;
     /// empty if there are too few.
     pub levels: Vec<RegionLevel>,
 }
 
-/// An affine map: x and y are `rows` times (1, u1, u2).
+/// The column at which a camera sees a press at a position.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct AffineModel {
-    /// Coefficients of x and y: mm, mm/px, mm/px.
-    pub rows: [[f64; 3]; 2],
-    /// Covariance of the coefficients of either row.
-    pub covariance: [[f64; 3]; 3],
+pub struct CameraField {
+    /// The expected column, px: coefficients of 1, x, y, x², xy, y² (mm). `None`: the geometry says what is expected.
+    pub polynomial: Option<[f64; 6]>,
+    /// Correction of the expected column.
+    pub field: FieldModel,
 }
 
-/// Two Gaussian processes with one kernel over the columns, one each for x and y.
+/// A Gaussian process over positions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FieldModel {
-    /// Standard deviation of the field before data, mm.
-    pub amplitude_mm: f64,
-    /// Length scale along the column of each camera, px.
-    pub length_px: [f64; 2],
+    /// Standard deviation of the field before data, px.
+    pub amplitude_px: f64,
+    /// Length scale, mm.
+    pub length_mm: f64,
+    /// Standard deviation from press to press that does not depend on the events, px.
+    pub fixed_px: f64,
+    /// Standard deviation from press to press with [`LocatorModel::reference_events`], px. Its variance is inversely
+    /// proportional to the cluster events.
+    pub column_px: f64,
     /// Observations.
     pub points: Vec<FieldPoint>,
 }
@@ -101,23 +108,31 @@ pub struct FieldModel {
 /// An observation of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FieldPoint {
-    /// Column in each camera, px.
-    pub columns: [f64; 2],
-    /// Truth minus position without the field, mm.
-    pub residual_mm: [f64; 2],
-    /// Variance of either coordinate, mm²; large for weak presses and outliers.
-    pub variance_mm2: f64,
+    /// Measured position, mm.
+    pub at_mm: [f64; 2],
+    /// Column minus the one expected there, px: the miss of the ray as an angle, divided by degrees per column.
+    pub residual_px: f64,
+    /// Its variance, px²; large for weak presses and outliers.
+    pub variance_px2: f64,
 }
 
-/// Scatter of a press: a part of its own, and one from the columns that grows as cluster events become fewer.
+/// Where presses are expected: mean and covariance of the calibration positions.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PositionPrior {
+    /// Mean, mm.
+    pub centre_mm: [f64; 2],
+    /// xx, xy, yy, mm².
+    pub covariance_mm2: [f64; 3],
+}
+
+/// Scatter of the crossing of two rays: a part of its own, and one from the columns that grows as cluster events become fewer.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Scatter {
     /// Standard deviation of either coordinate, mm.
     pub fixed_mm: f64,
-    /// Standard deviation of a column at `reference_events`, px. Its variance is inversely proportional to the events.
+    /// Standard deviation of a column with [`LocatorModel::reference_events`], px. Its variance is inversely proportional to the
+    /// cluster events.
     pub column_px: f64,
-    /// Median cluster events of the calibration presses, weaker camera.
-    pub reference_events: f64,
 }
 
 /// Size of the regions of one level.

@@ -23,8 +23,8 @@ pub use latency::{
     TrialBackground,
 };
 pub use locator::{
-    AffineModel, FieldModel, FieldPoint, LocatorComparison, LocatorModel, LocatorResult, LocatorTest,
-    Region, RegionLevel, ReliabilityRow, Scatter,
+    CameraField, FieldModel, FieldPoint, LocatorComparison, LocatorModel, LocatorResult,
+    LocatorTest, PositionPrior, Region, RegionLevel, ReliabilityRow, Scatter,
 };
 pub use motion::{Motion, MotionBin, PressMotion, TipSample};
 pub use reduction::{Reduction, ReductionCurve, ReductionRow, Thinning};
@@ -434,6 +434,18 @@ pub enum LocationOutcome {
 }
 
 impl LocationOutcome {
+    /// Sine of the angle between the rays; `None` without two columns.
+    #[must_use]
+    pub const fn sine(&self) -> Option<f64> {
+        match *self {
+            Self::Located { sine, .. }
+            | Self::Outside { sine, .. }
+            | Self::Parallel { sine }
+            | Self::Behind { sine } => Some(sine),
+            Self::Missing => None,
+        }
+    }
+
     /// The estimate of `Located` and `Outside`.
     #[must_use]
     pub const fn estimate(&self) -> Option<Point2> {

@@ -1,7 +1,9 @@
 //! Owns the options that trade speed for accuracy, and the combinations to try.
 
 use serde::{Deserialize, Serialize};
-use skinrig_model::{AnalysisSettings, CalibrationModel, CentroidRule, Estimator, Precision};
+use skinrig_model::{
+    AnalysisSettings, CalibrationModel, CentroidRule, Estimator, Locator, Precision,
+};
 
 /// Thinning factors.
 const FACTORS: [u32; 11] = [1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024];
@@ -103,13 +105,14 @@ impl Choice {
     }
 
     /// Settings of this choice: those of the session except for the traded options. `rows` are the rows of the region; the
-    /// calibration is one named model for all choices.
+    /// calibration is one named model, and the locator one named locator, for all choices.
     #[must_use]
     pub fn settings(
         &self,
         session: &AnalysisSettings,
         rows: [(u16, u16); 2],
         model: CalibrationModel,
+        locator: Locator,
     ) -> AnalysisSettings {
         AnalysisSettings {
             estimator: self.estimator,
@@ -124,6 +127,7 @@ impl Choice {
             },
             crop_v: rows,
             calibration: model,
+            locator,
             ..session.clone()
         }
     }
@@ -257,6 +261,11 @@ pub(super) fn overrides(from: &AnalysisSettings, to: &AnalysisSettings) -> Vec<(
         from.calibration != to.calibration,
         "calibration",
         variant_name(&to.calibration),
+    );
+    put(
+        from.locator != to.locator,
+        "locator",
+        to.locator.name().to_owned(),
     );
     out
 }

@@ -16,10 +16,11 @@ pub use choice::{Choice, Region};
 pub use front::Cost;
 
 use serde::{Deserialize, Serialize};
-use skinrig_model::{AnalysisSettings, CalibrationModel, PressRole, ReductionSettings};
+use skinrig_model::{AnalysisSettings, CalibrationModel, Locator, PressRole, ReductionSettings};
 
 use crate::error::AnalysisError;
 use crate::input::{EventSource, SessionInput};
+use crate::locator::Fitted;
 use crate::press_events::Retention;
 use crate::result::Estimate;
 use replay::Replay;
@@ -46,6 +47,8 @@ pub struct Tradeoff {
     pub settings: AnalysisSettings,
     /// Calibration model of all choices: the one chosen in the session's analysis.
     pub model: CalibrationModel,
+    /// Locator of all choices: likewise.
+    pub locator: Locator,
     /// Calibration presses: used, and attempted in the session.
     pub calibrating: (u32, u32),
     /// Scored presses: used, and attempted in the session.
@@ -129,12 +132,13 @@ pub fn measure(
         (CalibrationModel::Auto, None) => CalibrationModel::None,
         (named, _) => named,
     };
+    let locator = Fitted::of(&analysis).locator();
     let press_s = replay.press_s(&reading.settings);
     let mut rows = Vec::new();
     let mut candidates = Vec::new();
     for choice in choice::sweep(Choice::of(session), plan.full) {
         let crop = replay.region_rows(&reading.settings, choice.region);
-        let settings = choice.settings(session, crop, model);
+        let settings = choice.settings(session, crop, model, locator);
         let outcome = replay.run(&settings);
         let bits = bits_per_event(&settings);
         rows.push(Row {
@@ -155,7 +159,7 @@ pub fn measure(
         });
         candidates.push(Candidate {
             settings,
-            geometry: outcome.located.calibrated.geometry,
+            locator: outcome.located.fitted(),
         });
     }
     let outline = &input.rig.outline;
@@ -168,6 +172,7 @@ pub fn measure(
     let mut result = Tradeoff {
         settings: session.clone(),
         model,
+        locator,
         calibrating: replay.counts(PressRole::Calibrate),
         scored: replay.counts(PressRole::Score),
         least_located: plan

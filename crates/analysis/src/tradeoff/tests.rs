@@ -32,6 +32,7 @@ fn row(rmse: Option<f64>, cost: f64, located: f64) -> Row {
 
 fn tradeoff(rows: Vec<Row>) -> Tradeoff {
     let mut result = Tradeoff {
+        locator: Locator::Geometry,
         settings: AnalysisSettings::default(),
         model: CalibrationModel::Full,
         calibrating: (20, 20),
@@ -128,7 +129,7 @@ fn overrides_say_what_differs_and_no_more() {
         ..Choice::of(&session)
     };
     let rows = [(200, 280), (200, 355)];
-    let settings = choice.settings(&session, rows, CalibrationModel::Full);
+    let settings = choice.settings(&session, rows, CalibrationModel::Full, Locator::Field);
     let lines: Vec<String> = choice::overrides(&session, &settings)
         .into_iter()
         .map(|(key, value)| format!("{key}={value}"))
@@ -150,7 +151,7 @@ fn overrides_say_what_differs_and_no_more() {
         window_ms: None,
         ..Choice::of(&cut)
     };
-    let settings = whole.settings(&cut, cut.crop_v, cut.calibration);
+    let settings = whole.settings(&cut, cut.crop_v, cut.calibration, cut.locator);
     assert_eq!(
         choice::overrides(&cut, &settings),
         [(

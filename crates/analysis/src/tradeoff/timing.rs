@@ -1,13 +1,13 @@
 //! CPU time of locating a press.
 
-use skinrig_model::{CameraId, PressRole, StereoGeometry};
+use skinrig_model::{CameraId, PressRole};
 
 use super::replay::{Filter, Replay, after};
 use crate::estimators::PressEstimator;
+use crate::locator::Fitted;
 use crate::metrics::quantile;
 use crate::press_events::{PackedEvent, RetainedPress};
 use crate::segment::Window;
-use crate::triangulate::locate;
 use skinrig_model::{AnalysisSettings, SkinOutline};
 
 /// Maximum number of timed presses.
@@ -16,7 +16,7 @@ const MAX_PRESSES: usize = 24;
 /// One way of locating, ready for timing.
 pub(crate) struct Candidate {
     pub settings: AnalysisSettings,
-    pub geometry: StereoGeometry,
+    pub locator: Fitted,
 }
 
 /// Median, lowest and highest time of a press over the repeats, µs.
@@ -32,7 +32,7 @@ type Prepared = Vec<[(Vec<PackedEvent>, u32); 2]>;
 /// moment of the machine affects all. The stopwatch returns CPU seconds of this thread.
 ///
 /// The timed part is what a computer at the skin would do with the events that reach it: counting, the estimate in both
-/// cameras, the intersection. Events dropped before (thinning, rows, time window) cost nothing here.
+/// cameras, the location. Events dropped before (thinning, rows, time window) cost nothing here.
 pub(super) fn run(
     replay: &Replay<'_>,
     outline: &SkinOutline,
@@ -55,11 +55,13 @@ pub(super) fn run(
             });
             let begun = stopwatch();
             for views in &prepared {
-                let columns = [0, 1].map(|k| {
+                let found = [0, 1].map(|k| {
                     let (events, from_us) = &views[k];
-                    estimators[k].estimate(events, *from_us).column
+                    estimators[k].estimate(events, *from_us)
                 });
-                std::hint::black_box(locate(&candidate.geometry, outline, columns));
+                let events = found[0].events.min(found[1].events);
+                let columns = found.map(|f| f.column);
+                std::hint::black_box(candidate.locator.outcome(outline, columns, events));
             }
             let spent_s = stopwatch() - begun;
             if repeat > 0 {

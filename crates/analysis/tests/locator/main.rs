@@ -20,33 +20,41 @@ fn uneven(seed: u64) -> Skin {
 }
 
 #[test]
-fn a_field_halves_the_structured_error_and_is_chosen() {
-    for seed in 0..12 {
+fn a_field_removes_structured_error_and_is_chosen() {
+    let mut ratios = Vec::new();
+    for seed in 0..4 {
         let skin = uneven(seed);
         let auto = learn(&skin, Locator::Auto);
-        assert_eq!(auto.result.locator, Locator::Field, "{:?}", auto.result.compared);
+        assert_eq!(
+            auto.result.locator,
+            Locator::Field,
+            "{:?}",
+            auto.result.compared
+        );
         let geometry = learn(&skin, Locator::Geometry);
-        let (with, without) = (rms(&skin, &auto), rms(&skin, &geometry));
-        println!("{seed}: {with:.2} mm, geometry {without:.2} mm, {:?} {:?}", auto.result.model.scatter, auto.result.model.field.as_ref().map(|f|(f.amplitude_mm,f.length_px,f.points.len())));
+        ratios.push(rms(&skin, &auto) / rms(&skin, &geometry));
     }
+    let mean = ratios.iter().sum::<f64>() / 4.0;
+    assert!(mean < 0.8 && ratios.iter().all(|r| *r < 0.9), "{ratios:?}");
 }
 
+/// Nothing to learn: one choice in ten may be wrong, and a wrong one costs a few percent.
 #[test]
-fn scatter_alone_teaches_nothing_and_costs_nothing() {
+fn scatter_alone_teaches_nothing_and_costs_little() {
     let mut kept = 0;
-    for seed in 0..30 {
+    let mut ratios = Vec::new();
+    for seed in 0..8 {
         let skin = Skin {
             noise_px: 8.0,
             ..Skin::new(seed)
         };
         let auto = learn(&skin, Locator::Auto);
         kept += u32::from(auto.result.locator == Locator::Geometry);
- println!("{seed} {:?} {:?}", auto.result.locator, auto.result.compared.iter().map(|c|(c.test.map(|t|(t.gain_mm,t.ratio,t.needed)),c.rmse_mm.value)).collect::<Vec<_>>());
-        let named = learn(&skin, Locator::Field);
-        let geometry = rms(&skin, &learn(&skin, Locator::Geometry));
-        assert!(rms(&skin, &named) < 1.06 * geometry);
+        let geometry = learn(&skin, Locator::Geometry);
+        ratios.push(rms(&skin, &auto) / rms(&skin, &geometry));
     }
-    println!("{kept}");assert!(kept >= 7, "{kept} of 8");
+    assert!(kept >= 6, "{kept} of 8");
+    assert!(ratios.iter().all(|r| *r < 1.06), "{ratios:?}");
 }
 
 #[test]
@@ -59,7 +67,11 @@ fn what_is_too_little_to_learn_from_gives_the_geometry_and_a_reason() {
         };
         let named = learn(&skin, Locator::Field);
         assert_eq!(named.result.locator, Locator::Geometry);
-        assert!(said(&named).contains("needs 12 calibration locations"), "{}", said(&named));
+        assert!(
+            said(&named).contains("needs 12 calibration locations"),
+            "{}",
+            said(&named)
+        );
         assert_eq!(named.warnings.len(), 1);
         let auto = learn(&skin, Locator::Auto);
         assert_eq!(auto.result.locator, Locator::Geometry);
@@ -68,31 +80,40 @@ fn what_is_too_little_to_learn_from_gives_the_geometry_and_a_reason() {
     }
 }
 
-/// Every column equal, all on a line, all presses the same: typed reasons, no numbers that are none.
+/// Every column equal, all on a line, all presses the same; or all presses on a line: no number is not a number.
 #[test]
-fn degenerate_columns_teach_nothing() {
+fn degenerate_presses_end_in_numbers_or_reasons() {
     let skin = uneven(2);
-    for kind in 0..3 {
+    for kind in 0..4 {
         let rows = skin.presses().into_iter().enumerate().map(|(i, mut p)| {
             for (k, view) in p.views.iter_mut().enumerate() {
                 let u = match kind {
                     0 => 300.0,
                     1 => 250.0 + 0.5 * i as f64,
-                    _ => 300.0 + 1e-9 * (i + k) as f64,
+                    2 => 300.0 + 1e-9 * (i + k) as f64,
+                    _ => continue,
                 };
                 *view = view.map(|v| skinrig_analysis::result::PressView {
                     centroid_u: Some(u),
                     ..v
                 });
             }
+            if kind == 3 {
+                p.truth = Some(skinrig_model::Point2::new(
+                    0.1 * i as f64,
+                    5.0 + 0.2 * i as f64,
+                ));
+            }
             p
         });
         let set = CalibrationSet::from_presses(&rows.collect::<Vec<_>>());
-        let direct = skins::learn_set(&set, Locator::Direct);
-        assert_eq!(direct.result.locator, Locator::Geometry);
-        let reason = direct.result.fallback.unwrap();
-        assert!(reason.contains("lie on a line"), "{reason}");
-        for locator in [Locator::Auto, Locator::Field] {
+        if kind == 3 {
+            let direct = skins::learn_set(&set, Locator::Direct);
+            assert_eq!(direct.result.locator, Locator::Geometry);
+            let reason = direct.result.fallback.unwrap();
+            assert!(reason.contains("lie on a line"), "{reason}");
+        }
+        for locator in [Locator::Auto, Locator::Field, Locator::Direct] {
             let choice = skins::learn_set(&set, locator);
             for p in skin.presses() {
                 let found = choice.fitted.locate(&skins::features(&p));
@@ -105,7 +126,7 @@ fn degenerate_columns_teach_nothing() {
     }
 }
 
-/// Calibrated in one corner: far away the field fades instead of bending on.
+/// Calibrated in one corner: far away a field fades to the geometry, regions widen, and the flag says so.
 #[test]
 fn beyond_the_calibrating_presses_a_field_fades_to_the_geometry() {
     let skin = Skin {
@@ -115,23 +136,26 @@ fn beyond_the_calibrating_presses_a_field_fades_to_the_geometry() {
     let field = learn(&skin, Locator::Field);
     assert_eq!(field.result.locator, Locator::Field);
     let geometry = learn(&skin, Locator::Geometry);
-    let mut far = 0;
+    let mut areas = [Vec::new(), Vec::new()];
     for press in skin.presses() {
-        let features = skins::features(&press);
-        let (Some(with), Some(without)) =
-            (field.fitted.locate(&features), geometry.fitted.locate(&features))
-        else {
+        let Some(found) = field.fitted.locate(&skins::features(&press)) else {
             continue;
         };
-        let moved = libm::hypot(with.at[0] - without.at[0], with.at[1] - without.at[1]);
-        let largest = field.result.model.field.as_ref().unwrap().points.iter();
-        let largest = largest.map(|p| libm::hypot(p.residual_mm[0], p.residual_mm[1]));
-        assert!(moved <= largest.fold(0.0, f64::max));
-        if with.extrapolated {
-            far += 1;
-        }
+        let region = found.region.unwrap();
+        areas[usize::from(found.extrapolated)].push(region.area_mm2());
     }
-    assert!(far > 50, "{far}");
+    let median = |areas: &mut Vec<f64>| {
+        areas.sort_by(f64::total_cmp);
+        areas[areas.len() / 2]
+    };
+    let [near, far] = &mut areas;
+    assert!(
+        near.len() > 40 && far.len() > 50,
+        "{} {}",
+        near.len(),
+        far.len()
+    );
+    assert!(median(far) > 2.0 * median(near));
     assert!(rms(&skin, &field) < 1.1 * rms(&skin, &geometry));
 }
 
@@ -144,7 +168,8 @@ fn the_stored_form_locates_to_the_same_bits() {
         let stored: skinrig_analysis::result::LocatorResult = serde_json::from_str(&text).unwrap();
         assert_eq!(stored, choice.result);
         let geometry = skins::calibrated(&skin.set()).geometry;
-        let again = skinrig_analysis::locator::Fitted::new(locator, geometry, stored.model).unwrap();
+        let again =
+            skinrig_analysis::locator::Fitted::new(locator, geometry, stored.model).unwrap();
         for press in skin.presses() {
             let features = skins::features(&press);
             assert_eq!(again.locate(&features), choice.fitted.locate(&features));

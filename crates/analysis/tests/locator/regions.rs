@@ -10,12 +10,16 @@ fn drawn(seed: u64) -> Skin {
     let mut noise = Noise::new(seed ^ 0xc0ffee);
     let plain = Skin::new(seed);
     Skin {
-        side: 11 + (noise.unit() * 8.0) as u32,
+        side: 11 + (noise.unit() * 5.0) as u32,
         bend_px: [0.0, 5.0, 12.0, 20.0][(noise.unit() * 4.0) as usize],
         noise_px: [1.0, 3.0, 8.0][(noise.unit() * 3.0) as usize],
         outliers: [0.0, 0.0, 0.04][(noise.unit() * 3.0) as usize],
         weak: 0.2 + 0.6 * noise.unit(),
-        depths: if noise.unit() < 0.5 { &[2.0] } else { &[1.0, 2.0, 3.0] },
+        depths: if noise.unit() < 0.5 {
+            &[2.0]
+        } else {
+            &[1.0, 2.0, 3.0]
+        },
         repeats: if noise.unit() < 0.5 { 1 } else { 3 },
         ..plain
     }
@@ -44,11 +48,17 @@ fn of_skin(skin: &Skin, tally: &mut Tally) {
         tally.add("all", inside);
         tally.add(choice.result.locator.name(), inside);
         let y = press.truth.unwrap().y_mm;
-        tally.add(["skin low", "skin middle", "skin high"][((y + 30.0) / 21.4) as usize], inside);
+        tally.add(
+            ["skin low", "skin middle", "skin high"][((y + 30.0) / 21.4) as usize],
+            inside,
+        );
         let events = super::skins::features(&press).cluster_events;
         let class = usize::from(events > 75) + usize::from(events > 125);
         tally.add(["weak", "usual", "strong"][class], inside);
-        tally.add(["1 mm", "2 mm", "3 mm"][press.depth_mm as usize - 1], inside);
+        tally.add(
+            ["1 mm", "2 mm", "3 mm"][press.depth_mm as usize - 1],
+            inside,
+        );
     }
 }
 
@@ -68,44 +78,67 @@ fn coverage(skins: u64) -> Tally {
             None => sum.0.push((name, inside, all)),
         }
     }
-    for (name, inside, all) in &sum.0 {
-        println!("{name}: {:.4} of {all}", inside / all);
-    }
     sum
 }
 
 #[test]
-fn regions_hold_on_thirty_skins() {
-    for (name, inside, all) in coverage(30).0 {
+fn regions_hold_on_eight_skins() {
+    for (name, inside, all) in coverage(8).0 {
         let share = inside / all;
-        assert!((0.92..=0.98).contains(&share), "{name}: {share} of {all}");
+        assert!((0.91..=0.985).contains(&share), "{name}: {share} of {all}");
     }
 }
 
 #[test]
-#[ignore = "takes minutes"]
+#[ignore = "minutes: cargo test -p skinrig-analysis --test locator -- --ignored --nocapture"]
 fn regions_hold_on_five_hundred_skins() {
     for (name, inside, all) in coverage(500).0 {
         let share = inside / all;
+        println!("{name}: {share:.4} of {all}");
         assert!((0.93..=0.97).contains(&share), "{name}: {share} of {all}");
     }
 }
 
 /// Few presses, one corner, ten times the noise, one camera nearly blind, one depth, and all of it bent or straight.
 #[test]
+#[ignore = "half a minute: cargo test -p skinrig-analysis --test locator -- --ignored --nocapture"]
+fn the_choice_is_never_much_worse_than_the_geometry_on_sixty_skins() {
+    never_much_worse(60);
+}
+
+#[test]
 fn the_choice_is_never_much_worse_than_the_geometry() {
+    never_much_worse(10);
+}
+
+fn never_much_worse(skins: u64) {
     let mut rows = Vec::new();
-    for i in 0..20u64 {
+    for i in 0..skins {
         let plain = Skin {
             bend_px: if i % 2 == 0 { 0.0 } else { 12.0 },
             ..Skin::new(100 + i)
         };
         let skin = match i / 2 % 5 {
-            0 => Skin { calibrating: 14 + i as usize, ..plain },
-            1 => Skin { corner: true, ..plain },
-            2 => Skin { noise_px: 30.0, ..plain },
-            3 => Skin { blind: 20.0, ..plain },
-            _ => Skin { outliers: 0.1, ..plain },
+            0 => Skin {
+                calibrating: 14 + i as usize,
+                ..plain
+            },
+            1 => Skin {
+                corner: true,
+                ..plain
+            },
+            2 => Skin {
+                noise_px: 30.0,
+                ..plain
+            },
+            3 => Skin {
+                blind: 20.0,
+                ..plain
+            },
+            _ => Skin {
+                outliers: 0.1,
+                ..plain
+            },
         };
         rows.push((i, skin));
     }
@@ -114,13 +147,24 @@ fn the_choice_is_never_much_worse_than_the_geometry() {
         .map(|(i, skin)| {
             let auto = learn(&skin, Locator::Auto);
             let geometry = learn(&skin, Locator::Geometry);
-            (i, auto.result.locator, rms(&skin, &auto), rms(&skin, &geometry))
+            (
+                i,
+                auto.result.locator,
+                rms(&skin, &auto),
+                rms(&skin, &geometry),
+            )
         })
         .collect();
     for (i, locator, with, without) in &rows {
-        println!("{i}: {} {with:.2} mm, geometry {without:.2} mm", locator.name());
+        println!(
+            "{i}: {} {with:.2} mm, geometry {without:.2} mm",
+            locator.name()
+        );
     }
     for (i, locator, with, without) in rows {
-        assert!(with <= 1.05 * without, "{i}: {locator:?} {with} mm, {without} mm");
+        assert!(
+            with <= 1.05 * without,
+            "{i}: {locator:?} {with} mm, {without} mm"
+        );
     }
 }

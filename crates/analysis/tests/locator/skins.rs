@@ -59,7 +59,7 @@ impl Skin {
     pub(crate) fn new(seed: u64) -> Self {
         Self {
             seed,
-            side: 15,
+            side: 13,
             calibrating: usize::MAX,
             corner: false,
             bend_px: 0.0,
@@ -224,7 +224,11 @@ pub(crate) fn scored(
 /// Lengths of the errors of the scored presses, mm; one without position counts the skin's diagonal, the largest error.
 pub(crate) fn errors(skin: &Skin, choice: &LocatorChoice) -> Vec<f64> {
     let located = scored(skin, choice);
-    let all = skin.presses().iter().filter(|p| p.role == PressRole::Score).count();
+    let all = skin
+        .presses()
+        .iter()
+        .filter(|p| p.role == PressRole::Score)
+        .count();
     let lengths = located.iter().map(|(_, e, _)| e[0].hypot(e[1]).min(141.4));
     lengths.chain((located.len()..all).map(|_| 141.4)).collect()
 }

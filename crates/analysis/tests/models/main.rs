@@ -78,8 +78,8 @@ fn presses(
                 timing: None,
                 views: columns.map(view),
                 location_outcome: LocationOutcome::Missing,
-        region: None,
-        extrapolated: false,
+                region: None,
+                extrapolated: false,
             });
         }
     }

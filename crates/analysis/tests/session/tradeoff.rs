@@ -42,7 +42,9 @@ fn each_row_is_what_an_analysis_with_its_settings_says() {
         if i % 3 != 0 && i > 20 {
             continue;
         }
-        let settings = row.choice.settings(&input.settings, row.rows, result.model);
+        let settings = row
+            .choice
+            .settings(&input.settings, row.rows, result.model, result.locator);
         let other = Memory {
             events: memory.events.clone(),
             slice: 77 + i,

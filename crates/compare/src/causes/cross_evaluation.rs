@@ -1,8 +1,7 @@
 //! Owns cross-evaluation: evaluates the presses of each skin with the calibration or the settings of the other.
 
 use serde::Serialize;
-use skinrig_analysis::triangulate::locate;
-use skinrig_model::StereoGeometry;
+use skinrig_analysis::locator::Fitted;
 
 use super::factor::Reanalysis;
 use crate::locations::Locations;
@@ -32,26 +31,25 @@ pub(crate) fn cross_evaluate(
     locations: &Locations,
     shared: &[u32],
 ) -> Vec<CrossEvaluation> {
-    let geometry = |s: &Subject| s.sessions.first().map(|s| s.analysis.geometry);
-    let (Some(of_a), Some(of_b)) = (geometry(a), geometry(b)) else {
+    let locator = |s: &Subject| s.sessions.first().map(|s| Fitted::of(&s.analysis));
+    let (Some(of_a), Some(of_b)) = (locator(a), locator(b)) else {
         return Vec::new();
     };
-    let row =
-        |presses: &Subject, calibration: &Subject, settings: char, with: Option<StereoGeometry>| {
-            let (rmse_mm, located) = rmse(presses, locations, shared, with);
-            CrossEvaluation {
-                presses: presses.letter,
-                calibration: calibration.letter,
-                settings,
-                rmse_mm,
-                located,
-            }
-        };
+    let row = |presses: &Subject, calibration: &Subject, settings: char, with: Option<&Fitted>| {
+        let (rmse_mm, located) = rmse(presses, locations, shared, with);
+        CrossEvaluation {
+            presses: presses.letter,
+            calibration: calibration.letter,
+            settings,
+            rmse_mm,
+            located,
+        }
+    };
     let mut rows = vec![
         row(a, a, a.letter, None),
-        row(a, b, a.letter, Some(of_b)),
+        row(a, b, a.letter, Some(&of_b)),
         row(b, b, b.letter, None),
-        row(b, a, b.letter, Some(of_a)),
+        row(b, a, b.letter, Some(&of_a)),
     ];
     if let Some(reanalysis) = reanalysis {
         rows.insert(2, row(reanalysis.first, reanalysis.first, b.letter, None));
@@ -64,7 +62,7 @@ fn rmse(
     subject: &Subject,
     locations: &Locations,
     shared: &[u32],
-    with: Option<StereoGeometry>,
+    with: Option<&Fitted>,
 ) -> (Option<f64>, [u32; 2]) {
     let (mut sum, mut located, mut all) = (0.0, 0u32, 0u32);
     for attempt in locations
@@ -77,11 +75,15 @@ fn rmse(
         all += 1;
         let error = match (with, attempt.press.truth) {
             (None, _) => Some((x, y)),
-            (Some(geometry), Some(truth)) => {
-                let column = |k: usize| attempt.press.views[k].and_then(|v| v.centroid_u);
+            (Some(locator), Some(truth)) => {
+                let views = attempt.press.views;
+                let columns = views.map(|v| v.and_then(|v| v.centroid_u));
+                let events = views.map(|v| v.map_or(0, |v| v.cluster_events));
                 let outline = &attempt.session.analysis.rig.outline;
-                let found = locate(&geometry, outline, [column(0), column(1)]).estimate();
-                found.map(|at| (at.x_mm - truth.x_mm, at.y_mm - truth.y_mm))
+                let (found, _) = locator.outcome(outline, columns, events[0].min(events[1]));
+                found
+                    .estimate()
+                    .map(|at| (at.x_mm - truth.x_mm, at.y_mm - truth.y_mm))
             }
             (Some(_), None) => None,
         };

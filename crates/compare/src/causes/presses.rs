@@ -3,10 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use skinrig_analysis::calibrate::{calibrate, largest_supported_model, parameter_count};
+use skinrig_analysis::locator::held_out_errors;
 use skinrig_analysis::result::{PressResult, PressView};
 use skinrig_analysis::sets::CalibrationSet;
 use skinrig_analysis::triangulate::locate;
-use skinrig_model::{CalibrationModel, PressRole, StereoGeometry};
+use skinrig_model::{CalibrationModel, Locator, PressId, PressRole, StereoGeometry};
 
 use super::factor::FactorMeasurement;
 use crate::locations::{Attempt, Locations};
@@ -17,7 +18,7 @@ use crate::subject::{Session, Subject};
 pub(super) struct PressFactors {
     /// Error with the session's geometry, mm.
     pub used: [f64; 2],
-    /// Error with a geometry fitted to the scored presses, mm.
+    /// Error with the locator fitted to the scored presses, mm.
     pub fitted: [f64; 2],
     /// Measured minus planned position, mm.
     pub off_plan: [f64; 2],
@@ -51,9 +52,10 @@ impl SkinPresses {
                 .attempts(subject)
                 .filter(|p| of_session(p) && shared.contains(&p.location) && p.error().is_some())
                 .collect();
-            let refitted = refit_geometry(session, &attempts);
+            let refitted = refit(session, &attempts);
             for attempt in &attempts {
-                if let Some(factors) = press_factors(attempt, &refitted) {
+                let error = refitted.error(attempt);
+                if let Some(factors) = press_factors(attempt, error) {
                     all.entry(attempt.location).or_default().push(factors);
                 }
             }
@@ -109,17 +111,39 @@ impl SkinPresses {
     }
 }
 
-/// A geometry and the correction factor for errors evaluated with it.
-struct RefittedGeometry {
+/// What locates the scored presses best.
+struct Refitted {
     geometry: StereoGeometry,
+    /// Correction factor for errors of the presses that the geometry was fitted to.
     inflation: f64,
+    /// Errors under a field learnt from the presses at other locations, by press; empty for the geometry alone.
+    held_out: BTreeMap<PressId, Option<[f64; 2]>>,
+}
+
+impl Refitted {
+    /// Error of a press, mm.
+    fn error(&self, attempt: &Attempt<'_>) -> Option<[f64; 2]> {
+        let press = attempt.press;
+        if let Some(error) = self.held_out.get(&press.press) {
+            return *error;
+        }
+        let columns = press.views.map(|v| v.and_then(|v| v.centroid_u));
+        let outline = &attempt.session.analysis.rig.outline;
+        let (estimate, truth) = (
+            locate(&self.geometry, outline, columns).estimate()?,
+            press.truth?,
+        );
+        let error = [estimate.x_mm - truth.x_mm, estimate.y_mm - truth.y_mm];
+        Some(error.map(|e| e * self.inflation))
+    }
 }
 
 /// Fits a geometry to the scored presses as if they were calibration presses. This diagnoses the
 /// calibration and never scores. Residuals of `n` presses (two numbers each) under `p` fitted
 /// parameters are too small by `sqrt(1 - p / 2n)`; the inflation corrects this. Falls back to the
-/// session's geometry with too few presses.
-fn refit_geometry(session: &Session, attempts: &[Attempt<'_>]) -> RefittedGeometry {
+/// session's geometry with too few presses. A session that was judged by a field is diagnosed by a field of the same kind,
+/// with each press located by the presses at other locations.
+fn refit(session: &Session, attempts: &[Attempt<'_>]) -> Refitted {
     let used = session.analysis.geometry;
     let presses: Vec<PressResult> = attempts
         .iter()
@@ -132,31 +156,36 @@ fn refit_geometry(session: &Session, attempts: &[Attempt<'_>]) -> RefittedGeomet
     let model = largest_supported_model(&set, CalibrationModel::Full);
     let numbers = 2.0 * set.sights().len() as f64;
     let free = numbers - parameter_count(model) as f64;
-    match calibrate(&set, &used, model, session.analysis.settings.seed) {
-        Some((geometry, _)) if free > 0.0 => RefittedGeometry {
-            geometry,
-            inflation: (numbers / free).sqrt(),
-        },
-        _ => RefittedGeometry {
+    let settings = &session.analysis.settings;
+    let fit = calibrate(&set, &used, model, settings.seed).filter(|_| free > 0.0);
+    let Some((geometry, calibration)) = fit else {
+        return Refitted {
             geometry: used,
             inflation: 1.0,
-        },
+            held_out: BTreeMap::new(),
+        };
+    };
+    let locator = session.analysis.locator.as_ref().map(|l| l.locator);
+    let errors = locator
+        .filter(|l| *l != Locator::Geometry)
+        .and_then(|l| held_out_errors(&set, &geometry, Some(&calibration), settings, l));
+    let sights = set.sights().iter().map(|s| s.press);
+    Refitted {
+        geometry,
+        inflation: (numbers / free).sqrt(),
+        held_out: errors.map_or_else(BTreeMap::new, |e| sights.zip(e).collect()),
     }
 }
 
-fn press_factors(attempt: &Attempt<'_>, refitted: &RefittedGeometry) -> Option<PressFactors> {
+fn press_factors(attempt: &Attempt<'_>, fitted: Option<[f64; 2]>) -> Option<PressFactors> {
     let press = attempt.press;
     let views = [press.views[0]?, press.views[1]?];
     let truth = press.truth?;
     let (x, y) = attempt.error()?;
-    let columns = [views[0].centroid_u, views[1].centroid_u];
-    let outline = &attempt.session.analysis.rig.outline;
-    let estimate = locate(&refitted.geometry, outline, columns).estimate()?;
     let mean = |of: fn(&PressView) -> f64| 0.5 * (of(&views[0]) + of(&views[1]));
     Some(PressFactors {
         used: [x, y],
-        fitted: [estimate.x_mm - truth.x_mm, estimate.y_mm - truth.y_mm]
-            .map(|e| e * refitted.inflation),
+        fitted: fitted?,
         off_plan: [
             truth.x_mm - press.planned.x_mm,
             truth.y_mm - press.planned.y_mm,
@@ -194,9 +223,11 @@ pub(super) fn measurements(of: [&SkinPresses; 2]) -> Vec<FactorMeasurement> {
     };
     vec![
         row("RMSE as calibrated", "mm", &|p| rms(p, |o| o.used)),
-        row("RMSE with a geometry fitted to these presses", "mm", &|p| {
-            rms(p, |o| o.fitted)
-        }),
+        row(
+            "RMSE with the locator fitted to these presses",
+            "mm",
+            &|p| rms(p, |o| o.fitted),
+        ),
         row(
             "measured positions about their mean offset from plan",
             "mm",

@@ -63,7 +63,7 @@ fn fact(session: &Session, name: &str) -> Option<String> {
         .or_else(|| of_settings().map(|(_, value)| value))
 }
 
-/// Analysis settings and calibration of a session, as facts.
+/// Analysis settings, calibration and locator of a session, as facts.
 fn settings_of(session: &Session) -> Vec<(String, String)> {
     let analysis = &session.analysis;
     let mut facts = Vec::new();
@@ -82,6 +82,9 @@ fn settings_of(session: &Session) -> Vec<(String, String)> {
             "calibration.lens".to_owned(),
             crate::flatten::variant_name(&c.lens),
         ));
+    }
+    if let Some(locator) = &analysis.locator {
+        facts.push(("locator.used".to_owned(), locator.locator.name().to_owned()));
     }
     facts
 }

@@ -255,6 +255,12 @@ pub const RULES: &[Rule] = &[
         "another camera model leaves another bias behind",
     ),
     rule(
+        "locator.used",
+        "locator",
+        Confounding,
+        "the skins were judged by different locators; set `analysis.locator` to one of them for both",
+    ),
+    rule(
         "software.recorded",
         "software",
         Harmless,

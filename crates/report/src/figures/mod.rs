@@ -17,6 +17,7 @@ mod pictures;
 mod raster;
 mod rates;
 mod reduction;
+mod reliability;
 mod residuals;
 mod skin;
 mod threshold;
@@ -42,6 +43,7 @@ pub(crate) use pictures::press_pictures;
 pub use rates::event_rates;
 pub(crate) use rates::press_rates;
 pub use reduction::reduction;
+pub use reliability::reliability;
 pub use residuals::residuals;
 pub use threshold::threshold;
 
@@ -65,6 +67,7 @@ pub fn all(input: &ReportInput<'_>) -> Vec<Figure> {
         models,
         correlation,
         residuals,
+        reliability,
         threshold,
         reduction,
         latency_course,

@@ -11,6 +11,7 @@ mod calibration;
 mod comparison;
 pub(crate) mod findings;
 mod latency;
+mod locator;
 mod reduction;
 
 use std::collections::BTreeMap;
@@ -114,6 +115,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         },
         penalised => penalised(a).filter(|_| usable),
         geometry_note => derive::geometry_note(a),
+        locator_note => derive::locator_note(a),
         threshold_note => threshold_note(a),
         findings => findings::values(&a.findings),
         contents => contents(input),
@@ -179,6 +181,8 @@ fn grids(input: &ReportInput<'_>) -> BTreeMap<&'static str, Value> {
         ("bit_rates", areas::bit_rates(a)),
         ("fit", calibration::fit(a)),
         ("models", calibration::models(a)),
+        ("locators", locator::locators(a)),
+        ("reliability", locator::reliability(a)),
         ("reduction", reduction::reduction(a)),
         ("latency", latency::latency(a)),
         ("from_contact", latency::from_contact(a)),

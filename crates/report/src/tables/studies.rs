@@ -3,7 +3,7 @@
 use serde_json::Value;
 use skinrig_analysis::result::{
     Activity, Analysis, BitRates, CalibrationResult, Cmre, Coverage, Estimate, Latency,
-    ModelComparison, Reduction, ReferenceReduction, ThresholdChoice,
+    LocatorResult, ModelComparison, Reduction, ReferenceReduction, ThresholdChoice,
 };
 
 use super::table::Table;
@@ -21,6 +21,8 @@ pub(super) fn all(a: &Analysis) -> Vec<(&'static str, Value)> {
         ("latency_course", latency.map(course)),
         ("latency_onsets", latency.map(onsets)),
         ("models", calibration.map(|c| models(&c.compared))),
+        ("locators", a.locator.as_ref().map(locators)),
+        ("reliability", a.locator.as_ref().map(reliability)),
         ("correlation", calibration.map(correlation)),
         ("residuals", calibration.map(|_| residuals(a))),
         ("threshold", a.threshold.as_ref().map(threshold)),
@@ -36,6 +38,33 @@ pub(super) fn all(a: &Analysis) -> Vec<(&'static str, Value)> {
     ];
     let there = tables.into_iter();
     there.filter_map(|(name, t)| Some((name, t?))).collect()
+}
+
+fn locators(l: &LocatorResult) -> Value {
+    Table::of(&l.compared)
+        .any("locator", |r| r.locator)
+        .estimate(["rmse_mm", "rmse_low_mm", "rmse_high_mm"], 5, |r| {
+            &r.rmse_mm
+        })
+        .number("bounded_rmse_mm", 5, |r| r.bounded_rmse_mm)
+        .number("over_repetitions_mm", 5, |r| r.over_repetitions_mm)
+        .any("against", |r| r.test.map(|t| t.against))
+        .number("gain_mm", 5, |r| r.test.map(|t| t.gain_mm))
+        .number("gain_standard_error_mm", 5, |r| {
+            r.test.map(|t| t.standard_error_mm)
+        })
+        .number("gain_ratio", 4, |r| r.test.map(|t| t.ratio))
+        .number("needed_ratio", 4, |r| r.test.map(|t| t.needed))
+        .any("unfit", |r| r.unfit.clone())
+        .flag("chosen", |r| r.chosen)
+        .finish()
+}
+
+fn reliability(l: &LocatorResult) -> Value {
+    Table::of(&l.reliability)
+        .number("stated", 4, |r| r.level)
+        .estimate(["inside", "inside_low", "inside_high"], 5, |r| &r.inside)
+        .finish()
 }
 
 fn reduction(study: &Reduction) -> Value {

@@ -250,6 +250,9 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     out += &alignment_lines(&a.alignment);
     if usable {
         out += &studies::calibration(a);
+        if let Some(note) = crate::derive::locator_note(a) {
+            out += &wrap("locator   ", &note);
+        }
     }
     for (i, lost) in p.lost_bytes.iter().enumerate().filter(|(_, l)| **l > 0) {
         let mut text = format!("camera {}: {} bytes lost", i + 1, grouped(*lost));

@@ -63,6 +63,9 @@ fn head(input: &ReportInput<'_>, paint: Paint) -> String {
     } else {
         out += &paint.warn(&wrap("INVALID   ", "use no number of this session"));
     }
+    if let Some(note) = crate::derive::locator_note(a).filter(|_| a.is_valid()) {
+        out += &cut(wrap("locator   ", &note), MAX_REMARK);
+    }
     if let Some(variant) = &p.variant {
         out += &paint.warn(&cut(
             wrap("VARIANT   ", &plain(&variant.to_string())),

@@ -125,6 +125,7 @@ pub(crate) fn analysis(side: u32, repetitions: u32) -> Analysis {
         .map(|c| studies::activity(&mut noise, c))
         .to_vec();
     Analysis {
+        locator: None,
         version: ANALYSIS_VERSION,
         alignment: alignment(),
         legs: Vec::new(),
@@ -305,6 +306,8 @@ fn press(
     };
     let views = [view(0, noise), view(1, noise)];
     PressResult {
+        region: None,
+        extrapolated: false,
         press: PressId::from_index(id),
         role,
         repetition: RepetitionId::from_index(repetition),
