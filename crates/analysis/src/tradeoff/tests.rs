@@ -141,6 +141,7 @@ fn overrides_say_what_differs_and_no_more() {
             "analysis.window_after_contact=50 ms",
             "analysis.crop.camera1=[200 px, 280 px]",
             "analysis.calibration=full",
+            "analysis.locator=field",
         ]
     );
     let cut = AnalysisSettings {

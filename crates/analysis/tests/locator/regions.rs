@@ -81,11 +81,17 @@ fn coverage(skins: u64) -> Tally {
     sum
 }
 
+/// Presses of one skin share its errors: parts of eight skins scatter by several percent.
 #[test]
 fn regions_hold_on_eight_skins() {
     for (name, inside, all) in coverage(8).0 {
         let share = inside / all;
-        assert!((0.91..=0.985).contains(&share), "{name}: {share} of {all}");
+        let allowed = if name == "all" {
+            0.925..=0.985
+        } else {
+            0.88..=1.0
+        };
+        assert!(allowed.contains(&share), "{name}: {share} of {all}");
     }
 }
 

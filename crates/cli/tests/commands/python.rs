@@ -108,6 +108,12 @@ fn presses(session: &Path, analysis: &Analysis) -> Truth {
         put("error_mm", json!(error.map(|(x, y)| x.hypot(y))));
         let outcome = serde_json::to_value(found.location_outcome).unwrap();
         put("ray_sine", outcome["sine"].clone());
+        let region = found.region;
+        put("region_major_mm", json!(region.map(|r| r.semi_axes_mm[0])));
+        put("region_minor_mm", json!(region.map(|r| r.semi_axes_mm[1])));
+        put("region_angle_deg", json!(region.map(|r| r.angle_deg)));
+        let beyond = estimate.map(|_| u8::from(found.extrapolated));
+        put("extrapolated", json!(beyond));
         views(&mut put, analysis, i, [t.contact, t.release]);
     }
     table
@@ -256,10 +262,10 @@ fn exports_are_read_back_in_python_and_the_page_about_it_runs() {
     let mut read_back = Command::new(&python);
     read_back.arg(format!("{ROOT}/tests/python/read_back.py"));
     read_back.args([&out, stem, &text(&truth)]);
-    // 50 + 10 + 8 columns in three formats, 4 in six or more for each camera.
+    // 54 + 10 + 8 columns in three formats, 4 in six or more for each camera.
     let compared = succeeds(read_back);
     let compared: u32 = compared.split(' ').next().unwrap().parse().unwrap();
-    assert!(compared >= 3 * 69 + 2 * 4 * 6, "{compared}");
+    assert!(compared >= 3 * 72 + 2 * 4 * 6, "{compared}");
 
     let page = std::fs::read_to_string(format!("{ROOT}/docs/how-to/python.md")).unwrap();
     let (_, page) = page.split_once("## Without the package").unwrap();
