@@ -340,12 +340,13 @@ mod tests {
 
     struct NullScanner;
     impl crate::ChunkScanner for NullScanner {
-        fn restart(&mut self, _: skinrig_model::CameraId, _: skinrig_model::StreamFormat, _: u64) {}
-        fn lost(&mut self, _: skinrig_model::CameraId, _: skinrig_model::StreamFormat, _: u64) {}
+        fn new(_: skinrig_model::StreamFormat) -> Self {
+            Self
+        }
+        fn restart(&mut self, _: u64) {}
+        fn lost(&mut self, _: u64) {}
         fn scan(
             &mut self,
-            _: skinrig_model::CameraId,
-            _: skinrig_model::StreamFormat,
             _: &[u8],
         ) -> (skinrig_model::ChunkFacts, Vec<skinrig_model::TriggerEdge>) {
             Default::default()
@@ -437,7 +438,7 @@ mod tests {
         assert_eq!(reader.box_reports().unwrap(), []);
         assert_eq!(reader.preflight().unwrap(), []);
         // Without a header.
-        let empty = crate::verify(&path, &mut NullScanner);
+        let empty = crate::verify::<NullScanner>(&path);
         assert!(
             matches!(empty, Err(RecorderError::Empty { .. })),
             "{empty:?}"
@@ -460,8 +461,8 @@ mod tests {
             std::os::unix::fs::symlink(&victim, &link).unwrap();
             for refused in [
                 crate::SessionReader::open(&path).map(drop),
-                crate::SessionWriter::resume(&path, &mut NullScanner).map(drop),
-                crate::SessionWriter::open_ended(&path, &mut NullScanner).map(drop),
+                crate::SessionWriter::resume::<NullScanner>(&path).map(drop),
+                crate::SessionWriter::open_ended::<NullScanner>(&path).map(drop),
             ] {
                 let refused = refused.unwrap_err().to_string();
                 assert!(refused.contains("a link beside it"), "{refused}");
@@ -520,8 +521,8 @@ mod tests {
             forge();
             for refused in [
                 crate::SessionReader::open(&path).map(drop),
-                crate::SessionWriter::resume(&path, &mut NullScanner).map(drop),
-                crate::SessionWriter::open_ended(&path, &mut NullScanner).map(drop),
+                crate::SessionWriter::resume::<NullScanner>(&path).map(drop),
+                crate::SessionWriter::open_ended::<NullScanner>(&path).map(drop),
                 runtime.block_on(reopen(&path)).map(drop),
             ] {
                 let refused = refused.unwrap_err().to_string();

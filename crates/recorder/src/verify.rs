@@ -21,24 +21,22 @@ use crate::query::{each_row, sha, text};
 use crate::reader::SessionReader;
 use crate::rows::{AttemptRow, SessionTotals};
 
-/// Decoder for camera bytes. This crate decodes no events, so the caller supplies one.
+/// Decoder for the bytes of one camera. This crate decodes no events, so the caller supplies one.
 pub trait ChunkScanner {
-    /// Decodes the next bytes of `camera`. Called for every chunk in stream order; state carries over between
-    /// chunks, because a word may be split.
-    fn scan(
-        &mut self,
-        camera: CameraId,
-        format: StreamFormat,
-        bytes: &[u8],
-    ) -> (ChunkFacts, Vec<TriggerEdge>);
+    /// A decoder at the start of a stream of `format`.
+    fn new(format: StreamFormat) -> Self;
 
-    /// Resets the decoder: the next bytes of `camera` start a further leg, whose times count from `origin_us`.
-    /// Called before their `scan`.
-    fn restart(&mut self, camera: CameraId, format: StreamFormat, origin_us: u64);
+    /// Decodes the next bytes. Called for every chunk in stream order; state carries over between chunks, because a
+    /// word may be split.
+    fn scan(&mut self, bytes: &[u8]) -> (ChunkFacts, Vec<TriggerEdge>);
+
+    /// Resets the decoder: the next bytes start a further leg, whose times count from `origin_us`. Called before their
+    /// `scan`.
+    fn restart(&mut self, origin_us: u64);
 
     /// Discards state that lost bytes may have changed. Called before the `scan` of the chunk that follows them,
     /// if the session records the time of the loss.
-    fn lost(&mut self, camera: CameraId, format: StreamFormat, bytes: u64);
+    fn lost(&mut self, bytes: u64);
 }
 
 /// Verifies a session: SQLite's integrity and foreign keys, protocol and plan digests, checksum and facts of every
@@ -48,10 +46,7 @@ pub trait ChunkScanner {
 /// # Errors
 /// [`RecorderError::Missing`] and [`RecorderError::Io`] if there is no readable file, [`RecorderError::Empty`] if it holds no records,
 /// [`RecorderError::Unread`] if the system failed to read all of it. Everything wrong inside the file is a problem in the report.
-pub fn verify(
-    path: impl AsRef<Path>,
-    scanner: &mut dyn ChunkScanner,
-) -> Result<VerifyReport, RecorderError> {
+pub fn verify<S: ChunkScanner>(path: impl AsRef<Path>) -> Result<VerifyReport, RecorderError> {
     let path = path.as_ref();
     let mut report = VerifyReport::default();
     let reader = match SessionReader::open(path) {
@@ -74,7 +69,7 @@ pub fn verify(
     let formats = check_header(&reader, &mut report);
     for camera in CameraId::ALL {
         let format = formats.map(|f| f[camera.index()]);
-        if let Err(e) = check_chunks(&reader, camera, format, scanner, &mut report) {
+        if let Err(e) = check_chunks::<S>(&reader, camera, format, &mut report) {
             report.add_error(e);
         }
     }
@@ -155,14 +150,14 @@ fn check_header(reader: &SessionReader, report: &mut VerifyReport) -> Option<[St
     Some(header.stream_formats)
 }
 
-fn check_chunks(
+fn check_chunks<S: ChunkScanner>(
     reader: &SessionReader,
     camera: CameraId,
     format: Option<StreamFormat>,
-    scanner: &mut dyn ChunkScanner,
     report: &mut VerifyReport,
 ) -> Result<(), RecorderError> {
     let (mut previous, mut host) = (None, HostTime(i64::MIN));
+    let mut scanner = format.map(S::new);
     let index = reader.chunk_index(camera)?;
     gaps::check(camera, &index, report);
     for meta in index {
@@ -197,14 +192,16 @@ fn check_chunks(
         let Some(bytes) = report.ok_or_add(reader.chunk_bytes(camera, meta.seq)) else {
             continue;
         };
-        let Some(format) = format else { continue };
+        let Some(scanner) = &mut scanner else {
+            continue;
+        };
         if let Some(origin_us) = meta.restart_us {
-            scanner.restart(camera, format, origin_us);
+            scanner.restart(origin_us);
         }
         if meta.lost_time.is_some() {
-            scanner.lost(camera, format, meta.lost_before);
+            scanner.lost(meta.lost_before);
         }
-        let (facts, edges) = scanner.scan(camera, format, &bytes);
+        let (facts, edges) = scanner.scan(&bytes);
         report.expect_equal(&format!("{place}: facts"), &facts, &meta.facts);
         let recorded = reader.edges(camera, meta.seq as i64, meta.seq as i64)?;
         if edges != recorded {
