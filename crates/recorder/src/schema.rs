@@ -160,8 +160,11 @@ const SEAL_WAIT: Duration = Duration::from_secs(90);
 /// Interval at which a reader checks whether sealing has ended.
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Opens a session file for reading, after checking its first page.
-pub(crate) async fn open(path: &Path) -> Result<SqliteConnection, RecorderError> {
+/// Most rows that SQLite's thread reads ahead: waking two threads for each row costs more than the row.
+const ROWS_AHEAD: usize = 1024;
+
+/// Opens a session file for reading, after checking its first page. Also returns whether the file never changes.
+pub(crate) async fn open(path: &Path) -> Result<(SqliteConnection, bool), RecorderError> {
     reject_special_files(path)?;
     let from = Instant::now();
     while crate::lock::is_being_sealed(path) && from.elapsed() < SEAL_WAIT {
@@ -180,23 +183,32 @@ pub(crate) async fn open(path: &Path) -> Result<SqliteConnection, RecorderError>
         && !["-wal", "-journal"]
             .iter()
             .any(|end| sidecar_path(path, end).exists());
-    let mut conn = SqliteConnectOptions::new()
+    let mut conn = connect(path, immutable).await?;
+    let schema = check_schema(&mut conn).await;
+    let has_schema = schema.map_err(|fault| fault.at(path, "reading its schema"))?;
+    if has_schema {
+        Ok((conn, immutable))
+    } else {
+        Err(empty(path))
+    }
+}
+
+/// Opens a session file for reading, beside a connection that checked it; `immutable` as returned by [`open`].
+pub(crate) async fn connect(
+    path: &Path,
+    immutable: bool,
+) -> Result<SqliteConnection, RecorderError> {
+    SqliteConnectOptions::new()
         .filename(path)
         .read_only(true)
         .immutable(immutable)
         .foreign_keys(true)
         .busy_timeout(BUSY_TIMEOUT)
+        .row_buffer_size(ROWS_AHEAD)
         .thread_name(|_| "session-reader".to_owned())
         .connect()
         .await
-        .map_err(|e| Fault::from(e).at(path, "opening it"))?;
-    let schema = check_schema(&mut conn).await;
-    let has_schema = schema.map_err(|fault| fault.at(path, "reading its schema"))?;
-    if has_schema {
-        Ok(conn)
-    } else {
-        Err(empty(path))
-    }
+        .map_err(|e| Fault::from(e).at(path, "opening it"))
 }
 
 fn empty(path: &Path) -> RecorderError {
