@@ -127,7 +127,7 @@ proptest! {
         // With the data, an analysis may find more invalid presses, never fewer.
         prop_assert!(u64::from(counts.invalid) >= totals.presses.invalid);
 
-        let verified = verify(&path, &mut Rescan::default()).unwrap();
+        let verified = verify::<Rescan>(&path).unwrap();
         prop_assert!(verified.is_sound() && verified.sealed, "{:?}", verified.problems);
     }
 }

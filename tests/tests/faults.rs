@@ -226,7 +226,7 @@ struct Cell {
 /// `before`: presses completed before the fault; the text gives the number of valid ones where it differs.
 fn judge(run: &Run, fault: PlantedFault, before: u64, without: &Ideal) -> Cell {
     let mut wrong = Vec::new();
-    let verified = verify(&run.path, &mut Rescan::default()).unwrap();
+    let verified = verify::<Rescan>(&run.path).unwrap();
     if !verified.is_sound() || verified.sealed != run.sealed {
         wrong.push(format!(
             "verify: {:?}, sealed {}",

@@ -92,7 +92,7 @@ fn what_a_camera_drops_spoils_the_press_and_is_told() {
         let told = reader.notes().unwrap();
         let told = told.iter().find(|n| n.text.contains("overflow counter"));
         assert!(told.is_some_and(|n| n.text.starts_with("camera 1: ")));
-        let verified = verify(&path, &mut Rescan::default()).unwrap();
+        let verified = verify::<Rescan>(&path).unwrap();
         assert!(verified.is_sound(), "{:?}", verified.problems);
     });
 }

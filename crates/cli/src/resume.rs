@@ -50,7 +50,7 @@ pub(crate) fn resume(args: &ResumeArgs, command_line: &str, output: Output) -> O
     let operator = Operator::listen().map_err(Failure::internal)?;
     let session = &args.session;
     // From here on this process is the only writer, and the content is verified.
-    let writer = match SessionWriter::resume(session, &mut Rescan::default()) {
+    let writer = match SessionWriter::resume::<Rescan>(session) {
         Err(RecorderError::AlreadyCompleted { .. }) => return only_seal(session),
         opened => opened.map_err(refusal)?,
     };
@@ -530,7 +530,7 @@ fn end_only(
 
 /// Adds the missing seal of a session that has ended.
 fn only_seal(session: &Path) -> Outcome {
-    let writer = SessionWriter::open_ended(session, &mut Rescan::default()).map_err(refusal)?;
+    let writer = SessionWriter::open_ended::<Rescan>(session).map_err(refusal)?;
     let notify = || errln!("{}", crate::sink::HELD_OPEN);
     writer
         .finish_with_notice(notify)

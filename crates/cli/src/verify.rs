@@ -38,7 +38,7 @@ fn bundle(folder: &Path, json: bool) -> Outcome {
             );
             report.problems.push(problem);
         }
-        let session = recheck(&inside, &mut Rescan::default()).map_err(Failure::session)?;
+        let session = recheck::<Rescan>(&inside).map_err(Failure::session)?;
         report.problems.extend(session.problems);
         // A manifest can be forged, the session's seal cannot: everything else must follow from the session.
         if report.problems.is_empty() {
@@ -147,7 +147,7 @@ fn session(path: &Path, json: bool) -> Outcome {
         return Err(Failure::session(e));
     }
     let phase = Phase::begin("checking every byte");
-    let report = recheck(path, &mut Rescan::default()).map_err(Failure::session)?;
+    let report = recheck::<Rescan>(path).map_err(Failure::session)?;
     drop(phase);
     let name = path.display();
     if json {

@@ -25,6 +25,8 @@ const TOKEN: u32 = 0xB;
 const VALUE: u32 = 0x0FFF_FFFF;
 const MAX_RUN: usize = 0x00FF_FFFF;
 const MAX_SHIFT: u32 = 2;
+/// Words that unfolding writes at once.
+const BLOCK: usize = 16;
 
 /// Encoding of a stored chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -162,6 +164,18 @@ pub fn fold(raw: &[u8]) -> Option<Vec<u8>> {
 /// # Errors
 /// [`CodecError`] for bytes that [`fold`] never produces, or for another length.
 pub fn unfold(stored: &[u8], raw_bytes: usize) -> Result<Vec<u8>, CodecError> {
+    let mut out = Vec::new();
+    unfold_into(stored, raw_bytes, &mut out)?;
+    out.truncate(raw_bytes);
+    Ok(out)
+}
+
+/// [`unfold`] into a buffer for several chunks, which only grows.
+pub(crate) fn unfold_into<'a>(
+    stored: &[u8],
+    raw_bytes: usize,
+    buffer: &'a mut Vec<u8>,
+) -> Result<&'a [u8], CodecError> {
     let fault = |word, expected: String, found: String| CodecError {
         word,
         expected,
@@ -182,19 +196,28 @@ pub fn unfold(stored: &[u8], raw_bytes: usize) -> Result<Vec<u8>, CodecError> {
     let claimed = words.iter().map(|w| u32::from_le_bytes(*w));
     let unfolded: usize = claimed
         .map(|w| match w >> 28 {
-            TOKEN => 4 * (w as usize & MAX_RUN),
-            _ => 4,
+            TOKEN => w as usize & MAX_RUN,
+            _ => 1,
         })
         .sum();
-    let mut out = Vec::with_capacity(unfolded.min(raw_bytes));
-    let mut base = None;
+    // Runs are written in whole blocks, which end up to a block later.
+    let most = 4 * (unfolded.min(raw_bytes / 4) + BLOCK);
+    if buffer.len() < most {
+        buffer.resize(most, 0);
+    }
+    let out = buffer.as_chunks_mut::<4>().0;
+    let (mut at, mut base) = (0, None);
     for (i, bytes) in words.iter().enumerate() {
         let word = u32::from_le_bytes(*bytes);
         if word >> 28 != TOKEN {
             if word >> 28 == TIME_HIGH {
                 base = Some(word & VALUE);
             }
-            out.extend_from_slice(bytes);
+            // The length is checked at the end.
+            if let Some(out) = out.get_mut(at) {
+                *out = *bytes;
+            }
+            at += 1;
             continue;
         }
         let (phase, shift, n) = ((word >> 26) & 3, (word >> 24) & 3, word & MAX_RUN as u32);
@@ -212,27 +235,32 @@ pub fn unfold(stored: &[u8], raw_bytes: usize) -> Result<Vec<u8>, CodecError> {
                 format!("{word:#010x}"),
             ));
         }
-        if out.len() + 4 * n as usize > raw_bytes {
+        if 4 * (at + n as usize) > raw_bytes {
             return Err(fault(
                 i,
                 format!("{raw_bytes} bytes in all"),
                 "more bytes".into(),
             ));
         }
-        out.extend(
-            (0..n)
-                .flat_map(|k| ((TIME_HIGH << 28) | value(previous, phase, shift, k)).to_le_bytes()),
-        );
+        let blocks = out[at..].as_chunks_mut::<BLOCK>().0.iter_mut();
+        for (first, block) in (0..n).step_by(BLOCK).zip(blocks) {
+            // No branch per word, so that the compiler vectorises it.
+            for (k, out) in (first..).zip(block) {
+                let time = value(previous, phase, shift, k);
+                *out = ((TIME_HIGH << 28) | time).to_le_bytes();
+            }
+        }
+        at += n as usize;
         base = Some(value(previous, phase, shift, n - 1));
     }
-    if out.len() != raw_bytes {
+    if 4 * at != raw_bytes {
         return Err(fault(
             words.len(),
             format!("{raw_bytes} bytes in all"),
-            format!("{} bytes", out.len()),
+            format!("{} bytes", 4 * at),
         ));
     }
-    Ok(out)
+    Ok(&buffer[..raw_bytes])
 }
 
 #[cfg(test)]

@@ -172,15 +172,50 @@ struct Extent(i64, i64, [i64; 2]);
 /// Digests of all tables in the file's schema. A value is hashed as one type byte (0 null, 1 integer, 2 real, 3 text, 4 blob) and
 /// eight little-endian bytes of value; for text and blobs, eight bytes of length and the content.
 pub(crate) async fn digest_tables(conn: &mut SqliteConnection) -> Result<Vec<TableDigest>, Fault> {
+    digest_tables_beside(conn, None).await
+}
+
+/// Like [`digest_tables`], with the digest of one table if it is already known.
+pub(crate) async fn digest_tables_beside(
+    conn: &mut SqliteConnection,
+    known: Option<TableDigest>,
+) -> Result<Vec<TableDigest>, Fault> {
     let mut digests = Vec::with_capacity(TABLES.len());
     for table in &TABLES {
         // If a sealed file lacks a table, the tree hash differs.
-        if has_table(conn, table.name).await? {
-            let all = Extent(-1, i64::MAX, [i64::MAX; 2]);
-            digests.push(digest(conn, table.name, table.rows, &all).await?);
-        }
+        let digest = match &known {
+            Some(known) if known.name == table.name => Some(known.clone()),
+            _ => digest_rows(conn, table, |_| {}).await?,
+        };
+        digests.extend(digest);
     }
     Ok(digests)
+}
+
+/// Digest of one table, `None` without it. Calls `each` with every encoded row, in key order.
+pub(crate) async fn digest_table(
+    conn: &mut SqliteConnection,
+    name: &str,
+    each: impl FnMut(&[u8]),
+) -> Result<Option<TableDigest>, Fault> {
+    match TABLES.iter().find(|table| table.name == name) {
+        Some(table) => digest_rows(conn, table, each).await,
+        None => Ok(None),
+    }
+}
+
+async fn digest_rows(
+    conn: &mut SqliteConnection,
+    table: &Table,
+    each: impl FnMut(&[u8]),
+) -> Result<Option<TableDigest>, Fault> {
+    if !has_table(conn, table.name).await? {
+        return Ok(None);
+    }
+    let all = Extent(-1, i64::MAX, [i64::MAX; 2]);
+    digest(conn, table.name, table.rows, &all, each)
+        .await
+        .map(Some)
 }
 
 /// Like [`digest_tables`], over the rows of an earlier state.
@@ -195,7 +230,7 @@ pub(crate) async fn digest_earlier(
         let mut ways = table.earlier.iter().rev();
         let way = ways.find(|(since, _)| *since <= earlier.schema);
         let sql = way.map_or(table.rows, |(_, sql)| sql);
-        digests.push(digest(conn, table.name, sql, &extent).await?);
+        digests.push(digest(conn, table.name, sql, &extent, |_| {}).await?);
     }
     Ok(digests)
 }
@@ -205,6 +240,7 @@ async fn digest(
     name: &str,
     sql: &'static str,
     Extent(rows, leg, [one, two]): &Extent,
+    mut each: impl FnMut(&[u8]),
 ) -> Result<TableDigest, Fault> {
     let query = sqlx::query(sql)
         .bind(*rows)
@@ -217,6 +253,7 @@ async fn digest(
         bytes.clear();
         encode_row(row, &mut bytes)?;
         hash.update(&bytes);
+        each(&bytes);
         Ok(())
     })
     .await?;
@@ -234,14 +271,14 @@ fn encode_row(row: &SqliteRow, bytes: &mut Vec<u8>) -> Result<(), Fault> {
             bytes.push(0);
             continue;
         }
-        let kind = value.type_info().name().to_owned();
+        let kind = value.type_info();
         let mut push = |tag: u8, head: [u8; 8], content: &[u8]| {
             bytes.push(tag);
             bytes.extend_from_slice(&head);
             bytes.extend_from_slice(content);
         };
         let length = |content: &[u8]| (content.len() as u64).to_le_bytes();
-        match kind.as_str() {
+        match kind.name() {
             "INTEGER" => push(1, row.try_get_unchecked::<i64, _>(i)?.to_le_bytes(), &[]),
             "REAL" => push(2, row.try_get_unchecked::<f64, _>(i)?.to_le_bytes(), &[]),
             "TEXT" => {

@@ -27,6 +27,8 @@ mod stream;
 #[derive(Debug)]
 pub struct SessionReader {
     path: PathBuf,
+    /// Whether the file never changes.
+    immutable: bool,
     inner: Mutex<(Runtime, SqliteConnection)>,
 }
 
@@ -49,16 +51,23 @@ impl SessionReader {
     /// operating system or of SQLite.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
         let path = path.as_ref().to_owned();
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .build()
-            .map_err(|source| RecorderError::Io {
-                path: path.clone(),
-                doing: "starting to read it",
-                source,
-            })?;
-        let conn = runtime.block_on(schema::open(&path))?;
+        let runtime = runtime(&path)?;
+        let (conn, immutable) = runtime.block_on(schema::open(&path))?;
         Ok(Self {
             path,
+            immutable,
+            inner: Mutex::new((runtime, conn)),
+        })
+    }
+
+    /// Opens the session a second time, to read it in another thread. Waits for no writer: while `self` exists, the session
+    /// cannot be sealed.
+    pub(crate) fn reopen(&self) -> Result<Self, RecorderError> {
+        let runtime = runtime(&self.path)?;
+        let conn = runtime.block_on(schema::connect(&self.path, self.immutable))?;
+        Ok(Self {
+            path: self.path.clone(),
+            immutable: self.immutable,
             inner: Mutex::new((runtime, conn)),
         })
     }
@@ -277,4 +286,15 @@ impl SessionReader {
     pub fn totals(&self) -> Result<SessionTotals, RecorderError> {
         self.query("counting", totals::totals)
     }
+}
+
+/// Async runtime of one connection.
+fn runtime(path: &Path) -> Result<Runtime, RecorderError> {
+    tokio::runtime::Builder::new_current_thread()
+        .build()
+        .map_err(|source| RecorderError::Io {
+            path: path.to_owned(),
+            doing: "starting to read it",
+            source,
+        })
 }

@@ -25,10 +25,7 @@ pub(crate) struct LegStart {
 }
 
 /// Locks a session that can be resumed, and verifies all of it, so that damage is never sealed. Nothing changes.
-pub(crate) fn lock_unfinished(
-    path: &Path,
-    scanner: &mut dyn ChunkScanner,
-) -> Result<WriterLock, RecorderError> {
+pub(crate) fn lock_unfinished<S: ChunkScanner>(path: &Path) -> Result<WriterLock, RecorderError> {
     let lock = lock(path)?;
     let completed = SessionReader::open(path).and_then(|reader| is_completed(&reader));
     if let Ok(true) = completed {
@@ -36,7 +33,7 @@ pub(crate) fn lock_unfinished(
             path: path.to_owned(),
         });
     }
-    check(path, scanner)?;
+    check::<S>(path)?;
     Ok(lock)
 }
 
@@ -54,10 +51,7 @@ fn is_completed(reader: &SessionReader) -> Result<bool, RecorderError> {
 }
 
 /// Locks a session whose end is recorded but whose seal is missing or incomplete, and verifies all of it. Nothing changes.
-pub(crate) fn lock_unsealed(
-    path: &Path,
-    scanner: &mut dyn ChunkScanner,
-) -> Result<WriterLock, RecorderError> {
+pub(crate) fn lock_unsealed<S: ChunkScanner>(path: &Path) -> Result<WriterLock, RecorderError> {
     let lock = lock(path)?;
     let end = SessionReader::open(path).and_then(|reader| reader.end());
     if let Ok(None) = end {
@@ -66,7 +60,7 @@ pub(crate) fn lock_unsealed(
             expected: "the end of its run".into(),
         });
     }
-    if check(path, scanner)?.sealed {
+    if check::<S>(path)?.sealed {
         return Err(RecorderError::AlreadyCompleted {
             path: path.to_owned(),
         });
@@ -74,8 +68,8 @@ pub(crate) fn lock_unsealed(
     Ok(lock)
 }
 
-fn check(path: &Path, scanner: &mut dyn ChunkScanner) -> Result<VerifyReport, RecorderError> {
-    let report = verify(path, scanner)?;
+fn check<S: ChunkScanner>(path: &Path) -> Result<VerifyReport, RecorderError> {
+    let report = verify::<S>(path)?;
     if report.is_sound() {
         return Ok(report);
     }

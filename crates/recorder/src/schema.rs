@@ -160,8 +160,11 @@ const SEAL_WAIT: Duration = Duration::from_secs(90);
 /// Interval at which a reader checks whether sealing has ended.
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Opens a session file for reading, after checking its first page.
-pub(crate) async fn open(path: &Path) -> Result<SqliteConnection, RecorderError> {
+/// Most rows that SQLite's thread reads ahead: waking two threads for each row costs more than the row.
+const ROWS_AHEAD: usize = 1024;
+
+/// Opens a session file for reading, after checking its first page. Also returns whether the file never changes.
+pub(crate) async fn open(path: &Path) -> Result<(SqliteConnection, bool), RecorderError> {
     reject_special_files(path)?;
     let from = Instant::now();
     while crate::lock::is_being_sealed(path) && from.elapsed() < SEAL_WAIT {
@@ -180,23 +183,32 @@ pub(crate) async fn open(path: &Path) -> Result<SqliteConnection, RecorderError>
         && !["-wal", "-journal"]
             .iter()
             .any(|end| sidecar_path(path, end).exists());
-    let mut conn = SqliteConnectOptions::new()
+    let mut conn = connect(path, immutable).await?;
+    let schema = check_schema(&mut conn).await;
+    let has_schema = schema.map_err(|fault| fault.at(path, "reading its schema"))?;
+    if has_schema {
+        Ok((conn, immutable))
+    } else {
+        Err(empty(path))
+    }
+}
+
+/// Opens a session file for reading, beside a connection that checked it; `immutable` as returned by [`open`].
+pub(crate) async fn connect(
+    path: &Path,
+    immutable: bool,
+) -> Result<SqliteConnection, RecorderError> {
+    SqliteConnectOptions::new()
         .filename(path)
         .read_only(true)
         .immutable(immutable)
         .foreign_keys(true)
         .busy_timeout(BUSY_TIMEOUT)
+        .row_buffer_size(ROWS_AHEAD)
         .thread_name(|_| "session-reader".to_owned())
         .connect()
         .await
-        .map_err(|e| Fault::from(e).at(path, "opening it"))?;
-    let schema = check_schema(&mut conn).await;
-    let has_schema = schema.map_err(|fault| fault.at(path, "reading its schema"))?;
-    if has_schema {
-        Ok(conn)
-    } else {
-        Err(empty(path))
-    }
+        .map_err(|e| Fault::from(e).at(path, "opening it"))
 }
 
 fn empty(path: &Path) -> RecorderError {
@@ -340,12 +352,13 @@ mod tests {
 
     struct NullScanner;
     impl crate::ChunkScanner for NullScanner {
-        fn restart(&mut self, _: skinrig_model::CameraId, _: skinrig_model::StreamFormat, _: u64) {}
-        fn lost(&mut self, _: skinrig_model::CameraId, _: skinrig_model::StreamFormat, _: u64) {}
+        fn new(_: skinrig_model::StreamFormat) -> Self {
+            Self
+        }
+        fn restart(&mut self, _: u64) {}
+        fn lost(&mut self, _: u64) {}
         fn scan(
             &mut self,
-            _: skinrig_model::CameraId,
-            _: skinrig_model::StreamFormat,
             _: &[u8],
         ) -> (skinrig_model::ChunkFacts, Vec<skinrig_model::TriggerEdge>) {
             Default::default()
@@ -437,7 +450,7 @@ mod tests {
         assert_eq!(reader.box_reports().unwrap(), []);
         assert_eq!(reader.preflight().unwrap(), []);
         // Without a header.
-        let empty = crate::verify(&path, &mut NullScanner);
+        let empty = crate::verify::<NullScanner>(&path);
         assert!(
             matches!(empty, Err(RecorderError::Empty { .. })),
             "{empty:?}"
@@ -460,8 +473,8 @@ mod tests {
             std::os::unix::fs::symlink(&victim, &link).unwrap();
             for refused in [
                 crate::SessionReader::open(&path).map(drop),
-                crate::SessionWriter::resume(&path, &mut NullScanner).map(drop),
-                crate::SessionWriter::open_ended(&path, &mut NullScanner).map(drop),
+                crate::SessionWriter::resume::<NullScanner>(&path).map(drop),
+                crate::SessionWriter::open_ended::<NullScanner>(&path).map(drop),
             ] {
                 let refused = refused.unwrap_err().to_string();
                 assert!(refused.contains("a link beside it"), "{refused}");
@@ -520,8 +533,8 @@ mod tests {
             forge();
             for refused in [
                 crate::SessionReader::open(&path).map(drop),
-                crate::SessionWriter::resume(&path, &mut NullScanner).map(drop),
-                crate::SessionWriter::open_ended(&path, &mut NullScanner).map(drop),
+                crate::SessionWriter::resume::<NullScanner>(&path).map(drop),
+                crate::SessionWriter::open_ended::<NullScanner>(&path).map(drop),
                 runtime.block_on(reopen(&path)).map(drop),
             ] {
                 let refused = refused.unwrap_err().to_string();

@@ -1,6 +1,7 @@
 //! Verification: recomputes every hash, count and fact that a session stores.
 
 use std::path::Path;
+use std::thread::ScopedJoinHandle;
 
 use sha2::{Digest, Sha256};
 use skinrig_model::{
@@ -9,36 +10,37 @@ use skinrig_model::{
 };
 
 mod chain;
+mod edges;
 mod gaps;
 mod legs;
 mod report;
 mod seal;
+mod sqlite;
+mod stream;
 
 pub use self::report::VerifyReport;
+use self::stream::Stream;
 use crate::error::RecorderError;
 use crate::hex::hex;
-use crate::query::{each_row, sha, text};
 use crate::reader::SessionReader;
-use crate::rows::{AttemptRow, SessionTotals};
+use crate::rows::AttemptRow;
 
-/// Decoder for camera bytes. This crate decodes no events, so the caller supplies one.
+/// Decoder for the bytes of one camera. This crate decodes no events, so the caller supplies one.
 pub trait ChunkScanner {
-    /// Decodes the next bytes of `camera`. Called for every chunk in stream order; state carries over between
-    /// chunks, because a word may be split.
-    fn scan(
-        &mut self,
-        camera: CameraId,
-        format: StreamFormat,
-        bytes: &[u8],
-    ) -> (ChunkFacts, Vec<TriggerEdge>);
+    /// A decoder at the start of a stream of `format`.
+    fn new(format: StreamFormat) -> Self;
 
-    /// Resets the decoder: the next bytes of `camera` start a further leg, whose times count from `origin_us`.
-    /// Called before their `scan`.
-    fn restart(&mut self, camera: CameraId, format: StreamFormat, origin_us: u64);
+    /// Decodes the next bytes. Called for every chunk in stream order; state carries over between chunks, because a
+    /// word may be split.
+    fn scan(&mut self, bytes: &[u8]) -> (ChunkFacts, Vec<TriggerEdge>);
+
+    /// Resets the decoder: the next bytes start a further leg, whose times count from `origin_us`. Called before their
+    /// `scan`.
+    fn restart(&mut self, origin_us: u64);
 
     /// Discards state that lost bytes may have changed. Called before the `scan` of the chunk that follows them,
     /// if the session records the time of the loss.
-    fn lost(&mut self, camera: CameraId, format: StreamFormat, bytes: u64);
+    fn lost(&mut self, bytes: u64);
 }
 
 /// Verifies a session: SQLite's integrity and foreign keys, protocol and plan digests, checksum and facts of every
@@ -48,12 +50,8 @@ pub trait ChunkScanner {
 /// # Errors
 /// [`RecorderError::Missing`] and [`RecorderError::Io`] if there is no readable file, [`RecorderError::Empty`] if it holds no records,
 /// [`RecorderError::Unread`] if the system failed to read all of it. Everything wrong inside the file is a problem in the report.
-pub fn verify(
-    path: impl AsRef<Path>,
-    scanner: &mut dyn ChunkScanner,
-) -> Result<VerifyReport, RecorderError> {
+pub fn verify<S: ChunkScanner>(path: impl AsRef<Path>) -> Result<VerifyReport, RecorderError> {
     let path = path.as_ref();
-    let mut report = VerifyReport::default();
     let reader = match SessionReader::open(path) {
         Ok(reader) => reader,
         Err(
@@ -63,6 +61,7 @@ pub fn verify(
         ) => return Err(e),
         Err(e) if e.is_system_failure() => return Err(e),
         Err(e) => {
+            let mut report = VerifyReport::default();
             report.add(e);
             return Ok(report);
         }
@@ -70,22 +69,7 @@ pub fn verify(
     if let Err(e @ RecorderError::Empty { .. }) = reader.session_id() {
         return Err(e);
     }
-    check_sqlite(&reader, &mut report);
-    let formats = check_header(&reader, &mut report);
-    for camera in CameraId::ALL {
-        let format = formats.map(|f| f[camera.index()]);
-        if let Err(e) = check_chunks(&reader, camera, format, scanner, &mut report) {
-            report.add_error(e);
-        }
-    }
-    if let Err(e) = check_poses(&reader, &mut report) {
-        report.add_error(e);
-    }
-    check_journal(&reader, &mut report);
-    legs::check(&reader, &mut report);
-    report.totals = report.read_totals(&reader);
-    seal::check(&reader, &mut report);
-    chain::check(&reader, &mut report);
+    let mut report = check_all::<S>(&reader);
     drop(reader);
     if let Some(problem) = report.system_failure {
         return Err(RecorderError::Unread(problem));
@@ -96,32 +80,79 @@ pub fn verify(
     Ok(report)
 }
 
-impl VerifyReport {
-    fn read_totals(&mut self, reader: &SessionReader) -> Option<SessionTotals> {
-        self.ok_or_add(reader.totals())
-    }
+/// Makes all checks, some in threads with a connection each. The order of problems does not depend on the threads.
+fn check_all<S: ChunkScanner>(reader: &SessionReader) -> VerifyReport {
+    let (header, formats) = section(|report| check_header(reader, report));
+    // Before the edges: a session that is being written then has those of all these chunks.
+    let streams = CameraId::ALL.map(|camera| {
+        section(|report| Stream {
+            camera,
+            format: formats.map(|f| f[camera.index()]),
+            index: report
+                .ok_or_add(reader.chunk_index(camera))
+                .unwrap_or_default(),
+        })
+    });
+    let (sender, digest) = std::sync::mpsc::channel();
+    std::thread::scope(|scope| {
+        let edges = scope.spawn(move || edges::read(reader, &sender));
+        let cameras = streams.each_ref().map(|(_, stream)| {
+            scope.spawn(|| in_thread(reader, |reader, report| stream.check::<S>(reader, report)))
+        });
+        let seal = scope.spawn(move || {
+            in_thread(reader, |reader, report| {
+                seal::check(reader, &digest, report)
+            })
+        });
+        let (mut report, ()) = section(|report| sqlite::check(reader, report));
+        report.append(header);
+        let (others, ()) = section(|report| {
+            let poses = check_poses(reader, report);
+            report.ok_or_add(poses);
+            check_journal(reader, report);
+            legs::check(reader, report);
+        });
+        let (chain, ()) = section(|report| chain::check(reader, report));
+        let edges = join(edges);
+        for ((index, stream), camera) in streams.iter().zip(cameras) {
+            let (mut found, decoded) = join(camera);
+            if !edges.contain(stream.camera, &decoded) {
+                // The edges of a chunk differ or cannot be read: find out which.
+                (found, ()) = section(|report| stream.check_with_edges::<S>(reader, report));
+            }
+            report.append(index.clone());
+            report.append(found);
+        }
+        for found in [others, join(seal).0, chain] {
+            report.append(found);
+        }
+        report
+    })
 }
 
-fn check_sqlite(reader: &SessionReader, report: &mut VerifyReport) {
-    let messages = reader.query("checking its integrity", async |conn| {
-        let messages: Vec<String> = sqlx::query_scalar("PRAGMA integrity_check")
-            .fetch_all(&mut *conn)
-            .await?;
-        let mut problems: Vec<String> = messages.into_iter().filter(|m| m != "ok").collect();
-        let orphans = sqlx::query("SELECT \"table\", parent FROM pragma_foreign_key_check");
-        each_row(orphans, conn, |row| {
-            let (child, parent) = (text(row, "table")?, text(row, "parent")?);
-            problems.push(format!(
-                "a row of {child} refers to a missing row of {parent}"
-            ));
-            Ok(())
-        })
-        .await?;
-        Ok(problems)
-    });
-    for message in report.ok_or_add(messages).unwrap_or_default() {
-        report.add(format!("sqlite: {message}"));
-    }
+/// Runs a check with a report of its own.
+fn section<T>(check: impl FnOnce(&mut VerifyReport) -> T) -> (VerifyReport, T) {
+    let mut report = VerifyReport::default();
+    let value = check(&mut report);
+    (report, value)
+}
+
+/// Like [`section`], with a connection of its own.
+fn in_thread<T: Default>(
+    reader: &SessionReader,
+    check: impl FnOnce(&SessionReader, &mut VerifyReport) -> T,
+) -> (VerifyReport, T) {
+    section(|report| {
+        let reader = report.ok_or_add(reader.reopen());
+        reader
+            .map(|reader| check(&reader, report))
+            .unwrap_or_default()
+    })
+}
+
+fn join<T>(thread: ScopedJoinHandle<'_, T>) -> T {
+    let result = thread.join();
+    result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }
 
 fn check_header(reader: &SessionReader, report: &mut VerifyReport) -> Option<[StreamFormat; 2]> {
@@ -153,69 +184,6 @@ fn check_header(reader: &SessionReader, report: &mut VerifyReport) -> Option<[St
         report.add("device: expected the devices of a completed run, found none");
     }
     Some(header.stream_formats)
-}
-
-fn check_chunks(
-    reader: &SessionReader,
-    camera: CameraId,
-    format: Option<StreamFormat>,
-    scanner: &mut dyn ChunkScanner,
-    report: &mut VerifyReport,
-) -> Result<(), RecorderError> {
-    let (mut previous, mut host) = (None, HostTime(i64::MIN));
-    let index = reader.chunk_index(camera)?;
-    gaps::check(camera, &index, report);
-    for meta in index {
-        let place = format!("{camera} chunk {}", meta.seq);
-        let expected = previous.map_or(0, |p| p + 1);
-        if meta.seq != expected {
-            report.add(format!(
-                "{camera}: expected chunk {expected}, found chunk {}",
-                meta.seq
-            ));
-        }
-        if meta.host_time < host {
-            report.add(format!(
-                "{place}: expected host time from {host}, found {}",
-                meta.host_time
-            ));
-        }
-        (previous, host) = (Some(meta.seq), meta.host_time);
-        let sound = reader.query("checking a chunk", async |conn| {
-            let row =
-                sqlx::query("SELECT stored, stored_sha256 FROM chunk WHERE camera = ? AND seq = ?")
-                    .bind(camera.number())
-                    .bind(meta.seq as i64)
-                    .fetch_one(conn)
-                    .await?;
-            let stored = crate::query::blob(&row, "stored")?;
-            Ok(Sha256::digest(&stored).as_slice() == sha(&row, "stored_sha256")?)
-        })?;
-        if !sound {
-            report.add(format!("{place}: stored bytes do not match stored_sha256"));
-        }
-        let Some(bytes) = report.ok_or_add(reader.chunk_bytes(camera, meta.seq)) else {
-            continue;
-        };
-        let Some(format) = format else { continue };
-        if let Some(origin_us) = meta.restart_us {
-            scanner.restart(camera, format, origin_us);
-        }
-        if meta.lost_time.is_some() {
-            scanner.lost(camera, format, meta.lost_before);
-        }
-        let (facts, edges) = scanner.scan(camera, format, &bytes);
-        report.expect_equal(&format!("{place}: facts"), &facts, &meta.facts);
-        let recorded = reader.edges(camera, meta.seq as i64, meta.seq as i64)?;
-        if edges != recorded {
-            report.add(format!(
-                "{place}: expected the {} trigger edges in its bytes, found {} different ones in trigger_edge",
-                edges.len(),
-                recorded.len()
-            ));
-        }
-    }
-    Ok(())
 }
 
 fn check_poses(reader: &SessionReader, report: &mut VerifyReport) -> Result<(), RecorderError> {

@@ -97,12 +97,9 @@ impl SessionWriter {
     /// [`RecorderError::InUse`] while another process writes the session; [`RecorderError::AlreadyCompleted`] if there is nothing to
     /// resume; [`RecorderError::Unsound`] if [`verify`](crate::verify()) finds a problem; [`RecorderError::Empty`] without a
     /// header; or a read error.
-    pub fn resume(
-        path: impl AsRef<Path>,
-        scanner: &mut dyn ChunkScanner,
-    ) -> Result<Self, RecorderError> {
+    pub fn resume<S: ChunkScanner>(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
         let path = path.as_ref().to_owned();
-        let lock = resume::lock_unfinished(&path, scanner)?;
+        let lock = resume::lock_unfinished::<S>(&path)?;
         Ok(Self {
             lock,
             path,
@@ -119,12 +116,9 @@ impl SessionWriter {
     /// [`RecorderError::InUse`] while another process writes the session; [`RecorderError::AlreadyCompleted`] if it is sealed;
     /// [`RecorderError::NotFound`] without an end; [`RecorderError::Unsound`] if [`verify`](crate::verify()) finds a problem;
     /// or a read error.
-    pub fn open_ended(
-        path: impl AsRef<Path>,
-        scanner: &mut dyn ChunkScanner,
-    ) -> Result<Self, RecorderError> {
+    pub fn open_ended<S: ChunkScanner>(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
         let path = path.as_ref().to_owned();
-        let mut lock = resume::lock_unsealed(&path, scanner)?;
+        let mut lock = resume::lock_unsealed::<S>(&path)?;
         let runtime = runtime(&path)?;
         let conn = runtime.block_on(resume::reopen(&path))?;
         lock.take_log()?;

@@ -143,33 +143,23 @@ impl LegDecoder {
 }
 
 /// Decodes chunks again for `verify`.
-#[derive(Default)]
-pub struct Rescan {
-    scanners: [Option<Scanner>; 2],
-}
+pub struct Rescan(Scanner);
 
 impl ChunkScanner for Rescan {
-    fn scan(
-        &mut self,
-        camera: CameraId,
-        format: StreamFormat,
-        bytes: &[u8],
-    ) -> (ChunkFacts, Vec<TriggerEdge>) {
-        self.scanners[camera.index()]
-            .get_or_insert_with(|| Scanner::new(format))
-            .push(bytes)
+    fn new(format: StreamFormat) -> Self {
+        Self(Scanner::new(format))
     }
 
-    fn lost(&mut self, camera: CameraId, format: StreamFormat, bytes: u64) {
-        self.scanners[camera.index()]
-            .get_or_insert_with(|| Scanner::new(format))
-            .lost(bytes);
+    fn scan(&mut self, bytes: &[u8]) -> (ChunkFacts, Vec<TriggerEdge>) {
+        self.0.push(bytes)
     }
 
-    fn restart(&mut self, camera: CameraId, format: StreamFormat, origin_us: u64) {
-        self.scanners[camera.index()]
-            .get_or_insert_with(|| Scanner::new(format))
-            .restart(origin_us);
+    fn lost(&mut self, bytes: u64) {
+        self.0.lost(bytes);
+    }
+
+    fn restart(&mut self, origin_us: u64) {
+        self.0.restart(origin_us);
     }
 }
 

@@ -122,7 +122,7 @@ fn what_cannot_go_on_is_refused_and_left_as_it_is() {
             .code(2)
             .complains(parts);
     };
-    let writer = SessionWriter::resume(&session, &mut Rescan::default()).unwrap();
+    let writer = SessionWriter::resume::<Rescan>(&session).unwrap();
     refused(&session, &["process "]);
     drop(writer);
     assert_eq!(show(&session)["legs"].as_array().unwrap().len(), 1);

@@ -107,22 +107,41 @@ impl SessionReader {
         let Some((meta, stored)) = found else {
             return Ok(None);
         };
-        let place = || format!("{camera} chunk {}", meta.seq);
+        let mut buffer = Vec::new();
+        self.unpack(&meta, &stored, &mut buffer)?;
         let bytes = match meta.codec {
             Codec::None => stored,
-            Codec::TimeHighRuns => codec::unfold(&stored, meta.raw_bytes as usize)
+            Codec::TimeHighRuns => {
+                buffer.truncate(meta.raw_bytes as usize);
+                buffer
+            }
+        };
+        Ok(Some((meta, bytes)))
+    }
+
+    /// Verified raw bytes of a chunk from its stored ones; `buffer` serves several chunks.
+    pub(crate) fn unpack<'a>(
+        &self,
+        meta: &ChunkMeta,
+        stored: &'a [u8],
+        buffer: &'a mut Vec<u8>,
+    ) -> Result<&'a [u8], RecorderError> {
+        let place = || format!("{} chunk {}", meta.camera, meta.seq);
+        let bytes = match meta.codec {
+            Codec::None => stored,
+            Codec::TimeHighRuns => codec::unfold_into(stored, meta.raw_bytes as usize, buffer)
                 .map_err(|e| self.damaged(place(), "bytes that can be unfolded", e.to_string()))?,
         };
         if bytes.len() as u64 != meta.raw_bytes {
             let expected = format!("{} bytes", meta.raw_bytes);
             return Err(self.damaged(place(), &expected, bytes.len().to_string()));
         }
-        let crc = crc32fast::hash(&bytes);
+        let crc = crc32fast::hash(bytes);
         if crc != meta.raw_crc32 {
             let expected = format!("CRC-32 {:#010x}", meta.raw_crc32);
             return Err(self.damaged(place(), &expected, format!("{crc:#010x}")));
         }
-        Ok(Some((meta, bytes)))
+        Ok(bytes)
     }
 
     /// Calls `each` with every chunk of `camera` from number `from_seq` on, in stream order, with its raw bytes.

@@ -38,6 +38,18 @@ impl VerifyReport {
         }
     }
 
+    /// Adds what a later check found.
+    pub(super) fn append(&mut self, later: Self) {
+        self.more_problems += later.more_problems;
+        for problem in later.problems {
+            self.add(problem);
+        }
+        self.remarks.extend(later.remarks);
+        self.sealed |= later.sealed;
+        self.totals = self.totals.or(later.totals);
+        self.system_failure = self.system_failure.take().or(later.system_failure);
+    }
+
     /// The value, or `None` after adding the error to the report.
     pub(super) fn ok_or_add<T>(&mut self, result: Result<T, RecorderError>) -> Option<T> {
         result.map_err(|e| self.add_error(e)).ok()

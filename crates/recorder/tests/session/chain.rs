@@ -29,7 +29,7 @@ fn writable(path: &Path) {
 /// Continues the session; the writer is left unsealed unless `seal`.
 fn resume(path: &Path, stop_after: usize, seal: bool) {
     let known = SessionReader::open(path).unwrap().history().unwrap();
-    let mut writer = SessionWriter::resume(path, &mut Evt2::default()).unwrap();
+    let mut writer = SessionWriter::resume::<Evt2>(path).unwrap();
     for record in further_leg(&known).into_iter().take(stop_after) {
         writer.accept(record).unwrap();
     }
@@ -72,7 +72,7 @@ fn no_flipped_bit_is_sealed_again() {
         bytes[at] ^= 1 << (next(&mut seed) % 8);
         std::fs::write(&bad, &bytes).unwrap();
         let place = format!("byte {at}");
-        match SessionWriter::resume(&bad, &mut Evt2::default()) {
+        match SessionWriter::resume::<Evt2>(&bad) {
             Err(
                 RecorderError::Unsound { .. }
                 | RecorderError::NotASession { .. }
@@ -95,7 +95,7 @@ fn earlier_legs_cannot_be_rewritten() {
     let first = sealed(&original, PRESSES);
     // Cut off in its third attempt.
     resume(&original, 14, false);
-    let problems = |path: &Path| verify(path, &mut Evt2::default()).unwrap().problems;
+    let problems = |path: &Path| verify::<Evt2>(path).unwrap().problems;
     assert_eq!(problems(&original), [""; 0]);
     let legs = SessionReader::open(&original).unwrap().legs().unwrap();
     assert_eq!(legs[0].tree_sha256, Some(first.tree_sha256));
@@ -152,7 +152,7 @@ fn earlier_legs_cannot_be_rewritten() {
             "{statement}: {problems:?}"
         );
         assert!(matches!(
-            SessionWriter::resume(&path, &mut Evt2::default()),
+            SessionWriter::resume::<Evt2>(&path),
             Err(RecorderError::Unsound { .. })
         ));
     }
@@ -173,7 +173,7 @@ fn every_seal_of_many_legs_is_verified() {
     for leg in 2..6 {
         let cut_off = leg % 2 == 1;
         let known = SessionReader::open(&path).unwrap().history().unwrap();
-        let mut writer = SessionWriter::resume(&path, &mut Evt2::default()).unwrap();
+        let mut writer = SessionWriter::resume::<Evt2>(&path).unwrap();
         let mut leg_records = further_leg(&known);
         leg_records.truncate(11);
         for record in leg_records {
@@ -185,7 +185,7 @@ fn every_seal_of_many_legs_is_verified() {
         } else {
             // As at the end of a stopped run: every attempt has a verdict, and the remaining presses are missed.
             drop(writer);
-            let mut stopped = SessionWriter::resume(&path, &mut Evt2::default()).unwrap();
+            let mut stopped = SessionWriter::resume::<Evt2>(&path).unwrap();
             trees.push(None);
             let resumed = further_leg(&known).remove(0);
             stopped.accept(resumed).unwrap();
@@ -197,7 +197,7 @@ fn every_seal_of_many_legs_is_verified() {
             trees.push(Some(stopped.finish().unwrap().tree_sha256));
         }
     }
-    let report = verify(&path, &mut Evt2::default()).unwrap();
+    let report = verify::<Evt2>(&path).unwrap();
     assert_eq!((report.problems, report.remarks), (vec![], vec![]));
     let legs = SessionReader::open(&path).unwrap().legs().unwrap();
     let kept: Vec<_> = legs.iter().map(|leg| leg.tree_sha256).collect();
@@ -212,11 +212,11 @@ fn a_writable_sealed_file_is_made_read_only() {
     let path = folder.path().join("a.session.sqlite");
     sealed(&path, PRESSES);
     writable(&path);
-    let report = verify(&path, &mut Evt2::default()).unwrap();
+    let report = verify::<Evt2>(&path).unwrap();
     assert!(report.is_sound() && report.sealed, "{report:?}");
     assert!(report.remarks[0].contains("is read-only now"), "{report:?}");
     assert!(std::fs::metadata(&path).unwrap().permissions().readonly());
-    let report = verify(&path, &mut Evt2::default()).unwrap();
+    let report = verify::<Evt2>(&path).unwrap();
     assert!(report.remarks.is_empty(), "{report:?}");
 }
 
@@ -243,12 +243,12 @@ fn a_torn_file_hash_is_an_unfinished_seal() {
         let mut bytes = bytes.clone();
         bytes[at + written..at + 32].copy_from_slice(&placeholder[written..]);
         std::fs::write(&torn, bytes).unwrap();
-        let report = verify(&torn, &mut Evt2::default()).unwrap();
+        let report = verify::<Evt2>(&torn).unwrap();
         assert!(report.is_sound() && !report.sealed, "{written}: {report:?}");
         assert!(report.remarks[0].contains("interrupted"), "{report:?}");
-        let reopened = SessionWriter::open_ended(&torn, &mut Evt2::default()).unwrap();
+        let reopened = SessionWriter::open_ended::<Evt2>(&torn).unwrap();
         assert_eq!(reopened.finish().unwrap().tree_sha256, whole.tree_sha256);
-        let report = verify(&torn, &mut Evt2::default()).unwrap();
+        let report = verify::<Evt2>(&torn).unwrap();
         assert!(report.is_sound() && report.sealed, "{report:?}");
     }
 }
@@ -266,8 +266,8 @@ fn a_session_without_a_header_is_empty() {
     change_none(&begun);
     for path in [&path, &bare, &begun] {
         let refused = [
-            verify(path, &mut Evt2::default()).map(drop),
-            SessionWriter::resume(path, &mut Evt2::default()).map(drop),
+            verify::<Evt2>(path).map(drop),
+            SessionWriter::resume::<Evt2>(path).map(drop),
             SessionReader::open(path).and_then(|reader| reader.header().map(drop)),
         ];
         for refused in refused {
@@ -288,7 +288,7 @@ fn a_session_without_a_header_is_empty() {
     }
     drop(writer);
     change(&path, "DELETE FROM session");
-    let report = verify(&path, &mut Evt2::default()).unwrap();
+    let report = verify::<Evt2>(&path).unwrap();
     assert!(!report.is_sound());
 }
 

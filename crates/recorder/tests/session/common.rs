@@ -10,33 +10,31 @@ use skinrig_recorder::{ChunkScanner, Sealed, SessionWriter};
 /// EVT2 without wraps: enough to recompute facts.
 #[derive(Default)]
 pub(crate) struct Evt2 {
-    base: [Option<u64>; 2],
-    origin_us: [u64; 2],
+    base: Option<u64>,
+    origin_us: u64,
 }
 
 impl ChunkScanner for Evt2 {
-    fn restart(&mut self, camera: CameraId, _format: StreamFormat, origin_us: u64) {
-        self.base[camera.index()] = None;
-        self.origin_us[camera.index()] = origin_us;
+    fn new(_format: StreamFormat) -> Self {
+        Self::default()
     }
 
-    fn lost(&mut self, camera: CameraId, _format: StreamFormat, _bytes: u64) {
-        self.base[camera.index()] = None;
+    fn restart(&mut self, origin_us: u64) {
+        self.base = None;
+        self.origin_us = origin_us;
     }
 
-    fn scan(
-        &mut self,
-        camera: CameraId,
-        _format: StreamFormat,
-        bytes: &[u8],
-    ) -> (ChunkFacts, Vec<TriggerEdge>) {
-        let origin_us = self.origin_us[camera.index()];
-        let base = &mut self.base[camera.index()];
+    fn lost(&mut self, _bytes: u64) {
+        self.base = None;
+    }
+
+    fn scan(&mut self, bytes: &[u8]) -> (ChunkFacts, Vec<TriggerEdge>) {
+        let Self { base, origin_us } = self;
         let (mut facts, mut edges) = (ChunkFacts::default(), Vec::new());
         for word in bytes.as_chunks::<4>().0 {
             let w = u32::from_le_bytes(*word);
             if w >> 28 == 8 {
-                *base = Some(origin_us + (u64::from(w & 0x0FFF_FFFF) << 6));
+                *base = Some(*origin_us + (u64::from(w & 0x0FFF_FFFF) << 6));
             }
             let Some(base) = *base else { continue };
             let t = if w >> 28 == 8 {
@@ -247,7 +245,7 @@ pub(crate) fn further_leg(known: &[PressHistory]) -> Vec<Record> {
 
 /// Devices, preflight and these attempts in turn, the last at each press valid, from time zero on; returns the end.
 fn attempts(ids: &[AttemptId], out: &mut Vec<Record>) -> HostTime {
-    let mut scanner = Evt2::default();
+    let mut scanners = <[Evt2; 2]>::default();
     for (role, setting) in [
         (DeviceRole::Indenter, "speed"),
         (DeviceRole::Camera1, "bias_fo"),
@@ -297,7 +295,7 @@ fn attempts(ids: &[AttemptId], out: &mut Vec<Record>) -> HostTime {
         });
         for camera in CameraId::ALL {
             let bytes = stream(ALIGNMENT_US + k * 20_000, 5 + 300 * (k % 2));
-            let (facts, triggers) = scanner.scan(camera, StreamFormat::Evt2, &bytes);
+            let (facts, triggers) = scanners[camera.index()].scan(&bytes);
             out.push(Record::Chunk(RawChunk {
                 camera,
                 seq: k,

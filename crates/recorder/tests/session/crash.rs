@@ -48,7 +48,7 @@ fn later_bytes(seq: u64) -> Vec<u8> {
 /// Writes the acknowledged records, then chunks of both cameras, reporting each on standard output, until it is killed.
 fn write_until_killed(path: &Path, acknowledged: usize) -> Result<(), RecorderError> {
     let mut writer = SessionWriter::create(path)?;
-    let mut scanner = Evt2::default();
+    let mut scanners = <[Evt2; 2]>::default();
     let beginning = beginning(acknowledged);
     let first = CameraId::ALL.map(|camera| chunks(&beginning, camera).count() as u64);
     for record in beginning {
@@ -58,7 +58,7 @@ fn write_until_killed(path: &Path, acknowledged: usize) -> Result<(), RecorderEr
         for camera in CameraId::ALL {
             let seq = first[camera.index()] + n;
             let bytes = later_bytes(seq);
-            let (facts, triggers) = scanner.scan(camera, StreamFormat::Evt2, &bytes);
+            let (facts, triggers) = scanners[camera.index()].scan(&bytes);
             writer.accept(Record::Chunk(RawChunk {
                 camera,
                 seq,
@@ -118,7 +118,7 @@ fn a_killed_writer_leaves_all_acknowledged_records() {
 
         let place = format!("seed {seed}: {acknowledged} acknowledged, {sent} sent");
         let beginning = beginning(acknowledged);
-        let report = verify(&path, &mut Evt2::default()).unwrap();
+        let report = verify::<Evt2>(&path).unwrap();
         assert_eq!((report.problems, report.sealed), (vec![], false), "{place}");
         let reader = SessionReader::open(&path).unwrap();
         assert!(reader.end().unwrap().is_none(), "{place}");
@@ -155,13 +155,13 @@ fn a_killed_writer_leaves_all_acknowledged_records() {
         }
         let known = reader.history().unwrap();
         drop(reader);
-        let mut writer = SessionWriter::resume(&path, &mut Evt2::default()).unwrap();
+        let mut writer = SessionWriter::resume::<Evt2>(&path).unwrap();
         for record in further_leg(&known) {
             writer.accept(record).unwrap();
         }
         let totals = writer.finish().unwrap().totals;
         assert_eq!(totals.presses.valid, u64::from(PRESSES) - 1, "{place}");
-        let report = verify(&path, &mut Evt2::default()).unwrap();
+        let report = verify::<Evt2>(&path).unwrap();
         assert_eq!((report.problems, report.sealed), (vec![], true), "{place}");
     }
 }

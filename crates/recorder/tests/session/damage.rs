@@ -42,7 +42,7 @@ fn check(original: &[u8], offsets: impl Iterator<Item = usize>, bit: impl Fn(usi
     for offset in offsets {
         bytes[offset] ^= bit(offset);
         std::fs::write(&path, &bytes).unwrap();
-        let report = verify(&path, &mut Evt2::default()).unwrap();
+        let report = verify::<Evt2>(&path).unwrap();
         assert!(!report.is_sound(), "byte {offset} was changed undetected");
         if offset % 7 == 0 {
             read_all(&path);
@@ -65,7 +65,7 @@ fn planned_presses_match_the_plan_even_without_a_seal() {
         let mut writer = SessionWriter::create(&path).unwrap();
         writer.accept(Record::Started(Box::new(header))).unwrap();
         drop(writer);
-        verify(&path, &mut Evt2::default()).unwrap().problems
+        verify::<Evt2>(&path).unwrap().problems
     };
     assert_eq!(verify_with(0.0), Vec::<String>::new());
     let problems = verify_with(5.0);
@@ -94,7 +94,7 @@ fn a_repeated_valid_sync_press_within_one_leg_is_detected() {
         writer.accept(record).unwrap();
     }
     drop(writer);
-    let problems = verify(&path, &mut Evt2::default()).unwrap().problems;
+    let problems = verify::<Evt2>(&path).unwrap().problems;
     assert_eq!(problems.len(), 1, "{problems:?}");
     assert!(
         problems[0].contains("found one after a valid or excluded attempt"),
@@ -144,7 +144,7 @@ fn truncated_and_extended_files_are_detected() {
     let changed = folder.path().join("x.session.sqlite");
     // A file truncated to zero bytes is like one without records: no session, and not sound either.
     std::fs::write(&changed, "").unwrap();
-    let empty = verify(&changed, &mut Evt2::default());
+    let empty = verify::<Evt2>(&changed);
     assert!(
         matches!(empty, Err(RecorderError::Empty { .. })),
         "{empty:?}"
@@ -152,11 +152,11 @@ fn truncated_and_extended_files_are_detected() {
     for keep in [50, 100, PAGE, original.len() / 2, original.len() - 1] {
         std::fs::write(&changed, &original[..keep]).unwrap();
         assert!(
-            !verify(&changed, &mut Evt2::default()).unwrap().is_sound(),
+            !verify::<Evt2>(&changed).unwrap().is_sound(),
             "{keep} bytes"
         );
         read_all(&changed);
     }
     std::fs::write(&changed, [original.as_slice(), &[0]].concat()).unwrap();
-    assert!(!verify(&changed, &mut Evt2::default()).unwrap().is_sound());
+    assert!(!verify::<Evt2>(&changed).unwrap().is_sound());
 }

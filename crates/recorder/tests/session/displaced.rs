@@ -67,7 +67,7 @@ impl Run {
             other => panic!("{other:?}"),
         };
         assert!(!beside(&kept, "-wal").exists());
-        let report = verify(&kept, &mut Evt2::default()).unwrap();
+        let report = verify::<Evt2>(&kept).unwrap();
         assert_eq!((report.problems, report.sealed), (vec![], false));
         let reader = SessionReader::open(&kept).unwrap();
         assert!(matches!(
@@ -76,12 +76,12 @@ impl Run {
         ));
         let known = reader.history().unwrap();
         drop(reader);
-        let mut leg = SessionWriter::resume(&kept, &mut Evt2::default()).unwrap();
+        let mut leg = SessionWriter::resume::<Evt2>(&kept).unwrap();
         for record in further_leg(&known) {
             leg.accept(record).unwrap();
         }
         leg.finish().unwrap();
-        let report = verify(&kept, &mut Evt2::default()).unwrap();
+        let report = verify::<Evt2>(&kept).unwrap();
         assert_eq!((report.problems, report.sealed), (vec![], true));
         (self.root, kept)
     }
@@ -153,7 +153,7 @@ fn another_file_in_its_place_is_left_alone() {
         let bytes = std::fs::read(&other).unwrap();
         std::fs::rename(&other, &run.path).unwrap();
         // The log still belongs to the run: the file now under this name must not be resumed.
-        let refused = SessionWriter::resume(&run.path, &mut Evt2::default());
+        let refused = SessionWriter::resume::<Evt2>(&run.path);
         assert!(
             matches!(refused, Err(RecorderError::InUse { .. })),
             "{refused:?}"
@@ -163,7 +163,7 @@ fn another_file_in_its_place_is_left_alone() {
         let (_root, kept) = run.into_rescued("another file in its place");
         assert_eq!(kept, if own_is_kept { new } else { copy });
         assert_eq!(std::fs::read(&path).unwrap(), bytes);
-        let report = verify(&path, &mut Evt2::default()).unwrap();
+        let report = verify::<Evt2>(&path).unwrap();
         assert_eq!((report.problems, report.sealed), (vec![], true));
     }
 }
@@ -193,8 +193,8 @@ fn a_second_writer_is_rejected_without_the_lock_file() {
             std::fs::write(&lock, "anything").unwrap();
         }
         for refused in [
-            SessionWriter::resume(&run.path, &mut Evt2::default()),
-            SessionWriter::open_ended(&run.path, &mut Evt2::default()),
+            SessionWriter::resume::<Evt2>(&run.path),
+            SessionWriter::open_ended::<Evt2>(&run.path),
         ] {
             assert!(
                 matches!(refused, Err(RecorderError::InUse { .. })),
@@ -208,7 +208,7 @@ fn a_second_writer_is_rejected_without_the_lock_file() {
         }
         run.writer.finish().unwrap();
         assert_eq!(writer_of(&run.path), None);
-        let report = verify(&run.path, &mut Evt2::default()).unwrap();
+        let report = verify::<Evt2>(&run.path).unwrap();
         assert_eq!((report.problems, report.sealed), (vec![], true));
     }
 }
@@ -220,14 +220,14 @@ fn a_leg_is_locked_before_it_begins() {
     let path = folder.path().join("a.session.sqlite");
     sealed(&path, PRESSES);
     let known = SessionReader::open(&path).unwrap().history().unwrap();
-    let mut leg = SessionWriter::resume(&path, &mut Evt2::default()).unwrap();
+    let mut leg = SessionWriter::resume::<Evt2>(&path).unwrap();
     std::fs::remove_file(beside(&path, "-lock")).unwrap();
     // Under another name, without a lock file.
     let link = folder.path().join("b.session.sqlite");
     std::fs::hard_link(&path, &link).unwrap();
     let refused = || {
         for path in [&path, &link] {
-            let refused = SessionWriter::resume(path, &mut Evt2::default());
+            let refused = SessionWriter::resume::<Evt2>(path);
             assert!(
                 matches!(refused, Err(RecorderError::InUse { .. })),
                 "{refused:?}"

@@ -12,9 +12,9 @@ fn chunk(seq: u64, lost: u64, times_us: &[u64], scanner: &mut Evt2) -> RawChunk 
     let words = times_us.iter().map(|t| 0x8000_0000 | (t >> 6) as u32);
     let bytes: Vec<u8> = words.flat_map(u32::to_le_bytes).collect();
     if lost > 0 {
-        scanner.lost(CAMERA, StreamFormat::Evt2, lost);
+        scanner.lost(lost);
     }
-    let (facts, triggers) = scanner.scan(CAMERA, StreamFormat::Evt2, &bytes);
+    let (facts, triggers) = scanner.scan(&bytes);
     RawChunk {
         camera: CAMERA,
         seq,
@@ -112,7 +112,7 @@ fn lost_time_extends_from_the_last_time_to_the_next() {
             Some(time(192_000, None)),
         ]
     );
-    let report = verify(&path, &mut Evt2::default()).unwrap();
+    let report = verify::<Evt2>(&path).unwrap();
     assert_eq!(report.problems, Vec::<String>::new());
 }
 
@@ -134,7 +134,7 @@ fn a_gap_that_contradicts_its_surroundings_is_detected() {
         let path = folder.path().join("a.session.sqlite");
         lossy(&path);
         change(&path, &[statement]);
-        let problems = verify(&path, &mut Evt2::default()).unwrap().problems;
+        let problems = verify::<Evt2>(&path).unwrap().problems;
         assert!(
             problems.iter().any(|p| p.contains(words)),
             "{statement}: {problems:?}"
@@ -166,6 +166,6 @@ fn gaps_of_an_older_session_are_inferred() {
     assert_eq!(reader.gaps(CAMERA).unwrap(), gaps);
     let index = reader.chunk_index(CAMERA).unwrap();
     assert!(index.iter().all(|m| m.lost_time.is_none()));
-    let report = verify(&path, &mut Evt2::default()).unwrap();
+    let report = verify::<Evt2>(&path).unwrap();
     assert_eq!(report.problems, Vec::<String>::new());
 }

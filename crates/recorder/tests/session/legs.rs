@@ -12,7 +12,7 @@ use crate::common::{Evt2, further_leg, header, records, sealed};
 const PRESSES: u32 = 5;
 
 fn sound(path: &std::path::Path, sealed: bool) {
-    let report = verify(path, &mut Evt2::default()).unwrap();
+    let report = verify::<Evt2>(path).unwrap();
     assert_eq!((report.problems, report.sealed), (vec![], sealed));
 }
 
@@ -20,7 +20,7 @@ fn sound(path: &std::path::Path, sealed: bool) {
 fn resume(path: &std::path::Path) -> Vec<Record> {
     let known = SessionReader::open(path).unwrap().history().unwrap();
     let leg = further_leg(&known);
-    let mut writer = SessionWriter::resume(path, &mut Evt2::default()).unwrap();
+    let mut writer = SessionWriter::resume::<Evt2>(path).unwrap();
     for record in &leg {
         writer.accept(record.clone()).unwrap();
     }
@@ -134,7 +134,7 @@ fn a_stopped_and_sealed_session_is_resumed() {
         ]
     );
     // Opened and closed without a record: still the sealed session.
-    drop(SessionWriter::resume(&path, &mut Evt2::default()).unwrap());
+    drop(SessionWriter::resume::<Evt2>(&path).unwrap());
     sound(&path, true);
 
     let second = resume(&path);
@@ -172,7 +172,7 @@ fn a_stopped_and_sealed_session_is_resumed() {
                     }
         });
     assert!(resets.count() >= 1);
-    match SessionWriter::resume(&path, &mut Evt2::default()) {
+    match SessionWriter::resume::<Evt2>(&path) {
         Err(RecorderError::AlreadyCompleted { .. }) => {}
         other => panic!("{other:?}"),
     }
@@ -182,7 +182,7 @@ fn a_stopped_and_sealed_session_is_resumed() {
 fn one_writer_at_a_time_and_the_header_of_a_leg_first() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
-    match SessionWriter::resume(&path, &mut Evt2::default()) {
+    match SessionWriter::resume::<Evt2>(&path) {
         Err(RecorderError::Missing { .. }) => {}
         other => panic!("{other:?}"),
     }
@@ -191,14 +191,14 @@ fn one_writer_at_a_time_and_the_header_of_a_leg_first() {
     for record in records(PRESSES).into_iter().take(9) {
         writer.accept(record).unwrap();
     }
-    match SessionWriter::resume(&path, &mut Evt2::default()) {
+    match SessionWriter::resume::<Evt2>(&path) {
         Err(RecorderError::InUse { by, .. }) => assert!(by.starts_with("process "), "{by}"),
         other => panic!("{other:?}"),
     }
     drop(writer);
-    let mut writer = SessionWriter::resume(&path, &mut Evt2::default()).unwrap();
+    let mut writer = SessionWriter::resume::<Evt2>(&path).unwrap();
     assert!(matches!(
-        SessionWriter::resume(&path, &mut Evt2::default()),
+        SessionWriter::resume::<Evt2>(&path),
         Err(RecorderError::InUse { .. })
     ));
     let note = Record::Note {
@@ -246,18 +246,18 @@ fn a_session_that_ended_without_its_seal_is_sealed() {
         writer.accept(record).unwrap();
     }
     assert!(matches!(
-        SessionWriter::open_ended(&path, &mut Evt2::default()),
+        SessionWriter::open_ended::<Evt2>(&path),
         Err(RecorderError::InUse { .. })
     ));
     drop(writer);
     sound(&path, false);
-    SessionWriter::open_ended(&path, &mut Evt2::default())
+    SessionWriter::open_ended::<Evt2>(&path)
         .unwrap()
         .finish()
         .unwrap();
     sound(&path, true);
     assert!(matches!(
-        SessionWriter::open_ended(&path, &mut Evt2::default()),
+        SessionWriter::open_ended::<Evt2>(&path),
         Err(RecorderError::AlreadyCompleted { .. })
     ));
 }
@@ -279,7 +279,7 @@ fn a_half_written_seal_is_detected_and_rewritten() {
     // Still writable at that point.
     std::fs::remove_file(&path).unwrap();
     std::fs::write(&path, &bytes).unwrap();
-    let report = verify(&path, &mut Evt2::default()).unwrap();
+    let report = verify::<Evt2>(&path).unwrap();
     assert!(report.is_sound() && !report.sealed, "{report:?}");
     assert!(
         report
@@ -288,7 +288,7 @@ fn a_half_written_seal_is_detected_and_rewritten() {
             .any(|r| r.contains("sealing was interrupted")),
         "{report:?}"
     );
-    SessionWriter::open_ended(&path, &mut Evt2::default())
+    SessionWriter::open_ended::<Evt2>(&path)
         .unwrap()
         .finish()
         .unwrap();
@@ -374,7 +374,7 @@ fn check_older_schema(was_sealed: bool) {
         .await;
     });
     if was_sealed {
-        let ended = SessionWriter::open_ended(&path, &mut Evt2::default()).unwrap();
+        let ended = SessionWriter::open_ended::<Evt2>(&path).unwrap();
         ended.finish().unwrap();
     }
     sound(&path, was_sealed);
@@ -387,7 +387,7 @@ fn check_older_schema(was_sealed: bool) {
     assert_eq!(legs[0].tree_sha256.is_some(), was_sealed);
     assert_eq!(reader.header().unwrap(), header(PRESSES));
     // The seal of the old schema is verified from the rows of the new one.
-    let report = verify(&path, &mut Evt2::default()).unwrap();
+    let report = verify::<Evt2>(&path).unwrap();
     assert_eq!(report.remarks, [""; 0]);
 }
 
@@ -419,7 +419,7 @@ proptest! {
         let leg = further_leg(&reader.history().unwrap());
         drop(reader);
         let second = second.min(leg.len() - 1);
-        let mut writer = SessionWriter::resume(&path, &mut Evt2::default()).unwrap();
+        let mut writer = SessionWriter::resume::<Evt2>(&path).unwrap();
         for record in &leg[..second] {
             writer.accept(record.clone()).unwrap();
         }

@@ -77,12 +77,12 @@ fn eight_readers_are_never_blocked() {
     // Without a pause between two readers, sealing waits for the last one.
     if let Err(refused) = sealed {
         assert_next_step(&refused);
-        SessionWriter::open_ended(&path, &mut Evt2::default())
+        SessionWriter::open_ended::<Evt2>(&path)
             .unwrap()
             .finish()
             .unwrap();
     }
-    let report = verify(&path, &mut Evt2::default()).unwrap();
+    let report = verify::<Evt2>(&path).unwrap();
     assert!(report.sealed && report.is_sound(), "{report:?}");
 }
 
@@ -122,10 +122,10 @@ fn a_reader_that_stays_open_only_delays_the_seal() {
     read_everything(&path).unwrap();
     assert!(reader.end().unwrap().is_some() && reader.seal().unwrap().is_none());
     drop(reader);
-    SessionWriter::open_ended(&path, &mut Evt2::default())
+    SessionWriter::open_ended::<Evt2>(&path)
         .unwrap()
         .finish()
         .unwrap();
-    let report = verify(&path, &mut Evt2::default()).unwrap();
+    let report = verify::<Evt2>(&path).unwrap();
     assert!(report.sealed && report.is_sound(), "{report:?}");
 }

@@ -160,7 +160,7 @@ fn all_records_round_trip() {
     let gaps = reader.gaps(CameraId::Two).unwrap();
     assert_eq!(gaps.len(), 1);
     assert!(gaps[0].0 < 5_040_000 && gaps[0].1 >= 5_039_936, "{gaps:?}");
-    let report = verify(&path, &mut Evt2::default()).unwrap();
+    let report = verify::<Evt2>(&path).unwrap();
     assert_eq!(report.problems, Vec::<String>::new());
     assert!(report.sealed);
 }
@@ -197,7 +197,7 @@ fn durable_records_are_readable_immediately_and_a_dropped_writer_leaves_a_sessio
         }
     }
     drop(writer);
-    let report = verify(&path, &mut Evt2::default()).unwrap();
+    let report = verify::<Evt2>(&path).unwrap();
     assert_eq!((report.problems, report.sealed), (vec![], false));
     let reader = SessionReader::open(&path).unwrap();
     assert_eq!(

@@ -177,10 +177,7 @@ fn an_intact_session_is_recovered_completely() {
     assert!(report.is_whole(), "{report:?}");
     assert_eq!(hurt, 0);
     let to = case.folder.path().join("to");
-    assert_eq!(
-        verify(&to, &mut Evt2::default()).unwrap().problems,
-        Vec::<String>::new()
-    );
+    assert_eq!(verify::<Evt2>(&to).unwrap().problems, Vec::<String>::new());
     let notes = SessionReader::open(&to).unwrap().notes().unwrap();
     assert!(
         notes.last().unwrap().text.ends_with("no known losses"),
@@ -496,7 +493,7 @@ fn missing_chunks_get_the_time_of_the_previous_one_within_their_leg() {
     let [from, to] = ["from", "to"].map(|n| folder.path().join(n));
     sealed(&from, 5);
     let known = SessionReader::open(&from).unwrap().history().unwrap();
-    let mut writer = SessionWriter::resume(&from, &mut Evt2::default()).unwrap();
+    let mut writer = SessionWriter::resume::<Evt2>(&from).unwrap();
     for record in further_leg(&known) {
         writer.accept(record).unwrap();
     }
@@ -518,7 +515,7 @@ fn missing_chunks_get_the_time_of_the_previous_one_within_their_leg() {
     assert_eq!(after[4].host_time, before[3].host_time);
     assert!(after[5].host_time > before[4].host_time, "{after:?}");
     assert!(after[5].host_time <= before[5].host_time, "{after:?}");
-    let problems = verify(&to, &mut Evt2::default()).unwrap().problems;
+    let problems = verify::<Evt2>(&to).unwrap().problems;
     assert!(
         !problems.iter().any(|p| p.contains("host time")),
         "{problems:?}"

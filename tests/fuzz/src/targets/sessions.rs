@@ -39,26 +39,23 @@ impl Folder {
 }
 
 /// Chunk decoder for `verify`.
-struct Rescan([Scanner; 2]);
+struct Rescan(Scanner);
 
 impl ChunkScanner for Rescan {
-    fn restart(&mut self, camera: CameraId, format: StreamFormat, origin_us: u64) {
-        let scanner = &mut self.0[camera.index()];
-        *scanner = Scanner::new(format);
-        scanner.restart(origin_us);
+    fn new(format: StreamFormat) -> Self {
+        Self(Scanner::new(format))
     }
 
-    fn lost(&mut self, camera: CameraId, _format: StreamFormat, bytes: u64) {
-        self.0[camera.index()].lost(bytes);
+    fn restart(&mut self, origin_us: u64) {
+        self.0.restart(origin_us);
     }
 
-    fn scan(
-        &mut self,
-        camera: CameraId,
-        _format: StreamFormat,
-        bytes: &[u8],
-    ) -> (ChunkFacts, Vec<TriggerEdge>) {
-        self.0[camera.index()].push(bytes)
+    fn lost(&mut self, bytes: u64) {
+        self.0.lost(bytes);
+    }
+
+    fn scan(&mut self, bytes: &[u8]) -> (ChunkFacts, Vec<TriggerEdge>) {
+        self.0.push(bytes)
     }
 }
 
@@ -69,8 +66,7 @@ pub fn session(bytes: &[u8]) {
     let path = folder.file("x.session.sqlite", bytes);
     let _ = skinrig_recorder::list(folder.0.path());
     let _ = read(&path);
-    let rescan = [StreamFormat::Evt2; 2].map(Scanner::new);
-    let _ = skinrig_recorder::verify(&path, &mut Rescan(rescan));
+    let _ = skinrig_recorder::verify::<Rescan>(&path);
     let saved = folder.0.path().join("saved.session.sqlite");
     if skinrig_recorder::salvage(&path, &saved).is_ok() {
         let _ = read(&saved);
@@ -109,8 +105,7 @@ fn read(path: &Path) -> Result<(), RecorderError> {
 
 /// Begins a further leg, and abandons it.
 fn go_on(path: &Path) -> Result<(), RecorderError> {
-    let rescan = [StreamFormat::Evt2; 2].map(Scanner::new);
-    let mut writer = SessionWriter::resume(path, &mut Rescan(rescan))?;
+    let mut writer = SessionWriter::resume::<Rescan>(path)?;
     writer.accept(Record::Resumed(Box::new(ResumeHeader {
         operator: "stranger".into(),
         started_at: "2026-01-03T03:04:05Z".into(),
