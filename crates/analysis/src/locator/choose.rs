@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 use skinrig_model::{AnalysisSettings, CalibrationModel, Locator, StereoGeometry};
 
-use super::fitted::distance;
 use super::methods::{Hyperparameters, METHODS, Method, Start, Unfit, method};
+use super::prediction::distance;
 use super::{Features, Fitted, regions};
 use crate::calibrate::{Folds, Losses, NO_FIX_ERROR_MM, Refit, SessionCalibration, covariance};
 use crate::calibrate::{root_mean_square, select_model};

@@ -2,7 +2,7 @@
 //! the positions of the calibration presses as prior.
 
 use super::field::Field;
-use super::fitted::{Covariance, Prediction};
+use super::prediction::{Covariance, Prediction, inverted};
 use super::reading::Reading;
 use crate::result::{FieldModel, PositionPrior};
 
@@ -210,11 +210,4 @@ impl Inverse {
         }
         (at, normal)
     }
-}
-
-/// Inverse of a symmetric 2 x 2 matrix; `None` unless positive definite.
-fn inverted([xx, xy, yy]: Covariance) -> Option<Covariance> {
-    let determinant = xx * yy - xy * xy;
-    let inverse = [yy / determinant, -xy / determinant, xx / determinant];
-    (determinant > 0.0 && inverse.iter().all(|v| v.is_finite())).then_some(inverse)
 }

@@ -13,6 +13,7 @@ mod inverse;
 mod likelihood;
 mod methods;
 mod precision;
+mod prediction;
 mod quasi_newton;
 mod rays;
 mod reading;

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, SVector};
 use skinrig_model::StereoGeometry;
 
-use super::fitted::Covariance;
+use super::prediction::Covariance;
 use super::quasi_newton::minimise;
 use super::robust::{LEAST, reference_events, response, weight};
 use crate::calibrate::StereoModel;

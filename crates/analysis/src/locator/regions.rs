@@ -1,6 +1,7 @@
 //! Sizes of the 95 % regions from held-out calibration presses, and their check on the scored presses.
 
-use super::fitted::{LEVEL, distance};
+use super::fitted::LEVEL;
+use super::prediction::distance;
 use super::{Features, Fitted};
 use crate::exact;
 use crate::metrics::{bootstrap_over_locations, mean};
