@@ -295,9 +295,9 @@ pub fn residuals(analysis: &Analysis) -> Vec<Residual> {
 pub(crate) const fn locator_name(locator: Locator) -> &'static str {
     match locator {
         Locator::Auto => "automatic",
-        Locator::Geometry => "geometry alone",
-        Locator::Field => "geometry with a field",
-        Locator::Direct => "polynomial with a field",
+        Locator::Geometry => "geometry",
+        Locator::Field => "geometry + field",
+        Locator::Direct => "polynomial + field",
     }
 }
 
@@ -319,7 +319,7 @@ pub(crate) fn locator_note(analysis: &Analysis) -> Option<String> {
     );
     Some(match (own, alone) {
         (Some(own), Some(alone)) => {
-            format!("{name}: {own} mm at left-out locations; {alone} mm with the geometry alone")
+            format!("{name}: {own} mm at left-out locations, geometry {alone} mm")
         }
         _ => name.to_owned(),
     })
