@@ -79,10 +79,10 @@ fn a_bundle_proves_itself_elsewhere_and_finds_any_change() {
         let mut hostile = manifest.clone();
         hostile["files"][1][key] = Value::from(name);
         std::fs::write(moved.join("manifest.json"), hostile.to_string()).unwrap();
-        verify().code(2).complains(&["expected a bundle"]);
+        verify().code(2).expect_stderr(&["expected a bundle"]);
     }
     std::fs::write(moved.join("manifest.json"), "{}").unwrap();
-    verify().code(2).complains(&["expected a bundle"]);
+    verify().code(2).expect_stderr(&["expected a bundle"]);
 }
 
 #[test]
@@ -92,6 +92,6 @@ fn a_bundle_is_exported_alone() {
     let lab = Lab::new();
     let session = text(&lab.record("s", &[]));
     let export = ["export", &session, "--to", "bundle", "--to", "csv"];
-    skinrig(&export).code(2).complains(&["no other format"]);
+    skinrig(&export).code(2).expect_stderr(&["no other format"]);
     assert_eq!(files(&lab.path("s"), "").len(), 1);
 }

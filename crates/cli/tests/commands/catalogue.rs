@@ -82,7 +82,7 @@ fn sessions_are_found_by_prototype_and_by_tag_and_their_trend_is_shown() {
     }
     skinrig(&["prototypes", &s, "--prototype", "skin C"])
         .code(2)
-        .complains(&["skin C", "skin B, test skin"]);
+        .expect_stderr(&["skin C", "skin B, test skin"]);
 
     // A log that somebody broke is told, and the session listed all the same.
     let log = only(&lab.path("s"), ".tags.jsonl");
@@ -94,5 +94,5 @@ fn sessions_are_found_by_prototype_and_by_tag_and_their_trend_is_shown() {
     );
     skinrig(&["tag", &text(first), "more"])
         .code(2)
-        .complains(&["line 1"]);
+        .expect_stderr(&["line 1"]);
 }

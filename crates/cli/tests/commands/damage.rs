@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::support::{Dice, Lab, text};
-use crate::support::{Said, skinrig};
+use crate::support::{Lab, SeededRandom, text};
+use crate::support::{ProgramOutput, skinrig};
 
 /// A small sealed session and its bytes.
-fn sealed(lab: &Lab) -> (PathBuf, Vec<u8>) {
+fn sealed_session(lab: &Lab) -> (PathBuf, Vec<u8>) {
     let session = lab.record(
         "s",
         &[
@@ -23,7 +23,7 @@ fn sealed(lab: &Lab) -> (PathBuf, Vec<u8>) {
 }
 
 /// Lets every reading command read `file`: each must end with one of its codes, without a panic.
-fn read_by_all(lab: &Lab, file: &Path) -> Said {
+fn run_all_readers(lab: &Lab, file: &Path) -> ProgramOutput {
     let file = text(file);
     let out = lab.text("other.json");
     for arguments in [
@@ -40,11 +40,11 @@ fn read_by_all(lab: &Lab, file: &Path) -> Said {
 #[test]
 fn flipped_bytes_are_found() {
     let lab = Lab::new();
-    let (_, good) = sealed(&lab);
+    let (_, good) = sealed_session(&lab);
     let file = lab.path("damaged.session.sqlite");
     std::fs::write(&file, &good).unwrap();
     skinrig(&["verify", &text(&file)]).code(0);
-    let mut dice = Dice(20);
+    let mut random = SeededRandom(20);
     for round in 0..24 {
         let mut bytes = good.clone();
         // Every third time in the first pages, where headers and small tables lie.
@@ -53,11 +53,11 @@ fn flipped_bytes_are_found() {
         } else {
             bytes.len() as u64
         };
-        let at = dice.below(reach) as usize;
-        let flip = 1 + dice.below(255) as u8;
+        let at = random.below(reach) as usize;
+        let flip = 1 + random.below(255) as u8;
         bytes[at] ^= flip;
         std::fs::write(&file, &bytes).unwrap();
-        let said = read_by_all(&lab, &file);
+        let said = run_all_readers(&lab, &file);
         assert!(
             !said.err.contains("panicked"),
             "byte {at} ^ {flip:#04x}: {said:#?}"
@@ -73,11 +73,11 @@ fn flipped_bytes_are_found() {
 #[test]
 fn a_torn_session_is_found() {
     let lab = Lab::new();
-    let (_, good) = sealed(&lab);
+    let (_, good) = sealed_session(&lab);
     let file = lab.path("torn.session.sqlite");
     for length in [0, 50, 100, 4_096, good.len() / 2, good.len() - 1] {
         std::fs::write(&file, &good[..length]).unwrap();
-        let said = read_by_all(&lab, &file);
+        let said = run_all_readers(&lab, &file);
         assert!(!said.err.contains("panicked"), "{length} bytes: {said:#?}");
         assert!(
             matches!(said.code, Some(2 | 4)),
@@ -94,7 +94,7 @@ fn a_torn_session_is_found() {
 #[test]
 fn a_changed_row_is_found_and_its_table_named() {
     let lab = Lab::new();
-    let (_, good) = sealed(&lab);
+    let (_, good) = sealed_session(&lab);
     // The operator's name, in the session's header row.
     let at = good.windows(9).position(|w| w == b"test skin").unwrap();
     let mut bytes = good;
@@ -111,7 +111,7 @@ fn a_changed_row_is_found_and_its_table_named() {
 #[test]
 fn what_is_whole_of_a_damaged_session_is_salvaged_and_analysed() {
     let lab = Lab::new();
-    let (session, mut bytes) = sealed(&lab);
+    let (session, mut bytes) = sealed_session(&lab);
     let file = lab.path("damaged.session.sqlite");
     std::fs::write(&file, &bytes).unwrap();
     let new = lab.path("damaged.salvaged.session.sqlite");
@@ -121,7 +121,7 @@ fn what_is_whole_of_a_damaged_session_is_salvaged_and_analysed() {
     skinrig(&["verify", &text(&new)]).code(0);
     skinrig(&["salvage", &text(&file)])
         .code(2)
-        .complains(&["file already exists"]);
+        .expect_stderr(&["file already exists"]);
 
     // The end of the file is gone: SQLite will not have it, a salvage will.
     bytes.truncate(bytes.len() * 2 / 3);
@@ -130,7 +130,7 @@ fn what_is_whole_of_a_damaged_session_is_salvaged_and_analysed() {
     let said = skinrig(&["salvage", &text(&file), "--out", &out]);
     let said = said
         .code(4)
-        .complains(&["some data are lost", "skinrig show"]);
+        .expect_stderr(&["some data are lost", "skinrig show"]);
     assert!(said.out.contains("recovered"), "{said:#?}");
     let shown = skinrig(&["show", &out]);
     assert!(matches!(shown.code, Some(0 | 2)), "{shown:#?}");

@@ -6,7 +6,7 @@ use skinrig_formats::hdf5::EventWriter;
 use skinrig_model::{CameraId, CdEvent, Point2, Polarity};
 use skinrig_protocol::Schedule;
 
-use crate::support::{Dice, Lab, text};
+use crate::support::{Lab, SeededRandom, text};
 
 /// Camera time at the schedule's time 0, µs: what the import has to find.
 pub(crate) const OFFSET_US: [f64; 2] = [7_312_000.0, 11_905_000.0];
@@ -111,14 +111,14 @@ fn schedule() -> Vec<(f64, Point2)> {
 
 /// What `camera` saw: a burst while the tip goes in, one of the other polarity while it leaves, and background.
 pub(crate) fn events(camera: CameraId) -> Vec<CdEvent> {
-    let mut dice = Dice(1 + u64::from(camera.number()));
+    let mut random = SeededRandom(1 + u64::from(camera.number()));
     let rig = Schedule::parse("made", SCHEDULE.as_bytes(), &[])
         .unwrap()
         .rig;
     let model = rig.nominal.cameras[camera.index()];
     let camera_us =
         |t_s: f64| OFFSET_US[camera.index()] + t_s * 1e6 * (1.0 + DRIFT_PPM[camera.index()] * 1e-6);
-    let bell = |dice: &mut Dice| (0..6).map(|_| dice.unit()).sum::<f64>() - 3.0;
+    let bell = |random: &mut SeededRandom| (0..6).map(|_| random.unit()).sum::<f64>() - 3.0;
     let mut events = Vec::new();
     let mut push = |t_s: f64, x: f64, y: f64, polarity| {
         events.push(CdEvent {
@@ -133,11 +133,11 @@ pub(crate) fn events(camera: CameraId) -> Vec<CdEvent> {
         let column = model.column_of_point(*at).unwrap();
         for (from, to, polarity) in [(-0.275, -0.1, Polarity::On), (0.05, 0.275, Polarity::Off)] {
             for _ in 0..400 {
-                let t = press + from + (to - from) * dice.unit();
+                let t = press + from + (to - from) * random.unit();
                 push(
                     t,
-                    column + 4.0 * bell(&mut dice),
-                    270.0 + 15.0 * bell(&mut dice),
+                    column + 4.0 * bell(&mut random),
+                    270.0 + 15.0 * bell(&mut random),
                     polarity,
                 );
             }
@@ -146,9 +146,9 @@ pub(crate) fn events(camera: CameraId) -> Vec<CdEvent> {
     // 1 s before the first press to 1 s after the last.
     let length = schedule.last().unwrap().0 + 2.0;
     for _ in 0..(300.0 * length) as usize {
-        let t = length * dice.unit() - 1.0;
-        let polarity = Polarity::from_bit(dice.below(2) == 1);
-        push(t, 640.0 * dice.unit(), 480.0 * dice.unit(), polarity);
+        let t = length * random.unit() - 1.0;
+        let polarity = Polarity::from_bit(random.below(2) == 1);
+        push(t, 640.0 * random.unit(), 480.0 * random.unit(), polarity);
     }
     events.sort_by_key(|e| e.t_us);
     events

@@ -98,8 +98,8 @@ fn bad_input_ends_with_code_2_and_says_what_to_do() {
     ] {
         skinrig(&arguments)
             .code(2)
-            .complains(&["error"])
-            .complains(&parts);
+            .expect_stderr(&["error"])
+            .expect_stderr(&parts);
     }
 }
 

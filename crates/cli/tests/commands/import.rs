@@ -75,7 +75,7 @@ fn a_dataset_is_imported_its_clocks_aligned_and_its_presses_located() {
 fn import_wrong(
     change: impl Fn(Point2) -> Point2,
     swapped: bool,
-) -> (crate::support::Said, serde_json::Value) {
+) -> (crate::support::ProgramOutput, serde_json::Value) {
     let lab = Lab::new();
     let mut data = Dataset::new(&lab);
     let wrong: Vec<Point2> = positions().into_iter().map(change).collect();
@@ -103,7 +103,9 @@ fn positions_and_cameras_that_are_taken_for_others_make_the_session_invalid() {
     ];
     for (fault, change, swapped) in cases {
         let (said, results) = import_wrong(change, swapped);
-        let said = said.code(4).complains(&["the session is INVALID", fault]);
+        let said = said
+            .code(4)
+            .expect_stderr(&["the session is INVALID", fault]);
         assert_eq!(results["valid"], false, "{fault}");
         let rmse = results["analysis"]["scored"]["rmse_mm"]["value"].as_f64();
         let headline = rmse.map(|mm| format!("{mm:.2} mm"));
@@ -145,7 +147,7 @@ fn more_presses_than_the_schedule_says_are_told_apart_by_the_sync_presses_or_the
 
     // A single sync press in step with the path: nothing says which of the presses are the planned ones.
     let said = import("t", &["sync.count=1", "sync.pause_after=1.5 s"]).code(4);
-    let said = said.complains(&["INVALID", "log-odds", "all other alignments", "next:"]);
+    let said = said.expect_stderr(&["INVALID", "log-odds", "all other alignments", "next:"]);
     let results = read_json(&only(&lab.path("t"), ".results.json"));
     assert_eq!(results["valid"], false);
     assert!(said.out.contains("INVALID   use no number"), "{said:?}");

@@ -3,13 +3,13 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::support::{Lab, ROOT, files, only, said};
+use crate::support::{Lab, ROOT, files, only, run_to_end};
 
 /// Runs a tool and asserts that it ends well.
-fn tool(name: &str, arguments: &[&str]) {
+fn run_tool(name: &str, arguments: &[&str]) {
     let mut command = Command::new(name);
     command.args(arguments);
-    said(command).code(0);
+    run_to_end(command).code(0);
 }
 
 /// The installed program in `folder`, which sees nothing of this checkout.
@@ -20,7 +20,7 @@ fn installed(root: &Path, folder: &Path, arguments: &[&str]) -> String {
         .env("PATH", "/usr/bin:/bin")
         .env("HOME", folder);
     command.current_dir(folder).args(arguments);
-    said(command).code(0).out
+    run_to_end(command).code(0).out
 }
 
 #[test]
@@ -29,9 +29,9 @@ fn packages_hold_all_that_a_lab_needs() {
     let (out, root) = (lab.text("packages"), lab.text("root"));
     std::fs::create_dir(&root).unwrap();
     let package = format!("{ROOT}/packaging/package");
-    tool("bash", &[&package, &out, env!("CARGO_BIN_EXE_skinrig")]);
+    run_tool("bash", &[&package, &out, env!("CARGO_BIN_EXE_skinrig")]);
     let archive = only(Path::new(&out), ".tar.gz");
-    tool(
+    run_tool(
         "tar",
         &[
             "-xzf",
@@ -53,8 +53,11 @@ fn packages_hold_all_that_a_lab_needs() {
     }
     assert!(root.join("share/man/man1/skinrig-run.1.gz").exists());
 
-    let told = installed(root, &lab.path(""), &["init", "lab"]);
-    assert!(told.contains("skinrig run protocols/demo.yaml"), "{told}");
+    let printed = installed(root, &lab.path(""), &["init", "lab"]);
+    assert!(
+        printed.contains("skinrig run protocols/demo.yaml"),
+        "{printed}"
+    );
     let folder = lab.path("lab");
     // The demo without most of its presses: the test is about where files come from.
     let short = [
@@ -75,7 +78,7 @@ fn packages_hold_all_that_a_lab_needs() {
         return;
     };
     let debian = lab.text("debian");
-    tool("dpkg-deb", &["-x", deb.to_str().unwrap(), &debian]);
+    run_tool("dpkg-deb", &["-x", deb.to_str().unwrap(), &debian]);
     let program = |path: &Path| std::fs::read(path).unwrap();
     assert!(
         program(&Path::new(&debian).join("usr/bin/skinrig")) == program(&root.join("bin/skinrig"))

@@ -8,15 +8,15 @@ use std::process::{Child, ChildStderr, Command, Stdio};
 use serde_json::Value;
 
 use crate::replay::assert_replays;
-use crate::support::{Lab, ROOT, SMALL, files, only, program, said, show, skinrig, text};
+use crate::support::{Lab, ROOT, SMALL, files, only, program, run_to_end, show, skinrig, text};
 
 /// A run in real time, after its first press.
-pub(crate) struct Underway {
+pub(crate) struct LiveRun {
     child: Child,
     lines: BufReader<ChildStderr>,
 }
 
-impl Underway {
+impl LiveRun {
     pub(crate) fn new(folder: &Path) -> Self {
         let folder = text(folder);
         Self::of(program(&[
@@ -35,9 +35,9 @@ impl Underway {
             .spawn()
             .unwrap();
         let lines = BufReader::new(child.stderr.take().unwrap());
-        let mut underway = Self { child, lines };
-        underway.wait_for("press ");
-        underway
+        let mut run = Self { child, lines };
+        run.wait_for("press ");
+        run
     }
 
     /// Reads messages up to one that contains `word`.
@@ -106,7 +106,7 @@ fn assert_ended_early(folder: &Path, word: &str) -> PathBuf {
 #[test]
 fn ctrl_c_ends_the_run_after_the_press_with_a_sealed_session() {
     let lab = Lab::new();
-    let run = Underway::new(&lab.path("s"));
+    let run = LiveRun::new(&lab.path("s"));
     run.signal("INT");
     let (code, messages) = run.end();
     assert_eq!(code, Some(5), "{messages}");
@@ -125,7 +125,7 @@ fn ctrl_c_ends_the_run_after_the_press_with_a_sealed_session() {
 #[test]
 fn ctrl_c_twice_retracts_and_stops_at_once() {
     let lab = Lab::new();
-    let mut run = Underway::new(&lab.path("s"));
+    let mut run = LiveRun::new(&lab.path("s"));
     run.signal("INT");
     run.wait_for("stopping after this press");
     run.signal("INT");
@@ -140,7 +140,7 @@ fn ctrl_c_twice_retracts_and_stops_at_once() {
 fn signals_that_end_a_program_at_once_retract() {
     for signal in ["QUIT", "XCPU"] {
         let lab = Lab::new();
-        let run = Underway::new(&lab.path("s"));
+        let run = LiveRun::new(&lab.path("s"));
         run.signal(signal);
         let (code, messages) = run.end();
         assert_eq!(code, Some(5), "{signal}: {messages}");
@@ -162,7 +162,7 @@ fn ctrl_c_three_times_switches_the_motors_off_and_seals() {
         arguments.extend(["--set", set]);
     }
     arguments.extend(["--sessions", &folder]);
-    let mut run = Underway::of(program(&arguments));
+    let mut run = LiveRun::of(program(&arguments));
     let in_the_skin = || {
         let found = skinrig(&["status", "--json", &folder]).code(0).json();
         let z_mm = found["live"]["tip_mm"][2].as_f64();
@@ -203,7 +203,7 @@ fn nohup_is_respected() {
             lab.text("s")
         ),
     ]);
-    let mut run = Underway::of(command);
+    let mut run = LiveRun::of(command);
     run.signal("HUP");
     run.wait_for("press ");
     // Still there, and it listens to everything else.
@@ -231,7 +231,7 @@ fn a_polite_end_by_the_system_stops_as_ctrl_c_does() {
     };
     for signal in signals {
         let lab = Lab::new();
-        let run = Underway::new(&lab.path("s"));
+        let run = LiveRun::new(&lab.path("s"));
         run.signal(signal);
         let (code, messages) = run.end();
         assert_eq!(code, Some(5), "{signal}: {messages}");
@@ -243,7 +243,7 @@ fn a_polite_end_by_the_system_stops_as_ctrl_c_does() {
 fn a_killed_run_leaves_a_session_that_opens() {
     let lab = Lab::new();
     // Its first press is shown as done, so it is on the disk.
-    let run = Underway::new(&lab.path("s"));
+    let run = LiveRun::new(&lab.path("s"));
     run.signal("KILL");
     let (code, _) = run.end();
     assert_eq!(code, None);
@@ -278,7 +278,7 @@ fn a_killed_run_leaves_a_session_that_opens() {
 }
 
 /// The campaign with every file limited to `blocks` of 512 bytes: as on a full disk, and SIGXFSZ besides, which would end the process.
-fn on_a_full_disk(folder: &str, blocks: u32) -> crate::support::Said {
+fn on_a_full_disk(folder: &str, blocks: u32) -> crate::support::ProgramOutput {
     let mut command = Command::new("sh");
     command.current_dir(ROOT).args([
         "-c",
@@ -287,7 +287,7 @@ fn on_a_full_disk(folder: &str, blocks: u32) -> crate::support::Said {
             env!("CARGO_BIN_EXE_skinrig")
         ),
     ]);
-    said(command)
+    run_to_end(command)
 }
 
 #[test]
@@ -299,12 +299,12 @@ fn a_disk_that_fills_up_stops_the_run_which_can_be_resumed() {
         if said.code == Some(1) {
             continue;
         }
-        said.code(3).complains(&["recorder", "kept", "next:"]);
+        said.code(3).expect_stderr(&["recorder", "kept", "next:"]);
         let session = only(&lab.path("s"), ".session.sqlite");
         // The disk was full before the header: an empty session says so.
         let header = skinrig(&["show", &text(&session)]);
         if header.code != Some(0) {
-            header.code(2).complains(&["without records"]);
+            header.code(2).expect_stderr(&["without records"]);
             continue;
         }
         let shown = show(&session);
@@ -332,7 +332,7 @@ fn a_disk_that_is_full_from_the_start_ends_with_code_1_and_a_next_step() {
     let lab = Lab::new();
     on_a_full_disk(&lab.text("s"), 100)
         .code(1)
-        .complains(&["next:"]);
+        .expect_stderr(&["next:"]);
     // Whatever is left is no session that claims anything.
     let left = files(&lab.path("s"), "");
     assert!(left.is_empty(), "{left:?}");

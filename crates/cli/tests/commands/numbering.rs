@@ -146,7 +146,7 @@ fn a_press_has_one_number_everywhere() {
 fn the_key_that_counted_from_zero_is_refused_with_what_to_write() {
     skinrig(&["check", SMALL, "--set", "analysis.exclude_presses=[3, 7]"])
         .code(2)
-        .complains(&["exclude_press_numbers: [4, 8]"]);
+        .expect_stderr(&["exclude_press_numbers: [4, 8]"]);
     skinrig(&[
         "check",
         SMALL,
@@ -159,5 +159,5 @@ fn the_key_that_counted_from_zero_is_refused_with_what_to_write() {
     let old = "analysis.exclude_presses=[3]";
     skinrig(&["analyze", &text(&session), "--set", old])
         .code(2)
-        .complains(&["exclude_press_numbers"]);
+        .expect_stderr(&["exclude_press_numbers"]);
 }

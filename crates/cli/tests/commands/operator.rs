@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::interrupt::Underway;
+use crate::interrupt::LiveRun;
 use crate::support::{Lab, files, only, program, sha256, show, skinrig, text};
 
 fn status(place: &Path) -> Value {
@@ -27,7 +27,7 @@ fn socket_of(session: &Path) -> PathBuf {
 #[test]
 fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
     let lab = Lab::new();
-    let run = Underway::new(&lab.path("s"));
+    let run = LiveRun::new(&lab.path("s"));
     let session = only(&lab.path("s"), ".session.sqlite");
     assert!(socket_of(&session).exists());
     // The first press that is told of may be a sync press, which is not counted as done.
@@ -114,7 +114,7 @@ fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
         ["note", &text(&session), "late"],
     ] {
         let refused = skinrig(&arguments).code(2);
-        refused.complains(&["sealed one, which never changes"]);
+        refused.expect_stderr(&["sealed one, which never changes"]);
     }
     assert_eq!(sha256(&std::fs::read(&session).unwrap()), before);
     let left = files(&lab.path("s"), "-control");
@@ -124,7 +124,7 @@ fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
 #[test]
 fn a_killed_run_is_told_from_a_running_one_and_its_socket_is_replaced() {
     let lab = Lab::new();
-    let run = Underway::new(&lab.path("s"));
+    let run = LiveRun::new(&lab.path("s"));
     run.signal("KILL");
     assert_eq!(run.end().0, None);
     let session = only(&lab.path("s"), ".session.sqlite");
@@ -144,7 +144,7 @@ fn a_killed_run_is_told_from_a_running_one_and_its_socket_is_replaced() {
         ["note", &text(&session), "why?"],
     ] {
         let refused = skinrig(&arguments).code(2);
-        refused.complains(&["no program is running", "skinrig resume"]);
+        refused.expect_stderr(&["no program is running", "skinrig resume"]);
     }
 
     // The next leg listens again, and says so.
@@ -197,10 +197,10 @@ fn a_finished_session_is_only_read() {
     std::fs::create_dir(lab.path("none")).unwrap();
     skinrig(&["status", &lab.text("none")])
         .code(2)
-        .complains(&["expected a session, found none"]);
+        .expect_stderr(&["expected a session, found none"]);
     skinrig(&["status", "Cargo.toml"])
         .code(2)
-        .complains(&["expected a skinrig session"]);
+        .expect_stderr(&["expected a skinrig session"]);
     skinrig(&["control", &text(&session), "launch"]).code(2);
     skinrig(&["note", &text(&session)]).code(2);
 }

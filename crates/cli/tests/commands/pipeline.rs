@@ -188,7 +188,7 @@ fn analyze_and_report_give_the_same_results_again_and_others_with_other_settings
     skinrig(&["verify", &path]).code(0);
     skinrig(&["analyze", &path, "--set", "depth=1 mm"])
         .code(2)
-        .complains(&["analysis."]);
+        .expect_stderr(&["analysis."]);
 }
 
 fn events_of(session: &Path, camera: CameraId) -> Vec<CdEvent> {
@@ -300,7 +300,9 @@ fn exports_hold_exactly_what_was_recorded_and_inspect_reads_them() {
     skinrig(&raw).code(0);
     let camera = only(&lab.path("e"), ".camera1.raw");
     std::fs::write(&camera, "mine").unwrap();
-    skinrig(&raw).code(1).complains(&[".camera1.raw", "--out"]);
+    skinrig(&raw)
+        .code(1)
+        .expect_stderr(&[".camera1.raw", "--out"]);
     assert_eq!(std::fs::read(&camera).unwrap(), b"mine");
     let csv = ["export", &text(&session), "--to", "csv", "--out", &out];
     // But when asked, and then it is the same.

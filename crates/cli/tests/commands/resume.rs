@@ -120,7 +120,7 @@ fn what_cannot_go_on_is_refused_and_left_as_it_is() {
     let refused = |session: &std::path::Path, parts: &[&str]| {
         skinrig(&["resume", &text(session)])
             .code(2)
-            .complains(parts);
+            .expect_stderr(parts);
     };
     let writer = SessionWriter::resume(&session, &mut Rescan::default()).unwrap();
     refused(&session, &["process "]);
@@ -128,7 +128,7 @@ fn what_cannot_go_on_is_refused_and_left_as_it_is() {
     assert_eq!(show(&session)["legs"].as_array().unwrap().len(), 1);
 
     let rig = ["resume", &text(&session), "--rig", "hil/rigs/emulated.yaml"];
-    skinrig(&rig).code(2).complains(&["expected no --rig"]);
+    skinrig(&rig).code(2).expect_stderr(&["expected no --rig"]);
 
     for kind in ["imported", "replayed"] {
         let other = |header: &mut RunHeader| header.rig_kind = kind.to_owned();
@@ -157,7 +157,7 @@ fn what_cannot_go_on_is_refused_and_left_as_it_is() {
         let path = lab.path(&format!("{what}.session.sqlite"));
         std::fs::write(&path, &bytes).unwrap();
         let problem = format!("{what}_sha256: expected");
-        skinrig(&["resume", &text(&path)]).code(4).complains(&[
+        skinrig(&["resume", &text(&path)]).code(4).expect_stderr(&[
             "expected a sound session",
             &problem,
             "nothing was changed",

@@ -7,20 +7,20 @@ use serde_json::Value;
 use skinrig_protocol::rig::RigFile;
 
 use crate::replay::assert_replays;
-use crate::support::{Lab, ROOT, Said, files, program, said, show, skinrig};
+use crate::support::{Lab, ProgramOutput, ROOT, files, program, run_to_end, show, skinrig};
 
 const EMULATED: &str = "hil/rigs/emulated.yaml";
 const QUICK: &str = "protocols/quick-check.yaml";
 
 /// The program with the devices of an emulated bench that is not there.
-fn without_devices(arguments: &[&str]) -> Said {
+fn without_devices(arguments: &[&str]) -> ProgramOutput {
     let mut command = program(arguments);
     command
         .env("SKINRIG_EMULATED_LIBDRD", "/nowhere/libdrd.so")
         .env("SKINRIG_EMULATED_TRIGGER_BOX", "/nowhere/box")
         .env("SKINRIG_EMULATED_LAMPS_OFF", "/nowhere/lamps-off")
         .env("SKINRIG_LIBDRD", "/nowhere/libdrd.so");
-    said(command)
+    run_to_end(command)
 }
 
 #[test]
@@ -79,7 +79,7 @@ fn the_doctor_tells_of_a_bench_that_is_not_there_what_is_missing() {
     assert!(plain.out.contains("problem") && plain.out.contains("next: "));
     doctor(&["--rig", QUICK])
         .code(2)
-        .complains(&["this is not a rig"]);
+        .expect_stderr(&["this is not a rig"]);
 }
 
 #[test]
@@ -89,14 +89,14 @@ fn a_rig_file_is_read_with_the_same_care_as_a_protocol() {
         |rig: &str| without_devices(&["run", QUICK, "--rig", rig, "--sessions", &lab.text("s")]);
     run("hil/rigs/nowhere.yaml")
         .code(2)
-        .complains(&["cannot read hil/rigs/nowhere.yaml"]);
+        .expect_stderr(&["cannot read hil/rigs/nowhere.yaml"]);
     run(QUICK)
         .code(2)
-        .complains(&["this is not a rig", "found: a protocol"]);
+        .expect_stderr(&["this is not a rig", "found: a protocol"]);
     let spoilt = std::fs::read_to_string(format!("{ROOT}/{EMULATED}")).unwrap();
     let spoilt = spoilt.replace("max_force: 8 N", "max_force: 8");
     std::fs::write(lab.path("rig.yaml"), spoilt).unwrap();
-    run(&lab.text("rig.yaml")).code(2).complains(&[
+    run(&lab.text("rig.yaml")).code(2).expect_stderr(&[
         "limits.max_force",
         "the unit is missing",
         "write `8 N`",
@@ -107,7 +107,7 @@ fn a_rig_file_is_read_with_the_same_care_as_a_protocol() {
     std::fs::write(lab.path("bare.yaml"), bare).unwrap();
     run(&lab.text("bare.yaml"))
         .code(2)
-        .complains(&["robot.sample_is_off: expected false", "skinrig jog"]);
+        .expect_stderr(&["robot.sample_is_off: expected false", "skinrig jog"]);
     skinrig(&["run", QUICK, "--rig", EMULATED, "--level", "optical"]).code(2);
     assert_eq!(files(&lab.path("s"), "").len(), 0, "nothing was recorded");
 }
@@ -118,10 +118,10 @@ fn a_bench_that_is_not_there_is_named_with_the_next_step() {
     let sessions = lab.text("s");
     without_devices(&["run", QUICK, "--rig", EMULATED, "--sessions", &sessions])
         .code(3)
-        .complains(&["/nowhere/libdrd.so", "install the SDK"]);
+        .expect_stderr(&["/nowhere/libdrd.so", "install the SDK"]);
     without_devices(&["jog", "--rig", EMULATED, "--log", &lab.text("jog.log")])
         .code(3)
-        .complains(&["/nowhere/libdrd.so"]);
+        .expect_stderr(&["/nowhere/libdrd.so"]);
 }
 
 #[test]
@@ -139,7 +139,7 @@ fn the_tighter_limit_of_bench_and_protocol_holds() {
         &lab.text("s"),
     ])
     .code(2)
-    .complains(&[
+    .expect_stderr(&[
         "the speed is outside its limit",
         "at most 30 mm/s",
         "slow.yaml allows",
@@ -195,7 +195,7 @@ fn presses_that_touch_are_recorded_and_replayed() {
 }
 
 /// Jogs the simulated rig with these lines; the log goes to `log`.
-fn jog(lines: &str, log: &str) -> Said {
+fn jog(lines: &str, log: &str) -> ProgramOutput {
     let mut child = program(&["jog", "--log", log])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
@@ -205,7 +205,7 @@ fn jog(lines: &str, log: &str) -> Said {
     // The program may end before it has read everything.
     let _ = child.stdin.take().unwrap().write_all(lines.as_bytes());
     let output = child.wait_with_output().unwrap();
-    Said {
+    ProgramOutput {
         code: output.status.code(),
         out: String::from_utf8(output.stdout).unwrap(),
         err: String::from_utf8(output.stderr).unwrap(),
@@ -285,7 +285,7 @@ fn a_wrong_line_of_a_file_ends_the_jog_with_the_robot_disarmed() {
         let log = lab.text(&format!("{i}.log"));
         let said = jog(&format!("{line}\nz +1mm\n"), &log)
             .code(2)
-            .complains(&[words]);
+            .expect_stderr(&[words]);
         assert!(said.out.contains("disarmed at"), "{said:?}");
         let log = std::fs::read_to_string(log).unwrap();
         assert!(
@@ -302,7 +302,7 @@ fn a_jog_stays_within_the_depth_of_the_frame_unless_told_otherwise() {
     let log = lab.text("within.log");
     jog("touch 16.5mm\n", &log)
         .code(2)
-        .complains(&["at most 6 mm below the frame's surface", "--beyond-frame"]);
+        .expect_stderr(&["at most 6 mm below the frame's surface", "--beyond-frame"]);
     let log = std::fs::read_to_string(log).unwrap();
     assert!(log.contains("\tlimit\t6 mm below"), "{log}");
     let log = lab.text("beyond.log");
@@ -332,7 +332,7 @@ fn the_logs_of_jogs_are_never_written_over() {
     jog("where\n", &log).code(0);
     jog("where\n", &log)
         .code(1)
-        .complains(&["jog.log", "--log"]);
+        .expect_stderr(&["jog.log", "--log"]);
 }
 
 #[test]

@@ -32,15 +32,15 @@ fn a_session_says_what_its_successor_has_to_be_pressed() {
 
     skinrig(&["plan", "--detect", "1 mm"])
         .code(2)
-        .complains(&["--from"]);
+        .expect_stderr(&["--from"]);
     for (wrong, part) in [("0 mm", "above 0"), ("3 s", "length")] {
         let said = skinrig(&["plan", "--from", &session, "--detect", wrong]);
-        said.code(2).complains(&[part]);
+        said.code(2).expect_stderr(&[part]);
     }
     let sure = [
         "plan", "--from", &session, "--detect", "1 mm", "--power", "1",
     ];
-    skinrig(&sure).code(2).complains(&["probability"]);
+    skinrig(&sure).code(2).expect_stderr(&["probability"]);
     let both = [
         "plan",
         "protocols/demo.yaml",

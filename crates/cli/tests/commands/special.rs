@@ -43,7 +43,7 @@ const READING: [&str; 32] = [
 ];
 
 /// What a command says; `None` when it does not come back. What hangs is ended.
-fn said(arguments: &[&str]) -> Option<Output> {
+fn run_with_timeout(arguments: &[&str]) -> Option<Output> {
     let child = program(arguments)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
@@ -90,7 +90,7 @@ fn pipes_and_devices_are_refused() {
                     word => word,
                 })
                 .collect();
-            match said(&words) {
+            match run_with_timeout(&words) {
                 Some(output) if output.status.code() == Some(2) => {}
                 // Reads a session and no lock.
                 Some(output) if file == beside && output.status.code() == Some(0) => {}

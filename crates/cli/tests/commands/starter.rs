@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::support::{Lab, Said, only, program, said};
+use crate::support::{Lab, ProgramOutput, only, program, run_to_end};
 
 const KINDS: [&str; 9] = [
     "campaign",
@@ -17,10 +17,10 @@ const KINDS: [&str; 9] = [
 ];
 
 /// The program started in `folder`.
-fn at(folder: &Path, arguments: &[&str]) -> Said {
+fn at(folder: &Path, arguments: &[&str]) -> ProgramOutput {
     let mut command = program(arguments);
     command.current_dir(folder);
-    said(command)
+    run_to_end(command)
 }
 
 #[test]
@@ -34,7 +34,7 @@ fn every_new_protocol_passes_its_check_and_none_is_overwritten() {
         at(&folder, &["new", kind, &file]).code(0);
         at(&folder, &["check", &file]).code(0);
         std::fs::write(lab.path(&file), "mine").unwrap();
-        at(&folder, &["new", kind, &file]).code(2).complains(&[
+        at(&folder, &["new", kind, &file]).code(2).expect_stderr(&[
             &file,
             "found an existing one",
             "next:",
@@ -72,7 +72,7 @@ fn a_new_lab_runs_and_keeps_what_is_its_own() {
     std::fs::write(lab.path("file"), "").unwrap();
     at(&folder, &["init", "file/lab"])
         .code(2)
-        .complains(&["next:"]);
+        .expect_stderr(&["next:"]);
 }
 
 /// Without `scene`, the summary says what was taken; a skin of its own needs the level that models skins.
@@ -99,5 +99,5 @@ fn a_scene_is_optional_and_says_what_it_took() {
         &["check", "o.yaml", "--set", "scene.level=geometric"],
     )
     .code(2)
-    .complains(&["scene.level", "optical"]);
+    .expect_stderr(&["scene.level", "optical"]);
 }

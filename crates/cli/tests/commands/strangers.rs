@@ -105,7 +105,7 @@ fn links_in_a_strangers_folder_are_not_written_through() {
             let export = ["export", &session, "--to", kind, "--only", "pose"];
             skinrig(&[&export[..], more].concat())
                 .code(1)
-                .complains(&["next:"]);
+                .expect_stderr(&["next:"]);
         }
     }
     let npz = ["export", &session, "--to", "npz", "--only", "pose"];

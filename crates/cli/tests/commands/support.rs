@@ -18,13 +18,13 @@ pub(crate) const SMALL: &str = "crates/cli/tests/fixtures/small.yaml";
 
 /// What one call of the program did.
 #[derive(Debug)]
-pub(crate) struct Said {
+pub(crate) struct ProgramOutput {
     pub code: Option<i32>,
     pub out: String,
     pub err: String,
 }
 
-impl Said {
+impl ProgramOutput {
     /// Asserts the exit code; the message shows everything that was said.
     #[track_caller]
     pub(crate) fn code(self, expected: i32) -> Self {
@@ -44,7 +44,7 @@ impl Said {
 
     /// Asserts that standard error has all of `parts`.
     #[track_caller]
-    pub(crate) fn complains(self, parts: &[&str]) -> Self {
+    pub(crate) fn expect_stderr(self, parts: &[&str]) -> Self {
         for part in parts {
             assert!(self.err.contains(part), "expected {part:?} in {self:#?}");
         }
@@ -75,14 +75,14 @@ fn leases() -> PathBuf {
 }
 
 /// Runs the program to its end. Neither of its outputs is a terminal.
-pub(crate) fn skinrig<S: AsRef<OsStr>>(arguments: &[S]) -> Said {
-    said(program(arguments))
+pub(crate) fn skinrig<S: AsRef<OsStr>>(arguments: &[S]) -> ProgramOutput {
+    run_to_end(program(arguments))
 }
 
 /// Runs `command` to its end.
-pub(crate) fn said(mut command: Command) -> Said {
+pub(crate) fn run_to_end(mut command: Command) -> ProgramOutput {
     let output = command.output().unwrap();
-    Said {
+    ProgramOutput {
         code: output.status.code(),
         out: String::from_utf8(output.stdout).unwrap(),
         err: String::from_utf8(output.stderr).unwrap(),
@@ -177,9 +177,9 @@ pub(crate) fn sha256(bytes: &[u8]) -> String {
 }
 
 /// A small seeded generator of 64-bit numbers (SplitMix64, Steele, Lea and Flood 2014), for test data only.
-pub(crate) struct Dice(pub u64);
+pub(crate) struct SeededRandom(pub u64);
 
-impl Dice {
+impl SeededRandom {
     pub(crate) fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;

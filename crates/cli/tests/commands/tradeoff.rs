@@ -95,7 +95,7 @@ fn a_demand_that_nothing_meets_ends_with_code_4_and_a_table_fits_a_terminal() {
         "1 um",
     ])
     .code(4)
-    .complains(&["--full"]);
+    .expect_stderr(&["--full"]);
     assert!(
         said.out.lines().all(|l| l.chars().count() <= 100),
         "{}",
@@ -118,7 +118,7 @@ fn a_demand_that_nothing_meets_ends_with_code_4_and_a_table_fits_a_terminal() {
     }
     skinrig(&["tradeoff", &session, "--budget", "5 mm"])
         .code(2)
-        .complains(&["time"]);
+        .expect_stderr(&["time"]);
 }
 
 #[test]
@@ -146,6 +146,6 @@ fn a_trade_of_other_settings_leaves_that_of_the_session_alone() {
     );
     trade(&[&set[..], &["--out", &page]].concat())
         .code(2)
-        .complains(&["--out"]);
+        .expect_stderr(&["--out"]);
     assert_eq!(std::fs::read(&page).unwrap(), before);
 }

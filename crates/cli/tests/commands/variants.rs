@@ -111,12 +111,12 @@ fn a_variant_lies_beside_the_official_analysis_and_is_taken_only_when_asked_for(
     );
     skinrig(&["report", &s, "--analysis", "none-such"])
         .code(2)
-        .complains(&["all, min_samples=5, reference-code"]);
+        .expect_stderr(&["all, min_samples=5, reference-code"]);
 
     // Nothing puts a variant into the official place, and what lies there is not taken for official.
     skinrig(&["analyze", &s, "--set", CHANGE, "--out", &text(&official)])
         .code(2)
-        .complains(&["expected another path for the variant"]);
+        .expect_stderr(&["expected another path for the variant"]);
     skinrig(&["analyze", &s, "--name", "official"]).code(2);
     let variant = only(&lab.path("s"), ".analysis-all.results.json");
     std::fs::copy(variant, &official).unwrap();
@@ -149,7 +149,7 @@ fn a_copy_of_a_session_is_not_counted_again() {
     );
     skinrig(&["compare", &session, &copy])
         .code(2)
-        .complains(&["or a copy of it"]);
+        .expect_stderr(&["or a copy of it"]);
 }
 
 #[test]
@@ -170,7 +170,7 @@ fn an_export_made_again_is_done() {
     std::fs::write(&csv, "mine").unwrap();
     skinrig(&tables)
         .code(1)
-        .complains(&["another file exists", "--overwrite"]);
+        .expect_stderr(&["another file exists", "--overwrite"]);
     assert_eq!(std::fs::read_to_string(&csv).unwrap(), "mine");
 
     // An edited table whose manifest was written anew is not what the sealed session gives.

@@ -3,7 +3,7 @@
 
 use std::process::Stdio;
 
-use crate::interrupt::Underway;
+use crate::interrupt::LiveRun;
 use crate::support::{Lab, SMALL, only, program, read_json, skinrig, text};
 
 const WATCHERS: usize = 8;
@@ -11,7 +11,7 @@ const WATCHERS: usize = 8;
 #[test]
 fn a_run_in_real_time_is_shown_with_its_path_its_rates_and_its_signals() {
     let lab = Lab::new();
-    let mut run = Underway::new(&lab.path("s"));
+    let mut run = LiveRun::new(&lab.path("s"));
     // Before the first press there was nothing to compare it with.
     run.wait_for("press 3/10");
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
@@ -93,12 +93,10 @@ fn eight_watchers_of_a_whole_run_meet_no_lock_and_change_nothing() {
 fn a_run_that_is_not_there_yet_is_waited_for_and_a_cut_off_one_is_told() {
     let lab = Lab::new();
     let folder = lab.text("s");
-    skinrig(&["watch", &folder, "--once"]).code(2).complains(&[
-        &folder,
-        "found none yet",
-        "--once",
-    ]);
-    let run = Underway::new(&lab.path("s"));
+    skinrig(&["watch", &folder, "--once"])
+        .code(2)
+        .expect_stderr(&[&folder, "found none yet", "--once"]);
+    let run = LiveRun::new(&lab.path("s"));
     run.signal("KILL");
     run.end();
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
@@ -114,5 +112,5 @@ fn a_run_that_is_not_there_yet_is_waited_for_and_a_cut_off_one_is_told() {
         &lab.text("b"),
     ])
     .code(2)
-    .complains(&["sealed session", "resume"]);
+    .expect_stderr(&["sealed session", "resume"]);
 }

@@ -35,11 +35,11 @@ fn start() -> Option<(Slot, EmulatedBench)> {
     }
 }
 
-fn top() -> PathBuf {
+fn workspace_root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-fn said(output: &Output) -> String {
+fn all_output(output: &Output) -> String {
     format!(
         "{}{}",
         String::from_utf8_lossy(&output.stdout),
@@ -47,8 +47,8 @@ fn said(output: &Output) -> String {
     )
 }
 
-fn ended_well(output: &Output) -> String {
-    let said = said(output);
+fn assert_success(output: &Output) -> String {
+    let said = all_output(output);
     assert!(output.status.success(), "{}\n{said}", output.status);
     said
 }
@@ -56,7 +56,7 @@ fn ended_well(output: &Output) -> String {
 fn run(mut command: Command, rig: &[&str], sessions: &Path) -> Output {
     let seed = SEED.to_string();
     command
-        .current_dir(top())
+        .current_dir(workspace_root())
         .args(["run", "protocols/quick-check.yaml", "--seed", &seed])
         .args(rig)
         .arg("--sessions")
@@ -72,7 +72,7 @@ fn run_in_real_time(bench: &EmulatedBench, sessions: &Path) -> (PathBuf, String)
     for attempt in 1.. {
         let folder = sessions.join(attempt.to_string());
         let output = run(bench.command(SKINRIG).unwrap(), &rig, &folder);
-        let said = said(&output);
+        let said = all_output(&output);
         let starved = [
             "expected a pose sample no older than",
             "the session is INVALID",
@@ -82,14 +82,14 @@ fn run_in_real_time(bench: &EmulatedBench, sessions: &Path) -> (PathBuf, String)
         .iter()
         .any(|sign| said.contains(sign));
         if attempt == 4 || !starved {
-            return (folder, ended_well(&output));
+            return (folder, assert_success(&output));
         }
         eprintln!("the machine is too busy for real time, once more");
     }
     unreachable!("the fourth attempt returns")
 }
 
-fn the_only(folder: &Path, ending: &str) -> PathBuf {
+fn only_file(folder: &Path, ending: &str) -> PathBuf {
     let found: Vec<PathBuf> = fs::read_dir(folder)
         .unwrap()
         .map(|e| e.unwrap().path())
@@ -100,7 +100,7 @@ fn the_only(folder: &Path, ending: &str) -> PathBuf {
 }
 
 fn results(folder: &Path) -> Value {
-    let text = fs::read(the_only(folder, ".results.json")).unwrap();
+    let text = fs::read(only_file(folder, ".results.json")).unwrap();
     serde_json::from_slice(&text).unwrap()
 }
 
@@ -113,7 +113,7 @@ fn the_quick_check_on_the_emulated_bench_agrees_with_the_simulated_one() {
     };
     let (emulated, said) = run_in_real_time(&bench, &emulated);
     assert!(said.contains("rig       emulated"), "{said}");
-    ended_well(&run(Command::new(SKINRIG), &[], &simulated));
+    assert_success(&run(Command::new(SKINRIG), &[], &simulated));
 
     let (bench, sim) = (results(&emulated), results(&simulated));
     assert_eq!(bench["provenance"]["rig_kind"], "emulated");
@@ -147,7 +147,7 @@ fn the_quick_check_on_the_emulated_bench_agrees_with_the_simulated_one() {
             "{metric}: expected {sim:?} as on the simulated bench, found {bench:?}"
         );
     }
-    let session = the_only(&emulated, ".session.sqlite");
+    let session = only_file(&emulated, ".session.sqlite");
     let verified = Command::new(SKINRIG).arg("verify").arg(session).output();
-    ended_well(&verified.unwrap());
+    assert_success(&verified.unwrap());
 }

@@ -10,7 +10,7 @@ use skinrig_emulated_bench::{CAMERA_SERIALS, EmulatedBench, Order};
 use skinrig_model::{PressOutcome, PressVerdict, Setting};
 use skinrig_recorder::SessionReader;
 
-use super::{said, start, the_only, top};
+use super::{all_output, only_file, start, workspace_root};
 
 const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
 /// The register of `bias_diff_on`.
@@ -18,7 +18,7 @@ const BIAS: u32 = 0x0350;
 
 /// The emulated bench's rig file, with a bias that camera 2 does not take, and with `more` lines for that camera.
 fn rig(folder: &Path, more: &str) -> PathBuf {
-    let text = fs::read_to_string(top().join("hil/rigs/emulated.yaml")).unwrap();
+    let text = fs::read_to_string(workspace_root().join("hil/rigs/emulated.yaml")).unwrap();
     let serial = format!("    serial: \"{}\"\n", CAMERA_SERIALS[1]);
     let text = text.replace(
         &serial,
@@ -31,7 +31,7 @@ fn rig(folder: &Path, more: &str) -> PathBuf {
 
 /// The quick check with one press.
 fn protocol(folder: &Path) -> PathBuf {
-    let text = fs::read_to_string(top().join("protocols/quick-check.yaml")).unwrap();
+    let text = fs::read_to_string(workspace_root().join("protocols/quick-check.yaml")).unwrap();
     let kept = |line: &&str| !line.trim_start().starts_with("- [") || line.contains("the centre");
     let text: Vec<&str> = text.lines().filter(kept).collect();
     let path = folder.join("one-press.yaml");
@@ -41,7 +41,7 @@ fn protocol(folder: &Path) -> PathBuf {
 
 fn skinrig(bench: &EmulatedBench, arguments: &[&str]) -> Output {
     let mut command = bench.command(SKINRIG).unwrap();
-    command.current_dir(top()).args(arguments);
+    command.current_dir(workspace_root()).args(arguments);
     command.output().unwrap()
 }
 
@@ -86,17 +86,21 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
 
     // As it is: refused before anything moves, with the way on.
     let (refused, _) = run(&strict, "refused", &[]);
-    assert_eq!(refused.status.code(), Some(3), "{}", said(&refused));
-    assert!(said(&refused).contains("--tolerant"), "{}", said(&refused));
+    assert_eq!(refused.status.code(), Some(3), "{}", all_output(&refused));
+    assert!(
+        all_output(&refused).contains("--tolerant"),
+        "{}",
+        all_output(&refused)
+    );
 
     // Let pass once; a transfer fails in between.
     order(Order::BreakTransfer(60));
     let (tolerant, sessions) = run(&strict, "tolerant", &["--tolerant"]);
-    let told = said(&tolerant);
-    assert!(tolerant.status.success(), "{told}");
-    let (_, proposed) = told
+    let printed = all_output(&tolerant);
+    assert!(tolerant.status.success(), "{printed}");
+    let (_, proposed) = printed
         .split_once("cameras:\n  camera2:\n")
-        .unwrap_or_else(|| panic!("{told}"));
+        .unwrap_or_else(|| panic!("{printed}"));
     let lines: String = proposed
         .lines()
         .take_while(|l| l.starts_with("    "))
@@ -110,7 +114,7 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
     "#);
 
     // The session says that it was recorded so: in its header, with the device, in a note, before the run.
-    let session = the_only(&sessions, ".session.sqlite");
+    let session = only_file(&sessions, ".session.sqlite");
     let reader = SessionReader::open(&session).unwrap();
     let name = reader.header().unwrap().rig_name;
     assert!(name.ends_with("mismatches tolerated"), "{name}");
@@ -129,16 +133,16 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
     drop(reader);
     let shown = skinrig(&bench, &["show", session.to_str().unwrap()]);
     assert!(
-        said(&shown).contains("mismatches tolerated"),
+        all_output(&shown).contains("mismatches tolerated"),
         "{}",
-        said(&shown)
+        all_output(&shown)
     );
 
     // A later leg needs leave of its own: without it the session is refused, with it the presses that are open are made.
     let sessions = folder.join("killed");
     let mut command = bench.command(SKINRIG).unwrap();
     command
-        .current_dir(top())
+        .current_dir(workspace_root())
         .args(["run", "--tolerant", "--no-analysis"]);
     command.args([one_press.as_os_str(), "--rig".as_ref(), strict.as_os_str()]);
     let mut killed = command.arg("--sessions").arg(&sessions).spawn().unwrap();
@@ -148,19 +152,23 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
     }
     killed.kill().unwrap();
     killed.wait().unwrap();
-    let session = the_only(&sessions, ".session.sqlite");
+    let session = only_file(&sessions, ".session.sqlite");
     let resume = |more: &[&str]| {
         let mut arguments = vec!["resume", session.to_str().unwrap(), "--no-analysis"];
         arguments.extend(more);
         skinrig(&bench, &arguments)
     };
     let refused = resume(&[]);
-    assert_eq!(refused.status.code(), Some(3), "{}", said(&refused));
-    assert!(said(&refused).contains("--tolerant"), "{}", said(&refused));
+    assert_eq!(refused.status.code(), Some(3), "{}", all_output(&refused));
+    assert!(
+        all_output(&refused).contains("--tolerant"),
+        "{}",
+        all_output(&refused)
+    );
     let resumed = resume(&["--tolerant"]);
-    assert!(resumed.status.success(), "{}", said(&resumed));
+    assert!(resumed.status.success(), "{}", all_output(&resumed));
     let verified = skinrig(&bench, &["verify", session.to_str().unwrap()]);
-    assert!(verified.status.success(), "{}", said(&verified));
+    assert!(verified.status.success(), "{}", all_output(&verified));
     let outcomes = SessionReader::open(&session)
         .unwrap()
         .last_outcomes()
@@ -189,19 +197,19 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
     assert_eq!(settings["cause"], "rig", "{settings:#}");
     let camera2 = &settings["attempts"][0]["parts"][1]["measurements"][0];
     assert_eq!(camera2["value"], 3.0, "{settings:#}");
-    assert_ne!(night.status.code(), Some(0), "{}", said(&night));
+    assert_ne!(night.status.code(), Some(0), "{}", all_output(&night));
 
     // The lines in the rig file: opened without a word, transfers that fail included.
     let accepting = rig(folder, &lines);
     order(Order::BreakTransfer(60));
     let (accepted, sessions) = run(&accepting, "accepted", &[]);
-    let told = said(&accepted);
-    assert!(accepted.status.success(), "{told}");
+    let printed = all_output(&accepted);
+    assert!(accepted.status.success(), "{printed}");
     assert!(
-        !told.contains("tolerated") && !told.contains("--tolerant"),
-        "{told}"
+        !printed.contains("tolerated") && !printed.contains("--tolerant"),
+        "{printed}"
     );
-    let reader = SessionReader::open(the_only(&sessions, ".session.sqlite")).unwrap();
+    let reader = SessionReader::open(only_file(&sessions, ".session.sqlite")).unwrap();
     let name = reader.header().unwrap().rig_name;
     assert!(!name.contains("tolerated"), "{name}");
 }

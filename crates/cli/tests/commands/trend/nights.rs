@@ -8,7 +8,7 @@ use skinrig_hil::history::append;
 use skinrig_nightly::night::{Attempt, CheckResult, Measurement, NIGHT_VERSION, Part};
 use skinrig_nightly::{Golden, Night, NightExit, Verdict, Versions};
 
-use crate::support::{Lab, Said, program, said, skinrig};
+use crate::support::{Lab, ProgramOutput, program, run_to_end, skinrig};
 
 /// Names of the bench and the suite, as the emulated rig file and [`SUITE`] have them.
 const RIG: &str = "emulated";
@@ -153,16 +153,16 @@ impl Nights {
         home
     }
 
-    pub(super) fn trend(&self, more: &[&str]) -> Said {
+    pub(super) fn trend(&self, more: &[&str]) -> ProgramOutput {
         skinrig(&[&["hil", "trend", &self.history], more].concat())
     }
 
-    pub(super) fn accept(&self, more: &[&str]) -> Said {
+    pub(super) fn accept(&self, more: &[&str]) -> ProgramOutput {
         skinrig(&[&["hil", "accept", "--history", &self.history], more].concat())
     }
 
     /// A night of one check that needs no device, and its folder.
-    pub(super) fn run(&self, more: &[&str]) -> (Said, PathBuf) {
+    pub(super) fn run(&self, more: &[&str]) -> (ProgramOutput, PathBuf) {
         std::fs::write(self.lab.path("suite.yaml"), SUITE).unwrap();
         let (suite, out) = (self.lab.text("suite.yaml"), self.lab.text("nights"));
         let rig = "hil/rigs/emulated.yaml";
@@ -172,7 +172,7 @@ impl Nights {
             .env("SKINRIG_EMULATED_LIBDRD", "/nowhere/libdrd.so")
             .env("SKINRIG_EMULATED_LAMPS_OFF", "/nowhere/lamps-off")
             .env("SKINRIG_EMULATED_TRIGGER_BOX", "/nowhere/box");
-        let ran = said(command);
+        let ran = run_to_end(command);
         let folder = ran.out.lines().find(|l| l.starts_with(&out));
         let folder = PathBuf::from(folder.unwrap_or_else(|| panic!("no folder: {ran:#?}")));
         (ran, folder)
