@@ -1,4 +1,4 @@
-//! Bundles: made, moved, changed, and from strangers.
+//! Bundles: created, moved, modified, and from untrusted sources.
 
 use serde_json::Value;
 
@@ -50,7 +50,7 @@ fn a_bundle_proves_itself_elsewhere_and_finds_any_change() {
     }
     assert_eq!(files(&moved, "").len(), listed.len() + 1);
 
-    // One byte anywhere, a file more, a file less.
+    // One changed byte, an extra file, a missing file.
     for file in listed {
         let path = moved.join(file["name"].as_str().unwrap());
         let good = std::fs::read(&path).unwrap();
@@ -69,7 +69,7 @@ fn a_bundle_proves_itself_elsewhere_and_finds_any_change() {
     std::fs::remove_file(moved.join("more")).unwrap();
     verify().code(0);
 
-    // A manifest from a stranger reads nothing outside.
+    // An untrusted manifest cannot read files outside the bundle.
     for (key, name) in [
         ("name", "../x"),
         ("name", "/etc/passwd"),

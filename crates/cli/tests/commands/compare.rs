@@ -1,11 +1,11 @@
-//! Which skin is better: two sessions of one skin are not, what may not be compared is refused, and what is read is stable.
+//! Comparing skins: no difference between two sessions of one skin, rejected comparisons, and a stable output format.
 
 use serde_json::Value;
 
 use crate::json::shape;
 use crate::support::{Lab, files, only, skinrig, text};
 
-/// One small session of a skin, and its path.
+/// Records a small session of a skin and returns its path.
 fn record(lab: &Lab, folder: &str, seed: &str, more: &[&str]) -> String {
     let mut arguments = vec!["--seed", seed, "--set", "analysis.bootstrap_resamples=50"];
     arguments.extend_from_slice(more);
@@ -44,7 +44,7 @@ fn one_skin_twice_is_not_better_and_the_page_is_whole() {
     );
     let verdict = said.out.lines().next().unwrap();
     assert!(verdict.starts_with("VERDICT   B against A: "), "{verdict}");
-    // Numbers and names are of this run; what stands where is not.
+    // Numbers and names differ between runs; the layout does not.
     let layout: String = said
         .out
         .lines()
@@ -80,7 +80,7 @@ fn one_skin_twice_is_not_better_and_the_page_is_whole() {
     );
 }
 
-/// The keys of the document; of a session's facts only that there are some.
+/// Keys of the document, with each session's facts reduced to a placeholder.
 fn shape_without_facts(mut document: Value) -> String {
     for skin in document["skins"].as_array_mut().unwrap() {
         for session in skin["sessions"].as_array_mut().unwrap() {

@@ -1,11 +1,11 @@
-//! Damaged session files are noticed, never trusted, and never make the program panic.
+//! Damaged session files are detected, never trusted, and never cause a panic.
 
 use std::path::{Path, PathBuf};
 
 use crate::support::{Lab, SeededRandom, text};
 use crate::support::{ProgramOutput, skinrig};
 
-/// A small sealed session and its bytes.
+/// Records a small sealed session; returns its path and bytes.
 fn sealed_session(lab: &Lab) -> (PathBuf, Vec<u8>) {
     let session = lab.record(
         "s",
@@ -22,7 +22,7 @@ fn sealed_session(lab: &Lab) -> (PathBuf, Vec<u8>) {
     (session, bytes)
 }
 
-/// Lets every reading command read `file`: each must end with one of its codes, without a panic.
+/// Runs every reading command on `file`: each must exit with an expected code, without a panic.
 fn run_all_readers(lab: &Lab, file: &Path) -> ProgramOutput {
     let file = text(file);
     let out = lab.text("other.json");
@@ -47,7 +47,7 @@ fn flipped_bytes_are_found() {
     let mut random = SeededRandom(20);
     for round in 0..24 {
         let mut bytes = good.clone();
-        // Every third time in the first pages, where headers and small tables lie.
+        // One in three hits the first pages, which hold headers and small tables.
         let reach = if round % 3 == 0 {
             65_536
         } else {
@@ -84,7 +84,7 @@ fn a_torn_session_is_found() {
             "{length} bytes: {said:#?}"
         );
     }
-    // The list of a folder goes on past a broken file and names it.
+    // Listing a folder continues after a broken file and names it.
     let listed = skinrig(&["sessions", &text(lab.path("").as_path())])
         .code(0)
         .out;
@@ -123,7 +123,7 @@ fn what_is_whole_of_a_damaged_session_is_salvaged_and_analysed() {
         .code(2)
         .expect_stderr(&["file already exists"]);
 
-    // The end of the file is gone: SQLite will not have it, a salvage will.
+    // Truncated file: SQLite rejects it, a salvage reads it.
     bytes.truncate(bytes.len() * 2 / 3);
     std::fs::write(&file, &bytes).unwrap();
     let out = lab.text("cut.session.sqlite");

@@ -1,4 +1,4 @@
-//! A recording in the published layout, made here with known clocks: two containers, a CSV in metres, a schedule.
+//! Synthetic recording in the published layout with known clocks: two containers, a CSV in metres, a schedule.
 
 use std::path::{Path, PathBuf};
 
@@ -8,11 +8,11 @@ use skinrig_protocol::Schedule;
 
 use crate::support::{Lab, SeededRandom, text};
 
-/// Camera time at the schedule's time 0, µs: what the import has to find.
+/// True camera time at the schedule's time 0, µs; the import must recover it.
 pub(crate) const OFFSET_US: [f64; 2] = [7_312_000.0, 11_905_000.0];
-/// Camera clock against the schedule's clock, parts per million.
+/// Drift of each camera clock against the schedule's clock, ppm.
 pub(crate) const DRIFT_PPM: [f64; 2] = [40.0, -25.0];
-/// Presses of the path; with three sync presses before them.
+/// Presses of the path, without the three sync presses before them.
 pub(crate) const PRESSES: usize = 12;
 
 const PERIOD_S: f64 = 1.5;
@@ -47,7 +47,7 @@ pub(crate) struct Dataset {
     pub schedule: PathBuf,
 }
 
-/// Where the path presses.
+/// Planned positions of the path.
 pub(crate) fn positions() -> Vec<Point2> {
     (0..PRESSES)
         .map(|k| Point2::new(-10.0 + 10.0 * (k / 4) as f64, -14.0 + 9.0 * (k % 4) as f64))
@@ -75,7 +75,7 @@ impl Dataset {
         }
     }
 
-    /// `import` with these files into `folder`.
+    /// Arguments of `import` for these files, with sessions in `folder`.
     pub(crate) fn arguments(&self, folder: &Path) -> Vec<String> {
         let words = [
             ("--camera1", &self.cameras[0]),
@@ -92,7 +92,7 @@ impl Dataset {
     }
 }
 
-/// A CSV in metres that ends with a row of nothing but a blank, as the published one.
+/// A CSV in metres whose last row is a single blank, like the published file.
 pub(crate) fn csv(positions: &[Point2]) -> String {
     let mut text = String::from("x,y,z\n");
     for p in positions {
@@ -101,7 +101,7 @@ pub(crate) fn csv(positions: &[Point2]) -> String {
     text + " ,,\n"
 }
 
-/// Press times and places in order. Time 0 is when the first downward motion begins, 450 ms before its press time.
+/// Press times and positions in order. Time 0 is the start of the first descent, 450 ms before its press time.
 fn schedule() -> Vec<(f64, Point2)> {
     let sync = (0..SYNC).map(|k| (0.45 + SYNC_INTERVAL_S * k as f64, CENTRE));
     let first = 0.45 + SYNC_INTERVAL_S * (SYNC - 1) as f64 + PAUSE_AFTER_SYNC_S;
@@ -109,7 +109,7 @@ fn schedule() -> Vec<(f64, Point2)> {
     sync.chain(path).collect()
 }
 
-/// What `camera` saw: a burst while the tip goes in, one of the other polarity while it leaves, and background.
+/// Events of `camera`: a burst while the tip descends, one of opposite polarity while it retracts, and background.
 pub(crate) fn events(camera: CameraId) -> Vec<CdEvent> {
     let mut random = SeededRandom(1 + u64::from(camera.number()));
     let rig = Schedule::parse("made", SCHEDULE.as_bytes(), &[])

@@ -1,5 +1,5 @@
-//! The session is moved, removed or replaced while it is recorded, or its lock file is: noticed, kept, and gone on with by the command
-//! that the program names.
+//! The session or its lock file is moved, removed or replaced while recording: the run detects it, keeps the data, and the command
+//! that it prints resumes the session.
 #![cfg(target_os = "linux")]
 
 use std::path::{Path, PathBuf};
@@ -33,7 +33,7 @@ fn count_attempts(session: &Path) -> usize {
     attempts.filter(|a| a.intent.is_some()).count()
 }
 
-/// Does `harm` to a run; it ends with 3, says `found`, and names the session at `kept`, which is sound and goes on.
+/// Applies `damage` to a run, which must exit with 3, report `found`, and name the session at `kept`, which is sound and can be resumed.
 #[track_caller]
 fn assert_recovers_after(
     damage: impl FnOnce(&Lab, &Path),
@@ -131,7 +131,7 @@ fn another_file_takes_its_place() {
     );
 }
 
-/// Without it, and with any other file in its place, a second writer is refused, and the run ends as it would have.
+/// Without the lock file, or with another file in its place, a second writer is rejected and the run ends normally.
 #[test]
 fn the_lock_file_is_removed_or_replaced() {
     for replaced in [false, true] {
@@ -146,7 +146,7 @@ fn the_lock_file_is_removed_or_replaced() {
         skinrig(&["resume", &path])
             .code(2)
             .expect_stderr(&["session is in use: another process is writing it"]);
-        // Under another name, where no lock file was ever.
+        // Under another name, which never had a lock file.
         let link = lab.path("link.session.sqlite");
         std::fs::hard_link(&session, &link).unwrap();
         assert_ne!(skinrig(&["resume", &text(&link)]).code, Some(0));
@@ -159,7 +159,7 @@ fn the_lock_file_is_removed_or_replaced() {
     }
 }
 
-/// A run that waits for its operator notices it, too.
+/// A paused run detects it too.
 #[test]
 fn a_paused_run_notices_it() {
     assert_recovers_after(

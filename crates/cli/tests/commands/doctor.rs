@@ -1,4 +1,4 @@
-//! The doctor over stand-ins for hardware whose cables and rights are not as they should be. Emulated.
+//! `skinrig doctor` on emulated hardware with wrong cables or permissions.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ fn camera(serial: &str, change: impl FnOnce(&mut Evk1Config)) -> DeviceConfig {
     camera.into()
 }
 
-/// What the doctor says of these devices, and its exit code.
+/// Report of the doctor on these devices, and its exit code.
 fn doctor(cameras: Vec<DeviceConfig>, fault: Option<Fault>) -> (Value, Option<i32>) {
     let bus = Bus::start(&BusConfig { devices: cameras }).unwrap();
     let arm = EmulatedArm::spawn(&ArmConfig {
@@ -73,7 +73,7 @@ fn a_slow_camera_a_forbidden_one_and_a_robot_without_a_cable_are_told_apart() {
         verdict == "problem" && next.contains("USB 3 cable"),
         "{report:#}"
     );
-    // Nobody may ask the other one, not even whether it is camera 2.
+    // The other camera cannot be opened, so it is unknown whether it is camera 2.
     let (verdict, next) = find_check(&report, "permissions", "camera at bus 1 device 3");
     assert!(
         verdict == "problem" && next.contains("70-skinrig.rules"),

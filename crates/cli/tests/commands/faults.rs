@@ -1,4 +1,4 @@
-//! Faults on purpose: told wherever the session is, refused on a bench, their effects in the exit code.
+//! Injected faults: shown with the session everywhere, rejected on a bench, and reflected in the exit code.
 
 use crate::support::{Lab, SMALL, files, only, program, run_to_end, show, skinrig, text};
 
@@ -77,7 +77,7 @@ fn a_full_disk_keeps_what_was_written() {
     .expect_stderr(&["disk is full", "disk space", "skinrig resume"]);
     let session = only(&folder, ".session.sqlite");
     assert_eq!(show(&session)["totals"]["presses"]["valid"], 2);
-    // The place is there again: the rest follows, and the name stays.
+    // With space available again the remaining presses follow under the same name.
     skinrig(&["resume", &text(&session)]).code(0);
     let shown = show(&session);
     assert_eq!(shown["totals"]["presses"]["valid"], 8);
@@ -89,7 +89,7 @@ fn a_full_disk_keeps_what_was_written() {
     );
 }
 
-/// A robot whose reported height is off by half a millimetre, in a run with presses of this depth: what the run says.
+/// Runs presses of this depth, with a fault that shifts the reported height by 0.5 mm if given; returns the output.
 fn with_height_off(fault: Option<&str>, depth: &str, code: i32) -> String {
     let lab = Lab::new();
     let folder = text(&lab.path("a"));

@@ -1,4 +1,4 @@
-//! A suite of checks as a laboratory meets it: what is refused before it begins, a bench that is not there, and who holds one.
+//! `skinrig hil` from the command line: input rejected before the start, an absent bench, and lease holders.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use crate::support::{Lab, ProgramOutput, files, program, run_to_end, text};
 const EMULATED: &str = "hil/rigs/emulated.yaml";
 const NIGHTLY: &str = "hil/nightly.yaml";
 
-/// The program on an emulated bench that is not there, with leases in this folder.
+/// Runs the program with an absent emulated bench and leases in this folder.
 fn without_bench(leases: &Path, arguments: &[&str]) -> ProgramOutput {
     let mut command = program(arguments);
     command
@@ -109,7 +109,7 @@ fn a_bench_that_is_not_there_is_a_matter_of_cables_and_the_night_is_kept() {
     );
     let identity = &night["checks"][0];
     assert_eq!(identity["cause"], "infrastructure");
-    // A third attempt could not make it good any more.
+    // A third attempt could no longer reach two passes.
     assert_eq!(identity["attempts"].as_array().unwrap().len(), 2);
     let junit = std::fs::read_to_string(folder.join("junit.xml")).unwrap();
     let error = junit.lines().find(|line| line.contains("<error "));
@@ -155,7 +155,7 @@ fn a_bench_has_one_holder_whichever_command_asks() {
         ]);
     }
     assert!(files(&lab.path("out"), "").is_empty());
-    // Whoever only asks what is there does not reset the holder's box.
+    // Listing devices must not reset the lease holder's box.
     let asked = || {
         let listed = without_bench(&leases, &["devices", "--rig", EMULATED, "--json"]).code(0);
         let lines = listed.json()["devices"].as_array().unwrap().clone();

@@ -1,4 +1,4 @@
-//! Files that are not what they should be are refused by name and row, and leave no session that claims to be whole.
+//! Invalid files are rejected by name and row, and leave no session that claims to be complete.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use crate::dataset::{Dataset, csv, events, positions};
 use crate::support::{Lab, ProgramOutput, files, only, show, skinrig, text};
 use skinrig_model::CameraId;
 
-/// Runs the import and asserts its exit code, that it says all of `parts`, and that nothing looks completed.
+/// Runs the import; asserts exit code, all `parts` on standard error, and no completed session.
 #[track_caller]
 fn assert_refused(lab: &Lab, data: &Dataset, code: i32, parts: &[&str]) -> ProgramOutput {
     let folder = lab.path("s");
@@ -19,7 +19,7 @@ fn assert_refused(lab: &Lab, data: &Dataset, code: i32, parts: &[&str]) -> Progr
     said
 }
 
-/// Replaces the only occurrence of `old` in a file by as many bytes.
+/// Replaces the only occurrence of `old` in a file by the same number of bytes.
 #[track_caller]
 fn patch(path: &Path, old: &[u8], new: &[u8]) {
     let mut bytes = std::fs::read(path).unwrap();
@@ -36,7 +36,7 @@ fn patch(path: &Path, old: &[u8], new: &[u8]) {
     std::fs::write(path, bytes).unwrap();
 }
 
-/// The time in row `row` of camera 2 as the file has it.
+/// Stored time in row `row` of camera 2's file.
 fn stored_time(row: usize) -> [u8; 8] {
     (events(CameraId::Two)[row].t_us as f64 / 1e6).to_le_bytes()
 }
@@ -122,7 +122,7 @@ fn a_time_that_is_no_number_and_one_that_goes_back() {
         said.err.contains("kept"),
         "says that a part is kept: {said:?}"
     );
-    // What came before is kept, and called what it is.
+    // The events before are kept and reported as partial.
     let sessions = files(&lab.path("s"), ".session.sqlite");
     assert_eq!(sessions.len(), 1);
     let shown = show(&sessions[0]);

@@ -1,18 +1,18 @@
-//! The packages: installed into an empty root, the program needs no checkout.
+//! Packages: installed into an empty root, the program needs no checkout.
 
 use std::path::Path;
 use std::process::Command;
 
 use crate::support::{Lab, ROOT, files, only, run_to_end};
 
-/// Runs a tool and asserts that it ends well.
+/// Runs a tool and asserts exit code 0.
 fn run_tool(name: &str, arguments: &[&str]) {
     let mut command = Command::new(name);
     command.args(arguments);
     run_to_end(command).code(0);
 }
 
-/// The installed program in `folder`, which sees nothing of this checkout.
+/// Output of the installed program in `folder`, without access to this checkout.
 fn installed(root: &Path, folder: &Path, arguments: &[&str]) -> String {
     let mut command = Command::new(root.join("bin/skinrig"));
     command
@@ -59,7 +59,7 @@ fn packages_hold_all_that_a_lab_needs() {
         "{printed}"
     );
     let folder = lab.path("lab");
-    // The demo without most of its presses: the test is about where files come from.
+    // The demo with few presses: only the origin of files matters here.
     let short = [
         "run",
         "protocols/demo.yaml",
@@ -73,7 +73,7 @@ fn packages_hold_all_that_a_lab_needs() {
     assert_eq!(files(&folder.join("sessions"), ".report.html").len(), 1);
     installed(root, &folder, &["verify", session.to_str().unwrap()]);
 
-    // Where Debian's tool is, the .deb has the same program and what its computers need besides.
+    // Where dpkg-deb exists, the .deb contains the same program and the Debian-specific files.
     let Some(deb) = files(Path::new(&out), ".deb").pop() else {
         return;
     };

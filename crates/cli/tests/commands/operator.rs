@@ -1,4 +1,4 @@
-//! The operator at another terminal: status, notes, pause, resume, stop; runs that were killed; files that nobody runs.
+//! Commands from another terminal: status, notes, pause, resume, stop; killed runs; sessions without a run.
 #![cfg(unix)]
 
 use std::path::{Path, PathBuf};
@@ -30,13 +30,13 @@ fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
     let run = LiveRun::new(&lab.path("s"));
     let session = only(&lab.path("s"), ".session.sqlite");
     assert!(socket_of(&session).exists());
-    // The first press that is told of may be a sync press, which is not counted as done.
+    // The first reported press may be a sync press, which does not count as done.
     let patience = Instant::now() + Duration::from_secs(60);
     while status(&session)["live"]["done"].as_u64() == Some(0) {
         assert!(Instant::now() < patience, "no press was made");
     }
 
-    // Two readers at once, one by the folder.
+    // Two readers at once, one of which names the folder.
     let ask = |place: &str| {
         let mut reader = program(&["status", place, "--json"]);
         let piped = reader.stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -79,7 +79,7 @@ fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
         "Ann",
     ];
     assert!(skinrig(&note).code(0).out.contains("noted"));
-    // Nobody hurries a pause.
+    // A pause has no time limit.
     let said = skinrig(&["control", &text(&session), "pause", "--wait", "1 s"]);
     assert!(said.code(0).out.contains("the run is paused"));
 
@@ -93,7 +93,7 @@ fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
     let (code, messages) = run.end();
     assert_eq!(code, Some(5), "{messages}");
 
-    // The session tells all of it, nobody runs it, and it changes no more.
+    // The session lists all requests, has no run, and stays unchanged.
     let before = sha256(&std::fs::read(&session).unwrap());
     let ended = status(&lab.path("s"));
     assert_eq!(kinds(&ended), ["pause_now", "resume", "stop"], "{ended}");
@@ -147,7 +147,7 @@ fn a_killed_run_is_told_from_a_running_one_and_its_socket_is_replaced() {
         refused.expect_stderr(&["no program is running", "skinrig resume"]);
     }
 
-    // The next leg listens again, and says so.
+    // The next leg opens its control socket again and reports it.
     let again = ["resume", &text(&session), "--real-time", "--no-analysis"];
     let mut leg = program(&again);
     let mut leg = leg

@@ -1,4 +1,4 @@
-//! Overrides, limits, folders that cannot be written, names that are taken.
+//! Overrides, limits, unwritable folders, existing names.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -52,7 +52,7 @@ fn an_override_changes_the_plan_and_is_stored_with_the_base_text() {
         shown.contains("--set depth=1 mm") && shown.contains("depth: 1.5 mm"),
         "{shown}"
     );
-    // The plan that ran is the plan that was shown before.
+    // The executed plan equals the plan shown before.
     let planned = skinrig(&["plan", "--json", SMALL]).code(0).json();
     assert_eq!(planned["sha256"], base["plan_sha256"]);
 }
@@ -111,7 +111,7 @@ fn the_plan_is_drawn_and_printed_step_by_step() {
         drawn.starts_with("<svg") || drawn.starts_with("<?xml"),
         "{drawn}"
     );
-    // Numbered: the last of four places carries its number.
+    // Numbered: the last of four locations shows its number.
     assert!(drawn.contains(">4<"), "{drawn}");
     skinrig(&["plan", SMALL, "--svg", &lab.text("no/such/folder.svg")])
         .code(1)
@@ -146,7 +146,7 @@ fn a_limit_that_is_not_met_ends_with_code_4_and_keeps_the_results() {
             .code(2)
             .expect_stderr(&["--max-rmse"]);
     }
-    // Nothing located is not a limit that was met.
+    // A limit is not met when no press is located.
     skinrig(&[
         "run",
         SMALL,
@@ -206,7 +206,7 @@ fn a_folder_that_cannot_be_written_ends_with_code_1_and_a_next_step() {
     let mut permissions = std::fs::metadata(&locked).unwrap().permissions();
     permissions.set_readonly(true);
     std::fs::set_permissions(&locked, permissions).unwrap();
-    // To the administrator a folder without rights is no obstacle; a file system of the kernel is.
+    // Root can write to any folder without permissions, but not to a kernel file system.
     let kernel = Path::new("/sys/kernel").to_owned();
     let refusing = [locked, kernel]
         .into_iter()

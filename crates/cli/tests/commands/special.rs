@@ -1,4 +1,4 @@
-//! Where a file is expected, a pipe, a device and a folder are refused at once and by name, by every command that reads one.
+//! Every command that reads a file rejects pipes, devices and folders at once, by name.
 
 use std::process::{Command, Output, Stdio};
 use std::sync::mpsc::channel;
@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::support::{Lab, ROOT, SMALL, program};
 
-/// Every way to name a file to be read; `?` stands for it.
+/// Every command line that reads a file, marked `?`.
 const READING: [&str; 32] = [
     "check ?",
     "plan ?",
@@ -42,7 +42,7 @@ const READING: [&str; 32] = [
     "inspect --json ?",
 ];
 
-/// What a command says; `None` when it does not come back. What hangs is ended.
+/// Output of a command; `None` if it hangs and had to be killed.
 fn run_with_timeout(arguments: &[&str]) -> Option<Output> {
     let child = program(arguments)
         .stdin(Stdio::null())

@@ -1,4 +1,4 @@
-//! `skinrig new` and `skinrig init`: what a lab begins with, in a folder that knows no checkout.
+//! `skinrig new` and `skinrig init` in a folder outside any checkout.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ const KINDS: [&str; 9] = [
     "demo",
 ];
 
-/// The program started in `folder`.
+/// Runs the program in `folder`.
 fn at(folder: &Path, arguments: &[&str]) -> ProgramOutput {
     let mut command = program(arguments);
     command.current_dir(folder);
@@ -75,7 +75,7 @@ fn a_new_lab_runs_and_keeps_what_is_its_own() {
         .expect_stderr(&["next:"]);
 }
 
-/// Without `scene`, the summary says what was taken; a skin of its own needs the level that models skins.
+/// Without `scene` the summary names the chosen level; a custom skin needs the level that models skins.
 #[test]
 fn a_scene_is_optional_and_says_what_it_took() {
     let lab = Lab::new();

@@ -1,4 +1,4 @@
-//! The bench for hours, under full load of the processors: presses by the thousand, nights in a row. Made by hand; sizes come from
+//! Endurance of the bench under full processor load: thousands of presses, nights in a row. Started by hand; sizes come from
 //! the environment.
 
 use std::env;
@@ -14,7 +14,7 @@ use skinrig_recorder::SessionReader;
 
 use super::{SKINRIG, all_output, workspace_root};
 
-/// Presses on a skin whose places are near one another, as fast as the stand-in's arm can make them.
+/// Presses at closely spaced locations, as fast as the emulated arm can move.
 const PROTOCOL: &str = "\
 skinrig: 1
 name: endurance
@@ -35,14 +35,14 @@ limits:
 triggers: {marks: [contact, retract]}
 evaluation: {calibrate: [1], score: [2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30]}
 ";
-/// Presses of a run, with those that synchronise.
+/// Presses of a run, sync presses included.
 const PRESSES: usize = 303;
 
 fn env_size(name: &str, default: usize) -> usize {
     env::var(name).map_or(default, |text| text.parse().unwrap())
 }
 
-/// What keeps the processors busy at a lower priority, until it is dropped.
+/// Low-priority processes that keep all processors busy until dropped.
 struct CpuLoad(Vec<Child>);
 
 impl CpuLoad {
@@ -66,12 +66,12 @@ impl Drop for CpuLoad {
     }
 }
 
-/// What became of the presses of one bench.
+/// Outcome of the presses of one bench.
 #[derive(Debug, Default)]
 struct Tally {
     presses: usize,
     refused: usize,
-    /// Runs that ended early, and how.
+    /// Last messages of each run that ended early.
     ended: Vec<String>,
 }
 

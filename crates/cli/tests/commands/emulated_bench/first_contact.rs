@@ -1,4 +1,4 @@
-//! Steps 14 to 21 of docs/how-to/bench.md, as printed, on the emulated bench. Emulated; nobody has seen them on hardware.
+//! Steps 14 to 21 of docs/how-to/bench.md on the emulated bench. Never run on hardware.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -13,12 +13,12 @@ use skinrig_emulated_bench::{EmulatedBench, Fault, When};
 use super::{start, workspace_root};
 
 const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
-/// So long an answer may take that has to come; nothing waits longer than it must.
+/// Upper limit for waiting on an answer; waits end as soon as it arrives.
 const PATIENCE: Duration = Duration::from_secs(60);
-/// How far the tip of the stand-in may be from where it was sent, mm.
+/// Maximum distance of the emulated tip from its target, mm.
 const NEAR_MM: f64 = 0.15;
 
-/// A jog under way, its standard input a pipe.
+/// A running `skinrig jog` with a pipe as standard input.
 struct Jog {
     child: Child,
     orders: Option<ChildStdin>,
@@ -27,7 +27,7 @@ struct Jog {
 }
 
 impl Jog {
-    /// `skinrig jog --rig FILE`, up to its first lines.
+    /// Starts `skinrig jog --rig FILE`.
     fn start(bench: &EmulatedBench, rig: &Path, log: &Path) -> Self {
         let mut command = bench.command(SKINRIG).unwrap();
         command
@@ -58,7 +58,7 @@ impl Jog {
         writeln!(self.orders.as_mut().unwrap(), "{order}").unwrap();
     }
 
-    /// The next line that begins so.
+    /// Waits for the next line that starts with `beginning`.
     fn wait_for_line(&mut self, beginning: &str) -> String {
         loop {
             let line = self.lines.recv_timeout(PATIENCE);
@@ -80,7 +80,7 @@ impl Jog {
         format!("{}{errors}", self.printed)
     }
 
-    /// Gives an order and returns where the tip then is by the robot, mm.
+    /// Sends an order and returns the tip position that the robot then reports, mm.
     fn position_after(&mut self, order: &str) -> [f64; 3] {
         self.send(order);
         let line = self.wait_for_line("at ");
@@ -90,7 +90,7 @@ impl Jog {
         numbers.try_into().unwrap()
     }
 
-    /// The end: exit code, and everything said.
+    /// Waits for the exit; returns exit code and all output.
     fn end(mut self) -> (Option<i32>, String) {
         let rest = self.close_and_read();
         let code = self.child.wait().unwrap().code();
@@ -99,7 +99,7 @@ impl Jog {
     }
 }
 
-/// The bench, and the copy of its rig file that the steps edit.
+/// The bench and the copy of its rig file that the steps edit.
 struct Steps {
     bench: EmulatedBench,
     folder: tempfile::TempDir,
@@ -111,7 +111,7 @@ impl Steps {
         self.folder.path().join("NAME.yaml")
     }
 
-    /// Step 14: limits about where the arm is, in the middle of its reach.
+    /// Step 14: limits around the arm's position in the middle of its reach.
     fn write_rig(&self, max_force: &str, gravity_ratio: &str) {
         let text = fs::read_to_string(workspace_root().join("hil/rigs/emulated.yaml")).unwrap();
         let workspace = "workspace: {min: [-70 mm, -70 mm, -30 mm], max: [70 mm, 70 mm, 40 mm]}";
@@ -140,7 +140,7 @@ impl Steps {
         Jog::start(&self.bench, &self.rig(), &log)
     }
 
-    /// Puts the arm into the middle by hand.
+    /// Places the arm in the middle of its reach, as if by hand, without faults.
     fn center_arm(&self) {
         self.bench.arm().clear_faults().unwrap();
         self.bench.arm().place([0.01, 0.0, 0.01]).unwrap();
@@ -164,7 +164,7 @@ impl Steps {
             .map(|m| 1e3 * m)
     }
 
-    /// A jog in the middle of a slow way up.
+    /// Starts a jog and returns while it rises slowly.
     fn start_slow_rise(&mut self) -> Jog {
         self.center_arm();
         let mut jog = self.jog();
@@ -195,7 +195,7 @@ fn the_steps_of_a_first_contact_show_what_they_must() {
     a_hand(&mut steps);
 }
 
-/// Step 14: with 1 N this arm does not hold, jog says what to do, and that works.
+/// Step 14: this arm cannot hold itself with 1 N; following jog's advice fixes it.
 fn the_share_of_gravity(steps: &mut Steps) {
     steps.center_arm();
     steps.write_rig("1 N", "0");
@@ -211,7 +211,7 @@ fn the_share_of_gravity(steps: &mut Steps) {
     let note = jog.wait_for_line("note ");
     let (_, ratio) = note.split_once("gravity_ratio ").unwrap();
     let ratio: f64 = ratio.split_once(' ').unwrap().0.parse().unwrap();
-    // The stand-in carries 0.115 kg by itself, of the 0.12 kg that it has to.
+    // The emulated arm compensates 0.115 kg of its 0.12 kg.
     assert!((0.08..0.11).contains(&ratio), "{note}");
     let (code, said) = jog.end();
     assert_eq!(code, Some(0), "{said}");
@@ -268,7 +268,7 @@ fn button_and_cable(steps: &mut Steps) {
         assert_eq!(code, Some(3), "{said}");
         assert!(said.contains(words), "{words}: {said}");
         if fault == Fault::Button {
-            // The next press of it allows forces again.
+            // Pressing the button again re-enables forces.
             steps.bench.arm().inject(When::Now, Fault::Button).unwrap();
         }
     }

@@ -1,4 +1,4 @@
-//! The emulated bench, end to end and in real time: production drivers over stand-ins for the hardware.
+//! The emulated bench end to end in real time: production drivers over emulated hardware.
 
 mod endurance;
 mod first_contact;
@@ -15,10 +15,10 @@ use skinrig_emulated_bench::{BenchConfig, BenchError, EmulatedBench};
 pub(crate) use slot::Slot;
 
 const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
-/// Of the cameras' true geometry and their noise; the simulated bench takes it too.
+/// Seed of the cameras' true geometry and noise, also for the simulated run.
 const SEED: u64 = 1;
 
-/// A bench; `None`, and why on standard error, on a machine that can have none.
+/// Starts a bench; `None`, with the reason on standard error, where it cannot run.
 fn start() -> Option<(Slot, EmulatedBench)> {
     let slot = Slot::wait();
     let bench = EmulatedBench::start(&BenchConfig {
@@ -64,9 +64,9 @@ fn run(mut command: Command, rig: &[&str], sessions: &Path) -> Output {
     command.output().unwrap()
 }
 
-/// Runs on the emulated bench. A machine that leaves the robot's thread waiting for a tenth of a second, or the serial line
-/// so long that the host's clock is not known, gets the answer that a lab would want: a safe end, or an invalid session.
-/// It may try again.
+/// Runs on the emulated bench, up to four times. A machine that delays the robot's thread by a tenth of a second, or the serial
+/// line until the host's clock is unknown, correctly gets a safe end or an invalid session;
+/// the run is then repeated.
 fn run_in_real_time(bench: &EmulatedBench, sessions: &Path) -> (PathBuf, String) {
     let rig = ["--rig", "hil/rigs/emulated.yaml"];
     for attempt in 1.. {
@@ -140,7 +140,7 @@ fn the_quick_check_on_the_emulated_bench_agrees_with_the_simulated_one() {
                 .as_f64()
                 .unwrap_or_else(|| panic!("{metric}: no {what}"))
         };
-        // Either has its own contacts, drawn from its own seed: their intervals meet.
+        // Both draw their own contacts, so only their intervals overlap.
         let [bench, sim] = [&bench, &sim].map(|r| (of(r, "low"), of(r, "high")));
         assert!(
             bench.0 <= sim.1 && sim.0 <= bench.1,

@@ -1,5 +1,5 @@
-//! A camera that is not as expected, end to end on the emulated bench: refused, let pass once and told, then accepted by the lines that
-//! were proposed. Emulated; which of it a healthy camera shows nobody has seen.
+//! A camera with unexpected behaviour, end to end on the emulated bench: rejected, tolerated once and reported, then accepted by the
+//! proposed rig file lines. Whether a healthy camera behaves like this is unknown.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
 /// The register of `bias_diff_on`.
 const BIAS: u32 = 0x0350;
 
-/// The emulated bench's rig file, with a bias that camera 2 does not take, and with `more` lines for that camera.
+/// Rig file of the emulated bench with a bias that camera 2 rejects, and `more` lines for that camera.
 fn rig(folder: &Path, more: &str) -> PathBuf {
     let text = fs::read_to_string(workspace_root().join("hil/rigs/emulated.yaml")).unwrap();
     let serial = format!("    serial: \"{}\"\n", CAMERA_SERIALS[1]);
@@ -45,7 +45,7 @@ fn skinrig(bench: &EmulatedBench, arguments: &[&str]) -> Output {
     command.output().unwrap()
 }
 
-/// True once a press of the session that is being written in `sessions` has ended.
+/// True once a press of the session being recorded in `sessions` has an outcome.
 fn has_an_outcome(sessions: &Path) -> bool {
     let files = fs::read_dir(sessions).into_iter().flatten().flatten();
     let named = files.map(|file| file.path());
@@ -84,7 +84,7 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
         (skinrig(&bench, &arguments), sessions)
     };
 
-    // As it is: refused before anything moves, with the way on.
+    // Default: rejected before any motion, with the next step.
     let (refused, _) = run(&strict, "refused", &[]);
     assert_eq!(refused.status.code(), Some(3), "{}", all_output(&refused));
     assert!(
@@ -93,7 +93,7 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
         all_output(&refused)
     );
 
-    // Let pass once; a transfer fails in between.
+    // Tolerated once; a transfer fails during the run.
     order(Order::BreakTransfer(60));
     let (tolerant, sessions) = run(&strict, "tolerant", &["--tolerant"]);
     let printed = all_output(&tolerant);
@@ -113,7 +113,7 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
         failed_transfers: loss
     "#);
 
-    // The session says that it was recorded so: in its header, with the device, in a note, before the run.
+    // The session states it in its header, with the device, in a note and in the preflight.
     let session = only_file(&sessions, ".session.sqlite");
     let reader = SessionReader::open(&session).unwrap();
     let name = reader.header().unwrap().rig_name;
@@ -138,7 +138,7 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
         all_output(&shown)
     );
 
-    // A later leg needs leave of its own: without it the session is refused, with it the presses that are open are made.
+    // A further leg needs its own `--tolerant`: without it resuming is rejected, with it the open presses are taken.
     let sessions = folder.join("killed");
     let mut command = bench.command(SKINRIG).unwrap();
     command
@@ -177,7 +177,7 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
         |o: &Option<PressOutcome>| o.as_ref().is_some_and(|o| o.verdict == PressVerdict::Valid);
     assert!(outcomes.iter().all(valid), "{outcomes:?}");
 
-    // At night every check opens the cameras, and what was accepted is a difference that `settings` counts: never a good night.
+    // In a night every check opens the cameras; `settings` counts accepted mismatches as differences, so the night is never good.
     let nights = folder.join("nights");
     let mut arguments = vec![
         "hil",
@@ -199,7 +199,7 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
     assert_eq!(camera2["value"], 3.0, "{settings:#}");
     assert_ne!(night.status.code(), Some(0), "{}", all_output(&night));
 
-    // The lines in the rig file: opened without a word, transfers that fail included.
+    // With the lines in the rig file: opened without a warning, failing transfers included.
     let accepting = rig(folder, &lines);
     order(Order::BreakTransfer(60));
     let (accepted, sessions) = run(&accepting, "accepted", &[]);

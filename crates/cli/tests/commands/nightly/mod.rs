@@ -18,7 +18,7 @@ use crate::emulated_bench::Slot;
 const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
 const RIG: &str = include_str!("../../../../../hil/rigs/emulated.yaml");
 
-/// What the checks are made with here: short, never repeated.
+/// Suite of these tests: short checks without repeats.
 const SUITE: &str = "\
 skinrig_suite: 1
 name: planted
@@ -41,14 +41,14 @@ checks:
   stop_drill: {stopped_within: {at_most: 1 s}, distance: {at_most: 10 mm}}
 ";
 
-/// The bench and where its nights go.
+/// A bench and the folder of its nights.
 struct Nights {
     bench: EmulatedBench,
     _slot: Slot,
     folder: tempfile::TempDir,
 }
 
-/// How a night ended.
+/// Result of a night.
 struct NightResult {
     exit: i32,
     night: Value,
@@ -90,12 +90,12 @@ impl NightResult {
         assert_eq!(self.exit, exit, "{all}");
     }
 
-    /// The value of a metric on a device.
+    /// Value of a metric of a device.
     fn value(&self, name: &str, subject: &str, metric: &str) -> Option<f64> {
         self.find_measurement(name, subject, metric)?["value"].as_f64()
     }
 
-    /// The verdict on a metric of a device.
+    /// Verdict on a metric of a device.
     fn metric_verdict(&self, name: &str, subject: &str, metric: &str) -> &str {
         let measured = self.find_measurement(name, subject, metric);
         let verdict = measured.and_then(|m| m["verdict"].as_str());
@@ -132,7 +132,7 @@ impl Nights {
         })
     }
 
-    /// Makes these checks of the suite.
+    /// Runs these checks of the suite.
     fn night(&self, only: &str) -> NightResult {
         self.night_in(only, &self.folder.path().join("nights"))
     }
@@ -162,14 +162,14 @@ impl Nights {
         fs::write(self.folder.path().join("rig.yaml"), text).unwrap();
     }
 
-    /// Replaces a piece of the rig file as it is now.
+    /// Replaces text in the current rig file.
     fn edit_rig(&self, from: &str, to: &str) {
         let text = fs::read_to_string(self.folder.path().join("rig.yaml")).unwrap();
         assert!(text.contains(from), "{from}");
         self.write_rig(&text.replace(from, to));
     }
 
-    /// Lets the lamps' program for the dark be this one, which touches nothing.
+    /// Replaces the program that switches the lamps off with this one, which switches nothing.
     fn lamps_obey(&self, program: &str) {
         let text = fs::read_to_string(self.folder.path().join("rig.yaml")).unwrap();
         let line = text
@@ -189,7 +189,7 @@ impl Nights {
     }
 }
 
-/// A tiny disk, unmounted with this value; `None` where that is not allowed.
+/// A tiny disk, unmounted on drop.
 struct TinyDisk(PathBuf);
 
 impl TinyDisk {
@@ -218,7 +218,7 @@ fn a_healthy_bench_passes() {
     let all = "identity,settings,disk,trigger_loopback,noise_dark,noise_lit,test_pattern,robot_state,repeatability,step_response,depth,force_ceiling,\
                watchdog_drill,stop_drill";
     let mut seen = nights.night(all);
-    // A machine too busy to run the emulated devices in time says so, and is asked again.
+    // A machine too busy for the emulated devices reports infrastructure: try again.
     for _ in 0..2 {
         let checks = seen.night["checks"].as_array().unwrap();
         if !checks.iter().any(|c| c["cause"] == "infrastructure") {
@@ -232,7 +232,7 @@ fn a_healthy_bench_passes() {
         assert_eq!(verdict, "PASS", "{:#}\n{}", seen.check(name), seen.stderr);
     }
     assert_eq!(seen.exit, 0, "{}", seen.stderr);
-    // A touch is told at 0.2 N, which this skin of 500 N/m gives 0.4 mm deep.
+    // A touch registers at 0.2 N: 0.4 mm deep in this skin of 500 N/m.
     let surface_mm = seen.value("depth", "robot", "surface").unwrap();
     assert!((0.2..0.6).contains(&surface_mm), "{surface_mm}");
     let peak_n = seen.value("force_ceiling", "robot", "peak").unwrap();
@@ -243,7 +243,7 @@ fn a_healthy_bench_passes() {
     );
 }
 
-/// Limits that are broken by devices that answer as they should: nothing explains them, so the rig is to be looked at.
+/// Broken limits without evidence point at the rig.
 #[test]
 fn broken_limits_that_nothing_explains_are_the_rig_s() {
     let Some(nights) = Nights::start() else {
@@ -256,7 +256,7 @@ fn broken_limits_that_nothing_explains_are_the_rig_s() {
     let seen = nights.night("noise_dark,noise_lit,step_response");
     let metric_verdict = |check, subject, metric| seen.metric_verdict(check, subject, metric);
     for camera in ["camera1", "camera2"] {
-        // It is as light as before.
+        // The lamps stayed on.
         assert_eq!(metric_verdict("noise_dark", camera, "rate"), "FAIL");
     }
     assert_eq!(metric_verdict("noise_lit", "camera1", "hot_pixels"), "FAIL");

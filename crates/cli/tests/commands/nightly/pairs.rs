@@ -1,4 +1,4 @@
-//! Two faults at once: whatever else is wrong, none of them passes, and each is told by its own cause.
+//! Two faults at once: neither passes, and each is reported with its own cause.
 
 use std::collections::BTreeSet;
 use std::time::Instant;
@@ -9,18 +9,18 @@ use skinrig_model::CameraId;
 
 use super::{NightResult, Nights};
 
-/// How a fault shows in a night, when no other one hides it.
+/// A fault and its symptom in a night, unless another fault hides it.
 pub(super) struct FaultCase {
-    /// As in the list of docs/reference/nightly.md.
+    /// Name in the list of docs/reference/nightly.md.
     pub name: &'static str,
     plant: fn(&mut Nights),
     /// The check that finds it.
     check: &'static str,
-    /// What that check says: evidence of this kind about this device; `None`: a broken limit of this metric and device alone.
+    /// Symptom in that check.
     shows: Symptom,
-    /// Other devices of which evidence may speak besides: what is measured with them needs this one.
+    /// Other devices that evidence may name, because measuring them needs this one.
     also: &'static [&'static str],
-    /// Faults that cannot be seen beside this one.
+    /// Faults that this one hides.
     hides: &'static [&'static str],
 }
 
@@ -54,7 +54,7 @@ const fn absent(subject: &'static str) -> Symptom {
     }
 }
 
-/// Faults of the arm that leave nothing of it to measure.
+/// Faults of the arm, hidden by those that prevent measuring it.
 const ARM: &[&str] = &[
     "joints rub",
     "frame too low",
@@ -75,7 +75,7 @@ pub(super) const FAULTS: &[FaultCase] = &[
     FaultCase {
         name: "register of camera 1 stuck",
         plant: |n| {
-            // Its generator keeps the default, and the rig file asks for another value.
+            // The bias keeps its default, and the rig file requests another value.
             n.edit_rig(
                 "    serial: \"00000001\"\n",
                 "    serial: \"00000001\"\n    biases: {bias_diff_on: 400}\n",
@@ -85,7 +85,7 @@ pub(super) const FAULTS: &[FaultCase] = &[
         check: "settings",
         shows: rig_evidence("read_back", "camera1"),
         also: &[],
-        // A camera that cannot be set up measures nothing.
+        // A camera that cannot be configured measures nothing.
         hides: &["hot pixels in camera 1", "wire of camera 1 leaky"],
     },
     FaultCase {
@@ -183,7 +183,7 @@ pub(super) const FAULTS: &[FaultCase] = &[
     },
     FaultCase {
         name: "frame too low",
-        // The surface is found 0.7 mm above where the file puts it.
+        // The surface is found 0.7 mm above its position in the file.
         plant: |n| n.edit_rig("-2 mm, -20 mm]", "-2 mm, -21.1 mm]"),
         check: "depth",
         shows: Limit {
@@ -243,12 +243,12 @@ pub(super) fn pairs_in_order() -> Vec<[&'static FaultCase; 2]> {
     (0..FAULTS.len()).flat_map(with).collect()
 }
 
-/// The pair of these names.
+/// The two faults with these names.
 pub(super) fn pair_by_name(names: [&str; 2]) -> [&'static FaultCase; 2] {
     names.map(|name| FAULTS.iter().find(|f| f.name == name).unwrap())
 }
 
-/// Plants two faults into a fresh bench, makes the checks that find them, and says what is wrong with the night.
+/// Injects two faults into a fresh bench and runs the checks that find them. `Err` lists problems of the night, `None` without a bench.
 pub(super) fn run_pair([a, b]: [&FaultCase; 2]) -> Option<Result<String, String>> {
     let mut nights = Nights::start()?;
     let began = Instant::now();
@@ -259,7 +259,7 @@ pub(super) fn run_pair([a, b]: [&FaultCase; 2]) -> Option<Result<String, String>
     if b.check != a.check {
         only.push(b.check);
     }
-    // The arm is not moved without these.
+    // Checks that move the arm need `robot_state`.
     if ["repeatability", "step_response", "depth"]
         .iter()
         .any(|c| only.contains(c))
@@ -281,7 +281,7 @@ pub(super) fn run_pair([a, b]: [&FaultCase; 2]) -> Option<Result<String, String>
     })
 }
 
-/// What the night says and should not, or the other way round.
+/// Unexpected or missing statements of the night.
 fn find_problems(a: &FaultCase, b: &FaultCase, night: &NightResult) -> Vec<String> {
     let mut wrong = Vec::new();
     let verdict = &night.night["verdict"];
@@ -292,13 +292,13 @@ fn find_problems(a: &FaultCase, b: &FaultCase, night: &NightResult) -> Vec<Strin
         if !other.hides.contains(&fault.name) {
             wrong.extend(missing_symptom(fault, night));
         }
-        // Also a check that cannot show its fault must not call the bench good.
+        // Even a check whose fault is hidden must not pass.
         let verdict = &night.check(fault.check)["verdict"];
         if verdict == "PASS" || verdict == "MARGINAL" {
             wrong.push(format!("{}: {} is {verdict}", fault.name, fault.check));
         }
     }
-    // Nobody is blamed who is well.
+    // No healthy device is blamed.
     let mut guilty: BTreeSet<&str> = BTreeSet::from(["computer"]);
     for fault in [a, b] {
         guilty.extend(fault.also);
@@ -314,7 +314,7 @@ fn find_problems(a: &FaultCase, b: &FaultCase, night: &NightResult) -> Vec<Strin
     wrong
 }
 
-/// What is missing of a fault that should be seen.
+/// Missing part of a symptom that should be visible.
 fn missing_symptom(fault: &FaultCase, night: &NightResult) -> Option<String> {
     let check = night.check(fault.check);
     let name = fault.name;
@@ -326,7 +326,7 @@ fn missing_symptom(fault: &FaultCase, night: &NightResult) -> Option<String> {
         } => {
             let there = evidence([check])
                 .any(|e| (kind.is_empty() || e["kind"] == kind) && e["subject"] == subject);
-            // Of two equally bad causes of a check the one that is not the infrastructure is told.
+            // Of two equally bad causes the one that is not infrastructure is reported.
             let named_cause = check["cause"].as_str().unwrap_or("none");
             let fits = named_cause == cause || named_cause == "rig";
             (!there || !fits)
@@ -348,7 +348,7 @@ fn evidence<'a>(checks: impl IntoIterator<Item = &'a Value>) -> impl Iterator<It
     attempts.flat_map(|a| a["evidence"].as_array().unwrap())
 }
 
-/// A sample: every fault once that the other nights of this program do not plant.
+/// Sample of pairs: every fault that no other night of this program injects, once.
 const DEVICES: [[&str; 2]; 5] = [
     ["camera 2 unplugged", "register of camera 1 stuck"],
     ["camera 2 loses words", "trigger box unplugged"],
@@ -406,7 +406,7 @@ fn all_pairs_of_faults_are_told_by_their_own_causes() {
     assert_eq!(failed, [0; 0], "pairs with a wrong verdict or cause");
 }
 
-/// `SKINRIG_PAIRS=20-40`: from and to which pair, counted from 1; all without it.
+/// First and last pair, counted from 1, from `SKINRIG_PAIRS=20-40`; all without it.
 fn range(given: Option<String>) -> (usize, usize) {
     let Some(given) = given else {
         return (1, usize::MAX);

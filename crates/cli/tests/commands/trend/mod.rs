@@ -1,5 +1,5 @@
-//! The nights of a bench as a laboratory looks at them in the morning: what moved, on the terminal, on the page of the trends and on
-//! that of the last night; and a change that is accepted.
+//! Trends of a bench's nights: changes shown on the terminal, on the trend page and on
+//! the page of the last night; and accepting a change.
 
 mod nights;
 
@@ -10,11 +10,11 @@ use skinrig_nightly::{Night, NightExit, Verdict};
 use crate::support::{files, only, skinrig, text};
 use nights::Nights;
 
-/// The same series as pages name it.
+/// Name of the series [`EVENTS`] on pages.
 const EVENTS_IN_WORDS: &str = "skin: press events (golden)";
 const EVENTS: &str = "golden/skin/press_events";
 
-/// A page, with slashes as they are: in a page they are escaped too.
+/// Reads a page and restores its escaped slashes.
 #[track_caller]
 fn read(page: &Path) -> String {
     std::fs::read_to_string(page)
@@ -29,7 +29,7 @@ fn assert_contains(text: &str, parts: &[&str]) {
     }
 }
 
-/// What stands in the element with this test id, without what stands in elements in it.
+/// Text at the start of the element with this test id, before any nested element.
 #[track_caller]
 fn element_text<'a>(page: &'a str, id: &str) -> &'a str {
     let after = page.split(&format!("data-testid=\"{id}\"")).nth(1);
@@ -38,7 +38,7 @@ fn element_text<'a>(page: &'a str, id: &str) -> &'a str {
     text.split('<').next().unwrap()
 }
 
-/// Asserts that every link of the page leads to a file, or to a place in one; the links.
+/// Asserts that every link of the page leads to a file or an anchor in one; returns the links.
 #[track_caller]
 fn links(page: &Path) -> Vec<String> {
     let html = read(page);
@@ -177,7 +177,7 @@ fn an_alarm_links_a_session_that_outlives_its_night_and_replays() {
     assert_eq!(element_text(&shown, "alarms"), "1 alarm");
     assert_eq!(element_text(&shown, "theme"), "Dark");
 
-    // The nights are cleared away, and what the terminal says to do still works.
+    // With the nights removed, the commands printed on the terminal still work.
     for night in files(&nights.lab.path("nights"), "-small") {
         std::fs::remove_dir_all(night).unwrap();
     }
@@ -256,7 +256,7 @@ fn an_accepted_change_is_learnt_anew_and_says_who_and_why() {
         &[first, EVENTS_IN_WORDS, "a &lt;new&gt; lamp", "ada, 20"],
     );
     assert_eq!(element_text(&shown, "alarms"), "no alarm");
-    // The new level is the one that it is held against from now on.
+    // The new level is the reference from now on.
     nights.add(40..60, 36, None);
     assert_contains(
         &nights.trend(&[]).code(0).out,
@@ -293,7 +293,7 @@ fn the_page_of_a_night_says_what_moved_over_the_nights() {
     nights.add(0..36, 36, None);
     nights.add(36..40, 36, Some(&session));
     let (ran, folder) = nights.run(&["--history", &nights.history]);
-    // Its limits are met: an alarm of the trends does not change how it ends.
+    // Its limits are met: a trend alarm does not change the exit code.
     let ran = ran.code(0);
     let sentence = format!("{EVENTS} moved (-20 %) on 2024-02-06; probable cause: the skin");
     assert!(
@@ -339,7 +339,7 @@ fn the_page_of_a_night_says_what_moved_over_the_nights() {
     );
 }
 
-/// Tonight is the third night of a disk that was a million times faster before: the alarm leads to tonight's own page.
+/// Third night of a disk that became a million times slower: the alarm links to tonight's page.
 #[test]
 fn an_alarm_that_is_raised_tonight_leads_to_tonight() {
     let nights = Nights::new();
@@ -398,7 +398,7 @@ fn a_night_without_trends_says_why_and_is_judged_all_the_same() {
             "Limits were checked nevertheless",
         ],
     );
-    // It is added when the history is there again.
+    // It is added once the history is available again.
     let all = nights.lab.text("nights");
     nights
         .trend(&["--rebuild", &all])
