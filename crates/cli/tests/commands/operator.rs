@@ -79,7 +79,7 @@ fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
         "Ann",
     ];
     assert!(skinrig(&note).code(0).out.contains("noted"));
-    // A pause has no time limit.
+    // Pausing a paused run has no effect.
     let said = skinrig(&["control", &text(&session), "pause", "--wait", "1 s"]);
     assert!(said.code(0).out.contains("the run is paused"));
 
