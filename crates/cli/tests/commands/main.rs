@@ -1,11 +1,11 @@
-//! End-to-end tests of the `skinrig` binary: its files, output and exit codes.
+//! The `skinrig` program as a laboratory meets it: the built binary, its files, its output and its exit codes.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 #![expect(clippy::print_stderr, reason = "a test that is skipped says why")]
 
 mod bundle;
 mod catalogue;
 mod compare;
-// Stored with the other whole-system tests; compiled here because it starts the program.
+// Beside the other tests of the whole system; here because it starts the program.
 #[cfg(unix)]
 #[path = "../../../../tests/crash/mod.rs"]
 mod crash;
