@@ -22,7 +22,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use skinrig_model::RunEnd;
 use skinrig_recorder::{RecorderError, SessionReader};
 
-use super::lab::{Dice, expect, journal, program, resume, session_in, words};
+use super::lab::{SeededRandom, expect, journal, output_text, program, resume, session_in};
 
 const CAMPAIGN: &str = "tests/crash/disk.yaml";
 const KINDS: [&str; 6] = ["kill", "torn", "eio", "enospc", "full", "short"];
@@ -144,7 +144,11 @@ impl Bench {
             bench.before.insert(task, before);
             let case = tempfile::tempdir().unwrap();
             let output = bench.start(task, case.path(), None);
-            assert!(output.status.success(), "{task:?}: {}", words(&output));
+            assert!(
+                output.status.success(),
+                "{task:?}: {}",
+                output_text(&output)
+            );
             let log = std::fs::read_to_string(log_of(case.path())).unwrap();
             bench
                 .calls
@@ -186,7 +190,7 @@ impl Bench {
             .unwrap_or("never made")
             .to_owned();
         let named = |what: &str| {
-            let said = words(&output);
+            let said = output_text(&output);
             format!("{task:?}, {kind} at call {n} ({call}): {what}\n{said}")
         };
         let code = output.status.code();
@@ -195,18 +199,18 @@ impl Bench {
             _ if task == Task::Analyze => matches!(code, Some(0 | 1)),
             _ => matches!(code, Some(0 | 1 | 3)),
         };
-        if !may_end || words(&output).contains("panicked") {
+        if !may_end || output_text(&output).contains("panicked") {
             return Err(named("expected another end"));
         }
         let folder = folder_of(case.path());
         let said = String::from_utf8_lossy(&output.stderr);
-        let mut told = said.lines().filter_map(|line| {
+        let mut reported = said.lines().filter_map(|line| {
             let (n, _) = line.strip_prefix("press ")?.split_once('/')?;
             n.parse::<usize>().ok()
         });
-        let told = told.next_back().unwrap_or(0);
+        let reported = reported.next_back().unwrap_or(0);
         let Some(session) = session_in(&folder) else {
-            return if told == 0 && task == Task::Run {
+            return if reported == 0 && task == Task::Run {
                 Ok(())
             } else {
                 Err(named("no session"))
@@ -216,12 +220,12 @@ impl Bench {
             let output = program(&[OsStr::new("verify"), session.as_os_str()])
                 .output()
                 .unwrap();
-            (output.status.code(), words(&output))
+            (output.status.code(), output_text(&output))
         };
         let (code, said) = verify(&session);
         let empty = SessionReader::open(&session).and_then(|reader| reader.header());
         if matches!(empty, Err(RecorderError::Empty { .. })) {
-            let is_nothing = told == 0 && task == Task::Run && code == Some(2);
+            let is_nothing = reported == 0 && task == Task::Run && code == Some(2);
             return if is_nothing {
                 Ok(())
             } else {
@@ -236,8 +240,10 @@ impl Bench {
             .iter()
             .filter(|(_, attempts)| attempts.iter().any(|a| a.outcome.is_some()))
             .count();
-        if task == Task::Run && outcomes < told {
-            return Err(named(&format!("{told} presses told, {outcomes} kept")));
+        if task == Task::Run && outcomes < reported {
+            return Err(named(&format!(
+                "{reported} presses reported, {outcomes} kept"
+            )));
         }
         let reader = SessionReader::open(&session).unwrap();
         let completed = matches!(reader.end().unwrap(), Some((_, RunEnd::Completed)));
@@ -248,7 +254,7 @@ impl Bench {
         if output.status.code() != Some(expected) {
             return Err(named(&format!(
                 "expected resume to end with {expected}: {}",
-                words(&output)
+                output_text(&output)
             )));
         }
         let (code, said) = verify(&session);
@@ -283,7 +289,7 @@ impl Bench {
         if checked.status.success() {
             Ok(())
         } else {
-            Err(words(&checked))
+            Err(output_text(&checked))
         }
     }
 }
@@ -306,12 +312,16 @@ fn cases(bench: &Bench) -> Vec<(Task, &'static str, u64)> {
         };
         return TASKS.into_iter().flat_map(of).collect();
     }
-    let mut dice = Dice(24);
+    let mut random = SeededRandom(24);
     let many = asked.parse().unwrap_or(SAMPLE);
     let case = |i: usize| {
         let task = TASKS[i % TASKS.len()];
         let kind = KINDS[i / TASKS.len() % KINDS.len()];
-        (task, kind, 1 + dice.below(bench.calls[&task].len() as u64))
+        (
+            task,
+            kind,
+            1 + random.below(bench.calls[&task].len() as u64),
+        )
     };
     let sampled: Vec<_> = (0..many).map(case).collect();
     // The index of SQLite's log is a separate, temporary file: without space for it the session is not damaged.
@@ -400,7 +410,7 @@ fn the_check_of_histories_finds_a_press_too_many_and_a_byte_too_few() {
             .arg(change)
             .output()
             .unwrap();
-        assert!(changed.status.success(), "{}", words(&changed));
+        assert!(changed.status.success(), "{}", output_text(&changed));
         let wrong = bench.history(&copy).unwrap_err();
         assert!(wrong.contains(found), "{change}: {wrong}");
     }

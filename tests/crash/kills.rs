@@ -3,7 +3,9 @@
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 
-use super::lab::{Dice, Uninterrupted, campaign, expect, goes_on, journal, resume, session_in};
+use super::lab::{
+    SeededRandom, Uninterrupted, assert_resumes, campaign, expect, journal, resume, session_in,
+};
 
 /// Number of random kills.
 fn crashes() -> u64 {
@@ -12,12 +14,12 @@ fn crashes() -> u64 {
 }
 
 /// Runs the campaign with a fault; false if it finished before.
-fn killed(folder: &std::path::Path, fault: &str) -> bool {
+fn run_until_killed(folder: &std::path::Path, fault: &str) -> bool {
     let output = campaign(folder).args(["--fault", fault]).output().unwrap();
     match output.status.code() {
         None => true,
         code => {
-            assert_eq!(code, Some(0), "{}", super::lab::words(&output));
+            assert_eq!(code, Some(0), "{}", super::lab::output_text(&output));
             false
         }
     }
@@ -28,11 +30,11 @@ fn killed_at_every_other_write(first: usize) -> usize {
     for n in (first..).step_by(2) {
         let folder = tempfile::tempdir().unwrap();
         let fault = format!("killed@journal:{n}");
-        if !killed(folder.path(), &fault) {
+        if !run_until_killed(folder.path(), &fault) {
             return n / 2;
         }
         let session = session_in(folder.path()).unwrap();
-        goes_on(&session, 1, &fault);
+        assert_resumes(&session, 1, &fault);
     }
     0
 }
@@ -61,12 +63,12 @@ fn killed_at_random_instants() {
     let took = Uninterrupted::get().took;
     let mut under_way = 0;
     for seed in 0..crashes() {
-        let mut dice = Dice(seed);
+        let mut random = SeededRandom(seed);
         let folder = tempfile::tempdir().unwrap();
         let mut command = campaign(folder.path());
         let command = command.stdout(Stdio::null()).stderr(Stdio::piped());
         let mut child = command.spawn().unwrap();
-        let wait = took.mul_f64(dice.below(1_000) as f64 / 1_000.0);
+        let wait = took.mul_f64(random.below(1_000) as f64 / 1_000.0);
         // The time of the kill, not a wait for a condition.
         std::thread::sleep(wait);
         child.kill().unwrap();
@@ -74,33 +76,33 @@ fn killed_at_random_instants() {
         let ended = child.wait().unwrap().success();
         let case = format!("seed {seed}, killed after {wait:?}");
         // `press 4/12` is printed once the outcome of the fourth press is on the disk.
-        let told = said.lines().map_while(Result::ok).filter_map(|line| {
+        let reported = said.lines().map_while(Result::ok).filter_map(|line| {
             let (n, _) = line.strip_prefix("press ")?.split_once('/')?;
             n.parse::<usize>().ok()
         });
-        let told = told.last().unwrap_or(0);
+        let reported = reported.last().unwrap_or(0);
         let Some(session) = session_in(folder.path()) else {
-            assert_eq!(told, 0, "{case}");
+            assert_eq!(reported, 0, "{case}");
             continue;
         };
         let before = journal(&session).unwrap_or_default();
         let outcomes = before.iter().flat_map(|(_, attempts)| attempts);
         let outcomes = outcomes.filter(|a| a.outcome.is_some()).count();
         assert!(
-            outcomes >= told,
-            "{case}: {told} presses told, {outcomes} kept"
+            outcomes >= reported,
+            "{case}: {reported} presses reported, {outcomes} kept"
         );
         if ended {
             continue;
         }
         under_way += u64::from(outcomes > 0);
-        if !before.is_empty() && sealed(&session) {
+        if !before.is_empty() && is_sealed(&session) {
             // Either complete in time, or only the end of its seal is missing and gets written.
             let code = resume(&session).output().unwrap().status.code();
             assert!(matches!(code, Some(0 | 2)), "{case}: {code:?}");
-            Uninterrupted::get().assert_equalled_by(&session, 0, &case);
+            Uninterrupted::get().assert_matches(&session, 0, &case);
         } else {
-            goes_on(&session, 1, &case);
+            assert_resumes(&session, 1, &case);
         }
     }
     assert!(
@@ -109,7 +111,7 @@ fn killed_at_random_instants() {
     );
 }
 
-fn sealed(session: &std::path::Path) -> bool {
+fn is_sealed(session: &std::path::Path) -> bool {
     let reader = skinrig_recorder::SessionReader::open(session).unwrap();
     reader.seal().unwrap().is_some()
 }
@@ -118,7 +120,10 @@ fn sealed(session: &std::path::Path) -> bool {
 fn killed_again_while_it_goes_on() {
     for (first, again) in [(3, 2), (12, 1), (18, 12), (29, 9)] {
         let folder = tempfile::tempdir().unwrap();
-        assert!(killed(folder.path(), &format!("killed@journal:{first}")));
+        assert!(run_until_killed(
+            folder.path(),
+            &format!("killed@journal:{first}")
+        ));
         let session = session_in(folder.path()).unwrap();
         let mut leg = resume(&session);
         let output = leg
@@ -127,32 +132,32 @@ fn killed_again_while_it_goes_on() {
             .unwrap();
         let case = format!(
             "killed at {first}, then at {again}: {}",
-            super::lab::words(&output)
+            super::lab::output_text(&output)
         );
         assert_eq!(output.status.code(), None, "{case}");
-        goes_on(&session, 2, &case);
+        assert_resumes(&session, 2, &case);
     }
 }
 
 #[test]
 fn killed_before_the_seal() {
     let folder = tempfile::tempdir().unwrap();
-    assert!(killed(folder.path(), "killed@seal"));
+    assert!(run_until_killed(folder.path(), "killed@seal"));
     let session = session_in(folder.path()).unwrap();
     // All presses exist: only the seal is missing.
     let said = expect(resume(&session), 0);
     assert!(said.contains("only its seal was missing"), "{said}");
-    Uninterrupted::get().assert_equalled_by(&session, 0, "killed before the seal");
+    Uninterrupted::get().assert_matches(&session, 0, "killed before the seal");
     let said = expect(resume(&session), 2);
     assert!(said.contains("nothing to resume"), "{said}");
 
     // Same for a further leg.
     let folder = tempfile::tempdir().unwrap();
-    assert!(killed(folder.path(), "killed@journal:20"));
+    assert!(run_until_killed(folder.path(), "killed@journal:20"));
     let session = session_in(folder.path()).unwrap();
     let mut leg = resume(&session);
     let output = leg.args(["--fault", "killed@seal"]).output().unwrap();
     assert_eq!(output.status.code(), None);
     expect(resume(&session), 0);
-    Uninterrupted::get().assert_equalled_by(&session, 1, "killed before the seal of a leg");
+    Uninterrupted::get().assert_matches(&session, 1, "killed before the seal of a leg");
 }

@@ -31,7 +31,7 @@ pub(crate) fn campaign(folder: &Path) -> Command {
 }
 
 /// Output of a program, for messages.
-pub(crate) fn words(output: &Output) -> String {
+pub(crate) fn output_text(output: &Output) -> String {
     let text = |bytes| String::from_utf8_lossy(bytes).into_owned();
     format!(
         "{}{}{}",
@@ -45,8 +45,8 @@ pub(crate) fn words(output: &Output) -> String {
 #[track_caller]
 pub(crate) fn expect(mut command: Command, code: i32) -> String {
     let output = command.output().unwrap();
-    assert_eq!(output.status.code(), Some(code), "{}", words(&output));
-    words(&output)
+    assert_eq!(output.status.code(), Some(code), "{}", output_text(&output));
+    output_text(&output)
 }
 
 /// The only session of a folder; `None` if the process was killed before creating one.
@@ -107,7 +107,7 @@ impl Uninterrupted {
     /// results match the uninterrupted campaign: equal counts, an RMSE within its 95 % interval, certified clocks. At most
     /// `kills` attempts may be cut off.
     #[track_caller]
-    pub(crate) fn assert_equalled_by(&self, session: &Path, kills: usize, case: &str) {
+    pub(crate) fn assert_matches(&self, session: &Path, kills: usize, case: &str) {
         let verified = expect(program(&[OsStr::new("verify"), session.as_os_str()]), 0);
         assert!(verified.contains("sound, sealed"), "{case}: {verified}");
         let reader = SessionReader::open(session).unwrap();
@@ -194,20 +194,20 @@ pub(crate) fn resume(session: &Path) -> Command {
 /// Resumes a session after `kills`, and checks that it equals the uninterrupted campaign. A session without a header is
 /// rejected and is empty.
 #[track_caller]
-pub(crate) fn goes_on(session: &Path, kills: usize, case: &str) {
+pub(crate) fn assert_resumes(session: &Path, kills: usize, case: &str) {
     let Some(before) = journal(session) else {
         expect(resume(session), 2);
         return;
     };
     expect(resume(session), 0);
     assert_kept(&before, &journal(session).unwrap(), case);
-    Uninterrupted::get().assert_equalled_by(session, kills, case);
+    Uninterrupted::get().assert_matches(session, kills, case);
 }
 
 /// A small seeded generator of 64-bit numbers (SplitMix64, Steele, Lea and Flood 2014), for test data only.
-pub(crate) struct Dice(pub u64);
+pub(crate) struct SeededRandom(pub u64);
 
-impl Dice {
+impl SeededRandom {
     fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::lab::{Dice, Presses, campaign, goes_on, journal, program, session_in, words};
+use super::lab::{
+    Presses, SeededRandom, assert_resumes, campaign, journal, output_text, program, session_in,
+};
 
 /// Length of the header of a write-ahead log, and of each of its frames besides the page (sqlite.org/fileformat2.html, 4.1
 /// and 4.2).
@@ -40,13 +42,13 @@ fn flushed(log: &[u8]) -> usize {
 }
 
 /// A campaign killed at a random journal write: its session, journal and log.
-fn killed(dice: &mut Dice, folder: &Path) -> (PathBuf, Presses, Vec<u8>) {
-    let n = 10 + dice.below(20);
+fn killed_campaign(random: &mut SeededRandom, folder: &Path) -> (PathBuf, Presses, Vec<u8>) {
+    let n = 10 + random.below(20);
     let output = campaign(folder)
         .args(["--fault", &format!("killed@journal:{n}")])
         .output()
         .unwrap();
-    assert_eq!(output.status.code(), None, "{}", words(&output));
+    assert_eq!(output.status.code(), None, "{}", output_text(&output));
     let session = session_in(folder).unwrap();
     let log = std::fs::read(log_of(&session)).unwrap();
     let before = journal(&session).unwrap();
@@ -56,13 +58,13 @@ fn killed(dice: &mut Dice, folder: &Path) -> (PathBuf, Presses, Vec<u8>) {
 #[test]
 fn what_was_not_flushed_may_be_torn() {
     for seed in 0..4 {
-        let mut dice = Dice(seed);
+        let mut random = SeededRandom(seed);
         let folder = tempfile::tempdir().unwrap();
-        let (session, before, mut log) = killed(&mut dice, folder.path());
+        let (session, before, mut log) = killed_campaign(&mut random, folder.path());
         log.truncate(flushed(&log).max(LOG_HEADER));
         // Data in flight: any content, of any length.
-        let length = dice.below(20_000);
-        log.extend(dice.bytes(length));
+        let length = random.below(20_000);
+        log.extend(random.bytes(length));
         std::fs::write(log_of(&session), &log).unwrap();
         let case = format!("seed {seed}");
         assert_eq!(
@@ -70,7 +72,7 @@ fn what_was_not_flushed_may_be_torn() {
             before,
             "{case}: what was flushed is there"
         );
-        goes_on(&session, 1, &case);
+        assert_resumes(&session, 1, &case);
     }
 }
 
@@ -78,10 +80,10 @@ fn what_was_not_flushed_may_be_torn() {
 fn a_log_cut_anywhere_tells_nothing_wrong() {
     let mut sound = 0;
     for seed in 100..110 {
-        let mut dice = Dice(seed);
+        let mut random = SeededRandom(seed);
         let folder = tempfile::tempdir().unwrap();
-        let (session, before, mut log) = killed(&mut dice, folder.path());
-        let at = dice.below(log.len() as u64) as usize;
+        let (session, before, mut log) = killed_campaign(&mut random, folder.path());
+        let at = random.below(log.len() as u64) as usize;
         log.truncate(at);
         std::fs::write(log_of(&session), &log).unwrap();
         let case = format!("seed {seed}, cut at {at}");
@@ -90,7 +92,7 @@ fn a_log_cut_anywhere_tells_nothing_wrong() {
             Some(0) => {}
             // Detected: flushed pages are missing.
             Some(2 | 4) => continue,
-            _ => panic!("{case}: {}", words(&verified)),
+            _ => panic!("{case}: {}", output_text(&verified)),
         }
         sound += 1;
         let now = journal(&session).unwrap();
@@ -102,7 +104,7 @@ fn a_log_cut_anywhere_tells_nothing_wrong() {
             }
             assert!(now.len() <= before.len(), "{case}");
         }
-        goes_on(&session, 1, &case);
+        assert_resumes(&session, 1, &case);
     }
     assert!(sound > 0, "every cut was damage: the cuts are badly chosen");
 }

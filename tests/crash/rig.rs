@@ -8,11 +8,11 @@ use skinrig_model::{PressRole, PressVerdict};
 use skinrig_recorder::SessionReader;
 
 use super::lab::{
-    Presses, assert_kept, campaign, expect, journal, program, resume, session_in, words,
+    Presses, assert_kept, campaign, expect, journal, output_text, program, resume, session_in,
 };
 
 /// The campaign on a rig whose camera sends nothing from the tenth press on; returns the session.
-fn spoilt(folder: &Path) -> std::path::PathBuf {
+fn session_with_rig_losses(folder: &Path) -> std::path::PathBuf {
     let mut run = campaign(folder);
     run.args(["--fault", "camera1-stalled@approach:10"]);
     let said = expect(run, 3);
@@ -32,7 +32,7 @@ fn verify(session: &Path) -> String {
 }
 
 /// Every press is valid; no attempts were added to those valid before, except sync presses.
-fn is_whole(session: &Path, before: &Presses) {
+fn assert_complete(session: &Path, before: &Presses) {
     let said = verify(session);
     assert!(said.contains("sound, sealed"), "{said}");
     let after = journal(session).unwrap();
@@ -51,13 +51,13 @@ fn is_whole(session: &Path, before: &Presses) {
     let Ok(checked) = Command::new(python).arg(script).arg(session).output() else {
         return;
     };
-    assert!(checked.status.success(), "{}", words(&checked));
+    assert!(checked.status.success(), "{}", output_text(&checked));
 }
 
 #[test]
 fn what_the_rig_cost_is_taken_again() {
     let folder = tempfile::tempdir().unwrap();
-    let session = spoilt(folder.path());
+    let session = session_with_rig_losses(folder.path());
     let said = verify(&session);
     assert!(said.contains("sound, sealed"), "{said}");
     let before = journal(&session).unwrap();
@@ -66,7 +66,7 @@ fn what_the_rig_cost_is_taken_again() {
         said.contains("3 presses from press 10 to press 12"),
         "{said}"
     );
-    is_whole(&session, &before);
+    assert_complete(&session, &before);
     let legs = SessionReader::open(&session).unwrap().legs().unwrap();
     assert_eq!(legs.len(), 2);
     assert!(legs.iter().all(|leg| {
@@ -83,7 +83,7 @@ fn what_the_rig_cost_is_taken_again() {
 #[test]
 fn a_rig_that_is_not_mended_costs_them_again() {
     let folder = tempfile::tempdir().unwrap();
-    let session = spoilt(folder.path());
+    let session = session_with_rig_losses(folder.path());
     let before = journal(&session).unwrap();
     let mut again = resume(&session);
     // After the two sync presses of the leg.
@@ -91,7 +91,7 @@ fn a_rig_that_is_not_mended_costs_them_again() {
     let said = expect(again, 3);
     assert!(said.contains("2 of 12 presses are invalid"), "{said}");
     expect(resume(&session), 0);
-    is_whole(&session, &before);
+    assert_complete(&session, &before);
 }
 
 /// Kills at the start, in the middle and before the seal of the leg that repeats the presses.
@@ -99,13 +99,18 @@ fn a_rig_that_is_not_mended_costs_them_again() {
 fn killed_while_they_are_taken_again() {
     for fault in ["killed@journal:1", "killed@journal:12", "killed@seal"] {
         let folder = tempfile::tempdir().unwrap();
-        let session = spoilt(folder.path());
+        let session = session_with_rig_losses(folder.path());
         let before = journal(&session).unwrap();
         let mut killed = resume(&session);
         let killed = killed.args(["--fault", fault]).output().unwrap();
-        assert_eq!(killed.status.code(), None, "{fault}: {}", words(&killed));
+        assert_eq!(
+            killed.status.code(),
+            None,
+            "{fault}: {}",
+            output_text(&killed)
+        );
         verify(&session);
         expect(resume(&session), 0);
-        is_whole(&session, &before);
+        assert_complete(&session, &before);
     }
 }

@@ -301,13 +301,18 @@ pub(crate) const fn locator_name(locator: Locator) -> &'static str {
     }
 }
 
+/// The locator in use, if it is not the geometry alone.
+#[must_use]
+pub(crate) fn locator(analysis: &Analysis) -> Option<Locator> {
+    let used = analysis.locator.as_ref()?.locator;
+    (used != Locator::Geometry).then_some(used)
+}
+
 /// The locator in use and what it gains, if it is not the geometry alone.
 #[must_use]
 pub(crate) fn locator_note(analysis: &Analysis) -> Option<String> {
+    locator(analysis)?;
     let l = analysis.locator.as_ref()?;
-    if l.locator == Locator::Geometry {
-        return None;
-    }
     let rmse = |of: &dyn Fn(&LocatorComparison) -> bool| {
         let row = l.compared.iter().find(|c| of(c))?;
         row.rmse_mm.value.map(|v| number(Some(v), 2))

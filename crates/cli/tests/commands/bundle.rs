@@ -1,4 +1,4 @@
-//! Bundles: made, moved, changed, and from strangers.
+//! Bundles: created, moved, modified, and from untrusted sources.
 
 use serde_json::Value;
 
@@ -50,7 +50,7 @@ fn a_bundle_proves_itself_elsewhere_and_finds_any_change() {
     }
     assert_eq!(files(&moved, "").len(), listed.len() + 1);
 
-    // One byte anywhere, a file more, a file less.
+    // One changed byte, an extra file, a missing file.
     for file in listed {
         let path = moved.join(file["name"].as_str().unwrap());
         let good = std::fs::read(&path).unwrap();
@@ -69,7 +69,7 @@ fn a_bundle_proves_itself_elsewhere_and_finds_any_change() {
     std::fs::remove_file(moved.join("more")).unwrap();
     verify().code(0);
 
-    // A manifest from a stranger reads nothing outside.
+    // An untrusted manifest cannot read files outside the bundle.
     for (key, name) in [
         ("name", "../x"),
         ("name", "/etc/passwd"),
@@ -79,10 +79,10 @@ fn a_bundle_proves_itself_elsewhere_and_finds_any_change() {
         let mut hostile = manifest.clone();
         hostile["files"][1][key] = Value::from(name);
         std::fs::write(moved.join("manifest.json"), hostile.to_string()).unwrap();
-        verify().code(2).complains(&["expected a bundle"]);
+        verify().code(2).expect_stderr(&["expected a bundle"]);
     }
     std::fs::write(moved.join("manifest.json"), "{}").unwrap();
-    verify().code(2).complains(&["expected a bundle"]);
+    verify().code(2).expect_stderr(&["expected a bundle"]);
 }
 
 #[test]
@@ -92,6 +92,6 @@ fn a_bundle_is_exported_alone() {
     let lab = Lab::new();
     let session = text(&lab.record("s", &[]));
     let export = ["export", &session, "--to", "bundle", "--to", "csv"];
-    skinrig(&export).code(2).complains(&["no other format"]);
+    skinrig(&export).code(2).expect_stderr(&["no other format"]);
     assert_eq!(files(&lab.path("s"), "").len(), 1);
 }

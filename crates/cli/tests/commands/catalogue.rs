@@ -1,4 +1,4 @@
-//! What a folder of sessions holds: prototypes, tags, remarks.
+//! Contents of a sessions folder: prototypes, tags, remarks.
 
 use serde_json::Value;
 
@@ -27,7 +27,7 @@ fn sessions_are_found_by_prototype_and_by_tag_and_their_trend_is_shown() {
         "{said}"
     );
     skinrig(&["tag", &text(first), "Good Skin"]).code(2);
-    // The session is what it was.
+    // The session file is unchanged.
     assert!(before == std::fs::read(first).unwrap());
     skinrig(&["verify", &text(first)]).code(0);
 
@@ -82,9 +82,9 @@ fn sessions_are_found_by_prototype_and_by_tag_and_their_trend_is_shown() {
     }
     skinrig(&["prototypes", &s, "--prototype", "skin C"])
         .code(2)
-        .complains(&["skin C", "skin B, test skin"]);
+        .expect_stderr(&["skin C", "skin B, test skin"]);
 
-    // A log that somebody broke is told, and the session listed all the same.
+    // A broken tag log is reported; its session is still listed.
     let log = only(&lab.path("s"), ".tags.jsonl");
     std::fs::write(&log, "good-skin\n").unwrap();
     let words = skinrig(&["sessions", &s]).code(0).out;
@@ -94,5 +94,5 @@ fn sessions_are_found_by_prototype_and_by_tag_and_their_trend_is_shown() {
     );
     skinrig(&["tag", &text(first), "more"])
         .code(2)
-        .complains(&["line 1"]);
+        .expect_stderr(&["line 1"]);
 }

@@ -1,11 +1,11 @@
-//! Which skin is better: two sessions of one skin are not, what may not be compared is refused, and what is read is stable.
+//! Comparing skins: no difference between two sessions of one skin, rejected comparisons, and a stable output format.
 
 use serde_json::Value;
 
 use crate::json::shape;
 use crate::support::{Lab, files, only, skinrig, text};
 
-/// One small session of a skin, and its path.
+/// Records a small session of a skin and returns its path.
 fn record(lab: &Lab, folder: &str, seed: &str, more: &[&str]) -> String {
     let mut arguments = vec!["--seed", seed, "--set", "analysis.bootstrap_resamples=50"];
     arguments.extend_from_slice(more);
@@ -44,7 +44,7 @@ fn one_skin_twice_is_not_better_and_the_page_is_whole() {
     );
     let verdict = said.out.lines().next().unwrap();
     assert!(verdict.starts_with("VERDICT   B against A: "), "{verdict}");
-    // Numbers and names are of this run; what stands where is not.
+    // Numbers and names differ between runs; the layout does not.
     let layout: String = said
         .out
         .lines()
@@ -80,7 +80,7 @@ fn one_skin_twice_is_not_better_and_the_page_is_whole() {
     );
 }
 
-/// The keys of the document; of a session's facts only that there are some.
+/// Keys of the document, with each session's facts reduced to a placeholder.
 fn shape_without_facts(mut document: Value) -> String {
     for skin in document["skins"].as_array_mut().unwrap() {
         for session in skin["sessions"].as_array_mut().unwrap() {
@@ -100,7 +100,7 @@ fn what_may_not_be_compared_is_refused_and_can_be_lifted_by_name() {
         refused.out.contains("BLOCKING") && !refused.out.contains("RMSE"),
         "{refused:?}"
     );
-    refused.complains(&["depths", "no depth is shared", "--despite depths"]);
+    refused.expect_stderr(&["depths", "no depth is shared", "--despite depths"]);
     assert!(
         files(&lab.path("a"), ".html").is_empty(),
         "a page of what may not be compared"
@@ -109,7 +109,7 @@ fn what_may_not_be_compared_is_refused_and_can_be_lifted_by_name() {
     assert_eq!(json["blocked"], true);
     assert_eq!(json["table"].as_array().unwrap().len(), 0);
     let same = skinrig(&["compare", &a, &a]).code(2);
-    same.complains(&["same-session", "is on both sides"]);
+    same.expect_stderr(&["same-session", "is on both sides"]);
     let lifted = skinrig(&["compare", &a, &a, "--despite", "same-session"]).code(0);
     assert!(lifted.out.contains("despite   session"), "{lifted:?}");
     let page = std::fs::read_to_string(only(&lab.path("a"), "comparison.html")).unwrap();
@@ -118,11 +118,9 @@ fn what_may_not_be_compared_is_refused_and_can_be_lifted_by_name() {
         "not on the first screen"
     );
     let other_level = record(&lab, "c", "3", &["--level", "kinematic"]);
-    skinrig(&["compare", &a, &other_level]).code(2).complains(&[
-        "rig.level",
-        "sim-level",
-        "scored presses that count",
-    ]);
+    skinrig(&["compare", &a, &other_level])
+        .code(2)
+        .expect_stderr(&["rig.level", "sim-level", "scored presses that count"]);
 }
 
 #[test]
@@ -133,7 +131,7 @@ fn other_places_are_blocking_and_then_independent() {
     let b = record(&lab, "b", "2", &["--set", places]);
     skinrig(&["compare", &a, &b])
         .code(2)
-        .complains(&["fewer than two locations are shared", "--despite locations"]);
+        .expect_stderr(&["fewer than two locations are shared", "--despite locations"]);
     let json = skinrig(&["--json", "compare", &a, &b, "--despite", "locations"])
         .code(0)
         .json();
@@ -187,6 +185,6 @@ fn strangers_are_refused_with_what_to_do() {
         ),
     ] {
         let all: Vec<&str> = std::iter::once("compare").chain(arguments).collect();
-        skinrig(&all).code(2).complains(&parts);
+        skinrig(&all).code(2).expect_stderr(&parts);
     }
 }

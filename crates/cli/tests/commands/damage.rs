@@ -1,12 +1,12 @@
-//! Damaged session files are noticed, never trusted, and never make the program panic.
+//! Damaged session files are detected, never trusted, and never cause a panic.
 
 use std::path::{Path, PathBuf};
 
-use crate::support::{Dice, Lab, text};
-use crate::support::{Said, skinrig};
+use crate::support::{Lab, SeededRandom, text};
+use crate::support::{ProgramOutput, skinrig};
 
-/// A small sealed session and its bytes.
-fn sealed(lab: &Lab) -> (PathBuf, Vec<u8>) {
+/// Records a small sealed session; returns its path and bytes.
+fn sealed_session(lab: &Lab) -> (PathBuf, Vec<u8>) {
     let session = lab.record(
         "s",
         &[
@@ -22,8 +22,8 @@ fn sealed(lab: &Lab) -> (PathBuf, Vec<u8>) {
     (session, bytes)
 }
 
-/// Lets every reading command read `file`: each must end with one of its codes, without a panic.
-fn read_by_all(lab: &Lab, file: &Path) -> Said {
+/// Runs every reading command on `file`: each must exit with an expected code, without a panic.
+fn run_all_readers(lab: &Lab, file: &Path) -> ProgramOutput {
     let file = text(file);
     let out = lab.text("other.json");
     for arguments in [
@@ -40,24 +40,24 @@ fn read_by_all(lab: &Lab, file: &Path) -> Said {
 #[test]
 fn flipped_bytes_are_found() {
     let lab = Lab::new();
-    let (_, good) = sealed(&lab);
+    let (_, good) = sealed_session(&lab);
     let file = lab.path("damaged.session.sqlite");
     std::fs::write(&file, &good).unwrap();
     skinrig(&["verify", &text(&file)]).code(0);
-    let mut dice = Dice(20);
+    let mut random = SeededRandom(20);
     for round in 0..24 {
         let mut bytes = good.clone();
-        // Every third time in the first pages, where headers and small tables lie.
+        // One in three hits the first pages, which hold headers and small tables.
         let reach = if round % 3 == 0 {
             65_536
         } else {
             bytes.len() as u64
         };
-        let at = dice.below(reach) as usize;
-        let flip = 1 + dice.below(255) as u8;
+        let at = random.below(reach) as usize;
+        let flip = 1 + random.below(255) as u8;
         bytes[at] ^= flip;
         std::fs::write(&file, &bytes).unwrap();
-        let said = read_by_all(&lab, &file);
+        let said = run_all_readers(&lab, &file);
         assert!(
             !said.err.contains("panicked"),
             "byte {at} ^ {flip:#04x}: {said:#?}"
@@ -73,18 +73,18 @@ fn flipped_bytes_are_found() {
 #[test]
 fn a_torn_session_is_found() {
     let lab = Lab::new();
-    let (_, good) = sealed(&lab);
+    let (_, good) = sealed_session(&lab);
     let file = lab.path("torn.session.sqlite");
     for length in [0, 50, 100, 4_096, good.len() / 2, good.len() - 1] {
         std::fs::write(&file, &good[..length]).unwrap();
-        let said = read_by_all(&lab, &file);
+        let said = run_all_readers(&lab, &file);
         assert!(!said.err.contains("panicked"), "{length} bytes: {said:#?}");
         assert!(
             matches!(said.code, Some(2 | 4)),
             "{length} bytes: {said:#?}"
         );
     }
-    // The list of a folder goes on past a broken file and names it.
+    // Listing a folder continues after a broken file and names it.
     let listed = skinrig(&["sessions", &text(lab.path("").as_path())])
         .code(0)
         .out;
@@ -94,7 +94,7 @@ fn a_torn_session_is_found() {
 #[test]
 fn a_changed_row_is_found_and_its_table_named() {
     let lab = Lab::new();
-    let (_, good) = sealed(&lab);
+    let (_, good) = sealed_session(&lab);
     // The operator's name, in the session's header row.
     let at = good.windows(9).position(|w| w == b"test skin").unwrap();
     let mut bytes = good;
@@ -111,7 +111,7 @@ fn a_changed_row_is_found_and_its_table_named() {
 #[test]
 fn what_is_whole_of_a_damaged_session_is_salvaged_and_analysed() {
     let lab = Lab::new();
-    let (session, mut bytes) = sealed(&lab);
+    let (session, mut bytes) = sealed_session(&lab);
     let file = lab.path("damaged.session.sqlite");
     std::fs::write(&file, &bytes).unwrap();
     let new = lab.path("damaged.salvaged.session.sqlite");
@@ -121,16 +121,16 @@ fn what_is_whole_of_a_damaged_session_is_salvaged_and_analysed() {
     skinrig(&["verify", &text(&new)]).code(0);
     skinrig(&["salvage", &text(&file)])
         .code(2)
-        .complains(&["file already exists"]);
+        .expect_stderr(&["file already exists"]);
 
-    // The end of the file is gone: SQLite will not have it, a salvage will.
+    // Truncated file: SQLite rejects it, a salvage reads it.
     bytes.truncate(bytes.len() * 2 / 3);
     std::fs::write(&file, &bytes).unwrap();
     let out = lab.text("cut.session.sqlite");
     let said = skinrig(&["salvage", &text(&file), "--out", &out]);
     let said = said
         .code(4)
-        .complains(&["some data are lost", "skinrig show"]);
+        .expect_stderr(&["some data are lost", "skinrig show"]);
     assert!(said.out.contains("recovered"), "{said:#?}");
     let shown = skinrig(&["show", &out]);
     assert!(matches!(shown.code, Some(0 | 2)), "{shown:#?}");

@@ -1,4 +1,4 @@
-//! A recording in the published layout, made here with known clocks: two containers, a CSV in metres, a schedule.
+//! Synthetic recording in the published layout with known clocks: two containers, a CSV in metres, a schedule.
 
 use std::path::{Path, PathBuf};
 
@@ -6,13 +6,13 @@ use skinrig_formats::hdf5::EventWriter;
 use skinrig_model::{CameraId, CdEvent, Point2, Polarity};
 use skinrig_protocol::Schedule;
 
-use crate::support::{Dice, Lab, text};
+use crate::support::{Lab, SeededRandom, text};
 
-/// Camera time at the schedule's time 0, µs: what the import has to find.
+/// True camera time at the schedule's time 0, µs; the import must recover it.
 pub(crate) const OFFSET_US: [f64; 2] = [7_312_000.0, 11_905_000.0];
-/// Camera clock against the schedule's clock, parts per million.
+/// Drift of each camera clock against the schedule's clock, ppm.
 pub(crate) const DRIFT_PPM: [f64; 2] = [40.0, -25.0];
-/// Presses of the path; with three sync presses before them.
+/// Presses of the path, without the three sync presses before them.
 pub(crate) const PRESSES: usize = 12;
 
 const PERIOD_S: f64 = 1.5;
@@ -47,7 +47,7 @@ pub(crate) struct Dataset {
     pub schedule: PathBuf,
 }
 
-/// Where the path presses.
+/// Planned positions of the path.
 pub(crate) fn positions() -> Vec<Point2> {
     (0..PRESSES)
         .map(|k| Point2::new(-10.0 + 10.0 * (k / 4) as f64, -14.0 + 9.0 * (k % 4) as f64))
@@ -75,7 +75,7 @@ impl Dataset {
         }
     }
 
-    /// `import` with these files into `folder`.
+    /// Arguments of `import` for these files, with sessions in `folder`.
     pub(crate) fn arguments(&self, folder: &Path) -> Vec<String> {
         let words = [
             ("--camera1", &self.cameras[0]),
@@ -92,7 +92,7 @@ impl Dataset {
     }
 }
 
-/// A CSV in metres that ends with a row of nothing but a blank, as the published one.
+/// A CSV in metres whose last row is a single blank, like the published file.
 pub(crate) fn csv(positions: &[Point2]) -> String {
     let mut text = String::from("x,y,z\n");
     for p in positions {
@@ -101,7 +101,7 @@ pub(crate) fn csv(positions: &[Point2]) -> String {
     text + " ,,\n"
 }
 
-/// Press times and places in order. Time 0 is when the first downward motion begins, 450 ms before its press time.
+/// Press times and positions in order. Time 0 is the start of the first descent, 450 ms before its press time.
 fn schedule() -> Vec<(f64, Point2)> {
     let sync = (0..SYNC).map(|k| (0.45 + SYNC_INTERVAL_S * k as f64, CENTRE));
     let first = 0.45 + SYNC_INTERVAL_S * (SYNC - 1) as f64 + PAUSE_AFTER_SYNC_S;
@@ -109,16 +109,16 @@ fn schedule() -> Vec<(f64, Point2)> {
     sync.chain(path).collect()
 }
 
-/// What `camera` saw: a burst while the tip goes in, one of the other polarity while it leaves, and background.
+/// Events of `camera`: a burst while the tip descends, one of opposite polarity while it retracts, and background.
 pub(crate) fn events(camera: CameraId) -> Vec<CdEvent> {
-    let mut dice = Dice(1 + u64::from(camera.number()));
+    let mut random = SeededRandom(1 + u64::from(camera.number()));
     let rig = Schedule::parse("made", SCHEDULE.as_bytes(), &[])
         .unwrap()
         .rig;
     let model = rig.nominal.cameras[camera.index()];
     let camera_us =
         |t_s: f64| OFFSET_US[camera.index()] + t_s * 1e6 * (1.0 + DRIFT_PPM[camera.index()] * 1e-6);
-    let bell = |dice: &mut Dice| (0..6).map(|_| dice.unit()).sum::<f64>() - 3.0;
+    let bell = |random: &mut SeededRandom| (0..6).map(|_| random.unit()).sum::<f64>() - 3.0;
     let mut events = Vec::new();
     let mut push = |t_s: f64, x: f64, y: f64, polarity| {
         events.push(CdEvent {
@@ -133,11 +133,11 @@ pub(crate) fn events(camera: CameraId) -> Vec<CdEvent> {
         let column = model.column_of_point(*at).unwrap();
         for (from, to, polarity) in [(-0.275, -0.1, Polarity::On), (0.05, 0.275, Polarity::Off)] {
             for _ in 0..400 {
-                let t = press + from + (to - from) * dice.unit();
+                let t = press + from + (to - from) * random.unit();
                 push(
                     t,
-                    column + 4.0 * bell(&mut dice),
-                    270.0 + 15.0 * bell(&mut dice),
+                    column + 4.0 * bell(&mut random),
+                    270.0 + 15.0 * bell(&mut random),
                     polarity,
                 );
             }
@@ -146,9 +146,9 @@ pub(crate) fn events(camera: CameraId) -> Vec<CdEvent> {
     // 1 s before the first press to 1 s after the last.
     let length = schedule.last().unwrap().0 + 2.0;
     for _ in 0..(300.0 * length) as usize {
-        let t = length * dice.unit() - 1.0;
-        let polarity = Polarity::from_bit(dice.below(2) == 1);
-        push(t, 640.0 * dice.unit(), 480.0 * dice.unit(), polarity);
+        let t = length * random.unit() - 1.0;
+        let polarity = Polarity::from_bit(random.below(2) == 1);
+        push(t, 640.0 * random.unit(), 480.0 * random.unit(), polarity);
     }
     events.sort_by_key(|e| e.t_us);
     events

@@ -1,15 +1,15 @@
-//! The session is moved, removed or replaced while it is recorded, or its lock file is: noticed, kept, and gone on with by the command
-//! that the program names.
+//! The session or its lock file is moved, removed or replaced while recording: the run detects it, keeps the data, and the command
+//! that it prints resumes the session.
 #![cfg(target_os = "linux")]
 
 use std::path::{Path, PathBuf};
 
 use skinrig_recorder::SessionReader;
 
-use crate::interrupt::Underway;
+use crate::interrupt::LiveRun;
 use crate::support::{Lab, SMALL, only, program, show, skinrig, text};
 
-fn begin(lab: &Lab) -> (Underway, PathBuf) {
+fn start_run(lab: &Lab) -> (LiveRun, PathBuf) {
     let folder = lab.text("sessions");
     let arguments = [
         "run",
@@ -19,27 +19,31 @@ fn begin(lab: &Lab) -> (Underway, PathBuf) {
         "--sessions",
         &folder,
     ];
-    let underway = Underway::of(program(&arguments));
-    (underway, only(&lab.path("sessions"), ".session.sqlite"))
+    let run = LiveRun::of(program(&arguments));
+    (run, only(&lab.path("sessions"), ".session.sqlite"))
 }
 
-fn beside(session: &Path, ending: &str) -> PathBuf {
+fn companion_file(session: &Path, ending: &str) -> PathBuf {
     PathBuf::from(format!("{}{ending}", session.display()))
 }
 
-fn tried(session: &Path) -> usize {
+fn count_attempts(session: &Path) -> usize {
     let presses = SessionReader::open(session).unwrap().presses().unwrap();
     let attempts = presses.iter().flat_map(|(_, attempts)| attempts);
     attempts.filter(|a| a.intent.is_some()).count()
 }
 
-/// Does `harm` to a run; it ends with 3, says `found`, and names the session at `kept`, which is sound and goes on.
+/// Applies `damage` to a run, which must exit with 3, report `found`, and name the session at `kept`, which is sound and can be resumed.
 #[track_caller]
-fn harmed(harm: impl FnOnce(&Lab, &Path), found: &str, kept: impl FnOnce(&Lab, &Path) -> PathBuf) {
+fn assert_recovers_after(
+    damage: impl FnOnce(&Lab, &Path),
+    found: &str,
+    kept: impl FnOnce(&Lab, &Path) -> PathBuf,
+) {
     let lab = Lab::new();
-    let (run, session) = begin(&lab);
-    let before = tried(&session);
-    harm(&lab, &session);
+    let (run, session) = start_run(&lab);
+    let before = count_attempts(&session);
+    damage(&lab, &session);
     let (code, said) = run.end();
     assert_eq!(code, Some(3), "{said}");
     let kept = text(&kept(&lab, &session));
@@ -50,7 +54,7 @@ fn harmed(harm: impl FnOnce(&Lab, &Path), found: &str, kept: impl FnOnce(&Lab, &
     ] {
         assert!(said.contains(part), "expected {part:?} in {said}");
     }
-    let after = tried(Path::new(&kept));
+    let after = count_attempts(Path::new(&kept));
     assert!(
         after <= before + 1,
         "{before} presses, then {after}: {said}"
@@ -65,14 +69,14 @@ fn harmed(harm: impl FnOnce(&Lab, &Path), found: &str, kept: impl FnOnce(&Lab, &
     assert!(presses.iter().all(|p| p["verdict"] == "valid"), "{shown}");
 }
 
-fn rescued(folder: &Path, session: &Path) -> PathBuf {
+fn rescued_path(folder: &Path, session: &Path) -> PathBuf {
     let name = session.file_name().unwrap().to_str().unwrap();
     folder.join(name.replace(".session.sqlite", ".rescued.session.sqlite"))
 }
 
 #[test]
 fn the_file_is_renamed() {
-    harmed(
+    assert_recovers_after(
         |lab, session| std::fs::rename(session, lab.path("b.session.sqlite")).unwrap(),
         "it was moved to",
         |lab, _| lab.path("b.session.sqlite"),
@@ -81,16 +85,16 @@ fn the_file_is_renamed() {
 
 #[test]
 fn the_file_is_removed() {
-    harmed(
+    assert_recovers_after(
         |_, session| std::fs::remove_file(session).unwrap(),
         "it was removed",
-        |lab, session| rescued(&lab.path("sessions"), session),
+        |lab, session| rescued_path(&lab.path("sessions"), session),
     );
 }
 
 #[test]
 fn the_folder_is_renamed() {
-    harmed(
+    assert_recovers_after(
         |lab, _| std::fs::rename(lab.path("sessions"), lab.path("other")).unwrap(),
         "it was moved to",
         |lab, session| lab.path("other").join(session.file_name().unwrap()),
@@ -99,17 +103,17 @@ fn the_folder_is_renamed() {
 
 #[test]
 fn the_folder_is_removed() {
-    harmed(
+    assert_recovers_after(
         |lab, _| std::fs::remove_dir_all(lab.path("sessions")).unwrap(),
         "it was removed",
-        |lab, session| rescued(lab.path("").as_path(), session),
+        |lab, session| rescued_path(lab.path("").as_path(), session),
     );
 }
 
 #[test]
 fn the_log_is_removed() {
-    harmed(
-        |_, session| std::fs::remove_file(beside(session, "-wal")).unwrap(),
+    assert_recovers_after(
+        |_, session| std::fs::remove_file(companion_file(session, "-wal")).unwrap(),
         "-wal: the file of the current run is missing: it was removed",
         |_, session| session.to_owned(),
     );
@@ -117,23 +121,23 @@ fn the_log_is_removed() {
 
 #[test]
 fn another_file_takes_its_place() {
-    harmed(
+    assert_recovers_after(
         |lab, session| {
             std::fs::write(lab.path("other"), "not a session").unwrap();
             std::fs::rename(lab.path("other"), session).unwrap();
         },
         "another file in its place; the original was removed",
-        |lab, session| rescued(&lab.path("sessions"), session),
+        |lab, session| rescued_path(&lab.path("sessions"), session),
     );
 }
 
-/// Without it, and with any other file in its place, a second writer is refused, and the run ends as it would have.
+/// Without the lock file, or with another file in its place, a second writer is rejected and the run ends normally.
 #[test]
 fn the_lock_file_is_removed_or_replaced() {
     for replaced in [false, true] {
         let lab = Lab::new();
-        let (run, session) = begin(&lab);
-        let lock = beside(&session, "-lock");
+        let (run, session) = start_run(&lab);
+        let lock = companion_file(&session, "-lock");
         std::fs::remove_file(&lock).unwrap();
         if replaced {
             std::fs::write(&lock, "").unwrap();
@@ -141,8 +145,8 @@ fn the_lock_file_is_removed_or_replaced() {
         let path = text(&session);
         skinrig(&["resume", &path])
             .code(2)
-            .complains(&["session is in use: another process is writing it"]);
-        // Under another name, where no lock file was ever.
+            .expect_stderr(&["session is in use: another process is writing it"]);
+        // Under another name, which never had a lock file.
         let link = lab.path("link.session.sqlite");
         std::fs::hard_link(&session, &link).unwrap();
         assert_ne!(skinrig(&["resume", &text(&link)]).code, Some(0));
@@ -155,10 +159,10 @@ fn the_lock_file_is_removed_or_replaced() {
     }
 }
 
-/// A run that waits for its operator notices it, too.
+/// A paused run detects it too.
 #[test]
 fn a_paused_run_notices_it() {
-    harmed(
+    assert_recovers_after(
         |lab, session| {
             skinrig(&["control", &text(session), "pause", "--wait", "30s"]).code(0);
             std::fs::rename(session, lab.path("b.session.sqlite")).unwrap();

@@ -1,4 +1,4 @@
-//! The doctor over stand-ins for hardware whose cables and rights are not as they should be. Emulated.
+//! `skinrig doctor` on emulated hardware with wrong cables or permissions.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ fn camera(serial: &str, change: impl FnOnce(&mut Evk1Config)) -> DeviceConfig {
     camera.into()
 }
 
-/// What the doctor says of these devices, and its exit code.
+/// Report of the doctor on these devices, and its exit code.
 fn doctor(cameras: Vec<DeviceConfig>, fault: Option<Fault>) -> (Value, Option<i32>) {
     let bus = Bus::start(&BusConfig { devices: cameras }).unwrap();
     let arm = EmulatedArm::spawn(&ArmConfig {
@@ -47,12 +47,12 @@ fn doctor(cameras: Vec<DeviceConfig>, fault: Option<Fault>) -> (Value, Option<i3
 }
 
 /// Verdict and next step of a check.
-fn told<'a>(said: &'a Value, area: &str, check: &str) -> (&'a str, &'a str) {
-    let all = said["findings"].as_array().unwrap();
+fn find_check<'a>(report: &'a Value, area: &str, check: &str) -> (&'a str, &'a str) {
+    let all = report["findings"].as_array().unwrap();
     let found = all
         .iter()
         .find(|f| f["area"] == area && f["check"] == check);
-    let found = found.unwrap_or_else(|| panic!("{area}, {check}: {said:#}"));
+    let found = found.unwrap_or_else(|| panic!("{area}, {check}: {report:#}"));
     (
         found["verdict"].as_str().unwrap(),
         found["next_step"].as_str().unwrap_or(""),
@@ -65,33 +65,33 @@ fn a_slow_camera_a_forbidden_one_and_a_robot_without_a_cable_are_told_apart() {
         camera("00000001", |c| c.speed_mbit = 480),
         camera("00000002", |c| c.access = Access::NotPermitted),
     ];
-    let (said, code) = doctor(cameras, Some(Fault::Unplug));
-    assert_eq!(code, Some(3), "{said:#}");
-    assert_eq!(said["kind"], "emulated");
-    let (verdict, next) = told(&said, "USB speed", "camera1");
+    let (report, code) = doctor(cameras, Some(Fault::Unplug));
+    assert_eq!(code, Some(3), "{report:#}");
+    assert_eq!(report["kind"], "emulated");
+    let (verdict, next) = find_check(&report, "USB speed", "camera1");
     assert!(
         verdict == "problem" && next.contains("USB 3 cable"),
-        "{said:#}"
+        "{report:#}"
     );
-    // Nobody may ask the other one, not even whether it is camera 2.
-    let (verdict, next) = told(&said, "permissions", "camera at bus 1 device 3");
+    // The other camera cannot be opened, so it is unknown whether it is camera 2.
+    let (verdict, next) = find_check(&report, "permissions", "camera at bus 1 device 3");
     assert!(
         verdict == "problem" && next.contains("70-skinrig.rules"),
-        "{said:#}"
+        "{report:#}"
     );
-    assert_eq!(told(&said, "cables", "camera2").0, "not checked");
-    let (verdict, next) = told(&said, "cables", "robot");
+    assert_eq!(find_check(&report, "cables", "camera2").0, "not checked");
+    let (verdict, next) = find_check(&report, "cables", "robot");
     assert!(
         verdict == "problem" && next.contains("plug it in"),
-        "{said:#}"
+        "{report:#}"
     );
-    assert_eq!(told(&said, "versions", "robot library").0, "ok");
+    assert_eq!(find_check(&report, "versions", "robot library").0, "ok");
 }
 
 #[test]
 fn devices_as_they_should_be_are_no_problem() {
     let cameras = ["00000001", "00000002"].map(|serial| camera(serial, |_| {}));
-    let (said, _) = doctor(cameras.into(), None);
+    let (report, _) = doctor(cameras.into(), None);
     for (area, check) in [
         ("permissions", "camera1"),
         ("permissions", "robot"),
@@ -104,9 +104,9 @@ fn devices_as_they_should_be_are_no_problem() {
         ("bench", "devices"),
     ] {
         assert_eq!(
-            told(&said, area, check).0,
+            find_check(&report, area, check).0,
             "ok",
-            "{area}, {check}: {said:#}"
+            "{area}, {check}: {report:#}"
         );
     }
 }

@@ -1,11 +1,11 @@
-//! The evaluation as a laboratory meets it: the public code's choices, and recordings that are not what they claim.
+//! Evaluation from the command line: the public code's choices, and recordings with wrong documents.
 
 use skinrig_model::Point2;
 
 use crate::dataset::{Dataset, PRESSES, csv, positions};
 use crate::support::{Lab, files, only, read_json, skinrig, text};
 
-/// The findings of a recording that was imported with `spoil` done to its files.
+/// Findings after importing a recording whose files `spoil` has changed.
 fn faults(spoil: impl FnOnce(&mut Dataset)) -> (Vec<String>, String) {
     let lab = Lab::new();
     let mut data = Dataset::new(&lab);
@@ -55,7 +55,7 @@ fn the_public_codes_choices_stand_beside_the_sessions_own_results() {
     assert!(read_json(&own)["analysis"]["reference"].is_null());
 
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
-    // Presses follow each other twice as fast as in the published recording.
+    // The press period is half that of the published recording.
     let arguments = [
         "analyze",
         &session,

@@ -1,6 +1,6 @@
-//! Faults on purpose: told wherever the session is, refused on a bench, their effects in the exit code.
+//! Injected faults: shown with the session everywhere, rejected on a bench, and reflected in the exit code.
 
-use crate::support::{Lab, SMALL, files, only, program, said, show, skinrig, text};
+use crate::support::{Lab, SMALL, files, only, program, run_to_end, show, skinrig, text};
 
 #[test]
 fn a_run_with_faults_says_so_everywhere() {
@@ -17,16 +17,16 @@ fn a_run_with_faults_says_so_everywhere() {
         "trigger-lost@contact:5",
     ])
     .code(0);
-    let told = "FAULTS ON PURPOSE: camera1-drops@hold:3, trigger-lost@contact:5";
-    assert!(said.err.contains(told), "{said:#?}");
+    let notice = "FAULTS ON PURPOSE: camera1-drops@hold:3, trigger-lost@contact:5";
+    assert!(said.err.contains(notice), "{said:#?}");
     let words: Vec<&str> = said.out.split_whitespace().collect();
-    assert!(words.join(" ").contains(told), "{said:#?}");
+    assert!(words.join(" ").contains(notice), "{said:#?}");
     let shown = show(&only(&folder, ".session.sqlite"));
     let name = shown["rig"].as_str().unwrap_or_default();
-    assert!(name.contains(told), "{name}");
+    assert!(name.contains(notice), "{name}");
     let report = std::fs::read_to_string(only(&folder, ".html")).unwrap();
     let first = &report[..report.find("<h2").unwrap()];
-    assert!(first.contains(told), "not on the first screen");
+    assert!(first.contains(notice), "not on the first screen");
 }
 
 #[test]
@@ -45,9 +45,11 @@ fn a_bench_takes_no_faults() {
             .env("SKINRIG_EMULATED_LIBDRD", "not-there.so")
             .env("SKINRIG_EMULATED_TRIGGER_BOX", "/dev/not-there")
             .env("SKINRIG_EMULATED_LAMPS_OFF", "/not-there/lamps-off");
-        said(command)
-            .code(2)
-            .complains(&["only the simulated rig", "robot-slow@hold:1", "next: "]);
+        run_to_end(command).code(2).expect_stderr(&[
+            "only the simulated rig",
+            "robot-slow@hold:1",
+            "next: ",
+        ]);
     }
     assert!(files(&lab.path("."), ".sqlite").is_empty());
 }
@@ -55,8 +57,8 @@ fn a_bench_takes_no_faults() {
 #[test]
 fn a_fault_that_nobody_knows_is_refused() {
     let run = |plant: [&str; 2]| skinrig(&["run", SMALL, plant[0], plant[1]]).code(2);
-    run(["--fault", "camera1-stall@hold:1"]).complains(&["did you mean `camera1-stalled`?"]);
-    run(["--set", "faults=[robot-slow@record:3]"]).complains(&["faults[0]", "`preflight`"]);
+    run(["--fault", "camera1-stall@hold:1"]).expect_stderr(&["did you mean `camera1-stalled`?"]);
+    run(["--set", "faults=[robot-slow@record:3]"]).expect_stderr(&["faults[0]", "`preflight`"]);
 }
 
 #[test]
@@ -72,10 +74,10 @@ fn a_full_disk_keeps_what_was_written() {
         "disk-full@press:5",
     ])
     .code(3)
-    .complains(&["disk is full", "disk space", "skinrig resume"]);
+    .expect_stderr(&["disk is full", "disk space", "skinrig resume"]);
     let session = only(&folder, ".session.sqlite");
     assert_eq!(show(&session)["totals"]["presses"]["valid"], 2);
-    // The place is there again: the rest follows, and the name stays.
+    // With space available again the remaining presses follow under the same name.
     skinrig(&["resume", &text(&session)]).code(0);
     let shown = show(&session);
     assert_eq!(shown["totals"]["presses"]["valid"], 8);
@@ -87,7 +89,7 @@ fn a_full_disk_keeps_what_was_written() {
     );
 }
 
-/// A robot whose reported height is off by half a millimetre, in a run with presses of this depth: what the run says.
+/// Runs presses of this depth, with a fault that shifts the reported height by 0.5 mm if given; returns the output.
 fn with_height_off(fault: Option<&str>, depth: &str, code: i32) -> String {
     let lab = Lab::new();
     let folder = text(&lab.path("a"));

@@ -98,8 +98,8 @@ fn bad_input_ends_with_code_2_and_says_what_to_do() {
     ] {
         skinrig(&arguments)
             .code(2)
-            .complains(&["error"])
-            .complains(&parts);
+            .expect_stderr(&["error"])
+            .expect_stderr(&parts);
     }
 }
 
@@ -135,7 +135,7 @@ fn the_shipped_schemas_are_those_that_the_program_prints() {
     }
 }
 
-/// Bash itself completes with the script; commands that skinrig starts itself are in no script and on no page.
+/// Bash completes with the script; internal commands appear in no script and on no page.
 #[test]
 fn shells_complete_and_manuals_are_written() {
     for shell in ["bash", "zsh", "fish"] {

@@ -1,24 +1,24 @@
-//! A suite of checks as a laboratory meets it: what is refused before it begins, a bench that is not there, and who holds one.
+//! `skinrig hil` from the command line: input rejected before the start, an absent bench, and lease holders.
 
 use std::path::Path;
 
 use serde_json::Value;
 use skinrig_hil::lease::{Lease, LeaseTiming, Owner};
 
-use crate::support::{Lab, Said, files, program, said, text};
+use crate::support::{Lab, ProgramOutput, files, program, run_to_end, text};
 
 const EMULATED: &str = "hil/rigs/emulated.yaml";
 const NIGHTLY: &str = "hil/nightly.yaml";
 
-/// The program on an emulated bench that is not there, with leases in this folder.
-fn on_nothing(leases: &Path, arguments: &[&str]) -> Said {
+/// Runs the program with an absent emulated bench and leases in this folder.
+fn without_bench(leases: &Path, arguments: &[&str]) -> ProgramOutput {
     let mut command = program(arguments);
     command
         .env("SKINRIG_EMULATED_LIBDRD", "/nowhere/libdrd.so")
         .env("SKINRIG_EMULATED_TRIGGER_BOX", "/nowhere/box")
         .env("SKINRIG_EMULATED_LAMPS_OFF", "/nowhere/lamps-off")
         .env("SKINRIG_LEASES", leases);
-    said(command)
+    run_to_end(command)
 }
 
 fn lab() -> (Lab, std::path::PathBuf) {
@@ -45,23 +45,21 @@ fn what_cannot_be_a_night_is_refused_before_it_begins() {
     let run = |suite: &str, more: &[&str]| {
         let mut arguments = vec!["hil", "run", suite, "--rig", EMULATED, "--out", &out];
         arguments.extend_from_slice(more);
-        on_nothing(&leases, &arguments)
+        without_bench(&leases, &arguments)
     };
-    run(NIGHTLY, &["--only", "idle,idlle"]).code(2).complains(&[
-        "--only",
-        "found `idlle`",
-        "trigger_loopback",
-    ]);
+    run(NIGHTLY, &["--only", "idle,idlle"])
+        .code(2)
+        .expect_stderr(&["--only", "found `idlle`", "trigger_loopback"]);
     let long = suite(
         &lab,
         "10 s",
         "  clocks: {duration: 60 s, drift: {at_most: 200 ppm}}\n",
     );
-    run(&long, &[]).code(2).complains(&["budget", "next: "]);
+    run(&long, &[]).code(2).expect_stderr(&["budget", "next: "]);
     let toothless = suite(&lab, "10 min", "  idle: {duration: 3 s}\n");
     run(&toothless, &[])
         .code(2)
-        .complains(&["at least one of `data_rate`"]);
+        .expect_stderr(&["at least one of `data_rate`"]);
     run("no/such/suite.yaml", &[]).code(2);
     assert!(!lab.path("nights").exists());
 }
@@ -75,7 +73,7 @@ fn a_bench_that_is_not_there_is_a_matter_of_cables_and_the_night_is_kept() {
         &format!("{IDENTITY}  stop_drill: {{skip: nobody near, distance: {{at_most: 1 mm}}}}\n"),
     );
     let history = lab.text("history.sqlite");
-    let ran = on_nothing(
+    let ran = without_bench(
         &leases,
         &[
             "hil",
@@ -111,7 +109,7 @@ fn a_bench_that_is_not_there_is_a_matter_of_cables_and_the_night_is_kept() {
     );
     let identity = &night["checks"][0];
     assert_eq!(identity["cause"], "infrastructure");
-    // A third attempt could not make it good any more.
+    // A third attempt could no longer reach two passes.
     assert_eq!(identity["attempts"].as_array().unwrap().len(), 2);
     let junit = std::fs::read_to_string(folder.join("junit.xml")).unwrap();
     let error = junit.lines().find(|line| line.contains("<error "));
@@ -127,7 +125,7 @@ fn a_bench_has_one_holder_whichever_command_asks() {
     let shown = |more: &[&str]| {
         let mut arguments = vec!["hil", "lease", "--json"];
         arguments.extend_from_slice(more);
-        on_nothing(&leases, &arguments).code(0).json()
+        without_bench(&leases, &arguments).code(0).json()
     };
     assert_eq!(shown(&[])["leases"], Value::Array(Vec::new()));
     let lease = &shown(&["--rig", EMULATED])["leases"][0];
@@ -150,16 +148,16 @@ fn a_bench_has_one_holder_whichever_command_asks() {
         ],
         &["jog", "--rig", EMULATED, "--log", &*log],
     ] {
-        on_nothing(&leases, arguments).code(3).complains(&[
+        without_bench(&leases, arguments).code(3).expect_stderr(&[
             "`skinrig hil run nightly` of maria on lab-2",
             "next: ",
             "kill ",
         ]);
     }
     assert!(files(&lab.path("out"), "").is_empty());
-    // Whoever only asks what is there does not reset the holder's box.
+    // Listing devices must not reset the lease holder's box.
     let asked = || {
-        let listed = on_nothing(&leases, &["devices", "--rig", EMULATED, "--json"]).code(0);
+        let listed = without_bench(&leases, &["devices", "--rig", EMULATED, "--json"]).code(0);
         let lines = listed.json()["devices"].as_array().unwrap().clone();
         let boxed = |l: &&Value| l["device"] == "trigger box";
         lines.iter().find(boxed).unwrap().clone()
@@ -179,6 +177,6 @@ fn a_bench_has_one_holder_whichever_command_asks() {
     );
     drop(held);
     assert_eq!(asked()["state"], "absent");
-    let plain = on_nothing(&leases, &["hil", "lease"]).code(0);
+    let plain = without_bench(&leases, &["hil", "lease"]).code(0);
     assert!(plain.out.contains("free; last: ") && plain.out.contains(&text(Path::new(&path))));
 }

@@ -7,7 +7,7 @@ use skinrig_model::{CameraId, Point2, StreamFormat};
 
 use crate::dataset::{DRIFT_PPM, Dataset, OFFSET_US, PRESSES, csv, events, positions};
 use crate::replay::assert_replays;
-/// The event rates are looked at in bins of 10 ms.
+/// Tolerance of aligned times, µs: event rates have bins of 10 ms.
 const WITHIN_US: f64 = 25_000.0;
 
 use crate::support::{Lab, ROOT, chunks, only, read_json, show, skinrig, text};
@@ -22,7 +22,7 @@ fn a_dataset_is_imported_its_clocks_aligned_and_its_presses_located() {
     let session = only(&lab.path("s"), ".session.sqlite");
     let results = read_json(&only(&lab.path("s"), ".results.json"));
     let analysis = &results["analysis"];
-    // The middle of the recording, where offset and drift cannot make up for each other's error.
+    // In the middle of the recording errors of offset and drift cannot cancel.
     let middle_us = 12e6;
     for (k, clock) in analysis["clocks"].as_array().unwrap().iter().enumerate() {
         assert_eq!(clock["method"], "event_rates");
@@ -54,7 +54,7 @@ fn a_dataset_is_imported_its_clocks_aligned_and_its_presses_located() {
     }
     assert_eq!(located.len(), PRESSES);
 
-    // Nothing was measured, and everything says so.
+    // All outputs state that nothing was measured.
     let shown = show(&session);
     assert_eq!(shown["rig_kind"], "imported");
     assert_eq!(shown["end"], "completed");
@@ -71,11 +71,11 @@ fn a_dataset_is_imported_its_clocks_aligned_and_its_presses_located() {
     skinrig(&["verify", &text(&session)]).code(0);
 }
 
-/// Imports the dataset with these positions and cameras: the code and what was said.
+/// Imports the dataset with changed positions or swapped cameras; returns output and results.
 fn import_wrong(
     change: impl Fn(Point2) -> Point2,
     swapped: bool,
-) -> (crate::support::Said, serde_json::Value) {
+) -> (crate::support::ProgramOutput, serde_json::Value) {
     let lab = Lab::new();
     let mut data = Dataset::new(&lab);
     let wrong: Vec<Point2> = positions().into_iter().map(change).collect();
@@ -103,7 +103,9 @@ fn positions_and_cameras_that_are_taken_for_others_make_the_session_invalid() {
     ];
     for (fault, change, swapped) in cases {
         let (said, results) = import_wrong(change, swapped);
-        let said = said.code(4).complains(&["the session is INVALID", fault]);
+        let said = said
+            .code(4)
+            .expect_stderr(&["the session is INVALID", fault]);
         assert_eq!(results["valid"], false, "{fault}");
         let rmse = results["analysis"]["scored"]["rmse_mm"]["value"].as_f64();
         let headline = rmse.map(|mm| format!("{mm:.2} mm"));
@@ -143,9 +145,9 @@ fn more_presses_than_the_schedule_says_are_told_apart_by_the_sync_presses_or_the
         );
     }
 
-    // A single sync press in step with the path: nothing says which of the presses are the planned ones.
+    // A single sync press in rhythm with the path: the planned presses cannot be identified.
     let said = import("t", &["sync.count=1", "sync.pause_after=1.5 s"]).code(4);
-    let said = said.complains(&["INVALID", "log-odds", "all other alignments", "next:"]);
+    let said = said.expect_stderr(&["INVALID", "log-odds", "all other alignments", "next:"]);
     let results = read_json(&only(&lab.path("t"), ".results.json"));
     assert_eq!(results["valid"], false);
     assert!(said.out.contains("INVALID   use no number"), "{said:?}");
@@ -213,7 +215,7 @@ fn recordings_as_raw_files_are_imported_byte_for_byte() {
     }
 }
 
-/// Imports a sample of the published layout that lies beside the workspace; `None` when it is not there.
+/// Imports a sample in the published layout from beside the workspace; `None` if absent.
 fn sample(name: &str, schedule: &str) -> Option<(Lab, serde_json::Value)> {
     let folder = format!("{ROOT}/../shared/data/{name}");
     if !Path::new(&folder).exists() {
@@ -245,7 +247,7 @@ fn sample(name: &str, schedule: &str) -> Option<(Lab, serde_json::Value)> {
 fn the_short_sample_is_imported() {
     if let Some((_lab, results)) = sample("sample-dense", "ten-presses.schedule.yaml") {
         assert_eq!(results["analysis"]["counts"]["planned"], 10);
-        // Its skin is another than the schedule draws, and ten presses calibrate nothing: no number to use.
+        // Another skin than the schedule describes, and too few presses to calibrate: the number is unusable.
         assert_eq!(results["valid"], false);
     }
 }
@@ -256,7 +258,7 @@ fn the_sample_of_one_repetition_is_imported() {
         let counts = &results["analysis"]["counts"];
         assert_eq!(results["valid"], true);
         assert_eq!(counts["planned"], 289);
-        // The last 39 are recorded and not used.
+        // The last 39 presses are recorded but unused.
         assert!(counts["excluded"].as_u64().unwrap() >= 39, "{counts}");
         assert_eq!(results["analysis"]["clocks"][0]["method"], "event_rates");
     }

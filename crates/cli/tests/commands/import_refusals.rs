@@ -1,25 +1,25 @@
-//! Files that are not what they should be are refused by name and row, and leave no session that claims to be whole.
+//! Invalid files are rejected by name and row, and leave no session that claims to be complete.
 
 use std::path::Path;
 
 use crate::dataset::{Dataset, csv, events, positions};
-use crate::support::{Lab, Said, files, only, show, skinrig, text};
+use crate::support::{Lab, ProgramOutput, files, only, show, skinrig, text};
 use skinrig_model::CameraId;
 
-/// Runs the import and asserts its exit code, that it says all of `parts`, and that nothing looks completed.
+/// Runs the import; asserts exit code, all `parts` on standard error, and no completed session.
 #[track_caller]
-fn refused(lab: &Lab, data: &Dataset, code: i32, parts: &[&str]) -> Said {
+fn assert_refused(lab: &Lab, data: &Dataset, code: i32, parts: &[&str]) -> ProgramOutput {
     let folder = lab.path("s");
     let said = skinrig(&data.arguments(&folder))
         .code(code)
-        .complains(parts);
+        .expect_stderr(parts);
     for session in files(&folder, ".session.sqlite") {
         assert_ne!(show(&session)["end"], "completed", "{said:?}");
     }
     said
 }
 
-/// Replaces the only occurrence of `old` in a file by as many bytes.
+/// Replaces the only occurrence of `old` in a file by the same number of bytes.
 #[track_caller]
 fn patch(path: &Path, old: &[u8], new: &[u8]) {
     let mut bytes = std::fs::read(path).unwrap();
@@ -36,7 +36,7 @@ fn patch(path: &Path, old: &[u8], new: &[u8]) {
     std::fs::write(path, bytes).unwrap();
 }
 
-/// The time in row `row` of camera 2 as the file has it.
+/// Stored time in row `row` of camera 2's file.
 fn stored_time(row: usize) -> [u8; 8] {
     (events(CameraId::Two)[row].t_us as f64 / 1e6).to_le_bytes()
 }
@@ -54,7 +54,7 @@ fn files_of_another_kind() {
         schedule: data.schedule.clone(),
         ..text_file
     };
-    refused(
+    assert_refused(
         &lab,
         &text_file,
         2,
@@ -65,7 +65,7 @@ fn files_of_another_kind() {
         presses: data.presses.clone(),
         schedule: data.schedule.clone(),
     };
-    refused(&lab, &absent, 2, &["none.hdf5"]);
+    assert_refused(&lab, &absent, 2, &["none.hdf5"]);
     assert!(
         files(&lab.path("s"), ".sqlite").is_empty(),
         "nothing was to be made"
@@ -79,7 +79,7 @@ fn a_truncated_container() {
     let bytes = std::fs::read(&data.cameras[0]).unwrap();
     for share in [1, 40, 70, 99] {
         std::fs::write(&data.cameras[0], &bytes[..bytes.len() * share / 100]).unwrap();
-        let said = skinrig(&data.arguments(&lab.path("s"))).complains(&["camera1.hdf5"]);
+        let said = skinrig(&data.arguments(&lab.path("s"))).expect_stderr(&["camera1.hdf5"]);
         assert!(said.code == Some(2), "{share} %: {said:?}");
     }
     for session in files(&lab.path("s"), ".session.sqlite") {
@@ -92,7 +92,7 @@ fn a_missing_dataset() {
     let lab = Lab::new();
     let data = Dataset::new(&lab);
     patch(&data.cameras[0], b"\"pol\"", b"\"pal\"");
-    refused(&lab, &data, 2, &["camera1.hdf5", "pol"]);
+    assert_refused(&lab, &data, 2, &["camera1.hdf5", "pol"]);
     assert!(
         files(&lab.path("s"), ".sqlite").is_empty(),
         "nothing was to be made"
@@ -108,7 +108,7 @@ fn a_time_that_is_no_number_and_one_that_goes_back() {
         &stored_time(9_000),
         &f64::NAN.to_le_bytes(),
     );
-    refused(&lab, &data, 2, &["camera2.hdf5", "ts", "row 9000", "NaN"]);
+    assert_refused(&lab, &data, 2, &["camera2.hdf5", "ts", "row 9000", "NaN"]);
 
     let lab = Lab::new();
     let data = Dataset::new(&lab);
@@ -117,12 +117,12 @@ fn a_time_that_is_no_number_and_one_that_goes_back() {
         &stored_time(9_000),
         &1.0_f64.to_le_bytes(),
     );
-    let said = refused(&lab, &data, 2, &["camera2.hdf5", "ts", "row 9000"]);
+    let said = assert_refused(&lab, &data, 2, &["camera2.hdf5", "ts", "row 9000"]);
     assert!(
         said.err.contains("kept"),
         "says that a part is kept: {said:?}"
     );
-    // What came before is kept, and called what it is.
+    // The events before are kept and reported as partial.
     let sessions = files(&lab.path("s"), ".session.sqlite");
     assert_eq!(sessions.len(), 1);
     let shown = show(&sessions[0]);
@@ -137,17 +137,17 @@ fn positions_that_do_not_fit() {
     let data = Dataset::new(&lab);
     let write = |content: &str| std::fs::write(&data.presses, content).unwrap();
     write(&csv(&positions()[1..]));
-    refused(&lab, &data, 2, &["expected 12 press positions", "found 11"]);
+    assert_refused(&lab, &data, 2, &["expected 12 press positions", "found 11"]);
     write(&csv(&positions()).replacen("0.0\n", "0.0,7,8,9\n", 1));
-    refused(&lab, &data, 2, &["presses.csv:2"]);
+    assert_refused(&lab, &data, 2, &["presses.csv:2"]);
     write(&csv(&positions()).replacen("-0.01,", "left,", 1));
-    refused(&lab, &data, 2, &["presses.csv:2", "left"]);
+    assert_refused(&lab, &data, 2, &["presses.csv:2", "left"]);
     write(&csv(&positions()).replacen("-0.01,", "nan,", 1));
-    refused(&lab, &data, 2, &["presses.csv:2", "nan"]);
+    assert_refused(&lab, &data, 2, &["presses.csv:2", "nan"]);
     write(&csv(&positions()).replacen("x,y", "a,b", 1));
-    refused(&lab, &data, 2, &["presses.csv", "`x`"]);
+    assert_refused(&lab, &data, 2, &["presses.csv", "`x`"]);
     write("");
-    refused(&lab, &data, 2, &["presses.csv"]);
+    assert_refused(&lab, &data, 2, &["presses.csv"]);
     assert!(
         files(&lab.path("s"), ".sqlite").is_empty(),
         "nothing was to be made"
@@ -180,21 +180,21 @@ fn schedules_that_do_not_hold() {
         ("skinrig_schedule: 1", "skinrig_schedule: 9", vec![":1:19"]),
     ] {
         std::fs::write(&data.schedule, good.replacen(old, new, 1)).unwrap();
-        refused(&lab, &data, 2, &parts);
+        assert_refused(&lab, &data, 2, &parts);
     }
     std::fs::write(&data.schedule, "skinrig_schedule: [1").unwrap();
-    refused(&lab, &data, 2, &["made.schedule.yaml:1:"]);
+    assert_refused(&lab, &data, 2, &["made.schedule.yaml:1:"]);
     std::fs::write(&data.schedule, &good).unwrap();
     let mut arguments = data.arguments(&lab.path("s"));
     arguments.extend(["--set".into(), "sync.intervall=2 s".into()]);
     skinrig(&arguments)
         .code(2)
-        .complains(&["did you mean `interval`"]);
+        .expect_stderr(&["did you mean `interval`"]);
     arguments.truncate(arguments.len() - 2);
     arguments.extend(["--stream1".into(), "data/left".into()]);
     skinrig(&arguments)
         .code(2)
-        .complains(&["camera1.hdf5", "data/left"]);
+        .expect_stderr(&["camera1.hdf5", "data/left"]);
     assert!(
         files(&lab.path("s"), ".sqlite").is_empty(),
         "nothing was to be made"
@@ -206,7 +206,7 @@ fn one_file_for_both_cameras() {
     let lab = Lab::new();
     let mut data = Dataset::new(&lab);
     data.cameras[1] = data.cameras[0].clone();
-    refused(
+    assert_refused(
         &lab,
         &data,
         2,
@@ -231,7 +231,7 @@ fn raw_files_that_are_cut_off_or_empty() {
     let bytes = std::fs::read(&raw).unwrap();
     data.cameras[1] = raw.clone();
     std::fs::write(&raw, &bytes[..bytes.len() - 3]).unwrap();
-    refused(
+    assert_refused(
         &lab,
         &data,
         2,
@@ -239,7 +239,7 @@ fn raw_files_that_are_cut_off_or_empty() {
     );
     let body = bytes.windows(6).position(|w| w == b"% end\n").unwrap() + 6;
     std::fs::write(&raw, &bytes[..body]).unwrap();
-    refused(
+    assert_refused(
         &lab,
         &data,
         2,

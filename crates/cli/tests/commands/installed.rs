@@ -1,18 +1,18 @@
-//! The packages: installed into an empty root, the program needs no checkout.
+//! Packages: installed into an empty root, the program needs no checkout.
 
 use std::path::Path;
 use std::process::Command;
 
-use crate::support::{Lab, ROOT, files, only, said};
+use crate::support::{Lab, ROOT, files, only, run_to_end};
 
-/// Runs a tool and asserts that it ends well.
-fn tool(name: &str, arguments: &[&str]) {
+/// Runs a tool and asserts exit code 0.
+fn run_tool(name: &str, arguments: &[&str]) {
     let mut command = Command::new(name);
     command.args(arguments);
-    said(command).code(0);
+    run_to_end(command).code(0);
 }
 
-/// The installed program in `folder`, which sees nothing of this checkout.
+/// Output of the installed program in `folder`, without access to this checkout.
 fn installed(root: &Path, folder: &Path, arguments: &[&str]) -> String {
     let mut command = Command::new(root.join("bin/skinrig"));
     command
@@ -20,7 +20,7 @@ fn installed(root: &Path, folder: &Path, arguments: &[&str]) -> String {
         .env("PATH", "/usr/bin:/bin")
         .env("HOME", folder);
     command.current_dir(folder).args(arguments);
-    said(command).code(0).out
+    run_to_end(command).code(0).out
 }
 
 #[test]
@@ -29,9 +29,9 @@ fn packages_hold_all_that_a_lab_needs() {
     let (out, root) = (lab.text("packages"), lab.text("root"));
     std::fs::create_dir(&root).unwrap();
     let package = format!("{ROOT}/packaging/package");
-    tool("bash", &[&package, &out, env!("CARGO_BIN_EXE_skinrig")]);
+    run_tool("bash", &[&package, &out, env!("CARGO_BIN_EXE_skinrig")]);
     let archive = only(Path::new(&out), ".tar.gz");
-    tool(
+    run_tool(
         "tar",
         &[
             "-xzf",
@@ -53,10 +53,13 @@ fn packages_hold_all_that_a_lab_needs() {
     }
     assert!(root.join("share/man/man1/skinrig-run.1.gz").exists());
 
-    let told = installed(root, &lab.path(""), &["init", "lab"]);
-    assert!(told.contains("skinrig run protocols/demo.yaml"), "{told}");
+    let printed = installed(root, &lab.path(""), &["init", "lab"]);
+    assert!(
+        printed.contains("skinrig run protocols/demo.yaml"),
+        "{printed}"
+    );
     let folder = lab.path("lab");
-    // The demo without most of its presses: the test is about where files come from.
+    // The demo with few presses: only the origin of files matters here.
     let short = [
         "run",
         "protocols/demo.yaml",
@@ -70,12 +73,12 @@ fn packages_hold_all_that_a_lab_needs() {
     assert_eq!(files(&folder.join("sessions"), ".report.html").len(), 1);
     installed(root, &folder, &["verify", session.to_str().unwrap()]);
 
-    // Where Debian's tool is, the .deb has the same program and what its computers need besides.
+    // Where dpkg-deb exists, the .deb contains the same program and the Debian-specific files.
     let Some(deb) = files(Path::new(&out), ".deb").pop() else {
         return;
     };
     let debian = lab.text("debian");
-    tool("dpkg-deb", &["-x", deb.to_str().unwrap(), &debian]);
+    run_tool("dpkg-deb", &["-x", deb.to_str().unwrap(), &debian]);
     let program = |path: &Path| std::fs::read(path).unwrap();
     assert!(
         program(&Path::new(&debian).join("usr/bin/skinrig")) == program(&root.join("bin/skinrig"))

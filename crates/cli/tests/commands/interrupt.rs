@@ -1,4 +1,4 @@
-//! Runs that are cut short: by the operator, by the system, by the power, by a full disk.
+//! Interrupted runs: by operator, system, kill or full disk.
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader};
@@ -8,15 +8,15 @@ use std::process::{Child, ChildStderr, Command, Stdio};
 use serde_json::Value;
 
 use crate::replay::assert_replays;
-use crate::support::{Lab, ROOT, SMALL, files, only, program, said, show, skinrig, text};
+use crate::support::{Lab, ROOT, SMALL, files, only, program, run_to_end, show, skinrig, text};
 
-/// A run in real time, after its first press.
-pub(crate) struct Underway {
+/// A running program, past its first press.
+pub(crate) struct LiveRun {
     child: Child,
     lines: BufReader<ChildStderr>,
 }
 
-impl Underway {
+impl LiveRun {
     pub(crate) fn new(folder: &Path) -> Self {
         let folder = text(folder);
         Self::of(program(&[
@@ -35,9 +35,9 @@ impl Underway {
             .spawn()
             .unwrap();
         let lines = BufReader::new(child.stderr.take().unwrap());
-        let mut underway = Self { child, lines };
-        underway.wait_for("press ");
-        underway
+        let mut run = Self { child, lines };
+        run.wait_for("press ");
+        run
     }
 
     /// Reads messages up to one that contains `word`.
@@ -60,7 +60,7 @@ impl Underway {
         assert!(sent.success());
     }
 
-    /// Waits for the end; the exit code, none for a process that was killed, and the rest of the messages.
+    /// Waits for the exit; returns the exit code (`None` if killed) and the remaining messages.
     pub(crate) fn end(mut self) -> (Option<i32>, String) {
         let mut rest = String::new();
         while self.lines.read_line(&mut rest).unwrap() > 0 {}
@@ -77,7 +77,7 @@ fn count(shown: &Value, verdict: &str) -> u64 {
         .count() as u64
 }
 
-/// A session that ended early in the proper way: sealed, sound, every press with a verdict.
+/// Asserts that the session ended early but properly: sealed, sound, every press with a verdict.
 #[track_caller]
 fn assert_ended_early(folder: &Path, word: &str) -> PathBuf {
     let session = only(folder, ".session.sqlite");
@@ -106,7 +106,7 @@ fn assert_ended_early(folder: &Path, word: &str) -> PathBuf {
 #[test]
 fn ctrl_c_ends_the_run_after_the_press_with_a_sealed_session() {
     let lab = Lab::new();
-    let run = Underway::new(&lab.path("s"));
+    let run = LiveRun::new(&lab.path("s"));
     run.signal("INT");
     let (code, messages) = run.end();
     assert_eq!(code, Some(5), "{messages}");
@@ -118,14 +118,14 @@ fn ctrl_c_ends_the_run_after_the_press_with_a_sealed_session() {
         "presses that were not made are no progress: {messages}"
     );
     let session = assert_ended_early(&lab.path("s"), "stop");
-    // The part that was recorded is a session like any other, and its replay stops where it did.
+    // The recorded part is an ordinary session; its replay stops at the same point.
     assert_replays(&lab, &session, "r");
 }
 
 #[test]
 fn ctrl_c_twice_retracts_and_stops_at_once() {
     let lab = Lab::new();
-    let mut run = Underway::new(&lab.path("s"));
+    let mut run = LiveRun::new(&lab.path("s"));
     run.signal("INT");
     run.wait_for("stopping after this press");
     run.signal("INT");
@@ -135,12 +135,12 @@ fn ctrl_c_twice_retracts_and_stops_at_once() {
     assert_replays(&lab, &session, "r");
 }
 
-/// ctrl-\ and a used up limit of processor time retract at once: the second word of ctrl-C without the first.
+/// ctrl-\ and an exceeded CPU time limit retract at once, like the second ctrl-C.
 #[test]
 fn signals_that_end_a_program_at_once_retract() {
     for signal in ["QUIT", "XCPU"] {
         let lab = Lab::new();
-        let run = Underway::new(&lab.path("s"));
+        let run = LiveRun::new(&lab.path("s"));
         run.signal(signal);
         let (code, messages) = run.end();
         assert_eq!(code, Some(5), "{signal}: {messages}");
@@ -155,14 +155,14 @@ fn signals_that_end_a_program_at_once_retract() {
 #[test]
 fn ctrl_c_three_times_switches_the_motors_off_and_seals() {
     let lab = Lab::new();
-    // Between presses a stop would end the run before the second ctrl-C: the tip is to be in the skin for some seconds.
+    // Between presses a stop would end the run before the second ctrl-C, so the tip must be in the skin for some seconds.
     let folder = lab.text("s");
     let mut arguments = vec!["run", SMALL, "--real-time", "--no-analysis"];
     for set in ["motion.hold=3s", "motion.period=5s", "sync.interval=5s"] {
         arguments.extend(["--set", set]);
     }
     arguments.extend(["--sessions", &folder]);
-    let mut run = Underway::of(program(&arguments));
+    let mut run = LiveRun::of(program(&arguments));
     let in_the_skin = || {
         let found = skinrig(&["status", "--json", &folder]).code(0).json();
         let z_mm = found["live"]["tip_mm"][2].as_f64();
@@ -185,8 +185,8 @@ fn ctrl_c_three_times_switches_the_motors_off_and_seals() {
         .iter()
         .map(|i| i[1].as_str().unwrap().to_owned())
         .collect();
-    // Requests that come between two looks of the controller are heard together, the gravest alone takes effect; and a
-    // fast retraction may be over before the third signal.
+    // Of requests within one controller tick only the most severe takes effect, and a fast
+    // retraction may finish before the third signal.
     let last = kinds.last().map(String::as_str);
     assert!(matches!(last, Some("halt" | "abort")), "{kinds:?}");
 }
@@ -203,10 +203,10 @@ fn nohup_is_respected() {
             lab.text("s")
         ),
     ]);
-    let mut run = Underway::of(command);
+    let mut run = LiveRun::of(command);
     run.signal("HUP");
     run.wait_for("press ");
-    // Still there, and it listens to everything else.
+    // The run continues and handles other signals.
     run.signal("TERM");
     let (code, messages) = run.end();
     assert_eq!(code, Some(5), "{messages}");
@@ -219,7 +219,7 @@ fn nohup_is_respected() {
 
 #[test]
 fn a_polite_end_by_the_system_stops_as_ctrl_c_does() {
-    // Tests started with `nohup` hand that on to the run.
+    // The run inherits `nohup` from the tests.
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|l| l.strip_prefix("SigIgn:"));
     let mask = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
@@ -231,7 +231,7 @@ fn a_polite_end_by_the_system_stops_as_ctrl_c_does() {
     };
     for signal in signals {
         let lab = Lab::new();
-        let run = Underway::new(&lab.path("s"));
+        let run = LiveRun::new(&lab.path("s"));
         run.signal(signal);
         let (code, messages) = run.end();
         assert_eq!(code, Some(5), "{signal}: {messages}");
@@ -242,8 +242,8 @@ fn a_polite_end_by_the_system_stops_as_ctrl_c_does() {
 #[test]
 fn a_killed_run_leaves_a_session_that_opens() {
     let lab = Lab::new();
-    // Its first press is shown as done, so it is on the disk.
-    let run = Underway::new(&lab.path("s"));
+    // The first press is reported as done, so it is on the disk.
+    let run = LiveRun::new(&lab.path("s"));
     run.signal("KILL");
     let (code, _) = run.end();
     assert_eq!(code, None);
@@ -277,8 +277,8 @@ fn a_killed_run_leaves_a_session_that_opens() {
     .code(0);
 }
 
-/// The campaign with every file limited to `blocks` of 512 bytes: as on a full disk, and SIGXFSZ besides, which would end the process.
-fn on_a_full_disk(folder: &str, blocks: u32) -> crate::support::Said {
+/// Runs the campaign with files limited to `blocks` of 512 bytes: like a full disk, plus SIGXFSZ, which kills by default.
+fn on_a_full_disk(folder: &str, blocks: u32) -> crate::support::ProgramOutput {
     let mut command = Command::new("sh");
     command.current_dir(ROOT).args([
         "-c",
@@ -287,24 +287,24 @@ fn on_a_full_disk(folder: &str, blocks: u32) -> crate::support::Said {
             env!("CARGO_BIN_EXE_skinrig")
         ),
     ]);
-    said(command)
+    run_to_end(command)
 }
 
 #[test]
 fn a_disk_that_fills_up_stops_the_run_which_can_be_resumed() {
-    // How much is written before the first press is the recorder's affair: the limit rises until some of it fits.
+    // The amount written before the first press is unspecified: raise the limit until some of it fits.
     for blocks in (1_000..40_000).step_by(1_000) {
         let lab = Lab::new();
         let said = on_a_full_disk(&lab.text("s"), blocks);
         if said.code == Some(1) {
             continue;
         }
-        said.code(3).complains(&["recorder", "kept", "next:"]);
+        said.code(3).expect_stderr(&["recorder", "kept", "next:"]);
         let session = only(&lab.path("s"), ".session.sqlite");
-        // The disk was full before the header: an empty session says so.
+        // The disk was full before the header: an empty session.
         let header = skinrig(&["show", &text(&session)]);
         if header.code != Some(0) {
-            header.code(2).complains(&["without records"]);
+            header.code(2).expect_stderr(&["without records"]);
             continue;
         }
         let shown = show(&session);
@@ -312,7 +312,7 @@ fn a_disk_that_fills_up_stops_the_run_which_can_be_resumed() {
         let verified = skinrig(&["verify", &text(&session)]).code(0).out;
         assert!(verified.contains("not sealed"), "{verified}");
         if shown["totals"]["cd_events"].as_u64().unwrap() > 0 {
-            // With space again it goes on where it was.
+            // With space available it resumes.
             skinrig(&["resume", &text(&session), "--no-analysis"]).code(0);
             let shown = show(&session);
             assert_eq!(
@@ -332,8 +332,8 @@ fn a_disk_that_is_full_from_the_start_ends_with_code_1_and_a_next_step() {
     let lab = Lab::new();
     on_a_full_disk(&lab.text("s"), 100)
         .code(1)
-        .complains(&["next:"]);
-    // Whatever is left is no session that claims anything.
+        .expect_stderr(&["next:"]);
+    // No files remain.
     let left = files(&lab.path("s"), "");
     assert!(left.is_empty(), "{left:?}");
 }
@@ -362,7 +362,7 @@ fn a_reader_that_goes_away_stops_no_run() {
         (&"completed".into(), &true.into())
     );
 
-    // `skinrig show ... | head -1` is no error.
+    // `skinrig show ... | head -1` is not an error.
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
     let mut command = program(&["show", &session, "--presses"]);
     let mut child = command

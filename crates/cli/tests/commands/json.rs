@@ -1,4 +1,4 @@
-//! What programs read: JSON with stable keys, and output without control characters.
+//! Machine-readable output: JSON with stable keys, and no control characters.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::dataset::Dataset;
 use crate::support::{Lab, SMALL, only, skinrig, text};
 
-/// Every path of keys in `value` with the kinds of value found there; lists are merged into `[]`.
+/// Every key path in `value` with its kinds of value; list items are merged into `[]`.
 pub(crate) fn shape(value: &Value) -> String {
     fn walk(value: &Value, path: &str, found: &mut BTreeMap<String, BTreeSet<&'static str>>) {
         let kind = match value {
@@ -53,7 +53,7 @@ fn json_keys_are_stable() {
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
     assert_eq!(run["files"]["session"], session.as_str());
     let analyze = json(&["analyze", &session]);
-    // A run ends with what analysing its session gives.
+    // A run ends with the analysis of its session.
     assert_eq!(shape(&run), shape(&analyze));
     insta::assert_snapshot!("run", shape(&run));
     insta::assert_snapshot!("check", shape(&json(&["check", SMALL])));
@@ -83,7 +83,7 @@ fn json_keys_are_stable() {
     let arguments = data.arguments(&lab.path("i"));
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     insta::assert_snapshot!("import", shape(&json(&arguments)));
-    // A schema is JSON already.
+    // A schema is JSON anyway.
     assert_eq!(json(&["schema"]), skinrig(&["schema"]).code(0).json());
     let recorded = json(&["run", SMALL, "--sessions", &lab.text("n"), "--no-analysis"]);
     insta::assert_snapshot!("run_no_analysis", shape(&recorded));

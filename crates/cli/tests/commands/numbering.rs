@@ -1,13 +1,13 @@
-//! A press has one number wherever it is read or written, counted from 1 with the sync presses.
+//! A press has the same number everywhere, counted from 1 with the sync presses.
 
 use serde_json::Value;
 use skinrig_recorder::SessionReader;
 
 use crate::support::{Lab, SMALL, only, read_json, show, skinrig, text};
 
-/// The press in which a camera loses bytes, so that it is taken again: the sixth of eight behind two sync presses.
+/// The press in which a camera loses bytes and that is retaken: the sixth of eight after two sync presses.
 const SPOILT: u64 = 8;
-/// The press that is left out by hand: the second location of the first repetition.
+/// The press excluded by hand: second location of the first repetition.
 const BY_HAND: u64 = 4;
 
 fn find(rows: &Value, number: u64) -> Value {
@@ -15,7 +15,7 @@ fn find(rows: &Value, number: u64) -> Value {
     rows.iter().find(|r| r["press"] == number).unwrap().clone()
 }
 
-/// No text has a press, repetition or location with the number 0.
+/// Asserts that the text has no press, repetition or location 0.
 fn counts_from_one(text: &str) {
     for nothing in ["press 0", "repetition 0", "rep 0", "location 0", "press 0:"] {
         let found = text.find(nothing).map(|at| {
@@ -44,10 +44,10 @@ fn a_press_has_one_number_everywhere() {
     .code(0);
     let session = only(&folder, ".session.sqlite");
     let s = text(&session);
-    // Progress: the press that is spoilt is the eighth of ten.
+    // Progress: the spoiled press is the eighth of ten.
     assert!(run.err.contains(&format!("press {SPOILT}/10")), "{run:#?}");
     counts_from_one(&run.err);
-    // The terminal's table names the attempt that was replaced.
+    // The terminal's table names the replaced attempt.
     assert!(run.out.contains(&format!("press {SPOILT}: ")), "{run:#?}");
     counts_from_one(&run.out);
 
@@ -75,7 +75,7 @@ fn a_press_has_one_number_everywhere() {
     assert_eq!(row(SPOILT)[1..4], ["score", "2", "2"], "{table}");
     counts_from_one(&table);
 
-    // `status`: the last five outcomes, the spoilt one among them.
+    // `status`: the last five outcomes include the spoiled press.
     let status = skinrig(&["status", &s]).code(0).out;
     assert!(
         status.contains(&format!("press {SPOILT}, attempt 2 valid")),
@@ -146,7 +146,7 @@ fn a_press_has_one_number_everywhere() {
 fn the_key_that_counted_from_zero_is_refused_with_what_to_write() {
     skinrig(&["check", SMALL, "--set", "analysis.exclude_presses=[3, 7]"])
         .code(2)
-        .complains(&["exclude_press_numbers: [4, 8]"]);
+        .expect_stderr(&["exclude_press_numbers: [4, 8]"]);
     skinrig(&[
         "check",
         SMALL,
@@ -159,5 +159,5 @@ fn the_key_that_counted_from_zero_is_refused_with_what_to_write() {
     let old = "analysis.exclude_presses=[3]";
     skinrig(&["analyze", &text(&session), "--set", old])
         .code(2)
-        .complains(&["exclude_press_numbers"]);
+        .expect_stderr(&["exclude_press_numbers"]);
 }

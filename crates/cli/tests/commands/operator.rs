@@ -1,4 +1,4 @@
-//! The operator at another terminal: status, notes, pause, resume, stop; runs that were killed; files that nobody runs.
+//! Commands from another terminal: status, notes, pause, resume, stop; killed runs; sessions without a run.
 #![cfg(unix)]
 
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::interrupt::Underway;
+use crate::interrupt::LiveRun;
 use crate::support::{Lab, files, only, program, sha256, show, skinrig, text};
 
 fn status(place: &Path) -> Value {
@@ -27,16 +27,16 @@ fn socket_of(session: &Path) -> PathBuf {
 #[test]
 fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
     let lab = Lab::new();
-    let run = Underway::new(&lab.path("s"));
+    let run = LiveRun::new(&lab.path("s"));
     let session = only(&lab.path("s"), ".session.sqlite");
     assert!(socket_of(&session).exists());
-    // The first press that is told of may be a sync press, which is not counted as done.
+    // The first reported press may be a sync press, which does not count as done.
     let patience = Instant::now() + Duration::from_secs(60);
     while status(&session)["live"]["done"].as_u64() == Some(0) {
         assert!(Instant::now() < patience, "no press was made");
     }
 
-    // Two readers at once, one by the folder.
+    // Two readers at once, one of which names the folder.
     let ask = |place: &str| {
         let mut reader = program(&["status", place, "--json"]);
         let piped = reader.stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -79,7 +79,7 @@ fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
         "Ann",
     ];
     assert!(skinrig(&note).code(0).out.contains("noted"));
-    // Nobody hurries a pause.
+    // Pausing a paused run has no effect.
     let said = skinrig(&["control", &text(&session), "pause", "--wait", "1 s"]);
     assert!(said.code(0).out.contains("the run is paused"));
 
@@ -93,7 +93,7 @@ fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
     let (code, messages) = run.end();
     assert_eq!(code, Some(5), "{messages}");
 
-    // The session tells all of it, nobody runs it, and it changes no more.
+    // The session lists all requests, has no run, and stays unchanged.
     let before = sha256(&std::fs::read(&session).unwrap());
     let ended = status(&lab.path("s"));
     assert_eq!(kinds(&ended), ["pause_now", "resume", "stop"], "{ended}");
@@ -114,7 +114,7 @@ fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
         ["note", &text(&session), "late"],
     ] {
         let refused = skinrig(&arguments).code(2);
-        refused.complains(&["sealed one, which never changes"]);
+        refused.expect_stderr(&["sealed one, which never changes"]);
     }
     assert_eq!(sha256(&std::fs::read(&session).unwrap()), before);
     let left = files(&lab.path("s"), "-control");
@@ -124,7 +124,7 @@ fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
 #[test]
 fn a_killed_run_is_told_from_a_running_one_and_its_socket_is_replaced() {
     let lab = Lab::new();
-    let run = Underway::new(&lab.path("s"));
+    let run = LiveRun::new(&lab.path("s"));
     run.signal("KILL");
     assert_eq!(run.end().0, None);
     let session = only(&lab.path("s"), ".session.sqlite");
@@ -144,10 +144,10 @@ fn a_killed_run_is_told_from_a_running_one_and_its_socket_is_replaced() {
         ["note", &text(&session), "why?"],
     ] {
         let refused = skinrig(&arguments).code(2);
-        refused.complains(&["no program is running", "skinrig resume"]);
+        refused.expect_stderr(&["no program is running", "skinrig resume"]);
     }
 
-    // The next leg listens again, and says so.
+    // The next leg opens its control socket again and reports it.
     let again = ["resume", &text(&session), "--real-time", "--no-analysis"];
     let mut leg = program(&again);
     let mut leg = leg
@@ -197,10 +197,10 @@ fn a_finished_session_is_only_read() {
     std::fs::create_dir(lab.path("none")).unwrap();
     skinrig(&["status", &lab.text("none")])
         .code(2)
-        .complains(&["expected a session, found none"]);
+        .expect_stderr(&["expected a session, found none"]);
     skinrig(&["status", "Cargo.toml"])
         .code(2)
-        .complains(&["expected a skinrig session"]);
+        .expect_stderr(&["expected a skinrig session"]);
     skinrig(&["control", &text(&session), "launch"]).code(2);
     skinrig(&["note", &text(&session)]).code(2);
 }

@@ -1,4 +1,4 @@
-//! Overrides, limits, folders that cannot be written, names that are taken.
+//! Overrides, limits, unwritable folders, existing names.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -52,7 +52,7 @@ fn an_override_changes_the_plan_and_is_stored_with_the_base_text() {
         shown.contains("--set depth=1 mm") && shown.contains("depth: 1.5 mm"),
         "{shown}"
     );
-    // The plan that ran is the plan that was shown before.
+    // The executed plan equals the plan shown before.
     let planned = skinrig(&["plan", "--json", SMALL]).code(0).json();
     assert_eq!(planned["sha256"], base["plan_sha256"]);
 }
@@ -73,8 +73,8 @@ fn a_wrong_override_is_refused_with_a_suggestion() {
     ] {
         skinrig(&["run", SMALL, "--set", change, "--sessions", &lab.text("s")])
             .code(2)
-            .complains(&["--set"])
-            .complains(&parts);
+            .expect_stderr(&["--set"])
+            .expect_stderr(&parts);
     }
     assert!(!lab.path("s").exists(), "nothing was to be made");
 }
@@ -89,7 +89,7 @@ fn all_errors_of_a_protocol_are_reported_at_once() {
         .replacen("max_force: 4 N", "max_force: 4 mm", 1);
     let file = lab.text("bad.yaml");
     std::fs::write(&file, bad).unwrap();
-    skinrig(&["check", &file]).code(2).complains(&[
+    skinrig(&["check", &file]).code(2).expect_stderr(&[
         "bad.yaml:4:1",
         "did you mean `operator`",
         "bad.yaml:30:8",
@@ -111,11 +111,11 @@ fn the_plan_is_drawn_and_printed_step_by_step() {
         drawn.starts_with("<svg") || drawn.starts_with("<?xml"),
         "{drawn}"
     );
-    // Numbered: the last of four places carries its number.
+    // Numbered: the last of four locations shows its number.
     assert!(drawn.contains(">4<"), "{drawn}");
     skinrig(&["plan", SMALL, "--svg", &lab.text("no/such/folder.svg")])
         .code(1)
-        .complains(&["folder.svg"]);
+        .expect_stderr(&["folder.svg"]);
 }
 
 #[test]
@@ -130,7 +130,7 @@ fn a_limit_that_is_not_met_ends_with_code_4_and_keeps_the_results() {
         "0.1",
     ])
     .code(4)
-    .complains(&["RMSE", "at most 0.1 mm", "found"]);
+    .expect_stderr(&["RMSE", "at most 0.1 mm", "found"]);
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
     let rmse =
         read_json(&only(&lab.path("s"), ".results.json"))["analysis"]["scored"]["rmse_mm"]["value"]
@@ -144,9 +144,9 @@ fn a_limit_that_is_not_met_ends_with_code_4_and_keeps_the_results() {
     for nonsense in ["NaN", "-1", "two"] {
         skinrig(&["analyze", &session, &format!("--max-rmse={nonsense}")])
             .code(2)
-            .complains(&["--max-rmse"]);
+            .expect_stderr(&["--max-rmse"]);
     }
-    // Nothing located is not a limit that was met.
+    // A limit is not met when no press is located.
     skinrig(&[
         "run",
         SMALL,
@@ -158,7 +158,7 @@ fn a_limit_that_is_not_met_ends_with_code_4_and_keeps_the_results() {
         "100",
     ])
     .code(4)
-    .complains(&["no scored press was located"]);
+    .expect_stderr(&["no scored press was located"]);
 }
 
 #[test]
@@ -177,7 +177,7 @@ fn a_session_whose_clocks_are_beyond_a_limit_is_invalid_everywhere() {
     let document = said.json();
     assert_eq!(document["valid"], false);
     assert_eq!(document["analysis"]["alignment"]["status"], "invalid");
-    said.complains(&["INVALID", "camera 1 from box", "at most 0.5 µs", "next:"]);
+    said.expect_stderr(&["INVALID", "camera 1 from box", "at most 0.5 µs", "next:"]);
     let shown = skinrig(&["analyze", &session, "--set", strict]).code(4).out;
     assert!(
         shown.starts_with("INVALID   use no number of this session"),
@@ -188,7 +188,7 @@ fn a_session_whose_clocks_are_beyond_a_limit_is_invalid_everywhere() {
     assert!(page.contains("data-testid=\"invalid\""));
     skinrig(&["tradeoff", &session, "--set", strict])
         .code(4)
-        .complains(&["INVALID"]);
+        .expect_stderr(&["INVALID"]);
 }
 
 #[test]
@@ -199,14 +199,14 @@ fn a_folder_that_cannot_be_written_ends_with_code_1_and_a_next_step() {
     for folder in [text(&file), format!("{}/below", text(&file))] {
         skinrig(&["run", SMALL, "--sessions", &folder])
             .code(1)
-            .complains(&["next:", "--sessions"]);
+            .expect_stderr(&["next:", "--sessions"]);
     }
     let locked = lab.path("locked");
     std::fs::create_dir(&locked).unwrap();
     let mut permissions = std::fs::metadata(&locked).unwrap().permissions();
     permissions.set_readonly(true);
     std::fs::set_permissions(&locked, permissions).unwrap();
-    // To the administrator a folder without rights is no obstacle; a file system of the kernel is.
+    // Root can write to any folder without permissions, but not to a kernel file system.
     let kernel = Path::new("/sys/kernel").to_owned();
     let refusing = [locked, kernel]
         .into_iter()
@@ -217,7 +217,7 @@ fn a_folder_that_cannot_be_written_ends_with_code_1_and_a_next_step() {
     };
     skinrig(&["run", SMALL, "--sessions", &text(&folder)])
         .code(1)
-        .complains(&["next:", "--sessions"]);
+        .expect_stderr(&["next:", "--sessions"]);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! From a protocol to results and files in other programs' formats.
+//! From a protocol to results and exports.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -74,7 +74,7 @@ fn a_run_ends_with_results_that_add_up_and_files_that_exist() {
         assert_eq!(line[key.len()..], text(&only(&lab.path("s"), ending)));
     }
 
-    // The table, the file of results and the session say the same.
+    // Table, results file and session agree.
     let session = only(&lab.path("s"), ".session.sqlite");
     let results = read_json(&only(&lab.path("s"), ".results.json"));
     let stored = results["analysis"]["scored"]["rmse_mm"]["value"]
@@ -130,7 +130,7 @@ fn a_recorded_session_can_be_verified_listed_and_shown() {
     ] {
         assert!(shown.contains(part), "{part}\n{shown}");
     }
-    // Of which build: the one that runs here.
+    // The build is the one running here.
     let version = skinrig(&["--version"]).code(0).out;
     let build = version.trim_end().split_once(" (commit ").unwrap().1;
     assert!(
@@ -180,7 +180,7 @@ fn analyze_and_report_give_the_same_results_again_and_others_with_other_settings
     let other = read_json(Path::new(&other));
     assert_ne!(hash(&first), hash(&other));
     assert_ne!(first["analysis"]["settings"], other["analysis"]["settings"]);
-    // The session's own results stay what they were, and so does the session.
+    // The official results and the session are unchanged.
     assert_eq!(
         hash(&first),
         hash(&read_json(&only(&lab.path("s"), ".results.json")))
@@ -188,7 +188,7 @@ fn analyze_and_report_give_the_same_results_again_and_others_with_other_settings
     skinrig(&["verify", &path]).code(0);
     skinrig(&["analyze", &path, "--set", "depth=1 mm"])
         .code(2)
-        .complains(&["analysis."]);
+        .expect_stderr(&["analysis."]);
 }
 
 fn events_of(session: &Path, camera: CameraId) -> Vec<CdEvent> {
@@ -295,21 +295,23 @@ fn exports_hold_exactly_what_was_recorded_and_inspect_reads_them() {
     let rows = csv::Reader::from_path(&pose).unwrap().records().count();
     assert_eq!(rows as u64, reader.totals().unwrap().pose_samples);
 
-    // The same export again is done; what it did not write is never overwritten.
+    // Repeating the same export succeeds; files it did not write are never overwritten.
     let raw = ["export", &text(&session), "--to", "raw", "--out", &out];
     skinrig(&raw).code(0);
     let camera = only(&lab.path("e"), ".camera1.raw");
     std::fs::write(&camera, "mine").unwrap();
-    skinrig(&raw).code(1).complains(&[".camera1.raw", "--out"]);
+    skinrig(&raw)
+        .code(1)
+        .expect_stderr(&[".camera1.raw", "--out"]);
     assert_eq!(std::fs::read(&camera).unwrap(), b"mine");
     let csv = ["export", &text(&session), "--to", "csv", "--out", &out];
-    // But when asked, and then it is the same.
+    // Except with `--overwrite`, which gives the same file.
     let before = std::fs::read(&presses).unwrap();
     skinrig(&[&csv[..], &["--only", "presses", "--overwrite"]].concat()).code(0);
     assert!(before == std::fs::read(&presses).unwrap());
 }
 
-/// On a terminal each phase says what it does; in a pipe nothing but the answer is written.
+/// On a terminal each phase reports progress; in a pipe only the answer is written.
 #[test]
 fn a_terminal_shows_what_takes_time() {
     let lab = Lab::new();

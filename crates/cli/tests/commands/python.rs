@@ -1,7 +1,7 @@
-//! Exports read back by the programs they are made for, and the code of `docs/how-to/python.md` that needs no package; the tests of
+//! Exports read back by other programs, and the code of `docs/how-to/python.md` that needs no package; the tests of
 //! the package (`tests/python/package`) run the rest.
 //!
-//! Python with the packages of `tests/python/requirements.txt` comes from `SKINRIG_PYTHON`, its interpreter.
+//! `SKINRIG_PYTHON` names an interpreter with the packages of `tests/python/requirements.txt`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -42,7 +42,7 @@ impl Truth {
     }
 }
 
-/// `interpreter`, or `None` after saying why there is none.
+/// Path of the interpreter; `None`, with the reason on standard error, without one.
 fn interpreter() -> Option<String> {
     let python = std::env::var("SKINRIG_PYTHON").ok();
     if python.is_none() {
@@ -59,7 +59,7 @@ fn succeeds(mut command: Command) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The table of presses as the session and its results say.
+/// Expected table of presses, from the session and its results.
 fn presses(session: &Path, analysis: &Analysis) -> Truth {
     let reader = SessionReader::open(session).unwrap();
     let (id, header) = (reader.session_id().unwrap(), reader.header().unwrap());
@@ -138,7 +138,7 @@ fn views(put: &mut impl FnMut(&str, Value), analysis: &Analysis, i: usize, touch
     }
 }
 
-/// The table of results out of the document that `analyze` writes.
+/// Expected table of results, from the document that `analyze` writes.
 fn results(document: &Value) -> Truth {
     let analysis = &document["analysis"];
     let mut table = Truth::default();
@@ -219,7 +219,7 @@ fn events(session: &Path, camera: CameraId) -> Vec<u8> {
     packed
 }
 
-/// Every column that an export has, and the page that explains it.
+/// Asserts that the page explains every column.
 fn assert_documented(page: &str, table: &Truth) {
     for name in &table.order {
         assert!(
@@ -241,7 +241,7 @@ fn exports_are_read_back_in_python_and_the_page_about_it_runs() {
     let truth = lab.path("truth");
     std::fs::create_dir(&truth).unwrap();
     let document = read_json(&only(&lab.path("s"), ".results.json"));
-    // The analysis itself: its document leaves out the bulk that only figures need.
+    // The analysis itself: its document omits bulk data that only figures need.
     let analysis = skinrig::results::analyze_session(&session, Default::default());
     let analysis = analysis.map_err(|e| e.message).unwrap().analysis;
     let page = std::fs::read_to_string(format!("{ROOT}/docs/reference/exports.md")).unwrap();

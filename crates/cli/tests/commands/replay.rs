@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::support::{Lab, chunks, only, read_json, show, skinrig, text};
 
-/// Replays `session` into `folder` and asserts that nothing but names and dates differs.
+/// Replays `session` into `folder` and asserts that only names and dates differ.
 #[track_caller]
 pub(crate) fn assert_replays(lab: &Lab, session: &Path, folder: &str) {
     skinrig(&["analyze", &text(session)]).code(0);
@@ -61,7 +61,7 @@ fn a_replay_ends_with_the_same_press_table_and_results_hash() {
     let lab = Lab::new();
     let session = lab.record("s", &[]);
     assert_replays(&lab, &session, "r");
-    // A replay is a session like any other, and can be replayed itself.
+    // A replay is an ordinary session and can be replayed.
     let replayed = only(&lab.path("r"), ".session.sqlite");
     assert_replays(&lab, &replayed, "rr");
 }

@@ -1,4 +1,4 @@
-//! A session that was cut off goes on in a further leg, from the command line to its results; and what is refused.
+//! Resuming a cut-off session in a further leg, up to its results; and rejected resumes.
 
 use std::path::PathBuf;
 
@@ -9,7 +9,7 @@ use skinrig_results::Rescan;
 
 use crate::support::{Lab, SMALL, files, only, read_json, show, skinrig, text};
 
-/// The small campaign, gone in the middle of a press of its second round.
+/// The small campaign, killed during a press of its second repetition.
 fn cut_off(lab: &Lab) -> PathBuf {
     let sessions = lab.text("cut");
     let run = skinrig(&[
@@ -89,7 +89,7 @@ fn a_resumed_session_gives_the_results_of_one_that_was_never_cut_off() {
         assert_eq!(is["verdict"], "valid", "{is}");
         for axis in ["x_mm", "y_mm"] {
             let of = |press: &Value, what: &str| press[what][axis].as_f64().unwrap();
-            // The robot's noise is not the same twice.
+            // The robot's noise differs between runs.
             for expected in [of(was, "truth"), of(was, "planned")] {
                 let off = of(is, "truth") - expected;
                 assert!(off.abs() < 0.1, "{off} mm: {is}, was {was}");
@@ -98,7 +98,7 @@ fn a_resumed_session_gives_the_results_of_one_that_was_never_cut_off() {
     }
 }
 
-/// A session that was just begun, with another header.
+/// A session with only a header, changed by the caller.
 fn begun(
     lab: &Lab,
     name: &str,
@@ -120,7 +120,7 @@ fn what_cannot_go_on_is_refused_and_left_as_it_is() {
     let refused = |session: &std::path::Path, parts: &[&str]| {
         skinrig(&["resume", &text(session)])
             .code(2)
-            .complains(parts);
+            .expect_stderr(parts);
     };
     let writer = SessionWriter::resume::<Rescan>(&session).unwrap();
     refused(&session, &["process "]);
@@ -128,7 +128,7 @@ fn what_cannot_go_on_is_refused_and_left_as_it_is() {
     assert_eq!(show(&session)["legs"].as_array().unwrap().len(), 1);
 
     let rig = ["resume", &text(&session), "--rig", "hil/rigs/emulated.yaml"];
-    skinrig(&rig).code(2).complains(&["expected no --rig"]);
+    skinrig(&rig).code(2).expect_stderr(&["expected no --rig"]);
 
     for kind in ["imported", "replayed"] {
         let other = |header: &mut RunHeader| header.rig_kind = kind.to_owned();
@@ -144,7 +144,7 @@ fn what_cannot_go_on_is_refused_and_left_as_it_is() {
         [""; 0].map(PathBuf::from)
     );
 
-    // One byte of a text is another than when its SHA-256 was taken.
+    // One byte of a text differs from its recorded SHA-256.
     let header = SessionReader::open(&whole).unwrap().header().unwrap();
     for (what, of) in [
         ("protocol", &header.protocol_text),
@@ -157,7 +157,7 @@ fn what_cannot_go_on_is_refused_and_left_as_it_is() {
         let path = lab.path(&format!("{what}.session.sqlite"));
         std::fs::write(&path, &bytes).unwrap();
         let problem = format!("{what}_sha256: expected");
-        skinrig(&["resume", &text(&path)]).code(4).complains(&[
+        skinrig(&["resume", &text(&path)]).code(4).expect_stderr(&[
             "expected a sound session",
             &problem,
             "nothing was changed",

@@ -1,4 +1,4 @@
-//! Benches: rig files, what is connected, the preflight in sessions, jogging, and presses that touch.
+//! Benches: rig files, connected devices, preflight in sessions, jogging, and presses from touch.
 
 use std::io::{Read, Write};
 use std::process::Stdio;
@@ -7,20 +7,20 @@ use serde_json::Value;
 use skinrig_protocol::rig::RigFile;
 
 use crate::replay::assert_replays;
-use crate::support::{Lab, ROOT, Said, files, program, said, show, skinrig};
+use crate::support::{Lab, ProgramOutput, ROOT, files, program, run_to_end, show, skinrig};
 
 const EMULATED: &str = "hil/rigs/emulated.yaml";
 const QUICK: &str = "protocols/quick-check.yaml";
 
-/// The program with the devices of an emulated bench that is not there.
-fn without_devices(arguments: &[&str]) -> Said {
+/// Runs the program with the devices of an absent emulated bench.
+fn without_devices(arguments: &[&str]) -> ProgramOutput {
     let mut command = program(arguments);
     command
         .env("SKINRIG_EMULATED_LIBDRD", "/nowhere/libdrd.so")
         .env("SKINRIG_EMULATED_TRIGGER_BOX", "/nowhere/box")
         .env("SKINRIG_EMULATED_LAMPS_OFF", "/nowhere/lamps-off")
         .env("SKINRIG_LIBDRD", "/nowhere/libdrd.so");
-    said(command)
+    run_to_end(command)
 }
 
 #[test]
@@ -36,7 +36,7 @@ fn nothing_connected_is_no_error_and_every_line_has_a_next_step() {
     let role = |role: &str| lines.iter().find(|l| l["role"] == role);
     for name in ["camera1", "camera2", "trigger_box"] {
         let line = role(name).unwrap_or_else(|| panic!("{name} is not listed: {lines:?}"));
-        // On a machine without USB nobody can say whether a camera is there.
+        // Without USB it is unknown whether a camera is connected.
         let no_bus = name != "trigger_box" && line["state"] == "not asked";
         assert!(no_bus || line["state"] == "absent", "{line}");
         assert!(
@@ -62,7 +62,7 @@ fn the_doctor_tells_of_a_bench_that_is_not_there_what_is_missing() {
             .find(|f| f["area"] == area && f["check"] == check);
         found.map_or(Value::Null, |f| f["verdict"].clone())
     };
-    // Without a rig file nothing is missing; what the machine itself lacks is its own business.
+    // Without a rig file no device is missing; problems of this computer do not matter here.
     let alone = doctor(&["--json"]).json();
     assert_eq!(alone["kind"], Value::Null);
     for (area, check) in [("cables", "devices"), ("versions", "robot library")] {
@@ -79,7 +79,7 @@ fn the_doctor_tells_of_a_bench_that_is_not_there_what_is_missing() {
     assert!(plain.out.contains("problem") && plain.out.contains("next: "));
     doctor(&["--rig", QUICK])
         .code(2)
-        .complains(&["this is not a rig"]);
+        .expect_stderr(&["this is not a rig"]);
 }
 
 #[test]
@@ -89,25 +89,25 @@ fn a_rig_file_is_read_with_the_same_care_as_a_protocol() {
         |rig: &str| without_devices(&["run", QUICK, "--rig", rig, "--sessions", &lab.text("s")]);
     run("hil/rigs/nowhere.yaml")
         .code(2)
-        .complains(&["cannot read hil/rigs/nowhere.yaml"]);
+        .expect_stderr(&["cannot read hil/rigs/nowhere.yaml"]);
     run(QUICK)
         .code(2)
-        .complains(&["this is not a rig", "found: a protocol"]);
+        .expect_stderr(&["this is not a rig", "found: a protocol"]);
     let spoilt = std::fs::read_to_string(format!("{ROOT}/{EMULATED}")).unwrap();
     let spoilt = spoilt.replace("max_force: 8 N", "max_force: 8");
     std::fs::write(lab.path("rig.yaml"), spoilt).unwrap();
-    run(&lab.text("rig.yaml")).code(2).complains(&[
+    run(&lab.text("rig.yaml")).code(2).expect_stderr(&[
         "limits.max_force",
         "the unit is missing",
         "write `8 N`",
     ]);
-    // A run presses what the file says is off: the arm might sweep through it.
+    // A run presses the sample that the file declares removed; initialisation might sweep the arm through it.
     let bare = std::fs::read_to_string(format!("{ROOT}/{EMULATED}")).unwrap();
     let bare = bare.replace("\nrobot:\n", "\nrobot:\n  sample_is_off: true\n");
     std::fs::write(lab.path("bare.yaml"), bare).unwrap();
     run(&lab.text("bare.yaml"))
         .code(2)
-        .complains(&["robot.sample_is_off: expected false", "skinrig jog"]);
+        .expect_stderr(&["robot.sample_is_off: expected false", "skinrig jog"]);
     skinrig(&["run", QUICK, "--rig", EMULATED, "--level", "optical"]).code(2);
     assert_eq!(files(&lab.path("s"), "").len(), 0, "nothing was recorded");
 }
@@ -118,10 +118,10 @@ fn a_bench_that_is_not_there_is_named_with_the_next_step() {
     let sessions = lab.text("s");
     without_devices(&["run", QUICK, "--rig", EMULATED, "--sessions", &sessions])
         .code(3)
-        .complains(&["/nowhere/libdrd.so", "install the SDK"]);
+        .expect_stderr(&["/nowhere/libdrd.so", "install the SDK"]);
     without_devices(&["jog", "--rig", EMULATED, "--log", &lab.text("jog.log")])
         .code(3)
-        .complains(&["/nowhere/libdrd.so"]);
+        .expect_stderr(&["/nowhere/libdrd.so"]);
 }
 
 #[test]
@@ -139,7 +139,7 @@ fn the_tighter_limit_of_bench_and_protocol_holds() {
         &lab.text("s"),
     ])
     .code(2)
-    .complains(&[
+    .expect_stderr(&[
         "the speed is outside its limit",
         "at most 30 mm/s",
         "slow.yaml allows",
@@ -194,18 +194,18 @@ fn presses_that_touch_are_recorded_and_replayed() {
     assert_replays(&lab, &session, "r");
 }
 
-/// Jogs the simulated rig with these lines; the log goes to `log`.
-fn jog(lines: &str, log: &str) -> Said {
+/// Jogs the simulated rig with these input lines, logging to `log`.
+fn jog(lines: &str, log: &str) -> ProgramOutput {
     let mut child = program(&["jog", "--log", log])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // The program may end before it has read everything.
+    // The program may exit before reading all input.
     let _ = child.stdin.take().unwrap().write_all(lines.as_bytes());
     let output = child.wait_with_output().unwrap();
-    Said {
+    ProgramOutput {
         code: output.status.code(),
         out: String::from_utf8(output.stdout).unwrap(),
         err: String::from_utf8(output.stderr).unwrap(),
@@ -215,7 +215,7 @@ fn jog(lines: &str, log: &str) -> Said {
 #[test]
 fn touched_points_become_the_frame_of_a_rig_file() {
     let lab = Lab::new();
-    // The simulated skin is turned by the angle of the 7-24-25 triangle; robot = R skin + (-6, -3, -15) mm.
+    // The simulated skin is rotated by the angle of the 7-24-25 triangle; robot = R skin + (-6, -3, -15) mm.
     let robot = |x: f64, y: f64| (0.96 * x - 0.28 * y - 6.0, 0.28 * x + 0.96 * y - 3.0);
     let mut lines = "speed 40 mm/s\nwhere\n".to_owned();
     for (name, x, y) in [
@@ -250,7 +250,7 @@ fn touched_points_become_the_frame_of_a_rig_file() {
         assert!((found.rotation[i][1] - r[1]).abs() < 2e-3, "{found:?}");
         assert!((found.translation_mm[i] - t).abs() < 0.1, "{found:?}");
     }
-    // The touch comes late by the threshold over the skin's stiffness, 0.33 mm.
+    // The touch is 0.33 mm late: threshold over stiffness of the skin.
     assert!((found.translation_mm[2] + 15.4).abs() < 0.15, "{found:?}");
     let log = std::fs::read_to_string(log).unwrap();
     for kind in [
@@ -273,7 +273,7 @@ fn a_wrong_line_of_a_file_ends_the_jog_with_the_robot_disarmed() {
         ("to 200 0 0 mm", "expected a target with x"),
         ("speed 500 mm/s\nx 1mm", "expected a speed above 0"),
         ("point a", "`touch` first"),
-        // From the touch sideways: the tip is 2 mm up at most.
+        // Sideways after a touch: the tip is at most 2 mm up.
         (
             "touch 15mm\nz -1.5mm\nx +5mm",
             "expected lateral motion only at",
@@ -285,7 +285,7 @@ fn a_wrong_line_of_a_file_ends_the_jog_with_the_robot_disarmed() {
         let log = lab.text(&format!("{i}.log"));
         let said = jog(&format!("{line}\nz +1mm\n"), &log)
             .code(2)
-            .complains(&[words]);
+            .expect_stderr(&[words]);
         assert!(said.out.contains("disarmed at"), "{said:?}");
         let log = std::fs::read_to_string(log).unwrap();
         assert!(
@@ -302,7 +302,7 @@ fn a_jog_stays_within_the_depth_of_the_frame_unless_told_otherwise() {
     let log = lab.text("within.log");
     jog("touch 16.5mm\n", &log)
         .code(2)
-        .complains(&["at most 6 mm below the frame's surface", "--beyond-frame"]);
+        .expect_stderr(&["at most 6 mm below the frame's surface", "--beyond-frame"]);
     let log = std::fs::read_to_string(log).unwrap();
     assert!(log.contains("\tlimit\t6 mm below"), "{log}");
     let log = lab.text("beyond.log");
@@ -332,7 +332,7 @@ fn the_logs_of_jogs_are_never_written_over() {
     jog("where\n", &log).code(0);
     jog("where\n", &log)
         .code(1)
-        .complains(&["jog.log", "--log"]);
+        .expect_stderr(&["jog.log", "--log"]);
 }
 
 #[test]
@@ -346,7 +346,7 @@ fn ctrl_c_holds_rises_and_disarms() {
         .unwrap();
     let mut stdin = child.stdin.take().unwrap();
     stdin.write_all(b"where\n").unwrap();
-    // The log tells when the order was obeyed; a signal before that would find no robot to disarm.
+    // Wait until the log shows the order executed; an earlier signal would find no armed robot.
     let log = lab.path("jog.log");
     let began = std::time::Instant::now();
     while !std::fs::read_to_string(&log).is_ok_and(|t| t.contains("\tanswer\t")) {
@@ -387,7 +387,7 @@ fn a_jog_that_nobody_uses_disarms() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // Standard input stays open: a terminal that was left alone.
+    // Standard input stays open, like an abandoned terminal.
     let mut input = child.stdin.take().unwrap();
     input.write_all(b"where\n").unwrap();
     let mut said = String::new();

@@ -1,4 +1,4 @@
-//! What to press to find a difference, from a session's own variance.
+//! Presses needed to detect a difference, from a session's variance.
 
 use crate::support::{Lab, skinrig, text};
 
@@ -18,7 +18,7 @@ fn a_session_says_what_its_successor_has_to_be_pressed() {
     assert!(proposals[0]["seconds"].as_f64().unwrap() > 0.0);
     let locations =
         |said: &serde_json::Value| said["plan"]["proposals"][0]["locations"].as_u64().unwrap();
-    // A tenth of the difference takes more places; a length in another unit is the same length.
+    // A tenth of the difference takes more locations; units do not matter.
     assert!(locations(&ask(&["0.1 mm"])) > locations(&said));
     assert_eq!(ask(&["100 um"]), ask(&["0.1 mm"]));
     assert!(locations(&ask(&["0.1 mm", "--power", "0.95"])) > locations(&ask(&["0.1 mm"])));
@@ -32,15 +32,15 @@ fn a_session_says_what_its_successor_has_to_be_pressed() {
 
     skinrig(&["plan", "--detect", "1 mm"])
         .code(2)
-        .complains(&["--from"]);
+        .expect_stderr(&["--from"]);
     for (wrong, part) in [("0 mm", "above 0"), ("3 s", "length")] {
         let said = skinrig(&["plan", "--from", &session, "--detect", wrong]);
-        said.code(2).complains(&[part]);
+        said.code(2).expect_stderr(&[part]);
     }
     let sure = [
         "plan", "--from", &session, "--detect", "1 mm", "--power", "1",
     ];
-    skinrig(&sure).code(2).complains(&["probability"]);
+    skinrig(&sure).code(2).expect_stderr(&["probability"]);
     let both = [
         "plan",
         "protocols/demo.yaml",

@@ -1,4 +1,4 @@
-//! Where a file is expected, a pipe, a device and a folder are refused at once and by name, by every command that reads one.
+//! Every command that reads a file rejects pipes, devices and folders at once, by name.
 
 use std::process::{Command, Output, Stdio};
 use std::sync::mpsc::channel;
@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::support::{Lab, ROOT, SMALL, program};
 
-/// Every way to name a file to be read; `?` stands for it.
+/// Every command line that reads a file, marked `?`.
 const READING: [&str; 32] = [
     "check ?",
     "plan ?",
@@ -42,8 +42,8 @@ const READING: [&str; 32] = [
     "inspect --json ?",
 ];
 
-/// What a command says; `None` when it does not come back. What hangs is ended.
-fn said(arguments: &[&str]) -> Option<Output> {
+/// Output of a command; `None` if it hangs and had to be killed.
+fn run_with_timeout(arguments: &[&str]) -> Option<Output> {
     let child = program(arguments)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
@@ -90,7 +90,7 @@ fn pipes_and_devices_are_refused() {
                     word => word,
                 })
                 .collect();
-            match said(&words) {
+            match run_with_timeout(&words) {
                 Some(output) if output.status.code() == Some(2) => {}
                 // Reads a session and no lock.
                 Some(output) if file == beside && output.status.code() == Some(0) => {}

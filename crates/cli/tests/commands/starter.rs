@@ -1,8 +1,8 @@
-//! `skinrig new` and `skinrig init`: what a lab begins with, in a folder that knows no checkout.
+//! `skinrig new` and `skinrig init` in a folder outside any checkout.
 
 use std::path::Path;
 
-use crate::support::{Lab, Said, only, program, said};
+use crate::support::{Lab, ProgramOutput, only, program, run_to_end};
 
 const KINDS: [&str; 9] = [
     "campaign",
@@ -16,11 +16,11 @@ const KINDS: [&str; 9] = [
     "demo",
 ];
 
-/// The program started in `folder`.
-fn at(folder: &Path, arguments: &[&str]) -> Said {
+/// Runs the program in `folder`.
+fn at(folder: &Path, arguments: &[&str]) -> ProgramOutput {
     let mut command = program(arguments);
     command.current_dir(folder);
-    said(command)
+    run_to_end(command)
 }
 
 #[test]
@@ -34,7 +34,7 @@ fn every_new_protocol_passes_its_check_and_none_is_overwritten() {
         at(&folder, &["new", kind, &file]).code(0);
         at(&folder, &["check", &file]).code(0);
         std::fs::write(lab.path(&file), "mine").unwrap();
-        at(&folder, &["new", kind, &file]).code(2).complains(&[
+        at(&folder, &["new", kind, &file]).code(2).expect_stderr(&[
             &file,
             "found an existing one",
             "next:",
@@ -72,10 +72,10 @@ fn a_new_lab_runs_and_keeps_what_is_its_own() {
     std::fs::write(lab.path("file"), "").unwrap();
     at(&folder, &["init", "file/lab"])
         .code(2)
-        .complains(&["next:"]);
+        .expect_stderr(&["next:"]);
 }
 
-/// Without `scene`, the summary says what was taken; a skin of its own needs the level that models skins.
+/// Without `scene` the summary names the chosen level; a custom skin needs the level that models skins.
 #[test]
 fn a_scene_is_optional_and_says_what_it_took() {
     let lab = Lab::new();
@@ -99,5 +99,5 @@ fn a_scene_is_optional_and_says_what_it_took() {
         &["check", "o.yaml", "--set", "scene.level=geometric"],
     )
     .code(2)
-    .complains(&["scene.level", "optical"]);
+    .expect_stderr(&["scene.level", "optical"]);
 }

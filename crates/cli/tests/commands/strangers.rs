@@ -1,11 +1,11 @@
-//! Input from strangers: names in it lead nowhere but into the folders that were asked for.
+//! Untrusted input: names in it never lead outside the requested folders.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use crate::support::{Lab, SMALL, only, skinrig, text};
 
-/// Names of a prototype or a protocol by somebody who wants to write elsewhere, or does not think of it.
+/// Prototype or protocol names that try to write elsewhere, by intent or by accident.
 fn names() -> [String; 3] {
     [
         "../../../x".to_owned(),
@@ -31,7 +31,7 @@ fn names_from_a_file_stay_in_the_folders_that_were_asked_for() {
     let lab = Lab::new();
     let protocol = std::fs::read_to_string(Path::new(crate::support::ROOT).join(SMALL)).unwrap();
     for (n, name) in names().iter().enumerate() {
-        // Deep inside, so that a name that climbs would still end in this test's own folder.
+        // Nested deeply, so that `..` would still end in this test's folder.
         let (inner, sessions) = (format!("a/b/c/{n}"), format!("a/b/c/{n}/sessions"));
         std::fs::create_dir_all(lab.path(&inner)).unwrap();
         let file = lab.path(&format!("{inner}/x.yaml"));
@@ -68,7 +68,7 @@ fn names_from_a_file_stay_in_the_folders_that_were_asked_for() {
         })
         .collect();
     assert!(strays.is_empty(), "{strays:?}");
-    // Protocol, session, salvaged session, report, results, fifteen exports, and no run that was refused.
+    // Protocol, session, salvaged session, report, results, fifteen exports; nothing from rejected runs.
     assert!(found.len() >= 20 * names().len(), "{found:?}");
 }
 
@@ -105,7 +105,7 @@ fn links_in_a_strangers_folder_are_not_written_through() {
             let export = ["export", &session, "--to", kind, "--only", "pose"];
             skinrig(&[&export[..], more].concat())
                 .code(1)
-                .complains(&["next:"]);
+                .expect_stderr(&["next:"]);
         }
     }
     let npz = ["export", &session, "--to", "npz", "--only", "pose"];

@@ -22,7 +22,7 @@ fn equal_seeds_give_equal_bytes_and_other_seeds_do_not() {
     }
 }
 
-/// A change here means that old seeds give other sessions: wanted after a change of the simulation, else a fault.
+/// A change here means that old seeds give other sessions: intended after a change of the simulation, otherwise a bug.
 #[test]
 fn the_bytes_of_each_level_are_pinned() {
     let lab = Lab::new();

@@ -1,4 +1,4 @@
-//! What the tests of the program share: the program itself, a folder of their own, and a small campaign.
+//! Shared helpers: running the program, a temporary folder, and a small campaign.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -11,21 +11,21 @@ use skinrig_model::CameraId;
 use skinrig_recorder::SessionReader;
 use tempfile::TempDir;
 
-/// The workspace: where protocols lie, and where the program is started.
+/// Workspace root: holds the protocols and is the program's working directory.
 pub(crate) const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
-/// Two rounds of four presses and two sync presses, 17 s of rig time.
+/// Two repetitions of four presses, and two sync presses; 17 s of rig time.
 pub(crate) const SMALL: &str = "crates/cli/tests/fixtures/small.yaml";
 
-/// What one call of the program did.
+/// Exit code (`None` if killed), standard output and standard error of one call.
 #[derive(Debug)]
-pub(crate) struct Said {
+pub(crate) struct ProgramOutput {
     pub code: Option<i32>,
     pub out: String,
     pub err: String,
 }
 
-impl Said {
-    /// Asserts the exit code; the message shows everything that was said.
+impl ProgramOutput {
+    /// Asserts the exit code and that nothing panicked.
     #[track_caller]
     pub(crate) fn code(self, expected: i32) -> Self {
         assert_eq!(self.code, Some(expected), "{self:#?}");
@@ -42,9 +42,9 @@ impl Said {
         }
     }
 
-    /// Asserts that standard error has all of `parts`.
+    /// Asserts that standard error contains all `parts`.
     #[track_caller]
-    pub(crate) fn complains(self, parts: &[&str]) -> Self {
+    pub(crate) fn expect_stderr(self, parts: &[&str]) -> Self {
         for part in parts {
             assert!(self.err.contains(part), "expected {part:?} in {self:#?}");
         }
@@ -52,16 +52,16 @@ impl Said {
     }
 }
 
-/// The program with these arguments, not yet started.
+/// Command for the program with these arguments, not yet started.
 pub(crate) fn program<S: AsRef<OsStr>>(arguments: &[S]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_skinrig"));
     command.current_dir(ROOT).args(arguments);
-    // Each call has its leases for itself: tests run side by side, on benches of one name.
+    // Each call has its own leases: tests run in parallel on benches of the same name.
     command.env("SKINRIG_LEASES", leases());
     command
 }
 
-/// A new folder for leases.
+/// Creates a new folder for leases.
 fn leases() -> PathBuf {
     static MADE: AtomicUsize = AtomicUsize::new(0);
     let name = format!(
@@ -74,22 +74,22 @@ fn leases() -> PathBuf {
     folder
 }
 
-/// Runs the program to its end. Neither of its outputs is a terminal.
-pub(crate) fn skinrig<S: AsRef<OsStr>>(arguments: &[S]) -> Said {
-    said(program(arguments))
+/// Runs the program to its end, without a terminal.
+pub(crate) fn skinrig<S: AsRef<OsStr>>(arguments: &[S]) -> ProgramOutput {
+    run_to_end(program(arguments))
 }
 
 /// Runs `command` to its end.
-pub(crate) fn said(mut command: Command) -> Said {
+pub(crate) fn run_to_end(mut command: Command) -> ProgramOutput {
     let output = command.output().unwrap();
-    Said {
+    ProgramOutput {
         code: output.status.code(),
         out: String::from_utf8(output.stdout).unwrap(),
         err: String::from_utf8(output.stderr).unwrap(),
     }
 }
 
-/// A folder of one test, removed with it.
+/// Temporary folder of one test.
 pub(crate) struct Lab(TempDir);
 
 impl Lab {
@@ -102,12 +102,12 @@ impl Lab {
         self.0.path().join(name)
     }
 
-    /// The same as text, for arguments.
+    /// A path in the folder as text, for arguments.
     pub(crate) fn text(&self, name: &str) -> String {
         text(&self.path(name))
     }
 
-    /// Records the small campaign with more arguments and without analysis; the session's path.
+    /// Records the small campaign with `more` arguments, without analysis; returns the session's path.
     #[track_caller]
     pub(crate) fn record(&self, folder: &str, more: &[&str]) -> PathBuf {
         let sessions = self.text(folder);
@@ -123,7 +123,7 @@ pub(crate) fn text(path: &Path) -> String {
     path.to_str().unwrap().to_owned()
 }
 
-/// The files of `folder` whose names end so, sorted.
+/// Files of `folder` whose names end with `ending`, sorted.
 pub(crate) fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(folder) else {
         return Vec::new();
@@ -136,7 +136,7 @@ pub(crate) fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
     found
 }
 
-/// The one file of `folder` whose name ends so.
+/// The only file of `folder` whose name ends with `ending`.
 #[track_caller]
 pub(crate) fn only(folder: &Path, ending: &str) -> PathBuf {
     let found = files(folder, ending);
@@ -144,7 +144,7 @@ pub(crate) fn only(folder: &Path, ending: &str) -> PathBuf {
     found[0].clone()
 }
 
-/// A JSON file.
+/// Parses a JSON file.
 #[track_caller]
 pub(crate) fn read_json(path: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
@@ -177,9 +177,9 @@ pub(crate) fn sha256(bytes: &[u8]) -> String {
 }
 
 /// A small seeded generator of 64-bit numbers (SplitMix64, Steele, Lea and Flood 2014), for test data only.
-pub(crate) struct Dice(pub u64);
+pub(crate) struct SeededRandom(pub u64);
 
-impl Dice {
+impl SeededRandom {
     pub(crate) fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -188,12 +188,12 @@ impl Dice {
         z ^ (z >> 31)
     }
 
-    /// Below `n`, which is far below 2^64.
+    /// Uniform below `n`, which is far below 2^64.
     pub(crate) fn below(&mut self, n: u64) -> u64 {
         self.next() % n
     }
 
-    /// In 0..1.
+    /// Uniform in 0..1.
     pub(crate) fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }

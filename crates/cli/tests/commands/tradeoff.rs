@@ -1,10 +1,10 @@
-//! Speed against accuracy: what is printed selects what was measured.
+//! Trade-off of speed and accuracy: the printed lines select the measured settings.
 
 use serde_json::Value;
 
 use crate::support::{Lab, skinrig, text};
 
-/// A campaign whose first round calibrates.
+/// Records a campaign whose first repetition calibrates.
 fn session(lab: &Lab) -> String {
     text(&lab.record(
         "s",
@@ -37,7 +37,7 @@ fn the_printed_lines_select_what_was_measured_to_the_last_bit() {
     let said = skinrig(&arguments).code(0).json();
     let rows = said["tradeoff"]["rows"].as_array().unwrap();
     assert!(rows.len() > 60, "{}", rows.len());
-    // The session's own choice, and one with every kind of change.
+    // The session's own settings, and a choice with every kind of change.
     let wanted = |key: &str| {
         let has = |row: &&Value| row["overrides"].to_string().contains(key);
         rows.iter()
@@ -95,7 +95,7 @@ fn a_demand_that_nothing_meets_ends_with_code_4_and_a_table_fits_a_terminal() {
         "1 um",
     ])
     .code(4)
-    .complains(&["--full"]);
+    .expect_stderr(&["--full"]);
     assert!(
         said.out.lines().all(|l| l.chars().count() <= 100),
         "{}",
@@ -118,7 +118,7 @@ fn a_demand_that_nothing_meets_ends_with_code_4_and_a_table_fits_a_terminal() {
     }
     skinrig(&["tradeoff", &session, "--budget", "5 mm"])
         .code(2)
-        .complains(&["time"]);
+        .expect_stderr(&["time"]);
 }
 
 #[test]
@@ -146,6 +146,6 @@ fn a_trade_of_other_settings_leaves_that_of_the_session_alone() {
     );
     trade(&[&set[..], &["--out", &page]].concat())
         .code(2)
-        .complains(&["--out"]);
+        .expect_stderr(&["--out"]);
     assert_eq!(std::fs::read(&page).unwrap(), before);
 }

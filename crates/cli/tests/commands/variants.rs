@@ -1,4 +1,4 @@
-//! Trying something never changes the official result: variants, copies of sessions, and exports made twice.
+//! Variants, copies of sessions and repeated exports never change the official result.
 
 use serde_json::Value;
 
@@ -28,7 +28,7 @@ fn a_variant_lies_beside_the_official_analysis_and_is_taken_only_when_asked_for(
     );
     let rmse = best(&folder, &[])["best"].clone();
 
-    // The same settings are no change; another one is a variant, by its own name or by what it changes.
+    // Unchanged settings are official; a change makes a variant, named by the user or by the change.
     skinrig(&["analyze", &s]).code(0);
     let said = skinrig(&["analyze", &s, "--set", CHANGE]).code(0);
     assert!(
@@ -44,7 +44,7 @@ fn a_variant_lies_beside_the_official_analysis_and_is_taken_only_when_asked_for(
         "all",
     ])
     .code(0);
-    // Eight presses are too few for the public code's calibration, and the nominal cameras are no result.
+    // Eight presses are too few for the public code's calibration, and nominal cameras give no result.
     skinrig(&["analyze", &s, "--reference-code"]).code(4);
     let after = (
         std::fs::read(&official).unwrap(),
@@ -87,7 +87,7 @@ fn a_variant_lies_beside_the_official_analysis_and_is_taken_only_when_asked_for(
         "{shown}"
     );
 
-    // `prototypes` and `report` take a variant when it is asked for, and say so.
+    // `prototypes` and `report` use a variant on request, and say so.
     assert_eq!(best(&folder, &[])["best"], rmse);
     let asked = best(&folder, &["--analysis", "all"]);
     assert_eq!(
@@ -111,12 +111,12 @@ fn a_variant_lies_beside_the_official_analysis_and_is_taken_only_when_asked_for(
     );
     skinrig(&["report", &s, "--analysis", "none-such"])
         .code(2)
-        .complains(&["all, min_samples=5, reference-code"]);
+        .expect_stderr(&["all, min_samples=5, reference-code"]);
 
-    // Nothing puts a variant into the official place, and what lies there is not taken for official.
+    // No command writes a variant to the official path, and a variant found there does not count as official.
     skinrig(&["analyze", &s, "--set", CHANGE, "--out", &text(&official)])
         .code(2)
-        .complains(&["expected another path for the variant"]);
+        .expect_stderr(&["expected another path for the variant"]);
     skinrig(&["analyze", &s, "--name", "official"]).code(2);
     let variant = only(&lab.path("s"), ".analysis-all.results.json");
     std::fs::copy(variant, &official).unwrap();
@@ -149,7 +149,7 @@ fn a_copy_of_a_session_is_not_counted_again() {
     );
     skinrig(&["compare", &session, &copy])
         .code(2)
-        .complains(&["or a copy of it"]);
+        .expect_stderr(&["or a copy of it"]);
 }
 
 #[test]
@@ -170,10 +170,10 @@ fn an_export_made_again_is_done() {
     std::fs::write(&csv, "mine").unwrap();
     skinrig(&tables)
         .code(1)
-        .complains(&["another file exists", "--overwrite"]);
+        .expect_stderr(&["another file exists", "--overwrite"]);
     assert_eq!(std::fs::read_to_string(&csv).unwrap(), "mine");
 
-    // An edited table whose manifest was written anew is not what the sealed session gives.
+    // An edited table with a rewritten manifest does not match the sealed session.
     skinrig(&["verify", &bundle]).code(0);
     let table = only(&lab.path("bundle"), ".presses.csv");
     let edited = std::fs::read_to_string(&table)

@@ -1,9 +1,9 @@
-//! A run that is watched from other terminals, from before it begins until it is sealed.
+//! Watching a run from other terminals, from before its start until it is sealed.
 #![cfg(unix)]
 
 use std::process::Stdio;
 
-use crate::interrupt::Underway;
+use crate::interrupt::LiveRun;
 use crate::support::{Lab, SMALL, only, program, read_json, skinrig, text};
 
 const WATCHERS: usize = 8;
@@ -11,8 +11,8 @@ const WATCHERS: usize = 8;
 #[test]
 fn a_run_in_real_time_is_shown_with_its_path_its_rates_and_its_signals() {
     let lab = Lab::new();
-    let mut run = Underway::new(&lab.path("s"));
-    // Before the first press there was nothing to compare it with.
+    let mut run = LiveRun::new(&lab.path("s"));
+    // The first press has nothing to be compared with.
     run.wait_for("press 3/10");
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
     let frame = skinrig(&["watch", &lab.text("s"), "--once", "--json"]);
@@ -20,7 +20,7 @@ fn a_run_in_real_time_is_shown_with_its_path_its_rates_and_its_signals() {
     assert_eq!(frame["live"]["state"], "running", "{frame}");
     assert_eq!(frame["sealed"], false);
     assert_eq!(frame["presses"]["planned"], 8);
-    // Four places, twice each; two sync presses are none of them.
+    // Four locations, twice each; the two sync presses do not count.
     assert_eq!(frame["places"].as_array().unwrap().len(), 4, "{frame}");
     assert_eq!(frame["places"][0]["planned"], 2);
     let latest = frame["latest"].as_array().unwrap().last().unwrap();
@@ -93,18 +93,16 @@ fn eight_watchers_of_a_whole_run_meet_no_lock_and_change_nothing() {
 fn a_run_that_is_not_there_yet_is_waited_for_and_a_cut_off_one_is_told() {
     let lab = Lab::new();
     let folder = lab.text("s");
-    skinrig(&["watch", &folder, "--once"]).code(2).complains(&[
-        &folder,
-        "found none yet",
-        "--once",
-    ]);
-    let run = Underway::new(&lab.path("s"));
+    skinrig(&["watch", &folder, "--once"])
+        .code(2)
+        .expect_stderr(&[&folder, "found none yet", "--once"]);
+    let run = LiveRun::new(&lab.path("s"));
     run.signal("KILL");
     run.end();
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
     let said = skinrig(&["watch", &session]).code(0);
     assert!(said.out.contains("state    cut off"), "{said:?}");
-    // Nobody can say that it is whole.
+    // Its completeness cannot be verified.
     skinrig(&[
         "export",
         &session,
@@ -114,5 +112,5 @@ fn a_run_that_is_not_there_yet_is_waited_for_and_a_cut_off_one_is_told() {
         &lab.text("b"),
     ])
     .code(2)
-    .complains(&["sealed session", "resume"]);
+    .expect_stderr(&["sealed session", "resume"]);
 }

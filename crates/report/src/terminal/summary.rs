@@ -52,19 +52,18 @@ fn head(input: &ReportInput<'_>, paint: Paint) -> String {
         let rmse = &a.scored.rmse_mm;
         let text = match rmse.value {
             Some(value) => format!(
-                "RMSE      {} mm, 95 % interval {}, n {} presses",
+                "RMSE      {} mm, 95 % interval {}, n {} presses{}",
                 number(Some(value), 2),
                 interval(rmse, 1.0, 2),
-                rmse.n
+                rmse.n,
+                crate::derive::locator(a)
+                    .map_or_else(String::new, |l| format!(", locator {}", l.name()))
             ),
             None => "RMSE      none: no scored press was located".to_owned(),
         };
         let _ = writeln!(out, "{}", paint.bold(&text));
     } else {
         out += &paint.warn(&wrap("INVALID   ", "use no number of this session"));
-    }
-    if let Some(note) = crate::derive::locator_note(a).filter(|_| a.is_valid()) {
-        out += &cut(wrap("locator   ", &note), MAX_REMARK);
     }
     if let Some(variant) = &p.variant {
         out += &paint.warn(&cut(

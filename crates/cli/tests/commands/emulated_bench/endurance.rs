@@ -1,4 +1,4 @@
-//! The bench for hours, under full load of the processors: presses by the thousand, nights in a row. Made by hand; sizes come from
+//! Endurance of the bench under full processor load: thousands of presses, nights in a row. Started by hand; sizes come from
 //! the environment.
 
 use std::env;
@@ -12,9 +12,9 @@ use skinrig_emulated_bench::{BenchConfig, BenchError, EmulatedBench};
 use skinrig_model::PressOutcome;
 use skinrig_recorder::SessionReader;
 
-use super::{SKINRIG, said, top};
+use super::{SKINRIG, all_output, workspace_root};
 
-/// Presses on a skin whose places are near one another, as fast as the stand-in's arm can make them.
+/// Presses at closely spaced locations, as fast as the emulated arm can move.
 const PROTOCOL: &str = "\
 skinrig: 1
 name: endurance
@@ -35,17 +35,17 @@ limits:
 triggers: {marks: [contact, retract]}
 evaluation: {calibrate: [1], score: [2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30]}
 ";
-/// Presses of a run, with those that synchronise.
+/// Presses of a run, sync presses included.
 const PRESSES: usize = 303;
 
-fn size(name: &str, default: usize) -> usize {
+fn env_size(name: &str, default: usize) -> usize {
     env::var(name).map_or(default, |text| text.parse().unwrap())
 }
 
-/// What keeps the processors busy at a lower priority, until it is dropped.
-struct Busy(Vec<Child>);
+/// Low-priority processes that keep all processors busy until dropped.
+struct CpuLoad(Vec<Child>);
 
-impl Busy {
+impl CpuLoad {
     fn all() -> Self {
         let one = |_| {
             let mut command = Command::new("nice");
@@ -57,7 +57,7 @@ impl Busy {
     }
 }
 
-impl Drop for Busy {
+impl Drop for CpuLoad {
     fn drop(&mut self) {
         for child in &mut self.0 {
             let _ = child.kill();
@@ -66,16 +66,16 @@ impl Drop for Busy {
     }
 }
 
-/// What became of the presses of one bench.
+/// Outcome of the presses of one bench.
 #[derive(Debug, Default)]
 struct Tally {
     presses: usize,
     refused: usize,
-    /// Runs that ended early, and how.
+    /// Last messages of each run that ended early.
     ended: Vec<String>,
 }
 
-fn press(bench: &EmulatedBench, folder: &Path, presses: usize) -> Tally {
+fn record_presses(bench: &EmulatedBench, folder: &Path, presses: usize) -> Tally {
     let protocol = folder.join("endurance.yaml");
     fs::write(&protocol, PROTOCOL).unwrap();
     let mut tally = Tally::default();
@@ -86,13 +86,13 @@ fn press(bench: &EmulatedBench, folder: &Path, presses: usize) -> Tally {
         let sessions = folder.join(run.to_string());
         let mut command = bench.command(SKINRIG).unwrap();
         command
-            .current_dir(top())
+            .current_dir(workspace_root())
             .args(["run", "--no-analysis", "--rig", "hil/rigs/emulated.yaml"])
             .arg("--sessions")
             .arg(&sessions)
             .arg(&protocol);
         let output = command.output().unwrap();
-        let said = said(&output);
+        let said = all_output(&output);
         tally.refused += said.matches("motion refused").count();
         if !output.status.success() {
             let last = said.lines().rev().take(12).collect::<Vec<_>>();
@@ -121,8 +121,11 @@ fn press(bench: &EmulatedBench, folder: &Path, presses: usize) -> Tally {
 #[test]
 #[ignore = "an hour of real time: SKINRIG_CI_LONG=1 .ci/run, or SKINRIG_PRESSES=10000 SKINRIG_BENCHES=2 cargo test -p skinrig --test commands -- --ignored --nocapture thousands"]
 fn of_thousands_of_presses_under_load_no_motion_is_refused() {
-    let (presses, benches) = (size("SKINRIG_PRESSES", 10_000), size("SKINRIG_BENCHES", 2));
-    let _busy = Busy::all();
+    let (presses, benches) = (
+        env_size("SKINRIG_PRESSES", 10_000),
+        env_size("SKINRIG_BENCHES", 2),
+    );
+    let _busy = CpuLoad::all();
     let one = |seed| {
         let config = BenchConfig {
             seed: seed as u64,
@@ -133,7 +136,7 @@ fn of_thousands_of_presses_under_load_no_motion_is_refused() {
             other => other.unwrap(),
         };
         let folder = tempfile::tempdir().unwrap();
-        press(
+        record_presses(
             &bench,
             folder.path(),
             presses.div_ceil(benches).max(PRESSES),
@@ -157,7 +160,10 @@ fn of_thousands_of_presses_under_load_no_motion_is_refused() {
 #[test]
 #[ignore = "half an hour of real time: SKINRIG_CI_LONG=1 .ci/run, or SKINRIG_NIGHTS=20 SKINRIG_BENCHES=2 cargo test -p skinrig --test commands -- --ignored --nocapture nights"]
 fn nights_in_a_row_pass() {
-    let (nights, benches) = (size("SKINRIG_NIGHTS", 20), size("SKINRIG_BENCHES", 2));
+    let (nights, benches) = (
+        env_size("SKINRIG_NIGHTS", 20),
+        env_size("SKINRIG_BENCHES", 2),
+    );
     let one = |_| {
         let bench = EmulatedBench::start(&BenchConfig::default()).unwrap();
         let folder = tempfile::tempdir().unwrap();
@@ -165,7 +171,7 @@ fn nights_in_a_row_pass() {
         for night in 0..nights.div_ceil(benches) {
             let mut command = bench.command(SKINRIG).unwrap();
             command
-                .current_dir(top())
+                .current_dir(workspace_root())
                 .args([
                     "hil",
                     "run",
@@ -177,13 +183,19 @@ fn nights_in_a_row_pass() {
                 ])
                 .arg(folder.path().join("nights"));
             let output = command.output().unwrap();
-            let told: Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
-            let checks = told["checks"].as_array().cloned().unwrap_or_default();
+            let night_report: Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
+            let checks = night_report["checks"]
+                .as_array()
+                .cloned()
+                .unwrap_or_default();
             let bad = checks
                 .iter()
                 .filter(|c| !matches!(c["verdict"].as_str(), Some("PASS" | "SKIPPED")));
             let bad: Vec<String> = bad.map(|c| format!("{c}")).collect();
-            let verdict = told["verdict"].as_str().unwrap_or("none").to_owned();
+            let verdict = night_report["verdict"]
+                .as_str()
+                .unwrap_or("none")
+                .to_owned();
             eprintln!(
                 "night {}: {verdict} {:?} {bad:?}",
                 night + 1,

@@ -1,4 +1,4 @@
-//! Steps 14 to 21 of docs/how-to/bench.md, as printed, on the emulated bench. Emulated; nobody has seen them on hardware.
+//! Steps 14 to 21 of docs/how-to/bench.md on the emulated bench. Never run on hardware.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -10,24 +10,24 @@ use std::time::Duration;
 use emulated_libdrd::{ArmState, Contact, Mode};
 use skinrig_emulated_bench::{EmulatedBench, Fault, When};
 
-use super::{start, top};
+use super::{start, workspace_root};
 
 const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
-/// So long an answer may take that has to come; nothing waits longer than it must.
+/// Upper limit for waiting on an answer; waits end as soon as it arrives.
 const PATIENCE: Duration = Duration::from_secs(60);
-/// How far the tip of the stand-in may be from where it was sent, mm.
+/// Maximum distance of the emulated tip from its target, mm.
 const NEAR_MM: f64 = 0.15;
 
-/// A jog under way, its standard input a pipe.
+/// A running `skinrig jog` with a pipe as standard input.
 struct Jog {
     child: Child,
     orders: Option<ChildStdin>,
     lines: Receiver<String>,
-    said: String,
+    printed: String,
 }
 
 impl Jog {
-    /// `skinrig jog --rig FILE`, up to its first lines.
+    /// Starts `skinrig jog --rig FILE`.
     fn start(bench: &EmulatedBench, rig: &Path, log: &Path) -> Self {
         let mut command = bench.command(SKINRIG).unwrap();
         command
@@ -38,10 +38,10 @@ impl Jog {
         command.stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
         let out = BufReader::new(child.stdout.take().unwrap());
-        let (tell, lines) = channel();
+        let (sender, lines) = channel();
         std::thread::spawn(move || {
             for line in out.lines().map_while(Result::ok) {
-                if tell.send(line).is_err() {
+                if sender.send(line).is_err() {
                     return;
                 }
             }
@@ -50,55 +50,56 @@ impl Jog {
             orders: child.stdin.take(),
             child,
             lines,
-            said: String::new(),
+            printed: String::new(),
         }
     }
 
-    fn tell(&mut self, order: &str) {
+    fn send(&mut self, order: &str) {
         writeln!(self.orders.as_mut().unwrap(), "{order}").unwrap();
     }
 
-    /// The next line that begins so.
-    fn hear(&mut self, beginning: &str) -> String {
+    /// Waits for the next line that starts with `beginning`.
+    fn wait_for_line(&mut self, beginning: &str) -> String {
         loop {
             let line = self.lines.recv_timeout(PATIENCE);
-            let line = line.unwrap_or_else(|e| panic!("{beginning}: {e}: {}", self.rest()));
-            self.said += &format!("{line}\n");
+            let line =
+                line.unwrap_or_else(|e| panic!("{beginning}: {e}: {}", self.close_and_read()));
+            self.printed += &format!("{line}\n");
             if line.starts_with(beginning) {
                 return line;
             }
         }
     }
 
-    fn rest(&mut self) -> String {
+    fn close_and_read(&mut self) -> String {
         self.orders = None;
         let mut errors = String::new();
         if let Some(mut stderr) = self.child.stderr.take() {
             stderr.read_to_string(&mut errors).unwrap();
         }
-        format!("{}{errors}", self.said)
+        format!("{}{errors}", self.printed)
     }
 
-    /// Gives an order and returns where the tip then is by the robot, mm.
-    fn at(&mut self, order: &str) -> [f64; 3] {
-        self.tell(order);
-        let line = self.hear("at ");
+    /// Sends an order and returns the tip position that the robot then reports, mm.
+    fn position_after(&mut self, order: &str) -> [f64; 3] {
+        self.send(order);
+        let line = self.wait_for_line("at ");
         let (_, inside) = line.split_once('(').unwrap();
         let numbers = inside.split_once(')').unwrap().0.split(", ");
         let numbers: Vec<f64> = numbers.map(|n| n.parse().unwrap()).collect();
         numbers.try_into().unwrap()
     }
 
-    /// The end: exit code, and everything said.
+    /// Waits for the exit; returns exit code and all output.
     fn end(mut self) -> (Option<i32>, String) {
-        let rest = self.rest();
+        let rest = self.close_and_read();
         let code = self.child.wait().unwrap().code();
         let more: Vec<String> = self.lines.iter().collect();
         (code, format!("{rest}{}", more.join("\n")))
     }
 }
 
-/// The bench, and the copy of its rig file that the steps edit.
+/// The bench and the copy of its rig file that the steps edit.
 struct Steps {
     bench: EmulatedBench,
     folder: tempfile::TempDir,
@@ -110,9 +111,9 @@ impl Steps {
         self.folder.path().join("NAME.yaml")
     }
 
-    /// Step 14: limits about where the arm is, in the middle of its reach.
+    /// Step 14: limits around the arm's position in the middle of its reach.
     fn write_rig(&self, max_force: &str, gravity_ratio: &str) {
-        let text = fs::read_to_string(top().join("hil/rigs/emulated.yaml")).unwrap();
+        let text = fs::read_to_string(workspace_root().join("hil/rigs/emulated.yaml")).unwrap();
         let workspace = "workspace: {min: [-70 mm, -70 mm, -30 mm], max: [70 mm, 70 mm, 40 mm]}";
         let lines = [
             (
@@ -139,14 +140,14 @@ impl Steps {
         Jog::start(&self.bench, &self.rig(), &log)
     }
 
-    /// Puts the arm into the middle by hand.
-    fn middle(&self) {
+    /// Places the arm in the middle of its reach, as if by hand, without faults.
+    fn center_arm(&self) {
         self.bench.arm().clear_faults().unwrap();
         self.bench.arm().place([0.01, 0.0, 0.01]).unwrap();
     }
 
     /// Waits until the arm goes soft.
-    fn soft(&self) {
+    fn wait_until_soft(&self) {
         let soft = self
             .bench
             .arm()
@@ -163,14 +164,14 @@ impl Steps {
             .map(|m| 1e3 * m)
     }
 
-    /// A jog in the middle of a slow way up.
-    fn on_the_way_up(&mut self) -> Jog {
-        self.middle();
+    /// Starts a jog and returns while it rises slowly.
+    fn start_slow_rise(&mut self) -> Jog {
+        self.center_arm();
         let mut jog = self.jog();
-        jog.tell("speed 2mm/s");
-        jog.hear("speed");
+        jog.send("speed 2mm/s");
+        jog.wait_for_line("speed");
         let from_m = self.tip_mm()[2] * 1e-3;
-        jog.tell("z +20mm");
+        jog.send("z +20mm");
         let rises = |s: &ArmState| s.position_m[2] > from_m + 0.001;
         self.bench.arm().wait_until(PATIENCE, rises).unwrap();
         jog
@@ -194,23 +195,23 @@ fn the_steps_of_a_first_contact_show_what_they_must() {
     a_hand(&mut steps);
 }
 
-/// Step 14: with 1 N this arm does not hold, jog says what to do, and that works.
+/// Step 14: this arm cannot hold itself with 1 N; following jog's advice fixes it.
 fn the_share_of_gravity(steps: &mut Steps) {
-    steps.middle();
+    steps.center_arm();
     steps.write_rig("1 N", "0");
     let (code, said) = steps.jog().end();
     assert_eq!(code, Some(3), "{said}");
     for word in ["limits.max_force", "motor_force.gravity_ratio"] {
         assert!(said.contains(word), "{word}: {said}");
     }
-    steps.soft();
-    steps.middle();
+    steps.wait_until_soft();
+    steps.center_arm();
     steps.write_rig("3 N", "0");
     let mut jog = steps.jog();
-    let note = jog.hear("note ");
+    let note = jog.wait_for_line("note ");
     let (_, ratio) = note.split_once("gravity_ratio ").unwrap();
     let ratio: f64 = ratio.split_once(' ').unwrap().0.parse().unwrap();
-    // The stand-in carries 0.115 kg by itself, of the 0.12 kg that it has to.
+    // The emulated arm compensates 0.115 kg of its 0.12 kg.
     assert!((0.08..0.11).contains(&ratio), "{note}");
     let (code, said) = jog.end();
     assert_eq!(code, Some(0), "{said}");
@@ -219,18 +220,22 @@ fn the_share_of_gravity(steps: &mut Steps) {
 
 /// Steps 14 to 16.
 fn axes_and_rest(steps: &mut Steps) {
-    steps.middle();
+    steps.center_arm();
     let mut jog = steps.jog();
-    let told = jog.at("where");
+    let reported = jog.position_after("where");
     let near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|i| (a[i] - b[i]).abs() < NEAR_MM);
-    assert!(near(told, steps.tip_mm()), "{told:?} {:?}", steps.tip_mm());
-    jog.tell("speed 2mm/s");
-    jog.hear("speed");
+    assert!(
+        near(reported, steps.tip_mm()),
+        "{reported:?} {:?}",
+        steps.tip_mm()
+    );
+    jog.send("speed 2mm/s");
+    jog.wait_for_line("speed");
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
         for by_mm in [2.0, -2.0] {
-            let mut wanted = jog.at("where");
+            let mut wanted = jog.position_after("where");
             wanted[axis] += by_mm;
-            jog.at(&format!("{name} {by_mm:+}mm"));
+            jog.position_after(&format!("{name} {by_mm:+}mm"));
             assert!(
                 near(wanted, steps.tip_mm()),
                 "{name} {by_mm:+}: {wanted:?} {:?}",
@@ -238,10 +243,10 @@ fn axes_and_rest(steps: &mut Steps) {
             );
         }
     }
-    let before = jog.at("where");
+    let before = jog.position_after("where");
     let mut after = before;
     for _ in 0..100 {
-        after = jog.at("where");
+        after = jog.position_after("where");
     }
     let drift = (0..3)
         .map(|i| (after[i] - before[i]).powi(2))
@@ -256,14 +261,14 @@ fn axes_and_rest(steps: &mut Steps) {
 /// Steps 17 and 18.
 fn button_and_cable(steps: &mut Steps) {
     for (fault, words) in [(Fault::Button, "button"), (Fault::Unplug, "USB")] {
-        let jog = steps.on_the_way_up();
+        let jog = steps.start_slow_rise();
         steps.bench.arm().inject(When::Now, fault).unwrap();
-        steps.soft();
+        steps.wait_until_soft();
         let (code, said) = jog.end();
         assert_eq!(code, Some(3), "{said}");
         assert!(said.contains(words), "{words}: {said}");
         if fault == Fault::Button {
-            // The next press of it allows forces again.
+            // Pressing the button again re-enables forces.
             steps.bench.arm().inject(When::Now, Fault::Button).unwrap();
         }
     }
@@ -271,13 +276,13 @@ fn button_and_cable(steps: &mut Steps) {
 
 /// Steps 19 and 20.
 fn a_program_that_dies_or_hangs(steps: &mut Steps) {
-    let mut jog = steps.on_the_way_up();
+    let mut jog = steps.start_slow_rise();
     jog.child.kill().unwrap();
-    steps.soft();
+    steps.wait_until_soft();
     drop(jog.end());
-    let jog = steps.on_the_way_up();
+    let jog = steps.start_slow_rise();
     signal(&jog, "-STOP");
-    steps.soft();
+    steps.wait_until_soft();
     signal(&jog, "-CONT");
     let (code, said) = jog.end();
     assert_eq!(code, Some(3), "{said}");
@@ -293,10 +298,10 @@ fn signal(jog: &Jog, signal: &str) {
 
 /// Step 21: a hand 2 mm beside the tip.
 fn a_hand(steps: &mut Steps) {
-    steps.middle();
+    steps.center_arm();
     let mut jog = steps.jog();
-    jog.tell("speed 2mm/s");
-    jog.hear("speed");
+    jog.send("speed 2mm/s");
+    jog.wait_for_line("speed");
     let [x, y, z] = steps.tip_mm().map(|mm| 1e-3 * mm);
     let hand = Contact {
         point_m: [x + 0.002, y, z],
@@ -305,7 +310,7 @@ fn a_hand(steps: &mut Steps) {
         damping_n_s_m: 5.0,
     };
     steps.bench.arm().set_contact(Some(hand)).unwrap();
-    jog.tell("x +10mm");
+    jog.send("x +10mm");
     let arm = steps.bench.arm();
     let pushes = |s: &ArmState| -s.contact_force_n[0] > 0.5;
     arm.wait_until(PATIENCE, pushes).unwrap();

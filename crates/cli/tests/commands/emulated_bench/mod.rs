@@ -1,4 +1,4 @@
-//! The emulated bench, end to end and in real time: production drivers over stand-ins for the hardware.
+//! The emulated bench end to end in real time: production drivers over emulated hardware.
 
 mod endurance;
 mod first_contact;
@@ -15,10 +15,10 @@ use skinrig_emulated_bench::{BenchConfig, BenchError, EmulatedBench};
 pub(crate) use slot::Slot;
 
 const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
-/// Of the cameras' true geometry and their noise; the simulated bench takes it too.
+/// Seed of the cameras' true geometry and noise, also for the simulated run.
 const SEED: u64 = 1;
 
-/// A bench; `None`, and why on standard error, on a machine that can have none.
+/// Starts a bench; `None`, with the reason on standard error, where it cannot run.
 fn start() -> Option<(Slot, EmulatedBench)> {
     let slot = Slot::wait();
     let bench = EmulatedBench::start(&BenchConfig {
@@ -35,11 +35,11 @@ fn start() -> Option<(Slot, EmulatedBench)> {
     }
 }
 
-fn top() -> PathBuf {
+fn workspace_root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-fn said(output: &Output) -> String {
+fn all_output(output: &Output) -> String {
     format!(
         "{}{}",
         String::from_utf8_lossy(&output.stdout),
@@ -47,8 +47,8 @@ fn said(output: &Output) -> String {
     )
 }
 
-fn ended_well(output: &Output) -> String {
-    let said = said(output);
+fn assert_success(output: &Output) -> String {
+    let said = all_output(output);
     assert!(output.status.success(), "{}\n{said}", output.status);
     said
 }
@@ -56,7 +56,7 @@ fn ended_well(output: &Output) -> String {
 fn run(mut command: Command, rig: &[&str], sessions: &Path) -> Output {
     let seed = SEED.to_string();
     command
-        .current_dir(top())
+        .current_dir(workspace_root())
         .args(["run", "protocols/quick-check.yaml", "--seed", &seed])
         .args(rig)
         .arg("--sessions")
@@ -64,15 +64,15 @@ fn run(mut command: Command, rig: &[&str], sessions: &Path) -> Output {
     command.output().unwrap()
 }
 
-/// Runs on the emulated bench. A machine that leaves the robot's thread waiting for a tenth of a second, or the serial line
-/// so long that the host's clock is not known, gets the answer that a lab would want: a safe end, or an invalid session.
-/// It may try again.
+/// Runs on the emulated bench, up to four times. A machine that delays the robot's thread by a tenth of a second, or the serial
+/// line until the host's clock is unknown, correctly gets a safe end or an invalid session;
+/// the run is then repeated.
 fn run_in_real_time(bench: &EmulatedBench, sessions: &Path) -> (PathBuf, String) {
     let rig = ["--rig", "hil/rigs/emulated.yaml"];
     for attempt in 1.. {
         let folder = sessions.join(attempt.to_string());
         let output = run(bench.command(SKINRIG).unwrap(), &rig, &folder);
-        let said = said(&output);
+        let said = all_output(&output);
         let starved = [
             "expected a pose sample no older than",
             "the session is INVALID",
@@ -82,14 +82,14 @@ fn run_in_real_time(bench: &EmulatedBench, sessions: &Path) -> (PathBuf, String)
         .iter()
         .any(|sign| said.contains(sign));
         if attempt == 4 || !starved {
-            return (folder, ended_well(&output));
+            return (folder, assert_success(&output));
         }
         eprintln!("the machine is too busy for real time, once more");
     }
     unreachable!("the fourth attempt returns")
 }
 
-fn the_only(folder: &Path, ending: &str) -> PathBuf {
+fn only_file(folder: &Path, ending: &str) -> PathBuf {
     let found: Vec<PathBuf> = fs::read_dir(folder)
         .unwrap()
         .map(|e| e.unwrap().path())
@@ -100,7 +100,7 @@ fn the_only(folder: &Path, ending: &str) -> PathBuf {
 }
 
 fn results(folder: &Path) -> Value {
-    let text = fs::read(the_only(folder, ".results.json")).unwrap();
+    let text = fs::read(only_file(folder, ".results.json")).unwrap();
     serde_json::from_slice(&text).unwrap()
 }
 
@@ -113,7 +113,7 @@ fn the_quick_check_on_the_emulated_bench_agrees_with_the_simulated_one() {
     };
     let (emulated, said) = run_in_real_time(&bench, &emulated);
     assert!(said.contains("rig       emulated"), "{said}");
-    ended_well(&run(Command::new(SKINRIG), &[], &simulated));
+    assert_success(&run(Command::new(SKINRIG), &[], &simulated));
 
     let (bench, sim) = (results(&emulated), results(&simulated));
     assert_eq!(bench["provenance"]["rig_kind"], "emulated");
@@ -140,14 +140,14 @@ fn the_quick_check_on_the_emulated_bench_agrees_with_the_simulated_one() {
                 .as_f64()
                 .unwrap_or_else(|| panic!("{metric}: no {what}"))
         };
-        // Either has its own contacts, drawn from its own seed: their intervals meet.
+        // Both draw their own contacts, so only their intervals overlap.
         let [bench, sim] = [&bench, &sim].map(|r| (of(r, "low"), of(r, "high")));
         assert!(
             bench.0 <= sim.1 && sim.0 <= bench.1,
             "{metric}: expected {sim:?} as on the simulated bench, found {bench:?}"
         );
     }
-    let session = the_only(&emulated, ".session.sqlite");
+    let session = only_file(&emulated, ".session.sqlite");
     let verified = Command::new(SKINRIG).arg("verify").arg(session).output();
-    ended_well(&verified.unwrap());
+    assert_success(&verified.unwrap());
 }

@@ -1,4 +1,4 @@
-//! Permission to run an emulated bench: a few at a time, so that none is late for another.
+//! Limits how many emulated benches run at once, so that none starves another.
 
 use std::sync::{Condvar, Mutex, PoisonError};
 
@@ -8,7 +8,7 @@ const AT_ONCE: usize = 2;
 static RUNNING: Mutex<usize> = Mutex::new(0);
 static ENDED: Condvar = Condvar::new();
 
-/// Permission to run one bench, until it is dropped.
+/// Permission to run one bench; dropping it returns the permission.
 pub(crate) struct Slot(());
 
 impl Slot {

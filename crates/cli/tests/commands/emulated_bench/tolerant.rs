@@ -1,5 +1,5 @@
-//! A camera that is not as expected, end to end on the emulated bench: refused, let pass once and told, then accepted by the lines that
-//! were proposed. Emulated; which of it a healthy camera shows nobody has seen.
+//! A camera with unexpected behaviour, end to end on the emulated bench: rejected, tolerated once and reported, then accepted by the
+//! proposed rig file lines. Whether a healthy camera behaves like this is unknown.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,15 +10,15 @@ use skinrig_emulated_bench::{CAMERA_SERIALS, EmulatedBench, Order};
 use skinrig_model::{PressOutcome, PressVerdict, Setting};
 use skinrig_recorder::SessionReader;
 
-use super::{said, start, the_only, top};
+use super::{all_output, only_file, start, workspace_root};
 
 const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
 /// The register of `bias_diff_on`.
 const BIAS: u32 = 0x0350;
 
-/// The emulated bench's rig file, with a bias that camera 2 does not take, and with `more` lines for that camera.
+/// Rig file of the emulated bench with a bias that camera 2 rejects, and `more` lines for that camera.
 fn rig(folder: &Path, more: &str) -> PathBuf {
-    let text = fs::read_to_string(top().join("hil/rigs/emulated.yaml")).unwrap();
+    let text = fs::read_to_string(workspace_root().join("hil/rigs/emulated.yaml")).unwrap();
     let serial = format!("    serial: \"{}\"\n", CAMERA_SERIALS[1]);
     let text = text.replace(
         &serial,
@@ -31,7 +31,7 @@ fn rig(folder: &Path, more: &str) -> PathBuf {
 
 /// The quick check with one press.
 fn protocol(folder: &Path) -> PathBuf {
-    let text = fs::read_to_string(top().join("protocols/quick-check.yaml")).unwrap();
+    let text = fs::read_to_string(workspace_root().join("protocols/quick-check.yaml")).unwrap();
     let kept = |line: &&str| !line.trim_start().starts_with("- [") || line.contains("the centre");
     let text: Vec<&str> = text.lines().filter(kept).collect();
     let path = folder.join("one-press.yaml");
@@ -41,11 +41,11 @@ fn protocol(folder: &Path) -> PathBuf {
 
 fn skinrig(bench: &EmulatedBench, arguments: &[&str]) -> Output {
     let mut command = bench.command(SKINRIG).unwrap();
-    command.current_dir(top()).args(arguments);
+    command.current_dir(workspace_root()).args(arguments);
     command.output().unwrap()
 }
 
-/// True once a press of the session that is being written in `sessions` has ended.
+/// True once a press of the session being recorded in `sessions` has an outcome.
 fn has_an_outcome(sessions: &Path) -> bool {
     let files = fs::read_dir(sessions).into_iter().flatten().flatten();
     let named = files.map(|file| file.path());
@@ -84,19 +84,23 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
         (skinrig(&bench, &arguments), sessions)
     };
 
-    // As it is: refused before anything moves, with the way on.
+    // Default: rejected before any motion, with the next step.
     let (refused, _) = run(&strict, "refused", &[]);
-    assert_eq!(refused.status.code(), Some(3), "{}", said(&refused));
-    assert!(said(&refused).contains("--tolerant"), "{}", said(&refused));
+    assert_eq!(refused.status.code(), Some(3), "{}", all_output(&refused));
+    assert!(
+        all_output(&refused).contains("--tolerant"),
+        "{}",
+        all_output(&refused)
+    );
 
-    // Let pass once; a transfer fails in between.
+    // Tolerated once; a transfer fails during the run.
     order(Order::BreakTransfer(60));
     let (tolerant, sessions) = run(&strict, "tolerant", &["--tolerant"]);
-    let told = said(&tolerant);
-    assert!(tolerant.status.success(), "{told}");
-    let (_, proposed) = told
+    let printed = all_output(&tolerant);
+    assert!(tolerant.status.success(), "{printed}");
+    let (_, proposed) = printed
         .split_once("cameras:\n  camera2:\n")
-        .unwrap_or_else(|| panic!("{told}"));
+        .unwrap_or_else(|| panic!("{printed}"));
     let lines: String = proposed
         .lines()
         .take_while(|l| l.starts_with("    "))
@@ -109,8 +113,8 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
         failed_transfers: loss
     "#);
 
-    // The session says that it was recorded so: in its header, with the device, in a note, before the run.
-    let session = the_only(&sessions, ".session.sqlite");
+    // The session states it in its header, with the device, in a note and in the preflight.
+    let session = only_file(&sessions, ".session.sqlite");
     let reader = SessionReader::open(&session).unwrap();
     let name = reader.header().unwrap().rig_name;
     assert!(name.ends_with("mismatches tolerated"), "{name}");
@@ -129,16 +133,16 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
     drop(reader);
     let shown = skinrig(&bench, &["show", session.to_str().unwrap()]);
     assert!(
-        said(&shown).contains("mismatches tolerated"),
+        all_output(&shown).contains("mismatches tolerated"),
         "{}",
-        said(&shown)
+        all_output(&shown)
     );
 
-    // A later leg needs leave of its own: without it the session is refused, with it the presses that are open are made.
+    // A further leg needs its own `--tolerant`: without it resuming is rejected, with it the open presses are taken.
     let sessions = folder.join("killed");
     let mut command = bench.command(SKINRIG).unwrap();
     command
-        .current_dir(top())
+        .current_dir(workspace_root())
         .args(["run", "--tolerant", "--no-analysis"]);
     command.args([one_press.as_os_str(), "--rig".as_ref(), strict.as_os_str()]);
     let mut killed = command.arg("--sessions").arg(&sessions).spawn().unwrap();
@@ -148,19 +152,23 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
     }
     killed.kill().unwrap();
     killed.wait().unwrap();
-    let session = the_only(&sessions, ".session.sqlite");
+    let session = only_file(&sessions, ".session.sqlite");
     let resume = |more: &[&str]| {
         let mut arguments = vec!["resume", session.to_str().unwrap(), "--no-analysis"];
         arguments.extend(more);
         skinrig(&bench, &arguments)
     };
     let refused = resume(&[]);
-    assert_eq!(refused.status.code(), Some(3), "{}", said(&refused));
-    assert!(said(&refused).contains("--tolerant"), "{}", said(&refused));
+    assert_eq!(refused.status.code(), Some(3), "{}", all_output(&refused));
+    assert!(
+        all_output(&refused).contains("--tolerant"),
+        "{}",
+        all_output(&refused)
+    );
     let resumed = resume(&["--tolerant"]);
-    assert!(resumed.status.success(), "{}", said(&resumed));
+    assert!(resumed.status.success(), "{}", all_output(&resumed));
     let verified = skinrig(&bench, &["verify", session.to_str().unwrap()]);
-    assert!(verified.status.success(), "{}", said(&verified));
+    assert!(verified.status.success(), "{}", all_output(&verified));
     let outcomes = SessionReader::open(&session)
         .unwrap()
         .last_outcomes()
@@ -169,7 +177,7 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
         |o: &Option<PressOutcome>| o.as_ref().is_some_and(|o| o.verdict == PressVerdict::Valid);
     assert!(outcomes.iter().all(valid), "{outcomes:?}");
 
-    // At night every check opens the cameras, and what was accepted is a difference that `settings` counts: never a good night.
+    // In a night every check opens the cameras; `settings` counts accepted mismatches as differences, so the night is never good.
     let nights = folder.join("nights");
     let mut arguments = vec![
         "hil",
@@ -189,19 +197,19 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
     assert_eq!(settings["cause"], "rig", "{settings:#}");
     let camera2 = &settings["attempts"][0]["parts"][1]["measurements"][0];
     assert_eq!(camera2["value"], 3.0, "{settings:#}");
-    assert_ne!(night.status.code(), Some(0), "{}", said(&night));
+    assert_ne!(night.status.code(), Some(0), "{}", all_output(&night));
 
-    // The lines in the rig file: opened without a word, transfers that fail included.
+    // With the lines in the rig file: opened without a warning, failing transfers included.
     let accepting = rig(folder, &lines);
     order(Order::BreakTransfer(60));
     let (accepted, sessions) = run(&accepting, "accepted", &[]);
-    let told = said(&accepted);
-    assert!(accepted.status.success(), "{told}");
+    let printed = all_output(&accepted);
+    assert!(accepted.status.success(), "{printed}");
     assert!(
-        !told.contains("tolerated") && !told.contains("--tolerant"),
-        "{told}"
+        !printed.contains("tolerated") && !printed.contains("--tolerant"),
+        "{printed}"
     );
-    let reader = SessionReader::open(the_only(&sessions, ".session.sqlite")).unwrap();
+    let reader = SessionReader::open(only_file(&sessions, ".session.sqlite")).unwrap();
     let name = reader.header().unwrap().rig_name;
     assert!(!name.contains("tolerated"), "{name}");
 }

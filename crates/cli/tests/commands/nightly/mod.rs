@@ -18,7 +18,7 @@ use crate::emulated_bench::Slot;
 const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
 const RIG: &str = include_str!("../../../../../hil/rigs/emulated.yaml");
 
-/// What the checks are made with here: short, never repeated.
+/// Suite of these tests: short checks without repeats.
 const SUITE: &str = "\
 skinrig_suite: 1
 name: planted
@@ -41,31 +41,38 @@ checks:
   stop_drill: {stopped_within: {at_most: 1 s}, distance: {at_most: 10 mm}}
 ";
 
-/// The bench and where its nights go.
+/// A bench and the folder of its nights.
 struct Nights {
     bench: EmulatedBench,
     _slot: Slot,
     folder: tempfile::TempDir,
 }
 
-/// How a night ended.
-struct Seen {
+/// Result of a night.
+struct NightResult {
     exit: i32,
     night: Value,
-    said: String,
+    stderr: String,
 }
 
-impl Seen {
+impl NightResult {
     fn check(&self, name: &str) -> &Value {
         let checks = self.night["checks"].as_array().unwrap();
         let found = checks.iter().find(|c| c["name"] == name);
-        found.unwrap_or_else(|| panic!("no {name} in {}", self.said))
+        found.unwrap_or_else(|| panic!("no {name} in {}", self.stderr))
     }
 
     /// Asserts exit code, verdict and cause of a check, and evidence of this kind about this device.
-    fn is(&self, exit: i32, name: &str, verdict: &str, cause: &str, seen: &[(&str, &str)]) {
+    fn assert_check(
+        &self,
+        exit: i32,
+        name: &str,
+        verdict: &str,
+        cause: &str,
+        seen: &[(&str, &str)],
+    ) {
         let check = self.check(name);
-        let all = format!("{name}: {check:#}\n{}", self.said);
+        let all = format!("{name}: {check:#}\n{}", self.stderr);
         assert_eq!(check["verdict"], verdict, "{all}");
         assert_eq!(check["cause"], cause, "{all}");
         let evidence: Vec<&Value> = check["attempts"]
@@ -83,19 +90,19 @@ impl Seen {
         assert_eq!(self.exit, exit, "{all}");
     }
 
-    /// The value of a metric on a device.
+    /// Value of a metric of a device.
     fn value(&self, name: &str, subject: &str, metric: &str) -> Option<f64> {
-        self.measured(name, subject, metric)?["value"].as_f64()
+        self.find_measurement(name, subject, metric)?["value"].as_f64()
     }
 
-    /// The verdict on a metric of a device.
-    fn judged(&self, name: &str, subject: &str, metric: &str) -> &str {
-        let measured = self.measured(name, subject, metric);
+    /// Verdict on a metric of a device.
+    fn metric_verdict(&self, name: &str, subject: &str, metric: &str) -> &str {
+        let measured = self.find_measurement(name, subject, metric);
         let verdict = measured.and_then(|m| m["verdict"].as_str());
         verdict.unwrap_or_else(|| panic!("no {metric} of {subject}: {:#}", self.check(name)))
     }
 
-    fn measured(&self, name: &str, subject: &str, metric: &str) -> Option<&Value> {
+    fn find_measurement(&self, name: &str, subject: &str, metric: &str) -> Option<&Value> {
         let attempts = self.check(name)["attempts"].as_array().unwrap();
         let parts = attempts.last()?["parts"].as_array().unwrap();
         let part = parts.iter().find(|p| p["subject"] == subject)?;
@@ -125,12 +132,12 @@ impl Nights {
         })
     }
 
-    /// Makes these checks of the suite.
-    fn night(&self, only: &str) -> Seen {
+    /// Runs these checks of the suite.
+    fn night(&self, only: &str) -> NightResult {
         self.night_in(only, &self.folder.path().join("nights"))
     }
 
-    fn night_in(&self, only: &str, out: &Path) -> Seen {
+    fn night_in(&self, only: &str, out: &Path) -> NightResult {
         let place = |name: &str| self.folder.path().join(name);
         let mut command: Command = self.bench.command(SKINRIG).unwrap();
         command
@@ -141,13 +148,13 @@ impl Nights {
             .arg("--out")
             .arg(out);
         let output = command.output().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
         let night = serde_json::from_slice(&output.stdout)
-            .unwrap_or_else(|e| panic!("{e}: {} {said}", output.status));
-        Seen {
+            .unwrap_or_else(|e| panic!("{e}: {} {stderr}", output.status));
+        NightResult {
             exit: output.status.code().unwrap(),
             night,
-            said,
+            stderr,
         }
     }
 
@@ -155,14 +162,14 @@ impl Nights {
         fs::write(self.folder.path().join("rig.yaml"), text).unwrap();
     }
 
-    /// Replaces a piece of the rig file as it is now.
+    /// Replaces text in the current rig file.
     fn edit_rig(&self, from: &str, to: &str) {
         let text = fs::read_to_string(self.folder.path().join("rig.yaml")).unwrap();
         assert!(text.contains(from), "{from}");
         self.write_rig(&text.replace(from, to));
     }
 
-    /// Lets the lamps' program for the dark be this one, which touches nothing.
+    /// Replaces the program that switches the lamps off with this one, which switches nothing.
     fn lamps_obey(&self, program: &str) {
         let text = fs::read_to_string(self.folder.path().join("rig.yaml")).unwrap();
         let line = text
@@ -182,7 +189,7 @@ impl Nights {
     }
 }
 
-/// A tiny disk, unmounted with this value; `None` where that is not allowed.
+/// A tiny disk, unmounted on drop.
 struct TinyDisk(PathBuf);
 
 impl TinyDisk {
@@ -211,21 +218,21 @@ fn a_healthy_bench_passes() {
     let all = "identity,settings,disk,trigger_loopback,noise_dark,noise_lit,test_pattern,robot_state,repeatability,step_response,depth,force_ceiling,\
                watchdog_drill,stop_drill";
     let mut seen = nights.night(all);
-    // A machine too busy to run the emulated devices in time says so, and is asked again.
+    // A machine too busy for the emulated devices reports infrastructure: try again.
     for _ in 0..2 {
         let checks = seen.night["checks"].as_array().unwrap();
         if !checks.iter().any(|c| c["cause"] == "infrastructure") {
             break;
         }
-        eprintln!("once more: {}", seen.said);
+        eprintln!("once more: {}", seen.stderr);
         seen = nights.night(all);
     }
     for name in all.split(',') {
         let verdict = &seen.check(name)["verdict"];
-        assert_eq!(verdict, "PASS", "{:#}\n{}", seen.check(name), seen.said);
+        assert_eq!(verdict, "PASS", "{:#}\n{}", seen.check(name), seen.stderr);
     }
-    assert_eq!(seen.exit, 0, "{}", seen.said);
-    // A touch is told at 0.2 N, which this skin of 500 N/m gives 0.4 mm deep.
+    assert_eq!(seen.exit, 0, "{}", seen.stderr);
+    // A touch registers at 0.2 N: 0.4 mm deep in this skin of 500 N/m.
     let surface_mm = seen.value("depth", "robot", "surface").unwrap();
     assert!((0.2..0.6).contains(&surface_mm), "{surface_mm}");
     let peak_n = seen.value("force_ceiling", "robot", "peak").unwrap();
@@ -236,7 +243,7 @@ fn a_healthy_bench_passes() {
     );
 }
 
-/// Limits that are broken by devices that answer as they should: nothing explains them, so the rig is to be looked at.
+/// Broken limits without evidence point at the rig.
 #[test]
 fn broken_limits_that_nothing_explains_are_the_rig_s() {
     let Some(nights) = Nights::start() else {
@@ -247,19 +254,19 @@ fn broken_limits_that_nothing_explains_are_the_rig_s() {
     let arm = nights.bench.arm();
     arm.inject(When::Now, Fault::Friction(800.0)).unwrap();
     let seen = nights.night("noise_dark,noise_lit,step_response");
-    let judged = |check, subject, metric| seen.judged(check, subject, metric);
+    let metric_verdict = |check, subject, metric| seen.metric_verdict(check, subject, metric);
     for camera in ["camera1", "camera2"] {
-        // It is as light as before.
-        assert_eq!(judged("noise_dark", camera, "rate"), "FAIL");
+        // The lamps stayed on.
+        assert_eq!(metric_verdict("noise_dark", camera, "rate"), "FAIL");
     }
-    assert_eq!(judged("noise_lit", "camera1", "hot_pixels"), "FAIL");
-    assert_eq!(judged("noise_lit", "camera2", "hot_pixels"), "PASS");
+    assert_eq!(metric_verdict("noise_lit", "camera1", "hot_pixels"), "FAIL");
+    assert_eq!(metric_verdict("noise_lit", "camera2", "hot_pixels"), "PASS");
     let hot = seen.value("noise_lit", "camera1", "hot_pixels");
     assert!(hot >= Some(40.0) && hot <= Some(46.0), "{hot:?}");
-    assert_eq!(judged("step_response", "robot", "settling"), "FAIL");
-    assert_eq!(judged("step_response", "robot", "error"), "PASS");
+    assert_eq!(metric_verdict("step_response", "robot", "settling"), "FAIL");
+    assert_eq!(metric_verdict("step_response", "robot", "error"), "PASS");
     for check in ["noise_dark", "noise_lit", "step_response"] {
-        seen.is(1, check, "FAIL", "rig", &[]);
+        seen.assert_check(1, check, "FAIL", "rig", &[]);
     }
 }
 
@@ -273,5 +280,5 @@ fn a_full_disk_is_the_infrastructure_s() {
         return;
     };
     let seen = nights.night_in("disk", &tiny.0);
-    seen.is(3, "disk", "FAIL", "infrastructure", &[("disk", "computer")]);
+    seen.assert_check(3, "disk", "FAIL", "infrastructure", &[("disk", "computer")]);
 }

@@ -1,4 +1,4 @@
-//! Two faults at once: whatever else is wrong, none of them passes, and each is told by its own cause.
+//! Two faults at once: neither passes, and each is reported with its own cause.
 
 use std::collections::BTreeSet;
 use std::time::Instant;
@@ -7,24 +7,24 @@ use serde_json::Value;
 use skinrig_emulated_bench::{Fault, NoisePerMillion, Order, When, Wire};
 use skinrig_model::CameraId;
 
-use super::{Nights, Seen};
+use super::{NightResult, Nights};
 
-/// How a fault shows in a night, when no other one hides it.
-pub(super) struct Planted {
-    /// As in the list of docs/reference/nightly.md.
+/// A fault and its symptom in a night, unless another fault hides it.
+pub(super) struct FaultCase {
+    /// Name in the list of docs/reference/nightly.md.
     pub name: &'static str,
     plant: fn(&mut Nights),
     /// The check that finds it.
     check: &'static str,
-    /// What that check says: evidence of this kind about this device; `None`: a broken limit of this metric and device alone.
-    shows: Shows,
-    /// Other devices of which evidence may speak besides: what is measured with them needs this one.
+    /// Symptom in that check.
+    shows: Symptom,
+    /// Other devices that evidence may name, because measuring them needs this one.
     also: &'static [&'static str],
-    /// Faults that cannot be seen beside this one.
+    /// Faults that this one hides.
     hides: &'static [&'static str],
 }
 
-enum Shows {
+enum Symptom {
     Evidence {
         kind: &'static str,
         subject: &'static str,
@@ -36,9 +36,9 @@ enum Shows {
     },
 }
 
-use Shows::{Evidence, Limit};
+use Symptom::{Evidence, Limit};
 
-const fn seen(kind: &'static str, subject: &'static str) -> Shows {
+const fn rig_evidence(kind: &'static str, subject: &'static str) -> Symptom {
     Evidence {
         kind,
         subject,
@@ -46,7 +46,7 @@ const fn seen(kind: &'static str, subject: &'static str) -> Shows {
     }
 }
 
-const fn absent(subject: &'static str) -> Shows {
+const fn absent(subject: &'static str) -> Symptom {
     Evidence {
         kind: "absent",
         subject,
@@ -54,7 +54,7 @@ const fn absent(subject: &'static str) -> Shows {
     }
 }
 
-/// Faults of the arm that leave nothing of it to measure.
+/// Faults of the arm, hidden by those that prevent measuring it.
 const ARM: &[&str] = &[
     "joints rub",
     "frame too low",
@@ -63,8 +63,8 @@ const ARM: &[&str] = &[
     "robot not calibrated",
 ];
 
-pub(super) const FAULTS: &[Planted] = &[
-    Planted {
+pub(super) const FAULTS: &[FaultCase] = &[
+    FaultCase {
         name: "camera 2 unplugged",
         plant: |n| n.camera(CameraId::Two, Order::Unplug),
         check: "identity",
@@ -72,10 +72,10 @@ pub(super) const FAULTS: &[Planted] = &[
         also: &[],
         hides: &["camera 2 loses words", "wire of camera 2 cut"],
     },
-    Planted {
+    FaultCase {
         name: "register of camera 1 stuck",
         plant: |n| {
-            // Its generator keeps the default, and the rig file asks for another value.
+            // The bias keeps its default, and the rig file requests another value.
             n.edit_rig(
                 "    serial: \"00000001\"\n",
                 "    serial: \"00000001\"\n    biases: {bias_diff_on: 400}\n",
@@ -83,12 +83,12 @@ pub(super) const FAULTS: &[Planted] = &[
             n.camera(CameraId::One, Order::Stick(0x0350));
         },
         check: "settings",
-        shows: seen("read_back", "camera1"),
+        shows: rig_evidence("read_back", "camera1"),
         also: &[],
-        // A camera that cannot be set up measures nothing.
+        // A camera that cannot be configured measures nothing.
         hides: &["hot pixels in camera 1", "wire of camera 1 leaky"],
     },
-    Planted {
+    FaultCase {
         name: "hot pixels in camera 1",
         plant: |n| n.camera(CameraId::One, Order::HotPixels(40)),
         check: "noise_lit",
@@ -99,15 +99,15 @@ pub(super) const FAULTS: &[Planted] = &[
         also: &[],
         hides: &[],
     },
-    Planted {
+    FaultCase {
         name: "camera 2 loses words",
         plant: |n| n.camera(CameraId::Two, Order::Lose(10)),
         check: "test_pattern",
-        shows: seen("data_lost", "camera2"),
+        shows: rig_evidence("data_lost", "camera2"),
         also: &[],
         hides: &["wire of camera 2 cut"],
     },
-    Planted {
+    FaultCase {
         name: "lamps stay on",
         plant: |n| n.lamps_obey("true"),
         check: "noise_dark",
@@ -118,31 +118,31 @@ pub(super) const FAULTS: &[Planted] = &[
         also: &[],
         hides: &[],
     },
-    Planted {
+    FaultCase {
         name: "lamps' program fails",
         plant: |n| n.lamps_obey("false"),
         check: "noise_dark",
-        shows: seen("state", "computer"),
+        shows: rig_evidence("state", "computer"),
         also: &[],
         hides: &["lamps stay on"],
     },
-    Planted {
+    FaultCase {
         name: "wire of camera 2 cut",
         plant: |n| n.bench.wire(CameraId::Two, Wire::Cut),
         check: "trigger_loopback",
-        shows: seen("trigger_fault", "camera2"),
+        shows: rig_evidence("trigger_fault", "camera2"),
         also: &[],
         hides: &[],
     },
-    Planted {
+    FaultCase {
         name: "wire of camera 1 leaky",
         plant: |n| n.bench.wire(CameraId::One, Wire::Leaky),
         check: "trigger_loopback",
-        shows: seen("trigger_fault", "camera1"),
+        shows: rig_evidence("trigger_fault", "camera1"),
         also: &[],
         hides: &[],
     },
-    Planted {
+    FaultCase {
         name: "trigger box unplugged",
         plant: |n| {
             n.bench.trigger_box().unplug().unwrap();
@@ -157,11 +157,11 @@ pub(super) const FAULTS: &[Planted] = &[
             "other firmware in the box",
         ],
     },
-    Planted {
+    FaultCase {
         name: "other firmware in the box",
         plant: |n| n.edit_rig("  port: ", "  firmware: \"9.9.9\"\n  port: "),
         check: "identity",
-        shows: seen("other_device", "trigger box"),
+        shows: rig_evidence("other_device", "trigger box"),
         also: &[],
         hides: &[
             "wire of camera 1 leaky",
@@ -169,7 +169,7 @@ pub(super) const FAULTS: &[Planted] = &[
             "serial line noisy",
         ],
     },
-    Planted {
+    FaultCase {
         name: "joints rub",
         plant: |n| n.arm(When::Now, Fault::Friction(800.0)),
         check: "step_response",
@@ -181,9 +181,9 @@ pub(super) const FAULTS: &[Planted] = &[
         // Friction shifts the force at which a touch is detected.
         hides: &["frame too low"],
     },
-    Planted {
+    FaultCase {
         name: "frame too low",
-        // The surface is found 0.7 mm above where the file puts it.
+        // The surface is found 0.7 mm above its position in the file.
         plant: |n| n.edit_rig("-2 mm, -20 mm]", "-2 mm, -21.1 mm]"),
         check: "depth",
         shows: Limit {
@@ -193,31 +193,31 @@ pub(super) const FAULTS: &[Planted] = &[
         also: &[],
         hides: &[],
     },
-    Planted {
+    FaultCase {
         name: "arm jammed",
         plant: |n| n.arm(When::IntoMove(0.1), Fault::Jammed),
         check: "repeatability",
-        shows: seen("state", "robot"),
+        shows: rig_evidence("state", "robot"),
         also: &[],
         hides: ARM,
     },
-    Planted {
+    FaultCase {
         name: "robot unplugged",
         plant: |n| n.arm(When::IntoMove(1.0), Fault::Unplug),
         check: "repeatability",
-        shows: seen("device_lost", "robot"),
+        shows: rig_evidence("device_lost", "robot"),
         also: &[],
         hides: ARM,
     },
-    Planted {
+    FaultCase {
         name: "robot not calibrated",
         plant: |n| n.arm(When::Now, Fault::PowerLoss),
         check: "robot_state",
-        shows: seen("state", "robot"),
+        shows: rig_evidence("state", "robot"),
         also: &[],
         hides: ARM,
     },
-    Planted {
+    FaultCase {
         name: "serial line noisy",
         plant: |n| {
             let noise = NoisePerMillion {
@@ -238,18 +238,18 @@ pub(super) const FAULTS: &[Planted] = &[
 ];
 
 /// All pairs, in a fixed order.
-pub(super) fn all() -> Vec<[&'static Planted; 2]> {
+pub(super) fn pairs_in_order() -> Vec<[&'static FaultCase; 2]> {
     let with = |i: usize| FAULTS[i + 1..].iter().map(move |b| [&FAULTS[i], b]);
     (0..FAULTS.len()).flat_map(with).collect()
 }
 
-/// The pair of these names.
-pub(super) fn named(names: [&str; 2]) -> [&'static Planted; 2] {
+/// The two faults with these names.
+pub(super) fn pair_by_name(names: [&str; 2]) -> [&'static FaultCase; 2] {
     names.map(|name| FAULTS.iter().find(|f| f.name == name).unwrap())
 }
 
-/// Plants two faults into a fresh bench, makes the checks that find them, and says what is wrong with the night.
-pub(super) fn made([a, b]: [&Planted; 2]) -> Option<Result<String, String>> {
+/// Injects two faults into a fresh bench and runs the checks that find them. `Err` lists problems of the night, `None` without a bench.
+pub(super) fn run_pair([a, b]: [&FaultCase; 2]) -> Option<Result<String, String>> {
     let mut nights = Nights::start()?;
     let began = Instant::now();
     for fault in [a, b] {
@@ -259,7 +259,7 @@ pub(super) fn made([a, b]: [&Planted; 2]) -> Option<Result<String, String>> {
     if b.check != a.check {
         only.push(b.check);
     }
-    // The arm is not moved without these.
+    // Checks that move the arm need `robot_state`.
     if ["repeatability", "step_response", "depth"]
         .iter()
         .any(|c| only.contains(c))
@@ -267,22 +267,22 @@ pub(super) fn made([a, b]: [&Planted; 2]) -> Option<Result<String, String>> {
         only.insert(0, "robot_state");
     }
     let night = nights.night(&only.join(","));
-    let told = format!(
+    let summary = format!(
         "{} + {}: {} s, exit {}",
         a.name,
         b.name,
         began.elapsed().as_secs(),
         night.exit
     );
-    let wrong: Vec<String> = wrong(a, b, &night);
+    let wrong: Vec<String> = find_problems(a, b, &night);
     Some(match wrong.is_empty() {
-        true => Ok(told),
-        false => Err(format!("{told}: {}\n{}", wrong.join("; "), night.said)),
+        true => Ok(summary),
+        false => Err(format!("{summary}: {}\n{}", wrong.join("; "), night.stderr)),
     })
 }
 
-/// What the night says and should not, or the other way round.
-fn wrong(a: &Planted, b: &Planted, night: &Seen) -> Vec<String> {
+/// Unexpected or missing statements of the night.
+fn find_problems(a: &FaultCase, b: &FaultCase, night: &NightResult) -> Vec<String> {
     let mut wrong = Vec::new();
     let verdict = &night.night["verdict"];
     if night.exit == 0 || verdict == "PASS" || verdict == "MARGINAL" {
@@ -290,15 +290,15 @@ fn wrong(a: &Planted, b: &Planted, night: &Seen) -> Vec<String> {
     }
     for (fault, other) in [(a, b), (b, a)] {
         if !other.hides.contains(&fault.name) {
-            wrong.extend(hidden(fault, night));
+            wrong.extend(missing_symptom(fault, night));
         }
-        // Also a check that cannot show its fault must not call the bench good.
+        // Even a check whose fault is hidden must not pass.
         let verdict = &night.check(fault.check)["verdict"];
         if verdict == "PASS" || verdict == "MARGINAL" {
             wrong.push(format!("{}: {} is {verdict}", fault.name, fault.check));
         }
     }
-    // Nobody is blamed who is well.
+    // No healthy device is blamed.
     let mut guilty: BTreeSet<&str> = BTreeSet::from(["computer"]);
     for fault in [a, b] {
         guilty.extend(fault.also);
@@ -314,8 +314,8 @@ fn wrong(a: &Planted, b: &Planted, night: &Seen) -> Vec<String> {
     wrong
 }
 
-/// What is missing of a fault that should be seen.
-fn hidden(fault: &Planted, night: &Seen) -> Option<String> {
+/// Missing part of a symptom that should be visible.
+fn missing_symptom(fault: &FaultCase, night: &NightResult) -> Option<String> {
     let check = night.check(fault.check);
     let name = fault.name;
     match fault.shows {
@@ -326,16 +326,17 @@ fn hidden(fault: &Planted, night: &Seen) -> Option<String> {
         } => {
             let there = evidence([check])
                 .any(|e| (kind.is_empty() || e["kind"] == kind) && e["subject"] == subject);
-            // Of two equally bad causes of a check the one that is not the infrastructure is told.
-            let told = check["cause"].as_str().unwrap_or("none");
-            let fits = told == cause || told == "rig";
-            (!there || !fits).then(|| format!("{name}: cause {told}, evidence there: {there}"))
+            // Of two equally bad causes the one that is not infrastructure is reported.
+            let named_cause = check["cause"].as_str().unwrap_or("none");
+            let fits = named_cause == cause || named_cause == "rig";
+            (!there || !fits)
+                .then(|| format!("{name}: cause {named_cause}, evidence there: {there}"))
         }
         Limit { subject, metric } => {
-            let judged = night.judged(fault.check, subject, metric);
-            let told = check["cause"].as_str().unwrap_or("none");
-            (judged != "FAIL" || told != "rig")
-                .then(|| format!("{name}: {metric} of {subject} {judged}, cause {told}"))
+            let judged = night.metric_verdict(fault.check, subject, metric);
+            let named_cause = check["cause"].as_str().unwrap_or("none");
+            (judged != "FAIL" || named_cause != "rig")
+                .then(|| format!("{name}: {metric} of {subject} {judged}, cause {named_cause}"))
         }
     }
 }
@@ -347,7 +348,7 @@ fn evidence<'a>(checks: impl IntoIterator<Item = &'a Value>) -> impl Iterator<It
     attempts.flat_map(|a| a["evidence"].as_array().unwrap())
 }
 
-/// A sample: every fault once that the other nights of this program do not plant.
+/// Sample of pairs: every fault that no other night of this program injects, once.
 const DEVICES: [[&str; 2]; 5] = [
     ["camera 2 unplugged", "register of camera 1 stuck"],
     ["camera 2 loses words", "trigger box unplugged"],
@@ -360,12 +361,12 @@ const CONDITIONS: [[&str; 2]; 2] = [
     ["frame too low", "hot pixels in camera 1"],
 ];
 
-fn sample(pairs: &[[&str; 2]]) {
+fn assert_pairs(pairs: &[[&str; 2]]) {
     let mut failed = Vec::new();
     for pair in pairs {
-        match made(named(*pair)) {
+        match run_pair(pair_by_name(*pair)) {
             None => return,
-            Some(Ok(told)) => eprintln!("ok: {told}"),
+            Some(Ok(summary)) => eprintln!("ok: {summary}"),
             Some(Err(wrong)) => failed.push(wrong),
         }
     }
@@ -374,38 +375,38 @@ fn sample(pairs: &[[&str; 2]]) {
 
 #[test]
 fn pairs_of_broken_devices_are_told_by_their_own_causes() {
-    sample(&DEVICES);
+    assert_pairs(&DEVICES);
 }
 
 #[test]
 fn pairs_of_bad_conditions_are_told_by_their_own_causes() {
-    sample(&CONDITIONS);
+    assert_pairs(&CONDITIONS);
 }
 
 #[test]
 #[ignore = "half an hour of real time: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig --test commands -- --ignored --nocapture all_pairs"]
 fn all_pairs_of_faults_are_told_by_their_own_causes() {
     let (from, to) = range(std::env::var("SKINRIG_PAIRS").ok());
-    let pairs = all();
+    let pairs = pairs_in_order();
     let n = pairs.len();
     let mut failed = Vec::new();
     for (i, pair) in pairs.into_iter().enumerate() {
         if !(from..=to).contains(&(i + 1)) {
             continue;
         }
-        match made(pair) {
+        match run_pair(pair) {
             None => return,
-            Some(Ok(told)) => eprintln!("pair {} of {n}: ok: {told}", i + 1),
+            Some(Ok(summary)) => eprintln!("pair {} of {n}: ok: {summary}", i + 1),
             Some(Err(wrong)) => {
                 eprintln!("pair {} of {n}: WRONG: {wrong}", i + 1);
                 failed.push(i + 1);
             }
         }
     }
-    assert_eq!(failed, [0; 0], "pairs that were not told right");
+    assert_eq!(failed, [0; 0], "pairs with a wrong verdict or cause");
 }
 
-/// `SKINRIG_PAIRS=20-40`: from and to which pair, counted from 1; all without it.
+/// First and last pair, counted from 1, from `SKINRIG_PAIRS=20-40`; all without it.
 fn range(given: Option<String>) -> (usize, usize) {
     let Some(given) = given else {
         return (1, usize::MAX);

@@ -1,5 +1,5 @@
-//! The nights of a bench as a laboratory looks at them in the morning: what moved, on the terminal, on the page of the trends and on
-//! that of the last night; and a change that is accepted.
+//! Trends of a bench's nights: changes shown on the terminal, on the trend page and on
+//! the page of the last night; and accepting a change.
 
 mod nights;
 
@@ -10,11 +10,11 @@ use skinrig_nightly::{Night, NightExit, Verdict};
 use crate::support::{files, only, skinrig, text};
 use nights::Nights;
 
-/// The same series as pages name it.
+/// Name of the series [`EVENTS`] on pages.
 const EVENTS_IN_WORDS: &str = "skin: press events (golden)";
 const EVENTS: &str = "golden/skin/press_events";
 
-/// A page, with slashes as they are: in a page they are escaped too.
+/// Reads a page and restores its escaped slashes.
 #[track_caller]
 fn read(page: &Path) -> String {
     std::fs::read_to_string(page)
@@ -23,22 +23,22 @@ fn read(page: &Path) -> String {
 }
 
 #[track_caller]
-fn has(text: &str, parts: &[&str]) {
+fn assert_contains(text: &str, parts: &[&str]) {
     for part in parts {
         assert!(text.contains(part), "expected {part:?} in {text}");
     }
 }
 
-/// What stands in the element with this test id, without what stands in elements in it.
+/// Text at the start of the element with this test id, before any nested element.
 #[track_caller]
-fn says<'a>(page: &'a str, id: &str) -> &'a str {
+fn element_text<'a>(page: &'a str, id: &str) -> &'a str {
     let after = page.split(&format!("data-testid=\"{id}\"")).nth(1);
     let after = after.unwrap_or_else(|| panic!("no {id} in {page}"));
     let (_, text) = after.split_once('>').unwrap();
     text.split('<').next().unwrap()
 }
 
-/// Asserts that every link of the page leads to a file, or to a place in one; the links.
+/// Asserts that every link of the page leads to a file or an anchor in one; returns the links.
 #[track_caller]
 fn links(page: &Path) -> Vec<String> {
     let html = read(page);
@@ -65,9 +65,9 @@ fn links(page: &Path) -> Vec<String> {
 #[test]
 fn the_terminal_says_what_moved_since_when_and_why() {
     let nights = Nights::of(40, 36);
-    let told = nights.trend(&["--ascii"]).code(1);
-    has(
-        &told.out,
+    let trend = nights.trend(&["--ascii"]).code(1);
+    assert_contains(
+        &trend.out,
         &[
             &format!("{EVENTS} moved (-20 %)"),
             "on 2024-02-06",
@@ -78,11 +78,12 @@ fn the_terminal_says_what_moved_since_when_and_why() {
         ],
     );
     assert!(
-        told.out
+        trend
+            .out
             .lines()
             .all(|l| l.chars().count() <= 80 && l.is_ascii()),
         "{}",
-        told.out
+        trend.out
     );
     let one = nights.trend(&["--series", "idle/*"]).code(1);
     let table = one.out.split("series  ").last().unwrap();
@@ -97,9 +98,9 @@ fn the_terminal_says_what_moved_since_when_and_why() {
     assert_eq!(alarm["since"], serde_json::json!([36, 36]));
 
     let steady = Nights::of(40, 40).trend(&[]).code(0);
-    has(&steady.out, &["nothing moved in 40 nights (2 series)"]);
+    assert_contains(&steady.out, &["nothing moved in 40 nights (2 series)"]);
     let few = Nights::of(11, 11).trend(&[]).code(0);
-    has(
+    assert_contains(
         &few.out,
         &["too few nights for trends: 11 of the 12 that a reference needs"],
     );
@@ -113,14 +114,14 @@ fn what_is_no_history_is_bad_input_and_left_alone() {
     let page = lab.text("page.html");
     skinrig(&["hil", "trend", &none, "--html", &page])
         .code(2)
-        .complains(&["expected a history of nights, found no file", "--rebuild"]);
+        .expect_stderr(&["expected a history of nights, found no file", "--rebuild"]);
     assert!(!lab.path("none.sqlite").exists() && !lab.path("page.html").exists());
 
     std::fs::write(lab.path("notes.txt"), "name,value\n").unwrap();
     let notes = lab.text("notes.txt");
     skinrig(&["hil", "trend", &notes])
         .code(2)
-        .complains(&["a file that is not SQLite"]);
+        .expect_stderr(&["a file that is not SQLite"]);
     let of_notes = [
         "hil",
         "accept",
@@ -134,17 +135,17 @@ fn what_is_no_history_is_bad_input_and_left_alone() {
     ];
     skinrig(&of_notes)
         .code(2)
-        .complains(&["a file that is not SQLite"]);
+        .expect_stderr(&["a file that is not SQLite"]);
     assert_eq!(std::fs::read_to_string(&notes).unwrap(), "name,value\n");
 
     nights
         .trend(&["--rig", "another"])
         .code(2)
-        .complains(&["on another", "small on emulated"]);
+        .expect_stderr(&["on another", "small on emulated"]);
     nights
         .trend(&["--series", "lamp"])
         .code(2)
-        .complains(&["found `lamp`", "none of 2"]);
+        .expect_stderr(&["found `lamp`", "none of 2"]);
 }
 
 #[test]
@@ -155,8 +156,8 @@ fn an_alarm_links_a_session_that_outlives_its_night_and_replays() {
     nights.add(36..40, 36, Some(&session));
     let page = nights.lab.path("trends.html");
     let html = |to: &Path| nights.trend(&["--html", &text(to)]).code(1);
-    let told = html(&page);
-    has(&told.out, &[&text(&page)]);
+    let trend = html(&page);
+    assert_contains(&trend.out, &[&text(&page)]);
     let there = links(&page);
     let kept = nights.lab.path("nights/alarms/2024-02-08T02-00-00Z-small");
     let kept = only(&kept, ".session.sqlite");
@@ -169,25 +170,25 @@ fn an_alarm_links_a_session_that_outlives_its_night_and_replays() {
         "{there:?}"
     );
     let shown = read(Path::new(&page));
-    has(
-        says(&shown, "headline"),
+    assert_contains(
+        element_text(&shown, "headline"),
         &[EVENTS_IN_WORDS, "probable cause: the skin"],
     );
-    assert_eq!(says(&shown, "alarms"), "1 alarm");
-    assert_eq!(says(&shown, "theme"), "Dark");
+    assert_eq!(element_text(&shown, "alarms"), "1 alarm");
+    assert_eq!(element_text(&shown, "theme"), "Dark");
 
-    // The nights are cleared away, and what the terminal says to do still works.
+    // With the nights removed, the commands printed on the terminal still work.
     for night in files(&nights.lab.path("nights"), "-small") {
         std::fs::remove_dir_all(night).unwrap();
     }
-    let told = html(&page);
+    let trend = html(&page);
     links(&page);
     for (command, more) in [("run --replay", &["--no-analysis"][..]), ("verify", &[])] {
-        let line = told.out.lines().map(str::trim);
+        let line = trend.out.lines().map(str::trim);
         let mut found = line.filter_map(|l| l.strip_prefix(&format!("skinrig {command} ")));
         let file = found
             .next()
-            .unwrap_or_else(|| panic!("no {command}: {told:#?}"));
+            .unwrap_or_else(|| panic!("no {command}: {trend:#?}"));
         assert_eq!(Path::new(file), kept);
         let sessions = nights.lab.text("replayed");
         let mut arguments: Vec<&str> = command.split(' ').chain([file]).collect();
@@ -223,7 +224,7 @@ fn an_accepted_change_is_learnt_anew_and_says_who_and_why() {
             "--all",
         ),
     ] {
-        nights.accept(arguments).code(2).complains(&[why]);
+        nights.accept(arguments).code(2).expect_stderr(&[why]);
     }
     assert_eq!(std::fs::read(&nights.history).unwrap(), before);
     nights.trend(&[]).code(1);
@@ -243,21 +244,21 @@ fn an_accepted_change_is_learnt_anew_and_says_who_and_why() {
         format!("{EVENTS}: the reference restarts at night {first}")
     );
     let page = nights.lab.text("trends.html");
-    let told = nights.trend(&["--html", &page]).code(0);
-    has(
-        &told.out,
+    let trend = nights.trend(&["--html", &page]).code(0);
+    assert_contains(
+        &trend.out,
         &["nothing moved in 40 nights; 1 of 2 series are still learning their reference"],
     );
     let shown = read(Path::new(&page));
     let (_, accepted) = shown.split_once("data-testid=\"accepted\"").unwrap();
-    has(
+    assert_contains(
         accepted,
         &[first, EVENTS_IN_WORDS, "a &lt;new&gt; lamp", "ada, 20"],
     );
-    assert_eq!(says(&shown, "alarms"), "no alarm");
-    // The new level is the one that it is held against from now on.
+    assert_eq!(element_text(&shown, "alarms"), "no alarm");
+    // The new level is the reference from now on.
     nights.add(40..60, 36, None);
-    has(
+    assert_contains(
         &nights.trend(&[]).code(0).out,
         &["nothing moved in 60 nights (2 series)"],
     );
@@ -279,7 +280,7 @@ fn an_accepted_change_is_learnt_anew_and_says_who_and_why() {
         said["series"].is_null() && said["reason"] == "new skin",
         "{said}"
     );
-    has(
+    assert_contains(
         &nights.trend(&[]).code(0).out,
         &["too few nights for trends: 4 of the 12"],
     );
@@ -292,7 +293,7 @@ fn the_page_of_a_night_says_what_moved_over_the_nights() {
     nights.add(0..36, 36, None);
     nights.add(36..40, 36, Some(&session));
     let (ran, folder) = nights.run(&["--history", &nights.history]);
-    // Its limits are met: an alarm of the trends does not change how it ends.
+    // Its limits are met: a trend alarm does not change the exit code.
     let ran = ran.code(0);
     let sentence = format!("{EVENTS} moved (-20 %) on 2024-02-06; probable cause: the skin");
     assert!(
@@ -302,10 +303,10 @@ fn the_page_of_a_night_says_what_moved_over_the_nights() {
     );
     let words: Vec<&str> = ran.out.split_whitespace().collect();
     let trends = text(&folder.join("trends.html"));
-    has(&words.join(" "), &[&format!("trend: {sentence}"), &trends]);
+    assert_contains(&words.join(" "), &[&format!("trend: {sentence}"), &trends]);
     let page = folder.join("night.html");
     let there = links(&page);
-    has(
+    assert_contains(
         &there.join("\n"),
         &[
             "trends.html\n",
@@ -317,12 +318,12 @@ fn the_page_of_a_night_says_what_moved_over_the_nights() {
     links(&folder.join("trends.html"));
     let shown = read(Path::new(&page));
     assert_eq!(
-        says(&shown, "headline"),
+        element_text(&shown, "headline"),
         "All within limits, but the skin probably moved"
     );
     let trends = shown.find("data-testid=\"trends-moved\"").unwrap();
     assert!(trends < shown.find("id=\"checks\"").unwrap());
-    has(
+    assert_contains(
         &shown[trends..],
         &[
             &sentence.replace(EVENTS, EVENTS_IN_WORDS),
@@ -338,20 +339,20 @@ fn the_page_of_a_night_says_what_moved_over_the_nights() {
     );
 }
 
-/// Tonight is the third night of a disk that was a million times faster before: the alarm leads to tonight's own page.
+/// Third night of a disk that became a million times slower: the alarm links to tonight's page.
 #[test]
 fn an_alarm_that_is_raised_tonight_leads_to_tonight() {
     let nights = Nights::new();
     nights.add_disk(0..40, 38);
     nights.trend(&[]).code(0);
     let (ran, folder) = nights.run(&["--history", &nights.history]);
-    has(&ran.code(0).out, &["trend: disk/computer/write_rate moved"]);
+    assert_contains(&ran.code(0).out, &["trend: disk/computer/write_rate moved"]);
     let page = folder.join("trends.html");
     assert!(links(&page).contains(&"night.html".to_owned()));
     links(&folder.join("night.html"));
     let shown = read(&folder.join("night.html"));
     assert_eq!(
-        says(&shown, "headline"),
+        element_text(&shown, "headline"),
         "All within limits, but the computer probably moved"
     );
 }
@@ -363,7 +364,7 @@ fn a_night_without_trends_says_why_and_is_judged_all_the_same() {
     let (ran, folder) = nights.run(&[]);
     ran.code(0);
     let page = shown(&folder);
-    has(
+    assert_contains(
         &page,
         &["data-testid=\"trends-not-requested\"", "--history FILE"],
     );
@@ -372,8 +373,8 @@ fn a_night_without_trends_says_why_and_is_judged_all_the_same() {
 
     let (ran, folder) = nights.run(&["--history", &nights.history]);
     let too_few = "too few nights for trends: 10 of the 12";
-    has(&ran.code(0).out, &[too_few]);
-    has(
+    assert_contains(&ran.code(0).out, &[too_few]);
+    assert_contains(
         &shown(&folder),
         &["data-testid=\"trends-learning\"", too_few],
     );
@@ -382,14 +383,14 @@ fn a_night_without_trends_says_why_and_is_judged_all_the_same() {
     let (ran, folder) = nights.run(&["--history", &nights.lab.text("notes.txt")]);
     let ran = ran.code(0);
     assert!(!ran.out.contains("trend"), "{ran:#?}");
-    ran.complains(&[
+    ran.expect_stderr(&[
         "no trends for this night",
         "a file that is not SQLite",
         "--rebuild",
     ]);
     let page = shown(&folder);
-    assert_eq!(says(&page, "verdict"), "PASS");
-    has(
+    assert_eq!(element_text(&page, "verdict"), "PASS");
+    assert_contains(
         &page,
         &[
             "data-testid=\"trends-unavailable\"",
@@ -397,10 +398,10 @@ fn a_night_without_trends_says_why_and_is_judged_all_the_same() {
             "Limits were checked nevertheless",
         ],
     );
-    // It is added when the history is there again.
+    // It is added once the history is available again.
     let all = nights.lab.text("nights");
     nights
         .trend(&["--rebuild", &all])
         .code(0)
-        .complains(&["2 nights added"]);
+        .expect_stderr(&["2 nights added"]);
 }

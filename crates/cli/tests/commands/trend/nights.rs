@@ -1,4 +1,4 @@
-//! Nights that were never made: a bench's history, as the library writes it.
+//! Synthetic nights: a bench's history, written by the library.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -8,11 +8,11 @@ use skinrig_hil::history::append;
 use skinrig_nightly::night::{Attempt, CheckResult, Measurement, NIGHT_VERSION, Part};
 use skinrig_nightly::{Golden, Night, NightExit, Verdict, Versions};
 
-use crate::support::{Lab, Said, program, said, skinrig};
+use crate::support::{Lab, ProgramOutput, program, run_to_end, skinrig};
 
-/// Names of the bench and the suite, as the emulated rig file and [`SUITE`] have them.
+/// Names of bench and suite, as in the emulated rig file and [`SUITE`].
 const RIG: &str = "emulated";
-/// What needs no device.
+/// Suite of a check that needs no device.
 const SUITE: &str = "\
 skinrig_suite: 1
 name: small
@@ -21,7 +21,7 @@ checks:
   disk: {amount: 1 MB, write_rate: {at_least: 1 kB/s}, free: {at_least: 1 B}}
 ";
 
-/// Night number `at`, in which these were measured: check, device, metric, unit, value.
+/// Night number `at` with these measurements: check, device, metric, unit, value.
 fn night(at: usize, golden: Option<&str>, measured: &[(&str, &str, &str, &str, f64)]) -> Night {
     let day = NaiveDate::from_ymd_opt(2024, 1, 1).unwrap() + Days::new(at as u64);
     Night {
@@ -90,12 +90,12 @@ fn check(&(name, subject, metric, unit, value): &(&str, &str, &str, &str, f64)) 
     }
 }
 
-/// What changes from night to night in a bench that is well.
+/// Normal variation between nights of a healthy bench.
 fn wobble(at: usize) -> f64 {
     (at * 7 % 5) as f64
 }
 
-/// Nights in `nights/`, with their history beside them.
+/// Nights in `nights/`, with their history next to the folder.
 pub(super) struct Nights {
     pub lab: Lab,
     pub history: String,
@@ -109,14 +109,14 @@ impl Nights {
         Self { lab, history }
     }
 
-    /// So many nights, of which those from `change` on gave a fifth less.
+    /// This many nights; values drop by a fifth from night `change` on.
     pub(super) fn of(count: usize, change: usize) -> Self {
         let all = Self::new();
         all.add(0..count, change, None);
         all
     }
 
-    /// Nights of a golden skin and a camera; the skin gives a fifth less from `change` on.
+    /// Nights of a golden skin and a camera; the skin's events drop by a fifth from `change` on.
     pub(super) fn add(&self, which: Range<usize>, change: usize, session: Option<&Path>) {
         for at in which {
             let share = if at < change { 1.0 } else { 0.8 };
@@ -134,7 +134,7 @@ impl Nights {
         }
     }
 
-    /// Nights of a disk faster than any, which is a millionth of that from `change` on.
+    /// Nights of an impossibly fast disk that is a million times slower from `change` on.
     pub(super) fn add_disk(&self, which: Range<usize>, change: usize) {
         for at in which {
             let share = if at < change { 1.0 } else { 1e-6 };
@@ -144,7 +144,7 @@ impl Nights {
         }
     }
 
-    /// Puts a night with its page into the history; its folder.
+    /// Adds a night with its page to the history; returns its folder.
     fn append(&self, night: &Night) -> PathBuf {
         let home = self.lab.path("nights").join(&night.id);
         std::fs::create_dir(&home).unwrap();
@@ -153,16 +153,16 @@ impl Nights {
         home
     }
 
-    pub(super) fn trend(&self, more: &[&str]) -> Said {
+    pub(super) fn trend(&self, more: &[&str]) -> ProgramOutput {
         skinrig(&[&["hil", "trend", &self.history], more].concat())
     }
 
-    pub(super) fn accept(&self, more: &[&str]) -> Said {
+    pub(super) fn accept(&self, more: &[&str]) -> ProgramOutput {
         skinrig(&[&["hil", "accept", "--history", &self.history], more].concat())
     }
 
-    /// A night of one check that needs no device, and its folder.
-    pub(super) fn run(&self, more: &[&str]) -> (Said, PathBuf) {
+    /// Runs a night of one check that needs no device; returns output and folder.
+    pub(super) fn run(&self, more: &[&str]) -> (ProgramOutput, PathBuf) {
         std::fs::write(self.lab.path("suite.yaml"), SUITE).unwrap();
         let (suite, out) = (self.lab.text("suite.yaml"), self.lab.text("nights"));
         let rig = "hil/rigs/emulated.yaml";
@@ -172,7 +172,7 @@ impl Nights {
             .env("SKINRIG_EMULATED_LIBDRD", "/nowhere/libdrd.so")
             .env("SKINRIG_EMULATED_LAMPS_OFF", "/nowhere/lamps-off")
             .env("SKINRIG_EMULATED_TRIGGER_BOX", "/nowhere/box");
-        let ran = said(command);
+        let ran = run_to_end(command);
         let folder = ran.out.lines().find(|l| l.starts_with(&out));
         let folder = PathBuf::from(folder.unwrap_or_else(|| panic!("no folder: {ran:#?}")));
         (ran, folder)
