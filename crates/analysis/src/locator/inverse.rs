@@ -124,19 +124,17 @@ impl Inverse {
             matrix: self.precision,
             side: slope.map(|s| -s),
         };
-        for k in 0..2 {
+        for (k, variance) in variance.into_iter().enumerate() {
             let (expected, by) = self.reading.expected(k, at);
             let (field, field_by) = self.fields[k].value(at);
             let off = read.off(k, expected, field);
-            let by = [0, 1].map(|axis| by[axis] / read.slopes[k] + field_by[axis]);
-            let per = 1.0 / variance[k];
-            normal.value += 0.5 * off * off * per;
-            normal.matrix[0] += by[0] * by[0] * per;
-            normal.matrix[1] += by[0] * by[1] * per;
-            normal.matrix[2] += by[1] * by[1] * per;
-            for axis in 0..2 {
-                normal.side[axis] += by[axis] * off * per;
-            }
+            let [x, y] = [0, 1].map(|axis| by[axis] / read.slopes[k] + field_by[axis]);
+            normal.value += 0.5 * off * off / variance;
+            normal.matrix[0] += x * x / variance;
+            normal.matrix[1] += x * y / variance;
+            normal.matrix[2] += y * y / variance;
+            normal.side[0] += x * off / variance;
+            normal.side[1] += y * off / variance;
         }
         normal
     }

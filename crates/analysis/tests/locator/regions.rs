@@ -96,18 +96,17 @@ fn regions_hold_on_eight_skins() {
 }
 
 #[test]
-#[ignore = "minutes: cargo test -p skinrig-analysis --test locator -- --ignored --nocapture"]
+#[ignore = "minutes: cargo test -p skinrig-analysis --test locator -- --ignored"]
 fn regions_hold_on_five_hundred_skins() {
     for (name, inside, all) in coverage(500).0 {
         let share = inside / all;
-        println!("{name}: {share:.4} of {all}");
         assert!((0.93..=0.97).contains(&share), "{name}: {share} of {all}");
     }
 }
 
 /// Few presses, one corner, ten times the noise, one camera nearly blind, one depth, and all of it bent or straight.
 #[test]
-#[ignore = "half a minute: cargo test -p skinrig-analysis --test locator -- --ignored --nocapture"]
+#[ignore = "half a minute: cargo test -p skinrig-analysis --test locator -- --ignored"]
 fn the_choice_is_never_much_worse_than_the_geometry_on_sixty_skins() {
     never_much_worse(60);
 }
@@ -161,12 +160,6 @@ fn never_much_worse(skins: u64) {
             )
         })
         .collect();
-    for (i, locator, with, without) in &rows {
-        println!(
-            "{i}: {} {with:.2} mm, geometry {without:.2} mm",
-            locator.name()
-        );
-    }
     for (i, locator, with, without) in rows {
         assert!(
             with <= 1.05 * without,

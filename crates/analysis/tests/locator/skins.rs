@@ -126,7 +126,7 @@ impl Skin {
                 let views = [view(column(0, one), events), view(column(1, two), events)];
                 let lower_left = at.x_mm < 6.0 && at.y_mm < 0.0;
                 let mut role = PressRole::Score;
-                let turn = (location + location / self.side) % 2 == 0;
+                let turn = (location + location / self.side).is_multiple_of(2);
                 if turn && (lower_left || !self.corner) && calibrating < self.calibrating {
                     role = PressRole::Calibrate;
                     calibrating += usize::from(repetition == 0);
