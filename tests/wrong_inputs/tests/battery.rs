@@ -90,7 +90,7 @@ fn nor_does_any_of_ten_seeds() {
     );
 }
 
-/// The cases in `docs/reference/wrong-inputs.md`. Cases of a group that allow the same outcomes share a line.
+/// The cases in `README.md`. Cases of a group that allow the same outcomes share a line.
 fn list() -> String {
     let mut rows: Vec<(&str, String, String)> = Vec::new();
     for case in all() {
@@ -138,10 +138,7 @@ fn list() -> String {
 /// With `SKINRIG_WRITE_DOCS=1` writes the list instead of comparing it.
 #[test]
 fn the_documented_list_is_this_one() -> std::io::Result<()> {
-    let path = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../docs/reference/wrong-inputs.md"
-    );
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/README.md");
     let page = std::fs::read_to_string(path)?;
     let (before, rest) = page.split_once(BEGIN).unwrap_or_default();
     let (documented, after) = rest.split_once(END).unwrap_or_default();
@@ -152,4 +149,19 @@ fn the_documented_list_is_this_one() -> std::io::Result<()> {
     let next = "SKINRIG_WRITE_DOCS=1 cargo test -p skinrig-wrong-inputs documented";
     assert_eq!(documented, list, "{path} is not up to date; next: {next}");
     Ok(())
+}
+
+#[test]
+fn the_page_for_users_names_every_finding() {
+    let page = include_str!("../../../docs/reference/wrong-inputs.md");
+    let cases = all();
+    let named = cases.iter().flat_map(|case| &case.allowed);
+    let missing: Vec<&str> = named
+        .filter_map(|allowed| match allowed {
+            Allowed::Named(fault) => Some(fault.name()),
+            _ => None,
+        })
+        .filter(|name| !page.contains(name))
+        .collect();
+    assert!(missing.is_empty(), "{missing:?}");
 }

@@ -11,7 +11,7 @@ use super::{NightResult, Nights};
 
 /// A fault and its symptom in a night, unless another fault hides it.
 pub(super) struct FaultCase {
-    /// Name in the list of docs/reference/nightly.md.
+    /// Name in the printed results.
     pub name: &'static str,
     plant: fn(&mut Nights),
     /// The check that finds it.
