@@ -1,4 +1,4 @@
-//! Error bounds of this suite, by their names in `docs/reference/numerics.md`, and the worst error observed.
+//! Error bounds of this suite, by their names in `README.md`, and the worst error observed.
 
 use std::cell::RefCell;
 use std::fmt::Display;
@@ -84,7 +84,7 @@ impl Drop for Watch {
 
 #[test]
 fn the_document_states_the_bounds_that_are_held() {
-    let document = include_str!("../../../docs/reference/numerics.md");
+    let document = include_str!("README.md");
     let row = |name: &str| {
         let mut rows = document
             .lines()

@@ -1,5 +1,5 @@
 //! Numerical stability at extremes: fast code compared with slow, simple references of higher precision, within the bounds
-//! stated in `docs/reference/numerics.md`. `-- --nocapture` prints the worst error observed for each bound.
+//! stated in `README.md`. `-- --nocapture` prints the worst error observed for each bound.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
