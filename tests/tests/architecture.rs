@@ -10,7 +10,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// Allowed dependencies between our crates, except in tests. Mirrors the table in `ARCHITECTURE.md`.
+/// Allowed dependencies between our crates, except in tests.
 const ALLOWED: &[(&str, &[&str])] = &[
     ("skinrig-text", &[]),
     ("skinrig-settings-derive", &[]),

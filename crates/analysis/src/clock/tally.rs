@@ -3,8 +3,7 @@
 //! The model: the planned presses were executed, possibly with more before or after them in the same rhythm, and each was
 //! seen by both cameras, one or none, with unknown probabilities. All other bursts came at any time or one press period
 //! after another burst, in one camera or both, with unknown rates. Probabilities and rates are integrated out (Dirichlet
-//! priors), so that the recording itself weights every count. `docs/explanation/time-base.md` has the formulae and the
-//! priors.
+//! priors), so that the recording itself weights every count. `docs/explanation/time-base.md` has the formulae.
 
 use super::bursts::Bursts;
 use super::search::period_us;
