@@ -15,7 +15,7 @@ pub mod night_folder;
 pub mod run_evidence;
 pub mod runner;
 mod streams;
-pub mod test_volume;
+mod test_volume;
 
 pub use bench::{Bench, Devices, DrillResult, GoldenRun, Problem, Slot};
 pub use findings::{Findings, GoldenRecord};

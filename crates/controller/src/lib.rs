@@ -31,7 +31,7 @@ mod preflight;
 mod preflight_run;
 pub mod press_fault;
 mod press_series;
-pub mod press_tracker;
+mod press_tracker;
 pub mod progress;
 pub mod run;
 pub mod settings;

@@ -5,7 +5,7 @@
 //! `*_hz`, `*_deg`.
 
 pub mod camera;
-pub mod device_role;
+mod device_role;
 pub mod event;
 pub mod frame;
 pub mod id;

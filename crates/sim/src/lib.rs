@@ -18,7 +18,7 @@ pub mod line;
 pub mod motion;
 pub mod optical;
 mod pattern;
-pub mod phase_tracker;
+mod phase_tracker;
 pub mod random;
 pub mod replay;
 pub mod rig;

@@ -85,7 +85,7 @@ pub trait Method: Sync {
 }
 
 /// All methods, simplest first.
-pub const METHODS: [&dyn Method; 3] = [&Geometry, &GeometryField, &DirectField];
+pub(crate) const METHODS: [&dyn Method; 3] = [&Geometry, &GeometryField, &DirectField];
 
 /// The method of a locator; for `Auto` the geometry.
 #[must_use]

@@ -24,5 +24,5 @@ mod samples;
 pub(crate) use choose::{Effort, choose};
 pub use choose::{LocatorChoice, choose_locator, held_out_errors};
 pub use fitted::{Features, Fitted, Location};
-pub use methods::{Feature, Hyperparameters, METHODS, Method, Needs, Start, Unfit, method};
+pub use methods::{Feature, Hyperparameters, Method, Needs, Start, Unfit, method};
 pub(crate) use regions::reliability;

@@ -15,7 +15,7 @@ const BUILD: &str = "cargo build --release -p skinrig --features evk4";
 /// # Errors
 /// [`Failure::input`]: this build does not support the camera.
 #[cfg(not(feature = "evk4"))]
-pub fn open(
+pub(crate) fn open(
     setup: &CameraSetup,
     camera: CameraId,
     _clock: RealClock,
@@ -31,7 +31,7 @@ pub fn open(
 /// # Errors
 /// [`Failure::input`] for a model without a driver; [`Failure::rig`] when no such camera is connected.
 #[cfg(feature = "evk4")]
-pub fn open(
+pub(crate) fn open(
     setup: &CameraSetup,
     camera: CameraId,
     clock: RealClock,

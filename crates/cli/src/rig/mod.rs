@@ -1,7 +1,7 @@
 //! The rig of a run: simulated, a bench, or a replayed recording.
 
 pub mod bench;
-pub mod evt3_camera;
+pub(crate) mod evt3_camera;
 pub mod gates;
 pub mod inputs;
 pub mod planted;

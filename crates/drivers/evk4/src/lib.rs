@@ -14,7 +14,7 @@ pub mod camera;
 pub mod link;
 pub mod model;
 pub mod neuromorphic;
-pub mod stream_settings;
+mod stream_settings;
 
 pub use camera::Evt3Camera;
 pub use link::{Link, LinkError, Packet, Packets};

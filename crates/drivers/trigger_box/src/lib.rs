@@ -5,7 +5,7 @@
 //! [`SerialTriggerBox`] is the device.
 
 pub mod config;
-pub mod discover;
+mod discover;
 pub mod driver;
 pub mod frame;
 pub mod handshake;
