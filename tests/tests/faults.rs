@@ -16,8 +16,8 @@ use skinrig::rig::{self, gates};
 use skinrig_analysis::Analysis;
 use skinrig_analysis::result::PressResult;
 use skinrig_controller::{ControlHandle, RecordSink, RunReport, SinkFault};
-use skinrig_model::{CameraId, HostTime, PressId, PressTiming, Record, RunEnd, SimLevel};
-use skinrig_protocol::{FaultKind, FaultPhase, FaultTime, Plan, PlantedFault, Protocol};
+use skinrig_model::{CameraId, HostTime, PressId, PressTiming, Record, RigFault, RunEnd, SimLevel};
+use skinrig_protocol::{FaultPhase, FaultTime, Plan, PlantedFault, Protocol};
 use skinrig_recorder::{SessionReader, SessionWriter, verify};
 use skinrig_results::Rescan;
 use skinrig_sim::{SimConfig, simulated_rig};
@@ -159,11 +159,11 @@ fn run((protocol, plan): (&Protocol, &Plan), fault: Option<PlantedFault>, path: 
     // Every press of a location gives the same response, so that a repeated press can be compared.
     config.geometric.dead_share = 0.0;
     config.geometric.strength_spread = 0.0;
-    config.faults = rig::planted::of_devices(&faults);
+    config.faults = rig::planted::of_devices(&faults).unwrap();
     let simulated = simulated_rig(&config);
     let header = header(protocol, plan, &simulated).unwrap();
     let preflight = gates::of_simulated(&simulated, path.parent().unwrap(), 1.0);
-    let killed = fault.filter(|fault| fault.kind == FaultKind::Killed);
+    let killed = fault.filter(|fault| fault.kind == RigFault::Killed);
     let mut sink = Sink {
         writer: Some(SessionWriter::create(&path).unwrap()),
         saboteur: FaultInjector::new(if killed.is_some() { &[] } else { &faults }),
@@ -240,7 +240,7 @@ fn judge(run: &Run, fault: PlantedFault, before: u64, without: &Ideal) -> Cell {
     if !struck && !may_miss {
         wrong.push("all that was recorded is as without the fault: it did not strike".into());
     }
-    let killed = fault.kind == FaultKind::Killed;
+    let killed = fault.kind == RigFault::Killed;
     let totals = reader.totals().unwrap();
     for tally in [totals.presses, totals.sync] {
         let counted = tally.valid + tally.missed + tally.invalid + tally.excluded;
@@ -261,7 +261,7 @@ fn judge(run: &Run, fault: PlantedFault, before: u64, without: &Ideal) -> Cell {
     let report = &run.report;
     if !killed {
         // A robot that stopped answering cannot report that it is disarmed; its own brakes are on.
-        if !report.disarmed && fault.kind != FaultKind::RobotLost {
+        if !report.disarmed && fault.kind != RigFault::RobotLost {
             wrong.push("not disarmed".into());
         }
         if matches!(report.end, RunEnd::Completed) && !(report.retracted && report.disarmed) {
@@ -280,7 +280,7 @@ fn judge(run: &Run, fault: PlantedFault, before: u64, without: &Ideal) -> Cell {
         && usable
     {
         // A slow robot moves differently, with other events and other measured times.
-        let moves_as_ever = fault.kind != FaultKind::RobotSlow;
+        let moves_as_ever = fault.kind != RigFault::RobotSlow;
         wrong.extend(differences(analysis, &without.presses, moves_as_ever));
     }
     let planned = totals.presses.planned + totals.sync.planned;

@@ -19,6 +19,7 @@ pub mod pulse;
 pub mod quantile;
 pub mod reason;
 pub mod record;
+pub mod rig_fault;
 pub mod scene;
 pub mod settings;
 pub mod skin;
@@ -47,6 +48,7 @@ pub use record::{
     DeviceIdentity, InterruptionKind, MotionCommand, Record, ResumeHeader, RunEnd, RunHeader,
     Setting,
 };
+pub use rig_fault::{RigFault, UnsupportedFault};
 pub use scene::{SceneNeed, SimLevel};
 pub use settings::{
     AlignmentSettings, AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings,

@@ -7,14 +7,14 @@ use skinrig_device::{
 };
 use skinrig_formats::{Scanner, evt2};
 use skinrig_model::{
-    CameraId, DeviceIdentity, DeviceRole, HostTime, RawChunk, SENSOR_HEIGHT, SENSOR_WIDTH, Setting,
-    StreamFormat,
+    CameraId, DeviceIdentity, DeviceRole, HostTime, RawChunk, RigFault, SENSOR_HEIGHT,
+    SENSOR_WIDTH, Setting, StreamFormat,
 };
 
 use crate::camera_stream::{Outgoing, Streaming};
 use crate::config::SimConfig;
 use crate::drifting::DriftingClock;
-use crate::faults::{Fault, FaultTrigger, HOT_C, HOT_NS, HOT_RISE_NS, STORM_NS};
+use crate::faults::{self, FaultTrigger, HOT_C, HOT_NS, HOT_RISE_NS, STORM_NS};
 use crate::line::LineEdge;
 use crate::pattern::ScanModel;
 use crate::random::{Purpose, Stream};
@@ -50,7 +50,7 @@ pub(crate) struct SimCamera {
     serial: String,
     chunk_bytes: usize,
     jitter_ns: i64,
-    read_back_fault: bool,
+    setting_ignored: Option<FaultTrigger>,
     lost: Vec<(FaultTrigger, u64)>,
     unplug: Option<FaultTrigger>,
     stall: Option<FaultTrigger>,
@@ -80,45 +80,25 @@ impl SimCamera {
         shared: Shared,
         make_pixels: PixelFactory,
     ) -> Self {
-        let mut lost = Vec::new();
-        let (mut unplug, mut stall, mut hot) = (None, None, None);
-        let (mut storms, mut steps) = (Vec::new(), Vec::new());
-        let mut read_back_fault = false;
-        for fault in &config.faults {
-            match *fault {
-                Fault::CameraBytesLost {
-                    camera,
-                    when,
-                    words,
-                } if camera == id => {
-                    lost.push((when, words));
-                }
-                Fault::CameraUnplugged { camera, when } if camera == id => unplug = Some(when),
-                Fault::CameraReadBack(camera) if camera == id => read_back_fault = true,
-                Fault::CameraStalled { camera, when } if camera == id => stall = Some(when),
-                Fault::CameraHot { camera, when } if camera == id => hot = Some(when),
-                Fault::HotPixelStorm { camera, when } if camera == id => storms.push(when),
-                Fault::ClockStep {
-                    camera,
-                    when,
-                    by_us,
-                } if camera == id => steps.push((when, by_us)),
-                _ => {}
-            }
-        }
+        let times = |kind: fn(CameraId) -> RigFault| faults::times(&config.faults, kind(id));
+        let sizes = config.fault_sizes;
         Self {
             shared,
             id,
             serial: format!("sim-{:08x}-c{}", config.seed as u32, id.number()),
             chunk_bytes: config.camera_clock.chunk_bytes.max(4) / 4 * 4,
             jitter_ns: config.camera_clock.trigger_jitter_ns.max(0),
-            read_back_fault,
-            lost,
-            unplug,
-            stall,
-            storms,
-            steps,
-            hot,
+            setting_ignored: times(RigFault::CameraSettingIgnored).next(),
+            lost: times(RigFault::CameraDrops)
+                .map(|when| (when, sizes.lost_words))
+                .collect(),
+            unplug: times(RigFault::CameraUnplugged).last(),
+            stall: times(RigFault::CameraStalled).last(),
+            storms: times(RigFault::CameraStorm).collect(),
+            steps: times(RigFault::CameraClockStep)
+                .map(|when| (when, sizes.clock_step_us))
+                .collect(),
+            hot: times(RigFault::CameraHot).last(),
             buffer_bytes: config.camera_clock.buffer_bytes.max(4) / 4 * 4,
             make_pixels,
             random: Stream::new(config.seed, Purpose::CameraClock, id.index() as u64),
@@ -357,9 +337,12 @@ impl EventCamera for SimCamera {
             biases: biases.clone(),
             ..settings.clone()
         };
+        let ignores = self
+            .setting_ignored
+            .is_some_and(|when| self.shared.world().has_occurred(when));
         let mut read = Vec::new();
         for (name, value) in biases {
-            let found = if self.read_back_fault && name == "bias_fo" {
+            let found = if ignores && name == "bias_fo" {
                 value - 1
             } else {
                 value

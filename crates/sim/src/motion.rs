@@ -61,9 +61,9 @@ pub struct Motion {
     wander: [f64; 3],
     powered: bool,
     /// Factor on the lag frequency; reduced by a fault.
-    pub sluggish: f64,
+    pub bandwidth: f64,
     /// Whether a fault holds the tip in place.
-    pub stuck: bool,
+    pub stalled: bool,
 }
 
 impl Motion {
@@ -80,8 +80,8 @@ impl Motion {
             velocity: [0.0; 3],
             wander: [0.0; 3],
             powered: false,
-            sluggish: 1.0,
-            stuck: false,
+            bandwidth: 1.0,
+            stalled: false,
         }
     }
 
@@ -196,12 +196,12 @@ impl Motion {
 
     fn step_tip(&mut self) {
         let c = self.config;
-        let w = c.lag_rad_s * self.sluggish;
+        let w = c.lag_rad_s * self.bandwidth;
         let keep = 1.0 - DT_S / c.wander_s;
         let kick = c.wander_mm * (1.0 - keep * keep).sqrt();
         for i in 0..3 {
             let noise = self.noise.gauss();
-            if !self.powered || self.stuck {
+            if !self.powered || self.stalled {
                 continue; // braked; the draw keeps both random streams in step
             }
             let pull = w * w * (self.set_point[i] - self.tip[i]);

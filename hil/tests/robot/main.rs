@@ -5,7 +5,7 @@ mod bench;
 
 use bench::SimBench;
 use skinrig_hil::{DrillResult, Findings};
-use skinrig_model::HostTime;
+use skinrig_model::{HostTime, RigFault};
 use skinrig_nightly::EvidenceKind;
 use skinrig_sim::{Fault, FaultTrigger, MotionPhase};
 
@@ -26,6 +26,10 @@ fn value(found: &Findings, metric: &str) -> Option<f64> {
 
 fn kinds(found: &Findings) -> Vec<EvidenceKind> {
     found.evidence.iter().map(|e| e.kind).collect()
+}
+
+fn from_start(fault: RigFault) -> Fault {
+    Fault::new(fault, FaultTrigger::At(HostTime::ZERO)).unwrap()
 }
 
 /// Whether the arm is braked; a braked arm rejects commands.
@@ -82,7 +86,11 @@ fn a_healthy_robot_gives_small_numbers_and_is_braked_after_each_check() {
 
 #[test]
 fn a_robot_that_is_lost_leaves_nothing_measured_and_is_opened_again() {
-    let lost = Fault::IndenterLost(FaultTrigger::Moment(MotionPhase::Travel, 4));
+    let lost = Fault::new(
+        RigFault::RobotLost,
+        FaultTrigger::Moment(MotionPhase::Travel, 4),
+    )
+    .unwrap();
     let mut bench = SimBench::new(vec![lost]);
     let found = bench.run_check(REPEATABILITY);
     assert!(
@@ -98,7 +106,7 @@ fn a_robot_that_is_lost_leaves_nothing_measured_and_is_opened_again() {
 
 #[test]
 fn a_limit_that_does_not_read_back_is_a_fault_of_the_robot() {
-    let mut bench = SimBench::new(vec![Fault::IndenterReadBack]);
+    let mut bench = SimBench::new(vec![from_start(RigFault::RobotSettingIgnored)]);
     let found = bench.run_check(STATE);
     assert_eq!(value(&found, "faults"), Some(1.0), "{found:?}");
     assert_eq!(value(&found, "creep"), None);
@@ -106,16 +114,13 @@ fn a_limit_that_does_not_read_back_is_a_fault_of_the_robot() {
 }
 
 #[test]
-fn a_stuck_and_a_sluggish_robot_are_detected() {
-    let mut bench = SimBench::new(vec![Fault::IndenterStuck(FaultTrigger::At(HostTime(0)))]);
+fn a_stalled_and_a_slow_robot_are_detected() {
+    let mut bench = SimBench::new(vec![from_start(RigFault::RobotStalled)]);
     let found = bench.run_check(REPEATABILITY);
     assert_eq!(value(&found, "spread"), None);
     assert!(kinds(&found).contains(&EvidenceKind::State), "{found:?}");
-    let slow = Fault::Sluggish {
-        when: FaultTrigger::At(HostTime(0)),
-        percent: 10,
-    };
-    let mut bench = SimBench::new(vec![slow]);
+    let mut bench = SimBench::new(vec![from_start(RigFault::RobotSlow)]);
+    bench.config.fault_sizes.slow_percent = 10;
     let healthy = SimBench::new(Vec::new()).run_check(STEP);
     let found = bench.run_check(STEP);
     let settling = |found: &Findings| value(found, "settling").unwrap();

@@ -3,7 +3,7 @@
 use skinrig_controller::{ControlHandle, ExpectedDevice, Loopback, Preflight, Run, RunReport};
 use skinrig_model::*;
 use skinrig_sim::config::SimConfig;
-use skinrig_sim::faults::Fault;
+use skinrig_sim::faults::{Fault, FaultTrigger};
 use skinrig_sim::rig::simulated_rig;
 
 use crate::mock::{Sink, header};
@@ -167,5 +167,7 @@ fn failed_checks_of_the_caller_and_rejected_settings_end_the_run() {
         "make room",
     )];
     refused(Vec::new(), preflight, &["disk"]);
-    refused(vec![Fault::IndenterReadBack], full(), &["devices"]);
+    let start = FaultTrigger::At(HostTime::ZERO);
+    let ignored = Fault::new(RigFault::RobotSettingIgnored, start).unwrap();
+    refused(vec![ignored], full(), &["devices"]);
 }

@@ -11,6 +11,7 @@
 //! Everything recorded here is emulated.
 #![cfg(target_os = "linux")]
 
+mod faults;
 mod ties;
 
 use std::ffi::OsStr;
@@ -24,14 +25,14 @@ use skinrig_emulated_camera::{Bus, BusConfig, BusError, Evk1Config};
 use skinrig_emulated_trigger_box::{BoardOptions, EmulatedBox, Unavailable};
 use skinrig_model::{CameraId, Point3, RigidTransform, Robot, SimLevel, Skin};
 
-// What plants faults in its devices.
-pub use drd::{Fault, When};
+pub use faults::InjectionError;
+
+// Faults of single devices, with their sizes and times.
+pub use drd::{Fault as ArmFault, When};
 pub use skinrig_emulated_camera::steer::Order;
-pub use skinrig_emulated_trigger_box::NoisePerMillion;
-pub use ties::Wire;
 
 pub use ties::CAMERA_SERIALS;
-use ties::Ties;
+use ties::{Ties, Wire};
 
 /// Serial number of the arm, as in `hil/rigs/emulated.yaml`.
 pub(crate) const ARM_SERIAL: u16 = 4711;
@@ -171,16 +172,6 @@ impl EmulatedBench {
     #[must_use]
     pub fn bus(&self) -> &Bus {
         &self.bus
-    }
-
-    /// The wire from the trigger box to a camera.
-    pub fn wire(&self, camera: CameraId, wire: Wire) {
-        self.ties.wire(camera, wire);
-    }
-
-    /// The trigger box: noise, unplugging, resets.
-    pub const fn trigger_box(&mut self) -> &mut EmulatedBox {
-        &mut self.trigger_box
     }
 }
 

@@ -16,7 +16,7 @@ use skinrig_model::CameraId;
 pub const CAMERA_SERIALS: [&str; 2] = ["00000001", "00000002"];
 
 /// Interval at which the tip is read.
-const LOOK_EVERY: Duration = Duration::from_micros(500);
+const TIP_INTERVAL: Duration = Duration::from_micros(500);
 /// Interval at which the wire threads check whether to end.
 const TIMEOUT: Duration = Duration::from_millis(50);
 /// Camera input connected to the box: TRIG IN.
@@ -24,17 +24,17 @@ const TRIGGER_INPUT: u8 = 0;
 
 /// Quality of the wire from the trigger box to a camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Wire {
+pub(crate) enum Wire {
     /// Transmits all pulses.
-    Whole,
-    /// Loses every `LEAKS_EVERY`-th pulse.
-    Leaky,
+    Sound,
+    /// Loses every `LOST_EVERY`-th pulse.
+    Noisy,
     /// Disconnected.
     Cut,
 }
 
-/// A leaky wire loses every pulse with this index.
-pub(crate) const LEAKS_EVERY: u32 = 11;
+/// A noisy wire loses one of this many pulses.
+const LOST_EVERY: u32 = 11;
 
 /// The threads that connect the devices. Dropping this value ends them.
 pub(crate) struct Ties {
@@ -51,7 +51,7 @@ impl Ties {
     ) -> io::Result<Self> {
         let mut ties = Self {
             cut: Arc::default(),
-            wires: Arc::default(),
+            wires: Arc::new([Wire::Sound; 2].map(|wire| AtomicU8::new(wire as u8))),
             threads: Vec::new(),
         };
         let (view, on, cut) = (
@@ -105,7 +105,7 @@ fn show_tip(arm: &ArmView, bus: &Bus, cut: &AtomicBool) {
             position_mm: state.position_m.map(|m| m * 1e3),
         });
         world.announce(source, at_ns);
-        thread::sleep(LOOK_EVERY);
+        thread::sleep(TIP_INTERVAL);
     }
     world.leave(source);
 }
@@ -127,8 +127,8 @@ fn carry_edges(mut edges: EdgeStream, bus: &Bus, wires: &[AtomicU8; 2], cut: &At
                 };
                 pulses[n] = pulses[n].wrapping_add(u32::from(edge.high));
                 let wire = wires[n].load(Ordering::Relaxed);
-                let leaks = wire == Wire::Leaky as u8 && pulses[n].is_multiple_of(LEAKS_EVERY);
-                if leaks || wire == Wire::Cut as u8 {
+                let is_lost = wire == Wire::Noisy as u8 && pulses[n].is_multiple_of(LOST_EVERY);
+                if is_lost || wire == Wire::Cut as u8 {
                     continue;
                 }
                 let edge = Edge {

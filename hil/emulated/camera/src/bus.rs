@@ -299,10 +299,10 @@ impl Inner {
             Order::Stall => plugged.queues.stall(),
             Order::Cut(bytes) => plugged.queues.cut_next(bytes),
             Order::Garbage(words) => camera?.lock().faults.garbage.extend(words),
-            Order::Lose(words) => camera?.lock().faults.lost_words = words,
+            Order::DropWords(words) => camera?.lock().faults.dropped_words = words,
             Order::HotPixels(pixels) => camera?.lock().faults.hot_pixels = pixels,
-            Order::Stick(address) => {
-                camera?.lock().faults.stuck.insert(address);
+            Order::IgnoreWrites(address) => {
+                camera?.lock().faults.ignored_registers.insert(address);
             }
             Order::Silence(on) => camera?.lock().faults.silent = on,
             Order::FailResets(on) => plugged.queues.fail_resets(on),

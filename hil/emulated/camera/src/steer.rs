@@ -86,11 +86,13 @@ pub enum Order {
     /// Inserts these words into the next packet.
     Garbage(Vec<u32>),
     /// Number of words lost at the end of every packet, as with a full camera buffer; 0 is normal.
-    Lose(usize),
+    #[serde(rename = "lose")]
+    DropWords(usize),
     /// Number of pixels with an event every millisecond; 0 is normal.
     HotPixels(u16),
     /// Makes this register ignore writes.
-    Stick(u32),
+    #[serde(rename = "stick")]
+    IgnoreWrites(u32),
     /// Whether control requests stay unanswered.
     Silence(bool),
     /// Whether register reads report failure.

@@ -25,7 +25,7 @@ pub struct BoardOptions {
 }
 
 /// Error rates of the serial line in both directions, per million bytes.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct NoisePerMillion {
     /// Bytes with a flipped bit.
     pub flip: u32,

@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use emulated_libdrd::{ArmState, Contact, Mode};
-use skinrig_emulated_bench::{EmulatedBench, Fault, When};
+use skinrig_emulated_bench::{ArmFault, EmulatedBench, When};
 
 use super::{start, workspace_root};
 
@@ -260,16 +260,20 @@ fn axes_and_rest(steps: &mut Steps) {
 
 /// Steps 17 and 18.
 fn button_and_cable(steps: &mut Steps) {
-    for (fault, words) in [(Fault::Button, "button"), (Fault::Unplug, "USB")] {
+    for (fault, words) in [(ArmFault::Button, "button"), (ArmFault::Lost, "USB")] {
         let jog = steps.start_slow_rise();
         steps.bench.arm().inject(When::Now, fault).unwrap();
         steps.wait_until_soft();
         let (code, said) = jog.end();
         assert_eq!(code, Some(3), "{said}");
         assert!(said.contains(words), "{words}: {said}");
-        if fault == Fault::Button {
+        if fault == ArmFault::Button {
             // Pressing the button again re-enables forces.
-            steps.bench.arm().inject(When::Now, Fault::Button).unwrap();
+            steps
+                .bench
+                .arm()
+                .inject(When::Now, ArmFault::Button)
+                .unwrap();
         }
     }
 }

@@ -73,7 +73,7 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
     };
     order(Order::FailReads(true));
     order(Order::FailResets(true));
-    order(Order::Stick(BIAS));
+    order(Order::IgnoreWrites(BIAS));
     let (one_press, strict) = (protocol(folder), rig(folder, ""));
     let run = |rig: &Path, name: &str, more: &[&str]| {
         let sessions = folder.join(name);

@@ -62,7 +62,7 @@ fn a_register_that_rejects_a_value_is_named() {
     let test = "faults::a_register_that_rejects_a_value_is_named";
     on_bus(test, vec![noise(FIRST).into()], |remote| {
         let mut camera = open(FIRST);
-        remote.order(FIRST, Order::Stick(0x0358)).unwrap();
+        remote.order(FIRST, Order::IgnoreWrites(0x0358)).unwrap();
         let settings = CameraSettings {
             biases: [("bias_fo".to_owned(), 1600)].into(),
             ..CameraSettings::default()

@@ -88,7 +88,7 @@ fn rejected_generator_settings_are_reported_and_closing_switches_it_off() {
     let test = "pattern::rejected_generator_settings_are_reported_and_closing_switches_it_off";
     on_bus(test, vec![noise(FIRST).into()], |remote| {
         let mut camera = open(FIRST);
-        remote.order(FIRST, Order::Stick(0x0744)).unwrap();
+        remote.order(FIRST, Order::IgnoreWrites(0x0744)).unwrap();
         let error = camera.test_pattern(PATTERN).unwrap_err();
         assert!(matches!(error, DeviceError::ReadBack { .. }), "{error}");
         let told = camera

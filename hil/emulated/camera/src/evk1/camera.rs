@@ -20,7 +20,7 @@ use crate::world::{World, now_ns};
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Faults {
     /// Registers that ignore writes.
-    pub stuck: BTreeSet<u32>,
+    pub ignored_registers: BTreeSet<u32>,
     /// Whether control requests stay unanswered.
     pub silent: bool,
     /// Whether register reads report failure.
@@ -28,7 +28,7 @@ pub(crate) struct Faults {
     /// Words to insert into the next packet.
     pub garbage: Vec<u32>,
     /// Words lost at the end of each packet.
-    pub lost_words: usize,
+    pub dropped_words: usize,
     /// Number of pixels with an event every millisecond.
     pub hot_pixels: u16,
 }
@@ -250,7 +250,7 @@ impl Evk1 {
         if self.config.pacing == Pacing::RealTime {
             bytes.truncate(self.queues.free() / 4 * 4);
         }
-        bytes.truncate(bytes.len().saturating_sub(4 * model.faults.lost_words));
+        bytes.truncate(bytes.len().saturating_sub(4 * model.faults.dropped_words));
         let dropped = made - bytes.len();
         let dropped_words = dropped / 4;
         self.queues.push(bytes, end);

@@ -69,7 +69,7 @@ impl Evk1 {
                     model.counters.unknown_registers += 1;
                     return Reply::Stall;
                 }
-                if !model.faults.stuck.contains(&address) {
+                if !model.faults.ignored_registers.contains(&address) {
                     model.registers.write(address, value);
                     self.written(model, address, value);
                 }

@@ -116,7 +116,7 @@ fn a_register_may_ignore_writes_and_a_request_may_stay_unanswered() {
         bus(),
         |remote| {
             let camera = Camera::open(0);
-            remote.order(SERIAL, Order::Stick(0x0354)).unwrap();
+            remote.order(SERIAL, Order::IgnoreWrites(0x0354)).unwrap();
             camera.write(0x0354, 0x7900_0029).unwrap();
             assert_eq!(camera.read(0x0354), Ok(0));
             remote.order(SERIAL, Order::Silence(true)).unwrap();
@@ -135,12 +135,12 @@ fn a_full_buffer_loses_words_and_the_camera_counts_them() {
         |remote| {
             let mut camera = running();
             assert_eq!(camera.read(0x0018), Ok(0));
-            remote.order(SERIAL, Order::Lose(10)).unwrap();
+            remote.order(SERIAL, Order::DropWords(10)).unwrap();
             while remote.observe(SERIAL).unwrap().counters.dropped_bytes < 400 {
                 camera.transfer().unwrap();
             }
             assert!(camera.read(0x0018).unwrap() >= 100);
-            remote.order(SERIAL, Order::Lose(0)).unwrap();
+            remote.order(SERIAL, Order::DropWords(0)).unwrap();
             camera.stop();
             let seen = remote.observe(SERIAL).unwrap().counters;
             assert_eq!(seen.dropped_bytes % 40, 0, "10 words of each packet");

@@ -78,7 +78,7 @@ impl World {
     }
 
     fn connected(&self) -> bool {
-        !self.faults.is(|f| matches!(f, Fault::Unplug))
+        !self.faults.is(|f| matches!(f, Fault::Lost))
     }
 
     fn busy(&self) -> bool {

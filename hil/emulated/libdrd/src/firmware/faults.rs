@@ -36,7 +36,7 @@ fn is_event(fault: Fault) -> bool {
     matches!(
         fault,
         Fault::RegulationDies
-            | Fault::PowerLoss
+            | Fault::PowerLost
             | Fault::Button
             | Fault::VelocityTrip
             | Fault::WatchdogTrip
@@ -107,7 +107,7 @@ impl Faults {
 
     /// Whether a setting ignores writes.
     pub(crate) fn ignores(&self, setting: Setting) -> bool {
-        self.is(|f| matches!(f, Fault::Ignore(s) if *s == setting))
+        self.is(|f| matches!(f, Fault::SettingIgnored(s) if *s == setting))
     }
 
     /// Whether a stop fails; counts the failure.
@@ -144,8 +144,8 @@ impl Faults {
         for fault in &self.active {
             match *fault {
                 Fault::PositionNan => reported.position = [f64::NAN; 3],
-                Fault::PositionJump(by) => reported.position = add(reported.position, by),
-                Fault::PositionFrozen => {
+                Fault::PositionOffset(by) => reported.position = add(reported.position, by),
+                Fault::PositionStale => {
                     let (tick, position, velocity) =
                         *self.frozen.get_or_insert((tick, position, velocity));
                     reported = Reported {

@@ -119,12 +119,12 @@ impl World {
 
     fn step(&mut self, dt: f64) {
         self.let_faults_happen();
-        self.body.jammed = self.faults.is(|f| matches!(f, Fault::Jammed));
+        self.body.stalled = self.faults.is(|f| matches!(f, Fault::Stalled));
         let rub = self.faults.find(|f| match *f {
             Fault::Friction(n_s_m) => Some(n_s_m),
             _ => None,
         });
-        self.body.rub_n_s_m = rub.unwrap_or(0.0);
+        self.body.extra_friction_n_s_m = rub.unwrap_or(0.0);
         self.initialise(dt);
         self.run_loop();
         let live = self.mode == Mode::Force;
@@ -240,11 +240,11 @@ impl World {
                 self.watchdog_trips += 1;
                 self.power_off(Cause::Watchdog);
             }
-            Fault::Unplug => {
+            Fault::Lost => {
                 self.let_go();
                 self.power_off(Cause::Usb);
             }
-            Fault::PowerLoss => {
+            Fault::PowerLost => {
                 self.let_go();
                 self.initialised = false;
                 self.settings = Settings::new(&self.config);
@@ -314,7 +314,7 @@ impl World {
             initialising: self.initialisation.is_some(),
             regulating,
             moving: self.moving(),
-            connected: !self.faults.is(|f| matches!(f, Fault::Unplug)),
+            connected: !self.faults.is(|f| matches!(f, Fault::Lost)),
             saturated: self.regulation.as_ref().is_some_and(|r| r.saturated),
             held: self.holder.is_some(),
         }
