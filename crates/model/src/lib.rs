@@ -41,7 +41,7 @@ pub use press::{
     PlannedPress, PressHistory, PressOutcome, PressRole, PressTiming, PressVerdict, Verdict,
 };
 pub use press_fault::PressFaultKind;
-pub use pulse::{Label, Mark, MarkKind, PulseTrain, SeenMark, SeenSync, SentMark};
+pub use pulse::{DecodedMark, DecodedSync, Label, Mark, MarkKind, PulseTrain, SentMark};
 pub use quantile::quantile;
 pub use reason::{InvalidReason, StopReason};
 pub use record::{

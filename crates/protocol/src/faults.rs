@@ -127,13 +127,13 @@ const OF_DEVICES: &str = "`preflight`, `arming`, `time:SECONDS`, or `travel:N`, 
 
 /// Reason why a text is not a fault.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct NoFault {
+pub struct InvalidFault {
     expected: String,
     found: String,
     help: Option<String>,
 }
 
-impl fmt::Display for NoFault {
+impl fmt::Display for InvalidFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "expected {}, found `{}`", self.expected, self.found)?;
         match &self.help {
@@ -143,17 +143,17 @@ impl fmt::Display for NoFault {
     }
 }
 
-impl std::error::Error for NoFault {}
+impl std::error::Error for InvalidFault {}
 
 impl FromStr for PlantedFault {
-    type Err = NoFault;
+    type Err = InvalidFault;
 
-    fn from_str(text: &str) -> Result<Self, NoFault> {
+    fn from_str(text: &str) -> Result<Self, InvalidFault> {
         let (name, time) = text.trim().split_once('@').unwrap_or((text.trim(), ""));
         let Some(kind) = FAULTS.into_iter().find(|fault| fault.name() == name) else {
             let names = FAULTS.map(RigFault::name);
             let help = closest(name, names).map(|near| format!("did you mean `{near}`?"));
-            return Err(NoFault {
+            return Err(InvalidFault {
                 expected: format!("KIND@WHEN with a kind out of {}", names.join(", ")),
                 found: text.to_owned(),
                 help,
@@ -187,7 +187,7 @@ impl FromStr for PlantedFault {
         };
         match (when, misfit) {
             (Some(when), None) => Ok(Self { kind, when }),
-            (_, misfit) => Err(NoFault {
+            (_, misfit) => Err(InvalidFault {
                 expected: format!(
                     "{name}@WHEN with WHEN one of {}",
                     misfit.unwrap_or(OF_DEVICES)
@@ -236,7 +236,7 @@ pub(crate) fn faults(f: &Field, out: &mut Collector) -> Option<Vec<PlantedFault>
         };
         match text.parse() {
             Ok(fault) => Some(fault),
-            Err(NoFault {
+            Err(InvalidFault {
                 expected,
                 found,
                 help,
@@ -290,7 +290,7 @@ mod tests {
 
     #[test]
     fn invalid_faults_list_the_valid_ones() {
-        for (text, told) in [
+        for (text, message) in [
             ("", "a kind out of camera1-unplugged"),
             ("camera1-stall@hold:1", "did you mean `camera1-stalled`?"),
             ("camera3-stalled@hold:1", "did you mean"),
@@ -311,7 +311,7 @@ mod tests {
         ] {
             let refused = text.parse::<PlantedFault>().map_err(|e| e.to_string());
             assert!(
-                refused.as_ref().is_err_and(|e| e.contains(told)),
+                refused.as_ref().is_err_and(|e| e.contains(message)),
                 "{text}: {refused:?}"
             );
         }

@@ -189,7 +189,7 @@ impl SimCamera {
             return;
         };
         let index = self.id.index();
-        let struck = {
+        let due = {
             let mut world = self.shared.world();
             world.tips_since(index, stream.grid, &mut stream.tips);
             let jitter = |random: &mut Stream| (random.unit() * self.jitter_ns as f64) as i64;
@@ -219,12 +219,12 @@ impl SimCamera {
         let tips = std::mem::take(&mut stream.tips);
         for pair in tips.windows(2) {
             let (from, to) = (pair[0], pair[1]);
-            if struck.unplugged_ns.is_some_and(|t| t <= from.t_ns) {
+            if due.unplugged_ns.is_some_and(|t| t <= from.t_ns) {
                 self.gone = true;
                 break;
             }
             let within = |t: &i64| (from.t_ns..to.t_ns).contains(t);
-            let lose: u64 = struck
+            let lose: u64 = due
                 .losses
                 .iter()
                 .filter(|(t, _)| within(t))
@@ -234,15 +234,15 @@ impl SimCamera {
                 self.out.close(self.id, &mut self.scanner);
                 self.out.to_lose += lose;
             }
-            for (_, by_us) in struck.steps.iter().filter(|(t, _)| within(t)) {
+            for (_, by_us) in due.steps.iter().filter(|(t, _)| within(t)) {
                 clock = clock.stepped(i64::from(*by_us));
                 self.clock = Some(clock);
                 stream.encoder = evt2::Encoder::new(clock.own_us(from.t_ns));
             }
             let stormy = |t: &i64| (*t..*t + STORM_NS).contains(&from.t_ns);
-            let storm = struck.storms_ns.iter().any(stormy);
+            let storm = due.storms_ns.iter().any(stormy);
             stream.step(from, to, clock, &self.settings, storm);
-            if struck.stalled_ns.is_some_and(|t| t <= from.t_ns) {
+            if due.stalled_ns.is_some_and(|t| t <= from.t_ns) {
                 stream.fresh.clear();
                 continue;
             }
@@ -292,15 +292,15 @@ fn occurred(world: &World, when: Option<FaultTrigger>) -> Option<i64> {
 
 /// Takes the faults that have occurred, with their times.
 fn take_occurred<T: Copy>(world: &World, faults: &mut Vec<(FaultTrigger, T)>) -> Vec<(i64, T)> {
-    let mut struck = Vec::new();
+    let mut due = Vec::new();
     faults.retain(|&(when, what)| match occurred(world, Some(when)) {
         Some(t) => {
-            struck.push((t, what));
+            due.push((t, what));
             false
         }
         None => true,
     });
-    struck
+    due
 }
 
 impl EventCamera for SimCamera {

@@ -211,7 +211,7 @@ impl Line {
             let (noise, random) = (self.noise[i], &mut self.random[i]);
             let mut strikes =
                 |percent: u8| percent > 0 && random.unit() * 100.0 < f64::from(percent);
-            let mut seen = Vec::new();
+            let mut arriving = Vec::new();
             let mut extra = Vec::new();
             for (k, (offset_us, rising)) in (0u32..).zip(train.edges()) {
                 let pulse = k / 2;
@@ -220,7 +220,7 @@ impl Line {
                 let is_lost = strikes(noise.lost_percent)
                     || mark.is_some_and(|n| self.lost_pulses.contains(&(camera, n, pulse)));
                 if !is_lost {
-                    seen.push(edge);
+                    arriving.push(edge);
                 }
                 if strikes(noise.doubled_percent) {
                     extra.push((edge, true));
@@ -231,7 +231,7 @@ impl Line {
             }
             for (edge, doubled) in extra {
                 let span_ns = PulseTrain::DURATION_US as f64 * 1_000.0;
-                seen.push(if doubled {
+                arriving.push(if doubled {
                     let t_ns = edge.t_ns + 1 + (random.unit() * BOUNCE_NS) as i64;
                     LineEdge { t_ns, ..edge }
                 } else {
@@ -241,8 +241,8 @@ impl Line {
                     }
                 });
             }
-            seen.sort_by_key(|edge| edge.t_ns);
-            self.edges[i].extend(seen);
+            arriving.sort_by_key(|edge| edge.t_ns);
+            self.edges[i].extend(arriving);
         }
     }
 }

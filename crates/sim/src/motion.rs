@@ -169,7 +169,7 @@ impl Motion {
 
     fn step_set_point(&mut self) {
         let a_dt = self.config.acceleration_mm_s2 * DT_S;
-        let wanted = match self.target {
+        let target_velocity = match self.target {
             None => [0.0; 3],
             Some((target, speed)) => {
                 let way: [f64; 3] = std::array::from_fn(|i| target[i] - self.set_point[i]);
@@ -185,7 +185,7 @@ impl Motion {
                 way.map(|c| c / left * v)
             }
         };
-        let change: [f64; 3] = std::array::from_fn(|i| wanted[i] - self.set_velocity[i]);
+        let change: [f64; 3] = std::array::from_fn(|i| target_velocity[i] - self.set_velocity[i]);
         let size = norm(change);
         let share = if size > a_dt { a_dt / size } else { 1.0 };
         for (i, by) in change.into_iter().enumerate() {

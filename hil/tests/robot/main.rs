@@ -37,9 +37,9 @@ fn is_braked(bench: &mut SimBench) -> bool {
     use skinrig_hil::bench::Bench;
     let devices = bench.devices();
     let robot = devices.robot.as_mut().unwrap();
-    let mut seen = Vec::new();
-    robot.poll(&mut seen).unwrap();
-    let at = seen
+    let mut observed = Vec::new();
+    robot.poll(&mut observed).unwrap();
+    let at = observed
         .last()
         .map_or_else(|| skinrig_model::Point3::new(0.0, 0.0, 0.0), |s| s.measured);
     robot.command(at, 1.0).is_err()
@@ -85,7 +85,7 @@ fn a_healthy_robot_gives_small_numbers_and_is_braked_after_each_check() {
 }
 
 #[test]
-fn a_robot_that_is_lost_leaves_nothing_measured_and_is_opened_again() {
+fn a_lost_robot_gives_no_measurement_and_is_reopened() {
     let lost = Fault::new(
         RigFault::RobotLost,
         FaultTrigger::Moment(MotionPhase::Travel, 4),
@@ -99,8 +99,8 @@ fn a_robot_that_is_lost_leaves_nothing_measured_and_is_opened_again() {
     );
     assert_eq!(value(&found, "spread"), None);
     assert_eq!(value(&found, "error"), None);
-    let again = bench.run_check(STATE);
-    assert_eq!(value(&again, "faults"), Some(0.0), "{again:?}");
+    let repeated = bench.run_check(STATE);
+    assert_eq!(value(&repeated, "faults"), Some(0.0), "{repeated:?}");
     assert_eq!(bench.opened, 2);
 }
 

@@ -14,12 +14,12 @@ use crate::exit::Failure;
 pub fn of_devices(faults: &[PlantedFault]) -> Result<Vec<Fault>, UnsupportedFault> {
     let of_devices = faults.iter().filter(|fault| !fault.kind.is_of_records());
     of_devices
-        .filter_map(|fault| Some(Fault::new(fault.kind, when(fault.when)?)))
+        .filter_map(|fault| Some(Fault::new(fault.kind, fault_trigger(fault.when)?)))
         .collect()
 }
 
 /// Converts numbers, which count from 1 on the command line and from 0 in the simulated rig.
-fn when(time: FaultTime) -> Option<FaultTrigger> {
+fn fault_trigger(time: FaultTime) -> Option<FaultTrigger> {
     Some(match time {
         FaultTime::Preflight => FaultTrigger::At(HostTime::ZERO),
         FaultTime::Arming => FaultTrigger::Moment(MotionPhase::Arming, 0),

@@ -79,9 +79,9 @@ fn too_much_force_ends_at_clearance_height() {
                 plan.limits.max_force_n = limit_n;
                 let result = run(&plan, &SimConfig::new(seed, level));
                 let case = format!("{level:?}, {limit_n} N, seed {seed}");
-                let wanted = format!("force: expected at most {limit_n} N, found ");
+                let expected = format!("force: expected at most {limit_n} N, found ");
                 assert!(
-                    result.end().starts_with(&wanted),
+                    result.end().starts_with(&expected),
                     "{case}: {}",
                     result.end()
                 );

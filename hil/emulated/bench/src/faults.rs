@@ -3,7 +3,7 @@
 use std::io;
 
 use drd::{Fault as ArmFault, Setting, When};
-use skinrig_emulated_camera::steer::Order;
+use skinrig_emulated_camera::control::DeviceCommand;
 use skinrig_emulated_trigger_box::NoisePerMillion;
 use skinrig_model::{CameraId, RigFault, UnsupportedFault};
 
@@ -38,7 +38,7 @@ pub enum InjectionError {
 /// Effect of a fault on a device of the bench.
 #[derive(Debug, Clone, PartialEq)]
 enum Effect {
-    Camera(CameraId, Order),
+    Camera(CameraId, DeviceCommand),
     Wire(CameraId, Wire),
     BoxUnplugged,
     BoxNoise(NoisePerMillion),
@@ -49,12 +49,12 @@ fn effect(fault: RigFault) -> Result<Effect, UnsupportedFault> {
     use RigFault as F;
     let z_offset = |by_m| Effect::Arm(ArmFault::PositionOffset([0.0, 0.0, by_m]));
     Ok(match fault {
-        F::CameraUnplugged(camera) => Effect::Camera(camera, Order::Unplug),
-        F::CameraStalled(camera) => Effect::Camera(camera, Order::Stall),
-        F::CameraDrops(camera) => Effect::Camera(camera, Order::DropWords(DROPPED_WORDS)),
-        F::CameraStorm(camera) => Effect::Camera(camera, Order::HotPixels(HOT_PIXELS)),
+        F::CameraUnplugged(camera) => Effect::Camera(camera, DeviceCommand::Unplug),
+        F::CameraStalled(camera) => Effect::Camera(camera, DeviceCommand::Stall),
+        F::CameraDrops(camera) => Effect::Camera(camera, DeviceCommand::DropWords(DROPPED_WORDS)),
+        F::CameraStorm(camera) => Effect::Camera(camera, DeviceCommand::HotPixels(HOT_PIXELS)),
         F::CameraSettingIgnored(camera) => {
-            Effect::Camera(camera, Order::IgnoreWrites(BIAS_REGISTER))
+            Effect::Camera(camera, DeviceCommand::IgnoreWrites(BIAS_REGISTER))
         }
         F::LineCut(camera) => Effect::Wire(camera, Wire::Cut),
         F::LineNoisy(camera) => Effect::Wire(camera, Wire::Noisy),
@@ -100,7 +100,7 @@ impl EmulatedBench {
                 let remote = self.bus.remote()?;
                 remote.order(CAMERA_SERIALS[camera.index()], order)?;
             }
-            Effect::Wire(camera, wire) => self.ties.wire(camera, wire),
+            Effect::Wire(camera, wire) => self.connections.wire(camera, wire),
             Effect::BoxUnplugged => {
                 self.trigger_box.unplug()?;
             }

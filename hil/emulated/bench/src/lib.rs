@@ -11,8 +11,8 @@
 //! Everything recorded here is emulated.
 #![cfg(target_os = "linux")]
 
+mod connections;
 mod faults;
-mod ties;
 
 use std::ffi::OsStr;
 use std::io;
@@ -29,10 +29,10 @@ pub use faults::InjectionError;
 
 // Faults of single devices, with their sizes and times.
 pub use drd::{Fault as ArmFault, When};
-pub use skinrig_emulated_camera::steer::Order;
+pub use skinrig_emulated_camera::control::DeviceCommand;
 
-pub use ties::CAMERA_SERIALS;
-use ties::{Ties, Wire};
+pub use connections::CAMERA_SERIALS;
+use connections::{Connections, Wire};
 
 /// Serial number of the arm, as in `hil/rigs/emulated.yaml`.
 pub(crate) const ARM_SERIAL: u16 = 4711;
@@ -99,13 +99,13 @@ pub enum BenchError {
     Box(#[from] Unavailable),
     /// The connections between the devices.
     #[error("emulated bench: {0}")]
-    Ties(#[source] io::Error),
+    Connections(#[source] io::Error),
 }
 
 /// A running bench. Dropping it ends everything on it.
 pub struct EmulatedBench {
     // Declared first, so that the threads end before the devices that they use.
-    ties: Ties,
+    connections: Connections,
     arm: Arc<EmulatedArm>,
     bus: Arc<Bus>,
     trigger_box: EmulatedBox,
@@ -136,13 +136,14 @@ impl EmulatedBench {
             ..ArmConfig::default()
         });
         let arm = Arc::new(arm.map_err(BenchError::Arm)?);
-        let devices = CameraId::ALL.map(|camera| camera_of(config, camera).into());
+        let devices = CameraId::ALL.map(|camera| camera_config(config, camera).into());
         let bus = Arc::new(Bus::start(&BusConfig {
             devices: devices.into(),
         })?);
-        let ties = Ties::make(&arm, &bus, &trigger_box).map_err(BenchError::Ties)?;
+        let connections =
+            Connections::start(&arm, &bus, &trigger_box).map_err(BenchError::Connections)?;
         Ok(Self {
-            ties,
+            connections,
             arm,
             bus,
             trigger_box,
@@ -175,7 +176,7 @@ impl EmulatedBench {
     }
 }
 
-fn camera_of(config: &BenchConfig, camera: CameraId) -> Evk1Config {
+fn camera_config(config: &BenchConfig, camera: CameraId) -> Evk1Config {
     let i = camera.index();
     Evk1Config {
         drift_ppm: config.camera_ppm[i],

@@ -243,7 +243,7 @@ fn a_healthy_bench_passes() {
 
 /// Broken limits without evidence point at the rig.
 #[test]
-fn broken_limits_that_nothing_explains_are_the_rig_s() {
+fn unexplained_limit_failures_blame_the_rig() {
     let Some(mut nights) = Nights::start() else {
         return;
     };

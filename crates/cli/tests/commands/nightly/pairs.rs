@@ -366,18 +366,18 @@ fn assert_pairs(pairs: &[[&str; 2]]) {
 }
 
 #[test]
-fn pairs_of_broken_devices_are_told_by_their_own_causes() {
+fn pairs_of_broken_devices_are_reported_with_both_causes() {
     assert_pairs(&DEVICES);
 }
 
 #[test]
-fn pairs_of_bad_conditions_are_told_by_their_own_causes() {
+fn pairs_of_bad_conditions_are_reported_with_both_causes() {
     assert_pairs(&CONDITIONS);
 }
 
 #[test]
 #[ignore = "half an hour of real time: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig --test commands -- --ignored --nocapture all_pairs"]
-fn all_pairs_of_faults_are_told_by_their_own_causes() {
+fn all_pairs_of_faults_are_reported_with_both_causes() {
     let (from, to) = range(std::env::var("SKINRIG_PAIRS").ok());
     let pairs = pairs_in_order();
     let n = pairs.len();

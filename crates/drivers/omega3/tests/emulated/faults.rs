@@ -23,7 +23,7 @@ fn assert_words(error: impl ToString, words: &[&str]) {
 }
 
 #[test]
-fn faults_at_open_are_reported_and_nothing_moves() {
+fn faults_at_open_are_reported_without_motion() {
     let codes = |code: ErrorCode| Fault::Open(code.0);
     let cases: [(Fault, [&str; 2]); 10] = [
         (codes(ErrorCode::NO_DRIVER_FOUND), ["not permitted", "udev"]),

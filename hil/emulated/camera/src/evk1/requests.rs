@@ -1,7 +1,7 @@
 //! The vendor requests of an EVK1 (EVK1 reference, section 1.3).
 
 use super::camera::{Evk1, Model};
-use crate::steer::Request;
+use crate::control::Request;
 use crate::usb::descriptors::Descriptors;
 use crate::usb::function::{Function, Reply};
 use crate::usb::usbfs::Setup;
