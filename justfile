@@ -6,7 +6,7 @@ _list:
 demo:
     cargo run --release --locked -- run protocols/demo.yaml
 
-# Tests of one crate and of what its edit breaks first: `just test analysis`, `just test analysis --test audit`.
+# Tests of one crate: `just test analysis`, `just test analysis --test audit`.
 test crate *args:
     cargo test -p skinrig{{ if crate == "cli" { "" } else { "-" + crate } }} {{ args }}
 
@@ -14,14 +14,14 @@ test crate *args:
 test-all:
     cargo test --workspace --locked
 
-# Formatting, lints and docs, as the check of a change wants them.
+# Formatting, lints and docs, as in `.ci/run`.
 lint:
     cargo fmt --all --check
     cargo clippy --workspace --all-targets --locked -- -D warnings
     cargo clippy -p skinrig --all-targets --features evk4 --locked -- -D warnings
     RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
 
-# The whole check of a clean clone.
+# Complete check of a clean clone.
 ci:
     bash .ci/run
 
@@ -30,7 +30,7 @@ night out="/tmp/skinrig-nights":
     cargo build --locked -p skinrig -p skinrig-emulated-bench
     target/debug/emulated-bench -- target/debug/skinrig hil run hil/nightly.yaml --rig hil/rigs/emulated.yaml --out {{ out }}
 
-# Rewrite what is generated: schemas, snapshots of the command line, the page of faults.
+# Regenerate schemas, snapshots of the command line and the table of faults.
 generate:
     cargo run -q -p skinrig-protocol --example write_schema
     INSTA_UPDATE=always cargo test -p skinrig --test commands json

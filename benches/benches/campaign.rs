@@ -96,12 +96,13 @@ fn plain_write(source: &Path, target: &Path) -> f64 {
 }
 
 fn main() {
-    let wanted = std::env::var("SKINRIG_BENCH_REPETITIONS").unwrap_or_else(|_| "1,3,10".to_owned());
+    let expected =
+        std::env::var("SKINRIG_BENCH_REPETITIONS").unwrap_or_else(|_| "1,3,10".to_owned());
     let number = |text: &str| match text.trim().parse() {
         Ok(n @ 1..=10) => n,
         _ => panic!("SKINRIG_BENCH_REPETITIONS: numbers from 1 to 10, as 1,3,10; not {text:?}"),
     };
-    let campaigns: Vec<Campaign> = wanted.split(',').map(number).map(campaign).collect();
+    let campaigns: Vec<Campaign> = expected.split(',').map(number).map(campaign).collect();
     growth(&campaigns);
 }
 

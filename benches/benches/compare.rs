@@ -61,7 +61,7 @@ fn start(script: &str, folder: &Path) -> Option<RefCell<Python>> {
 
 /// Wall-clock seconds of a task; panics unless both sides found the same.
 fn seconds(python: &RefCell<Python>, task: &str) -> f64 {
-    let answer = python.borrow_mut().ask(task).expect("an answer");
+    let answer = python.borrow_mut().query(task).expect("an answer");
     assert_eq!(answer["agrees"], true, "{task}: {answer}");
     answer["seconds"].as_f64().expect("seconds") / answer["share"].as_f64().unwrap_or(1.0)
 }
@@ -157,7 +157,7 @@ fn repetition(folder: &Path) {
     write(
         folder,
         "repetition.json",
-        known(&input, &done).to_string().as_bytes(),
+        known_result(&input, &done).to_string().as_bytes(),
     );
 
     let python = [
@@ -231,7 +231,7 @@ fn studies(folder: &Path) {
 }
 
 /// Input for the baseline, and the expected result.
-fn known(input: &SessionInput, done: &Analysis) -> Value {
+fn known_result(input: &SessionInput, done: &Analysis) -> Value {
     let presses = || {
         let rows = done.presses.iter().enumerate();
         rows.filter(|(_, p)| p.role != PressRole::Sync)

@@ -41,7 +41,7 @@ with h5py.File(sys.argv[1]) as a, h5py.File(sys.argv[2], "w") as b:
 
 /// Reads the file and returns the duration in seconds, as measured by Python.
 fn read(h5py: &mut Python, path: &Path) -> f64 {
-    let answer = h5py.ask(&path.display().to_string()).expect("an answer");
+    let answer = h5py.query(&path.display().to_string()).expect("an answer");
     assert_eq!(answer["rows"].as_u64(), Some(EVENTS as u64));
     answer["seconds"].as_f64().expect("a number of seconds")
 }

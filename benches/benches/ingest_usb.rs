@@ -117,7 +117,7 @@ mod linux {
                 free.mb_per_s(),
                 free.mb_per_s() / plain
             );
-            tell_threads(&free);
+            report_threads(&free);
             let [found, beyond] = search(folder.path(), sink, seconds)?;
             match found {
                 Some((rate, best)) => {
@@ -131,7 +131,7 @@ mod linux {
                             ", the sensor's maximum"
                         }
                     );
-                    tell_threads(&best);
+                    report_threads(&best);
                 }
                 None => println!("  {label}: loses events at 2 x {STEP:.0} Mev/s already"),
             }
@@ -175,7 +175,7 @@ mod linux {
         Ok([holds, loses])
     }
 
-    fn tell_threads(trial: &Trial) {
+    fn report_threads(trial: &Trial) {
         let busy = trial
             .threads
             .iter()

@@ -51,7 +51,7 @@ impl Python {
     ///
     /// # Errors
     /// If the program has ended, or its answer is not JSON; the text contains that answer.
-    pub fn ask(&mut self, question: &str) -> Result<Value, String> {
+    pub fn query(&mut self, question: &str) -> Result<Value, String> {
         let failed = |e: std::io::Error| e.to_string();
         let questions = self.child.stdin.as_mut().ok_or("a closed pipe")?;
         writeln!(questions, "{question}").map_err(failed)?;

@@ -12,7 +12,7 @@ mod nights;
 
 use std::path::Path;
 
-use nights::{Bench, Drawn, Planted, head};
+use nights::{Bench, DrawnValue, Planted, head};
 use skinrig_hil::history::append;
 use skinrig_model::Limit;
 use skinrig_nightly::night::{Attempt, CheckResult, Measurement, NIGHT_VERSION, Part};
@@ -47,7 +47,7 @@ fn main() {
 }
 
 /// A night with these values.
-fn night(at: usize, drawn: &[Drawn<'_>]) -> Night {
+fn night(at: usize, drawn: &[DrawnValue<'_>]) -> Night {
     let head = head(at);
     let mut versions = head.versions;
     if at >= 90 {

@@ -107,7 +107,10 @@ impl Bench {
             .args(["-O1", "-shared", "-fPIC", "-o"])
             .arg(&library)
             .args([source, "-ldl"]);
-        if !compile.output().is_ok_and(|made| made.status.success()) {
+        if !compile
+            .output()
+            .is_ok_and(|created| created.status.success())
+        {
             eprintln!("skipped: no C compiler (cc) for the library that makes the disk fail");
             return None;
         }
@@ -190,8 +193,8 @@ impl Bench {
             .unwrap_or("never made")
             .to_owned();
         let named = |what: &str| {
-            let said = output_text(&output);
-            format!("{task:?}, {kind} at call {n} ({call}): {what}\n{said}")
+            let text = output_text(&output);
+            format!("{task:?}, {kind} at call {n} ({call}): {what}\n{text}")
         };
         let code = output.status.code();
         let may_end = match kind {
@@ -203,8 +206,8 @@ impl Bench {
             return Err(named("expected another end"));
         }
         let folder = folder_of(case.path());
-        let said = String::from_utf8_lossy(&output.stderr);
-        let mut reported = said.lines().filter_map(|line| {
+        let text = String::from_utf8_lossy(&output.stderr);
+        let mut reported = text.lines().filter_map(|line| {
             let (n, _) = line.strip_prefix("press ")?.split_once('/')?;
             n.parse::<usize>().ok()
         });
@@ -222,18 +225,18 @@ impl Bench {
                 .unwrap();
             (output.status.code(), output_text(&output))
         };
-        let (code, said) = verify(&session);
+        let (code, text) = verify(&session);
         let empty = SessionReader::open(&session).and_then(|reader| reader.header());
         if matches!(empty, Err(RecorderError::Empty { .. })) {
             let is_nothing = reported == 0 && task == Task::Run && code == Some(2);
             return if is_nothing {
                 Ok(())
             } else {
-                Err(named(&format!("nothing left: {said}")))
+                Err(named(&format!("nothing left: {text}")))
             };
         }
         if code != Some(0) {
-            return Err(named(&format!("expected a sound session, found: {said}")));
+            return Err(named(&format!("expected a sound session, found: {text}")));
         }
         let presses = journal(&session).unwrap_or_default();
         let outcomes = presses
@@ -247,7 +250,7 @@ impl Bench {
         }
         let reader = SessionReader::open(&session).unwrap();
         let completed = matches!(reader.end().unwrap(), Some((_, RunEnd::Completed)));
-        let done = completed && said.contains("sound, sealed");
+        let done = completed && text.contains("sound, sealed");
         drop(reader);
         let output = resume(&session).output().unwrap();
         let expected = if done { 2 } else { 0 };
@@ -257,9 +260,9 @@ impl Bench {
                 output_text(&output)
             )));
         }
-        let (code, said) = verify(&session);
-        if code != Some(0) || !said.contains("sound, sealed") {
-            return Err(named(&format!("expected a sealed session, found: {said}")));
+        let (code, text) = verify(&session);
+        if code != Some(0) || !text.contains("sound, sealed") {
+            return Err(named(&format!("expected a sealed session, found: {text}")));
         }
         if task == Task::Analyze {
             expect(program(&[OsStr::new("analyze"), session.as_os_str()]), 0);
@@ -304,8 +307,8 @@ fn log_of(case: &Path) -> PathBuf {
 
 /// The cases to try: all, or the requested number, spread over tasks and kinds.
 fn cases(bench: &Bench) -> Vec<(Task, &'static str, u64)> {
-    let asked = std::env::var("SKINRIG_DISK_FAULTS").unwrap_or_default();
-    if asked == "all" {
+    let requested = std::env::var("SKINRIG_DISK_FAULTS").unwrap_or_default();
+    if requested == "all" {
         let of = |task: Task| {
             (1..=bench.calls[&task].len() as u64)
                 .flat_map(move |n| KINDS.map(|kind| (task, kind, n)))
@@ -313,7 +316,7 @@ fn cases(bench: &Bench) -> Vec<(Task, &'static str, u64)> {
         return TASKS.into_iter().flat_map(of).collect();
     }
     let mut random = SeededRandom(24);
-    let many = asked.parse().unwrap_or(SAMPLE);
+    let many = requested.parse().unwrap_or(SAMPLE);
     let case = |i: usize| {
         let task = TASKS[i % TASKS.len()];
         let kind = KINDS[i / TASKS.len() % KINDS.len()];

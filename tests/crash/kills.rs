@@ -4,13 +4,13 @@ use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 
 use super::lab::{
-    SeededRandom, Uninterrupted, assert_resumes, campaign, expect, journal, resume, session_in,
+    BaselineCampaign, SeededRandom, assert_resumes, campaign, expect, journal, resume, session_in,
 };
 
 /// Number of random kills.
 fn crashes() -> u64 {
-    let asked = std::env::var("SKINRIG_CRASHES").ok();
-    asked.and_then(|n| n.parse().ok()).unwrap_or(16)
+    let requested = std::env::var("SKINRIG_CRASHES").ok();
+    requested.and_then(|n| n.parse().ok()).unwrap_or(16)
 }
 
 /// Runs the campaign with a fault; false if it finished before.
@@ -60,7 +60,7 @@ fn killed_before_every_even_journal_write() {
 
 #[test]
 fn killed_at_random_instants() {
-    let took = Uninterrupted::get().took;
+    let took = BaselineCampaign::get().took;
     let mut under_way = 0;
     for seed in 0..crashes() {
         let mut random = SeededRandom(seed);
@@ -72,11 +72,11 @@ fn killed_at_random_instants() {
         // The time of the kill, not a wait for a condition.
         std::thread::sleep(wait);
         child.kill().unwrap();
-        let said = BufReader::new(child.stderr.take().unwrap());
+        let text = BufReader::new(child.stderr.take().unwrap());
         let ended = child.wait().unwrap().success();
         let case = format!("seed {seed}, killed after {wait:?}");
         // `press 4/12` is printed once the outcome of the fourth press is on the disk.
-        let reported = said.lines().map_while(Result::ok).filter_map(|line| {
+        let reported = text.lines().map_while(Result::ok).filter_map(|line| {
             let (n, _) = line.strip_prefix("press ")?.split_once('/')?;
             n.parse::<usize>().ok()
         });
@@ -100,7 +100,7 @@ fn killed_at_random_instants() {
             // Either complete in time, or only the end of its seal is missing and gets written.
             let code = resume(&session).output().unwrap().status.code();
             assert!(matches!(code, Some(0 | 2)), "{case}: {code:?}");
-            Uninterrupted::get().assert_matches(&session, 0, &case);
+            BaselineCampaign::get().assert_matches(&session, 0, &case);
         } else {
             assert_resumes(&session, 1, &case);
         }
@@ -117,8 +117,8 @@ fn is_sealed(session: &std::path::Path) -> bool {
 }
 
 #[test]
-fn killed_again_while_it_goes_on() {
-    for (first, again) in [(3, 2), (12, 1), (18, 12), (29, 9)] {
+fn killed_a_second_time_during_resume() {
+    for (first, repeated) in [(3, 2), (12, 1), (18, 12), (29, 9)] {
         let folder = tempfile::tempdir().unwrap();
         assert!(run_until_killed(
             folder.path(),
@@ -127,11 +127,11 @@ fn killed_again_while_it_goes_on() {
         let session = session_in(folder.path()).unwrap();
         let mut leg = resume(&session);
         let output = leg
-            .args(["--fault", &format!("killed@journal:{again}")])
+            .args(["--fault", &format!("killed@journal:{repeated}")])
             .output()
             .unwrap();
         let case = format!(
-            "killed at {first}, then at {again}: {}",
+            "killed at {first}, then at {repeated}: {}",
             super::lab::output_text(&output)
         );
         assert_eq!(output.status.code(), None, "{case}");
@@ -145,11 +145,11 @@ fn killed_before_the_seal() {
     assert!(run_until_killed(folder.path(), "killed@seal"));
     let session = session_in(folder.path()).unwrap();
     // All presses exist: only the seal is missing.
-    let said = expect(resume(&session), 0);
-    assert!(said.contains("only its seal was missing"), "{said}");
-    Uninterrupted::get().assert_matches(&session, 0, "killed before the seal");
-    let said = expect(resume(&session), 2);
-    assert!(said.contains("nothing to resume"), "{said}");
+    let text = expect(resume(&session), 0);
+    assert!(text.contains("only its seal was missing"), "{text}");
+    BaselineCampaign::get().assert_matches(&session, 0, "killed before the seal");
+    let text = expect(resume(&session), 2);
+    assert!(text.contains("nothing to resume"), "{text}");
 
     // Same for a further leg.
     let folder = tempfile::tempdir().unwrap();
@@ -159,5 +159,5 @@ fn killed_before_the_seal() {
     let output = leg.args(["--fault", "killed@seal"]).output().unwrap();
     assert_eq!(output.status.code(), None);
     expect(resume(&session), 0);
-    Uninterrupted::get().assert_matches(&session, 1, "killed before the seal of a leg");
+    BaselineCampaign::get().assert_matches(&session, 1, "killed before the seal of a leg");
 }

@@ -72,7 +72,7 @@ pub(crate) fn journal(session: &Path) -> Option<Presses> {
 }
 
 /// The campaign without any fault.
-pub(crate) struct Uninterrupted {
+pub(crate) struct BaselineCampaign {
     /// Total duration, including process start.
     pub took: Duration,
     presses: usize,
@@ -80,10 +80,10 @@ pub(crate) struct Uninterrupted {
     rmse_interval_mm: [f64; 2],
 }
 
-impl Uninterrupted {
+impl BaselineCampaign {
     /// Recorded once for all tests.
     pub(crate) fn get() -> &'static Self {
-        static ONCE: OnceLock<Uninterrupted> = OnceLock::new();
+        static ONCE: OnceLock<BaselineCampaign> = OnceLock::new();
         ONCE.get_or_init(|| {
             let folder = tempfile::tempdir().unwrap();
             let began = Instant::now();
@@ -201,7 +201,7 @@ pub(crate) fn assert_resumes(session: &Path, kills: usize, case: &str) {
     };
     expect(resume(session), 0);
     assert_kept(&before, &journal(session).unwrap(), case);
-    Uninterrupted::get().assert_matches(session, kills, case);
+    BaselineCampaign::get().assert_matches(session, kills, case);
 }
 
 /// A small seeded generator of 64-bit numbers (SplitMix64, Steele, Lea and Flood 2014), for test data only.

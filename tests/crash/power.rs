@@ -77,7 +77,7 @@ fn what_was_not_flushed_may_be_torn() {
 }
 
 #[test]
-fn a_log_cut_anywhere_tells_nothing_wrong() {
+fn a_truncated_log_yields_no_wrong_entry() {
     let mut sound = 0;
     for seed in 100..110 {
         let mut random = SeededRandom(seed);

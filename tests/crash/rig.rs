@@ -15,12 +15,12 @@ use super::lab::{
 fn session_with_rig_losses(folder: &Path) -> std::path::PathBuf {
     let mut run = campaign(folder);
     run.args(["--fault", "camera1-stalled@approach:10"]);
-    let said = expect(run, 3);
+    let text = expect(run, 3);
     for part in [
         "3 of 12 presses are invalid because of the rig, not the skin: press 10: camera 1 sent no bytes",
         "repeat these presses with `skinrig resume ",
     ] {
-        assert!(said.contains(part), "expected {part:?} in {said}");
+        assert!(text.contains(part), "expected {part:?} in {text}");
     }
     session_in(folder).unwrap()
 }
@@ -33,8 +33,8 @@ fn verify(session: &Path) -> String {
 
 /// Every press is valid; no attempts were added to those valid before, except sync presses.
 fn assert_complete(session: &Path, before: &Presses) {
-    let said = verify(session);
-    assert!(said.contains("sound, sealed"), "{said}");
+    let text = verify(session);
+    assert!(text.contains("sound, sealed"), "{text}");
     let after = journal(session).unwrap();
     assert_kept(before, &after, "what the rig cost");
     for ((press, was), (_, is)) in before.iter().zip(&after) {
@@ -55,16 +55,16 @@ fn assert_complete(session: &Path, before: &Presses) {
 }
 
 #[test]
-fn what_the_rig_cost_is_taken_again() {
+fn presses_lost_to_the_rig_are_retaken() {
     let folder = tempfile::tempdir().unwrap();
     let session = session_with_rig_losses(folder.path());
-    let said = verify(&session);
-    assert!(said.contains("sound, sealed"), "{said}");
+    let text = verify(&session);
+    assert!(text.contains("sound, sealed"), "{text}");
     let before = journal(&session).unwrap();
-    let said = expect(resume(&session), 0);
+    let text = expect(resume(&session), 0);
     assert!(
-        said.contains("3 presses from press 10 to press 12"),
-        "{said}"
+        text.contains("3 presses from press 10 to press 12"),
+        "{text}"
     );
     assert_complete(&session, &before);
     let legs = SessionReader::open(&session).unwrap().legs().unwrap();
@@ -75,8 +75,8 @@ fn what_the_rig_cost_is_taken_again() {
             .is_some_and(|(_, end)| end.name() == "completed")
     }));
     // No presses remain to be repeated.
-    let said = expect(resume(&session), 2);
-    assert!(said.contains("there is nothing to resume"), "{said}");
+    let text = expect(resume(&session), 2);
+    assert!(text.contains("there is nothing to resume"), "{text}");
 }
 
 /// The rig is not repaired: the leg ends like the run did, and the next leg can repeat the presses.
@@ -85,18 +85,18 @@ fn a_rig_that_is_not_mended_costs_them_again() {
     let folder = tempfile::tempdir().unwrap();
     let session = session_with_rig_losses(folder.path());
     let before = journal(&session).unwrap();
-    let mut again = resume(&session);
+    let mut repeated = resume(&session);
     // After the two sync presses of the leg.
-    again.args(["--fault", "camera2-stalled@approach:4"]);
-    let said = expect(again, 3);
-    assert!(said.contains("2 of 12 presses are invalid"), "{said}");
+    repeated.args(["--fault", "camera2-stalled@approach:4"]);
+    let text = expect(repeated, 3);
+    assert!(text.contains("2 of 12 presses are invalid"), "{text}");
     expect(resume(&session), 0);
     assert_complete(&session, &before);
 }
 
 /// Kills at the start, in the middle and before the seal of the leg that repeats the presses.
 #[test]
-fn killed_while_they_are_taken_again() {
+fn killed_during_retakes() {
     for fault in ["killed@journal:1", "killed@journal:12", "killed@seal"] {
         let folder = tempfile::tempdir().unwrap();
         let session = session_with_rig_losses(folder.path());

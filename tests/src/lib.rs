@@ -71,7 +71,7 @@ pub fn record(
 ) -> Result<RunReport, Fault> {
     let header = header(protocol, plan, &rig)?;
     let control = ControlHandle::new();
-    let mut sink = Watched {
+    let mut sink = ObservedSink {
         writer: SessionWriter::create(path)?,
         control: control.clone(),
         watch,
@@ -81,13 +81,13 @@ pub fn record(
     Ok(report)
 }
 
-struct Watched<W> {
+struct ObservedSink<W> {
     writer: SessionWriter,
     control: ControlHandle,
     watch: W,
 }
 
-impl<W: FnMut(&Record, &ControlHandle)> RecordSink for Watched<W> {
+impl<W: FnMut(&Record, &ControlHandle)> RecordSink for ObservedSink<W> {
     fn accept(&mut self, record: Record) -> Result<(), SinkFault> {
         (self.watch)(&record, &self.control);
         self.writer

@@ -428,6 +428,58 @@ fn crates_depend_in_one_direction() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
+/// Packages that ship: the program and the Python wheel.
+const SHIPPED: [&str; 2] = ["skinrig", "skinrig-python"];
+
+/// All packages that `roots` link or build with, without their test dependencies.
+fn linked_packages<'a>(metadata: &'a Value, roots: &[&str]) -> Vec<&'a Value> {
+    let by_id: BTreeMap<&str, &Value> = metadata["packages"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|package| (package["id"].as_str().unwrap(), package))
+        .collect();
+    let nodes: BTreeMap<&str, &Value> = metadata["resolve"]["nodes"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|node| (node["id"].as_str().unwrap(), node))
+        .collect();
+    let is_root = |package: &Value| roots.contains(&package["name"].as_str().unwrap());
+    let mut pending: Vec<&str> = by_id
+        .iter()
+        .filter_map(|(id, package)| is_root(package).then_some(*id))
+        .collect();
+    let mut linked = BTreeSet::new();
+    while let Some(id) = pending.pop() {
+        if !linked.insert(id) {
+            continue;
+        }
+        for dependency in nodes[id]["deps"].as_array().unwrap() {
+            let kinds = dependency["dep_kinds"].as_array().unwrap();
+            if kinds.iter().any(|k| k["kind"] != "dev") {
+                pending.push(dependency["pkg"].as_str().unwrap());
+            }
+        }
+    }
+    linked.into_iter().map(|id| by_id[id]).collect()
+}
+
+#[test]
+fn no_shipped_package_links_a_stand_in() {
+    let metadata = metadata();
+    let is_stand_in = |package: &&Value| {
+        let manifest = package["manifest_path"].as_str().unwrap();
+        manifest.contains("/hil/emulated/")
+    };
+    let all = metadata["packages"].as_array().unwrap();
+    assert_eq!(all.iter().filter(is_stand_in).count(), 5);
+    let linked = linked_packages(&metadata, &SHIPPED);
+    assert!(linked.len() > 100, "{}", linked.len());
+    let stand_ins: Vec<&Value> = linked.into_iter().filter(is_stand_in).collect();
+    assert!(stand_ins.is_empty(), "{stand_ins:#?}");
+}
+
 #[test]
 fn every_dependency_has_a_licence_we_accept() {
     let metadata = metadata();

@@ -6,7 +6,7 @@ use std::ops::Range;
 use skinrig::results::{Choices, analyze_session};
 use skinrig_analysis::Analysis;
 use skinrig_analysis::result::{Fault as Accused, Finding};
-use skinrig_model::{CameraId, HostTime, RunEnd, SimLevel};
+use skinrig_model::{CameraId, HostTime, RigFault, RunEnd, SimLevel};
 use skinrig_sim::{Fault, FaultTrigger, SimConfig, simulated_rig};
 use skinrig_tests::{planned, record};
 
@@ -39,20 +39,36 @@ fn findings(seed: u64, faults: Vec<Fault>) -> Vec<Finding> {
 }
 
 fn analysed(protocol: &str, level: SimLevel, seed: u64, faults: Vec<Fault>) -> Analysis {
-    let (protocol, plan) = planned(protocol).unwrap();
     let mut config = SimConfig::new(seed, level);
     config.faults = faults;
+    analysed_on(protocol, &config)
+}
+
+fn analysed_on(protocol: &str, config: &SimConfig) -> Analysis {
+    let (protocol, plan) = planned(protocol).unwrap();
     let lab = tempfile::tempdir().unwrap();
     let path = lab.path().join("audit.session.sqlite");
-    let report = record(&protocol, &plan, simulated_rig(&config), &path, |_, _| {}).unwrap();
-    assert_eq!(report.end, RunEnd::Completed, "seed {seed}: {report:?}");
+    let report = record(&protocol, &plan, simulated_rig(config), &path, |_, _| {}).unwrap();
+    assert_eq!(
+        report.end,
+        RunEnd::Completed,
+        "seed {}: {report:?}",
+        config.seed
+    );
     analyze_session(&path, Choices::default()).unwrap().analysis
 }
 
-/// From the start the tip is this much higher than the robot reports, µm.
-fn higher(by_um: i32) -> Vec<Fault> {
-    let when = FaultTrigger::At(HostTime::ZERO);
-    vec![Fault::HeightOff { when, by_um }]
+/// Like [`analysed`], on a robot whose tip is this much higher than it reports from the start, µm.
+fn analysed_higher(protocol: &str, level: SimLevel, seed: u64, by_um: i32) -> Analysis {
+    let fault = if by_um < 0 {
+        RigFault::RobotZHigh
+    } else {
+        RigFault::RobotZLow
+    };
+    let mut config = SimConfig::new(seed, level);
+    config.faults = vec![Fault::new(fault, FaultTrigger::At(HostTime::ZERO)).unwrap()];
+    config.fault_sizes.z_error_um = by_um.unsigned_abs();
+    analysed_on(protocol, &config)
 }
 
 fn accused(analysis: &Analysis) -> Vec<Accused> {
@@ -67,7 +83,7 @@ fn shallow() -> String {
 #[test]
 fn a_tip_lower_than_the_robot_reports_is_named() {
     for seed in 0..3 {
-        let analysis = analysed(PROTOCOL, SimLevel::Geometric, seed, higher(-500));
+        let analysis = analysed_higher(PROTOCOL, SimLevel::Geometric, seed, -500);
         assert_eq!(accused(&analysis), [Accused::HeightOff], "seed {seed}");
         assert!(analysis.is_valid());
         let found = &analysis.findings[0];
@@ -79,7 +95,7 @@ fn a_tip_lower_than_the_robot_reports_is_named() {
 fn a_tip_that_never_reaches_the_skin_is_no_blind_camera() {
     let sound = analysed(&shallow(), SimLevel::Geometric, 1, Vec::new());
     assert_eq!(accused(&sound), []);
-    let off = analysed(&shallow(), SimLevel::Geometric, 1, higher(500));
+    let off = analysed_higher(&shallow(), SimLevel::Geometric, 1, 500);
     assert_eq!(accused(&off), [Accused::NotTouched], "{:#?}", off.findings);
     assert!(!off.is_valid());
     let found = &off.findings[0];
@@ -130,7 +146,7 @@ fn how_often_heights_that_are_off_are_named() {
     ] {
         for by_um in [0, -100, -200, -500, -1000, 500] {
             let all: Vec<Analysis> = (0..seeds)
-                .map(|seed| analysed(PROTOCOL, level, seed, higher(by_um)))
+                .map(|seed| analysed_higher(PROTOCOL, level, seed, by_um))
                 .collect();
             let named = |a: &&Analysis| accused(a).contains(&Accused::HeightOff);
             let else_named = |a: &&Analysis| {

@@ -74,7 +74,11 @@ fn unit(name: &str) -> BTreeMap<(String, String), Vec<String>> {
     found
 }
 
-fn one<'a>(unit: &'a BTreeMap<(String, String), Vec<String>>, section: &str, key: &str) -> &'a str {
+fn single_value<'a>(
+    unit: &'a BTreeMap<(String, String), Vec<String>>,
+    section: &str,
+    key: &str,
+) -> &'a str {
     match unit
         .get(&(section.to_owned(), key.to_owned()))
         .map(Vec::as_slice)
@@ -85,7 +89,7 @@ fn one<'a>(unit: &'a BTreeMap<(String, String), Vec<String>>, section: &str, key
 }
 
 #[test]
-fn every_unit_has_known_keys_and_names_units_that_are_there() {
+fn units_have_known_keys_and_existing_dependencies() {
     let there: BTreeSet<String> = std::fs::read_dir(top().join("hil/systemd"))
         .unwrap()
         .map(|e| e.unwrap().file_name().into_string().unwrap())
@@ -106,30 +110,33 @@ fn every_unit_has_known_keys_and_names_units_that_are_there() {
     }
     assert!(named >= 3, "{named}");
     let timer = unit("skinrig-nightly.timer");
-    assert_eq!(one(&timer, "Timer", "Persistent"), "true");
-    assert_eq!(one(&timer, "Timer", "RandomizedDelaySec"), "0");
+    assert_eq!(single_value(&timer, "Timer", "Persistent"), "true");
+    assert_eq!(single_value(&timer, "Timer", "RandomizedDelaySec"), "0");
 }
 
 #[test]
 fn a_night_has_the_time_and_the_rights_that_it_needs() {
     let service = unit("skinrig-nightly.service");
     // The suite's own budget ends a night first.
-    let limit = one(&service, "Service", "TimeoutStartSec");
+    let limit = single_value(&service, "Service", "TimeoutStartSec");
     let hours: f64 = limit.strip_suffix('h').unwrap().parse().unwrap();
     let text = read("hil/nightly.yaml");
     let suite = Suite::parse("nightly.yaml", text.as_bytes()).unwrap();
     assert!(suite.budget.as_secs_f64() * 1.5 < hours * 3600.0, "{limit}");
     // The process that brakes the arm outlives the program.
-    assert_eq!(one(&service, "Service", "KillMode"), "process");
-    assert_eq!(one(&service, "Service", "LimitRTPRIO"), "99");
-    assert_eq!(one(&service, "Service", "LimitMEMLOCK"), "infinity");
+    assert_eq!(single_value(&service, "Service", "KillMode"), "process");
+    assert_eq!(single_value(&service, "Service", "LimitRTPRIO"), "99");
+    assert_eq!(
+        single_value(&service, "Service", "LimitMEMLOCK"),
+        "infinity"
+    );
     for kind in ["char-usb_device rw", "char-ttyACM rw", "char-ttyUSB rw"] {
         let allowed = &service[&("Service".to_owned(), "DeviceAllow".to_owned())];
         assert!(allowed.iter().any(|a| a == kind), "{kind}");
     }
     // A lease in a private folder would not protect the bench.
     assert_eq!(
-        one(&service, "Service", "ReadWritePaths"),
+        single_value(&service, "Service", "ReadWritePaths"),
         "-/run/lock /tmp"
     );
     for forbidding in [
@@ -148,7 +155,7 @@ fn a_night_has_the_time_and_the_rights_that_it_needs() {
 #[test]
 fn the_night_is_a_command_that_the_program_takes() {
     let service = unit("skinrig-nightly.service");
-    let command = one(&service, "Service", "ExecStart");
+    let command = single_value(&service, "Service", "ExecStart");
     let words: Vec<&str> = command.split_whitespace().collect();
     assert_eq!(words[1..3], ["hil", "run"]);
     if let Err(e) = skinrig::parse(&words) {
@@ -163,7 +170,10 @@ fn the_night_is_a_command_that_the_program_takes() {
         );
     }
     // It may write its outputs.
-    assert_eq!(one(&service, "Service", "StateDirectory"), "skinrig");
+    assert_eq!(
+        single_value(&service, "Service", "StateDirectory"),
+        "skinrig"
+    );
     assert!(words.contains(&"/var/lib/skinrig/nights"), "{command}");
     // Without a history no page shows trends; next to the nights, relative links survive a move.
     let history = words.iter().position(|w| *w == "--history");
@@ -175,7 +185,7 @@ fn the_night_is_a_command_that_the_program_takes() {
 }
 
 #[test]
-fn systemd_itself_has_nothing_to_say_about_the_units() {
+fn systemd_verifies_the_units() {
     let folder = tempfile::tempdir().unwrap();
     for name in UNITS {
         // The program is not installed where tests run.
@@ -234,7 +244,7 @@ fn rule(line: &str) -> Vec<(String, String, String)> {
 }
 
 #[test]
-fn the_rules_open_the_devices_of_the_drivers_to_a_group_and_to_nobody_else() {
+fn the_udev_rules_give_the_devices_to_one_group_only() {
     let text = read("hil/udev/70-skinrig.rules");
     let rules: Vec<_> = text
         .lines()
@@ -390,8 +400,8 @@ fn the_steps_of_the_guide_are_counted() {
 }
 
 #[test]
-fn every_command_of_the_guides_is_one_of_the_program() {
-    let mut seen = 0;
+fn every_command_in_the_guides_exists() {
+    let mut observed = 0;
     for file in ["docs/how-to/bench.md", "hil/README.md"] {
         let text = read(file);
         for command in text.split('`').filter(|c| c.starts_with("skinrig ")) {
@@ -402,10 +412,10 @@ fn every_command_of_the_guides_is_one_of_the_program() {
             words.push("--help");
             let kind = skinrig::parse(&words).unwrap_err().kind();
             assert_eq!(kind, ErrorKind::DisplayHelp, "{file}: {command}");
-            seen += 1;
+            observed += 1;
         }
     }
-    assert!(seen > 15, "{seen}");
+    assert!(observed > 15, "{observed}");
 }
 
 #[test]

@@ -20,7 +20,7 @@ type Module = Vec<String>;
 
 /// References from one file to others.
 #[derive(Default)]
-struct Mentions {
+struct References {
     /// Paths used.
     used: Vec<Vec<String>>,
     /// Paths re-exported under their last name.
@@ -55,7 +55,7 @@ fn leaves(tree: &UseTree, before: &[String], out: &mut Vec<Vec<String>>) {
     }
 }
 
-impl<'a> Visit<'a> for Mentions {
+impl<'a> Visit<'a> for References {
     fn visit_item(&mut self, item: &'a Item) {
         match item {
             Item::Use(u) if is_for_tests(&u.attrs) => {}
@@ -78,10 +78,10 @@ impl<'a> Visit<'a> for Mentions {
 }
 
 /// Non-test files of a crate, by module.
-fn files(root: &Path, file: &Path, module: &Module, out: &mut BTreeMap<Module, Mentions>) {
+fn files(root: &Path, file: &Path, module: &Module, out: &mut BTreeMap<Module, References>) {
     let text = fs::read_to_string(file).unwrap();
     let parsed = syn::parse_file(&text).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
-    let mut mentions = Mentions::default();
+    let mut mentions = References::default();
     mentions.visit_file(&parsed);
     out.insert(module.clone(), mentions);
     let elsewhere = parsed.items.iter().filter_map(|item| match item {
@@ -105,7 +105,11 @@ fn files(root: &Path, file: &Path, module: &Module, out: &mut BTreeMap<Module, M
 }
 
 /// The file that defines `path`, as seen from `from`; follows re-exports.
-fn defined_in(all: &BTreeMap<Module, Mentions>, from: &Module, path: &[String]) -> Option<Module> {
+fn defined_in(
+    all: &BTreeMap<Module, References>,
+    from: &Module,
+    path: &[String],
+) -> Option<Module> {
     let mut rest = path;
     let mut at: Module = match rest.first()?.as_str() {
         "crate" => Vec::new(),
@@ -142,15 +146,15 @@ fn reached<'a>(
     from: &'a Module,
     uses: &'a BTreeMap<Module, BTreeSet<Module>>,
 ) -> BTreeSet<&'a Module> {
-    let (mut seen, mut todo) = (BTreeSet::new(), vec![from]);
+    let (mut observed, mut todo) = (BTreeSet::new(), vec![from]);
     while let Some(module) = todo.pop() {
         for next in uses.get(module).into_iter().flatten() {
-            if seen.insert(next) {
+            if observed.insert(next) {
                 todo.push(next);
             }
         }
     }
-    seen
+    observed
 }
 
 /// Cycles of a crate, each as the names of its files.
@@ -217,7 +221,7 @@ fn few_files_use_each_other_in_a_circle() {
 }
 
 #[test]
-fn a_circle_is_found_also_through_what_a_module_hands_on() {
+fn a_cycle_through_reexports_is_found() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     let write = |name: &str, text: &str| fs::write(root.join(name), text).unwrap();

@@ -121,11 +121,11 @@ fn a_replayed_robot_keeps_the_contract() {
     let mut simulated = || -> (Box<dyn Indenter>, Box<dyn Clock>) {
         let rig = rig();
         let clock = Shared(Arc::new(Mutex::new(rig.clock)));
-        let tape = Arc::default();
-        tapes.push(Arc::clone(&tape));
-        let robot = Taped {
+        let records = Arc::default();
+        tapes.push(Arc::clone(&records));
+        let robot = RecordedRobot {
             robot: rig.indenter,
-            tape,
+            records,
             clock: clock.clone(),
             skin_from_robot: rig.robot_from_skin.inverse(),
         };
@@ -135,9 +135,9 @@ fn a_replayed_robot_keeps_the_contract() {
     assert!(tapes.len() >= 3, "{}", tapes.len());
 
     let files: Vec<PathBuf> = (tapes.iter().enumerate())
-        .map(|(n, tape)| {
+        .map(|(n, records)| {
             let path = lab.path().join(format!("{n}.session.sqlite"));
-            write(&path, &tape.lock().unwrap());
+            write(&path, &records.lock().unwrap());
             path
         })
         .collect();
@@ -182,14 +182,14 @@ impl Clock for Shared {
 }
 
 /// A robot that records its commands and poses.
-struct Taped {
+struct RecordedRobot {
     robot: Box<dyn Indenter>,
-    tape: Arc<Mutex<Vec<Record>>>,
+    records: Arc<Mutex<Vec<Record>>>,
     clock: Shared,
     skin_from_robot: RigidTransform<Skin, Robot>,
 }
 
-impl Indenter for Taped {
+impl Indenter for RecordedRobot {
     fn identity(&self) -> DeviceIdentity {
         self.robot.identity()
     }
@@ -200,7 +200,7 @@ impl Indenter for Taped {
 
     fn configure(&mut self, limits: &MotionLimits) -> Result<Vec<Setting>, DeviceError> {
         let settings = self.robot.configure(limits)?;
-        self.tape.lock().unwrap().push(Record::Device {
+        self.records.lock().unwrap().push(Record::Device {
             role: DeviceRole::Indenter,
             identity: self.robot.identity(),
             settings: settings.clone(),
@@ -214,7 +214,7 @@ impl Indenter for Taped {
 
     fn command(&mut self, target: Point3<Robot>, speed_mm_s: f64) -> Result<(), DeviceError> {
         self.robot.command(target, speed_mm_s)?;
-        self.tape.lock().unwrap().push(Record::Command {
+        self.records.lock().unwrap().push(Record::Command {
             t: self.clock.now(),
             command: MotionCommand {
                 target: self.skin_from_robot.apply(target),
@@ -235,7 +235,7 @@ impl Indenter for Taped {
         };
         let poses: Vec<PoseSample> = samples[before..].iter().map(on_skin).collect();
         if !poses.is_empty() {
-            self.tape.lock().unwrap().push(Record::Poses(poses));
+            self.records.lock().unwrap().push(Record::Poses(poses));
         }
         answer
     }

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use skinrig::results::{Choices, analyze_session};
-use skinrig_model::{CameraId, Record, SimLevel};
+use skinrig_model::{CameraId, Record, RigFault, SimLevel};
 use skinrig_recorder::{SessionReader, verify};
 use skinrig_results::Rescan;
 use skinrig_sim::{Fault, FaultTrigger, SimConfig, simulated_rig};
@@ -57,17 +57,18 @@ fn operators() -> impl Strategy<Value = Operator> {
 }
 
 fn faults() -> impl Strategy<Value = Vec<Fault>> {
-    let when = || (0_u32..6).prop_map(FaultTrigger::Contact);
+    let when = (0_u32..6).prop_map(FaultTrigger::Contact);
     let camera = prop_oneof![Just(CameraId::One), Just(CameraId::Two)];
+    let kind = prop_oneof![
+        Just(RigFault::RobotLost),
+        camera.clone().prop_map(RigFault::CameraUnplugged),
+        camera.prop_map(RigFault::CameraDrops),
+        Just(RigFault::BoxSilent),
+        Just(RigFault::RobotSlow),
+    ];
     prop_oneof![
         2 => Just(Vec::new()),
-        1 => when().prop_map(|w| vec![Fault::IndenterLost(w)]),
-        1 => (camera.clone(), when())
-            .prop_map(|(camera, when)| vec![Fault::CameraUnplugged { camera, when }]),
-        1 => (camera, when())
-            .prop_map(|(camera, when)| vec![Fault::CameraBytesLost { camera, when, words: 999 }]),
-        1 => when().prop_map(|w| vec![Fault::TriggerBoxLost(w)]),
-        1 => when().prop_map(|when| vec![Fault::Sluggish { when, percent: 4 }]),
+        5 => (kind, when).prop_map(|(kind, when)| vec![Fault::new(kind, when).expect("a supported fault")]),
     ]
 }
 
@@ -87,8 +88,9 @@ proptest! {
         let text = protocol(&places, sync, repetitions, depth_um, seed);
         let (protocol, plan) = planned(&text).unwrap();
         let mut config = SimConfig::new(seed, SimLevel::Kinematic);
-        let robot_lost = matches!(faults[..], [Fault::IndenterLost(_)]);
+        let robot_lost = faults.iter().any(|f| f.kind() == Some(RigFault::RobotLost));
         config.faults = faults;
+        config.fault_sizes.lost_words = 999;
         let lab = tempfile::tempdir().unwrap();
         let path = lab.path().join("random.session.sqlite");
         let mut n = 0;

@@ -75,10 +75,10 @@ fn anchors(page: &Path) -> BTreeSet<String> {
 #[test]
 fn every_relative_link_and_anchor_resolves() {
     let mut broken = Vec::new();
-    let mut seen = 0;
+    let mut observed = 0;
     for page in pages() {
         for link in links(&page) {
-            seen += 1;
+            observed += 1;
             let (file, anchor) = link.split_once('#').unwrap_or((&link, ""));
             let target = if file.is_empty() {
                 page.clone()
@@ -96,7 +96,7 @@ fn every_relative_link_and_anchor_resolves() {
         }
     }
     assert!(broken.is_empty(), "broken links:\n{}", broken.join("\n"));
-    assert!(seen > 80, "{seen}");
+    assert!(observed > 80, "{observed}");
 }
 
 #[test]

@@ -16,8 +16,8 @@ use skinrig::rig::{self, gates};
 use skinrig_analysis::Analysis;
 use skinrig_analysis::result::PressResult;
 use skinrig_controller::{ControlHandle, RecordSink, RunReport, SinkFault};
-use skinrig_model::{CameraId, HostTime, PressId, PressTiming, Record, RunEnd, SimLevel};
-use skinrig_protocol::{FaultKind, FaultPhase, FaultTime, Plan, PlantedFault, Protocol};
+use skinrig_model::{CameraId, HostTime, PressId, PressTiming, Record, RigFault, RunEnd, SimLevel};
+use skinrig_protocol::{FaultPhase, FaultTime, Plan, PlantedFault, Protocol};
 use skinrig_recorder::{SessionReader, SessionWriter, verify};
 use skinrig_results::Rescan;
 use skinrig_sim::{SimConfig, simulated_rig};
@@ -105,23 +105,23 @@ fn planted(fault: &str, phase: usize, record: usize) -> PlantedFault {
 /// Record sink that can simulate a kill: later records are not written.
 struct Sink {
     writer: Option<SessionWriter>,
-    saboteur: FaultInjector,
+    injector: FaultInjector,
     killed_at: Option<FaultTime>,
     /// For each record the latest time reported so far.
-    told: Vec<HostTime>,
+    record_times: Vec<HostTime>,
     moved: bool,
 }
 
 impl RecordSink for Sink {
     fn accept(&mut self, record: Record) -> Result<(), SinkFault> {
-        let t = time_of(&record).max(self.told.last().copied());
-        self.told.push(t.unwrap_or_default());
+        let t = time_of(&record).max(self.record_times.last().copied());
+        self.record_times.push(t.unwrap_or_default());
         self.moved |= matches!(record, Record::Command { .. });
-        let n = u32::try_from(self.told.len()).unwrap();
+        let n = u32::try_from(self.record_times.len()).unwrap();
         if self.killed_at == Some(FaultTime::Nth(FaultPhase::Record, n)) {
             self.writer = None;
         }
-        self.saboteur.before(&record)?;
+        self.injector.before(&record)?;
         match &mut self.writer {
             Some(writer) => writer
                 .accept(record)
@@ -146,7 +146,7 @@ fn time_of(record: &Record) -> Option<HostTime> {
 struct Run {
     report: RunReport,
     path: PathBuf,
-    told: Vec<HostTime>,
+    record_times: Vec<HostTime>,
     moved: bool,
     sealed: bool,
 }
@@ -159,36 +159,36 @@ fn run((protocol, plan): (&Protocol, &Plan), fault: Option<PlantedFault>, path: 
     // Every press of a location gives the same response, so that a repeated press can be compared.
     config.geometric.dead_share = 0.0;
     config.geometric.strength_spread = 0.0;
-    config.faults = rig::planted::of_devices(&faults);
+    config.faults = rig::planted::of_devices(&faults).unwrap();
     let simulated = simulated_rig(&config);
     let header = header(protocol, plan, &simulated).unwrap();
     let preflight = gates::of_simulated(&simulated, path.parent().unwrap(), 1.0);
-    let killed = fault.filter(|fault| fault.kind == FaultKind::Killed);
+    let killed = fault.filter(|fault| fault.kind == RigFault::Killed);
     let mut sink = Sink {
         writer: Some(SessionWriter::create(&path).unwrap()),
-        saboteur: FaultInjector::new(if killed.is_some() { &[] } else { &faults }),
+        injector: FaultInjector::new(if killed.is_some() { &[] } else { &faults }),
         killed_at: killed.map(|fault| fault.when),
-        told: Vec::new(),
+        record_times: Vec::new(),
         moved: false,
     };
     let control = ControlHandle::new();
     let report = skinrig_controller::Run::new(plan, header, simulated, &control, &mut sink)
         .checked(preflight)
         .execute();
-    let seals = killed.is_none() && sink.saboteur.before_the_seal().is_ok();
+    let seals = killed.is_none() && sink.injector.before_the_seal().is_ok();
     let writer = sink.writer.take();
     let sealed = seals && writer.is_some_and(|writer| writer.finish().is_ok());
     Run {
         report,
         path,
-        told: sink.told,
+        record_times: sink.record_times,
         moved: sink.moved,
         sealed,
     }
 }
 
 /// The fault-free run.
-struct Ideal {
+struct FaultFreeRun {
     presses: BTreeMap<PressId, PressResult>,
     recorded: u64,
 }
@@ -206,12 +206,12 @@ fn recorded(reader: &SessionReader) -> u64 {
     let poses = reader
         .poses(HostTime(i64::MIN), HostTime(i64::MAX))
         .unwrap();
-    let told = (
+    let delivered = (
         reader.box_reports().unwrap(),
         reader.marks_sent().unwrap(),
         poses,
     );
-    format!("{told:?}").hash(&mut hash);
+    format!("{delivered:?}").hash(&mut hash);
     hash.finish()
 }
 
@@ -224,7 +224,7 @@ struct Cell {
 
 /// Evaluates a run with a fault from its session file alone, compared with the fault-free run.
 /// `before`: presses completed before the fault; the text gives the number of valid ones where it differs.
-fn judge(run: &Run, fault: PlantedFault, before: u64, without: &Ideal) -> Cell {
+fn judge(run: &Run, fault: PlantedFault, before: u64, without: &FaultFreeRun) -> Cell {
     let mut wrong = Vec::new();
     let verified = verify::<Rescan>(&run.path).unwrap();
     if !verified.is_sound() || verified.sealed != run.sealed {
@@ -234,13 +234,13 @@ fn judge(run: &Run, fault: PlantedFault, before: u64, without: &Ideal) -> Cell {
         ));
     }
     let reader = SessionReader::open(&run.path).unwrap();
-    let struck = recorded(&reader) != without.recorded;
+    let due = recorded(&reader) != without.recorded;
     // No mark follows the last press that could be affected.
     let may_miss = matches!(fault.when, FaultTime::Nth(FaultPhase::Between, 5));
-    if !struck && !may_miss {
+    if !due && !may_miss {
         wrong.push("all that was recorded is as without the fault: it did not strike".into());
     }
-    let killed = fault.kind == FaultKind::Killed;
+    let killed = fault.kind == RigFault::Killed;
     let totals = reader.totals().unwrap();
     for tally in [totals.presses, totals.sync] {
         let counted = tally.valid + tally.missed + tally.invalid + tally.excluded;
@@ -261,7 +261,7 @@ fn judge(run: &Run, fault: PlantedFault, before: u64, without: &Ideal) -> Cell {
     let report = &run.report;
     if !killed {
         // A robot that stopped answering cannot report that it is disarmed; its own brakes are on.
-        if !report.disarmed && fault.kind != FaultKind::RobotLost {
+        if !report.disarmed && fault.kind != RigFault::RobotLost {
             wrong.push("not disarmed".into());
         }
         if matches!(report.end, RunEnd::Completed) && !(report.retracted && report.disarmed) {
@@ -280,17 +280,17 @@ fn judge(run: &Run, fault: PlantedFault, before: u64, without: &Ideal) -> Cell {
         && usable
     {
         // A slow robot moves differently, with other events and other measured times.
-        let moves_as_ever = fault.kind != FaultKind::RobotSlow;
-        wrong.extend(differences(analysis, &without.presses, moves_as_ever));
+        let moves_normally = fault.kind != RigFault::RobotSlow;
+        wrong.extend(differences(analysis, &without.presses, moves_normally));
     }
     let planned = totals.presses.planned + totals.sync.planned;
-    let kept = if valid == before {
+    let valid_count = if valid == before {
         String::new()
     } else {
         format!(", {valid} valid")
     };
     let mut words = match (&report.end, killed) {
-        (_, true) => format!("cut off{kept}"),
+        (_, true) => format!("cut off{valid_count}"),
         (RunEnd::Faulted(_), _) if !run.moved => "refused".to_owned(),
         (RunEnd::Faulted(_), _) => {
             let place = if report.retracted {
@@ -298,9 +298,9 @@ fn judge(run: &Run, fault: PlantedFault, before: u64, without: &Ideal) -> Cell {
             } else {
                 "braked"
             };
-            format!("ended {place}{kept}")
+            format!("ended {place}{valid_count}")
         }
-        (RunEnd::Completed, _) if !struck => "too late to strike".to_owned(),
+        (RunEnd::Completed, _) if !due => "too late to strike".to_owned(),
         (RunEnd::Completed, _) if !usable => "INVALID session".to_owned(),
         (RunEnd::Completed, _) if valid < planned => format!("{} invalid", planned - valid),
         (RunEnd::Completed, _) => "survived".to_owned(),
@@ -345,7 +345,7 @@ const SLOW_ESTIMATE_MM: f64 = 0.4;
 fn differences(
     analysis: &Analysis,
     without: &BTreeMap<PressId, PressResult>,
-    moves_as_ever: bool,
+    moves_normally: bool,
 ) -> Vec<String> {
     let mut found = Vec::new();
     for press in analysis
@@ -353,23 +353,23 @@ fn differences(
         .iter()
         .filter(|p| p.verdict == skinrig_model::Verdict::Valid)
     {
-        let as_ever = &without[&press.press];
+        let fault_free = &without[&press.press];
         let off_mm = press
             .truth
-            .zip(as_ever.truth)
+            .zip(fault_free.truth)
             .map(|(a, b)| a.distance_mm(b));
         if off_mm.is_none_or(|off_mm| off_mm > TRUTH_MM) {
             found.push(format!("{}: truth off by {off_mm:?} mm", press.press));
         }
-        for (k, (seen, ever)) in press.views.iter().zip(&as_ever.views).enumerate() {
-            let (Some(seen), Some(ever)) = (seen, ever) else {
-                if seen.is_some() != ever.is_some() {
-                    found.push(format!("{}: view {k} is {seen:?}", press.press));
+        for (k, (observed, normal)) in press.views.iter().zip(&fault_free.views).enumerate() {
+            let (Some(observed), Some(normal)) = (observed, normal) else {
+                if observed.is_some() != normal.is_some() {
+                    found.push(format!("{}: view {k} is {observed:?}", press.press));
                 }
                 continue;
             };
-            let (n, of) = (f64::from(seen.events), f64::from(ever.events));
-            if moves_as_ever && (n - of).abs() > EVENTS_SHARE * of {
+            let (n, of) = (f64::from(observed.events), f64::from(normal.events));
+            if moves_normally && (n - of).abs() > EVENTS_SHARE * of {
                 found.push(format!(
                     "{}: camera {} saw {n} events, without a fault {of}",
                     press.press,
@@ -379,15 +379,15 @@ fn differences(
         }
         let off_mm = press
             .estimate()
-            .zip(as_ever.estimate())
+            .zip(fault_free.estimate())
             .map(|(a, b)| a.distance_mm(b));
-        let most_mm = if moves_as_ever {
+        let most_mm = if moves_normally {
             ESTIMATE_MM
         } else {
             SLOW_ESTIMATE_MM
         };
         if off_mm.is_some_and(|off_mm| off_mm > most_mm)
-            || press.estimate().is_some() != as_ever.estimate().is_some()
+            || press.estimate().is_some() != fault_free.estimate().is_some()
         {
             found.push(format!("{}: estimate off by {off_mm:?} mm", press.press));
         }
@@ -396,13 +396,13 @@ fn differences(
 }
 
 /// Number of the first record of a phase in the fault-free run.
-fn record_of(phase: usize, told: &[HostTime], timings: &[PressTiming]) -> usize {
+fn record_of(phase: usize, record_times: &[HostTime], timings: &[PressTiming]) -> usize {
     let (sync, press, last) = (timings[0], timings[2], timings[4]);
     let t = match phase {
         0 => return 2,
         1 => {
             let began = timings[0].approach;
-            return told.iter().position(|t| *t >= began).unwrap() - 3;
+            return record_times.iter().position(|t| *t >= began).unwrap() - 3;
         }
         2 => sync.at_depth,
         3 => HostTime(timings[1].clear.0 + 1_010_000_000),
@@ -413,7 +413,10 @@ fn record_of(phase: usize, told: &[HostTime], timings: &[PressTiming]) -> usize 
         8 => press.clear,
         _ => last.clear,
     };
-    told.iter().position(|told| *told >= t).unwrap()
+    record_times
+        .iter()
+        .position(|t_record| *t_record >= t)
+        .unwrap()
 }
 
 #[test]
@@ -431,7 +434,7 @@ fn each_fault_in_each_phase_ends_as_documented() {
     let presses: BTreeMap<_, _> = analysis.presses.into_iter().map(|p| (p.press, p)).collect();
     let timings: Vec<PressTiming> = presses.values().filter_map(|p| p.timing).collect();
     let recorded = recorded(&SessionReader::open(&ideal.path).unwrap());
-    let without = Ideal { presses, recorded };
+    let without = FaultFreeRun { presses, recorded };
 
     let cells: Vec<(usize, usize)> = (0..FAULTS.len())
         .flat_map(|f| (0..PHASES.len()).map(move |p| (f, p)))
@@ -440,7 +443,7 @@ fn each_fault_in_each_phase_ends_as_documented() {
         .into_par_iter()
         .map(|(f, p)| {
             let path = lab.path().join(format!("{}-{p}.session.sqlite", FAULTS[f]));
-            let fault = planted(FAULTS[f], p, record_of(p, &ideal.told, &timings));
+            let fault = planted(FAULTS[f], p, record_of(p, &ideal.record_times, &timings));
             let run = run(experiment, Some(fault), path);
             let cell = judge(&run, fault, PHASES[p].2, &without);
             std::fs::remove_file(&run.path).unwrap();

@@ -40,8 +40,8 @@ analysis: {calibration: none}
 ";
 
 #[test]
-fn what_a_camera_drops_spoils_the_press_and_is_told() {
-    let test = "what_a_camera_drops_spoils_the_press_and_is_told";
+fn dropped_bytes_invalidate_the_press_and_are_reported() {
+    let test = "dropped_bytes_invalidate_the_press_and_are_reported";
     // A packet of about 80 kB every millisecond; the FIFO and two transfers of 16 KiB take less than half of it.
     let camera = Emulated {
         fifo_bytes: 4 << 10,
@@ -72,8 +72,8 @@ fn what_a_camera_drops_spoils_the_press_and_is_told() {
 
         let reader = SessionReader::open(&path).unwrap();
         let mut attempts = 0;
-        for (_, made) in reader.presses().unwrap() {
-            for outcome in made.into_iter().filter_map(|a| a.outcome) {
+        for (_, created) in reader.presses().unwrap() {
+            for outcome in created.into_iter().filter_map(|a| a.outcome) {
                 match outcome.verdict {
                     PressVerdict::Invalid(why) => {
                         attempts += 1;
@@ -89,9 +89,9 @@ fn what_a_camera_drops_spoils_the_press_and_is_told() {
         let spans = losses.iter().filter_map(|l| l.time.span_us());
         assert!(spans.sum::<u64>() > 100_000, "{losses:?}");
         assert_eq!(reader.losses(CameraId::Two).unwrap(), []);
-        let told = reader.notes().unwrap();
-        let told = told.iter().find(|n| n.text.contains("overflow counter"));
-        assert!(told.is_some_and(|n| n.text.starts_with("camera 1: ")));
+        let message = reader.notes().unwrap();
+        let message = message.iter().find(|n| n.text.contains("overflow counter"));
+        assert!(message.is_some_and(|n| n.text.starts_with("camera 1: ")));
         let verified = verify::<Rescan>(&path).unwrap();
         assert!(verified.is_sound(), "{:?}", verified.problems);
     });

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use skinrig::results::{Choices, analyze_session};
 use skinrig_analysis::result::{AlignmentStatus, Analysis};
-use skinrig_model::{BoxReport, CameraId, PressVerdict, RunEnd, SimLevel};
+use skinrig_model::{BoxReport, CameraId, PressVerdict, RigFault, RunEnd, SimLevel};
 use skinrig_recorder::SessionReader;
 use skinrig_sim::{Fault, FaultTrigger, SimConfig, simulated_rig};
 use skinrig_tests::{planned, record};
@@ -37,6 +37,7 @@ fn recorded(path: &std::path::Path, faults: Vec<Fault>) -> (SessionReader, Analy
     let (protocol, plan) = planned(PROTOCOL).unwrap();
     let mut config = SimConfig::new(5, SimLevel::Geometric);
     config.faults = faults;
+    config.fault_sizes.lost_words = 999;
     let report = record(&protocol, &plan, simulated_rig(&config), path, |_, _| {}).unwrap();
     assert_eq!(report.end, RunEnd::Completed);
     let results = analyze_session(path, Choices::default()).unwrap();
@@ -46,10 +47,9 @@ fn recorded(path: &std::path::Path, faults: Vec<Fault>) -> (SessionReader, Analy
 #[test]
 fn a_retaken_press_counts_once_and_its_marks_misname_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    let lost = |camera, contact| Fault::CameraBytesLost {
-        camera,
-        when: FaultTrigger::Contact(contact),
-        words: 999,
+    let lost = |camera, contact| {
+        let when = FaultTrigger::Contact(contact);
+        Fault::new(RigFault::CameraDrops(camera), when).unwrap()
     };
     // Two sync presses, then press 3 and its first retake: the eighth contact is that of press 6.
     let faults = vec![

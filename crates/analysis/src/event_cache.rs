@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_refused_whole() {
+    fn a_slice_that_does_not_fit_is_refused_completely() {
         let event = |t_us, x, y| CdEvent {
             t_us,
             x,

@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_leg_that_lies_by_its_nominal_start_is_said() {
+    fn a_leg_placed_by_its_nominal_start_is_reported() {
         let fit = ClockFit {
             method: ClockMethod::TriggerMarks,
             offset_us: 0.0,

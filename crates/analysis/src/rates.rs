@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_gives_nothing() {
+    fn empty_input_gives_empty_output() {
         assert_eq!(
             RateHistogram::new(10_000).series(None),
             RateSeries::default()

@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn a_press_that_is_not_found_passes_as_published_and_fails_here() {
+    fn a_missing_press_passes_under_the_published_rule_and_fails_under_ours() {
         let threshold = quantile(&mut filled(&errors()), 0.95).unwrap();
         let rates = |e: &[Option<f64>]| {
             (

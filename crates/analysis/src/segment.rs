@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn a_window_about_the_middle_has_its_own_length() {
+    fn a_centred_window_has_its_configured_length() {
         let settings = AnalysisSettings {
             window_anchor: WindowAnchor::Middle,
             window_before_ms: 1500.0,

@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn silences_are_found_where_there_is_noise_to_miss() {
+    fn silences_are_found_where_noise_is_expected() {
         let lost = [(0.0, 4.0), (10.0, 12.0), (25.0, 30.0)];
         let rates = noisy(&lost, &[]);
         let span = (5e6, 35e6);
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn contacts_that_nobody_listed_are_found_too() {
+    fn unlisted_contacts_are_found() {
         let made = [3.0, 6.0, 8.0, 9.0, 12.0, 20.0];
         let rates = noisy(&[], &made);
         let listed: Vec<(f64, f64)> = [3.0, 6.0, 9.0, 12.0].map(|s| (s, s + 0.5)).to_vec();

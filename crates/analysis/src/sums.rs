@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_plain_addition_loses_is_kept() {
+    fn compensated_sums_keep_small_terms() {
         assert_eq!(sum([1.0, 1e100, 1.0, -1e100].into_iter()), 2.0);
         assert_eq!(sum(std::iter::empty()), 0.0);
         assert_eq!(sum([f64::INFINITY, 1.0].into_iter()), f64::INFINITY);

@@ -27,14 +27,14 @@ pub struct Intersection {
 #[must_use]
 pub fn intersect(geometry: &StereoGeometry, angles_deg: [f64; 2]) -> Intersection {
     let [one, two] = geometry.cameras;
-    meet(
+    intersect_rays(
         [one.position, two.position],
         [one.direction(angles_deg[0]), two.direction(angles_deg[1])],
     )
 }
 
 /// [`intersect`] for rays from `positions` along unit `directions`.
-pub(crate) fn meet(positions: [Point2; 2], directions: [[f64; 2]; 2]) -> Intersection {
+pub(crate) fn intersect_rays(positions: [Point2; 2], directions: [[f64; 2]; 2]) -> Intersection {
     let ([one, two], [d1, d2]) = (positions, directions);
     let w = [two.x_mm - one.x_mm, two.y_mm - one.y_mm];
     let sine = cross(d1, d2);

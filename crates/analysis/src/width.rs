@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn a_press_that_adds_next_to_nothing_has_no_width() {
+    fn a_press_with_negligible_information_has_no_width() {
         let mut grid = PixelGrid::new((100, 199));
         (0..90).for_each(|k| assert!(grid.add(300 + k % 9, 150)));
         assert_eq!(width_u(&grid, 0, &window()), None);

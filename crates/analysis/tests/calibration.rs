@@ -69,8 +69,8 @@ fn exact_rays_give_the_planted_geometry_back() {
     assert!(set.sights().len() > 200);
     let start = StereoGeometry::PAPER;
     let (found, result) = calibrate(&set, &start, CalibrationModel::Full, 1).unwrap();
-    for (value, wanted) in result.values.iter().zip(PLANTED) {
-        assert!((value - wanted).abs() < 1e-6, "{:?}", result.values);
+    for (value, expected) in result.values.iter().zip(PLANTED) {
+        assert!((value - expected).abs() < 1e-6, "{:?}", result.values);
     }
     assert!(
         result.rmse_after_mm < 1e-7 && result.rmse_before_mm > 1.0,
@@ -88,8 +88,8 @@ fn exact_rays_give_the_planted_geometry_back() {
             .iter()
             .all(|e| e.is_some_and(|e| e < 1e-6))
     );
-    let again = calibrate(&set, &start, CalibrationModel::Full, 1).unwrap();
-    assert_eq!(again, (found, result));
+    let repeated = calibrate(&set, &start, CalibrationModel::Full, 1).unwrap();
+    assert_eq!(repeated, (found, result));
 }
 
 #[test]
@@ -146,7 +146,7 @@ fn outliers_and_presses_without_a_fix_pull_little() {
 fn too_few_places_get_a_smaller_model() {
     let planted = StereoGeometry::paper_like(PLANTED);
     let rows = exact(&planted, 4.0);
-    for (places, wanted) in [
+    for (places, expected) in [
         (3, CalibrationModel::None),
         (4, CalibrationModel::Positions),
         (7, CalibrationModel::PositionsSkews),
@@ -157,7 +157,7 @@ fn too_few_places_get_a_smaller_model() {
         let set = CalibrationSet::from_presses(&few);
         assert_eq!(
             largest_supported_model(&set, CalibrationModel::Full),
-            wanted
+            expected
         );
     }
     let set = CalibrationSet::from_presses(&rows);

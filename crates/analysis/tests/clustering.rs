@@ -112,13 +112,13 @@ fn the_labels_are_those_of_scikit_learn() {
         let found = labels(&mut dbscan, &events);
         // Cluster numbers, and the cluster of a border event between two, depend on scikit-learn's input order: compare
         // noise for all events, and cluster membership for all except such border events.
-        let wanted = list("labels");
+        let expected = list("labels");
         let ambiguous = |e: &Event| name.as_str().unwrap().starts_with("border") && e.0 == 110;
         for (i, a) in events.iter().enumerate() {
-            assert_eq!(found[i] == NOISE, wanted[i] == -1, "{name}: event {i}");
+            assert_eq!(found[i] == NOISE, expected[i] == -1, "{name}: event {i}");
             for (j, b) in events.iter().enumerate() {
                 if !ambiguous(a) && !ambiguous(b) {
-                    let together = wanted[i] == wanted[j];
+                    let together = expected[i] == expected[j];
                     assert_eq!(found[i] == found[j], together, "{name}: events {i}, {j}");
                 }
             }
@@ -197,12 +197,12 @@ proptest! {
         eps in prop_oneof![Just(10.0), Just(1.0), Just(0.5), Just(50.0), 0.1f64..50.0, 50.0f64..300.0],
         min_samples in prop_oneof![Just(10u32), Just(1), 1u32..40],
     ) {
-        let wanted = reference(&events, eps, min_samples);
+        let expected = reference(&events, eps, min_samples);
         let mut dbscan = Dbscan::new(eps, min_samples);
         // Buffers of an earlier run must have no effect.
         dbscan.run(&grid_of(&[(3, 3), (3, 4), (600, 470)]));
-        prop_assert_eq!(labels(&mut dbscan, &events), wanted.clone());
-        prop_assert_eq!(dbscan.clusters(), &clusters_of(&events, &wanted)[..]);
+        prop_assert_eq!(labels(&mut dbscan, &events), expected.clone());
+        prop_assert_eq!(dbscan.clusters(), &clusters_of(&events, &expected)[..]);
     }
 
     #[test]

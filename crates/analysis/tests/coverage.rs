@@ -60,18 +60,18 @@ fn areas_are_those_of_the_published_skin() {
     let skin = published_polygon();
     let chamfers = [(50.0, -38.0), (50.0, 42.0)];
     let optimised = [(44.25, -31.98), (49.71, 39.81)];
-    for (at, skews, wanted) in [
+    for (at, skews, expected) in [
         (chamfers, [0.0, 0.0], 8781.7),
         (chamfers, [-1.92, -1.47], 8771.7),
         (optimised, [0.0, 0.0], 7996.0),
     ] {
         let found = seen(at, skews, &skin);
-        assert!((found - wanted).abs() < 0.1, "{found}");
+        assert!((found - expected).abs() < 0.1, "{found}");
     }
 }
 
 #[test]
-fn the_published_grid_stands_for_its_cells() {
+fn the_published_grid_represents_its_cells() {
     let places = grid();
     assert_eq!(neighbour_distance_mm(&places), Some(4.0));
     assert_eq!(probed_area_mm2(&SKIN, &places, 4.0), 4624.0);
@@ -130,7 +130,7 @@ fn contact_maps_score_as_in_the_public_code_but_for_its_two_faults() {
         )
     };
     let truth = (12.5, 4.5);
-    for (name, estimate, truth, wanted) in [
+    for (name, estimate, truth, expected) in [
         (
             "exact centre",
             (12.5, 4.5),
@@ -156,7 +156,7 @@ fn contact_maps_score_as_in_the_public_code_but_for_its_two_faults() {
         ),
     ] {
         let found = score(estimate, truth).unwrap();
-        assert!((found - wanted).abs() < 1e-14, "{name}: {found}");
+        assert!((found - expected).abs() < 1e-14, "{name}: {found}");
     }
     // The public code: 0.99202, because it moves the truth into the corner cell.
     assert_eq!(score(truth, (300.0, 300.0)), None);

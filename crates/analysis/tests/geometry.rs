@@ -70,7 +70,7 @@ fn every_case_of_the_public_solver_comes_out_right() {
 }
 
 #[test]
-fn the_grid_points_that_the_public_solver_moves_stay_where_they_are() {
+fn grid_points_that_the_public_solver_moves_stay_fixed() {
     let cases = fixture(include_str!("fixtures/grid.json"));
     assert_eq!(cases.len(), 46);
     for case in &cases {
@@ -82,8 +82,8 @@ fn the_grid_points_that_the_public_solver_moves_stay_where_they_are() {
 }
 
 #[test]
-fn the_whole_grid_is_located_exactly() {
-    let mut seen = 0;
+fn the_complete_grid_is_located_exactly() {
+    let mut observed = 0;
     for i in -8i32..=8 {
         for j in -8i32..=8 {
             let p = Point2::new(10.0 + 4.0 * f64::from(i), 2.0 + 4.0 * f64::from(j));
@@ -96,10 +96,10 @@ fn the_whole_grid_is_located_exactly() {
                 "{p:?}: {outcome:?}"
             );
             assert!(outcome.estimate().unwrap().distance_mm(p) < 1e-10);
-            seen += 1;
+            observed += 1;
         }
     }
-    assert_eq!(seen, 289);
+    assert_eq!(observed, 289);
 }
 
 #[test]
@@ -152,7 +152,7 @@ fn right_angles_and_the_axis_are_ordinary_directions() {
 
 proptest! {
     #[test]
-    fn rays_through_a_point_meet_there(
+    fn rays_through_a_point_intersect_at_it(
         x in -40.0f64..60.0, y in -48.0f64..52.0,
         x1 in 40.0f64..55.0, y1 in -50.0f64..-30.0, x2 in 40.0f64..55.0, y2 in 30.0f64..40.0,
         skew1 in -5.0f64..5.0, skew2 in -5.0f64..5.0, w1 in -0.9f64..0.9, w2 in -0.9f64..0.9,
@@ -175,7 +175,7 @@ proptest! {
     }
 
     #[test]
-    fn nothing_panics_whatever_the_numbers(
+    fn no_panic_on_any_numbers(
         u1 in prop::num::f64::ANY, u2 in prop::num::f64::ANY, w in prop::num::f64::ANY,
         x in prop::num::f64::ANY,
     ) {

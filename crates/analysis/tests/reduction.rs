@@ -208,7 +208,7 @@ fn data_rates_are_means_over_the_presses_that_count() {
 }
 
 #[test]
-fn the_published_way_judges_the_first_repetition_and_counts_nothing_as_missing() {
+fn the_published_rule_scores_the_first_repetition_and_ignores_missing_presses() {
     let (mut input, source) = small();
     input.settings.centroid = skinrig_model::CentroidRule::AllClusters;
     // What it calibrates on is then what this session calibrates on.

@@ -8,7 +8,7 @@ use skinrig_recorder::{SessionReader, writer_of};
 use crate::args::{ControlArgs, NoteArgs};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::host::user_name;
-use crate::remote::{Live, RemoteError, Reply, Request, RunRequest, ask};
+use crate::remote::{RemoteError, Reply, Request, RunRequest, RunSnapshot, ask};
 use crate::sessions;
 
 /// The controller reads requests at every tick; a run that takes longer than this hangs.
@@ -59,7 +59,10 @@ pub(crate) fn control(args: &ControlArgs, json: bool) -> Outcome {
 ///
 /// # Errors
 /// As [`control`].
-pub(crate) fn request(session: &Path, what: RunRequest) -> Result<Option<Box<Live>>, Failure> {
+pub(crate) fn request(
+    session: &Path,
+    what: RunRequest,
+) -> Result<Option<Box<RunSnapshot>>, Failure> {
     let number = send(session, &Request::Control(what))?;
     match wait(session, ACKNOWLEDGE_WITHIN, |live| live.heard >= number)? {
         WaitOutcome::Done(live) => Ok(Some(live)),
@@ -174,7 +177,7 @@ fn remote_failure(session: &Path, error: RemoteError) -> Failure {
 }
 
 /// The failure for a run that did not acknowledge a request in time.
-fn no_acknowledgement(live: &Live) -> Failure {
+fn no_acknowledgement(live: &RunSnapshot) -> Failure {
     Failure::rig(format!(
         "the run ({}) has not acknowledged the request within {} s; it may do so later\n  next: look at the arm; to stop it at once press the \
          force button on its base",
@@ -186,9 +189,9 @@ fn no_acknowledgement(live: &Live) -> Failure {
 /// Outcome of the wait.
 enum WaitOutcome {
     /// The condition holds.
-    Done(Box<Live>),
+    Done(Box<RunSnapshot>),
     /// Timed out: the condition still does not hold.
-    TimedOut(Box<Live>),
+    TimedOut(Box<RunSnapshot>),
     /// The run ended first.
     Ended,
 }
@@ -197,7 +200,7 @@ enum WaitOutcome {
 fn wait(
     session: &Path,
     within: Duration,
-    done: impl Fn(&Live) -> bool,
+    done: impl Fn(&RunSnapshot) -> bool,
 ) -> Result<WaitOutcome, Failure> {
     let from = Instant::now();
     loop {

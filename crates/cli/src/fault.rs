@@ -5,8 +5,8 @@
 use std::sync::Arc;
 
 use skinrig_controller::SinkFault;
-use skinrig_model::Record;
-use skinrig_protocol::{FaultKind, FaultPhase, FaultTime, PlantedFault};
+use skinrig_model::{Record, RigFault};
+use skinrig_protocol::{FaultPhase, FaultTime, PlantedFault};
 use skinrig_recorder::{RecorderError, WriteFailure};
 
 /// Counts the records of a run and injects its faults.
@@ -58,8 +58,8 @@ impl FaultInjector {
                 _ => false,
             };
             match fault.kind {
-                FaultKind::Killed if due => die(),
-                FaultKind::DiskFull if due => self.full = true,
+                RigFault::Killed if due => die(),
+                RigFault::DiskFull if due => self.full = true,
                 _ => {}
             }
         }
@@ -75,7 +75,7 @@ impl FaultInjector {
     /// On a full disk.
     pub fn before_the_seal(&self) -> Result<(), RecorderError> {
         let killed =
-            |fault: &PlantedFault| fault.kind == FaultKind::Killed && fault.when == FaultTime::Seal;
+            |fault: &PlantedFault| fault.kind == RigFault::Killed && fault.when == FaultTime::Seal;
         if self.faults.iter().any(killed) {
             die();
         }

@@ -88,7 +88,7 @@ impl ProgressView {
     }
 
     /// Writes lines above the bar.
-    pub(crate) fn say(&self, text: &str) {
+    pub(crate) fn print(&self, text: &str) {
         match &self.display {
             Display::Bar(bar) => bar.suspend(|| errln!("{text}")),
             Display::Lines { .. } => errln!("{text}"),

@@ -371,7 +371,7 @@ fn open_rig(
             args.real_time,
             faults,
             pressed_before(found, wanted),
-        );
+        )?;
         let mut preflight = gates::of_simulated(&rig, folder, summary.expected_bytes);
         preflight
             .caller_checks

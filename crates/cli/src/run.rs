@@ -246,7 +246,7 @@ pub(crate) fn simulated(
     if let Some(label) = planted::label(&faults) {
         errln!("warning: {label}\n");
     }
-    let mut rig = rig::simulated(&protocol, level, seed, args.real_time, &faults);
+    let mut rig = rig::simulated(&protocol, level, seed, args.real_time, &faults)?;
     if level < protocol.scene.level {
         // In the name, so that every report of this session shows it.
         let short = format!(

@@ -75,7 +75,7 @@ pub(crate) fn find(place: &Path) -> Result<PathBuf, Failure> {
         ))),
         (Some(one), None) => Ok(one.clone()),
         (None, _) => {
-            let newest = all.into_iter().max_by_key(|p| (written(p), p.clone()));
+            let newest = all.into_iter().max_by_key(|p| (modified_at(p), p.clone()));
             newest.ok_or_else(|| none_in(place))
         }
     }
@@ -208,7 +208,7 @@ pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 }
 
 /// Time of the last write to a session or its log.
-fn written(session: &Path) -> Option<SystemTime> {
+fn modified_at(session: &Path) -> Option<SystemTime> {
     let mut log = session.as_os_str().to_owned();
     log.push("-wal");
     let at = |path: &Path| std::fs::metadata(path).and_then(|m| m.modified()).ok();

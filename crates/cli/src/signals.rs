@@ -115,7 +115,7 @@ impl Operator {
 
     /// True if ctrl-C was pressed or another signal requested an end.
     #[must_use]
-    pub(crate) fn asked(&self) -> bool {
+    pub(crate) fn is_requested(&self) -> bool {
         self.asked.load(Ordering::SeqCst)
     }
 

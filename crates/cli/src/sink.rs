@@ -101,7 +101,7 @@ impl SessionSink {
     pub(crate) fn controlled(mut self, session: &Path, control: &ControlHandle) -> Self {
         match Remote::open(session, control) {
             Ok(remote) => self.remote = Some(remote),
-            Err(why) => self.view.say(&format!(
+            Err(why) => self.view.print(&format!(
                 "warning: this run cannot be controlled from other terminals ({why}); ctrl-C works"
             )),
         }
@@ -141,7 +141,7 @@ impl SessionSink {
             mb(load.most_bytes),
             mb(load.limit_bytes)
         );
-        self.view.say(&format!("note: {text}"));
+        self.view.print(&format!("note: {text}"));
         let note = self.writer.accept(Record::Note { t, text });
         note.map_err(|e| fault_of(&e))
     }
@@ -173,7 +173,7 @@ impl RecordSink for SessionSink {
             _ => {}
         }
         if let Record::Preflight(checks) = &record {
-            self.view.say(&gates::report(checks));
+            self.view.print(&gates::report(checks));
         }
         self.fault_injector.before(&record)?;
         if let Record::Ended { t, .. } = &record {
@@ -195,7 +195,7 @@ impl RecordSink for SessionSink {
             remote.show(self.view.progress(), is_bulk);
         }
         for text in std::mem::take(&mut self.notes) {
-            self.view.say(&format!("note: {text}"));
+            self.view.print(&format!("note: {text}"));
             let t = HostTime::ZERO;
             let note = self.writer.accept(Record::Note { t, text });
             note.map_err(|e| fault_of(&e))?;

@@ -10,7 +10,7 @@ use crate::args::StatusArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::paths;
 use crate::progress::{clock_text, eta_text};
-use crate::remote::{Live, RemoteError, Reply, Request, ask};
+use crate::remote::{RemoteError, Reply, Request, RunSnapshot, ask};
 use crate::rig::gates;
 use crate::sessions;
 
@@ -100,7 +100,7 @@ fn stored(session: &Path) -> Result<Value, RecorderError> {
 }
 
 /// The current state of the session, in words.
-fn state(d: &Value, live: Option<&Live>) -> String {
+fn state(d: &Value, live: Option<&RunSnapshot>) -> String {
     let session = d["session"].as_str().unwrap_or_default();
     let next = match d["rig_kind"].as_str() {
         Some("imported" | "replayed") => "run it again".to_owned(),
@@ -128,7 +128,7 @@ fn state(d: &Value, live: Option<&Live>) -> String {
     }
 }
 
-fn print(d: &Value, live: Option<&Live>) {
+fn print(d: &Value, live: Option<&RunSnapshot>) {
     let text = |key: &str| d[key].as_str().unwrap_or("-").to_owned();
     outln!("session   {}", text("session"));
     outln!("state     {}", state(d, live));
@@ -185,7 +185,7 @@ fn print(d: &Value, live: Option<&Live>) {
     }
 }
 
-fn print_live(live: &Live) {
+fn print_live(live: &RunSnapshot) {
     let press = live.press.as_ref().map_or_else(String::new, |p| {
         let block = match p.role {
             skinrig_model::PressRole::Sync => "sync".to_owned(),

@@ -71,7 +71,7 @@ fn place(given: &Path) -> Result<(PathBuf, Option<String>), Failure> {
 pub struct Program;
 
 /// The message of a failure, without its first word.
-fn told(failure: Failure) -> LabError {
+fn lab_error(failure: Failure) -> LabError {
     let message = failure.message;
     let plain = message.strip_prefix("error: ").map(str::to_owned);
     LabError(plain.unwrap_or(message))
@@ -98,16 +98,16 @@ impl Lab for Program {
                 request.escape_debug()
             ))
         })?;
-        let session = sessions::find_running(session).map_err(told)?;
-        let after = control::request(&session, what).map_err(told)?;
+        let session = sessions::find_running(session).map_err(lab_error)?;
+        let after = control::request(&session, what).map_err(lab_error)?;
         Ok(after.map_or_else(|| State::Finished.name().to_owned(), |live| live.state))
     }
 
     fn note(&self, session: &Path, by: &str, text: &str) -> Result<(), LabError> {
-        let session = sessions::find_running(session).map_err(told)?;
+        let session = sessions::find_running(session).map_err(lab_error)?;
         control::add_note(&session, by, text)
             .map(|_| ())
-            .map_err(told)
+            .map_err(lab_error)
     }
 
     fn analysis(&self, session: &Path, session_id: &str, name: Option<&str>) -> Option<Analysis> {
@@ -143,14 +143,14 @@ impl Lab for Program {
     }
 
     fn facts(&self, session: &Path) -> Result<BTreeMap<String, String>, LabError> {
-        let unreadable = |e| told(Failure::session(e));
+        let unreadable = |e| lab_error(Failure::session(e));
         let reader = SessionReader::open(session).map_err(unreadable)?;
         let header = reader.header().map_err(unreadable)?;
-        compare::values(session, &reader, &header).map_err(told)
+        compare::values(session, &reader, &header).map_err(lab_error)
     }
 
     fn prototypes(&self, folder: &Path) -> Result<Value, LabError> {
-        prototypes::document(folder).map_err(told)
+        prototypes::document(folder).map_err(lab_error)
     }
 
     fn nights(&self, folder: &Path) -> Result<Vec<Value>, LabError> {

@@ -19,5 +19,5 @@ pub use flatten::flatten;
 pub use location_results::{Location, LocationComparison};
 pub use metrics::{DisplayFormat, Metric};
 pub use result::{Comparison, ComparisonOptions, Reanalyses, Skin, compare};
-pub use subject::{Facts, Session, Subject};
+pub use subject::{Session, SessionFacts, Subject};
 pub use table::{BaselineComparison, Margins, Row, Value};

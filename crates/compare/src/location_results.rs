@@ -4,7 +4,7 @@ use serde::Serialize;
 use skinrig_model::Point2;
 
 use crate::locations::Locations;
-use crate::statistics::{Better, Interval, Pairing, Question, Sample, Settings, compare};
+use crate::statistics::{Better, ComparisonTarget, Interval, Pairing, Sample, Settings, compare};
 use crate::subject::Subject;
 
 /// Results of one skin at one location.
@@ -119,7 +119,7 @@ fn difference(a: &[f64], b: &[f64], settings: &Settings) -> Option<Interval> {
         high: None,
     };
     let sample = |v: &[f64]| Sample::mean((0..).zip(v.iter().copied()));
-    let question = Question {
+    let question = ComparisonTarget {
         better: Better::Lower,
         margin: None,
     };

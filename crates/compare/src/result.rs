@@ -8,7 +8,7 @@ use crate::comparability::{Difference, Severity, differences};
 use crate::location_results::{Location, compare_locations};
 use crate::locations::Locations;
 use crate::statistics::{Pairing, Settings, Verdict};
-use crate::subject::{Facts, Subject};
+use crate::subject::{SessionFacts, Subject};
 use crate::table::{Margins, Row, table};
 
 /// Options of a comparison.
@@ -34,7 +34,7 @@ pub struct Skin {
     /// Prototype, or the name that the user gave.
     pub name: String,
     /// Its sessions.
-    pub sessions: Vec<Facts>,
+    pub sessions: Vec<SessionFacts>,
     /// Scored presses attempted at the depths that all skins share.
     pub attempted: u32,
     /// Attempted presses that count.

@@ -8,7 +8,7 @@ use skinrig_model::SkinOutline;
 
 /// Everything known about a session besides its results.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Facts {
+pub struct SessionFacts {
     /// File name.
     pub file: String,
     /// Unique ID, independent of the file name.
@@ -32,7 +32,7 @@ pub struct Facts {
 #[derive(Debug, Clone)]
 pub struct Session {
     /// Facts of the session.
-    pub facts: Facts,
+    pub facts: SessionFacts,
     /// Results of the session.
     pub analysis: Analysis,
 }

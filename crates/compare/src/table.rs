@@ -5,8 +5,8 @@ use serde::Serialize;
 use crate::locations::Locations;
 use crate::metrics::{DisplayFormat, Metric};
 use crate::statistics::{
-    Adjusted, Comparison, Interval, PairSelection, Question, Sample, Settings, Verdict,
-    compare_all, estimate,
+    AdjustedComparison, Comparison, ComparisonTarget, Interval, PairSelection, Sample, Settings,
+    Verdict, compare_all, estimate,
 };
 use crate::subject::Subject;
 
@@ -30,7 +30,7 @@ pub struct BaselineComparison {
     /// Both over their shared locations, and their difference; `None` if they cannot be compared.
     pub comparison: Option<Comparison>,
     /// Corrected for the number of skins.
-    pub adjusted: Option<Adjusted>,
+    pub adjusted: Option<AdjustedComparison>,
     /// Final verdict, corrected for the number of skins.
     pub verdict: Option<Verdict>,
     /// Why they cannot be compared.
@@ -108,7 +108,7 @@ fn against<F: ToString>(
         verdict: None,
         error: Some(reason),
     };
-    let question = Question {
+    let question = ComparisonTarget {
         better: metric.better(),
         margin,
     };

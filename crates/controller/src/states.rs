@@ -388,7 +388,7 @@ mod tests {
     }
 
     #[test]
-    fn only_disarming_finishes_and_nothing_leaves_the_end() {
+    fn only_disarming_finishes_and_the_end_is_final() {
         for state in State::ALL {
             for event in EVENTS {
                 let (next, action) = transition(state, event);

@@ -50,7 +50,7 @@ fn all(to: &mut dyn TableWriter, rows_said: u64) -> Result<(), ExportError> {
 }
 
 #[test]
-fn files_get_their_names_when_they_are_whole() {
+fn files_are_renamed_when_complete() {
     let dir = tempfile::tempdir().unwrap();
     let folder = |overwrite| Folder::new(dir.path(), "s", overwrite).unwrap();
     let mut csv = CsvFiles::new(folder(false));

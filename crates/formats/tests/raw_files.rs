@@ -31,7 +31,7 @@ fn old_headers_end_at_the_first_word() {
 }
 
 #[test]
-fn new_headers_end_at_their_mark_whatever_follows() {
+fn headers_end_at_their_end_mark() {
     let text = "% format EVT3;height=720;width=1280\n% strange   two   words\n% end\n% \x01";
     let header = parse(text).unwrap();
     assert!(header.has_end);

@@ -324,13 +324,13 @@ fn a_chunk_that_ends_just_behind_a_block_is_decoded_whole() {
         let event = (3_u32 << 11 | 5).to_le_bytes();
         let chunk: Vec<u8> = std::iter::repeat_n(event, events).flatten().collect();
         // The time base is first, so that the chunk begins with an empty block and whole groups.
-        let (seen, decoder) = decode(StreamFormat::Evt2, &[&time, &chunk]);
+        let (observed, decoder) = decode(StreamFormat::Evt2, &[&time, &chunk]);
         assert_eq!(
             decoder.stats().cd_events(),
             events as u64,
             "{events} events"
         );
-        assert_eq!(seen.len(), events, "{events} events");
+        assert_eq!(observed.len(), events, "{events} events");
     }
 }
 

@@ -195,7 +195,7 @@ fn decode(format: StreamFormat, parts: &[&[u8]]) -> String {
 }
 
 #[test]
-fn all_vectors_decode_whole_and_at_every_split() {
+fn all_vectors_decode_completely_and_at_every_split() {
     assert_eq!(VECTORS.len(), 25);
     for (name, format, hex, expected) in VECTORS {
         let bytes = bytes_of(hex);

@@ -19,6 +19,7 @@ pub mod pulse;
 pub mod quantile;
 pub mod reason;
 pub mod record;
+pub mod rig_fault;
 pub mod scene;
 pub mod settings;
 pub mod skin;
@@ -40,13 +41,14 @@ pub use press::{
     PlannedPress, PressHistory, PressOutcome, PressRole, PressTiming, PressVerdict, Verdict,
 };
 pub use press_fault::PressFaultKind;
-pub use pulse::{Label, Mark, MarkKind, PulseTrain, SeenMark, SeenSync, SentMark};
+pub use pulse::{DecodedMark, DecodedSync, Label, Mark, MarkKind, PulseTrain, SentMark};
 pub use quantile::quantile;
 pub use reason::{InvalidReason, StopReason};
 pub use record::{
     DeviceIdentity, InterruptionKind, MotionCommand, Record, ResumeHeader, RunEnd, RunHeader,
     Setting,
 };
+pub use rig_fault::{RigFault, UnsupportedFault};
 pub use scene::{SceneNeed, SimLevel};
 pub use settings::{
     AlignmentSettings, AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings,

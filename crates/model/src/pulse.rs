@@ -277,7 +277,7 @@ impl PulseTrain {
 
 /// A mark decoded from a camera's trigger input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SeenMark {
+pub struct DecodedMark {
     /// Decoded mark.
     pub mark: Mark,
     /// Rising edge of its start pulse on the camera's clock, µs.
@@ -286,7 +286,7 @@ pub struct SeenMark {
 
 /// A sync train decoded from a camera's trigger input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SeenSync {
+pub struct DecodedSync {
     /// Running number, modulo 2^17.
     pub count: u32,
     /// Rising edge of its start pulse on the camera's clock, µs.

@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use serde::Serialize;
-use skinrig_model::{CameraId, HostDuration};
+use skinrig_model::{CameraId, HostDuration, RigFault};
 
 use skinrig_settings::{Collector, closest};
 use skinrig_settings::{Dimension, quantity};
@@ -14,109 +14,45 @@ use skinrig_settings::{Field, Shape, Value};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PlantedFault {
     /// Kind of the fault.
-    pub kind: FaultKind,
+    pub kind: RigFault,
     /// Time of the fault.
     pub when: FaultTime,
 }
 
-/// Kind of an injected fault.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FaultKind {
-    /// A camera stops answering.
-    CameraUnplugged(CameraId),
-    /// A camera stops sending without an error.
-    CameraStalled(CameraId),
-    /// A camera loses some bytes, and counts them.
-    CameraDrops(CameraId),
-    /// Hot pixels of a camera send a storm of events.
-    CameraStorm(CameraId),
-    /// The clock of a camera jumps forward.
-    CameraClockStep(CameraId),
-    /// A camera overheats, then cools down.
-    CameraHot(CameraId),
-    /// The next mark reaches no camera.
-    TriggerLost,
-    /// The next mark reaches the cameras twice.
-    TriggerDoubled,
-    /// The next mark reaches the cameras late.
-    TriggerDelayed,
-    /// The trigger box stops answering.
-    BoxSilent,
-    /// Noise on the trigger lines and in the box's reports.
-    BoxNoisy,
-    /// The robot stops answering; its brakes are on.
-    RobotLost,
-    /// The robot ignores all commands.
-    RobotStalled,
-    /// The robot follows its set point too slowly.
-    RobotSlow,
-    /// The robot reports its tip higher than it is: presses are deeper than planned.
-    RobotZHigh,
-    /// The robot reports its tip lower than it is: presses are shallower than planned.
-    RobotZLow,
-    /// The robot briefly reports a force beyond every limit.
-    RobotForceSpike,
-    /// The pose stream stops without an error.
-    RobotStale,
-    /// The recorder delays the run briefly.
-    RecorderSlow,
-    /// The disk is full.
-    DiskFull,
-    /// The process is killed, as by `kill -9`.
-    Killed,
-}
-
-/// Names of all kinds.
-const KINDS: [(&str, FaultKind); 27] = {
+/// Faults of a protocol; the simulated rig and the recorder inject them.
+const FAULTS: [RigFault; 27] = {
     use CameraId::{One, Two};
-    use FaultKind as K;
+    use RigFault as F;
     [
-        ("camera1-unplugged", K::CameraUnplugged(One)),
-        ("camera2-unplugged", K::CameraUnplugged(Two)),
-        ("camera1-stalled", K::CameraStalled(One)),
-        ("camera2-stalled", K::CameraStalled(Two)),
-        ("camera1-drops", K::CameraDrops(One)),
-        ("camera2-drops", K::CameraDrops(Two)),
-        ("camera1-storm", K::CameraStorm(One)),
-        ("camera2-storm", K::CameraStorm(Two)),
-        ("camera1-clock-step", K::CameraClockStep(One)),
-        ("camera2-clock-step", K::CameraClockStep(Two)),
-        ("camera1-hot", K::CameraHot(One)),
-        ("camera2-hot", K::CameraHot(Two)),
-        ("trigger-lost", K::TriggerLost),
-        ("trigger-doubled", K::TriggerDoubled),
-        ("trigger-delayed", K::TriggerDelayed),
-        ("box-silent", K::BoxSilent),
-        ("box-noisy", K::BoxNoisy),
-        ("robot-lost", K::RobotLost),
-        ("robot-stalled", K::RobotStalled),
-        ("robot-slow", K::RobotSlow),
-        ("robot-z-high", K::RobotZHigh),
-        ("robot-z-low", K::RobotZLow),
-        ("robot-force-spike", K::RobotForceSpike),
-        ("robot-stale", K::RobotStale),
-        ("recorder-slow", K::RecorderSlow),
-        ("disk-full", K::DiskFull),
-        ("killed", K::Killed),
+        F::CameraUnplugged(One),
+        F::CameraUnplugged(Two),
+        F::CameraStalled(One),
+        F::CameraStalled(Two),
+        F::CameraDrops(One),
+        F::CameraDrops(Two),
+        F::CameraStorm(One),
+        F::CameraStorm(Two),
+        F::CameraClockStep(One),
+        F::CameraClockStep(Two),
+        F::CameraHot(One),
+        F::CameraHot(Two),
+        F::TriggerLost,
+        F::TriggerDoubled,
+        F::TriggerDelayed,
+        F::BoxSilent,
+        F::BoxNoisy,
+        F::RobotLost,
+        F::RobotStalled,
+        F::RobotSlow,
+        F::RobotZHigh,
+        F::RobotZLow,
+        F::RobotForceSpike,
+        F::RobotStale,
+        F::RecorderSlow,
+        F::DiskFull,
+        F::Killed,
     ]
 };
-
-impl FaultKind {
-    /// The name in a protocol.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        KINDS
-            .iter()
-            .find(|(_, kind)| *kind == self)
-            .map_or("", |(name, _)| name)
-    }
-
-    /// True for a fault of the records rather than of a device.
-    #[must_use]
-    pub const fn is_of_records(self) -> bool {
-        matches!(self, Self::DiskFull | Self::Killed)
-    }
-}
 
 /// Time of a fault. Numbers count from 1, through the whole run: sync presses, surface searches and failed attempts
 /// count too.
@@ -169,19 +105,19 @@ const PHASES: [(&str, FaultPhase); 9] = [
 
 impl FaultTime {
     /// The valid times of `kind` if this one is invalid.
-    fn misfit(self, kind: FaultKind) -> Option<&'static str> {
+    fn misfit(self, kind: RigFault) -> Option<&'static str> {
         use FaultPhase as P;
         let fits = match self {
             Self::Preflight | Self::Arming | Self::Time(_) => !kind.is_of_records(),
-            Self::Seal => kind == FaultKind::Killed,
+            Self::Seal => kind == RigFault::Killed,
             Self::Nth(P::Press, _) => true,
             Self::Nth(P::Record | P::Journal, _) => kind.is_of_records(),
             Self::Nth(..) => !kind.is_of_records(),
         };
         match kind {
             _ if fits => None,
-            FaultKind::Killed => Some("`record:N`, `journal:N`, `press:N` or `seal`"),
-            FaultKind::DiskFull => Some("`record:N`, `journal:N` or `press:N`"),
+            RigFault::Killed => Some("`record:N`, `journal:N`, `press:N` or `seal`"),
+            RigFault::DiskFull => Some("`record:N`, `journal:N` or `press:N`"),
             _ => Some(OF_DEVICES),
         }
     }
@@ -191,13 +127,13 @@ const OF_DEVICES: &str = "`preflight`, `arming`, `time:SECONDS`, or `travel:N`, 
 
 /// Reason why a text is not a fault.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct NoFault {
+pub struct InvalidFault {
     expected: String,
     found: String,
     help: Option<String>,
 }
 
-impl fmt::Display for NoFault {
+impl fmt::Display for InvalidFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "expected {}, found `{}`", self.expected, self.found)?;
         match &self.help {
@@ -207,23 +143,22 @@ impl fmt::Display for NoFault {
     }
 }
 
-impl std::error::Error for NoFault {}
+impl std::error::Error for InvalidFault {}
 
 impl FromStr for PlantedFault {
-    type Err = NoFault;
+    type Err = InvalidFault;
 
-    fn from_str(text: &str) -> Result<Self, NoFault> {
+    fn from_str(text: &str) -> Result<Self, InvalidFault> {
         let (name, time) = text.trim().split_once('@').unwrap_or((text.trim(), ""));
-        let Some((_, kind)) = KINDS.iter().find(|(known, _)| *known == name) else {
-            let names = KINDS.map(|(name, _)| name);
+        let Some(kind) = FAULTS.into_iter().find(|fault| fault.name() == name) else {
+            let names = FAULTS.map(RigFault::name);
             let help = closest(name, names).map(|near| format!("did you mean `{near}`?"));
-            return Err(NoFault {
+            return Err(InvalidFault {
                 expected: format!("KIND@WHEN with a kind out of {}", names.join(", ")),
                 found: text.to_owned(),
                 help,
             });
         };
-        let kind = *kind;
         let when = match time.split_once(':') {
             None => match time {
                 "preflight" => Some(FaultTime::Preflight),
@@ -252,7 +187,7 @@ impl FromStr for PlantedFault {
         };
         match (when, misfit) {
             (Some(when), None) => Ok(Self { kind, when }),
-            (_, misfit) => Err(NoFault {
+            (_, misfit) => Err(InvalidFault {
                 expected: format!(
                     "{name}@WHEN with WHEN one of {}",
                     misfit.unwrap_or(OF_DEVICES)
@@ -301,7 +236,7 @@ pub(crate) fn faults(f: &Field, out: &mut Collector) -> Option<Vec<PlantedFault>
         };
         match text.parse() {
             Ok(fault) => Some(fault),
-            Err(NoFault {
+            Err(InvalidFault {
                 expected,
                 found,
                 help,
@@ -327,8 +262,8 @@ mod tests {
 
     #[test]
     fn every_kind_reads_back_as_it_is_shown() {
-        for (name, kind) in KINDS {
-            assert_eq!(kind.name(), name);
+        for kind in FAULTS {
+            let name = kind.name();
             let when = if kind.is_of_records() {
                 "journal:3"
             } else {
@@ -355,10 +290,11 @@ mod tests {
 
     #[test]
     fn invalid_faults_list_the_valid_ones() {
-        for (text, told) in [
+        for (text, message) in [
             ("", "a kind out of camera1-unplugged"),
             ("camera1-stall@hold:1", "did you mean `camera1-stalled`?"),
             ("camera3-stalled@hold:1", "did you mean"),
+            ("robot-power-lost@hold:1", "a kind out of"),
             ("robot-slow", "`preflight`"),
             ("robot-slow@seal", "`preflight`"),
             ("robot-slow@record:1", "`preflight`"),
@@ -375,7 +311,7 @@ mod tests {
         ] {
             let refused = text.parse::<PlantedFault>().map_err(|e| e.to_string());
             assert!(
-                refused.as_ref().is_err_and(|e| e.contains(told)),
+                refused.as_ref().is_err_and(|e| e.contains(message)),
                 "{text}: {refused:?}"
             );
         }

@@ -40,7 +40,7 @@ pub mod timing;
 
 pub use area::{Area, KeepOut, Surroundings};
 pub use check::{Segment, Violation, check};
-pub use faults::{FaultKind, FaultPhase, FaultTime, NoFault, PlantedFault};
+pub use faults::{FaultPhase, FaultTime, InvalidFault, PlantedFault};
 pub use limits::Limits;
 pub use phases::PressPhases;
 pub use plan::{OnTrip, Plan, PressStep, RunLimits, Step};

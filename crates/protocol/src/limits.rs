@@ -182,8 +182,8 @@ impl Margin {
             found,
         };
         let (value, range, unit) = match &key.shape {
-            Shape::Quantity(wanted, range) => {
-                let found = quantity::parse(value, wanted).map_err(|e| wrong(e.found))?;
+            Shape::Quantity(dimensions, range) => {
+                let found = quantity::parse(value, dimensions).map_err(|e| wrong(e.found))?;
                 (found.value, range, found.dimension.usual_unit())
             }
             Shape::Number(range) => {

@@ -189,14 +189,14 @@ fn csv_points(
     let (_, header) = *lines.first()?;
     let names: Vec<&str> = header.split(',').map(str::trim).collect();
     let mut columns = [0; 2];
-    for (slot, wanted) in columns.iter_mut().zip(["x", "y"]) {
-        match names.iter().position(|n| *n == wanted) {
+    for (slot, requested) in columns.iter_mut().zip(["x", "y"]) {
+        match names.iter().position(|n| *n == requested) {
             Some(column) => *slot = column,
             None => {
                 out.error(
                     Span::new(source, 0, header.len()),
                     "",
-                    format!("the column `{wanted}` is missing"),
+                    format!("the column `{requested}` is missing"),
                 )
                 .expected("a header line with `x` and `y`, separated by commas")
                 .found(quote(header));

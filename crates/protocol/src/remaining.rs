@@ -22,7 +22,7 @@ impl Plan {
         let unknown = PressHistory::default();
         let wants = |i: usize| {
             let history = histories.get(i).unwrap_or(&unknown);
-            self.retakes.wants(history)
+            self.retakes.should_retake(history)
         };
         let is_sync = |i: usize| {
             self.presses

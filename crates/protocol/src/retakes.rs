@@ -31,7 +31,7 @@ impl Retakes {
     /// or has an attempt left. Attempts lost to the rig or the operator do not count. If the plan was completed
     /// before, only presses whose last attempt was lost in this way are taken again.
     #[must_use]
-    pub fn wants(&self, history: &PressHistory) -> bool {
+    pub fn should_retake(&self, history: &PressHistory) -> bool {
         match &history.verdict {
             None | Some(PressVerdict::Missed(_)) => true,
             Some(PressVerdict::Valid | PressVerdict::Excluded(_)) => false,

@@ -265,11 +265,11 @@ fn points(list: &[Point2], at: &impl Fn(Point2) -> (f64, f64)) -> String {
 
 /// Locations of the first repetition at its first depth, in order; repeated ones once.
 fn first_visits(plan: &Plan) -> Vec<Point2> {
-    let mut seen = std::collections::HashSet::new();
+    let mut visited = std::collections::HashSet::new();
     plan.presses
         .iter()
         .filter(|p| p.role != PressRole::Sync && p.repetition == RepetitionId::default())
-        .filter(|p| seen.insert(p.location))
+        .filter(|p| visited.insert(p.location))
         .map(|p| p.at)
         .collect()
 }

@@ -134,7 +134,7 @@ pub(crate) fn distinct_presses(plan: &Plan) -> Vec<&PressStep> {
 }
 
 /// A press that does not fit between its start and the next one's.
-pub(crate) struct Misfit {
+pub(crate) struct TimingConflict {
     pub sync: bool,
     pub press: String,
     pub needed_s: f64,
@@ -145,8 +145,8 @@ pub(crate) struct Misfit {
 }
 
 /// The press that exceeds its period most, if any.
-pub(crate) fn first_misfit(plan: &Plan) -> Option<Misfit> {
-    let mut worst: Option<Misfit> = None;
+pub(crate) fn first_misfit(plan: &Plan) -> Option<TimingConflict> {
+    let mut worst: Option<TimingConflict> = None;
     let mut sync = false;
     let mut before: Option<&PressStep> = None;
     let mut position: Option<Point3<Skin>> = None;
@@ -172,10 +172,10 @@ pub(crate) fn first_misfit(plan: &Plan) -> Option<Misfit> {
                     let (motion, still) = press_s(&plan.limits, previous);
                     let needed = (motion + still + travel) * FIT_RESERVE;
                     let period = (start.0 - from.0) as f64 * 1e-9;
-                    let excess = |m: &Misfit| m.needed_s - m.period_s;
+                    let excess = |m: &TimingConflict| m.needed_s - m.period_s;
                     if needed > period && worst.as_ref().is_none_or(|w| needed - period > excess(w))
                     {
-                        worst = Some(Misfit {
+                        worst = Some(TimingConflict {
                             sync,
                             press: previous.press.to_string(),
                             needed_s: needed,

@@ -7,7 +7,7 @@ use skinrig_model::{RawChunk, Record, StreamFormat};
 
 use crate::codec::{self, Codec};
 use crate::error::WriteFailure;
-use crate::prepared::{Prepared, PreparedChunk, PreparedGap, PreparedRecord};
+use crate::prepared::{PreparedChunk, PreparedGap, PreparedRecord, PreparedResult};
 use crate::query::Fault;
 use crate::queue::Shared;
 
@@ -90,7 +90,7 @@ impl Preparer {
 }
 
 impl Preparer {
-    fn prepare(&mut self, record: Record) -> Prepared {
+    fn prepare(&mut self, record: Record) -> PreparedResult {
         match record {
             Record::Chunk(chunk) => Ok(PreparedRecord::Chunk(Box::new(self.chunk(chunk)?))),
             other => {

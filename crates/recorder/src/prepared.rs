@@ -6,7 +6,7 @@ use crate::codec::Codec;
 use crate::query::Fault;
 
 /// A record ready to write, or the reason why it cannot be written. Keeps its place in the order either way.
-pub(crate) type Prepared = Result<PreparedRecord, Fault>;
+pub(crate) type PreparedResult = Result<PreparedRecord, Fault>;
 
 /// A record ready to write.
 #[derive(Debug)]

@@ -8,7 +8,7 @@ use skinrig_model::Record;
 
 use crate::error::{RecorderError, WriteFailure};
 use crate::file_lock::RescueTargets;
-use crate::prepared::{Prepared, is_durable};
+use crate::prepared::{PreparedResult, is_durable};
 
 /// Most bytes of records that may wait to be written; beyond that, [`accept`](crate::SessionWriter::accept) blocks.
 const QUEUE_BYTES: usize = 64 << 20;
@@ -45,7 +45,7 @@ struct Queue {
     accepted: VecDeque<(Record, usize)>,
     /// True while a record is being prepared; it is then in neither `accepted` nor `prepared`.
     preparing: bool,
-    prepared: VecDeque<(Prepared, usize)>,
+    prepared: VecDeque<(PreparedResult, usize)>,
     /// Bytes accepted and not yet written.
     bytes: usize,
     /// Highest value of `bytes`, and how often a caller waited for space.
@@ -86,7 +86,7 @@ pub(crate) enum CloseMode {
 /// Next task of the writer thread.
 pub(crate) enum WriterTask {
     /// Write these records, each with its bytes in the queue.
-    Write(VecDeque<(Prepared, usize)>),
+    Write(VecDeque<(PreparedResult, usize)>),
     /// Commit: no record arrived in time.
     Commit,
     /// Close the session: everything is written.
@@ -183,7 +183,7 @@ impl Shared {
     }
 
     /// Passes on the result for the record that [`next_to_prepare`](Self::next_to_prepare) returned.
-    pub(crate) fn push_prepared(&self, prepared: Prepared, bytes: usize) {
+    pub(crate) fn push_prepared(&self, prepared: PreparedResult, bytes: usize) {
         let mut queue = self.lock();
         queue.preparing = false;
         if queue.failed.is_none() {

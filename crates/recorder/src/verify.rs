@@ -292,8 +292,8 @@ fn check_journal(reader: &SessionReader, report: &mut VerifyReport) {
 /// each kind is in order only among its own.
 fn check_box_reports(reader: &SessionReader, report: &mut VerifyReport) {
     let mut last = [BoxTime::default(); 3];
-    for (taken, said) in report.ok_or_add(reader.box_reports()).unwrap_or_default() {
-        let (like, at) = match said {
+    for (taken, box_report) in report.ok_or_add(reader.box_reports()).unwrap_or_default() {
+        let (like, at) = match box_report {
             BoxReport::Exchange { at, .. } => (0, at),
             BoxReport::Mark { at, .. } | BoxReport::Sync { at, .. } => (1, at),
             BoxReport::Input { at, .. } => (2, at),

@@ -11,7 +11,7 @@ use tokio::runtime::Runtime;
 use crate::close_result::{CloseResult, Sealed};
 use crate::error::{RecorderError, WriteFailure};
 use crate::insert::Journal;
-use crate::prepared::Prepared;
+use crate::prepared::PreparedResult;
 use crate::query::Fault;
 use crate::queue::{CloseMode, Shared, WriterTask};
 use crate::{rescue, seal};
@@ -103,7 +103,7 @@ impl Worker {
 
     fn write_all(
         &mut self,
-        records: VecDeque<(Prepared, usize)>,
+        records: VecDeque<(PreparedResult, usize)>,
         written: &mut u64,
     ) -> Result<(), Fault> {
         let mut durable = false;
@@ -174,8 +174,8 @@ async fn seal_session(mut journal: Journal, shared: &Shared) -> Result<Sealed, R
     let timeout = shared.seal_timeout();
     let from = Instant::now();
     let mode: String = loop {
-        let asked = sqlx::query_scalar("PRAGMA journal_mode = DELETE");
-        match asked.fetch_one(&mut conn).await {
+        let requested = sqlx::query_scalar("PRAGMA journal_mode = DELETE");
+        match requested.fetch_one(&mut conn).await {
             Ok(mode) => break mode,
             Err(e) if !is_held(&e) => return Err(sql(e.into())),
             Err(_) if from.elapsed() < timeout => {

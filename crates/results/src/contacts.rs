@@ -135,7 +135,7 @@ mod tests {
     use skinrig_model::Point3;
 
     #[test]
-    fn a_crossing_is_known_to_the_noise_over_the_speed() {
+    fn crossing_time_error_is_noise_over_speed() {
         let pose = |ms: i64, z_mm: f64| {
             let at = Point3::new(0.0, 0.0, z_mm);
             PoseSample {

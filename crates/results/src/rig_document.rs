@@ -6,7 +6,7 @@ use skinrig_model::{AnalysisSettings, PressId, RigGeometry};
 
 /// Content of `RunHeader::rig_json`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-#[serde(try_from = "RecordedRig")]
+#[serde(try_from = "StoredRigDocument")]
 pub struct RigDocument {
     /// Geometry for the analysis.
     pub geometry: RigGeometry,
@@ -18,16 +18,16 @@ pub struct RigDocument {
 
 /// [`RigDocument`] as written by any version.
 #[derive(Deserialize)]
-struct RecordedRig {
+struct StoredRigDocument {
     geometry: RigGeometry,
     analysis: Value,
     rig: Value,
 }
 
-impl TryFrom<RecordedRig> for RigDocument {
+impl TryFrom<StoredRigDocument> for RigDocument {
     type Error = serde_json::Error;
 
-    fn try_from(recorded: RecordedRig) -> Result<Self, Self::Error> {
+    fn try_from(recorded: StoredRigDocument) -> Result<Self, Self::Error> {
         let mut analysis = recorded.analysis;
         // Earlier versions counted excluded presses from 0, under another name.
         if let Some(settings) = analysis.as_object_mut()

@@ -253,12 +253,12 @@ pub fn closest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         return None;
     }
     let flat = |s: &str| s.to_lowercase().replace(['-', ' '], "_");
-    let wanted = flat(word);
+    let target = flat(word);
     candidates
         .into_iter()
-        .map(|c| (strsim::damerau_levenshtein(&wanted, &flat(c)), c))
+        .map(|c| (strsim::damerau_levenshtein(&target, &flat(c)), c))
         .filter(|(distance, c)| {
-            let shorter = c.chars().count().min(wanted.chars().count());
+            let shorter = c.chars().count().min(target.chars().count());
             *distance < shorter && *distance <= 1.max(shorter / 3)
         })
         .min_by_key(|(distance, _)| *distance)

@@ -301,13 +301,13 @@ pub(crate) fn split_number(text: &str) -> (Option<f64>, &str) {
     };
     let sign = usize::from(matches!(bytes.first(), Some(b'+' | b'-')));
     let mut end = digits(sign);
-    let mut seen = end > sign;
+    let mut has_digits = end > sign;
     if bytes.get(end) == Some(&b'.') {
         let fraction = digits(end + 1);
-        seen |= fraction > end + 1;
+        has_digits |= fraction > end + 1;
         end = fraction;
     }
-    if !seen {
+    if !has_digits {
         return (None, text);
     }
     if matches!(bytes.get(end), Some(b'e' | b'E')) {

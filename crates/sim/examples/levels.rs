@@ -97,8 +97,8 @@ fn measure(level: SimLevel, presses: usize) -> Result<(), DeviceError> {
             let index = chunk.camera.index();
             let rows = config.skin_rows[index];
             decoders[index].for_each_slice(&chunk.bytes, |slice| {
-                let seen = slice.iter().filter(|e| (rows.0..=rows.1).contains(&e.y));
-                window[index].extend(seen);
+                let observed = slice.iter().filter(|e| (rows.0..=rows.1).contains(&e.y));
+                window[index].extend(observed);
             });
         }
         samples.clear();

@@ -7,14 +7,14 @@ use skinrig_device::{
 };
 use skinrig_formats::{Scanner, evt2};
 use skinrig_model::{
-    CameraId, DeviceIdentity, DeviceRole, HostTime, RawChunk, SENSOR_HEIGHT, SENSOR_WIDTH, Setting,
-    StreamFormat,
+    CameraId, DeviceIdentity, DeviceRole, HostTime, RawChunk, RigFault, SENSOR_HEIGHT,
+    SENSOR_WIDTH, Setting, StreamFormat,
 };
 
 use crate::camera_stream::{Outgoing, Streaming};
 use crate::config::SimConfig;
 use crate::drifting::DriftingClock;
-use crate::faults::{Fault, FaultTrigger, HOT_C, HOT_NS, HOT_RISE_NS, STORM_NS};
+use crate::faults::{self, FaultTrigger, HOT_C, HOT_NS, HOT_RISE_NS, STORM_NS};
 use crate::line::LineEdge;
 use crate::pattern::ScanModel;
 use crate::random::{Purpose, Stream};
@@ -50,7 +50,7 @@ pub(crate) struct SimCamera {
     serial: String,
     chunk_bytes: usize,
     jitter_ns: i64,
-    read_back_fault: bool,
+    setting_ignored: Option<FaultTrigger>,
     lost: Vec<(FaultTrigger, u64)>,
     unplug: Option<FaultTrigger>,
     stall: Option<FaultTrigger>,
@@ -80,45 +80,25 @@ impl SimCamera {
         shared: Shared,
         make_pixels: PixelFactory,
     ) -> Self {
-        let mut lost = Vec::new();
-        let (mut unplug, mut stall, mut hot) = (None, None, None);
-        let (mut storms, mut steps) = (Vec::new(), Vec::new());
-        let mut read_back_fault = false;
-        for fault in &config.faults {
-            match *fault {
-                Fault::CameraBytesLost {
-                    camera,
-                    when,
-                    words,
-                } if camera == id => {
-                    lost.push((when, words));
-                }
-                Fault::CameraUnplugged { camera, when } if camera == id => unplug = Some(when),
-                Fault::CameraReadBack(camera) if camera == id => read_back_fault = true,
-                Fault::CameraStalled { camera, when } if camera == id => stall = Some(when),
-                Fault::CameraHot { camera, when } if camera == id => hot = Some(when),
-                Fault::HotPixelStorm { camera, when } if camera == id => storms.push(when),
-                Fault::ClockStep {
-                    camera,
-                    when,
-                    by_us,
-                } if camera == id => steps.push((when, by_us)),
-                _ => {}
-            }
-        }
+        let times = |kind: fn(CameraId) -> RigFault| faults::times(&config.faults, kind(id));
+        let sizes = config.fault_sizes;
         Self {
             shared,
             id,
             serial: format!("sim-{:08x}-c{}", config.seed as u32, id.number()),
             chunk_bytes: config.camera_clock.chunk_bytes.max(4) / 4 * 4,
             jitter_ns: config.camera_clock.trigger_jitter_ns.max(0),
-            read_back_fault,
-            lost,
-            unplug,
-            stall,
-            storms,
-            steps,
-            hot,
+            setting_ignored: times(RigFault::CameraSettingIgnored).next(),
+            lost: times(RigFault::CameraDrops)
+                .map(|when| (when, sizes.lost_words))
+                .collect(),
+            unplug: times(RigFault::CameraUnplugged).last(),
+            stall: times(RigFault::CameraStalled).last(),
+            storms: times(RigFault::CameraStorm).collect(),
+            steps: times(RigFault::CameraClockStep)
+                .map(|when| (when, sizes.clock_step_us))
+                .collect(),
+            hot: times(RigFault::CameraHot).last(),
             buffer_bytes: config.camera_clock.buffer_bytes.max(4) / 4 * 4,
             make_pixels,
             random: Stream::new(config.seed, Purpose::CameraClock, id.index() as u64),
@@ -209,7 +189,7 @@ impl SimCamera {
             return;
         };
         let index = self.id.index();
-        let struck = {
+        let due = {
             let mut world = self.shared.world();
             world.tips_since(index, stream.grid, &mut stream.tips);
             let jitter = |random: &mut Stream| (random.unit() * self.jitter_ns as f64) as i64;
@@ -239,12 +219,12 @@ impl SimCamera {
         let tips = std::mem::take(&mut stream.tips);
         for pair in tips.windows(2) {
             let (from, to) = (pair[0], pair[1]);
-            if struck.unplugged_ns.is_some_and(|t| t <= from.t_ns) {
+            if due.unplugged_ns.is_some_and(|t| t <= from.t_ns) {
                 self.gone = true;
                 break;
             }
             let within = |t: &i64| (from.t_ns..to.t_ns).contains(t);
-            let lose: u64 = struck
+            let lose: u64 = due
                 .losses
                 .iter()
                 .filter(|(t, _)| within(t))
@@ -254,15 +234,15 @@ impl SimCamera {
                 self.out.close(self.id, &mut self.scanner);
                 self.out.to_lose += lose;
             }
-            for (_, by_us) in struck.steps.iter().filter(|(t, _)| within(t)) {
+            for (_, by_us) in due.steps.iter().filter(|(t, _)| within(t)) {
                 clock = clock.stepped(i64::from(*by_us));
                 self.clock = Some(clock);
                 stream.encoder = evt2::Encoder::new(clock.own_us(from.t_ns));
             }
             let stormy = |t: &i64| (*t..*t + STORM_NS).contains(&from.t_ns);
-            let storm = struck.storms_ns.iter().any(stormy);
+            let storm = due.storms_ns.iter().any(stormy);
             stream.step(from, to, clock, &self.settings, storm);
-            if struck.stalled_ns.is_some_and(|t| t <= from.t_ns) {
+            if due.stalled_ns.is_some_and(|t| t <= from.t_ns) {
                 stream.fresh.clear();
                 continue;
             }
@@ -312,15 +292,15 @@ fn occurred(world: &World, when: Option<FaultTrigger>) -> Option<i64> {
 
 /// Takes the faults that have occurred, with their times.
 fn take_occurred<T: Copy>(world: &World, faults: &mut Vec<(FaultTrigger, T)>) -> Vec<(i64, T)> {
-    let mut struck = Vec::new();
+    let mut due = Vec::new();
     faults.retain(|&(when, what)| match occurred(world, Some(when)) {
         Some(t) => {
-            struck.push((t, what));
+            due.push((t, what));
             false
         }
         None => true,
     });
-    struck
+    due
 }
 
 impl EventCamera for SimCamera {
@@ -357,9 +337,12 @@ impl EventCamera for SimCamera {
             biases: biases.clone(),
             ..settings.clone()
         };
+        let ignores = self
+            .setting_ignored
+            .is_some_and(|when| self.shared.world().has_occurred(when));
         let mut read = Vec::new();
         for (name, value) in biases {
-            let found = if self.read_back_fault && name == "bias_fo" {
+            let found = if ignores && name == "bias_fo" {
                 value - 1
             } else {
                 value

@@ -6,7 +6,7 @@ use skinrig_model::{
 };
 
 use crate::contacts::Contacts;
-use crate::faults::Fault;
+use crate::faults::{Fault, FaultSizes};
 use crate::geometric::GeometricConfig;
 use crate::motion::MotionConfig;
 use crate::optical::OpticalConfig;
@@ -141,6 +141,8 @@ pub struct SimConfig {
     pub pressed_before: Vec<Point2>,
     /// Injected faults.
     pub faults: Vec<Fault>,
+    /// Sizes of the injected faults.
+    pub fault_sizes: FaultSizes,
 }
 
 /// Nominal geometry: cameras at the positions that the public code states as measured, (45, -35) and (45, 46), with an undistorted lens of
@@ -189,6 +191,7 @@ impl SimConfig {
             optical: OpticalConfig::default(),
             pressed_before: Vec::new(),
             faults: Vec::new(),
+            fault_sizes: FaultSizes::default(),
         }
     }
 

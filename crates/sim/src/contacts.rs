@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn contacts_elsewhere_and_their_order_have_no_effect() {
+    fn contacts_at_other_locations_and_their_order_have_no_effect() {
         let (grid, mut turned) = (grid(), grid());
         turned.reverse();
         let mut back = draws(&Contacts::default(), &turned);
@@ -113,10 +113,13 @@ mod tests {
             }
         }
         let places = [grid[0], grid[40], grid[0]];
-        let [first, _, again] = draws(&Contacts::default(), &places)[..] else {
+        let [first, _, repeated_press] = draws(&Contacts::default(), &places)[..] else {
             panic!("three draws");
         };
-        assert_ne!(first, again, "the same place again is another contact");
+        assert_ne!(
+            first, repeated_press,
+            "the same place again is another contact"
+        );
         // A run in two parts meets the same contacts as in one part.
         let whole = draws(&Contacts::default(), &grid);
         let rest = draws(&Contacts::after(&grid[..30]), &grid[30..]);

@@ -1,6 +1,6 @@
-//! Fault injection: faults of a simulated rig, as data.
+//! Fault injection: faults of a simulated rig, their times and their sizes.
 
-use skinrig_model::{CameraId, HostTime};
+use skinrig_model::{CameraId, HostTime, RigFault, UnsupportedFault};
 
 /// When a fault occurs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,7 +13,7 @@ pub enum FaultTrigger {
     Moment(MotionPhase, u32),
 }
 
-/// A motion phase as seen by the simulated robot. Every descent counts, including those that search for the surface and those of failed
+/// A motion phase of the simulated robot. Every descent counts, including those that search for the surface and those of failed
 /// attempts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MotionPhase {
@@ -31,84 +31,11 @@ pub enum MotionPhase {
     Between,
 }
 
-/// A fault.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A fault of a simulated rig.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fault {
-    /// The robot stops responding and brakes at its position. Seen as [`skinrig_device::DeviceError::Lost`].
-    IndenterLost(FaultTrigger),
-    /// The robot follows its set point with this percentage of its usual bandwidth: it settles late, or never in time.
-    Sluggish {
-        /// Start.
-        when: FaultTrigger,
-        /// 1 to 100.
-        percent: u32,
-    },
-    /// The tip is higher than the robot reports (negative: lower); the offset grows at `HEIGHT_OFF_MM_S`.
-    HeightOff {
-        /// Start.
-        when: FaultTrigger,
-        /// Offset, µm.
-        by_um: i32,
-    },
-    /// The tip stays in place and ignores commands; the pose stream continues.
-    IndenterStuck(FaultTrigger),
-    /// The robot reports a force that is `SPIKE_N` too high, for `SPIKE_NS`.
-    ForceSpike(FaultTrigger),
-    /// The pose stream stops without an error.
-    PosesStale(FaultTrigger),
-    /// A limit reads back with another value than written. Seen as
-    /// [`skinrig_device::DeviceError::ReadBack`].
-    IndenterReadBack,
-    /// A camera is unplugged. Data already sent is still delivered; then
-    /// [`skinrig_device::DeviceError::Lost`].
-    CameraUnplugged {
-        /// The camera.
-        camera: CameraId,
-        /// Time of the fault.
-        when: FaultTrigger,
-    },
-    /// The next `words` 32-bit words of a camera are lost; seen in `lost_before` of the next chunk.
-    CameraBytesLost {
-        /// The camera.
-        camera: CameraId,
-        /// Time of the fault.
-        when: FaultTrigger,
-        /// Number of words.
-        words: u64,
-    },
-    /// A camera stops sending without an error.
-    CameraStalled {
-        /// The camera.
-        camera: CameraId,
-        /// Time of the fault.
-        when: FaultTrigger,
-    },
-    /// [`STORM_PIXELS`] pixels of a camera send [`STORM_PER_MS`] events per millisecond each, for `STORM_NS`.
-    HotPixelStorm {
-        /// The camera.
-        camera: CameraId,
-        /// Time of the fault.
-        when: FaultTrigger,
-    },
-    /// A camera's clock jumps forward.
-    ClockStep {
-        /// The camera.
-        camera: CameraId,
-        /// Time of the fault.
-        when: FaultTrigger,
-        /// Size of the jump, µs.
-        by_us: u32,
-    },
-    /// A camera heats up by `HOT_C` within `HOT_RISE_NS`, stays hot for `HOT_NS`, and cools down as fast.
-    CameraHot {
-        /// The camera.
-        camera: CameraId,
-        /// Start.
-        when: FaultTrigger,
-    },
-    /// A bias reads back with another value than written. Seen as
-    /// [`skinrig_device::DeviceError::ReadBack`].
-    CameraReadBack(CameraId),
+    /// A fault of the shared vocabulary.
+    Timed(TimedFault),
     /// A pulse of a mark does not reach a camera. Seen as lost edges; a lost start pulse as stray edges and a missing mark.
     PulseLost {
         /// The camera.
@@ -118,36 +45,6 @@ pub enum Fault {
         /// Index of the pulse, from 0.
         pulse: u32,
     },
-    /// A camera's trigger input loses, doubles and invents edges, each as a percentage of the edges sent.
-    NoisyLine {
-        /// The camera.
-        camera: CameraId,
-        /// Edges that never arrive.
-        lost_percent: u8,
-        /// Edges that arrive twice, within 10 µs.
-        doubled_percent: u8,
-        /// Spurious edges anywhere within a train.
-        spurious_percent: u8,
-    },
-    /// The next mark does not reach the cameras, reaches them twice, or late; the box reports it as sent.
-    Mark {
-        /// Effect on the mark.
-        fate: MarkFault,
-        /// The first mark after this time is affected.
-        when: FaultTrigger,
-    },
-    /// The trigger inputs of both cameras lose, double and invent edges, 20 % each, and some data from the box to the host is unreadable. Seen
-    /// as [`skinrig_device::DeviceError::State`] when polled.
-    TriggerBoxNoisy(FaultTrigger),
-    /// The program stalls, for example because of a slow recorder: no device is polled meanwhile.
-    HostHeldUp {
-        /// Time of the fault.
-        when: FaultTrigger,
-        /// Duration, ms.
-        for_ms: u32,
-    },
-    /// The trigger box stops responding. Seen as [`skinrig_device::DeviceError::Lost`].
-    TriggerBoxLost(FaultTrigger),
     /// The n-th contact, counted from 0, produces no events in a camera (geometric level).
     DeadPress {
         /// The camera.
@@ -157,9 +54,115 @@ pub enum Fault {
     },
 }
 
+impl Fault {
+    /// A fault of the shared vocabulary at this time. Effects, with the sizes of [`FaultSizes`]:
+    ///
+    /// | fault | effect |
+    /// |---|---|
+    /// | `CameraUnplugged` | data already sent is still delivered, then [`Lost`](skinrig_device::DeviceError::Lost) |
+    /// | `CameraDrops` | the next words are lost; `lost_before` of the next chunk counts them |
+    /// | `CameraStorm` | [`STORM_PIXELS`] pixels send [`STORM_PER_MS`] events per ms each, for `STORM_NS` |
+    /// | `CameraHot` | heats up by `HOT_C` within `HOT_RISE_NS`, stays hot for `HOT_NS`, cools down as fast |
+    /// | `CameraSettingIgnored`, `RobotSettingIgnored` | [`ReadBack`](skinrig_device::DeviceError::ReadBack) of a bias or limit |
+    /// | `LineNoisy` | the trigger input loses, doubles and invents edges |
+    /// | `LineCut` | the trigger input loses all edges |
+    /// | `TriggerLost`, `TriggerDoubled`, `TriggerDelayed` | the box reports the next mark as sent |
+    /// | `BoxSilent` | [`Lost`](skinrig_device::DeviceError::Lost) |
+    /// | `BoxNoisy` | noise of 20 % on both lines, and unreadable data: [`State`](skinrig_device::DeviceError::State) |
+    /// | `RobotLost` | brakes at its position, then [`Lost`](skinrig_device::DeviceError::Lost) |
+    /// | `RobotStalled` | the tip stays in place, the pose stream continues |
+    /// | `RobotZHigh`, `RobotZLow` | the reported height drifts off at `Z_ERROR_MM_S` |
+    /// | `RobotForceSpike` | the reported force is `SPIKE_N` too high, for `SPIKE_NS` |
+    /// | `RecorderSlow` | no device is polled for a while |
+    ///
+    /// # Errors
+    /// [`UnsupportedFault`] for `RobotPowerLost`, `DiskFull` and `Killed`.
+    pub const fn new(kind: RigFault, when: FaultTrigger) -> Result<Self, UnsupportedFault> {
+        match kind {
+            RigFault::RobotPowerLost | RigFault::DiskFull | RigFault::Killed => {
+                Err(UnsupportedFault {
+                    fault: kind,
+                    rig: "the simulated rig",
+                })
+            }
+            _ => Ok(Self::Timed(TimedFault { kind, when })),
+        }
+    }
+
+    /// The fault in the shared vocabulary, if it has a name there.
+    #[must_use]
+    pub const fn kind(&self) -> Option<RigFault> {
+        match self {
+            Self::Timed(fault) => Some(fault.kind),
+            Self::PulseLost { .. } | Self::DeadPress { .. } => None,
+        }
+    }
+}
+
+/// A fault of the shared vocabulary that the simulated rig supports, and its time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TimedFault {
+    kind: RigFault,
+    when: FaultTrigger,
+}
+
+/// The times of the faults of one kind.
+pub(crate) fn times(faults: &[Fault], kind: RigFault) -> impl Iterator<Item = FaultTrigger> {
+    timed(faults).filter_map(move |(found, when)| (found == kind).then_some(when))
+}
+
+/// The faults of the shared vocabulary with their times.
+pub(crate) fn timed(faults: &[Fault]) -> impl Iterator<Item = (RigFault, FaultTrigger)> {
+    faults.iter().filter_map(|fault| match fault {
+        Fault::Timed(TimedFault { kind, when }) => Some((*kind, *when)),
+        _ => None,
+    })
+}
+
+/// Sizes of the faults of a rig.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FaultSizes {
+    /// 32-bit words lost by `CameraDrops`.
+    pub lost_words: u64,
+    /// Forward jump of `CameraClockStep`, µs.
+    pub clock_step_us: u32,
+    /// Edges affected by `LineNoisy`, percent of the edges sent.
+    pub line_noise: LineNoise,
+    /// Bandwidth of `RobotSlow`, percent of the usual one, 1 to 100: the robot settles late, or never in time.
+    pub slow_percent: u32,
+    /// Error of the height reported under `RobotZHigh` and `RobotZLow`, µm.
+    pub z_error_um: u32,
+    /// Duration of `RecorderSlow`, ms.
+    pub recorder_ms: u32,
+}
+
+impl Default for FaultSizes {
+    fn default() -> Self {
+        Self {
+            lost_words: 2_000,
+            clock_step_us: 300_000,
+            line_noise: BOX_NOISE,
+            slow_percent: 4,
+            z_error_um: 500,
+            recorder_ms: 800,
+        }
+    }
+}
+
+/// Noise of a trigger line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct LineNoise {
+    /// Edges that never arrive.
+    pub lost_percent: u8,
+    /// Edges that arrive twice, within 10 µs.
+    pub doubled_percent: u8,
+    /// Spurious edges anywhere within a train.
+    pub spurious_percent: u8,
+}
+
 /// Effect of a fault on a mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MarkFault {
+pub(crate) enum MarkFault {
     /// None of its pulses arrives.
     Lost,
     /// It arrives twice, one after the other.
@@ -168,6 +171,12 @@ pub enum MarkFault {
     Delayed,
 }
 
+/// Noise of both trigger lines while the box is noisy.
+pub(crate) const BOX_NOISE: LineNoise = LineNoise {
+    lost_percent: 20,
+    doubled_percent: 20,
+    spurious_percent: 20,
+};
 /// Delay of a delayed mark, ns.
 pub(crate) const DELAY_NS: i64 = 20_000_000;
 /// Duration of a force spike, ns.
@@ -175,7 +184,7 @@ pub(crate) const SPIKE_NS: i64 = 50_000_000;
 /// Height of a force spike, N; more than the robot can exert.
 pub(crate) const SPIKE_N: f64 = 20.0;
 /// Rate at which the true height deviates from the reported one, mm/s; slow enough for a small viscous force.
-pub(crate) const HEIGHT_OFF_MM_S: f64 = 10.0;
+pub(crate) const Z_ERROR_MM_S: f64 = 10.0;
 /// Number of pixels in an event storm.
 pub const STORM_PIXELS: u16 = 40;
 /// Events per pixel and millisecond.

@@ -85,7 +85,7 @@ impl GeometricConfig {
 
 /// A pressed location that is still relaxing.
 #[derive(Debug, Clone)]
-struct Site {
+struct RelaxingContact {
     at: Point2,
     /// Columns of the footprint's points.
     columns: Vec<f64>,
@@ -106,7 +106,7 @@ pub struct GeometricModel {
     events: Stream,
     hot: Vec<(u16, u16)>,
     hot_hz: f64,
-    sites: Vec<Site>,
+    sites: Vec<RelaxingContact>,
     touching: bool,
     /// Expected events until the next one.
     due: f64,
@@ -177,7 +177,7 @@ impl GeometricModel {
         };
         let columns = self.table.footprint(at, self.scene.tip_side_mm);
         let halo_px = c.halo_mm * self.table.columns_per_mm(at);
-        self.sites.push(Site {
+        self.sites.push(RelaxingContact {
             at,
             columns,
             halo_px,

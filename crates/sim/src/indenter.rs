@@ -1,10 +1,10 @@
 //! The simulated robot.
 
 use skinrig_device::{DeviceError, Indenter, IndenterCapabilities, MotionLimits, RobotSample};
-use skinrig_model::{DeviceIdentity, DeviceRole, Point3, Robot, Setting};
+use skinrig_model::{DeviceIdentity, DeviceRole, Point3, RigFault, Robot, Setting};
 
 use crate::config::SimConfig;
-use crate::faults::{Fault, FaultTrigger};
+use crate::faults::{self, FaultTrigger};
 use crate::world::{Shared, World};
 use skinrig_device::limits;
 
@@ -17,30 +17,23 @@ pub(crate) struct SimIndenter {
     limits: Option<MotionLimits>,
     lost: Option<FaultTrigger>,
     stale: Option<FaultTrigger>,
-    read_back_fault: bool,
+    setting_ignored: Option<FaultTrigger>,
 }
 
 impl SimIndenter {
     /// The robot of a rig.
     #[must_use]
     pub(crate) fn new(config: &SimConfig, shared: Shared) -> Self {
-        let lost = config.faults.iter().find_map(|f| match f {
-            Fault::IndenterLost(when) => Some(*when),
-            _ => None,
-        });
-        let stale = config.faults.iter().find_map(|f| match f {
-            Fault::PosesStale(when) => Some(*when),
-            _ => None,
-        });
+        let when = |kind| faults::times(&config.faults, kind).next();
         Self {
             shared,
             serial: format!("sim-{:08x}-r", config.seed as u32),
             workspace_mm: config.workspace_mm,
             max_acceleration_mm_s2: config.motion.acceleration_mm_s2,
             limits: None,
-            lost,
-            stale,
-            read_back_fault: config.faults.contains(&Fault::IndenterReadBack),
+            lost: when(RigFault::RobotLost),
+            stale: when(RigFault::RobotStale),
+            setting_ignored: when(RigFault::RobotSettingIgnored),
         }
     }
 
@@ -82,7 +75,10 @@ impl Indenter for SimIndenter {
         limits::check_limits(&self.serial, &self.capabilities(), limits)?;
         let mut world = self.shared.world();
         self.check_lost(&world)?;
-        if self.read_back_fault {
+        if self
+            .setting_ignored
+            .is_some_and(|when| world.has_occurred(when))
+        {
             return Err(DeviceError::ReadBack {
                 role: DeviceRole::Indenter,
                 serial: self.serial.clone(),

@@ -29,5 +29,5 @@ pub mod world;
 
 pub use clock::{PacedClock, SimClock};
 pub use config::SimConfig;
-pub use faults::{Fault, FaultTrigger, MarkFault, MotionPhase};
+pub use faults::{Fault, FaultSizes, FaultTrigger, LineNoise, MotionPhase};
 pub use rig::{in_real_time, simulated_rig};

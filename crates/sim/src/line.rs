@@ -7,7 +7,7 @@ use skinrig_model::{BoxReport, BoxTime, CameraId, Mark, PulseTrain};
 
 use crate::config::SimConfig;
 use crate::drifting::DriftingClock;
-use crate::faults::{DELAY_NS, Fault, MarkFault};
+use crate::faults::{DELAY_NS, Fault, LineNoise, MarkFault};
 use crate::random::{Purpose, Stream};
 
 /// Camera channel to which the trigger box is connected.
@@ -30,14 +30,6 @@ const REPORT_NS: i64 = 300_000;
 /// Duration of a train and the pause after it, ns of world time; the box's clock deviates by a few thousandths at most.
 const TRAIN_NS: i64 = PulseTrain::DURATION_US as i64 * 1_010;
 
-/// Line noise of one camera, in percent of the edges.
-#[derive(Debug, Clone, Copy, Default)]
-struct Noise {
-    lost: f64,
-    doubled: f64,
-    spurious: f64,
-}
-
 /// The trigger line.
 #[derive(Debug)]
 pub struct Line {
@@ -53,10 +45,10 @@ pub struct Line {
     sync_after_ns: i64,
     lost_pulses: Vec<(CameraId, u32, u32)>,
     /// Pending faults of marks.
-    doomed: VecDeque<MarkFault>,
-    /// Faults that were applied to a mark.
-    done: Vec<usize>,
-    noise: [Noise; 2],
+    mark_faults: VecDeque<MarkFault>,
+    /// Indices of the faults already applied to a mark.
+    applied: Vec<usize>,
+    noise: [LineNoise; 2],
     random: [Stream; 2],
     /// Edges that the cameras have not fetched yet.
     edges: [VecDeque<LineEdge>; 2],
@@ -73,30 +65,14 @@ impl Line {
         let random = |index: u64| Stream::new(config.seed, Purpose::TriggerBox, index);
         let clock = DriftingClock::draw(set.max_origin_s, set.max_drift_ppm, &mut random(1), 0);
         let sync_ns = clock.world_ns(i64::from(set.sync_period_ms) * 1_000_000);
-        let mut lost_pulses = Vec::new();
-        let mut noise = [Noise::default(); 2];
-        for fault in &config.faults {
-            match *fault {
-                Fault::PulseLost {
-                    camera,
-                    train,
-                    pulse,
-                } => lost_pulses.push((camera, train, pulse)),
-                Fault::NoisyLine {
-                    camera,
-                    lost_percent,
-                    doubled_percent,
-                    spurious_percent,
-                } => {
-                    noise[camera.index()] = Noise {
-                        lost: f64::from(lost_percent),
-                        doubled: f64::from(doubled_percent),
-                        spurious: f64::from(spurious_percent),
-                    };
-                }
-                _ => {}
-            }
-        }
+        let lost_pulse = |fault: &Fault| match *fault {
+            Fault::PulseLost {
+                camera,
+                train,
+                pulse,
+            } => Some((camera, train, pulse)),
+            _ => None,
+        };
         Self {
             clock,
             sync_ns,
@@ -105,10 +81,10 @@ impl Line {
             marks: 0,
             busy_until_ns: 0,
             sync_after_ns: 0,
-            lost_pulses,
-            doomed: VecDeque::new(),
-            done: Vec::new(),
-            noise,
+            lost_pulses: config.faults.iter().filter_map(lost_pulse).collect(),
+            mark_faults: VecDeque::new(),
+            applied: Vec::new(),
+            noise: [LineNoise::default(); 2],
             random: [random(3), random(4)],
             edges: [VecDeque::new(), VecDeque::new()],
             reports: VecDeque::new(),
@@ -122,21 +98,26 @@ impl Line {
         self.clock
     }
 
-    /// Makes edges of both cameras noisy from now on.
-    pub(crate) const fn add_noise(&mut self) {
-        let noise = Noise {
-            lost: 20.0,
-            doubled: 20.0,
-            spurious: 20.0,
+    /// Makes the edges of this camera noisy from now on.
+    pub(crate) const fn set_noise(&mut self, camera: CameraId, noise: LineNoise) {
+        self.noise[camera.index()] = noise;
+    }
+
+    /// Cuts the line of this camera.
+    pub(crate) const fn cut(&mut self, camera: CameraId) {
+        let cut = LineNoise {
+            lost_percent: 100,
+            doubled_percent: 0,
+            spurious_percent: 0,
         };
-        self.noise = [noise; 2];
+        self.set_noise(camera, cut);
     }
 
     /// Applies fault `n` to the next mark.
-    pub(crate) fn set_mark_fault(&mut self, n: usize, fate: MarkFault) {
-        if !self.done.contains(&n) {
-            self.done.push(n);
-            self.doomed.push_back(fate);
+    pub(crate) fn set_mark_fault(&mut self, n: usize, fault: MarkFault) {
+        if !self.applied.contains(&n) {
+            self.applied.push(n);
+            self.mark_faults.push_back(fault);
         }
     }
 
@@ -149,13 +130,12 @@ impl Line {
             }
             self.next_sync_ns += self.sync_ns;
             let train = PulseTrain::sync(self.syncs);
-            let report = |at| BoxReport::Sync {
+            let report = BoxReport::Sync {
                 count: self.syncs,
-                at,
+                at: self.time(start_ns),
             };
-            let report = report(self.time(start_ns));
             self.syncs = (self.syncs + 1) & skinrig_model::pulse::MAX_MARKED_PRESS;
-            self.tell(start_ns, report);
+            self.report(start_ns, report);
             self.add_train(train, start_ns, None);
             self.busy_until_ns = start_ns + TRAIN_NS;
             self.sync_after_ns = self.busy_until_ns;
@@ -171,14 +151,14 @@ impl Line {
     /// Sends the train of a mark whose first edge rises at `rise_ns`; the line is then busy until `until_ns`.
     pub fn send(&mut self, mark: Mark, train: PulseTrain, rise_ns: i64, until_ns: i64) {
         let at = self.time(rise_ns);
-        self.tell(rise_ns, BoxReport::Mark { mark, at });
-        let fate = self.doomed.pop_front();
-        let late_ns = match fate {
+        self.report(rise_ns, BoxReport::Mark { mark, at });
+        let fault = self.mark_faults.pop_front();
+        let late_ns = match fault {
             None | Some(MarkFault::Lost) => 0,
             Some(MarkFault::Doubled) => TRAIN_NS,
             Some(MarkFault::Delayed) => DELAY_NS,
         };
-        let (first, second) = match fate {
+        let (first, second) = match fault {
             None => (Some(rise_ns), None),
             Some(MarkFault::Lost) => (None, None),
             Some(MarkFault::Doubled) => (Some(rise_ns), Some(rise_ns + late_ns)),
@@ -198,7 +178,7 @@ impl Line {
     pub fn input(&mut self, t_ns: i64, rising: bool) {
         if self.input {
             let at = self.time(t_ns);
-            self.tell(t_ns, BoxReport::Input { rising, at });
+            self.report(t_ns, BoxReport::Input { rising, at });
         }
     }
 
@@ -218,7 +198,7 @@ impl Line {
         }
     }
 
-    fn tell(&mut self, t_ns: i64, report: BoxReport) {
+    fn report(&mut self, t_ns: i64, report: BoxReport) {
         let reaches = t_ns + REPORT_NS;
         let at = self.reports.partition_point(|(t, _)| *t <= reaches);
         self.reports.insert(at, (reaches, report));
@@ -229,28 +209,29 @@ impl Line {
         for camera in CameraId::ALL {
             let i = camera.index();
             let (noise, random) = (self.noise[i], &mut self.random[i]);
-            let mut strikes = |percent: f64| percent > 0.0 && random.unit() * 100.0 < percent;
-            let mut seen = Vec::new();
+            let mut strikes =
+                |percent: u8| percent > 0 && random.unit() * 100.0 < f64::from(percent);
+            let mut arriving = Vec::new();
             let mut extra = Vec::new();
             for (k, (offset_us, rising)) in (0u32..).zip(train.edges()) {
                 let pulse = k / 2;
                 let t_ns = rise_ns + self.clock.world_ns(offset_us as i64 * 1_000);
                 let edge = LineEdge { t_ns, rising };
-                let is_lost = strikes(noise.lost)
+                let is_lost = strikes(noise.lost_percent)
                     || mark.is_some_and(|n| self.lost_pulses.contains(&(camera, n, pulse)));
                 if !is_lost {
-                    seen.push(edge);
+                    arriving.push(edge);
                 }
-                if strikes(noise.doubled) {
+                if strikes(noise.doubled_percent) {
                     extra.push((edge, true));
                 }
-                if strikes(noise.spurious) {
+                if strikes(noise.spurious_percent) {
                     extra.push((edge, false));
                 }
             }
             for (edge, doubled) in extra {
                 let span_ns = PulseTrain::DURATION_US as f64 * 1_000.0;
-                seen.push(if doubled {
+                arriving.push(if doubled {
                     let t_ns = edge.t_ns + 1 + (random.unit() * BOUNCE_NS) as i64;
                     LineEdge { t_ns, ..edge }
                 } else {
@@ -260,8 +241,8 @@ impl Line {
                     }
                 });
             }
-            seen.sort_by_key(|edge| edge.t_ns);
-            self.edges[i].extend(seen);
+            arriving.sort_by_key(|edge| edge.t_ns);
+            self.edges[i].extend(arriving);
         }
     }
 }

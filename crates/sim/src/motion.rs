@@ -61,9 +61,9 @@ pub struct Motion {
     wander: [f64; 3],
     powered: bool,
     /// Factor on the lag frequency; reduced by a fault.
-    pub sluggish: f64,
+    pub bandwidth: f64,
     /// Whether a fault holds the tip in place.
-    pub stuck: bool,
+    pub stalled: bool,
 }
 
 impl Motion {
@@ -80,8 +80,8 @@ impl Motion {
             velocity: [0.0; 3],
             wander: [0.0; 3],
             powered: false,
-            sluggish: 1.0,
-            stuck: false,
+            bandwidth: 1.0,
+            stalled: false,
         }
     }
 
@@ -169,7 +169,7 @@ impl Motion {
 
     fn step_set_point(&mut self) {
         let a_dt = self.config.acceleration_mm_s2 * DT_S;
-        let wanted = match self.target {
+        let target_velocity = match self.target {
             None => [0.0; 3],
             Some((target, speed)) => {
                 let way: [f64; 3] = std::array::from_fn(|i| target[i] - self.set_point[i]);
@@ -185,7 +185,7 @@ impl Motion {
                 way.map(|c| c / left * v)
             }
         };
-        let change: [f64; 3] = std::array::from_fn(|i| wanted[i] - self.set_velocity[i]);
+        let change: [f64; 3] = std::array::from_fn(|i| target_velocity[i] - self.set_velocity[i]);
         let size = norm(change);
         let share = if size > a_dt { a_dt / size } else { 1.0 };
         for (i, by) in change.into_iter().enumerate() {
@@ -196,12 +196,12 @@ impl Motion {
 
     fn step_tip(&mut self) {
         let c = self.config;
-        let w = c.lag_rad_s * self.sluggish;
+        let w = c.lag_rad_s * self.bandwidth;
         let keep = 1.0 - DT_S / c.wander_s;
         let kick = c.wander_mm * (1.0 - keep * keep).sqrt();
         for i in 0..3 {
             let noise = self.noise.gauss();
-            if !self.powered || self.stuck {
+            if !self.powered || self.stalled {
                 continue; // braked; the draw keeps both random streams in step
             }
             let pull = w * w * (self.set_point[i] - self.tip[i]);

@@ -36,7 +36,7 @@ pub fn simulated_rig(config: &SimConfig) -> Rig {
         cameras: CameraId::ALL.map(camera),
         camera_settings: [settings.clone(), settings],
         trigger_box: Some(trigger_box),
-        clock: match StallingClock::new(shared.clone(), &config.faults) {
+        clock: match StallingClock::new(shared.clone(), config) {
             Some(stalling) => Box::new(stalling),
             None => Box::new(shared.clock.clone()),
         },

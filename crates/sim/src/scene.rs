@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn every_start_has_noise_of_its_own_and_the_same_pixels() {
+    fn every_start_has_new_noise_and_the_same_pixels() {
         for (first, second) in press(0, false).iter().zip(&press(1, false)) {
             assert_ne!(first, second);
             assert_eq!(hottest(first), hottest(second));

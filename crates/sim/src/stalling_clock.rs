@@ -1,28 +1,29 @@
 //! A clock that simulates a stalled program: the wait during which the fault occurs ends late.
 
 use skinrig_device::Clock;
-use skinrig_model::{HostDuration, HostTime};
+use skinrig_model::{HostDuration, HostTime, RigFault};
 
-use crate::faults::{Fault, FaultTrigger};
+use crate::config::SimConfig;
+use crate::faults::{self, FaultTrigger};
 use crate::world::Shared;
 
 /// Clock of a rig whose host stalls.
 pub(crate) struct StallingClock {
     shared: Shared,
-    faults: Vec<(FaultTrigger, u32)>,
+    stalls: Vec<FaultTrigger>,
+    stall: HostDuration,
 }
 
 impl StallingClock {
-    /// Clock of `shared` with the stall faults among `faults`; `None` without any.
-    pub(crate) fn new(shared: Shared, faults: &[Fault]) -> Option<Self> {
-        let faults: Vec<_> = faults
-            .iter()
-            .filter_map(|fault| match *fault {
-                Fault::HostHeldUp { when, for_ms } => Some((when, for_ms)),
-                _ => None,
-            })
-            .collect();
-        (!faults.is_empty()).then_some(Self { shared, faults })
+    /// Clock of `shared` with the stalls of `config`; `None` without any.
+    pub(crate) fn new(shared: Shared, config: &SimConfig) -> Option<Self> {
+        let stalls: Vec<_> = faults::times(&config.faults, RigFault::RecorderSlow).collect();
+        let stall = HostDuration::from_millis(i64::from(config.fault_sizes.recorder_ms));
+        (!stalls.is_empty()).then_some(Self {
+            shared,
+            stalls,
+            stall,
+        })
     }
 }
 
@@ -33,20 +34,16 @@ impl Clock for StallingClock {
 
     fn wait_until(&mut self, t: HostTime) {
         self.shared.clock.wait_until(t);
-        if self.faults.is_empty() {
+        let before = self.stalls.len();
+        if before == 0 {
             return;
         }
-        let mut held_ms = 0;
         {
             let world = self.shared.world();
-            self.faults.retain(|&(when, for_ms)| {
-                let struck = world.has_occurred(when);
-                held_ms += if struck { i64::from(for_ms) } else { 0 };
-                !struck
-            });
+            self.stalls.retain(|&when| !world.has_occurred(when));
         }
-        if held_ms > 0 {
-            let until = self.shared.clock.now() + HostDuration::from_millis(held_ms);
+        for _ in self.stalls.len()..before {
+            let until = self.shared.clock.now() + self.stall;
             self.shared.clock.wait_until(until);
         }
     }

@@ -3,12 +3,12 @@
 use skinrig_device::{DeviceError, TriggerBox, TriggerCapabilities};
 use skinrig_model::{
     BoxReport, BoxTime, DeviceIdentity, DeviceRole, HostDuration, HostTime, Mark, PulseTrain,
-    SentMark,
+    RigFault, SentMark,
 };
 
 use crate::config::{SimConfig, TriggerBoxConfig};
 use crate::drifting::DriftingClock;
-use crate::faults::{Fault, FaultTrigger};
+use crate::faults::{self, FaultTrigger};
 use crate::random::{Purpose, Stream};
 use crate::world::Shared;
 
@@ -36,14 +36,7 @@ impl SimTriggerBox {
     /// The box of a rig.
     #[must_use]
     pub(crate) fn new(config: &SimConfig, shared: Shared) -> Self {
-        let lost = config.faults.iter().find_map(|fault| match fault {
-            Fault::TriggerBoxLost(when) => Some(*when),
-            _ => None,
-        });
-        let noisy = config.faults.iter().find_map(|fault| match fault {
-            Fault::TriggerBoxNoisy(when) => Some(*when),
-            _ => None,
-        });
+        let when = |kind| faults::times(&config.faults, kind).next();
         Self {
             shared,
             config: config.trigger_box,
@@ -52,8 +45,8 @@ impl SimTriggerBox {
             delays: Stream::new(config.seed, Purpose::TriggerBox, 2),
             next_exchange_ns: 0,
             exchange: None,
-            lost,
-            noisy,
+            lost: when(RigFault::BoxSilent),
+            noisy: when(RigFault::BoxNoisy),
             noise_ns: None,
         }
     }

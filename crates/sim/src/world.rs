@@ -7,11 +7,13 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use skinrig_device::{Clock, RobotSample};
-use skinrig_model::{HostTime, Point3, RigidTransform, Robot, Skin};
+use skinrig_model::{CameraId, HostTime, Point3, RigFault, RigidTransform, Robot, Skin};
 
 use crate::clock::SimClock;
 use crate::config::SimConfig;
-use crate::faults::{Fault, FaultTrigger, HEIGHT_OFF_MM_S, SPIKE_N, SPIKE_NS};
+use crate::faults::{
+    self, BOX_NOISE, FaultSizes, FaultTrigger, MarkFault, SPIKE_N, SPIKE_NS, Z_ERROR_MM_S,
+};
 use crate::line::Line;
 use crate::motion::Motion;
 use crate::phase_tracker::PhaseTracker;
@@ -26,7 +28,8 @@ pub struct World {
     /// The robot.
     pub motion: Motion,
     skin_from_robot: RigidTransform<Skin, Robot>,
-    faults: Vec<Fault>,
+    faults: Vec<(RigFault, FaultTrigger)>,
+    sizes: FaultSizes,
     grid: i64,
     samples: VecDeque<RobotSample>,
     tips: VecDeque<TipSample>,
@@ -42,7 +45,7 @@ pub struct World {
     touching: bool,
     last_z_mm: f64,
     /// Height of the tip above the reported one because of a fault, mm.
-    height_off_mm: f64,
+    z_error_mm: f64,
     force_limit_n: f64,
     /// Whether the robot stopped by itself; the next rise releases it.
     tripped: bool,
@@ -58,7 +61,8 @@ impl World {
         let mut world = Self {
             motion: Motion::new(config.motion, config.seed, start),
             skin_from_robot: config.robot_from_skin.inverse(),
-            faults: config.faults.clone(),
+            faults: faults::timed(&config.faults).collect(),
+            sizes: config.fault_sizes,
             grid: 0,
             samples: VecDeque::new(),
             tips: VecDeque::new(),
@@ -70,7 +74,7 @@ impl World {
             phases: PhaseTracker::default(),
             touching: false,
             last_z_mm: config.start.z_mm,
-            height_off_mm: 0.0,
+            z_error_mm: 0.0,
             force_limit_n: f64::INFINITY,
             tripped: false,
             overloaded: false,
@@ -94,30 +98,47 @@ impl World {
 
     fn apply_faults(&mut self) {
         for n in 0..self.faults.len() {
-            match self.faults[n] {
-                Fault::Sluggish { when, percent } if self.has_occurred(when) => {
-                    self.motion.sluggish = f64::from(percent) / 100.0;
+            let (kind, when) = self.faults[n];
+            if !self.has_occurred(when) {
+                continue;
+            }
+            match kind {
+                RigFault::RobotSlow => {
+                    self.motion.bandwidth = f64::from(self.sizes.slow_percent) / 100.0;
                 }
-                Fault::IndenterLost(when) if self.has_occurred(when) => self.motion.power_off(),
-                Fault::HeightOff { when, by_um } if self.has_occurred(when) => {
-                    let most_mm = HEIGHT_OFF_MM_S * GRID_NS as f64 * 1e-9;
-                    let left_mm = f64::from(by_um) * 1e-3 - self.height_off_mm;
-                    self.height_off_mm += left_mm.clamp(-most_mm, most_mm);
+                RigFault::RobotLost => self.motion.power_off(),
+                RigFault::RobotStalled => self.motion.stalled = true,
+                // The robot reports its tip higher than it is: the tip is lower.
+                RigFault::RobotZHigh => self.move_z_error(-1.0),
+                RigFault::RobotZLow => self.move_z_error(1.0),
+                RigFault::LineCut(camera) => self.line.cut(camera),
+                RigFault::LineNoisy(camera) => {
+                    self.line.set_noise(camera, self.sizes.line_noise);
                 }
-                Fault::IndenterStuck(when) if self.has_occurred(when) => self.motion.stuck = true,
-                Fault::TriggerBoxNoisy(when) if self.has_occurred(when) => self.line.add_noise(),
-                Fault::Mark { fate, when } if self.has_occurred(when) => {
-                    self.line.set_mark_fault(n, fate)
+                RigFault::BoxNoisy => {
+                    for camera in CameraId::ALL {
+                        self.line.set_noise(camera, BOX_NOISE);
+                    }
                 }
+                RigFault::TriggerLost => self.line.set_mark_fault(n, MarkFault::Lost),
+                RigFault::TriggerDoubled => self.line.set_mark_fault(n, MarkFault::Doubled),
+                RigFault::TriggerDelayed => self.line.set_mark_fault(n, MarkFault::Delayed),
                 _ => {}
             }
         }
     }
 
+    /// Moves the error of the reported height by one step towards its size.
+    fn move_z_error(&mut self, sign: f64) {
+        let most_mm = Z_ERROR_MM_S * GRID_NS as f64 * 1e-9;
+        let left_mm = sign * f64::from(self.sizes.z_error_um) * 1e-3 - self.z_error_mm;
+        self.z_error_mm += left_mm.clamp(-most_mm, most_mm);
+    }
+
     /// True tip position on the skin, whatever the robot reports.
     fn true_tip(&self) -> Point3<Skin> {
         let mut tip = self.skin_from_robot.apply(self.motion.tip());
-        tip.z_mm += self.height_off_mm;
+        tip.z_mm += self.z_error_mm;
         tip
     }
 
@@ -144,9 +165,9 @@ impl World {
             self.phases.at_rest(t_ns, self.touching);
         }
         let (force_n, mut felt_n) = self.motion.force_n(-position.z_mm, rate);
-        for fault in &self.faults {
-            if let Fault::ForceSpike(when) = *fault
-                && let Some(from_ns) = self.occurred_at(when)
+        for (kind, when) in &self.faults {
+            if *kind == RigFault::RobotForceSpike
+                && let Some(from_ns) = self.occurred_at(*when)
                 && (from_ns..from_ns + SPIKE_NS).contains(&t_ns)
             {
                 felt_n += SPIKE_N;
@@ -192,12 +213,6 @@ impl World {
             FaultTrigger::Contact(n) => self.contact_times.get(n as usize).copied(),
             FaultTrigger::Moment(moment, n) => self.phases.when(moment, n),
         }
-    }
-
-    /// Faults of this rig.
-    #[must_use]
-    pub fn faults(&self) -> &[Fault] {
-        &self.faults
     }
 
     /// Number of contacts so far.

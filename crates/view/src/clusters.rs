@@ -6,11 +6,11 @@ use skinrig_analysis::grid::PixelGrid;
 use skinrig_analysis::segment::windows;
 use skinrig_model::{CameraId, PressId};
 
-use crate::opened::Opened;
+use crate::open_session::OpenSession;
 use crate::problem::Problem;
 
 /// Per camera: rows of the crop, window (s after contact), clusters (events, centroid), and pixels (column, row, events, cluster or -1).
-pub(crate) fn document(opened: &Opened, press: PressId) -> Result<Value, Problem> {
+pub(crate) fn document(opened: &OpenSession, press: PressId) -> Result<Value, Problem> {
     let known = &opened.known;
     let Some(analysis) = &known.analysis else {
         return Err(Problem::absent(format!(

@@ -8,7 +8,7 @@ use skinrig_results::Origin;
 
 use crate::folder::name_of;
 use crate::lab::Lab;
-use crate::opened::Opened;
+use crate::open_session::OpenSession;
 use crate::problem::Problem;
 
 /// Segments of each arc of the outline.
@@ -17,7 +17,7 @@ const ARC_SEGMENTS: u32 = 12;
 const RATE_BINS: usize = 240;
 
 /// The session, its presses, marks, notes and losses, and its analysis as far as there is one.
-pub(crate) fn document(lab: &dyn Lab, opened: &Opened) -> Result<Value, Problem> {
+pub(crate) fn document(lab: &dyn Lab, opened: &OpenSession) -> Result<Value, Problem> {
     let known = &opened.known;
     let header = &known.header;
     let reader = &opened.reader;

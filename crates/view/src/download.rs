@@ -6,14 +6,14 @@ use skinrig_export::{CsvFiles, Folder, NpzFile, Source, TableName, TableWriter};
 use skinrig_model::{Polarity, PoseSample};
 
 use crate::events::Window;
-use crate::opened::Opened;
+use crate::open_session::OpenSession;
 use crate::poses::Interval;
 use crate::problem::Problem;
 
 /// A table to download.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum What {
+pub(crate) enum DownloadTable {
     /// All presses.
     Presses,
     /// The robot's path in the window.
@@ -37,7 +37,7 @@ pub(crate) enum Format {
 /// A download.
 #[derive(Debug, Clone, Copy, Deserialize)]
 pub(crate) struct Request {
-    pub what: What,
+    pub what: DownloadTable,
     pub format: Format,
     /// Start of the window, s of session time.
     pub from_s: f64,
@@ -46,7 +46,7 @@ pub(crate) struct Request {
 }
 
 /// Name and bytes of the file.
-pub(crate) fn file(opened: &Opened, request: Request) -> Result<(String, Vec<u8>), Problem> {
+pub(crate) fn file(opened: &OpenSession, request: Request) -> Result<(String, Vec<u8>), Problem> {
     let place = tempfile::tempdir().map_err(Problem::internal)?;
     let stem = crate::folder::name_of(&opened.path);
     let stem = stem.trim_end_matches(skinrig_recorder::SESSION_SUFFIX);
@@ -68,7 +68,7 @@ pub(crate) fn file(opened: &Opened, request: Request) -> Result<(String, Vec<u8>
     Ok((crate::folder::name_of(&path), bytes))
 }
 
-fn write(opened: &Opened, request: Request, to: &mut dyn TableWriter) -> Result<(), Problem> {
+fn write(opened: &OpenSession, request: Request, to: &mut dyn TableWriter) -> Result<(), Problem> {
     let known = &opened.known;
     let Request { from_s, to_s, .. } = request;
     let events = |camera: u8| {
@@ -82,7 +82,7 @@ fn write(opened: &Opened, request: Request, to: &mut dyn TableWriter) -> Result<
         )
     };
     match request.what {
-        What::Presses => {
+        DownloadTable::Presses => {
             let analysis = known.analysis.as_ref();
             let source = Source {
                 reader: &opened.reader,
@@ -91,18 +91,18 @@ fn write(opened: &Opened, request: Request, to: &mut dyn TableWriter) -> Result<
             };
             source.write(TableName::Presses, to)?;
         }
-        What::Pose => {
+        DownloadTable::Pose => {
             let samples = crate::poses::read(opened, Interval { from_s, to_s })?;
             pose_table(&samples).write(to)?;
         }
-        What::EventsCamera1 => events(1)?.write(to)?,
-        What::EventsCamera2 => events(2)?.write(to)?,
+        DownloadTable::EventsCamera1 => events(1)?.write(to)?,
+        DownloadTable::EventsCamera2 => events(2)?.write(to)?,
     }
     Ok(())
 }
 
 /// Columns as in the table of all events.
-fn events_table(opened: &Opened, window: Window) -> Result<Table, Problem> {
+fn events_table(opened: &OpenSession, window: Window) -> Result<Table, Problem> {
     let camera = window.check()?;
     let events = crate::events::read(opened, &window)?;
     let time = |t: u64| i64::try_from(t).unwrap_or(i64::MAX);

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use skinrig_model::{CameraId, CdEvent, Polarity};
 use skinrig_results::events_between;
 
-use crate::opened::Opened;
+use crate::open_session::OpenSession;
 use crate::problem::Problem;
 
 /// Most events of one answer: 16 MB.
@@ -53,7 +53,7 @@ pub(crate) fn check_interval(from_s: f64, to_s: f64, longest_s: f64) -> Result<(
 }
 
 /// Events of the window in stream order, each with its time after the start, µs.
-pub(crate) fn read(opened: &Opened, window: &Window) -> Result<Vec<(u32, CdEvent)>, Problem> {
+pub(crate) fn read(opened: &OpenSession, window: &Window) -> Result<Vec<(u32, CdEvent)>, Problem> {
     let camera = window.check()?;
     let known = &opened.known;
     let clock = known.clocks[camera.index()].as_ref();
@@ -85,7 +85,7 @@ pub(crate) fn read(opened: &Opened, window: &Window) -> Result<Vec<(u32, CdEvent
 }
 
 /// The answer.
-pub(crate) fn bytes(opened: &Opened, window: &Window) -> Result<Vec<u8>, Problem> {
+pub(crate) fn bytes(opened: &OpenSession, window: &Window) -> Result<Vec<u8>, Problem> {
     let events = read(opened, window)?;
     let mut bytes = Vec::with_capacity(8 * events.len());
     for (after_us, event) in events {

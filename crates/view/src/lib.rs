@@ -21,7 +21,7 @@ mod events;
 mod folder;
 mod lab;
 mod live;
-mod opened;
+mod open_session;
 mod poses;
 mod problem;
 mod routes;

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use skinrig_model::{HostTime, PoseSample};
 
 use crate::events::check_interval;
-use crate::opened::Opened;
+use crate::open_session::OpenSession;
 use crate::problem::Problem;
 
 /// Longest interval, s.
@@ -23,7 +23,7 @@ pub(crate) struct Interval {
 }
 
 /// Measured poses: `every` n-th sample as time (s), x, y, z (mm, skin frame) and force (N).
-pub(crate) fn document(opened: &Opened, interval: Interval) -> Result<Value, Problem> {
+pub(crate) fn document(opened: &OpenSession, interval: Interval) -> Result<Value, Problem> {
     let samples = read(opened, interval)?;
     let every = samples.len().div_ceil(MOST_SAMPLES).max(1);
     let row = |s: &PoseSample| {
@@ -42,7 +42,7 @@ pub(crate) fn document(opened: &Opened, interval: Interval) -> Result<Value, Pro
 }
 
 /// All samples of the interval.
-pub(crate) fn read(opened: &Opened, interval: Interval) -> Result<Vec<PoseSample>, Problem> {
+pub(crate) fn read(opened: &OpenSession, interval: Interval) -> Result<Vec<PoseSample>, Problem> {
     check_interval(interval.from_s, interval.to_s, LONGEST_S)?;
     let at = HostTime::from_secs_f64;
     Ok(opened

@@ -18,7 +18,7 @@ use crate::access::{self, Token};
 use crate::folder::Folder;
 use crate::lab::Lab;
 use crate::live::Hub;
-use crate::opened::{Cache, Opened};
+use crate::open_session::{Cache, OpenSession};
 use crate::problem::Problem;
 use crate::{assets, clusters, control, differences, document, download, events, poses, shelf};
 
@@ -72,7 +72,7 @@ impl App {
 }
 
 impl Shared {
-    fn open(&self, named: &Named) -> Result<Opened, Problem> {
+    fn open(&self, named: &SessionQuery) -> Result<OpenSession, Problem> {
         let path = self.folder.session(&named.session)?;
         self.cache
             .open(&*self.lab, &path, named.analysis.as_deref())
@@ -81,7 +81,7 @@ impl Shared {
 
 /// A session of the folder.
 #[derive(Debug, Deserialize)]
-struct Named {
+struct SessionQuery {
     session: String,
     /// A variant; the official analysis without.
     #[serde(default)]
@@ -101,16 +101,16 @@ struct Numbered {
     press: u32,
 }
 
-type Asked<T> = Result<Query<T>, QueryRejection>;
-type Sent<T> = Result<Json<T>, JsonRejection>;
+type QueryInput<T> = Result<Query<T>, QueryRejection>;
+type JsonInput<T> = Result<Json<T>, JsonRejection>;
 type Answer = Result<Response, Problem>;
 
-fn query<T>(asked: Asked<T>) -> Result<T, Problem> {
+fn query<T>(asked: QueryInput<T>) -> Result<T, Problem> {
     let parsed = asked.map(|Query(parsed)| parsed);
     parsed.map_err(|e| Problem::request(e.body_text()))
 }
 
-fn body<T>(sent: Sent<T>) -> Result<T, Problem> {
+fn body<T>(sent: JsonInput<T>) -> Result<T, Problem> {
     let parsed = sent.map(|Json(parsed)| parsed);
     parsed.map_err(|e| Problem::new(e.status(), e.body_text()))
 }
@@ -180,7 +180,7 @@ async fn shelf_route(State(app): State<App>) -> Answer {
     Ok(Json(found).into_response())
 }
 
-async fn session(State(app): State<App>, named: Asked<Named>) -> Answer {
+async fn session(State(app): State<App>, named: QueryInput<SessionQuery>) -> Answer {
     let named = query(named)?;
     let answer = move |s: &Shared| document::document(&*s.lab, &s.open(&named)?);
     Ok(Json(app.compute(answer).await?).into_response())
@@ -188,8 +188,8 @@ async fn session(State(app): State<App>, named: Asked<Named>) -> Answer {
 
 async fn events_route(
     State(app): State<App>,
-    named: Asked<Named>,
-    window: Asked<events::Window>,
+    named: QueryInput<SessionQuery>,
+    window: QueryInput<events::Window>,
 ) -> Answer {
     let (named, window) = (query(named)?, query(window)?);
     window.check()?;
@@ -202,8 +202,8 @@ async fn events_route(
 
 async fn poses_route(
     State(app): State<App>,
-    named: Asked<Named>,
-    interval: Asked<poses::Interval>,
+    named: QueryInput<SessionQuery>,
+    interval: QueryInput<poses::Interval>,
 ) -> Answer {
     let (named, interval) = (query(named)?, query(interval)?);
     let answer = move |s: &Shared| poses::document(&s.open(&named)?, interval);
@@ -212,8 +212,8 @@ async fn poses_route(
 
 async fn clusters_route(
     State(app): State<App>,
-    named: Asked<Named>,
-    press: Asked<Numbered>,
+    named: QueryInput<SessionQuery>,
+    press: QueryInput<Numbered>,
 ) -> Answer {
     let (named, number) = (query(named)?, query(press)?.press);
     let index = number
@@ -226,8 +226,8 @@ async fn clusters_route(
 
 async fn download_route(
     State(app): State<App>,
-    named: Asked<Named>,
-    asked: Asked<download::Request>,
+    named: QueryInput<SessionQuery>,
+    asked: QueryInput<download::Request>,
 ) -> Answer {
     let (named, asked) = (query(named)?, query(asked)?);
     let answer = move |s: &Shared| download::file(&s.open(&named)?, asked);
@@ -246,7 +246,7 @@ async fn download_route(
     Ok(answer)
 }
 
-async fn differences_route(State(app): State<App>, pair: Asked<Pair>) -> Answer {
+async fn differences_route(State(app): State<App>, pair: QueryInput<Pair>) -> Answer {
     let pair = query(pair)?;
     let answer = move |s: &Shared| {
         let (a, b) = (s.folder.session(&pair.a)?, s.folder.session(&pair.b)?);
@@ -255,20 +255,20 @@ async fn differences_route(State(app): State<App>, pair: Asked<Pair>) -> Answer 
     Ok(Json(app.compute(answer).await?).into_response())
 }
 
-async fn live(State(app): State<App>, named: Asked<Named>) -> Answer {
+async fn live(State(app): State<App>, named: QueryInput<SessionQuery>) -> Answer {
     let named = query(named)?;
     let path = app.0.folder.session(&named.session)?;
     app.0.hub.stream(&app.0.lab, &path)
 }
 
-async fn control_route(State(app): State<App>, sent: Sent<control::ControlRequest>) -> Answer {
+async fn control_route(State(app): State<App>, sent: JsonInput<control::ControlRequest>) -> Answer {
     control::check(app.0.has_control)?;
     let asked = body(sent)?;
     let answer = move |s: &Shared| control::control(&*s.lab, &s.folder, &asked);
     Ok(Json(app.compute(answer).await?).into_response())
 }
 
-async fn note(State(app): State<App>, sent: Sent<control::NoteRequest>) -> Answer {
+async fn note(State(app): State<App>, sent: JsonInput<control::NoteRequest>) -> Answer {
     control::check(app.0.has_control)?;
     let asked = body(sent)?;
     let answer = move |s: &Shared| control::note(&*s.lab, &s.folder, &asked);

@@ -8,7 +8,7 @@ use skinrig::library::Program;
 use skinrig_view::{Options, Server};
 
 /// Status and whole answer of a request.
-fn ask(to: SocketAddr, head: &str, body: &str) -> (u16, String) {
+fn send_request(to: SocketAddr, head: &str, body: &str) -> (u16, String) {
     let mut stream = TcpStream::connect(to).unwrap();
     let length = body.len();
     let text = format!("{head}\r\nConnection: close\r\nContent-Length: {length}\r\n\r\n{body}");
@@ -21,7 +21,7 @@ fn ask(to: SocketAddr, head: &str, body: &str) -> (u16, String) {
 }
 
 #[test]
-fn only_the_own_page_with_the_token_gets_answers() {
+fn only_the_own_page_with_the_token_is_served() {
     let folder = tempfile::tempdir().unwrap();
     let options = Options {
         folder: folder.path().to_owned(),
@@ -34,7 +34,8 @@ fn only_the_own_page_with_the_token_gets_answers() {
     assert!(to.ip().is_loopback() && server.link().contains(&format!("#token={token}")));
     std::thread::spawn(move || server.run_until(std::future::pending()));
     let own = format!("Host: {to}\r\nAuthorization: Bearer {token}");
-    let get = |path: &str, more: &str| ask(to, &format!("GET {path} HTTP/1.1\r\n{more}"), "");
+    let get =
+        |path: &str, more: &str| send_request(to, &format!("GET {path} HTTP/1.1\r\n{more}"), "");
     let (status, page) = get("/", &format!("Host: {to}"));
     assert!(status == 200 && page.contains("content-security-policy: default-src 'none'"));
     assert_eq!(get("/api/shelf", &own).0, 200);
@@ -53,7 +54,7 @@ fn only_the_own_page_with_the_token_gets_answers() {
         403
     );
     let json = format!("{own}\r\nContent-Type: application/json");
-    let post = ask(to, &format!("POST /api/control HTTP/1.1\r\n{json}"), "{}");
+    let post = send_request(to, &format!("POST /api/control HTTP/1.1\r\n{json}"), "{}");
     assert!(post.0 == 403 && post.1.contains("only reads"), "{}", post.1);
     for query in [
         "/api/session",

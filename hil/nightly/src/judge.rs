@@ -3,7 +3,7 @@
 use crate::cause::Cause;
 use crate::evidence::Evidence;
 use crate::night::{Attempt, Part};
-use crate::rules::{Case, Ruling, apply_rules};
+use crate::rules::{Case, RuleResult, apply_rules};
 use crate::verdict::Verdict;
 
 /// The computer takes part in every check, so evidence about it concerns every device.
@@ -40,11 +40,16 @@ pub fn judge_attempt(
 
 /// Sort key. Of two equally severe rulings, the one that does not blame the computer wins, so that
 /// other faults stay visible.
-fn severity(ruling: &Ruling) -> (Verdict, bool) {
+fn severity(ruling: &RuleResult) -> (Verdict, bool) {
     (ruling.verdict, ruling.cause != Some(Cause::Infrastructure))
 }
 
-fn judge_part(part: &Part, parts: &[Part], evidence: &[Evidence], default_cause: Cause) -> Ruling {
+fn judge_part(
+    part: &Part,
+    parts: &[Part],
+    evidence: &[Evidence],
+    default_cause: Cause,
+) -> RuleResult {
     let concerns = |e: &&Evidence| {
         e.subject == part.subject
             || e.subject == COMPUTER
@@ -63,7 +68,7 @@ fn judge_part(part: &Part, parts: &[Part], evidence: &[Evidence], default_cause:
 }
 
 /// Judges an attempt without parts.
-fn judge_empty(evidence: &[Evidence], default_cause: Cause) -> Ruling {
+fn judge_empty(evidence: &[Evidence], default_cause: Cause) -> RuleResult {
     let all: Vec<&Evidence> = evidence.iter().collect();
     apply_rules(&Case {
         verdict: Verdict::worst([]),

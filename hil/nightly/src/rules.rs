@@ -7,7 +7,7 @@ use crate::verdict::Verdict;
 
 /// Result of the rules.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Ruling {
+pub struct RuleResult {
     /// Verdict after considering the evidence.
     pub verdict: Verdict,
     /// Where to look; `None` when the verdict is good.
@@ -136,7 +136,7 @@ pub struct Case<'a> {
 
 /// Applies the rules. A good verdict stands: evidence can explain a failure but cannot cause one.
 #[must_use]
-pub fn apply_rules(case: &Case<'_>) -> Ruling {
+pub fn apply_rules(case: &Case<'_>) -> RuleResult {
     let Case {
         verdict,
         exceeds_limit,
@@ -144,7 +144,7 @@ pub fn apply_rules(case: &Case<'_>) -> Ruling {
         evidence,
     } = *case;
     if verdict.is_good() {
-        return Ruling {
+        return RuleResult {
             verdict,
             cause: None,
             rule: None,
@@ -155,12 +155,12 @@ pub fn apply_rules(case: &Case<'_>) -> Ruling {
         explains && evidence.iter().any(|e| rule.kinds.contains(&e.kind))
     };
     RULES.iter().find(matches).map_or(
-        Ruling {
+        RuleResult {
             verdict,
             cause: Some(default_cause),
             rule: None,
         },
-        |rule| Ruling {
+        |rule| RuleResult {
             verdict: rule.verdict,
             cause: Some(rule.cause.unwrap_or(default_cause)),
             rule: Some(rule.name),

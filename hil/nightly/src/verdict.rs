@@ -125,7 +125,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_worst_child_wins_and_nothing_measured_is_a_failure() {
+    fn the_worst_child_decides_and_no_measurement_is_a_failure() {
         use Verdict::*;
         assert_eq!(Verdict::worst([]), Fail);
         assert_eq!(Verdict::worst([Skipped]), Skipped);

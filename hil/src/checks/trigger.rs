@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use skinrig_analysis::timebase::{NoCameraClock, Wire, WireTrain, wire};
+use skinrig_analysis::timebase::{CameraClockError, Wire, WireTrain, wire};
 use skinrig_model::pulse::{MAX_MARKED_PRESS, PULSES_PER_TRAIN, decode_marks};
 use skinrig_model::{
     BoxReport, CameraId, HostDuration, Label, Mark, MarkKind, PressId, RawChunk, TriggerEdge,
@@ -128,7 +128,7 @@ struct LineQuality {
     /// Jitter, s, and the number of edges behind it.
     jitter: Option<(f64, u64)>,
     /// Why the camera clock could not be fitted. Pulses are then only counted, not matched.
-    unfitted: Option<NoCameraClock>,
+    unfitted: Option<CameraClockError>,
 }
 
 impl LineQuality {

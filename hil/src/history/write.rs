@@ -81,8 +81,8 @@ async fn check(tx: &mut Rows<'_>, night: i64, check: &CheckResult) -> Result<(),
         .bind(whole(check.attempts.len() as u64))
         .execute(&mut **tx)
         .await?;
-    for (attempt, made) in (1..).zip(&check.attempts) {
-        for part in &made.parts {
+    for (attempt, record) in (1..).zip(&check.attempts) {
+        for part in &record.parts {
             for m in &part.measurements {
                 measurement(tx, (night, &check.name, attempt), part, m).await?;
             }

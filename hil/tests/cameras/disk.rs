@@ -35,7 +35,7 @@ impl Drop for Folder {
 }
 
 #[test]
-fn what_is_written_comes_back_and_nothing_stays() {
+fn written_data_read_back_and_no_file_remains() {
     let folder = Folder::new("disk-well");
     let inner = folder.0.join("sessions"); // does not exist yet
     let found = bench(&inner).run_check(DISK);

@@ -1,8 +1,8 @@
 //! Checks `identity` and `settings`.
 
-use skinrig_model::{CameraId, SimLevel};
+use skinrig_model::{CameraId, HostTime, RigFault, SimLevel};
 use skinrig_nightly::EvidenceKind;
-use skinrig_sim::Fault;
+use skinrig_sim::{Fault, FaultTrigger};
 
 use crate::bench::{SimBench, kinds_and_subjects, number, value};
 
@@ -58,7 +58,9 @@ fn accepted_settings_are_noted_and_others_count_as_differences() {
         let note = value(&found, camera, "differences").note.clone().unwrap();
         assert!(note.contains("bias_fo 1477"), "{note}");
     }
-    let found = known(vec![Fault::CameraReadBack(CameraId::Two)]).run_check(SETTINGS);
+    let ignored = RigFault::CameraSettingIgnored(CameraId::Two);
+    let ignored = Fault::new(ignored, FaultTrigger::At(HostTime::ZERO)).unwrap();
+    let found = known(vec![ignored]).run_check(SETTINGS);
     assert_eq!(number(&found, "camera1", "differences"), 0.0);
     assert_eq!(number(&found, "camera2", "differences"), 1.0);
     assert_eq!(

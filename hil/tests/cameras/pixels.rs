@@ -1,7 +1,7 @@
 //! Checks `idle`, `test_pattern` and `noise_*`.
 
 use skinrig_device::DeviceError;
-use skinrig_model::{CameraId, DeviceRole, HostTime, SimLevel};
+use skinrig_model::{CameraId, DeviceRole, HostTime, RigFault, SimLevel};
 use skinrig_nightly::{Evidence, EvidenceKind};
 use skinrig_protocol::suite::Light;
 use skinrig_sim::faults::{STORM_PER_MS, STORM_PIXELS};
@@ -15,16 +15,18 @@ const LIT: &str = "noise_lit: {duration: 4 s, hot_above: 20 ev/s, rate: {at_most
 const DARK: &str = "noise_dark: {duration: 1 s, hot_above: 20 ev/s, rate: {at_most: 1 Mev/s}}";
 const CAMERAS: [&str; 2] = ["camera1", "camera2"];
 
-fn at(seconds: f64) -> FaultTrigger {
-    FaultTrigger::At(HostTime::from_secs_f64(seconds))
+/// A fault of camera 2.
+fn fault(kind: fn(CameraId) -> RigFault, seconds: f64) -> Fault {
+    let when = FaultTrigger::At(HostTime::from_secs_f64(seconds));
+    Fault::new(kind(CameraId::Two), when).unwrap()
 }
 
-fn lost(when: FaultTrigger) -> Fault {
-    Fault::CameraBytesLost {
-        camera: CameraId::Two,
-        when,
-        words: 250,
-    }
+/// A bench whose camera 2 loses 1,000 bytes at each of these times.
+fn lossy(seconds: &[f64]) -> SimBench {
+    let drops = seconds.iter().map(|s| fault(RigFault::CameraDrops, *s));
+    let mut bench = SimBench::new(SimLevel::Kinematic, drops.collect());
+    bench.config.fault_sizes.lost_words = 250;
+    bench
 }
 
 #[test]
@@ -42,8 +44,7 @@ fn a_quiet_stream_has_its_rate_and_no_gap() {
 
 #[test]
 fn lost_bytes_are_counted_on_their_camera() {
-    let found =
-        SimBench::new(SimLevel::Kinematic, vec![lost(at(1.0)), lost(at(0.2))]).run_check(IDLE);
+    let found = lossy(&[1.0, 0.2]).run_check(IDLE);
     assert_eq!(number(&found, "camera1", "lost"), 0.0);
     // Losses before counting starts do not count.
     assert_eq!(number(&found, "camera2", "lost"), 1000.0);
@@ -56,17 +57,12 @@ fn lost_bytes_are_counted_on_their_camera() {
 
 #[test]
 fn a_stalled_camera_ends_the_wait() {
-    let stalled = Fault::CameraStalled {
-        camera: CameraId::Two,
-        when: at(2.3), // so late that only the end of the check can detect it
-    };
+    // So late that only the end of the check can detect it.
+    let stalled = fault(RigFault::CameraStalled, 2.3);
     for (check, metric) in [(IDLE, "gaps"), (PATTERN, "received"), (LIT, "rate")] {
-        let mut faults = vec![stalled.clone()];
+        let mut faults = vec![stalled];
         if check == PATTERN {
-            faults = vec![Fault::CameraStalled {
-                camera: CameraId::Two,
-                when: at(1.4),
-            }];
+            faults = vec![fault(RigFault::CameraStalled, 1.4)];
         }
         let found = SimBench::new(SimLevel::Kinematic, faults).run_check(check);
         assert_eq!(
@@ -99,7 +95,7 @@ fn the_pattern_arrives_completely_and_is_switched_off_afterwards() {
 
 #[test]
 fn losses_in_the_pattern_show_in_every_metric() {
-    let found = SimBench::new(SimLevel::Kinematic, vec![lost(at(1.0))]).run_check(PATTERN);
+    let found = lossy(&[1.0]).run_check(PATTERN);
     assert_eq!(number(&found, "camera2", "lost"), 1000.0);
     assert!(number(&found, "camera2", "gaps") >= 1.0);
     assert!(number(&found, "camera2", "received") < 99.99);
@@ -134,10 +130,7 @@ fn noise_and_hot_pixels_are_those_of_the_scene() {
 
 #[test]
 fn a_storm_of_hot_pixels_is_counted_pixel_by_pixel() {
-    let storm = Fault::HotPixelStorm {
-        camera: CameraId::Two,
-        when: at(2.0),
-    };
+    let storm = fault(RigFault::CameraStorm, 2.0);
     let found = SimBench::new(SimLevel::Kinematic, vec![storm]).run_check(LIT);
     assert_eq!(number(&found, "camera1", "hot_pixels"), 0.0);
     assert_eq!(

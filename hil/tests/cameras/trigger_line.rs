@@ -1,8 +1,8 @@
 //! Checks `trigger_loopback` and `clocks`.
 
-use skinrig_model::{CameraId, HostTime, SimLevel};
+use skinrig_model::{CameraId, HostTime, RigFault, SimLevel};
 use skinrig_nightly::EvidenceKind;
-use skinrig_sim::{Fault, FaultTrigger, MarkFault};
+use skinrig_sim::{Fault, FaultTrigger, LineNoise};
 
 use crate::bench::{SimBench, kinds_and_subjects, number, value};
 
@@ -14,8 +14,9 @@ fn bench(faults: Vec<Fault>) -> SimBench {
     SimBench::new(SimLevel::Kinematic, faults)
 }
 
-fn at(seconds: f64) -> FaultTrigger {
-    FaultTrigger::At(HostTime::from_secs_f64(seconds))
+fn fault(kind: RigFault, seconds: f64) -> Fault {
+    let when = FaultTrigger::At(HostTime::from_secs_f64(seconds));
+    Fault::new(kind, when).unwrap()
 }
 
 #[test]
@@ -58,13 +59,13 @@ fn lost_pulses_are_counted_on_the_camera_that_lost_them() {
 
 #[test]
 fn a_noisy_line_shows_lost_and_extra_pulses() {
-    let noisy = Fault::NoisyLine {
-        camera: CameraId::One,
+    let mut bench = bench(vec![fault(RigFault::LineNoisy(CameraId::One), 0.0)]);
+    bench.config.fault_sizes.line_noise = LineNoise {
         lost_percent: 3,
         doubled_percent: 2,
         spurious_percent: 3,
     };
-    let found = bench(vec![noisy]).run_check(LOOPBACK);
+    let found = bench.run_check(LOOPBACK);
     // 1280 edges plus sync trains: 3 % lost over nearly as many pulses, and 5 % extra.
     let (lost, extra) = (
         number(&found, "camera1", "lost_pulses"),
@@ -81,13 +82,12 @@ fn a_noisy_line_shows_lost_and_extra_pulses() {
 
 #[test]
 fn a_mark_that_is_not_sent_counts_as_lost_and_a_doubled_one_as_extra() {
-    let fate = |fate, s| Fault::Mark { fate, when: at(s) };
-    let found = bench(vec![fate(MarkFault::Lost, 0.5)]).run_check(LOOPBACK);
+    let found = bench(vec![fault(RigFault::TriggerLost, 0.5)]).run_check(LOOPBACK);
     for camera in CAMERAS {
         assert_eq!(number(&found, camera, "lost_pulses"), 32.0);
         assert_eq!(number(&found, camera, "unread_trains"), 1.0);
     }
-    let found = bench(vec![fate(MarkFault::Doubled, 0.5)]).run_check(LOOPBACK);
+    let found = bench(vec![fault(RigFault::TriggerDoubled, 0.5)]).run_check(LOOPBACK);
     for camera in CAMERAS {
         assert_eq!(number(&found, camera, "lost_pulses"), 0.0);
         assert_eq!(number(&found, camera, "extra_pulses"), 64.0);
@@ -123,8 +123,8 @@ fn without_a_box_the_checks_do_not_apply_and_a_lost_box_is_reported() {
             found.not_applicable.is_some() && found.values.is_empty(),
             "{found:?}"
         );
-        for when in [at(0.0), at(0.8)] {
-            let lost = bench(vec![Fault::TriggerBoxLost(when)]).run_check(check);
+        for seconds in [0.0, 0.8] {
+            let lost = bench(vec![fault(RigFault::BoxSilent, seconds)]).run_check(check);
             assert_eq!(
                 kinds_and_subjects(&lost),
                 [(EvidenceKind::DeviceLost, "trigger box")]
@@ -161,12 +161,9 @@ fn drifts_are_those_of_the_clocks_within_the_stated_interval() {
 
 #[test]
 fn a_clock_that_jumps_leaves_a_residual() {
-    let step = Fault::ClockStep {
-        camera: CameraId::Two,
-        when: at(5.0),
-        by_us: 700,
-    };
-    let found = bench(vec![step]).run_check(CLOCKS);
+    let mut bench = bench(vec![fault(RigFault::CameraClockStep(CameraId::Two), 5.0)]);
+    bench.config.fault_sizes.clock_step_us = 700;
+    let found = bench.run_check(CLOCKS);
     assert!(number(&found, "camera1", "residual") < 2e-6);
     let residual = value(&found, "camera2", "residual");
     assert!(residual.value > Some(100e-6), "{residual:?}");
@@ -174,18 +171,8 @@ fn a_clock_that_jumps_leaves_a_residual() {
 
 #[test]
 fn a_silent_or_unplugged_camera_does_not_affect_the_other_one() {
-    let camera = CameraId::One;
-    for fault in [
-        Fault::CameraStalled {
-            camera,
-            when: at(1.0),
-        },
-        Fault::CameraUnplugged {
-            camera,
-            when: at(1.0),
-        },
-    ] {
-        let mut bench = bench(vec![fault]);
+    for kind in [RigFault::CameraStalled, RigFault::CameraUnplugged] {
+        let mut bench = bench(vec![fault(kind(CameraId::One), 1.0)]);
         let found = bench.run_check(CLOCKS);
         assert_eq!(
             kinds_and_subjects(&found),

@@ -183,13 +183,13 @@ fn an_unusable_lease_file_is_reported() {
 }
 
 /// Another process that tries to take the lease.
-struct Rival {
+struct CompetingProcess {
     child: Child,
     stdin: ChildStdin,
     lines: Receiver<String>,
 }
 
-impl Rival {
+impl CompetingProcess {
     /// Starts the process, which waits for `go`.
     fn start(path: &Path) -> Self {
         let mut child = Command::new(std::env::current_exe().unwrap())
@@ -233,7 +233,7 @@ impl Rival {
     }
 }
 
-/// The process that [`Rival`] starts; not a test.
+/// The process that [`CompetingProcess`] starts; not a test.
 #[test]
 #[ignore = "not a test: other tests start it as their second process"]
 fn rival() {
@@ -254,14 +254,15 @@ fn exactly_one_of_several_processes_gets_the_lease() {
     let folder = tempfile::tempdir().unwrap();
     let path = path_of(folder.path(), "omega3-7");
     for _ in 0..3 {
-        let mut rivals: Vec<Rival> = (0..4).map(|_| Rival::start(&path)).collect();
+        let mut rivals: Vec<CompetingProcess> =
+            (0..4).map(|_| CompetingProcess::start(&path)).collect();
         for rival in &mut rivals {
             rival.go();
         }
-        let answers: Vec<String> = rivals.iter().map(Rival::read_line).collect();
+        let answers: Vec<String> = rivals.iter().map(CompetingProcess::read_line).collect();
         let taken = answers.iter().filter(|h| *h == "taken").count();
         assert_eq!(taken, 1, "{answers:?}");
-        rivals.into_iter().for_each(Rival::end);
+        rivals.into_iter().for_each(CompetingProcess::end);
     }
 }
 
@@ -269,7 +270,7 @@ fn exactly_one_of_several_processes_gets_the_lease() {
 fn the_lease_of_a_killed_holder_is_free_and_the_next_holder_notes_the_takeover() {
     let folder = tempfile::tempdir().unwrap();
     let path = path_of(folder.path(), "omega3-7");
-    let mut rival = Rival::start(&path);
+    let mut rival = CompetingProcess::start(&path);
     rival.go();
     assert_eq!(rival.read_line(), "taken");
     assert!(matches!(take(&path, "jog"), Err(LeaseError::Held { .. })));

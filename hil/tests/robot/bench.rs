@@ -19,7 +19,7 @@ const RIG: &str = include_str!("../../rigs/emulated.yaml");
 /// A bench that reopens its devices after a close and counts the openings.
 pub(crate) struct SimBench {
     pub rig: RigFile,
-    config: SimConfig,
+    pub config: SimConfig,
     devices: Option<Devices>,
     pub opened: u32,
     pub drills: Vec<Drill>,

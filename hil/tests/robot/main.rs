@@ -5,7 +5,7 @@ mod bench;
 
 use bench::SimBench;
 use skinrig_hil::{DrillResult, Findings};
-use skinrig_model::HostTime;
+use skinrig_model::{HostTime, RigFault};
 use skinrig_nightly::EvidenceKind;
 use skinrig_sim::{Fault, FaultTrigger, MotionPhase};
 
@@ -28,14 +28,18 @@ fn kinds(found: &Findings) -> Vec<EvidenceKind> {
     found.evidence.iter().map(|e| e.kind).collect()
 }
 
+fn from_start(fault: RigFault) -> Fault {
+    Fault::new(fault, FaultTrigger::At(HostTime::ZERO)).unwrap()
+}
+
 /// Whether the arm is braked; a braked arm rejects commands.
 fn is_braked(bench: &mut SimBench) -> bool {
     use skinrig_hil::bench::Bench;
     let devices = bench.devices();
     let robot = devices.robot.as_mut().unwrap();
-    let mut seen = Vec::new();
-    robot.poll(&mut seen).unwrap();
-    let at = seen
+    let mut observed = Vec::new();
+    robot.poll(&mut observed).unwrap();
+    let at = observed
         .last()
         .map_or_else(|| skinrig_model::Point3::new(0.0, 0.0, 0.0), |s| s.measured);
     robot.command(at, 1.0).is_err()
@@ -81,8 +85,12 @@ fn a_healthy_robot_gives_small_numbers_and_is_braked_after_each_check() {
 }
 
 #[test]
-fn a_robot_that_is_lost_leaves_nothing_measured_and_is_opened_again() {
-    let lost = Fault::IndenterLost(FaultTrigger::Moment(MotionPhase::Travel, 4));
+fn a_lost_robot_gives_no_measurement_and_is_reopened() {
+    let lost = Fault::new(
+        RigFault::RobotLost,
+        FaultTrigger::Moment(MotionPhase::Travel, 4),
+    )
+    .unwrap();
     let mut bench = SimBench::new(vec![lost]);
     let found = bench.run_check(REPEATABILITY);
     assert!(
@@ -91,14 +99,14 @@ fn a_robot_that_is_lost_leaves_nothing_measured_and_is_opened_again() {
     );
     assert_eq!(value(&found, "spread"), None);
     assert_eq!(value(&found, "error"), None);
-    let again = bench.run_check(STATE);
-    assert_eq!(value(&again, "faults"), Some(0.0), "{again:?}");
+    let repeated = bench.run_check(STATE);
+    assert_eq!(value(&repeated, "faults"), Some(0.0), "{repeated:?}");
     assert_eq!(bench.opened, 2);
 }
 
 #[test]
 fn a_limit_that_does_not_read_back_is_a_fault_of_the_robot() {
-    let mut bench = SimBench::new(vec![Fault::IndenterReadBack]);
+    let mut bench = SimBench::new(vec![from_start(RigFault::RobotSettingIgnored)]);
     let found = bench.run_check(STATE);
     assert_eq!(value(&found, "faults"), Some(1.0), "{found:?}");
     assert_eq!(value(&found, "creep"), None);
@@ -106,16 +114,13 @@ fn a_limit_that_does_not_read_back_is_a_fault_of_the_robot() {
 }
 
 #[test]
-fn a_stuck_and_a_sluggish_robot_are_detected() {
-    let mut bench = SimBench::new(vec![Fault::IndenterStuck(FaultTrigger::At(HostTime(0)))]);
+fn a_stalled_and_a_slow_robot_are_detected() {
+    let mut bench = SimBench::new(vec![from_start(RigFault::RobotStalled)]);
     let found = bench.run_check(REPEATABILITY);
     assert_eq!(value(&found, "spread"), None);
     assert!(kinds(&found).contains(&EvidenceKind::State), "{found:?}");
-    let slow = Fault::Sluggish {
-        when: FaultTrigger::At(HostTime(0)),
-        percent: 10,
-    };
-    let mut bench = SimBench::new(vec![slow]);
+    let mut bench = SimBench::new(vec![from_start(RigFault::RobotSlow)]);
+    bench.config.fault_sizes.slow_percent = 10;
     let healthy = SimBench::new(Vec::new()).run_check(STEP);
     let found = bench.run_check(STEP);
     let settling = |found: &Findings| value(found, "settling").unwrap();

@@ -20,11 +20,11 @@ type Step = fn(&mut Findings);
 /// Attempts and the expected result: verdict, number of attempts, explanation.
 type Case<'a> = (&'a [Step], Verdict, usize, Option<&'a str>);
 
-fn good(found: &mut Findings) {
-    lost(found, [0.0; 2]);
+fn add_passing(found: &mut Findings) {
+    add_losses(found, [0.0; 2]);
 }
 
-fn lost(found: &mut Findings, bytes: [f64; 2]) {
+fn add_losses(found: &mut Findings, bytes: [f64; 2]) {
     found.value("camera1", "lost", bytes[0]);
     found.value("camera2", "lost", bytes[1]);
 }
@@ -61,12 +61,12 @@ fn a_metric_that_one_camera_lacks_fails_that_camera() {
 }
 
 #[test]
-fn non_finite_unknown_and_doubled_values_are_never_good() {
+fn non_finite_unknown_and_duplicate_values_never_pass() {
     let broken: [(Step, Option<Cause>); 3] = [
-        (|f| lost(f, [f64::NAN, 0.0]), Some(Cause::Rig)),
+        (|f| add_losses(f, [f64::NAN, 0.0]), Some(Cause::Rig)),
         (
             |f| {
-                lost(f, [1.0, 0.0]);
+                add_losses(f, [1.0, 0.0]);
                 f.value("camera1", "lost", 0.0);
             },
             Some(Cause::Software),
@@ -89,22 +89,22 @@ fn non_finite_unknown_and_doubled_values_are_never_good() {
 
 #[test]
 fn after_a_failure_only_consecutive_passes_count_and_only_as_marginal() {
-    let bad = |f: &mut Findings| lost(f, [0.0, 7.0]);
+    let bad = |f: &mut Findings| add_losses(f, [0.0, 7.0]);
     let worse = |f: &mut Findings| {
         f.add_evidence(EvidenceKind::DataLost, "camera2", "7 bytes");
-        lost(f, [0.0, 7.0]);
+        add_losses(f, [0.0, 7.0]);
     };
     let cases: [Case; 4] = [
-        (&[good], Verdict::Pass, 1, None),
+        (&[add_passing], Verdict::Pass, 1, None),
         (
-            &[bad, good, good],
+            &[bad, add_passing, add_passing],
             Verdict::Marginal,
             3,
             Some("FAIL at first; passed 2 times in a row when repeated, so MARGINAL"),
         ),
         // A third attempt could not change the verdict.
         (
-            &[bad, bad, good],
+            &[bad, bad, add_passing],
             Verdict::Fail,
             2,
             Some(
@@ -113,7 +113,7 @@ fn after_a_failure_only_consecutive_passes_count_and_only_as_marginal() {
         ),
         // The worst verdict stands.
         (
-            &[bad, good, worse],
+            &[bad, add_passing, worse],
             Verdict::Invalid,
             3,
             Some(
@@ -190,7 +190,7 @@ fn a_check_that_does_not_fit_the_budget_is_not_started() {
     let script = Script::default()
         .attempt("idle", move |f| {
             slow.advance(15);
-            good(f);
+            add_passing(f);
         })
         .attempt("robot_state", |_| panic!("must not run"));
     // Estimated: 9 s for the stream, 6 s for the robot.
@@ -224,7 +224,7 @@ fn a_repeat_leaves_budget_for_the_remaining_checks() {
     let script = Script::default()
         .attempt("idle", move |f| {
             slow.advance(10);
-            lost(f, [1.0, 0.0]);
+            add_losses(f, [1.0, 0.0]);
         })
         .attempt("robot_state", |f| {
             f.value("robot", "faults", 0.0);
@@ -309,7 +309,7 @@ fn a_golden_skin_beyond_its_limits_is_invalid_when_the_rig_was_faulty_in_the_sam
         (0.0, Verdict::Fail, Cause::Skin, NightExit::Fail),
         (9.0, Verdict::Invalid, Cause::Rig, NightExit::Invalid),
     ] {
-        let idle = move |f: &mut Findings| lost(f, [camera_lost, 0.0]);
+        let idle = move |f: &mut Findings| add_losses(f, [camera_lost, 0.0]);
         let script = (0..3).fold(Script::default(), |s, _| s.attempt("idle", idle));
         let night = run_suite(
             &suite(600, &format!("{IDLE}{GOLDEN}")),

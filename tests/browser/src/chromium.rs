@@ -122,8 +122,8 @@ impl Browser {
 impl Drop for Browser {
     fn drop(&mut self) {
         // Ask it to close first, so that its helper processes end too and leave the profile alone.
-        let asked = self.devtools.call(None, "Browser.close", json!({}));
-        if asked.is_err() {
+        let requested = self.devtools.call(None, "Browser.close", json!({}));
+        if requested.is_err() {
             let _ = self.process.kill();
         }
         let _ = self.process.wait();

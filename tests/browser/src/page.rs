@@ -96,10 +96,10 @@ impl<'a> Page<'a> {
     ///
     /// # Errors
     /// [`BrowserError::Refused`] with the text of a thrown exception.
-    pub fn ask(&mut self, expression: &str) -> Result<Value, BrowserError> {
-        let asked =
+    pub fn evaluate(&mut self, expression: &str) -> Result<Value, BrowserError> {
+        let requested =
             json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
-        let answer = self.call("Runtime.evaluate", asked)?;
+        let answer = self.call("Runtime.evaluate", requested)?;
         match answer.get("exceptionDetails") {
             None => Ok(answer["result"]["value"].clone()),
             Some(thrown) => Err(BrowserError::Refused {
@@ -114,7 +114,7 @@ impl<'a> Page<'a> {
     /// # Errors
     /// [`BrowserError`].
     pub fn text(&mut self, expression: &str) -> Result<String, BrowserError> {
-        let answer = self.ask(expression)?;
+        let answer = self.evaluate(expression)?;
         Ok(answer
             .as_str()
             .map_or_else(|| answer.to_string(), str::to_owned))
@@ -142,7 +142,7 @@ impl<'a> Page<'a> {
     }
 
     fn middle(&mut self, selector: &str) -> Result<(f64, f64), BrowserError> {
-        let found = self.ask(&format!(
+        let found = self.evaluate(&format!(
             "(() => {{ const e = document.querySelector({}); \
              for (let d = e; d && !e.closest('summary'); d = d.parentElement) if (d.matches('details')) d.open = true; \
              e.scrollIntoView({{ block: 'center', behavior: 'instant' }}); \

@@ -153,15 +153,15 @@ fn devices() {
     };
     let mut hello = head(1, 0);
     hello.extend(b"\x01\x01\x00\x10\x04A123\x13skinrig-trigger-box");
-    let mut told = head(6, 0);
-    told.extend([0, 0, 4, 0, 0, 0, 0, 0, 0, 0, 4]);
+    let mut message = head(6, 0);
+    message.extend([0, 0, 4, 0, 0, 0, 0, 0, 0, 0, 4]);
     for (kind, code) in [(1u32, 0u32), (2, 7 << 17), (3, 0), (4, 0)] {
-        told.extend((kind << 24 | code).to_le_bytes());
-        told.extend(170_000_000u64.to_le_bytes());
+        message.extend((kind << 24 | code).to_le_bytes());
+        message.extend(170_000_000u64.to_le_bytes());
     }
     let mut counters = head(7, 0);
     counters.extend([0; 40]);
-    for body in [hello, told, counters, head(9, 0), head(4, 3)] {
+    for body in [hello, message, counters, head(9, 0), head(4, 3)] {
         line.extend(frame::encode(&body).unwrap());
     }
     std::fs::write(file("box", "line"), &line).unwrap();

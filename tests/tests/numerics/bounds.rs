@@ -61,7 +61,7 @@ impl Watch {
     }
 
     /// Checks one error; `at` is shown if it is too large. NaN is too large.
-    pub(crate) fn see(&self, error: f64, at: impl Display) {
+    pub(crate) fn record(&self, error: f64, at: impl Display) {
         let Bound { name, limit } = self.bound;
         assert!(error <= *limit, "{name}: {error:e} > {limit:e} at {at}");
         if error > self.worst.borrow().0 {

@@ -6,8 +6,8 @@ use skinrig_analysis::result::CalibrationResult;
 use skinrig_analysis::sets::CalibrationSet;
 use skinrig_model::{AnalysisSettings, CalibrationModel, Point2, PressRole, StereoGeometry};
 
+use crate::hostile::holds_only_numbers;
 use crate::support::{PLANTED, session};
-use crate::wild::holds_only_numbers;
 
 /// The planted session; `calibrate` selects its calibration presses, and the full model is requested.
 fn calibrated(calibrate: impl Fn(Point2, usize) -> bool) -> (Option<CalibrationResult>, String) {
@@ -32,22 +32,22 @@ fn calibrated(calibrate: impl Fn(Point2, usize) -> bool) -> (Option<CalibrationR
 
 #[test]
 fn enough_places_give_the_model_that_was_asked_for() {
-    let (found, said) = calibrated(|_, _| true);
-    assert_eq!(found.unwrap().model, CalibrationModel::Full, "{said}");
+    let (found, output) = calibrated(|_, _| true);
+    assert_eq!(found.unwrap().model, CalibrationModel::Full, "{output}");
 }
 
 #[test]
-fn presses_that_cannot_tell_the_parameters_are_reported_and_not_guessed_from() {
+fn presses_that_do_not_determine_the_parameters_are_reported() {
     let centre = Point2::new(8.0, 2.0);
     let one_place = |at: Point2, _: usize| at == centre;
     let two_places = |at: Point2, kept: usize| at.x_mm < -13.0 && kept < 2;
-    for (name, (found, said)) in [
+    for (name, (found, output)) in [
         ("one press", calibrated(one_place)),
         ("two presses", calibrated(two_places)),
     ] {
-        assert!(!said.is_empty(), "{name}: nothing is said: {found:?}");
+        assert!(!output.is_empty(), "{name}: nothing is said: {found:?}");
         let smaller = found.is_none_or(|f| f.model != CalibrationModel::Full);
-        assert!(smaller, "{name}: {said}");
+        assert!(smaller, "{name}: {output}");
     }
 }
 
@@ -92,15 +92,15 @@ const TOO_FEW_FOR_FULL: &str =
 /// A row of the planted session with too few locations.
 #[test]
 fn five_places_on_one_line_give_the_positions() {
-    let (found, said) = calibrated(|at, _| at.x_mm < -13.0);
+    let (found, output) = calibrated(|at, _| at.x_mm < -13.0);
     let found = found.unwrap();
     assert_eq!(
         (found.model, found.rank, found.n),
         (CalibrationModel::Positions, 4, 5)
     );
     // Scored locations far from the line may be worse, which gives another warning.
-    let wanted = format!("{TOO_FEW_FOR_FULL}: using `positions`");
-    assert!(said.starts_with(&wanted), "{said}");
+    let expected = format!("{TOO_FEW_FOR_FULL}: using `positions`");
+    assert!(output.starts_with(&expected), "{output}");
 }
 
 /// The angles of eight positions suffice even on one line: the positions are known, and a camera beside their line sees each
@@ -186,6 +186,6 @@ fn two_places_pressed_twice_calibrate_nothing() {
     let usable = CalibrationSet::from_presses(&a.presses);
     assert_eq!(usable.sights().len(), 4);
     assert_eq!(a.calibration, None);
-    let said = "2 calibration locations are too few for any calibration: using the nominal camera geometry";
-    assert!(a.warnings.iter().any(|w| w == said), "{:?}", a.warnings);
+    let output = "2 calibration locations are too few for any calibration: using the nominal camera geometry";
+    assert!(a.warnings.iter().any(|w| w == output), "{:?}", a.warnings);
 }

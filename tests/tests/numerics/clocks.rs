@@ -62,9 +62,9 @@ fn camera_times_are_exact_to_the_last_bit_or_two_of_the_counter() {
                     assert_eq!(found, 0.0);
                     continue;
                 }
-                there.see(precise::error(found, &exact) / (UNIT * size), &at);
+                there.record(precise::error(found, &exact) / (UNIT * size), &at);
                 let home = fit.host_us_of_camera(precise::near(&exact));
-                back.see((home - host_us).abs() / (UNIT * size), &at);
+                back.record((home - host_us).abs() / (UNIT * size), &at);
             }
         }
     }
@@ -108,7 +108,7 @@ fn windows_begin_and_end_on_the_right_microsecond_as_long_as_doubles_have_one() 
                     }
                     let size = offset.abs() + host as f64 * 1e-3;
                     let off = (late - 0.5).abs() - 0.5;
-                    watch.see(off / (UNIT * size), format!("{offset} {drift} {host}"));
+                    watch.record(off / (UNIT * size), format!("{offset} {drift} {host}"));
                 }
             }
         }
@@ -179,19 +179,19 @@ fn drifts_up_to_1000_ppm_come_out_with_a_third_of_the_trains_spoiled() {
                 "{at}"
             );
             // 333 marks of 0.6 µs rms jitter over 700 s.
-            slope.see((found.fit.drift_ppm - drift).abs(), &at);
+            slope.record((found.fit.drift_ppm - drift).abs(), &at);
             for host_us in [5e6, 2e8, 7e8] {
                 let exact = exact_camera(0.0, drift, host_us) + real(base_us as f64);
                 let coarse = UNIT * 2.0 * base_us as f64;
                 let error = precise::error(found.fit.camera_us(host_us), &exact);
-                place.see((error - 2.0 * coarse).max(0.0), &at);
+                place.record((error - 2.0 * coarse).max(0.0), &at);
             }
         }
     }
 }
 
 #[test]
-fn times_that_are_no_times_give_no_clock_and_say_so() {
+fn invalid_times_give_no_clock_and_a_reason() {
     let sent = marks(40, 1_750_111_222);
     for base_us in [1u64 << 62, (1 << 63) + 5, u64::MAX - 100_000_000] {
         let edges: Vec<TriggerEdge> = sent
@@ -213,10 +213,10 @@ fn times_that_are_no_times_give_no_clock_and_say_so() {
         }
         assert!(count > 0);
         let a = analyze(&input, &source).unwrap();
-        let said = a.warnings.join("; ");
+        let output = a.warnings.join("; ");
         assert!(
-            said.contains("the time base of the stream is broken"),
-            "{said}"
+            output.contains("the time base of the stream is broken"),
+            "{output}"
         );
         assert_eq!(a.clocks, [None, None]);
         assert_eq!((a.counts.valid, a.counts.invalid), (0, 50));
@@ -239,7 +239,7 @@ fn a_session_over_the_wrap_of_34_bits_is_the_session_without_it() {
             edge.t_us = shift(edge.t_us);
         }
     }
-    let wanted = analyze(&input, &source).unwrap();
+    let expected = analyze(&input, &source).unwrap();
     let mut decoded = Memory {
         events: [Vec::new(), Vec::new()],
         slice: 999,
@@ -259,14 +259,14 @@ fn a_session_over_the_wrap_of_34_bits_is_the_session_without_it() {
         assert!(decoded.events[k].iter().any(|e| e.t_us > 1 << 34));
         assert_eq!(&decoded.events[k], events);
     }
-    assert_eq!(analyze(&input, &decoded).unwrap(), wanted);
-    assert_eq!(wanted.counts.valid, 50);
+    assert_eq!(analyze(&input, &decoded).unwrap(), expected);
+    assert_eq!(expected.counts.valid, 50);
 }
 
 #[test]
 fn disorder_within_ten_milliseconds_changes_nothing() {
     let (input, source) = session();
-    let wanted = analyze(&input, &source).unwrap();
+    let expected = analyze(&input, &source).unwrap();
     let mut shuffled = Memory {
         events: source.events.clone(),
         slice: 1000,
@@ -282,9 +282,9 @@ fn disorder_within_ten_milliseconds_changes_nothing() {
     }
     assert!(moved > 10_000);
     let found = analyze(&input, &shuffled).unwrap();
-    assert_eq!(found.presses, wanted.presses);
-    assert_eq!(found.scored, wanted.scored);
-    assert_eq!(found.warnings, wanted.warnings);
+    assert_eq!(found.presses, expected.presses);
+    assert_eq!(found.scored, expected.scored);
+    assert_eq!(found.warnings, expected.warnings);
 }
 
 /// Presses at irregular intervals, and the counts of a camera with this clock in 10 ms bins.
@@ -341,11 +341,11 @@ fn drifts_up_to_1000_ppm_are_found_in_the_rates_or_doubted() {
             }
             right += 1;
             let error_ppm = (found.fit.drift_ppm - drift).abs();
-            slope.see(error_ppm / found.fit.drift_se_ppm, &at);
+            slope.record(error_ppm / found.fit.drift_se_ppm, &at);
             for press in [0, presses.len() / 2, presses.len() - 1] {
                 let host_us = presses[press].contact_us;
                 let error = found.fit.camera_us(host_us) - clock(31e6, drift).camera_us(host_us);
-                place.see(error.abs() * 1e-3, &at);
+                place.record(error.abs() * 1e-3, &at);
             }
             assert!(drift.abs() <= 1000.0 && evidence.log_odds > 7.0, "{at}");
         }

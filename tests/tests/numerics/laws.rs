@@ -78,7 +78,7 @@ fn check(case: &Case, bound: &Watch, factor: f64, by: [f64; 2]) {
         }
         return;
     };
-    let wanted = moved(p, factor, by);
+    let expected = moved(p, factor, by);
     let reach = [(x1, y1), (x2, y2)]
         .map(|(x, y)| p.distance_mm(Point2::new(x, y)))
         .into_iter()
@@ -87,8 +87,8 @@ fn check(case: &Case, bound: &Watch, factor: f64, by: [f64; 2]) {
     let size = factor * (reach + 100.0) + by[0].abs() + by[1].abs();
     // Rounding of the axis ends rotates the axis, which moves the point in proportion to the range.
     let lever = (reach + 100.0) / 40.0;
-    let error = q.distance_mm(wanted) * sine(here).abs() / (UNIT * size * lever);
-    bound.see(error, format!("{case:?}, factor {factor}, by {by:?}"));
+    let error = q.distance_mm(expected) * sine(here).abs() / (UNIT * size * lever);
+    bound.record(error, format!("{case:?}, factor {factor}, by {by:?}"));
 }
 
 #[test]

@@ -55,40 +55,40 @@ fn the_angle_of_a_column_is_right_to_the_last_bits() {
             } else {
                 error / size / UNIT
             };
-            angle.see(relative, format!("W = {w}, u = {u}"));
+            angle.record(relative, format!("W = {w}, u = {u}"));
         }
     }
 }
 
 #[test]
-fn the_column_of_a_point_shows_it_wherever_the_angle_still_grows() {
+fn columns_and_angles_are_inverse_while_the_angle_grows() {
     let backward = Watch::new(&bounds::LENS_BACKWARD);
     let fold = Watch::new(&bounds::LENS_FOLD);
-    let mut seen = 0;
+    let mut observed = 0;
     for w in DISTORTIONS {
         let camera = camera(w);
         for i in 0..=640 {
             let p = point_of(&camera, f64::from(i));
-            let wanted = precise::angle_of_point(&camera, p);
+            let expected = precise::angle_of_point(&camera, p);
             let at = format!("W = {w}, u = {i}");
             // The very edge of the field of view may be on either side.
             let Some(u) = camera.column_of_point(p) else {
                 assert!(i == 0 || i == 640, "{at}");
                 continue;
             };
-            seen += 1;
+            observed += 1;
             let shown = precise::angle_of_column(w, u);
-            backward.see(
-                precise::near(&(shown - &wanted)).abs() / (UNIT * 180.0),
+            backward.record(
+                precise::near(&(shown - &expected)).abs() / (UNIT * 180.0),
                 &at,
             );
             // Where the slope vanishes the column is accurate only to the root of the rounding error.
             if i % 64 == 1 || !(4..637).contains(&i) {
-                fold.see((u - precise::column_of_angle(w, &wanted)).abs(), &at);
+                fold.record((u - precise::column_of_angle(w, &expected)).abs(), &at);
             }
         }
     }
-    assert!(seen > 11 * 638);
+    assert!(observed > 11 * 638);
 }
 
 #[test]

@@ -6,6 +6,7 @@
 mod bounds;
 mod calibration;
 mod clocks;
+mod hostile;
 mod laws;
 mod lens;
 mod precise;
@@ -14,8 +15,7 @@ mod rates;
 mod rays;
 mod reference_cases;
 mod same_bits;
+mod settings;
 mod sums;
 #[path = "../../../crates/analysis/tests/session/support.rs"]
 mod support;
-mod taken;
-mod wild;

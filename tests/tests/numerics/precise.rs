@@ -83,7 +83,7 @@ fn from(a: Point2, b: Point2) -> [Real; 2] {
 }
 
 /// Intersection of two rays.
-pub(crate) struct Meeting {
+pub(crate) struct RayIntersection {
     /// Position; `None` if the lines are exactly parallel.
     pub at: Option<[Real; 2]>,
     /// Signed distance from each camera along its ray; zero without an intersection.
@@ -93,7 +93,7 @@ pub(crate) struct Meeting {
 }
 
 /// Intersects the rays at these angles (degrees).
-pub(crate) fn intersect(geometry: &StereoGeometry, angles_deg: [Real; 2]) -> Meeting {
+pub(crate) fn intersect(geometry: &StereoGeometry, angles_deg: [Real; 2]) -> RayIntersection {
     let unit = |k: usize| {
         let camera = &geometry.cameras[k];
         let [ax, ay] = from(camera.position, camera.aim);
@@ -117,7 +117,7 @@ pub(crate) fn intersect(geometry: &StereoGeometry, angles_deg: [Real; 2]) -> Mee
     let determinant = &a1 * &b2 - &a2 * &b1;
     if determinant == real(0.0) {
         let ranges = [real(0.0), real(0.0)];
-        return Meeting {
+        return RayIntersection {
             at: None,
             ranges,
             sine,
@@ -130,7 +130,7 @@ pub(crate) fn intersect(geometry: &StereoGeometry, angles_deg: [Real; 2]) -> Mee
         (&x - real(p.x_mm)) * &d[k][0] + (&y - real(p.y_mm)) * &d[k][1]
     };
     let ranges = [range(0), range(1)];
-    Meeting {
+    RayIntersection {
         at: Some([x, y]),
         ranges,
         sine,

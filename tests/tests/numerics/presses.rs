@@ -57,7 +57,7 @@ fn none_one_two_and_ten_million_events() {
         let (u, _) = all.centroid().unwrap();
         let exact = exact_column(&pixels);
         let size = precise::near(&exact).abs().max(f64::MIN_POSITIVE);
-        centroid.see(
+        centroid.record(
             precise::error(u, &exact) / size / UNIT,
             format!("{clusters} clusters"),
         );
@@ -90,7 +90,7 @@ fn counts_reach_the_end_of_32_bits_and_not_beyond() {
             let exact = exact_column(&pixels);
             let (u, _) = found[0].centroid().unwrap();
             let error = precise::error(u, &exact) / precise::near(&exact) / UNIT;
-            centroid.see(error, format!("{pixels:?}"));
+            centroid.record(error, format!("{pixels:?}"));
         }
     }
     // One too many at once: rejected as a whole.
@@ -101,7 +101,7 @@ fn counts_reach_the_end_of_32_bits_and_not_beyond() {
 }
 
 #[test]
-fn a_kept_event_reaches_32_bits_of_time_at_any_camera_time() {
+fn a_retained_event_has_32_bit_times_at_any_camera_time() {
     for start_us in [
         0,
         (1 << 34) - 1,

@@ -18,12 +18,12 @@ const PRESSES: u64 = 4;
 const FIRST_US: u64 = 100_000;
 
 /// Events as a function of time: `background` on every microsecond, and `extra[press]` at one instant of each press.
-struct Flood {
+struct SyntheticEvents {
     background: u64,
     extra: [u64; PRESSES as usize],
 }
 
-impl EventSource for Flood {
+impl EventSource for SyntheticEvents {
     fn for_each_slice(
         &self,
         _: CameraId,
@@ -97,9 +97,9 @@ fn session() -> SessionInput {
     input
 }
 
-fn analysed(flood: &Flood) -> Analysis {
+fn analysed(flood: &SyntheticEvents) -> Analysis {
     let a = analyze(&session(), flood).unwrap();
-    crate::wild::holds_only_numbers(&a);
+    crate::hostile::holds_only_numbers(&a);
     a
 }
 
@@ -112,7 +112,7 @@ fn fifty_million_background_events_per_second_are_counted_and_predicted() {
     // 50 events per µs over a window of 30 ms: 1.5 million, and sqrt(1.5e6 (1 + 30 / 70)) = 1464 standard error.
     let error = (1.5e6f64 * (1.0 + 3.0 / 7.0)).sqrt();
     let (below, above) = ((4.9 * error) as u64, (5.1 * error) as u64);
-    let a = analysed(&Flood {
+    let a = analysed(&SyntheticEvents {
         background: 50,
         extra: [0, below, above, 1_000_000],
     });
@@ -122,9 +122,9 @@ fn fifty_million_background_events_per_second_are_counted_and_predicted() {
         assert_eq!(u64::from(view.events), 1_500_000 + extra);
         if k > 0 {
             let at = format!("{view:?}");
-            rate.see((view.idle_rate_per_s - 5e7).abs() / 5e7 / UNIT, &at);
-            let wanted = (1_500_000 + extra) as f64 / 0.03;
-            rate.see((view.rate_per_s - wanted).abs() / wanted / UNIT, &at);
+            rate.record((view.idle_rate_per_s - 5e7).abs() / 5e7 / UNIT, &at);
+            let expected = (1_500_000 + extra) as f64 / 0.03;
+            rate.record((view.rate_per_s - expected).abs() / expected / UNIT, &at);
         }
     }
     assert_eq!(rule(&a, 1), Some(Rule::NoResponse(CameraId::One)));
@@ -135,7 +135,7 @@ fn fifty_million_background_events_per_second_are_counted_and_predicted() {
 
 #[test]
 fn without_background_and_without_events_everything_has_its_row() {
-    let a = analysed(&Flood {
+    let a = analysed(&SyntheticEvents {
         background: 0,
         extra: [0, 1, 30, 10_000_000],
     });
@@ -151,7 +151,7 @@ fn without_background_and_without_events_everything_has_its_row() {
     // Ten million simultaneous events on 800 pixels: the centroid is the middle of the block.
     assert_eq!(a.presses[3].views[0].unwrap().centroid_u, Some(319.5));
 
-    let silent = analysed(&Flood {
+    let silent = analysed(&SyntheticEvents {
         background: 0,
         extra: [0; 4],
     });

@@ -57,7 +57,7 @@ fn rays_from_a_right_angle_to_a_millionth_of_a_millionth_of_a_degree_apart() {
                 let exact = precise::intersect(&g, angles.map(precise::real));
                 let hit = intersect(&g, angles);
                 let at = format!("{apart:e}° apart, {angles:?}");
-                sine.see(precise::error(hit.sine, &exact.sine) / UNIT, &at);
+                sine.record(precise::error(hit.sine, &exact.sine) / UNIT, &at);
                 let s = precise::near(&exact.sine).abs();
                 let outcome = locate_angles(&g, &SKIN, angles);
                 // The threshold itself is accurate to the error of a sine.
@@ -71,10 +71,10 @@ fn rays_from_a_right_angle_to_a_millionth_of_a_millionth_of_a_degree_apart() {
                 let place = exact.at.unwrap();
                 let ranges = exact.ranges.each_ref().map(|r| precise::near(r).abs());
                 let reach = baseline + ranges[0].min(ranges[1]);
-                meet.see(precise::distance(hit.at, &place) * s / UNIT / reach, &at);
+                meet.record(precise::distance(hit.at, &place) * s / UNIT / reach, &at);
                 for (k, r) in ranges.into_iter().enumerate() {
                     let error = precise::error(hit.range_mm[k], &exact.ranges[k]);
-                    range.see(error * s / UNIT / (baseline + r), &at);
+                    range.record(error * s / UNIT / (baseline + r), &at);
                 }
             }
         }
@@ -106,7 +106,7 @@ fn a_contact_near_the_baseline_is_as_good_as_its_sine_or_parallel() {
                     assert!(matches!(outcome, LocationOutcome::Parallel { .. }), "{at}");
                 } else if s > 2.0 * PARALLEL_SINE {
                     let error = outcome.estimate().unwrap().distance_mm(p);
-                    trip.see(error * s / UNIT / (baseline + r1.min(r2)), &at);
+                    trip.record(error * s / UNIT / (baseline + r1.min(r2)), &at);
                 }
             }
         }
@@ -114,7 +114,7 @@ fn a_contact_near_the_baseline_is_as_good_as_its_sine_or_parallel() {
 }
 
 #[test]
-fn a_ray_through_the_other_camera_ends_on_it_or_behind_it_and_nowhere_else() {
+fn a_ray_through_the_other_camera_ends_at_or_behind_it() {
     let trip = Watch::new(&bounds::ROUND_TRIP);
     for g in geometries() {
         for k in 0..2 {
@@ -127,7 +127,7 @@ fn a_ray_through_the_other_camera_ends_on_it_or_behind_it_and_nowhere_else() {
                 let error = hit.at.distance_mm(camera);
                 let size = baseline + camera.distance_mm(Point2::default());
                 let at = format!("camera {}, {own}°: {hit:?}", k + 1);
-                trip.see(error * hit.sine.abs() / UNIT / size, &at);
+                trip.record(error * hit.sine.abs() / UNIT / size, &at);
                 match locate_angles(&g, &SKIN, angles) {
                     LocationOutcome::Located { at: found, .. }
                     | LocationOutcome::Outside { at: found, .. } => assert_eq!(found, hit.at),
@@ -144,7 +144,7 @@ fn a_ray_through_the_other_camera_ends_on_it_or_behind_it_and_nowhere_else() {
 }
 
 #[test]
-fn behind_is_told_from_in_front_down_to_the_rounding_of_the_range() {
+fn behind_and_in_front_are_distinguished_up_to_rounding() {
     let g = StereoGeometry::PAPER;
     let camera = g.cameras[1];
     for angle in [-30.0, 0.0, 12.0] {
@@ -182,12 +182,12 @@ fn the_principal_point_and_its_neighbours_are_ordinary() {
                 let exact = precise::angle_of_point(camera, p);
                 let unit = UNIT * 180.0 / std::f64::consts::PI;
                 let error = precise::error(camera.angle_of_point_deg(p), &exact);
-                angle.see(error / unit, format!("{off:e} mm from the axis"));
+                angle.record(error / unit, format!("{off:e} mm from the axis"));
             }
             let angles = g.cameras.map(|c| c.angle_of_point_deg(p));
             let hit = intersect(&g, angles);
             let reach = hit.range_mm[0].abs() + hit.range_mm[1].abs();
-            trip.see(
+            trip.record(
                 hit.at.distance_mm(p) * hit.sine.abs() / UNIT / reach,
                 format!("{off:e} mm from the principal point"),
             );
@@ -196,7 +196,7 @@ fn the_principal_point_and_its_neighbours_are_ordinary() {
 }
 
 #[test]
-fn numbers_that_lead_nowhere_are_missing() {
+fn estimates_of_extreme_geometry_are_finite_or_missing() {
     let mut far = StereoGeometry::PAPER;
     far.cameras[0].position = Point2::new(-8e307, 8e307);
     far.cameras[0].aim = Point2::new(8e307, 8e307);

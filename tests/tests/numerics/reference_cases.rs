@@ -31,7 +31,7 @@ const CASES: &[(&str, &str, &str, &str)] = &[
         "geometry",
         "behind",
         RAYS,
-        "behind_is_told_from_in_front_down_to_the_rounding_of_the_range",
+        "behind_and_in_front_are_distinguished_up_to_rounding",
     ),
     (
         "geometry",
@@ -43,25 +43,25 @@ const CASES: &[(&str, &str, &str, &str)] = &[
         "geometry",
         "nan",
         RAYS,
-        "numbers_that_lead_nowhere_are_missing",
+        "estimates_of_extreme_geometry_are_finite_or_missing",
     ),
     (
         "grid",
         "46 of 289 points moved",
         GEOMETRY,
-        "the_grid_points_that_the_public_solver_moves_stay_where_they_are",
+        "grid_points_that_the_public_solver_moves_stay_fixed",
     ),
     (
         "grid",
         "all 289 points",
         GEOMETRY,
-        "the_whole_grid_is_located_exactly",
+        "the_complete_grid_is_located_exactly",
     ),
     (
         "bounds",
         "parameters anywhere in the optimiser's box",
         GEOMETRY,
-        "rays_through_a_point_meet_there",
+        "rays_through_a_point_intersect_at_it",
     ),
     (
         "calibration",
@@ -73,7 +73,7 @@ const CASES: &[(&str, &str, &str, &str)] = &[
         "lens",
         "slope 0 at W = 1, s = 1",
         LENS,
-        "the_column_of_a_point_shows_it_wherever_the_angle_still_grows",
+        "columns_and_angles_are_inverse_while_the_angle_grows",
     ),
     (
         "outline",
@@ -199,9 +199,9 @@ const CLOCKS: &str = "tests/tests/numerics/clocks.rs";
 const SOLVER: &str = "every_case_of_the_public_solver_comes_out_right";
 const SCIKIT: &str = "the_labels_are_those_of_scikit_learn";
 const CONTACT_MAPS: &str = "contact_maps_score_as_in_the_public_code_but_for_its_two_faults";
-const BACKGROUND: &str = "a_background_has_a_rate_whatever_is_in_it";
+const BACKGROUND: &str = "every_background_has_a_rate";
 const NO_ANSWER: &str = "trials_without_an_answer_are_answered_with_none";
-const PASS_RATE: &str = "a_press_that_is_not_found_passes_as_published_and_fails_here";
+const PASS_RATE: &str = "a_missing_press_passes_under_the_published_rule_and_fails_under_ours";
 const WINDOWS: &str =
     "windows_include_their_start_and_exclude_their_end_in_any_order_within_the_slack";
 

@@ -15,14 +15,14 @@ fn one_thread_or_two_and_slices_of_any_size_give_identical_bytes() {
     let (mut input, mut source) = session();
     input.settings.study_presses = 8;
     input.settings.reduction.seeds = 2;
-    let wanted = bytes(1, &input, &source);
-    assert!(wanted.len() > 100_000);
+    let expected = bytes(1, &input, &source);
+    assert!(expected.len() > 100_000);
     for (threads, slice) in [(2, 1000), (2, 1), (3, 4096), (1, usize::MAX)] {
         source.slice = slice;
         let found = bytes(threads, &input, &source);
-        assert!(found == wanted, "{threads} threads, slices of {slice}");
+        assert!(found == expected, "{threads} threads, slices of {slice}");
     }
     // Control: another seed gives other bytes.
     input.settings.seed += 1;
-    assert!(bytes(2, &input, &source) != wanted);
+    assert!(bytes(2, &input, &source) != expected);
 }

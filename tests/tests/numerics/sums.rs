@@ -49,13 +49,13 @@ fn hold(n: u64) {
         let count = real(n as f64);
         let exact_sum = s.exact(|x| x);
         let size = precise::near(&s.exact(|x| if x < real(0.0) { -x } else { x }));
-        watch[0].see(
+        watch[0].record(
             precise::error(sum(s.values()), &exact_sum) / size / UNIT,
             &at,
         );
         let exact_rms = (s.exact(|x| &x * &x) / &count).sqrt();
         let rms = root_mean_square(s.values()).unwrap();
-        watch[1].see(
+        watch[1].record(
             precise::error(rms, &exact_rms) / precise::near(&exact_rms) / UNIT,
             &at,
         );
@@ -70,7 +70,7 @@ fn hold(n: u64) {
                 "{at}"
             );
         } else {
-            watch[2].see(
+            watch[2].record(
                 precise::error(found, &exact) / precise::near(&exact) / UNIT,
                 &at,
             );

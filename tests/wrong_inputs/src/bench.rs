@@ -41,7 +41,7 @@ impl Random {
 
 /// An executed press.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pressed {
+pub struct ExecutedPress {
     /// Position, skin frame.
     pub at: Point2,
     /// Contact, s on the host clock.
@@ -103,7 +103,7 @@ pub struct Bench {
     /// Seed of the noise.
     pub seed: u64,
     /// Executed presses in time order, sync presses first.
-    pub pressed: Vec<Pressed>,
+    pub pressed: Vec<ExecutedPress>,
     /// True cameras.
     pub cameras: StereoGeometry,
     /// Camera time at host time 0, µs, and drift, ppm.
@@ -443,7 +443,7 @@ impl Bench {
     #[must_use]
     pub(crate) fn pressed_at(&self, host_s: f64) -> Option<Point2> {
         let near = self.pressed.iter().min_by(|a, b| {
-            let off = |p: &Pressed| (p.contact_s - host_s).abs();
+            let off = |p: &ExecutedPress| (p.contact_s - host_s).abs();
             off(a).total_cmp(&off(b))
         })?;
         ((near.contact_s - host_s).abs() < 0.45).then_some(near.at)
@@ -453,12 +453,12 @@ impl Bench {
 impl Timetable {
     /// Presses of this schedule along a path.
     #[must_use]
-    pub fn pressed(&self, path: &[Point2]) -> Vec<Pressed> {
-        let sync = (0..self.sync.count).map(|k| Pressed {
+    pub fn pressed(&self, path: &[Point2]) -> Vec<ExecutedPress> {
+        let sync = (0..self.sync.count).map(|k| ExecutedPress {
             at: SkinOutline::PAPER.centre,
             contact_s: FIRST_CONTACT_S + f64::from(k) * self.sync.interval_s,
         });
-        let mut all: Vec<Pressed> = sync.collect();
+        let mut all: Vec<ExecutedPress> = sync.collect();
         let first = FIRST_CONTACT_S
             + f64::from(self.sync.count.saturating_sub(1)) * self.sync.interval_s
             + if self.sync.count > 0 {
@@ -469,7 +469,7 @@ impl Timetable {
         let repetition_s = f64::from(self.presses) * self.period_s + self.pause_s;
         for repetition in 0..self.repetitions {
             for (i, at) in path.iter().enumerate() {
-                all.push(Pressed {
+                all.push(ExecutedPress {
                     at: *at,
                     contact_s: first
                         + f64::from(repetition) * repetition_s

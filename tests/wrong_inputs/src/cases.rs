@@ -3,7 +3,7 @@
 use skinrig_analysis::result::Fault::{self, *};
 use skinrig_model::Point2;
 
-use crate::bench::{Bench, Picture, Pressed, Random, Timetable, meander};
+use crate::bench::{Bench, ExecutedPress, Picture, Random, Timetable, meander};
 use crate::judge::Allowed::{self, Named, Refused, Right, Unknowable};
 
 /// A wrong or unusual recording or setup.
@@ -60,7 +60,7 @@ fn times(p: Point2, factor: f64) -> Point2 {
 /// An extra press at `at_s`, in the middle of the path.
 fn extra(bench: &mut Bench, at_s: f64) {
     let at = bench.pressed.iter().position(|p| p.contact_s > at_s);
-    let press = Pressed {
+    let press = ExecutedPress {
         at: CENTRE,
         contact_s: at_s,
     };
@@ -247,7 +247,7 @@ fn presses(t: &mut Table) {
                 later(b, 36, 2.0);
                 b.pressed.insert(
                     36,
-                    Pressed {
+                    ExecutedPress {
                         contact_s: again.contact_s + 2.0,
                         ..again
                     },
@@ -260,9 +260,9 @@ fn presses(t: &mut Table) {
         "every press made twice, half a period apart",
         |s| {
             import(s, |b| {
-                let twice: Vec<Pressed> = b.pressed[3..]
+                let twice: Vec<ExecutedPress> = b.pressed[3..]
                     .iter()
-                    .map(|p| Pressed {
+                    .map(|p| ExecutedPress {
                         contact_s: p.contact_s + 1.0,
                         ..*p
                     })

@@ -108,7 +108,7 @@ impl Numbers {
 
 /// Verdict on a case.
 #[derive(Debug, Clone)]
-pub struct Judged {
+pub struct CaseVerdict {
     /// Observed outcome.
     pub observed: Observed,
     /// True if the case allows it.
@@ -119,7 +119,7 @@ pub struct Judged {
     pub findings: Vec<String>,
 }
 
-impl fmt::Display for Judged {
+impl fmt::Display for CaseVerdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:?}\n    {:?}", self.observed, self.numbers)?;
         self.findings
@@ -130,7 +130,7 @@ impl fmt::Display for Judged {
 
 /// Analyses a case and evaluates the outcome.
 #[must_use]
-pub fn judge(case: &Case, seed: u64) -> Judged {
+pub fn judge(case: &Case, seed: u64) -> CaseVerdict {
     let bench = (case.bench)(seed);
     let analysis = bench
         .input()
@@ -196,7 +196,7 @@ pub fn judge(case: &Case, seed: u64) -> Judged {
             )
         })
         .chain(analysis.alignment.violations.iter().cloned());
-    Judged {
+    CaseVerdict {
         observed,
         holds,
         numbers,
@@ -204,8 +204,8 @@ pub fn judge(case: &Case, seed: u64) -> Judged {
     }
 }
 
-fn refused(case: &Case, why: String) -> Judged {
-    Judged {
+fn refused(case: &Case, why: String) -> CaseVerdict {
+    CaseVerdict {
         observed: Observed::Refused(why),
         holds: case.allowed.contains(&Allowed::Refused),
         numbers: None,

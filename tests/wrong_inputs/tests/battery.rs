@@ -4,10 +4,10 @@
 
 use rayon::prelude::*;
 use skinrig_wrong_inputs::cases::{Case, all};
-use skinrig_wrong_inputs::judge::{Allowed, Judged, Observed, judge};
+use skinrig_wrong_inputs::judge::{Allowed, CaseVerdict, Observed, judge};
 
 /// Outcome of a case, as a line of the printed summary.
-fn row(case: &Case, judged: &Judged) -> String {
+fn row(case: &Case, judged: &CaseVerdict) -> String {
     let unknowable = case.allowed.iter().find_map(|allowed| match allowed {
         Allowed::Unknowable(why) => Some(*why),
         _ => None,
@@ -42,7 +42,7 @@ fn failures(seeds: u64) -> Vec<String> {
         .filter(|case| case.name.contains(&only))
         .flat_map(|case| (0..seeds).map(move |seed| (case.clone(), seed)))
         .collect();
-    let judged: Vec<(Case, u64, Judged)> = cases
+    let judged: Vec<(Case, u64, CaseVerdict)> = cases
         .into_par_iter()
         .map(|(case, seed)| {
             let judged = judge(&case, seed);

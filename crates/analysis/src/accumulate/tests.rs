@@ -124,7 +124,7 @@ fn an_event_that_is_too_late_is_reported() {
 }
 
 #[test]
-fn slices_of_any_size_and_a_little_disorder_give_what_each_event_gives() {
+fn slices_of_any_size_equal_single_events() {
     let windows = [
         window(0, 3_000, 20_000, 60_000),
         window(1, 50_000, 50_000, 90_000),

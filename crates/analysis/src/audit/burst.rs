@@ -27,7 +27,7 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
     let [one, two] = CameraId::ALL.map(|camera| {
         let sights = presses_seen
             .iter()
-            .filter(|t| t.done() && t.timing.is_some());
+            .filter(|t| t.is_complete() && t.timing.is_some());
         sights
             .filter_map(|t| Some((t.press, t.sights[camera.index()].response?)))
             .collect::<Vec<(PressId, f64)>>()
@@ -74,7 +74,7 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
             ));
         }
     }
-    let stretches = [&one, &two].map(|seen| stretch(seen));
+    let stretches = [&one, &two].map(|seen| longest_silent_run(seen));
     match stretches {
         [Some(a), Some(b)] if a.first <= b.last && b.first <= a.last => {
             let (first, last) = (a.first.max(b.first), a.last.min(b.last));
@@ -148,14 +148,14 @@ fn blind(seen: &[(PressId, f64)]) -> Option<(f64, usize)> {
 
 /// Consecutive presses without a burst.
 #[derive(Debug, Clone, Copy)]
-struct Stretch {
+struct SilentRun {
     first: PressId,
     last: PressId,
 }
 
 /// The longest significant stretch without bursts: the maximum sum of consecutive presses, where one without response counts
 /// 1 and one with a response -[`RESPONSE_WEIGHT`].
-fn stretch(seen: &[(PressId, f64)]) -> Option<Stretch> {
+fn longest_silent_run(seen: &[(PressId, f64)]) -> Option<SilentRun> {
     let responds = |i: usize| seen[i].1 >= MIN_RESPONSE;
     let (mut best, mut sum, mut from) = ((0, 0..0), 0, 0);
     for i in 0..seen.len() {
@@ -171,7 +171,7 @@ fn stretch(seen: &[(PressId, f64)]) -> Option<Stretch> {
     let respond = others.clone().filter(|i| responds(*i)).count();
     let long = sum >= MIN_STRETCH && range.len() as f64 >= MIN_STRETCH_SHARE * seen.len() as f64;
     let stands_out = respond > 0 && respond as f64 >= SHARE_ELSEWHERE * others.count() as f64;
-    (long && stands_out).then(|| Stretch {
+    (long && stands_out).then(|| SilentRun {
         first: seen[range.start].0,
         last: seen[range.end - 1].0,
     })

@@ -33,7 +33,7 @@ const MAX_SHIFT: i32 = 5;
 pub(super) fn findings(input: &SessionInput, presses_seen: &[ObservedPress<'_>]) -> Vec<Finding> {
     let path: Vec<&ObservedPress<'_>> = presses_seen
         .iter()
-        .filter(|t| t.role != PressRole::Sync && t.done())
+        .filter(|t| t.role != PressRole::Sync && t.is_complete())
         .collect();
     let mut found = Vec::new();
     found.extend(unit(input, &path));

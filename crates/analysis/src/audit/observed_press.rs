@@ -57,7 +57,7 @@ impl ObservedPress<'_> {
     }
 
     /// True if the journal reports no problem.
-    pub(super) fn done(&self) -> bool {
+    pub(super) fn is_complete(&self) -> bool {
         self.outcome.verdict == PressVerdict::Valid
     }
 }

@@ -17,7 +17,7 @@ const MIN_GAIN_PER_PRESS: f64 = 0.3;
 
 /// The shifted rest of a session.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ShiftedRest {
+pub(crate) struct ShiftedSegment {
     /// Index of its first press in the path, from 0.
     pub from: usize,
     /// Shift of the position in rows.
@@ -32,7 +32,7 @@ pub(crate) fn shifted_rest(
     path: &Path<'_>,
     as_is: &ScoredReading<'_>,
     cameras: &[usize],
-) -> Option<ShiftedRest> {
+) -> Option<ShiftedSegment> {
     let n = path.presses_seen.len();
     let shifts: Vec<i32> = (-MAX_SHIFT..=MAX_SHIFT).collect();
     let loss = |i: usize, by: i32| -> f64 {
@@ -54,7 +54,7 @@ pub(crate) fn shifted_rest(
     };
     // Backwards: the best shift of all presses from each one onwards, against no shift.
     let mut gains = vec![0.0; shifts.len()];
-    let mut best: Option<ShiftedRest> = None;
+    let mut best: Option<ShiftedSegment> = None;
     for from in (0..n).rev() {
         let none = loss(from, 0);
         for (gain, by) in gains.iter_mut().zip(&shifts) {
@@ -65,7 +65,7 @@ pub(crate) fn shifted_rest(
                 && *gain - CHANGE > MIN_GAIN
                 && *gain > MIN_GAIN_PER_PRESS * rest as f64;
             if *by != 0 && enough && best.is_none_or(|b| *gain - CHANGE > b.gain) {
-                best = Some(ShiftedRest {
+                best = Some(ShiftedSegment {
                     from,
                     by: *by,
                     gain: *gain - CHANGE,

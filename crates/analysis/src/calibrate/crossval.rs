@@ -161,7 +161,7 @@ mod tests {
     use super::super::parameters::{MODELS, parameter_count};
     use super::*;
 
-    fn sights() -> Vec<CalibrationPress> {
+    fn sample_presses() -> Vec<CalibrationPress> {
         let planted = StereoGeometry::paper_like([43.0, -33.0, 47.5, 38.0, -1.2, 0.4, -0.11, 0.03]);
         let mut noise = seeded::generator(5, 0);
         let mut out = Vec::new();
@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn locations_stay_together_and_folds_are_even() {
-        let folds = Folds::deal(&sights(), 3);
+        let folds = Folds::deal(&sample_presses(), 3);
         assert_eq!((folds.count, folds.least_kept()), (10, 27));
         for i in 0..30 {
             assert_eq!(folds.of_sight[i], folds.of_sight[i + 30]);
@@ -196,16 +196,16 @@ mod tests {
         for fold in 0..10 {
             assert_eq!(folds.of_sight.iter().filter(|f| **f == fold).count(), 6);
         }
-        let few = Folds::deal(&sights()[..7], 3);
+        let few = Folds::deal(&sample_presses()[..7], 3);
         assert_eq!((few.count, few.least_kept()), (7, 6));
         assert_eq!(Folds::deal(&[], 3).count, 0);
     }
 
     /// If the fits saw the held-out location, a change of its truth would change its estimates.
     #[test]
-    fn a_held_out_location_has_no_say_in_its_own_error() {
+    fn a_held_out_location_does_not_affect_its_own_error() {
         let start = StereoGeometry::PAPER;
-        let mut sights = sights();
+        let mut sights = sample_presses();
         let folds = Folds::deal(&sights, 3);
         let errors = |sights: &[CalibrationPress]| {
             let problem = Problem::coarse(sights, &start, 8);
@@ -239,9 +239,9 @@ mod tests {
 
     /// The two descents of a fold find the same optimum as the search with all starts.
     #[test]
-    fn folds_end_where_a_full_search_of_their_presses_ends() {
+    fn folds_converge_to_the_full_search() {
         let start = StereoGeometry::PAPER;
-        let mut sights = sights();
+        let mut sights = sample_presses();
         // A distant press, so that the bounds of the fits matter.
         sights[17].columns[0] += 60.0;
         let folds = Folds::deal(&sights, 3);

@@ -10,7 +10,7 @@ use skinrig_model::{CameraModel, LensAngle, Point2, SENSOR_WIDTH, StereoGeometry
 
 use super::parameters::{PARAMETERS, Parameters, with_parameters};
 use crate::sets::CalibrationPress;
-use crate::triangulate::{Intersection, PARALLEL_SINE, meet};
+use crate::triangulate::{Intersection, PARALLEL_SINE, intersect_rays};
 
 /// Errors longer than this many bounds have no slope: it falls with the cube of the length.
 const SATURATED: f64 = 1e6;
@@ -86,12 +86,12 @@ impl StereoModel {
     /// Estimate minus truth, mm; `None` if the rays do not meet in front of both cameras.
     pub(crate) fn error_vector(&self, sight: &CalibrationPress) -> Option<[f64; 2]> {
         let d = [0, 1].map(|k| self.0[k].ray(sight.columns[k]).1);
-        self.error_of(sight.truth, &self.meet(d))
+        self.error_of(sight.truth, &self.intersect(d))
     }
 
-    fn meet(&self, directions: [[f64; 2]; 2]) -> Intersection {
+    fn intersect(&self, directions: [[f64; 2]; 2]) -> Intersection {
         let positions = [0, 1].map(|k| self.0[k].camera.position);
-        meet(positions, directions)
+        intersect_rays(positions, directions)
     }
 
     fn error_of(&self, truth: Point2, hit: &Intersection) -> Option<[f64; 2]> {
@@ -132,7 +132,7 @@ impl StereoModel {
         truth: Point2,
     ) -> Option<([f64; 2], [[f64; PARAMETERS]; 2])> {
         let rays = [0, 1].map(|k| self.0[k].ray(columns[k]));
-        let hit = self.meet(rays.map(|(_, d)| d));
+        let hit = self.intersect(rays.map(|(_, d)| d));
         let error = self.error_of(truth, &hit)?;
         let mut slope = [[0.0; PARAMETERS]; 2];
         for (k, eye) in self.0.iter().enumerate() {
@@ -321,7 +321,7 @@ mod tests {
     use super::super::parameters::parameters_of;
     use super::*;
 
-    fn sights() -> Vec<CalibrationPress> {
+    fn sample_presses() -> Vec<CalibrationPress> {
         (0u32..12)
             .map(|i| CalibrationPress {
                 press: PressId::from_index(i),
@@ -345,7 +345,7 @@ mod tests {
     #[test]
     fn the_jacobian_is_the_slope_of_the_residuals_for_every_lens() {
         use LensKind::{Equidistant, Equisolid, Exponential, Rectilinear, Stereographic};
-        let sights = sights();
+        let sights = sample_presses();
         for kind in [
             Exponential,
             Equidistant,
@@ -385,7 +385,7 @@ mod tests {
 
     #[test]
     fn the_normal_equations_are_those_of_the_rows() {
-        let (sights, base) = (sights(), lens(LensKind::Exponential));
+        let (sights, base) = (sample_presses(), lens(LensKind::Exponential));
         let p = parameters_of(&base);
         for count in [4, 6, 8, 10] {
             let problem = Problem {

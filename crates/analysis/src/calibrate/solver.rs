@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn it_ends_where_an_orthogonal_solver_ends() {
+    fn it_converges_to_the_orthogonal_solution() {
         let planted = StereoGeometry::paper_like([43.0, -33.0, 47.5, 38.0, -1.2, 0.4, -0.11, 0.03]);
         let mut noise = seeded::generator(2, 0);
         let sights: Vec<CalibrationPress> = (0..80u32)

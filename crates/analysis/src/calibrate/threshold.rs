@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn presses_that_are_worse_than_nothing_are_left_out() {
+    fn presses_worse_than_the_penalty_are_left_out() {
         let found = session(&[(25, 80.0), (40, 60.0), (31, 90.0)]);
         assert_eq!((found.events, found.left_out, found.n), (41, 3, 23));
         assert!((found.penalty_mm - 30.0).abs() < 1e-9);
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn a_geometry_that_knows_nothing_leaves_the_floor() {
+    fn an_uninformative_geometry_gives_the_floor() {
         let rows: Vec<_> = (0..20).map(|i| (100 + i, 90.0)).collect();
         let (sights, errors) = presses(&rows);
         let found = choose(&sights, &errors, 20, 1).unwrap();

@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn a_location_that_decides_alone_leaves_nothing_to_judge_by() {
+    fn a_location_that_alone_determines_the_fit_has_no_held_out_error() {
         let (residuals, jacobian, _) = line();
         let found = uncertainty(&residuals, &jacobian, &[0; 6]);
         assert_eq!((found.rank, found.standard_errors), (2, vec![None, None]));

@@ -42,7 +42,7 @@ impl Bursts {
         let found = strongest(
             &matches,
             MIN_STRENGTH * strength,
-            apart(presses) / merged_us,
+            separation(presses) / merged_us,
         );
         let length_us = activity.length_us();
         let inside = found
@@ -58,7 +58,7 @@ impl Bursts {
 }
 
 /// Minimum distance of two bursts, µs.
-fn apart(presses: &[PressSpan]) -> f64 {
+fn separation(presses: &[PressSpan]) -> f64 {
     let steps = presses
         .windows(2)
         .map(|w| w[1].contact_us - w[0].contact_us);

@@ -175,7 +175,7 @@ impl<'a> Counter<'a> {
         let (mut path, mut sync) = (SightingCounts::default(), SightingCounts::default());
         self.clear();
         for &(contact_us, is_sync) in &self.plan.contacts {
-            let seen = [0, 1].map(|k| self.look(k, contact_us + shift_us[k]));
+            let seen = [0, 1].map(|k| self.responds_at(k, contact_us + shift_us[k]));
             for (k, seen) in seen.into_iter().enumerate() {
                 tally.expected[k] += u32::from(seen.is_some());
                 tally.found[k] += u32::from(seen == Some(true));
@@ -218,7 +218,7 @@ impl<'a> Counter<'a> {
     }
 
     /// Whether camera `k` saw a press at `at_us`; `None` if it was not recording.
-    fn look(&mut self, k: usize, at_us: f64) -> Option<bool> {
+    fn responds_at(&mut self, k: usize, at_us: f64) -> Option<bool> {
         let train = self.trains[k]?;
         if at_us < train.from_us - NEAR_US || at_us > train.to_us {
             return None;
@@ -274,11 +274,11 @@ impl<'a> Counter<'a> {
             if self.plan.is_planned(at_us) {
                 continue;
             }
-            let sights = [0, 1].map(|k| self.look(k, at_us + shift_us[k]));
-            found.push((i, sights));
-            if sights.contains(&Some(true)) {
+            let responses = [0, 1].map(|k| self.responds_at(k, at_us + shift_us[k]));
+            found.push((i, responses));
+            if responses.contains(&Some(true)) {
                 (unseen, until) = (0, found.len());
-            } else if sights.contains(&Some(false)) {
+            } else if responses.contains(&Some(false)) {
                 unseen += 1;
             }
         }
@@ -287,7 +287,7 @@ impl<'a> Counter<'a> {
             return none;
         };
         let more = f64::from(*more);
-        found.iter().for_each(|(_, sights)| path.add(*sights));
+        found.iter().for_each(|(_, responses)| path.add(*responses));
         let planned = (self.plan.contacts.len() as f64).max(1.0);
         libm::log(MORE_PRIOR / planned) - (more - 1.0) / planned
     }

@@ -61,7 +61,7 @@ impl<R: Real> Streaming<R> {
     /// Adds the next event: time, not before the previous one (µs), and column.
     pub fn add(&mut self, t_us: u32, x: u16) {
         if u64::from(t_us) >= self.next_us {
-            self.forget(t_us);
+            self.discard_before(t_us);
         }
         let bin = usize::from(x >> BIN_SHIFT);
         let within = R::of(f64::from(x & (BIN_PX - 1) & self.mask)) + self.middle_px;
@@ -71,7 +71,7 @@ impl<R: Real> Streaming<R> {
         }
     }
 
-    fn forget(&mut self, t_us: u32) {
+    fn discard_before(&mut self, t_us: u32) {
         let steps = (u64::from(t_us) - self.next_us) / u64::from(self.step_us) + 1;
         self.next_us += steps * u64::from(self.step_us);
         let mut factor = R::of(1.0);

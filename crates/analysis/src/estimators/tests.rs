@@ -138,7 +138,7 @@ fn none_one_two_and_many_events_in_one_place_have_their_answers() {
 }
 
 #[test]
-fn an_estimator_says_the_same_again_after_another_press() {
+fn an_estimator_has_no_state_between_presses() {
     let (a, b) = (
         planted(200.0, 9.0, 500, 50, 1),
         planted(420.0, 15.0, 900, 50, 2),
@@ -246,7 +246,7 @@ proptest! {
     }
 
     #[test]
-    fn a_mirrored_press_is_seen_mirrored(columns in columns(), bin in proptest::sample::select(&AnalysisSettings::BIN_SIDES_PX[..])) {
+    fn a_mirrored_press_gives_a_mirrored_response(columns in columns(), bin in proptest::sample::select(&AnalysisSettings::BIN_SIDES_PX[..])) {
         for (estimator, precision) in ALL {
             let s = AnalysisSettings { centroid: CentroidRule::AllClusters, ..settings(estimator, precision, bin) };
             let of = |flip: bool| {

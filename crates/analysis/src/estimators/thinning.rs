@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_share_that_stays_is_one_in_k_in_each_camera_apart() {
+    fn thinning_keeps_one_in_k_per_camera() {
         let kept = |factor: u32, camera: CameraId, seed: u64| -> Vec<u64> {
             let thinning = Thinning::new(factor, camera, seed);
             let times = (0..100_000u64).map(|i| 7 * i + (1 << 50));

@@ -172,7 +172,7 @@ mod tests {
     proptest! {
         /// Reference: cluster each choice of events from scratch.
         #[test]
-        fn every_step_is_the_clustering_of_what_is_left(
+        fn every_step_clusters_the_remaining_events(
             pixels in prop::collection::vec((300u16..340, 250u16..270), 0..300), min_samples in 1u32..12, seed in 0u64..1000,
         ) {
             const POWERS: u32 = 9;

@@ -130,7 +130,7 @@ pub(crate) fn beyond_us(ties: &[f64], at: f64) -> f64 {
 
 /// Why the edges that a camera saw give no clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum NoCameraClock {
+pub enum CameraClockError {
     /// The box sent nothing.
     #[error("the box reported no train")]
     NoTrain,
@@ -188,10 +188,10 @@ impl Edges {
         &mut self,
         epoch: &Epoch,
         recorded: &[(u64, u64)],
-    ) -> Result<CameraFromBox, NoCameraClock> {
+    ) -> Result<CameraFromBox, CameraClockError> {
         let anchors = anchors(&self.trains, &epoch.trains);
         let Some(reference_us) = anchors.first().map(|a| a.1) else {
-            return Err(NoCameraClock::Unidentified {
+            return Err(CameraClockError::Unidentified {
                 sent: epoch.trains.len(),
                 edges: self.all.len(),
             });
@@ -202,7 +202,7 @@ impl Edges {
             .collect();
         let mut map = SmoothMap::fit(&points, STEP_US, ANCHOR_FLOOR_US)
             .filter(|map| map.drift.value.abs() <= crate::clock::NO_CLOCK_DRIFT)
-            .ok_or(NoCameraClock::NoLine {
+            .ok_or(CameraClockError::NoLine {
                 identified: anchors.len(),
                 sent: epoch.trains.len(),
             })?;
@@ -211,7 +211,7 @@ impl Edges {
         let mut instants = Vec::new();
         let mut seen_us = Vec::new();
         for near_us in NEAR_US {
-            matched = self.look(&epoch.trains, &map, reference_us, near_us);
+            matched = self.match_trains(&epoch.trains, &map, reference_us, near_us);
             instants = matched.iter().map(TrainMatch::instant).collect::<Vec<_>>();
             let seen: Vec<Point> = epoch
                 .trains
@@ -220,7 +220,7 @@ impl Edges {
                 .filter_map(|(sent, at)| Some(Point::new(sent.box_us, (*at)?)))
                 .collect();
             map = SmoothMap::fit(&seen, STEP_US, FLOOR_US)
-                .ok_or(NoCameraClock::FewSeen { seen: seen.len() })?;
+                .ok_or(CameraClockError::FewSeen { seen: seen.len() })?;
             seen_us = seen.iter().map(|p| p.from_us).collect();
         }
         let used = seen_us.into_iter().zip(&map.used).filter(|(_, u)| **u);
@@ -250,7 +250,7 @@ impl Edges {
     }
 
     /// Searches every sent edge at its position predicted by the map.
-    fn look(
+    fn match_trains(
         &self,
         sent: &[SentTrain],
         map: &SmoothMap,

@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn trains_in_step_with_the_microseconds_of_a_camera_are_no_evidence_against_its_clock() {
+    fn trains_synchronous_with_camera_ticks_are_no_evidence_against_its_clock() {
         for half_ppm in -120..=120 {
             for phase_us in [0.05, 0.3, 0.55, 0.8] {
                 let ppm = 0.5 * f64::from(half_ppm);

@@ -20,7 +20,7 @@ mod smooth;
 mod wire;
 
 pub use self::base::{Tie, TimeBase, TimeBaseInput};
-pub use self::edges::NoCameraClock;
+pub use self::edges::CameraClockError;
 pub(crate) use self::edges::distance_us;
 pub use self::reading::{Drift, Reading};
 pub(crate) use self::smooth::{Point, STEP_US, SmoothMap};

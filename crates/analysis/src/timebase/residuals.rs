@@ -104,7 +104,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn thinning_keeps_order_and_what_stands_out() {
+    fn thinning_keeps_order_and_extremes() {
         let residual_us = |k: u32| match k {
             4001 => -90.0,
             4002 => 9.0,

@@ -2,7 +2,7 @@
 
 use skinrig_model::{BoxReport, Label, TriggerEdge};
 
-use super::edges::{Edges, NoCameraClock};
+use super::edges::{CameraClockError, Edges};
 use super::epochs::epochs;
 use crate::result::LineCounts;
 
@@ -40,10 +40,10 @@ pub fn wire(
     reports: &[BoxReport],
     edges: &[TriggerEdge],
     channel: u8,
-) -> Result<Wire, NoCameraClock> {
+) -> Result<Wire, CameraClockError> {
     let epochs = epochs(reports, &[]);
     let Some(epoch) = epochs.iter().max_by_key(|e| e.trains.len()) else {
-        return Err(NoCameraClock::NoTrain);
+        return Err(CameraClockError::NoTrain);
     };
     let found = Edges::new(edges, channel).map(epoch, &[])?;
     let trains = epoch.trains.iter().zip(&found.whole_pulses);
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn pulses_that_are_missing_or_too_many_are_counted_where_they_are() {
+    fn missing_and_extra_pulses_are_counted_per_pulse() {
         let (reports, mut edges) = sent(6);
         let clean = wire(&reports, &edges, 6).unwrap();
         assert!(clean.trains.iter().all(|t| t.lost_pulses == 0), "{clean:?}");

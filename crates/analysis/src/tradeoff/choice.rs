@@ -170,7 +170,7 @@ pub(super) fn sweep(session: Choice, full: bool) -> Vec<Choice> {
             ..session
         }));
         all.extend(regions.map(|region| Choice { region, ..session }));
-        all.extend(promising(session));
+        all.extend(candidates(session));
     }
     let mut fresh: Vec<Choice> = Vec::new();
     for choice in all {
@@ -183,7 +183,7 @@ pub(super) fn sweep(session: Choice, full: bool) -> Vec<Choice> {
 
 /// Combinations that save in several ways at once: cheap estimators with short windows and thinned events, and clusters on
 /// coarse bins.
-fn promising(session: Choice) -> Vec<Choice> {
+fn candidates(session: Choice) -> Vec<Choice> {
     let mut all = Vec::new();
     for (estimator, precision) in [
         (Estimator::Dbscan, Precision::F64),

@@ -60,7 +60,7 @@ fn rows() -> impl Strategy<Value = Vec<Row>> {
 
 proptest! {
     #[test]
-    fn the_front_holds_exactly_what_nothing_dominates(rows in rows()) {
+    fn the_front_is_the_set_of_undominated_points(rows in rows()) {
         let result = tradeoff(rows);
         let values = |r: &Row| (r.rmse_mm.value.unwrap_or(f64::INFINITY), r.cpu_us);
         for one in &result.rows {
@@ -76,7 +76,7 @@ proptest! {
     }
 
     #[test]
-    fn what_is_selected_meets_the_demand_and_nothing_cheaper_or_better_does(
+    fn the_selection_meets_the_demand_and_is_optimal(
         rows in rows(),
         target in 0.5..9.0f64,
         budget in 0.5..9.0f64,
@@ -111,7 +111,7 @@ fn an_rmse_without_an_interval_meets_no_target() {
 }
 
 #[test]
-fn a_sweep_begins_with_the_sessions_choice_and_tries_nothing_twice() {
+fn a_sweep_starts_at_the_session_settings_without_repeats() {
     let session = Choice::of(&AnalysisSettings::default());
     let (some, all) = (choice::sweep(session, false), choice::sweep(session, true));
     assert_eq!((some[0], all[0]), (session, session));
@@ -121,7 +121,7 @@ fn a_sweep_begins_with_the_sessions_choice_and_tries_nothing_twice() {
 }
 
 #[test]
-fn overrides_say_what_differs_and_no_more() {
+fn overrides_list_only_the_differences() {
     let session = AnalysisSettings::default();
     let choice = Choice {
         thinning: 8,

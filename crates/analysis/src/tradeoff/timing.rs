@@ -26,7 +26,7 @@ pub(super) struct Time {
 }
 
 /// Input of the timed part: per press and camera the events and the start of the window.
-type Prepared = Vec<[(Vec<PackedEvent>, u32); 2]>;
+type PreparedPresses = Vec<[(Vec<PackedEvent>, u32); 2]>;
 
 /// Times each candidate `repeats` times after one warm-up run. Within a repeat every candidate runs once, so that a slow
 /// moment of the machine affects all. The stopwatch returns CPU seconds of this thread.
@@ -83,7 +83,7 @@ fn prepare(
     replay: &Replay<'_>,
     presses: &[&RetainedPress],
     settings: &AnalysisSettings,
-) -> Prepared {
+) -> PreparedPresses {
     let windows = CameraId::ALL.map(|camera| replay.windows_by_row(camera, settings));
     let filters = CameraId::ALL.map(|camera| Filter::new(camera, settings));
     let of = |press: &RetainedPress, k: usize, window: Option<Window>| {

@@ -5,7 +5,7 @@
 mod rigs;
 
 use rayon::prelude::*;
-use rigs::{Random, Session, Wishes, session, sound};
+use rigs::{Random, Session, SessionOptions, session, sound};
 use skinrig_analysis::result::{Fault, Finding};
 use skinrig_analysis::{Analysis, SessionInput, analyze};
 use skinrig_model::{HostTime, Point2, PressVerdict};
@@ -44,7 +44,7 @@ fn names(fault: Fault, plant: impl Fn(u64) -> Session + Sync) {
     );
 }
 
-fn edit(seed: u64, wishes: Wishes, change: impl Fn(&mut SessionInput)) -> Session {
+fn edit(seed: u64, wishes: SessionOptions, change: impl Fn(&mut SessionInput)) -> Session {
     let mut session = session(seed, wishes);
     change(&mut session.input);
     session
@@ -86,10 +86,10 @@ fn exchanged_cameras() {
 #[test]
 fn exchanged_cameras_on_a_single_line() {
     // Along y both cameras of the first rig see the presses in the same order: only the angles distinguish them.
-    let line = Wishes {
+    let line = SessionOptions {
         rig: Some(0),
         line_of: 10,
-        ..Wishes::default()
+        ..SessionOptions::default()
     };
     names(Fault::CamerasSwapped, |seed| {
         let mut s = session(seed, line);
@@ -110,7 +110,7 @@ fn a_mirrored_axis() {
         names(Fault::AxisMirrored, |seed| {
             // About 0 or the skin's centre; against the plan too, or together with it.
             let about = [Point2::new(0.0, 0.0), Point2::new(10.0, 2.0)][(seed % 2) as usize];
-            edit(seed, Wishes::default(), |input| {
+            edit(seed, SessionOptions::default(), |input| {
                 positions(input, seed % 4 < 3, |p| {
                     let flip = |v: f64, c: f64, sign: f64| c + sign * (v - c);
                     Point2::new(flip(p.x_mm, about.x_mm, x), flip(p.y_mm, about.y_mm, y))
@@ -124,12 +124,16 @@ fn a_mirrored_axis() {
 fn a_shifted_press_list() {
     for by in [1, -1, 3] {
         names(Fault::IndexShifted, |seed| {
-            edit(seed, Wishes::default(), |input| shift(input, by, true))
+            edit(seed, SessionOptions::default(), |input| {
+                shift(input, by, true)
+            })
         });
     }
     // Against its own plan.
     names(Fault::IndexShifted, |seed| {
-        edit(seed, Wishes::default(), |input| shift(input, 1, false))
+        edit(seed, SessionOptions::default(), |input| {
+            shift(input, 1, false)
+        })
     });
 }
 
@@ -137,11 +141,11 @@ fn a_shifted_press_list() {
 #[test]
 fn a_stream_of_other_presses() {
     for rows_late in [1, 2, 4] {
-        let wishes = Wishes {
+        let wishes = SessionOptions {
             rows_late,
             places: 20,
             line: Some(true),
-            ..Wishes::default()
+            ..SessionOptions::default()
         };
         names(Fault::ClockWrong, |seed| session(seed, wishes));
     }
@@ -166,7 +170,7 @@ fn shift(input: &mut SessionInput, by: i32, also_planned: bool) {
 fn another_unit_of_length() {
     for factor in [1e-3, 1e3] {
         names(Fault::UnitOfPositions, |seed| {
-            edit(seed, Wishes::default(), |input| {
+            edit(seed, SessionOptions::default(), |input| {
                 // Together with the plan, or against it.
                 positions(input, seed % 2 == 0, |p| {
                     Point2::new(factor * p.x_mm, factor * p.y_mm)
@@ -178,17 +182,17 @@ fn another_unit_of_length() {
 
 #[test]
 fn a_clock_that_is_no_crystals() {
-    let fast = Wishes {
+    let fast = SessionOptions {
         drift_ppm: Some(300.0),
-        ..Wishes::default()
+        ..SessionOptions::default()
     };
-    let with_line = Wishes {
+    let with_line = SessionOptions {
         line: Some(true),
         ..fast
     };
     names(Fault::ClockWrong, |seed| session(seed, with_line));
     // From the presses alone a drift shows only in long sessions.
-    let long = Wishes {
+    let long = SessionOptions {
         line: Some(false),
         places: 20,
         repetitions: 4,
@@ -204,33 +208,33 @@ fn missing_data() {
         s.events.events[(seed % 2) as usize].clear();
         s
     });
-    let line = Wishes {
+    let line = SessionOptions {
         line: Some(true),
-        ..Wishes::default()
+        ..SessionOptions::default()
     };
     names(Fault::NoTriggers, |seed| {
         edit(seed, line, |input| input.edges = [Vec::new(), Vec::new()])
     });
     names(Fault::NoTruth, |seed| {
-        edit(seed, Wishes::default(), |input| {
+        edit(seed, SessionOptions::default(), |input| {
             let outcomes = input.outcomes.iter_mut().flatten();
             outcomes.for_each(|o| o.measured_at = None);
         })
     });
     names(Fault::NoTruth, |seed| {
-        edit(seed, Wishes::default(), |input| {
+        edit(seed, SessionOptions::default(), |input| {
             let no_number = [f64::NAN, f64::INFINITY][(seed % 2) as usize];
             positions(input, false, |p| Point2::new(p.x_mm, no_number));
         })
     });
     // Half the presses were never executed; or executed after the recording ended.
     names(Fault::PressesMissing, |seed| {
-        edit(seed, Wishes::default(), |input| {
+        edit(seed, SessionOptions::default(), |input| {
             let half = input.outcomes.len() / 2;
             input.outcomes[half..].fill(None);
         })
     });
-    let ended = Wishes {
+    let ended = SessionOptions {
         end_at: Some(0.6),
         ..line
     };
@@ -239,9 +243,9 @@ fn missing_data() {
 
 #[test]
 fn a_camera_that_does_not_see_the_presses() {
-    let line = Wishes {
+    let line = SessionOptions {
         line: Some(true),
-        ..Wishes::default()
+        ..SessionOptions::default()
     };
     // Its events occur at random times.
     names(Fault::CameraBlind, |seed| {
@@ -257,7 +261,7 @@ fn a_camera_that_does_not_see_the_presses() {
     });
 
     // It goes dark half-way, without even noise.
-    let dark = Wishes {
+    let dark = SessionOptions {
         dark_from: Some(0.6),
         ..line
     };
@@ -275,7 +279,7 @@ fn a_camera_that_does_not_see_the_presses() {
 }
 
 #[test]
-fn a_robot_that_goes_elsewhere() {
+fn a_robot_at_the_wrong_position() {
     names(Fault::RobotOff, |seed| {
         let mut random = Random::new(seed);
         let mut s = sound(seed);
@@ -288,13 +292,13 @@ fn a_robot_that_goes_elsewhere() {
         s
     });
     names(Fault::RobotOff, |seed| {
-        edit(seed, Wishes::default(), |input| {
+        edit(seed, SessionOptions::default(), |input| {
             let outcomes = input.outcomes.iter_mut().flatten();
             outcomes.for_each(|o| o.measured_depth_mm = Some(0.9));
         })
     });
     names(Fault::RobotOff, |seed| {
-        edit(seed, Wishes::default(), |input| {
+        edit(seed, SessionOptions::default(), |input| {
             for outcome in input.outcomes.iter_mut().flatten().step_by(3) {
                 let timing = outcome.timing.as_mut().unwrap();
                 timing.at_depth = HostTime(timing.contact.0 + 30_000_000);
@@ -305,10 +309,10 @@ fn a_robot_that_goes_elsewhere() {
 
 #[test]
 fn a_camera_that_moved_between_repetitions() {
-    let moved = Wishes {
+    let moved = SessionOptions {
         move_px: 30.0,
         places: 9,
-        ..Wishes::default()
+        ..SessionOptions::default()
     };
     names(Fault::RigMoved, |seed| session(seed, moved));
 }
@@ -332,7 +336,7 @@ fn a_journal_that_contradicts_itself() {
     };
     let journal = |change: &(dyn Fn(&mut SessionInput) + Sync)| {
         names(Fault::JournalContradictory, |seed| {
-            edit(seed, Wishes::default(), change)
+            edit(seed, SessionOptions::default(), change)
         });
     };
     journal(&|input| timings(input, &|_| HostTime(0)));
@@ -357,12 +361,12 @@ fn a_journal_that_contradicts_itself() {
 fn sessions_too_small_to_judge_are_not_accused() {
     // One press and its sync presses: valid, as far as the data show.
     for seed in 0..20 {
-        let one = edit(seed, Wishes::default(), |input| {
+        let one = edit(seed, SessionOptions::default(), |input| {
             input.planned.truncate(4);
             input.outcomes.truncate(4);
         });
         assert_eq!(named(&run(&one).findings), [], "seed {seed}");
-        let alone = edit(seed, Wishes::default(), |input| {
+        let alone = edit(seed, SessionOptions::default(), |input| {
             input.planned.drain(..3);
             input.outcomes.drain(..3);
             input.planned.truncate(1);
@@ -370,12 +374,12 @@ fn sessions_too_small_to_judge_are_not_accused() {
         });
         assert_eq!(named(&run(&alone).findings), [], "seed {seed}");
     }
-    let nothing = edit(0, Wishes::default(), |input| {
+    let nothing = edit(0, SessionOptions::default(), |input| {
         input.planned.clear();
         input.outcomes.clear();
     });
     assert_eq!(named(&run(&nothing).findings), [Fault::PressesMissing]);
-    let refused = edit(0, Wishes::default(), |input| {
+    let refused = edit(0, SessionOptions::default(), |input| {
         for outcome in input.outcomes.iter_mut().flatten() {
             outcome.verdict = PressVerdict::Invalid("settled 0.3 mm from plan".to_owned().into());
         }

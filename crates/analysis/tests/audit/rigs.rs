@@ -46,7 +46,7 @@ impl Random {
 
 /// Modifications of a seeded session.
 #[derive(Clone, Copy, Default)]
-pub(crate) struct Wishes {
+pub(crate) struct SessionOptions {
     /// Index of the rig (`None`: from the seed).
     pub rig: Option<usize>,
     /// Number of locations along y instead of a path (0: a path).
@@ -120,11 +120,11 @@ fn path(random: &mut Random, least: usize) -> Vec<Point2> {
 
 /// The valid session of this seed.
 pub(crate) fn sound(seed: u64) -> Session {
-    session(seed, Wishes::default())
+    session(seed, SessionOptions::default())
 }
 
 /// The session of this seed with modifications.
-pub(crate) fn session(seed: u64, wishes: Wishes) -> Session {
+pub(crate) fn session(seed: u64, wishes: SessionOptions) -> Session {
     let mut random = Random::new(seed);
     let drawn = random.below(4);
     let at = RIGS[wishes.rig.unwrap_or(drawn)];

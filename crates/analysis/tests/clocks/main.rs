@@ -103,12 +103,12 @@ fn lost_doubled_late_and_foreign_pulses_do_no_harm() {
     let mut sent = marks(60);
     let mut edges = edges_of(&sent, &planted, 1.0);
     // Press 30's contact is attempted again later: the same name twice.
-    let again = SentMark {
+    let repeated = SentMark {
         t: HostTime(sent[119].t.0 + 900_000_000),
         ..sent[60]
     };
-    edges.extend(edges_of(&[again], &planted, 0.0));
-    sent.push(again);
+    edges.extend(edges_of(&[repeated], &planted, 0.0));
+    sent.push(repeated);
     // One train loses the end of its start pulse, one arrives 3 ms late; between them a foreign pulse and another channel's
     // edges.
     for edge in &mut edges[64 * 20..64 * 21] {

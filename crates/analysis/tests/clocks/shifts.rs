@@ -118,11 +118,11 @@ const SITUATIONS: &[Situation] = &[
     }),
     ("a hole of 15 s in one camera", Sure, |w, _| {
         let camera = w.dice.below(2);
-        w.hole(camera, 15.0);
+        w.add_gap(camera, 15.0);
     }),
     ("a hole of 15 s, more presses than planned", Sure, |w, n| {
         let camera = w.dice.below(2);
-        w.hole(camera, 15.0);
+        w.add_gap(camera, 15.0);
         let planned = some(w, 0.5, 0.99, n);
         w.plan_only(0, planned);
     }),
@@ -222,7 +222,7 @@ const SITUATIONS: &[Situation] = &[
         }
         if maybe(w) {
             let camera = w.dice.below(2);
-            w.hole(camera, 15.0);
+            w.add_gap(camera, 15.0);
         }
     }),
 ];

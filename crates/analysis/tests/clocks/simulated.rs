@@ -210,7 +210,7 @@ impl World {
         self.cameras[camera].to_s = 2.0 + PAUSE_S + (presses - 0.5) * self.period_s;
     }
 
-    pub(crate) fn hole(&mut self, camera: usize, length_s: f64) {
+    pub(crate) fn add_gap(&mut self, camera: usize, length_s: f64) {
         let r = self.cameras[camera];
         let from_s = self.dice.between(r.from_s.max(0.0), r.to_s - length_s);
         self.cameras[camera].hole_s = Some((from_s, from_s + length_s));

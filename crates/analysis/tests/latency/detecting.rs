@@ -57,7 +57,7 @@ fn the_kernel_is_the_published_one_and_keeps_a_constant() {
 }
 
 #[test]
-fn a_background_has_a_rate_whatever_is_in_it() {
+fn every_background_has_a_rate() {
     // 0 and 1 events (public code: 0.001 per second), 2 events 1 µs apart (2e6), 2 simultaneous ones (2e9): all over 0.9 s.
     for (events, rate) in [
         (0, 0.5 / 0.9),
@@ -149,7 +149,7 @@ fn a_planted_step_is_found_in_its_bin() {
 }
 
 #[test]
-fn false_alarms_on_pure_background_are_as_rare_as_theory_says() {
+fn false_alarms_on_pure_background_match_theory() {
     // Lorden 1971: the mean time between false alarms of an unsmoothed CUSUM is at least exp(h) bins. For Poisson counts the
     // sum jumps in steps of ln 4, so the true rate is lower, by the overshoot of about one such step and the share of
     // excursions that a run of one bin requires.

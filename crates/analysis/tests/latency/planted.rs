@@ -215,7 +215,7 @@ fn contacts_that_were_not_measured_may_be_off_by_the_window() {
 }
 
 #[test]
-fn what_was_left_out_by_hand_is_no_trial_and_what_the_skin_missed_is() {
+fn manual_exclusions_are_no_trials_and_missed_presses_are() {
     let (mut analysis, kept) = planted(|_| Some(2e4));
     for (n, rule) in [
         (3, "by hand"),
@@ -286,7 +286,7 @@ fn latency_from_the_contact_needs_a_contact_measured_apart_from_the_events() {
 }
 
 #[test]
-fn neighbours_cut_a_trial_and_the_study_says_so() {
+fn neighbours_shorten_a_trial_and_the_study_reports_it() {
     let (mut analysis, mut kept) = planted(|_| Some(2e4));
     // The press before the tenth is released 0.4 s before its contact.
     let row = kept.presses[10].row;
@@ -364,7 +364,7 @@ fn the_published_choice_takes_its_background_after_the_press_and_pads_with_zeros
 }
 
 #[test]
-fn the_study_is_the_same_whatever_the_number_of_threads() {
+fn the_study_does_not_depend_on_the_number_of_threads() {
     let (analysis, kept) = planted(|n| (n % 5 > 0).then_some(1e4 + 2e3 * n as f64));
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new()

@@ -208,7 +208,7 @@ fn the_choice_is_right_over_two_hundred_seeds_of_every_scene() {
 
 /// A sample of the same: what each scene needs is plain to see, with and without outliers.
 #[test]
-fn auto_takes_what_the_scene_requires_and_no_more() {
+fn auto_selects_the_lowest_sufficient_level() {
     let plain = |s: &Scene| s.side == 9 && s.noise_px < 2.0 && !s.name.starts_with("small");
     for scene in scenes().into_iter().filter(plain) {
         let s = simulate(&scene, 16);

@@ -250,7 +250,7 @@ fn a_named_model_is_used_compared_and_called_out() {
 }
 
 #[test]
-fn too_few_places_take_the_largest_model_they_bear_and_say_so() {
+fn too_few_locations_use_the_largest_supported_model_with_a_note() {
     let geometry = StereoGeometry::paper_like([43.0, -33.5, 47.0, 38.0, 0.0, 0.0, 0.0, 0.0]);
     let places: Vec<Point2> = grid(3);
     let of = |n: usize| {
@@ -290,7 +290,7 @@ fn too_few_places_take_the_largest_model_they_bear_and_say_so() {
 
 /// Noise in which the larger models run out of what a rig can be.
 #[test]
-fn a_fit_that_fails_falls_to_the_next_smaller_model_and_says_so() {
+fn a_failed_fit_falls_back_to_the_next_smaller_model_with_a_note() {
     let geometry = StereoGeometry::PAPER;
     let largest_first = [
         CalibrationModel::FullScale,

@@ -118,9 +118,9 @@ fn the_same_input_gives_the_same_bits_however_it_is_sliced() {
 }
 
 /// Counts the passes over each camera.
-struct Counted<'a>(&'a Memory, [AtomicU32; 2]);
+struct PassCounter<'a>(&'a Memory, [AtomicU32; 2]);
 
-impl EventSource for Counted<'_> {
+impl EventSource for PassCounter<'_> {
     fn for_each_slice(
         &self,
         camera: CameraId,
@@ -132,12 +132,12 @@ impl EventSource for Counted<'_> {
 }
 
 #[test]
-fn held_events_give_what_a_second_reading_gives() {
+fn cached_events_equal_a_second_reading() {
     let (mut input, mut source) = session();
     input.rig.trigger_channel = None;
     input.marks.clear();
     let passes = |source: &Memory| {
-        let counted = Counted(source, Default::default());
+        let counted = PassCounter(source, Default::default());
         let found = analyze_with_events(&input, &counted, Retention::All).unwrap();
         (found, counted.1.map(AtomicU32::into_inner))
     };
@@ -174,9 +174,9 @@ fn without_marks_the_rates_align_the_clocks() {
     input.marks.clear();
     let a = analyze(&input, &source).unwrap();
     for k in 0..2 {
-        let (clock, wanted) = (a.clocks[k].unwrap(), camera_us(k, 50.0));
+        let (clock, expected) = (a.clocks[k].unwrap(), camera_us(k, 50.0));
         assert!(
-            (clock.camera_us(50e6) - wanted).abs() < 15_000.0,
+            (clock.camera_us(50e6) - expected).abs() < 15_000.0,
             "{clock:?}"
         );
     }
@@ -189,7 +189,7 @@ fn without_marks_the_rates_align_the_clocks() {
 }
 
 #[test]
-fn whatever_goes_wrong_has_its_own_row_and_reason() {
+fn each_failure_has_its_own_row_and_reason() {
     let (mut input, mut source) = session();
     let verdict = |input: &mut SessionInput, row: usize, v: PressVerdict| {
         input.outcomes[row].as_mut().unwrap().verdict = v;
@@ -347,7 +347,7 @@ fn a_million_events_on_one_pixel_are_counted() {
 }
 
 #[test]
-fn broken_times_neither_panic_nor_pass_unseen() {
+fn broken_times_are_errors_and_never_panic() {
     let (input, mut source) = session();
     let last = CdEvent {
         t_us: u64::MAX,
@@ -374,11 +374,11 @@ fn broken_times_neither_panic_nor_pass_unseen() {
 fn single_events_outside_the_sensor_are_left_out_and_counted() {
     let (input, source) = session();
     let clean = analyze(&input, &source).unwrap();
-    let (_, mut spoilt) = session();
-    let t_us = spoilt.events[1][500].t_us;
+    let (_, mut corrupted) = session();
+    let t_us = corrupted.events[1][500].t_us;
     for (x, y) in [(640, 300), (3, 480), (u16::MAX, 0)] {
         let polarity = Polarity::On;
-        spoilt.events[1].insert(
+        corrupted.events[1].insert(
             500,
             CdEvent {
                 t_us,
@@ -388,7 +388,7 @@ fn single_events_outside_the_sensor_are_left_out_and_counted() {
             },
         );
     }
-    let mut found = analyze(&input, &spoilt).unwrap();
+    let mut found = analyze(&input, &corrupted).unwrap();
     assert_eq!(found.off_sensor[0], clean.off_sensor[0]);
     assert_eq!(found.off_sensor[1].events, 3);
     assert_eq!(found.off_sensor[1].of, clean.off_sensor[1].of + 3);
@@ -412,7 +412,7 @@ fn contradictions_are_refused_with_their_place() {
         refuse(|i, _| i.rig.nominal.cameras[1].position = Point2::new(10.0, 2.0)),
         refuse(|_, s| s.events[1].iter_mut().step_by(50).for_each(|e| e.x = 640)),
     ];
-    let wanted = [
+    let expected = [
         "expected one outcome slot per planned press (53), found 52",
         "expected the outcome of press 5 in its journal row, found that of press 6",
         "`eps`, found NaN px",
@@ -421,12 +421,12 @@ fn contradictions_are_refused_with_their_place() {
         "found (10, 2) mm, skew -1.47°",
         "expected events within 640 x 480 px but for at most 1 %, found ",
     ];
-    for (found, wanted) in all.iter().zip(wanted) {
-        assert!(found.contains(wanted), "{found}");
+    for (found, expected) in all.iter().zip(expected) {
+        assert!(found.contains(expected), "{found}");
     }
 
-    struct Broken;
-    impl EventSource for Broken {
+    struct FailingSource;
+    impl EventSource for FailingSource {
         fn for_each_slice(
             &self,
             camera: CameraId,
@@ -439,7 +439,7 @@ fn contradictions_are_refused_with_their_place() {
         }
     }
     let (input, _) = session();
-    let found = analyze(&input, &Broken).unwrap_err();
+    let found = analyze(&input, &FailingSource).unwrap_err();
     let AnalysisError::Events { camera, source } = found else {
         panic!("{found}");
     };
@@ -488,7 +488,7 @@ proptest! {
 }
 
 #[test]
-fn a_rule_groups_what_the_reason_tells_apart() {
+fn presses_with_different_reasons_are_grouped_by_rule() {
     let (input, mut source) = session();
     // Camera 2 sees almost nothing of two presses, not equally little.
     for (row, most) in [(40usize, 15), (41, 17)] {
@@ -569,7 +569,7 @@ fn pictures_are_spread_over_the_places() {
 }
 
 #[test]
-fn kept_events_are_those_of_the_presses_chosen() {
+fn retained_events_are_those_of_the_chosen_presses() {
     let (mut input, source) = session();
     input.settings.study_presses = 10;
     let (a, scored) = analyze_with_events(&input, &source, Retention::Scored).unwrap();
@@ -584,12 +584,12 @@ fn kept_events_are_those_of_the_presses_chosen() {
     for kept in &all.presses {
         let press = &a.presses[kept.row];
         assert_eq!(press.press, kept.press);
-        for (view, seen) in kept.views.iter().zip(press.views.map(Option::unwrap)) {
-            assert_eq!(view.press_events().len(), seen.events as usize);
+        for (view, observed) in kept.views.iter().zip(press.views.map(Option::unwrap)) {
+            assert_eq!(view.press_events().len(), observed.events as usize);
             let on = view.press_events().iter().filter(|e| e.is_on()).count();
-            assert_eq!(on, seen.on_events as usize);
+            assert_eq!(on, observed.on_events as usize);
             let idle = view.between(view.idle_from_us, view.window_us.0).len() as f64;
-            assert!((idle / seen.idle_s - seen.idle_rate_per_s).abs() < 1e-9);
+            assert!((idle / observed.idle_s - observed.idle_rate_per_s).abs() < 1e-9);
             assert!(view.events.is_sorted());
             // Contact 50 ms after the window begins, and the view reaches a second before it.
             assert!((view.contact_us - f64::from(view.window_us.0) - 50e3).abs() < 1.0);
@@ -622,8 +622,8 @@ fn presses_named_by_hand_are_rows_with_that_rule() {
     let count = |e: &skinrig_analysis::result::Estimate| e.value.unwrap() * f64::from(e.n);
     assert!((count(&a.scored.located_rate) - 24.0).abs() < 1e-9);
     let rms = |e: &skinrig_analysis::result::Estimate| e.value.unwrap().powi(2) * f64::from(e.n);
-    let wanted = rms(&a.scored.rmse_mm) + a.penalised.penalty_mm.powi(2);
-    assert!((rms(&a.penalised.rmse_mm) - wanted).abs() < 1e-6);
+    let expected = rms(&a.scored.rmse_mm) + a.penalised.penalty_mm.powi(2);
+    assert!((rms(&a.penalised.rmse_mm) - expected).abs() < 1e-6);
 }
 
 #[test]

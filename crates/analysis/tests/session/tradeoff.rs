@@ -30,7 +30,7 @@ fn with_settings(input: &SessionInput, settings: AnalysisSettings) -> SessionInp
 }
 
 #[test]
-fn each_row_is_what_an_analysis_with_its_settings_says() {
+fn each_row_equals_an_analysis_with_its_settings() {
     let (mut input, memory) = session();
     input.settings.bootstrap_resamples = 50;
     let result = measure(&input, &memory, PLAN, &mut ticking()).unwrap();
@@ -86,9 +86,9 @@ fn results_do_not_depend_on_times_and_costs_follow_the_choice() {
     }
     let own = &one.rows[0];
     let find = |change: fn(&mut Choice)| {
-        let mut wanted = own.choice;
-        change(&mut wanted);
-        one.rows.iter().find(|r| r.choice == wanted).unwrap()
+        let mut expected = own.choice;
+        change(&mut expected);
+        one.rows.iter().find(|r| r.choice == expected).unwrap()
     };
     // 0.45 s between contact and release, 50 ms after it.
     assert!((own.delay_ms - 500.0).abs() < 0.1, "{}", own.delay_ms);

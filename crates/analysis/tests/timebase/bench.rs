@@ -55,7 +55,7 @@ const WALK_STEP_US: f64 = 1e6;
 
 impl Clock {
     /// 20 ppm fast, with a rate that swings by `swing` (share, angular frequency per µs).
-    pub(crate) fn swinging(origin_us: f64, swing: (f64, f64)) -> Self {
+    pub(crate) fn oscillating(origin_us: f64, swing: (f64, f64)) -> Self {
         Self {
             origin_us,
             drift: 20e-6,
@@ -71,7 +71,7 @@ impl Clock {
             + host_us * (1.0 + self.drift)
             + 0.5 * self.wander * host_us * host_us
             + self.swing.0 / self.swing.1 * (self.swing.1 * host_us).sin()
-            + self.walked(host_us)
+            + self.random_walk_at(host_us)
     }
 
     /// The same crystal, begun anew.
@@ -82,7 +82,7 @@ impl Clock {
         }
     }
 
-    fn walked(&self, host_us: f64) -> f64 {
+    fn random_walk_at(&self, host_us: f64) -> f64 {
         let at = (host_us / WALK_STEP_US).max(0.0);
         let k = at as usize;
         match (self.walk.get(k), self.walk.get(k + 1)) {
@@ -103,7 +103,7 @@ impl Clock {
 
 /// How rates change besides evenly, by up to 3 ppm per hour.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Wander {
+pub(crate) enum RateVariation {
     /// Not.
     Even,
     /// They swing by 1 ppm, in between so many and so many s.
@@ -156,7 +156,7 @@ impl Delay {
 pub(crate) struct Conditions {
     pub span_s: f64,
     pub most_drift: f64,
-    pub wander: Wander,
+    pub wander: RateVariation,
     /// Edges come late by up to this, evenly; or by this on average, when `decays`.
     pub jitter_us: f64,
     pub decays: bool,
@@ -176,7 +176,7 @@ pub(crate) struct Conditions {
 pub(crate) const CLEAN: Conditions = Conditions {
     span_s: 40.0,
     most_drift: 500e-6,
-    wander: Wander::Even,
+    wander: RateVariation::Even,
     jitter_us: 2.5,
     decays: false,
     lost: 0.0,
@@ -218,21 +218,21 @@ pub(crate) fn bench(seed: u64, c: &Conditions) -> Bench {
         // Up to 3 ppm per hour.
         wander: r.between(-3e-6, 3e-6) / 3.6e9,
         swing: match c.wander {
-            Wander::Swings(low, high) => {
+            RateVariation::Swings(low, high) => {
                 let period_us = 1e6 * r.between(low, high);
                 (1e-6, std::f64::consts::TAU / period_us)
             }
             _ => (0.0, 1.0),
         },
-        walk: walk(&mut r, c),
+        walk: random_walk(&mut r, c),
     };
     let boxed = clock(1e9);
     let cameras = [clock(1e12), clock(1e12)];
     run(r, boxed, cameras, c)
 }
 
-fn walk(r: &mut Random, c: &Conditions) -> Arc<[f64]> {
-    let Wander::Walks(in_a_minute) = c.wander else {
+fn random_walk(r: &mut Random, c: &Conditions) -> Arc<[f64]> {
+    let RateVariation::Walks(in_a_minute) = c.wander else {
         return Arc::default();
     };
     let sigma = in_a_minute * (WALK_STEP_US / 60e6).sqrt();

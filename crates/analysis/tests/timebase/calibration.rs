@@ -7,7 +7,7 @@ use skinrig_analysis::result::AlignmentStatus;
 use skinrig_analysis::timebase::Reading;
 use skinrig_model::AlignmentSettings;
 
-use crate::bench::{CLEAN, Conditions, Delay, NOISY, Wander, bench};
+use crate::bench::{CLEAN, Conditions, Delay, NOISY, RateVariation, bench};
 
 /// Readings that state an interval.
 const READ: [&str; 5] = [
@@ -19,7 +19,7 @@ const READ: [&str; 5] = [
 ];
 
 /// One bench: what its certificate states, and how it really was.
-struct Judged {
+struct CalibrationTrial {
     /// By the order of [`READ`]: what was read, and its error, µs (of the drift ppm).
     read: [(Reading, f64); 5],
     /// Held-out trains of all maps: within their interval, and all.
@@ -73,7 +73,7 @@ const EXCEPTIONS: [(&str, &str, RangeInclusive<f64>); 12] = [
 
 /// Error of each bench in one reading. Readings of a camera come late by a mean delay, the same on all benches: the
 /// bound is for it, not the interval.
-fn errors(judged: &[Judged], what: usize) -> Vec<(Reading, f64)> {
+fn errors(judged: &[CalibrationTrial], what: usize) -> Vec<(Reading, f64)> {
     let all = judged.iter().map(|j| j.read[what]);
     let mean = if matches!(what, 0 | 2 | 3) {
         all.clone().map(|(_, off)| off).sum::<f64>() / judged.len() as f64
@@ -103,13 +103,13 @@ fn unevenness(errors: &[(Reading, f64)]) -> f64 {
 }
 
 /// Share of held-out trains within their interval; `None` when no bench states any.
-fn held_out(judged: &[Judged]) -> Option<f64> {
+fn held_out(judged: &[CalibrationTrial]) -> Option<f64> {
     let each = judged.iter().map(|j| j.held_out);
     let (inside, n) = each.fold((0.0, 0.0), |s, h| (s.0 + h.0, s.1 + h.1));
     (n > 0.0).then(|| inside / n)
 }
 
-fn judge(seed: u64, c: &Conditions) -> Judged {
+fn judge(seed: u64, c: &Conditions) -> CalibrationTrial {
     let b = bench(seed, c);
     let base = b.align(&AlignmentSettings::default());
     let a = &base.alignment;
@@ -153,7 +153,7 @@ fn judge(seed: u64, c: &Conditions) -> Judged {
         let n = f64::from(m.coverage_n);
         (sum.0 + n * m.coverage.unwrap_or(0.0), sum.1 + n)
     });
-    Judged {
+    CalibrationTrial {
         read: [
             (of_box, of_box_off),
             (between, between.us - b.cameras[1].at(shown_at)),
@@ -175,7 +175,7 @@ const FAST: &str = "rates that swing in 200 to 900 s, 5 min";
 const WALK: &str = "rates that walk, 5 min";
 
 /// An hour with few trains and exchanges.
-const HOUR: &str = "a train each 4 s, swinging rates, 1 h";
+const HOUR: &str = "a train each 4 s, oscillating rates, 1 h";
 
 fn conditions() -> Vec<(&'static str, Conditions)> {
     let decaying = Conditions {
@@ -243,21 +243,21 @@ fn conditions() -> Vec<(&'static str, Conditions)> {
         (
             "rates that swing in 20 to 60 min, 5 min",
             Conditions {
-                wander: Wander::Swings(1200.0, 3600.0),
+                wander: RateVariation::Swings(1200.0, 3600.0),
                 ..c(300.0)
             },
         ),
         (
             FAST,
             Conditions {
-                wander: Wander::Swings(200.0, 900.0),
+                wander: RateVariation::Swings(200.0, 900.0),
                 ..c(300.0)
             },
         ),
         (
             WALK,
             Conditions {
-                wander: Wander::Walks(0.05e-6),
+                wander: RateVariation::Walks(0.05e-6),
                 ..c(300.0)
             },
         ),
@@ -266,7 +266,7 @@ fn conditions() -> Vec<(&'static str, Conditions)> {
             Conditions {
                 sync_s: 4,
                 exchange_s: 1.0,
-                wander: Wander::Swings(1200.0, 3600.0),
+                wander: RateVariation::Swings(1200.0, 3600.0),
                 ..c(3600.0)
             },
         ),
@@ -292,7 +292,7 @@ fn intervals_hold_in_every_condition() {
         } else {
             benches.min(LONG)
         };
-        let judged: Vec<Judged> = (from..from + n)
+        let judged: Vec<CalibrationTrial> = (from..from + n)
             .into_par_iter()
             .map(|seed| judge(seed, &c))
             .collect();
@@ -323,8 +323,8 @@ fn intervals_hold_in_every_condition() {
 
 /// 1000 benches with drifts up to 500 ppm, jitter, 20 % of the edges lost and 5 % spurious.
 #[test]
-fn labels_are_right_and_intervals_hold_as_often_as_they_say_on_1000_noisy_benches() {
-    let judged: Vec<Judged> = (0..1000u64)
+fn labels_are_right_and_intervals_have_nominal_coverage_on_1000_noisy_benches() {
+    let judged: Vec<CalibrationTrial> = (0..1000u64)
         .into_par_iter()
         .map(|seed| judge(seed, &NOISY))
         .collect();
@@ -355,7 +355,7 @@ fn short_sessions_state_no_coverage_of_trains_and_hold_their_other_intervals() {
         span_s: 10.0,
         ..NOISY
     };
-    let judged: Vec<Judged> = (0..500u64)
+    let judged: Vec<CalibrationTrial> = (0..500u64)
         .into_par_iter()
         .map(|seed| judge(seed, &c))
         .collect();

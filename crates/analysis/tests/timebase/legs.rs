@@ -14,14 +14,14 @@ use crate::bench::{Bench, NOISY, Random, bench, run};
 
 /// Two benches joined as the recorder joins the legs of a session: the second with the same crystals, all its clocks begun anew, and
 /// the same labels.
-struct InLegs {
+struct JoinedLegs {
     first: Bench,
     second: Bench,
     leg: LegStart,
     joined: Bench,
 }
 
-fn in_legs(seed: u64) -> InLegs {
+fn in_legs(seed: u64) -> JoinedLegs {
     let first = bench(seed, &NOISY);
     let second = run(
         Random(seed + 1000),
@@ -60,7 +60,7 @@ fn in_legs(seed: u64) -> InLegs {
         ..first
     };
     let first = bench(seed, &NOISY);
-    InLegs {
+    JoinedLegs {
         first,
         second,
         leg,
@@ -74,7 +74,7 @@ fn joint(leg: &LegStart, k: usize) -> f64 {
 }
 
 /// The session as it was recorded.
-fn input(s: &InLegs) -> SessionInput {
+fn input(s: &JoinedLegs) -> SessionInput {
     SessionInput {
         planned: Vec::new(),
         outcomes: Vec::new(),
@@ -148,7 +148,7 @@ fn trains_of_one_leg_are_never_looked_for_in_another() {
 }
 
 #[test]
-fn the_legs_are_laid_on_one_line() {
+fn the_legs_share_one_time_axis() {
     let s = in_legs(31);
     let mut input = input(&s);
     align(&mut input);

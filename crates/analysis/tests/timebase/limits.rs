@@ -12,7 +12,7 @@ fn status(b: &Bench, limits: &AlignmentSettings) -> (AlignmentStatus, String) {
 }
 
 #[test]
-fn a_session_beyond_any_limit_is_invalid_and_says_which() {
+fn a_session_beyond_a_limit_is_invalid_and_names_the_limit() {
     let clean = bench(1, &CLEAN);
     let limits = AlignmentSettings::default();
     assert_eq!(
@@ -20,7 +20,7 @@ fn a_session_beyond_any_limit_is_invalid_and_says_which() {
         (AlignmentStatus::Valid, String::new())
     );
     let noisy = bench(1, &NOISY);
-    for (limits, said) in [
+    for (limits, output) in [
         (
             AlignmentSettings {
                 max_residual_us: 0.01,
@@ -72,8 +72,8 @@ fn a_session_beyond_any_limit_is_invalid_and_says_which() {
         ),
     ] {
         let (found, words) = status(&noisy, &limits);
-        assert_eq!(found, AlignmentStatus::Invalid, "{said}");
-        assert!(words.contains(said), "{said}: {words}");
+        assert_eq!(found, AlignmentStatus::Invalid, "{output}");
+        assert!(words.contains(output), "{output}: {words}");
     }
     // No edge of one camera, as when its cable is off.
     let mut dead = bench(2, &CLEAN);
@@ -108,17 +108,17 @@ fn a_session_beyond_any_limit_is_invalid_and_says_which() {
 
 /// Clocks whose rate changes faster than a clock's may: of a camera, of the box, and a jump. Their trains came, and are not called lost.
 #[test]
-fn a_clock_that_drifts_too_fast_is_told_from_a_wire_that_loses() {
+fn a_fast_drift_is_distinguished_from_a_lossy_wire() {
     let limits = AlignmentSettings::default();
-    let steady = Clock::swinging(5e8, (0.0, 1.0));
+    let steady = Clock::oscillating(5e8, (0.0, 1.0));
     for period_s in [3.0, 7.0, 20.0] {
         for ppm in [100.0, 300.0, 1_000.0] {
-            let swinging =
-                Clock::swinging(3e9, (ppm * 1e-6, std::f64::consts::TAU / (period_s * 1e6)));
+            let oscillating =
+                Clock::oscillating(3e9, (ppm * 1e-6, std::f64::consts::TAU / (period_s * 1e6)));
             for (of_box, name) in [(false, "camera 1"), (true, "trigger box")] {
                 let (boxed, one) = match of_box {
-                    true => (swinging.clone(), steady.clone()),
-                    false => (steady.clone(), swinging.clone()),
+                    true => (oscillating.clone(), steady.clone()),
+                    false => (steady.clone(), oscillating.clone()),
                 };
                 let b = run(Random(9), boxed, [one, steady.clone()], &CLEAN);
                 let (found, words) = status(&b, &limits);
@@ -144,7 +144,7 @@ fn a_clock_that_drifts_too_fast_is_told_from_a_wire_that_loses() {
 }
 
 #[test]
-fn nothing_is_certified_without_a_press_and_nothing_is_said_without_a_box() {
+fn no_certificate_without_a_press_and_no_statement_without_a_box() {
     let mut b = bench(7, &CLEAN);
     b.presses.clear();
     b.edges[0].clear();

@@ -30,7 +30,7 @@ impl Bench {
 }
 
 #[test]
-fn what_a_wire_loses_at_the_ends_is_lost_and_no_press_there_is_timed() {
+fn presses_beyond_lost_end_trains_are_not_timed() {
     let limits = AlignmentSettings::default();
     for seed in 40..50 {
         let mut b = bench(seed, &CLEAN);
@@ -128,10 +128,10 @@ fn presses_after_the_last_exchange_are_not_timed() {
     assert_eq!(a.warnings.len(), 2);
     let a = end(23e6);
     assert_eq!(a.status, AlignmentStatus::Invalid);
-    let said = a.violations.join("; ");
+    let output = a.violations.join("; ");
     assert!(
-        said.contains("without a tie within 2.5 s: expected at most 30 %"),
-        "{said}"
+        output.contains("without a tie within 2.5 s: expected at most 30 %"),
+        "{output}"
     );
 }
 
@@ -189,7 +189,7 @@ fn session_of(b: &Bench, marks: bool) -> SessionInput {
 fn a_press_that_no_clock_reaches_is_refused_by_a_rule_that_names_itself() {
     let mut b = bench(53, &CLEAN);
     b.cut_wire(1, 31e6);
-    for (marks, said) in [(false, "train"), (true, "mark")] {
+    for (marks, output) in [(false, "train"), (true, "mark")] {
         let input = session_of(&b, marks);
         let a = analyze(&input, &Dark).unwrap();
         assert!(a.alignment.is_usable(), "{:?}", a.alignment);
@@ -199,7 +199,7 @@ fn a_press_that_no_clock_reaches_is_refused_by_a_rule_that_names_itself() {
                 assert_eq!(press.verdict, Verdict::Invalid);
                 assert_eq!(press.rule, Some(Rule::NotTimed(CameraId::Two)));
                 assert!(
-                    reason.starts_with(&format!("not timed: the nearest {said} seen is "))
+                    reason.starts_with(&format!("not timed: the nearest {output} seen is "))
                         && reason.ends_with(" s away, expected at most 2.5 s (camera 2)"),
                     "{reason}"
                 );

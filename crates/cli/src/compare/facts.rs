@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde_json::Value;
-use skinrig_compare::{Facts, flatten};
+use skinrig_compare::{SessionFacts, flatten};
 use skinrig_model::{CameraId, DeviceRole, RunHeader};
 use skinrig_protocol::Protocol;
 use skinrig_recorder::SessionReader;
@@ -31,7 +31,7 @@ pub(super) fn facts(
     path: &Path,
     reader: &SessionReader,
     header: &RunHeader,
-) -> Result<Facts, Failure> {
+) -> Result<SessionFacts, Failure> {
     let unreadable = Failure::session;
     let mut values = BTreeMap::new();
     let mut add = |name: &str, value: String| {
@@ -83,7 +83,7 @@ pub(super) fn facts(
     };
     flatten(kind, &rig.map_or(Value::Null, |r| r.rig), &mut flat);
     values.extend(flat);
-    Ok(Facts {
+    Ok(SessionFacts {
         file: path
             .file_name()
             .map(|n| n.to_string_lossy().into_owned())

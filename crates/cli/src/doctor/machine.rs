@@ -38,7 +38,7 @@ pub(super) struct Machine {
 
 impl Machine {
     /// The machine that this program runs on.
-    pub(super) fn this() -> Self {
+    pub(super) fn current() -> Self {
         Self {
             root: PathBuf::from("/"),
             free_b: crate::rig::gates::free_bytes,
@@ -47,7 +47,7 @@ impl Machine {
 
     /// A machine planted in `root`, with this free space everywhere.
     #[cfg(test)]
-    pub(super) fn planted(root: &Path, free_b: fn(&Path) -> io::Result<f64>) -> Self {
+    pub(super) fn with_root(root: &Path, free_b: fn(&Path) -> io::Result<f64>) -> Self {
         Self {
             root: root.to_owned(),
             free_b,

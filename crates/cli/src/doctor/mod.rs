@@ -43,10 +43,10 @@ pub(crate) fn doctor(args: &DoctorArgs, json: bool) -> Outcome {
     let survey = if lease.as_deref().is_some_and(bench::is_held) {
         Survey::of_a_held_bench(rig.as_ref())
     } else {
-        Survey::make(rig.as_ref())
+        Survey::query(rig.as_ref())
     };
     let findings = examine(&Case {
-        machine: &Machine::this(),
+        machine: &Machine::current(),
         rig: rig.as_ref(),
         inputs: &rig.as_ref().map(rig_inputs::all).unwrap_or_default(),
         survey: &survey,

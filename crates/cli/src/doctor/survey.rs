@@ -35,7 +35,7 @@ pub(super) enum Library {
 
 impl Survey {
     /// Queries all devices and the library.
-    pub(super) fn make(rig: Option<&RigFile>) -> Self {
+    pub(super) fn query(rig: Option<&RigFile>) -> Self {
         Self {
             lines: devices::survey(rig),
             left_alone: false,

@@ -11,7 +11,7 @@ use skinrig_report::trend::Links;
 
 /// Why the session of an alarm is missing.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum NoEvidence {
+pub(crate) enum MissingEvidence {
     /// The night has no golden session.
     #[error("that night has no golden session")]
     NoGolden,
@@ -42,7 +42,7 @@ pub(crate) struct AlarmEvidence {
     /// Page of the night that raised it.
     page: Option<PathBuf>,
     /// Golden session of that night.
-    pub session: Result<PathBuf, NoEvidence>,
+    pub session: Result<PathBuf, MissingEvidence>,
 }
 
 /// Copies the session of every alarm to `alarms/NIGHT/` beside the history, unless it is there
@@ -52,10 +52,10 @@ pub(super) fn keep(history: &Path, report: &Report) -> Vec<AlarmEvidence> {
         let night = &report.nights[alarm.raised];
         let home = history::folder_of(history, &night.folder);
         let page = home.join(night_folder::PAGE);
-        let kept = history::folder_of(history, "alarms").join(plain(&alarm.id));
+        let kept = history::folder_of(history, "alarms").join(file_name_part(&alarm.id));
         let session = match &night.golden {
             Some(golden) => copy(&home.join(golden), &kept),
-            None => Err(NoEvidence::NoGolden),
+            None => Err(MissingEvidence::NoGolden),
         };
         AlarmEvidence {
             home: history::folder_of(history, ""),
@@ -67,14 +67,14 @@ pub(super) fn keep(history: &Path, report: &Report) -> Vec<AlarmEvidence> {
 }
 
 /// Links or copies a sealed session into `folder`, unless it is there already.
-fn copy(session: &Path, folder: &Path) -> Result<PathBuf, NoEvidence> {
+fn copy(session: &Path, folder: &Path) -> Result<PathBuf, MissingEvidence> {
     let name = session.file_name().unwrap_or_default();
     let to = folder.join(name);
     if to.is_file() {
         return Ok(to);
     }
     if SessionReader::open(session)?.seal()?.is_none() {
-        return Err(NoEvidence::Unsealed {
+        return Err(MissingEvidence::Unsealed {
             session: session.to_owned(),
         });
     }
@@ -87,12 +87,12 @@ fn copy(session: &Path, folder: &Path) -> Result<PathBuf, NoEvidence> {
     });
     match copied {
         Ok(()) => Ok(to),
-        Err(source) => Err(NoEvidence::Copy { to, source }),
+        Err(source) => Err(MissingEvidence::Copy { to, source }),
     }
 }
 
 /// Converts `id` to a safe file name.
-fn plain(id: &str) -> String {
+fn file_name_part(id: &str) -> String {
     let safe = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
     let name: String = id.chars().map(|c| if safe(c) { c } else { '-' }).collect();
     name.trim_start_matches('.').to_owned()

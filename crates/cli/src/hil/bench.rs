@@ -139,11 +139,11 @@ impl Bench for RealBench {
     fn stop_signal(&self) -> Box<dyn Fn() -> bool> {
         let operator = self.operator.clone();
         let lost = self.lease.as_ref().map(Lease::watch);
-        Box::new(move || operator.asked() || lost.as_ref().is_some_and(|lost| lost()))
+        Box::new(move || operator.is_requested() || lost.as_ref().is_some_and(|lost| lost()))
     }
 
     fn stop_requested(&self) -> bool {
-        self.operator.asked() || self.lease_is_lost()
+        self.operator.is_requested() || self.lease_is_lost()
     }
 
     fn control(&self) -> ControlHandle {

@@ -12,7 +12,7 @@ use skinrig_report::night;
 use skinrig_text::Paint;
 
 /// Prints the progress of a night and saves its results.
-pub(super) struct Live {
+pub(super) struct NightProgress {
     folder: NightFolder,
     display: Display,
     paint: Paint,
@@ -28,7 +28,7 @@ enum Display {
     Lines,
 }
 
-impl Live {
+impl NightProgress {
     /// Progress of a night of `suite` in `folder`.
     #[must_use]
     pub(super) fn new(folder: NightFolder, suite: &Suite) -> Self {
@@ -80,7 +80,7 @@ pub(super) fn paint(stream: &impl IsTerminal) -> Paint {
     Paint::new(crate::terminal::is_coloured(stream))
 }
 
-impl NightObserver for Live {
+impl NightObserver for NightProgress {
     fn attempt_started(&mut self, _night: &Night, check: &Check, attempt: usize) {
         let again = match attempt {
             1 => String::new(),

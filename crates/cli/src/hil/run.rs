@@ -19,7 +19,7 @@ use skinrig_report::night::{self, Trends, span};
 use skinrig_report::trend::sentence;
 
 use super::args::HilRunArgs;
-use super::live::{self, Live};
+use super::live::{self, NightProgress};
 use super::real_bench::RealBench;
 use super::trend::After;
 use super::{lease, trend};
@@ -77,7 +77,7 @@ pub(crate) fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome 
     let started = started.to_rfc3339_opts(SecondsFormat::Secs, true);
     let mut night = blank(folder.id().to_owned(), &suite, &rig, started);
     night.lease_note = lease.note().map(str::to_owned);
-    let mut live = Live::new(folder.clone(), &suite);
+    let mut live = NightProgress::new(folder.clone(), &suite);
     let mut bench =
         RealBench::new(rig, folder.path().to_owned(), operator, command_line).holding(lease);
     let night = runner.run(night, &mut bench, &mut live);
@@ -93,7 +93,7 @@ pub(crate) fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome 
         outln!("{}", night::tree(&night, paint).trim_end());
         outln!("{}", folder.path().join(night_folder::PAGE).display());
     }
-    match write_error.map_or(trends, |e| Err(KeepError::Night(e))) {
+    match write_error.map_or(trends, |e| Err(NightFileError::Night(e))) {
         Ok(None) => Ok(Exit::Night(night.exit)),
         // The exit code depends on the limits alone, not on trends.
         Ok(Some(trends)) => {
@@ -123,7 +123,7 @@ type TrendOutcome = Option<Result<After, HistoryError>>;
 
 /// A file of the night could not be written.
 #[derive(Debug, thiserror::Error)]
-enum KeepError {
+enum NightFileError {
     /// JSON.
     #[error(transparent)]
     Night(io::Error),
@@ -146,11 +146,11 @@ fn keep(
     night: &Night,
     folder: &NightFolder,
     history: Option<&Path>,
-) -> Result<TrendOutcome, KeepError> {
+) -> Result<TrendOutcome, NightFileError> {
     let write = |name: &'static str, text: &str| {
         folder
             .write(name, text)
-            .map_err(|source| KeepError::File { name, source })
+            .map_err(|source| NightFileError::File { name, source })
     };
     let page = |trends: Trends<'_>| {
         let page = night::html(night, trends)?;

@@ -23,7 +23,7 @@ pub(crate) fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
     if let Some(folder) = &args.rebuild {
         rebuild(&args.history, folder)?;
     }
-    let (history, report) = judged(args)?;
+    let (history, report) = judge_history(args)?;
     let pattern = args.series.as_deref().unwrap_or("*");
     let series = series(pattern).map_err(|e| {
         Failure::input(format!(
@@ -71,7 +71,7 @@ pub(crate) fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
     }))
 }
 
-fn judged(args: &HilTrendArgs) -> Result<(History, Report), Failure> {
+fn judge_history(args: &HilTrendArgs) -> Result<(History, Report), Failure> {
     let filter = Filter {
         rig: args.rig.clone(),
         suite: args.suite.clone(),

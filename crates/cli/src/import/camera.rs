@@ -80,14 +80,14 @@ pub(crate) struct ChunkFeed {
 
 /// The run ended before the file, so reading stops.
 #[derive(Debug)]
-pub(super) struct RunEnded;
+pub(super) struct ImportEnded;
 
 impl ChunkFeed {
     /// Encodes the next events of a container that stores no words, in time order.
     ///
     /// # Errors
-    /// [`RunEnded`]; [`ChunkFeed::fail`] has been called when an event cannot be encoded.
-    pub(super) fn events(&mut self, events: &[CdEvent]) -> Result<(), RunEnded> {
+    /// [`ImportEnded`]; [`ChunkFeed::fail`] has been called when an event cannot be encoded.
+    pub(super) fn events(&mut self, events: &[CdEvent]) -> Result<(), ImportEnded> {
         for event in events {
             if self.encoder.is_none() {
                 let first = event.t_us - event.t_us % TIME_HIGH_EVERY_US;
@@ -130,8 +130,8 @@ impl ChunkFeed {
     /// Takes the next bytes of a stream that is recorded unchanged.
     ///
     /// # Errors
-    /// [`RunEnded`].
-    pub(super) fn raw(&mut self, bytes: &[u8]) -> Result<(), RunEnded> {
+    /// [`ImportEnded`].
+    pub(super) fn raw(&mut self, bytes: &[u8]) -> Result<(), ImportEnded> {
         self.bytes.extend_from_slice(bytes);
         if self.bytes.len() >= CHUNK_BYTES {
             self.send()
@@ -143,13 +143,13 @@ impl ChunkFeed {
     /// Ends the stream with an error.
     ///
     /// # Errors
-    /// Always [`RunEnded`].
-    pub(super) fn fail(&mut self, error: RecordingError) -> Result<(), RunEnded> {
-        self.queue.send(Err(error)).map_err(|_| RunEnded)?;
-        Err(RunEnded)
+    /// Always [`ImportEnded`].
+    pub(super) fn fail(&mut self, error: RecordingError) -> Result<(), ImportEnded> {
+        self.queue.send(Err(error)).map_err(|_| ImportEnded)?;
+        Err(ImportEnded)
     }
 
-    fn send(&mut self) -> Result<(), RunEnded> {
+    fn send(&mut self) -> Result<(), ImportEnded> {
         if self.bytes.is_empty() {
             return Ok(());
         }
@@ -157,7 +157,7 @@ impl ChunkFeed {
         let (facts, triggers) = self.scanner.push(&bytes);
         self.queue
             .send(Ok((bytes, facts, triggers)))
-            .map_err(|_| RunEnded)
+            .map_err(|_| ImportEnded)
     }
 }
 

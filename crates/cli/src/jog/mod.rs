@@ -239,7 +239,7 @@ pub(crate) fn jog(args: &JogArgs) -> Outcome {
     }
     match &ended {
         Ok(at) => {
-            let place = at.map_or_else(|| "no known pose".to_owned(), |p| words(&p));
+            let place = at.map_or_else(|| "no known pose".to_owned(), |p| describe_pose(&p));
             log.line(t, "end", &format!("disarmed at {place}"));
             outln!("disarmed at {place}");
         }
@@ -260,7 +260,7 @@ fn default_log() -> PathBuf {
 }
 
 /// `(x, y, z) mm, force F N`.
-fn words(p: &PoseSample) -> String {
+fn describe_pose(p: &PoseSample) -> String {
     let [x, y, z] = p.measured.to_array();
     format!("({x:.3}, {y:.3}, {z:.3}) mm, force {:.2} N", p.force_n)
 }
@@ -370,8 +370,8 @@ impl Console {
         let [x, y, z] = target;
         let moved = self.jog.go(Point3::new(x, y, z), self.speed_mm_s, stop)?;
         Ok(match moved {
-            MoveOutcome::Arrived(at) => format!("at {}", words(&at)),
-            MoveOutcome::Stopped(at) => format!("stopped at {}", words(&at)),
+            MoveOutcome::Arrived(at) => format!("at {}", describe_pose(&at)),
+            MoveOutcome::Stopped(at) => format!("stopped at {}", describe_pose(&at)),
         })
     }
 
@@ -381,7 +381,7 @@ impl Console {
         let [a, b, c] = self.skin_from_robot.apply(Point3::new(x, y, z)).to_array();
         Ok(format!(
             "at {}; skin ({a:.3}, {b:.3}, {c:.3}) mm by the rig's frame",
-            words(&at)
+            describe_pose(&at)
         ))
     }
 
@@ -390,10 +390,13 @@ impl Console {
             TouchOutcome::At(found) => {
                 let [x, y, z] = found.measured.to_array();
                 self.last_touch = Some(Point3::new(x, y, z));
-                format!("touched at {}; `point NAME` records it", words(&found))
+                format!(
+                    "touched at {}; `point NAME` records it",
+                    describe_pose(&found)
+                )
             }
-            TouchOutcome::NotFound(at) => format!("no contact down to {}", words(&at)),
-            TouchOutcome::Stopped(at) => format!("stopped at {}", words(&at)),
+            TouchOutcome::NotFound(at) => format!("no contact down to {}", describe_pose(&at)),
+            TouchOutcome::Stopped(at) => format!("stopped at {}", describe_pose(&at)),
         })
     }
 

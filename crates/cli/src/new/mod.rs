@@ -14,7 +14,7 @@ use crate::exit::{Exit, Failure, Outcome};
 /// Outcome of writing a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
-enum Written {
+enum WriteOutcome {
     /// Created.
     New,
     /// Existing generated file, replaced by the content of this version.
@@ -38,7 +38,7 @@ pub(crate) fn new(args: &NewArgs, json: bool) -> Outcome {
         _ => Path::new("."),
     };
     fs::create_dir_all(folder).map_err(|e| unwritable(folder, &e))?;
-    if write(&file, template)? == Written::Kept {
+    if write(&file, template)? == WriteOutcome::Kept {
         return Err(Failure::input(format!(
             "{}: expected a new file, found an existing one\n  next: choose another name, such as `skinrig new {} OTHER.yaml`",
             file.display(),
@@ -47,7 +47,7 @@ pub(crate) fn new(args: &NewArgs, json: bool) -> Outcome {
     }
     let mut written = vec![file.clone()];
     let schema = folder.join(PROTOCOL_SCHEMA.name());
-    if write(&schema, PROTOCOL_SCHEMA)? != Written::Kept {
+    if write(&schema, PROTOCOL_SCHEMA)? != WriteOutcome::Kept {
         written.push(schema);
     }
     if json {
@@ -87,14 +87,14 @@ pub(crate) fn init(args: &InitArgs, json: bool) -> Outcome {
         crate::terminal::print_json(&serde_json::json!({ "files": rows.collect::<Vec<_>>() }));
         return Ok(Exit::Ok);
     }
-    let kept = match (count(Written::Kept), count(Written::Updated)) {
+    let kept = match (count(WriteOutcome::Kept), count(WriteOutcome::Updated)) {
         (0, 0) => String::new(),
         (kept, updated) => format!(", {updated} updated, {kept} kept"),
     };
     outln!(
         "{}: {} files written{kept}",
         folder.display(),
-        count(Written::New)
+        count(WriteOutcome::New)
     );
     outln!("protocols/       campaigns to copy from; `skinrig new --help` lists them");
     outln!("hil/rigs/        bench.yaml: copy it and fill in what `skinrig devices` shows");
@@ -110,22 +110,22 @@ pub(crate) fn init(args: &InitArgs, json: bool) -> Outcome {
 }
 
 /// Creates a missing file; updates a generated one.
-fn write(path: &Path, file: StarterFile) -> Result<Written, Failure> {
+fn write(path: &Path, file: StarterFile) -> Result<WriteOutcome, Failure> {
     let content = file.content();
     match OpenOptions::new().write(true).create_new(true).open(path) {
         Ok(mut new) => {
             new.write_all(content.as_bytes())
                 .map_err(|e| unwritable(path, &e))?;
-            Ok(Written::New)
+            Ok(WriteOutcome::New)
         }
         Err(e) if e.kind() == ErrorKind::AlreadyExists && file.is_generated() => {
             if fs::read(path).is_ok_and(|found| found == content.as_bytes()) {
-                return Ok(Written::Kept);
+                return Ok(WriteOutcome::Kept);
             }
             fs::write(path, content.as_bytes()).map_err(|e| unwritable(path, &e))?;
-            Ok(Written::Updated)
+            Ok(WriteOutcome::Updated)
         }
-        Err(e) if e.kind() == ErrorKind::AlreadyExists => Ok(Written::Kept),
+        Err(e) if e.kind() == ErrorKind::AlreadyExists => Ok(WriteOutcome::Kept),
         Err(e) => Err(unwritable(path, &e)),
     }
 }

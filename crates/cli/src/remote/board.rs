@@ -8,7 +8,7 @@ use skinrig_controller::{ControlHandle, Progress, State};
 
 use super::error::ServerError;
 use super::server::Server;
-use super::wire::{Live, Reply, Request, RunRequest};
+use super::wire::{Reply, Request, RunRequest, RunSnapshot};
 
 /// Shortest interval between updates caused by bulk data.
 const UPDATE_EVERY: Duration = Duration::from_millis(100);
@@ -59,14 +59,14 @@ impl Board {
         }
     }
 
-    fn live(&self) -> Live {
+    fn live(&self) -> RunSnapshot {
         let c = &self.control;
         // Read the acknowledgements first: a state that is read later is at least as new.
         let counts = [c.requests_acknowledged(), c.notes_recorded()];
         let [heard, noted] = counts;
         let progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
         let waited_s = self.began.elapsed().as_secs_f64();
-        Live::of(
+        RunSnapshot::of(
             &progress,
             c.state(),
             [c.requests_made(), heard, noted],

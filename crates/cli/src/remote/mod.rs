@@ -16,7 +16,7 @@ mod wire;
 pub(crate) use board::Remote;
 pub(crate) use client::ask;
 pub(crate) use error::RemoteError;
-pub(crate) use wire::{Live, MOST_NAME_CHARS, Reply, Request, RunRequest};
+pub(crate) use wire::{MOST_NAME_CHARS, Reply, Request, RunRequest, RunSnapshot};
 
 /// This system has no Unix sockets.
 #[cfg(not(unix))]

@@ -205,7 +205,7 @@ mod tests {
     const PAUSE: Request = Request::Control(RunRequest::Pause);
 
     #[test]
-    fn a_leftover_socket_is_replaced_and_the_own_one_removed() {
+    fn a_stale_socket_is_replaced_and_the_new_one_removed_at_exit() {
         let (folder, session) = session();
         let place = &place::places(&session).unwrap()[0];
         // A killed process leaves its socket without a listener.
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_socket_beside_the_session_there_is_another_path() {
+    fn a_fallback_path_is_used_without_a_socket_beside_the_session() {
         let (_folder, session) = session();
         let [beside, own] = place::places(&session).unwrap();
         // Another file has that name, and stays.

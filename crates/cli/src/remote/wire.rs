@@ -54,7 +54,7 @@ pub(crate) enum Request {
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Reply {
     /// The state of the run.
-    Live(Box<Live>),
+    Live(Box<RunSnapshot>),
     /// Accepted; the number of the request or note.
     Handed(u64),
     /// Refused, with the reason.
@@ -63,7 +63,7 @@ pub(crate) enum Reply {
 
 /// A run at one instant, as reported by the run itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Live {
+pub(crate) struct RunSnapshot {
     /// Name of its [`State`].
     pub state: String,
     /// Requests made so far, by ctrl-C or from another terminal.
@@ -103,7 +103,7 @@ pub(crate) struct Live {
     pub cameras: [LiveCamera; 2],
 }
 
-/// A press of a [`Live`] run.
+/// A press in a [`RunSnapshot`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LivePress {
     /// Its number in the plan, from 1.
@@ -116,7 +116,7 @@ pub(crate) struct LivePress {
     pub at_mm: [f64; 2],
 }
 
-/// A camera of a [`Live`] run.
+/// A camera in a [`RunSnapshot`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LiveCamera {
     /// CD events per second of rig time over about the last second.
@@ -189,7 +189,7 @@ impl Request {
     }
 }
 
-impl Live {
+impl RunSnapshot {
     /// The reply for a run with this progress.
     #[must_use]
     pub(crate) fn of(p: &Progress, state: State, counts: [u64; 3], waited_s: f64) -> Self {

@@ -73,7 +73,8 @@ pub(crate) fn open(
 #[must_use]
 pub(crate) fn evk1_places() -> Vec<(u8, u8)> {
     let found = skinrig_evk1::enumerate().unwrap_or_default();
-    let ready = |f: &&skinrig_evk1::Found| matches!(f.state, skinrig_evk1::FoundState::Ready(_));
+    let ready =
+        |f: &&skinrig_evk1::FoundDevice| matches!(f.state, skinrig_evk1::FoundState::Ready(_));
     found.iter().filter(ready).map(|f| f.address).collect()
 }
 

@@ -23,19 +23,20 @@ use crate::recording::SessionRecording;
 use skinrig_results::RigDocument;
 
 /// The simulated rig for `protocol`, with the injected device faults; its name lists all `faults`.
-#[must_use]
+///
+/// # Errors
+/// [`Failure::input`] for a fault that the simulated rig does not support.
 pub fn simulated(
     protocol: &Protocol,
     level: SimLevel,
     seed: u64,
     real_time: bool,
     faults: &[PlantedFault],
-) -> Rig {
+) -> Result<Rig, Failure> {
     simulated_after(protocol, level, seed, real_time, faults, Vec::new())
 }
 
 /// Like [`simulated`], for a further leg: the skin was pressed at these locations before.
-#[must_use]
 pub(crate) fn simulated_after(
     protocol: &Protocol,
     level: SimLevel,
@@ -43,7 +44,7 @@ pub(crate) fn simulated_after(
     real_time: bool,
     faults: &[PlantedFault],
     pressed_before: Vec<Point2>,
-) -> Rig {
+) -> Result<Rig, Failure> {
     let mut config = SimConfig {
         pressed_before,
         ..SimConfig::new(seed, level)
@@ -62,13 +63,13 @@ pub(crate) fn simulated_after(
     if let Some(cameras) = protocol.scene.cameras {
         config.nominal = StereoGeometry { cameras };
     }
-    config.faults = planted::of_devices(faults);
+    config.faults = planted::of_devices(faults).map_err(Failure::input)?;
     let mut rig = simulated_rig(&config);
     planted::mark_name(&mut rig, faults);
     for (settings, request) in rig.camera_settings.iter_mut().zip(&protocol.cameras) {
         requests::apply(settings, request);
     }
-    if real_time { in_real_time(rig) } else { rig }
+    Ok(if real_time { in_real_time(rig) } else { rig })
 }
 
 /// A recorded session as a rig.

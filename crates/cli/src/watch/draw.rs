@@ -3,9 +3,9 @@
 use skinrig_model::text::is_hidden;
 use skinrig_model::{HostDuration, PressRole};
 
-use super::frame::{Frame, Latest, Place};
+use super::frame::{Frame, LatestAttempt, Place};
 use crate::progress::{clock_text, eta_text};
-use crate::remote::Live;
+use crate::remote::RunSnapshot;
 use crate::rig::gates;
 
 /// Maximum size of the map, columns and rows.
@@ -60,7 +60,7 @@ pub(super) fn text(frame: &Frame) -> String {
     lines.into_iter().map(plain).collect::<Vec<_>>().join("\n")
 }
 
-fn of_run(live: &Live) -> Vec<String> {
+fn of_run(live: &RunSnapshot) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(p) = &live.press {
         let block = match p.role {
@@ -95,7 +95,7 @@ fn of_run(live: &Live) -> Vec<String> {
     lines
 }
 
-fn latest(press: &Latest) -> String {
+fn latest(press: &LatestAttempt) -> String {
     let [one, two] = press
         .cameras
         .map(|signal| signal.map_or_else(|| "-".to_owned(), |s| format!("{:.1}", s.ratio())));

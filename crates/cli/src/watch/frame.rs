@@ -12,7 +12,7 @@ use skinrig_recorder::{AttemptRow, PressTally, RecorderError, SessionReader};
 
 use super::signal::{Signal, signals};
 use crate::paths;
-use crate::remote::{Live, RemoteError, Reply, Request, ask};
+use crate::remote::{RemoteError, Reply, Request, RunSnapshot, ask};
 use crate::rig::gates;
 
 /// Number of latest presses shown.
@@ -35,7 +35,7 @@ pub(super) struct Frame {
     /// True if it is sealed.
     pub sealed: bool,
     /// State reported by the run; `None` if it does not answer.
-    pub live: Option<Box<Live>>,
+    pub live: Option<Box<RunSnapshot>>,
     /// Name of the prototype.
     pub prototype: String,
     /// Name of the protocol.
@@ -49,7 +49,7 @@ pub(super) struct Frame {
     /// Locations of the path with their progress.
     pub places: Vec<Place>,
     /// The latest attempts, oldest first.
-    pub latest: Vec<Latest>,
+    pub latest: Vec<LatestAttempt>,
     /// The latest interruptions, oldest first.
     pub faults: Vec<Fault>,
     /// Interruptions so far.
@@ -73,7 +73,7 @@ pub(super) struct Place {
 
 /// An attempt that ended.
 #[derive(Debug, Serialize)]
-pub(crate) struct Latest {
+pub(crate) struct LatestAttempt {
     /// Number of the press in the plan, from 1.
     pub press: u32,
     /// Number of the attempt, from 1.
@@ -138,7 +138,7 @@ impl Follower {
 
     /// True if the session may be being sealed, for which its writer needs exclusive access: then the file is not opened for a
     /// while.
-    fn may_be_sealing(&mut self, live: Option<&Live>, writer: Option<&str>) -> bool {
+    fn may_be_sealing(&mut self, live: Option<&RunSnapshot>, writer: Option<&str>) -> bool {
         let is_running = live.is_some_and(|live| live.state != State::Finished.name());
         if is_running || writer.is_none() {
             self.silent = None;
@@ -154,7 +154,7 @@ impl Follower {
 
     /// Reads the state of the run; `None` if there is nothing new. The file is open only during the call, and with `patience` it is
     /// not opened while it may be being sealed.
-    pub(super) fn look(
+    pub(super) fn read_frame(
         &mut self,
         writer: Option<&str>,
         patience: bool,
@@ -185,7 +185,7 @@ impl Follower {
             }
         }
         drop(reader);
-        let row = |(planned, outcome): &(&PlannedPress, &PressOutcome)| Latest {
+        let row = |(planned, outcome): &(&PlannedPress, &PressOutcome)| LatestAttempt {
             press: planned.id.number(),
             attempt: outcome.attempt.number,
             at_mm: [planned.at.x_mm, planned.at.y_mm],
@@ -197,7 +197,7 @@ impl Follower {
                 .copied()
                 .unwrap_or_default(),
         };
-        let latest: Vec<Latest> = latest.iter().map(row).collect();
+        let latest: Vec<LatestAttempt> = latest.iter().map(row).collect();
         let fault_count = interruptions.len();
         let faults = interruptions
             .into_iter()
@@ -243,7 +243,12 @@ fn head(reader: &SessionReader) -> Result<SessionInfo, RecorderError> {
     })
 }
 
-fn state(live: Option<&Live>, writer: Option<&str>, end: Option<&RunEnd>, sealed: bool) -> String {
+fn state(
+    live: Option<&RunSnapshot>,
+    writer: Option<&str>,
+    end: Option<&RunEnd>,
+    sealed: bool,
+) -> String {
     match (live, writer, end) {
         _ if sealed => end.map_or("sealed", RunEnd::name).to_owned(),
         (Some(live), ..) => live.state.clone(),

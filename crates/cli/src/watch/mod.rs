@@ -33,9 +33,9 @@ pub(crate) fn watch(args: &WatchArgs, json: bool) -> Outcome {
     let mut follower = None;
     loop {
         let frame = match follower.as_mut() {
-            Some(follower) => look(follower, args.once)?,
+            Some(follower) => read_frame(follower, args.once)?,
             None => match find_session(&args.session)? {
-                Some(session) => look(follower.insert(Follower::new(session)), args.once)?,
+                Some(session) => read_frame(follower.insert(Follower::new(session)), args.once)?,
                 None => None,
             },
         };
@@ -86,10 +86,10 @@ fn find_session(place: &Path) -> Result<Option<PathBuf>, Failure> {
 }
 
 /// The next frame; `None` if there is nothing new, for example before the first records of the run are on the disk.
-fn look(follower: &mut Follower, once: bool) -> Result<Option<Frame>, Failure> {
+fn read_frame(follower: &mut Follower, once: bool) -> Result<Option<Frame>, Failure> {
     // Look for the writer first: if the run ends in between, its end is then in the file.
     let writer = writer_of(follower.session());
-    match follower.look(writer.as_deref(), !once) {
+    match follower.read_frame(writer.as_deref(), !once) {
         Ok(frame) => Ok(frame),
         Err(RecorderError::Empty { .. } | RecorderError::NotASession { .. })
             if writer.is_some() =>

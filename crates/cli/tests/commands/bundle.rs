@@ -5,15 +5,15 @@ use serde_json::Value;
 use crate::support::{Lab, SMALL, files, only, read_json, sha256, skinrig, text};
 
 #[test]
-fn a_bundle_proves_itself_elsewhere_and_finds_any_change() {
+fn a_moved_bundle_verifies_and_detects_any_change() {
     let lab = Lab::new();
     let s = lab.text("s");
     skinrig(&["run", SMALL, "--sessions", &s]).code(0);
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
     skinrig(&["tag", &session, "good"]).code(0);
     let before = files(&lab.path("s"), "").len();
-    let made = lab.text("made");
-    let export = ["export", &session, "--to", "bundle", "--out", &made];
+    let created = lab.text("made");
+    let export = ["export", &session, "--to", "bundle", "--out", &created];
     skinrig(&export).code(0);
     assert_eq!(
         files(&lab.path("s"), "").len(),

@@ -21,10 +21,10 @@ fn sessions_are_found_by_prototype_and_by_tag_and_their_trend_is_shown() {
     let tags = ["tag", &text(first), "good-skin", "wet", "--by", "Ann"];
     skinrig(&tags).code(0);
     let more = ["tag", &text(first), "-wet", "--note", "the lamp was new"];
-    let said = skinrig(&more).code(0).out;
+    let output = skinrig(&more).code(0).out;
     assert!(
-        said.contains("tags  good-skin\n") && said.contains("the lamp was new"),
-        "{said}"
+        output.contains("tags  good-skin\n") && output.contains("the lamp was new"),
+        "{output}"
     );
     skinrig(&["tag", &text(first), "Good Skin"]).code(2);
     // The session file is unchanged.

@@ -18,7 +18,7 @@ fn row<'a>(document: &'a Value, metric: &str) -> &'a Value {
 }
 
 #[test]
-fn one_skin_twice_is_not_better_and_the_page_is_whole() {
+fn comparing_a_skin_with_itself_finds_no_difference_and_a_complete_page() {
     let lab = Lab::new();
     let a = record(&lab, "a", "1", &[]);
     let b = record(&lab, "b", "2", &[]);
@@ -36,16 +36,16 @@ fn one_skin_twice_is_not_better_and_the_page_is_whole() {
         "--out",
         &out,
     ];
-    let said = skinrig(&arguments).code(0);
+    let output = skinrig(&arguments).code(0);
     assert!(
-        said.out.lines().all(|l| l.chars().count() <= 80),
+        output.out.lines().all(|l| l.chars().count() <= 80),
         "{}",
-        said.out
+        output.out
     );
-    let verdict = said.out.lines().next().unwrap();
+    let verdict = output.out.lines().next().unwrap();
     assert!(verdict.starts_with("VERDICT   B against A: "), "{verdict}");
     // Numbers and names differ between runs; the layout does not.
-    let layout: String = said
+    let layout: String = output
         .out
         .lines()
         .skip_while(|l| !l.starts_with("B against"))
@@ -144,7 +144,7 @@ fn other_places_are_blocking_and_then_independent() {
 }
 
 #[test]
-fn strangers_are_refused_with_what_to_do() {
+fn invalid_arguments_are_refused_with_help() {
     let lab = Lab::new();
     let a = record(&lab, "a", "1", &[]);
     let wrong = lab.path("limits.yaml");

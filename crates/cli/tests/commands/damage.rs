@@ -30,9 +30,15 @@ fn run_all_readers(lab: &Lab, file: &Path) -> ProgramOutput {
         vec!["show", &file, "--presses"],
         vec!["analyze", &file, "--out", &out],
     ] {
-        let said = skinrig(&arguments);
-        assert!(matches!(said.code, Some(0 | 2)), "{arguments:?}: {said:#?}");
-        assert!(!said.err.contains("panicked"), "{arguments:?}: {said:#?}");
+        let output = skinrig(&arguments);
+        assert!(
+            matches!(output.code, Some(0 | 2)),
+            "{arguments:?}: {output:#?}"
+        );
+        assert!(
+            !output.err.contains("panicked"),
+            "{arguments:?}: {output:#?}"
+        );
     }
     skinrig(&["verify", &file])
 }
@@ -57,16 +63,16 @@ fn flipped_bytes_are_found() {
         let flip = 1 + random.below(255) as u8;
         bytes[at] ^= flip;
         std::fs::write(&file, &bytes).unwrap();
-        let said = run_all_readers(&lab, &file);
+        let output = run_all_readers(&lab, &file);
         assert!(
-            !said.err.contains("panicked"),
-            "byte {at} ^ {flip:#04x}: {said:#?}"
+            !output.err.contains("panicked"),
+            "byte {at} ^ {flip:#04x}: {output:#?}"
         );
         assert!(
-            matches!(said.code, Some(2 | 4)),
-            "byte {at} ^ {flip:#04x}: {said:#?}"
+            matches!(output.code, Some(2 | 4)),
+            "byte {at} ^ {flip:#04x}: {output:#?}"
         );
-        assert!(said.err.contains("damaged.session.sqlite"), "{said:#?}");
+        assert!(output.err.contains("damaged.session.sqlite"), "{output:#?}");
     }
 }
 
@@ -77,11 +83,14 @@ fn a_torn_session_is_found() {
     let file = lab.path("torn.session.sqlite");
     for length in [0, 50, 100, 4_096, good.len() / 2, good.len() - 1] {
         std::fs::write(&file, &good[..length]).unwrap();
-        let said = run_all_readers(&lab, &file);
-        assert!(!said.err.contains("panicked"), "{length} bytes: {said:#?}");
+        let output = run_all_readers(&lab, &file);
         assert!(
-            matches!(said.code, Some(2 | 4)),
-            "{length} bytes: {said:#?}"
+            !output.err.contains("panicked"),
+            "{length} bytes: {output:#?}"
+        );
+        assert!(
+            matches!(output.code, Some(2 | 4)),
+            "{length} bytes: {output:#?}"
         );
     }
     // Listing a folder continues after a broken file and names it.
@@ -101,23 +110,23 @@ fn a_changed_row_is_found_and_its_table_named() {
     bytes[at] = b'b';
     let file = lab.path("forged.session.sqlite");
     std::fs::write(&file, &bytes).unwrap();
-    let said = skinrig(&["verify", &text(&file)]).code(4);
-    assert!(said.out.contains("session"), "{said:#?}");
+    let output = skinrig(&["verify", &text(&file)]).code(4);
+    assert!(output.out.contains("session"), "{output:#?}");
     let json = skinrig(&["verify", "--json", &text(&file)]).code(4).json();
     assert_eq!(json["sound"], false);
     assert!(!json["problems"].as_array().unwrap().is_empty());
 }
 
 #[test]
-fn what_is_whole_of_a_damaged_session_is_salvaged_and_analysed() {
+fn intact_parts_of_a_damaged_session_are_salvaged_and_analysed() {
     let lab = Lab::new();
     let (session, mut bytes) = sealed_session(&lab);
     let file = lab.path("damaged.session.sqlite");
     std::fs::write(&file, &bytes).unwrap();
     let new = lab.path("damaged.salvaged.session.sqlite");
-    let said = skinrig(&["salvage", "--json", &text(&file)]).code(0).json();
-    assert_eq!(said["whole"], true);
-    assert_eq!(said["salvaged"], text(&new));
+    let output = skinrig(&["salvage", "--json", &text(&file)]).code(0).json();
+    assert_eq!(output["whole"], true);
+    assert_eq!(output["salvaged"], text(&new));
     skinrig(&["verify", &text(&new)]).code(0);
     skinrig(&["salvage", &text(&file)])
         .code(2)
@@ -127,11 +136,11 @@ fn what_is_whole_of_a_damaged_session_is_salvaged_and_analysed() {
     bytes.truncate(bytes.len() * 2 / 3);
     std::fs::write(&file, &bytes).unwrap();
     let out = lab.text("cut.session.sqlite");
-    let said = skinrig(&["salvage", &text(&file), "--out", &out]);
-    let said = said
+    let output = skinrig(&["salvage", &text(&file), "--out", &out]);
+    let output = output
         .code(4)
         .expect_stderr(&["some data are lost", "skinrig show"]);
-    assert!(said.out.contains("recovered"), "{said:#?}");
+    assert!(output.out.contains("recovered"), "{output:#?}");
     let shown = skinrig(&["show", &out]);
     assert!(matches!(shown.code, Some(0 | 2)), "{shown:#?}");
     assert_ne!(std::fs::read(&session).unwrap(), bytes);

@@ -44,20 +44,20 @@ fn assert_recovers_after(
     let (run, session) = start_run(&lab);
     let before = count_attempts(&session);
     damage(&lab, &session);
-    let (code, said) = run.end();
-    assert_eq!(code, Some(3), "{said}");
+    let (code, output) = run.end();
+    assert_eq!(code, Some(3), "{output}");
     let kept = text(&kept(&lab, &session));
     for part in [
         found,
         &format!("everything recorded so far is kept: {kept}\n"),
         &format!("continue with `skinrig resume {kept}`"),
     ] {
-        assert!(said.contains(part), "expected {part:?} in {said}");
+        assert!(output.contains(part), "expected {part:?} in {output}");
     }
     let after = count_attempts(Path::new(&kept));
     assert!(
         after <= before + 1,
-        "{before} presses, then {after}: {said}"
+        "{before} presses, then {after}: {output}"
     );
     let verified = skinrig(&["verify", &kept]).code(0).out;
     assert!(verified.contains("not sealed"), "{verified}");
@@ -152,8 +152,8 @@ fn the_lock_file_is_removed_or_replaced() {
         assert_ne!(skinrig(&["resume", &text(&link)]).code, Some(0));
         std::fs::remove_file(link).unwrap();
         run.signal("INT");
-        let (code, said) = run.end();
-        assert_eq!(code, Some(5), "{said}");
+        let (code, output) = run.end();
+        assert_eq!(code, Some(5), "{output}");
         let verified = skinrig(&["verify", &path]).code(0).out;
         assert!(verified.contains("sound, sealed"), "{verified}");
     }

@@ -60,12 +60,12 @@ fn find_check<'a>(report: &'a Value, area: &str, check: &str) -> (&'a str, &'a s
 }
 
 #[test]
-fn a_slow_camera_a_forbidden_one_and_a_robot_without_a_cable_are_told_apart() {
+fn a_slow_camera_a_forbidden_one_and_an_unplugged_robot_get_different_findings() {
     let cameras = vec![
         camera("00000001", |c| c.speed_mbit = 480),
         camera("00000002", |c| c.access = Access::NotPermitted),
     ];
-    let (report, code) = doctor(cameras, Some(Fault::Unplug));
+    let (report, code) = doctor(cameras, Some(Fault::Lost));
     assert_eq!(code, Some(3), "{report:#}");
     assert_eq!(report["kind"], "emulated");
     let (verdict, next) = find_check(&report, "USB speed", "camera1");

@@ -10,13 +10,13 @@ fn faults(spoil: impl FnOnce(&mut Dataset)) -> (Vec<String>, String) {
     let lab = Lab::new();
     let mut data = Dataset::new(&lab);
     spoil(&mut data);
-    let said = skinrig(&data.arguments(&lab.path("s")));
+    let output = skinrig(&data.arguments(&lab.path("s")));
     let results = read_json(&only(&lab.path("s"), ".results.json"));
     let findings = results["analysis"]["findings"].as_array().unwrap();
     let names = findings
         .iter()
         .map(|f| f["fault"].as_str().unwrap().to_owned());
-    (names.collect(), said.out)
+    (names.collect(), output.out)
 }
 
 fn write_positions(data: &Dataset, change: impl Fn(usize, Point2) -> Point2) {
@@ -29,7 +29,7 @@ fn write_positions(data: &Dataset, change: impl Fn(usize, Point2) -> Point2) {
 }
 
 #[test]
-fn a_recording_that_is_not_what_it_claims_is_named() {
+fn a_recording_of_another_format_is_reported() {
     let (names, _) = faults(|_| {});
     assert!(names.is_empty(), "{names:?}");
 
@@ -46,7 +46,7 @@ fn a_recording_that_is_not_what_it_claims_is_named() {
 }
 
 #[test]
-fn the_public_codes_choices_stand_beside_the_sessions_own_results() {
+fn results_with_the_public_codes_choices_are_shown_beside_the_sessions() {
     let lab = Lab::new();
     let data = Dataset::new(&lab);
     skinrig(&data.arguments(&lab.path("s"))).code(0);

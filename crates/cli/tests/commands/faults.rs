@@ -3,10 +3,10 @@
 use crate::support::{Lab, SMALL, files, only, program, run_to_end, show, skinrig, text};
 
 #[test]
-fn a_run_with_faults_says_so_everywhere() {
+fn a_run_with_faults_is_labelled_in_every_view() {
     let lab = Lab::new();
     let folder = lab.path("a");
-    let said = skinrig(&[
+    let output = skinrig(&[
         "run",
         SMALL,
         "--sessions",
@@ -18,9 +18,9 @@ fn a_run_with_faults_says_so_everywhere() {
     ])
     .code(0);
     let notice = "FAULTS ON PURPOSE: camera1-drops@hold:3, trigger-lost@contact:5";
-    assert!(said.err.contains(notice), "{said:#?}");
-    let words: Vec<&str> = said.out.split_whitespace().collect();
-    assert!(words.join(" ").contains(notice), "{said:#?}");
+    assert!(output.err.contains(notice), "{output:#?}");
+    let words: Vec<&str> = output.out.split_whitespace().collect();
+    assert!(words.join(" ").contains(notice), "{output:#?}");
     let shown = show(&only(&folder, ".session.sqlite"));
     let name = shown["rig"].as_str().unwrap_or_default();
     assert!(name.contains(notice), "{name}");
@@ -55,7 +55,7 @@ fn a_bench_takes_no_faults() {
 }
 
 #[test]
-fn a_fault_that_nobody_knows_is_refused() {
+fn an_unknown_fault_is_refused() {
     let run = |plant: [&str; 2]| skinrig(&["run", SMALL, plant[0], plant[1]]).code(2);
     run(["--fault", "camera1-stall@hold:1"]).expect_stderr(&["did you mean `camera1-stalled`?"]);
     run(["--set", "faults=[robot-slow@record:3]"]).expect_stderr(&["faults[0]", "`preflight`"]);
@@ -96,18 +96,18 @@ fn with_height_off(fault: Option<&str>, depth: &str, code: i32) -> String {
     let depth = format!("depth={depth}");
     let mut arguments = vec!["run", "-v", SMALL, "--sessions", &folder, "--set", &depth];
     arguments.extend(fault.iter().flat_map(|f| ["--fault", f]));
-    let said = skinrig(&arguments).code(code);
+    let output = skinrig(&arguments).code(code);
     let shown = skinrig(&["show", &text(&only(&lab.path("a"), ".session.sqlite"))]).code(0);
     for fault in ["height off", "not touched"] {
         let found = shown.out.contains(&format!("found: {fault}"));
-        assert_eq!(said.out.contains(fault), found, "{}", shown.out);
+        assert_eq!(output.out.contains(fault), found, "{}", shown.out);
     }
-    let words: Vec<&str> = said.out.split_whitespace().collect();
+    let words: Vec<&str> = output.out.split_whitespace().collect();
     words.join(" ")
 }
 
 #[test]
-fn a_robot_whose_height_is_off_is_named_with_what_tells_it_from_the_surface() {
+fn a_wrong_robot_height_is_reported_with_the_evidence() {
     let check = "skinrig hil run hil/nightly.yaml --rig NAME.yaml --only depth";
     let deep = with_height_off(Some("robot-z-high@preflight"), "1 mm", 0);
     assert!(

@@ -49,7 +49,7 @@ fn every_command_has_help_with_an_example() {
 }
 
 #[test]
-fn bad_input_ends_with_code_2_and_says_what_to_do() {
+fn bad_input_exits_with_code_2_and_help() {
     skinrig(&["no-such-command"]).code(2);
     for (arguments, parts) in [
         (
@@ -105,18 +105,21 @@ fn bad_input_ends_with_code_2_and_says_what_to_do() {
 
 #[test]
 fn shipped_protocols_pass_their_own_check() {
-    let mut seen = 0;
+    let mut observed = 0;
     for entry in std::fs::read_dir(format!("{ROOT}/protocols")).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
         let other = [".schedule.yaml", ".limits.yaml"];
         if name.ends_with(".yaml") && !other.iter().any(|e| name.ends_with(e)) {
-            let said = skinrig(&["check", path.to_str().unwrap()]).code(0);
-            assert!(said.out.contains(": ok"), "{said:?}");
-            seen += 1;
+            let text = skinrig(&["check", path.to_str().unwrap()]).code(0);
+            assert!(text.out.contains(": ok"), "{text:?}");
+            observed += 1;
         }
     }
-    assert!(seen >= 5, "expected the shipped protocols, found {seen}");
+    assert!(
+        observed >= 5,
+        "expected the shipped protocols, found {observed}"
+    );
 }
 
 #[test]

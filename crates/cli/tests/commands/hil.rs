@@ -65,7 +65,7 @@ fn what_cannot_be_a_night_is_refused_before_it_begins() {
 }
 
 #[test]
-fn a_bench_that_is_not_there_is_a_matter_of_cables_and_the_night_is_kept() {
+fn a_missing_bench_is_an_infrastructure_failure_and_the_night_is_stored() {
     let (lab, leases) = lab();
     let small = suite(
         &lab,
@@ -88,14 +88,14 @@ fn a_bench_that_is_not_there_is_a_matter_of_cables_and_the_night_is_kept() {
         ],
     )
     .code(3);
-    for said in [
+    for output in [
         "Look at the computer and its cables",
         "about ",
         "FAIL",
         "nobody near",
         "next",
     ] {
-        assert!(ran.out.contains(said), "expected {said:?} in {ran:#?}");
+        assert!(ran.out.contains(output), "expected {output:?} in {ran:#?}");
     }
     let [folder] = &files(&lab.path("nights"), "-small")[..] else {
         panic!("one night: {ran:#?}");

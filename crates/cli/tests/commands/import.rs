@@ -16,8 +16,8 @@ use crate::support::{Lab, ROOT, chunks, only, read_json, show, skinrig, text};
 fn a_dataset_is_imported_its_clocks_aligned_and_its_presses_located() {
     let lab = Lab::new();
     let data = Dataset::new(&lab);
-    let said = skinrig(&data.arguments(&lab.path("s"))).code(0);
-    assert!(said.err.contains("blank line(s) [14]"), "{said:?}");
+    let output = skinrig(&data.arguments(&lab.path("s"))).code(0);
+    assert!(output.err.contains("blank line(s) [14]"), "{output:?}");
 
     let session = only(&lab.path("s"), ".session.sqlite");
     let results = read_json(&only(&lab.path("s"), ".results.json"));
@@ -49,7 +49,7 @@ fn a_dataset_is_imported_its_clocks_aligned_and_its_presses_located() {
     for (outcome, at) in located.iter().zip(positions()) {
         assert_eq!(outcome["status"], "located", "{at:?}");
         let off = [("x_mm", at.x_mm), ("y_mm", at.y_mm)]
-            .map(|(key, wanted)| (outcome["at"][key].as_f64().unwrap() - wanted).abs());
+            .map(|(key, expected)| (outcome["at"][key].as_f64().unwrap() - expected).abs());
         assert!(off.iter().all(|d| *d < 1.0), "{at:?}: {outcome}");
     }
     assert_eq!(located.len(), PRESSES);
@@ -58,7 +58,7 @@ fn a_dataset_is_imported_its_clocks_aligned_and_its_presses_located() {
     let shown = show(&session);
     assert_eq!(shown["rig_kind"], "imported");
     assert_eq!(shown["end"], "completed");
-    assert!(said.out.contains("not from a measurement"), "{said:?}");
+    assert!(output.out.contains("not from a measurement"), "{output:?}");
     // Every event of the files is in the session, in order.
     for camera in CameraId::ALL {
         let mut decoder = Decoder::new(StreamFormat::Evt2);
@@ -83,9 +83,9 @@ fn import_wrong(
     if swapped {
         data.cameras.swap(0, 1);
     }
-    let said = skinrig(&data.arguments(&lab.path("s")));
+    let output = skinrig(&data.arguments(&lab.path("s")));
     let results = read_json(&only(&lab.path("s"), ".results.json"));
-    (said, results)
+    (output, results)
 }
 
 #[test]
@@ -102,23 +102,22 @@ fn positions_and_cameras_that_are_taken_for_others_make_the_session_invalid() {
         ("cameras swapped", |p| p, true),
     ];
     for (fault, change, swapped) in cases {
-        let (said, results) = import_wrong(change, swapped);
-        let said = said
+        let (output, results) = import_wrong(change, swapped);
+        let output = output
             .code(4)
             .expect_stderr(&["the session is INVALID", fault]);
         assert_eq!(results["valid"], false, "{fault}");
         let rmse = results["analysis"]["scored"]["rmse_mm"]["value"].as_f64();
         let headline = rmse.map(|mm| format!("{mm:.2} mm"));
         assert!(
-            headline.is_none_or(|mm| !said.out.contains(&mm)),
-            "{said:?}"
+            headline.is_none_or(|mm| !output.out.contains(&mm)),
+            "{output:?}"
         );
     }
 }
 
 #[test]
-fn more_presses_than_the_schedule_says_are_told_apart_by_the_sync_presses_or_the_session_is_invalid()
- {
+fn extra_presses_are_identified_by_the_sync_presses_or_the_session_is_invalid() {
     let lab = Lab::new();
     let data = Dataset::new(&lab);
     std::fs::write(&data.presses, csv(&positions()[..PRESSES - 3])).unwrap();
@@ -146,11 +145,11 @@ fn more_presses_than_the_schedule_says_are_told_apart_by_the_sync_presses_or_the
     }
 
     // A single sync press in rhythm with the path: the planned presses cannot be identified.
-    let said = import("t", &["sync.count=1", "sync.pause_after=1.5 s"]).code(4);
-    let said = said.expect_stderr(&["INVALID", "log-odds", "all other alignments", "next:"]);
+    let output = import("t", &["sync.count=1", "sync.pause_after=1.5 s"]).code(4);
+    let output = output.expect_stderr(&["INVALID", "log-odds", "all other alignments", "next:"]);
     let results = read_json(&only(&lab.path("t"), ".results.json"));
     assert_eq!(results["valid"], false);
-    assert!(said.out.contains("INVALID   use no number"), "{said:?}");
+    assert!(output.out.contains("INVALID   use no number"), "{output:?}");
     let page = std::fs::read_to_string(only(&lab.path("t"), ".report.html")).unwrap();
     assert!(page.contains("data-testid=\"invalid\""));
     skinrig(&["analyze", &text(&only(&lab.path("t"), ".session.sqlite"))]).code(4);
@@ -224,7 +223,7 @@ fn sample(name: &str, schedule: &str) -> Option<(Lab, serde_json::Value)> {
     }
     let lab = Lab::new();
     let file = |name: &str| format!("{folder}/{name}");
-    let said = skinrig(&[
+    let output = skinrig(&[
         "import",
         "--camera1",
         &file("grid_path2_v2_camera1.hdf5"),
@@ -237,7 +236,7 @@ fn sample(name: &str, schedule: &str) -> Option<(Lab, serde_json::Value)> {
         "--sessions",
         &lab.text("s"),
     ]);
-    assert!(said.out.contains("RMSE"), "{said:?}");
+    assert!(output.out.contains("RMSE"), "{output:?}");
     let results = read_json(&only(&lab.path("s"), ".results.json"));
     skinrig(&["verify", &text(&only(&lab.path("s"), ".session.sqlite"))]).code(0);
     Some((lab, results))
@@ -270,13 +269,17 @@ fn progress_and_summary_of_an_import_count_the_same() {
     let data = Dataset::new(&lab);
     let mut arguments = data.arguments(&lab.path("s"));
     arguments.extend(["--set".to_owned(), "presses_used=10".to_owned()]);
-    let said = skinrig(&arguments).code(0);
-    let last = said.err.lines().rfind(|l| l.starts_with("press ")).unwrap();
+    let output = skinrig(&arguments).code(0);
+    let last = output
+        .err
+        .lines()
+        .rfind(|l| l.starts_with("press "))
+        .unwrap();
     assert!(
         last.starts_with("press 15/15") && last.ends_with("  2 excluded"),
-        "{said:?}"
+        "{output:?}"
     );
-    assert!(!said.err.contains("invalid"), "{said:?}");
+    assert!(!output.err.contains("invalid"), "{output:?}");
     let summary = "12 planned = 10 valid + 0 missed + 0 invalid + 2 excluded";
-    assert!(said.out.contains(summary), "{said:?}");
+    assert!(output.out.contains(summary), "{output:?}");
 }

@@ -10,13 +10,13 @@ use skinrig_model::CameraId;
 #[track_caller]
 fn assert_refused(lab: &Lab, data: &Dataset, code: i32, parts: &[&str]) -> ProgramOutput {
     let folder = lab.path("s");
-    let said = skinrig(&data.arguments(&folder))
+    let output = skinrig(&data.arguments(&folder))
         .code(code)
         .expect_stderr(parts);
     for session in files(&folder, ".session.sqlite") {
-        assert_ne!(show(&session)["end"], "completed", "{said:?}");
+        assert_ne!(show(&session)["end"], "completed", "{output:?}");
     }
-    said
+    output
 }
 
 /// Replaces the only occurrence of `old` in a file by the same number of bytes.
@@ -79,8 +79,8 @@ fn a_truncated_container() {
     let bytes = std::fs::read(&data.cameras[0]).unwrap();
     for share in [1, 40, 70, 99] {
         std::fs::write(&data.cameras[0], &bytes[..bytes.len() * share / 100]).unwrap();
-        let said = skinrig(&data.arguments(&lab.path("s"))).expect_stderr(&["camera1.hdf5"]);
-        assert!(said.code == Some(2), "{share} %: {said:?}");
+        let output = skinrig(&data.arguments(&lab.path("s"))).expect_stderr(&["camera1.hdf5"]);
+        assert!(output.code == Some(2), "{share} %: {output:?}");
     }
     for session in files(&lab.path("s"), ".session.sqlite") {
         assert_ne!(show(&session)["end"], "completed");
@@ -100,7 +100,7 @@ fn a_missing_dataset() {
 }
 
 #[test]
-fn a_time_that_is_no_number_and_one_that_goes_back() {
+fn nan_times_and_times_that_go_back_are_rejected() {
     let lab = Lab::new();
     let data = Dataset::new(&lab);
     patch(
@@ -117,10 +117,10 @@ fn a_time_that_is_no_number_and_one_that_goes_back() {
         &stored_time(9_000),
         &1.0_f64.to_le_bytes(),
     );
-    let said = assert_refused(&lab, &data, 2, &["camera2.hdf5", "ts", "row 9000"]);
+    let output = assert_refused(&lab, &data, 2, &["camera2.hdf5", "ts", "row 9000"]);
     assert!(
-        said.err.contains("kept"),
-        "says that a part is kept: {said:?}"
+        output.err.contains("kept"),
+        "says that a part is kept: {output:?}"
     );
     // The events before are kept and reported as partial.
     let sessions = files(&lab.path("s"), ".session.sqlite");

@@ -339,7 +339,7 @@ fn a_disk_that_is_full_from_the_start_ends_with_code_1_and_a_next_step() {
 }
 
 #[test]
-fn a_reader_that_goes_away_stops_no_run() {
+fn a_disconnected_reader_does_not_stop_the_run() {
     let lab = Lab::new();
     let folder = lab.text("s");
     // `skinrig run ... 2>&1 | head -1`: both outputs closed after the first line.

@@ -9,7 +9,11 @@ use crate::support::{Lab, SMALL, only, skinrig, text};
 
 /// Every key path in `value` with its kinds of value; list items are merged into `[]`.
 pub(crate) fn shape(value: &Value) -> String {
-    fn walk(value: &Value, path: &str, found: &mut BTreeMap<String, BTreeSet<&'static str>>) {
+    fn collect_types(
+        value: &Value,
+        path: &str,
+        found: &mut BTreeMap<String, BTreeSet<&'static str>>,
+    ) {
         let kind = match value {
             Value::Null => "null",
             Value::Bool(_) => "bool",
@@ -17,13 +21,13 @@ pub(crate) fn shape(value: &Value) -> String {
             Value::String(_) => "text",
             Value::Array(items) => {
                 for item in items {
-                    walk(item, &format!("{path}[]"), found);
+                    collect_types(item, &format!("{path}[]"), found);
                 }
                 "list"
             }
             Value::Object(members) => {
                 for (key, member) in members {
-                    walk(member, &format!("{path}.{key}"), found);
+                    collect_types(member, &format!("{path}.{key}"), found);
                 }
                 "map"
             }
@@ -31,7 +35,7 @@ pub(crate) fn shape(value: &Value) -> String {
         found.entry(path.to_owned()).or_default().insert(kind);
     }
     let mut found = BTreeMap::new();
-    walk(value, "", &mut found);
+    collect_types(value, "", &mut found);
     let mut text = String::new();
     for (path, kinds) in found {
         let kinds: Vec<_> = kinds.into_iter().collect();
@@ -138,10 +142,10 @@ fn without_a_terminal_output_is_plain_lines() {
     ] {
         all.push(skinrig(&arguments));
     }
-    for said in all {
+    for output in all {
         for (name, text) in [
-            ("standard output", &said.out),
-            ("standard error", &said.err),
+            ("standard output", &output.out),
+            ("standard error", &output.err),
         ] {
             let control = text.chars().find(|c| c.is_control() && *c != '\n');
             assert_eq!(control, None, "{name}: {text:?}");

@@ -57,10 +57,14 @@ fn a_press_has_one_number_everywhere() {
         .map(|p| p["press"].as_u64().unwrap())
         .collect();
     assert_eq!(numbers, (1..=10).collect::<Vec<_>>());
-    let spoilt = find(&shown["presses"], SPOILT);
-    assert_eq!(spoilt["earlier"].as_array().unwrap().len(), 1, "{spoilt}");
+    let corrupted = find(&shown["presses"], SPOILT);
     assert_eq!(
-        (&spoilt["repetition"], &spoilt["location"]),
+        corrupted["earlier"].as_array().unwrap().len(),
+        1,
+        "{corrupted}"
+    );
+    assert_eq!(
+        (&corrupted["repetition"], &corrupted["location"]),
         (&2.into(), &2.into())
     );
     let table = skinrig(&["show", "--presses", &s]).code(0).out;
@@ -143,7 +147,7 @@ fn a_press_has_one_number_everywhere() {
 }
 
 #[test]
-fn the_key_that_counted_from_zero_is_refused_with_what_to_write() {
+fn the_old_zero_based_key_is_refused_with_help() {
     skinrig(&["check", SMALL, "--set", "analysis.exclude_presses=[3, 7]"])
         .code(2)
         .expect_stderr(&["exclude_press_numbers: [4, 8]"]);

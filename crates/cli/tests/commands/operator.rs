@@ -44,9 +44,9 @@ fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
     };
     let readers = [ask(&text(&session)), ask(&lab.text("s"))];
     for reader in readers {
-        let said = reader.wait_with_output().unwrap();
-        assert_eq!(said.status.code(), Some(0), "{said:?}");
-        let found: Value = serde_json::from_slice(&said.stdout).unwrap();
+        let output = reader.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{output:?}");
+        let found: Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!(found["live"]["state"], "running", "{found}");
         assert_eq!(found["live"]["planned"], 10);
         assert!(found["live"]["done"].as_u64() >= Some(1), "{found}");
@@ -60,8 +60,8 @@ fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
         assert!(words.contains(word), "{word} in {words}");
     }
 
-    let said = control(&session, "pause-now");
-    assert!(said.contains("the run is paused"), "{said}");
+    let output = control(&session, "pause-now");
+    assert!(output.contains("the run is paused"), "{output}");
     let paused = status(&session);
     assert_eq!(paused["live"]["state"], "paused", "{paused}");
     let kinds = |found: &Value| -> Vec<String> {
@@ -80,15 +80,15 @@ fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
     ];
     assert!(skinrig(&note).code(0).out.contains("noted"));
     // Pausing a paused run has no effect.
-    let said = skinrig(&["control", &text(&session), "pause", "--wait", "1 s"]);
-    assert!(said.code(0).out.contains("the run is paused"));
+    let output = skinrig(&["control", &text(&session), "pause", "--wait", "1 s"]);
+    assert!(output.code(0).out.contains("the run is paused"));
 
-    let said = control(&session, "resume");
-    assert!(said.contains("the run is running"), "{said}");
-    let said = control(&session, "stop");
+    let output = control(&session, "resume");
+    assert!(output.contains("the run is running"), "{output}");
+    let output = control(&session, "stop");
     assert!(
-        said.contains("ended") || said.contains("finished"),
-        "{said}"
+        output.contains("ended") || output.contains("finished"),
+        "{output}"
     );
     let (code, messages) = run.end();
     assert_eq!(code, Some(5), "{messages}");
@@ -122,7 +122,7 @@ fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
 }
 
 #[test]
-fn a_killed_run_is_told_from_a_running_one_and_its_socket_is_replaced() {
+fn a_killed_run_is_recognised_and_its_socket_is_replaced() {
     let lab = Lab::new();
     let run = LiveRun::new(&lab.path("s"));
     run.signal("KILL");
@@ -148,8 +148,8 @@ fn a_killed_run_is_told_from_a_running_one_and_its_socket_is_replaced() {
     }
 
     // The next leg opens its control socket again and reports it.
-    let again = ["resume", &text(&session), "--real-time", "--no-analysis"];
-    let mut leg = program(&again);
+    let repeated = ["resume", &text(&session), "--real-time", "--no-analysis"];
+    let mut leg = program(&repeated);
     let mut leg = leg
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
@@ -160,10 +160,10 @@ fn a_killed_run_is_told_from_a_running_one_and_its_socket_is_replaced() {
         assert!(leg.try_wait().unwrap().is_none(), "{found}");
         found = status(&session);
     }
-    let said = control(&session, "halt");
+    let output = control(&session, "halt");
     assert!(
-        said.contains("ended") || said.contains("finished"),
-        "{said}"
+        output.contains("ended") || output.contains("finished"),
+        "{output}"
     );
     assert_eq!(leg.wait().unwrap().code(), Some(5));
     let ended = status(&session);

@@ -153,7 +153,7 @@ fn a_recorded_session_can_be_verified_listed_and_shown() {
 }
 
 #[test]
-fn analyze_and_report_give_the_same_results_again_and_others_with_other_settings() {
+fn analyze_and_report_are_reproducible_and_depend_on_settings() {
     let lab = Lab::new();
     let session = lab.record("s", &[]);
     assert!(files(&lab.path("s"), ".results.json").is_empty());
@@ -165,8 +165,8 @@ fn analyze_and_report_give_the_same_results_again_and_others_with_other_settings
     skinrig(&["report", &path, "--out", &lab.text("r.html")]).code(0);
     assert!(std::fs::metadata(lab.path("r.html")).unwrap().len() > 10_000);
     let hash = |v: &serde_json::Value| v["provenance"]["results_hash"].as_str().unwrap().to_owned();
-    let again = read_json(&only(&lab.path("s"), ".results.json"));
-    assert_eq!(hash(&first), hash(&again));
+    let repeated = read_json(&only(&lab.path("s"), ".results.json"));
+    assert_eq!(hash(&first), hash(&repeated));
     let other = lab.text("other.json");
     skinrig(&[
         "analyze",
@@ -239,11 +239,11 @@ fn exports_hold_exactly_what_was_recorded_and_inspect_reads_them() {
         let hdf5 = only(&lab.path("e"), &format!(".camera{}.hdf5", camera.number()));
         let container = Container::open(&hdf5).unwrap();
         let mut stream = container.events(None, Geometry::EVK1).unwrap();
-        let mut again = Vec::new();
+        let mut repeated = Vec::new();
         loop {
             match stream.next_batch().unwrap() {
                 [] => break,
-                batch => again.extend_from_slice(batch),
+                batch => repeated.extend_from_slice(batch),
             }
         }
         // Times in a container count from the first event.
@@ -252,7 +252,7 @@ fn exports_hold_exactly_what_was_recorded_and_inspect_reads_them() {
             ..*e
         };
         let expected: Vec<CdEvent> = recorded.iter().map(shifted).collect();
-        assert!(again == expected, "{camera}: events differ");
+        assert!(repeated == expected, "{camera}: events differ");
 
         for (file, kind) in [(&raw, "Prophesee RAW"), (&hdf5, "bimvee HDF5")] {
             let inspected = skinrig(&["inspect", "--json", &text(file)]).code(0).json();
@@ -313,7 +313,7 @@ fn exports_hold_exactly_what_was_recorded_and_inspect_reads_them() {
 
 /// On a terminal each phase reports progress; in a pipe only the answer is written.
 #[test]
-fn a_terminal_shows_what_takes_time() {
+fn slow_steps_are_shown_on_a_terminal() {
     let lab = Lab::new();
     let session = lab.record("s", &[]);
     let piped = skinrig(&["analyze", &session.display().to_string()]).code(0);

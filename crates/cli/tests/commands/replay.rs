@@ -19,13 +19,13 @@ pub(crate) fn assert_replays(lab: &Lab, session: &Path, folder: &str) {
     ])
     .code(if stopped { 5 } else { 0 });
     let replayed = only(&lab.path(folder), ".session.sqlite");
-    let again = read_json(&only(&lab.path(folder), ".results.json"));
+    let repeated = read_json(&only(&lab.path(folder), ".results.json"));
     let hash = &original["provenance"]["results_hash"];
     assert_eq!(hash.as_str().unwrap().len(), 64);
-    assert_eq!(*hash, again["provenance"]["results_hash"]);
+    assert_eq!(*hash, repeated["provenance"]["results_hash"]);
     assert_eq!(
         original["analysis"]["presses"],
-        again["analysis"]["presses"]
+        repeated["analysis"]["presses"]
     );
     let (a, b) = (show(session), show(&replayed));
     for key in [

@@ -27,8 +27,8 @@ fn cut_off(lab: &Lab) -> PathBuf {
 
 fn analysis(session: &std::path::Path) -> (Value, String) {
     let out = session.with_extension("results.json");
-    let said = skinrig(&["analyze", &text(session), "--out", &text(&out)]).code(0);
-    (read_json(&out), said.out)
+    let output = skinrig(&["analyze", &text(session), "--out", &text(&out)]).code(0);
+    (read_json(&out), output.out)
 }
 
 #[test]
@@ -41,25 +41,28 @@ fn a_resumed_session_gives_the_results_of_one_that_was_never_cut_off() {
         .find(|p| p["verdict"] == "open" && p["attempts"] == 1);
     let press = open.expect("one press was under way")["press"].clone();
 
-    let said = skinrig(&["resume", "-v", &text(&session)]).code(0).out;
-    assert!(said.contains(&format!("press {press} cut off")), "{said}");
-    let told = format!("press {press}: cut off: leg 1 of the session ended without its outcome");
+    let output = skinrig(&["resume", "-v", &text(&session)]).code(0).out;
+    assert!(
+        output.contains(&format!("press {press} cut off")),
+        "{output}"
+    );
+    let message = format!("press {press}: cut off: leg 1 of the session ended without its outcome");
     for line in [
         "leg 1 ",
         ": cut off\n",
         "leg 2 ",
         ": completed\n",
         "1 attempt at 1 press retaken",
-        &told,
+        &message,
     ] {
-        assert!(said.contains(line), "expected {line:?} in {said}");
+        assert!(output.contains(line), "expected {line:?} in {output}");
     }
     let page = std::fs::read_to_string(only(&lab.path("cut"), ".report.html")).unwrap();
     for part in [
         "data-testid=\"legs\"",
         "data-testid=\"retaken\"",
         "<b>leg 2</b>",
-        &told,
+        &message,
     ] {
         assert!(page.contains(part), "expected {part:?} on the page");
     }

@@ -47,7 +47,7 @@ fn nothing_connected_is_no_error_and_every_line_has_a_next_step() {
 }
 
 #[test]
-fn the_doctor_tells_of_a_bench_that_is_not_there_what_is_missing() {
+fn doctor_lists_the_missing_devices_of_an_absent_bench() {
     let lab = Lab::new();
     let sessions = lab.text("s");
     let doctor = |more: &[&str]| {
@@ -93,9 +93,9 @@ fn a_rig_file_is_read_with_the_same_care_as_a_protocol() {
     run(QUICK)
         .code(2)
         .expect_stderr(&["this is not a rig", "found: a protocol"]);
-    let spoilt = std::fs::read_to_string(format!("{ROOT}/{EMULATED}")).unwrap();
-    let spoilt = spoilt.replace("max_force: 8 N", "max_force: 8");
-    std::fs::write(lab.path("rig.yaml"), spoilt).unwrap();
+    let corrupted = std::fs::read_to_string(format!("{ROOT}/{EMULATED}")).unwrap();
+    let corrupted = corrupted.replace("max_force: 8 N", "max_force: 8");
+    std::fs::write(lab.path("rig.yaml"), corrupted).unwrap();
     run(&lab.text("rig.yaml")).code(2).expect_stderr(&[
         "limits.max_force",
         "the unit is missing",
@@ -113,7 +113,7 @@ fn a_rig_file_is_read_with_the_same_care_as_a_protocol() {
 }
 
 #[test]
-fn a_bench_that_is_not_there_is_named_with_the_next_step() {
+fn a_missing_bench_is_reported_with_the_next_step() {
     let lab = Lab::new();
     let sessions = lab.text("s");
     without_devices(&["run", QUICK, "--rig", EMULATED, "--sessions", &sessions])
@@ -296,7 +296,7 @@ fn a_wrong_line_of_a_file_ends_the_jog_with_the_robot_disarmed() {
 }
 
 #[test]
-fn a_jog_stays_within_the_depth_of_the_frame_unless_told_otherwise() {
+fn jog_stays_within_the_frame_depth_by_default() {
     let lab = Lab::new();
     // From z = -5 mm: the simulated skin is at -15 mm, and 6 mm of it may be pressed.
     let log = lab.text("within.log");
@@ -378,7 +378,7 @@ fn ctrl_c_holds_rises_and_disarms() {
 }
 
 #[test]
-fn a_jog_that_nobody_uses_disarms() {
+fn an_idle_jog_disarms() {
     let lab = Lab::new();
     let log = lab.text("jog.log");
     let mut child = program(&["jog", "--idle", "200 ms", "--log", &log])

@@ -3,7 +3,7 @@
 use crate::support::{Lab, skinrig, text};
 
 #[test]
-fn a_session_says_what_its_successor_has_to_be_pressed() {
+fn a_session_gives_the_sample_size_of_the_next_one() {
     let lab = Lab::new();
     let session = text(&lab.record("s", &[]));
     let ask = |more: &[&str]| {

@@ -69,8 +69,8 @@ fn pipes_and_devices_are_refused() {
     let lab = Lab::new();
     let session = lab.record("sessions", &[]).display().to_string();
     let pipe = lab.text("pipe");
-    let made = Command::new("mkfifo").arg(&pipe).status();
-    assert!(made.unwrap().success());
+    let created = Command::new("mkfifo").arg(&pipe).status();
+    assert!(created.unwrap().success());
     // A pipe beside a session, where its lock would be.
     let beside = lab.text("beside.session.sqlite");
     std::fs::copy(std::path::Path::new(ROOT).join(&session), &beside).unwrap();

@@ -43,18 +43,18 @@ fn every_new_protocol_passes_its_check_and_none_is_overwritten() {
     }
     // The schema that their first line names.
     assert!(lab.path("skinrig.schema.json").exists());
-    let made = at(&folder, &["new", "demo", "deeper/one.yaml", "--json"]).code(0);
-    assert_eq!(made.json()["files"].as_array().unwrap().len(), 2);
+    let created = at(&folder, &["new", "demo", "deeper/one.yaml", "--json"]).code(0);
+    assert_eq!(created.json()["files"].as_array().unwrap().len(), 2);
 }
 
 #[test]
-fn a_new_lab_runs_and_keeps_what_is_its_own() {
+fn a_new_lab_runs_and_user_files_are_not_overwritten() {
     let lab = Lab::new();
     let folder = lab.path("");
-    let told = at(&folder, &["init", "here"]).code(0).out;
+    let message = at(&folder, &["init", "here"]).code(0).out;
     assert!(
-        told.contains("cd here && skinrig run protocols/demo.yaml"),
-        "{told}"
+        message.contains("cd here && skinrig run protocols/demo.yaml"),
+        "{message}"
     );
     let here = lab.path("here");
     at(&here, &["run", "protocols/quick-check.yaml"]).code(0);
@@ -65,8 +65,8 @@ fn a_new_lab_runs_and_keeps_what_is_its_own() {
     );
     std::fs::write(&own, "mine").unwrap();
     std::fs::write(&schema, "old").unwrap();
-    let told = at(&here, &["init"]).code(0).out;
-    assert!(told.contains("0 files written, 1 updated"), "{told}");
+    let message = at(&here, &["init"]).code(0).out;
+    assert!(message.contains("0 files written, 1 updated"), "{message}");
     assert_eq!(std::fs::read_to_string(&own).unwrap(), "mine");
     assert_ne!(std::fs::read_to_string(&schema).unwrap(), "old");
     std::fs::write(lab.path("file"), "").unwrap();
@@ -77,7 +77,7 @@ fn a_new_lab_runs_and_keeps_what_is_its_own() {
 
 /// Without `scene` the summary names the chosen level; a custom skin needs the level that models skins.
 #[test]
-fn a_scene_is_optional_and_says_what_it_took() {
+fn a_scene_is_optional_and_the_chosen_level_is_reported() {
     let lab = Lab::new();
     let folder = lab.path("");
     at(&folder, &["new", "quick-check", "p.yaml"]).code(0);
@@ -88,10 +88,10 @@ fn a_scene_is_optional_and_says_what_it_took() {
     );
     assert_ne!(text, without);
     std::fs::write(lab.path("p.yaml"), without).unwrap();
-    let told = at(&folder, &["run", "p.yaml", "--no-analysis"]).code(0).out;
+    let message = at(&folder, &["run", "p.yaml", "--no-analysis"]).code(0).out;
     assert!(
-        told.contains("simulated (geometric, for event_rates, localisation)"),
-        "{told}"
+        message.contains("simulated (geometric, for event_rates, localisation)"),
+        "{message}"
     );
     at(&folder, &["new", "other-skin", "o.yaml"]).code(0);
     at(

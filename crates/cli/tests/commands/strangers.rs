@@ -59,12 +59,12 @@ fn names_from_a_file_stay_in_the_folders_that_were_asked_for() {
         .iter()
         .filter(|path| {
             let folder = path.parent().unwrap();
-            let asked = folder.ends_with("sessions") || folder.ends_with("out");
+            let requested = folder.ends_with("sessions") || folder.ends_with("out");
             let name = path.file_name().unwrap().to_str().unwrap();
             let plain = name
                 .chars()
                 .all(|c| c.is_ascii_alphanumeric() || "._-".contains(c));
-            !(asked && plain && name.len() < 200 || path.ends_with("x.yaml"))
+            !(requested && plain && name.len() < 200 || path.ends_with("x.yaml"))
         })
         .collect();
     assert!(strays.is_empty(), "{strays:?}");

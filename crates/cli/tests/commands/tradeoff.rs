@@ -34,11 +34,11 @@ fn the_printed_lines_select_what_was_measured_to_the_last_bit() {
         "--budget",
         "10s",
     ];
-    let said = skinrig(&arguments).code(0).json();
-    let rows = said["tradeoff"]["rows"].as_array().unwrap();
+    let output = skinrig(&arguments).code(0).json();
+    let rows = output["tradeoff"]["rows"].as_array().unwrap();
     assert!(rows.len() > 60, "{}", rows.len());
     // The session's own settings, and a choice with every kind of change.
-    let wanted = |key: &str| {
+    let expected = |key: &str| {
         let has = |row: &&Value| row["overrides"].to_string().contains(key);
         rows.iter()
             .find(has)
@@ -52,7 +52,7 @@ fn the_printed_lines_select_what_was_measured_to_the_last_bit() {
         "window_after_contact",
         "crop",
     ];
-    for row in std::iter::once(&rows[0]).chain(keys.map(wanted).iter().copied()) {
+    for row in std::iter::once(&rows[0]).chain(keys.map(expected).iter().copied()) {
         let out = lab.text("one.json");
         let mut arguments = vec![
             "--json".to_owned(),
@@ -77,16 +77,16 @@ fn the_printed_lines_select_what_was_measured_to_the_last_bit() {
             row["overrides"]
         );
     }
-    assert!(said["answers"][0]["row"]["cpu_us"].as_f64().unwrap() > 0.0);
-    let page = std::fs::read_to_string(said["files"]["page"].as_str().unwrap()).unwrap();
+    assert!(output["answers"][0]["row"]["cpu_us"].as_f64().unwrap() > 0.0);
+    let page = std::fs::read_to_string(output["files"]["page"].as_str().unwrap()).unwrap();
     assert!(page.contains("<svg") && page.contains("</html>"), "{page}");
 }
 
 #[test]
-fn a_demand_that_nothing_meets_ends_with_code_4_and_a_table_fits_a_terminal() {
+fn an_unmet_demand_exits_with_code_4_and_tables_fit_the_terminal() {
     let lab = Lab::new();
     let session = session(&lab);
-    let said = skinrig(&[
+    let output = skinrig(&[
         "tradeoff",
         &session,
         "--repeats",
@@ -97,14 +97,14 @@ fn a_demand_that_nothing_meets_ends_with_code_4_and_a_table_fits_a_terminal() {
     .code(4)
     .expect_stderr(&["--full"]);
     assert!(
-        said.out.lines().all(|l| l.chars().count() <= 100),
+        output.out.lines().all(|l| l.chars().count() <= 100),
         "{}",
-        said.out
+        output.out
     );
-    assert!(said.out.contains("streaming f32"), "{}", said.out);
+    assert!(output.out.contains("streaming f32"), "{}", output.out);
     // The answer comes before the table.
-    let answer = said.out.find("none of the choices tried").unwrap();
-    assert!(answer < said.out.find("choices tried on").unwrap());
+    let answer = output.out.find("none of the choices tried").unwrap();
+    assert!(answer < output.out.find("choices tried on").unwrap());
     let budget = ["tradeoff", &session, "--repeats", "1", "--budget", "10s"];
     let met = skinrig(&budget).code(0).out;
     let mut lines = met.lines();
@@ -139,10 +139,10 @@ fn a_trade_of_other_settings_leaves_that_of_the_session_alone() {
         other["variant"]["changed"][0],
         "analysis.estimator=column_median"
     );
-    let said = std::fs::read_to_string(other["files"]["page"].as_str().unwrap()).unwrap();
+    let output = std::fs::read_to_string(other["files"]["page"].as_str().unwrap()).unwrap();
     assert!(
-        said.contains("Not the session&#x27;s own settings: analysis.estimator=column_median"),
-        "{said}"
+        output.contains("Not the session&#x27;s own settings: analysis.estimator=column_median"),
+        "{output}"
     );
     trade(&[&set[..], &["--out", &page]].concat())
         .code(2)

@@ -14,7 +14,7 @@ fn best(folder: &str, more: &[&str]) -> Value {
 }
 
 #[test]
-fn a_variant_lies_beside_the_official_analysis_and_is_taken_only_when_asked_for() {
+fn a_variant_is_stored_beside_the_official_analysis_and_used_only_on_request() {
     let lab = Lab::new();
     let folder = lab.text("s");
     skinrig(&["run", SMALL, "--sessions", &folder]).code(0);
@@ -30,10 +30,10 @@ fn a_variant_lies_beside_the_official_analysis_and_is_taken_only_when_asked_for(
 
     // Unchanged settings are official; a change makes a variant, named by the user or by the change.
     skinrig(&["analyze", &s]).code(0);
-    let said = skinrig(&["analyze", &s, "--set", CHANGE]).code(0);
+    let output = skinrig(&["analyze", &s, "--set", CHANGE]).code(0);
     assert!(
-        said.out.contains("VARIANT   analysis `min_samples=5`"),
-        "{said:#?}"
+        output.out.contains("VARIANT   analysis `min_samples=5`"),
+        "{output:#?}"
     );
     skinrig(&[
         "analyze",
@@ -89,9 +89,9 @@ fn a_variant_lies_beside_the_official_analysis_and_is_taken_only_when_asked_for(
 
     // `prototypes` and `report` use a variant on request, and say so.
     assert_eq!(best(&folder, &[])["best"], rmse);
-    let asked = best(&folder, &["--analysis", "all"]);
+    let requested = best(&folder, &["--analysis", "all"]);
     assert_eq!(
-        asked["points"][0]["variant"]["changed"][0],
+        requested["points"][0]["variant"]["changed"][0],
         "analysis.centroid=all_clusters"
     );
     let table = skinrig(&["prototypes", &folder, "--analysis", "all"])
@@ -99,11 +99,11 @@ fn a_variant_lies_beside_the_official_analysis_and_is_taken_only_when_asked_for(
         .out;
     assert!(table.contains("analysis.centroid=all_clusters"), "{table}");
     skinrig(&["report", &s]).code(0);
-    let again = (
+    let repeated = (
         std::fs::read(&official).unwrap(),
         std::fs::read(&report).unwrap(),
     );
-    assert!(before == again);
+    assert!(before == repeated);
     let page = skinrig(&["report", &s, "--analysis", "all"]).code(0).out;
     assert!(
         page.trim_end().ends_with(".analysis-all.report.html"),
@@ -129,16 +129,19 @@ fn a_variant_lies_beside_the_official_analysis_and_is_taken_only_when_asked_for(
 }
 
 #[test]
-fn a_copy_of_a_session_is_not_counted_again() {
+fn a_copy_of_a_session_counts_once() {
     let lab = Lab::new();
     let folder = lab.text("s");
     skinrig(&["run", SMALL, "--sessions", &folder]).code(0);
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
     skinrig(&["salvage", &session]).code(0);
     let copy = text(&only(&lab.path("s"), ".salvaged.session.sqlite"));
-    let said = skinrig(&["--json", "prototypes", &folder]).code(0);
-    assert!(said.err.contains("is a copy of the session"), "{said:#?}");
-    let all = said.json();
+    let output = skinrig(&["--json", "prototypes", &folder]).code(0);
+    assert!(
+        output.err.contains("is a copy of the session"),
+        "{output:#?}"
+    );
+    let all = output.json();
     assert_eq!(all[0]["sessions"], 1);
     let points = all[0]["series"][0]["points"].as_array().unwrap();
     assert_eq!(points.len(), 1);
@@ -153,7 +156,7 @@ fn a_copy_of_a_session_is_not_counted_again() {
 }
 
 #[test]
-fn an_export_made_again_is_done() {
+fn a_repeated_export_changes_nothing() {
     let lab = Lab::new();
     let folder = lab.text("s");
     skinrig(&["run", SMALL, "--sessions", &folder]).code(0);
@@ -190,11 +193,12 @@ fn an_export_made_again_is_done() {
         }
     }
     std::fs::write(&path, manifest.to_string()).unwrap();
-    let said = skinrig(&["verify", &bundle]).code(4);
+    let output = skinrig(&["verify", &bundle]).code(4);
     assert!(
-        said.out
+        output
+            .out
             .contains("expected the content that follows from the sealed session"),
-        "{said:#?}"
+        "{output:#?}"
     );
 }
 
@@ -214,7 +218,7 @@ fn text_that_acts_is_written_out() {
     let lab = Lab::new();
     let folder = lab.text("s");
     let hostile = "prototype.id='=1+1 \u{202e}gpj \u{1b}[8m'";
-    let said = skinrig(&["run", SMALL, "--sessions", &folder, "--set", hostile]).code(0);
+    let output = skinrig(&["run", SMALL, "--sessions", &folder, "--set", hostile]).code(0);
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
     let page = std::fs::read_to_string(only(&lab.path("s"), ".report.html")).unwrap();
     let shown = skinrig(&["show", &session]).code(0);
@@ -223,7 +227,7 @@ fn text_that_acts_is_written_out() {
         "export", &session, "--to", "csv", "--only", "presses", "--out", &out,
     ])
     .code(0);
-    for text in [&said.out, &said.err, &shown.out, &page] {
+    for text in [&output.out, &output.err, &shown.out, &page] {
         assert!(!text.contains(['\u{202e}', '\u{1b}']), "{text}");
     }
     assert!(shown.out.contains("\\u{202e}gpj \\u{1b}[8m"), "{shown:#?}");

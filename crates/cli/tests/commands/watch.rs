@@ -45,16 +45,16 @@ fn a_run_in_real_time_is_shown_with_its_path_its_rates_and_its_signals() {
     let mut watcher = program(&["watch", &session, "--every", "100 ms"]);
     let watcher = watcher.stdout(Stdio::piped()).spawn().unwrap();
     skinrig(&["control", &session, "stop", "--wait", "60 s"]).code(0);
-    let said = watcher.wait_with_output().unwrap();
-    assert_eq!(said.status.code(), Some(0), "{said:?}");
-    let said = String::from_utf8(said.stdout).unwrap();
-    let states: Vec<&str> = said.lines().filter(|l| l.starts_with("state ")).collect();
+    let output = watcher.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let output = String::from_utf8(output.stdout).unwrap();
+    let states: Vec<&str> = output.lines().filter(|l| l.starts_with("state ")).collect();
     assert_eq!(states.last(), Some(&"state    stopped"), "{states:?}");
     assert_eq!(run.end().0, Some(5));
 }
 
 #[test]
-fn eight_watchers_of_a_whole_run_meet_no_lock_and_change_nothing() {
+fn eight_readers_of_a_run_meet_no_lock_and_change_nothing() {
     let lab = Lab::new();
     let watchers: Vec<_> = (0..WATCHERS)
         .map(|_| {
@@ -72,10 +72,10 @@ fn eight_watchers_of_a_whole_run_meet_no_lock_and_change_nothing() {
     };
     let watched = hash("s");
     for watcher in watchers {
-        let said = watcher.wait_with_output().unwrap();
-        let (out, err) = (&said.stdout, &said.stderr);
+        let output = watcher.wait_with_output().unwrap();
+        let (out, err) = (&output.stdout, &output.stderr);
         let [out, err] = [out, err].map(|text| String::from_utf8_lossy(text).into_owned());
-        assert_eq!(said.status.code(), Some(0), "{out}{err}");
+        assert_eq!(output.status.code(), Some(0), "{out}{err}");
         assert!(!err.contains("locked") && !err.contains("error"), "{err}");
         assert!(out.contains("state    completed"), "{out}");
     }
@@ -90,7 +90,7 @@ fn eight_watchers_of_a_whole_run_meet_no_lock_and_change_nothing() {
 }
 
 #[test]
-fn a_run_that_is_not_there_yet_is_waited_for_and_a_cut_off_one_is_told() {
+fn watch_waits_for_a_run_and_reports_an_interrupted_one() {
     let lab = Lab::new();
     let folder = lab.text("s");
     skinrig(&["watch", &folder, "--once"])
@@ -100,8 +100,8 @@ fn a_run_that_is_not_there_yet_is_waited_for_and_a_cut_off_one_is_told() {
     run.signal("KILL");
     run.end();
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
-    let said = skinrig(&["watch", &session]).code(0);
-    assert!(said.out.contains("state    cut off"), "{said:?}");
+    let output = skinrig(&["watch", &session]).code(0);
+    assert!(output.out.contains("state    cut off"), "{output:?}");
     // Its completeness cannot be verified.
     skinrig(&[
         "export",

@@ -81,18 +81,18 @@ pub fn causes(
     let shared = locations.shared([a, b]);
     let of = |subject: &Subject| SkinPresses::of(subject, &locations, &shared);
     let mut own = [of(a), of(b)];
-    let both: Vec<u32> = own[0].locations().filter(|p| own[1].has(*p)).collect();
+    let both: Vec<u32> = own[0].locations().filter(|p| own[1].contains(*p)).collect();
     if both.len() < MIN_LOCATIONS {
         return None;
     }
-    own.iter_mut().for_each(|p| p.keep(&both));
+    own.iter_mut().for_each(|p| p.retain_locations(&both));
     // One pair under the settings of B, one under those of A: within a pair only the skins differ.
     let variants: Vec<[SkinPresses; 2]> = match reanalysis {
         None => vec![own],
         Some(reanalysis) => {
             let [a, b] = own;
             let mut others = [of(reanalysis.first), of(reanalysis.second)];
-            others.iter_mut().for_each(|p| p.keep(&both));
+            others.iter_mut().for_each(|p| p.retain_locations(&both));
             let [a_as_b, b_as_a] = others;
             vec![[a, b_as_a], [a_as_b, b]]
         }

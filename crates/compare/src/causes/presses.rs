@@ -75,12 +75,12 @@ impl SkinPresses {
         self.by_place.keys().copied()
     }
 
-    pub(super) fn has(&self, location: u32) -> bool {
+    pub(super) fn contains(&self, location: u32) -> bool {
         self.by_place.contains_key(&location)
     }
 
     /// Drops all other locations.
-    pub(super) fn keep(&mut self, locations: &[u32]) {
+    pub(super) fn retain_locations(&mut self, locations: &[u32]) {
         self.by_place
             .retain(|location, _| locations.contains(location));
     }
@@ -112,7 +112,7 @@ impl SkinPresses {
 }
 
 /// What locates the scored presses best.
-struct Refitted {
+struct RefittedGeometry {
     geometry: StereoGeometry,
     /// Correction factor for errors of the presses that the geometry was fitted to.
     inflation: f64,
@@ -120,7 +120,7 @@ struct Refitted {
     held_out: BTreeMap<PressId, Option<[f64; 2]>>,
 }
 
-impl Refitted {
+impl RefittedGeometry {
     /// Error of a press, mm.
     fn error(&self, attempt: &Attempt<'_>) -> Option<[f64; 2]> {
         let press = attempt.press;
@@ -143,7 +143,7 @@ impl Refitted {
 /// parameters are too small by `sqrt(1 - p / 2n)`; the inflation corrects this. Falls back to the
 /// session's geometry with too few presses. A session that was judged by a field is diagnosed by a field of the same kind,
 /// with each press located by the presses at other locations.
-fn refit(session: &Session, attempts: &[Attempt<'_>]) -> Refitted {
+fn refit(session: &Session, attempts: &[Attempt<'_>]) -> RefittedGeometry {
     let used = session.analysis.geometry;
     let presses: Vec<PressResult> = attempts
         .iter()
@@ -159,7 +159,7 @@ fn refit(session: &Session, attempts: &[Attempt<'_>]) -> Refitted {
     let settings = &session.analysis.settings;
     let fit = calibrate(&set, &used, model, settings.seed).filter(|_| free > 0.0);
     let Some((geometry, calibration)) = fit else {
-        return Refitted {
+        return RefittedGeometry {
             geometry: used,
             inflation: 1.0,
             held_out: BTreeMap::new(),
@@ -170,7 +170,7 @@ fn refit(session: &Session, attempts: &[Attempt<'_>]) -> Refitted {
         .filter(|l| *l != Locator::Geometry)
         .and_then(|l| held_out_errors(&set, &geometry, Some(&calibration), settings, l));
     let sights = set.sights().iter().map(|s| s.press);
-    Refitted {
+    RefittedGeometry {
         geometry,
         inflation: (numbers / free).sqrt(),
         held_out: errors.map_or_else(BTreeMap::new, |e| sights.zip(e).collect()),

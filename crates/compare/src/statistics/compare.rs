@@ -5,7 +5,7 @@ use super::error::{ComparisonError, Side};
 use super::inference::Inference;
 use super::influence::Measure;
 use super::measure::measure;
-use super::question::{Better, Pairing, Question, Settings};
+use super::question::{Better, ComparisonTarget, Pairing, Settings};
 use super::sample::{Data, Kind, Sample};
 use super::spread::RepeatEstimator;
 use super::{components, notes, presses_needed};
@@ -31,7 +31,7 @@ pub fn estimate(sample: &Sample, settings: &Settings) -> Result<Interval, Compar
 pub fn compare(
     a: &Sample,
     b: &Sample,
-    question: &Question,
+    question: &ComparisonTarget,
     settings: &Settings,
 ) -> Result<Comparison, ComparisonError> {
     settings.check()?;
@@ -96,7 +96,7 @@ pub(super) fn verdict(
     [a, b]: [f64; 2],
     p_difference: f64,
     p_tost: Option<f64>,
-    question: &Question,
+    question: &ComparisonTarget,
     settings: &Settings,
 ) -> Verdict {
     if p_tost.is_some_and(|p| p <= settings.alpha) {

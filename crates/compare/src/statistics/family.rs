@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::compare::verdict;
 use super::comparison::{Comparison, Interval, Verdict};
 use super::error::ComparisonError;
-use super::question::{Question, Settings};
+use super::question::{ComparisonTarget, Settings};
 use super::sample::Sample;
 
 /// Pairs to compare.
@@ -28,13 +28,13 @@ pub struct Pair {
     /// Uncorrected comparison, or why there is none.
     pub alone: Result<Comparison, ComparisonError>,
     /// Corrected for the size of the family; `None` without a comparison.
-    pub adjusted: Option<Adjusted>,
+    pub adjusted: Option<AdjustedComparison>,
 }
 
 /// A comparison corrected for its family: the probability of any false claim in the family is below
 /// alpha.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Adjusted {
+pub struct AdjustedComparison {
     /// Number of comparisons in the family.
     pub family: u32,
     /// p value of no difference, Holm-corrected (1979).
@@ -54,7 +54,7 @@ pub struct Adjusted {
 pub fn compare_all(
     samples: &[Sample],
     against: PairSelection,
-    question: &Question,
+    question: &ComparisonTarget,
     settings: &Settings,
 ) -> Result<Vec<Pair>, ComparisonError> {
     let setting = |name, expected, found| ComparisonError::setting(name, expected, found as f64);
@@ -99,7 +99,7 @@ pub fn compare_all(
                 let p_difference = differences[i]?;
                 let values = [c.a.value, c.b.value];
                 let verdict = verdict(values, p_difference, tosts[i], question, settings);
-                Some(Adjusted {
+                Some(AdjustedComparison {
                     family: family as u32,
                     p_difference,
                     p_tost: tosts[i],

@@ -44,6 +44,6 @@ pub use comparison::{
     Comparison, Components, Design, Interval, Note, PressesNeeded, RequiredDesign, Tost, Verdict,
 };
 pub use error::{ComparisonError, Side};
-pub use family::{Adjusted, Pair, PairSelection, compare_all};
-pub use question::{Better, Pairing, Question, Settings};
+pub use family::{AdjustedComparison, Pair, PairSelection, compare_all};
+pub use question::{Better, ComparisonTarget, Pairing, Settings};
 pub use sample::{Count, Kind, Position, Sample, SampleFault};

@@ -2,7 +2,7 @@
 
 use super::comparison::{Components, PressesNeeded, RequiredDesign, Verdict, direction};
 use super::influence::Measure;
-use super::question::{Better, Question, Settings};
+use super::question::{Better, ComparisonTarget, Settings};
 use skinrig_analysis::distributions::student_quantile;
 
 /// Upper limit of the search for locations.
@@ -11,7 +11,7 @@ const MAX_LOCATIONS: u32 = 100_000;
 /// Presses required for a decision, if the measured difference and variance are the true ones.
 pub(super) fn presses_needed(
     verdict: Verdict,
-    question: &Question,
+    question: &ComparisonTarget,
     components: &Components,
     of: &[Measure; 2],
     settings: &Settings,

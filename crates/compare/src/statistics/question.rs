@@ -18,7 +18,7 @@ pub enum Better {
 
 /// Parameters of the comparison of one metric.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Question {
+pub struct ComparisonTarget {
     /// Direction in which the metric improves.
     pub better: Better,
     /// Equivalence margin in the unit of the metric; `None`: never equivalent.
@@ -65,7 +65,7 @@ impl Default for Settings {
     }
 }
 
-impl Question {
+impl ComparisonTarget {
     pub(super) fn check(&self) -> Result<(), ComparisonError> {
         match self.margin {
             Some(margin) if !(margin > 0.0 && margin.is_finite()) => Err(ComparisonError::setting(

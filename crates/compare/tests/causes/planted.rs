@@ -2,7 +2,7 @@
 //! without devices.
 
 use skinrig_analysis::{Analysis, SessionInput, analyze};
-use skinrig_compare::{Facts, Session, Subject};
+use skinrig_compare::{Session, SessionFacts, Subject};
 use skinrig_model::{
     AnalysisSettings, CalibrationModel, CameraId, CdEvent, HostTime, MarkKind, Point2, Point3,
     PressRole, PressTiming, RigGeometry, SimLevel, Skin, StereoGeometry,
@@ -60,7 +60,7 @@ impl NoiseSource {
 pub(crate) struct SimulatedSession {
     input: SessionInput,
     events: Memory,
-    facts: Facts,
+    facts: SessionFacts,
 }
 
 /// Records a session: one calibration repetition, two scored ones.
@@ -120,14 +120,14 @@ pub(crate) fn record(seed: u64, plant: PlantedCause) -> SimulatedSession {
             events,
             slice: usize::MAX,
         },
-        facts: Facts {
+        facts: SessionFacts {
             file: format!("{seed}.session.sqlite"),
             session_id: format!("{seed:032x}"),
             prototype: format!("{plant:?}"),
             rig_kind: "simulated".into(),
             origin: Some("simulated".into()),
             rig_name: "simulated (geometric)".into(),
-            ..Facts::default()
+            ..SessionFacts::default()
         },
     }
 }

@@ -1,12 +1,13 @@
 //! Tests comparisons of several prototypes at once.
 
 use skinrig_compare::statistics::{
-    Better, ComparisonError, Pair, PairSelection, Question, Sample, Settings, Verdict, compare_all,
+    Better, ComparisonError, ComparisonTarget, Pair, PairSelection, Sample, Settings, Verdict,
+    compare_all,
 };
 
 use crate::populations::Draws;
 
-const QUESTION: Question = Question {
+const QUESTION: ComparisonTarget = ComparisonTarget {
     better: Better::Lower,
     margin: None,
 };

@@ -3,8 +3,8 @@
 
 use proptest::prelude::*;
 use skinrig_compare::statistics::{
-    Better, Comparison, Interval, Kind, Pairing, Position, Question, Sample, Settings, Verdict,
-    compare, estimate,
+    Better, Comparison, ComparisonTarget, Interval, Kind, Pairing, Position, Sample, Settings,
+    Verdict, compare, estimate,
 };
 
 use crate::populations::{Draws, SimulatedPair};
@@ -97,7 +97,7 @@ proptest! {
         let pair = if shifted { SimulatedPair::new(kind).shifted() } else { SimulatedPair::new(kind) };
         let [a, b] = pair.draw(&mut Draws::new(seed, 1), false);
         let pairing = if independent { Pairing::Independent } else { Pairing::SharedLocations };
-        let question = Question { better: pair.better(), margin: Some(0.3) };
+        let question = ComparisonTarget { better: pair.better(), margin: Some(0.3) };
         let there = compare(&a, &b, &question, &settings(pairing));
         let back = compare(&b, &a, &question, &settings(pairing));
         if let (Ok(there), Ok(back)) = (&there, &back) {
@@ -119,7 +119,7 @@ proptest! {
         let by = turn % a.len();
         turned.rotate_left(by);
         turned.reverse();
-        let question = Question { better: Better::Lower, margin: Some(0.5) };
+        let question = ComparisonTarget { better: Better::Lower, margin: Some(0.5) };
         let of = |a: &[(u32, f64)]| {
             let [a, b] = [a, &b[..]].map(|v| Sample::rms(v.iter().copied()).unwrap());
             compare(&a, &b, &question, &settings(Pairing::SharedLocations)).unwrap()
@@ -142,7 +142,7 @@ proptest! {
         for make in make {
             let of = |unit: f64| {
                 let scaled = |v: &[(u32, f64)]| make(v.iter().map(|(k, x)| (*k, unit * x)).collect());
-                let question = Question { better: Better::Lower, margin: Some(0.5 * unit) };
+                let question = ComparisonTarget { better: Better::Lower, margin: Some(0.5 * unit) };
                 let settings = settings(Pairing::SharedLocations);
                 compare(&scaled(&a), &scaled(&b), &question, &settings).unwrap()
             };
@@ -161,7 +161,7 @@ proptest! {
 
 #[test]
 fn a_clear_difference_is_found_and_equal_skins_are_equivalent() {
-    let question = Question {
+    let question = ComparisonTarget {
         better: Better::Lower,
         margin: Some(0.5),
     };

@@ -1,6 +1,6 @@
 //! Coverage of intervals and error rates of tests on simulated skins; treating presses as independent fails the same checks.
 
-use skinrig_compare::statistics::{Kind, Pairing, Question, Settings, Verdict, compare};
+use skinrig_compare::statistics::{ComparisonTarget, Kind, Pairing, Settings, Verdict, compare};
 
 use crate::populations::{Draws, SimulatedPair};
 
@@ -43,7 +43,7 @@ impl Trial {
     pub(crate) fn rates(&self) -> Rates {
         let [a, b] = self.pair.truth();
         let truth = b - a;
-        let question = Question {
+        let question = ComparisonTarget {
             better: self.pair.better(),
             margin: (truth != 0.0).then_some(truth.abs()),
         };

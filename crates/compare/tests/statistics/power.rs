@@ -2,7 +2,8 @@
 
 use skinrig_compare::statistics::power::{Target, measure, plan};
 use skinrig_compare::statistics::{
-    Better, ComparisonError, Kind, PressesNeeded, Question, Sample, Settings, Verdict, compare,
+    Better, ComparisonError, ComparisonTarget, Kind, PressesNeeded, Sample, Settings, Verdict,
+    compare,
 };
 
 use crate::levels::Trial;
@@ -128,7 +129,7 @@ fn copies(copies: u32, shift: f64) -> [Sample; 2] {
 fn a_required_design_decides() {
     let settings = Settings::default();
     for (shift, margin) in [(0.5, None), (-0.3, Some(1.0))] {
-        let question = Question {
+        let question = ComparisonTarget {
             better: Better::Lower,
             margin,
         };
@@ -160,7 +161,7 @@ fn values_that_do_not_vary_promise_no_verdict() {
         let presses = (0..20).flat_map(|location| [(location, true); 3]);
         Sample::share(presses)
     };
-    let question = Question {
+    let question = ComparisonTarget {
         better: Better::Higher,
         margin: Some(0.01),
     };

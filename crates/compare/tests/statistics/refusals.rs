@@ -2,11 +2,11 @@
 //! is NaN.
 
 use skinrig_compare::statistics::{
-    Better, ComparisonError, Count, Note, Pairing, Position, Question, Sample, SampleFault,
+    Better, ComparisonError, ComparisonTarget, Count, Note, Pairing, Position, Sample, SampleFault,
     Settings, compare, estimate,
 };
 
-const LOWER: Question = Question {
+const LOWER: ComparisonTarget = ComparisonTarget {
     better: Better::Lower,
     margin: Some(0.5),
 };
@@ -92,7 +92,7 @@ fn without_spread_there_is_no_interval() {
 #[test]
 fn a_share_of_0_or_1_still_has_an_interval() {
     let all = |success: bool| Sample::share((0..20).map(|i| (i / 2, success)));
-    let question = Question {
+    let question = ComparisonTarget {
         better: Better::Higher,
         margin: None,
     };
@@ -219,7 +219,7 @@ fn settings_out_of_range_are_refused() {
             "{found}"
         );
     }
-    let margin = Question {
+    let margin = ComparisonTarget {
         margin: Some(0.0),
         ..LOWER
     };

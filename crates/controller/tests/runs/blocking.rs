@@ -228,7 +228,7 @@ impl Clock for SettledClock {
         let now = self.now().0;
         let devices = self.devices.lock().map(|d| d.clone()).unwrap_or_default();
         for (calls, until) in devices {
-            while calls.under_way() > 0 && now >= until.load(Ordering::Acquire) {
+            while calls.pending_calls() > 0 && now >= until.load(Ordering::Acquire) {
                 thread::yield_now();
             }
         }

@@ -153,10 +153,10 @@ fn the_operator_may_interrupt_at_every_tick() {
                 }
                 OperatorAction::Note => unreachable!("has a test of its own"),
                 OperatorAction::Abort => {
-                    let wanted = RunEnd::Stopped(StopReason::Abort);
+                    let expected = RunEnd::Stopped(StopReason::Abort);
                     // At the very last ticks nothing is left to abort.
                     if result.report.end != RunEnd::Completed {
-                        assert_eq!(result.report.end, wanted, "{case}");
+                        assert_eq!(result.report.end, expected, "{case}");
                         assert!(result.report.invalid <= 1, "{case}");
                     }
                 }

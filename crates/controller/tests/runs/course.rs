@@ -272,7 +272,7 @@ fn marks_wait_for_a_busy_line() {
 }
 
 #[test]
-fn from_an_unknown_start_the_tip_rises_first() {
+fn the_tip_rises_first_from_an_unknown_start() {
     let result = run_plan(&plan(), faults(), [20.0, 30.0, -1.0], Sink::default());
     result.check("low start");
     assert_eq!(result.report.valid, 3);

@@ -101,7 +101,7 @@ proptest! {
         for act in acts {
             match act {
                 Act::Command(mut target, speed) => {
-                    let (now, tip, heard) = {
+                    let (now, tip, commands_before) = {
                         let w = lock(&world);
                         (w.t, w.tip, w.commands.len())
                     };
@@ -128,7 +128,7 @@ proptest! {
                         && fresh && guard.is_armed() && !sideways
                         && last.is_none_or(|p| allows(p.measured.to_array(), [x, y, z]));
                     prop_assert_eq!(answer.is_ok(), allowed, "{:?} at {} -> {:?}", target, speed, answer);
-                    prop_assert_eq!(w.commands.len() - heard, usize::from(allowed));
+                    prop_assert_eq!(w.commands.len() - commands_before, usize::from(allowed));
                     if allowed && z < 4.95 {
                         foot.get_or_insert([x, y]);
                     } else if allowed && last.is_some_and(|p| p.measured.z_mm >= 4.95) {
@@ -137,11 +137,11 @@ proptest! {
                 }
                 Act::Look(ms) => {
                     lock(&world).t += ms * MS;
-                    let seen = guard.poll(&MockClock(world.clone()), &mut poses);
+                    let observed = guard.poll(&MockClock(world.clone()), &mut poses);
                     let gap = HostDuration(unseen + ms * MS);
                     unseen = 0;
                     lowest_mm = poses.iter().map(|p| p.measured.z_mm).fold(lowest_mm, f64::min);
-                    if let Err(why) = seen {
+                    if let Err(why) = observed {
                         // Only this is a fault here: too long between polls while the tip may have been low.
                         let is_late = matches!(
                             why,

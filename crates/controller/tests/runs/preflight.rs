@@ -3,13 +3,13 @@
 use skinrig_controller::{ControlHandle, ExpectedDevice, Loopback, Preflight, Run, RunReport};
 use skinrig_model::*;
 use skinrig_sim::config::SimConfig;
-use skinrig_sim::faults::Fault;
+use skinrig_sim::faults::{Fault, FaultTrigger};
 use skinrig_sim::rig::simulated_rig;
 
 use crate::mock::{Sink, header};
 use crate::simulated::paced_plan;
 
-fn full() -> Preflight {
+fn full_preflight() -> Preflight {
     Preflight {
         caller_checks: vec![PreflightCheck::new("disk", "1 GB", "2 GB", true, "")],
         expected: Vec::new(),
@@ -54,7 +54,7 @@ fn failed(checks: &[PreflightCheck]) -> Vec<&str> {
 
 #[test]
 fn a_healthy_rig_passes_every_check_and_runs() {
-    let (report, checks, records) = run(Vec::new(), full());
+    let (report, checks, records) = run(Vec::new(), full_preflight());
     assert_eq!((report.end, report.valid), (RunEnd::Completed, 3));
     let names: Vec<&str> = checks.iter().map(|c| c.check.as_str()).collect();
     assert_eq!(
@@ -114,13 +114,13 @@ fn a_lost_trigger_line_is_found_before_the_robot_is_powered() {
         pulse: 0,
     };
     let broken = (0..4).map(start_pulse).collect();
-    refused(broken, full(), &["camera 2: trigger loop-back"]);
+    refused(broken, full_preflight(), &["camera 2: trigger loop-back"]);
     // One damaged train is reported, but does not fail the run.
-    let (report, checks, _) = run(vec![start_pulse(0)], full());
+    let (report, checks, _) = run(vec![start_pulse(0)], full_preflight());
     assert_eq!((report.end, failed(&checks)), (RunEnd::Completed, vec![]));
     let last = checks.last().unwrap();
     assert_eq!(last.found, "the mark; 2 marks were sent", "{last:?}");
-    let mut crossed = full();
+    let mut crossed = full_preflight();
     crossed.loopback = Some(Loopback {
         channels: [0, 7],
         within: HostDuration::from_millis(500),
@@ -130,7 +130,7 @@ fn a_lost_trigger_line_is_found_before_the_robot_is_powered() {
 
 #[test]
 fn an_unexpected_device_or_version_is_rejected() {
-    let mut preflight = full();
+    let mut preflight = full_preflight();
     preflight.expected = vec![
         ExpectedDevice {
             role: DeviceRole::Camera2,
@@ -158,7 +158,7 @@ fn an_unexpected_device_or_version_is_rejected() {
 
 #[test]
 fn failed_checks_of_the_caller_and_rejected_settings_end_the_run() {
-    let mut preflight = full();
+    let mut preflight = full_preflight();
     preflight.caller_checks = vec![PreflightCheck::new(
         "disk",
         "9 GB",
@@ -167,5 +167,7 @@ fn failed_checks_of_the_caller_and_rejected_settings_end_the_run() {
         "make room",
     )];
     refused(Vec::new(), preflight, &["disk"]);
-    refused(vec![Fault::IndenterReadBack], full(), &["devices"]);
+    let start = FaultTrigger::At(HostTime::ZERO);
+    let ignored = Fault::new(RigFault::RobotSettingIgnored, start).unwrap();
+    refused(vec![ignored], full_preflight(), &["devices"]);
 }

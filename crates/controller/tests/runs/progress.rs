@@ -90,7 +90,7 @@ fn marks_are_counted_across_chunks_and_stray_edges_are_not() {
         }
     }
     let mut tracker = ProgressTracker::new(None);
-    let mut seen = Vec::new();
+    let mut observed = Vec::new();
     for (seq, part) in edges.chunks(20).enumerate() {
         let p = tracker.update(&Record::Chunk(RawChunk {
             camera: CameraId::One,
@@ -102,8 +102,8 @@ fn marks_are_counted_across_chunks_and_stray_edges_are_not() {
             facts: ChunkFacts::default(),
             triggers: part.to_vec(),
         }));
-        seen.push(p.cameras[0].marks_seen);
+        observed.push(p.cameras[0].marks_seen);
     }
     // A train is complete once no more than three of its bits are missing: the first after 60 edges.
-    assert_eq!(seen, [0, 0, 1, 1, 1, 1, 2]);
+    assert_eq!(observed, [0, 0, 1, 1, 1, 1, 2]);
 }

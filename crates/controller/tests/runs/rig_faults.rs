@@ -4,7 +4,7 @@ use skinrig_controller::{ControlHandle, Run, RunReport};
 use skinrig_model::*;
 use skinrig_protocol::plan::Plan;
 use skinrig_sim::config::SimConfig;
-use skinrig_sim::faults::{Fault, FaultTrigger};
+use skinrig_sim::faults::{Fault, FaultSizes, FaultTrigger, LineNoise};
 use skinrig_sim::rig::simulated_rig;
 
 use crate::mock::{MS, Sink, header};
@@ -79,9 +79,9 @@ fn too_much_force_ends_at_clearance_height() {
                 plan.limits.max_force_n = limit_n;
                 let result = run(&plan, &SimConfig::new(seed, level));
                 let case = format!("{level:?}, {limit_n} N, seed {seed}");
-                let wanted = format!("force: expected at most {limit_n} N, found ");
+                let expected = format!("force: expected at most {limit_n} N, found ");
                 assert!(
-                    result.end().starts_with(&wanted),
+                    result.end().starts_with(&expected),
                     "{case}: {}",
                     result.end()
                 );
@@ -128,9 +128,17 @@ fn every_fault_at_every_stage_ends_safely() {
     let mut plan = paced_plan();
     plan.presses[0].role = PressRole::Sync;
     let (one, two) = (CameraId::One, CameraId::Two);
+    let timed = |fault, when| Fault::new(fault, when).unwrap();
+    let start = FaultTrigger::At(HostTime::ZERO);
     let mut cases = vec![
-        ("refused limit".to_owned(), Fault::IndenterReadBack),
-        ("refused bias".to_owned(), Fault::CameraReadBack(two)),
+        (
+            "ignored limit".to_owned(),
+            timed(RigFault::RobotSettingIgnored, start),
+        ),
+        (
+            "ignored bias".to_owned(),
+            timed(RigFault::CameraSettingIgnored(two), start),
+        ),
     ];
     for press in 0..2 {
         let (camera, contact, train) = (one, press, 3 * press);
@@ -143,62 +151,67 @@ fn every_fault_at_every_stage_ends_safely() {
             pulse,
         };
         cases.push((format!("pulse lost in press {press}"), lost));
-        let noisy = Fault::NoisyLine {
-            camera,
-            lost_percent: 20,
-            doubled_percent: 5,
-            spurious_percent: 5,
-        };
-        cases.push((format!("noisy trigger line {press}"), noisy));
+    }
+    for camera in [one, two] {
+        let noisy = timed(RigFault::LineNoisy(camera), start);
+        cases.push((format!("noisy trigger line of {camera:?}"), noisy));
     }
     for (stage, when) in instants(&plan, seed) {
-        let name = |what: &str| format!("{what}, {stage}");
-        let sluggish = |percent| Fault::Sluggish { when, percent };
-        let lost = |camera, words| Fault::CameraBytesLost {
-            camera,
-            when,
-            words,
-        };
-        let unplugged = |camera| Fault::CameraUnplugged { camera, when };
-        cases.extend([
-            (name("robot lost"), Fault::IndenterLost(when)),
-            (name("robot at 30 %"), sluggish(30)),
-            (name("robot at 5 %"), sluggish(5)),
-            (name("camera 1 unplugged"), unplugged(one)),
-            (name("camera 2 unplugged"), unplugged(two)),
-            (name("bytes lost"), lost(two, 7)),
-            (name("trigger box lost"), Fault::TriggerBoxLost(when)),
-        ]);
+        for fault in [
+            RigFault::RobotLost,
+            RigFault::RobotSlow,
+            RigFault::CameraUnplugged(one),
+            RigFault::CameraUnplugged(two),
+            RigFault::CameraDrops(two),
+            RigFault::BoxSilent,
+        ] {
+            cases.push((format!("{fault}, {stage}"), timed(fault, when)));
+        }
     }
+    let mut runs = Vec::new();
     for (case, fault) in cases {
+        if fault.kind() == Some(RigFault::RobotSlow) {
+            runs.push((format!("{case}, 30 %"), fault, 30));
+        }
+        runs.push((case, fault, 5));
+    }
+    for (case, fault, slow_percent) in runs {
         let mut config = SimConfig::new(seed, SimLevel::Kinematic);
-        config.faults = vec![fault.clone()];
+        config.faults = vec![fault];
+        config.fault_sizes = FaultSizes {
+            lost_words: 7,
+            slow_percent,
+            line_noise: LineNoise {
+                lost_percent: 20,
+                doubled_percent: 5,
+                spurious_percent: 5,
+            },
+            ..FaultSizes::default()
+        };
         let result = run(&plan, &config);
         result.check_presses(&case);
         let r = &result.report;
         let end = result.end();
-        let robot_gone = matches!(fault, Fault::IndenterLost(_));
-        match fault {
-            Fault::IndenterReadBack | Fault::CameraReadBack(_) => {
+        let robot_gone = fault.kind() == Some(RigFault::RobotLost);
+        match fault.kind() {
+            Some(RigFault::RobotSettingIgnored | RigFault::CameraSettingIgnored(_)) => {
                 assert!(end.contains("after writing"), "{case}: {end}");
                 assert!(r.disarmed && r.missed == r.planned, "{case}: {r:?}");
             }
-            Fault::IndenterLost(_) | Fault::CameraUnplugged { .. } | Fault::TriggerBoxLost(_) => {
+            Some(RigFault::RobotLost | RigFault::CameraUnplugged(_) | RigFault::BoxSilent) => {
                 assert!(matches!(r.end, RunEnd::Faulted(_)), "{case}: {r:?}");
                 assert!(end.contains("sim-00000005-"), "{case}, device: {end}");
             }
-            Fault::Sluggish { .. } => {
+            Some(RigFault::RobotSlow) => {
                 // Late, but in position: a press is invalid, or a travel ends the run.
                 assert!(r.valid < r.planned || r.end == RunEnd::Completed, "{case}");
             }
-            Fault::CameraBytesLost { .. }
-            | Fault::PulseLost { .. }
-            | Fault::NoisyLine { .. }
-            | Fault::DeadPress { .. } => {
+            // A lost pulse or a press without events.
+            None | Some(RigFault::CameraDrops(_) | RigFault::LineNoisy(_)) => {
                 assert_eq!(r.end, RunEnd::Completed, "{case}: {r:?}");
             }
             // docs/reference/runs.md lists whole runs with each of them, with session and analysis.
-            other => panic!("{case}: expected a fault handled above, found {other:?}"),
+            Some(other) => panic!("{case}: expected a fault handled above, found {other:?}"),
         }
         if let RunEnd::Faulted(_) = r.end {
             assert!(

@@ -87,9 +87,12 @@ fn presses_on_the_simulated_rig_are_valid_and_reproducible() {
     assert_eq!(sent.len(), 9);
     assert_eq!(result, sent);
     for edges in edges {
-        let seen = pulse::decode_marks(&edges);
-        assert_eq!(seen.stray_edges, 0);
-        assert_eq!(seen.marks.iter().map(|m| m.mark).collect::<Vec<_>>(), sent);
+        let observed = pulse::decode_marks(&edges);
+        assert_eq!(observed.stray_edges, 0);
+        assert_eq!(
+            observed.marks.iter().map(|m| m.mark).collect::<Vec<_>>(),
+            sent
+        );
     }
     assert!(records == run(), "the same seed gives the same records");
 }

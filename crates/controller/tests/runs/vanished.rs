@@ -6,14 +6,14 @@ use skinrig_controller::{ControllerError, RecordSink, Run, RunReport, SinkFault}
 use skinrig_model::*;
 
 /// A sink whose records vanish at some time, which only `check` reports. ms of the rig's clock.
-struct Vanishing {
+struct VanishingSink {
     sink: Sink,
     world: Shared,
     gone_ms: i64,
     checked_ms: Vec<i64>,
 }
 
-impl RecordSink for Vanishing {
+impl RecordSink for VanishingSink {
     fn accept(&mut self, record: Record) -> Result<(), SinkFault> {
         self.sink.accept(record)
     }
@@ -28,7 +28,7 @@ impl RecordSink for Vanishing {
     }
 }
 
-fn run(gone_ms: i64, operator: Option<(u64, OperatorAction)>) -> (Vanishing, RunReport) {
+fn run(gone_ms: i64, operator: Option<(u64, OperatorAction)>) -> (VanishingSink, RunReport) {
     let plan = plan();
     let world = World::shared(
         Faults {
@@ -38,7 +38,7 @@ fn run(gone_ms: i64, operator: Option<(u64, OperatorAction)>) -> (Vanishing, Run
         START,
     );
     let control = lock(&world).control.clone();
-    let mut sink = Vanishing {
+    let mut sink = VanishingSink {
         sink: Sink::default(),
         world: world.clone(),
         gone_ms,

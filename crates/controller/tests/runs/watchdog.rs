@@ -29,8 +29,8 @@ fn trip_of(samples: impl IntoIterator<Item = ([f64; 3], f64)>) -> Option<(i64, W
     watchdog.start();
     for (i, (at, force_n)) in samples.into_iter().enumerate() {
         let ms = i as i64 + 1;
-        let seen = watchdog.check_sample(&sample(ms, at, force_n));
-        if let Err(trip) = seen.and_then(|()| watchdog.check_poll(HostTime(ms * MS))) {
+        let observed = watchdog.check_sample(&sample(ms, at, force_n));
+        if let Err(trip) = observed.and_then(|()| watchdog.check_poll(HostTime(ms * MS))) {
             return Some((ms, trip));
         }
     }

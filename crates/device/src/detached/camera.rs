@@ -108,7 +108,7 @@ impl EventCamera for DetachedCamera {
         if self.poll.is_none() {
             let fetch = self.fetching(|d, chunks| d.poll(chunks));
             let within = self.worker.timeouts.running;
-            self.poll = Some(self.worker.ask("poll", within, fetch)?);
+            self.poll = Some(self.worker.request("poll", within, fetch)?);
         }
         answer.unwrap_or(Ok(()))
     }
@@ -117,7 +117,7 @@ impl EventCamera for DetachedCamera {
         if self.flush.is_none() {
             let fetch = self.fetching(|d, chunks| d.flush(chunks));
             let within = self.worker.timeouts.running;
-            self.flush = Some(self.worker.ask("flush", within, fetch)?);
+            self.flush = Some(self.worker.request("flush", within, fetch)?);
         }
         let answer = self.worker.answer(&mut self.flush);
         chunks.extend(self.chunks.try_iter());
@@ -154,7 +154,7 @@ impl EventCamera for DetachedCamera {
         if self.temperature.is_none() {
             let within = self.worker.timeouts.running;
             let call = |d: &mut Device| d.temperature_c();
-            self.temperature = Some(self.worker.ask("temperature", within, call)?);
+            self.temperature = Some(self.worker.request("temperature", within, call)?);
         }
         answer.unwrap_or_else(|| Err(self.worker.pending("temperature")))
     }

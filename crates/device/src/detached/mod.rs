@@ -49,7 +49,7 @@ pub struct Calls(Arc<AtomicUsize>);
 impl Calls {
     /// Number of calls that are queued or in progress.
     #[must_use]
-    pub fn under_way(&self) -> usize {
+    pub fn pending_calls(&self) -> usize {
         self.0.load(Ordering::Acquire)
     }
 }
@@ -140,7 +140,7 @@ impl<D: Send + 'static> Worker<D> {
     }
 
     /// Sends a call without waiting.
-    fn ask<T: Send + 'static>(
+    fn request<T: Send + 'static>(
         &self,
         doing: &'static str,
         within: HostDuration,
@@ -192,11 +192,11 @@ impl<D: Send + 'static> Worker<D> {
         doing: &'static str,
         call: impl FnOnce(&mut D) -> T + Send + 'static,
     ) -> Result<T, DeviceError> {
-        let within = match self.silent && self.calls.under_way() > 0 {
+        let within = match self.silent && self.calls.pending_calls() > 0 {
             true => HostDuration::ZERO,
             false => self.timeouts.set_up,
         };
-        let mut asked = Some(self.ask(doing, within, call)?);
+        let mut asked = Some(self.request(doing, within, call)?);
         loop {
             if let Some(answer) = self.answer(&mut asked)? {
                 return Ok(answer);
@@ -220,7 +220,7 @@ impl<D> Drop for Worker<D> {
     /// call.
     fn drop(&mut self) {
         self.jobs = None;
-        if self.silent && self.calls.under_way() > 0 {
+        if self.silent && self.calls.pending_calls() > 0 {
             return;
         }
         // If it did not close in time, reopening it will fail and report that.

@@ -60,7 +60,7 @@ impl TriggerBox for DetachedBox {
         if self.sending.is_none() {
             let within = self.worker.timeouts.running;
             let call = move |d: &mut Device| (mark, d.send(mark));
-            self.sending = Some(self.worker.ask("send", within, call)?);
+            self.sending = Some(self.worker.request("send", within, call)?);
         }
         Err(self.worker.pending("send"))
     }
@@ -74,7 +74,7 @@ impl TriggerBox for DetachedBox {
                 let answer = d.poll(&mut reports);
                 (reports, answer)
             };
-            self.poll = Some(self.worker.ask("report", within, call)?);
+            self.poll = Some(self.worker.request("report", within, call)?);
         }
         let Some((fresh, answer)) = answer else {
             return Ok(());

@@ -31,7 +31,7 @@ pub enum Group {
 
 /// Whether the driver needs a function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Need {
+pub enum Requirement {
     /// If missing, the library is rejected.
     Required,
     /// If missing, the driver works without it.
@@ -46,30 +46,30 @@ pub struct Symbol {
     /// Purpose.
     pub group: Group,
     /// Whether the driver needs it.
-    pub need: Need,
+    pub need: Requirement,
     /// Arguments and result as Rust types.
     pub signature: &'static str,
 }
 
 /// Required functions missing in a library, in the order of the table.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Missing(pub Vec<&'static str>);
+pub struct MissingFunctions(pub Vec<&'static str>);
 
-impl fmt::Display for Missing {
+impl fmt::Display for MissingFunctions {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "the library lacks {}", self.0.join(", "))
     }
 }
 
-impl std::error::Error for Missing {}
+impl std::error::Error for MissingFunctions {}
 
-/// Converts the table's keyword to a [`Need`].
+/// Converts the table's keyword to a [`Requirement`].
 macro_rules! need {
     (required) => {
-        Need::Required
+        Requirement::Required
     };
     (optional) => {
-        Need::Optional
+        Requirement::Optional
     };
 }
 
@@ -123,7 +123,7 @@ macro_rules! struct_of {
             /// Looks up all functions of the table.
             ///
             /// # Errors
-            /// [`Missing`] with all required functions for which `lookup` returned `None`.
+            /// [`MissingFunctions`] with all required functions for which `lookup` returned `None`.
             ///
             /// # Safety
             /// Each address that `lookup` returns must be that of a function with the requested name, of an
@@ -131,7 +131,7 @@ macro_rules! struct_of {
             /// never unloaded while the result or a copy of it is in use.
             pub unsafe fn resolve(
                 mut lookup: impl FnMut(&'static CStr) -> Option<NonNull<c_void>>,
-            ) -> Result<Self, Missing> {
+            ) -> Result<Self, MissingFunctions> {
                 let mut missing = Vec::new();
                 $(let $req = lookup(c_name(concat!(stringify!($req), "\0")));
                 if $req.is_none() {
@@ -140,7 +140,7 @@ macro_rules! struct_of {
                 $(let $opt = lookup(c_name(concat!(stringify!($opt), "\0")));)*
                 // One refutable pattern for all required functions: all present, or all missing ones reported together.
                 let ($(Some($req),)*) = ($($req,)*) else {
-                    return Err(Missing(missing));
+                    return Err(MissingFunctions(missing));
                 };
                 Ok(Self {
                     // SAFETY: by this function's contract the address is that of this function.

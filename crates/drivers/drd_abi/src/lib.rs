@@ -28,6 +28,6 @@ mod version;
 
 pub use constants::*;
 pub use error::ErrorCode;
-pub use functions::{Functions, Group, Missing, Need, SYMBOLS, Symbol, fns};
+pub use functions::{Functions, Group, MissingFunctions, Requirement, SYMBOLS, Symbol, fns};
 pub use status::{ForceOffCause, STATUS_CAPACITY, StatusField, StatusVector};
 pub use version::SdkVersion;

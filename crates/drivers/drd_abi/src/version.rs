@@ -38,7 +38,7 @@ impl SdkVersion {
     /// # Safety
     /// `get` must be the `dhdGetSDKVersion` of a loaded library.
     #[must_use]
-    pub unsafe fn ask(get: crate::fns::dhdGetSDKVersion) -> Self {
+    pub unsafe fn query(get: crate::fns::dhdGetSDKVersion) -> Self {
         let mut version = Self::new(0, 0, 0);
         let Self {
             major,

@@ -5,7 +5,7 @@ use std::ffi::{CStr, c_void};
 use std::ptr::NonNull;
 
 use skinrig_drd_abi::{
-    ErrorCode, ForceOffCause, Functions, NEVER_USED, Need, SYMBOLS, SdkVersion, StatusField,
+    ErrorCode, ForceOffCause, Functions, NEVER_USED, Requirement, SYMBOLS, SdkVersion, StatusField,
     StatusVector,
 };
 
@@ -86,7 +86,7 @@ fn all_missing_functions_are_reported_together_and_optional_ones_may_be_absent()
             .iter()
             .find(|s| s.name == name.to_str().unwrap())
             .unwrap();
-        (symbol.need == Need::Required).then(stand_in)
+        (symbol.need == Requirement::Required).then(stand_in)
     };
     // SAFETY: nothing is called through the result.
     let functions = unsafe { Functions::resolve(required) }.unwrap();

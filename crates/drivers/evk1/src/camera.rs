@@ -18,7 +18,7 @@ use crate::chunks::Chunker;
 use crate::config::Evk1Config;
 use crate::error::{Evk1Error, FirstError, UsbError};
 use crate::identify::{Identity, identify_tolerating, open_serial};
-use crate::inbox::{Inbox, Taken};
+use crate::inbox::{Inbox, QueuedData};
 use crate::registers::{CHIP_ID, OVERFLOW_HITCOUNT, TEMPERATURE};
 use crate::report::StreamReport;
 use crate::settings::Checked;
@@ -225,10 +225,10 @@ impl Evk1 {
     /// # Errors
     /// The first [`Evk1Error::Usb`] or [`Evk1Error::ReadBack`]; the camera is released anyway.
     pub fn close(mut self) -> Result<(), Evk1Error> {
-        self.shut()
+        self.close_device()
     }
 
-    fn shut(&mut self) -> Result<(), Evk1Error> {
+    fn close_device(&mut self) -> Result<(), Evk1Error> {
         if std::mem::replace(&mut self.closed, true) {
             return Ok(());
         }
@@ -245,7 +245,7 @@ impl Evk1 {
             done.after(sequences::stop(&mut registers));
         }
         if self.pattern {
-            done.after(pattern::off(&mut registers));
+            done.after(pattern::disable(&mut registers));
         }
         done.after(sequences::close(&mut registers, self.clock.as_ref()));
         done.outcome()
@@ -336,7 +336,7 @@ impl Evk1 {
 
     fn give_pixels_back(&mut self) -> Result<(), Evk1Error> {
         if self.pattern {
-            pattern::off(&mut self.registers())?;
+            pattern::disable(&mut self.registers())?;
             self.pattern = false;
         }
         Ok(())
@@ -422,7 +422,11 @@ impl Evk1 {
     }
 
     /// Converts received blocks to chunks, then returns the error that ended the stream, if any.
-    fn hand_over(&mut self, taken: Taken, chunks: &mut Vec<RawChunk>) -> Result<(), Evk1Error> {
+    fn hand_over(
+        &mut self,
+        taken: QueuedData,
+        chunks: &mut Vec<RawChunk>,
+    ) -> Result<(), Evk1Error> {
         for block in taken.blocks {
             self.chunker.take(block, &mut self.report, chunks);
         }
@@ -587,6 +591,6 @@ impl EventCamera for Evk1 {
 impl Drop for Evk1 {
     fn drop(&mut self) {
         // Errors cannot be returned here; `close` returns them.
-        let _ = self.shut();
+        let _ = self.close_device();
     }
 }

@@ -82,8 +82,8 @@ impl Chunker {
         let from_us = good_us.or(self.began_us);
         let arrived = at.max(self.last_arrival);
         self.hand_over(Vec::new(), arrived, WORD as u64, report, chunks);
-        if let Some(told) = chunks.last_mut() {
-            told.lost_from_us = from_us;
+        if let Some(chunk) = chunks.last_mut() {
+            chunk.lost_from_us = from_us;
         }
     }
 
@@ -138,7 +138,7 @@ impl Chunker {
             report.time_gaps += 1;
             // The step is reported once; continue from its end.
             let step = &bytes[..WORD];
-            self.watch.look(step, arrived, |jump| report.add_jump(jump));
+            self.watch.scan(step, arrived, |jump| report.add_jump(jump));
         }
         self.hand_over(bytes, arrived, lost, report, chunks);
     }
@@ -152,7 +152,7 @@ impl Chunker {
         chunks: &mut Vec<RawChunk>,
     ) {
         self.watch
-            .look(&bytes, arrived, |jump| report.add_jump(jump));
+            .scan(&bytes, arrived, |jump| report.add_jump(jump));
         self.scanner.lost(lost);
         let (facts, triggers) = self.scanner.push(&bytes);
         if let (Some(first), Some(last)) = (facts.first_us, facts.last_us) {

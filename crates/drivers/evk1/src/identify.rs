@@ -49,7 +49,7 @@ fn dotted(version: u32) -> String {
 
 /// A device that may be an EVK1.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Found {
+pub struct FoundDevice {
     /// Bus, port and speed.
     pub place: String,
     /// Bus number and device address.
@@ -75,7 +75,7 @@ pub enum FoundState {
     Faulty(String),
 }
 
-impl Found {
+impl FoundDevice {
     /// Next step, if any.
     #[must_use]
     pub fn next_step(&self) -> Option<String> {
@@ -100,15 +100,19 @@ impl Found {
 ///
 /// # Errors
 /// [`UsbError::NoUsb`] on a computer without USB.
-pub fn enumerate() -> Result<Vec<Found>, UsbError> {
+pub fn enumerate() -> Result<Vec<FoundDevice>, UsbError> {
     let clock = RealClock::start();
     let strict = Tolerance::default();
-    let ask = |slot: &Slot| ask_slot(slot, clock, &strict).0;
+    let ask = |slot: &Slot| query_slot(slot, clock, &strict).0;
     Ok(bus()?.iter().map(ask).collect())
 }
 
 /// Queries one device; also returns the claimed camera if it is one.
-fn ask_slot(slot: &Slot, clock: RealClock, tolerance: &Tolerance) -> (Found, Option<LibUsb>) {
+fn query_slot(
+    slot: &Slot,
+    clock: RealClock,
+    tolerance: &Tolerance,
+) -> (FoundDevice, Option<LibUsb>) {
     let (state, camera) = match slot.open(clock) {
         Ok(Access::Open(mut usb)) => {
             // Mismatches tolerated here are reported when the camera is opened.
@@ -121,7 +125,7 @@ fn ask_slot(slot: &Slot, clock: RealClock, tolerance: &Tolerance) -> (Found, Opt
         Ok(Access::Treuzell) => (FoundState::NotEvk1(TREUZELL.to_owned()), None),
         Err(e) => (FoundState::of(e.during("opening")), None),
     };
-    let found = Found {
+    let found = FoundDevice {
         place: slot.place(),
         address: slot.address(),
         port: slot.port(),
@@ -161,7 +165,7 @@ impl fmt::Display for FoundState {
     }
 }
 
-impl fmt::Display for Found {
+impl fmt::Display for FoundDevice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}", self.place, self.state)?;
         match self.next_step() {
@@ -182,9 +186,9 @@ pub(crate) fn open_serial(
 ) -> Result<LibUsb, Evk1Error> {
     let mut others = Vec::new();
     for slot in bus().map_err(|e| e.during("listing USB devices"))? {
-        match ask_slot(&slot, clock, tolerance) {
+        match query_slot(&slot, clock, tolerance) {
             (
-                Found {
+                FoundDevice {
                     state: FoundState::Ready(identity),
                     ..
                 },
@@ -272,7 +276,7 @@ pub(crate) fn identify_tolerating(
         return Err(not_evk1("system ID 0x1c", format!("{system:#04x}, {what}")));
     }
     let mut answer = [0; 8];
-    ask(
+    query(
         transport,
         requests::FX3_VERSION,
         &mut answer,
@@ -310,12 +314,12 @@ fn await_fpga(transport: &mut dyn Transport, clock: &mut dyn Clock) -> Result<()
 
 fn ask16(transport: &mut dyn Transport, code: u8, doing: &str) -> Result<u16, Evk1Error> {
     let mut answer = [0; 4];
-    ask(transport, code, &mut answer, doing)?;
+    query(transport, code, &mut answer, doing)?;
     let [_, _, low, high] = answer;
     Ok(u16::from_le_bytes([low, high]))
 }
 
-fn ask(
+fn query(
     transport: &mut dyn Transport,
     code: u8,
     answer: &mut [u8],

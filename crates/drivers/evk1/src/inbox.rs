@@ -65,7 +65,7 @@ struct State {
 
 /// Data taken from the queue.
 #[derive(Debug, Default)]
-pub struct Taken {
+pub struct QueuedData {
     /// Blocks in order of arrival.
     pub blocks: VecDeque<Block>,
     /// Error that ended the stream. All data before it is in `blocks`.
@@ -98,7 +98,7 @@ impl Inbox {
         if state.losing {
             state.lose(bytes.len(), at);
         } else {
-            state.keep(bytes, at, self.chunk_bytes);
+            state.append(bytes, at, self.chunk_bytes);
         }
     }
 
@@ -124,7 +124,7 @@ impl Inbox {
 
     /// Takes the complete blocks.
     #[must_use]
-    pub fn take_full(&self) -> Taken {
+    pub fn take_full(&self) -> QueuedData {
         let mut state = self.state();
         if state.error.is_some() {
             state.close();
@@ -134,7 +134,7 @@ impl Inbox {
 
     /// Takes all whole words; an incomplete word stays.
     #[must_use]
-    pub fn take_all(&self) -> Taken {
+    pub fn take_all(&self) -> QueuedData {
         let mut state = self.state();
         state.close();
         state.take()
@@ -142,7 +142,7 @@ impl Inbox {
 
     /// Takes everything at the end of a stream; an incomplete word counts as lost.
     #[must_use]
-    pub fn finish(&self) -> Taken {
+    pub fn finish(&self) -> QueuedData {
         let mut state = self.state();
         state.close();
         let rest = state.open.len();
@@ -172,7 +172,7 @@ impl State {
         }
     }
 
-    fn keep(&mut self, bytes: &[u8], at: HostTime, chunk_bytes: usize) {
+    fn append(&mut self, bytes: &[u8], at: HostTime, chunk_bytes: usize) {
         // After a loss, also drop the rest of a word whose beginning was lost.
         let cut = match self.open.len() {
             0 => (WORD - self.phase) % WORD,
@@ -232,9 +232,9 @@ impl State {
         });
     }
 
-    fn take(&mut self) -> Taken {
+    fn take(&mut self) -> QueuedData {
         self.waiting = 0;
-        Taken {
+        QueuedData {
             blocks: std::mem::take(&mut self.ready),
             error: self.error.clone(),
         }

@@ -33,7 +33,7 @@ pub mod usb;
 pub use camera::Evk1;
 pub use config::Evk1Config;
 pub use error::{Evk1Error, UsbError};
-pub use identify::{Found, FoundState, Identity, enumerate};
+pub use identify::{FoundDevice, FoundState, Identity, enumerate};
 pub use report::StreamReport;
 pub use tolerance::{Accept, Mismatch, Mismatches, Tolerance};
 pub use triggers::TriggerOut;

@@ -54,7 +54,7 @@ pub fn write(registers: &mut Registers<'_>, filter: Option<NoiseFilter>) -> Resu
 #[must_use]
 pub fn describe(filter: Option<NoiseFilter>) -> String {
     let (events, period_us) = thresholds(filter);
-    words(filter.is_some(), events, period_us)
+    describe_filter(filter.is_some(), events, period_us)
 }
 
 /// Reads and describes the setting.
@@ -64,14 +64,14 @@ pub fn describe(filter: Option<NoiseFilter>) -> String {
 pub fn read(registers: &mut Registers<'_>) -> Result<String, Evk1Error> {
     let enabled = registers.get(NFL_EN)? == 1;
     let word = registers.read(NFL_THRESH)?;
-    Ok(words(
+    Ok(describe_filter(
         enabled,
         NFL_EVT_THRESH.of(word),
         NFL_PERIOD_CNT_THRESH.of(word),
     ))
 }
 
-fn words(enabled: bool, events: u32, period_us: u32) -> String {
+fn describe_filter(enabled: bool, events: u32, period_us: u32) -> String {
     if enabled {
         format!("below {events} events in {period_us} µs")
     } else {

@@ -27,10 +27,10 @@ const LENGTH: u32 = 30_720;
 /// # Errors
 /// [`Evk1Error::Refused`] for an unsupported rate.
 fn ratio(pattern: TestPattern) -> Result<u32, Evk1Error> {
-    let wanted = (pattern.rate_ev_s / EVERY_CYCLE_EV_S * CYCLES).round();
+    let expected = (pattern.rate_ev_s / EVERY_CYCLE_EV_S * CYCLES).round();
     let most = f64::from(r::pattern_valid_ratio(r::TEST_PATTERN_N_PERIOD).max());
-    if (1.0..=most).contains(&wanted) {
-        return Ok(wanted as u32);
+    if (1.0..=most).contains(&expected) {
+        return Ok(expected as u32);
     }
     Err(Evk1Error::refused(
         "a pattern of 97656 to 99902344 events/s",
@@ -65,7 +65,7 @@ pub fn on(registers: &mut Registers<'_>, pattern: TestPattern) -> Result<Pattern
 ///
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
-pub fn off(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
+pub fn disable(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
     let mut done = FirstError::default();
     done.after(registers.set(r::PATTERN_ENABLE, 0));
     done.after(registers.set(r::ENABLE_OUT_OF_FOV, 1));

@@ -109,7 +109,7 @@ impl Watch {
     }
 
     /// Examines whole words received at `arrived`, and reports jumps.
-    pub fn look(&mut self, bytes: &[u8], arrived: HostTime, mut on_jump: impl FnMut(TimeJump)) {
+    pub fn scan(&mut self, bytes: &[u8], arrived: HostTime, mut on_jump: impl FnMut(TimeJump)) {
         let (words, _) = bytes.as_chunks::<WORD>();
         for group in words.chunks(GROUP) {
             let any = group.iter().fold(0, |any, w| any | u32::from_le_bytes(*w));
@@ -171,7 +171,7 @@ mod tests {
         stream.extend([high(3), high(2), high(3)]);
         // The result must not depend on how the stream is cut.
         for word in stream {
-            watch.look(&bytes(&[word]), HostTime(7), |j| jumps.push(j));
+            watch.scan(&bytes(&[word]), HostTime(7), |j| jumps.push(j));
         }
         let us: Vec<_> = jumps
             .iter()
@@ -179,6 +179,6 @@ mod tests {
             .collect();
         assert_eq!(us, [(64, 192, false), (192, 128, true)]);
         watch.reset();
-        watch.look(&bytes(&[high(100)]), HostTime(8), |j| panic!("{j:?}"));
+        watch.scan(&bytes(&[high(100)]), HostTime(8), |j| panic!("{j:?}"));
     }
 }

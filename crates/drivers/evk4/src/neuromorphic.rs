@@ -163,7 +163,7 @@ fn evk3_hd(settings: &StreamSettings) -> prophesee_evk3_hd::Configuration {
 
 /// A device with the USB IDs of one of the models.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Found {
+pub struct FoundDevice {
     /// Bus and address, as shown by `lsusb`.
     pub place: (u8, u8),
     /// State of the device.
@@ -189,7 +189,7 @@ pub enum FoundState {
 ///
 /// # Errors
 /// On a computer without USB.
-pub fn enumerate(known: &[(u8, u8)]) -> Result<Vec<Found>, LinkError> {
+pub fn enumerate(known: &[(u8, u8)]) -> Result<Vec<FoundDevice>, LinkError> {
     let context = rusb::Context::new().map_err(link_error)?;
     let mut found = Vec::new();
     for device in context.devices().map_err(link_error)?.iter() {
@@ -199,12 +199,12 @@ pub fn enumerate(known: &[(u8, u8)]) -> Result<Vec<Found>, LinkError> {
         };
         let ids = (descriptor.vendor_id(), descriptor.product_id());
         if !known.contains(&place) && Model::ALL.iter().any(|m| usb_ids(*m).contains(&ids)) {
-            let state = ask(&device, ids).unwrap_or_else(|e| match e {
+            let state = query(&device, ids).unwrap_or_else(|e| match e {
                 rusb::Error::Busy => FoundState::Busy,
                 rusb::Error::Access => FoundState::NoPermission,
                 other => FoundState::Faulty(other.to_string()),
             });
-            found.push(Found { place, state });
+            found.push(FoundDevice { place, state });
         }
     }
     Ok(found)
@@ -218,7 +218,7 @@ const fn usb_ids(model: Model) -> &'static [(u16, u16)] {
     }
 }
 
-fn ask(device: &rusb::Device<rusb::Context>, ids: (u16, u16)) -> rusb::Result<FoundState> {
+fn query(device: &rusb::Device<rusb::Context>, ids: (u16, u16)) -> rusb::Result<FoundState> {
     let mut handle = device.open()?;
     for model in Model::ALL {
         if !usb_ids(model).contains(&ids) {

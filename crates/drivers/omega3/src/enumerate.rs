@@ -14,7 +14,7 @@ pub const USB_VENDOR: u16 = 0x1451;
 
 /// A connected Force Dimension device.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Found {
+pub struct FoundDevice {
     /// Index in the library's enumeration.
     pub index: i8,
     /// Model, if readable.
@@ -54,7 +54,7 @@ impl From<CallError> for Availability {
     }
 }
 
-impl Found {
+impl FoundDevice {
     /// Next step before it can be used; `None` if it is free.
     #[must_use]
     pub fn next_step(&self) -> Option<String> {
@@ -68,7 +68,7 @@ impl Found {
     }
 }
 
-impl fmt::Display for Found {
+impl fmt::Display for FoundDevice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let model = self.model.as_deref().unwrap_or("Force Dimension device");
         match self.serial {
@@ -89,7 +89,7 @@ impl fmt::Display for Found {
 ///
 /// # Errors
 /// When the devices cannot be counted.
-pub fn list(sdk: &dyn Sdk) -> CallResult<Vec<Found>> {
+pub fn list(sdk: &dyn Sdk) -> CallResult<Vec<FoundDevice>> {
     let count = sdk.device_count()?;
     Ok((0..count)
         .map(|index| match sdk.open(index) {
@@ -106,8 +106,8 @@ pub fn list(sdk: &dyn Sdk) -> CallResult<Vec<Found>> {
 }
 
 /// Entry of a device that could not be opened.
-pub(crate) fn unopened(index: i8, error: CallError) -> Found {
-    Found {
+pub(crate) fn unopened(index: i8, error: CallError) -> FoundDevice {
+    FoundDevice {
         index,
         model: None,
         type_number: None,
@@ -123,14 +123,14 @@ pub(crate) fn firmware_text(version: f64) -> String {
 }
 
 /// Reads the identity of an open device.
-pub(crate) fn identify(sdk: &dyn Sdk, index: i8, id: DeviceId) -> Found {
+pub(crate) fn identify(sdk: &dyn Sdk, index: i8, id: DeviceId) -> FoundDevice {
     let type_number = sdk.system_type(id);
     let availability = match &type_number {
         Ok(DEVICE_OMEGA3) => Availability::Free,
         Ok(_) => Availability::OtherModel,
         Err(e) => Availability::Failed(e.clone()),
     };
-    Found {
+    FoundDevice {
         index,
         model: sdk.system_name(id),
         type_number: type_number.ok(),

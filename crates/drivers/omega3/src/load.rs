@@ -6,7 +6,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::ptr::NonNull;
 
-use skinrig_drd_abi::{Functions, Missing, SdkVersion, fns};
+use skinrig_drd_abi::{Functions, MissingFunctions, SdkVersion, fns};
 
 use crate::library::Library;
 
@@ -27,7 +27,7 @@ const NAMES: &[&str] = if cfg!(target_os = "windows") {
 
 /// A loaded library and its origin.
 #[derive(Debug, Clone)]
-pub struct Loaded {
+pub struct LoadedLibrary {
     /// The calls.
     pub library: Library,
     /// Requested path, or name that the system resolved.
@@ -71,7 +71,7 @@ pub enum LoadError {
         /// Its version.
         found: SdkVersion,
         /// The missing function.
-        missing: Missing,
+        missing: MissingFunctions,
     },
     /// Another library.
     #[error("{}: expected Force Dimension's libdrd, found a library without dhdGetSDKVersion", path.display())]
@@ -142,11 +142,11 @@ fn sdk_directories(root: &Path) -> Vec<PathBuf> {
 ///
 /// # Errors
 /// [`LoadError`]. A library that exists but cannot be used ends the search, so that no other version is loaded by accident.
-pub fn load(configured: Option<&Path>) -> Result<Loaded, LoadError> {
+pub fn load(configured: Option<&Path>) -> Result<LoadedLibrary, LoadError> {
     load_from(search_paths(configured, |name| std::env::var_os(name)))
 }
 
-fn load_from(paths: Vec<PathBuf>) -> Result<Loaded, LoadError> {
+fn load_from(paths: Vec<PathBuf>) -> Result<LoadedLibrary, LoadError> {
     let mut attempts = Vec::new();
     for path in paths {
         // SAFETY: the operator chose the library; its initialisers are the vendor's.
@@ -172,12 +172,15 @@ fn with_sources(error: &dyn std::error::Error) -> String {
     text
 }
 
-fn check_library(requested: PathBuf, library: libloading::Library) -> Result<Loaded, LoadError> {
+fn check_library(
+    requested: PathBuf,
+    library: libloading::Library,
+) -> Result<LoadedLibrary, LoadError> {
     let path = loaded_file(&requested);
     // SAFETY: the name has this type in every version of the SDK.
     let version = match unsafe { library.get::<fns::dhdGetSDKVersion>("dhdGetSDKVersion") } {
         // SAFETY: found in a loaded library under its own name.
-        Ok(ask) => unsafe { SdkVersion::ask(*ask) },
+        Ok(ask) => unsafe { SdkVersion::query(*ask) },
         Err(_) => return Err(LoadError::NotLibdrd { path }),
     };
     // Its code may have started threads by now: never unload it.
@@ -207,7 +210,7 @@ fn check_library(requested: PathBuf, library: libloading::Library) -> Result<Loa
             SdkVersion::ADVISED
         )
     });
-    Ok(Loaded {
+    Ok(LoadedLibrary {
         library: Library::new(functions, version),
         requested,
         path,
@@ -234,7 +237,7 @@ fn loaded_file(requested: &Path) -> PathBuf {
     found.unwrap_or_else(|| requested.to_owned())
 }
 
-impl fmt::Display for Loaded {
+impl fmt::Display for LoadedLibrary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "SDK {} ({})", self.version, self.path.display())
     }

@@ -9,14 +9,14 @@ use skinrig_model::Setting;
 
 use crate::brake::brake;
 use crate::config::{Initialise, OmegaConfig, RedundantEncoders, Timeouts, Watchdog};
-use crate::enumerate::{self, Found};
+use crate::enumerate::{self, FoundDevice};
 use crate::error::OmegaError;
 use crate::remark::Remark;
 use crate::sdk::{CallError, CallResult, Quantity, Sdk};
 
 /// An open robot with its motors off.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Opened {
+pub struct OpenRobot {
     /// Device ID in library calls.
     pub id: DeviceId,
     /// Serial number; 65535, as in the library, if the robot does not report one.
@@ -42,7 +42,7 @@ pub fn open(
     sdk: &dyn Sdk,
     config: &OmegaConfig,
     guard: impl FnOnce(Option<u16>) -> Result<(), OmegaError>,
-) -> Result<Opened, OmegaError> {
+) -> Result<OpenRobot, OmegaError> {
     let (id, found) = find(sdk, config)?;
     let serial = found
         .serial
@@ -54,7 +54,7 @@ pub fn open(
         serial: &serial,
         config,
     };
-    let mut opened = Opened {
+    let mut opened = OpenRobot {
         id,
         serial: serial.clone(),
         model: found.model.unwrap_or_else(|| "omega.3".to_owned()),
@@ -83,7 +83,7 @@ pub fn open(
 }
 
 /// Opens devices one by one until the one with the configured serial number is found.
-fn find(sdk: &dyn Sdk, config: &OmegaConfig) -> Result<(DeviceId, Found), OmegaError> {
+fn find(sdk: &dyn Sdk, config: &OmegaConfig) -> Result<(DeviceId, FoundDevice), OmegaError> {
     let expected = config.serial.map_or_else(
         || "one free robot".to_owned(),
         |serial| format!("the robot with serial {serial}"),
@@ -93,8 +93,8 @@ fn find(sdk: &dyn Sdk, config: &OmegaConfig) -> Result<(DeviceId, Found), OmegaE
         step: "count the connected devices",
         cause,
     })?;
-    let mut devices: Vec<Found> = Vec::new();
-    let mut candidate: Option<(DeviceId, Found)> = None;
+    let mut devices: Vec<FoundDevice> = Vec::new();
+    let mut candidate: Option<(DeviceId, FoundDevice)> = None;
     for index in 0..count {
         let found = match sdk.open(index) {
             Err(e) => enumerate::unopened(index, e),
@@ -130,7 +130,7 @@ fn find(sdk: &dyn Sdk, config: &OmegaConfig) -> Result<(DeviceId, Found), OmegaE
         _ => "add the serial number of this bench's robot to the rig file, and free that robot"
             .to_owned(),
     };
-    let list: Vec<String> = devices.iter().map(Found::to_string).collect();
+    let list: Vec<String> = devices.iter().map(FoundDevice::to_string).collect();
     Err(OmegaError::NotFound {
         expected,
         found: if list.is_empty() {
@@ -152,7 +152,7 @@ struct OpenProcedure<'a> {
 
 impl OpenProcedure<'_> {
     /// All steps before the arm may move.
-    fn check(&self, opened: &mut Opened, type_number: Option<i32>) -> Result<(), OmegaError> {
+    fn check(&self, opened: &mut OpenRobot, type_number: Option<i32>) -> Result<(), OmegaError> {
         self.identify(opened, type_number)?;
         self.check_status(opened)?;
         self.mount(opened)?;
@@ -182,7 +182,7 @@ impl OpenProcedure<'_> {
         })
     }
 
-    fn identify(&self, opened: &mut Opened, type_number: Option<i32>) -> Result<(), OmegaError> {
+    fn identify(&self, opened: &mut OpenRobot, type_number: Option<i32>) -> Result<(), OmegaError> {
         let number = match type_number {
             Some(number) => number,
             None => self.call("read its type", self.sdk.system_type(self.id))?,
@@ -221,7 +221,7 @@ impl OpenProcedure<'_> {
         Ok(())
     }
 
-    fn check_status(&self, opened: &mut Opened) -> Result<(), OmegaError> {
+    fn check_status(&self, opened: &mut OpenRobot) -> Result<(), OmegaError> {
         let status = self.call("read its status", self.sdk.status(self.id))?;
         let words = format!("{:?}", status.words());
         opened.settings.push(observed_setting("status", words));
@@ -255,7 +255,7 @@ impl OpenProcedure<'_> {
     /// A 0 means either encoders that disagree or no redundant encoders: it is an error only if the robot is known to have them.
     fn check_redundancy(
         &self,
-        opened: &mut Opened,
+        opened: &mut OpenRobot,
         status: &StatusVector,
     ) -> Result<(), OmegaError> {
         let word = status.get(StatusField::Redundancy);
@@ -278,7 +278,7 @@ impl OpenProcedure<'_> {
         }
     }
 
-    fn mount(&self, opened: &mut Opened) -> Result<(), OmegaError> {
+    fn mount(&self, opened: &mut OpenRobot) -> Result<(), OmegaError> {
         let mount = &self.config.mount;
         let angle = mount.device_angle_deg;
         opened
@@ -322,7 +322,7 @@ impl OpenProcedure<'_> {
     }
 
     /// Arms the device's watchdog. A device without one is accepted if a supervisor is configured.
-    fn watchdog(&self, opened: &mut Opened) -> Result<(), OmegaError> {
+    fn watchdog(&self, opened: &mut OpenRobot) -> Result<(), OmegaError> {
         let result = self.sdk.enable_expert_mode();
         self.call("enable expert mode", result)?;
         let before = self.sdk.watchdog(self.id).ok();
@@ -372,7 +372,7 @@ impl OpenProcedure<'_> {
     }
 
     /// Lets the robot initialise itself if needed. This moves the arm.
-    fn initialise(&self, opened: &mut Opened) -> Result<(), OmegaError> {
+    fn initialise(&self, opened: &mut OpenRobot) -> Result<(), OmegaError> {
         if self.sdk.is_initialized(self.id) {
             return Ok(());
         }

@@ -12,7 +12,7 @@ use crate::brake::brake;
 use crate::config::{OmegaConfig, Timeouts};
 use crate::engine::Engine;
 use crate::error::OmegaError;
-use crate::open::{self, Opened};
+use crate::open::{self, OpenRobot};
 use crate::sdk::Sdk;
 use crate::stream::Stream;
 use crate::supervisor::Supervisor;
@@ -52,7 +52,7 @@ impl Owner {
         library: std::path::PathBuf,
         clock: RealClock,
         stream: Arc<Stream>,
-    ) -> Result<(Self, Opened), OmegaError> {
+    ) -> Result<(Self, OpenRobot), OmegaError> {
         let timeouts = config.timeouts;
         let (requests, inbox) = mpsc::sync_channel(QUEUE);
         let (opened_sender, opened) = mpsc::sync_channel(1);

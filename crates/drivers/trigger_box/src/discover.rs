@@ -6,7 +6,7 @@ use std::time::Duration;
 use skinrig_device::RealClock;
 use skinrig_model::DeviceIdentity;
 
-use crate::handshake::{HandshakeError, shake_hands};
+use crate::handshake::{HandshakeError, run_handshake};
 use crate::link::Link;
 use crate::serial::SerialConnector;
 use crate::wire::{OpenError, connect_when_free};
@@ -68,7 +68,7 @@ fn check_port(port: &str, hello_timeout: Duration) -> PortState {
         Err(e) => return PortState::Closed(e),
     };
     let mut link = Link::new(wire, RealClock::start());
-    match shake_hands(&mut link, port, None, hello_timeout) {
+    match run_handshake(&mut link, port, None, hello_timeout) {
         Ok(handshake) => PortState::Ready(handshake.identity),
         Err(e) => PortState::Unusable(e),
     }

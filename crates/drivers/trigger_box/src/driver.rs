@@ -12,7 +12,7 @@ use skinrig_model::{
 };
 
 use crate::config::TriggerBoxConfig;
-use crate::handshake::shake_hands;
+use crate::handshake::run_handshake;
 use crate::link::Link;
 use crate::notes::{Losses, describe_losses};
 use crate::protocol::{Counters, MAX_SERIAL, MIN_SYNC_PERIOD_MS, SelfTest};
@@ -81,7 +81,7 @@ impl SerialTriggerBox {
         let wire = connect_when_free(connector.as_mut(), config.hello_timeout)
             .map_err(|e| open_failed(&e, &named))?;
         let mut link = Link::new(wire, clock);
-        let handshake = shake_hands(
+        let handshake = run_handshake(
             &mut link,
             connector.target(),
             config.serial.as_deref(),

@@ -68,7 +68,7 @@ pub(crate) fn flash_command(port: &str) -> String {
 ///
 /// # Errors
 /// [`HandshakeError`].
-pub fn shake_hands(
+pub fn run_handshake(
     link: &mut Link,
     port: &str,
     serial: Option<&str>,

@@ -10,7 +10,7 @@ use skinrig_model::pulse::MAX_MARKED_PRESS;
 use skinrig_model::{BoxReport, DeviceRole, Mark, SentMark};
 
 use crate::config::TriggerBoxConfig;
-use crate::handshake::{Handshake, HandshakeError, shake_hands};
+use crate::handshake::{Handshake, HandshakeError, run_handshake};
 use crate::link::{Link, LinkError, RequestTimeouts, TimedReply};
 use crate::offset::{Exchange, HostFromBox};
 use crate::protocol::{Counters, Event, EventKind, Events, Outcome, Request, SelfTest, parse_mark};
@@ -419,7 +419,7 @@ impl Worker {
             }
         };
         let serial = Some(self.serial.as_str());
-        match shake_hands(
+        match run_handshake(
             &mut link,
             self.connector.target(),
             serial,

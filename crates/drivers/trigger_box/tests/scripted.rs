@@ -88,7 +88,7 @@ impl Default for Script {
 }
 
 /// Counts a fault down; returns whether it applies.
-fn strikes(fault: &mut Option<(u8, u32)>, command: u8) -> bool {
+fn take_fault(fault: &mut Option<(u8, u32)>, command: u8) -> bool {
     match fault {
         Some((which, left)) if *which == command && *left > 0 => {
             *left -= 1;
@@ -107,7 +107,7 @@ impl Script {
 
     fn take(&mut self, body: &[u8]) {
         let (command, arguments) = (body[1], &body[4..]);
-        if strikes(&mut self.deaf_to, command) {
+        if take_fault(&mut self.deaf_to, command) {
             return;
         }
         let number = |at: usize| u32::from_le_bytes(arguments[at..at + 4].try_into().unwrap());
@@ -154,7 +154,7 @@ impl Script {
             }
             _ => {}
         }
-        if strikes(&mut self.mute_after, command) {
+        if take_fault(&mut self.mute_after, command) {
             return;
         }
         let flags = u8::from(self.armed) | u8::from(self.silent_disarm) << 3;

@@ -1,8 +1,8 @@
 //! Decodes trains on a noisy line with lost, doubled and spurious edges.
 
 use super::{
-    CHECK_BITS, DATA_BITS, Label, ONE_WIDTH_US, PULSE_PERIOD_US, PULSES_PER_TRAIN, PulseTrain,
-    START_WIDTH_US, SeenMark, SeenSync, TOLERANCE_US, ZERO_WIDTH_US, check_bits,
+    CHECK_BITS, DATA_BITS, DecodedMark, DecodedSync, Label, ONE_WIDTH_US, PULSE_PERIOD_US,
+    PULSES_PER_TRAIN, PulseTrain, START_WIDTH_US, TOLERANCE_US, ZERO_WIDTH_US, check_bits,
 };
 use crate::event::TriggerEdge;
 
@@ -13,9 +13,9 @@ const MOST_ERASED: u32 = 3;
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct DecodedMarks {
     /// Trains that named a press, in time order.
-    pub marks: Vec<SeenMark>,
+    pub marks: Vec<DecodedMark>,
     /// Periodic trains, in time order.
-    pub syncs: Vec<SeenSync>,
+    pub syncs: Vec<DecodedSync>,
     /// Edges that belong to no readable train: spurious ones, doubled ones, and those of damaged trains.
     pub stray_edges: u64,
     /// Edges missing from the decoded trains.
@@ -72,8 +72,8 @@ pub fn decode_marks(edges: &[TriggerEdge]) -> DecodedMarks {
         out.lost_edges += 2 * PULSES_PER_TRAIN - u64::from(first.edges_seen);
         let t_us = first.t_us;
         match label {
-            Label::Mark(mark) => out.marks.push(SeenMark { mark, t_us }),
-            Label::Sync(count) => out.syncs.push(SeenSync { count, t_us }),
+            Label::Mark(mark) => out.marks.push(DecodedMark { mark, t_us }),
+            Label::Sync(count) => out.syncs.push(DecodedSync { count, t_us }),
         }
     }
     out.stray_edges = edges.len() as u64 - used;

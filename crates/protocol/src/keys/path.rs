@@ -162,7 +162,7 @@ pub(crate) enum Order {
 
 /// Orders with a name.
 #[derive(Clone, Copy, Choice)]
-enum KnownOrder {
+enum OrderName {
     /// The order of the path.
     Listed,
 }
@@ -183,18 +183,18 @@ pub(crate) struct Shuffled {
 }
 
 impl Setting for Order {
-    const SHAPE: Shape = Shape::WordOr(KnownOrder::WORDS, OrderKeys::TABLE);
+    const SHAPE: Shape = Shape::WordOr(OrderName::WORDS, OrderKeys::TABLE);
 
     fn from_field(field: &Field, out: &mut Collector) -> Option<Self> {
-        match field.as_word().and_then(KnownOrder::from_word) {
-            Some(KnownOrder::Listed) => Some(Self::Listed),
+        match field.as_word().and_then(OrderName::from_word) {
+            Some(OrderName::Listed) => Some(Self::Listed),
             None => OrderKeys::from_mapping(field, out).map(|keys| Self::Shuffled(keys.shuffled)),
         }
     }
 
     fn text(&self) -> String {
         match self {
-            Self::Listed => KnownOrder::Listed.text(),
+            Self::Listed => OrderName::Listed.text(),
             Self::Shuffled(shuffled) => format!("{{shuffled: {}}}", shuffled.text()),
         }
     }

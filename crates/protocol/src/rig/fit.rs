@@ -62,7 +62,7 @@ mod tests {
     use skinrig_model::{Robot, Skin};
 
     fn turn(yaw: f64, pitch: f64, roll: f64, shift: [f64; 3]) -> RigidTransform<Robot, Skin> {
-        super::super::frame::turned(yaw, pitch, roll, shift)
+        super::super::frame::rotated(yaw, pitch, roll, shift)
     }
 
     proptest! {

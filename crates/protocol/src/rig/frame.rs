@@ -63,7 +63,7 @@ pub struct TouchedPoint {
 )]
 struct FrameKeys {
     /// Pose of the skin, measured by other means.
-    given: Option<GivenKeys>,
+    given: Option<GivenFrameKeys>,
     /// Points that were touched with the tip: `skinrig jog` prints this block.
     touch_off: Option<TouchOffKeys>,
 }
@@ -71,7 +71,7 @@ struct FrameKeys {
 /// Robot = Rz(yaw) Ry(pitch) Rx(roll) skin + origin.
 #[derive(Settings)]
 #[settings(name = "given_frame")]
-struct GivenKeys {
+struct GivenFrameKeys {
     /// The skin's origin in the robot's frame.
     #[setting(range = COORDINATE, example = "[0 mm, 0 mm, -20 mm]")]
     origin_mm: [f64; 3],
@@ -149,10 +149,10 @@ impl FrameKeys {
     }
 }
 
-impl GivenKeys {
+impl GivenFrameKeys {
     fn frame(self) -> Frame {
         Frame {
-            robot_from_skin: turned(self.yaw_deg, self.pitch_deg, self.roll_deg, self.origin_mm),
+            robot_from_skin: rotated(self.yaw_deg, self.pitch_deg, self.roll_deg, self.origin_mm),
             date: self.date,
             touch_off: None,
         }
@@ -239,7 +239,7 @@ fn point<F>([x_mm, y_mm, z_mm]: [f64; 3]) -> Point3<F> {
 }
 
 /// The transform with this translation (mm) and R = Rz(yaw) Ry(pitch) Rx(roll), degrees.
-pub(super) fn turned(
+pub(super) fn rotated(
     yaw: f64,
     pitch: f64,
     roll: f64,

@@ -15,14 +15,14 @@ pub(crate) fn shipped(name: &str) -> String {
 }
 
 /// A loader that finds no file.
-pub(crate) fn nothing(_: &Path) -> std::io::Result<Vec<u8>> {
+pub(crate) fn no_file(_: &Path) -> std::io::Result<Vec<u8>> {
     Err(std::io::Error::from(std::io::ErrorKind::NotFound))
 }
 
 /// Parses a text with overrides.
 pub(crate) fn parse(text: &str, overrides: &[&str]) -> Result<Protocol, Diagnostics> {
     let overrides: Vec<String> = overrides.iter().map(|s| (*s).to_owned()).collect();
-    Protocol::parse("test.yaml", text.as_bytes(), &overrides, &nothing)
+    Protocol::parse("test.yaml", text.as_bytes(), &overrides, &no_file)
 }
 
 /// The demo with overrides; panics with its findings if there are any.

@@ -8,7 +8,7 @@ use skinrig_protocol::{Protocol, Schedule};
 fn all_findings_of_a_file_at_once() {
     let text = include_str!("inputs/wrong.yaml");
     let error =
-        Protocol::parse("wrong.yaml", text.as_bytes(), &[], &crate::common::nothing).unwrap_err();
+        Protocol::parse("wrong.yaml", text.as_bytes(), &[], &crate::common::no_file).unwrap_err();
     insta::assert_snapshot!("wrong", error.render(false));
 }
 
@@ -333,9 +333,9 @@ fn a_broken_limit_is_one_finding_at_its_key() {
     let error = protocol.check(&plan).unwrap_err();
     let all = skinrig_protocol::check(&plan, &protocol.surroundings, None).len();
     assert!(all > 100 && error.list().len() < 6, "{all}: {error}");
-    let mut seen = std::collections::BTreeSet::new();
+    let mut observed = std::collections::BTreeSet::new();
     for d in error.list() {
-        assert!(seen.insert((&d.message, &d.path)), "{error}");
+        assert!(observed.insert((&d.message, &d.path)), "{error}");
         assert!(d.location.line > 1 && d.path == "path", "{error}");
     }
     assert!(
@@ -464,18 +464,18 @@ fn hostile_texts() {
         (&b"name: a\noperator: \xff\n"[..], "byte 0xff"),
         (&b"\xff\xfes\0k\0"[..], "UTF-16"),
     ] {
-        let error = Protocol::parse("x.yaml", bytes, &[], &crate::common::nothing).unwrap_err();
+        let error = Protocol::parse("x.yaml", bytes, &[], &crate::common::no_file).unwrap_err();
         assert!(error.to_string().contains(message), "{error}");
     }
     let huge = vec![b'#'; (4 << 20) + 1];
-    let error = Protocol::parse("x.yaml", &huge, &[], &crate::common::nothing).unwrap_err();
+    let error = Protocol::parse("x.yaml", &huge, &[], &crate::common::no_file).unwrap_err();
     assert!(error.to_string().contains("too large"), "{error}");
 }
 
 proptest! {
     #[test]
     fn any_bytes_give_an_answer(bytes in proptest::collection::vec(any::<u8>(), 0..300)) {
-        let _ = Protocol::parse("x.yaml", &bytes, &[], &crate::common::nothing);
+        let _ = Protocol::parse("x.yaml", &bytes, &[], &crate::common::no_file);
         let _ = Schedule::parse("x.yaml", &bytes, &[]);
     }
 

@@ -81,7 +81,7 @@ fn a_press_is_final_if_valid_or_without_attempts_left() {
             per_press: 2,
             per_session: 0,
         };
-        retakes.wants(&PressHistory {
+        retakes.should_retake(&PressHistory {
             attempts: 9,
             spent,
             verdict,
@@ -103,7 +103,7 @@ fn a_press_is_final_if_valid_or_without_attempts_left() {
 #[test]
 fn after_a_completed_plan_only_lost_presses_are_retaken() {
     let wants = |given_back, spent, verdict: PressVerdict| {
-        Retakes::default().wants(&PressHistory {
+        Retakes::default().should_retake(&PressHistory {
             attempts: 3,
             spent,
             verdict: Some(verdict),

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use skinrig_protocol::rig::{RigFile, RigKind, SyncRole};
 use skinrig_protocol::{Diagnostics, Protocol, Surface, rig_schema_json};
 
-use crate::common::nothing;
+use crate::common::no_file;
 use crate::validate::validate;
 
 fn folder() -> PathBuf {
@@ -337,7 +337,7 @@ fn touched_points_must_span_the_skin_and_not_its_mirror_image() {
 
 #[test]
 fn languages_are_distinguished() {
-    let error = Protocol::parse("rig.yaml", example().as_bytes(), &[], &nothing).unwrap_err();
+    let error = Protocol::parse("rig.yaml", example().as_bytes(), &[], &no_file).unwrap_err();
     assert!(
         error
             .to_string()

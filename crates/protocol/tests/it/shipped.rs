@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::common::{folder, nothing, parse, shipped};
+use crate::common::{folder, no_file, parse, shipped};
 use crate::validate::validate;
 use skinrig_protocol::{Protocol, Schedule, check, path_svg, schedule_schema_json, schema_json};
 
@@ -128,7 +128,7 @@ fn texts_and_hashes_are_kept_byte_for_byte() {
         "\u{feff}{}",
         shipped("quick-check.yaml").replace('\n', "\r\n")
     );
-    let protocol = Protocol::parse("q.yaml", text.as_bytes(), &[], &nothing).unwrap();
+    let protocol = Protocol::parse("q.yaml", text.as_bytes(), &[], &no_file).unwrap();
     assert_eq!(protocol.text, text);
     let plain = parse(&shipped("quick-check.yaml"), &[]).unwrap();
     assert_ne!(protocol.sha256, plain.sha256);

@@ -110,16 +110,16 @@ impl Cell {
         if self.payload > pages.most_bytes() {
             return Ok(None);
         }
-        let (whole, wanted) = (self.payload as usize, (self.payload as usize).min(most));
+        let (whole, expected) = (self.payload as usize, (self.payload as usize).min(most));
         let Some(first) = page.get(self.at..self.at + self.local) else {
             return Ok(None);
         };
         let mut bytes = first.to_vec();
         let mut next = number(page, self.at + self.local);
-        let (mut image, mut seen) = (Vec::new(), HashSet::new());
-        while bytes.len() < wanted {
+        let (mut image, mut visited) = (Vec::new(), HashSet::new());
+        while bytes.len() < expected {
             // A valid overflow chain never visits a page twice.
-            let Some(n) = next.filter(|n| *n > 1 && seen.insert(*n)) else {
+            let Some(n) = next.filter(|n| *n > 1 && visited.insert(*n)) else {
                 return Ok(None);
             };
             if !pages.follow(n, &mut image)? {

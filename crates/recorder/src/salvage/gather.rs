@@ -9,7 +9,7 @@ use super::shapes::{KeyPart, TableShape};
 
 /// A recovered row.
 #[derive(Debug, Clone)]
-pub(crate) enum FoundRow {
+pub(crate) enum RecoveredRow {
     /// The values.
     Values(Vec<Value>),
     /// The location of a long row, which is read again when it is written.
@@ -19,7 +19,7 @@ pub(crate) enum FoundRow {
 /// Recovered rows of one table, by key.
 #[derive(Debug, Default)]
 pub(crate) struct TableRows {
-    pub rows: BTreeMap<Vec<KeyPart>, FoundRow>,
+    pub rows: BTreeMap<Vec<KeyPart>, RecoveredRow>,
     /// Number of rows whose overflow pages are missing.
     pub torn: u64,
 }
@@ -48,7 +48,9 @@ pub(super) fn gather(pages: &mut Pages, shapes: &[TableShape]) -> io::Result<Vec
             if shape.kind.hashed.is_some() {
                 let row = cells::leading(&head, types.len()).map(|v| shape.row(v, cell.rowid));
                 if let Some(key) = row.and_then(|row| shape.key(&row)) {
-                    out[first].rows.insert(key, FoundRow::Location(image, cell));
+                    out[first]
+                        .rows
+                        .insert(key, RecoveredRow::Location(image, cell));
                 }
                 continue;
             }
@@ -72,13 +74,13 @@ pub(super) fn gather(pages: &mut Pages, shapes: &[TableShape]) -> io::Result<Vec
             let rows = &mut out[i].rows;
             // A completed attempt never becomes open again, so an older copy does not replace it.
             let undone = shape.kind.name == "attempt"
-                && matches!(rows.get(&key), Some(FoundRow::Values(old)) if old[VERDICT] != Value::Null)
+                && matches!(rows.get(&key), Some(RecoveredRow::Values(old)) if old[VERDICT] != Value::Null)
                 && row[VERDICT] == Value::Null;
             if !undone {
                 let found = if cell.is_long() {
-                    FoundRow::Location(image, cell)
+                    RecoveredRow::Location(image, cell)
                 } else {
-                    FoundRow::Values(row)
+                    RecoveredRow::Values(row)
                 };
                 rows.insert(key, found);
             }
@@ -94,11 +96,11 @@ const VERDICT: usize = 4;
 pub(super) fn read(
     pages: &mut Pages,
     shape: &TableShape,
-    found: &FoundRow,
+    found: &RecoveredRow,
 ) -> io::Result<Option<Vec<Value>>> {
     let (image, cell) = match found {
-        FoundRow::Values(row) => return Ok(Some(row.clone())),
-        FoundRow::Location(image, cell) => (image, cell),
+        RecoveredRow::Values(row) => return Ok(Some(row.clone())),
+        RecoveredRow::Location(image, cell) => (image, cell),
     };
     let mut page = Vec::new();
     pages.read(*image, &mut page)?;
@@ -111,9 +113,9 @@ pub(super) fn read(
 pub(crate) fn read_leading(
     pages: &mut Pages,
     shape: &TableShape,
-    found: &FoundRow,
+    found: &RecoveredRow,
 ) -> io::Result<Vec<Value>> {
-    let FoundRow::Location(image, cell) = found else {
+    let RecoveredRow::Location(image, cell) = found else {
         return Ok(Vec::new());
     };
     let mut page = Vec::new();

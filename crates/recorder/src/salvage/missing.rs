@@ -1,7 +1,7 @@
 //! Lists missing rows, by comparison with the seal and with other rows, and documents them in the new file.
 
 use super::cells::Value;
-use super::gather::FoundRow;
+use super::gather::RecoveredRow;
 use super::shapes::KeyPart;
 use super::writer::{SalvageError, SalvageWriter};
 use crate::chain::{self, PreviousSeal};
@@ -20,7 +20,7 @@ impl SalvageWriter<'_> {
         };
         for digest in digest::digest_tables(self.conn).await? {
             let key = vec![KeyPart::Text(digest.name.clone())];
-            let Some(FoundRow::Values(row)) = sealed.rows.get(&key) else {
+            let Some(RecoveredRow::Values(row)) = sealed.rows.get(&key) else {
                 continue;
             };
             if row.get(2) == Some(&Value::Blob(digest.sha256.to_vec())) {

@@ -104,7 +104,7 @@ impl Pages {
             return Ok(());
         }
         let stride = FRAME_HEADER + self.size as u64;
-        let salts = self.salts(&mut log, &head, bytes)?;
+        let salts = self.read_salts(&mut log, &head, bytes)?;
         let mut big_endian = word(&head, 0) & 1 == 1;
         let first = checksum(big_endian, [0, 0], &head[..24]);
         // Checksums that the next frame may continue: the stored and the computed one, either of which may be damaged.
@@ -149,7 +149,7 @@ impl Pages {
 
     /// Salts of the log's current generation: from an intact header, otherwise from the first two consecutive frames that
     /// agree.
-    fn salts(&self, log: &mut File, head: &[u8], bytes: u64) -> io::Result<[u32; 2]> {
+    fn read_salts(&self, log: &mut File, head: &[u8], bytes: u64) -> io::Result<[u32; 2]> {
         let stored = [word(head, 24), word(head, 28)];
         let is_whole = [false, true]
             .iter()

@@ -8,7 +8,7 @@ use skinrig_model::CameraId;
 use sqlx::sqlite::SqliteConnection;
 
 use super::cells::Value;
-use super::gather::{self, FoundRow, TableRows};
+use super::gather::{self, RecoveredRow, TableRows};
 use super::pages::Pages;
 use super::report::{self, LostBytes, SalvageReport, SalvagedTable};
 use super::shapes::{KeyPart, TableShape};
@@ -257,14 +257,14 @@ impl SalvageWriter<'_> {
         let rows = legs.find(|(shape, _)| shape.kind.name == "leg");
         let rows = rows.into_iter().flat_map(|(_, rows)| rows.rows.values());
         rows.filter_map(|found| match found {
-            FoundRow::Values(row) => match (
+            RecoveredRow::Values(row) => match (
                 row.get(LEG_FIRST_SEQ[camera.index()]),
                 row.get(LEG_ORIGIN_NS),
             ) {
                 (Some(Value::Int(seq)), Some(Value::Int(origin_ns))) => Some((*seq, *origin_ns)),
                 _ => None,
             },
-            FoundRow::Location(..) => None,
+            RecoveredRow::Location(..) => None,
         })
         .collect()
     }

@@ -25,8 +25,8 @@ pub(super) fn check(camera: CameraId, index: &[ChunkMeta], report: &mut VerifyRe
             if !ends {
                 report.add(format!(
                     "{place}: expected it to end with the first time after it, {} µs, found {}",
-                    words(after_us),
-                    words(time.to_us)
+                    describe(after_us),
+                    describe(time.to_us)
                 ));
             }
             let in_leg = index[..n].iter().rev();
@@ -44,8 +44,8 @@ pub(super) fn check(camera: CameraId, index: &[ChunkMeta], report: &mut VerifyRe
             if !begins {
                 report.add(format!(
                     "{place}: expected it to begin with the last time before it, {} µs, or earlier, found {}",
-                    words(before_us),
-                    words(time.from_us)
+                    describe(before_us),
+                    describe(time.from_us)
                 ));
             }
         }
@@ -65,6 +65,6 @@ fn last_time<'a>(chunks: impl Iterator<Item = &'a ChunkMeta>) -> Option<u64> {
     None
 }
 
-fn words(us: Option<u64>) -> String {
+fn describe(us: Option<u64>) -> String {
     us.map_or_else(|| "none".to_owned(), |us| us.to_string())
 }

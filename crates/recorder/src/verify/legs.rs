@@ -122,7 +122,7 @@ fn resets(
         let reset = BoxReport::Reset {
             noticed: leg.origin,
         };
-        if !reports.iter().any(|(_, said)| *said == reset) {
+        if !reports.iter().any(|(_, output)| *output == reset) {
             report.add(format!(
                 "leg {}: expected a reset of the box's clock at its origin, found none",
                 leg.number

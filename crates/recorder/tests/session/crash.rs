@@ -90,14 +90,14 @@ fn kill_after(path: &Path, acknowledged: usize, sent: usize) {
         .spawn()
         .unwrap();
     let mut output = BufReader::new(child.stdout.take().unwrap());
-    let seen = output
+    let observed = output
         .by_ref()
         .lines()
         .filter(|line| line.as_ref().unwrap() == "sent")
         .take(sent)
         .count();
     child.kill().unwrap();
-    assert_eq!(seen, sent, "the child ended by itself");
+    assert_eq!(observed, sent, "the child ended by itself");
     assert_eq!(child.wait().unwrap().code(), None, "killed by a signal");
 }
 

@@ -19,7 +19,7 @@ struct Run {
     rest: Vec<Record>,
 }
 
-fn beside(path: &Path, ending: &str) -> PathBuf {
+fn sibling(path: &Path, ending: &str) -> PathBuf {
     PathBuf::from(format!("{}{ending}", path.display()))
 }
 
@@ -66,7 +66,7 @@ impl Run {
             }
             other => panic!("{other:?}"),
         };
-        assert!(!beside(&kept, "-wal").exists());
+        assert!(!sibling(&kept, "-wal").exists());
         let report = verify::<Evt2>(&kept).unwrap();
         assert_eq!((report.problems, report.sealed), (vec![], false));
         let reader = SessionReader::open(&kept).unwrap();
@@ -132,7 +132,7 @@ fn a_removed_folder_leads_to_a_copy_above_it() {
 fn a_removed_log_loses_nothing() {
     for ending in ["-wal", "-shm"] {
         let run = begin();
-        std::fs::remove_file(beside(&run.path, ending)).unwrap();
+        std::fs::remove_file(sibling(&run.path, ending)).unwrap();
         let path = run.path.clone();
         let (_root, kept) =
             run.into_rescued(&format!("{ending}: the file of the current run is missing"));
@@ -187,7 +187,7 @@ fn the_next_free_name_is_used() {
 fn a_second_writer_is_rejected_without_the_lock_file() {
     for replaced in [false, true] {
         let mut run = begin();
-        let lock = beside(&run.path, "-lock");
+        let lock = sibling(&run.path, "-lock");
         std::fs::remove_file(&lock).unwrap();
         if replaced {
             std::fs::write(&lock, "anything").unwrap();
@@ -221,7 +221,7 @@ fn a_leg_is_locked_before_it_begins() {
     sealed(&path, PRESSES);
     let known = SessionReader::open(&path).unwrap().history().unwrap();
     let mut leg = SessionWriter::resume::<Evt2>(&path).unwrap();
-    std::fs::remove_file(beside(&path, "-lock")).unwrap();
+    std::fs::remove_file(sibling(&path, "-lock")).unwrap();
     // Under another name, without a lock file.
     let link = folder.path().join("b.session.sqlite");
     std::fs::hard_link(&path, &link).unwrap();

@@ -11,7 +11,7 @@ use crate::common::{Evt2, further_leg, header, records, sealed};
 
 const PRESSES: u32 = 5;
 
-fn sound(path: &std::path::Path, sealed: bool) {
+fn assert_sound(path: &std::path::Path, sealed: bool) {
     let report = verify::<Evt2>(path).unwrap();
     assert_eq!((report.problems, report.sealed), (vec![], sealed));
 }
@@ -135,10 +135,10 @@ fn a_stopped_and_sealed_session_is_resumed() {
     );
     // Opened and closed without a record: still the sealed session.
     drop(SessionWriter::resume::<Evt2>(&path).unwrap());
-    sound(&path, true);
+    assert_sound(&path, true);
 
     let second = resume(&path);
-    sound(&path, true);
+    assert_sound(&path, true);
     assert!(std::fs::metadata(&path).unwrap().permissions().readonly());
     assert_eq!(
         std::fs::read_dir(folder.path()).unwrap().count(),
@@ -164,9 +164,9 @@ fn a_stopped_and_sealed_session_is_resumed() {
         .box_reports()
         .unwrap()
         .into_iter()
-        .filter(|(t, said)| {
+        .filter(|(t, output)| {
             *t == legs[1].origin
-                && *said
+                && *output
                     == BoxReport::Reset {
                         noticed: legs[1].origin,
                     }
@@ -213,7 +213,7 @@ fn one_writer_at_a_time_and_the_header_of_a_leg_first() {
         writer.finish(),
         Err(RecorderError::Unsealable { .. })
     ));
-    sound(&path, false);
+    assert_sound(&path, false);
 }
 
 /// Runs statements on the unchanged file.
@@ -250,12 +250,12 @@ fn a_session_that_ended_without_its_seal_is_sealed() {
         Err(RecorderError::InUse { .. })
     ));
     drop(writer);
-    sound(&path, false);
+    assert_sound(&path, false);
     SessionWriter::open_ended::<Evt2>(&path)
         .unwrap()
         .finish()
         .unwrap();
-    sound(&path, true);
+    assert_sound(&path, true);
     assert!(matches!(
         SessionWriter::open_ended::<Evt2>(&path),
         Err(RecorderError::AlreadyCompleted { .. })
@@ -292,7 +292,7 @@ fn a_half_written_seal_is_detected_and_rewritten() {
         .unwrap()
         .finish()
         .unwrap();
-    sound(&path, true);
+    assert_sound(&path, true);
     let seal = SessionReader::open(&path).unwrap().seal().unwrap().unwrap();
     assert_eq!(
         seal.tree_sha256, whole.tree_sha256,
@@ -334,7 +334,7 @@ fn a_half_begun_leg_is_rolled_back() {
         before,
         "the file is changed already"
     );
-    sound(&left, true);
+    assert_sound(&left, true);
     assert_eq!(std::fs::read(&left).unwrap(), before);
 }
 
@@ -377,10 +377,10 @@ fn check_older_schema(was_sealed: bool) {
         let ended = SessionWriter::open_ended::<Evt2>(&path).unwrap();
         ended.finish().unwrap();
     }
-    sound(&path, was_sealed);
+    assert_sound(&path, was_sealed);
     assert_eq!(SessionReader::open(&path).unwrap().legs().unwrap().len(), 1);
     resume(&path);
-    sound(&path, true);
+    assert_sound(&path, true);
     let reader = SessionReader::open(&path).unwrap();
     let legs = reader.legs().unwrap();
     assert_eq!(legs.len(), 2);
@@ -406,7 +406,7 @@ proptest! {
             writer.accept(record.clone()).unwrap();
         }
         drop(writer);
-        sound(&path, false);
+        assert_sound(&path, false);
 
         let reader = SessionReader::open(&path).unwrap();
         let open = |reader: &SessionReader| -> Vec<AttemptId> {
@@ -424,7 +424,7 @@ proptest! {
             writer.accept(record.clone()).unwrap();
         }
         drop(writer);
-        sound(&path, false);
+        assert_sound(&path, false);
         let reader = SessionReader::open(&path).unwrap();
         if let Some(id) = cut_off.first() {
             let presses = reader.presses().unwrap();
@@ -437,7 +437,7 @@ proptest! {
 
         drop(reader); // a session with a reader is not sealed
         let last = resume(&path);
-        sound(&path, true);
+        assert_sound(&path, true);
         let reader = SessionReader::open(&path).unwrap();
         prop_assert_eq!(open(&reader), vec![]);
         let legs = reader.legs().unwrap();

@@ -30,7 +30,7 @@ fn all_records_round_trip() {
     let mut chunks = Vec::new();
     for camera in CameraId::ALL {
         let edges = reader.trigger_edges(camera).unwrap();
-        let mut wanted = Vec::new();
+        let mut requested = Vec::new();
         reader
             .for_each_chunk(camera, 0, |meta, bytes| {
                 assert_eq!(
@@ -52,7 +52,7 @@ fn all_records_round_trip() {
             if let Record::Chunk(c) = record
                 && c.camera == camera
             {
-                wanted.extend_from_slice(&c.triggers);
+                requested.extend_from_slice(&c.triggers);
                 let found = chunks
                     .iter()
                     .find(|f| (f.0, f.1) == (c.camera, c.seq))
@@ -63,7 +63,7 @@ fn all_records_round_trip() {
                 );
             }
         }
-        assert_eq!(edges, wanted);
+        assert_eq!(edges, requested);
         assert!(
             reader
                 .chunk_index(camera)
@@ -128,7 +128,7 @@ fn all_records_round_trip() {
     let reports: Vec<_> = expected
         .iter()
         .filter_map(|r| match r {
-            Record::BoxReports { t, reports } => Some(reports.iter().map(|said| (*t, *said))),
+            Record::BoxReports { t, reports } => Some(reports.iter().map(|output| (*t, *output))),
             _ => None,
         })
         .flatten()

@@ -184,10 +184,10 @@ fn an_intact_session_is_recovered_completely() {
         "{notes:?}"
     );
     // Existing files are not overwritten.
-    let again = salvage(&case.folder.path().join("from"), &to);
+    let repeated = salvage(&case.folder.path().join("from"), &to);
     assert!(
-        matches!(again, Err(RecorderError::Exists { .. })),
-        "{again:?}"
+        matches!(repeated, Err(RecorderError::Exists { .. })),
+        "{repeated:?}"
     );
 }
 
@@ -208,7 +208,7 @@ fn a_damaged_byte_costs_one_table_at_most() {
 }
 
 #[test]
-fn a_missing_page_costs_only_its_own_rows() {
+fn a_missing_page_loses_only_its_own_rows() {
     let (case, original) = Case::new(4);
     for page in 0..original.len() / PAGE {
         let mut bytes = original.clone();

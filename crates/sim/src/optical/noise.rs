@@ -159,10 +159,10 @@ impl Noise {
         }
         // Shot noise (and the last bit of rounding of the hot pixels): a row by its rate, then columns until
         // one accepts.
-        let wanted = self.random.unit() * self.shot_below.last().copied().unwrap_or(0.0);
+        let threshold = self.random.unit() * self.shot_below.last().copied().unwrap_or(0.0);
         let y = self
             .shot_below
-            .partition_point(|&sum| sum <= wanted)
+            .partition_point(|&sum| sum <= threshold)
             .min(self.row_light.len() - 1);
         loop {
             let x = below(&mut self.random, SENSOR_WIDTH);

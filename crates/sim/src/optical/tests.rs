@@ -321,7 +321,7 @@ fn a_pixel_never_emits_below_its_threshold() {
 }
 
 #[test]
-fn latency_shifts_events_and_changes_nothing_else() {
+fn latency_only_shifts_events() {
     let with = |latency_us| {
         let config = OpticalConfig {
             latency_us,

@@ -6,22 +6,26 @@ use skinrig_model::{
     StreamFormat,
 };
 
-use super::tape::Tape;
+use super::shared_recording::SharedRecording;
 
 /// A camera that returns the recorded chunks unchanged.
 pub(crate) struct ReplayedCamera {
-    tape: Tape,
+    recording: SharedRecording,
     id: CameraId,
     format: StreamFormat,
     streaming: bool,
 }
 
 impl ReplayedCamera {
-    /// Camera `id` of `tape`.
+    /// Camera `id` of `recording`.
     #[must_use]
-    pub(crate) const fn new(tape: Tape, id: CameraId, format: StreamFormat) -> Self {
+    pub(crate) const fn new(
+        recording: SharedRecording,
+        id: CameraId,
+        format: StreamFormat,
+    ) -> Self {
         Self {
-            tape,
+            recording,
             id,
             format,
             streaming: false,
@@ -56,11 +60,16 @@ impl EventCamera for ReplayedCamera {
     }
 
     fn identity(&self) -> DeviceIdentity {
-        self.tape.lock().identity(DeviceRole::of_camera(self.id))
+        self.recording
+            .lock()
+            .identity(DeviceRole::of_camera(self.id))
     }
 
     fn capabilities(&self) -> CameraCapabilities {
-        let recorded = self.tape.lock().settings(DeviceRole::of_camera(self.id));
+        let recorded = self
+            .recording
+            .lock()
+            .settings(DeviceRole::of_camera(self.id));
         let biases = recorded.into_iter().map(|s| s.name);
         CameraCapabilities {
             width: SENSOR_WIDTH,
@@ -75,7 +84,10 @@ impl EventCamera for ReplayedCamera {
     fn configure(&mut self, settings: &CameraSettings) -> Result<Vec<Setting>, DeviceError> {
         self.expect_stopped()?;
         let can = self.capabilities();
-        let recorded = self.tape.lock().settings(DeviceRole::of_camera(self.id));
+        let recorded = self
+            .recording
+            .lock()
+            .settings(DeviceRole::of_camera(self.id));
         for (name, value) in &settings.biases {
             let known = recorded.iter().find(|s| s.name == *name);
             if known.is_none_or(|s| s.read_back != value.to_string()) {
@@ -108,7 +120,7 @@ impl EventCamera for ReplayedCamera {
         if !self.streaming {
             return Ok(());
         }
-        self.tape.lock().take_chunks(self.id, false, chunks)
+        self.recording.lock().take_chunks(self.id, false, chunks)
     }
 
     /// Same as [`poll`](Self::poll): the recorded chunks are already closed where they were flushed.
@@ -122,6 +134,6 @@ impl EventCamera for ReplayedCamera {
             return Ok(());
         }
         self.streaming = false;
-        self.tape.lock().take_chunks(self.id, true, chunks)
+        self.recording.lock().take_chunks(self.id, true, chunks)
     }
 }

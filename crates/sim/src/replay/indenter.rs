@@ -6,12 +6,12 @@ use skinrig_model::{
     Skin,
 };
 
-use super::tape::Tape;
+use super::shared_recording::SharedRecording;
 use skinrig_device::limits;
 
 /// A robot that checks commands against the recorded ones and returns the recorded poses.
 pub(crate) struct ReplayedIndenter {
-    tape: Tape,
+    recording: SharedRecording,
     robot_from_skin: RigidTransform<Robot, Skin>,
     limits: Option<MotionLimits>,
     armed: bool,
@@ -19,11 +19,14 @@ pub(crate) struct ReplayedIndenter {
 }
 
 impl ReplayedIndenter {
-    /// The robot of `tape`.
+    /// The robot of `recording`.
     #[must_use]
-    pub(crate) const fn new(tape: Tape, robot_from_skin: RigidTransform<Robot, Skin>) -> Self {
+    pub(crate) const fn new(
+        recording: SharedRecording,
+        robot_from_skin: RigidTransform<Robot, Skin>,
+    ) -> Self {
         Self {
-            tape,
+            recording,
             robot_from_skin,
             limits: None,
             armed: false,
@@ -38,7 +41,7 @@ impl ReplayedIndenter {
 
 impl Indenter for ReplayedIndenter {
     fn identity(&self) -> DeviceIdentity {
-        self.tape.lock().identity(DeviceRole::Indenter)
+        self.recording.lock().identity(DeviceRole::Indenter)
     }
 
     /// Wide limits: the recorded commands decide what is allowed.
@@ -58,7 +61,7 @@ impl Indenter for ReplayedIndenter {
     fn configure(&mut self, limits: &MotionLimits) -> Result<Vec<Setting>, DeviceError> {
         limits::check_limits(&self.serial(), &self.capabilities(), limits)?;
         self.limits = Some(*limits);
-        let recorded = self.tape.lock().settings(DeviceRole::Indenter);
+        let recorded = self.recording.lock().settings(DeviceRole::Indenter);
         if recorded.is_empty() {
             return Ok(limits::settings(limits));
         }
@@ -66,7 +69,7 @@ impl Indenter for ReplayedIndenter {
     }
 
     fn arm(&mut self) -> Result<(), DeviceError> {
-        self.tape.lock().check(DeviceRole::Indenter)?;
+        self.recording.lock().check(DeviceRole::Indenter)?;
         if self.limits.is_none() {
             let serial = self.serial();
             return Err(limits::wrong_state(&serial, "configured", "without limits"));
@@ -81,15 +84,15 @@ impl Indenter for ReplayedIndenter {
         };
         limits::check_command(&self.serial(), &limits, target, speed_mm_s)?;
         let command = MotionCommand {
-            target: self.tape.skin_from_robot().apply(target),
+            target: self.recording.skin_from_robot().apply(target),
             speed_mm_s,
         };
-        self.tape.lock().take_command(command)
+        self.recording.lock().take_command(command)
     }
 
     fn poll(&mut self, samples: &mut Vec<RobotSample>) -> Result<(), DeviceError> {
         self.poses.clear();
-        let answer = self.tape.lock().take_poses(&mut self.poses);
+        let answer = self.recording.lock().take_poses(&mut self.poses);
         samples.extend(self.poses.iter().map(|p| RobotSample {
             t: p.t,
             commanded: self.robot_from_skin.apply(p.commanded),
@@ -100,7 +103,7 @@ impl Indenter for ReplayedIndenter {
     }
 
     fn hold(&mut self) -> Result<(), DeviceError> {
-        self.tape.lock().check(DeviceRole::Indenter)
+        self.recording.lock().check(DeviceRole::Indenter)
     }
 
     fn disarm(&mut self) -> Result<(), DeviceError> {

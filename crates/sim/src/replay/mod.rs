@@ -14,7 +14,7 @@
 mod camera;
 mod indenter;
 mod recording;
-mod tape;
+mod shared_recording;
 mod trigger;
 
 use skinrig_device::{CameraSettings, EventCamera, Rig, TriggerBox};
@@ -23,8 +23,8 @@ use skinrig_model::{CameraId, DeviceRole, RigGeometry, RigidTransform, Robot, Sk
 pub(crate) use camera::ReplayedCamera;
 pub(crate) use indenter::ReplayedIndenter;
 pub use recording::{Recording, RecordingError};
-pub(crate) use tape::ReplayClock;
-pub(crate) use tape::Tape;
+pub(crate) use shared_recording::ReplayClock;
+pub(crate) use shared_recording::SharedRecording;
 pub(crate) use trigger::ReplayedTriggerBox;
 
 #[cfg(doc)]
@@ -51,21 +51,24 @@ pub struct RecordedRig {
 #[must_use]
 pub fn replayed_rig(rig: RecordedRig, recording: Box<dyn Recording>) -> Rig {
     let has_box = recording.identity(DeviceRole::TriggerBox).is_some();
-    let tape = Tape::new(recording, rig.robot_from_skin.inverse());
+    let recording = SharedRecording::new(recording, rig.robot_from_skin.inverse());
     let camera = |id: CameraId| -> Box<dyn EventCamera> {
         let format = rig.stream_formats[id.index()];
-        Box::new(ReplayedCamera::new(tape.clone(), id, format))
+        Box::new(ReplayedCamera::new(recording.clone(), id, format))
     };
-    let trigger_box =
-        has_box.then(|| -> Box<dyn TriggerBox> { Box::new(ReplayedTriggerBox::new(tape.clone())) });
+    let trigger_box = has_box
+        .then(|| -> Box<dyn TriggerBox> { Box::new(ReplayedTriggerBox::new(recording.clone())) });
     Rig {
         kind: "replayed".to_owned(),
         name: format!("replayed {}", rig.name),
-        indenter: Box::new(ReplayedIndenter::new(tape.clone(), rig.robot_from_skin)),
+        indenter: Box::new(ReplayedIndenter::new(
+            recording.clone(),
+            rig.robot_from_skin,
+        )),
         cameras: CameraId::ALL.map(camera),
         camera_settings: rig.camera_settings,
         trigger_box,
-        clock: Box::new(ReplayClock::new(tape.clone())),
+        clock: Box::new(ReplayClock::new(recording.clone())),
         robot_from_skin: rig.robot_from_skin,
         geometry: rig.geometry,
         description_json: rig.description_json,

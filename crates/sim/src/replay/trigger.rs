@@ -5,20 +5,20 @@ use skinrig_model::{
     BoxReport, DeviceIdentity, DeviceRole, HostDuration, HostTime, Mark, PulseTrain, SentMark,
 };
 
-use super::tape::Tape;
+use super::shared_recording::SharedRecording;
 
 /// A trigger box that accepts the recorded marks in order and returns their recorded times.
 pub(crate) struct ReplayedTriggerBox {
-    tape: Tape,
+    recording: SharedRecording,
     busy_until: Option<HostTime>,
 }
 
 impl ReplayedTriggerBox {
-    /// The box of `tape`.
+    /// The box of `recording`.
     #[must_use]
-    pub(crate) const fn new(tape: Tape) -> Self {
+    pub(crate) const fn new(recording: SharedRecording) -> Self {
         Self {
-            tape,
+            recording,
             busy_until: None,
         }
     }
@@ -26,7 +26,7 @@ impl ReplayedTriggerBox {
 
 impl TriggerBox for ReplayedTriggerBox {
     fn identity(&self) -> DeviceIdentity {
-        self.tape.lock().identity(DeviceRole::TriggerBox)
+        self.recording.lock().identity(DeviceRole::TriggerBox)
     }
 
     fn capabilities(&self) -> TriggerCapabilities {
@@ -36,10 +36,10 @@ impl TriggerBox for ReplayedTriggerBox {
     }
 
     fn send(&mut self, mark: Mark) -> Result<SentMark, DeviceError> {
-        let mut tape = self.tape.lock();
-        tape.check(DeviceRole::TriggerBox)?;
-        let serial = tape.identity(DeviceRole::TriggerBox).serial;
-        let now = tape.now();
+        let mut recording = self.recording.lock();
+        recording.check(DeviceRole::TriggerBox)?;
+        let serial = recording.identity(DeviceRole::TriggerBox).serial;
+        let now = recording.now();
         if let Some(until) = self.busy_until.filter(|&until| now < until) {
             return Err(DeviceError::State {
                 role: DeviceRole::TriggerBox,
@@ -57,16 +57,16 @@ impl TriggerBox for ReplayedTriggerBox {
             });
         }
         let show = |m: Mark| format!("{} of {}", m.kind, m.press);
-        match tape.next_mark() {
+        match recording.next_mark() {
             Some(recorded) if recorded.mark == mark => {
-                tape.pass_mark();
-                drop(tape);
+                recording.pass_mark();
+                drop(recording);
                 self.busy_until = Some(now + self.capabilities().train_duration);
                 Ok(recorded)
             }
             other => Err(DeviceError::Diverged {
                 role: DeviceRole::TriggerBox,
-                at: format!("mark {}", tape.marks_read()),
+                at: format!("mark {}", recording.marks_read()),
                 expected: other.map_or_else(|| "no further mark".to_owned(), |m| show(m.mark)),
                 found: show(mark),
             }),
@@ -74,6 +74,6 @@ impl TriggerBox for ReplayedTriggerBox {
     }
 
     fn poll(&mut self, reports: &mut Vec<BoxReport>) -> Result<(), DeviceError> {
-        self.tape.lock().take_reports(reports)
+        self.recording.lock().take_reports(reports)
     }
 }

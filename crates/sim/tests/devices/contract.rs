@@ -134,7 +134,7 @@ impl Clock for SettledClock {
     }
     fn wait_until(&mut self, t: HostTime) {
         let calls = self.calls.lock().unwrap().clone();
-        while calls.as_ref().is_some_and(|c| c.under_way() > 0) {
+        while calls.as_ref().is_some_and(|c| c.pending_calls() > 0) {
             std::thread::yield_now();
         }
         self.clock.lock().unwrap().wait_until(t);

@@ -4,16 +4,36 @@ use crate::common::{LIMITS, RunData, places, press_all, ready};
 use skinrig_device::DeviceError;
 use skinrig_formats::Decoder;
 use skinrig_model::{
-    BoxReport, CameraId, DeviceRole, HostTime, Polarity, RawChunk, SimLevel, StreamFormat,
+    BoxReport, CameraId, DeviceRole, HostTime, Polarity, RawChunk, RigFault, SimLevel,
+    StreamFormat,
     pulse::{DecodedMarks, decode_marks},
 };
-use skinrig_sim::{Fault, FaultTrigger, SimConfig, simulated_rig};
+use skinrig_sim::{Fault, FaultTrigger, LineNoise, SimConfig, simulated_rig};
 
 fn with(level: SimLevel, fault: Fault) -> SimConfig {
     SimConfig {
         faults: vec![fault],
         ..SimConfig::new(4, level)
     }
+}
+
+fn from_start(fault: RigFault) -> Fault {
+    Fault::new(fault, FaultTrigger::At(HostTime::ZERO)).unwrap()
+}
+
+#[test]
+fn faults_of_other_rigs_are_refused() {
+    let supported = |fault: RigFault| Fault::new(fault, FaultTrigger::At(HostTime::ZERO));
+    let refused: Vec<&str> = RigFault::NAMES
+        .iter()
+        .filter_map(|(name, fault)| supported(*fault).is_err().then_some(*name))
+        .collect();
+    assert_eq!(refused, ["robot-power-lost", "disk-full", "killed"]);
+    let error = supported(RigFault::Killed).unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "expected a fault that the simulated rig injects, found `killed`"
+    );
 }
 
 fn failed(config: &SimConfig) -> DeviceError {
@@ -31,7 +51,10 @@ fn lost_indenter() {
         FaultTrigger::At(HostTime(700_000_000)),
         FaultTrigger::Contact(1),
     ] {
-        let config = with(SimLevel::Kinematic, Fault::IndenterLost(when));
+        let config = with(
+            SimLevel::Kinematic,
+            Fault::new(RigFault::RobotLost, when).unwrap(),
+        );
         let mut rig = simulated_rig(&config);
         ready(&mut rig);
         let error = press_all(&mut rig, &places(3), &[5_000]).err();
@@ -51,7 +74,7 @@ fn lost_indenter() {
 }
 
 #[test]
-fn sluggish_indenter_is_late() {
+fn slow_robot_is_late() {
     let off_at_hold = |faults: Vec<Fault>| {
         let config = SimConfig {
             faults,
@@ -69,14 +92,14 @@ fn sluggish_indenter_is_late() {
     };
     assert!(off_at_hold(vec![]) < 0.05);
     let when = FaultTrigger::At(HostTime::ZERO);
-    assert!(off_at_hold(vec![Fault::Sluggish { when, percent: 5 }]) > 0.5);
+    assert!(off_at_hold(vec![Fault::new(RigFault::RobotSlow, when).unwrap()]) > 0.5);
 }
 
 #[test]
 fn an_unplugged_camera_delivers_its_remaining_data() {
     let when = FaultTrigger::At(HostTime(400_000_000));
-    let camera = CameraId::Two;
-    let config = with(SimLevel::Kinematic, Fault::CameraUnplugged { camera, when });
+    let unplugged = Fault::new(RigFault::CameraUnplugged(CameraId::Two), when).unwrap();
+    let config = with(SimLevel::Kinematic, unplugged);
     let mut rig = simulated_rig(&config);
     ready(&mut rig);
     rig.clock.wait_until(HostTime(1_000_000_000));
@@ -102,11 +125,7 @@ fn an_unplugged_camera_delivers_its_remaining_data() {
 fn lost_bytes_are_counted() {
     let when = FaultTrigger::At(HostTime(400_000_000));
     let camera = CameraId::One;
-    let fault = Fault::CameraBytesLost {
-        camera,
-        when,
-        words: 1_234,
-    };
+    let fault = Fault::new(RigFault::CameraDrops(camera), when).unwrap();
     let run = |config: &SimConfig| -> RunData {
         let mut rig = simulated_rig(config);
         ready(&mut rig);
@@ -114,23 +133,22 @@ fn lost_bytes_are_counted() {
         take.stop(&mut rig);
         take
     };
-    let (whole, holed) = (
-        run(&SimConfig::new(4, SimLevel::Geometric)),
-        run(&with(SimLevel::Geometric, fault)),
-    );
-    let (a, b) = (whole.bytes(camera), holed.bytes(camera));
+    let mut faulted = with(SimLevel::Geometric, fault);
+    faulted.fault_sizes.lost_words = 1_234;
+    let (complete, lossy) = (run(&SimConfig::new(4, SimLevel::Geometric)), run(&faulted));
+    let (a, b) = (complete.bytes(camera), lossy.bytes(camera));
     assert_eq!(a.len(), b.len() + 4 * 1_234);
-    let lost: Vec<(usize, u64)> = holed.chunks[0]
+    let lost: Vec<(usize, u64)> = lossy.chunks[0]
         .iter()
         .enumerate()
         .filter(|(_, c)| c.lost_before > 0)
         .map(|(n, c)| (n, c.lost_before))
         .collect();
     assert_eq!(lost, [(1, 4 * 1_234)]);
-    let hole = holed.chunks[0][0].bytes.len();
-    assert_eq!(a[..hole], b[..hole]);
-    assert_eq!(a[hole + 4 * 1_234..], b[hole..]);
-    assert_eq!(whole.bytes(CameraId::Two), holed.bytes(CameraId::Two));
+    let gap = lossy.chunks[0][0].bytes.len();
+    assert_eq!(a[..gap], b[..gap]);
+    assert_eq!(a[gap + 4 * 1_234..], b[gap..]);
+    assert_eq!(complete.bytes(CameraId::Two), lossy.bytes(CameraId::Two));
 }
 
 #[test]
@@ -155,13 +173,14 @@ fn a_lost_start_pulse_makes_one_train_of_one_camera_unreadable() {
 
 #[test]
 fn a_noisy_line_corrupts_no_mark_and_affects_only_one_camera() {
-    let fault = Fault::NoisyLine {
-        camera: CameraId::Two,
+    let fault = from_start(RigFault::LineNoisy(CameraId::Two));
+    let mut config = with(SimLevel::Kinematic, fault);
+    config.fault_sizes.line_noise = LineNoise {
         lost_percent: 3,
         doubled_percent: 3,
         spurious_percent: 3,
     };
-    let mut rig = simulated_rig(&with(SimLevel::Kinematic, fault));
+    let mut rig = simulated_rig(&config);
     ready(&mut rig);
     let mut take = press_all(&mut rig, &places(8), &[5_000]).unwrap();
     take.stop(&mut rig);
@@ -242,7 +261,7 @@ fn the_box_reports_its_clock_its_trains_and_contacts() {
 fn trigger_box_lost() {
     let error = failed(&with(
         SimLevel::Kinematic,
-        Fault::TriggerBoxLost(FaultTrigger::Contact(0)),
+        Fault::new(RigFault::BoxSilent, FaultTrigger::Contact(0)).unwrap(),
     ));
     assert!(matches!(
         error,
@@ -255,7 +274,10 @@ fn trigger_box_lost() {
 
 #[test]
 fn settings_that_read_back_differently_are_errors() {
-    let mut rig = simulated_rig(&with(SimLevel::Kinematic, Fault::IndenterReadBack));
+    let mut rig = simulated_rig(&with(
+        SimLevel::Kinematic,
+        from_start(RigFault::RobotSettingIgnored),
+    ));
     assert!(matches!(
         rig.indenter.configure(&LIMITS),
         Err(DeviceError::ReadBack {
@@ -265,7 +287,7 @@ fn settings_that_read_back_differently_are_errors() {
     ));
     let mut rig = simulated_rig(&with(
         SimLevel::Kinematic,
-        Fault::CameraReadBack(CameraId::Two),
+        from_start(RigFault::CameraSettingIgnored(CameraId::Two)),
     ));
     let settings = rig.camera_settings.clone();
     rig.cameras[0].configure(&settings[0]).unwrap();

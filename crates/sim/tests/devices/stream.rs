@@ -49,11 +49,11 @@ fn marks_reach_both_cameras_and_fit_a_line() {
     let take = run(&config, &places(8));
     for camera in CameraId::ALL {
         let (_, edges) = decode(&take, camera);
-        let seen = decode_marks(&edges);
-        assert_eq!(seen.stray_edges, 0);
-        assert_eq!(seen.marks.len(), take.marks.len());
+        let observed = decode_marks(&edges);
+        assert_eq!(observed.stray_edges, 0);
+        assert_eq!(observed.marks.len(), take.marks.len());
         // Camera time against host time: a line with a slope within the stated drift.
-        let pairs: Vec<(f64, f64)> = seen
+        let pairs: Vec<(f64, f64)> = observed
             .marks
             .iter()
             .zip(&take.marks)
@@ -102,10 +102,10 @@ fn presses_appear_at_their_position_and_time() {
         let mut columns: Vec<u16> = press.iter().map(|e| e.x).collect();
         columns.sort_unstable();
         let median = f64::from(columns[columns.len() / 2]);
-        let wanted = truth.cameras[camera.index()]
+        let expected = truth.cameras[camera.index()]
             .column_of_point(at[0])
             .unwrap();
-        assert!((median - wanted).abs() < 4.0, "{median} {wanted}");
+        assert!((median - expected).abs() < 4.0, "{median} {expected}");
         let quiet = phase(0, 50).len() as f64 / 0.05;
         assert!(quiet < 2_500.0, "background {quiet} events/s");
     }

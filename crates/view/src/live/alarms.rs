@@ -4,7 +4,7 @@ use serde::Serialize;
 use skinrig_analysis::Analysis;
 use skinrig_model::InterruptionKind;
 
-use super::looks::Looks;
+use super::snapshot::SessionSnapshot;
 use crate::lab::RunState;
 
 /// Less free space than this is an alarm, bytes.
@@ -25,7 +25,7 @@ pub(super) struct Alarm {
 pub(super) fn alarms(
     is_written: bool,
     run: Option<&RunState>,
-    looks: &Looks,
+    snapshot: &SessionSnapshot,
     analysis: Option<&Analysis>,
     free_bytes: Option<u64>,
 ) -> Vec<Alarm> {
@@ -37,7 +37,7 @@ pub(super) fn alarms(
             "the program that writes this session does not answer".to_owned(),
         );
     }
-    for (k, file) in looks.lost_bytes().into_iter().enumerate() {
+    for (k, file) in snapshot.lost_bytes().into_iter().enumerate() {
         // The run may have lost bytes that are not in the file yet.
         let lost = run.map_or(file, |run| file.max(run.lost_bytes[k]));
         if lost > 0 {
@@ -45,13 +45,13 @@ pub(super) fn alarms(
         }
     }
     // What the operator asked for is no alarm.
-    let faults = looks.interruptions().iter();
+    let faults = snapshot.interruptions().iter();
     let mut faults = faults.filter(|i| i.kind == InterruptionKind::Fault);
     if let Some(last) = faults.next_back() {
         let t = last.t.as_secs_f64();
         add("warn", format!("fault at {t:.1} s: {}", last.reason));
     }
-    let failures = looks.failures_in_a_row();
+    let failures = snapshot.failures_in_a_row();
     if failures >= FAILURES {
         add("bad", format!("the last {failures} attempts were invalid"));
     }

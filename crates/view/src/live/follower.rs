@@ -10,8 +10,8 @@ use skinrig_recorder::{RecorderError, writer_of};
 
 use super::alarms;
 use super::estimates::Estimates;
-use super::looks::Looks;
 use super::parts::{Sender, publish};
+use super::snapshot::SessionSnapshot;
 use crate::lab::{Lab, RunState};
 
 /// Between two questions to the run, and two looks at the state of the file.
@@ -44,7 +44,7 @@ pub(super) fn follow(
     to: &Sender,
 ) {
     let stop = Arc::new(AtomicBool::new(false));
-    let mut looks = Looks::new(path);
+    let mut snapshot = SessionSnapshot::new(path);
     let mut estimates = Estimates::new(path, &stop);
     let mut sealing = Sealing::default();
     let mut unwatched: Option<Instant> = None;
@@ -57,10 +57,10 @@ pub(super) fn follow(
         let seen = if may_be_sealing {
             Ok(())
         } else {
-            looks.look(estimates.newest().as_deref(), to)
+            snapshot.refresh(estimates.newest().as_deref(), to)
         };
         if writer.is_some() && !may_be_sealing {
-            estimates.renew(looks.outcomes());
+            estimates.renew(snapshot.outcomes());
         }
         if let Some(analysis) = estimates.newest() {
             publish(to, "analysis", &crate::document::summary(&analysis));
@@ -69,7 +69,7 @@ pub(super) fn follow(
         let alarms = alarms::alarms(
             writer.is_some(),
             run.as_ref(),
-            &looks,
+            &snapshot,
             estimates.newest().as_deref(),
             free_bytes,
         );

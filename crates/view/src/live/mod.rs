@@ -6,9 +6,9 @@
 mod alarms;
 mod estimates;
 mod follower;
-mod looks;
 mod parts;
 mod picture;
+mod snapshot;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

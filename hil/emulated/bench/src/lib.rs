@@ -11,7 +11,8 @@
 //! Everything recorded here is emulated.
 #![cfg(target_os = "linux")]
 
-mod ties;
+mod connections;
+mod faults;
 
 use std::ffi::OsStr;
 use std::io;
@@ -24,14 +25,14 @@ use skinrig_emulated_camera::{Bus, BusConfig, BusError, Evk1Config};
 use skinrig_emulated_trigger_box::{BoardOptions, EmulatedBox, Unavailable};
 use skinrig_model::{CameraId, Point3, RigidTransform, Robot, SimLevel, Skin};
 
-// What plants faults in its devices.
-pub use drd::{Fault, When};
-pub use skinrig_emulated_camera::steer::Order;
-pub use skinrig_emulated_trigger_box::NoisePerMillion;
-pub use ties::Wire;
+pub use faults::InjectionError;
 
-pub use ties::CAMERA_SERIALS;
-use ties::Ties;
+// Faults of single devices, with their sizes and times.
+pub use drd::{Fault as ArmFault, When};
+pub use skinrig_emulated_camera::control::DeviceCommand;
+
+pub use connections::CAMERA_SERIALS;
+use connections::{Connections, Wire};
 
 /// Serial number of the arm, as in `hil/rigs/emulated.yaml`.
 pub(crate) const ARM_SERIAL: u16 = 4711;
@@ -98,13 +99,13 @@ pub enum BenchError {
     Box(#[from] Unavailable),
     /// The connections between the devices.
     #[error("emulated bench: {0}")]
-    Ties(#[source] io::Error),
+    Connections(#[source] io::Error),
 }
 
 /// A running bench. Dropping it ends everything on it.
 pub struct EmulatedBench {
     // Declared first, so that the threads end before the devices that they use.
-    ties: Ties,
+    connections: Connections,
     arm: Arc<EmulatedArm>,
     bus: Arc<Bus>,
     trigger_box: EmulatedBox,
@@ -135,13 +136,14 @@ impl EmulatedBench {
             ..ArmConfig::default()
         });
         let arm = Arc::new(arm.map_err(BenchError::Arm)?);
-        let devices = CameraId::ALL.map(|camera| camera_of(config, camera).into());
+        let devices = CameraId::ALL.map(|camera| camera_config(config, camera).into());
         let bus = Arc::new(Bus::start(&BusConfig {
             devices: devices.into(),
         })?);
-        let ties = Ties::make(&arm, &bus, &trigger_box).map_err(BenchError::Ties)?;
+        let connections =
+            Connections::start(&arm, &bus, &trigger_box).map_err(BenchError::Connections)?;
         Ok(Self {
-            ties,
+            connections,
             arm,
             bus,
             trigger_box,
@@ -172,19 +174,9 @@ impl EmulatedBench {
     pub fn bus(&self) -> &Bus {
         &self.bus
     }
-
-    /// The wire from the trigger box to a camera.
-    pub fn wire(&self, camera: CameraId, wire: Wire) {
-        self.ties.wire(camera, wire);
-    }
-
-    /// The trigger box: noise, unplugging, resets.
-    pub const fn trigger_box(&mut self) -> &mut EmulatedBox {
-        &mut self.trigger_box
-    }
 }
 
-fn camera_of(config: &BenchConfig, camera: CameraId) -> Evk1Config {
+fn camera_config(config: &BenchConfig, camera: CameraId) -> Evk1Config {
     let i = camera.index();
     Evk1Config {
         drift_ppm: config.camera_ppm[i],

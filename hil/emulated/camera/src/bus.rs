@@ -14,9 +14,9 @@ use rustix::io::Errno;
 
 use crate::config::{Access, BusConfig, DeviceConfig};
 use crate::content::Source;
+use crate::control::{AddressedCommand, Answer, DeviceCommand, Observation, ROOT_VARIABLE, Remote};
 use crate::error::{BusError, SHIM, SHIM_VARIABLE};
 use crate::evk1::{Evk1, SyncLine, produce};
-use crate::steer::{Addressed, Answer, Observation, Order, ROOT_VARIABLE, Remote};
 use crate::treuzell::Treuzell;
 use crate::usb::function::Function;
 use crate::usb::queues::Queues;
@@ -30,7 +30,7 @@ enum Device {
     Treuzell(Arc<Treuzell>),
 }
 
-struct Plugged {
+struct BusDevice {
     config: DeviceConfig,
     at: Address,
     device: Device,
@@ -42,7 +42,7 @@ struct Inner {
     bed: TestBed,
     world: Arc<World>,
     sync_line: Arc<SyncLine>,
-    devices: Mutex<BTreeMap<String, Plugged>>,
+    devices: Mutex<BTreeMap<String, BusDevice>>,
     closed: AtomicBool,
 }
 
@@ -67,7 +67,7 @@ impl Bus {
         inner
             .world
             .listen(UnixListener::bind(root.join("world"))?)?;
-        let listener = UnixListener::bind(root.join("steer"))?;
+        let listener = UnixListener::bind(root.join("control"))?;
         for (n, device) in config.devices.iter().enumerate() {
             let at = Address {
                 port: n as u8 + 1,
@@ -77,8 +77,8 @@ impl Bus {
         }
         let serving = Arc::clone(&inner);
         thread::Builder::new()
-            .name("steer".into())
-            .spawn(move || serving.take_orders(&listener))?;
+            .name("control".into())
+            .spawn(move || serving.accept_connections(&listener))?;
         Ok(Self(inner))
     }
 
@@ -123,9 +123,9 @@ impl Drop for Bus {
         let serials: Vec<String> = inner.lock().keys().cloned().collect();
         for serial in serials {
             // A device that is already unplugged stays so.
-            let _ = inner.obey(&serial, Order::Unplug);
+            let _ = inner.execute(&serial, DeviceCommand::Unplug);
         }
-        for name in ["world", "steer"] {
+        for name in ["world", "control"] {
             // Wakes the listener, which then ends.
             let _ = UnixStream::connect(inner.bed.root().join(name));
         }
@@ -161,7 +161,7 @@ pub fn shim() -> Result<PathBuf, BusError> {
 }
 
 impl Inner {
-    fn lock(&self) -> std::sync::MutexGuard<'_, BTreeMap<String, Plugged>> {
+    fn lock(&self) -> std::sync::MutexGuard<'_, BTreeMap<String, BusDevice>> {
         self.devices.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -213,7 +213,7 @@ impl Inner {
         };
         listen(node, UnixListener::bind(self.bed.socket(at))?)?;
         self.bed.add(at, function.descriptors())?;
-        let plugged = Plugged {
+        let plugged = BusDevice {
             config: config.clone(),
             at,
             device,
@@ -224,7 +224,7 @@ impl Inner {
         Ok(())
     }
 
-    fn take_orders(self: &Arc<Self>, listener: &UnixListener) {
+    fn accept_connections(self: &Arc<Self>, listener: &UnixListener) {
         while let Ok((stream, _)) = listener.accept() {
             if self.closed.load(Ordering::Relaxed) {
                 return;
@@ -232,10 +232,10 @@ impl Inner {
             let inner = Arc::clone(self);
             let serving = move || {
                 // A broken connection means that the process ended.
-                let _ = inner.converse(stream);
+                let _ = inner.serve_connection(stream);
             };
             if thread::Builder::new()
-                .name("steer line".into())
+                .name("control line".into())
                 .spawn(serving)
                 .is_err()
             {
@@ -244,11 +244,11 @@ impl Inner {
         }
     }
 
-    fn converse(&self, mut stream: UnixStream) -> io::Result<()> {
+    fn serve_connection(&self, mut stream: UnixStream) -> io::Result<()> {
         for line in BufReader::new(stream.try_clone()?).lines() {
-            let answer = match serde_json::from_str::<Addressed>(&line?) {
+            let answer = match serde_json::from_str::<AddressedCommand>(&line?) {
                 Ok((serial, order)) => self
-                    .obey(&serial, order)
+                    .execute(&serial, order)
                     .unwrap_or_else(|e| Answer::Failed(e.to_string())),
                 Err(e) => Answer::Failed(e.to_string()),
             };
@@ -259,7 +259,7 @@ impl Inner {
         Ok(())
     }
 
-    fn obey(&self, serial: &str, order: Order) -> Result<Answer, BusError> {
+    fn execute(&self, serial: &str, order: DeviceCommand) -> Result<Answer, BusError> {
         let unknown = || BusError::Config {
             expected: "a device of this bus".into(),
             found: serial.to_owned(),
@@ -275,7 +275,7 @@ impl Inner {
             }),
         };
         match order {
-            Order::Unplug => {
+            DeviceCommand::Unplug => {
                 if plugged.present {
                     plugged.present = false;
                     match &plugged.device {
@@ -287,7 +287,7 @@ impl Inner {
                     self.bed.remove(plugged.at)?;
                 }
             }
-            Order::Plug => {
+            DeviceCommand::Plug => {
                 let config = plugged.config.clone();
                 let at = Address {
                     port: plugged.at.port,
@@ -296,19 +296,19 @@ impl Inner {
                 drop(devices);
                 self.plug(&config, at)?;
             }
-            Order::Stall => plugged.queues.stall(),
-            Order::Cut(bytes) => plugged.queues.cut_next(bytes),
-            Order::Garbage(words) => camera?.lock().faults.garbage.extend(words),
-            Order::Lose(words) => camera?.lock().faults.lost_words = words,
-            Order::HotPixels(pixels) => camera?.lock().faults.hot_pixels = pixels,
-            Order::Stick(address) => {
-                camera?.lock().faults.stuck.insert(address);
+            DeviceCommand::Stall => plugged.queues.stall(),
+            DeviceCommand::Cut(bytes) => plugged.queues.cut_next(bytes),
+            DeviceCommand::Garbage(words) => camera?.lock().faults.garbage.extend(words),
+            DeviceCommand::DropWords(words) => camera?.lock().faults.dropped_words = words,
+            DeviceCommand::HotPixels(pixels) => camera?.lock().faults.hot_pixels = pixels,
+            DeviceCommand::IgnoreWrites(address) => {
+                camera?.lock().faults.ignored_registers.insert(address);
             }
-            Order::Silence(on) => camera?.lock().faults.silent = on,
-            Order::FailResets(on) => plugged.queues.fail_resets(on),
-            Order::BreakTransfer(after) => plugged.queues.break_after(after),
-            Order::FailReads(on) => camera?.lock().faults.failing_reads = on,
-            Order::Edge {
+            DeviceCommand::Silence(on) => camera?.lock().faults.silent = on,
+            DeviceCommand::FailResets(on) => plugged.queues.fail_resets(on),
+            DeviceCommand::BreakTransfer(after) => plugged.queues.break_after(after),
+            DeviceCommand::FailReads(on) => camera?.lock().faults.failing_reads = on,
+            DeviceCommand::Edge {
                 channel,
                 rising,
                 at_ns,
@@ -320,21 +320,24 @@ impl Inner {
                 };
                 self.world.edge(serial, edge);
             }
-            Order::Temperature(steps) => {
+            DeviceCommand::Temperature(steps) => {
                 camera?.lock().set_temperature(steps);
             }
-            Order::Observe => {
+            DeviceCommand::Observe => {
                 let counters = camera?.lock().counters;
-                let handed = plugged.queues.handed();
-                return Ok(Answer::Observed(Observation { handed, counters }));
+                let delivered = plugged.queues.delivered();
+                return Ok(Answer::Observed(Observation {
+                    delivered,
+                    counters,
+                }));
             }
-            Order::Journal => {
+            DeviceCommand::Journal => {
                 return Ok(Answer::Journal(match &plugged.device {
                     Device::Evk1(camera) => camera.lock().journal.clone(),
                     Device::Treuzell(camera) => camera.journal(),
                 }));
             }
-            Order::Register(address) => {
+            DeviceCommand::Register(address) => {
                 let value = camera?.lock().registers.read(address);
                 return value.map(Answer::Register).ok_or_else(|| BusError::Config {
                     expected: "a register of an EVK1".into(),

@@ -18,8 +18,8 @@ use std::time::{Duration, Instant};
 
 use crate::bus::Bus;
 use crate::config::{BusConfig, DeviceConfig};
+use crate::control::Remote;
 use crate::error::BusError;
-use crate::steer::Remote;
 
 /// Time limit of a test.
 const TIMEOUT: Duration = Duration::from_secs(180);
@@ -39,10 +39,10 @@ pub fn on_bus(test: &str, devices: Vec<DeviceConfig>, body: impl FnOnce(&Remote)
         return;
     }
     let bus = Bus::start(&BusConfig { devices }).expect("an emulated bus");
-    let said = in_child(&bus, test).expect("the test's own process");
+    let output = in_child(&bus, test).expect("the test's own process");
     assert!(
         bus.root().join(RAN).exists(),
-        "there is no test named `{test}`:\n{said}"
+        "there is no test named `{test}`:\n{output}"
     );
 }
 
@@ -69,10 +69,12 @@ fn in_child(bus: &Bus, test: &str) -> Result<String, BusError> {
         }
         thread::sleep(Duration::from_millis(5));
     };
-    let said = fs::read_to_string(&log)?;
+    let output = fs::read_to_string(&log)?;
     match status {
-        Some(status) if status.success() => Ok(said),
-        Some(status) => panic!("on the emulated bus: {status}\n{said}"),
-        None => panic!("on the emulated bus: expected the test to end within {TIMEOUT:?}\n{said}"),
+        Some(status) if status.success() => Ok(output),
+        Some(status) => panic!("on the emulated bus: {status}\n{output}"),
+        None => {
+            panic!("on the emulated bus: expected the test to end within {TIMEOUT:?}\n{output}")
+        }
     }
 }

@@ -13,7 +13,7 @@
 //!
 //! * [`config`]: devices and their content; also the JSON input of the binary `emulated-cameras`.
 //! * [`world`]: trigger edges, the time of their source, and the robot's tip, from other threads or processes.
-//! * [`steer`]: plugging, faults, counters and the journal of requests, also from the process under test.
+//! * [`control`]: plugging, faults, counters and the journal of requests, also from the process under test.
 //! * [`harness`]: runs a test again under the preload library.
 //!
 //! Everything here is emulated: the behaviour of a real EVK1 is known only from public sources (`evk1.md`, "the EVK1 reference" in the
@@ -23,16 +23,16 @@
 pub mod bus;
 pub mod config;
 pub mod content;
+pub mod control;
 mod error;
 mod evk1;
 pub mod harness;
 mod random;
-pub mod steer;
 mod treuzell;
 mod usb;
 pub mod world;
 
 pub use bus::Bus;
 pub use config::{BusConfig, DeviceConfig, Evk1Config};
+pub use control::Remote;
 pub use error::BusError;
-pub use steer::Remote;

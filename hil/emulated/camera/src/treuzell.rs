@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use crate::steer::Request;
+use crate::control::Request;
 use crate::usb::descriptors::Descriptors;
 use crate::usb::function::{Function, Reply};
 use crate::usb::usbfs::Setup;

@@ -231,7 +231,7 @@ impl World {
         let source = self.source();
         if let Ok(reading) = stream.try_clone() {
             for line in BufReader::new(reading).lines().map_while(Result::ok) {
-                if let Err(what) = self.obey(source, &line) {
+                if let Err(what) = self.execute(source, &line) {
                     let _ = writeln!(stream, "error: {what}");
                     break;
                 }
@@ -240,7 +240,7 @@ impl World {
         self.leave(source);
     }
 
-    fn obey(&self, source: u64, line: &str) -> Result<(), LineError> {
+    fn execute(&self, source: u64, line: &str) -> Result<(), LineError> {
         let words: Vec<&str> = line.split_ascii_whitespace().collect();
         let number = |word: &str| -> Result<i64, LineError> {
             word.parse().map_err(|_| LineError::Number {
@@ -334,13 +334,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_are_obeyed_or_refused_with_what_was_expected() {
+    fn lines_are_executed_or_refused_with_the_expected_form() {
         let world = World::default();
-        world.obey(1, "edge 00001621 0 1 1000").unwrap();
-        world.obey(1, "edge 00001621 0 0 2000").unwrap();
-        world.obey(1, "edge 00001622 7 1 1500").unwrap();
-        world.obey(1, "tip 1000 0 0 4").unwrap();
-        world.obey(1, "tip 2000 1 -2 5").unwrap();
+        world.execute(1, "edge 00001621 0 1 1000").unwrap();
+        world.execute(1, "edge 00001621 0 0 2000").unwrap();
+        world.execute(1, "edge 00001622 7 1 1500").unwrap();
+        world.execute(1, "tip 1000 0 0 4").unwrap();
+        world.execute(1, "tip 2000 1 -2 5").unwrap();
         let first = Edge {
             channel: 0,
             rising: true,
@@ -359,8 +359,11 @@ mod tests {
             "tip 1 nan 0 0",
             "jump 1",
         ] {
-            let said = world.obey(1, bad).unwrap_err().to_string();
-            assert!(said.contains("expected") && said.contains(bad), "{said}");
+            let output = world.execute(1, bad).unwrap_err().to_string();
+            assert!(
+                output.contains("expected") && output.contains(bad),
+                "{output}"
+            );
         }
     }
 
@@ -376,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_wait_for_who_announces_a_time() {
+    fn cameras_wait_for_sources_that_announce_times() {
         let world = World::default();
         let long_ago = now_ns() - 1_000_000_000;
         assert!(world.wait_until(long_ago, Duration::ZERO));

@@ -174,7 +174,9 @@ pub enum Setting {
     Watchdog,
 }
 
-/// A fault. Faults last until [`EmulatedArm::clear_faults`](crate::EmulatedArm::clear_faults), except those marked as events.
+/// A fault of the arm, or of the vendor's library. Faults of the arm that every rig knows have the names of `skinrig_model::RigFault`.
+///
+/// Faults last until [`EmulatedArm::clear_faults`](crate::EmulatedArm::clear_faults), except those marked as events.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Fault {
     /// Every open fails with this code.
@@ -202,9 +204,9 @@ pub enum Fault {
     /// The regulation loop runs at this rate, kHz.
     LoopRate(f64),
     /// USB is disconnected until the faults are cleared; the device must be reopened.
-    Unplug,
+    Lost,
     /// Event: a power cycle; the arm must be reopened and calibrated.
-    PowerLoss,
+    PowerLost,
     /// Event: the force button on the base is pressed. Pressing it again allows forces.
     Button,
     /// Event: the velocity trip.
@@ -212,7 +214,7 @@ pub enum Fault {
     /// Event: a watchdog trip.
     WatchdogTrip,
     /// The arm is blocked at its position.
-    Jammed,
+    Stalled,
     /// Additional viscous friction of the joints, N per (m/s).
     Friction(f64),
     /// `drdIsMoving` stays true; blocking moves never return.
@@ -220,9 +222,9 @@ pub enum Fault {
     /// Every reported position is NaN.
     PositionNan,
     /// Offset of every reported position, m.
-    PositionJump([f64; 3]),
+    PositionOffset([f64; 3]),
     /// Reported positions and the loop's counter freeze.
-    PositionFrozen,
+    PositionStale,
     /// Offset of every reported force, N.
     ForceOffset([f64; 3]),
     /// Reported forces drift along z, N/s.
@@ -230,7 +232,7 @@ pub enum Fault {
     /// Standard deviation of noise on reported forces, N.
     ForceNoise(f64),
     /// Writing the setting reports success but has no effect.
-    Ignore(Setting),
+    SettingIgnored(Setting),
     /// The next n calls of `drdStop` and of `dhdStop` fail.
     StopFails(u32),
     /// `drdStop` returns 0 without effect unless a regulation runs; the vendor's behaviour is not documented.

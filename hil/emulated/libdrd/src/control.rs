@@ -17,7 +17,7 @@ use crate::wire::{Connection, Control, Request};
 use crate::{FIRMWARE_VARIABLE, entry, file};
 
 /// Polling interval of waits.
-const LOOK_EVERY: Duration = Duration::from_micros(500);
+const POLL_INTERVAL: Duration = Duration::from_micros(500);
 
 /// Read-only view of a running arm from any process.
 #[derive(Debug)]
@@ -78,7 +78,7 @@ impl EmulatedArm {
     /// When the library was not built beside this executable, the process cannot be started, or the
     /// configuration is invalid.
     pub fn spawn(config: &ArmConfig) -> io::Result<Self> {
-        assert_ne!(entry::keep(), 0, "the linker kept the entry");
+        assert_ne!(entry::link_entry(), 0, "the linker kept the entry");
         let directory = tempfile::Builder::new().prefix("arm-").tempdir()?;
         fs::write(
             directory.path().join(file::CONFIG),
@@ -157,7 +157,7 @@ impl EmulatedArm {
                 let fault = format!("timed out after {within:?} with the arm in {state:?}");
                 return Err(io::Error::new(io::ErrorKind::TimedOut, fault));
             }
-            thread::sleep(LOOK_EVERY);
+            thread::sleep(POLL_INTERVAL);
         }
     }
 
@@ -206,7 +206,7 @@ impl EmulatedArm {
             .connection
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
-        connection.ask(&Request::Control(control)).map(|_| ())
+        connection.request(&Request::Control(control)).map(|_| ())
     }
 }
 

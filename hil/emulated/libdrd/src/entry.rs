@@ -5,9 +5,9 @@ use std::io::Read;
 use std::path::Path;
 
 /// Runs in every process that links this crate, before `main`; returns at once unless the variable is set.
-extern "C" fn become_firmware_if_asked() {
+extern "C" fn run_firmware_if_requested() {
     if let Some(directory) = std::env::var_os(crate::FIRMWARE_VARIABLE) {
-        become_firmware(&directory);
+        run_firmware(&directory);
     }
 }
 
@@ -15,14 +15,14 @@ extern "C" fn become_firmware_if_asked() {
 #[used]
 #[cfg_attr(target_os = "macos", unsafe(link_section = "__DATA,__mod_init_func"))]
 #[cfg_attr(not(target_os = "macos"), unsafe(link_section = ".init_array"))]
-static AT_START: extern "C" fn() = become_firmware_if_asked;
+static AT_START: extern "C" fn() = run_firmware_if_requested;
 
 /// Referenced wherever a firmware is started, so that the linker keeps this file.
-pub fn keep() -> usize {
+pub fn link_entry() -> usize {
     &raw const AT_START as usize
 }
 
-fn become_firmware(directory: &OsString) -> ! {
+fn run_firmware(directory: &OsString) -> ! {
     // The parent holds the other end of standard input, so that no orphan outlives it.
     std::thread::spawn(|| {
         let mut rest = Vec::new();

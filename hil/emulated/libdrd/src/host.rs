@@ -86,7 +86,7 @@ impl Link {
     fn find(directory: &Path) -> std::io::Result<Self> {
         let mut connection = Connection::connect(directory)?;
         let about = connection
-            .ask(&Request::Hello {
+            .request(&Request::Hello {
                 pid: std::process::id(),
             })?
             .values;
@@ -104,10 +104,10 @@ impl Link {
         })
     }
 
-    fn ask(&self, request: &Request) -> Reply {
+    fn request(&self, request: &Request) -> Reply {
         // A dead firmware means a disconnected device.
         lock(&self.connection)
-            .ask(request)
+            .request(request)
             .unwrap_or_else(|_| Reply::failed(ErrorCode::COM))
     }
 }
@@ -157,7 +157,7 @@ pub fn count() -> Result<[i32; 2], ErrorCode> {
     let Some(link) = link() else {
         return Ok([0, 0]);
     };
-    match checked(link.ask(&Request::Count))?.as_slice() {
+    match checked(link.request(&Request::Count))?.as_slice() {
         &[all, free] => Ok([integer(all), integer(free)]),
         _ => Err(ErrorCode::UNDOCUMENTED),
     }
@@ -167,7 +167,7 @@ pub fn count() -> Result<[i32; 2], ErrorCode> {
 pub fn open(id: i8) -> Result<i8, ErrorCode> {
     let link = link().ok_or(ErrorCode::NO_DEVICE_FOUND)?;
     let index = usize::try_from(id).map_err(|_| ErrorCode::INVALID_INDEX)?;
-    checked(link.ask(&Request::Device {
+    checked(link.request(&Request::Device {
         index,
         call: Call::Open,
     }))?;
@@ -182,7 +182,7 @@ pub fn open(id: i8) -> Result<i8, ErrorCode> {
 /// Closes a device.
 pub fn close(id: i8) -> Result<(), ErrorCode> {
     let (link, id) = device(id)?;
-    checked(link.ask(&Request::Device {
+    checked(link.request(&Request::Device {
         index: index(id),
         call: Call::Close,
     }))?;
@@ -214,7 +214,7 @@ fn device(id: i8) -> Result<(&'static Link, i8), ErrorCode> {
 /// Calls the firmware about an open device.
 pub fn call(id: i8, call: Call) -> Result<Vec<f64>, ErrorCode> {
     let (link, id) = device(id)?;
-    checked(link.ask(&Request::Device {
+    checked(link.request(&Request::Device {
         index: index(id),
         call,
     }))

@@ -165,7 +165,7 @@ impl Connection {
     }
 
     /// Sends a request and waits for its reply.
-    pub fn ask(&mut self, request: &Request) -> io::Result<Reply> {
+    pub fn request(&mut self, request: &Request) -> io::Result<Reply> {
         self.send(request)?;
         self.receive()?
             .ok_or_else(|| io::ErrorKind::UnexpectedEof.into())

@@ -25,7 +25,7 @@ pub struct BoardOptions {
 }
 
 /// Error rates of the serial line in both directions, per million bytes.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct NoisePerMillion {
     /// Bytes with a flipped bit.
     pub flip: u32,
@@ -166,7 +166,7 @@ impl EmulatedBox {
     /// # Errors
     /// When the board is gone.
     pub fn cycle(&mut self) -> io::Result<u64> {
-        self.order("cycle")
+        self.send("cycle")
     }
 
     /// Sets the input level now; returns the cycle.
@@ -174,7 +174,7 @@ impl EmulatedBox {
     /// # Errors
     /// When the board is gone.
     pub fn input(&mut self, high: bool) -> io::Result<u64> {
-        self.order(&format!("input {}", u8::from(high)))
+        self.send(&format!("input {}", u8::from(high)))
     }
 
     /// Schedules input levels at these cycles, in order.
@@ -187,7 +187,7 @@ impl EmulatedBox {
             .map(|(high, cycle)| format!("input {} {cycle}\n", u8::from(*high)))
             .collect();
         self.control.write_all(lines.as_bytes())?;
-        plan.iter().try_for_each(|_| self.taken().map(|_| ()))
+        plan.iter().try_for_each(|_| self.read_cycle().map(|_| ()))
     }
 
     /// Connects the spare output to the input with this delay in cycles; 0 disconnects it.
@@ -195,7 +195,7 @@ impl EmulatedBox {
     /// # Errors
     /// When the board is gone.
     pub fn loop_back(&mut self, cycles: u64) -> io::Result<()> {
-        self.order(&format!("loop {cycles}")).map(|_| ())
+        self.send(&format!("loop {cycles}")).map(|_| ())
     }
 
     /// Sets the error rates of the serial line; returns the errors so far.
@@ -206,15 +206,15 @@ impl EmulatedBox {
         let NoisePerMillion { flip, drop, insert } = noise;
         let order = format!("noise {seed} {flip} {drop} {insert}\n");
         self.control.write_all(order.as_bytes())?;
-        let answer = self.answer()?;
-        let numbers: Vec<u64> = answer.split(' ').filter_map(|w| w.parse().ok()).collect();
+        let reply = self.reply()?;
+        let numbers: Vec<u64> = reply.split(' ').filter_map(|w| w.parse().ok()).collect();
         match numbers[..] {
             [_cycle, flipped, dropped, inserted] => Ok(NoiseDone {
                 flipped,
                 dropped,
                 inserted,
             }),
-            _ => Err(io::Error::other(answer)),
+            _ => Err(io::Error::other(reply)),
         }
     }
 
@@ -223,7 +223,7 @@ impl EmulatedBox {
     /// # Errors
     /// When the board is gone, or already unplugged.
     pub fn unplug(&mut self) -> io::Result<u64> {
-        self.order("unplug")
+        self.send("unplug")
     }
 
     /// Plugs the cable in again.
@@ -231,7 +231,7 @@ impl EmulatedBox {
     /// # Errors
     /// When the board is gone, or already plugged in.
     pub fn plug(&mut self) -> io::Result<u64> {
-        self.order("plug")
+        self.send("plug")
     }
 
     /// Resets the processor.
@@ -239,7 +239,7 @@ impl EmulatedBox {
     /// # Errors
     /// When the board is gone.
     pub fn reset(&mut self, cause: ResetCause) -> io::Result<u64> {
-        self.order(match cause {
+        self.send(match cause {
             ResetCause::BrownOut => "reset brown-out",
             ResetCause::Button => "reset button",
         })
@@ -250,27 +250,27 @@ impl EmulatedBox {
     /// # Errors
     /// When the board is gone.
     pub fn hang(&mut self) -> io::Result<u64> {
-        self.order("hang")
+        self.send("hang")
     }
 
     /// Sends a command; returns the cycle of its execution.
-    fn order(&mut self, line: &str) -> io::Result<u64> {
+    fn send(&mut self, line: &str) -> io::Result<u64> {
         self.control.write_all(format!("{line}\n").as_bytes())?;
-        self.taken()
+        self.read_cycle()
     }
 
-    fn taken(&mut self) -> io::Result<u64> {
-        let answer = self.answer()?;
-        let cycle = answer.strip_prefix("ok ").and_then(|c| c.parse().ok());
-        cycle.ok_or_else(|| io::Error::other(answer))
+    fn read_cycle(&mut self) -> io::Result<u64> {
+        let reply = self.reply()?;
+        let cycle = reply.strip_prefix("ok ").and_then(|c| c.parse().ok());
+        cycle.ok_or_else(|| io::Error::other(reply))
     }
 
-    fn answer(&mut self) -> io::Result<String> {
-        let mut answer = String::new();
-        if self.lines.read_line(&mut answer)? == 0 {
+    fn reply(&mut self) -> io::Result<String> {
+        let mut reply = String::new();
+        if self.lines.read_line(&mut reply)? == 0 {
             return Err(io::ErrorKind::UnexpectedEof.into());
         }
-        Ok(answer.trim_end().to_owned())
+        Ok(reply.trim_end().to_owned())
     }
 }
 

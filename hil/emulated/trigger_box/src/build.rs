@@ -41,7 +41,7 @@ pub struct Built {
 pub fn build() -> Result<Built, Unavailable> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let firmware_dir = here.join("../../trigger_box");
-    tools_are_there()?;
+    check_tools()?;
     let (cache, scratch) = places(&sources(here, &firmware_dir)).unwrap_or_else(|e| {
         panic!("the emulated trigger box needs a place to build in: {e}");
     });
@@ -52,23 +52,23 @@ pub fn build() -> Result<Built, Unavailable> {
     if cache.exists() {
         return Ok(built);
     }
-    make(&firmware_dir, scratch.path(), "trigger_box.elf");
-    make(here, scratch.path(), "board");
+    run_make(&firmware_dir, scratch.path(), "trigger_box.elf");
+    run_make(here, scratch.path(), "board");
     // Of concurrent builds the first one wins; the results are equal.
-    let made = scratch.keep();
-    if fs::rename(&made, &cache).is_err() {
+    let created = scratch.keep();
+    if fs::rename(&created, &cache).is_err() {
         assert!(
             cache.exists(),
             "cannot keep the build in {}",
             cache.display()
         );
         // Failure only costs disk space.
-        let _ = fs::remove_dir_all(made);
+        let _ = fs::remove_dir_all(created);
     }
     Ok(built)
 }
 
-fn make(sources: &Path, into: &Path, what: &str) {
+fn run_make(sources: &Path, into: &Path, what: &str) {
     let target = into.join(what);
     let output = Command::new("make")
         .arg("-C")
@@ -85,7 +85,7 @@ fn make(sources: &Path, into: &Path, what: &str) {
     );
 }
 
-fn tools_are_there() -> Result<(), Unavailable> {
+fn check_tools() -> Result<(), Unavailable> {
     for tool in ["avr-gcc", "make", "cc"] {
         let found = Command::new(tool)
             .arg("--version")
@@ -101,14 +101,14 @@ fn tools_are_there() -> Result<(), Unavailable> {
         ("cc", "simavr/sim_avr.h"),
         ("cc", "libelf.h"),
     ] {
-        if !preprocesses(compiler, headers).unwrap_or(false) {
+        if !has_header(compiler, headers).unwrap_or(false) {
             return Err(Unavailable(format!("{headers} is not installed")));
         }
     }
     Ok(())
 }
 
-fn preprocesses(compiler: &str, header: &str) -> io::Result<bool> {
+fn has_header(compiler: &str, header: &str) -> io::Result<bool> {
     let mut words = compiler.split(' ');
     let mut child = Command::new(words.next().unwrap_or_default())
         .args(words)

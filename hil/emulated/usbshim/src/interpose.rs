@@ -178,7 +178,7 @@ pub unsafe extern "C" fn ioctl(fd: c_int, request: Ioctl, argument: *mut c_void)
             fail(errno);
             result
         }
-        Err(wire::Broken) => {
+        Err(wire::ConnectionLost) => {
             // The message may be incomplete, so the connection is unusable.
             let _ = stream.shutdown(std::net::Shutdown::Both);
             fail(libc::ENODEV)

@@ -16,17 +16,17 @@ const READ_MEM: usize = 5;
 const WRITE_MEM: usize = 6;
 
 /// Time limit of a reply; the emulator replies at once.
-const PATIENCE: Duration = Duration::from_secs(20);
+const REPLY_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// The connection to the emulator failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Broken;
+pub struct ConnectionLost;
 
 /// Connects to the emulator's socket of one device.
 pub fn connect(path: &Path) -> std::io::Result<UnixStream> {
     let stream = UnixStream::connect(path)?;
-    stream.set_read_timeout(Some(PATIENCE))?;
-    stream.set_write_timeout(Some(PATIENCE))?;
+    stream.set_read_timeout(Some(REPLY_TIMEOUT))?;
+    stream.set_write_timeout(Some(REPLY_TIMEOUT))?;
     Ok(stream)
 }
 
@@ -39,7 +39,7 @@ pub unsafe fn ioctl(
     stream: &UnixStream,
     request: usize,
     argument: *mut c_void,
-) -> Result<(c_int, c_int), Broken> {
+) -> Result<(c_int, c_int), ConnectionLost> {
     let fd = stream.as_raw_fd();
     let mut message = [IOCTL, request, argument.expose_provenance()];
     let (words, length) = (message.as_mut_ptr().cast::<u8>(), size_of_val(&message));
@@ -56,14 +56,14 @@ pub unsafe fn ioctl(
             READ_MEM => unsafe { send(fd, std::ptr::with_exposed_provenance(a), b)? },
             // SAFETY: the emulator names memory that the request lets the kernel write (see above).
             WRITE_MEM => unsafe { receive(fd, std::ptr::with_exposed_provenance_mut(a), b)? },
-            _ => return Err(Broken),
+            _ => return Err(ConnectionLost),
         }
     }
 }
 
 /// # Safety
 /// `from` is readable for `left` bytes.
-unsafe fn send(fd: RawFd, mut from: *const u8, mut left: usize) -> Result<(), Broken> {
+unsafe fn send(fd: RawFd, mut from: *const u8, mut left: usize) -> Result<(), ConnectionLost> {
     while left > 0 {
         // SAFETY: the caller's promise, shrunk by what has been sent.
         let sent = unsafe { libc::send(fd, from.cast(), left, libc::MSG_NOSIGNAL) };
@@ -77,13 +77,13 @@ unsafe fn send(fd: RawFd, mut from: *const u8, mut left: usize) -> Result<(), Br
 
 /// # Safety
 /// `to` is writable for `left` bytes.
-unsafe fn receive(fd: RawFd, mut to: *mut u8, mut left: usize) -> Result<(), Broken> {
+unsafe fn receive(fd: RawFd, mut to: *mut u8, mut left: usize) -> Result<(), ConnectionLost> {
     while left > 0 {
         // SAFETY: the caller's promise, shrunk by what has been received.
         let received = unsafe { libc::recv(fd, to.cast(), left, libc::MSG_WAITALL) };
         let done = progress(received)?;
         if done == 0 && received == 0 {
-            return Err(Broken);
+            return Err(ConnectionLost);
         }
         // SAFETY: `done <= left`, so this stays within the caller's memory or one past its end.
         to = unsafe { to.add(done) };
@@ -93,13 +93,13 @@ unsafe fn receive(fd: RawFd, mut to: *mut u8, mut left: usize) -> Result<(), Bro
 }
 
 /// Bytes transferred by a call; 0 after a signal.
-fn progress(result: isize) -> Result<usize, Broken> {
+fn progress(result: isize) -> Result<usize, ConnectionLost> {
     match usize::try_from(result) {
         Ok(bytes) => Ok(bytes),
         Err(_) if std::io::Error::last_os_error().kind() == std::io::ErrorKind::Interrupted => {
             Ok(0)
         }
-        Err(_) => Err(Broken),
+        Err(_) => Err(ConnectionLost),
     }
 }
 
@@ -121,9 +121,9 @@ mod tests {
         let argument = memory.as_mut_ptr();
         let address = argument.expose_provenance();
         let emulator = thread::spawn(move || {
-            let mut asked = [0; 24];
-            theirs.read_exact(&mut asked).unwrap();
-            assert_eq!(asked[..], words([IOCTL, 7, address]));
+            let mut requested = [0; 24];
+            theirs.read_exact(&mut requested).unwrap();
+            assert_eq!(requested[..], words([IOCTL, 7, address]));
             theirs.write_all(&words([READ_MEM, address, 8])).unwrap();
             let mut read = [0; 8];
             theirs.read_exact(&mut read).unwrap();
@@ -145,6 +145,6 @@ mod tests {
         drop(theirs);
         // SAFETY: no memory is accessed.
         let result = unsafe { ioctl(&ours, 7, std::ptr::null_mut()) };
-        assert_eq!(result, Err(Broken));
+        assert_eq!(result, Err(ConnectionLost));
     }
 }

@@ -23,11 +23,11 @@ impl Rule {
     /// The rule with one false alarm per `every` nights, for `series` two-sided charts together.
     #[must_use]
     pub fn of(nights: usize, series: usize, every: f64) -> Self {
-        let wanted = every * 2.0 * series.max(1) as f64;
+        let required = every * 2.0 * series.max(1) as f64;
         let (mut low, mut high) = (0.0, 8.0);
         for _ in 0..60 {
             let limit = f64::midpoint(low, high);
-            if (Self { nights, limit }).mean_run_length(0.0) < wanted {
+            if (Self { nights, limit }).mean_run_length(0.0) < required {
                 low = limit;
             } else {
                 high = limit;

@@ -43,8 +43,12 @@ fn delay(seed: u64, series: &'static str, spread: f64, from: usize, factor: f64)
     let chart = chart(&report, series);
     let raised = chart.excursions.iter().map(|e| e.raised);
     let raised = raised.filter(|night| *night >= first).min()?;
-    let made = chart.nights.iter();
-    Some(made.filter(|n| (first..=raised).contains(&n.night)).count())
+    let created = chart.nights.iter();
+    Some(
+        created
+            .filter(|n| (first..=raised).contains(&n.night))
+            .count(),
+    )
 }
 
 /// Index of the first night of the history on or after the calendar's `day`.

@@ -203,7 +203,7 @@ struct Metric {
 }
 
 /// A value drawn for a night.
-pub(crate) struct Drawn<'a> {
+pub(crate) struct DrawnValue<'a> {
     pub name: &'a str,
     pub unit: &'static str,
     pub value: f64,
@@ -249,7 +249,7 @@ impl Bench {
     }
 
     /// Draws the values of night number `at`; `None`: the night is missing.
-    pub(crate) fn night(&mut self, at: usize) -> Option<Vec<Drawn<'_>>> {
+    pub(crate) fn night(&mut self, at: usize) -> Option<Vec<DrawnValue<'_>>> {
         let Self {
             random,
             metrics,
@@ -268,7 +268,7 @@ impl Bench {
             }
             // The lamps were off: the values are meaningless.
             let is_wrong = invalid && metric.name.starts_with("golden");
-            Drawn {
+            DrawnValue {
                 name: &metric.name,
                 unit: metric.unit,
                 value: if is_wrong { value * 0.2 } else { value },

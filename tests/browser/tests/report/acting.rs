@@ -3,20 +3,20 @@
 use serde_json::{Value, json};
 use skinrig_browser::Page;
 
-use crate::{Session, counted, keep, with_report};
+use crate::{Session, counted, save_picture, with_report};
 
 /// Content of the inspector as name and value; camera values are prefixed with their camera.
 fn inspected(page: &mut Page<'_>) -> Vec<(String, String)> {
     let read = "(() => { let camera = ''; return [...document.querySelectorAll('#inspect dt')].map(dt => { \
         if (dt.className === 'head') { camera = dt.textContent + ' '; return null; } \
         return [camera + dt.textContent, dt.nextElementSibling.textContent]; }).filter(Boolean); })()";
-    let rows = page.ask(read).unwrap();
+    let rows = page.evaluate(read).unwrap();
     let text = |v: &Value| v.as_str().unwrap().to_owned();
     let rows = rows.as_array().unwrap().iter();
     rows.map(|r| (text(&r[0]), text(&r[1]))).collect()
 }
 
-fn said(rows: &[(String, String)], name: &str) -> String {
+fn row_text(rows: &[(String, String)], name: &str) -> String {
     let row = rows.iter().find(|r| r.0 == name);
     row.unwrap_or_else(|| panic!("no {name} in {rows:?}"))
         .1
@@ -25,17 +25,20 @@ fn said(rows: &[(String, String)], name: &str) -> String {
 
 /// The inspector shows the same values as the results for the press that it names.
 fn agrees(session: &Session, rows: &[(String, String)]) {
-    let number: u64 = said(rows, "press").parse().unwrap();
+    let number: u64 = row_text(rows, "press").parse().unwrap();
     let press = session
         .presses()
         .iter()
         .find(|p| p["press"] == number)
         .unwrap();
     assert_eq!(
-        said(rows, "depth (mm)"),
+        row_text(rows, "depth (mm)"),
         press["depth_mm"].to_string().trim_end_matches(".0")
     );
-    assert_eq!(said(rows, "verdict"), press["verdict"].as_str().unwrap());
+    assert_eq!(
+        row_text(rows, "verdict"),
+        press["verdict"].as_str().unwrap()
+    );
     for k in 0..2 {
         let view = &press["views"][k];
         for (name, key) in [
@@ -44,7 +47,7 @@ fn agrees(session: &Session, rows: &[(String, String)]) {
             ("of them ON", "on_events"),
         ] {
             assert_eq!(
-                said(rows, &format!("camera {} {name}", k + 1)),
+                row_text(rows, &format!("camera {} {name}", k + 1)),
                 view[key].to_string()
             );
         }
@@ -59,11 +62,11 @@ fn a_press_that_is_pointed_at_shows_its_numbers() {
         let rows = inspected(page);
         agrees(session, &rows);
         assert_eq!(
-            page.ask("document.querySelectorAll('#skin-map .selection *').length")
+            page.evaluate("document.querySelectorAll('#skin-map .selection *').length")
                 .unwrap(),
             json!(3)
         );
-        keep(page, "hover", false);
+        save_picture(page, "hover", false);
         page.hover("h1").unwrap();
         assert!(inspected(page).is_empty());
     });
@@ -72,7 +75,7 @@ fn a_press_that_is_pointed_at_shows_its_numbers() {
 #[test]
 fn the_keyboard_walks_from_press_to_press() {
     with_report(|page, session| {
-        page.ask("document.querySelector('[data-figure=skin-map] .canvas').focus()")
+        page.evaluate("document.querySelector('[data-figure=skin-map] .canvas').focus()")
             .unwrap();
         page.key("ArrowRight").unwrap();
         let first = inspected(page);
@@ -80,7 +83,7 @@ fn the_keyboard_walks_from_press_to_press() {
         page.key("ArrowRight").unwrap();
         let second = inspected(page);
         agrees(session, &second);
-        assert_ne!(said(&first, "press"), said(&second, "press"));
+        assert_ne!(row_text(&first, "press"), row_text(&second, "press"));
         page.key("End").unwrap();
         let last = session
             .presses()
@@ -88,7 +91,10 @@ fn the_keyboard_walks_from_press_to_press() {
             .rev()
             .find(|p| p["role"] == "score")
             .unwrap();
-        assert_eq!(said(&inspected(page), "press"), last["press"].to_string());
+        assert_eq!(
+            row_text(&inspected(page), "press"),
+            last["press"].to_string()
+        );
         page.key("Escape").unwrap();
         assert!(inspected(page).is_empty());
     });
@@ -96,7 +102,7 @@ fn the_keyboard_walks_from_press_to_press() {
 
 /// Selects a filter value as in its list.
 fn choose(page: &mut Page<'_>, filter: &str, value: &str) {
-    page.ask(&format!(
+    page.evaluate(&format!(
         "(() => {{ const s = document.querySelector('[data-testid=filter-{filter}]'); s.value = {}; \
          if (s.value !== {0}) throw new Error('no such choice'); s.dispatchEvent(new Event('input', {{ bubbles: true }})); }})()",
         json!(value)
@@ -114,20 +120,20 @@ fn pieces(page: &mut Page<'_>, path: &str) -> usize {
 }
 
 /// The table and every linked figure show exactly these presses.
-fn shows(page: &mut Page<'_>, session: &Session, like: impl Fn(&Value) -> bool) {
+fn assert_shown(page: &mut Page<'_>, session: &Session, like: impl Fn(&Value) -> bool) {
     let n = session.count(&like);
     let state = page
         .text("document.querySelector('#filter-state').textContent")
         .unwrap();
     let all = session.presses().len();
-    let wanted = match n {
+    let expected = match n {
         0 => "no press matches".to_owned(),
         n if n == all => format!("all {all} presses"),
         n => format!("{n} of {all} presses"),
     };
-    assert_eq!(state, wanted);
+    assert_eq!(state, expected);
     let rows = "document.querySelectorAll('#press-table tbody tr').length";
-    assert_eq!(page.ask(rows).unwrap(), json!(n.min(50)));
+    assert_eq!(page.evaluate(rows).unwrap(), json!(n.min(50)));
     if n > 0 {
         let pager = page
             .text("document.querySelector('#page-state').textContent")
@@ -147,7 +153,7 @@ fn shows(page: &mut Page<'_>, session: &Session, like: impl Fn(&Value) -> bool) 
         session.count(|p| like(p) && !p["timing"].is_null())
     );
     let discs = page
-        .ask("document.querySelectorAll('#skin-map .locations circle:not(.off-layer)').length")
+        .evaluate("document.querySelectorAll('#skin-map .locations circle:not(.off-layer)').length")
         .unwrap();
     let places: std::collections::BTreeSet<String> = session
         .presses()
@@ -163,17 +169,17 @@ fn shows(page: &mut Page<'_>, session: &Session, like: impl Fn(&Value) -> bool) 
     assert_eq!(steps.matches('V').count(), located);
     let heights = "Math.round([...document.querySelectorAll('#error-distribution .bars rect')].reduce((sum, r) => sum + Number(r.getAttribute('height')), 0) \
         / (([from, to, start, end]) => (start - end) / (to - from))(document.querySelectorAll('#error-distribution .plot')[1].dataset.y.split(' ').map(Number)))";
-    assert_eq!(page.ask(heights).unwrap(), json!(located));
+    assert_eq!(page.evaluate(heights).unwrap(), json!(located));
 }
 
 #[test]
 fn a_filter_takes_the_same_presses_out_of_table_and_figures() {
     with_report(|page, session| {
-        shows(page, session, |_| true);
+        assert_shown(page, session, |_| true);
         choose(page, "depth", "2");
-        shows(page, session, |p| p["depth_mm"] == 2.0);
+        assert_shown(page, session, |p| p["depth_mm"] == 2.0);
         choose(page, "repetition", "2");
-        shows(page, session, |p| {
+        assert_shown(page, session, |p| {
             p["depth_mm"] == 2.0 && p["repetition"] == 2
         });
         let foot = page
@@ -183,17 +189,17 @@ fn a_filter_takes_the_same_presses_out_of_table_and_figures() {
             foot.contains("depth (mm) 2") && foot.contains("repetition 2"),
             "{foot}"
         );
-        keep(page, "filtered", true);
+        save_picture(page, "filtered", true);
         choose(page, "role", "calibrate");
-        shows(page, session, |_| false);
+        assert_shown(page, session, |_| false);
         page.click("[data-testid=filter-reset]").unwrap();
-        shows(page, session, |_| true);
+        assert_shown(page, session, |_| true);
         choose(page, "outcome", "located");
-        shows(page, session, |p| {
+        assert_shown(page, session, |p| {
             p["location_outcome"]["status"] == "located"
         });
         assert_eq!(
-            page.ask("document.querySelector('#filter-state').ariaLive")
+            page.evaluate("document.querySelector('#filter-state').ariaLive")
                 .unwrap(),
             "polite"
         );
@@ -214,7 +220,7 @@ fn the_table_sorts_and_a_row_selects_its_press() {
                     .unwrap(),
                 order
             );
-            let errors = page.ask(column).unwrap();
+            let errors = page.evaluate(column).unwrap();
             let errors = errors.as_array().unwrap().iter();
             let errors: Vec<f64> = errors.filter_map(|e| e.as_str()?.parse().ok()).collect();
             assert!(
@@ -229,7 +235,7 @@ fn the_table_sorts_and_a_row_selects_its_press() {
         let row = page
             .text("document.querySelector('#press-table tr[aria-selected=true] th').textContent")
             .unwrap();
-        assert_eq!(said(&rows, "press"), row);
+        assert_eq!(row_text(&rows, "press"), row);
     });
 }
 
@@ -255,12 +261,12 @@ fn event_rates_zoom_by_button_key_and_wheel_and_back() {
             "{whole:?} {half:?}"
         );
         let drawn = "Number(document.querySelector('#event-rates .zoomed').getAttribute('transform').match(/scale\\((\\S+)/)[1])";
-        let scale = page.ask(drawn).unwrap().as_f64().unwrap();
+        let scale = page.evaluate(drawn).unwrap().as_f64().unwrap();
         assert!((scale - 2.0).abs() < 1e-6, "{scale}");
         page.click("[data-zoom=right]").unwrap();
         assert!(range(page).0 > half.0);
-        keep(page, "zoomed", false);
-        page.ask("document.querySelector('[data-figure=event-rates] .canvas').focus()")
+        save_picture(page, "zoomed", false);
+        page.evaluate("document.querySelector('[data-figure=event-rates] .canvas').focus()")
             .unwrap();
         page.key("+").unwrap();
         assert!((span(range(page)) / span(whole) - 0.25).abs() < 0.01);

@@ -8,13 +8,13 @@ use skinrig_browser::{Browser, BrowserError, Page, Size};
 
 use crate::downloads::{AT_A_TIME, buttons, rows};
 use crate::reading::{LIGHTNESS, complaints, identifiers, misfits};
-use crate::{keep, kept_folder, skinrig};
+use crate::{picture_folder, save_picture, skinrig};
 
 /// Page that compares two simulated skins.
 fn comparison() -> &'static PathBuf {
     static PAGE: OnceLock<PathBuf> = OnceLock::new();
     PAGE.get_or_init(|| {
-        let folder = kept_folder().join("comparison");
+        let folder = picture_folder().join("comparison");
         let _ = std::fs::remove_dir_all(&folder);
         let skins = ["one", "two"].map(|skin| {
             let to = folder.join(skin).to_str().unwrap().to_owned();
@@ -57,7 +57,7 @@ fn with_comparison(test: impl FnOnce(&mut Page<'_>)) {
 }
 
 #[test]
-fn it_loads_without_a_word_and_says_whether_the_skins_may_be_compared() {
+fn it_loads_without_console_output_and_states_comparability() {
     with_comparison(|page| {
         let found = complaints(page, ".html");
         assert!(found.is_empty(), "{found:#?}");
@@ -65,10 +65,10 @@ fn it_loads_without_a_word_and_says_whether_the_skins_may_be_compared() {
             let bottom = format!(
                 "document.querySelector('[data-testid={card}]').getBoundingClientRect().bottom"
             );
-            let bottom = page.ask(&bottom).unwrap().as_f64().unwrap();
+            let bottom = page.evaluate(&bottom).unwrap().as_f64().unwrap();
             assert!(bottom <= f64::from(Size::LAPTOP.height), "{card}: {bottom}");
         }
-        keep(page, "comparison-light", true);
+        save_picture(page, "comparison-light", true);
     });
 }
 
@@ -76,7 +76,7 @@ fn it_loads_without_a_word_and_says_whether_the_skins_may_be_compared() {
 fn every_figure_and_table_can_be_taken_out() {
     with_comparison(|page| {
         let figures = page
-            .ask("document.querySelectorAll('svg.fig').length")
+            .evaluate("document.querySelectorAll('svg.fig').length")
             .unwrap();
         let drawings = buttons(page, "svg");
         assert_eq!(json!(drawings.len()), figures);
@@ -110,20 +110,22 @@ fn it_is_dark_prints_and_fits_a_phone() {
     with_comparison(|page| {
         page.media("", "dark").unwrap();
         let body = format!("{LIGHTNESS}(getComputedStyle(document.body).backgroundColor)");
-        assert!(page.ask(&body).unwrap().as_f64().unwrap() < 60.0);
-        keep(page, "comparison-dark", true);
+        assert!(page.evaluate(&body).unwrap().as_f64().unwrap() < 60.0);
+        save_picture(page, "comparison-dark", true);
         page.click("#theme").unwrap();
-        assert!(page.ask(&body).unwrap().as_f64().unwrap() > 200.0);
+        assert!(page.evaluate(&body).unwrap().as_f64().unwrap() > 200.0);
         let pdf = page.pdf().unwrap();
         assert!(pdf.starts_with(b"%PDF-"));
-        std::fs::write(kept_folder().join("comparison.pdf"), &pdf).unwrap();
+        std::fs::write(picture_folder().join("comparison.pdf"), &pdf).unwrap();
         page.resize(Size::PHONE).unwrap();
-        let width = page.ask("document.documentElement.scrollWidth").unwrap();
+        let width = page
+            .evaluate("document.documentElement.scrollWidth")
+            .unwrap();
         assert!(
             width.as_u64().unwrap() <= u64::from(Size::PHONE.width),
             "{width}"
         );
-        keep(page, "comparison-phone", true);
+        save_picture(page, "comparison-phone", true);
         let found = misfits(page);
         assert!(found.is_empty(), "{found:#?}");
         let found = identifiers(page);

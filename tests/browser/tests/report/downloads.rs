@@ -23,7 +23,7 @@ pub(crate) const AT_A_TIME: usize = 8;
 
 pub(crate) fn buttons(page: &mut Page<'_>, kind: &str) -> Vec<String> {
     let found = page
-        .ask(&format!("[...document.querySelectorAll('[data-save={kind}]')].map(b => b.closest('[data-figure]').dataset.figure)"))
+        .evaluate(&format!("[...document.querySelectorAll('[data-save={kind}]')].map(b => b.closest('[data-figure]').dataset.figure)"))
         .unwrap();
     let found = found.as_array().unwrap().iter();
     found.map(|f| f.as_str().unwrap().to_owned()).collect()
@@ -33,7 +33,7 @@ pub(crate) fn buttons(page: &mut Page<'_>, kind: &str) -> Vec<String> {
 fn every_figure_is_a_drawing_of_its_own_and_names_its_session() {
     with_report(|page, session| {
         let figures = page
-            .ask("document.querySelectorAll('svg.fig').length")
+            .evaluate("document.querySelectorAll('svg.fig').length")
             .unwrap();
         let all = buttons(page, "svg");
         assert_eq!(json!(all.len()), figures);
@@ -55,7 +55,7 @@ fn every_figure_is_a_drawing_of_its_own_and_names_its_session() {
             );
             assert!(!text.contains("var("), "{figure} needs the page's style");
             let parsed = page
-                .ask(&format!(
+                .evaluate(&format!(
                     "(() => {{ const d = new DOMParser().parseFromString({}, 'image/svg+xml'); \
                      return [d.documentElement.localName, d.querySelectorAll('parsererror').length, d.querySelectorAll('text').length]; }})()",
                     json!(text)
@@ -91,22 +91,22 @@ fn every_figure_gives_its_data() {
                 head.iter().all(|h| !h.is_empty()) && n > 0,
                 "{figure}: {head:?}, {n} rows"
             );
-            let wanted = match figure.as_str() {
+            let expected = match figure.as_str() {
                 "skin-map" | "press-table" | "error-scatter" => session.presses().len(),
                 "error-distribution" => session.count(counted),
                 "models" => length(&a["calibration"]["compared"]),
                 "latency-onsets" => length(&a["latency"]["onsets"]),
                 _ => continue,
             };
-            assert_eq!(n, wanted, "{figure}");
+            assert_eq!(n, expected, "{figure}");
         }
     });
 }
 
 #[test]
-fn data_that_are_filtered_are_downloaded_filtered_and_say_so() {
+fn filtered_data_are_downloaded_filtered_and_labelled() {
     with_report(|page, session| {
-        page.ask("(() => { const s = document.querySelector('[data-testid=filter-depth]'); s.value = '1'; s.dispatchEvent(new Event('input')); })()")
+        page.evaluate("(() => { const s = document.querySelector('[data-testid=filter-depth]'); s.value = '1'; s.dispatchEvent(new Event('input')); })()")
             .unwrap();
         let shallow = |p: &Value| p["depth_mm"] == 1.0;
         let (name, bytes) = page.download("[data-testid=press-table-csv]").unwrap();

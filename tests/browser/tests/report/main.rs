@@ -48,7 +48,7 @@ fn counted(press: &Value) -> bool {
         && press["location_outcome"]["at"].is_object()
 }
 
-fn kept_folder() -> PathBuf {
+fn picture_folder() -> PathBuf {
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap();
     target.join("browser")
 }
@@ -63,7 +63,7 @@ fn skinrig(arguments: &[&str]) {
 fn session() -> &'static Session {
     static SESSION: OnceLock<Session> = OnceLock::new();
     SESSION.get_or_init(|| {
-        let folder = kept_folder().join("session");
+        let folder = picture_folder().join("session");
         let _ = std::fs::remove_dir_all(&folder);
         let protocol = concat!(
             env!("CARGO_MANIFEST_DIR"),
@@ -116,8 +116,8 @@ fn with_report(test: impl FnOnce(&mut Page<'_>, &Session)) {
 }
 
 /// Saves a screenshot of the page.
-fn keep(page: &mut Page<'_>, name: &str, whole: bool) {
-    let folder = kept_folder();
+fn save_picture(page: &mut Page<'_>, name: &str, whole: bool) {
+    let folder = picture_folder();
     std::fs::create_dir_all(&folder).unwrap();
     let picture = page.picture(whole).unwrap();
     std::fs::write(folder.join(format!("{name}.png")), picture).unwrap();

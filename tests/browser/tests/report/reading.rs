@@ -3,7 +3,7 @@
 use serde_json::json;
 use skinrig_browser::{Page, Size};
 
-use crate::{keep, kept_folder, with_report};
+use crate::{picture_folder, save_picture, with_report};
 
 /// All errors and warnings of a page, and all requests except for itself.
 pub(crate) fn complaints(page: &mut Page<'_>, own_ending: &str) -> Vec<String> {
@@ -23,12 +23,12 @@ pub(crate) fn complaints(page: &mut Page<'_>, own_ending: &str) -> Vec<String> {
 }
 
 #[test]
-fn it_loads_without_a_word_and_asks_nobody() {
+fn it_loads_without_console_output_or_requests() {
     with_report(|page, session| {
-        assert_eq!(page.ask("document.readyState").unwrap(), "complete");
+        assert_eq!(page.evaluate("document.readyState").unwrap(), "complete");
         let rows = "document.querySelectorAll('#press-table tbody tr').length";
         assert_eq!(
-            page.ask(rows).unwrap(),
+            page.evaluate(rows).unwrap(),
             json!(session.presses().len().min(50))
         );
         // Every part of the script ran: the last one writes this.
@@ -40,15 +40,18 @@ fn it_loads_without_a_word_and_asks_nobody() {
         let found = complaints(page, ".report.html");
         assert!(found.is_empty(), "{found:#?}");
         // The page's policy blocks everything except its own script.
-        page.ask("document.body.insertAdjacentHTML('beforeend', '<img src=x onerror=\"window.ran = 1\">')")
+        page.evaluate("document.body.insertAdjacentHTML('beforeend', '<img src=x onerror=\"window.ran = 1\">')")
             .unwrap();
-        page.ask("new Promise(done => setTimeout(done, 50))")
+        page.evaluate("new Promise(done => setTimeout(done, 50))")
             .unwrap();
         assert!(
             !complaints(page, ".report.html").is_empty(),
             "the complaints are not seen"
         );
-        assert_eq!(page.ask("window.ran === undefined").unwrap(), json!(true));
+        assert_eq!(
+            page.evaluate("window.ran === undefined").unwrap(),
+            json!(true)
+        );
         let eval = json!({ "expression": "eval('1')", "allowUnsafeEvalBlockedByCSP": false });
         let answer = page.call("Runtime.evaluate", eval).unwrap();
         assert!(answer["exceptionDetails"].is_object(), "{answer}");
@@ -68,13 +71,13 @@ fn provenance_faults_and_exclusions_stand_on_the_first_screen() {
             let bottom = format!(
                 "document.querySelector('[data-testid={card}]').getBoundingClientRect().bottom"
             );
-            let bottom = page.ask(&bottom).unwrap().as_f64().unwrap();
+            let bottom = page.evaluate(&bottom).unwrap().as_f64().unwrap();
             assert!(bottom <= f64::from(Size::LAPTOP.height), "{card}: {bottom}");
         }
         let block = page
             .text("document.querySelector('[data-testid=provenance]').textContent")
             .unwrap();
-        let wanted = &session.results["provenance"];
+        let expected = &session.results["provenance"];
         for key in [
             "session_id",
             "protocol_sha256",
@@ -84,15 +87,15 @@ fn provenance_faults_and_exclusions_stand_on_the_first_screen() {
             "operator",
         ] {
             assert!(
-                block.contains(wanted[key].as_str().unwrap()),
+                block.contains(expected[key].as_str().unwrap()),
                 "{key}: {block}"
             );
         }
         // Nothing overflows its card.
         let wide = "[...document.querySelectorAll('.first .card')].filter(c => c.scrollWidth > c.clientWidth).length";
-        assert_eq!(page.ask(wide).unwrap(), json!(0));
-        keep(page, "first-screen", false);
-        keep(page, "light", true);
+        assert_eq!(page.evaluate(wide).unwrap(), json!(0));
+        save_picture(page, "first-screen", false);
+        save_picture(page, "light", true);
     });
 }
 
@@ -100,7 +103,9 @@ fn provenance_faults_and_exclusions_stand_on_the_first_screen() {
 fn headings_landmarks_and_tables_are_in_order() {
     with_report(|page, _| {
         let levels = page
-            .ask("[...document.querySelectorAll('h1,h2,h3,h4')].map(h => Number(h.tagName[1]))")
+            .evaluate(
+                "[...document.querySelectorAll('h1,h2,h3,h4')].map(h => Number(h.tagName[1]))",
+            )
             .unwrap();
         let levels: Vec<u64> = levels
             .as_array()
@@ -125,24 +130,24 @@ fn headings_landmarks_and_tables_are_in_order() {
             "form[role=search][aria-label]",
         ] {
             let n = page
-                .ask(&format!("document.querySelectorAll('{landmark}').length"))
+                .evaluate(&format!("document.querySelectorAll('{landmark}').length"))
                 .unwrap();
             assert_eq!(n, json!(1), "{landmark}");
         }
         let bare = "[...document.querySelectorAll('th')].filter(th => !th.scope).length";
-        assert_eq!(page.ask(bare).unwrap(), json!(0));
+        assert_eq!(page.evaluate(bare).unwrap(), json!(0));
         let uncaptioned = "[...document.querySelectorAll('table')].filter(t => !t.caption).length";
-        assert_eq!(page.ask(uncaptioned).unwrap(), json!(0));
+        assert_eq!(page.evaluate(uncaptioned).unwrap(), json!(0));
         let untold = "[...document.querySelectorAll('svg.fig')].filter(s => !s.querySelector('title')?.textContent || !s.querySelector('desc')?.textContent).length";
-        assert_eq!(page.ask(untold).unwrap(), json!(0));
+        assert_eq!(page.evaluate(untold).unwrap(), json!(0));
         // The first tab stop skips the header, and is visible.
         page.key("Tab").unwrap();
         assert_eq!(
-            page.ask("document.activeElement.className").unwrap(),
+            page.evaluate("document.activeElement.className").unwrap(),
             "skip"
         );
         assert!(
-            page.ask("document.activeElement.getBoundingClientRect().left")
+            page.evaluate("document.activeElement.getBoundingClientRect().left")
                 .unwrap()
                 .as_f64()
                 .unwrap()
@@ -173,7 +178,7 @@ fn everything_that_can_be_used_has_a_name() {
             "image",
             "search",
         ];
-        let mut seen = std::collections::BTreeMap::<&str, u32>::new();
+        let mut observed = std::collections::BTreeMap::<&str, u32>::new();
         for node in nodes.iter().filter(|n| n["ignored"] != true) {
             let role = node["role"]["value"].as_str().unwrap_or_default();
             let Some(role) = used.iter().find(|r| **r == role) else {
@@ -187,7 +192,7 @@ fn everything_that_can_be_used_has_a_name() {
             }
             let name = node["name"]["value"].as_str().unwrap_or_default();
             assert!(!name.trim().is_empty(), "a {role} without a name: {node}");
-            *seen.entry(role).or_default() += 1;
+            *observed.entry(role).or_default() += 1;
         }
         for role in [
             "button",
@@ -197,10 +202,10 @@ fn everything_that_can_be_used_has_a_name() {
             "spinbutton",
             "image",
         ] {
-            assert!(seen.contains_key(role), "no {role} among {seen:?}");
+            assert!(observed.contains_key(role), "no {role} among {observed:?}");
         }
         let still = "document.getAnimations().length";
-        assert_eq!(page.ask(still).unwrap(), json!(0));
+        assert_eq!(page.evaluate(still).unwrap(), json!(0));
     });
 }
 
@@ -215,12 +220,12 @@ fn dark_follows_the_system_and_the_button() {
             let figure = format!(
                 "{LIGHTNESS}(getComputedStyle(document.querySelector('#skin-map')).backgroundColor)"
             );
-            [body, figure].map(|what| page.ask(&what).unwrap().as_f64().unwrap())
+            [body, figure].map(|what| page.evaluate(&what).unwrap().as_f64().unwrap())
         };
         assert!(lightness(page).iter().all(|l| *l > 200.0));
         page.media("", "dark").unwrap();
         assert!(lightness(page).iter().all(|l| *l < 60.0));
-        keep(page, "dark", true);
+        save_picture(page, "dark", true);
         page.click("#theme").unwrap();
         assert!(lightness(page).iter().all(|l| *l > 200.0));
         page.click("#theme").unwrap();
@@ -229,10 +234,10 @@ fn dark_follows_the_system_and_the_button() {
 }
 
 #[test]
-fn it_prints_and_leaves_out_what_paper_cannot_do() {
+fn the_print_view_omits_interactive_parts() {
     with_report(|page, _| {
         let pdf = page.pdf().unwrap();
-        std::fs::write(kept_folder().join("print.pdf"), &pdf).unwrap();
+        std::fs::write(picture_folder().join("print.pdf"), &pdf).unwrap();
         let text = String::from_utf8_lossy(&pdf);
         let pages = text.matches("/Type /Page").count() - text.matches("/Type /Pages").count();
         assert!(
@@ -255,12 +260,14 @@ fn it_prints_and_leaves_out_what_paper_cannot_do() {
 fn a_phone_scrolls_one_way_only() {
     with_report(|page, _| {
         page.resize(Size::PHONE).unwrap();
-        let width = page.ask("document.documentElement.scrollWidth").unwrap();
+        let width = page
+            .evaluate("document.documentElement.scrollWidth")
+            .unwrap();
         assert!(
             width.as_u64().unwrap() <= u64::from(Size::PHONE.width),
             "{width}"
         );
-        keep(page, "phone", true);
+        save_picture(page, "phone", true);
         let found = misfits(page);
         assert!(found.is_empty(), "{found:#?}");
     });
@@ -290,7 +297,7 @@ pub(crate) fn misfits(page: &mut Page<'_>) -> Vec<String> {
         }
         return found;
     })()";
-    let found = page.ask(script).unwrap();
+    let found = page.evaluate(script).unwrap();
     let texts = found.as_array().unwrap().iter();
     texts.map(|t| t.as_str().unwrap().to_owned()).collect()
 }
@@ -309,7 +316,7 @@ pub(crate) fn identifiers(page: &mut Page<'_>) -> Vec<String> {
         }
         return found;
     })()";
-    let found = page.ask(script).unwrap();
+    let found = page.evaluate(script).unwrap();
     let texts = found.as_array().unwrap().iter();
     texts.map(|t| t.as_str().unwrap().to_owned()).collect()
 }
@@ -319,14 +326,16 @@ fn the_contents_stay_in_sight() {
     with_report(|page, _| {
         for size in [Size::LAPTOP, Size::PHONE] {
             page.resize(size).unwrap();
-            page.ask("document.querySelector('#session').scrollIntoView({ behavior: 'instant' })")
-                .unwrap();
+            page.evaluate(
+                "document.querySelector('#session').scrollIntoView({ behavior: 'instant' })",
+            )
+            .unwrap();
             let hit = "(() => { const a = document.querySelector('nav a').getBoundingClientRect(); \
                  return document.elementFromPoint(a.x + a.width / 2, a.y + a.height / 2)?.closest('nav') !== null; })()";
-            assert_eq!(page.ask(hit).unwrap(), json!(true), "{size:?}");
+            assert_eq!(page.evaluate(hit).unwrap(), json!(true), "{size:?}");
             let clear = "document.querySelector('#session-h').getBoundingClientRect().top \
                  >= document.querySelector('nav').getBoundingClientRect().bottom";
-            assert_eq!(page.ask(clear).unwrap(), json!(true), "{size:?}");
+            assert_eq!(page.evaluate(clear).unwrap(), json!(true), "{size:?}");
         }
     });
 }
@@ -337,9 +346,9 @@ fn tables_of_the_literature_open_on_request() {
         for id in ["comparison-msows", "comparison-skins", "comparison-sensors"] {
             let shown =
                 format!("document.querySelector('[data-testid={id}] table').checkVisibility()");
-            assert_eq!(page.ask(&shown).unwrap(), json!(false), "{id}");
+            assert_eq!(page.evaluate(&shown).unwrap(), json!(false), "{id}");
             page.click(&format!("[data-testid={id}] summary")).unwrap();
-            assert_eq!(page.ask(&shown).unwrap(), json!(true), "{id}");
+            assert_eq!(page.evaluate(&shown).unwrap(), json!(true), "{id}");
         }
     });
 }
@@ -387,6 +396,6 @@ fn it_can_be_read_without_its_script() {
         ] {
             assert!(named(name), "{name}");
         }
-        keep(page, "without-script", false);
+        save_picture(page, "without-script", false);
     });
 }

@@ -17,16 +17,16 @@ const SOON: Duration = Duration::from_millis(2);
 pub fn trigger_box(bytes: &[u8]) {
     let mut reader = FrameReader::default();
     for body in bytes.iter().filter_map(|b| reader.push(*b)) {
-        look(&body);
+        exercise(&body);
     }
     for body in bytes.chunks(frame::MAX_BODY) {
-        look(body);
+        exercise(body);
         assert!(frame::encode(body).is_some());
     }
     drive(bytes);
 }
 
-fn look(body: &[u8]) {
+fn exercise(body: &[u8]) {
     let answers = Reply::parse(body).map_or_else(|| body.to_vec(), |reply| reply.data);
     let _ = Hello::parse(&answers);
     let _ = Events::parse(&answers);

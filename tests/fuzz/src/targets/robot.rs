@@ -62,7 +62,7 @@ impl Hostile {
         }
     }
 
-    fn yes(&self, good: bool) -> bool {
+    fn succeeds_or(&self, good: bool) -> bool {
         self.take::<1>()
             .map_or(good, |[choice]| (choice % 4 == 1) != good)
     }
@@ -82,7 +82,7 @@ impl Hostile {
     fn reading(&self) -> CallResult<Reading> {
         Ok(Reading {
             position_m: self.vector()?,
-            cached: self.yes(false),
+            cached: self.succeeds_or(false),
         })
     }
 }
@@ -130,19 +130,19 @@ impl Sdk for Hostile {
         Ok(StatusVector::from_words(&words))
     }
     fn is_supported(&self, _: DeviceId) -> bool {
-        self.yes(true)
+        self.succeeds_or(true)
     }
     fn is_initialized(&self, _: DeviceId) -> bool {
-        self.yes(true)
+        self.succeeds_or(true)
     }
     fn auto_init(&self, _: DeviceId) -> CallResult<()> {
         self.done()
     }
     fn set(&self, _: DeviceId, _: Quantity, _: f64) -> Option<CallResult<()>> {
-        self.yes(true).then(|| self.done())
+        self.succeeds_or(true).then(|| self.done())
     }
     fn get(&self, _: DeviceId, _: Quantity) -> Option<CallResult<f64>> {
-        self.yes(true).then(|| self.real(0.0))
+        self.succeeds_or(true).then(|| self.real(0.0))
     }
     fn compensate_gravity(&self, _: DeviceId) -> CallResult<()> {
         self.done()
@@ -166,7 +166,7 @@ impl Sdk for Hostile {
         self.done()
     }
     fn is_running(&self, _: DeviceId) -> bool {
-        self.yes(false)
+        self.succeeds_or(false)
     }
     fn control_khz(&self, _: DeviceId) -> CallResult<f64> {
         self.real(4.0)
@@ -178,7 +178,7 @@ impl Sdk for Hostile {
         self.done()
     }
     fn is_filtering(&self, _: DeviceId) -> bool {
-        self.yes(true)
+        self.succeeds_or(true)
     }
     fn set_generator_limits(
         &self,

@@ -36,7 +36,7 @@ impl Counting {
         self.peak.load(Relaxed)
     }
 
-    fn more(&self, bytes: usize) {
+    fn add(&self, bytes: usize) {
         let held = self.held.fetch_add(bytes, Relaxed) + bytes;
         self.peak.fetch_max(held, Relaxed);
     }
@@ -53,7 +53,7 @@ unsafe impl GlobalAlloc for Counting {
         if layout.size() > REFUSED {
             return std::ptr::null_mut();
         }
-        self.more(layout.size());
+        self.add(layout.size());
         // SAFETY: the caller's promise about `layout` is the system's too.
         unsafe { System.alloc(layout) }
     }
@@ -62,7 +62,7 @@ unsafe impl GlobalAlloc for Counting {
         if layout.size() > REFUSED {
             return std::ptr::null_mut();
         }
-        self.more(layout.size());
+        self.add(layout.size());
         // SAFETY: as for `alloc`.
         unsafe { System.alloc_zeroed(layout) }
     }
@@ -78,7 +78,7 @@ unsafe impl GlobalAlloc for Counting {
             return std::ptr::null_mut();
         }
         self.less(layout.size());
-        self.more(size);
+        self.add(size);
         // SAFETY: `pointer` came from `alloc` here, that is from the system, with this layout; `size` is the caller's.
         unsafe { System.realloc(pointer, layout, size) }
     }

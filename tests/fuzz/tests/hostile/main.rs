@@ -52,7 +52,7 @@ fn watch() {
                 std::thread::sleep(Duration::from_secs(1));
                 let hanging = match &*lock(&CASE) {
                     Some((name, bytes, since)) if since.elapsed() > HANGS => {
-                        Some((name.clone(), keep(name, bytes)))
+                        Some((name.clone(), save_input(name, bytes)))
                     }
                     _ => None,
                 };
@@ -69,7 +69,7 @@ fn watch() {
 }
 
 /// Writes an input to a file, for inspection and the corpus.
-fn keep(name: &str, bytes: &[u8]) -> PathBuf {
+fn save_input(name: &str, bytes: &[u8]) -> PathBuf {
     let path = std::env::temp_dir().join(format!("skinrig-fuzz-{}.bin", name.replace(' ', "-")));
     std::fs::write(&path, bytes).expect("the temporary folder takes a file");
     path
@@ -92,7 +92,7 @@ fn run(target: &Target, name: &str, bytes: &[u8]) -> usize {
     *lock(&CASE) = None;
     let bound = target.bound.of(bytes.len());
     if ended.is_err() || PANICS.load(Relaxed) > panics || peak > bound {
-        let path = keep(name, bytes);
+        let path = save_input(name, bytes);
         panic!(
             "{name}: expected no panic and at most {bound} bytes of memory, found {} panic(s) and {peak} bytes for the input {}; \
              mend the reader, and add the input to tests/fuzz/corpus/{}",
@@ -136,7 +136,7 @@ fn hostile(name: &str) {
         if trace {
             eprintln!(
                 "{case}: {}",
-                keep(&format!("{name} last"), &bytes).display()
+                save_input(&format!("{name} last"), &bytes).display()
             );
         }
         largest = largest.max(run(&target, &case, &bytes));

@@ -83,7 +83,7 @@ impl Bench {
     }
 
     fn findings(&self) -> Vec<Finding> {
-        let machine = Machine::planted(self.folder.path(), self.free_b);
+        let machine = Machine::with_root(self.folder.path(), self.free_b);
         examine(&Case {
             machine: &machine,
             rig: self.rig.as_ref(),
@@ -95,7 +95,7 @@ impl Bench {
     }
 
     /// Area, check and verdict of each problem and warning.
-    fn wrong(&self) -> Vec<(&'static str, String, Verdict)> {
+    fn problems(&self) -> Vec<(&'static str, String, Verdict)> {
         let all = self.findings().into_iter();
         all.filter(|f| matches!(f.verdict, Verdict::Problem | Verdict::Warning))
             .map(|f| (f.area, f.check, f.verdict))
@@ -228,7 +228,7 @@ fn each_fault_has_exactly_its_own_finding() {
     for (name, fault, (area, check, verdict), next) in FAULTS {
         let mut bench = healthy();
         fault(&mut bench);
-        let wrong = bench.wrong();
+        let wrong = bench.problems();
         assert_eq!(wrong, [(*area, (*check).to_owned(), *verdict)], "{name}");
         let findings = bench.findings();
         let found = findings.iter().find(|f| f.verdict == *verdict).unwrap();
@@ -262,14 +262,14 @@ fn devices_of_a_held_bench_are_not_queried_and_its_holder_is_named() {
     assert!(bench::is_held(lease.path()));
     bench.survey.lines.clear();
     bench.survey.left_alone = true;
-    let wrong = bench.wrong();
+    let wrong = bench.problems();
     assert_eq!(wrong, [("bench", "lease".to_owned(), Verdict::Problem)]);
     let findings = bench.findings();
     let held = findings.iter().find(|f| f.verdict == Verdict::Problem);
     assert!(held.unwrap().found.contains("bob on lab"), "{held:?}");
     drop(lease);
     assert!(!bench::is_held(&bench.path(LEASE)));
-    assert_eq!(bench.wrong(), []);
+    assert_eq!(bench.problems(), []);
 }
 
 #[test]
@@ -279,7 +279,7 @@ fn without_the_library_the_device_file_shows_the_robots_permissions() {
         bench.mode(ROBOT_NODE, mode);
         bench.survey.library = Library::Absent(6);
         bench.survey.lines.remove(0);
-        let found = bench.wrong();
+        let found = bench.problems();
         assert_eq!(found.len(), wrong, "{mode:o}: {found:?}");
         let last = found.last().unwrap();
         assert_eq!((last.0, last.1.as_str()), ("versions", "robot library"));

@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use emulated_libdrd::{ArmState, Contact, Mode};
-use skinrig_emulated_bench::{EmulatedBench, Fault, When};
+use skinrig_emulated_bench::{ArmFault, EmulatedBench, When};
 
 use super::{start, workspace_root};
 
@@ -199,10 +199,10 @@ fn the_steps_of_a_first_contact_show_what_they_must() {
 fn the_share_of_gravity(steps: &mut Steps) {
     steps.center_arm();
     steps.write_rig("1 N", "0");
-    let (code, said) = steps.jog().end();
-    assert_eq!(code, Some(3), "{said}");
+    let (code, output) = steps.jog().end();
+    assert_eq!(code, Some(3), "{output}");
     for word in ["limits.max_force", "motor_force.gravity_ratio"] {
-        assert!(said.contains(word), "{word}: {said}");
+        assert!(output.contains(word), "{word}: {output}");
     }
     steps.wait_until_soft();
     steps.center_arm();
@@ -213,8 +213,8 @@ fn the_share_of_gravity(steps: &mut Steps) {
     let ratio: f64 = ratio.split_once(' ').unwrap().0.parse().unwrap();
     // The emulated arm compensates 0.115 kg of its 0.12 kg.
     assert!((0.08..0.11).contains(&ratio), "{note}");
-    let (code, said) = jog.end();
-    assert_eq!(code, Some(0), "{said}");
+    let (code, output) = jog.end();
+    assert_eq!(code, Some(0), "{output}");
     steps.write_rig("1 N", &ratio.to_string());
 }
 
@@ -233,12 +233,12 @@ fn axes_and_rest(steps: &mut Steps) {
     jog.wait_for_line("speed");
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
         for by_mm in [2.0, -2.0] {
-            let mut wanted = jog.position_after("where");
-            wanted[axis] += by_mm;
+            let mut expected = jog.position_after("where");
+            expected[axis] += by_mm;
             jog.position_after(&format!("{name} {by_mm:+}mm"));
             assert!(
-                near(wanted, steps.tip_mm()),
-                "{name} {by_mm:+}: {wanted:?} {:?}",
+                near(expected, steps.tip_mm()),
+                "{name} {by_mm:+}: {expected:?} {:?}",
                 steps.tip_mm()
             );
         }
@@ -253,23 +253,27 @@ fn axes_and_rest(steps: &mut Steps) {
         .sum::<f64>()
         .sqrt();
     assert!(drift < 0.05, "{before:?} {after:?}");
-    let (code, said) = jog.end();
-    assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("disarmed"), "{said}");
+    let (code, output) = jog.end();
+    assert_eq!(code, Some(0), "{output}");
+    assert!(output.contains("disarmed"), "{output}");
 }
 
 /// Steps 17 and 18.
 fn button_and_cable(steps: &mut Steps) {
-    for (fault, words) in [(Fault::Button, "button"), (Fault::Unplug, "USB")] {
+    for (fault, words) in [(ArmFault::Button, "button"), (ArmFault::Lost, "USB")] {
         let jog = steps.start_slow_rise();
         steps.bench.arm().inject(When::Now, fault).unwrap();
         steps.wait_until_soft();
-        let (code, said) = jog.end();
-        assert_eq!(code, Some(3), "{said}");
-        assert!(said.contains(words), "{words}: {said}");
-        if fault == Fault::Button {
+        let (code, output) = jog.end();
+        assert_eq!(code, Some(3), "{output}");
+        assert!(output.contains(words), "{words}: {output}");
+        if fault == ArmFault::Button {
             // Pressing the button again re-enables forces.
-            steps.bench.arm().inject(When::Now, Fault::Button).unwrap();
+            steps
+                .bench
+                .arm()
+                .inject(When::Now, ArmFault::Button)
+                .unwrap();
         }
     }
 }
@@ -284,8 +288,8 @@ fn a_program_that_dies_or_hangs(steps: &mut Steps) {
     signal(&jog, "-STOP");
     steps.wait_until_soft();
     signal(&jog, "-CONT");
-    let (code, said) = jog.end();
-    assert_eq!(code, Some(3), "{said}");
+    let (code, output) = jog.end();
+    assert_eq!(code, Some(3), "{output}");
 }
 
 fn signal(jog: &Jog, signal: &str) {
@@ -318,8 +322,8 @@ fn a_hand(steps: &mut Steps) {
     let ended = arm.wait_until(PATIENCE, |s| s.mode != Mode::Force);
     ended.unwrap();
     most_n = most_n.max(-arm.state().unwrap().contact_force_n[0]);
-    let (code, said) = jog.end();
-    assert_eq!(code, Some(3), "{said}");
+    let (code, output) = jog.end();
+    assert_eq!(code, Some(3), "{output}");
     assert!(most_n < 1.3, "{most_n} N");
-    assert!(said.contains("force"), "{said}");
+    assert!(output.contains("force"), "{output}");
 }

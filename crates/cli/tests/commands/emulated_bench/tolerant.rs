@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 
 use serde_json::Value;
-use skinrig_emulated_bench::{CAMERA_SERIALS, EmulatedBench, Order};
+use skinrig_emulated_bench::{CAMERA_SERIALS, DeviceCommand, EmulatedBench};
 use skinrig_model::{PressOutcome, PressVerdict, Setting};
 use skinrig_recorder::SessionReader;
 
@@ -63,7 +63,7 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
     };
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let order = |order: Order| {
+    let order = |order: DeviceCommand| {
         bench
             .bus()
             .remote()
@@ -71,9 +71,9 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
             .order(CAMERA_SERIALS[1], order)
             .unwrap();
     };
-    order(Order::FailReads(true));
-    order(Order::FailResets(true));
-    order(Order::Stick(BIAS));
+    order(DeviceCommand::FailReads(true));
+    order(DeviceCommand::FailResets(true));
+    order(DeviceCommand::IgnoreWrites(BIAS));
     let (one_press, strict) = (protocol(folder), rig(folder, ""));
     let run = |rig: &Path, name: &str, more: &[&str]| {
         let sessions = folder.join(name);
@@ -94,7 +94,7 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
     );
 
     // Tolerated once; a transfer fails during the run.
-    order(Order::BreakTransfer(60));
+    order(DeviceCommand::BreakTransfer(60));
     let (tolerant, sessions) = run(&strict, "tolerant", &["--tolerant"]);
     let printed = all_output(&tolerant);
     assert!(tolerant.status.success(), "{printed}");
@@ -201,7 +201,7 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
 
     // With the lines in the rig file: opened without a warning, failing transfers included.
     let accepting = rig(folder, &lines);
-    order(Order::BreakTransfer(60));
+    order(DeviceCommand::BreakTransfer(60));
     let (accepted, sessions) = run(&accepting, "accepted", &[]);
     let printed = all_output(&accepted);
     assert!(accepted.status.success(), "{printed}");

@@ -8,10 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde_json::Value;
-use skinrig_emulated_bench::{
-    BenchConfig, BenchError, CAMERA_SERIALS, EmulatedBench, Fault, Order, When,
-};
-use skinrig_model::CameraId;
+use skinrig_emulated_bench::{ArmFault, BenchConfig, BenchError, EmulatedBench, When};
+use skinrig_model::{CameraId, RigFault};
 
 use crate::emulated_bench::Slot;
 
@@ -179,13 +177,13 @@ impl Nights {
         self.edit_rig(line, &format!("    dark: [\"{program}\"]"));
     }
 
-    fn arm(&self, when: When, fault: Fault) {
-        self.bench.arm().inject(when, fault).unwrap();
+    fn inject(&mut self, fault: RigFault) {
+        self.bench.inject(fault).unwrap();
     }
 
-    fn camera(&self, camera: CameraId, order: Order) {
-        let remote = self.bench.bus().remote().unwrap();
-        remote.order(CAMERA_SERIALS[camera.index()], order).unwrap();
+    /// Injects a fault of the arm at a later time.
+    fn arm(&self, when: When, fault: ArmFault) {
+        self.bench.arm().inject(when, fault).unwrap();
     }
 }
 
@@ -245,14 +243,13 @@ fn a_healthy_bench_passes() {
 
 /// Broken limits without evidence point at the rig.
 #[test]
-fn broken_limits_that_nothing_explains_are_the_rig_s() {
-    let Some(nights) = Nights::start() else {
+fn unexplained_limit_failures_blame_the_rig() {
+    let Some(mut nights) = Nights::start() else {
         return;
     };
     nights.lamps_obey("true");
-    nights.camera(CameraId::One, Order::HotPixels(40));
-    let arm = nights.bench.arm();
-    arm.inject(When::Now, Fault::Friction(800.0)).unwrap();
+    nights.inject(RigFault::CameraStorm(CameraId::One));
+    nights.inject(RigFault::RobotSlow);
     let seen = nights.night("noise_dark,noise_lit,step_response");
     let metric_verdict = |check, subject, metric| seen.metric_verdict(check, subject, metric);
     for camera in ["camera1", "camera2"] {

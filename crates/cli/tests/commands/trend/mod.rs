@@ -63,7 +63,7 @@ fn links(page: &Path) -> Vec<String> {
 }
 
 #[test]
-fn the_terminal_says_what_moved_since_when_and_why() {
+fn the_terminal_lists_changes_with_date_and_cause() {
     let nights = Nights::of(40, 36);
     let trend = nights.trend(&["--ascii"]).code(1);
     assert_contains(
@@ -201,7 +201,7 @@ fn an_alarm_links_a_session_that_outlives_its_night_and_replays() {
 }
 
 #[test]
-fn an_accepted_change_is_learnt_anew_and_says_who_and_why() {
+fn an_accepted_change_restarts_the_reference_and_records_author_and_reason() {
     let nights = Nights::of(40, 36);
     let first = "2024-02-06T02-00-00Z-small";
     let before = std::fs::read(&nights.history).unwrap();
@@ -238,9 +238,9 @@ fn an_accepted_change_is_learnt_anew_and_says_who_and_why() {
         "--by",
         "ada",
     ];
-    let said = nights.accept(&taken).code(0);
+    let output = nights.accept(&taken).code(0);
     assert_eq!(
-        said.out.trim(),
+        output.out.trim(),
         format!("{EVENTS}: the reference restarts at night {first}")
     );
     let page = nights.lab.text("trends.html");
@@ -272,13 +272,13 @@ fn an_accepted_change_is_learnt_anew_and_says_who_and_why() {
         "--reason",
         "new skin",
     ];
-    let said = nights
+    let output = nights
         .accept(&[&["--json"], &all[..]].concat())
         .code(0)
         .json();
     assert!(
-        said["series"].is_null() && said["reason"] == "new skin",
-        "{said}"
+        output["series"].is_null() && output["reason"] == "new skin",
+        "{output}"
     );
     assert_contains(
         &nights.trend(&[]).code(0).out,
@@ -287,7 +287,7 @@ fn an_accepted_change_is_learnt_anew_and_says_who_and_why() {
 }
 
 #[test]
-fn the_page_of_a_night_says_what_moved_over_the_nights() {
+fn the_page_of_a_night_lists_the_trends() {
     let nights = Nights::new();
     let session = nights.lab.record("s", &[]);
     nights.add(0..36, 36, None);
@@ -358,7 +358,7 @@ fn an_alarm_that_is_raised_tonight_leads_to_tonight() {
 }
 
 #[test]
-fn a_night_without_trends_says_why_and_is_judged_all_the_same() {
+fn a_night_without_trends_gives_the_reason_and_is_still_judged() {
     let nights = Nights::of(10, 10);
     let shown = |folder: &Path| read(&folder.join("night.html"));
     let (ran, folder) = nights.run(&[]);

@@ -45,7 +45,7 @@ struct Shared {
     clock: RealClock,
     /// Whether a failed transfer is a loss instead of the end of the stream.
     failures_are_losses: bool,
-    flight: Mutex<Flight>,
+    flight: Mutex<PendingTransfers>,
     /// Notified when a transfer is not resubmitted, and when the event thread ends.
     landed: Condvar,
     /// Whether the event thread must end despite transfers in flight.
@@ -53,7 +53,7 @@ struct Shared {
 }
 
 #[derive(Default)]
-struct Flight {
+struct PendingTransfers {
     /// Transfers in flight.
     count: usize,
     /// Whether submission is disabled.
@@ -65,12 +65,12 @@ struct Flight {
 }
 
 impl Shared {
-    fn flight(&self) -> MutexGuard<'_, Flight> {
+    fn flight(&self) -> MutexGuard<'_, PendingTransfers> {
         self.flight.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Waits until `done` or the time limit, and returns the state.
-    fn wait(&self, done: impl Fn(&Flight) -> bool) -> MutexGuard<'_, Flight> {
+    fn wait(&self, done: impl Fn(&PendingTransfers) -> bool) -> MutexGuard<'_, PendingTransfers> {
         self.landed
             .wait_timeout_while(self.flight(), STOP_LIMIT, |f| !done(f))
             .unwrap_or_else(PoisonError::into_inner)
@@ -174,13 +174,13 @@ extern "system" fn completed(transfer: *mut libusb_transfer) {
             shared.inbox.lose_some(arrived);
             Ok(true)
         }
-        Ok(again) => {
+        Ok(resubmit) => {
             flight.failed = 0;
-            Ok(again)
+            Ok(resubmit)
         }
         ended => ended,
     };
-    let outcome = outcome.and_then(|again| match again && !flight.ending {
+    let outcome = outcome.and_then(|resubmit| match resubmit && !flight.ending {
         true => submit(transfer),
         false => Ok(false),
     });

@@ -45,8 +45,8 @@ fn each_kind_of_device_is_listed_with_its_next_step() {
             "never ask a Treuzell camera"
         );
         for device in all_kinds() {
-            let asked = remote.journal(device.serial()).unwrap();
-            assert!(asked.iter().all(|r| r.is_in), "listing must not write");
+            let requested = remote.journal(device.serial()).unwrap();
+            assert!(requested.iter().all(|r| r.is_in), "listing must not write");
         }
     });
 }
@@ -111,13 +111,13 @@ fn driver_waits_for_a_slow_start() {
 }
 
 #[test]
-fn whole_driver_keeps_the_contract() {
+fn the_driver_fulfils_the_contract() {
     // It is not published whether a camera's time restarts at every start; here it continues.
     let camera = Emulated {
         time_restarts: false,
         ..noise(FIRST)
     };
-    let test = "devices::whole_driver_keeps_the_contract";
+    let test = "devices::the_driver_fulfils_the_contract";
     on_bus(test, vec![camera.into()], |_| {
         let settings = CameraSettings {
             roi: Some(Roi {

@@ -1,8 +1,8 @@
 //! Faults: every wait ends, every fault is named, and the data before it is delivered.
 
 use skinrig_device::{CameraSettings, DeviceError, EventCamera, RealClock};
+use skinrig_emulated_camera::control::DeviceCommand;
 use skinrig_emulated_camera::harness::on_bus;
-use skinrig_emulated_camera::steer::Order;
 use skinrig_evk1::{Evk1, Evk1Config, FoundState, enumerate};
 use skinrig_model::CameraId;
 
@@ -16,7 +16,7 @@ fn a_disconnected_cable_is_named_and_the_camera_can_be_reopened() {
         camera.start().unwrap();
         let mut chunks = Vec::new();
         until(&mut camera, &mut chunks, |c| events(c) > 100).unwrap();
-        remote.order(FIRST, Order::Unplug).unwrap();
+        remote.order(FIRST, DeviceCommand::Unplug).unwrap();
         let lost = until(&mut camera, &mut chunks, |_| false).unwrap_err();
         assert!(
             lost.to_string()
@@ -26,12 +26,12 @@ fn a_disconnected_cable_is_named_and_the_camera_can_be_reopened() {
         camera.stop(&mut chunks).unwrap_err();
         camera.stop(&mut chunks).unwrap();
         camera.start().unwrap_err();
-        let handed = remote.observe(FIRST).unwrap().handed.bytes;
+        let delivered = remote.observe(FIRST).unwrap().delivered.bytes;
         let kept: usize = chunks.iter().map(|c| c.bytes.len()).sum();
         let lost: u64 = chunks.iter().map(|c| c.lost_before).sum();
-        assert_eq!(kept as u64 + lost, handed);
+        assert_eq!(kept as u64 + lost, delivered);
         drop(camera);
-        remote.order(FIRST, Order::Plug).unwrap();
+        remote.order(FIRST, DeviceCommand::Plug).unwrap();
         let mut camera = open(FIRST);
         camera.start().unwrap();
         until(&mut camera, &mut Vec::new(), |c| events(c) > 100).unwrap();
@@ -46,7 +46,7 @@ fn a_stall_ends_the_stream_and_the_next_start_clears_it() {
         camera.start().unwrap();
         let mut chunks = Vec::new();
         until(&mut camera, &mut chunks, |c| events(c) > 100).unwrap();
-        remote.order(FIRST, Order::Stall).unwrap();
+        remote.order(FIRST, DeviceCommand::Stall).unwrap();
         let lost = until(&mut camera, &mut chunks, |_| false).unwrap_err();
         assert!(lost.to_string().contains("the endpoint stalled"), "{lost}");
         camera.stop(&mut chunks).unwrap_err();
@@ -62,7 +62,9 @@ fn a_register_that_rejects_a_value_is_named() {
     let test = "faults::a_register_that_rejects_a_value_is_named";
     on_bus(test, vec![noise(FIRST).into()], |remote| {
         let mut camera = open(FIRST);
-        remote.order(FIRST, Order::Stick(0x0358)).unwrap();
+        remote
+            .order(FIRST, DeviceCommand::IgnoreWrites(0x0358))
+            .unwrap();
         let settings = CameraSettings {
             biases: [("bias_fo".to_owned(), 1600)].into(),
             ..CameraSettings::default()
@@ -80,7 +82,7 @@ fn an_unresponsive_camera_times_out() {
     let test = "faults::an_unresponsive_camera_times_out";
     on_bus(test, vec![noise(FIRST).into()], |remote| {
         let mut camera = open(FIRST);
-        remote.order(FIRST, Order::Silence(true)).unwrap();
+        remote.order(FIRST, DeviceCommand::Silence(true)).unwrap();
         let lost = camera.start().unwrap_err();
         assert!(
             lost.to_string().contains("no reply within the time limit"),
@@ -89,8 +91,8 @@ fn an_unresponsive_camera_times_out() {
         drop(camera);
         let found = enumerate().unwrap();
         assert!(matches!(found[0].state, FoundState::Faulty(_)), "{found:?}");
-        remote.order(FIRST, Order::Silence(false)).unwrap();
-        remote.order(FIRST, Order::FailReads(true)).unwrap();
+        remote.order(FIRST, DeviceCommand::Silence(false)).unwrap();
+        remote.order(FIRST, DeviceCommand::FailReads(true)).unwrap();
         let (config, clock) = (Evk1Config::default(), RealClock::start());
         let error = Evk1::open_serial(FIRST, CameraId::One, config, clock)
             .err()

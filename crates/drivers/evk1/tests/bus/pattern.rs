@@ -1,8 +1,8 @@
 //! The pattern generator: registers as in the reference, events in the pattern's order and rate.
 
 use skinrig_device::{CameraSettings, DeviceError, EventCamera, NoiseFilter, Roi, TestPattern};
+use skinrig_emulated_camera::control::DeviceCommand;
 use skinrig_emulated_camera::harness::on_bus;
-use skinrig_emulated_camera::steer::Order;
 use skinrig_formats::{Decoder, Geometry};
 use skinrig_model::{CdEvent, RawChunk, StreamFormat};
 
@@ -88,13 +88,15 @@ fn rejected_generator_settings_are_reported_and_closing_switches_it_off() {
     let test = "pattern::rejected_generator_settings_are_reported_and_closing_switches_it_off";
     on_bus(test, vec![noise(FIRST).into()], |remote| {
         let mut camera = open(FIRST);
-        remote.order(FIRST, Order::Stick(0x0744)).unwrap();
+        remote
+            .order(FIRST, DeviceCommand::IgnoreWrites(0x0744))
+            .unwrap();
         let error = camera.test_pattern(PATTERN).unwrap_err();
         assert!(matches!(error, DeviceError::ReadBack { .. }), "{error}");
-        let told = camera
+        let message = camera
             .test_pattern(Some(TestPattern { rate_ev_s: 1.0 }))
             .unwrap_err();
-        assert!(matches!(told, DeviceError::Refused { .. }), "{told}");
+        assert!(matches!(message, DeviceError::Refused { .. }), "{message}");
         camera.close().unwrap();
         assert_eq!(remote.register(FIRST, 0x0740).unwrap() & 1, 0);
         assert_eq!(remote.register(FIRST, 0x0008).unwrap() >> 11 & 1, 1);

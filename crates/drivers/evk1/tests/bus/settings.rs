@@ -1,8 +1,8 @@
 //! Register writes of the driver, checked by a camera model built without the driver's tables.
 
 use skinrig_device::{CameraSettings, DeviceError, EventCamera, NoiseFilter, Roi, SyncMode};
+use skinrig_emulated_camera::control::DeviceCommand;
 use skinrig_emulated_camera::harness::on_bus;
-use skinrig_emulated_camera::steer::Order;
 use skinrig_formats::Decoder;
 use skinrig_model::StreamFormat;
 
@@ -105,10 +105,10 @@ fn region_biases_and_filter_reach_the_registers_and_the_stream() {
         assert_eq!(value(0x0248) & 1, 1, "the filter is on");
         let mut chunks = Vec::new();
         until(&mut camera, &mut chunks, |c| events(c) > 1_000).unwrap();
-        let (mut seen, mut edges) = (Vec::new(), Vec::new());
-        Decoder::new(StreamFormat::Evt2).push_cd(&bytes(&chunks), &mut seen, &mut edges);
+        let (mut observed, mut edges) = (Vec::new(), Vec::new());
+        Decoder::new(StreamFormat::Evt2).push_cd(&bytes(&chunks), &mut observed, &mut edges);
         let inside = |x: u16, y: u16| (100..400).contains(&x) && (50..250).contains(&y);
-        assert!(seen.iter().all(|e| inside(e.x, e.y)));
+        assert!(observed.iter().all(|e| inside(e.x, e.y)));
         let on: u64 = chunks.iter().map(|c| c.facts.on_events).sum();
         assert_eq!(on, events(&chunks));
     });
@@ -119,7 +119,7 @@ fn a_register_that_cannot_be_read_has_no_value() {
     let test = "settings::a_register_that_cannot_be_read_has_no_value";
     on_bus(test, vec![noise(FIRST).into()], |remote| {
         let mut camera = open(FIRST);
-        remote.order(FIRST, Order::FailReads(true)).unwrap();
+        remote.order(FIRST, DeviceCommand::FailReads(true)).unwrap();
         let settings = CameraSettings {
             sync: SyncMode::Master,
             ..CameraSettings::default()
@@ -144,13 +144,15 @@ fn temperature_is_readable_in_every_state() {
         // Bits beyond the field are not part of it.
         let steps = 61 << 12 | 1 << 10;
         remote
-            .order(FIRST, Order::Temperature(1 << 30 | steps))
+            .order(FIRST, DeviceCommand::Temperature(1 << 30 | steps))
             .unwrap();
         assert_eq!(camera.temperature_c().unwrap(), Some(61.25));
         camera.stop(&mut Vec::new()).unwrap();
-        remote.order(FIRST, Order::FailReads(true)).unwrap();
+        remote.order(FIRST, DeviceCommand::FailReads(true)).unwrap();
         let lost = camera.temperature_c().unwrap_err();
         assert!(lost.to_string().contains("EVK_EXT_TEMP_VALUE"), "{lost}");
-        remote.order(FIRST, Order::FailReads(false)).unwrap();
+        remote
+            .order(FIRST, DeviceCommand::FailReads(false))
+            .unwrap();
     });
 }

@@ -3,8 +3,8 @@
 use skinrig_device::{CameraSettings, EventCamera, RealClock};
 use skinrig_emulated_camera::Evk1Config as Emulated;
 use skinrig_emulated_camera::config::{Content, Pacing};
+use skinrig_emulated_camera::control::DeviceCommand;
 use skinrig_emulated_camera::harness::on_bus;
-use skinrig_emulated_camera::steer::Order;
 use skinrig_evk1::{Evk1, Evk1Config};
 use skinrig_formats::{Decoder, Scanner};
 use skinrig_model::{CameraId, RawChunk, StreamFormat};
@@ -35,13 +35,13 @@ fn chunks_hold_exactly_the_sent_bytes() {
         let mut chunks = Vec::new();
         until(&mut camera, &mut chunks, |c| events(c) > 5_000_000).unwrap();
         camera.stop(&mut chunks).unwrap();
-        let handed = remote.observe(FIRST).unwrap().handed;
+        let delivered = remote.observe(FIRST).unwrap().delivered;
         assert_eq!(camera.report().lost_bytes, 0);
         assert_eq!(camera.report().discarded_bytes, 0);
         assert_eq!(camera.report().jump_count, 0);
         let all = bytes(&chunks);
-        assert_eq!(handed.bytes, all.len() as u64);
-        assert_eq!(handed.crc32, crc32fast::hash(&all));
+        assert_eq!(delivered.bytes, all.len() as u64);
+        assert_eq!(delivered.crc32, crc32fast::hash(&all));
         check_facts(&chunks);
     });
 }
@@ -54,7 +54,7 @@ fn transfers_that_end_within_a_word_lose_nothing() {
         camera.start().unwrap();
         let mut chunks = Vec::new();
         for cut in [1, 2, 3, 1] {
-            remote.order(FIRST, Order::Cut(cut)).unwrap();
+            remote.order(FIRST, DeviceCommand::Cut(cut)).unwrap();
             let before = chunks.len();
             until(&mut camera, &mut chunks, |c| c.len() > before + 20).unwrap();
         }
@@ -65,8 +65,8 @@ fn transfers_that_end_within_a_word_lose_nothing() {
         assert_eq!(decoder.stats().skipped_words(), 0, "no word may be torn");
         assert_eq!(camera.report().jump_count, 0);
         let lost: u64 = chunks.iter().map(|c| c.lost_before).sum();
-        let handed = remote.observe(FIRST).unwrap().handed;
-        assert_eq!(handed.bytes, all.len() as u64 + lost);
+        let delivered = remote.observe(FIRST).unwrap().delivered;
+        assert_eq!(delivered.bytes, all.len() as u64 + lost);
         assert!(lost < 4, "at most the beginning of the last word");
         check_facts(&chunks);
     });
@@ -81,7 +81,7 @@ fn garbage_is_kept_unchanged() {
         let mut chunks = Vec::new();
         let garbage = vec![0x2bad_cafe, 0xb000_0001, 0xf123_4567, 0x7fff_ffff];
         remote
-            .order(FIRST, Order::Garbage(garbage.clone()))
+            .order(FIRST, DeviceCommand::Garbage(garbage.clone()))
             .unwrap();
         let wanted: Vec<u8> = garbage.iter().flat_map(|w| w.to_le_bytes()).collect();
         until(&mut camera, &mut chunks, |c| {
@@ -114,12 +114,12 @@ fn an_unpolled_driver_never_blocks_transfers() {
         camera.start().unwrap();
         let mut chunks = Vec::new();
         until(&mut camera, &mut chunks, |_| {
-            remote.observe(FIRST).unwrap().handed.bytes > 1 << 20
+            remote.observe(FIRST).unwrap().delivered.bytes > 1 << 20
         })
         .unwrap();
-        let handed = || remote.observe(FIRST).unwrap().handed.bytes;
-        let asleep = handed() + (8 << 20);
-        while handed() < asleep {
+        let delivered = || remote.observe(FIRST).unwrap().delivered.bytes;
+        let asleep = delivered() + (8 << 20);
+        while delivered() < asleep {
             std::thread::yield_now();
         }
         camera.poll(&mut chunks).unwrap();
@@ -127,7 +127,7 @@ fn an_unpolled_driver_never_blocks_transfers() {
         let lost: u64 = chunks.iter().map(|c| c.lost_before).sum();
         assert!(lost > 6 << 20, "{lost}");
         assert_eq!(lost, camera.report().lost_bytes);
-        assert_eq!(handed(), lost + bytes(&chunks).len() as u64);
+        assert_eq!(delivered(), lost + bytes(&chunks).len() as u64);
         // After a gap the stream continues with a time.
         for pair in chunks.windows(2) {
             if pair[1].lost_before > 0 && !pair[1].bytes.is_empty() {

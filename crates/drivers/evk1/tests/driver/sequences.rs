@@ -28,7 +28,7 @@ fn start_stop_and_close_follow_the_golden_trace() {
 }
 
 #[test]
-fn a_temperature_is_one_read_and_changes_nothing() {
+fn reading_the_temperature_takes_one_request() {
     let bench = Bench::new();
     let mut camera = bench.open().unwrap();
     let sensor = r::EVK_EXT_TEMP_VALUE.address;

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use skinrig_device::{CameraSettings, Clock, DeviceError, EventCamera, NoiseFilter, SyncMode};
-use skinrig_evk1::inbox::{Block, Inbox, Taken};
+use skinrig_evk1::inbox::{Block, Inbox, QueuedData};
 use skinrig_evk1::registers as r;
 use skinrig_evk1::{Evk1Config, UsbError};
 use skinrig_model::{HostDuration, HostTime, RawChunk};
@@ -345,7 +345,7 @@ proptest! {
             };
             got.extend(taken.blocks);
         }
-        let Taken { blocks, error } = inbox.finish();
+        let QueuedData { blocks, error } = inbox.finish();
         got.extend(blocks);
         prop_assert_eq!(error, None);
         let (mut place, mut last) = (0_u64, HostTime(0));

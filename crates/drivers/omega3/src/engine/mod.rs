@@ -14,7 +14,7 @@ use armed::{Armed, rises};
 use crate::brake::{BrakeUnconfirmed, brake};
 use crate::config::{OmegaConfig, Timeouts};
 use crate::monitor::Trip;
-use crate::open::{Opened, SettingError, observed_setting};
+use crate::open::{OpenRobot, SettingError, observed_setting};
 use crate::regulation;
 use crate::sdk::{CallError, Sdk};
 use crate::span::span;
@@ -42,7 +42,7 @@ enum State {
 pub(crate) struct Engine<C: Clock> {
     sdk: Arc<dyn Sdk>,
     config: Arc<OmegaConfig>,
-    opened: Opened,
+    opened: OpenRobot,
     clock: C,
     stream: Arc<Stream>,
     supervisor: Option<Supervisor>,
@@ -58,7 +58,7 @@ impl<C: Clock> Engine<C> {
     pub(crate) fn new(
         sdk: Arc<dyn Sdk>,
         config: Arc<OmegaConfig>,
-        opened: Opened,
+        opened: OpenRobot,
         clock: C,
         stream: Arc<Stream>,
         supervisor: Option<Supervisor>,

@@ -125,7 +125,7 @@ fn initialisation_requires_that_the_sample_is_off_and_ends_braked() {
 fn redundant_encoders_are_reported_and_required_only_if_configured() {
     use RedundantEncoders::{Reported, Required};
     // Status word 13; missing in SDKs that write fewer words.
-    for (word, wanted, opens, remarked) in [
+    for (word, expected, opens, remarked) in [
         (Some(1), Reported, true, false),
         (Some(0), Reported, true, true),
         (Some(-1), Reported, true, false),
@@ -136,14 +136,14 @@ fn redundant_encoders_are_reported_and_required_only_if_configured() {
         let sdk = Scripted::default();
         sdk.with(|s| s.status.extend(word.map(|w| (13, w))));
         let config = OmegaConfig {
-            redundant_encoders: wanted,
+            redundant_encoders: expected,
             ..OmegaConfig::default()
         };
         match open(&sdk, &config, |_| Ok(())) {
             Ok(opened) => {
-                assert!(opens, "{word:?} {wanted:?}");
+                assert!(opens, "{word:?} {expected:?}");
                 let is_remarked = opened.remarks.contains(&Remark::NoRedundantEncoders);
-                assert_eq!(is_remarked, remarked, "{word:?} {wanted:?}");
+                assert_eq!(is_remarked, remarked, "{word:?} {expected:?}");
                 let recorded = opened.settings.iter().any(|s| {
                     s.name == "redundant_encoders"
                         && Some(&s.read_back) == word.map(|w| w.to_string()).as_ref()
@@ -151,7 +151,7 @@ fn redundant_encoders_are_reported_and_required_only_if_configured() {
                 assert!(recorded, "{:?}", opened.settings);
             }
             Err(e) => {
-                assert!(!opens, "{word:?} {wanted:?}: {e}");
+                assert!(!opens, "{word:?} {expected:?}: {e}");
                 assert!(
                     e.to_string().contains("redundant_encoders: reported"),
                     "{e}"
@@ -230,7 +230,7 @@ fn brake_all_brakes_every_robot_that_may_be_the_one_and_no_other() {
         ..Timeouts::default()
     };
     // Indices 0 to 2 have the serial numbers 77 to 79.
-    for (wanted, without_serial, opened, braked) in [
+    for (expected, without_serial, opened, braked) in [
         (Some(78), vec![], 2, 1),
         (Some(78), vec![0], 2, 2),
         (Some(78), vec![1], 3, 1),
@@ -238,7 +238,7 @@ fn brake_all_brakes_every_robot_that_may_be_the_one_and_no_other() {
     ] {
         let sdk = Scripted::default();
         sdk.with(|s| (s.devices, s.without_serial) = (3, without_serial));
-        brake_all(&sdk, wanted, &once).unwrap();
+        brake_all(&sdk, expected, &once).unwrap();
         let count = |call| sdk.log().iter().filter(|c| *c == call).count();
         assert_eq!((count("drdOpenID"), count("drdStop")), (opened, braked));
         assert_eq!(count("drdClose"), opened);

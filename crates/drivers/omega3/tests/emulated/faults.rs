@@ -23,7 +23,7 @@ fn assert_words(error: impl ToString, words: &[&str]) {
 }
 
 #[test]
-fn faults_at_open_are_reported_and_nothing_moves() {
+fn faults_at_open_are_reported_without_motion() {
     let codes = |code: ErrorCode| Fault::Open(code.0);
     let cases: [(Fault, [&str; 2]); 10] = [
         (codes(ErrorCode::NO_DRIVER_FOUND), ["not permitted", "udev"]),
@@ -34,11 +34,11 @@ fn faults_at_open_are_reported_and_nothing_moves() {
         (Fault::Unsupported, ["control", "SDK"]),
         (Fault::ControllerMemory, ["memory", "contact"]),
         (
-            Fault::Ignore(Setting::Watchdog),
+            Fault::SettingIgnored(Setting::Watchdog),
             ["watchdog_125us", "expected 80"],
         ),
         (
-            Fault::Ignore(Setting::DeviceAngle),
+            Fault::SettingIgnored(Setting::DeviceAngle),
             ["device_angle_deg", "expected 30"],
         ),
         (Fault::StatusLength(10), ["", ""]),
@@ -126,9 +126,15 @@ fn faults_when_arming_are_reported_and_leave_the_arm_braked() {
             Fault::StartFails(ErrorCode::DEVICE_NOT_READY.0),
             "not initialised",
         ),
-        (Fault::Ignore(Setting::MotorRatio), "motor_ratio_max"),
-        (Fault::Ignore(Setting::TrackParam), "track_parameters"),
-        (Fault::Ignore(Setting::Filter), "track_filter"),
+        (
+            Fault::SettingIgnored(Setting::MotorRatio),
+            "motor_ratio_max",
+        ),
+        (
+            Fault::SettingIgnored(Setting::TrackParam),
+            "track_parameters",
+        ),
+        (Fault::SettingIgnored(Setting::Filter), "track_filter"),
         (Fault::PositionNan, "position"),
         (Fault::ForceOffset([0.0, 0.0, -2.0]), "does not hang free"),
         (Fault::LoopRate(0.2), "kHz"),
@@ -144,7 +150,7 @@ fn faults_when_arming_are_reported_and_leave_the_arm_braked() {
         let mut omega = Omega::open(config, RealClock::start()).expect("robot opens");
         let configured = match fault {
             // Already detected when the limits are written.
-            Fault::Ignore(Setting::MotorRatio | Setting::TrackParam) => {
+            Fault::SettingIgnored(Setting::MotorRatio | Setting::TrackParam) => {
                 omega.configure(&LIMITS).expect("limits are accepted");
                 let mut other = LIMITS;
                 other.max_force_n = 3.0;
@@ -174,7 +180,7 @@ fn faults_in_motion_are_reported_and_brake_at_once() {
         (Fault::VelocityTrip, "velocity"),
         (Fault::WatchdogTrip, "watchdog"),
         (Fault::PositionNan, "finite"),
-        (Fault::PositionJump([0.03, 0.0, 0.0]), "the tip"),
+        (Fault::PositionOffset([0.03, 0.0, 0.0]), "the tip"),
         (Fault::ForceOffset([0.0, 0.0, -9.0]), "force"),
         (Fault::LoopRate(0.2), "loop is slow"),
         (Fault::RegulationHangs, "watchdog"),
@@ -215,7 +221,7 @@ fn faults_in_motion_are_reported_and_brake_at_once() {
 
 #[test]
 fn an_unplugged_robot_is_lost_and_does_not_resume_by_itself() {
-    each([Fault::Unplug, Fault::PowerLoss], |fault| {
+    each([Fault::Lost, Fault::PowerLost], |fault| {
         let arm = arm();
         let mut omega = armed(&arm);
         arm.inject(When::IntoMove(0.05), fault)
@@ -238,7 +244,7 @@ fn an_unplugged_robot_is_lost_and_does_not_resume_by_itself() {
         }
         assert_ne!(arm.state().expect("arm state").mode, Mode::Force);
         drop(omega);
-        if fault == Fault::Unplug {
+        if fault == Fault::Lost {
             // After reconnection it can be opened again.
             let mut omega = armed(&arm);
             go(&mut omega, START, 20.0);
@@ -257,10 +263,10 @@ fn a_failing_stop_is_retried_until_it_works() {
 }
 
 #[test]
-fn a_jammed_arm_is_not_pulled_beyond_the_lead() {
+fn a_stalled_arm_is_not_pulled_beyond_the_lead() {
     let arm = arm();
     let mut omega = armed(&arm);
-    arm.inject(When::Now, Fault::Jammed)
+    arm.inject(When::Now, Fault::Stalled)
         .expect("fault injected");
     omega
         .command(point([12.5, 0.0, 5.0]), 20.0)

@@ -116,11 +116,11 @@ fn sync_trains_keep_counting_between_marks() {
     assert_eq!(counts, (0..counts.len() as u32).collect::<Vec<_>>());
     let trains = counts.len() + 6;
     let all = without_skew(&edges.take(trains * EDGES_PER_TRAIN, TIMEOUT).unwrap());
-    let seen = decode_marks(&trigger_edges(&all, CAMERA_1));
-    assert_eq!((seen.stray_edges, seen.lost_edges), (0, 0));
-    let marks: Vec<Mark> = seen.marks.iter().map(|m| m.mark).collect();
+    let observed = decode_marks(&trigger_edges(&all, CAMERA_1));
+    assert_eq!((observed.stray_edges, observed.lost_edges), (0, 0));
+    let marks: Vec<Mark> = observed.marks.iter().map(|m| m.mark).collect();
     assert_eq!(marks, (0..6).map(mark).collect::<Vec<_>>());
-    let on_the_line: Vec<u32> = seen.syncs.iter().map(|s| s.count).collect();
+    let on_the_line: Vec<u32> = observed.syncs.iter().map(|s| s.count).collect();
     assert_eq!(on_the_line, counts);
 }
 
@@ -166,19 +166,24 @@ fn a_mark_waits_for_a_running_sync_train() {
     let counters = Counters::parse(&status.data).unwrap();
     let trains = (counters.marks + counters.syncs) as usize;
     let all = without_skew(&edges.take(trains * EDGES_PER_TRAIN, TIMEOUT).unwrap());
-    let seen = decode_marks(&trigger_edges(&all, CAMERA_1));
+    let observed = decode_marks(&trigger_edges(&all, CAMERA_1));
     assert_eq!(counters.late_edges, 0);
-    assert_eq!((seen.stray_edges, seen.lost_edges), (0, 0));
-    assert_eq!(seen.marks.len(), reported.len());
+    assert_eq!((observed.stray_edges, observed.lost_edges), (0, 0));
+    assert_eq!(observed.marks.len(), reported.len());
     // The first count exceeded 17 bits by one.
-    assert_eq!(seen.syncs[0].count, 0);
+    assert_eq!(observed.syncs[0].count, 0);
     let starts: Vec<u64> = all
         .chunks(2 * PULSES_PER_TRAIN as usize)
         .map(|train| train[0].cycle)
         .collect();
     let train = PulseTrain::DURATION_US * CYCLES_PER_US;
     assert!(starts.windows(2).all(|pair| pair[1] - pair[0] >= train));
-    let is_mark = |cycle: u64| seen.marks.iter().any(|m| m.t_us == cycle / CYCLES_PER_US);
+    let is_mark = |cycle: u64| {
+        observed
+            .marks
+            .iter()
+            .any(|m| m.t_us == cycle / CYCLES_PER_US)
+    };
     let marks: Vec<u64> = starts.iter().copied().filter(|&c| is_mark(c)).collect();
     for (&cycle, (ticks, waited)) in marks.iter().zip(&reported) {
         assert_eq!(

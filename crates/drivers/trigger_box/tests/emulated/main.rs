@@ -17,7 +17,7 @@ use skinrig_emulated_trigger_box::{
 };
 use skinrig_model::pulse::{PULSES_PER_TRAIN, PulseTrain, decode_marks};
 use skinrig_model::{BoxReport, BoxTime, HostTime, Mark, MarkKind, PressId, SentMark};
-use skinrig_trigger_box::handshake::shake_hands;
+use skinrig_trigger_box::handshake::run_handshake;
 use skinrig_trigger_box::link::{Link, RequestTimeouts};
 use skinrig_trigger_box::protocol::{
     Counters, Event, EventKind, Events, Outcome, Reply, Request, parse_mark,
@@ -183,7 +183,7 @@ fn requester(board: &EmulatedBox) -> impl FnMut(Request) -> Reply + use<> {
         SerialConnector::new(port).connect().unwrap(),
         RealClock::start(),
     );
-    let handshake = shake_hands(&mut link, port, Some("TB-0001"), TIMEOUT).unwrap();
+    let handshake = run_handshake(&mut link, port, Some("TB-0001"), TIMEOUT).unwrap();
     assert_eq!(handshake.identity.serial, "TB-0001");
     let patience = RequestTimeouts {
         per_try: Duration::from_millis(60),

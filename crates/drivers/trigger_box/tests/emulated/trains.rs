@@ -14,9 +14,9 @@ fn run_marks(n: u32) {
         assert_eq!(sent.mark, mark(k));
         let train = without_skew(&edges.take(EDGES_PER_TRAIN, TIMEOUT).unwrap());
         assert_train(&train, mark(k));
-        let seen = decode_marks(&trigger_edges(&train, CAMERA_1));
-        assert_eq!((seen.marks.len(), seen.stray_edges), (1, 0));
-        assert_eq!(seen.marks[0].mark, mark(k));
+        let observed = decode_marks(&trigger_edges(&train, CAMERA_1));
+        assert_eq!((observed.marks.len(), observed.stray_edges), (1, 0));
+        assert_eq!(observed.marks[0].mark, mark(k));
         device.poll(&mut reports).unwrap();
     }
     poll_until(&mut device, &mut reports, |r| {

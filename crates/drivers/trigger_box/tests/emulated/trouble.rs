@@ -40,10 +40,10 @@ fn on_a_noisy_line_every_mark_is_sent_once_or_reported() {
     assert!(counters.bad_checksums + counters.bad_frames > 0);
     let trains = counters.marks as usize;
     let all = without_skew(&edges.take(trains * EDGES_PER_TRAIN, TIMEOUT).unwrap());
-    let seen = decode_marks(&trigger_edges(&all, CAMERA_1));
-    assert_eq!(seen.stray_edges, 0);
+    let observed = decode_marks(&trigger_edges(&all, CAMERA_1));
+    assert_eq!(observed.stray_edges, 0);
     // In order and never twice; a mark may be missing only after an error.
-    let mut on_the_line = seen.marks.iter().map(|m| m.mark).peekable();
+    let mut on_the_line = observed.marks.iter().map(|m| m.mark).peekable();
     for (mark, certain) in sent {
         let is_sent = on_the_line.next_if_eq(&mark).is_some();
         assert!(is_sent || !certain, "{mark:?} was confirmed but not sent");

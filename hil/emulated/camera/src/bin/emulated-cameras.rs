@@ -48,8 +48,8 @@ mod linux {
         let bus = Bus::start(&config)?;
         match arguments.next() {
             None => {
-                let told = serde_json::json!({ "root": bus.root(), "preload": shim()? });
-                println!("{told}");
+                let message = serde_json::json!({ "root": bus.root(), "preload": shim()? });
+                println!("{message}");
                 std::io::stdin().read_to_end(&mut Vec::new())?;
                 Ok(ExitCode::SUCCESS)
             }

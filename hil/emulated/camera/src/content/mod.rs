@@ -11,7 +11,7 @@ use crate::error::BusError;
 use crate::random::Splitmix;
 use crate::world::World;
 use dense::Dense;
-use recorded::Recorded;
+use recorded::RecordedEvents;
 use scene::Scene;
 
 /// Pixel events of one camera on the monotonic clock.
@@ -23,7 +23,7 @@ pub(crate) enum Source {
         next_ns: f64,
     },
     Dense(Dense),
-    Recorded(Recorded),
+    RecordedEvents(RecordedEvents),
     Scene(Box<Scene>),
 }
 
@@ -48,7 +48,7 @@ impl Source {
             Content::Dense { mev_per_s } => {
                 Self::Dense(Dense::new(positive("a rate in Mev/s", *mev_per_s)?))
             }
-            Content::File { path } => Self::Recorded(Recorded::open(path)?),
+            Content::File { path } => Self::RecordedEvents(RecordedEvents::open(path)?),
             Content::Scene(scene) => Self::Scene(Box::new(Scene::new(scene)?)),
         })
     }
@@ -58,7 +58,7 @@ impl Source {
         match self {
             Self::Silence | Self::Dense(_) => {}
             Self::Noise { next_ns, .. } => *next_ns = from_ns as f64,
-            Self::Recorded(recorded) => recorded.start(from_ns),
+            Self::RecordedEvents(recorded) => recorded.start(from_ns),
             Self::Scene(scene) => scene.start(world, from_ns),
         }
     }
@@ -94,7 +94,7 @@ impl Source {
                 }
             }
             Self::Dense(dense) => dense.events(from_ns, until_ns, out),
-            Self::Recorded(recorded) => recorded.events(until_ns, out),
+            Self::RecordedEvents(recorded) => recorded.events(until_ns, out),
             Self::Scene(scene) => scene.events(world, until_ns, out),
         }
     }

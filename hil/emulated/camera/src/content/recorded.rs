@@ -9,21 +9,21 @@ use skinrig_sim::scene::PixelEvent;
 
 use crate::error::BusError;
 
-pub(crate) struct Recorded {
+pub(crate) struct RecordedEvents {
     /// In the order of time.
     events: Vec<CdEvent>,
     next: usize,
     from_ns: i64,
 }
 
-impl Recorded {
+impl RecordedEvents {
     pub(crate) fn open(path: &Path) -> Result<Self, BusError> {
-        let told = |e: skinrig_formats::FormatsError| BusError::Content(e.to_string());
-        let mut reader = RawReader::open(path).map_err(told)?;
+        let message = |e: skinrig_formats::FormatsError| BusError::Content(e.to_string());
+        let mut reader = RawReader::open(path).map_err(message)?;
         let mut decoder = reader.decoder();
         let (mut events, mut triggers) = (Vec::new(), Vec::new());
         loop {
-            let chunk = reader.next_chunk().map_err(told)?;
+            let chunk = reader.next_chunk().map_err(message)?;
             if chunk.is_empty() {
                 break;
             }

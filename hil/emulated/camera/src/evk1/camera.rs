@@ -11,7 +11,7 @@ use super::registers as r;
 use super::registers::Registers;
 use super::sensor::{Gates, Roi, Sync, runs};
 use crate::config::{Evk1Config, Pacing};
-use crate::steer::Request;
+use crate::control::Request;
 use crate::usb::descriptors::Descriptors;
 use crate::usb::queues::Queues;
 use crate::world::{World, now_ns};
@@ -20,7 +20,7 @@ use crate::world::{World, now_ns};
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Faults {
     /// Registers that ignore writes.
-    pub stuck: BTreeSet<u32>,
+    pub ignored_registers: BTreeSet<u32>,
     /// Whether control requests stay unanswered.
     pub silent: bool,
     /// Whether register reads report failure.
@@ -28,7 +28,7 @@ pub(crate) struct Faults {
     /// Words to insert into the next packet.
     pub garbage: Vec<u32>,
     /// Words lost at the end of each packet.
-    pub lost_words: usize,
+    pub dropped_words: usize,
     /// Number of pixels with an event every millisecond.
     pub hot_pixels: u16,
 }
@@ -246,16 +246,16 @@ impl Evk1 {
         if !model.is_running(run) {
             return;
         }
-        let made = bytes.len();
+        let created = bytes.len();
         if self.config.pacing == Pacing::RealTime {
             bytes.truncate(self.queues.free() / 4 * 4);
         }
-        bytes.truncate(bytes.len().saturating_sub(4 * model.faults.lost_words));
-        let dropped = made - bytes.len();
+        bytes.truncate(bytes.len().saturating_sub(4 * model.faults.dropped_words));
+        let dropped = created - bytes.len();
         let dropped_words = dropped / 4;
         self.queues.push(bytes, end);
         count(&mut model.counters);
-        model.counters.made_bytes += made as u64;
+        model.counters.made_bytes += created as u64;
         model.counters.dropped_bytes += dropped as u64;
         model.reached_us = reached_us;
         if dropped_words > 0 {

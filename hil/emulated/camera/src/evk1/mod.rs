@@ -14,5 +14,5 @@ mod sensor;
 
 pub(crate) use camera::Evk1;
 pub(crate) use clock::SyncLine;
-pub(crate) use counters::Counters;
+pub use counters::Counters;
 pub(crate) use producer::produce;

@@ -228,21 +228,21 @@ impl<'a> Producer<'a> {
         self.edges.sort_by_key(|e| e.at_ns);
         let due = self.edges.partition_point(|e| e.at_ns < until_ns);
         let mut late = 0;
-        let mut seen = Vec::new();
+        let mut observed = Vec::new();
         for edge in self.edges.drain(..due) {
             if edge.at_ns < self.made_ns {
                 late += 1;
             }
             if gates.triggers >> edge.channel & 1 == 1 {
                 let t_us = self.run.time.at(edge.at_ns.max(self.made_ns), sync_line);
-                seen.push(TriggerEdge {
+                observed.push(TriggerEdge {
                     t_us,
                     channel: edge.channel,
                     rising: edge.rising,
                 });
             }
         }
-        (seen, late)
+        (observed, late)
     }
 
     /// Edges of the camera's own trigger output, which return on input 6.

@@ -1,7 +1,7 @@
 //! The vendor requests of an EVK1 (EVK1 reference, section 1.3).
 
 use super::camera::{Evk1, Model};
-use crate::steer::Request;
+use crate::control::Request;
 use crate::usb::descriptors::Descriptors;
 use crate::usb::function::{Function, Reply};
 use crate::usb::usbfs::Setup;
@@ -69,7 +69,7 @@ impl Evk1 {
                     model.counters.unknown_registers += 1;
                     return Reply::Stall;
                 }
-                if !model.faults.stuck.contains(&address) {
+                if !model.faults.ignored_registers.contains(&address) {
                     model.registers.write(address, value);
                     self.written(model, address, value);
                 }

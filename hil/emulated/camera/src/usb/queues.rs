@@ -16,14 +16,14 @@ use super::usbfs::Urb;
 
 /// A submitted transfer: the URB and its address in the process under test.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Submitted {
+pub(crate) struct SubmittedTransfer {
     pub address: u64,
     pub urb: Urb,
 }
 
 /// A finished transfer with its data and target address in the process.
 #[derive(Debug)]
-pub(crate) struct Finished {
+pub(crate) struct FinishedTransfer {
     pub address: u64,
     pub urb: Urb,
     pub to: u64,
@@ -34,7 +34,7 @@ pub(crate) struct Finished {
 
 /// Data delivered to the host from the data endpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Handed {
+pub struct Delivered {
     /// Bytes.
     pub bytes: u64,
     /// CRC-32 (IEEE 802.3) over all of them.
@@ -46,10 +46,10 @@ pub struct Handed {
 #[derive(Debug, Default)]
 struct OpenFile {
     /// Transfers that wait for bytes.
-    waiting: VecDeque<Submitted>,
+    waiting: VecDeque<SubmittedTransfer>,
     /// Control requests that are never answered.
-    unanswered: Vec<Submitted>,
-    done: VecDeque<Finished>,
+    unanswered: Vec<SubmittedTransfer>,
+    done: VecDeque<FinishedTransfer>,
 }
 
 #[derive(Debug)]
@@ -70,7 +70,7 @@ struct State {
     /// Transfers until one fails.
     broken: Option<u32>,
     resets_fail: bool,
-    handed: Handed,
+    delivered: Delivered,
     ready: Readiness,
 }
 
@@ -84,14 +84,14 @@ pub(crate) struct Queues {
 
 /// ID of a program outside the processes under test that has claimed the interface of a busy
 /// device.
-const SOMEBODY: u64 = 0;
+const OTHER_PROGRAM: u64 = 0;
 
 impl Queues {
     /// The queues of a device that can hold `capacity` bytes.
     pub(crate) fn new(capacity: usize, ready: Readiness) -> Self {
         let state = State {
             files: BTreeMap::new(),
-            next_file: SOMEBODY + 1,
+            next_file: OTHER_PROGRAM + 1,
             claimed_by: None,
             unplugged: false,
             halted: false,
@@ -102,7 +102,7 @@ impl Queues {
             cut: None,
             broken: None,
             resets_fail: false,
-            handed: Handed::default(),
+            delivered: Delivered::default(),
             ready,
         };
         Self {
@@ -118,7 +118,7 @@ impl Queues {
 
     /// Marks the interface as claimed by another program.
     pub(crate) fn occupy(&self) {
-        self.lock().claimed_by = Some(SOMEBODY);
+        self.lock().claimed_by = Some(OTHER_PROGRAM);
     }
 
     // ---- from the process under test
@@ -137,7 +137,7 @@ impl Queues {
         if state.claimed_by == Some(file) {
             state.claimed_by = None;
         }
-        state.tell();
+        state.update_readiness();
     }
 
     pub(crate) fn claim(&self, file: u64) -> Result<(), Errno> {
@@ -165,7 +165,7 @@ impl Queues {
     }
 
     /// A transfer from the data endpoint.
-    pub(crate) fn submit(&self, file: u64, transfer: Submitted) -> Result<(), Errno> {
+    pub(crate) fn submit(&self, file: u64, transfer: SubmittedTransfer) -> Result<(), Errno> {
         let mut state = self.lock();
         state.plugged()?;
         // The kernel claims the interface implicitly.
@@ -186,18 +186,22 @@ impl Queues {
     }
 
     /// A control request that has been answered already.
-    pub(crate) fn answered(&self, file: u64, finished: Finished) -> Result<(), Errno> {
+    pub(crate) fn complete_control(
+        &self,
+        file: u64,
+        finished: FinishedTransfer,
+    ) -> Result<(), Errno> {
         let mut state = self.lock();
         state.plugged()?;
         if let Some(open) = state.files.get_mut(&file) {
             open.done.push_back(finished);
         }
-        state.tell();
+        state.update_readiness();
         Ok(())
     }
 
     /// A control request that the device does not answer.
-    pub(crate) fn unanswered(&self, file: u64, transfer: Submitted) -> Result<(), Errno> {
+    pub(crate) fn hold_control(&self, file: u64, transfer: SubmittedTransfer) -> Result<(), Errno> {
         let mut state = self.lock();
         state.plugged()?;
         if let Some(open) = state.files.get_mut(&file) {
@@ -233,12 +237,12 @@ impl Queues {
     }
 
     /// The oldest finished transfer.
-    pub(crate) fn reap(&self, file: u64) -> Result<Finished, Errno> {
+    pub(crate) fn reap(&self, file: u64) -> Result<FinishedTransfer, Errno> {
         let mut state = self.lock();
         let gone = state.unplugged;
         let open = state.files.get_mut(&file).ok_or(Errno::NODEV)?;
         let finished = open.done.pop_front();
-        state.tell();
+        state.update_readiness();
         match finished {
             Some(finished) => Ok(finished),
             None if gone => Err(Errno::NODEV),
@@ -248,11 +252,11 @@ impl Queues {
 
     /// Counts the data of a reaped transfer.
     pub(crate) fn count(&self, bytes: &[u8]) {
-        let before = self.lock().handed;
+        let before = self.lock().delivered;
         // Only the thread that serves the file counts, so this is not interrupted.
         let mut crc = crc32fast::Hasher::new_with_initial_len(before.crc32, before.bytes);
         crc.update(bytes);
-        self.lock().handed = Handed {
+        self.lock().delivered = Delivered {
             bytes: before.bytes + bytes.len() as u64,
             crc32: crc.finalize(),
             transfers: before.transfers + 1,
@@ -271,7 +275,7 @@ impl Queues {
             return false;
         }
         state.halted = false;
-        state.empty();
+        state.clear_fifo();
         true
     }
 
@@ -320,7 +324,7 @@ impl Queues {
     pub(crate) fn unplug(&self) {
         let mut state = self.lock();
         state.unplugged = true;
-        state.empty();
+        state.clear_fifo();
         state.abort(Errno::SHUTDOWN);
         self.room.notify_all();
     }
@@ -349,8 +353,8 @@ impl Queues {
     }
 
     /// Data delivered to the host so far.
-    pub(crate) fn handed(&self) -> Handed {
-        self.lock().handed
+    pub(crate) fn delivered(&self) -> Delivered {
+        self.lock().delivered
     }
 }
 
@@ -395,7 +399,7 @@ impl State {
         }
     }
 
-    fn next_waiting(&self) -> Option<(u64, Submitted)> {
+    fn next_waiting(&self) -> Option<(u64, SubmittedTransfer)> {
         self.files
             .iter()
             .find_map(|(file, open)| open.waiting.front().map(|t| (*file, *t)))
@@ -428,17 +432,17 @@ impl State {
         taken
     }
 
-    fn empty(&mut self) {
+    fn clear_fifo(&mut self) {
         self.fifo.clear();
         (self.head, self.level, self.cut) = (0, 0, None);
     }
 
     /// Ends a transfer of the data endpoint; `errno` 0 for success.
-    fn finish(&mut self, file: u64, transfer: Submitted, errno: i32, bytes: Vec<u8>) {
-        let Submitted { address, mut urb } = transfer;
+    fn finish(&mut self, file: u64, transfer: SubmittedTransfer, errno: i32, bytes: Vec<u8>) {
+        let SubmittedTransfer { address, mut urb } = transfer;
         urb.finish(-errno, bytes.len());
         if let Some(open) = self.files.get_mut(&file) {
-            open.done.push_back(Finished {
+            open.done.push_back(FinishedTransfer {
                 address,
                 urb,
                 to: urb.buffer(),
@@ -446,7 +450,7 @@ impl State {
                 bytes,
             });
         }
-        self.tell();
+        self.update_readiness();
     }
 
     /// Ends all transfers.
@@ -462,10 +466,10 @@ impl State {
                 self.finish(file, transfer, errno.raw_os_error(), Vec::new());
             }
         }
-        self.tell();
+        self.update_readiness();
     }
 
-    fn tell(&mut self) {
+    fn update_readiness(&mut self) {
         let ready = self.unplugged || self.files.values().any(|f| !f.done.is_empty());
         self.ready.set(ready);
     }

@@ -8,9 +8,9 @@ use std::thread;
 use rustix::io::Errno;
 
 use super::function::{Function, Reply};
-use super::queues::{Finished, Queues, Submitted};
+use super::queues::{FinishedTransfer, Queues, SubmittedTransfer};
 use super::usbfs::{self, Setup, Transfer, URB_BYTES, Urb};
-use super::wire::{Asked, Wire};
+use super::wire::{IoctlRequest, Wire};
 
 /// GET_DESCRIPTOR (USB 3.2 section 9.4.3).
 const GET_DESCRIPTOR: u8 = 6;
@@ -55,8 +55,8 @@ impl Node {
         self.queues.close(file);
     }
 
-    fn answer(&self, file: u64, wire: &mut Wire, asked: Asked) -> io::Result<()> {
-        let Asked { request, argument } = asked;
+    fn answer(&self, file: u64, wire: &mut Wire, asked: IoctlRequest) -> io::Result<()> {
+        let IoctlRequest { request, argument } = asked;
         let queues = &self.queues;
         let result = match request {
             usbfs::GET_CAPABILITIES => {
@@ -119,7 +119,9 @@ impl Node {
                 let setup = Setup::new(*setup);
                 let (status, moved, bytes) = match self.control(setup, data) {
                     Reply::Silence => {
-                        return Ok(self.queues.unanswered(file, Submitted { address, urb }));
+                        return Ok(self
+                            .queues
+                            .hold_control(file, SubmittedTransfer { address, urb }));
                     }
                     Reply::Stall => (-Errno::PIPE.raw_os_error(), 0, Vec::new()),
                     Reply::Done(mut bytes) if setup.is_in() => {
@@ -130,9 +132,9 @@ impl Node {
                 };
                 urb.finish(status, moved);
                 let to = urb.buffer() + 8;
-                Ok(self.queues.answered(
+                Ok(self.queues.complete_control(
                     file,
-                    Finished {
+                    FinishedTransfer {
                         address,
                         urb,
                         to,
@@ -142,7 +144,7 @@ impl Node {
                 ))
             }
             Transfer::BulkIn(endpoint) if endpoints.contains(&endpoint) => {
-                Ok(self.queues.submit(file, Submitted { address, urb }))
+                Ok(self.queues.submit(file, SubmittedTransfer { address, urb }))
             }
             Transfer::BulkIn(_) | Transfer::BulkOut(_) => Ok(Err(Errno::NOENT)),
             Transfer::Other => Ok(Err(Errno::INVAL)),

@@ -22,7 +22,7 @@ pub(crate) struct Wire {
 
 /// An `ioctl` that waits for its result.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Asked {
+pub(crate) struct IoctlRequest {
     pub request: u64,
     pub argument: u64,
 }
@@ -44,7 +44,7 @@ impl Wire {
     }
 
     /// The next `ioctl`; `None` when the process closed the device. Other calls on it fail.
-    pub(crate) fn next(&mut self) -> io::Result<Option<Asked>> {
+    pub(crate) fn next(&mut self) -> io::Result<Option<IoctlRequest>> {
         loop {
             let mut bytes = [0; 24];
             match self.stream.read_exact(&mut bytes) {
@@ -57,7 +57,7 @@ impl Wire {
                 u64::from_ne_bytes(word)
             };
             if word(0) == IOCTL {
-                return Ok(Some(Asked {
+                return Ok(Some(IoctlRequest {
                     request: word(1),
                     argument: word(2),
                 }));

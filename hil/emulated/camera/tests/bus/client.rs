@@ -90,28 +90,34 @@ impl Camera {
     }
 
     /// Receives until `enough` returns true for all data so far.
-    pub(crate) fn until(&mut self, mut enough: impl FnMut(&Seen) -> bool) -> Seen {
+    pub(crate) fn read_until(
+        &mut self,
+        mut enough: impl FnMut(&StreamContent) -> bool,
+    ) -> StreamContent {
         for _ in 0..20_000 {
             self.transfer().expect("bytes");
-            let seen = Seen::of(&self.received);
-            if enough(&seen) {
-                return seen;
+            let observed = StreamContent::decode(&self.received);
+            if enough(&observed) {
+                return observed;
             }
         }
-        panic!("condition not met by {:?}", Seen::of(&self.received));
+        panic!(
+            "condition not met by {:?}",
+            StreamContent::decode(&self.received)
+        );
     }
 }
 
 /// Content of a stream.
 #[derive(Debug)]
-pub(crate) struct Seen {
+pub(crate) struct StreamContent {
     pub events: Vec<CdEvent>,
     pub triggers: Vec<TriggerEdge>,
     pub last_us: u64,
 }
 
-impl Seen {
-    pub(crate) fn of(bytes: &[u8]) -> Self {
+impl StreamContent {
+    pub(crate) fn decode(bytes: &[u8]) -> Self {
         let mut decoder = Decoder::new(StreamFormat::Evt2);
         let (mut events, mut triggers) = (Vec::new(), Vec::new());
         decoder.push_cd(bytes, &mut events, &mut triggers);

@@ -108,7 +108,7 @@ fn registers_keep_their_values_and_unknown_requests_are_rejected() {
             let journal = remote.journal("00001621").unwrap();
             let write = journal
                 .iter()
-                .find_map(|r| Some((r.register(), r.written()?)));
+                .find_map(|r| Some((r.register(), r.written_value()?)));
             assert_eq!(write, Some((0x0354, 0x7900_0029)));
         },
     );

@@ -7,7 +7,7 @@ use skinrig_emulated_camera::config::{Content, SceneContent};
 use skinrig_emulated_camera::harness::on_bus;
 use skinrig_model::{CameraId, SimLevel};
 
-use crate::client::{Camera, Seen};
+use crate::client::{Camera, StreamContent};
 
 const SERIAL: &str = "00001621";
 /// About 0.4 s of a quiet stream.
@@ -42,27 +42,27 @@ fn noise_falls_when_the_lamps_are_off_and_comes_back() {
                     fs::remove_file(&lamps_off).unwrap();
                 }
                 // Skip packets generated before the lamps were switched.
-                let made = remote.observe(SERIAL).unwrap().counters.made_bytes as usize;
-                let from_us = until(&mut camera, made + 2_000).last_us;
-                let seen = until(&mut camera, made + 2_000 + BYTES);
-                let events = seen.events.iter().filter(|e| e.t_us >= from_us).count();
-                rates.push(events as f64 / (seen.last_us - from_us) as f64 * 1e6);
+                let created = remote.observe(SERIAL).unwrap().counters.made_bytes as usize;
+                let from_us = read_until(&mut camera, created + 2_000).last_us;
+                let observed = read_until(&mut camera, created + 2_000 + BYTES);
+                let events = observed.events.iter().filter(|e| e.t_us >= from_us).count();
+                rates.push(events as f64 / (observed.last_us - from_us) as f64 * 1e6);
             }
             camera.stop();
             // 1,800 events/s of background, a third of which remain in the dark, and 612 of hot pixels.
-            let [lit, dark, again] = rates[..] else {
+            let [lit, dark, relit] = rates[..] else {
                 panic!("{rates:?}")
             };
             assert!(dark > 800.0 && dark < 1_600.0, "{rates:?}");
-            assert!(lit > 1_900.0 && again > 1_900.0, "{rates:?}");
+            assert!(lit > 1_900.0 && relit > 1_900.0, "{rates:?}");
         },
     );
 }
 
 /// Receives this many bytes in total and returns their content.
-fn until(camera: &mut Camera, bytes: usize) -> Seen {
+fn read_until(camera: &mut Camera, bytes: usize) -> StreamContent {
     while camera.received.len() < bytes {
         camera.transfer().expect("bytes");
     }
-    Seen::of(&camera.received)
+    StreamContent::decode(&camera.received)
 }

@@ -41,32 +41,32 @@ fn an_idle_camera_sends_its_time_every_16_us_in_packets_of_1024_us() {
                 assert_eq!(word, 0x8000_0000 | (n as u32 * 16) >> 6, "word {n}");
             }
             camera.stop();
-            let seen = remote.observe(SERIAL).unwrap();
-            assert_eq!(seen.counters.dropped_bytes, 0);
-            assert_eq!(seen.handed.bytes, camera.received.len() as u64);
+            let found = remote.observe(SERIAL).unwrap();
+            assert_eq!(found.counters.dropped_bytes, 0);
+            assert_eq!(found.delivered.bytes, camera.received.len() as u64);
         },
     );
 }
 
 #[test]
-fn what_is_received_is_what_was_sent_and_time_never_goes_back() {
+fn received_data_equal_sent_data_and_time_is_monotonic() {
     let noise = Content::Noise {
         events_per_s: 2e5,
         seed: 3,
     };
     on_bus(
-        "stream::what_is_received_is_what_was_sent_and_time_never_goes_back",
+        "stream::received_data_equal_sent_data_and_time_is_monotonic",
         vec![camera(noise).into()],
         |remote| {
             let mut camera = Camera::open(0);
             camera.configure(1 << 12);
             camera.start();
-            let seen = camera.until(|s| s.last_us > 200_000);
+            let found = camera.read_until(|s| s.last_us > 200_000);
             camera.stop();
-            let rate = seen.events.len() as f64 / (seen.last_us as f64 * 1e-6);
+            let rate = found.events.len() as f64 / (found.last_us as f64 * 1e-6);
             assert!((1.9e5..2.1e5).contains(&rate), "{rate}");
-            assert!(seen.events.is_sorted_by_key(|e| e.t_us));
-            let handed = remote.observe(SERIAL).unwrap().handed;
+            assert!(found.events.is_sorted_by_key(|e| e.t_us));
+            let handed = remote.observe(SERIAL).unwrap().delivered;
             assert_eq!(handed.bytes, camera.received.len() as u64);
             assert_eq!(handed.crc32, crc32fast::hash(&camera.received));
         },
@@ -88,7 +88,7 @@ fn pixels_send_only_when_powered_released_and_in_the_region() {
             let end = |camera: &mut Camera, by_us| {
                 camera.received.clear();
                 let mut first = None;
-                camera.until(|s| s.last_us > *first.get_or_insert(s.last_us) + by_us)
+                camera.read_until(|s| s.last_us > *first.get_or_insert(s.last_us) + by_us)
             };
             // Region: columns 32..64 of rows 0..32.
             camera.write(0x0400, 0).unwrap();
@@ -153,10 +153,10 @@ fn a_slow_host_loses_events_that_are_counted() {
             assert_eq!(camera.read(0x0018), Ok(0xffff));
             // The remaining data is the capacity of the buffer.
             camera.transfer().unwrap();
-            let seen = remote.observe(SERIAL).unwrap();
-            assert_eq!(seen.handed.bytes, 64 << 10);
+            let found = remote.observe(SERIAL).unwrap();
+            assert_eq!(found.delivered.bytes, 64 << 10);
             assert_eq!(
-                seen.counters.made_bytes - seen.counters.dropped_bytes,
+                found.counters.made_bytes - found.counters.dropped_bytes,
                 64 << 10
             );
         },
@@ -180,8 +180,8 @@ fn a_camera_that_waits_for_its_host_loses_nothing_at_the_highest_rate() {
                 camera.transfer().unwrap();
             }
             camera.stop();
-            let seen = crate::client::Seen::of(&camera.received);
-            let rate = seen.events.len() as f64 / seen.last_us as f64;
+            let found = crate::client::StreamContent::decode(&camera.received);
+            let rate = found.events.len() as f64 / found.last_us as f64;
             assert!((49.9..50.1).contains(&rate), "{rate} Mev/s of its own time");
             let highs = words(&camera.received).filter(|w| w >> 28 == 8);
             let mut last = 0;
@@ -191,7 +191,7 @@ fn a_camera_that_waits_for_its_host_loses_nothing_at_the_highest_rate() {
             }
             let observed = remote.observe(SERIAL).unwrap();
             assert_eq!(observed.counters.dropped_bytes, 0);
-            assert_eq!(observed.handed.crc32, crc32fast::hash(&camera.received));
+            assert_eq!(observed.delivered.crc32, crc32fast::hash(&camera.received));
         },
     );
 }

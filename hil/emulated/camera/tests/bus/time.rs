@@ -16,7 +16,7 @@ const MASTER: u32 = 1 << 12 | 1 << 14;
 const SLAVE: u32 = 1 << 14;
 
 /// A time far enough ahead that an edge arrives before it, even on a busy computer.
-fn soon() -> i64 {
+fn upcoming_ns() -> i64 {
     now_ns() + 200_000_000
 }
 
@@ -48,7 +48,7 @@ fn edges_arrive_at_their_times_on_enabled_inputs_only() {
             camera.configure(STANDALONE);
             camera.write(0x01a0, 1 << 0 | 1 << 7).unwrap();
             camera.start();
-            let first_ns = soon();
+            let first_ns = upcoming_ns();
             for (channel, rising, after_us) in [
                 (0, true, 0),
                 (0, false, 500),
@@ -59,10 +59,10 @@ fn edges_arrive_at_their_times_on_enabled_inputs_only() {
                     .edge(FIRST, channel, rising, first_ns + after_us * 1_000)
                     .unwrap();
             }
-            let seen = camera.until(|s| s.triggers.len() >= 3);
-            let zero = seen.triggers[0].t_us;
+            let observed = camera.read_until(|s| s.triggers.len() >= 3);
+            let zero = observed.triggers[0].t_us;
             // 100 ppm of 700 µs is below a microsecond; the first edge may be anywhere within one.
-            let after: Vec<_> = seen
+            let after: Vec<_> = observed
                 .triggers
                 .iter()
                 .map(|t: &TriggerEdge| (t.channel, t.rising, t.t_us - zero))
@@ -86,8 +86,8 @@ fn trigger_out_comes_back_on_input_6() {
         camera.write(0x003c, 1).unwrap();
         camera.write(0x01a4, 1).unwrap();
         camera.start();
-        let seen = camera.until(|s| s.triggers.len() >= 10);
-        for (pair, rising) in seen
+        let observed = camera.read_until(|s| s.triggers.len() >= 10);
+        for (pair, rising) in observed
             .triggers
             .windows(2)
             .zip([true, false].into_iter().cycle())
@@ -113,15 +113,15 @@ fn a_slave_shares_its_masters_time_when_it_starts_first() {
                 camera.write(0x01a0, 1).unwrap();
             }
             slave.start();
-            let waiting = slave.until(|s| s.events.len() > 100);
+            let waiting = slave.read_until(|s| s.events.len() > 100);
             assert_eq!(waiting.last_us, 0, "no pulses on the line yet");
             master.start();
-            let at_ns = soon();
+            let at_ns = upcoming_ns();
             for serial in [FIRST, SECOND] {
                 remote.edge(serial, 0, true, at_ns).unwrap();
             }
-            let by_master = master.until(|s| s.triggers.len() == 1);
-            let by_slave = slave.until(|s| s.triggers.len() == 1);
+            let by_master = master.read_until(|s| s.triggers.len() == 1);
+            let by_slave = slave.read_until(|s| s.triggers.len() == 1);
             assert!(by_master.triggers[0].t_us > 0);
             assert_eq!(by_master.triggers, by_slave.triggers);
         },
@@ -141,14 +141,14 @@ fn a_slave_that_starts_after_its_master_is_behind() {
                 camera.write(0x01a0, 1).unwrap();
             }
             master.start();
-            master.until(|s| s.last_us > 20_000);
+            master.read_until(|s| s.last_us > 20_000);
             slave.start();
-            let at_ns = soon();
+            let at_ns = upcoming_ns();
             for serial in [FIRST, SECOND] {
                 remote.edge(serial, 0, true, at_ns).unwrap();
             }
-            let by_master = master.until(|s| s.triggers.len() == 1).triggers[0].t_us;
-            let by_slave = slave.until(|s| s.triggers.len() == 1).triggers[0].t_us;
+            let by_master = master.read_until(|s| s.triggers.len() == 1).triggers[0].t_us;
+            let by_slave = slave.read_until(|s| s.triggers.len() == 1).triggers[0].t_us;
             assert!(by_slave + 20_000 < by_master, "{by_slave}, {by_master}");
         },
     );
@@ -171,8 +171,8 @@ fn a_time_base_restarts_at_every_start_or_continues() {
                 for at_least in [first_us, second_us] {
                     camera.received.clear();
                     camera.start();
-                    let seen = camera.until(|s| s.last_us > at_least + 20_000);
-                    let first = seen.events[0].t_us;
+                    let observed = camera.read_until(|s| s.last_us > at_least + 20_000);
+                    let first = observed.events[0].t_us;
                     assert!((at_least..at_least + 20_000).contains(&first), "{first}");
                     camera.stop();
                     camera.handle.reset().unwrap();

@@ -23,9 +23,9 @@ fn looped(id: i8) -> Outcome<ArmState> {
 /// 1 if the same call has already returned this reading, otherwise 0.
 fn cached(last: &Mutex<u64>, now: u64) -> i32 {
     let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
-    let again = *last == now;
+    let repeated = *last == now;
     *last = now;
-    if again { TIMEGUARD } else { 0 }
+    if repeated { TIMEGUARD } else { 0 }
 }
 
 #[unsafe(no_mangle)]

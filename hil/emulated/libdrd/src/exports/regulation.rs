@@ -11,7 +11,7 @@ use crate::page::ArmState;
 use crate::wire::Call;
 
 /// Polling interval of blocking calls.
-const LOOK_EVERY: Duration = Duration::from_millis(1);
+const POLL_INTERVAL: Duration = Duration::from_millis(1);
 /// Time limit for a tick of a loop that may have stopped.
 const LONGEST_TICK: Duration = Duration::from_millis(100);
 
@@ -22,7 +22,7 @@ fn wait_while(id: i8, busy: impl Fn(&ArmState) -> bool) -> Outcome<ArmState> {
         if !busy(&state) {
             return Ok(state);
         }
-        sleep(LOOK_EVERY);
+        sleep(POLL_INTERVAL);
     }
 }
 
@@ -87,7 +87,7 @@ pub extern "system" fn drdHold(id: i8) -> i32 {
 }
 
 /// 2 while the motors are saturated: still a success.
-fn accepted(id: i8) -> Outcome<i32> {
+fn saturation_code(id: i8) -> Outcome<i32> {
     Ok(if host::state(id)?.saturated {
         MOTOR_SATURATED
     } else {
@@ -99,23 +99,23 @@ fn accepted(id: i8) -> Outcome<i32> {
 pub extern "system" fn drdMoveToPos(x_m: f64, y_m: f64, z_m: f64, block: bool, id: i8) -> i32 {
     let arguments = [x_m, y_m, z_m, f64::from(u8::from(block))];
     run("drdMoveToPos", &arguments, -1, || {
-        go(id, [x_m, y_m, z_m], Call::Move)?;
+        set_target(id, [x_m, y_m, z_m], Call::Move)?;
         if block && !wait_while(id, |s| s.moving)?.regulating {
             return Err(ErrorCode::NO_REGULATION);
         }
-        accepted(id)
+        saturation_code(id)
     })
 }
 
 #[unsafe(no_mangle)]
 pub extern "system" fn drdTrackPos(x_m: f64, y_m: f64, z_m: f64, id: i8) -> i32 {
     run("drdTrackPos", &[x_m, y_m, z_m], -1, || {
-        go(id, [x_m, y_m, z_m], Call::Track)?;
-        accepted(id)
+        set_target(id, [x_m, y_m, z_m], Call::Track)?;
+        saturation_code(id)
     })
 }
 
-fn go(id: i8, target: [f64; 3], call: fn([f64; 3]) -> Call) -> Outcome<()> {
+fn set_target(id: i8, target: [f64; 3], call: fn([f64; 3]) -> Call) -> Outcome<()> {
     if target.iter().any(|x| !x.is_finite()) {
         return Err(ErrorCode::INVALID);
     }

@@ -26,9 +26,9 @@ pub(crate) struct Body {
     /// The sample.
     pub contact: Option<Contact>,
     /// Whether it is blocked.
-    pub jammed: bool,
+    pub stalled: bool,
     /// Additional viscous friction, N per (m/s).
-    pub rub_n_s_m: f64,
+    pub extra_friction_n_s_m: f64,
     weight: Vector,
 }
 
@@ -40,8 +40,8 @@ impl Body {
             velocity: ZERO,
             contact_force: ZERO,
             contact: config.contact,
-            jammed: false,
-            rub_n_s_m: 0.0,
+            stalled: false,
+            extra_friction_n_s_m: 0.0,
             weight: gravity(config.gravity_mass_kg, config.tilt_deg),
         }
     }
@@ -49,7 +49,7 @@ impl Body {
     /// Advances by `dt` seconds under a motor force, with or without the electromagnetic brake.
     pub fn step(&mut self, config: &ArmConfig, motor: Vector, braking: bool, dt: f64) {
         self.contact_force = self.push_of_sample();
-        if self.jammed {
+        if self.stalled {
             self.velocity = ZERO;
             return;
         }
@@ -63,7 +63,7 @@ impl Body {
         .fold(ZERO, add);
         // Implicit viscous terms keep a brake of any strength stable. Dry friction follows; it never reverses the speed.
         let viscous = config.viscous_friction_n_s_m
-            + self.rub_n_s_m
+            + self.extra_friction_n_s_m
             + if braking { config.brake_n_s_m } else { 0.0 };
         let pushed = add(self.velocity, scale(force, dt / config.inertia_kg));
         let free = scale(pushed, 1.0 / (1.0 + viscous * dt / config.inertia_kg));

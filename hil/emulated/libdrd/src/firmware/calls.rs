@@ -39,7 +39,7 @@ impl World {
             Control::Inject(when, fault) => {
                 self.faults.inject(self.t_ns(), when, fault);
                 // Effects that are due are visible at once.
-                self.let_faults_happen();
+                self.apply_due_faults();
             }
             Control::ClearFaults => self.faults.clear(),
             Control::SetContact(contact) => self.body.contact = contact,
@@ -78,11 +78,11 @@ impl World {
     }
 
     fn connected(&self) -> bool {
-        !self.faults.is(|f| matches!(f, Fault::Unplug))
+        !self.faults.any(|f| matches!(f, Fault::Lost))
     }
 
     fn busy(&self) -> bool {
-        self.faults.is(|f| matches!(f, Fault::Busy))
+        self.faults.any(|f| matches!(f, Fault::Busy))
     }
 
     fn call_arm(&mut self, caller: Caller, call: &Call) -> Answer {
@@ -103,7 +103,7 @@ impl World {
                 if self.faults.close_fails() {
                     return Err(ErrorCode::COM);
                 }
-                self.let_go();
+                self.release_holder();
                 done
             }
             Call::Identity => Ok(self.identity()),
@@ -121,8 +121,8 @@ impl World {
             }
             Call::Force(on) => self.force(*on),
             Call::Brakes(on) => self.brakes(*on),
-            Call::Move(target) => self.go(*target, true),
-            Call::Track(target) => self.go(*target, false),
+            Call::Move(target) => self.set_target(*target, true),
+            Call::Track(target) => self.set_target(*target, false),
             Call::Hold => {
                 let position = self.body.position;
                 let regulation = self.regulation.as_mut().ok_or(ErrorCode::NO_REGULATION)?;
@@ -180,7 +180,7 @@ impl World {
             Fault::DeviceType(claimed) => Some(*claimed),
             _ => None,
         });
-        let serial = if self.faults.is(|f| matches!(f, Fault::NoSerial)) {
+        let serial = if self.faults.any(|f| matches!(f, Fault::NoSerial)) {
             -1.0
         } else {
             f64::from(device.serial)
@@ -190,8 +190,8 @@ impl World {
             f64::from(claimed.unwrap_or(device.device_type)),
             serial,
             device.firmware,
-            unless(self.faults.is(|f| matches!(f, Fault::ControllerMemory))),
-            unless(self.faults.is(|f| matches!(f, Fault::Unsupported))),
+            unless(self.faults.any(|f| matches!(f, Fault::ControllerMemory))),
+            unless(self.faults.any(|f| matches!(f, Fault::Unsupported))),
         ]
     }
 
@@ -282,7 +282,7 @@ impl World {
             return Err(ErrorCode::COM);
         }
         let idle = self.regulation.is_none() && self.initialisation.is_none();
-        if idle && self.faults.is(|f| matches!(f, Fault::StopNeedsRegulation)) {
+        if idle && self.faults.any(|f| matches!(f, Fault::StopNeedsRegulation)) {
             return Ok(Vec::new());
         }
         self.regulation = None;
@@ -318,7 +318,7 @@ impl World {
         Ok(Vec::new())
     }
 
-    fn go(&mut self, target: Vector, straight: bool) -> Answer {
+    fn set_target(&mut self, target: Vector, straight: bool) -> Answer {
         if target.iter().any(|x| !x.is_finite()) {
             return Err(ErrorCode::INVALID);
         }

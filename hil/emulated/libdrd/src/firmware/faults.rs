@@ -24,7 +24,7 @@ enum Waiting {
 
 /// Pose and force as reported by the library.
 #[derive(Debug, Clone, Copy)]
-pub struct Reported {
+pub struct ReportedState {
     pub tick: u64,
     pub position: Vector,
     pub velocity: Vector,
@@ -36,7 +36,7 @@ fn is_event(fault: Fault) -> bool {
     matches!(
         fault,
         Fault::RegulationDies
-            | Fault::PowerLoss
+            | Fault::PowerLost
             | Fault::Button
             | Fault::VelocityTrip
             | Fault::WatchdogTrip
@@ -101,13 +101,13 @@ impl Faults {
     }
 
     /// Whether a fault is active.
-    pub fn is(&self, which: impl FnMut(&Fault) -> bool) -> bool {
+    pub fn any(&self, which: impl FnMut(&Fault) -> bool) -> bool {
         self.active.iter().any(which)
     }
 
     /// Whether a setting ignores writes.
     pub(crate) fn ignores(&self, setting: Setting) -> bool {
-        self.is(|f| matches!(f, Fault::Ignore(s) if *s == setting))
+        self.any(|f| matches!(f, Fault::SettingIgnored(s) if *s == setting))
     }
 
     /// Whether a stop fails; counts the failure.
@@ -134,8 +134,8 @@ impl Faults {
         position: Vector,
         velocity: Vector,
         force: Vector,
-    ) -> Reported {
-        let mut reported = Reported {
+    ) -> ReportedState {
+        let mut reported = ReportedState {
             tick,
             position,
             velocity,
@@ -144,11 +144,11 @@ impl Faults {
         for fault in &self.active {
             match *fault {
                 Fault::PositionNan => reported.position = [f64::NAN; 3],
-                Fault::PositionJump(by) => reported.position = add(reported.position, by),
-                Fault::PositionFrozen => {
+                Fault::PositionOffset(by) => reported.position = add(reported.position, by),
+                Fault::PositionStale => {
                     let (tick, position, velocity) =
                         *self.frozen.get_or_insert((tick, position, velocity));
-                    reported = Reported {
+                    reported = ReportedState {
                         tick,
                         position,
                         velocity,

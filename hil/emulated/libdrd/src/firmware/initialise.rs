@@ -52,7 +52,7 @@ impl World {
         else {
             return;
         };
-        if self.faults.is(|f| matches!(f, Fault::AutoInitHangs)) || regulation.moving() {
+        if self.faults.any(|f| matches!(f, Fault::AutoInitHangs)) || regulation.moving() {
             return;
         }
         if let Some(next) = initialisation.way.pop() {

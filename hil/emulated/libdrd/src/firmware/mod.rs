@@ -39,23 +39,23 @@ struct Firmware {
 }
 
 /// The world at the current time; publishes the new state on drop.
-struct Present<'a> {
+struct CurrentWorld<'a> {
     world: MutexGuard<'a, World>,
     page: &'a Page,
 }
 
 impl Firmware {
-    fn present(&self) -> Present<'_> {
+    fn current(&self) -> CurrentWorld<'_> {
         let mut world = self.world.lock().unwrap_or_else(PoisonError::into_inner);
         world.advance_to(now_ns());
-        Present {
+        CurrentWorld {
             world,
             page: &self.page,
         }
     }
 }
 
-impl Drop for Present<'_> {
+impl Drop for CurrentWorld<'_> {
     fn drop(&mut self) {
         let state = self.world.state();
         self.page.write(&state);
@@ -64,11 +64,11 @@ impl Drop for Present<'_> {
 
 /// Runs the firmware of the arm in `directory` until the process ends.
 ///
-/// Reads `arm.json` if it exists. With `tell_ready`, prints a line as soon as a library can connect.
+/// Reads `arm.json` if it exists. With `announce_ready`, prints a line as soon as a library can connect.
 ///
 /// # Errors
 /// When the directory, the configuration, the page or the socket cannot be used.
-pub fn run(directory: &Path, tell_ready: bool) -> io::Result<()> {
+pub fn run(directory: &Path, announce_ready: bool) -> io::Result<()> {
     let config = match fs::read(directory.join(file::CONFIG)) {
         Ok(json) => serde_json::from_slice(&json)?,
         Err(error) if error.kind() == io::ErrorKind::NotFound => ArmConfig::default(),
@@ -80,21 +80,21 @@ pub fn run(directory: &Path, tell_ready: bool) -> io::Result<()> {
         world: Mutex::new(World::new(config, now_ns())),
         page,
     });
-    drop(firmware.present());
+    drop(firmware.current());
     let socket = directory.join(file::SOCKET);
     match fs::remove_file(&socket) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
         _ => {}
     }
     let listener = UnixListener::bind(socket)?;
-    if tell_ready {
+    if announce_ready {
         writeln!(io::stdout(), "ready")?;
         io::stdout().flush()?;
     }
     let arm = Arc::clone(&firmware);
     thread::Builder::new()
         .name("arm".to_owned())
-        .spawn(move || live(&arm))?;
+        .spawn(move || run_clock(&arm))?;
     for (connection, stream) in (0..).zip(listener.incoming()) {
         let stream = stream?;
         let firmware = Arc::clone(&firmware);
@@ -120,13 +120,13 @@ fn check(config: &ArmConfig) -> io::Result<()> {
 }
 
 /// Advances the arm repeatedly.
-fn live(firmware: &Firmware) {
+fn run_clock(firmware: &Firmware) {
     for wake in 0_u32.. {
         thread::sleep(WAKE_EVERY);
-        let mut present = firmware.present();
+        let mut current = firmware.current();
         if wake.is_multiple_of(WAKES_PER_LOOK)
-            && present.world.regulation.is_some()
-            && let Some(holder) = &mut present.world.holder
+            && current.world.regulation.is_some()
+            && let Some(holder) = &mut current.world.holder
         {
             holder.stopped = is_stopped(holder.pid);
         }
@@ -149,8 +149,8 @@ fn is_stopped(pid: u32) -> bool {
 fn serve(firmware: &Firmware, connection: u64, mut peer: Connection) {
     let mut pid = 0;
     while let Ok(Some(request)) = peer.receive() {
-        let mut present = firmware.present();
-        let world = &mut present.world;
+        let mut current = firmware.current();
+        let world = &mut current.world;
         let reply = match request {
             Request::Hello { pid: driver } => {
                 pid = driver;
@@ -166,17 +166,17 @@ fn serve(firmware: &Firmware, connection: u64, mut peer: Connection) {
             Request::Device { index, call } => world.call(Caller { connection, pid }, index, &call),
             Request::Control(control) => world.control(control),
         };
-        drop(present);
+        drop(current);
         if peer.send(&reply).is_err() {
             break;
         }
     }
-    let mut present = firmware.present();
-    if present
+    let mut current = firmware.current();
+    if current
         .world
         .holder
         .is_some_and(|h| h.connection == connection)
     {
-        present.world.let_go();
+        current.world.release_holder();
     }
 }

@@ -108,10 +108,10 @@ impl Regulation {
             ZERO
         };
         // The cap applies to the sum: a low ratio leaves too little for gravity compensation, and the arm sinks.
-        let wanted = add(servo, gravity_compensation(settings));
+        let expected = add(servo, gravity_compensation(settings));
         let limit = settings.motor_ratio * config.max_force_n;
-        self.saturated = norm(wanted) > limit;
-        shorten(wanted, limit)
+        self.saturated = norm(expected) > limit;
+        shorten(expected, limit)
     }
 
     fn advance(&mut self, settings: &Settings, dt: f64) {

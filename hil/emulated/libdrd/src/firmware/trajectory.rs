@@ -88,7 +88,7 @@ impl Line {
     }
 
     /// Distance travelled `t` seconds into the ramp.
-    fn ramp_way(&self, t: f64) -> f64 {
+    fn ramp_distance(&self, t: f64) -> f64 {
         let (j, t1) = (self.jerk, self.jerk_s);
         if t < t1 {
             j * t.powi(3) / 6.0
@@ -106,11 +106,11 @@ impl Line {
         let way = if t >= self.total_s {
             self.length
         } else if t < self.ramp_s {
-            self.ramp_way(t)
+            self.ramp_distance(t)
         } else if t < self.total_s - self.ramp_s {
-            self.ramp_way(self.ramp_s) + self.speed * (t - self.ramp_s)
+            self.ramp_distance(self.ramp_s) + self.speed * (t - self.ramp_s)
         } else {
-            self.length - self.ramp_way(self.total_s - t)
+            self.length - self.ramp_distance(self.total_s - t)
         };
         (
             add(self.from, scale(self.direction, way)),
@@ -137,7 +137,7 @@ pub struct Follower {
 }
 
 /// Distance to the target that counts as arrived despite rounding, m.
-const THERE_M: f64 = 1e-12;
+const ARRIVED_M: f64 = 1e-12;
 
 impl Follower {
     /// At rest at a position.
@@ -165,7 +165,8 @@ impl Follower {
             .clamp(self.raw_speed - change, self.raw_speed + change);
         self.raw += self.raw_speed * dt;
         self.average(limits, dt);
-        let there = (target - self.position).abs() < THERE_M && (target - self.raw).abs() < THERE_M;
+        let there =
+            (target - self.position).abs() < ARRIVED_M && (target - self.raw).abs() < ARRIVED_M;
         if there {
             *self = Self::at_rest(target);
         }
@@ -182,7 +183,7 @@ impl Follower {
     fn average(&mut self, limits: Limits, dt: f64) {
         let steps = (2.0 * limits.amax / limits.jerk / dt)
             .ceil()
-            .clamp(1.0, MOST_STEPS) as usize;
+            .clamp(1.0, MAX_STEPS) as usize;
         while self.window.len() + 1 < steps {
             self.window.push_front(self.position);
             self.sum += self.position;
@@ -197,7 +198,7 @@ impl Follower {
 }
 
 /// Longest averaging window, steps of the loop: four seconds at 4 kHz.
-const MOST_STEPS: f64 = 16_000.0;
+const MAX_STEPS: f64 = 16_000.0;
 
 #[cfg(test)]
 mod tests {
@@ -269,7 +270,7 @@ mod tests {
             "{velocity} {acceleration}"
         );
         assert!(
-            jerk <= LIMITS.jerk * 1.1 + 2.0 * THERE_M / dt.powi(3),
+            jerk <= LIMITS.jerk * 1.1 + 2.0 * ARRIVED_M / dt.powi(3),
             "{jerk} m/s^3"
         );
     }

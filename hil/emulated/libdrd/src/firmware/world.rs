@@ -118,13 +118,13 @@ impl World {
     }
 
     fn step(&mut self, dt: f64) {
-        self.let_faults_happen();
-        self.body.jammed = self.faults.is(|f| matches!(f, Fault::Jammed));
+        self.apply_due_faults();
+        self.body.stalled = self.faults.any(|f| matches!(f, Fault::Stalled));
         let rub = self.faults.find(|f| match *f {
             Fault::Friction(n_s_m) => Some(n_s_m),
             _ => None,
         });
-        self.body.rub_n_s_m = rub.unwrap_or(0.0);
+        self.body.extra_friction_n_s_m = rub.unwrap_or(0.0);
         self.initialise(dt);
         self.run_loop();
         let live = self.mode == Mode::Force;
@@ -140,7 +140,7 @@ impl World {
     fn loop_runs(&self) -> bool {
         self.regulation.is_some()
             && self.holder.is_some_and(|h| !h.stopped)
-            && !self.faults.is(|f| matches!(f, Fault::RegulationHangs))
+            && !self.faults.any(|f| matches!(f, Fault::RegulationHangs))
     }
 
     fn run_loop(&mut self) {
@@ -212,14 +212,14 @@ impl World {
     }
 
     /// Applies the faults that are due.
-    pub(crate) fn let_faults_happen(&mut self) {
+    pub(crate) fn apply_due_faults(&mut self) {
         let touching = norm(self.body.contact_force) > 0.0;
         for event in self.faults.due(self.t_ns, self.body.position[2], touching) {
-            self.happen(event);
+            self.apply_event(event);
         }
     }
 
-    fn happen(&mut self, event: Fault) {
+    fn apply_event(&mut self, event: Fault) {
         match event {
             Fault::RegulationDies => {
                 self.regulation = None;
@@ -240,12 +240,12 @@ impl World {
                 self.watchdog_trips += 1;
                 self.power_off(Cause::Watchdog);
             }
-            Fault::Unplug => {
-                self.let_go();
+            Fault::Lost => {
+                self.release_holder();
                 self.power_off(Cause::Usb);
             }
-            Fault::PowerLoss => {
-                self.let_go();
+            Fault::PowerLost => {
+                self.release_holder();
                 self.initialised = false;
                 self.settings = Settings::new(&self.config);
                 self.power_off(Cause::None);
@@ -255,7 +255,7 @@ impl World {
     }
 
     /// Handles a disconnected library or a dead program: the regulation ends, and the motors keep the last commanded force.
-    pub(crate) fn let_go(&mut self) {
+    pub(crate) fn release_holder(&mut self) {
         self.holder = None;
         self.regulation = None;
         self.initialisation = None;
@@ -265,7 +265,7 @@ impl World {
     pub fn moving(&self) -> bool {
         let regulation = self.regulation.as_ref();
         regulation.is_some_and(Regulation::moving)
-            || (regulation.is_some() && self.faults.is(|f| matches!(f, Fault::MovingForever)))
+            || (regulation.is_some() && self.faults.any(|f| matches!(f, Fault::MovingForever)))
     }
 
     /// The public state of the arm.
@@ -314,7 +314,7 @@ impl World {
             initialising: self.initialisation.is_some(),
             regulating,
             moving: self.moving(),
-            connected: !self.faults.is(|f| matches!(f, Fault::Unplug)),
+            connected: !self.faults.any(|f| matches!(f, Fault::Lost)),
             saturated: self.regulation.as_ref().is_some_and(|r| r.saturated),
             held: self.holder.is_some(),
         }

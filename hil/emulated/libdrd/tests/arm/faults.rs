@@ -138,7 +138,7 @@ fn only_the_watchdog_detects_a_hanging_regulation_thread() {
 fn unplugging_fails_every_call_until_the_next_open() {
     let bench = high_up();
     let sdk = &bench.sdk;
-    inject(&bench, When::Below(0.04), Fault::Unplug);
+    inject(&bench, When::Below(0.04), Fault::Lost);
     assert!(bench.move_to([0.0125, 0.0, 0.0]) >= 0);
     let gone = bench.arm.wait_until(WITHIN, |s| !s.connected).unwrap();
     assert!(
@@ -157,7 +157,7 @@ fn unplugging_fails_every_call_until_the_next_open() {
         lost((sdk.drdHold)(ID));
         assert_eq!((sdk.drdOpenID)(0), 0);
         assert!((sdk.drdIsInitialized)(ID) != 0);
-        inject(&bench, When::Now, Fault::PowerLoss);
+        inject(&bench, When::Now, Fault::PowerLost);
         lost((sdk.drdHold)(ID));
         assert_eq!((sdk.drdOpenID)(0), 0);
         assert_eq!((sdk.drdIsInitialized)(ID), 0);
@@ -208,18 +208,18 @@ fn a_move_that_is_too_fast_trips_the_controller() {
 }
 
 #[test]
-fn a_jammed_arm_stays_in_place_while_its_set_point_moves() {
+fn a_stalled_arm_stays_in_place_while_its_set_point_moves() {
     let bench = high_up();
-    inject(&bench, When::Now, Fault::Jammed);
+    inject(&bench, When::Now, Fault::Stalled);
     let start = bench.arm.state().unwrap().position_m;
     inject(&bench, When::Now, Fault::MovingForever);
     assert!(bench.move_to([0.0125, 0.0, 0.04]) >= 0);
-    let stuck = bench
+    let moved = bench
         .arm
         .wait_until(WITHIN, |s| (s.reference_m[2] - 0.04).abs() < 1e-9)
         .unwrap();
-    assert_eq!(stuck.position_m, start);
-    assert!(stuck.saturated, "{stuck:?}");
+    assert_eq!(moved.position_m, start);
+    assert!(moved.saturated, "{moved:?}");
     // SAFETY: a function of the table.
     assert!(unsafe { (bench.sdk.drdIsMoving)(ID) } != 0);
 }
@@ -240,7 +240,7 @@ fn an_arm_with_high_friction_arrives_late() {
 fn reported_poses_and_forces_are_falsified() {
     let bench = high_up();
     let (_, real) = bench.position();
-    inject(&bench, When::Now, Fault::PositionJump([0.0, 0.001, 0.0]));
+    inject(&bench, When::Now, Fault::PositionOffset([0.0, 0.001, 0.0]));
     assert!((bench.position().1[1] - real[1] - 0.001).abs() < 5e-5);
     bench.arm.clear_faults().unwrap();
 
@@ -248,7 +248,7 @@ fn reported_poses_and_forces_are_falsified() {
     assert!(bench.position().1.iter().all(|x| x.is_nan()));
     bench.arm.clear_faults().unwrap();
 
-    inject(&bench, When::Now, Fault::PositionFrozen);
+    inject(&bench, When::Now, Fault::PositionStale);
     let frozen = bench.arm.state().unwrap();
     assert!(bench.move_to([0.0125, 0.0, 0.04]) >= 0);
     let later = bench.arm.wait_until(WITHIN, |s| !s.moving).unwrap();
@@ -280,7 +280,11 @@ fn reported_poses_and_forces_are_falsified() {
 #[test]
 fn an_ignored_setting_reports_success_and_reads_back_unchanged() {
     let bench = Bench::started(&ArmConfig::default());
-    inject(&bench, When::Now, Fault::Ignore(Setting::MotorRatio));
+    inject(
+        &bench,
+        When::Now,
+        Fault::SettingIgnored(Setting::MotorRatio),
+    );
     // SAFETY: functions of the table, called with their signatures.
     let (set, get) = unsafe {
         (
@@ -338,7 +342,7 @@ fn a_fault_can_start_at_contact() {
         .set_contact(Some(Contact::horizontal(0.03)))
         .unwrap();
     inject(&bench, When::Contact, Fault::RegulationDies);
-    inject(&bench, When::After(3600.0), Fault::Unplug);
+    inject(&bench, When::After(3600.0), Fault::Lost);
     assert!(bench.move_to([0.0125, 0.0, 0.02]) >= 0);
     let dead = bench.arm.wait_until(WITHIN, |s| !s.regulating).unwrap();
     assert!(

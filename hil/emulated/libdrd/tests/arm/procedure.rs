@@ -16,7 +16,7 @@ fn a_press_from_open_to_close() {
     let press_m = [0.02, 0.01, -0.002];
     // SAFETY: functions of the table, called with their signatures; every place lives through its call.
     unsafe {
-        assert!(SdkVersion::ask(sdk.dhdGetSDKVersion) >= SdkVersion::ADVISED);
+        assert!(SdkVersion::query(sdk.dhdGetSDKVersion) >= SdkVersion::ADVISED);
         assert_eq!(
             ((sdk.dhdGetDeviceCount)(), (sdk.dhdGetAvailableCount)()),
             (1, 1)
@@ -97,7 +97,7 @@ fn a_press_from_open_to_close() {
 }
 
 #[test]
-fn the_library_exports_the_whole_table_and_nothing_that_is_never_used() {
+fn the_library_exports_exactly_the_table() {
     let path = drd::library_beside_this_executable().unwrap();
     // SAFETY: the library runs no code when it is loaded, unless it is to become a firmware.
     let library = unsafe { libloading::Library::new(path) }.unwrap();

@@ -12,23 +12,23 @@ use drd::{ARM_VARIABLE, ArmConfig, ArmView, EmulatedArm};
 use crate::support::{ID, WITHIN, load};
 
 /// Environment variable that makes the test with the same name play its role.
-const PART: &str = "PART";
+const ROLE: &str = "ROLE";
 
-fn play(part: &str) -> Command {
+fn start_role(role: &str) -> Command {
     let mut command = Command::new(std::env::current_exe().unwrap());
     command
-        .args(["--exact", &format!("processes::{part}"), "--nocapture"])
-        .env(PART, part);
+        .args(["--exact", &format!("processes::{role}"), "--nocapture"])
+        .env(ROLE, role);
     command
 }
 
-fn is_part() -> bool {
-    std::env::var_os(PART).is_some()
+fn has_role() -> bool {
+    std::env::var_os(ROLE).is_some()
 }
 
 #[test]
 fn drives_the_arm_that_the_environment_names() {
-    if !is_part() {
+    if !has_role() {
         return;
     }
     let sdk = load(&drd::library_beside_this_executable().unwrap());
@@ -49,9 +49,9 @@ fn drives_the_arm_that_the_environment_names() {
 }
 
 /// A process that is killed on drop.
-struct Killed(Child);
+struct KillOnDrop(Child);
 
-impl Drop for Killed {
+impl Drop for KillOnDrop {
     fn drop(&mut self) {
         let _ = self.0.kill();
         let _ = self.0.wait();
@@ -64,13 +64,13 @@ fn the_firmware_also_runs_from_a_shell_and_is_found_through_the_environment() {
     let firmware = Command::new(env!("CARGO_BIN_EXE_drd-firmware"))
         .arg(directory.path())
         .spawn();
-    let _firmware = Killed(firmware.unwrap());
+    let _firmware = KillOnDrop(firmware.unwrap());
     let started = Instant::now();
     while !directory.path().join("arm.sock").exists() {
         assert!(started.elapsed() < WITHIN, "no socket");
         thread::sleep(Duration::from_millis(1));
     }
-    let driver = play("drives_the_arm_that_the_environment_names")
+    let driver = start_role("drives_the_arm_that_the_environment_names")
         .env(ARM_VARIABLE, directory.path())
         .output()
         .unwrap();
@@ -90,7 +90,7 @@ fn without_an_arm_there_is_no_device() {
 
 #[test]
 fn keeps_an_arm_until_it_is_killed() {
-    if !is_part() {
+    if !has_role() {
         return;
     }
     let arm = EmulatedArm::spawn(&ArmConfig::default()).unwrap();
@@ -106,18 +106,18 @@ fn keeps_an_arm_until_it_is_killed() {
 
 #[test]
 fn a_firmware_ends_with_the_process_that_started_it() {
-    let starter = play("keeps_an_arm_until_it_is_killed")
+    let starter = start_role("keeps_an_arm_until_it_is_killed")
         .stdout(Stdio::piped())
         .spawn();
-    let mut starter = Killed(starter.unwrap());
+    let mut starter = KillOnDrop(starter.unwrap());
     let output = BufReader::new(starter.0.stdout.take().unwrap());
-    let told = output
+    let message = output
         .lines()
         .map(Result::unwrap)
         .find(|l| l.contains("firmware "))
         .unwrap();
-    let [pid, directory] = told.rsplit(' ').take(2).collect::<Vec<_>>()[..] else {
-        panic!("{told}")
+    let [pid, directory] = message.rsplit(' ').take(2).collect::<Vec<_>>()[..] else {
+        panic!("{message}")
     };
     let (directory, pid) = (pid, directory);
     assert!(ArmView::attach(directory.as_ref()).is_ok());
@@ -158,16 +158,16 @@ fn an_invalid_configuration_is_rejected() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    let mut said = String::new();
+    let mut text = String::new();
     firmware
         .stderr
         .take()
         .unwrap()
-        .read_to_string(&mut said)
+        .read_to_string(&mut text)
         .unwrap();
     assert!(!firmware.wait().unwrap().success());
     assert!(
-        said.contains("arm_index: expected the index of one of the devices"),
-        "{said}"
+        text.contains("arm_index: expected the index of one of the devices"),
+        "{text}"
     );
 }

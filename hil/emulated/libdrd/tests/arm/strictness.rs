@@ -76,7 +76,7 @@ fn each_misuse_has_its_error() {
 }
 
 #[test]
-fn an_error_belongs_to_the_thread_that_made_it() {
+fn an_error_belongs_to_the_thread_that_caused_it() {
     let bench = Bench::new(&ArmConfig::default());
     // SAFETY: a function of the table.
     assert_eq!(unsafe { (bench.sdk.drdStart)(ID) }, -1);

@@ -126,8 +126,8 @@ fn an_unread_stream_is_bounded_and_counts_dropped_samples() {
     let (samples, dropped) = bench.poll();
     assert_eq!(samples.len(), crate::stream::CAPACITY);
     assert!(dropped > 3_000, "{dropped}");
-    let (_, again) = bench.poll();
-    assert_eq!(again, 0);
+    let (_, repeated) = bench.poll();
+    assert_eq!(repeated, 0);
 }
 
 #[test]

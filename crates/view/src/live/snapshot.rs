@@ -24,7 +24,7 @@ struct Head {
 }
 
 /// The session as last seen.
-pub(super) struct Looks {
+pub(super) struct SessionSnapshot {
     path: PathBuf,
     head: Option<Head>,
     stamp: Option<[Option<(u64, SystemTime)>; 2]>,
@@ -39,7 +39,7 @@ pub(super) struct Looks {
     counted: [Option<u64>; 2],
 }
 
-impl Looks {
+impl SessionSnapshot {
     pub(super) fn new(path: &Path) -> Self {
         Self {
             path: path.to_owned(),
@@ -84,7 +84,7 @@ impl Looks {
     }
 
     /// Publishes what is new in the file; does not open one that has not changed.
-    pub(super) fn look(
+    pub(super) fn refresh(
         &mut self,
         analysis: Option<&Analysis>,
         to: &Sender,

@@ -18,7 +18,7 @@ use crate::problem::Problem;
 const MOST_KEPT: usize = 8;
 
 /// What was parsed of one session.
-pub(crate) struct Known {
+pub(crate) struct ParsedSession {
     pub session_id: String,
     pub header: RunHeader,
     pub rig: RigDocument,
@@ -37,10 +37,10 @@ pub(crate) struct Known {
 }
 
 /// A session open for the length of one answer.
-pub(crate) struct Opened {
+pub(crate) struct OpenSession {
     pub path: PathBuf,
     pub reader: SessionReader,
-    pub known: Arc<Known>,
+    pub known: Arc<ParsedSession>,
 }
 
 /// State of the files at which a session was parsed.
@@ -70,7 +70,7 @@ impl Stamp {
 
 /// What was parsed lately, the newest last.
 #[derive(Default)]
-pub(crate) struct Cache(Mutex<Vec<(Stamp, Arc<Known>)>>);
+pub(crate) struct Cache(Mutex<Vec<(Stamp, Arc<ParsedSession>)>>);
 
 impl Cache {
     /// Opens the session at `path` with its stored results of this `variant` (`None`: the official ones).
@@ -79,7 +79,7 @@ impl Cache {
         lab: &dyn Lab,
         path: &Path,
         variant: Option<&str>,
-    ) -> Result<Opened, Problem> {
+    ) -> Result<OpenSession, Problem> {
         let stamp = Stamp::of(path, variant);
         let reader = SessionReader::open(path)?;
         let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -90,7 +90,7 @@ impl Cache {
         drop(kept);
         let known = match found {
             Some(known) => known,
-            None => Arc::new(Known::read(&reader, lab, path, variant)?),
+            None => Arc::new(ParsedSession::read(&reader, lab, path, variant)?),
         };
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         kept.retain(|(s, _)| s.path != stamp.path || s.variant != stamp.variant);
@@ -98,7 +98,7 @@ impl Cache {
         kept.drain(..excess);
         kept.push((stamp, Arc::clone(&known)));
         drop(kept);
-        Ok(Opened {
+        Ok(OpenSession {
             path: path.to_owned(),
             reader,
             known,
@@ -106,7 +106,7 @@ impl Cache {
     }
 }
 
-impl Known {
+impl ParsedSession {
     fn read(
         reader: &SessionReader,
         lab: &dyn Lab,

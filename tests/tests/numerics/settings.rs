@@ -54,19 +54,19 @@ fn keys() -> Vec<Key> {
     let schema: Value = serde_json::from_str(&schema_json()).unwrap();
     let mut found = Vec::new();
     let analysis = &schema["properties"]["analysis"];
-    walk(&schema, analysis, "analysis", &mut found);
+    collect_keys(&schema, analysis, "analysis", &mut found);
     found
 }
 
 /// Keys at and below `node`, whose path is `name`.
-fn walk(schema: &Value, node: &Value, name: &str, found: &mut Vec<Key>) {
+fn collect_keys(schema: &Value, node: &Value, name: &str, found: &mut Vec<Key>) {
     let node = match node["$ref"].as_str() {
         Some(place) => schema.pointer(place.trim_start_matches('#')).unwrap(),
         None => node,
     };
     if let Some(below) = node["properties"].as_object() {
         for (key, node) in below {
-            walk(schema, node, &format!("{name}.{key}"), found);
+            collect_keys(schema, node, &format!("{name}.{key}"), found);
         }
         return;
     }
@@ -103,7 +103,7 @@ fn values(node: &Value) -> Vec<String> {
 
 /// Parses like the protocol of a recording, which also accepts keys of earlier versions. `Ok(false)` if the protocol is
 /// rejected, `Ok(true)` if protocol and analysis accept the settings.
-fn taken(overrides: &[String]) -> Result<bool, String> {
+fn is_accepted(overrides: &[String]) -> Result<bool, String> {
     let no_files =
         |_: &std::path::Path| -> std::io::Result<Vec<u8>> { unreachable!("no file is named") };
     let Ok(protocol) = Protocol::parse_recorded("demo.yaml", PROTOCOL, overrides, &no_files) else {
@@ -115,7 +115,7 @@ fn taken(overrides: &[String]) -> Result<bool, String> {
     }
 }
 
-fn one(key: &Key, value: &str) -> String {
+fn single_key(key: &Key, value: &str) -> String {
     format!("{}={value}", key.name)
 }
 
@@ -126,7 +126,7 @@ fn every_value_that_a_protocol_takes() {
     for key in &keys {
         let before = takes;
         for value in &key.values {
-            match taken(&[one(key, value)]) {
+            match is_accepted(&[single_key(key, value)]) {
                 Ok(true) => takes += 1,
                 Ok(false) => refuses += 1,
                 Err(e) => wrong.push(e),
@@ -148,9 +148,9 @@ fn every_value_that_a_protocol_takes() {
 }
 
 /// Accepted values of a key, as overrides.
-fn good(key: &Key) -> Vec<String> {
-    let all = key.values.iter().map(|v| one(key, v));
-    all.filter(|o| taken(std::slice::from_ref(o)) == Ok(true))
+fn valid_values(key: &Key) -> Vec<String> {
+    let all = key.values.iter().map(|v| single_key(key, v));
+    all.filter(|o| is_accepted(std::slice::from_ref(o)) == Ok(true))
         .collect()
 }
 
@@ -162,13 +162,13 @@ proptest! {
     fn values_that_a_protocol_takes_together(
         chosen in prop::collection::vec((any::<prop::sample::Index>(), any::<prop::sample::Index>()), 2..6),
     ) {
-        static GOOD: OnceLock<Vec<Vec<String>>> = OnceLock::new();
-        let good = GOOD.get_or_init(|| keys().iter().map(good).collect());
+        static VALID: OnceLock<Vec<Vec<String>>> = OnceLock::new();
+        let values = VALID.get_or_init(|| keys().iter().map(valid_values).collect());
         let overrides: Vec<String> = chosen
             .iter()
-            .map(|(key, value)| value.get::<String>(key.get::<Vec<String>>(good)).clone())
+            .map(|(key, value)| value.get::<String>(key.get::<Vec<String>>(values)).clone())
             .collect();
-        if let Err(wrong) = taken(&overrides) {
+        if let Err(wrong) = is_accepted(&overrides) {
             return Err(TestCaseError::fail(wrong));
         }
     }

@@ -16,7 +16,7 @@ use skinrig_model::CameraId;
 pub const CAMERA_SERIALS: [&str; 2] = ["00000001", "00000002"];
 
 /// Interval at which the tip is read.
-const LOOK_EVERY: Duration = Duration::from_micros(500);
+const TIP_INTERVAL: Duration = Duration::from_micros(500);
 /// Interval at which the wire threads check whether to end.
 const TIMEOUT: Duration = Duration::from_millis(50);
 /// Camera input connected to the box: TRIG IN.
@@ -24,50 +24,50 @@ const TRIGGER_INPUT: u8 = 0;
 
 /// Quality of the wire from the trigger box to a camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Wire {
+pub(crate) enum Wire {
     /// Transmits all pulses.
-    Whole,
-    /// Loses every `LEAKS_EVERY`-th pulse.
-    Leaky,
+    Sound,
+    /// Loses every `LOST_EVERY`-th pulse.
+    Noisy,
     /// Disconnected.
     Cut,
 }
 
-/// A leaky wire loses every pulse with this index.
-pub(crate) const LEAKS_EVERY: u32 = 11;
+/// A noisy wire loses one of this many pulses.
+const LOST_EVERY: u32 = 11;
 
 /// The threads that connect the devices. Dropping this value ends them.
-pub(crate) struct Ties {
-    cut: Arc<AtomicBool>,
+pub(crate) struct Connections {
+    stop: Arc<AtomicBool>,
     wires: Arc<[AtomicU8; 2]>,
     threads: Vec<JoinHandle<()>>,
 }
 
-impl Ties {
-    pub(crate) fn make(
+impl Connections {
+    pub(crate) fn start(
         arm: &EmulatedArm,
         bus: &Arc<Bus>,
         trigger_box: &EmulatedBox,
     ) -> io::Result<Self> {
-        let mut ties = Self {
-            cut: Arc::default(),
-            wires: Arc::default(),
+        let mut connections = Self {
+            stop: Arc::default(),
+            wires: Arc::new([Wire::Sound; 2].map(|wire| AtomicU8::new(wire as u8))),
             threads: Vec::new(),
         };
-        let (view, on, cut) = (
+        let (view, on, stop) = (
             ArmView::attach(arm.directory())?,
             Arc::clone(bus),
-            Arc::clone(&ties.cut),
+            Arc::clone(&connections.stop),
         );
-        ties.spawn("tip", move || show_tip(&view, &on, &cut))?;
+        connections.spawn("tip", move || report_tip(&view, &on, &stop))?;
         let edges = EdgeStream::follow(trigger_box.socket())?;
-        let (on, cut, wires) = (
+        let (on, stop, wires) = (
             Arc::clone(bus),
-            Arc::clone(&ties.cut),
-            Arc::clone(&ties.wires),
+            Arc::clone(&connections.stop),
+            Arc::clone(&connections.wires),
         );
-        ties.spawn("wires", move || carry_edges(edges, &on, &wires, &cut))?;
-        Ok(ties)
+        connections.spawn("wires", move || forward_edges(edges, &on, &wires, &stop))?;
+        Ok(connections)
     }
 
     /// Sets the quality of a camera's wire.
@@ -82,9 +82,9 @@ impl Ties {
     }
 }
 
-impl Drop for Ties {
+impl Drop for Connections {
     fn drop(&mut self) {
-        self.cut.store(true, Ordering::Relaxed);
+        self.stop.store(true, Ordering::Relaxed);
         for thread in self.threads.drain(..) {
             // A panic has already printed its message.
             let _ = thread.join();
@@ -93,10 +93,10 @@ impl Drop for Ties {
 }
 
 /// Reports the tip position to the cameras, which never simulate past the last report.
-fn show_tip(arm: &ArmView, bus: &Bus, cut: &AtomicBool) {
+fn report_tip(arm: &ArmView, bus: &Bus, stop: &AtomicBool) {
     let world = bus.world();
     let source = world.source();
-    while !cut.load(Ordering::Relaxed) {
+    while !stop.load(Ordering::Relaxed) {
         // If the firmware died, the run under test detects it itself.
         let Ok(state) = arm.state() else { break };
         let at_ns = i64::try_from(state.t_ns).unwrap_or(i64::MAX);
@@ -105,19 +105,19 @@ fn show_tip(arm: &ArmView, bus: &Bus, cut: &AtomicBool) {
             position_mm: state.position_m.map(|m| m * 1e3),
         });
         world.announce(source, at_ns);
-        thread::sleep(LOOK_EVERY);
+        thread::sleep(TIP_INTERVAL);
     }
     world.leave(source);
 }
 
 /// Forwards the box's pulses to the cameras' inputs. Cameras wait for a board that lags on a busy
 /// computer.
-fn carry_edges(mut edges: EdgeStream, bus: &Bus, wires: &[AtomicU8; 2], cut: &AtomicBool) {
+fn forward_edges(mut edges: EdgeStream, bus: &Bus, wires: &[AtomicU8; 2], stop: &AtomicBool) {
     let world = bus.world();
     let source = world.source();
     let clock = edges.clock();
     let mut pulses = [0_u32; 2];
-    while !cut.load(Ordering::Relaxed) {
+    while !stop.load(Ordering::Relaxed) {
         match edges.next_message(TIMEOUT) {
             Ok(Some(BoardMessage::Edge(edge))) => {
                 let n = match edge.pin {
@@ -127,8 +127,8 @@ fn carry_edges(mut edges: EdgeStream, bus: &Bus, wires: &[AtomicU8; 2], cut: &At
                 };
                 pulses[n] = pulses[n].wrapping_add(u32::from(edge.high));
                 let wire = wires[n].load(Ordering::Relaxed);
-                let leaks = wire == Wire::Leaky as u8 && pulses[n].is_multiple_of(LEAKS_EVERY);
-                if leaks || wire == Wire::Cut as u8 {
+                let is_lost = wire == Wire::Noisy as u8 && pulses[n].is_multiple_of(LOST_EVERY);
+                if is_lost || wire == Wire::Cut as u8 {
                     continue;
                 }
                 let edge = Edge {

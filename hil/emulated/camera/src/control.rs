@@ -1,6 +1,6 @@
 //! Controls the devices of a bus from any process, including the one under test: plugging, faults, counters, journals.
 //!
-//! One line of JSON per request and per reply, on the Unix stream socket `ROOT/steer`.
+//! One line of JSON per request and per reply, on the Unix stream socket `ROOT/control`.
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
@@ -10,14 +10,9 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use crate::evk1::Counters as Evk1Counters;
-use crate::usb::queues::Handed as HandedOver;
+pub use crate::evk1::Counters;
+pub use crate::usb::queues::Delivered;
 use crate::usb::usbfs::Setup;
-
-/// Data delivered to the host from the data endpoint.
-pub type Handed = HandedOver;
-/// Counts of a camera.
-pub type Counters = Evk1Counters;
 
 /// Environment variable with the folder of the bus, for processes under test.
 pub(crate) const ROOT_VARIABLE: &str = "UMOCKDEV_DIR";
@@ -56,7 +51,7 @@ impl Request {
 
     /// Value in a register write (request 0x56).
     #[must_use]
-    pub fn written(&self) -> Option<u32> {
+    pub fn written_value(&self) -> Option<u32> {
         let value = <[u8; 4]>::try_from(&self.data[..]).ok()?;
         (self.request == 0x56 && !self.is_in).then(|| u32::from_be_bytes(value))
     }
@@ -66,7 +61,7 @@ impl Request {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Observation {
     /// Data delivered to the host.
-    pub handed: Handed,
+    pub delivered: Delivered,
     /// Its counters.
     pub counters: Counters,
 }
@@ -74,7 +69,7 @@ pub struct Observation {
 /// A request to a device.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Order {
+pub enum DeviceCommand {
     /// Unplugs the cable.
     Unplug,
     /// Plugs the cable in again: the same device at the same port, after a power-up.
@@ -86,11 +81,13 @@ pub enum Order {
     /// Inserts these words into the next packet.
     Garbage(Vec<u32>),
     /// Number of words lost at the end of every packet, as with a full camera buffer; 0 is normal.
-    Lose(usize),
+    #[serde(rename = "lose")]
+    DropWords(usize),
     /// Number of pixels with an event every millisecond; 0 is normal.
     HotPixels(u16),
     /// Makes this register ignore writes.
-    Stick(u32),
+    #[serde(rename = "stick")]
+    IgnoreWrites(u32),
     /// Whether control requests stay unanswered.
     Silence(bool),
     /// Whether register reads report failure.
@@ -124,18 +121,18 @@ pub enum Order {
 pub enum Answer {
     /// Done.
     Done,
-    /// To [`Order::Observe`].
+    /// To [`DeviceCommand::Observe`].
     Observed(Observation),
-    /// To [`Order::Journal`].
+    /// To [`DeviceCommand::Journal`].
     Journal(Vec<Request>),
-    /// To [`Order::Register`].
+    /// To [`DeviceCommand::Register`].
     Register(u32),
     /// Failure.
     Failed(String),
 }
 
 /// A request with the serial number of the device.
-pub(crate) type Addressed = (String, Order);
+pub(crate) type AddressedCommand = (String, DeviceCommand);
 
 /// A connection to the emulator.
 #[derive(Debug)]
@@ -150,7 +147,7 @@ impl Remote {
     /// # Errors
     /// When the bus does not accept connections.
     pub fn connect(root: &Path) -> io::Result<Self> {
-        let stream = UnixStream::connect(root.join("steer"))?;
+        let stream = UnixStream::connect(root.join("control"))?;
         stream.set_read_timeout(Some(Duration::from_secs(20)))?;
         Ok(Self {
             root: root.to_owned(),
@@ -178,7 +175,7 @@ impl Remote {
     ///
     /// # Errors
     /// When the emulator is gone or the request fails.
-    pub fn order(&self, serial: &str, order: Order) -> io::Result<Answer> {
+    pub fn order(&self, serial: &str, order: DeviceCommand) -> io::Result<Answer> {
         let mut line = self
             .line
             .lock()
@@ -199,8 +196,8 @@ impl Remote {
     /// # Errors
     /// As [`order`](Self::order).
     pub fn observe(&self, serial: &str) -> io::Result<Observation> {
-        match self.order(serial, Order::Observe)? {
-            Answer::Observed(seen) => Ok(seen),
+        match self.order(serial, DeviceCommand::Observe)? {
+            Answer::Observed(observed) => Ok(observed),
             other => Err(unexpected(&other)),
         }
     }
@@ -210,7 +207,7 @@ impl Remote {
     /// # Errors
     /// As [`order`](Self::order).
     pub fn journal(&self, serial: &str) -> io::Result<Vec<Request>> {
-        match self.order(serial, Order::Journal)? {
+        match self.order(serial, DeviceCommand::Journal)? {
             Answer::Journal(requests) => Ok(requests),
             other => Err(unexpected(&other)),
         }
@@ -221,7 +218,7 @@ impl Remote {
     /// # Errors
     /// As [`order`](Self::order).
     pub fn register(&self, serial: &str, address: u32) -> io::Result<u32> {
-        match self.order(serial, Order::Register(address))? {
+        match self.order(serial, DeviceCommand::Register(address))? {
             Answer::Register(value) => Ok(value),
             other => Err(unexpected(&other)),
         }
@@ -233,7 +230,7 @@ impl Remote {
     /// # Errors
     /// As [`order`](Self::order).
     pub fn edge(&self, serial: &str, channel: u8, rising: bool, at_ns: i64) -> io::Result<()> {
-        let edge = Order::Edge {
+        let edge = DeviceCommand::Edge {
             channel,
             rising,
             at_ns,

@@ -51,7 +51,11 @@ fn faults() -> impl Strategy<Value = Vec<(u8, f64, usize)>> {
     prop::collection::vec((0u8..26, number(), 0usize..53), 1..4)
 }
 
-fn spoil(input: &mut skinrig_analysis::SessionInput, source: &mut Memory, fault: (u8, f64, usize)) {
+fn corrupt(
+    input: &mut skinrig_analysis::SessionInput,
+    source: &mut Memory,
+    fault: (u8, f64, usize),
+) {
     let (what, x, row) = fault;
     let settings = &mut input.settings;
     let camera = &mut input.rig.nominal.cameras[row % 2];
@@ -106,7 +110,7 @@ fn spoil(input: &mut skinrig_analysis::SessionInput, source: &mut Memory, fault:
 }
 
 #[test]
-fn whatever_the_numbers_the_analysis_has_none_that_is_not_one() {
+fn analysis_results_are_always_finite() {
     let (mut plain, source) = session();
     plain.settings.bootstrap_resamples = 20;
     plain.settings.calibration = CalibrationModel::Positions;
@@ -123,7 +127,7 @@ fn whatever_the_numbers_the_analysis_has_none_that_is_not_one() {
                 slice: 4096,
             };
             for fault in &faults {
-                spoil(&mut input, &mut memory, *fault);
+                corrupt(&mut input, &mut memory, *fault);
             }
             match analyze(&input, &memory) {
                 Ok(a) => {

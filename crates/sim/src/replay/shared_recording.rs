@@ -35,12 +35,12 @@ pub(super) struct Reader {
 
 /// A shared handle of the recording.
 #[derive(Clone)]
-pub(crate) struct Tape {
+pub(crate) struct SharedRecording {
     reader: Arc<Mutex<Reader>>,
     skin_from_robot: RigidTransform<Skin, Robot>,
 }
 
-impl Tape {
+impl SharedRecording {
     /// At the start of `recording`.
     #[must_use]
     pub(crate) fn new(
@@ -280,24 +280,24 @@ impl Reader {
 
 /// The clock of a replayed rig.
 pub(crate) struct ReplayClock {
-    tape: Tape,
+    recording: SharedRecording,
 }
 
 impl ReplayClock {
-    /// The clock of `tape`.
+    /// The clock of `recording`.
     #[must_use]
-    pub(crate) const fn new(tape: Tape) -> Self {
-        Self { tape }
+    pub(crate) const fn new(recording: SharedRecording) -> Self {
+        Self { recording }
     }
 }
 
 impl Clock for ReplayClock {
     fn now(&self) -> HostTime {
-        self.tape.lock().now()
+        self.recording.lock().now()
     }
 
     /// Returns early, once, at the time of a recorded command.
     fn wait_until(&mut self, t: HostTime) {
-        self.tape.lock().wait_until(t);
+        self.recording.lock().wait_until(t);
     }
 }
