@@ -4,7 +4,7 @@
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use skinrig_controller::{
-    ControlHandle, ControllerError, ControllerSettings, Jog, MoveOutcome, TouchOutcome,
+    ControlHandle, ControllerSettings, Jog, MoveOutcome, RunFault, TouchOutcome,
 };
 use skinrig_device::{Clock, DeviceError, Indenter, MotionLimits, RobotSample};
 use skinrig_model::{HostDuration, HostTime, Point2, Point3, PoseSample, Robot, Setting, Skin};
@@ -218,7 +218,7 @@ fn arm_and_work(
     drop(arm);
     let Err(e) = ended else { return result };
     // The motion ended below clearance: retract once more from there. Report a second error next to the first.
-    if !matches!(e, ControllerError::Device(DeviceError::Lost { .. }))
+    if !matches!(e, RunFault::Device(DeviceError::Lost { .. }))
         && let Err(second) = retract(robot, clock, setup)
     {
         findings.evidence.push(*second);
@@ -465,7 +465,7 @@ pub fn hold_in_air(
 }
 
 /// Evidence from a controller error.
-pub(crate) fn from_controller(e: ControllerError) -> Problem {
+pub(crate) fn from_controller(e: RunFault) -> Problem {
     let rows = run_evidence::from_error(&e).into_iter();
     let software = || Evidence::new(EvidenceKind::Software, "robot", e.to_string());
     Box::new(rows.last().unwrap_or_else(software))

@@ -102,7 +102,7 @@ mod tests {
                 DeviceError::Silent {
                     role,
                     serial: serial(),
-                    doing: "poll",
+                    doing: "poll".into(),
                     within: skinrig_model::HostDuration::ZERO,
                 },
             ),

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use skinrig_controller::{
-    ControllerError, NotAtRest, PressFault, RunReport, TimingFault, TouchFault, WatchdogTrip,
+    NotAtRest, PressFault, RunFault, RunReport, TimingFault, TouchFault, WatchdogTrip,
 };
 use skinrig_model::{CameraId, CheckKind, DeviceRole, PreflightCheck, PressId};
 use skinrig_nightly::{Evidence, EvidenceKind};
@@ -12,14 +12,14 @@ use crate::device_evidence::{self, COMPUTER, SKIN};
 
 const ROBOT: &str = device_evidence::subject(DeviceRole::Indenter);
 
-/// Evidence from a finished run: why it ended early, secondary problems, and faults of presses
-/// without a valid attempt.
+/// Evidence from a finished run: the faults that ended it, secondary problems, and faults of presses
+/// without a valid attempt. A stop by the operator is none.
 #[must_use]
 pub fn from_report(report: &RunReport) -> Vec<Evidence> {
     let problems = report.problems.iter().map(|p| &p.error);
-    let mut all: Vec<Evidence> = report
-        .causes
-        .iter()
+    let faults = report.end.faults().iter();
+    let mut all: Vec<Evidence> = faults
+        .filter(|fault| !matches!(fault, RunFault::Stopped(_)))
         .chain(problems)
         .flat_map(from_error)
         .collect();
@@ -67,33 +67,35 @@ fn from_press_faults(report: &RunReport) -> Vec<Evidence> {
 
 /// Evidence from a controller error; never empty.
 #[must_use]
-pub fn from_error(error: &ControllerError) -> Vec<Evidence> {
+pub fn from_error(error: &RunFault) -> Vec<Evidence> {
     use EvidenceKind as K;
     let (kind, subject) = match error {
-        ControllerError::Device(device) => return vec![*device_evidence::from_error(device)],
-        ControllerError::InvalidInARow { faults, .. } => {
+        RunFault::Device(device) => return vec![*device_evidence::from_error(device)],
+        RunFault::InvalidInARow { faults, .. } => {
             return faults.iter().map(from_press_fault).collect();
         }
-        ControllerError::Preflight { failed } => {
+        RunFault::Preflight { failed } => {
             return failed.iter().map(from_preflight_check).collect();
         }
-        ControllerError::Sink(_) => (K::Disk, COMPUTER),
-        ControllerError::Watchdog(WatchdogTrip::Feedback { .. } | WatchdogTrip::Stale { .. })
-        | ControllerError::PoseStream { .. } => (K::DeviceLost, ROBOT),
-        ControllerError::Watchdog(WatchdogTrip::Late { .. }) => (K::HostLate, COMPUTER),
-        ControllerError::Watchdog(_) => (K::Trip, ROBOT),
-        ControllerError::NotArrived(_) | ControllerError::NotAtRest(_) => (K::State, ROBOT),
-        ControllerError::Guard(_) | ControllerError::Rig { .. } => (K::Refused, ROBOT),
-        ControllerError::Surface { .. } => (K::State, SKIN),
-        ControllerError::ChunkOrder { camera, .. } => {
+        RunFault::Sink(_) => (K::Disk, COMPUTER),
+        RunFault::Watchdog(WatchdogTrip::Feedback { .. } | WatchdogTrip::Stale { .. })
+        | RunFault::PoseStream { .. } => (K::DeviceLost, ROBOT),
+        RunFault::Watchdog(WatchdogTrip::Late { .. }) => (K::HostLate, COMPUTER),
+        RunFault::Watchdog(_) => (K::Trip, ROBOT),
+        RunFault::NotArrived(_) | RunFault::NotAtRest(_) => (K::State, ROBOT),
+        RunFault::Guard(_) | RunFault::Rig { .. } => (K::Refused, ROBOT),
+        RunFault::Surface { .. } => (K::State, SKIN),
+        RunFault::ChunkOrder { camera, .. } => {
             (K::Software, device_evidence::camera_subject(*camera))
         }
-        ControllerError::ClockStep { camera, .. } => {
+        RunFault::ClockStep { camera, .. } => {
             (K::DeviceLost, device_evidence::camera_subject(*camera))
         }
-        ControllerError::Suspended { .. } => (K::TimeOut, COMPUTER),
-        ControllerError::Halted => (K::Stopped, ROBOT),
-        ControllerError::Plan { .. } | ControllerError::Internal(_) => (K::Software, COMPUTER),
+        RunFault::Suspended { .. } => (K::TimeOut, COMPUTER),
+        RunFault::Halted | RunFault::Stopped(_) => (K::Stopped, ROBOT),
+        RunFault::Plan { .. } | RunFault::Internal(_) | RunFault::Recorded { .. } => {
+            (K::Software, COMPUTER)
+        }
     };
     let entry = Evidence::new(kind, subject, error.to_string());
     vec![match next_step(error) {
@@ -103,25 +105,25 @@ pub fn from_error(error: &ControllerError) -> Vec<Evidence> {
 }
 
 /// Next step for errors whose text has none.
-const fn next_step(error: &ControllerError) -> Option<&'static str> {
+const fn next_step(error: &RunFault) -> Option<&'static str> {
     Some(match error {
-        ControllerError::PoseStream { .. }
-        | ControllerError::Watchdog(WatchdogTrip::Feedback { .. } | WatchdogTrip::Stale { .. }) => {
+        RunFault::PoseStream { .. }
+        | RunFault::Watchdog(WatchdogTrip::Feedback { .. } | WatchdogTrip::Stale { .. }) => {
             "check the robot's power, its light and its cable, then run `skinrig doctor`"
         }
-        ControllerError::Watchdog(WatchdogTrip::Late { .. }) => {
+        RunFault::Watchdog(WatchdogTrip::Late { .. }) => {
             "find out what else this computer runs at that time"
         }
-        ControllerError::Watchdog(_) | ControllerError::NotArrived(_) => {
+        RunFault::Watchdog(_) | RunFault::NotArrived(_) => {
             "check the arm: is anything in its way, does it move freely by hand?"
         }
-        ControllerError::NotAtRest(NotAtRest::NotClear | NotAtRest::NotDisarmed) => {
+        RunFault::NotAtRest(NotAtRest::NotClear | NotAtRest::NotDisarmed) => {
             "check where the arm is before powering it"
         }
-        ControllerError::Guard(_) => {
+        RunFault::Guard(_) => {
             "compare `limits` and `frame` of the rig file with the real positions of arm and skin"
         }
-        ControllerError::Internal(_) | ControllerError::ChunkOrder { .. } => {
+        RunFault::Internal(_) | RunFault::ChunkOrder { .. } => {
             "this is a bug in skinrig: please report it with the night's folder"
         }
         _ => return None,
@@ -180,11 +182,11 @@ fn from_preflight_check(check: &PreflightCheck) -> Evidence {
 mod tests {
     use skinrig_controller::NotArrived;
     use skinrig_device::DeviceError;
-    use skinrig_model::{HostDuration, HostTime, Point3};
+    use skinrig_model::{Causes, HostDuration, HostTime, Point3};
 
     use super::*;
 
-    fn kinds_and_subjects(error: ControllerError) -> Vec<(EvidenceKind, String)> {
+    fn kinds_and_subjects(error: RunFault) -> Vec<(EvidenceKind, String)> {
         let rows = from_error(&error);
         rows.into_iter().map(|e| (e.kind, e.subject)).collect()
     }
@@ -244,14 +246,15 @@ mod tests {
             kinds_and_subjects(force.into()),
             one(EvidenceKind::Trip, "robot")
         );
-        let row = ControllerError::InvalidInARow {
+        let row = RunFault::InvalidInARow {
             limit: 2,
-            faults: vec![
+            faults: Causes::try_from(vec![
                 PressFault::MotionLate(not_arrived),
                 PressFault::NoData {
                     camera: CameraId::One,
                 },
-            ],
+            ])
+            .unwrap(),
         };
         let both = [
             (EvidenceKind::State, "robot".to_owned()),
@@ -261,7 +264,7 @@ mod tests {
         let full = PreflightCheck::new(misleading, "", "", false, "").about(CheckKind::Disk);
         let failed = vec![full];
         assert_eq!(
-            kinds_and_subjects(ControllerError::Preflight { failed }),
+            kinds_and_subjects(RunFault::Preflight { failed }),
             one(EvidenceKind::Disk, "computer")
         );
     }

@@ -10,7 +10,7 @@ use skinrig_device::{
 };
 use skinrig_model::{
     CameraId, DeviceIdentity, DeviceRole, HostDuration, HostTime, Mark, MotionCommand, Point3,
-    PoseSample, Record, RigidTransform, Robot, RunEnd, Setting, SimLevel, Skin,
+    PoseSample, Record, RigidTransform, Robot, RunEnd, Setting, SimLevel, Skin, StopReason,
 };
 use skinrig_recorder::{SessionReader, SessionWriter};
 use skinrig_results::RigDocument;
@@ -163,7 +163,7 @@ fn write(path: &Path, records: &[Record]) {
         }
         writer.accept(record.clone()).unwrap();
     }
-    let end = RunEnd::Stopped("the contract is no plan".to_owned().into());
+    let end = RunEnd::Stopped(StopReason::Stop);
     writer.accept(Record::Ended { t: last, end }).unwrap();
     writer.finish().unwrap();
 }

@@ -309,11 +309,11 @@ fn judge(run: &Run, fault: PlantedFault, before: u64, without: &FaultFreeRun) ->
     if retaken > 0 {
         let _ = write!(words, ", {retaken} retaken");
     }
-    let mut reason = report.end.reason().unwrap_or_default().to_owned();
+    let mut reason = report.end.reason().unwrap_or_default();
     match &analysis {
         Ok(a) => {
             for p in &a.presses {
-                if let Some(r) = &p.reason {
+                if let Some(r) = p.reason() {
                     let _ = write!(reason, " | {}: {r}", p.press);
                 }
             }

@@ -7,12 +7,13 @@ use crate::result::{
     Analysis, CalibrationResult, LocationOutcome, Metrics, PressCounts, PressResult, PressView,
     Region,
 };
+use crate::rule::Rule;
 use skinrig_model::{
     AnalysisSettings, LocationId, Point2, PressId, PressRole, RepetitionId, StereoGeometry, Verdict,
 };
 
 /// Content of the digest: settings, geometry, table of presses and metrics. It excludes absolute times, so that a replay at
-/// another time has the same digest.
+/// another time has the same digest, and texts, so that a reworded message does not change it.
 #[derive(Serialize)]
 struct Results<'a> {
     version: u32,
@@ -35,7 +36,7 @@ struct Row<'a> {
     depth_mm: f64,
     truth: Option<Point2>,
     verdict: Verdict,
-    reason: Option<&'a str>,
+    rule: Option<Rule>,
     views: &'a [Option<PressView>; 2],
     location_outcome: &'a LocationOutcome,
     region: &'a Option<Region>,
@@ -53,7 +54,7 @@ impl<'a> Row<'a> {
             depth_mm: press.depth_mm,
             truth: press.truth,
             verdict: press.verdict,
-            reason: press.reason.as_deref(),
+            rule: press.rule(),
             views: &press.views,
             location_outcome: &press.location_outcome,
             region: &press.region,

@@ -28,6 +28,7 @@ mod error;
 pub mod estimators;
 mod event_cache;
 mod exact;
+pub mod exclusion;
 pub mod grid;
 mod hash;
 pub mod input;
@@ -57,7 +58,7 @@ pub mod sums;
 pub mod timebase;
 pub mod tradeoff;
 pub mod triangulate;
-mod untimed;
+pub mod untimed;
 pub mod verdict;
 mod width;
 

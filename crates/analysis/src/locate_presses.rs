@@ -120,8 +120,7 @@ fn rows(input: &SessionInput, seen: [CameraObservations<'_>; 2]) -> Vec<PressRes
                     .as_ref()
                     .and_then(|o| o.measured_at.filter(check::is_place)),
                 verdict: Verdict::Missed,
-                reason: None,
-                rule: None,
+                cause: None,
                 timing: outcome.as_ref().and_then(|o| o.timing),
                 views,
                 location_outcome: LocationOutcome::Missing,

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
 use skinrig_model::CameraId;
 
 use crate::clock::{MarksFit, fit_marks};
@@ -11,8 +12,8 @@ use crate::session_base::time_base;
 use crate::timebase::{Tie, TimeBase, distance_us};
 
 /// A press too far from the ties of a clock.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Untimed {
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Untimed {
     /// Kind of tie.
     pub tie: Tie,
     /// Distance of the nearest tie from the contact or the release, µs.

@@ -11,45 +11,42 @@
 //!
 //! Only the journal and the data decide on sync presses; no rule excludes them.
 
-use std::borrow::Cow;
-
 use skinrig_model::{
-    AnalysisSettings, CameraId, InvalidReason, PressOutcome, PressRole, PressVerdict, Verdict,
+    AnalysisSettings, CameraId, MissedReason, PressOutcome, PressRole, PressVerdict, Verdict,
 };
 
 use crate::check;
+use crate::exclusion::Exclusion;
 use crate::result::{Estimate, LocationOutcome, PressCounts, PressResult, PressView};
 use crate::rule::Rule;
 use crate::untimed::Untimed;
 
-/// A verdict and its rule.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A verdict and its cause.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Judgement {
-    /// The verdict with its full reason.
-    pub verdict: PressVerdict,
-    /// The rule without the press's numbers; `None` if valid.
-    pub rule: Option<Rule>,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Why the press does not count; `None` if valid.
+    pub cause: Option<Exclusion>,
 }
 
 impl Judgement {
     const VALID: Self = Self {
-        verdict: PressVerdict::Valid,
-        rule: None,
+        verdict: Verdict::Valid,
+        cause: None,
     };
 
-    fn invalid(rule: Rule) -> Self {
+    const fn invalid(cause: Exclusion) -> Self {
         Self {
-            verdict: PressVerdict::Invalid(InvalidReason::Faults {
-                text: rule.to_string(),
-            }),
-            rule: Some(rule),
+            verdict: Verdict::Invalid,
+            cause: Some(cause),
         }
     }
 
-    fn excluded(rule: Rule, reason: String) -> Self {
+    const fn excluded(cause: Exclusion) -> Self {
         Self {
-            verdict: PressVerdict::Excluded(reason),
-            rule: Some(rule),
+            verdict: Verdict::Excluded,
+            cause: Some(cause),
         }
     }
 
@@ -57,29 +54,28 @@ impl Judgement {
     #[must_use]
     pub(crate) fn or_by_hand(self) -> Self {
         match self.verdict {
-            PressVerdict::Missed(_) | PressVerdict::Invalid(_) => self,
-            _ => Self::excluded(Rule::ByHand, "left out by hand".to_owned()),
+            Verdict::Missed | Verdict::Invalid => self,
+            Verdict::Valid | Verdict::Excluded => Self::excluded(Exclusion::ByHand),
         }
     }
 
     /// Invalid because a camera's clock is unknown at the press, unless it is missed or invalid anyway.
     #[must_use]
-    pub(crate) fn or_untimed(self, camera: CameraId, untimed: Untimed) -> Self {
+    pub(crate) fn or_untimed(self, camera: CameraId, nearest: Untimed) -> Self {
         match self.verdict {
-            PressVerdict::Missed(_) | PressVerdict::Invalid(_) => self,
-            _ => Self {
-                verdict: PressVerdict::Invalid(InvalidReason::Faults {
-                    text: format!("not timed: {untimed} ({camera})"),
-                }),
-                rule: Some(Rule::NotTimed(camera)),
-            },
+            Verdict::Missed | Verdict::Invalid => self,
+            Verdict::Valid | Verdict::Excluded => {
+                Self::invalid(Exclusion::NotTimed { camera, nearest })
+            }
         }
     }
 
-    /// Verdict of the journal; its rule is the reason without numbers, except camera numbers.
+    /// Verdict of the journal.
     fn from_journal(verdict: PressVerdict) -> Self {
-        let rule = verdict.reason().map(|text| Rule::of_journal(&text));
-        Self { verdict, rule }
+        Self {
+            verdict: verdict.kind(),
+            cause: Exclusion::of_journal(verdict),
+        }
     }
 }
 
@@ -94,23 +90,23 @@ pub fn from_data(
     settings: &AnalysisSettings,
 ) -> Judgement {
     let Some(outcome) = outcome else {
-        return Judgement::from_journal(PressVerdict::Missed("never attempted".to_owned()));
+        return Judgement::from_journal(PressVerdict::Missed(MissedReason::NeverAttempted));
     };
     if outcome.verdict != PressVerdict::Valid {
         return Judgement::from_journal(outcome.verdict.clone());
     }
     if outcome.timing.is_none() {
-        return Judgement::invalid(Rule::NoTimes);
+        return Judgement::invalid(Exclusion::NoTimes);
     }
     if outcome.measured_at.is_none_or(|p| !check::is_place(&p)) {
-        return Judgement::invalid(Rule::NoPosition);
+        return Judgement::invalid(Exclusion::NoPosition);
     }
     for camera in CameraId::ALL {
         if !has_clock[camera.index()] {
-            return Judgement::invalid(Rule::NoClock(camera));
+            return Judgement::invalid(Exclusion::NoClock { camera });
         }
         if data_lost[camera.index()] {
-            return Judgement::invalid(Rule::DataLost(camera));
+            return Judgement::invalid(Exclusion::DataLost { camera });
         }
     }
     if role == PressRole::Sync {
@@ -119,8 +115,7 @@ pub fn from_data(
     for camera in CameraId::ALL {
         let view = views[camera.index()];
         let Some(view) = view.filter(|v| v.centroid_u.is_some()) else {
-            let rule = Rule::NoCluster(camera);
-            return Judgement::excluded(rule.clone(), rule.to_string());
+            return Judgement::excluded(Exclusion::NoCluster { camera });
         };
         if let Some(judgement) = too_few_cluster_events(&view, settings.min_cluster_events, camera)
         {
@@ -131,13 +126,12 @@ pub fn from_data(
                 < idle.expected + settings.min_response_sigma * idle.standard_error
         }) && settings.min_response_sigma > 0.0
         {
-            return Judgement::excluded(
-                Rule::NoResponse(camera),
-                format!(
-                    "no response: {} events, {:.0} ± {:.0} expected at the idle rate ({camera})",
-                    view.events, idle.expected, idle.standard_error
-                ),
-            );
+            return Judgement::excluded(Exclusion::NoResponse {
+                camera,
+                found: view.events,
+                expected: idle.expected,
+                standard_error: idle.standard_error,
+            });
         }
     }
     Judgement::VALID
@@ -151,13 +145,11 @@ pub(crate) fn too_few_cluster_events(
     camera: CameraId,
 ) -> Option<Judgement> {
     (view.cluster_events < least).then(|| {
-        Judgement::excluded(
-            Rule::FewClusterEvents(camera),
-            format!(
-                "too few cluster events: {} < {least} ({camera})",
-                view.cluster_events
-            ),
-        )
+        Judgement::excluded(Exclusion::FewClusterEvents {
+            camera,
+            found: view.cluster_events,
+            least,
+        })
     })
 }
 
@@ -188,43 +180,35 @@ pub(crate) fn location_rule(
     outcome: &LocationOutcome,
     settings: &AnalysisSettings,
 ) -> Option<Judgement> {
-    let plain = |rule: Rule| {
-        let reason = rule.to_string();
-        Some(Judgement::excluded(rule, reason))
-    };
-    match *outcome {
-        LocationOutcome::Missing => plain(Rule::NoView),
-        LocationOutcome::Parallel { .. } => plain(Rule::ParallelRays),
-        LocationOutcome::Behind { .. } => plain(Rule::BehindCamera),
+    let cause = match *outcome {
+        LocationOutcome::Missing => Exclusion::NoView,
+        LocationOutcome::Parallel { .. } => Exclusion::ParallelRays,
+        LocationOutcome::Behind { .. } => Exclusion::BehindCamera,
         LocationOutcome::Located { sine, .. } | LocationOutcome::Outside { sine, .. }
             if sine.abs() < settings.min_ray_sine =>
         {
-            Some(Judgement::excluded(
-                Rule::NearlyParallelRays,
-                format!(
-                    "nearly parallel rays: sine {:.4} < {}",
-                    sine.abs(),
-                    settings.min_ray_sine
-                ),
-            ))
+            Exclusion::NearlyParallelRays {
+                sine: sine.abs(),
+                least: settings.min_ray_sine,
+            }
         }
-        LocationOutcome::Outside { .. } if settings.exclude_outside => plain(Rule::OutsideOutline),
-        LocationOutcome::Located { .. } | LocationOutcome::Outside { .. } => None,
-    }
+        LocationOutcome::Outside { .. } if settings.exclude_outside => Exclusion::OutsideOutline,
+        LocationOutcome::Located { .. } | LocationOutcome::Outside { .. } => return None,
+    };
+    Some(Judgement::excluded(cause))
 }
 
 /// True for a press that was executed as planned, whether or not the cameras saw it: valid, or excluded by a rule on the
 /// data. Exclusions by the journal or by hand say nothing about the skin.
 #[must_use]
 pub(crate) fn is_done_as_planned(press: &PressResult) -> bool {
-    press.verdict == Verdict::Valid || press.rule.as_ref().is_some_and(Rule::is_on_data)
+    press.verdict == Verdict::Valid || press.rule().is_some_and(|rule| rule.is_on_data())
 }
 
 /// Writes a verdict into a row.
 pub fn put(row: &mut PressResult, judgement: Judgement) {
-    row.verdict = judgement.verdict.kind();
-    row.reason = judgement.verdict.reason().map(Cow::into_owned);
-    row.rule = judgement.rule;
+    row.verdict = judgement.verdict;
+    row.cause = judgement.cause;
 }
 
 /// A warning if the headline depends on the exclusions: the RMSE of all located presses is outside the 95 % interval of the
@@ -245,16 +229,19 @@ pub(crate) fn exclusion_warning(presses: &[PressResult], rmse: [&Estimate; 2]) -
         (None, ..) => format!("from {all:.2} mm to nothing"),
         _ => return None,
     };
-    let mut rules: Vec<&Rule> = presses
+    let mut causes: Vec<(Rule, &Exclusion)> = presses
         .iter()
         .filter(|p| p.role == PressRole::Score && p.error_mm().is_some())
-        .filter_map(|p| p.rule.as_ref())
+        .filter_map(|p| p.cause.as_ref().map(|cause| (cause.rule(), cause)))
         .collect();
-    rules.sort_unstable();
-    let most = rules
-        .chunk_by(|a, b| a == b)
+    causes.sort_by(|a, b| a.0.cmp(&b.0));
+    let most = causes
+        .chunk_by(|a, b| a.0 == b.0)
         .max_by_key(|group| group.len())
-        .map(|group| format!(" (most often, {} times: {})", group.len(), group[0]))
+        .map(|group| {
+            let label = group[0].1.label();
+            format!(" (most often, {} times: {label})", group.len())
+        })
         .unwrap_or_default();
     Some(format!(
         "the RMSE depends on the exclusions: excluding {left_out} of {} located presses{most} changes it {change}",
@@ -298,12 +285,14 @@ mod tests {
         );
         assert_eq!(
             rule(LocationOutcome::Located { at, sine: -0.0499 }, &settings),
-            Some(Judgement::excluded(
-                Rule::NearlyParallelRays,
-                "nearly parallel rays: sine 0.0499 < 0.05".to_owned()
-            ))
+            Some(Judgement::excluded(Exclusion::NearlyParallelRays {
+                sine: 0.0499,
+                least: 0.05
+            }))
         );
-        let rule = |outcome: LocationOutcome, s: &AnalysisSettings| rule(outcome, s)?.rule;
+        let rule = |outcome: LocationOutcome, s: &AnalysisSettings| {
+            rule(outcome, s)?.cause.map(|c| c.rule())
+        };
         let outside = LocationOutcome::Outside { at, sine: 0.5 };
         assert_eq!(rule(outside, &settings), Some(Rule::OutsideOutline));
         settings.exclude_outside = false;
@@ -327,7 +316,6 @@ mod tests {
                 number: 1,
             },
             verdict: PressVerdict::Valid,
-            faults: Vec::new(),
             timing: Some(skinrig_model::PressTiming {
                 approach: skinrig_model::HostTime(0),
                 contact: skinrig_model::HostTime(1),
@@ -373,22 +361,27 @@ mod tests {
         assert_eq!(judge(PressRole::Score, 33, 33), Judgement::VALID);
         assert_eq!(
             judge(PressRole::Score, 33, 32),
-            Judgement::excluded(
-                Rule::NoResponse(CameraId::Two),
-                "no response: 32 events, 10 ± 4 expected at the idle rate (camera 2)".to_owned()
-            )
+            Judgement::excluded(Exclusion::NoResponse {
+                camera: CameraId::Two,
+                found: 32,
+                expected: 10.0,
+                standard_error: 20f64.sqrt(),
+            })
         );
         assert_eq!(
             judge(PressRole::Calibrate, 33, 19),
-            Judgement::excluded(
-                Rule::FewClusterEvents(CameraId::Two),
-                "too few cluster events: 19 < 20 (camera 2)".to_owned()
-            )
+            Judgement::excluded(Exclusion::FewClusterEvents {
+                camera: CameraId::Two,
+                found: 19,
+                least: 20,
+            })
         );
         assert_eq!(judge(PressRole::Sync, 0, 0), Judgement::VALID);
         let by_hand = judge(PressRole::Score, 33, 33).or_by_hand();
-        assert_eq!(by_hand.rule, Some(Rule::ByHand));
-        let lost = Judgement::invalid(Rule::DataLost(CameraId::One));
+        assert_eq!(by_hand.cause, Some(Exclusion::ByHand));
+        let lost = Judgement::invalid(Exclusion::DataLost {
+            camera: CameraId::One,
+        });
         assert_eq!(lost.clone().or_by_hand(), lost);
     }
 

@@ -18,8 +18,7 @@ fn row(location: u32, error: Option<(f64, f64)>, verdict: Verdict) -> PressResul
         depth_mm: 2.0,
         truth: Some(truth),
         verdict,
-        reason: None,
-        rule: None,
+        cause: None,
         timing: None,
         views: [None, None],
         location_outcome: error.map_or(LocationOutcome::Missing, |(dx, dy)| {

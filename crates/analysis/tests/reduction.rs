@@ -246,7 +246,10 @@ fn the_published_rule_scores_the_first_repetition_and_ignores_missing_presses() 
     // Presses left out by hand are not judged, those that a schedule does not use are not there at all.
     input.settings.exclude_press_numbers = vec![a.presses[3].press];
     if let Some(outcome) = &mut input.outcomes[4] {
-        outcome.verdict = skinrig_model::PressVerdict::Excluded("not used".to_owned());
+        outcome.verdict =
+            skinrig_model::PressVerdict::Excluded(skinrig_model::ExcludedReason::NotUsed {
+                presses_used: "[5]".to_owned(),
+            });
     }
     let (a, kept) = analyze_with_events(&input, &source, Retention::All).unwrap();
     let r = reference_code(&input, &a, &kept);

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use skinrig_controller::{ControllerError, Problem, RunReport, SinkFault};
+use skinrig_controller::{Problem, RunFault, RunReport, SinkFault};
 use skinrig_model::{PressRole, PressVerdict, RunEnd};
 use skinrig_protocol::Plan;
 use skinrig_recorder::{RecorderError, SessionReader};
@@ -29,18 +29,17 @@ pub(crate) fn close(
             RecorderError::Lost { .. } => lost = Some(error.to_string()),
             _ => {}
         }
-        let error = ControllerError::from(SinkFault::Rejected(error.to_string()));
+        let error = RunFault::from(SinkFault::Rejected(error.to_string()));
         if report.end == RunEnd::Completed && !is_complete {
-            report.end = RunEnd::Faulted(error.to_string());
-            report.causes.push(error);
-        } else if !report.causes.contains(&error) {
+            report.end = RunEnd::fault(error);
+        } else if !report.end.faults().contains(&error) {
             // The data of a complete run are on the disk: a missing seal is not a fault of the run.
             report.problems.push(Problem { doing: "", error });
         }
     }
     operator.run_is_over();
     for problem in &report.problems {
-        if !report.causes.contains(&problem.error) {
+        if !report.end.faults().contains(&problem.error) {
             errln!("warning: {problem}");
         }
     }
@@ -115,8 +114,8 @@ pub(crate) fn end_of(session: &Path, report: &RunReport) -> Result<Option<String
             "stopped: {reason}; {kept}\n  next: {}",
             next_step(session)
         ))),
-        RunEnd::Faulted(reason) => Err(Failure::rig(format!(
-            "{reason}\n  {kept}\n  next: fix the cause named above (device, cable, file, disk space), then {}; \
+        RunEnd::Faulted(causes) => Err(Failure::rig(format!(
+            "{causes}\n  {kept}\n  next: fix the cause named above (device, cable, file, disk space), then {}; \
              `skinrig show` lists what was kept",
             next_step(session)
         ))),
@@ -146,7 +145,11 @@ fn presses_lost_to_the_rig(session: &Path) -> Result<Option<String>, Failure> {
         .filter(|((press, _), wanted)| *wanted && press.role != PressRole::Sync)
         .map(|((press, known), _)| {
             let reason = known.verdict.as_ref().and_then(PressVerdict::reason);
-            format!("{}: {}", press.id, reason.unwrap_or("no verdict".into()))
+            format!(
+                "{}: {}",
+                press.id,
+                reason.unwrap_or_else(|| "no verdict".to_owned())
+            )
         })
         .collect();
     if lost.is_empty() {

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use skinrig_evk1::FoundState;
 use skinrig_hil::lease::{self, LeaseState};
 use skinrig_omega3::enumerate::{Availability, SERIAL_UNKNOWN};
@@ -22,6 +22,50 @@ const HELLO: Duration = Duration::from_secs(4);
 /// The same for an emulated box, whose simulated processor competes for a real one.
 const EMULATED_HELLO: Duration = Duration::from_secs(20);
 
+/// State of a device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum DeviceState {
+    /// It responded.
+    Ready,
+    /// Another program uses it.
+    Busy,
+    /// The operating system denies access.
+    NotPermitted,
+    /// A device of another kind.
+    OtherDevice,
+    /// The box runs another firmware.
+    OtherFirmware,
+    /// Not connected, or not installed.
+    Absent,
+    /// Not queried.
+    #[default]
+    NotAsked,
+    /// It responded wrongly.
+    Faulty,
+}
+
+impl DeviceState {
+    /// The name, as shown and in JSON.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Ready => "ready",
+            Self::Busy => "busy",
+            Self::NotPermitted => "not permitted",
+            Self::OtherDevice => "other device",
+            Self::OtherFirmware => "other firmware",
+            Self::Absent => "absent",
+            Self::NotAsked => "not asked",
+            Self::Faulty => "faulty",
+        }
+    }
+}
+
+impl Serialize for DeviceState {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(self.name())
+    }
+}
+
 /// One device, found or expected.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub(crate) struct Line {
@@ -31,8 +75,8 @@ pub(crate) struct Line {
     pub what: String,
     /// Its serial number, if known.
     pub serial: Option<String>,
-    /// `ready`, `busy`, `not permitted`, `other device`, `other firmware`, `absent`, `not asked` or `faulty`.
-    pub state: &'static str,
+    /// Its state.
+    pub state: DeviceState,
     /// More about the state.
     pub detail: String,
     /// Its role in the rig file, for example `camera1`.
@@ -90,7 +134,7 @@ fn print(lines: &[Line], rig: Option<&RigFile>) {
     let table = Table::new([11, what, serial, 13].map(Column::left));
     for l in lines {
         let role = l.role.as_ref().map(|r| format!("[{r}]"));
-        let first = [l.device, &l.what, l.shown_serial(), l.state];
+        let first = [l.device, &l.what, l.shown_serial(), l.state.name()];
         let more = [Some(l.detail.as_str()), role.as_deref()];
         let more = more.into_iter().flatten().filter(|c| !c.is_empty());
         outln!("{}", table.row(first.into_iter().chain(more)));
@@ -98,7 +142,7 @@ fn print(lines: &[Line], rig: Option<&RigFile>) {
             outln!("             next: {next}");
         }
     }
-    if lines.iter().all(|l| l.state != "ready") {
+    if lines.iter().all(|l| l.state != DeviceState::Ready) {
         outln!(
             "\nno device is ready. The simulated rig needs none: `skinrig run protocols/demo.yaml`; docs/how-to/bench.md describes how to wire a bench"
         );
@@ -126,7 +170,7 @@ fn robots(rig: Option<&RigFile>) -> Vec<Line> {
             let next = "install Force Dimension's SDK (3.10 or newer is advised) and name its libdrd in the rig file or in SKINRIG_LIBDRD; everything else works without it";
             return vec![line(
                 "omega.3 library",
-                "absent",
+                DeviceState::Absent,
                 detail,
                 Some(next.to_owned()),
             )];
@@ -134,17 +178,17 @@ fn robots(rig: Option<&RigFile>) -> Vec<Line> {
     };
     let found = match skinrig_omega3::enumerate::list(&loaded.library) {
         Ok(found) => found,
-        Err(e) => return vec![line("omega.3", "faulty", e.to_string(), None)],
+        Err(e) => return vec![line("omega.3", DeviceState::Faulty, e.to_string(), None)],
     };
     let mut lines: Vec<Line> = found
         .iter()
         .map(|f| {
             let (state, detail) = match &f.availability {
-                Availability::Free => ("ready", String::new()),
-                Availability::Busy => ("busy", "in use by another program".to_owned()),
-                Availability::NotPermitted => ("not permitted", String::new()),
-                Availability::OtherModel => ("other device", "not an omega.3".to_owned()),
-                Availability::Failed(e) => ("faulty", e.to_string()),
+                Availability::Free => (DeviceState::Ready, String::new()),
+                Availability::Busy => (DeviceState::Busy, "in use by another program".to_owned()),
+                Availability::NotPermitted => (DeviceState::NotPermitted, String::new()),
+                Availability::OtherModel => (DeviceState::OtherDevice, "not an omega.3".to_owned()),
+                Availability::Failed(e) => (DeviceState::Faulty, e.to_string()),
             };
             Line {
                 serial: f.serial.map(|s| s.to_string()),
@@ -187,7 +231,7 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
     let mut lines = Vec::new();
     let others = other_cameras(&mut lines, &wanted);
     match skinrig_evk1::enumerate() {
-        Err(e) => lines.push(line("USB", "faulty", e.to_string())),
+        Err(e) => lines.push(line("USB", DeviceState::Faulty, e.to_string())),
         Ok(found) => lines.extend(
             found
                 .iter()
@@ -200,20 +244,28 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
                             serial: Some(identity.serial.clone()),
                             role: wanted(&identity.serial).or_else(|| wanted(f.port.as_deref()?)),
                             firmware: Some(identity.firmware()),
-                            ..line(&place("EVK1 Gen3.1"), "ready", identity.firmware())
+                            ..line(
+                                &place("EVK1 Gen3.1"),
+                                DeviceState::Ready,
+                                identity.firmware(),
+                            )
                         },
                         FoundState::Busy => line(
                             &place("camera"),
-                            "busy",
+                            DeviceState::Busy,
                             "in use by another program".to_owned(),
                         ),
                         FoundState::NoPermission => {
-                            line(&place("camera"), "not permitted", String::new())
+                            line(&place("camera"), DeviceState::NotPermitted, String::new())
                         }
-                        FoundState::NotEvk1(what) => {
-                            line(&place("not an EVK1"), "other device", what.clone())
+                        FoundState::NotEvk1(what) => line(
+                            &place("not an EVK1"),
+                            DeviceState::OtherDevice,
+                            what.clone(),
+                        ),
+                        FoundState::Faulty(what) => {
+                            line(&place("camera"), DeviceState::Faulty, what.clone())
                         }
-                        FoundState::Faulty(what) => line(&place("camera"), "faulty", what.clone()),
                     };
                     Line {
                         next_step,
@@ -239,7 +291,7 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
             next_step: Some("check cable and power; an EVK1 needs USB 3".to_owned()),
             ..line(
                 "EVK1",
-                "absent",
+                DeviceState::Absent,
                 "no device with the USB IDs of an EVK1".to_owned(),
             )
         });
@@ -265,7 +317,7 @@ fn other_cameras(lines: &mut Vec<Line>, wanted: &dyn Fn(&str) -> Option<String>)
                 what: format!("{}, USB bus {bus} device {device}", model.name()),
                 role: wanted(&serial),
                 serial: Some(serial),
-                state: "ready",
+                state: DeviceState::Ready,
                 detail: format!("model {}", model.word()),
                 usb: Some(found.place),
                 ..Line::default()
@@ -303,20 +355,23 @@ fn add_missing(
     let is_candidate = |l: &&Line| {
         l.device == device
             && l.serial.is_none()
-            && matches!(l.state, "busy" | "not permitted" | "faulty")
+            && matches!(
+                l.state,
+                DeviceState::Busy | DeviceState::NotPermitted | DeviceState::Faulty
+            )
     };
-    let candidates: Vec<&'static str> =
-        lines.iter().filter(is_candidate).map(|l| l.state).collect();
+    let candidates: Vec<DeviceState> = lines.iter().filter(is_candidate).map(|l| l.state).collect();
     let (state, detail, next_step) = match candidates.first() {
         None => (
-            "absent",
+            DeviceState::Absent,
             String::new(),
             "plug it in and switch it on, or correct its serial number in the rig file",
         ),
         Some(first) => (
-            "not asked",
+            DeviceState::NotAsked,
             format!(
-                "may be one that is {first}: {} of that kind without a known serial number",
+                "may be one that is {}: {} of that kind without a known serial number",
+                first.name(),
                 candidates.len()
             ),
             "fix that one first, then repeat this command",
@@ -350,7 +405,7 @@ fn trigger_boxes(rig: Option<&RigFile>) -> Vec<Line> {
         lines.push(Line {
             device: "trigger box",
             what: port.clone(),
-            state: "busy",
+            state: DeviceState::Busy,
             detail: "not opened, which would reset it".to_owned(),
             role: Some("trigger_box".to_owned()),
             next_step: Some(format!(
@@ -368,18 +423,23 @@ fn trigger_boxes(rig: Option<&RigFile>) -> Vec<Line> {
         use skinrig_trigger_box::OpenError;
         use skinrig_trigger_box::handshake::HandshakeError;
         let (state, detail) = match &found.state {
-            PortState::Ready(identity) => ("ready", format!("firmware {}", identity.firmware)),
-            PortState::Closed(OpenError::Absent(_)) => ("absent", String::new()),
-            PortState::Closed(OpenError::Busy(_)) => ("busy", String::new()),
-            PortState::Closed(OpenError::NotPermitted(_)) => ("not permitted", String::new()),
-            PortState::Closed(_) => ("faulty", String::new()),
+            PortState::Ready(identity) => (
+                DeviceState::Ready,
+                format!("firmware {}", identity.firmware),
+            ),
+            PortState::Closed(OpenError::Absent(_)) => (DeviceState::Absent, String::new()),
+            PortState::Closed(OpenError::Busy(_)) => (DeviceState::Busy, String::new()),
+            PortState::Closed(OpenError::NotPermitted(_)) => {
+                (DeviceState::NotPermitted, String::new())
+            }
+            PortState::Closed(_) => (DeviceState::Faulty, String::new()),
             PortState::Unusable(HandshakeError::WrongFirmware {
                 firmware, protocol, ..
             }) => (
-                "other firmware",
+                DeviceState::OtherFirmware,
                 format!("firmware {firmware} with protocol {protocol}"),
             ),
-            PortState::Unusable(_) => ("other device", String::new()),
+            PortState::Unusable(_) => (DeviceState::OtherDevice, String::new()),
         };
         let (identity, next_step) = match &found.state {
             PortState::Ready(identity) => (Some(identity.clone()), None),
@@ -402,7 +462,7 @@ fn trigger_boxes(rig: Option<&RigFile>) -> Vec<Line> {
             lines.push(Line {
                 device: "port",
                 what: path,
-                state: "not asked",
+                state: DeviceState::NotAsked,
                 next_step: Some(
                     "if this is the trigger box, name the port in the rig file; other ports are never opened".to_owned(),
                 ),
@@ -433,7 +493,7 @@ fn serial_ports(folder: &Path) -> Vec<String> {
 mod tests {
     use super::*;
 
-    fn camera(state: &'static str, serial: Option<&str>, role: Option<&str>) -> Line {
+    fn camera(state: DeviceState, serial: Option<&str>, role: Option<&str>) -> Line {
         Line {
             device: "camera",
             what: "camera, USB bus 1 device 4".to_owned(),
@@ -445,7 +505,7 @@ mod tests {
     }
 
     /// State of camera 1 when `found` is the only camera.
-    fn state_beside(found: Line) -> Option<&'static str> {
+    fn state_beside(found: Line) -> Option<DeviceState> {
         let mut lines = vec![found];
         let wanted = Some(("camera1", "00001753".to_owned()));
         add_missing(&mut lines, "camera", "EVK1", wanted);
@@ -454,16 +514,23 @@ mod tests {
 
     #[test]
     fn a_device_that_may_be_the_busy_one_is_not_called_absent() {
-        for state in ["busy", "not permitted", "faulty"] {
-            assert_eq!(state_beside(camera(state, None, None)), Some("not asked"));
+        for state in [
+            DeviceState::Busy,
+            DeviceState::NotPermitted,
+            DeviceState::Faulty,
+        ] {
+            assert_eq!(
+                state_beside(camera(state, None, None)),
+                Some(DeviceState::NotAsked)
+            );
         }
-        let other = camera("ready", Some("00001754"), Some("camera2"));
-        assert_eq!(state_beside(other), Some("absent"));
-        let it = camera("ready", Some("00001753"), Some("camera1"));
+        let other = camera(DeviceState::Ready, Some("00001754"), Some("camera2"));
+        assert_eq!(state_beside(other), Some(DeviceState::Absent));
+        let it = camera(DeviceState::Ready, Some("00001753"), Some("camera1"));
         assert_eq!(state_beside(it), None);
         assert_eq!(
-            state_beside(camera("other device", None, None)),
-            Some("absent")
+            state_beside(camera(DeviceState::OtherDevice, None, None)),
+            Some(DeviceState::Absent)
         );
     }
 }

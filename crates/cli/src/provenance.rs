@@ -3,7 +3,7 @@
 use crate::rig::bench::TOLERATED;
 use chrono::DateTime;
 use skinrig_analysis::Analysis;
-use skinrig_model::{HostTime, PressVerdict, RunHeader, Setting};
+use skinrig_model::{HostTime, InterruptionReason, PressVerdict, RunHeader, Setting};
 use skinrig_recorder::{RecorderError, SessionReader};
 use skinrig_report::{DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakeRow};
 use skinrig_results::Origin;
@@ -27,7 +27,8 @@ pub(crate) fn provenance(
             firmware: d.identity.firmware,
         })
         .collect();
-    let (run_end, run_end_reason) = match reader.end()? {
+    let end = reader.end()?.map(|(_, end)| end);
+    let (run_end, run_end_reason) = match &end {
         None => (
             "not ended".to_owned(),
             Some(match skinrig_recorder::writer_of(reader.path()) {
@@ -35,10 +36,11 @@ pub(crate) fn provenance(
                 None => "the run was cut off; `skinrig resume` continues it".to_owned(),
             }),
         ),
-        Some((_, end)) => {
-            let reason = end.reason().map(str::to_owned);
-            (end.name().to_owned(), reason)
-        }
+        Some(end) => (end.name().to_owned(), end.reason()),
+    };
+    let ended_run = |reason: &InterruptionReason| match (reason, &end) {
+        (InterruptionReason::End(reason), Some(end)) => reason == end,
+        _ => false,
     };
     let interruptions = reader
         .interruptions()?
@@ -46,7 +48,8 @@ pub(crate) fn provenance(
         .map(|i| InterruptionRow {
             t_s: i.t.as_secs_f64(),
             kind: i.kind.name().to_owned(),
-            reason: i.reason,
+            reason: i.reason.to_string(),
+            ended_run: ended_run(&i.reason),
         })
         .collect();
     let notes = reader
@@ -95,6 +98,7 @@ pub(crate) fn provenance(
         results_hash: skinrig_analysis::results_hash(analysis),
         run_end,
         run_end_reason,
+        run_end_cause: end,
         legs: legs(reader, header)?,
         retaken: retaken(reader)?,
         interruptions,
@@ -169,7 +173,11 @@ fn retaken(reader: &SessionReader) -> Result<Vec<RetakeRow>, RecorderError> {
             rows.push(RetakeRow {
                 press: planned.id.number(),
                 attempt: attempt.id.number,
-                reason: reason.unwrap_or("no outcome".into()).into_owned(),
+                reason: reason.unwrap_or_else(|| "no outcome".to_owned()),
+                cause: match verdict {
+                    Some(PressVerdict::Invalid(reason)) => Some(reason.clone()),
+                    _ => None,
+                },
             });
         }
     }

@@ -193,7 +193,7 @@ fn describe(session: &Path, found: &UnfinishedSession, wanted: &[bool]) -> Strin
     let ended = match &found.end {
         None => "cut off".to_owned(),
         Some(RunEnd::Stopped(reason)) => format!("stopped: {reason}"),
-        Some(RunEnd::Faulted(reason)) => format!("faulted: {reason}"),
+        Some(RunEnd::Faulted(causes)) => format!("faulted: {causes}"),
         Some(RunEnd::Completed) => "completed, with presses lost to rig faults".to_owned(),
     };
     let all = || found.plan.presses.iter().zip(&found.histories).zip(wanted);
@@ -514,7 +514,6 @@ fn end_only(
     let missed = count(|v| matches!(v, PressVerdict::Missed(_)));
     Ok(RunReport {
         end: RunEnd::Completed,
-        causes: Vec::new(),
         press_faults: Vec::new(),
         valid_presses: Vec::new(),
         ended_at: HostTime::ZERO,

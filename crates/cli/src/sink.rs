@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use skinrig_controller::{ControlHandle, RecordSink, SinkFault};
 use skinrig_model::{
-    HostTime, InterruptionKind, PressId, PressOutcome, PressTiming, PressVerdict, Record,
+    ExcludedReason, HostTime, InterruptionKind, PressId, PressOutcome, PressTiming, PressVerdict,
+    Record,
 };
 use skinrig_recorder::{RecorderError, Sealed, SessionWriter};
 
@@ -23,7 +24,7 @@ pub(crate) struct ReplayExpectations {
     /// which is less exact.
     pub timings: BTreeMap<PressId, PressTiming>,
     /// Excluded presses, each with its rule.
-    pub excluded: BTreeMap<PressId, String>,
+    pub excluded: BTreeMap<PressId, ExcludedReason>,
     /// When and how the operator ended the recorded run.
     pub interruption: Option<(HostTime, InterruptionKind)>,
 }

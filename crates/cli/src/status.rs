@@ -74,6 +74,7 @@ fn stored(session: &Path) -> Result<Value, RecorderError> {
             json!({
                 "press": o.attempt.press, "attempt": o.attempt.number,
                 "verdict": o.verdict.name(), "reason": o.verdict.reason(),
+                "cause": o.verdict.cause(),
             })
         })
         .collect();
@@ -81,7 +82,7 @@ fn stored(session: &Path) -> Result<Value, RecorderError> {
     let count = interruptions.len();
     let interruptions: Vec<_> = interruptions[last(count)..]
         .iter()
-        .map(|i| json!([i.t.as_secs_f64(), i.kind.name(), i.reason]))
+        .map(|i| json!([i.t.as_secs_f64(), i.kind.name(), i.reason.to_string()]))
         .collect();
     let notes = reader.notes()?;
     let notes: Vec<_> = notes[last(notes.len())..]
@@ -94,6 +95,7 @@ fn stored(session: &Path) -> Result<Value, RecorderError> {
         "started_at": header.started_at, "prototype": header.prototype, "operator": header.operator,
         "protocol": header.protocol_name, "rig": header.rig_name, "rig_kind": header.rig_kind,
         "legs": reader.legs()?.len(), "end": end.as_ref().map(RunEnd::name), "end_reason": reason,
+        "end_cause": end.as_ref().and_then(RunEnd::cause),
         "totals": totals, "last_outcomes": outcomes, "interruption_count": count,
         "last_interruptions": interruptions, "last_notes": notes,
     }))

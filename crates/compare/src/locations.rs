@@ -143,8 +143,7 @@ fn scored(subject: &Subject) -> impl Iterator<Item = &PressResult> {
 fn is_attempt(press: &PressResult) -> bool {
     let by_journal = press.verdict == Verdict::Excluded
         && !press
-            .rule
-            .as_ref()
-            .is_some_and(|rule| *rule == Rule::ByHand || rule.is_on_data());
+            .rule()
+            .is_some_and(|rule| rule == Rule::ByHand || rule.is_on_data());
     press.role == PressRole::Score && press.verdict != Verdict::Missed && !by_journal
 }

@@ -1,10 +1,11 @@
 //! Both cameras with their streams: the order of their chunks, their continuity in time, and data not yet taken.
 
 use skinrig_device::{CameraCapabilities, CameraSettings, DeviceError, EventCamera, SyncMode};
-use skinrig_model::{CameraId, DeviceIdentity, HostDuration, HostTime, RawChunk, Setting};
+use skinrig_model::{
+    CameraId, DeviceIdentity, HostDuration, HostTime, RawChunk, RunFault, Setting,
+};
 
 use crate::continuity::{Continuity, StreamTiming};
-use crate::error::ControllerError;
 
 /// How to read the cameras.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,11 +106,11 @@ impl CameraStreams {
     }
 
     /// Checks that no chunk is missing before this one.
-    pub(crate) fn check_order(&mut self, chunk: &RawChunk) -> Result<(), ControllerError> {
+    pub(crate) fn check_order(&mut self, chunk: &RawChunk) -> Result<(), RunFault> {
         let i = chunk.camera.index();
         let expected = self.next_seq[i].replace(chunk.seq + 1);
         match expected {
-            Some(expected) if expected != chunk.seq => Err(ControllerError::ChunkOrder {
+            Some(expected) if expected != chunk.seq => Err(RunFault::ChunkOrder {
                 camera: chunk.camera,
                 expected,
                 found: chunk.seq,
@@ -123,17 +124,14 @@ impl CameraStreams {
     /// new clock for what follows.
     ///
     /// Returns how late the data are, if this is to be reported.
-    pub(crate) fn check_time(
-        &mut self,
-        chunk: &RawChunk,
-    ) -> Result<Option<LateData>, ControllerError> {
+    pub(crate) fn check_time(&mut self, chunk: &RawChunk) -> Result<Option<LateData>, RunFault> {
         let Some(limit) = self.lag_limit else {
             return Ok(None);
         };
         let camera = chunk.camera;
         match self.continuity[camera.index()].observe(chunk, limit) {
             StreamTiming::InStep => Ok(None),
-            StreamTiming::Stepped(us) => Err(ControllerError::ClockStep {
+            StreamTiming::Stepped(us) => Err(RunFault::ClockStep {
                 camera,
                 limit,
                 found: HostDuration(us * 1_000),

@@ -4,15 +4,14 @@ use skinrig_device::{
     Clock, DeviceError, Indenter, IndenterCapabilities, MotionLimits, RobotSample,
 };
 use skinrig_model::{
-    DeviceIdentity, HostDuration, HostTime, Point2, Point3, PoseSample, RigidTransform, Robot,
-    Setting, Skin,
+    DeviceIdentity, GuardError, HostDuration, HostTime, Point2, Point3, PoseSample, RigidTransform,
+    Robot, RunFault, Setting, Skin, WatchdogTrip,
 };
 use skinrig_protocol::area::Surroundings;
 use skinrig_protocol::plan::{OnTrip, RunLimits};
 
-use crate::error::{ControllerError, GuardError};
 use crate::settings::ControllerSettings;
-use crate::watchdog::{WatchLimits, Watchdog, WatchdogTrip};
+use crate::watchdog::{WatchLimits, Watchdog};
 
 /// Limit on the depth below the surface of a frame, where motions use the coordinates of a different frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,7 +100,7 @@ impl<'a> GuardedIndenter<'a> {
     ///
     /// # Errors
     /// The error of the robot.
-    pub fn configure(&mut self, limits: &MotionLimits) -> Result<Vec<Setting>, ControllerError> {
+    pub fn configure(&mut self, limits: &MotionLimits) -> Result<Vec<Setting>, RunFault> {
         Ok(self.inner.configure(limits)?)
     }
 
@@ -109,7 +108,7 @@ impl<'a> GuardedIndenter<'a> {
     ///
     /// # Errors
     /// The error of the robot.
-    pub fn arm(&mut self) -> Result<(), ControllerError> {
+    pub fn arm(&mut self) -> Result<(), RunFault> {
         self.inner.arm()?;
         self.armed = true;
         self.trip = None;
@@ -212,7 +211,7 @@ impl<'a> GuardedIndenter<'a> {
         target: Point3<Skin>,
         speed_mm_s: f64,
         now: HostTime,
-    ) -> Result<(), ControllerError> {
+    ) -> Result<(), RunFault> {
         self.check(target, speed_mm_s, now)?;
         self.inner
             .command(self.robot_from_skin.apply(target), speed_mm_s)
@@ -258,9 +257,7 @@ impl<'a> GuardedIndenter<'a> {
         let rises = target.z_mm - last.measured.z_mm >= lateral_mm
             && lateral_mm <= limits.position_tolerance_mm;
         if let Some(trip) = self.trip.as_ref().filter(|_| !rises) {
-            return Err(GuardError::Tripped {
-                reason: trip.to_string(),
-            });
+            return Err(GuardError::Tripped(trip.clone()));
         }
         let height_mm = target.z_mm.min(last.measured.z_mm);
         // Measured from where the tip went down, so that many small steps count as one large step.
@@ -337,14 +334,10 @@ impl<'a> GuardedIndenter<'a> {
     /// Appends all new samples in the skin frame, and runs the watchdog on them and on the time of `clock`.
     ///
     /// # Errors
-    /// [`ControllerError::Watchdog`] if a limit is exceeded: the robot then holds or brakes, and until it is armed again
+    /// [`RunFault::Watchdog`] if a limit is exceeded: the robot then holds or brakes, and until it is armed again
     /// only upward motion is allowed. A malformed sample and those after it are not appended. Errors of the robot are
     /// returned after appending its samples.
-    pub fn poll(
-        &mut self,
-        clock: &dyn Clock,
-        poses: &mut Vec<PoseSample>,
-    ) -> Result<(), ControllerError> {
+    pub fn poll(&mut self, clock: &dyn Clock, poses: &mut Vec<PoseSample>) -> Result<(), RunFault> {
         self.samples.clear();
         let answer = self.inner.poll(&mut self.samples);
         let mut seen = Ok(());
@@ -390,7 +383,7 @@ impl<'a> GuardedIndenter<'a> {
     }
 
     /// Commands a failed device to hold, if it still responds. A rejected request is not a failure.
-    fn hold_after(&mut self, e: DeviceError) -> ControllerError {
+    fn hold_after(&mut self, e: DeviceError) -> RunFault {
         if self.armed && !matches!(e, DeviceError::Refused { .. }) {
             let _ = self.inner.hold();
         }
@@ -401,7 +394,7 @@ impl<'a> GuardedIndenter<'a> {
     ///
     /// # Errors
     /// The error of the robot.
-    pub fn hold(&mut self) -> Result<(), ControllerError> {
+    pub fn hold(&mut self) -> Result<(), RunFault> {
         Ok(self.inner.hold()?)
     }
 
@@ -409,7 +402,7 @@ impl<'a> GuardedIndenter<'a> {
     ///
     /// # Errors
     /// The error of the robot; no motion is allowed afterwards either way.
-    pub fn disarm(&mut self) -> Result<(), ControllerError> {
+    pub fn disarm(&mut self) -> Result<(), RunFault> {
         self.armed = false;
         self.watchdog.stop();
         Ok(self.inner.disarm()?)

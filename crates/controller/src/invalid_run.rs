@@ -1,7 +1,6 @@
 //! Counts consecutive invalid presses: beyond a limit, more presses would not help.
 
-use crate::error::ControllerError;
-use crate::press_fault::PressFault;
+use skinrig_model::{Causes, NoCause, PressFault, RunFault};
 
 /// The current row of invalid presses.
 #[derive(Debug)]
@@ -30,8 +29,8 @@ impl InvalidRun {
     /// Ends a press after its last attempt. A press that was interrupted on purpose is not counted.
     ///
     /// # Errors
-    /// [`ControllerError::InvalidInARow`] at the limit.
-    pub(crate) fn press_ended(&mut self) -> Result<(), ControllerError> {
+    /// [`RunFault::InvalidInARow`] at the limit.
+    pub(crate) fn press_ended(&mut self) -> Result<(), RunFault> {
         match self.last.take() {
             Some(faults) if faults.first().is_some_and(PressFault::is_pause) => {}
             Some(faults) if !faults.is_empty() => self.faults.push(faults),
@@ -49,10 +48,14 @@ impl InvalidRun {
                 faults.push(fault.clone());
             }
         }
-        Err(ControllerError::InvalidInARow {
-            limit: self.limit,
-            faults,
-        })
+        match Causes::try_from(faults) {
+            Ok(faults) => Err(RunFault::InvalidInARow {
+                limit: self.limit,
+                faults,
+            }),
+            // Only presses with faults are in the row.
+            Err(NoCause) => Ok(()),
+        }
     }
 }
 

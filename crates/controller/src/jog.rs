@@ -4,16 +4,15 @@ mod watch;
 
 use skinrig_device::{Clock, Indenter, MotionLimits};
 use skinrig_model::{
-    DeviceIdentity, HostDuration, HostTime, Point3, PoseSample, RigidTransform, Robot, Setting,
-    Skin,
+    DeviceIdentity, GuardError, HostDuration, HostTime, NotArrived, Point3, PoseSample,
+    RigidTransform, Robot, RunFault, Setting, Skin,
 };
 use skinrig_protocol::TouchSearch;
 use skinrig_protocol::plan::RunLimits;
 
 use crate::control::ControlHandle;
-use crate::error::{ControllerError, GuardError};
+
 use crate::guard::{Floor, GuardedIndenter};
-use crate::not_arrived::NotArrived;
 use crate::press_tracker::Settling;
 use crate::settings::ControllerSettings;
 use crate::touch::TouchDetector;
@@ -67,10 +66,10 @@ pub enum TouchOutcome {
 impl<'a> Jog<'a> {
     /// Configures the robot's limits, powers it, and waits for its pose. All coordinates, including those of `limits`, are in the
     /// robot frame, since the pose of the skin is still to be found by touching off. Nothing goes below the `floor`. Of `control`, only a
-    /// halt is handled: it disarms immediately and ends the current call with [`ControllerError::Halted`].
+    /// halt is handled: it disarms immediately and ends the current call with [`RunFault::Halted`].
     ///
     /// # Errors
-    /// The error of the robot; [`ControllerError::PoseStream`] if it reports no pose. The robot is then disarmed.
+    /// The error of the robot; [`RunFault::PoseStream`] if it reports no pose. The robot is then disarmed.
     pub fn start(
         indenter: Box<dyn Indenter + 'a>,
         clock: Box<dyn Clock + 'a>,
@@ -79,7 +78,7 @@ impl<'a> Jog<'a> {
         floor: Option<Floor>,
         control: &ControlHandle,
         settings: ControllerSettings,
-    ) -> Result<(Self, Vec<Setting>), ControllerError> {
+    ) -> Result<(Self, Vec<Setting>), RunFault> {
         let indenter =
             GuardedIndenter::new(indenter, RigidTransform::identity(), limits, &settings)
                 .with_floor(floor);
@@ -99,7 +98,7 @@ impl<'a> Jog<'a> {
         robot_limits: &MotionLimits,
         control: &ControlHandle,
         settings: ControllerSettings,
-    ) -> Result<(Self, Vec<Setting>), ControllerError> {
+    ) -> Result<(Self, Vec<Setting>), RunFault> {
         let indenter = GuardedIndenter::new(indenter, robot_from_skin, limits, &settings);
         Self::begin(indenter, clock, limits, robot_limits, control, settings)
     }
@@ -111,7 +110,7 @@ impl<'a> Jog<'a> {
         robot_limits: &MotionLimits,
         control: &ControlHandle,
         settings: ControllerSettings,
-    ) -> Result<(Self, Vec<Setting>), ControllerError> {
+    ) -> Result<(Self, Vec<Setting>), RunFault> {
         let mut jog = Self {
             indenter,
             clock,
@@ -129,7 +128,7 @@ impl<'a> Jog<'a> {
         let until = jog.clock.now() + jog.settings.first_pose_within;
         while jog.indenter.position().is_none() {
             if jog.clock.now() >= until {
-                return Err(ControllerError::PoseStream {
+                return Err(RunFault::PoseStream {
                     expected: format!("a sample within {}", jog.settings.first_pose_within),
                     found: "none".to_owned(),
                 });
@@ -154,8 +153,8 @@ impl<'a> Jog<'a> {
     /// Polls the robot and returns the tip position. Call it often: it also monitors force and pose stream.
     ///
     /// # Errors
-    /// [`ControllerError::Watchdog`] above the force limit or with a stale or invalid pose stream; the error of the robot.
-    pub fn look(&mut self) -> Result<PoseSample, ControllerError> {
+    /// [`RunFault::Watchdog`] above the force limit or with a stale or invalid pose stream; the error of the robot.
+    pub fn look(&mut self) -> Result<PoseSample, RunFault> {
         self.tick()?;
         self.position()
     }
@@ -173,14 +172,14 @@ impl<'a> Jog<'a> {
     /// Moves straight to `target`. After a touch, sideways motion needs 2 mm of height above it.
     ///
     /// # Errors
-    /// [`ControllerError::Guard`] for a motion that is not allowed: nothing moved. [`ControllerError::NotArrived`]:
+    /// [`RunFault::Guard`] for a motion that is not allowed: nothing moved. [`RunFault::NotArrived`]:
     /// the robot holds. Otherwise as [`look`](Self::look).
     pub fn go(
         &mut self,
         target: Point3<Skin>,
         speed_mm_s: f64,
         stop: StopCheck<'_>,
-    ) -> Result<MoveOutcome, ControllerError> {
+    ) -> Result<MoveOutcome, RunFault> {
         let from = self.look()?;
         self.check_lift(from, target)?;
         let way_mm = target.distance_mm(from.measured);
@@ -215,13 +214,13 @@ impl<'a> Jog<'a> {
     /// Moves down slowly, at most `way_mm`, until the force rises, then back up off the surface.
     ///
     /// # Errors
-    /// As [`go`](Self::go); [`ControllerError::PoseStream`] for a robot that reports no force.
+    /// As [`go`](Self::go); [`RunFault::PoseStream`] for a robot that reports no force.
     pub fn touch(
         &mut self,
         search: TouchSearch,
         way_mm: f64,
         stop: StopCheck<'_>,
-    ) -> Result<TouchOutcome, ControllerError> {
+    ) -> Result<TouchOutcome, RunFault> {
         let above = self.look()?;
         let here = above.commanded;
         let t = self.command(here, search.speed_mm_s)?;
@@ -229,7 +228,7 @@ impl<'a> Jog<'a> {
         let until = t + search.tare + self.settings.first_pose_within;
         while detector.tare_n().is_none() {
             if detector.is_blind() || self.clock.now() >= until {
-                return Err(ControllerError::PoseStream {
+                return Err(RunFault::PoseStream {
                     expected: "forces".to_owned(),
                     found: "none".to_owned(),
                 });
@@ -274,7 +273,7 @@ impl<'a> Jog<'a> {
     ///
     /// # Errors
     /// The first thing that failed.
-    pub fn finish(&mut self) -> Result<Option<PoseSample>, ControllerError> {
+    pub fn finish(&mut self) -> Result<Option<PoseSample>, RunFault> {
         if std::mem::replace(&mut self.finished, true) {
             return Ok(self.indenter.position());
         }
@@ -284,7 +283,7 @@ impl<'a> Jog<'a> {
         };
         // The operator interrupted the retraction; the result of disarming is reported below.
         let rose = rose.or_else(|e| match e {
-            ControllerError::Halted => Ok(()),
+            RunFault::Halted => Ok(()),
             other => Err(other),
         });
         let disarmed = (0..3)
@@ -295,7 +294,7 @@ impl<'a> Jog<'a> {
         Ok(self.indenter.position())
     }
 
-    fn rise(&mut self) -> Result<(), ControllerError> {
+    fn rise(&mut self) -> Result<(), RunFault> {
         self.indenter.hold()?;
         let at = self.look()?.measured;
         let z_mm = (at.z_mm + RETRACT_MM).min(self.limits.workspace_max_mm[2]);
@@ -333,11 +332,7 @@ impl<'a> Jog<'a> {
         Ok(())
     }
 
-    fn command(
-        &mut self,
-        target: Point3<Skin>,
-        speed_mm_s: f64,
-    ) -> Result<HostTime, ControllerError> {
+    fn command(&mut self, target: Point3<Skin>, speed_mm_s: f64) -> Result<HostTime, RunFault> {
         // A slow log may have delayed the loop: poll again before moving.
         if self.indenter.check_fresh(self.clock.now()).is_err() {
             self.tick()?;
@@ -347,21 +342,21 @@ impl<'a> Jog<'a> {
         Ok(self.clock.now())
     }
 
-    fn position(&self) -> Result<PoseSample, ControllerError> {
+    fn position(&self) -> Result<PoseSample, RunFault> {
         self.indenter
             .position()
-            .ok_or_else(|| ControllerError::PoseStream {
+            .ok_or_else(|| RunFault::PoseStream {
                 expected: "a known position".to_owned(),
                 found: "none".to_owned(),
             })
     }
 
-    fn tick(&mut self) -> Result<(), ControllerError> {
+    fn tick(&mut self) -> Result<(), RunFault> {
         self.clock.wait_until(self.clock.now() + self.settings.tick);
         self.fresh.clear();
         if self.control.is_halted() && self.indenter.is_armed() {
             self.indenter.disarm()?;
-            return Err(ControllerError::Halted);
+            return Err(RunFault::Halted);
         }
         let polled = self.indenter.poll(self.clock.as_ref(), &mut self.fresh);
         for s in &self.fresh {

@@ -3,13 +3,13 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use skinrig_model::{
-    AttemptId, HostDuration, HostTime, PoseSample, PressHistory, PressId, PressOutcome,
-    PressVerdict, Record,
+    AttemptId, HostDuration, HostTime, MissedReason, PoseSample, PressHistory, PressId,
+    PressOutcome, PressVerdict, Record, RunFault, SinkFault,
 };
 
-use crate::error::{ControllerError, Problem};
+use crate::error::Problem;
 use crate::settings::ControllerSettings;
-use crate::sink::{RecordSink, SinkFault};
+use crate::sink::RecordSink;
 
 /// State of a planned press.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,7 +88,7 @@ impl<'a> Journal<'a> {
     }
 
     /// Regularly checks that the records are still where they were written.
-    pub(crate) fn check(&mut self, now: HostTime) -> Result<(), ControllerError> {
+    pub(crate) fn check(&mut self, now: HostTime) -> Result<(), RunFault> {
         if now - self.checked < self.check_every {
             return Ok(());
         }
@@ -116,7 +116,7 @@ impl<'a> Journal<'a> {
         std::mem::take(&mut self.problems)
     }
 
-    pub(crate) fn problem(&mut self, doing: &'static str, error: impl Into<ControllerError>) {
+    pub(crate) fn problem(&mut self, doing: &'static str, error: impl Into<RunFault>) {
         let problem = Problem {
             doing,
             error: error.into(),
@@ -127,7 +127,7 @@ impl<'a> Journal<'a> {
     }
 
     /// Emits a record. During the end of the run a failure becomes a problem instead of an error.
-    pub(crate) fn emit(&mut self, record: Record) -> Result<(), ControllerError> {
+    pub(crate) fn emit(&mut self, record: Record) -> Result<(), RunFault> {
         if !self.is_ending {
             return Ok(self.sink.accept(record)?);
         }
@@ -140,12 +140,12 @@ impl<'a> Journal<'a> {
     }
 
     /// Emits a note.
-    pub(crate) fn note(&mut self, t: HostTime, text: String) -> Result<(), ControllerError> {
+    pub(crate) fn note(&mut self, t: HostTime, text: String) -> Result<(), RunFault> {
         self.emit(Record::Note { t, text })
     }
 
     /// Buffers pose samples; emits them once a block is full.
-    pub(crate) fn add_poses(&mut self, samples: &[PoseSample]) -> Result<(), ControllerError> {
+    pub(crate) fn add_poses(&mut self, samples: &[PoseSample]) -> Result<(), RunFault> {
         self.poses.extend_from_slice(samples);
         if self.poses.len() >= self.pose_block {
             self.emit_poses()?;
@@ -154,7 +154,7 @@ impl<'a> Journal<'a> {
     }
 
     /// Emits all buffered samples.
-    pub(crate) fn emit_poses(&mut self) -> Result<(), ControllerError> {
+    pub(crate) fn emit_poses(&mut self) -> Result<(), RunFault> {
         if self.poses.is_empty() {
             return Ok(());
         }
@@ -169,11 +169,7 @@ impl<'a> Journal<'a> {
     }
 
     /// Starts an attempt: its intent is durable on return.
-    pub(crate) fn intent(
-        &mut self,
-        attempt: AttemptId,
-        t: HostTime,
-    ) -> Result<(), ControllerError> {
+    pub(crate) fn intent(&mut self, attempt: AttemptId, t: HostTime) -> Result<(), RunFault> {
         let emitted = self.emit(Record::Intent { attempt, t });
         if !was_rejected(&emitted) {
             if let Some(attempts) = self.attempts.get_mut(attempt.press.index() as usize) {
@@ -185,7 +181,7 @@ impl<'a> Journal<'a> {
     }
 
     /// Ends an attempt.
-    pub(crate) fn outcome(&mut self, outcome: PressOutcome) -> Result<(), ControllerError> {
+    pub(crate) fn outcome(&mut self, outcome: PressOutcome) -> Result<(), RunFault> {
         let state = match outcome.verdict {
             PressVerdict::Valid => PressState::Valid,
             _ => PressState::Invalid,
@@ -199,11 +195,11 @@ impl<'a> Journal<'a> {
     }
 
     /// Marks every press that was never attempted as missed.
-    pub(crate) fn miss_the_rest(&mut self, reason: &str) -> Result<(), ControllerError> {
+    pub(crate) fn miss_the_rest(&mut self, reason: &MissedReason) -> Result<(), RunFault> {
         for i in 0..self.states.len() {
             if self.states[i] == PressState::Planned {
                 let attempt = self.next_attempt(PressId::from_index(i as u32));
-                self.emit(Record::Missed(attempt, reason.to_owned()))?;
+                self.emit(Record::Missed(attempt, reason.clone()))?;
                 self.states[i] = PressState::Missed;
             }
         }
@@ -233,6 +229,6 @@ impl<'a> Journal<'a> {
 }
 
 /// Whether a record is certainly not in the session. A late one may still arrive there, and must not be followed by another of its kind.
-pub(crate) const fn was_rejected(result: &Result<(), ControllerError>) -> bool {
-    matches!(result, Err(ControllerError::Sink(SinkFault::Rejected(_))))
+pub(crate) const fn was_rejected(result: &Result<(), RunFault>) -> bool {
+    matches!(result, Err(RunFault::Sink(SinkFault::Rejected(_))))
 }

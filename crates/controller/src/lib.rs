@@ -24,12 +24,10 @@ mod invalid_run;
 pub mod jog;
 mod journal;
 mod machine;
-mod not_arrived;
 mod open_press;
 mod pose_trackers;
 mod preflight;
 mod preflight_run;
-pub mod press_fault;
 mod press_series;
 mod press_tracker;
 pub mod progress;
@@ -48,14 +46,17 @@ pub use checks::{
     ExpectedDevice, Loopback, Preflight, contains_version, differing, identity_checks,
 };
 pub use control::{ControlHandle, NotesFull};
-pub use error::{ControllerError, GuardError, NotAtRest, Problem};
+pub use error::Problem;
 pub use guard::{Floor, GuardedIndenter};
 pub use jog::{Jog, MoveOutcome, TouchOutcome};
-pub use not_arrived::NotArrived;
-pub use press_fault::{PressFault, TimingFault, TouchFault};
 pub use progress::{Progress, ProgressTracker};
 pub use run::{Resume, Run, RunReport};
 pub use settings::ControllerSettings;
-pub use sink::{RecordSink, SinkFault};
+pub use sink::RecordSink;
 pub use states::State;
-pub use watchdog::{WatchLimits, Watchdog, WatchdogTrip};
+pub use watchdog::{WatchLimits, Watchdog};
+
+pub use skinrig_model::fault::{
+    GuardError, NotArrived, NotAtRest, PressFault, RunFault, SinkFault, TimingFault, TouchFault,
+    WatchdogTrip,
+};

@@ -1,9 +1,10 @@
 //! The press in progress: its phases, the marks still to send, and what its cameras delivered.
 
-use skinrig_model::{AttemptId, CameraId, HostTime, Mark, MarkKind, PoseSample, RawChunk};
+use skinrig_model::{
+    AttemptId, CameraId, HostTime, Mark, MarkKind, PoseSample, PressFault, RawChunk,
+};
 use skinrig_protocol::plan::PressStep;
 
-use crate::press_fault::PressFault;
 use crate::press_tracker::PressTracker;
 
 /// Data of one camera during the press.

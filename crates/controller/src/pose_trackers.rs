@@ -1,9 +1,8 @@
 //! The trackers that follow the pose stream: the press in progress, the surface search, and the current motion.
 
 use skinrig_device::Clock;
-use skinrig_model::{HostTime, PoseSample};
+use skinrig_model::{HostTime, PoseSample, RunFault};
 
-use crate::error::ControllerError;
 use crate::guard::GuardedIndenter;
 use crate::open_press::OpenPress;
 use crate::press_tracker::{PressTracker, Settling};
@@ -25,7 +24,7 @@ impl PoseTrackers {
         &mut self,
         indenter: &mut GuardedIndenter<'_>,
         clock: &dyn Clock,
-    ) -> Result<(), ControllerError> {
+    ) -> Result<(), RunFault> {
         self.fresh.clear();
         let answer = indenter.poll(clock, &mut self.fresh);
         for sample in &self.fresh {

@@ -2,12 +2,11 @@
 
 use skinrig_device::{IndenterCapabilities, MotionLimits};
 use skinrig_model::{
-    Point2, Point3, PressHistory, PressId, RigidTransform, Robot, RunHeader, Skin,
+    Point2, Point3, PressHistory, PressId, RigidTransform, Robot, RunFault, RunHeader, Skin,
 };
 use skinrig_protocol::plan::{Plan, PressStep, Step};
 use skinrig_protocol::{Surface, TouchSearch};
 
-use crate::error::ControllerError;
 use crate::guard::check_target;
 
 /// Largest distance of a press from the end of the previous travel, mm: rounding of a plan stored as text.
@@ -17,8 +16,8 @@ fn plan_error(
     place: impl Into<String>,
     expected: impl Into<String>,
     found: impl Into<String>,
-) -> ControllerError {
-    ControllerError::Plan {
+) -> RunFault {
+    RunFault::Plan {
         place: place.into(),
         expected: expected.into(),
         found: found.into(),
@@ -32,7 +31,7 @@ pub(crate) fn check_plan(
     plan: &Plan,
     header: &RunHeader,
     histories: Option<&[PressHistory]>,
-) -> Result<(), ControllerError> {
+) -> Result<(), RunFault> {
     if header.presses != plan.presses {
         return Err(plan_error(
             "header",
@@ -142,7 +141,8 @@ pub(crate) fn check_plan(
                     return Err(plan_error(
                         name,
                         "a travel to above the press first",
-                        above.map_or_else(|| "none".to_owned(), |a| crate::not_arrived::point(&a)),
+                        above
+                            .map_or_else(|| "none".to_owned(), |a| skinrig_model::fault::point(&a)),
                     ));
                 }
                 above = Some(press.at.at_height(limits.clearance_mm));
@@ -180,7 +180,7 @@ fn check_search(
     place: &str,
     at: Point2,
     search: &TouchSearch,
-) -> Result<(), ControllerError> {
+) -> Result<(), RunFault> {
     let limits = &plan.limits;
     check_speed(plan, place, search.speed_mm_s)?;
     check_point(plan, place, at.at_height(-search.band_mm))?;
@@ -204,7 +204,7 @@ fn check_search(
     ))
 }
 
-fn check_speed(plan: &Plan, place: &str, speed_mm_s: f64) -> Result<(), ControllerError> {
+fn check_speed(plan: &Plan, place: &str, speed_mm_s: f64) -> Result<(), RunFault> {
     let limit = plan.limits.max_speed_mm_s;
     if speed_mm_s.is_finite() && speed_mm_s > 0.0 && speed_mm_s <= limit {
         return Ok(());
@@ -216,7 +216,7 @@ fn check_speed(plan: &Plan, place: &str, speed_mm_s: f64) -> Result<(), Controll
     ))
 }
 
-fn check_point(plan: &Plan, place: &str, target: Point3<Skin>) -> Result<(), ControllerError> {
+fn check_point(plan: &Plan, place: &str, target: Point3<Skin>) -> Result<(), RunFault> {
     check_target(&plan.limits, target)
         .map_err(|e| plan_error(place, "a target within the limits", e.to_string()))
 }
@@ -231,7 +231,7 @@ pub(crate) fn motion_limits(
     plan: &Plan,
     robot_from_skin: &RigidTransform<Robot, Skin>,
     can: &IndenterCapabilities,
-) -> Result<(MotionLimits, Vec<String>), ControllerError> {
+) -> Result<(MotionLimits, Vec<String>), RunFault> {
     let limits = &plan.limits;
     let margin = limits.position_tolerance_mm;
     let low_z = limits.workspace_min_mm[2].max(-limits.max_depth_mm);
@@ -295,7 +295,7 @@ fn check_reach(
     plan: &Plan,
     robot_from_skin: &RigidTransform<Robot, Skin>,
     limits: &MotionLimits,
-) -> Result<(), ControllerError> {
+) -> Result<(), RunFault> {
     let reach = |n: usize, target: Point3<Skin>, speed_mm_s: f64| {
         let place = format!("indenter, step {n} of the plan");
         within(limits, robot_from_skin, place, target, speed_mm_s)
@@ -351,13 +351,13 @@ fn within(
     place: String,
     target: Point3<Skin>,
     speed_mm_s: f64,
-) -> Result<(), ControllerError> {
+) -> Result<(), RunFault> {
     let p = robot_from_skin.apply(target).to_array();
     let inside = (0..3).all(|i| (limits.min_mm[i]..=limits.max_mm[i]).contains(&p[i]));
     if inside && speed_mm_s <= limits.max_speed_mm_s {
         return Ok(());
     }
-    Err(ControllerError::Rig {
+    Err(RunFault::Rig {
         place,
         expected: format!(
             "a target from {:?} to {:?} mm (robot frame) and at most {} mm/s",

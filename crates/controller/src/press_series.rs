@@ -1,12 +1,10 @@
 //! The presses of a run so far: the time of their repetition, their retakes and their faults.
 
-use skinrig_model::{AttemptId, HostDuration, HostTime};
+use skinrig_model::{AttemptId, HostDuration, HostTime, PressFault, RunFault};
 use skinrig_protocol::Retakes;
 use skinrig_protocol::plan::Plan;
 
-use crate::error::ControllerError;
 use crate::invalid_run::InvalidRun;
-use crate::press_fault::PressFault;
 
 /// Schedule, retakes and faults of the presses.
 pub(crate) struct PressSeries {
@@ -65,8 +63,8 @@ impl PressSeries {
     /// Ends a press after its last attempt.
     ///
     /// # Errors
-    /// [`ControllerError::InvalidInARow`] at the limit of consecutive invalid presses.
-    pub(crate) fn end_press(&mut self) -> Result<(), ControllerError> {
+    /// [`RunFault::InvalidInARow`] at the limit of consecutive invalid presses.
+    pub(crate) fn end_press(&mut self) -> Result<(), RunFault> {
         self.invalid_run.press_ended()
     }
 

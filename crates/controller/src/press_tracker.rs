@@ -1,9 +1,9 @@
 //! Determines the phase times of a press from the pose stream alone.
 
-use skinrig_model::{HostDuration, HostTime, Point2, Point3, PoseSample, PressTiming, Skin};
+use skinrig_model::{
+    HostDuration, HostTime, Point2, Point3, PoseSample, PressMoment, PressTiming, Skin, TimingFault,
+};
 use skinrig_protocol::plan::RunLimits;
-
-use crate::press_fault::TimingFault;
 
 /// A set point that changes by more than this has begun to move, mm.
 const MOVED_MM: f64 = 1e-3;
@@ -301,14 +301,14 @@ impl PressTracker {
     /// # Errors
     /// The first phase time that is missing or out of order.
     pub(crate) fn timing(&self) -> Result<PressTiming, TimingFault> {
-        let need = |t: Option<HostTime>, what: &'static str| t.ok_or(TimingFault::Missing(what));
+        let need = |t: Option<HostTime>, what: PressMoment| t.ok_or(TimingFault::Missing(what));
         let timing = PressTiming {
-            approach: need(self.approach, "start of the approach")?,
-            contact: need(self.contact, "contact")?,
-            at_depth: need(self.at_depth, "settling at depth")?,
-            retract: need(self.retract, "start of the retraction")?,
-            release: need(self.release, "release")?,
-            clear: need(self.clear, "settling at clearance height")?,
+            approach: need(self.approach, PressMoment::Approach)?,
+            contact: need(self.contact, PressMoment::Contact)?,
+            at_depth: need(self.at_depth, PressMoment::AtDepth)?,
+            retract: need(self.retract, PressMoment::Retract)?,
+            release: need(self.release, PressMoment::Release)?,
+            clear: need(self.clear, PressMoment::Clear)?,
         };
         let order = [
             timing.approach,
@@ -457,7 +457,7 @@ mod tests {
         let mut tracker = PressTracker::new(at, 2.0, &LIMITS, HostTime(0), None);
         samples(&[1.0, 0.9, 0.5]).for_each(|s| tracker.feed(&s));
         let found = tracker.timing();
-        assert_eq!(found, Err(TimingFault::Missing("contact")));
+        assert_eq!(found, Err(TimingFault::Missing(PressMoment::Contact)));
         assert_eq!(tracker.check_hold(), Err(TimingFault::NoHold));
     }
 }

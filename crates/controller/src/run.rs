@@ -2,20 +2,19 @@
 
 use skinrig_device::Rig;
 use skinrig_model::{
-    AttemptId, HostTime, PressHistory, PressId, Record, ResumeHeader, RunEnd, RunHeader,
+    AttemptId, HostTime, PressFault, PressHistory, PressId, Record, ResumeHeader, RunEnd, RunHeader,
 };
 use skinrig_protocol::plan::Plan;
 
 use crate::checks::Preflight;
 use crate::control::ControlHandle;
-use crate::error::{ControllerError, Problem};
+use crate::error::Problem;
 use crate::executor::Executor;
-use crate::press_fault::PressFault;
 use crate::settings::ControllerSettings;
 use crate::sink::RecordSink;
 
 /// Data to continue an interrupted, stopped or faulted session.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Resume {
     /// First record of the leg.
     pub header: ResumeHeader,
@@ -27,11 +26,8 @@ pub struct Resume {
 #[derive(Debug, Clone, PartialEq)]
 #[must_use]
 pub struct RunReport {
-    /// Kind of the end, as in the last record.
+    /// The end, as in the last record: the faults of an early end are followed by an unsafe state of the robot, if any.
     pub end: RunEnd,
-    /// Causes of an early end, followed by an unsafe state of the robot, if any. Empty after a completed run and after the
-    /// operator's stop.
-    pub causes: Vec<ControllerError>,
     /// Faults of each attempt in this leg, in order.
     pub press_faults: Vec<(AttemptId, PressFault)>,
     /// Valid presses, over all legs.
@@ -176,7 +172,7 @@ mod tests {
     use skinrig_sim::rig::simulated_rig;
 
     use super::*;
-    use crate::sink::SinkFault;
+    use skinrig_model::fault::SinkFault;
 
     const CLEARANCE_MM: f64 = 5.0;
 

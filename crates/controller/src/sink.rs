@@ -1,17 +1,6 @@
 //! The consumer of records.
 
-use skinrig_model::Record;
-
-/// The sink failed; the run must end safely.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum SinkFault {
-    /// The record was rejected.
-    #[error("recorder: {0}")]
-    Rejected(String),
-    /// The record was accepted but is delayed on its way to the disk: it may already be there, or arrive later.
-    #[error("recorder: {0}")]
-    Delayed(String),
-}
+use skinrig_model::{Record, SinkFault};
 
 /// Consumes every record of a run, in order.
 pub trait RecordSink {

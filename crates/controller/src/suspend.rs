@@ -1,10 +1,8 @@
 //! The conditions that suspend a run: each with its hysteresis, evaluated once per window.
 
-use skinrig_model::{CameraId, HostDuration, HostTime, RawChunk};
+use skinrig_model::{CameraId, HostDuration, HostTime, RawChunk, Suspension, WatchedQuantity};
 use skinrig_protocol::{Suspend, Threshold, UnderWay};
 
-/// Prefix of the reason of every suspension.
-const SUSPENDED: &str = "suspended";
 /// Averaging time of rates.
 const WINDOW: HostDuration = HostDuration::from_millis(1_000);
 
@@ -69,33 +67,10 @@ impl Hysteresis {
     }
 }
 
-/// Monitored quantity.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Quantity {
-    Storm,
-    Dark,
-    Loss,
-    Temperature,
-    Disk,
-}
-
-impl Quantity {
-    /// Name and unit.
-    const fn words(self) -> (&'static str, &'static str) {
-        match self {
-            Self::Storm => ("event rate", "ev/s"),
-            Self::Dark => ("dark scene: event rate", "ev/s"),
-            Self::Loss => ("lost data", "B/s"),
-            Self::Temperature => ("temperature", "°C"),
-            Self::Disk => ("free space", "B"),
-        }
-    }
-}
-
 /// A monitored condition.
 #[derive(Debug, Clone)]
 struct Condition {
-    quantity: Quantity,
+    quantity: WatchedQuantity,
     hysteresis: Hysteresis,
 }
 
@@ -109,14 +84,14 @@ pub(crate) struct WindowMeasurements {
 }
 
 /// End of a suspension.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum SuspensionEnd {
-    /// Every condition is back to normal; the text of the interruption that continues the run.
-    Calm(String),
+    /// Every condition is back to normal.
+    Calm(Suspension),
     /// The suspension has reached its limit.
     TooLong {
-        /// Its reason.
-        reason: String,
+        /// The suspension.
+        suspension: Suspension,
         /// Longest suspension.
         limit: HostDuration,
     },
@@ -133,9 +108,9 @@ pub(crate) struct Suspender {
     events: [u64; 2],
     lost: [u64; 2],
     /// Condition that tripped while the run was not running.
-    pending: Option<String>,
-    /// Start and reason of the current suspension.
-    holding: Option<(HostTime, String)>,
+    pending: Option<Suspension>,
+    /// The current suspension and its start.
+    holding: Option<(HostTime, Suspension)>,
 }
 
 impl Suspender {
@@ -148,10 +123,10 @@ impl Suspender {
         };
         let of_camera = || {
             [
-                watched(Quantity::Storm, settings.event_rate),
-                watched(Quantity::Dark, settings.dark),
-                watched(Quantity::Loss, settings.lost_bytes),
-                watched(Quantity::Temperature, settings.temperature),
+                watched(WatchedQuantity::Storm, settings.event_rate),
+                watched(WatchedQuantity::Dark, settings.dark),
+                watched(WatchedQuantity::Loss, settings.lost_bytes),
+                watched(WatchedQuantity::Temperature, settings.temperature),
             ]
             .into_iter()
             .flatten()
@@ -159,7 +134,7 @@ impl Suspender {
         };
         Self {
             cameras: [of_camera(), of_camera()],
-            disk: watched(Quantity::Disk, settings.disk_free),
+            disk: watched(WatchedQuantity::Disk, settings.disk_free),
             settings,
             window_from: None,
             events: [0; 2],
@@ -181,9 +156,9 @@ impl Suspender {
         self.holding.take().is_some()
     }
 
-    /// Reason of the current suspension.
-    pub(crate) fn reason(&self) -> Option<&str> {
-        self.holding.as_ref().map(|(_, reason)| reason.as_str())
+    /// The current suspension.
+    pub(crate) fn current(&self) -> Option<Suspension> {
+        self.holding.map(|(_, suspension)| suspension)
     }
 
     /// True if nothing is monitored.
@@ -193,12 +168,14 @@ impl Suspender {
 
     pub(crate) fn monitors_temperature(&self, camera: CameraId) -> bool {
         let watched = &self.cameras[camera.index()];
-        watched.iter().any(|w| w.quantity == Quantity::Temperature)
+        watched
+            .iter()
+            .any(|w| w.quantity == WatchedQuantity::Temperature)
     }
 
     /// Stops monitoring the temperature of a camera that cannot measure it.
     pub(crate) fn stop_monitoring_temperature(&mut self, camera: CameraId) {
-        self.cameras[camera.index()].retain(|w| w.quantity != Quantity::Temperature);
+        self.cameras[camera.index()].retain(|w| w.quantity != WatchedQuantity::Temperature);
     }
 
     pub(crate) const fn monitors_disk(&self) -> bool {
@@ -238,31 +215,26 @@ impl Suspender {
         }
     }
 
-    /// Reason to suspend a run that is running now. An earlier suspension is over then, because the operator resumed.
-    pub(crate) fn take_reason(&mut self) -> Option<String> {
+    /// The suspension of a run that is running now. An earlier suspension is over then, because the operator resumed.
+    pub(crate) fn take_pending(&mut self) -> Option<Suspension> {
         self.holding = None;
-        let words = self.pending.take()?;
-        Some(format!("{SUSPENDED}: {words}"))
+        self.pending.take()
     }
 
     /// Starts a suspension.
-    pub(crate) fn hold(&mut self, t: HostTime, reason: String) {
-        self.holding = Some((t, reason));
+    pub(crate) fn hold(&mut self, t: HostTime, suspension: Suspension) {
+        self.holding = Some((t, suspension));
     }
 
     /// Ends the current suspension if it is over or too long. Without `may_continue` it can only be too long.
     pub(crate) fn end(&mut self, now: HostTime, may_continue: bool) -> Option<SuspensionEnd> {
-        let (since, reason) = self.holding.as_ref()?;
+        let (since, suspension) = self.holding?;
         let limit = self.settings.give_up_after;
         if self.is_calm() && may_continue {
-            let words = format!("no longer {reason}");
             self.holding = None;
-            return Some(SuspensionEnd::Calm(words));
+            return Some(SuspensionEnd::Calm(suspension));
         }
-        (now - *since >= limit).then(|| SuspensionEnd::TooLong {
-            reason: reason.clone(),
-            limit,
-        })
+        (now - since >= limit).then_some(SuspensionEnd::TooLong { suspension, limit })
     }
 
     fn is_calm(&self) -> bool {
@@ -270,16 +242,21 @@ impl Suspender {
         !all.any(|w| w.hysteresis.is_tripped())
     }
 
-    /// Passes the values of a window to the conditions; returns a description of the first one that tripped.
-    fn feed(&mut self, t: HostTime, seconds: f64, measured: WindowMeasurements) -> Option<String> {
-        let mut words = None;
-        let mut feed = |w: &mut Condition, of: &str, value: f64| {
-            if w.hysteresis.feed(t, value) == Some(Transition::Tripped) {
-                let Threshold { trip, .. } = w.hysteresis.threshold;
-                let side = if value > trip { "at most" } else { "at least" };
-                let (what, unit) = w.quantity.words();
-                words.get_or_insert_with(|| {
-                    format!("{of}{what}: expected {side} {trip} {unit}, found {value:.0} {unit}")
+    /// Passes the values of a window to the conditions; returns the first one that tripped.
+    fn feed(
+        &mut self,
+        t: HostTime,
+        seconds: f64,
+        measured: WindowMeasurements,
+    ) -> Option<Suspension> {
+        let mut first = None;
+        let mut feed = |w: &mut Condition, camera: Option<CameraId>, found: f64| {
+            if w.hysteresis.feed(t, found) == Some(Transition::Tripped) {
+                first.get_or_insert(Suspension {
+                    camera,
+                    quantity: w.quantity,
+                    trip: w.hysteresis.threshold.trip,
+                    found,
                 });
             }
         };
@@ -287,20 +264,22 @@ impl Suspender {
             let i = camera.index();
             for w in &mut self.cameras[i] {
                 let value = match w.quantity {
-                    Quantity::Storm | Quantity::Dark => Some(self.events[i] as f64 / seconds),
-                    Quantity::Loss => Some(self.lost[i] as f64 / seconds),
-                    Quantity::Temperature => measured.temperatures_c[i],
-                    Quantity::Disk => None,
+                    WatchedQuantity::Storm | WatchedQuantity::Dark => {
+                        Some(self.events[i] as f64 / seconds)
+                    }
+                    WatchedQuantity::Loss => Some(self.lost[i] as f64 / seconds),
+                    WatchedQuantity::Temperature => measured.temperatures_c[i],
+                    WatchedQuantity::Disk => None,
                 };
                 if let Some(value) = value {
-                    feed(w, &format!("{camera}: "), value);
+                    feed(w, Some(camera), value);
                 }
             }
         }
         if let (Some(disk), Some(free_b)) = (&mut self.disk, measured.free_b) {
-            feed(disk, "", free_b);
+            feed(disk, None, free_b);
         }
         (self.events, self.lost) = ([0; 2], [0; 2]);
-        words
+        first
     }
 }

@@ -1,11 +1,10 @@
 //! The verdict on an attempt, and whether to repeat it.
 
-use std::iter;
-
-use skinrig_model::{InvalidReason, Point3, PressOutcome, PressTiming, PressVerdict};
+use skinrig_model::{
+    Causes, InvalidReason, NoCause, Point3, PressFault, PressOutcome, PressTiming, PressVerdict,
+};
 
 use crate::open_press::OpenPress;
-use crate::press_fault::PressFault;
 use crate::press_tracker::PressTracker;
 
 /// A finished attempt.
@@ -20,23 +19,6 @@ impl JudgedAttempt {
     pub(crate) fn should_retake(&self) -> bool {
         !self.faults.is_empty() && self.faults.iter().all(PressFault::passes)
     }
-}
-
-/// Why an attempt with these faults is invalid; `None` without faults.
-fn invalid_reason(faults: &[PressFault]) -> Option<InvalidReason> {
-    let (first, rest) = faults.split_first()?;
-    let joined = |first: String| {
-        let rest = rest.iter().map(ToString::to_string);
-        iter::once(first).chain(rest).collect::<Vec<_>>().join("; ")
-    };
-    Some(match first {
-        PressFault::RunEnded(reason) => InvalidReason::RunEnded {
-            reason: joined(reason.clone()),
-        },
-        fault => InvalidReason::Faults {
-            text: joined(fault.to_string()),
-        },
-    })
 }
 
 /// Outcome of a press: valid only if all phases were measured, the tip stayed in place and no data were lost.
@@ -58,11 +40,10 @@ pub(crate) fn judge(press: &OpenPress, fault: Option<PressFault>) -> JudgedAttem
     let mean = tracker.and_then(PressTracker::mean);
     let outcome = PressOutcome {
         attempt: press.attempt(),
-        verdict: match invalid_reason(&faults) {
-            None => PressVerdict::Valid,
-            Some(reason) => PressVerdict::Invalid(reason),
+        verdict: match Causes::try_from(faults.clone()) {
+            Err(NoCause) => PressVerdict::Valid,
+            Ok(faults) => PressVerdict::Invalid(InvalidReason::Faults(faults)),
         },
-        faults: faults.iter().map(PressFault::kind).collect(),
         timing,
         measured_at: mean.map(Point3::plane),
         measured_depth_mm: mean.zip(tracker).map(|(m, t)| t.surface_mm() - m.z_mm),

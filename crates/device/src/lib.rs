@@ -8,7 +8,6 @@ pub mod camera;
 pub mod clock;
 pub mod contract;
 pub mod detached;
-pub mod error;
 pub mod indenter;
 pub mod limits;
 pub mod rig;
@@ -20,7 +19,7 @@ pub use camera::{
 };
 pub use clock::{Clock, RealClock};
 pub use detached::{DetachedBox, DetachedCamera, Timeouts};
-pub use error::DeviceError;
 pub use indenter::{Indenter, IndenterCapabilities, MotionLimits, RobotSample};
 pub use rig::Rig;
+pub use skinrig_model::DeviceError;
 pub use trigger::{TriggerBox, TriggerCapabilities};

@@ -1,7 +1,5 @@
 //! The tidy table of presses: one row per planned press, with its last attempt and the views of both cameras.
 
-use std::borrow::Cow;
-
 use skinrig_analysis::result::{ClockFit, PressResult, PressView};
 use skinrig_model::{HostTime, PlannedPress, PressTiming};
 use skinrig_recorder::AttemptRow;
@@ -107,8 +105,8 @@ fn journal(table: &mut Columns<'_>) {
         Some(found.to_owned())
     });
     table.text("reason", |r| match r.found {
-        Some(found) => found.reason.clone(),
-        None => r.last()?.verdict.reason().map(Cow::into_owned),
+        Some(found) => found.reason(),
+        None => r.last()?.verdict.reason(),
     });
     table.text("truth_source", |r| {
         let scheduled = r.last()?.scheduled;

@@ -7,10 +7,12 @@
 pub mod camera;
 mod device_role;
 pub mod event;
+pub mod fault;
 pub mod frame;
 pub mod id;
 pub mod lens;
 pub mod limit;
+mod number;
 pub mod pose;
 pub mod preflight;
 pub mod press;
@@ -31,6 +33,11 @@ pub mod trigger_box;
 pub use camera::{CameraModel, SENSOR_HEIGHT, SENSOR_WIDTH, StereoGeometry};
 pub use device_role::DeviceRole;
 pub use event::{CdEvent, Polarity, TriggerEdge};
+pub use fault::{
+    Causes, DeviceError, GuardError, NoCause, NotArrived, NotAtRest, PressFault, PressMoment,
+    RunFault, SinkFault, SurfaceFault, SurfaceFinding, Suspension, TimingFault, TouchFault,
+    TouchPhase, WatchdogTrip, WatchedQuantity,
+};
 pub use frame::{Point2, Point3, RigidTransform, Robot, Skin};
 pub use id::{AttemptId, CameraId, LocationId, PressId, RepetitionId, as_index};
 pub use lens::{LensAngle, LensKind, LensModel};
@@ -43,7 +50,9 @@ pub use press::{
 pub use press_fault::PressFaultKind;
 pub use pulse::{DecodedMark, DecodedSync, Label, Mark, MarkKind, PulseTrain, SentMark};
 pub use quantile::quantile;
-pub use reason::{InvalidReason, StopReason};
+pub use reason::{
+    ExcludedReason, InterruptionReason, InvalidReason, MissedReason, ReasonRef, StopReason,
+};
 pub use record::{
     DeviceIdentity, InterruptionKind, MotionCommand, Record, ResumeHeader, RunEnd, RunHeader,
     Setting,

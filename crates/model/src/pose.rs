@@ -16,5 +16,6 @@ pub struct PoseSample {
     pub measured: Point3<Skin>,
     /// Force on the tip along the skin's normal as reported by the device, N; positive pushes the tip out.
     /// `NaN` if the device does not measure or estimate it.
+    #[serde(with = "crate::number")]
     pub force_n: f64,
 }

@@ -32,7 +32,8 @@ impl CheckVerdict {
 }
 
 /// Subject of a preflight check, for programs that determine causes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum CheckKind {
     /// Anything else.
     #[default]
@@ -55,6 +56,12 @@ pub enum CheckKind {
     Trigger(DeviceRole),
 }
 
+impl CheckKind {
+    const fn is_other(&self) -> bool {
+        matches!(self, Self::Other)
+    }
+}
+
 /// One check before a run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PreflightCheck {
@@ -68,8 +75,8 @@ pub struct PreflightCheck {
     pub verdict: CheckVerdict,
     /// Next step after a failed check; empty for others.
     pub next_step: String,
-    /// Subject; not stored in sessions.
-    #[serde(skip)]
+    /// Subject; sessions store it only for the failed checks that ended the run.
+    #[serde(default, skip_serializing_if = "CheckKind::is_other")]
     pub kind: CheckKind,
 }
 

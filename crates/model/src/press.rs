@@ -1,6 +1,5 @@
 //! Presses: planned, attempted and judged.
 
-use std::borrow::Cow;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -8,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::frame::Point2;
 use crate::id::{AttemptId, LocationId, PressId, RepetitionId, as_index};
 use crate::press_fault::PressFaultKind;
-use crate::reason::InvalidReason;
+use crate::reason::{ExcludedReason, InvalidReason, MissedReason, ReasonRef};
 use crate::time::{HostDuration, HostTime};
 
 /// Role of a press. Calibration presses never score.
@@ -121,17 +120,17 @@ impl fmt::Display for Verdict {
 }
 
 /// Verdict on a press. Planned = valid + missed + invalid + excluded, always.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "verdict", content = "reason", rename_all = "snake_case")]
 pub enum PressVerdict {
     /// Done as planned, with all its data recorded.
     Valid,
     /// Never attempted (the run stopped before it).
-    Missed(String),
+    Missed(MissedReason),
     /// Attempted, but it deviated from the plan, or data were lost in its window.
     Invalid(InvalidReason),
     /// Done, but excluded from the metrics by a stated rule.
-    Excluded(String),
+    Excluded(ExcludedReason),
 }
 
 impl PressVerdict {
@@ -161,23 +160,44 @@ impl PressVerdict {
 
     /// True for an attempt that did not finish; the state of its press is unknown.
     #[must_use]
-    pub const fn is_cut_off(&self) -> bool {
+    pub fn is_cut_off(&self) -> bool {
         matches!(self, Self::Invalid(reason) if reason.is_cut_off())
     }
 
-    /// Reason of any verdict but `Valid`.
+    /// Kinds of the faults of an invalid attempt, in order; empty for other verdicts and for attempts recorded before schema 8.
     #[must_use]
-    pub fn reason(&self) -> Option<Cow<'_, str>> {
+    pub fn fault_kinds(&self) -> Vec<PressFaultKind> {
+        match self {
+            Self::Invalid(reason) => reason.kinds(),
+            Self::Valid | Self::Missed(_) | Self::Excluded(_) => Vec::new(),
+        }
+    }
+
+    /// The reason, for JSON; `None` if valid.
+    #[must_use]
+    pub const fn cause(&self) -> Option<ReasonRef<'_>> {
         match self {
             Self::Valid => None,
-            Self::Invalid(reason) => Some(reason.text()),
-            Self::Missed(text) | Self::Excluded(text) => Some(text.into()),
+            Self::Missed(reason) => Some(ReasonRef::Missed(reason)),
+            Self::Invalid(reason) => Some(ReasonRef::Invalid(reason)),
+            Self::Excluded(reason) => Some(ReasonRef::Excluded(reason)),
+        }
+    }
+
+    /// Text of the reason, of any verdict but `Valid`.
+    #[must_use]
+    pub fn reason(&self) -> Option<String> {
+        match self {
+            Self::Valid => None,
+            Self::Missed(reason) => Some(reason.to_string()),
+            Self::Invalid(reason) => Some(reason.to_string()),
+            Self::Excluded(reason) => Some(reason.to_string()),
         }
     }
 }
 
 /// History of one planned press: the starting point of a resumed run.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct PressHistory {
     /// Attempts so far; 0: none.
     pub attempts: u32,
@@ -199,10 +219,6 @@ pub struct PressOutcome {
     pub attempt: AttemptId,
     /// Verdict on the attempt.
     pub verdict: PressVerdict,
-    /// Kinds of the faults that made it invalid, in the order of the verdict's reason; empty for other verdicts and in sessions
-    /// of older schemas.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub faults: Vec<PressFaultKind>,
     /// Phase times; `None` if the attempt ended before they were known.
     pub timing: Option<PressTiming>,
     /// The mean measured tip position during the hold, skin frame: the ground truth of localisation.

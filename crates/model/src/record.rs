@@ -6,13 +6,14 @@
 use serde::{Deserialize, Serialize};
 
 use crate::device_role::DeviceRole;
+use crate::fault::{Causes, RunFault};
 use crate::frame::{Point3, RigidTransform, Robot, Skin};
 use crate::id::AttemptId;
 use crate::pose::PoseSample;
 use crate::preflight::PreflightCheck;
 use crate::press::{PlannedPress, PressOutcome};
 use crate::pulse::SentMark;
-use crate::reason::StopReason;
+use crate::reason::{InterruptionReason, MissedReason, ReasonRef, StopReason};
 use crate::stream::{RawChunk, StreamFormat};
 use crate::time::HostTime;
 use crate::trigger_box::BoxReport;
@@ -178,18 +179,37 @@ impl InterruptionKind {
 }
 
 /// End of a run.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(tag = "status", content = "reason", rename_all = "snake_case")]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum RunEnd {
     /// Every step of the plan was executed.
     Completed,
     /// The operator stopped or aborted it.
     Stopped(StopReason),
-    /// A device, a limit or the recorder ended it: the causes as text, separated by `; `.
-    Faulted(String),
+    /// A device, a limit or the recorder ended it. The first cause comes first.
+    Faulted(Causes<RunFault>),
 }
 
 impl RunEnd {
+    /// A run that ended with one fault.
+    #[must_use]
+    pub fn fault(fault: impl Into<RunFault>) -> Self {
+        Self::Faulted(Causes::one(fault.into()))
+    }
+
+    /// The same end with one more fault.
+    #[must_use]
+    pub fn and_fault(self, fault: impl Into<RunFault>) -> Self {
+        match self {
+            Self::Completed => Self::fault(fault),
+            Self::Stopped(reason) => Self::fault(RunFault::Stopped(reason)).and_fault(fault),
+            Self::Faulted(mut causes) => {
+                causes.push(fault.into());
+                Self::Faulted(causes)
+            }
+        }
+    }
+
     /// `completed`, `stopped` or `faulted`.
     #[must_use]
     pub const fn name(&self) -> &'static str {
@@ -200,13 +220,32 @@ impl RunEnd {
         }
     }
 
-    /// Reason of any end but `Completed`.
+    /// The faults that ended it; empty for other ends.
     #[must_use]
-    pub fn reason(&self) -> Option<&str> {
+    pub fn faults(&self) -> &[RunFault] {
+        match self {
+            Self::Completed | Self::Stopped(_) => &[],
+            Self::Faulted(causes) => causes.as_slice(),
+        }
+    }
+
+    /// The reason, for JSON; `None` for a completed run.
+    #[must_use]
+    pub const fn cause(&self) -> Option<ReasonRef<'_>> {
         match self {
             Self::Completed => None,
-            Self::Stopped(reason) => Some(reason.text()),
-            Self::Faulted(reason) => Some(reason),
+            Self::Stopped(reason) => Some(ReasonRef::Stopped(reason)),
+            Self::Faulted(causes) => Some(ReasonRef::Faulted(causes)),
+        }
+    }
+
+    /// Text of the reason, of any end but `Completed`.
+    #[must_use]
+    pub fn reason(&self) -> Option<String> {
+        match self {
+            Self::Completed => None,
+            Self::Stopped(reason) => Some(reason.to_string()),
+            Self::Faulted(causes) => Some(causes.to_string()),
         }
     }
 }
@@ -260,15 +299,15 @@ pub enum Record {
     /// An attempt ended. Durable together with all chunks up to its end.
     Outcome(PressOutcome),
     /// A press of the plan that was not attempted, and the reason. Emitted at the end of an interrupted run.
-    Missed(AttemptId, String),
+    Missed(AttemptId, MissedReason),
     /// The run deviated from its plan.
     Interruption {
         /// Kind.
         kind: InterruptionKind,
         /// Time.
         t: HostTime,
-        /// Reason for display.
-        reason: String,
+        /// Reason.
+        reason: InterruptionReason,
     },
     /// A note by the operator or by skinrig.
     Note {

@@ -29,7 +29,21 @@ const fn table(name: &'static str, since: u32, rows: &'static str) -> Table {
 /// In the order in which the tree hash covers them.
 const TABLES: [Table; 21] = [
     table("session", 1, "SELECT * FROM session ORDER BY id LIMIT ?1"),
-    table("leg", 5, "SELECT * FROM leg ORDER BY number LIMIT ?1"),
+    Table {
+        name: "leg",
+        since: 5,
+        rows: "SELECT * FROM leg ORDER BY number LIMIT ?1",
+        earlier: &[
+            (
+                5,
+                "SELECT number, operator, started_at, host, software, command_line, origin_ns, camera1_origin_us,
+                 camera2_origin_us, first_seq_1, first_seq_2, devices_before, preflight_before, previous_status,
+                 previous_reason, previous_end_ns, previous_tree_sha256
+                 FROM leg ORDER BY number LIMIT ?1",
+            ),
+            (11, "SELECT * FROM leg ORDER BY number LIMIT ?1"),
+        ],
+    },
     table(
         "robot_from_skin",
         1,
@@ -77,6 +91,12 @@ const TABLES: [Table; 21] = [
                  retract_ns, release_ns, clear_ns, measured_x_mm, measured_y_mm, measured_depth_mm, peak_force_n, scheduled,
                  touched_mm, faults, leg FROM attempt WHERE coalesce(leg, 1) < ?2 ORDER BY press, number",
             ),
+            (
+                11,
+                "SELECT press, number, previous, intent_ns, verdict, reason, approach_ns, contact_ns, at_depth_ns,
+                 retract_ns, release_ns, clear_ns, measured_x_mm, measured_y_mm, measured_depth_mm, peak_force_n, scheduled,
+                 touched_mm, faults, leg, cause FROM attempt WHERE coalesce(leg, 1) < ?2 ORDER BY press, number",
+            ),
         ],
     },
     table("command", 1, "SELECT * FROM command ORDER BY id LIMIT ?1"),
@@ -110,22 +130,36 @@ const TABLES: [Table; 21] = [
         "SELECT camera, seq, position, t_us, channel, rising FROM trigger_edge
          WHERE seq <= CASE camera WHEN 1 THEN ?3 ELSE ?4 END ORDER BY camera, seq, position",
     ),
-    table(
-        "interruption",
-        1,
-        "SELECT * FROM interruption ORDER BY id LIMIT ?1",
-    ),
+    Table {
+        name: "interruption",
+        since: 1,
+        rows: "SELECT * FROM interruption ORDER BY id LIMIT ?1",
+        earlier: &[
+            (
+                1,
+                "SELECT id, t_ns, kind, reason FROM interruption ORDER BY id LIMIT ?1",
+            ),
+            (11, "SELECT * FROM interruption ORDER BY id LIMIT ?1"),
+        ],
+    },
     table("note", 1, "SELECT * FROM note ORDER BY id LIMIT ?1"),
     Table {
         name: "run_end",
         since: 1,
         rows: "SELECT * FROM run_end ORDER BY id",
         // The next leg moves it into its own row.
-        earlier: &[(
-            1,
-            "SELECT 1, previous_end_ns, previous_status, previous_reason FROM leg
-             WHERE number = ?2 AND previous_end_ns IS NOT NULL",
-        )],
+        earlier: &[
+            (
+                1,
+                "SELECT 1, previous_end_ns, previous_status, previous_reason FROM leg
+                 WHERE number = ?2 AND previous_end_ns IS NOT NULL",
+            ),
+            (
+                11,
+                "SELECT 1, previous_end_ns, previous_status, previous_reason, previous_cause FROM leg
+                 WHERE number = ?2 AND previous_end_ns IS NOT NULL",
+            ),
+        ],
     },
     // The migrations that made the schema: version and content, not when or how fast they ran.
     table(

@@ -2,17 +2,18 @@
 
 use skinrig_model::{
     AttemptId, CameraId, ChunkFacts, HostTime, LocationId, PlannedPress, Point2, PoseSample,
-    PressFaultKind, PressId, PressOutcome, PressTiming, PressVerdict, RepetitionId, RigidTransform,
-    RunHeader, StreamFormat, UnknownName, press::PressRole,
+    PressFaultKind, PressId, PressOutcome, PressTiming, RepetitionId, RigidTransform, RunHeader,
+    StreamFormat, UnknownName, press::PressRole,
 };
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
+use crate::cause::verdict_from;
 use crate::codec::Codec;
 use crate::pose;
 use crate::query::{
-    Fault, enum_value, int, num, opt_int, opt_num, opt_real, opt_text, real, real_if_present, sha,
-    text, text_if_present,
+    Fault, enum_value, int, num, opt_int, opt_num, opt_real, real, real_if_present, sha, text,
+    text_if_present,
 };
 use crate::rows::{AttemptRow, ChunkMeta};
 
@@ -67,15 +68,7 @@ pub(crate) fn attempt_from(row: &SqliteRow) -> Result<AttemptRow, Fault> {
         press: PressId::from_index(num(row, "press")?),
         number: num(row, "number")?,
     };
-    let reason = opt_text(row, "reason")?.unwrap_or_default();
-    let verdict = match opt_text(row, "verdict")?.as_deref() {
-        None => None,
-        Some("valid") => Some(PressVerdict::Valid),
-        Some("missed") => Some(PressVerdict::Missed(reason)),
-        Some("invalid") => Some(PressVerdict::Invalid(reason.into())),
-        Some("excluded") => Some(PressVerdict::Excluded(reason)),
-        Some(other) => return Err(Fault::bad(id, "a verdict", format!("`{other}`"))),
-    };
+    let verdict = verdict_from(row, fault_kinds(id, row)?)?;
     let at = |column: &str| Ok::<_, Fault>(opt_int(row, column)?.map(HostTime));
     let moments = (
         at("approach_ns")?,
@@ -113,7 +106,6 @@ pub(crate) fn attempt_from(row: &SqliteRow) -> Result<AttemptRow, Fault> {
         Some(verdict) => Some(PressOutcome {
             attempt: id,
             verdict,
-            faults: faults(id, row)?,
             timing,
             measured_at: measured.0.zip(measured.1).map(|(x, y)| Point2::new(x, y)),
             measured_depth_mm: opt_real(row, "measured_depth_mm")?,
@@ -131,7 +123,7 @@ pub(crate) fn attempt_from(row: &SqliteRow) -> Result<AttemptRow, Fault> {
 }
 
 /// Fault kinds of an attempt; empty in sessions of an older schema.
-fn faults(id: AttemptId, row: &SqliteRow) -> Result<Vec<PressFaultKind>, Fault> {
+fn fault_kinds(id: AttemptId, row: &SqliteRow) -> Result<Vec<PressFaultKind>, Fault> {
     let kinds = text_if_present(row, "faults")?.unwrap_or_default();
     kinds
         .split_whitespace()

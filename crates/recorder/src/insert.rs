@@ -10,6 +10,7 @@ use skinrig_model::{
 };
 use sqlx::sqlite::SqliteConnection;
 
+use crate::cause;
 use crate::pose;
 use crate::prepared::{PreparedChunk, PreparedRecord};
 use crate::query::Fault;
@@ -180,25 +181,29 @@ impl Journal {
             Record::Outcome(outcome) => self.outcome(&outcome).await,
             Record::Missed(attempt, reason) => {
                 sqlx::query(
-                    "INSERT INTO attempt (press, number, previous, verdict, reason, scheduled, leg)
-                     VALUES (?, ?, ?, 'missed', ?, 0, ?)",
+                    "INSERT INTO attempt (press, number, previous, verdict, reason, cause, scheduled, leg)
+                     VALUES (?, ?, ?, 'missed', ?, ?, 0, ?)",
                 )
                 .bind(attempt.press.index())
                 .bind(attempt.number)
                 .bind(previous(attempt.number))
-                .bind(reason)
+                .bind(reason.to_string())
+                .bind(cause::json("attempt", &reason)?)
                 .bind(self.leg)
                 .execute(&mut self.conn)
                 .await?;
                 Ok(())
             }
             Record::Interruption { kind, t, reason } => {
-                sqlx::query("INSERT INTO interruption (t_ns, kind, reason) VALUES (?, ?, ?)")
-                    .bind(t.0)
-                    .bind(kind.name())
-                    .bind(reason)
-                    .execute(&mut self.conn)
-                    .await?;
+                sqlx::query(
+                    "INSERT INTO interruption (t_ns, kind, reason, cause) VALUES (?, ?, ?, ?)",
+                )
+                .bind(t.0)
+                .bind(kind.name())
+                .bind(reason.to_string())
+                .bind(cause::json("interruption", &reason)?)
+                .execute(&mut self.conn)
+                .await?;
                 Ok(())
             }
             Record::Note { t, text } => {
@@ -210,12 +215,15 @@ impl Journal {
                 Ok(())
             }
             Record::Ended { t, end } => {
-                sqlx::query("INSERT INTO run_end (id, t_ns, status, reason) VALUES (1, ?, ?, ?)")
-                    .bind(t.0)
-                    .bind(end.name())
-                    .bind(end.reason())
-                    .execute(&mut self.conn)
-                    .await?;
+                sqlx::query(
+                    "INSERT INTO run_end (id, t_ns, status, reason, cause) VALUES (1, ?, ?, ?, ?)",
+                )
+                .bind(t.0)
+                .bind(end.name())
+                .bind(end.reason())
+                .bind(cause::json_of("run_end", end.cause())?)
+                .execute(&mut self.conn)
+                .await?;
                 Ok(())
             }
         }
@@ -333,7 +341,7 @@ impl Journal {
         let mut update = sqlx::query(
             "UPDATE attempt SET verdict = ?, reason = ?, scheduled = ?, approach_ns = ?, contact_ns = ?,
                at_depth_ns = ?, retract_ns = ?, release_ns = ?, clear_ns = ?, measured_x_mm = ?,
-               measured_y_mm = ?, measured_depth_mm = ?, touched_mm = ?, peak_force_n = ?, faults = ?
+               measured_y_mm = ?, measured_depth_mm = ?, touched_mm = ?, peak_force_n = ?, faults = ?, cause = ?
              WHERE press = ? AND number = ? AND verdict IS NULL",
         )
         .bind(outcome.verdict.name())
@@ -353,9 +361,11 @@ impl Journal {
         for number in numbers {
             update = update.bind(number);
         }
-        let faults: Vec<&str> = outcome.faults.iter().map(|kind| kind.name()).collect();
+        let kinds = outcome.verdict.fault_kinds();
+        let faults: Vec<&str> = kinds.iter().map(|kind| kind.name()).collect();
         let rows = update
             .bind((!faults.is_empty()).then(|| faults.join(" ")))
+            .bind(cause::json_of("attempt", outcome.verdict.cause())?)
             .bind(id.press.index())
             .bind(id.number)
             .execute(&mut self.conn)

@@ -12,6 +12,7 @@
 
 mod box_row;
 pub mod catalogue;
+mod cause;
 mod chain;
 pub mod codec;
 pub mod error;
@@ -33,6 +34,7 @@ mod from_row;
 mod hex;
 mod insert;
 mod leg;
+mod legacy_text;
 mod lock;
 mod migrations;
 mod pose;

@@ -6,7 +6,7 @@ use sqlx::SqlSafeStr;
 use sqlx::migrate::{Migration, MigrationType, Migrator};
 
 /// Schema version that this build writes, and the newest that it reads (`PRAGMA user_version`).
-pub(crate) const SCHEMA_VERSION: u32 = 10;
+pub(crate) const SCHEMA_VERSION: u32 = 11;
 
 /// All migrations, oldest first: version, description and SQL. Listed by hand, because the macro that reads the folder would
 /// build SQLite a second time for the compiler.
@@ -60,6 +60,11 @@ const MIGRATIONS: [(i64, &str, &str); SCHEMA_VERSION as usize] = [
         20261122120000,
         "completed leg",
         include_str!("../../../migrations/20261122120000_completed_leg.sql"),
+    ),
+    (
+        20261125000000,
+        "causes",
+        include_str!("../../../migrations/20261125000000_causes.sql"),
     ),
 ];
 

@@ -14,7 +14,7 @@ use crate::lock::WriterLock;
 use crate::query::{Fault, blob, int, opt_int, opt_text, schema_version, text};
 use crate::reader::SessionReader;
 use crate::verify::{ChunkScanner, VerifyReport, verify};
-use crate::{chain, schema};
+use crate::{cause, chain, schema};
 
 /// Start values for the writer of a new leg.
 pub(crate) struct LegStart {
@@ -133,11 +133,13 @@ async fn write(conn: &mut SqliteConnection, header: &ResumeHeader) -> Result<Leg
     let (offset, formats) = offset(&mut all).await?;
     let number = insert_leg(&mut all, header, &offset).await?;
     chain::archive_seal(&mut all, number, schema).await?;
+    let cut_off = PressVerdict::cut_off(number - 1);
     sqlx::query(
-        "UPDATE attempt SET verdict = 'invalid', reason = ?, scheduled = 0, faults = ? WHERE verdict IS NULL",
+        "UPDATE attempt SET verdict = 'invalid', reason = ?, scheduled = 0, faults = ?, cause = ? WHERE verdict IS NULL",
     )
-    .bind(PressVerdict::cut_off(number - 1).reason())
+    .bind(cut_off.reason())
     .bind(PressFaultKind::RunEnded.name())
+    .bind(cause::json_of("attempt", cut_off.cause())?)
     .execute(&mut *all)
     .await?;
     // The box's clock of this leg does not continue the previous one.
@@ -224,7 +226,7 @@ async fn insert_leg(
     )
     .fetch_one(&mut **conn)
     .await?;
-    let end: Option<SqliteRow> = one("SELECT t_ns, status, reason FROM run_end")
+    let end: Option<SqliteRow> = one("SELECT t_ns, status, reason, cause FROM run_end")
         .fetch_optional(&mut **conn)
         .await?;
     let seal: Option<SqliteRow> = one("SELECT tree_sha256 FROM seal")
@@ -235,8 +237,8 @@ async fn insert_leg(
     let mut insert = sqlx::query(
         "INSERT INTO leg (number, operator, started_at, host, software, command_line, origin_ns, camera1_origin_us,
            camera2_origin_us, first_seq_1, first_seq_2, devices_before, preflight_before, previous_status,
-           previous_reason, previous_end_ns, previous_tree_sha256)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+           previous_reason, previous_cause, previous_end_ns, previous_tree_sha256)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(number)
     .bind(&header.operator)
@@ -255,8 +257,10 @@ async fn insert_leg(
         Some(end) => insert
             .bind(text(end, "status")?)
             .bind(opt_text(end, "reason")?)
+            .bind(opt_text(end, "cause")?)
             .bind(int(end, "t_ns")?),
         None => insert
+            .bind(None::<String>)
             .bind(None::<String>)
             .bind(None::<String>)
             .bind(None::<i64>),

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use skinrig_model::{
     AttemptId, CameraId, ChunkFacts, DeviceIdentity, DeviceRole, HostTime, InterruptionKind,
-    LostTime, MotionCommand, PressOutcome, ResumeHeader, RunEnd, Setting,
+    InterruptionReason, LostTime, MotionCommand, PressOutcome, ResumeHeader, RunEnd, Setting,
 };
 
 use crate::codec::Codec;
@@ -20,7 +20,7 @@ pub struct DeviceRow {
 }
 
 /// One leg of a session: the part recorded by one process. The first has number 1, and all its origins are zero.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LegRow {
     /// 1, 2, 3, ...
     pub number: u32,
@@ -65,14 +65,14 @@ pub struct CommandRow {
 }
 
 /// A deviation from the planned course of a run.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct InterruptionRow {
     /// Host time at which it began.
     pub t: HostTime,
     /// Type of the deviation.
     pub kind: InterruptionKind,
-    /// Reason given.
-    pub reason: String,
+    /// Its reason.
+    pub reason: InterruptionReason,
 }
 
 /// An operator note.

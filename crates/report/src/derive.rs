@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use skinrig_analysis::exclusion::Exclusion;
 use skinrig_analysis::result::{Analysis, Latency, LocatorComparison, OffSensor, PressResult};
 use skinrig_analysis::rule::Rule;
 use skinrig_analysis::triangulate::locate;
@@ -124,35 +125,39 @@ pub struct Rejection {
 /// exclude; otherwise all other presses.
 #[must_use]
 pub fn rejections(analysis: &Analysis, sync: bool) -> Vec<Rejection> {
-    let mut groups: BTreeMap<(Verdict, String), Vec<&str>> = BTreeMap::new();
+    let mut groups: BTreeMap<(Verdict, Option<Rule>), Vec<&PressResult>> = BTreeMap::new();
     let rejected = analysis
         .presses
         .iter()
         .filter(|p| p.verdict != Verdict::Valid);
     for press in rejected.filter(|p| (p.role == PressRole::Sync) == sync) {
-        let reason = press.reason.as_deref().unwrap_or("no reason recorded");
-        let rule = press
-            .rule
-            .as_ref()
-            .map_or_else(|| reason.to_owned(), Rule::to_string);
-        let group = groups.entry((press.verdict, rule)).or_default();
-        group.push(reason);
+        let group = groups.entry((press.verdict, press.rule())).or_default();
+        group.push(press);
     }
-    let mut rows: Vec<Rejection> = groups
+    let mut rows: Vec<(String, Rejection)> = groups
         .into_iter()
-        .map(|((verdict, rule), reasons)| {
-            let first = reasons[0];
-            let alike = reasons.iter().all(|r| *r == first);
-            Rejection {
+        .map(|((verdict, _), presses)| {
+            let first = &presses[0].cause;
+            let alike = presses.iter().all(|p| p.reason() == presses[0].reason());
+            let text = |text: fn(&Exclusion) -> String| {
+                let text = first.as_ref().map(text);
+                text.unwrap_or_else(|| "no reason recorded".to_owned())
+            };
+            let (label, reason) = (text(Exclusion::label), text(Exclusion::to_string));
+            let rejection = Rejection {
                 verdict,
-                rule: if alike { first.to_owned() } else { rule },
-                example: (!alike).then(|| first.to_owned()),
-                n: reasons.len() as u32,
-            }
+                rule: if alike { reason.clone() } else { label.clone() },
+                example: (!alike).then_some(reason),
+                n: presses.len() as u32,
+            };
+            (label, rejection)
         })
         .collect();
-    rows.sort_by_key(|row| std::cmp::Reverse(row.n));
-    rows
+    rows.sort_by(|(a, row), (b, other)| {
+        let order = |label, row: &Rejection| (std::cmp::Reverse(row.n), row.verdict, label);
+        order(a, row).cmp(&order(b, other))
+    });
+    rows.into_iter().map(|(_, row)| row).collect()
 }
 
 /// Number of repetitions and locations in the plan, without sync presses.

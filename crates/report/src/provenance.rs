@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use skinrig_model::{LostTime, PreflightCheck};
+use skinrig_model::{InvalidReason, LostTime, PreflightCheck, RunEnd};
 
 /// Origin of the numbers of a report. The report shows empty strings as "not recorded".
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -55,6 +55,9 @@ pub struct Provenance {
     pub run_end: String,
     /// Why the run ended, unless it completed normally.
     pub run_end_reason: Option<String>,
+    /// The end as kinds and fields; `None` before it.
+    #[serde(default)]
+    pub run_end_cause: Option<RunEnd>,
     /// Legs in order; a single one if the session was never resumed.
     #[serde(default)]
     pub legs: Vec<LegRow>,
@@ -129,11 +132,6 @@ impl Provenance {
     pub(crate) fn several_legs(&self) -> &[LegRow] {
         if self.legs.len() > 1 { &self.legs } else { &[] }
     }
-
-    /// True if this interruption ended the run: both have the same reason.
-    pub(crate) fn ended_by(&self, interruption: &InterruptionRow) -> bool {
-        self.run_end_reason.as_ref() == Some(&interruption.reason)
-    }
 }
 
 /// One device.
@@ -166,7 +164,7 @@ pub struct LegRow {
 }
 
 /// A superseded attempt at a press.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct RetakeRow {
     /// Number of the press, from 1.
     pub press: u32,
@@ -174,6 +172,9 @@ pub struct RetakeRow {
     pub attempt: u32,
     /// Why it was retaken.
     pub reason: String,
+    /// The reason as kinds and fields; `None` without an outcome.
+    #[serde(default)]
+    pub cause: Option<InvalidReason>,
 }
 
 /// One interruption.
@@ -185,6 +186,9 @@ pub struct InterruptionRow {
     pub kind: String,
     /// Reason given.
     pub reason: String,
+    /// True if it ended the run.
+    #[serde(default)]
+    pub ended_run: bool,
 }
 
 /// An operator note.

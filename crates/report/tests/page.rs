@@ -4,8 +4,8 @@ mod support;
 #[path = "page/traces.rs"]
 mod traces;
 
-use skinrig_analysis::rule::Rule;
-use skinrig_model::{CameraId, Verdict};
+use skinrig_analysis::exclusion::Exclusion;
+use skinrig_model::{CameraId, ExcludedReason, Verdict};
 use skinrig_report::{ReportInput, html};
 
 fn input(analysis: &skinrig_analysis::result::Analysis) -> ReportInput<'_> {
@@ -50,9 +50,10 @@ fn hostile_text_stays_text() {
     let mut analysis = support::analysis(4, 3);
     analysis.warnings = vec![HOSTILE.into()];
     for press in &mut analysis.presses {
-        if press.reason.is_some() {
-            press.reason = Some(format!("{HOSTILE} in full"));
-            press.rule = Some(HOSTILE.to_owned().into());
+        if press.cause.is_some() {
+            press.cause = Some(Exclusion::Excluded(ExcludedReason::Recorded {
+                text: format!("{HOSTILE} in full"),
+            }));
         }
     }
     if let Some(c) = &mut analysis.calibration {
@@ -368,8 +369,12 @@ fn presses_that_do_not_count_are_grouped_by_rule() {
     for (i, press) in analysis.presses.iter_mut().enumerate() {
         if i % 10 == 1 {
             press.verdict = Verdict::Excluded;
-            press.rule = Some(Rule::NoResponse(CameraId::Two));
-            press.reason = Some(format!("no response: {i} events, 800 expected (camera 2)"));
+            press.cause = Some(Exclusion::NoResponse {
+                camera: CameraId::Two,
+                found: i as u32,
+                expected: 800.0,
+                standard_error: 40.0,
+            });
         } else if press.verdict != Verdict::Valid {
             press.verdict = Verdict::Valid;
         }
@@ -429,6 +434,7 @@ fn the_reason_that_ended_the_run_is_said_once() {
     input.provenance.run_end_reason = Some("the belt tore".into());
     input.provenance.interruptions[0].kind = "fault".into();
     input.provenance.interruptions[0].reason = "the belt tore".into();
+    input.provenance.interruptions[0].ended_run = true;
     let page = html(&input).unwrap();
     assert_eq!(page.matches("the belt tore").count(), 1);
     assert!(page.contains("Run faulted at 1803.2 s."));

@@ -206,6 +206,7 @@ fn the_summary_shows_what_qualifies_the_answer() {
         kind: "fault".to_owned(),
         t_s: 2.5,
         reason: "camera 1 sent nothing".to_owned(),
+        ended_run: false,
     }];
     let input = ReportInput {
         analysis: &analysis,

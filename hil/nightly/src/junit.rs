@@ -98,11 +98,28 @@ fn test_case(night: &Night, check: &CheckResult) -> TestCase {
     let mut case = TestCase::new(printable(&check.name), status);
     case.set_classname(printable(&night.suite));
     case.set_time(duration(check.attempts.iter().map(|a| a.took_s).sum()));
+    for (name, value) in kinds(check) {
+        case.add_property((name, printable(&value).as_str()));
+    }
     let values = values(check);
     if !values.is_empty() {
         case.set_system_out(printable(&values));
     }
     case
+}
+
+/// Cause, rule and evidence as kinds, for programs; the texts for people are in the message and in the description.
+fn kinds(check: &CheckResult) -> Vec<(&'static str, String)> {
+    let mut all = Vec::new();
+    all.extend(check.cause.map(|cause| ("cause", cause.name().to_owned())));
+    all.extend(check.rule.iter().map(|rule| ("rule", rule.clone())));
+    for e in check.attempts.iter().flat_map(|a| &a.evidence) {
+        let evidence = ("evidence", format!("{}: {}", e.subject, e.kind.name()));
+        if !all.contains(&evidence) {
+            all.push(evidence);
+        }
+    }
+    all
 }
 
 /// Returns zero for negative and non-finite values.

@@ -125,7 +125,6 @@ pub fn press(input: &mut SessionInput, touch: Touch) -> PressId {
             number: 1,
         },
         verdict: PressVerdict::Valid,
-        faults: Vec::new(),
         timing: Some(touch.timing),
         measured_at: Some(touch.measured_at),
         measured_depth_mm: touch.measured_depth_mm,

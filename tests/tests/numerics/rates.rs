@@ -104,7 +104,7 @@ fn analysed(flood: &SyntheticEvents) -> Analysis {
 }
 
 fn rule(a: &Analysis, press: usize) -> Option<Rule> {
-    a.presses[press].rule.clone()
+    a.presses[press].rule()
 }
 
 #[test]

@@ -352,7 +352,9 @@ impl Bench {
                 && let Some(outcome) = &mut input.outcomes[row]
             {
                 outcome.verdict =
-                    skinrig_model::PressVerdict::Excluded("not used: presses_used".to_owned());
+                    skinrig_model::PressVerdict::Excluded(skinrig_model::ExcludedReason::NotUsed {
+                        presses_used: "others".to_owned(),
+                    });
             }
             if let Some(robot) = &self.robot {
                 self.marks(&mut input, robot, id, touch, &mut random);

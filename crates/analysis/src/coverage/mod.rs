@@ -14,7 +14,6 @@ use skinrig_model::{CameraModel, Point2, PressRole, Verdict};
 pub use cells::{neighbour_distance_mm, probed_area_mm2};
 
 use crate::result::{Analysis, Coverage, Estimate};
-use crate::rule::Rule;
 
 /// Segments per arc of the outline for computing areas.
 pub const ARC_SEGMENTS: u32 = 256;
@@ -115,7 +114,7 @@ pub fn taxels(area_mm2: Option<f64>, rmse_mm: &Estimate) -> Estimate {
 /// Distinct planned positions of attempted presses that are used, and the number of their locations.
 fn probed_places(analysis: &Analysis) -> (Vec<Point2>, u32) {
     let probed = analysis.presses.iter().filter(|p| {
-        let used = p.verdict != Verdict::Excluded || p.rule.as_ref().is_some_and(Rule::is_on_data);
+        let used = p.verdict != Verdict::Excluded || p.rule().is_some_and(|rule| rule.is_on_data());
         p.role != PressRole::Sync && p.verdict != Verdict::Missed && used
     });
     let mut locations: Vec<(u32, Point2)> =

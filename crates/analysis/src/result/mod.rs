@@ -36,10 +36,11 @@ use skinrig_model::{
     RigGeometry, StereoGeometry, Verdict,
 };
 
+use crate::exclusion::Exclusion;
 use crate::rule::Rule;
 
 /// Version of this layout and of the algorithms behind it; part of every result.
-pub const ANALYSIS_VERSION: u32 = 8;
+pub const ANALYSIS_VERSION: u32 = 9;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -291,10 +292,9 @@ pub struct PressResult {
     pub truth: Option<Point2>,
     /// Verdict on the press.
     pub verdict: Verdict,
-    /// Full reason with this press's numbers, unless valid.
-    pub reason: Option<String>,
-    /// Rule behind the reason, without this press's numbers, for grouping.
-    pub rule: Option<Rule>,
+    /// Why it does not count; `None` if valid. In JSON also its texts: `reason` with this press's numbers, and `rule` without.
+    #[serde(flatten, with = "crate::exclusion")]
+    pub cause: Option<Exclusion>,
     /// Measured times, host clock.
     pub timing: Option<PressTiming>,
     /// View of each camera.
@@ -310,6 +310,18 @@ pub struct PressResult {
 }
 
 impl PressResult {
+    /// Why it does not count, with this press's numbers; `None` if valid.
+    #[must_use]
+    pub fn reason(&self) -> Option<String> {
+        self.cause.as_ref().map(Exclusion::to_string)
+    }
+
+    /// The rule behind the reason; `None` if valid.
+    #[must_use]
+    pub fn rule(&self) -> Option<Rule> {
+        self.cause.as_ref().map(Exclusion::rule)
+    }
+
     /// The estimate, if there is one.
     #[must_use]
     pub const fn estimate(&self) -> Option<Point2> {

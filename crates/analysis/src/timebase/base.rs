@@ -1,5 +1,6 @@
 //! Time base of a session: all its epochs, and conversions between clocks.
 
+use serde::{Deserialize, Serialize};
 use skinrig_model::{AlignmentSettings, BoxReport, HostTime, TriggerEdge};
 
 use super::edges::Edges;
@@ -28,7 +29,8 @@ pub struct TimeBaseInput<'a> {
 }
 
 /// Kind of observation that ties two clocks at an instant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Tie {
     /// A time request from the host to the trigger box.
     Exchange,

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use rigs::{Random, Session, SessionOptions, session, sound};
 use skinrig_analysis::result::{Fault, Finding};
 use skinrig_analysis::{Analysis, SessionInput, analyze};
-use skinrig_model::{HostTime, Point2, PressVerdict};
+use skinrig_model::{Causes, HostTime, InvalidReason, Point2, PressFault, PressVerdict};
 
 fn run(session: &Session) -> Analysis {
     analyze(&session.input, &session.events).unwrap()
@@ -381,7 +381,8 @@ fn sessions_too_small_to_judge_are_not_accused() {
     assert_eq!(named(&run(&nothing).findings), [Fault::PressesMissing]);
     let refused = edit(0, SessionOptions::default(), |input| {
         for outcome in input.outcomes.iter_mut().flatten() {
-            outcome.verdict = PressVerdict::Invalid("settled 0.3 mm from plan".to_owned().into());
+            outcome.verdict =
+                PressVerdict::Invalid(InvalidReason::Faults(Causes::one(PressFault::Paused)));
         }
     });
     assert_eq!(named(&run(&refused).findings), [Fault::RobotOff]);

@@ -1,7 +1,7 @@
 //! The study on planted sessions: recovers latencies with their uncertainty, and counts non-trials separately.
 
 use super::*;
-use skinrig_analysis::rule::Rule;
+use skinrig_analysis::exclusion::Exclusion;
 
 /// The planted session's results with other events: background at 400 per second and camera, and a burst of 20 000 per
 /// second and camera that begins `latency_us(press)` after contact.
@@ -217,14 +217,24 @@ fn contacts_that_were_not_measured_may_be_off_by_the_window() {
 #[test]
 fn manual_exclusions_are_no_trials_and_missed_presses_are() {
     let (mut analysis, kept) = planted(|_| Some(2e4));
-    for (n, rule) in [
-        (3, "by hand"),
-        (4, "the operator's hand in view"),
-        (5, "no cluster (camera 1)"),
+    for (n, cause) in [
+        (3, Exclusion::ByHand),
+        (
+            4,
+            Exclusion::Excluded(skinrig_model::ExcludedReason::Recorded {
+                text: "the operator's hand in view".to_owned(),
+            }),
+        ),
+        (
+            5,
+            Exclusion::NoCluster {
+                camera: skinrig_model::CameraId::One,
+            },
+        ),
     ] {
         let press = &mut analysis.presses[kept.presses[n].row];
         press.verdict = skinrig_model::Verdict::Excluded;
-        press.rule = Some(Rule::from(rule.to_owned()));
+        press.cause = Some(cause);
     }
     let found = studied(&analysis, &kept);
     assert_eq!((found.trials, found.unusable), (23, 2));

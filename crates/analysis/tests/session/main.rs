@@ -8,6 +8,7 @@ mod tradeoff;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use proptest::prelude::*;
+use skinrig_analysis::exclusion::Exclusion;
 use skinrig_analysis::result::LocationOutcome;
 use skinrig_analysis::rule::Rule;
 use skinrig_analysis::{
@@ -15,7 +16,8 @@ use skinrig_analysis::{
     analyze_with_events, results_hash,
 };
 use skinrig_model::{
-    CalibrationModel, CameraId, CdEvent, Point2, Polarity, PressRole, PressVerdict, StereoGeometry,
+    CalibrationModel, CameraId, Causes, CdEvent, ExcludedReason, InvalidReason, MissedReason,
+    Point2, Polarity, PressFault, PressRole, PressVerdict, RunEnd, StereoGeometry, StopReason,
     Verdict,
 };
 
@@ -115,6 +117,17 @@ fn the_same_input_gives_the_same_bits_however_it_is_sliced() {
     let mut other = first.clone();
     other.presses[30].views[1].as_mut().unwrap().cluster_events += 1;
     assert_ne!(results_hash(&first), results_hash(&other));
+    // It covers the kind of a cause, not its words and numbers.
+    let camera = CameraId::One;
+    let caused = |fault: PressFault| {
+        let faults = InvalidReason::Faults(Causes::one(fault));
+        let mut other = first.clone();
+        other.presses[30].cause = Some(Exclusion::Invalid(faults));
+        results_hash(&other)
+    };
+    let lost = |bytes| caused(PressFault::DataLost { camera, bytes });
+    assert_eq!(lost(64), lost(65));
+    assert_ne!(lost(64), caused(PressFault::NoData { camera }));
 }
 
 /// Counts the passes over each camera.
@@ -198,17 +211,19 @@ fn each_failure_has_its_own_row_and_reason() {
     verdict(
         &mut input,
         51,
-        PressVerdict::Missed("run stopped".to_owned()),
+        PressVerdict::Missed(MissedReason::RunEnded(RunEnd::Stopped(StopReason::Stop))),
     );
     verdict(
         &mut input,
         50,
-        PressVerdict::Invalid("force limit".to_owned().into()),
+        PressVerdict::Invalid(InvalidReason::Faults(Causes::one(PressFault::Paused))),
     );
     verdict(
         &mut input,
         49,
-        PressVerdict::Excluded("operator".to_owned()),
+        PressVerdict::Excluded(ExcludedReason::NotUsed {
+            presses_used: "[1]".to_owned(),
+        }),
     );
     input.outcomes[48].as_mut().unwrap().measured_at = None;
     input.outcomes[47].as_mut().unwrap().timing = None;
@@ -237,17 +252,15 @@ fn each_failure_has_its_own_row_and_reason() {
         }
     }
     let a = analyze(&input, &source).unwrap();
-    let reason = |row: usize| {
-        (
-            a.presses[row].verdict,
-            a.presses[row].reason.clone().unwrap(),
-        )
-    };
+    let reason = |row: usize| (a.presses[row].verdict, a.presses[row].reason().unwrap());
     let said = |v: Verdict, r: &str| (v, r.to_owned());
     assert_eq!(reason(52), said(Verdict::Missed, "never attempted"));
-    assert_eq!(reason(51), said(Verdict::Missed, "run stopped"));
-    assert_eq!(reason(50), said(Verdict::Invalid, "force limit"));
-    assert_eq!(reason(49), said(Verdict::Excluded, "operator"));
+    assert_eq!(reason(51), said(Verdict::Missed, "operator: stop"));
+    assert_eq!(reason(50), said(Verdict::Invalid, "paused by the operator"));
+    assert_eq!(
+        reason(49),
+        said(Verdict::Excluded, "not used: presses_used is [1]")
+    );
     assert_eq!(reason(48), said(Verdict::Invalid, "no measured position"));
     assert_eq!(reason(47), said(Verdict::Invalid, "no measured times"));
     assert_eq!(
@@ -267,6 +280,18 @@ fn each_failure_has_its_own_row_and_reason() {
         v == Verdict::Excluded && r == "outside the skin outline",
         "{v}: {r}"
     );
+    // Kinds and fields, with both texts for people.
+    let json = serde_json::to_value(&a).unwrap();
+    let found = &json["presses"][45];
+    assert_eq!(found["cause"]["no_cluster"]["camera"], "camera2", "{found}");
+    assert_eq!(found["rule"], "no cluster (camera 2)");
+    assert_eq!(
+        json["presses"][50]["cause"]["invalid"]["faults"][0],
+        "paused"
+    );
+    assert_eq!(json["presses"][50]["reason"], "paused by the operator");
+    let back: skinrig_analysis::Analysis = serde_json::from_str(&json.to_string()).unwrap();
+    assert_eq!(back, a);
     assert!(a.counts.add_up());
     assert_eq!(
         (
@@ -291,7 +316,7 @@ fn a_session_without_anything_is_still_an_analysis() {
     let a = analyze(&input, &source).unwrap();
     assert_eq!((a.counts.planned, a.counts.excluded), (50, 50));
     assert_eq!(
-        a.presses[10].reason.as_deref(),
+        a.presses[10].reason().as_deref(),
         Some("no cluster (camera 1)")
     );
     assert!(
@@ -310,7 +335,7 @@ fn a_session_without_anything_is_still_an_analysis() {
     let a = analyze(&input, &source).unwrap();
     assert_eq!(a.clocks, [None, None]);
     assert_eq!(
-        a.presses[10].reason.as_deref(),
+        a.presses[10].reason().as_deref(),
         Some("no clock alignment (camera 1)")
     );
     assert_eq!((a.counts.invalid, a.counts.add_up()), (50, true));
@@ -465,9 +490,9 @@ proptest! {
             let Some(o) = outcome else { continue };
             match fate {
                 0 => *outcome = None,
-                1 => o.verdict = PressVerdict::Missed("m".to_owned()),
-                2 => o.verdict = PressVerdict::Invalid("i".to_owned().into()),
-                3 => o.verdict = PressVerdict::Excluded("e".to_owned()),
+                1 => o.verdict = PressVerdict::Missed(MissedReason::NeverAttempted),
+                2 => o.verdict = PressVerdict::cut_off(1),
+                3 => o.verdict = PressVerdict::Excluded(ExcludedReason::Recorded { text: "e".to_owned() }),
                 4 => o.timing = None,
                 5 => o.measured_at = Some(Point2::new(f64::NAN, 0.0)),
                 _ => {}
@@ -477,8 +502,8 @@ proptest! {
         prop_assert!(a.counts.add_up());
         prop_assert_eq!(a.counts.planned + a.counts.sync, 53);
         for p in &a.presses {
-            prop_assert_eq!(p.verdict == Verdict::Valid, p.reason.is_none());
-            prop_assert!(p.reason.as_ref().is_none_or(|r| !r.is_empty()));
+            prop_assert_eq!(p.verdict == Verdict::Valid, p.cause.is_none());
+            prop_assert!(p.reason().is_none_or(|r| !r.is_empty()));
         }
         let valid_scored = a.presses.iter().filter(|p| p.role == PressRole::Score && p.verdict == Verdict::Valid);
         prop_assert_eq!(a.scored.rmse_mm.n as usize, valid_scored.count());
@@ -503,14 +528,14 @@ fn presses_with_different_reasons_are_grouped_by_rule() {
     }
     let a = analyze(&input, &source).unwrap();
     let (p, q) = (&a.presses[40], &a.presses[41]);
-    assert_eq!(p.verdict, Verdict::Excluded, "{:?}", p.reason);
-    assert_ne!(p.reason, q.reason);
-    assert_eq!(p.rule, Some(Rule::FewClusterEvents(CameraId::Two)));
-    assert_eq!(p.rule, q.rule);
+    assert_eq!(p.verdict, Verdict::Excluded, "{:?}", p.cause);
+    assert_ne!(p.reason(), q.reason());
+    assert_eq!(p.rule(), Some(Rule::FewClusterEvents(CameraId::Two)));
+    assert_eq!(p.rule(), q.rule());
     assert!(
         a.presses
             .iter()
-            .all(|p| p.rule.is_some() == (p.verdict != Verdict::Valid))
+            .all(|p| p.cause.is_some() == (p.verdict != Verdict::Valid))
     );
 }
 
@@ -612,7 +637,7 @@ fn presses_named_by_hand_are_rows_with_that_rule() {
     let a = analyze(&input, &source).unwrap();
     assert_eq!((a.counts.valid, a.counts.excluded), (49, 1));
     assert_eq!(
-        a.presses[scored.id.index() as usize].rule,
+        a.presses[scored.id.index() as usize].rule(),
         Some(Rule::ByHand)
     );
     assert_eq!(a.scored.rmse_mm.n, 24);

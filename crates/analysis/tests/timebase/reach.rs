@@ -194,10 +194,10 @@ fn a_press_that_no_clock_reaches_is_refused_by_a_rule_that_names_itself() {
         let a = analyze(&input, &Dark).unwrap();
         assert!(a.alignment.is_usable(), "{:?}", a.alignment);
         for (press, at) in a.presses.iter().zip(&b.presses) {
-            let reason = press.reason.as_deref().unwrap();
+            let reason = press.reason().unwrap();
             if *at + 5e5 > 33.5e6 {
                 assert_eq!(press.verdict, Verdict::Invalid);
-                assert_eq!(press.rule, Some(Rule::NotTimed(CameraId::Two)));
+                assert_eq!(press.rule(), Some(Rule::NotTimed(CameraId::Two)));
                 assert!(
                     reason.starts_with(&format!("not timed: the nearest {output} seen is "))
                         && reason.ends_with(" s away, expected at most 2.5 s (camera 2)"),

@@ -39,7 +39,9 @@ pub(super) fn facts(
     };
     add("rig.kind", header.rig_kind.clone());
     add("rig.name", header.rig_name.clone());
-    add("rig.level", level(&header.rig_name));
+    let rig: Option<RigDocument> = serde_json::from_str(&header.rig_json).ok();
+    let level = rig.as_ref().and_then(|r| r.rig["level"].as_str());
+    add("rig.level", level.unwrap_or("none").to_owned());
     add("software.recorded", header.software.clone());
     let sealed = reader.seal().map_err(unreadable)?.is_some();
     add("session.sealed", sealed.to_string());
@@ -74,7 +76,6 @@ pub(super) fn facts(
     }
     let mut flat = Vec::new();
     flatten("protocol", &protocol(header), &mut flat);
-    let rig: Option<RigDocument> = serde_json::from_str(&header.rig_json).ok();
     let origin = Origin::of(header);
     let kind = if origin == Some(Origin::Simulated) {
         "simulation"
@@ -96,14 +97,6 @@ pub(super) fn facts(
         rig_name: header.rig_name.clone(),
         values,
     })
-}
-
-/// The level in the name of a simulated rig: `simulated (geometric)`.
-fn level(rig_name: &str) -> String {
-    let named = rig_name
-        .split_once("simulated (")
-        .and_then(|(_, rest)| rest.split_once(')'));
-    named.map_or("none", |(level, _)| level).to_owned()
 }
 
 /// The protocol by key. A protocol that no longer parses (a schedule, or a file is missing) is reduced to its name and the

@@ -11,7 +11,7 @@ use super::finding::{Finding, check};
 use super::machine::Machine;
 use super::survey::name_of;
 use super::usb;
-use crate::devices::Line;
+use crate::devices::{DeviceState, Line};
 use crate::sessions;
 
 const AREA: &str = "bench";
@@ -22,7 +22,7 @@ pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
         .survey
         .lines
         .iter()
-        .filter(|l| l.state == "busy")
+        .filter(|l| l.state == DeviceState::Busy)
         .map(|l| held(case, l))
         .collect();
     let mut findings = Vec::new();

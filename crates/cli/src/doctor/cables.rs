@@ -7,7 +7,7 @@ use super::case::Case;
 use super::finding::{Finding, check};
 use super::survey::{LEFT_ALONE, Library, name_of};
 use super::usb::{self, UsbDevice};
-use crate::devices::Line;
+use crate::devices::{DeviceState, Line};
 
 const AREA: &str = "cables";
 const SPEED: &str = "USB speed";
@@ -68,11 +68,15 @@ fn connected(case: &Case<'_>, devices: Option<&[UsbDevice]>) -> Vec<Finding> {
         };
         let next = || line.next_step.clone().unwrap_or_default();
         match line.state {
-            "ready" => check.ok(line.what.as_str()),
-            "absent" => check.problem("not connected", next()),
-            "not asked" => check.not_checked(line.detail.as_str()),
-            "faulty" | "other device" => check.problem(with_detail(line), next()),
-            state => check.ok(format!("{}, {state}", line.what)),
+            DeviceState::Ready => check.ok(line.what.as_str()),
+            DeviceState::Absent => check.problem("not connected", next()),
+            DeviceState::NotAsked => check.not_checked(line.detail.as_str()),
+            DeviceState::Faulty | DeviceState::OtherDevice => {
+                check.problem(with_detail(line), next())
+            }
+            DeviceState::Busy | DeviceState::NotPermitted | DeviceState::OtherFirmware => {
+                check.ok(format!("{}, {}", line.what, line.state.name()))
+            }
         }
     };
     let mut findings: Vec<Finding> = roles.iter().map(|role| finding(role)).collect();
@@ -86,7 +90,7 @@ fn unnamed(case: &Case<'_>) -> Vec<Finding> {
     let mut findings =
         vec![check(AREA, "devices", "those of the rig file").not_checked("no rig file given")];
     for line in &case.survey.lines {
-        if line.state == "ready" {
+        if line.state == DeviceState::Ready {
             findings.push(check(AREA, name_of(line), "responds").ok(line.what.as_str()));
         } else if is_faulty(line) {
             findings.push(fault(line));
@@ -97,7 +101,7 @@ fn unnamed(case: &Case<'_>) -> Vec<Finding> {
 
 /// A machine without USB is not a cable fault; the permissions report it.
 fn is_faulty(line: &Line) -> bool {
-    line.state == "faulty" && line.what != "USB"
+    line.state == DeviceState::Faulty && line.what != "USB"
 }
 
 fn fault(line: &Line) -> Finding {
@@ -111,8 +115,8 @@ fn fault(line: &Line) -> Finding {
 
 fn with_detail(line: &Line) -> String {
     match line.detail.as_str() {
-        "" => format!("{}, {}", line.what, line.state),
-        detail => format!("{}, {}: {detail}", line.what, line.state),
+        "" => format!("{}, {}", line.what, line.state.name()),
+        detail => format!("{}, {}: {detail}", line.what, line.state.name()),
     }
 }
 

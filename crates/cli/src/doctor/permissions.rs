@@ -10,7 +10,7 @@ use super::finding::{Finding, check};
 use super::machine::MachineError;
 use super::survey::{LEFT_ALONE, name_of};
 use super::usb;
-use crate::devices::Line;
+use crate::devices::{DeviceState, Line};
 
 const AREA: &str = "permissions";
 /// Installs the udev rules of this repository.
@@ -54,7 +54,7 @@ fn cameras(case: &Case<'_>, user: Option<&User>) -> Vec<Finding> {
     }
     let finding = |line: &&Line| {
         let check = check(AREA, name_of(line), expected);
-        if line.state != "not permitted" {
+        if line.state != DeviceState::NotPermitted {
             return check.ok("opened");
         }
         let node = line
@@ -75,17 +75,17 @@ fn robot(case: &Case<'_>, user: Option<&User>) -> Vec<Finding> {
         let mut of_maker = all.iter().filter(|d| d.vendor == USB_VENDOR);
         of_maker.next().map(usb::UsbDevice::node)
     });
-    let asked = |state: &str| {
+    let asked = |state: DeviceState| {
         let robots = case.survey.lines.iter().filter(|l| l.device == "robot");
         robots.into_iter().any(|l| l.state == state)
     };
     vec![match (node, user) {
-        (node, _) if asked("not permitted") => {
+        (node, _) if asked(DeviceState::NotPermitted) => {
             let node = node.unwrap_or_default();
             let (rights, next) = access_denied(case, user, &node);
             check().problem(format!("refused: {node}{rights}"), next)
         }
-        _ if asked("ready") || asked("busy") => check().ok("opened"),
+        _ if asked(DeviceState::Ready) || asked(DeviceState::Busy) => check().ok("opened"),
         (Some(node), Some(user)) => match case.machine.node(&node) {
             Some(rights) if rights.is_open_to(user) => check().ok(node),
             Some(_) => {
@@ -110,12 +110,12 @@ fn serial_port(case: &Case<'_>, user: Option<&User>) -> Vec<Finding> {
     };
     let state = case.survey.role("trigger_box").map(|l| l.state);
     vec![match state {
-        Some("not permitted") => {
+        Some(DeviceState::NotPermitted) => {
             let (rights, next) = access_denied(case, user, port);
             check().problem(format!("refused: {port}{rights}"), next)
         }
         None if case.survey.left_alone => check().not_checked(LEFT_ALONE),
-        Some("absent") | None => check().not_checked(format!("there is no {port}")),
+        Some(DeviceState::Absent) | None => check().not_checked(format!("there is no {port}")),
         Some(_) => check().ok(format!("{port} opened")),
     }]
 }

@@ -3,7 +3,7 @@
 use skinrig_omega3::load::{self, LoadError};
 use skinrig_protocol::rig::RigFile;
 
-use crate::devices::{self, Line};
+use crate::devices::{self, DeviceState, Line};
 
 /// Result of the query.
 pub(super) struct Survey {
@@ -71,7 +71,7 @@ impl Survey {
         self.lines
             .iter()
             .filter(seen)
-            .filter(|l| l.state != "other device")
+            .filter(|l| l.state != DeviceState::OtherDevice)
     }
 }
 

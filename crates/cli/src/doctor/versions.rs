@@ -7,7 +7,7 @@ use skinrig_trigger_box::protocol::{FIRMWARE_VERSION, PROTOCOL_VERSION};
 use super::case::Case;
 use super::finding::{Check, Finding, check};
 use super::survey::Library;
-use crate::devices::Line;
+use crate::devices::{DeviceState, Line};
 
 const AREA: &str = "versions";
 /// First firmware of the robot with a watchdog (Force Dimension's documentation of `dhdSetWatchdog`).
@@ -114,7 +114,7 @@ fn trigger_box(case: &Case<'_>) -> Finding {
     let wanted = |rig: &RigFile| rig.trigger_box.as_ref()?.firmware.clone();
     let flash = |line: &Line| line.next_step.clone().unwrap_or_default();
     match case.survey.role("trigger_box") {
-        Some(line) if line.state == "other firmware" => {
+        Some(line) if line.state == DeviceState::OtherFirmware => {
             box_check(&supported).problem(line.detail.as_str(), flash(line))
         }
         Some(line) if line.firmware.is_some() && case.rig.and_then(wanted).is_none() => {

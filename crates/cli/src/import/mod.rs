@@ -11,7 +11,7 @@ use std::io::Read;
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
-use skinrig_controller::ControllerError;
+use skinrig_controller::RunFault;
 use skinrig_device::{CameraSettings, Rig};
 use skinrig_formats::Geometry;
 use skinrig_formats::hdf5::Container;
@@ -20,7 +20,8 @@ use skinrig_formats::positions::{LengthUnit, PositionTable};
 use skinrig_formats::raw::RawReader;
 use skinrig_formats::regular;
 use skinrig_model::{
-    CameraId, DeviceIdentity, HostDuration, LocationId, Point2, RigidTransform, StreamFormat,
+    CameraId, DeviceIdentity, ExcludedReason, HostDuration, LocationId, Point2, RigidTransform,
+    StreamFormat,
 };
 use skinrig_protocol::Schedule;
 use skinrig_sim::SimClock;
@@ -54,7 +55,9 @@ pub(crate) fn import(args: &ImportArgs, command_line: &str, output: Output) -> O
         .map_err(|found| Failure::findings(&found))?;
     let positions = read_positions(&args.presses, &schedule)?;
     let (presses, times) = schedule.planned(&positions).map_err(Failure::input)?;
-    let unused = format!("not used: presses_used is {}", schedule.presses_used);
+    let unused = ExcludedReason::NotUsed {
+        presses_used: schedule.presses_used.to_string(),
+    };
     let excluded = presses
         .iter()
         .filter(|p| !schedule.is_used(p))
@@ -118,9 +121,10 @@ pub(crate) fn import(args: &ImportArgs, command_line: &str, output: Output) -> O
     let operator = Operator::listen().map_err(Failure::internal)?;
     let (session, report) = record(&intent, &plan, rig, &args.sessions, None, &operator)?;
     let unreadable = report
-        .causes
+        .end
+        .faults()
         .iter()
-        .any(|c| matches!(c, ControllerError::Device(_)));
+        .any(|c| matches!(c, RunFault::Device(_)));
     conclude(&session, &report, args.no_analysis, None, output).map_err(|failure| {
         // An import uses no rig: a camera error means that its file is damaged or too short.
         if unreadable {

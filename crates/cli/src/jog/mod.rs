@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use chrono::Utc;
 use skinrig_controller::{
-    ControlHandle, ControllerError, ControllerSettings, Floor, Jog, MoveOutcome, TouchOutcome,
+    ControlHandle, ControllerSettings, Floor, Jog, MoveOutcome, RunFault, TouchOutcome,
 };
 use skinrig_device::{Clock, Indenter, MotionLimits, RealClock};
 use skinrig_hil::lease::Lease;
@@ -296,7 +296,7 @@ impl Console {
                     let polled = self.jog.look();
                     log.path_of_tip(&self.jog.take_trace());
                     match polled {
-                        Err(ControllerError::Halted) => continue,
+                        Err(RunFault::Halted) => continue,
                         other => other.map_err(Failure::rig)?,
                     };
                     if last_input.elapsed() < self.idle {
@@ -325,7 +325,7 @@ impl Console {
                     outln!("{text}");
                 }
                 // The next turn of the loop ends it: a halt also sets the stop flag.
-                Err(Refusal::Rig(ControllerError::Halted)) => {
+                Err(Refusal::Rig(RunFault::Halted)) => {
                     log.line(self.jog.now(), "ctrl-C", "motors off");
                 }
                 Err(Refusal::Rig(e)) => {

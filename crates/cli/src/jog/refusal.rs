@@ -1,6 +1,6 @@
 //! Reasons for rejecting a command.
 
-use skinrig_controller::{ControllerError, GuardError};
+use skinrig_controller::{GuardError, RunFault};
 use skinrig_device::DeviceError;
 
 use super::order::OrderError;
@@ -10,7 +10,7 @@ pub(super) enum Refusal {
     /// Invalid or not allowed; the robot did not move.
     Input(InputError),
     /// The robot failed.
-    Rig(ControllerError),
+    Rig(RunFault),
 }
 
 /// Error in a command.
@@ -36,20 +36,16 @@ pub(super) enum InputError {
     Device(DeviceError),
 }
 
-impl From<ControllerError> for Refusal {
-    fn from(e: ControllerError) -> Self {
+impl From<RunFault> for Refusal {
+    fn from(e: RunFault) -> Self {
         match e {
             // A fault of the robot, not of the command.
-            ControllerError::Guard(
+            RunFault::Guard(
                 GuardError::StalePose { .. } | GuardError::NotArmed | GuardError::Tripped { .. },
             ) => Self::Rig(e),
-            ControllerError::Guard(e @ GuardError::Floor { .. }) => {
-                Self::Input(InputError::Floor(e))
-            }
-            ControllerError::Guard(e) => Self::Input(InputError::Guard(e)),
-            ControllerError::Device(e @ DeviceError::Refused { .. }) => {
-                Self::Input(InputError::Device(e))
-            }
+            RunFault::Guard(e @ GuardError::Floor { .. }) => Self::Input(InputError::Floor(e)),
+            RunFault::Guard(e) => Self::Input(InputError::Guard(e)),
+            RunFault::Device(e @ DeviceError::Refused { .. }) => Self::Input(InputError::Device(e)),
             e => Self::Rig(e),
         }
     }

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use skinrig_analysis::result::Estimate;
 use skinrig_model::{
     CameraId, InterruptionKind, LocationId, PlannedPress, PreflightCheck, PressId, PressRole,
-    RepetitionId,
+    PressVerdict, RepetitionId, RunEnd,
 };
 use skinrig_recorder::{
     AttemptRow, DeviceRow, LegRow, Loss, RecorderError, SessionReader, SessionTotals,
@@ -47,6 +47,9 @@ pub(super) struct Description {
     /// `completed`, `stopped` or `faulted`; `None` without an end.
     pub end: Option<&'static str>,
     pub end_reason: Option<String>,
+    /// The same as kinds and fields.
+    #[serde(serialize_with = "end_cause")]
+    pub end_cause: Option<RunEnd>,
     pub duration_s: Option<f64>,
     pub preflight: Vec<PreflightCheck>,
     pub analyses: Vec<Analysis>,
@@ -68,6 +71,8 @@ pub(super) struct Leg {
     pub from_s: f64,
     pub end: Option<&'static str>,
     pub end_reason: Option<String>,
+    #[serde(serialize_with = "end_cause")]
+    pub end_cause: Option<RunEnd>,
     pub attempts: usize,
     /// As `press/attempt`.
     pub cut_off: Vec<String>,
@@ -149,9 +154,20 @@ pub(super) struct Press {
     pub earlier: Vec<(u32, &'static str, Option<String>)>,
     pub verdict: &'static str,
     pub reason: Option<String>,
+    /// The reason as kinds and fields.
+    #[serde(serialize_with = "verdict_cause")]
+    pub cause: Option<PressVerdict>,
     pub contact_s: Option<f64>,
     pub measured_depth_mm: Option<f64>,
     pub touched_mm: Option<f64>,
+}
+
+fn end_cause<S: Serializer>(end: &Option<RunEnd>, to: S) -> Result<S::Ok, S::Error> {
+    end.as_ref().and_then(RunEnd::cause).serialize(to)
+}
+
+fn verdict_cause<S: Serializer>(verdict: &Option<PressVerdict>, to: S) -> Result<S::Ok, S::Error> {
+    verdict.as_ref().and_then(PressVerdict::cause).serialize(to)
 }
 
 /// The verdict of an attempt without an outcome.
@@ -184,14 +200,18 @@ impl Description {
                 .map(camera)
                 .collect::<Result<_, _>>()?,
             interruptions: interruptions
-                .map(|i| (i.t.as_secs_f64(), InterruptionKind::name(i.kind), i.reason))
+                .map(|i| {
+                    (
+                        i.t.as_secs_f64(),
+                        InterruptionKind::name(i.kind),
+                        i.reason.to_string(),
+                    )
+                })
                 .collect(),
             notes: notes.map(|n| (n.t.as_secs_f64(), n.text)).collect(),
             end: end.as_ref().map(|(_, end)| end.name()),
-            end_reason: end
-                .as_ref()
-                .and_then(|(_, end)| end.reason())
-                .map(str::to_owned),
+            end_reason: end.as_ref().and_then(|(_, end)| end.reason()),
+            end_cause: end.as_ref().map(|(_, end)| end.clone()),
             duration_s: end.as_ref().map(|(t, _)| t.as_secs_f64()),
             preflight: reader.preflight()?,
             analyses: analyses(&args.session, &id),
@@ -236,7 +256,8 @@ fn legs(legs: &[LegRow], presses: &[(PlannedPress, Vec<AttemptRow>)]) -> Vec<Leg
             command_line: leg.began.command_line.clone(),
             from_s: leg.origin.as_secs_f64(),
             end: end.map(|end| end.name()),
-            end_reason: end.and_then(|end| end.reason()).map(str::to_owned),
+            end_reason: end.and_then(|end| end.reason()),
+            end_cause: end.cloned(),
             attempts: own.len(),
             cut_off: own
                 .iter()
@@ -325,7 +346,7 @@ impl Press {
     fn of((planned, attempts): &(PlannedPress, Vec<AttemptRow>)) -> Self {
         let verdict = |attempt: &AttemptRow| {
             let verdict = attempt.outcome.as_ref().map(|o| &o.verdict);
-            let reason = verdict.and_then(|v| v.reason()).map(Into::into);
+            let reason = verdict.and_then(|v| v.reason());
             (verdict.map_or(OPEN, |v| v.name()), reason)
         };
         let earlier = attempts
@@ -351,6 +372,7 @@ impl Press {
                 .collect(),
             verdict: last,
             reason,
+            cause: outcome.map(|o| o.verdict.clone()),
             contact_s: outcome
                 .and_then(|o| o.timing)
                 .map(|t| t.contact.as_secs_f64()),

@@ -1,6 +1,5 @@
 //! State of a run at one instant.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -190,7 +189,7 @@ impl Follower {
             attempt: outcome.attempt.number,
             at_mm: [planned.at.x_mm, planned.at.y_mm],
             verdict: outcome.verdict.name().to_owned(),
-            reason: outcome.verdict.reason().map(Cow::into_owned),
+            reason: outcome.verdict.reason(),
             cameras: self
                 .signals
                 .get(&outcome.attempt)
@@ -205,7 +204,7 @@ impl Follower {
         let faults = faults.map(|i| Fault {
             t_s: i.t.as_secs_f64(),
             kind: i.kind.name().to_owned(),
-            reason: i.reason,
+            reason: i.reason.to_string(),
         });
         let of = |text: fn(&SessionInfo) -> &String| {
             self.head.as_ref().map(text).cloned().unwrap_or_default()

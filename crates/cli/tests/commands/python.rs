@@ -79,7 +79,7 @@ fn presses(session: &Path, analysis: &Analysis) -> Truth {
         put("depth_mm", json!(planned.depth_mm));
         put("attempts", json!(attempts.len()));
         put("verdict", json!(found.verdict));
-        put("reason", json!(found.reason));
+        put("reason", json!(found.reason()));
         put("truth_source", json!("measured"));
         let t = last.timing.unwrap();
         let moments: [(&str, HostTime); 6] = [

@@ -1,11 +1,11 @@
 //! Arming: opens, configures, reads back and starts the devices, and waits for the robot's position.
 
-use skinrig_model::{CameraId, DeviceRole, Record};
+use skinrig_model::{CameraId, DeviceRole, Record, RunFault};
 use skinrig_protocol::plan::Step;
 
 use super::Executor;
 use super::steps::internal;
-use crate::error::{ControllerError, Halt};
+use crate::error::Halt;
 use crate::preflight;
 use crate::run::Leg;
 use crate::states::{Action, Event, State};
@@ -77,7 +77,7 @@ impl Executor<'_> {
         &mut self,
         camera: CameraId,
         format: skinrig_model::StreamFormat,
-    ) -> Result<(), ControllerError> {
+    ) -> Result<(), RunFault> {
         let found = self.cameras.id(camera);
         if found != camera {
             return Err(rig_error("cameras", camera.to_string(), found.to_string()));
@@ -97,7 +97,7 @@ impl Executor<'_> {
         })
     }
 
-    fn check_trigger_box(&mut self) -> Result<(), ControllerError> {
+    fn check_trigger_box(&mut self) -> Result<(), RunFault> {
         let marks = self
             .plan
             .steps
@@ -132,7 +132,7 @@ impl Executor<'_> {
             }
             if self.now() >= deadline {
                 let expected = format!("a sample within {}", self.settings.first_pose_within);
-                return Err(Halt::Fault(ControllerError::PoseStream {
+                return Err(Halt::Fault(RunFault::PoseStream {
                     expected,
                     found: "none".to_owned(),
                 }));
@@ -145,8 +145,8 @@ fn rig_error(
     place: impl Into<String>,
     expected: impl Into<String>,
     found: impl Into<String>,
-) -> ControllerError {
-    ControllerError::Rig {
+) -> RunFault {
+    RunFault::Rig {
         place: place.into(),
         expected: expected.into(),
         found: found.into(),

@@ -2,11 +2,13 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use skinrig_model::{CameraId, InterruptionKind, Record, RunEnd, StopReason};
+use skinrig_model::{
+    CameraId, InterruptionKind, InterruptionReason, MissedReason, NotAtRest, PressFault, Record,
+    RunEnd, RunFault, StopReason,
+};
 
 use super::Executor;
-use crate::error::{ControllerError, Halt, NotAtRest};
-use crate::press_fault::PressFault;
+use crate::error::Halt;
 use crate::run::RunReport;
 use crate::states::{Event, State};
 
@@ -21,7 +23,7 @@ impl Executor<'_> {
     ) -> Result<(), Halt> {
         match catch_unwind(AssertUnwindSafe(|| part(self))) {
             Ok(result) => result,
-            Err(payload) => Err(ControllerError::Internal(panic_text(&*payload)).into()),
+            Err(payload) => Err(RunFault::Internal(panic_text(&*payload)).into()),
         }
     }
 
@@ -29,7 +31,7 @@ impl Executor<'_> {
     fn attempt(
         &mut self,
         what: &'static str,
-        part: impl FnOnce(&mut Self) -> Result<(), ControllerError>,
+        part: impl FnOnce(&mut Self) -> Result<(), RunFault>,
     ) -> bool {
         match self.catch_panic(|executor| Ok(part(executor)?)) {
             Ok(()) => true,
@@ -46,7 +48,6 @@ impl Executor<'_> {
     pub(super) fn conclude(&mut self, result: Result<(), Halt>) -> RunReport {
         let at = catch_unwind(AssertUnwindSafe(|| self.now())).ok();
         self.journal.begin_ending();
-        let mut causes = Vec::new();
         let (mut end, interruption) = match result {
             Ok(()) => (RunEnd::Completed, None),
             // The interruption was recorded when the operator requested it.
@@ -61,26 +62,21 @@ impl Executor<'_> {
             // Handled below, where the motors are switched off.
             Err(Halt::Halted) => (RunEnd::Stopped(StopReason::Halt), None),
             Err(Halt::PausedNow) => {
-                let lost = "no motion handled a pause";
                 self.machine.fire(Event::Fault);
-                let error = ControllerError::Internal(lost.to_owned());
-                let end = RunEnd::Faulted(error.to_string());
-                causes.push(error);
-                (end, Some(InterruptionKind::Fault))
+                let lost = RunFault::Internal("no motion handled a pause".to_owned());
+                (RunEnd::fault(lost), Some(InterruptionKind::Fault))
             }
             Err(Halt::Fault(e)) => {
                 self.machine.fire(Event::Fault);
-                let end = RunEnd::Faulted(e.to_string());
-                causes.push(e);
-                (end, Some(InterruptionKind::Fault))
+                (RunEnd::fault(e), Some(InterruptionKind::Fault))
             }
         };
 
         let (retracted, disarmed) = self.make_safe();
-        let first_reason = end.reason().unwrap_or_default().to_owned();
+        let first_end = end.clone();
         if self.machine.halted_at().is_some() {
             end = match end {
-                RunEnd::Faulted(r) => RunEnd::Faulted(format!("{r}; {}", StopReason::Halt)),
+                RunEnd::Faulted(_) => end.and_fault(RunFault::Stopped(StopReason::Halt)),
                 _ => RunEnd::Stopped(StopReason::Halt),
             };
         }
@@ -90,22 +86,19 @@ impl Executor<'_> {
             (_, false) => Some(NotAtRest::NotDisarmed),
         };
         if let Some(warning) = warning {
-            causes.push(warning.into());
-            end = RunEnd::Faulted(match end.reason() {
-                None => warning.to_string(),
-                Some(reason) => format!("{reason}; {warning}"),
-            });
+            end = end.and_fault(warning);
         }
 
-        let reason = end.reason().unwrap_or_default().to_owned();
         let t = at.unwrap_or_else(|| self.indenter.position().map(|p| p.t).unwrap_or_default());
         let ended = catch_unwind(AssertUnwindSafe(|| self.now())).unwrap_or(t);
         self.attempt("outcome", |executor| {
             executor.journal.emit_poses()?;
             if executor.trackers.press().is_some() {
-                executor.close_press(Some(PressFault::RunEnded(reason.clone())))?;
+                executor.close_press(Some(PressFault::RunEnded(end.clone())))?;
             }
-            executor.journal.miss_the_rest(&reason)
+            executor
+                .journal
+                .miss_the_rest(&MissedReason::RunEnded(end.clone()))
         });
         self.attempt("the operator's notes", Self::write_notes);
         let problems = self.journal.problems().to_vec();
@@ -114,17 +107,18 @@ impl Executor<'_> {
         }
         // First the cause of the run's end, then the problems during the end.
         let mut rows = Vec::new();
-        rows.extend(interruption.map(|kind| (kind, t, first_reason)));
+        rows.extend(interruption.map(|kind| (kind, t, first_end)));
         rows.extend(
             self.machine
                 .halted_at()
-                .map(|t| (InterruptionKind::Halt, t, StopReason::Halt.into())),
+                .map(|t| (InterruptionKind::Halt, t, RunEnd::Stopped(StopReason::Halt))),
         );
         if warning.is_some() {
             rows.retain(|(kind, ..)| *kind != InterruptionKind::Fault);
-            rows.push((InterruptionKind::Fault, t, reason));
+            rows.push((InterruptionKind::Fault, t, end.clone()));
         }
-        for (kind, t, reason) in rows {
+        for (kind, t, end) in rows {
+            let reason = InterruptionReason::End(end);
             let _ = self.journal.emit(Record::Interruption { kind, t, reason });
         }
         let _ = self.journal.emit(Record::Ended {
@@ -137,7 +131,6 @@ impl Executor<'_> {
         let [planned, valid, invalid, missed] = self.journal.counts();
         RunReport {
             end,
-            causes,
             press_faults: self.series.take_faults(),
             valid_presses: self.journal.valid(),
             ended_at: ended,
@@ -181,7 +174,7 @@ impl Executor<'_> {
     }
 
     /// Rises straight to clearance height, unless the tip is already there.
-    fn rise_clear(&mut self) -> Result<(), ControllerError> {
+    fn rise_clear(&mut self) -> Result<(), RunFault> {
         if self.machine.state() != State::Retracting {
             // Ends any current motion, including lateral ones.
             self.attempt("hold", |executor| executor.indenter.hold());
@@ -192,7 +185,7 @@ impl Executor<'_> {
         }
         let (Some(target), Some(from)) = (self.indenter.point_above(), self.indenter.position())
         else {
-            return Err(ControllerError::PoseStream {
+            return Err(RunFault::PoseStream {
                 expected: "a known position".to_owned(),
                 found: "none".to_owned(),
             });
@@ -219,7 +212,7 @@ impl Drop for Executor<'_> {
         if self.machine.state() == State::Finished {
             return;
         }
-        let dropped = ControllerError::Internal("the run was dropped before its end".to_owned());
+        let dropped = RunFault::Internal("the run was dropped before its end".to_owned());
         let _ = self.conclude(Err(Halt::Fault(dropped)));
     }
 }

@@ -16,11 +16,13 @@ mod surface;
 mod suspension;
 
 use skinrig_device::{Clock, DeviceError, Rig};
-use skinrig_model::{CameraId, HostDuration, HostTime, MotionCommand, Point3, Record, Skin};
+use skinrig_model::{
+    CameraId, HostDuration, HostTime, MotionCommand, Point3, Record, RunFault, Skin,
+};
 use skinrig_protocol::plan::Plan;
 
 use crate::camera_streams::{CameraStreams, Collect};
-use crate::error::{ControllerError, Halt};
+use crate::error::Halt;
 use crate::guard::GuardedIndenter;
 use crate::journal::Journal;
 use crate::machine::Machine;
@@ -101,11 +103,7 @@ impl<'a> Executor<'a> {
     }
 
     /// Commands a straight motion; returns the time after the indenter accepted it.
-    fn command(
-        &mut self,
-        target: Point3<Skin>,
-        speed_mm_s: f64,
-    ) -> Result<HostTime, ControllerError> {
+    fn command(&mut self, target: Point3<Skin>, speed_mm_s: f64) -> Result<HostTime, RunFault> {
         // A slow sink may have delayed the loop: poll again before moving.
         if self.indenter.check_fresh(self.clock.now()).is_err() {
             self.observe_poses()?;
@@ -137,7 +135,7 @@ impl<'a> Executor<'a> {
     }
 
     /// Polls every device without waiting.
-    fn observe(&mut self) -> Result<(), ControllerError> {
+    fn observe(&mut self) -> Result<(), RunFault> {
         let poses = self.observe_poses();
         let cameras = self.collect(Collect::Poll);
         let line = self.observe_box();
@@ -154,7 +152,7 @@ impl<'a> Executor<'a> {
     }
 
     /// Emits the reports of the trigger box, including those before a failure.
-    fn observe_box(&mut self) -> Result<(), ControllerError> {
+    fn observe_box(&mut self) -> Result<(), RunFault> {
         let mut reports = Vec::new();
         let answer = self.trigger.poll(&mut reports);
         if !reports.is_empty() {
@@ -172,7 +170,7 @@ impl<'a> Executor<'a> {
         }
     }
 
-    fn observe_poses(&mut self) -> Result<(), ControllerError> {
+    fn observe_poses(&mut self) -> Result<(), RunFault> {
         let clock = self.clock.as_ref();
         let answer = self.trackers.poll(&mut self.indenter, clock);
         let buffered = self.journal.add_poses(self.trackers.fresh());
@@ -181,7 +179,7 @@ impl<'a> Executor<'a> {
 
     /// Emits the data of both cameras, including those before a failure. A camera that needs longer for a flush delivers
     /// the rest later: see [`CameraStreams::is_flushed_to`].
-    fn collect(&mut self, how: Collect) -> Result<(), ControllerError> {
+    fn collect(&mut self, how: Collect) -> Result<(), RunFault> {
         let mut answer = Ok(());
         for camera in CameraId::ALL {
             let now = self.clock.now();
@@ -193,7 +191,7 @@ impl<'a> Executor<'a> {
     }
 
     /// Stops one camera, and emits its remaining data and its notes.
-    fn stop_camera(&mut self, camera: CameraId) -> Result<(), ControllerError> {
+    fn stop_camera(&mut self, camera: CameraId) -> Result<(), RunFault> {
         let (stopped, notes) = self.cameras.stop(camera);
         self.emit_chunks()?;
         for note in notes {
@@ -204,7 +202,7 @@ impl<'a> Executor<'a> {
     }
 
     /// Emits the notes of the trigger box.
-    fn emit_box_notes(&mut self) -> Result<(), ControllerError> {
+    fn emit_box_notes(&mut self) -> Result<(), RunFault> {
         for note in self.trigger.take_notes() {
             let (t, text) = (self.now(), format!("trigger box: {note}"));
             self.journal.note(t, text)?;
@@ -212,7 +210,7 @@ impl<'a> Executor<'a> {
         Ok(())
     }
 
-    fn emit_chunks(&mut self) -> Result<(), ControllerError> {
+    fn emit_chunks(&mut self) -> Result<(), RunFault> {
         let mut answer = Ok(());
         for chunk in self.cameras.take_chunks() {
             let ordered = self.cameras.check_order(&chunk);
@@ -241,7 +239,7 @@ impl<'a> Executor<'a> {
     }
 
     /// Sends the next mark if the line is free.
-    fn send_marks(&mut self) -> Result<(), ControllerError> {
+    fn send_marks(&mut self) -> Result<(), RunFault> {
         match self.trigger.send_next(self.clock.as_ref())? {
             Some(sent) => self.journal.emit(Record::MarkSent(sent)),
             None => Ok(()),

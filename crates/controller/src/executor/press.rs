@@ -1,16 +1,15 @@
 //! Execution of one press: down to the surface, to depth, hold and back up, with all phase times measured.
 
-use skinrig_model::HostTime;
+use skinrig_model::{HostTime, PressFault, RunFault};
 use skinrig_protocol::Surface;
 use skinrig_protocol::plan::PressStep;
 
 use super::Executor;
 use super::search::Probe;
 use crate::camera_streams::Collect;
-use crate::error::{ControllerError, Halt};
+use crate::error::Halt;
 use crate::journal::was_rejected;
 use crate::open_press::OpenPress;
-use crate::press_fault::PressFault;
 use crate::press_tracker::PressTracker;
 use crate::verdict::judge;
 
@@ -122,9 +121,9 @@ impl Executor<'_> {
         self.machine.set_interruptible(false);
         match part {
             Err(Halt::PausedNow) => {
-                let suspended = self.suspender.reason().map(ToOwned::to_owned);
+                let suspension = self.suspender.current();
                 Ok(Some(
-                    suspended.map_or(PressFault::Paused, PressFault::Suspended),
+                    suspension.map_or(PressFault::Paused, PressFault::Suspended),
                 ))
             }
             other => other,
@@ -199,10 +198,7 @@ impl Executor<'_> {
     }
 
     /// Emits all bytes and poses so far, then the outcome. Returns whether to repeat the press.
-    pub(super) fn close_press(
-        &mut self,
-        fault: Option<PressFault>,
-    ) -> Result<bool, ControllerError> {
+    pub(super) fn close_press(&mut self, fault: Option<PressFault>) -> Result<bool, RunFault> {
         let flushed = self.observe().and(self.collect(Collect::Flush));
         if self.journal.is_ending() {
             if let Err(e) = flushed {

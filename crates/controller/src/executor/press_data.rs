@@ -1,12 +1,11 @@
 //! The camera data of a press: they reach its end, and the event rate stays below its limit. A press with faulty data is repeated.
 
-use skinrig_model::{CameraId, HostTime};
+use skinrig_model::{CameraId, HostTime, PressFault};
 
 use super::Executor;
 use crate::camera_streams::Collect;
 use crate::error::Halt;
 use crate::open_press::OpenPress;
-use crate::press_fault::PressFault;
 
 impl Executor<'_> {
     /// Waits, up to a limit, until both cameras have delivered their data of the press, so that losses are known before the

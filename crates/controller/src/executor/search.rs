@@ -1,12 +1,11 @@
 //! Surface search by touch: averages the force in free air, then moves down slowly until the force rises.
 
-use skinrig_model::{HostDuration, HostTime, Point2, PoseSample};
+use skinrig_model::{HostDuration, HostTime, Point2, PoseSample, TouchFault, TouchPhase};
 use skinrig_protocol::TouchSearch;
 use skinrig_protocol::plan::PressStep;
 
 use super::Executor;
 use crate::error::Halt;
-use crate::press_fault::TouchFault;
 use crate::press_tracker::Settling;
 use crate::touch::TouchDetector;
 
@@ -55,7 +54,9 @@ impl Executor<'_> {
         let done = self.until_touch(deadline, |t| t.is_blind() || t.tare_n().is_some())?;
         Ok(match self.trackers.touch() {
             Some(t) if done && !t.is_blind() => Ok(()),
-            Some(t) if t.is_blind() => Err(TouchFault::NoForce { during: "tare" }),
+            Some(t) if t.is_blind() => Err(TouchFault::NoForce {
+                during: TouchPhase::Tare,
+            }),
             _ => Err(TouchFault::ShortTare(search.tare)),
         })
     }
@@ -95,7 +96,9 @@ impl Executor<'_> {
                 return Ok(self.check_surface_height(found, step, search));
             }
             if self.trackers.touch().is_some_and(TouchDetector::is_blind) {
-                return Ok(Err(TouchFault::NoForce { during: "search" }));
+                return Ok(Err(TouchFault::NoForce {
+                    during: TouchPhase::Search,
+                }));
             }
             if low(self) || self.now() >= until.min(deadline) {
                 return Ok(Err(TouchFault::NotFound {

@@ -1,12 +1,12 @@
 //! Executes the steps of a plan in order.
 
-use skinrig_model::{HostDuration, HostTime, Point3, PoseSample, Skin};
+use skinrig_model::{
+    GuardError, HostDuration, HostTime, NotArrived, Point3, PoseSample, PressFault, RunFault, Skin,
+};
 use skinrig_protocol::plan::Step;
 
 use super::Executor;
-use crate::error::{ControllerError, GuardError, Halt};
-use crate::not_arrived::NotArrived;
-use crate::press_fault::PressFault;
+use crate::error::Halt;
 use crate::press_tracker::Settling;
 use crate::states::{Action, Event, State};
 
@@ -16,7 +16,7 @@ impl Executor<'_> {
         self.series.begin(self.now());
         self.safe_point()?;
         self.rise_first()?;
-        self.check_surface("before the first press")?;
+        self.check_surface(None)?;
         self.series.begin(self.now());
         let plan = self.plan;
         for (n, step) in plan.steps.iter().enumerate() {
@@ -119,11 +119,11 @@ impl Executor<'_> {
         let until = self.now() + within;
         loop {
             match self.command(target, speed_mm_s) {
-                Err(ControllerError::Guard(GuardError::Lateral { .. })) if self.now() < until => {
+                Err(RunFault::Guard(GuardError::Lateral { .. })) if self.now() < until => {
                     self.tick(Some(until))?;
                 }
                 // Compare with the commanded position; without one the rejection is final.
-                Err(ControllerError::Guard(refused @ GuardError::Lateral { .. })) => {
+                Err(RunFault::Guard(refused @ GuardError::Lateral { .. })) => {
                     let Some(held) = self.indenter.target() else {
                         return Err(refused.into());
                     };
@@ -220,5 +220,5 @@ impl OffTarget {
 
 /// The transition table has no such transition.
 pub(super) fn internal(what: &str, state: State) -> Halt {
-    ControllerError::Internal(format!("{what}: not possible while {state:?}")).into()
+    RunFault::Internal(format!("{what}: not possible while {state:?}")).into()
 }

@@ -2,12 +2,12 @@
 
 use skinrig_device::DeviceError;
 use skinrig_model::pulse::LOOPBACK;
-use skinrig_model::{CameraId, HostDuration, PreflightCheck, Record};
+use skinrig_model::{CameraId, HostDuration, PreflightCheck, Record, RunFault};
 
 use super::Executor;
 use crate::camera_streams::Collect;
 use crate::checks::Preflight;
-use crate::error::{ControllerError, Halt};
+use crate::error::Halt;
 use crate::stream_probe::StreamProbe;
 
 /// How often to send the test mark before the line counts as broken: one damaged train must not cost a night.
@@ -58,7 +58,7 @@ impl Executor<'_> {
                 Ok(()) => return Ok(()),
                 Err(DeviceError::Pending { .. }) => self.tick(None)?,
                 Err(DeviceError::State { .. }) if self.now() < until => self.tick(Some(until))?,
-                Err(e) => return Err(ControllerError::from(e).into()),
+                Err(e) => return Err(RunFault::from(e).into()),
             }
         }
     }
@@ -98,6 +98,6 @@ impl Executor<'_> {
         if failed.is_empty() {
             return Ok(());
         }
-        Err(ControllerError::Preflight { failed }.into())
+        Err(RunFault::Preflight { failed }.into())
     }
 }

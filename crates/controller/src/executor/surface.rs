@@ -1,48 +1,50 @@
 //! The surface check: touches the protocol's points and compares the surface with the frame.
 
-use skinrig_model::{HostDuration, Point2, PreflightCheck, PressRole, Record, RepetitionId};
+use skinrig_model::{
+    Causes, HostDuration, NoCause, Point2, PreflightCheck, PressRole, Record, RepetitionId,
+    RunFault, SurfaceFault, SurfaceFinding, TouchFault,
+};
 use skinrig_protocol::SurfaceCheck;
 use skinrig_protocol::plan::Step;
 
 use super::Executor;
 use super::search::Probe;
-use crate::error::{ControllerError, Halt};
-use crate::press_fault::TouchFault;
-
-/// Next step if the surface is not where the frame puts it.
-const NEXT: &str = "check the mount and the skin, touch off again (`skinrig jog --rig FILE`: `touch`, `point NAME`), and enter \
-                    the points in the rig file";
+use crate::error::Halt;
 
 impl Executor<'_> {
-    /// Touches the surface at every point of the protocol's check, if it has one. The tip ends at clearance height.
-    pub(super) fn check_surface(&mut self, when: &str) -> Result<(), Halt> {
+    /// Touches the surface at every point of the protocol's check, if it has one: before the first press, or `after` a
+    /// repetition. The tip ends at clearance height.
+    pub(super) fn check_surface(&mut self, after: Option<RepetitionId>) -> Result<(), Halt> {
         let Some(check) = &self.plan.surface_check else {
             return Ok(());
         };
         let (mut rows, mut failed) = (Vec::new(), Vec::new());
-        let expected = format!("0 +- {} mm", check.tolerance_mm);
         for at in &check.points {
             let found = self.touch_point(check, *at)?;
             let sound = matches!(found, Ok(mm) if mm.abs() <= check.tolerance_mm);
-            let result = found.map_or_else(|why| why.to_string(), |mm| format!("{mm:.3} mm"));
-            let name = format!("surface at ({}, {}) mm, {when}", at.x_mm, at.y_mm);
-            if !sound {
-                failed.push(format!("{name}: expected {expected}, found {result}"));
-            }
+            let point = SurfaceFault {
+                at: *at,
+                after,
+                tolerance_mm: check.tolerance_mm,
+                found: found.map_or_else(SurfaceFinding::NotFound, SurfaceFinding::HeightMm),
+            };
             rows.push(PreflightCheck::new(
-                name,
-                expected.as_str(),
-                result,
+                point.check(),
+                point.expected(),
+                point.found.to_string(),
                 sound,
-                NEXT,
+                SurfaceFault::NEXT_STEP,
             ));
+            if !sound {
+                failed.push(point);
+            }
         }
         self.trackers.end_touch();
         self.journal.emit(Record::Preflight(rows))?;
-        if failed.is_empty() {
-            return Ok(());
+        match Causes::try_from(failed) {
+            Ok(failed) => Err(RunFault::Surface { failed }.into()),
+            Err(NoCause) => Ok(()),
         }
-        Err(ControllerError::Surface { failed, next: NEXT }.into())
     }
 
     /// After a repetition, if the protocol requires it: checks the surface, then returns to the previous location.
@@ -58,7 +60,7 @@ impl Executor<'_> {
         let Some(from) = self.indenter.position() else {
             return Ok(()); // the next poll of the robot reports the failure
         };
-        self.check_surface(&format!("after {repetition}"))?;
+        self.check_surface(Some(repetition))?;
         self.travel_above("return from the surface check", from.measured.plane())
     }
 

@@ -1,12 +1,14 @@
 //! Suspension: a run waits at clearance height during a disturbance, and continues automatically afterwards.
 
 use skinrig_device::DeviceError;
-use skinrig_model::{CameraId, HostTime, InterruptionKind, Record};
+use skinrig_model::{
+    CameraId, HostTime, InterruptionKind, InterruptionReason as Reason, Record, RunFault,
+};
 use skinrig_protocol::UnderWay;
 
 use super::Executor;
 use crate::camera_streams::Collect;
-use crate::error::{ControllerError, Halt};
+use crate::error::Halt;
 use crate::states::{Event, State};
 use crate::suspend::{SuspensionEnd, WindowMeasurements};
 
@@ -38,29 +40,30 @@ impl Executor<'_> {
         };
         self.suspender.evaluate(now, seconds, measured);
         if self.machine.state() == State::Running
-            && let Some(reason) = self.suspender.take_reason()
+            && let Some(suspension) = self.suspender.take_pending()
         {
             let (event, kind) = match self.suspender.press_under_way() {
                 UnderWay::Finish => (Event::Pause, InterruptionKind::Pause),
                 UnderWay::BreakOff => (Event::PauseNow, InterruptionKind::PauseNow),
             };
-            self.interrupt(event, kind, now, reason.clone())?;
-            self.suspender.hold(now, reason);
+            self.interrupt(event, kind, now, Reason::Suspended(suspension))?;
+            self.suspender.hold(now, suspension);
         }
         let may_continue = self.machine.state() != State::PausingNow;
         match self.suspender.end(now, may_continue) {
             None => Ok(()),
-            Some(SuspensionEnd::Calm(words)) => {
-                self.interrupt(Event::Resume, InterruptionKind::Resume, now, words)
+            Some(SuspensionEnd::Calm(suspension)) => {
+                let reason = Reason::Calm(suspension);
+                self.interrupt(Event::Resume, InterruptionKind::Resume, now, reason)
             }
-            Some(SuspensionEnd::TooLong { reason, limit }) => {
-                Err(ControllerError::Suspended { reason, limit }.into())
+            Some(SuspensionEnd::TooLong { suspension, limit }) => {
+                Err(RunFault::Suspended { suspension, limit }.into())
             }
         }
     }
 
     /// Reads the temperatures of the monitored cameras. No answer is a fault, as in any other call.
-    fn temperatures(&mut self, t: HostTime) -> Result<[Option<f64>; 2], ControllerError> {
+    fn temperatures(&mut self, t: HostTime) -> Result<[Option<f64>; 2], RunFault> {
         let mut found = [None; 2];
         for camera in CameraId::ALL {
             if !self.suspender.monitors_temperature(camera) {
@@ -83,7 +86,7 @@ impl Executor<'_> {
     }
 
     /// Free space at the session file in bytes, if monitored.
-    fn free_space(&mut self, t: HostTime) -> Result<Option<f64>, ControllerError> {
+    fn free_space(&mut self, t: HostTime) -> Result<Option<f64>, RunFault> {
         if !self.suspender.monitors_disk() {
             return Ok(None);
         }
@@ -101,7 +104,7 @@ impl Executor<'_> {
         event: Event,
         kind: InterruptionKind,
         t: HostTime,
-        reason: String,
+        reason: Reason,
     ) -> Result<(), Halt> {
         self.machine.fire(event);
         Ok(self

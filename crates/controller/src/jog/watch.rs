@@ -1,17 +1,16 @@
 //! Moves whose samples are all observed, not only their end.
 
 use skinrig_device::MotionLimits;
-use skinrig_model::{HostDuration, HostTime, Point3, PoseSample, Setting, Skin};
+use skinrig_model::{HostDuration, HostTime, Point3, PoseSample, RunFault, Setting, Skin};
 
 use super::Jog;
-use crate::error::ControllerError;
 
 impl Jog<'_> {
     /// Configures new limits of the robot, as [`start`](Self::start) did. The guard keeps its own.
     ///
     /// # Errors
     /// The error of the robot.
-    pub fn limit(&mut self, robot_limits: &MotionLimits) -> Result<Vec<Setting>, ControllerError> {
+    pub fn limit(&mut self, robot_limits: &MotionLimits) -> Result<Vec<Setting>, RunFault> {
         self.indenter.configure(robot_limits)
     }
 
@@ -20,11 +19,7 @@ impl Jog<'_> {
     ///
     /// # Errors
     /// As [`go`](Self::go).
-    pub fn send(
-        &mut self,
-        target: Point3<Skin>,
-        speed_mm_s: f64,
-    ) -> Result<HostTime, ControllerError> {
+    pub fn send(&mut self, target: Point3<Skin>, speed_mm_s: f64) -> Result<HostTime, RunFault> {
         let from = self.look()?;
         self.check_lift(from, target)?;
         self.command(target, speed_mm_s)
@@ -40,7 +35,7 @@ impl Jog<'_> {
         span: HostDuration,
         seen: &mut Vec<PoseSample>,
         mut enough: impl FnMut(&PoseSample) -> bool,
-    ) -> Result<(), ControllerError> {
+    ) -> Result<(), RunFault> {
         let until = self.clock.now() + span;
         while self.clock.now() < until {
             let looked = self.tick();
@@ -57,7 +52,7 @@ impl Jog<'_> {
     ///
     /// # Errors
     /// The error of the robot.
-    pub fn hold(&mut self) -> Result<HostTime, ControllerError> {
+    pub fn hold(&mut self) -> Result<HostTime, RunFault> {
         let t = self.clock.now();
         self.indenter.hold()?;
         Ok(t)
@@ -67,7 +62,7 @@ impl Jog<'_> {
     ///
     /// # Errors
     /// The error of the robot.
-    pub fn halt(&mut self) -> Result<HostTime, ControllerError> {
+    pub fn halt(&mut self) -> Result<HostTime, RunFault> {
         let t = self.clock.now();
         self.indenter.disarm()?;
         Ok(t)

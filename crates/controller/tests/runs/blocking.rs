@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, ThreadId};
 
-use skinrig_controller::{ControllerError, Run, RunReport};
+use skinrig_controller::{Run, RunFault, RunReport};
 use skinrig_device::detached::Calls;
 use skinrig_device::*;
 use skinrig_model::*;
@@ -335,9 +335,9 @@ fn run(site: Option<(Site, i64)>, detached: bool) -> RunResult {
     }
 }
 
-fn silent(error: &ControllerError) -> Option<DeviceRole> {
+fn silent(error: &RunFault) -> Option<DeviceRole> {
     match error {
-        ControllerError::Device(DeviceError::Silent { role, .. }) => Some(*role),
+        RunFault::Device(DeviceError::Silent { role, .. }) => Some(*role),
         _ => None,
     }
 }
@@ -358,7 +358,7 @@ fn a_blocked_call_does_not_delay_the_loop() {
             );
             match site {
                 _ if site.in_contact() => {
-                    let causes: Vec<_> = report.causes.iter().map(silent).collect();
+                    let causes: Vec<_> = report.end.faults().iter().map(silent).collect();
                     assert_eq!(causes, [Some(site.role())], "{case}: {report:?}");
                     assert!(report.retracted, "{case}: {report:?}");
                     // In the first press: detected after 2 s of a hold of 4 s, and off the skin at once.
@@ -368,7 +368,7 @@ fn a_blocked_call_does_not_delay_the_loop() {
                 }
                 // The robot was never powered.
                 Site::Configure | Site::Start => {
-                    let causes: Vec<_> = report.causes.iter().map(silent).collect();
+                    let causes: Vec<_> = report.end.faults().iter().map(silent).collect();
                     assert_eq!(causes, [Some(site.role())], "{case}: {report:?}");
                     assert!(!result.ever_armed, "{case}");
                 }

@@ -55,15 +55,13 @@ impl RunResult {
 
     pub(crate) fn invalid_reason(&self, n: usize) -> String {
         let outcome = self.outcomes()[n];
-        outcome
-            .verdict
-            .reason()
-            .unwrap_or("valid".into())
-            .into_owned()
+        let reason = outcome.verdict.reason();
+        reason.unwrap_or_else(|| "valid".to_owned())
     }
 
-    pub(crate) fn end_reason(&self) -> &str {
-        self.report.end.reason().unwrap_or("completed")
+    pub(crate) fn end_reason(&self) -> String {
+        let reason = self.report.end.reason();
+        reason.unwrap_or_else(|| "completed".to_owned())
     }
 
     /// Invariants of every run whose sink accepted all records.
@@ -73,7 +71,7 @@ impl RunResult {
         for press in 0..n {
             let ends = self.records.iter().filter(|r| match r {
                 Record::Outcome(o) => o.attempt.press.index() == press,
-                Record::Missed(a, reason) => a.press.index() == press && !reason.is_empty(),
+                Record::Missed(a, MissedReason::RunEnded(_)) => a.press.index() == press,
                 _ => false,
             });
             assert_eq!(ends.count(), 1, "{case}: press {press} ends once");

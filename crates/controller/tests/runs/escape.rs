@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseResult;
-use skinrig_controller::{ControllerError, ControllerSettings, GuardedIndenter};
+use skinrig_controller::{ControllerSettings, GuardedIndenter, RunFault};
 use skinrig_device::{
     Clock, DeviceError, Indenter, IndenterCapabilities, MotionLimits, RobotSample,
 };
@@ -378,7 +378,7 @@ fn step(
     }
     if was_armed && b.blind {
         prop_assert!(
-            matches!(answer, Err(ControllerError::Watchdog(_))),
+            matches!(answer, Err(RunFault::Watchdog(_))),
             "{:?}: {:?}",
             act,
             answer
@@ -392,7 +392,7 @@ fn step(
     }
     if was_armed && b.tripped && !before {
         prop_assert!(
-            matches!(answer, Err(ControllerError::Watchdog(_))),
+            matches!(answer, Err(RunFault::Watchdog(_))),
             "{:?}: {:?}",
             act,
             answer
@@ -407,7 +407,7 @@ fn step(
     }
     // The watchdog trips on more than the model covers (speed, depth): only the way up is open then, too.
     drop(b);
-    if matches!(answer, Err(ControllerError::Watchdog(_))) && was_armed {
+    if matches!(answer, Err(RunFault::Watchdog(_))) && was_armed {
         lock(model).tripped = true;
     }
     Ok(())

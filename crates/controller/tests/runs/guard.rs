@@ -1,9 +1,7 @@
 //! Arbitrary commands: no forbidden motion reaches the robot, and every allowed one does.
 
 use proptest::prelude::*;
-use skinrig_controller::{
-    ControllerError, ControllerSettings, GuardError, GuardedIndenter, WatchdogTrip,
-};
+use skinrig_controller::{ControllerSettings, GuardError, GuardedIndenter, RunFault, WatchdogTrip};
 use skinrig_model::{HostDuration, HostTime, Point2, Point3, SkinOutline};
 use skinrig_protocol::area::{Area, KeepOut, Surroundings};
 
@@ -145,7 +143,7 @@ proptest! {
                         // Only this is a fault here: too long between polls while the tip may have been low.
                         let is_late = matches!(
                             why,
-                            ControllerError::Watchdog(WatchdogTrip::Late { found, .. }) if found == gap
+                            RunFault::Watchdog(WatchdogTrip::Late { found, .. }) if found == gap
                         );
                         let limit = ControllerSettings::default().late_after;
                         prop_assert!(is_late && gap > limit && lowest_mm < 4.95, "{gap}: {why}");
@@ -175,7 +173,7 @@ fn rejections_state_the_limit() {
     let mut ask = |x, y, z, speed, ms: i64| {
         let answer = guard.command(Point3::new(x, y, z), speed, HostTime(ms * MS));
         match answer {
-            Err(ControllerError::Guard(e)) => e.to_string(),
+            Err(RunFault::Guard(e)) => e.to_string(),
             other => format!("{other:?}"),
         }
     };
@@ -229,10 +227,7 @@ fn many_small_lateral_steps_count_as_one_large_step() {
     for z in [-1.0, -0.97, -1.5] {
         let refused = go(0.08, z);
         assert!(
-            matches!(
-                &refused,
-                Err(ControllerError::Guard(GuardError::Lateral { .. }))
-            ),
+            matches!(&refused, Err(RunFault::Guard(GuardError::Lateral { .. }))),
             "{z}: {refused:?}"
         );
     }

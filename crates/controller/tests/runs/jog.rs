@@ -1,8 +1,6 @@
 //! Manual motion on the simulated rig: the floor of the frame, and the operator's halt.
 
-use skinrig_controller::{
-    ControlHandle, ControllerError, ControllerSettings, Floor, GuardError, Jog,
-};
+use skinrig_controller::{ControlHandle, ControllerSettings, Floor, GuardError, Jog, RunFault};
 use skinrig_device::MotionLimits;
 use skinrig_model::{HostDuration, Point3, SimLevel, Skin};
 use skinrig_protocol::TouchSearch;
@@ -55,7 +53,7 @@ fn jog(max_depth_mm: Option<f64>, control: &ControlHandle) -> Jog<'static> {
     }
 }
 
-fn down_to(jog: &mut Jog<'_>, z_mm: f64) -> Result<f64, ControllerError> {
+fn down_to(jog: &mut Jog<'_>, z_mm: f64) -> Result<f64, RunFault> {
     let here = jog.look()?.commanded;
     jog.go(here.plane().at_height(z_mm), 10.0, &NEVER_STOP)?;
     Ok(jog.look()?.measured.z_mm)
@@ -66,8 +64,7 @@ fn the_floor_limits_every_motion_unless_disabled() {
     let control = ControlHandle::new();
     let mut low = jog(Some(2.0), &control);
     assert!((down_to(&mut low, -16.9).unwrap() + 16.9).abs() < 0.1);
-    let is_floor =
-        |e: &ControllerError| matches!(e, ControllerError::Guard(GuardError::Floor { .. }));
+    let is_floor = |e: &RunFault| matches!(e, RunFault::Guard(GuardError::Floor { .. }));
     assert!(down_to(&mut low, -17.1).is_err_and(|e| is_floor(&e)));
     down_to(&mut low, -10.0).unwrap();
     let search = TouchSearch {
@@ -100,10 +97,7 @@ fn a_halt_leaves_the_tip_in_place() {
         control.halt();
         false
     };
-    assert_eq!(
-        moved.go(target, 1.0, &halting),
-        Err(ControllerError::Halted)
-    );
+    assert_eq!(moved.go(target, 1.0, &halting), Err(RunFault::Halted));
     let left = moved.finish().unwrap().unwrap();
     assert!((left.measured.z_mm + 12.0).abs() < 0.5, "{left:?}");
     assert!(moved.look().is_err() || moved.look().unwrap().measured.z_mm < -11.0);

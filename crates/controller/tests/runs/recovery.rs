@@ -1,8 +1,6 @@
 //! A robot that was braked in contact rises first, straight up and no deeper, whatever its pose.
 
-use skinrig_controller::{
-    ControllerError, ControllerSettings, WatchLimits, Watchdog, WatchdogTrip,
-};
+use skinrig_controller::{ControllerSettings, RunFault, WatchLimits, Watchdog, WatchdogTrip};
 use skinrig_model::{HostTime, Point3, PoseSample, RunEnd};
 use skinrig_protocol::plan::OnTrip;
 
@@ -36,7 +34,7 @@ fn a_braked_arm_in_contact_rises_before_anything_else() {
     for start in starts {
         for on_trip in [OnTrip::Retract, OnTrip::Brake] {
             let result = from(start, 0.03, on_trip);
-            let case = format!("{start:?} {on_trip:?}: {:?}", result.report.causes);
+            let case = format!("{start:?} {on_trip:?}: {:?}", result.report.end);
             assert_eq!(result.report.end, RunEnd::Completed, "{case}");
             let w = lock(&result.world);
             let at_edge = start[0] > 60.0 || start[0] < -40.0;
@@ -54,13 +52,11 @@ fn a_braked_arm_in_contact_rises_before_anything_else() {
 fn a_tip_that_sinks_below_its_start_trips() {
     for start_mm in [-3.04, -3.4] {
         let result = from([10.0, 2.0, start_mm], 0.08, OnTrip::Retract);
-        let depth = |e: &ControllerError| {
-            matches!(e, ControllerError::Watchdog(WatchdogTrip::Depth { .. }))
-        };
+        let depth = |e: &RunFault| matches!(e, RunFault::Watchdog(WatchdogTrip::Depth { .. }));
         assert!(
-            result.report.causes.iter().any(depth),
+            result.report.end.faults().iter().any(depth),
             "{:?}",
-            result.report.causes
+            result.report.end
         );
         assert!(result.report.retracted && result.report.disarmed);
     }

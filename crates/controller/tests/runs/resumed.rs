@@ -294,7 +294,7 @@ fn a_plan_other_than_the_remaining_one_is_rejected() {
     let refused = |rest: &Plan, histories: &[PressHistory], words: &str| {
         let result = resume(&plan, rest, histories, faults());
         match &result.report.end {
-            RunEnd::Faulted(reason) => assert!(reason.contains(words), "{reason}"),
+            RunEnd::Faulted(causes) => assert!(causes.to_string().contains(words), "{causes}"),
             other => panic!("expected a fault, found {other:?}"),
         }
         assert!(!lock(&result.world).ever_armed);

@@ -31,8 +31,9 @@ fn run(plan: &Plan, config: &SimConfig) -> RunResult {
 }
 
 impl RunResult {
-    fn end(&self) -> &str {
-        self.report.end.reason().unwrap_or("completed")
+    fn end(&self) -> String {
+        let reason = self.report.end.reason();
+        reason.unwrap_or_else(|| "completed".to_owned())
     }
 
     fn last_height_mm(&self) -> f64 {
@@ -50,7 +51,7 @@ impl RunResult {
         for press in 0..r.planned as u32 {
             let ends = self.records.iter().filter(|record| match record {
                 Record::Outcome(o) => o.attempt.press.index() == press,
-                Record::Missed(a, reason) => a.press.index() == press && !reason.is_empty(),
+                Record::Missed(a, MissedReason::RunEnded(_)) => a.press.index() == press,
                 _ => false,
             });
             assert_eq!(ends.count(), 1, "{case}: press {press} ends once");

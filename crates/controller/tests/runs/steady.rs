@@ -1,6 +1,6 @@
 //! Encoder noise: readings of a healthy robot reject no motion, and a robot off its position is identified as the fault.
 
-use skinrig_controller::{ControllerError, PressFault, Run, RunReport};
+use skinrig_controller::{PressFault, Run, RunFault, RunReport};
 use skinrig_model::*;
 use skinrig_protocol::plan::{Plan, Step};
 
@@ -10,7 +10,7 @@ use crate::mock::*;
 struct DiscardSink;
 
 impl skinrig_controller::RecordSink for DiscardSink {
-    fn accept(&mut self, _record: Record) -> Result<(), skinrig_controller::SinkFault> {
+    fn accept(&mut self, _record: Record) -> Result<(), SinkFault> {
         Ok(())
     }
 }
@@ -66,7 +66,7 @@ fn noisy_encoders_reject_no_motion() {
     for seed in 1..=20_u64 {
         let aside_mm = 0.01 * (seed % 3) as f64;
         let (report, violations) = run(&plan, (seed, 1, aside_mm));
-        assert_eq!(report.causes, Vec::new(), "seed {seed}");
+        assert_eq!(report.end.faults(), [], "seed {seed}");
         assert_eq!(
             (report.end, report.valid),
             (RunEnd::Completed, presses_each),
@@ -86,9 +86,9 @@ fn a_tip_that_rests_off_target_is_a_fault_of_the_robot() {
     for aside_mm in [0.06, 0.2] {
         let (report, _) = run(&plan, (7, 0, aside_mm));
         assert!(
-            matches!(report.causes.first(), Some(ControllerError::NotArrived(_))),
+            matches!(report.end.faults().first(), Some(RunFault::NotArrived(_))),
             "{:?}",
-            report.causes
+            report.end
         );
         assert!(report.retracted && report.disarmed);
     }
@@ -98,11 +98,11 @@ fn a_tip_that_rests_off_target_is_a_fault_of_the_robot() {
 #[test]
 fn noise_beyond_the_tolerance_is_a_fault_of_the_robot() {
     let (report, violations) = run(&presses(4), (3, 12, 0.0));
-    let refused = |e: &ControllerError| matches!(e, ControllerError::Guard(_));
+    let refused = |e: &RunFault| matches!(e, RunFault::Guard(_));
     assert!(
-        !report.causes.is_empty() && !report.causes.iter().any(refused),
+        !report.end.faults().is_empty() && !report.end.faults().iter().any(refused),
         "{:?}",
-        report.causes
+        report.end
     );
     assert_eq!(violations, Vec::<String>::new());
     assert!(

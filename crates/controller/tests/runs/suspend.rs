@@ -133,7 +133,7 @@ fn run(
     };
     let report = Run::new(&plan, header(&plan), rig(&world), &control, &mut disk).execute();
     let rows = disk.sink.records.into_iter().filter_map(|r| match r {
-        Record::Interruption { kind, t, reason } => Some((kind, t.0 / MS, reason)),
+        Record::Interruption { kind, t, reason } => Some((kind, t.0 / MS, reason.to_string())),
         _ => None,
     });
     (rows.collect(), report.end, report.valid)
@@ -167,9 +167,10 @@ fn a_full_disk_suspends_and_the_run_continues() {
 #[test]
 fn a_disk_that_stays_full_ends_the_run() {
     let (rows, end, valid) = run(500..i64::MAX, UnderWay::BreakOff, None);
-    let RunEnd::Faulted(reason) = end else {
+    let RunEnd::Faulted(causes) = end else {
         panic!("{end:?}");
     };
+    let reason = causes.to_string();
     assert!(reason.starts_with("suspended: free space"), "{reason}");
     assert!(reason.contains("20.000000 s"), "{reason}");
     assert_eq!(rows[0].0, InterruptionKind::PauseNow);
@@ -210,7 +211,9 @@ fn a_hot_camera_suspends_until_it_is_cool() {
     let mut notes = Vec::new();
     for record in &result.records {
         match record {
-            Record::Interruption { kind, t, reason } => rows.push((*kind, t.0 / MS, reason)),
+            Record::Interruption { kind, t, reason } => {
+                rows.push((*kind, t.0 / MS, reason.to_string()))
+            }
             Record::Note { text, .. } if text.contains("temperature") => notes.push(text),
             _ => {}
         }
@@ -219,7 +222,7 @@ fn a_hot_camera_suspends_until_it_is_cool() {
     let [
         (InterruptionKind::Pause, at, why),
         (InterruptionKind::Resume, then, because),
-    ] = rows[..]
+    ] = &rows[..]
     else {
         panic!("{rows:?}");
     };
@@ -229,7 +232,7 @@ fn a_hot_camera_suspends_until_it_is_cool() {
     );
     assert!(because.starts_with("no longer suspended: camera 1: temperature"));
     assert!(
-        (1_000..2_600).contains(&at) && (8_000..10_000).contains(&then),
+        (1_000..2_600).contains(at) && (8_000..10_000).contains(then),
         "{rows:?}"
     );
     assert_eq!(

@@ -177,9 +177,10 @@ fn a_surface_that_moved_ends_the_run_before_any_press() {
         (1.5, "immediately"),
     ] {
         let (end, records) = checked(off_mm, false);
-        let RunEnd::Faulted(reason) = &end else {
+        let RunEnd::Faulted(causes) = &end else {
             panic!("{off_mm}: {end:?}");
         };
+        let reason = causes.to_string();
         for words in [
             "surface check",
             "(9, 3) mm",
@@ -283,9 +284,10 @@ fn invalid_presses_in_a_row_end_the_run() {
     let mut plan = touching_plan();
     plan.max_consecutive_invalid = 2;
     let (end, outcomes, _) = run(1.5, &plan);
-    let RunEnd::Faulted(reason) = end else {
+    let RunEnd::Faulted(causes) = end else {
         panic!("{end:?}");
     };
+    let reason = causes.to_string();
     assert!(reason.contains("fewer than 2 in a row"), "{reason}");
     assert!(reason.contains("found contact immediately"), "{reason}");
     assert_eq!(outcomes.len(), 2);
@@ -307,8 +309,9 @@ fn a_robot_that_cannot_reach_the_deepest_touch_is_rejected() {
     };
     let mut sink = Sink::default();
     let report = Run::new(&plan, header, rig, &ControlHandle::new(), &mut sink).execute();
-    let RunEnd::Faulted(reason) = report.end else {
+    let RunEnd::Faulted(causes) = report.end else {
         panic!("{report:?}");
     };
+    let reason = causes.to_string();
     assert!(reason.contains("expected a target from"), "{reason}");
 }

@@ -2,7 +2,7 @@
 
 use crate::course::{START, faults};
 use crate::mock::*;
-use skinrig_controller::{ControllerError, RecordSink, Run, RunReport, SinkFault};
+use skinrig_controller::{RecordSink, Run, RunFault, RunReport, SinkFault};
 use skinrig_model::*;
 
 /// A sink whose records vanish at some time, which only `check` reports. ms of the rig's clock.
@@ -66,7 +66,7 @@ fn lost_records_are_detected_within_half_a_second() {
             let (sink, report) = run(gone_ms, operator);
             let case = format!("gone at {gone_ms} ms, {operator:?}");
             let fault = SinkFault::Rejected("the file is gone".into());
-            assert_eq!(report.causes, [ControllerError::Sink(fault)], "{case}");
+            assert_eq!(report.end.faults(), [RunFault::Sink(fault)], "{case}");
             assert!(report.retracted && report.disarmed, "{case}: {report:?}");
             // One failed check ends the run; its last records are still written.
             let noticed_ms = *sink.checked_ms.last().unwrap();

@@ -180,9 +180,10 @@ fn every_cause_ends_the_press_within_two_ticks() {
                 ..faults()
             };
             let result = run_plan(&plan, broken, START, Sink::default());
-            let RunEnd::Faulted(reason) = &result.report.end else {
+            let RunEnd::Faulted(causes) = &result.report.end else {
                 panic!("{case}: {:?}", result.report);
             };
+            let reason = causes.to_string();
             assert!(reason.starts_with(words), "{case}: {reason}");
             assert!(result.report.disarmed, "{case}");
             let verdicts = result.records.iter().filter_map(|r| match r {

@@ -179,7 +179,7 @@ impl<D: Send + 'static> Worker<D> {
                 Err(DeviceError::Silent {
                     role: self.role,
                     serial: self.identity.serial.clone(),
-                    doing: call.doing,
+                    doing: call.doing.into(),
                     within: call.within,
                 })
             }
@@ -210,7 +210,7 @@ impl<D: Send + 'static> Worker<D> {
         DeviceError::Pending {
             role: self.role,
             serial: self.identity.serial.clone(),
-            doing,
+            doing: doing.into(),
         }
     }
 }

@@ -1,7 +1,10 @@
 //! Properties of the remaining plan when some of its presses are done.
 
 use proptest::prelude::*;
-use skinrig_model::{HostDuration, PressHistory, PressId, PressRole, PressVerdict};
+use skinrig_model::{
+    CameraId, Causes, ExcludedReason, HostDuration, InvalidReason, MissedReason, PressFault,
+    PressHistory, PressId, PressRole, PressVerdict, RunEnd, StopReason, TimingFault,
+};
 use skinrig_protocol::{Plan, PressStep, Protocol, Retakes, Route, Step, check};
 
 use crate::common::{parse, shipped};
@@ -68,7 +71,7 @@ fn missing_presses_follow_the_sync_presses() {
     // A sync press alone does not restart the run.
     histories[0].verdict = None;
     assert_eq!(plan.wanted(&histories), none);
-    histories[sync].verdict = Some(PressVerdict::Invalid("cut off: no power".to_owned().into()));
+    histories[sync].verdict = Some(PressVerdict::cut_off(1));
     let mut expected = vec![false; plan.presses.len()];
     expected[..=sync].fill(true);
     assert_eq!(plan.wanted(&histories), expected);
@@ -88,15 +91,31 @@ fn a_press_is_final_if_valid_or_without_attempts_left() {
             ..PressHistory::default()
         })
     };
-    let invalid = |reason: &str| Some(PressVerdict::Invalid(reason.to_owned().into()));
+    let invalid = |fault| {
+        Some(PressVerdict::Invalid(InvalidReason::Faults(Causes::one(
+            fault,
+        ))))
+    };
+    let stopped = RunEnd::Stopped(StopReason::Stop);
+    let moved = || PressFault::Timing(TimingFault::NoHold);
     assert!(wants(0, None));
     assert!(wants(7, None));
-    assert!(wants(7, Some(PressVerdict::Missed("stop".into()))));
-    assert!(wants(7, invalid("cut off: the process was gone")));
-    assert!(wants(2, invalid("hold: expected within 0.05 mm")));
-    assert!(!wants(3, invalid("hold: expected within 0.05 mm")));
+    assert!(wants(
+        7,
+        Some(PressVerdict::Missed(MissedReason::RunEnded(
+            stopped.clone()
+        )))
+    ));
+    assert!(wants(7, invalid(PressFault::RunEnded(stopped))));
+    assert!(wants(2, invalid(moved())));
+    assert!(!wants(3, invalid(moved())));
     assert!(!wants(1, Some(PressVerdict::Valid)));
-    assert!(!wants(1, Some(PressVerdict::Excluded("rule".into()))));
+    assert!(!wants(
+        1,
+        Some(PressVerdict::Excluded(ExcludedReason::NotUsed {
+            presses_used: "[1]".to_owned()
+        }))
+    ));
 }
 
 /// After a completed plan only presses lost to the rig or the operator are open.
@@ -111,14 +130,19 @@ fn after_a_completed_plan_only_lost_presses_are_retaken() {
             plan_done: true,
         })
     };
-    let lost = || PressVerdict::Invalid("camera 1 lost 64 bytes".to_owned().into());
+    let invalid = |fault| PressVerdict::Invalid(InvalidReason::Faults(Causes::one(fault)));
+    let lost = || {
+        invalid(PressFault::NoData {
+            camera: CameraId::One,
+        })
+    };
     assert!(wants(true, 0, lost()));
     assert!(wants(true, 2, lost()));
     assert!(!wants(true, 3, lost()));
     assert!(!wants(
         false,
         1,
-        PressVerdict::Invalid("hold: expected".to_owned().into())
+        invalid(PressFault::Timing(TimingFault::NoHold))
     ));
     assert!(!wants(false, 0, PressVerdict::Valid));
 }

@@ -1,15 +1,16 @@
 //! Reading the journal: presses and attempts, commands, marks, notes and the end of the run.
 
 use skinrig_model::{
-    BoxReport, CheckKind, CheckVerdict, HostTime, InterruptionKind, Mark, MarkKind, MotionCommand,
-    PlannedPress, Point3, PreflightCheck, PressId, PressOutcome, RunEnd, SentMark,
+    BoxReport, CheckKind, CheckVerdict, HostTime, Mark, MarkKind, MotionCommand, PlannedPress,
+    Point3, PreflightCheck, PressId, PressOutcome, RunEnd, SentMark,
 };
 
 use super::SessionReader;
 use crate::box_row::report_from;
+use crate::cause::{EndColumns, end_from, interruption_from};
 use crate::error::RecorderError;
 use crate::from_row::{attempt_from, planned_from};
-use crate::query::{self, Fault, enum_value, has_table, int, num, opt_text, real, text};
+use crate::query::{self, enum_value, has_table, int, num, opt_text, real, text};
 use crate::rows::{AttemptRow, CommandRow, InterruptionRow, NoteRow};
 
 impl SessionReader {
@@ -137,10 +138,11 @@ impl SessionReader {
             "reading interruptions",
             "SELECT * FROM interruption ORDER BY id",
             |row| {
+                let (kind, reason) = interruption_from(row)?;
                 Ok(InterruptionRow {
                     t: HostTime(int(row, "t_ns")?),
-                    kind: enum_value(row, "kind", &InterruptionKind::ALL, InterruptionKind::name)?,
-                    reason: text(row, "reason")?,
+                    kind,
+                    reason,
                 })
             },
         )
@@ -165,20 +167,12 @@ impl SessionReader {
     /// If the file is damaged.
     pub fn end(&self) -> Result<Option<(HostTime, RunEnd)>, RecorderError> {
         let ends = self.query_all("reading its end", "SELECT * FROM run_end", |row| {
-            let reason = opt_text(row, "reason")?.unwrap_or_default();
-            let end = match text(row, "status")?.as_str() {
-                "completed" => RunEnd::Completed,
-                "stopped" => RunEnd::Stopped(reason.into()),
-                "faulted" => RunEnd::Faulted(reason),
-                other => {
-                    return Err(Fault::bad(
-                        "run_end",
-                        "completed, stopped or faulted",
-                        other,
-                    ));
-                }
+            let columns = EndColumns {
+                status: "status",
+                reason: "reason",
+                cause: "cause",
             };
-            Ok((HostTime(int(row, "t_ns")?), end))
+            Ok((HostTime(int(row, "t_ns")?), end_from(row, &columns)?))
         })?;
         Ok(ends.into_iter().next())
     }

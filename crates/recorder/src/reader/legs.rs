@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use skinrig_model::{CameraId, HostTime, PressHistory, PressVerdict, ResumeHeader, RunEnd};
 
 use super::SessionReader;
+use crate::cause::{EndColumns, end_from};
 use crate::error::RecorderError;
 use crate::query::{Fault, has_table, int, num, opt_int, opt_text, text};
 use crate::rows::LegRow;
@@ -61,8 +62,9 @@ impl SessionReader {
             // Without an outcome, the attempt was interrupted. Without fault kinds, it is of an older schema and its cause is unknown.
             let spends = |a: &&crate::rows::AttemptRow| match &a.outcome {
                 Some(o) if matches!(o.verdict, PressVerdict::Invalid(_)) => {
+                    let kinds = o.verdict.fault_kinds();
                     !o.verdict.is_cut_off()
-                        && (o.faults.is_empty() || o.faults.iter().any(|f| f.is_of_the_place()))
+                        && (kinds.is_empty() || kinds.iter().any(|k| k.is_of_the_place()))
                 }
                 _ => false,
             };
@@ -137,15 +139,13 @@ fn further_from(row: &sqlx::sqlite::SqliteRow) -> Result<(LegRow, PreviousLeg), 
         opt_text(row, "previous_status")?,
     ) {
         (None, None) => None,
-        (Some(t), Some(status)) => {
-            let reason = opt_text(row, "previous_reason")?.unwrap_or_default();
-            let end = match status.as_str() {
-                "completed" => RunEnd::Completed,
-                "stopped" => RunEnd::Stopped(reason.into()),
-                "faulted" => RunEnd::Faulted(reason),
-                other => return Err(Fault::bad("leg", "completed, stopped or faulted", other)),
+        (Some(t), Some(_)) => {
+            let columns = EndColumns {
+                status: "previous_status",
+                reason: "previous_reason",
+                cause: "previous_cause",
             };
-            Some((HostTime(t), end))
+            Some((HostTime(t), end_from(row, &columns)?))
         }
         _ => {
             return Err(Fault::bad(

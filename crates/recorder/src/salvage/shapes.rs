@@ -51,12 +51,12 @@ pub(super) const TABLES: [TableSpec; 21] = [
     table(
         "leg",
         17,
-        "INSERT INTO leg VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO leg VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     ),
     table(
         "attempt",
         17,
-        "INSERT INTO attempt VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO attempt VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     ),
     table(
         "command",
@@ -93,12 +93,12 @@ pub(super) const TABLES: [TableSpec; 21] = [
     ),
     TableSpec {
         words: Some((2, &["completed", "stopped", "faulted"])),
-        ..table("run_end", 4, "INSERT INTO run_end VALUES (?, ?, ?, ?)")
+        ..table("run_end", 4, "INSERT INTO run_end VALUES (?, ?, ?, ?, ?)")
     },
     table(
         "interruption",
         4,
-        "INSERT INTO interruption VALUES (?, ?, ?, ?)",
+        "INSERT INTO interruption VALUES (?, ?, ?, ?, ?)",
     ),
     table("note", 3, "INSERT INTO note VALUES (?, ?, ?)"),
     table("table_digest", 3, ""),

@@ -190,7 +190,7 @@ fn every_seal_of_many_legs_is_verified() {
             let resumed = further_leg(&known).remove(0);
             stopped.accept(resumed).unwrap();
             let t = skinrig_model::HostTime(5);
-            let end = skinrig_model::RunEnd::Stopped("operator".to_owned().into());
+            let end = crate::common::stopped();
             stopped
                 .accept(skinrig_model::Record::Ended { t, end })
                 .unwrap();

@@ -6,6 +6,7 @@ use sha2::{Digest, Sha256};
 use skinrig_model::press::PressRole;
 use skinrig_model::*;
 use skinrig_recorder::{ChunkScanner, Sealed, SessionWriter};
+use sqlx::{ConnectOptions, sqlite::SqliteConnectOptions};
 
 /// EVT2 without wraps: enough to recompute facts.
 #[derive(Default)]
@@ -137,10 +138,6 @@ pub(crate) fn outcome(attempt: AttemptId, t: i64, verdict: PressVerdict) -> Pres
     let at = |ms: i64| HostTime(t + ms * 1_000_000);
     PressOutcome {
         attempt,
-        faults: match verdict {
-            PressVerdict::Invalid(_) => vec![PressFaultKind::DataLost, PressFaultKind::Hold],
-            _ => Vec::new(),
-        },
         verdict,
         timing: Some(PressTiming {
             approach: at(1),
@@ -182,6 +179,23 @@ fn box_reports(mark: Mark, t: HostTime, k: u64) -> Vec<BoxReport> {
     ]
 }
 
+/// The end of [`records`].
+pub(crate) const fn stopped() -> RunEnd {
+    RunEnd::Stopped(StopReason::Stop)
+}
+
+/// A transient fault and one of the place.
+fn not_settled() -> InvalidReason {
+    let faults = vec![
+        PressFault::DataLost {
+            camera: CameraId::One,
+            bytes: 64,
+        },
+        PressFault::Timing(TimingFault::NoHold),
+    ];
+    InvalidReason::Faults(Causes::try_from(faults).unwrap())
+}
+
 /// All records of a run of `presses` presses of 20 ms each; the last but one needs two attempts, the last is missed.
 pub(crate) fn records(presses: u32) -> Vec<Record> {
     let mut out = vec![Record::Started(Box::new(header(presses)))];
@@ -199,7 +213,7 @@ pub(crate) fn records(presses: u32) -> Vec<Record> {
     out.push(Record::Interruption {
         kind: InterruptionKind::Stop,
         t,
-        reason: "operator".into(),
+        reason: InterruptionReason::End(stopped()),
     });
     out.push(Record::Note {
         t,
@@ -209,11 +223,8 @@ pub(crate) fn records(presses: u32) -> Vec<Record> {
         press: PressId::from_index(presses - 1),
         number: 1,
     };
-    out.push(Record::Missed(last, "stopped before it".into()));
-    out.push(Record::Ended {
-        t,
-        end: RunEnd::Stopped("operator".to_owned().into()),
-    });
+    out.push(Record::Missed(last, MissedReason::RunEnded(stopped())));
+    out.push(Record::Ended { t, end: stopped() });
     out
 }
 
@@ -322,9 +333,7 @@ fn attempts(ids: &[AttemptId], out: &mut Vec<Record>) -> HostTime {
                 .collect(),
         ));
         let verdict = match ids.get(k as usize + 1) {
-            Some(next) if next.press == id.press => {
-                PressVerdict::Invalid("not settled".to_owned().into())
-            }
+            Some(next) if next.press == id.press => PressVerdict::Invalid(not_settled()),
             _ => PressVerdict::Valid,
         };
         out.push(Record::Outcome(outcome(*id, t.0, verdict)));
@@ -339,4 +348,21 @@ pub(crate) fn sealed(path: &Path, presses: u32) -> Sealed {
         writer.accept(record).unwrap();
     }
     writer.finish().unwrap()
+}
+
+/// Executes statements on a session file.
+pub(crate) fn change(path: &Path, statements: &[&'static str]) {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .build()
+        .unwrap();
+    runtime.block_on(async {
+        let mut conn = SqliteConnectOptions::new()
+            .filename(path)
+            .connect()
+            .await
+            .unwrap();
+        for statement in statements {
+            sqlx::query(*statement).execute(&mut conn).await.unwrap();
+        }
+    });
 }

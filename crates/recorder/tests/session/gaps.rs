@@ -1,9 +1,8 @@
 //! Time lost with bytes: stored in its own row, and checked against the times around it.
 
-use crate::common::{Evt2, header};
+use crate::common::{Evt2, change, header};
 use skinrig_model::*;
 use skinrig_recorder::{ChunkScanner, SessionReader, SessionWriter, verify};
-use sqlx::{ConnectOptions, sqlite::SqliteConnectOptions};
 
 const CAMERA: CameraId = CameraId::Two;
 
@@ -57,22 +56,6 @@ fn time(from_us: u64, to_us: impl Into<Option<u64>>) -> LostTime {
         from_us: Some(from_us),
         to_us: to_us.into(),
     }
-}
-
-fn change(path: &std::path::Path, statements: &[&'static str]) {
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .build()
-        .unwrap();
-    runtime.block_on(async {
-        let mut conn = SqliteConnectOptions::new()
-            .filename(path)
-            .connect()
-            .await
-            .unwrap();
-        for statement in statements {
-            sqlx::query(*statement).execute(&mut conn).await.unwrap();
-        }
-    });
 }
 
 #[test]

@@ -7,7 +7,7 @@ use skinrig_recorder::{LegRow, RecorderError, SessionReader, SessionWriter, veri
 use sqlx::ConnectOptions;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 
-use crate::common::{Evt2, further_leg, header, records, sealed};
+use crate::common::{Evt2, further_leg, header, records, sealed, stopped};
 
 const PRESSES: u32 = 5;
 
@@ -121,7 +121,7 @@ fn a_stopped_and_sealed_session_is_resumed() {
         .iter()
         .map(|k| (k.attempts, k.verdict.clone()))
         .collect();
-    let missed = PressVerdict::Missed("stopped before it".into());
+    let missed = PressVerdict::Missed(MissedReason::RunEnded(stopped()));
     let valid = || Some(PressVerdict::Valid);
     assert_eq!(
         counted,
@@ -150,8 +150,7 @@ fn a_stopped_and_sealed_session_is_resumed() {
     assert_eq!(reader.header().unwrap(), header(PRESSES));
     let legs = reader.legs().unwrap();
     assert_eq!(legs.len(), 2);
-    let stopped = RunEnd::Stopped("operator".to_owned().into());
-    assert_eq!(legs[0].end.as_ref().map(|e| &e.1), Some(&stopped));
+    assert_eq!(legs[0].end.as_ref().map(|e| &e.1), Some(&stopped()));
     assert_eq!(legs[0].tree_sha256, Some(first.tree_sha256));
     assert_eq!(legs[1].began.operator, "another tester");
     assert_eq!((legs[1].devices_before, legs[1].preflight_before), (2, 3));
@@ -367,6 +366,9 @@ fn check_older_schema(was_sealed: bool) {
                 "ALTER TABLE attempt DROP COLUMN leg",
                 "ALTER TABLE attempt DROP COLUMN touched_mm",
                 "ALTER TABLE attempt DROP COLUMN faults",
+                "ALTER TABLE attempt DROP COLUMN cause",
+                "ALTER TABLE interruption DROP COLUMN cause",
+                "ALTER TABLE run_end DROP COLUMN cause",
                 "DELETE FROM _sqlx_migrations WHERE version > 20261121120000",
                 "PRAGMA user_version = 2",
             ],

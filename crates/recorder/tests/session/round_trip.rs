@@ -1,6 +1,6 @@
 //! Round trips of sealed, growing, interrupted and rejected sessions.
 
-use crate::common::{Evt2, header, records, sealed};
+use crate::common::{Evt2, header, records, sealed, stopped};
 use skinrig_model::*;
 use skinrig_recorder::{
     Codec, RecorderError, SessionReader, SessionState, SessionWriter, WriteFailure, list, verify,
@@ -119,7 +119,7 @@ fn all_records_round_trip() {
     assert_eq!(last[4].as_ref().unwrap().verdict, PressVerdict::Valid);
     assert_eq!(
         last[5].as_ref().unwrap().verdict,
-        PressVerdict::Missed("stopped before it".into())
+        PressVerdict::Missed(MissedReason::RunEnded(stopped()))
     );
     assert_eq!(reader.devices().unwrap().len(), 2);
     assert_eq!(reader.devices().unwrap()[1].settings[0].name, "bias_fo");
@@ -140,10 +140,7 @@ fn all_records_round_trip() {
         reader.interruptions().unwrap()[0].kind,
         InterruptionKind::Stop
     );
-    assert_eq!(
-        reader.end().unwrap().unwrap().1,
-        RunEnd::Stopped("operator".to_owned().into())
-    );
+    assert_eq!(reader.end().unwrap().unwrap().1, stopped());
     assert_eq!(reader.totals().unwrap(), seal.totals);
     let t = seal.totals;
     assert_eq!(
@@ -442,6 +439,9 @@ fn sessions_of_the_first_schema_are_read() {
             "DROP TABLE preflight",
             "ALTER TABLE attempt DROP COLUMN touched_mm",
             "ALTER TABLE attempt DROP COLUMN faults",
+            "ALTER TABLE attempt DROP COLUMN cause",
+            "ALTER TABLE interruption DROP COLUMN cause",
+            "ALTER TABLE run_end DROP COLUMN cause",
             "PRAGMA user_version = 1",
         ] {
             conn.execute(sql).await.unwrap();

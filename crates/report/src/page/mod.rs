@@ -105,7 +105,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         prototype => or_missing(&p.prototype),
         run_end => or_missing(&p.run_end),
         run_end_reason => p.run_end_reason.clone(),
-        run_end_s => p.interruptions.iter().find(|i| p.ended_by(i)).map(|i| number(Some(i.t_s), 1)),
+        run_end_s => p.interruptions.iter().find(|i| i.ended_run).map(|i| number(Some(i.t_s), 1)),
         metrics => metrics(input),
         rmse_all => context! {
             differs => usable && a.scored_without_exclusions != a.scored,
@@ -139,7 +139,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
             .collect::<Vec<_>>(),
         retaken => crate::course::retaken(p),
         retaken_for => crate::course::reasons(p),
-        interruptions => p.interruptions.iter().filter(|i| !p.ended_by(i))
+        interruptions => p.interruptions.iter().filter(|i| !i.ended_run)
             .map(|i| context! { t => number(Some(i.t_s), 1), kind => i.kind.clone(), reason => i.reason.clone() })
             .collect::<Vec<_>>(),
         notes => p.notes.iter()

@@ -6,6 +6,7 @@ mod table;
 mod traces;
 
 use serde_json::{Map, Value, json};
+use skinrig_analysis::exclusion::Exclusion;
 use skinrig_analysis::result::{Analysis, CalibrationResult, PressResult, PressView};
 use skinrig_model::PressId;
 use skinrig_settings::Settings;
@@ -97,8 +98,8 @@ fn presses(a: &Analysis) -> Value {
     }
     table
         .flag("counted", |p| derive::is_counted(p))
-        .any("rule", |p| p.rule.clone())
-        .any("reason", |p| p.reason.clone())
+        .any("rule", |p| p.cause.as_ref().map(Exclusion::label))
+        .any("reason", |p| p.reason())
         .finish()
 }
 

@@ -282,7 +282,7 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     for row in &p.interruptions {
         let mut text = format!("{} at {} s", row.kind, number(Some(row.t_s), 1));
         // The reason for the end of the run is shown above.
-        if !p.ended_by(row) {
+        if !row.ended_run {
             let _ = write!(text, ": {}", row.reason);
         }
         let text = plain(&text);

@@ -111,7 +111,7 @@ fn remarks(input: &ReportInput<'_>) -> Vec<String> {
     // A pause changes no answer, and the reason for the end of the run stands in the head.
     let pause = |row: &&InterruptionRow| matches!(row.kind.as_str(), "pause" | "resume");
     let faults = p.interruptions.iter().filter(|row| !pause(row));
-    for row in faults.filter(|row| !p.ended_by(row)) {
+    for row in faults.filter(|row| !row.ended_run) {
         let at = number(Some(row.t_s), 1);
         let text = format!("{} at {at} s: {}", row.kind, row.reason);
         all.push(("event     ", text));

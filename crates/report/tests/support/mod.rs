@@ -2,6 +2,7 @@
 
 pub(crate) mod studies;
 
+use skinrig_analysis::exclusion::Exclusion;
 use skinrig_analysis::result::*;
 use skinrig_model::*;
 use skinrig_report::{DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakeRow};
@@ -241,6 +242,11 @@ fn fit(method: ClockMethod, drift_ppm: f64) -> Option<ClockFit> {
     })
 }
 
+fn recorded(text: &str) -> Exclusion {
+    let text = text.to_owned();
+    Exclusion::Excluded(ExcludedReason::Recorded { text })
+}
+
 fn press(
     noise: &mut Noise,
     geometry: &StereoGeometry,
@@ -265,19 +271,32 @@ fn press(
         truth.y_mm + bias.1 + 0.7 * sigma * noise.normal(),
     );
     let inside = SkinOutline::PAPER.contains(estimate);
-    let (verdict, reason) = match id % 211 {
+    let (verdict, cause) = match id % 211 {
         13 => (
             Verdict::Invalid,
-            Some("settled 0.31 mm from the planned position, limit 0.10 mm"),
+            Some(Exclusion::Invalid(InvalidReason::Recorded {
+                text: "settled 0.31 mm from the planned position, limit 0.10 mm".to_owned(),
+                kinds: vec![PressFaultKind::Hold],
+                is_cut_off: false,
+            })),
         ),
-        47 => (Verdict::Missed, Some("the run stopped before it")),
+        47 => (
+            Verdict::Missed,
+            Some(Exclusion::Missed(MissedReason::Recorded {
+                text: "the run stopped before it".to_owned(),
+            })),
+        ),
         90 => (
             Verdict::Excluded,
-            Some("min_cluster_events: 12 clustered events in camera 1, at least 20 needed"),
+            Some(recorded(
+                "min_cluster_events: 12 clustered events in camera 1, at least 20 needed",
+            )),
         ),
         _ if !inside => (
             Verdict::Excluded,
-            Some("exclude_outside: the estimate lies outside the skin"),
+            Some(recorded(
+                "exclude_outside: the estimate lies outside the skin",
+            )),
         ),
         _ => (Verdict::Valid, None),
     };
@@ -316,8 +335,7 @@ fn press(
         depth_mm: 2.0,
         truth: (!missed).then_some(truth),
         verdict,
-        reason: reason.map(str::to_owned),
-        rule: reason.map(|r| r.split([':', ',']).next().unwrap_or(r).to_owned().into()),
+        cause,
         timing: (!missed).then(|| PressTiming {
             approach: t(0.8),
             contact: t(1.0),
@@ -504,6 +522,7 @@ pub(crate) fn provenance() -> Provenance {
         results_hash: "77e1".repeat(16),
         run_end: "completed".into(),
         run_end_reason: None,
+        run_end_cause: Some(RunEnd::Completed),
         legs: vec![
             LegRow {
                 number: 1,
@@ -529,12 +548,14 @@ pub(crate) fn provenance() -> Provenance {
             press,
             attempt: 1,
             reason: reason.into(),
+            cause: None,
         })
         .to_vec(),
         interruptions: vec![InterruptionRow {
             t_s: 1803.2,
             kind: "pause".into(),
             reason: "operator paused".into(),
+            ended_run: false,
         }],
         notes: vec![NoteRow {
             t_s: 2.0,

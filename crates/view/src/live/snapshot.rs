@@ -145,7 +145,7 @@ impl SessionSnapshot {
                 "tally": tally,
                 "notes": notes.map(|n| json!([n.t.as_secs_f64(), n.text])).collect::<Vec<_>>(),
                 "interruptions": self.interruptions.iter()
-                    .map(|i| json!([i.t.as_secs_f64(), i.kind.name(), i.reason])).collect::<Vec<_>>(),
+                    .map(|i| json!([i.t.as_secs_f64(), i.kind.name(), i.reason.to_string()])).collect::<Vec<_>>(),
                 "sealed": reader.seal()?.is_some(),
                 "end": reader.end()?.map(|(_, end)| end.name()),
             }),

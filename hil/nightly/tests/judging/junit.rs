@@ -134,6 +134,18 @@ fn document_is_well_formed_and_counts_add_up() {
         value(named("skipped")[0], "message"),
         "not &quot;here&quot; &amp; &lt;now&gt;"
     );
+    // Kinds for programs: the cause, the rule and the evidence of each check.
+    let kinds = |name: &str| {
+        let all = named("property").into_iter();
+        let named = all.filter(|a| value(a, "name") == name);
+        named.map(|a| value(a, "value")).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        kinds("cause"),
+        ["infrastructure", "software", "rig", "rig", "skin"]
+    );
+    assert_eq!(kinds("rule"), ["device-at-fault"]);
+    assert_eq!(kinds("evidence"), ["camera1: read back"; 7]);
     // JUnit readers require timestamps without a time zone.
     assert_eq!(
         value(named("testsuite")[0], "timestamp"),

@@ -5,6 +5,7 @@ use std::fs;
 use super::super::finding::Verdict;
 use super::super::survey::Library;
 use super::{Bench, CAMERA_1, CAMERA_2, ROBOT_NODE, lamp};
+use crate::devices::DeviceState;
 use crate::rig::inputs::UnusableInput;
 
 pub(super) type Fault = (
@@ -41,7 +42,7 @@ pub(super) const FAULTS: &[Fault] = &[
         |b| {
             b.mode("dev/bus/usb/002/003", 0o660);
             let line = b.line("camera1");
-            (line.state, line.role, line.serial) = ("not permitted", None, None);
+            (line.state, line.role, line.serial) = (DeviceState::NotPermitted, None, None);
         },
         ("permissions", "camera at bus 2 device 3", Verdict::Problem),
         "sudo usermod -aG bench ann",
@@ -51,7 +52,7 @@ pub(super) const FAULTS: &[Fault] = &[
         |b| {
             b.mode("dev/bus/usb/002/003", 0o600);
             let line = b.line("camera1");
-            (line.state, line.role, line.serial) = ("not permitted", None, None);
+            (line.state, line.role, line.serial) = (DeviceState::NotPermitted, None, None);
         },
         ("permissions", "camera at bus 2 device 3", Verdict::Problem),
         "70-skinrig.rules",
@@ -61,14 +62,14 @@ pub(super) const FAULTS: &[Fault] = &[
         |b| {
             b.mode(ROBOT_NODE, 0o664);
             let line = b.line("robot");
-            (line.state, line.role) = ("not permitted", None);
+            (line.state, line.role) = (DeviceState::NotPermitted, None);
         },
         ("permissions", "robot", Verdict::Problem),
         "sudo usermod -aG bench ann",
     ),
     (
         "the port is shut",
-        |b| b.line("trigger_box").state = "not permitted",
+        |b| b.line("trigger_box").state = DeviceState::NotPermitted,
         ("permissions", "trigger_box", Verdict::Problem),
         "70-skinrig.rules",
     ),
@@ -77,7 +78,7 @@ pub(super) const FAULTS: &[Fault] = &[
         |b| {
             fs::remove_dir_all(b.path(CAMERA_1)).unwrap();
             let line = b.line("camera1");
-            (line.state, line.usb, line.firmware) = ("absent", None, None);
+            (line.state, line.usb, line.firmware) = (DeviceState::Absent, None, None);
             line.next_step = Some("plug it in".to_owned());
         },
         ("cables", "camera1", Verdict::Problem),
@@ -87,7 +88,7 @@ pub(super) const FAULTS: &[Fault] = &[
         "a camera does not answer",
         |b| {
             let line = b.line("camera2");
-            (line.state, line.role, line.serial) = ("faulty", None, None);
+            (line.state, line.role, line.serial) = (DeviceState::Faulty, None, None);
             line.next_step = Some("wait 5 s".to_owned());
         },
         ("cables", "camera at bus 4 device 2", Verdict::Problem),
@@ -173,7 +174,7 @@ pub(super) const FAULTS: &[Fault] = &[
         "a box with another protocol",
         |b| {
             let line = b.line("trigger_box");
-            (line.state, line.firmware) = ("other firmware", None);
+            (line.state, line.firmware) = (DeviceState::OtherFirmware, None);
             line.detail = "firmware 1.0.0 with protocol 1".to_owned();
             line.next_step = Some("make -C hil/trigger_box flash PORT=/dev/ttyACM0".to_owned());
         },
@@ -293,7 +294,7 @@ pub(super) const FAULTS: &[Fault] = &[
         "another program has a camera",
         |b| {
             let line = b.line("camera2");
-            (line.state, line.role, line.serial) = ("busy", None, None);
+            (line.state, line.role, line.serial) = (DeviceState::Busy, None, None);
             b.write("proc/4711/cmdline", "skinrig\0run\0demo.yaml\0");
             b.link("proc/4711/fd/7", "/dev/bus/usb/004/002");
         },

@@ -15,7 +15,7 @@ use super::finding::Verdict;
 use super::machine::Machine;
 use super::survey::{Library, Survey};
 use super::*;
-use crate::devices::Line;
+use crate::devices::{DeviceState, Line};
 use crate::rig::inputs::{Input, UnusableInput};
 use faults::FAULTS;
 
@@ -117,7 +117,7 @@ fn ready(device: &'static str, role: &str, what: &str, firmware: &str) -> Line {
     Line {
         device,
         what: what.to_owned(),
-        state: "ready",
+        state: DeviceState::Ready,
         role: Some(role.to_owned()),
         detail: format!("firmware {firmware}"),
         firmware: Some(firmware.to_owned()),

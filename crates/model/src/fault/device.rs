@@ -1,11 +1,17 @@
 //! Errors of devices.
 
-use skinrig_model::{DeviceRole, HostDuration};
+use std::borrow::Cow;
+
+use serde::{Deserialize, Serialize};
+
+use crate::device_role::DeviceRole;
+use crate::time::HostDuration;
 
 /// A device failed or rejected a request.
 ///
 /// Messages state the device, and what was expected and found.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[serde(rename_all = "snake_case")]
 pub enum DeviceError {
     /// The device is disconnected or stopped responding.
     #[error("{role} {serial}: lost: {detail}")]
@@ -27,7 +33,7 @@ pub enum DeviceError {
         /// Its serial number.
         serial: String,
         /// The call.
-        doing: &'static str,
+        doing: Cow<'static, str>,
         /// Time limit.
         within: HostDuration,
     },
@@ -39,7 +45,7 @@ pub enum DeviceError {
         /// Its serial number.
         serial: String,
         /// The call.
-        doing: &'static str,
+        doing: Cow<'static, str>,
     },
     /// A setting read back with another value than was written.
     #[error("{role} {serial}: {name}: expected {expected} after writing, found {found}")]

@@ -2,17 +2,23 @@
 
 use std::fmt;
 
-use skinrig_model::{
-    CameraId, HostDuration, HostTime, InvalidReason, Point3, PressFaultKind, Skin,
-};
+use serde::{Deserialize, Serialize};
 
-use crate::not_arrived::{NotArrived, point};
+use super::motion::{NotArrived, point};
+use super::suspension::Suspension;
+use crate::frame::{Point3, Skin};
+use crate::id::CameraId;
+use crate::press_fault::PressFaultKind;
+use crate::reason::CUT_OFF;
+use crate::record::RunEnd;
+use crate::time::{HostDuration, HostTime};
 
 /// Message for a press that the operator's `pause_now` interrupted.
 const PAUSED: &str = "paused by the operator";
 
 /// Reason why an attempt at a press is invalid.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum PressFault {
     /// A camera lost bytes.
     DataLost {
@@ -44,6 +50,7 @@ pub enum PressFault {
         /// Event rate of the press, ev/s.
         level_ev_s: f64,
         /// Limit, ev/s.
+        #[serde(with = "crate::number")]
         found_ev_s: f64,
     },
     /// A motion of the press did not arrive in time.
@@ -66,10 +73,10 @@ pub enum PressFault {
     },
     /// The operator's `pause_now` interrupted the press.
     Paused,
-    /// A suspension interrupted the press; its reason, which starts with `suspended`.
-    Suspended(String),
-    /// The run ended during the press, for this reason.
-    RunEnded(String),
+    /// A suspension interrupted the press.
+    Suspended(Suspension),
+    /// The run ended during the press.
+    RunEnded(RunEnd),
     /// The surface search failed.
     Touch(TouchFault),
     /// A phase time or the hold is wrong.
@@ -77,13 +84,14 @@ pub enum PressFault {
 }
 
 /// Reason why a touch did not find the surface.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[serde(rename_all = "snake_case")]
 pub enum TouchFault {
     /// The robot did not report forces.
     #[error("{during}: expected forces, found none")]
     NoForce {
-        /// `tare` or `search`.
-        during: &'static str,
+        /// What needed them.
+        during: TouchPhase,
     },
     /// The tare received too few forces.
     #[error("tare: expected forces for {0}, found fewer")]
@@ -123,12 +131,63 @@ pub enum TouchFault {
     },
 }
 
+/// Phase of a touch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TouchPhase {
+    /// The mean force at clearance height.
+    Tare,
+    /// The slow motion down until contact.
+    Search,
+}
+
+impl fmt::Display for TouchPhase {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Tare => "tare",
+            Self::Search => "search",
+        })
+    }
+}
+
+/// Moment of a press that [`PressTiming`](crate::PressTiming) needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PressMoment {
+    /// The downward motion began.
+    Approach,
+    /// The tip reached the surface.
+    Contact,
+    /// The tip settled at its depth.
+    AtDepth,
+    /// The upward motion began.
+    Retract,
+    /// The tip left the surface.
+    Release,
+    /// The tip settled at clearance height.
+    Clear,
+}
+
+impl fmt::Display for PressMoment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Approach => "start of the approach",
+            Self::Contact => "contact",
+            Self::AtDepth => "settling at depth",
+            Self::Retract => "start of the retraction",
+            Self::Release => "release",
+            Self::Clear => "settling at clearance height",
+        })
+    }
+}
+
 /// Fault in the phase times of a press or in its hold.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[serde(rename_all = "snake_case")]
 pub enum TimingFault {
     /// A phase time was not measured.
     #[error("expected a measured {0}, found none")]
-    Missing(&'static str),
+    Missing(PressMoment),
     /// The phase times are not in order.
     #[error("expected phase times in order, found {0:?}")]
     OutOfOrder([HostTime; 6]),
@@ -170,6 +229,25 @@ impl PressFault {
         }
     }
 
+    /// Camera of the fault; `None` for a fault of the robot, the skin or the run.
+    #[must_use]
+    pub const fn camera(&self) -> Option<CameraId> {
+        match self {
+            Self::DataLost { camera, .. }
+            | Self::NoData { camera }
+            | Self::DataLate { camera, .. }
+            | Self::EventStorm { camera, .. } => Some(*camera),
+            Self::MotionLate(_)
+            | Self::ClearLate { .. }
+            | Self::PushedAside { .. }
+            | Self::Paused
+            | Self::Suspended(_)
+            | Self::RunEnded(_)
+            | Self::Touch(_)
+            | Self::Timing(_) => None,
+        }
+    }
+
     /// True if another attempt may succeed. Properties of the skin or the robot at this location persist, and a run that has
     /// ended makes no more attempts.
     #[must_use]
@@ -179,7 +257,7 @@ impl PressFault {
 
     /// True for a press that was interrupted on purpose: the rig is not at fault.
     #[must_use]
-    pub(crate) const fn is_pause(&self) -> bool {
+    pub const fn is_pause(&self) -> bool {
         matches!(self, Self::Paused | Self::Suspended(_))
     }
 }
@@ -228,8 +306,10 @@ impl fmt::Display for PressFault {
                 found.as_ref().map_or_else(|| "no pose".to_owned(), point)
             ),
             Self::Paused => f.write_str(PAUSED),
-            Self::Suspended(reason) => f.write_str(reason),
-            Self::RunEnded(reason) => write!(f, "{}{reason}", InvalidReason::CUT_OFF),
+            Self::Suspended(suspension) => suspension.fmt(f),
+            Self::RunEnded(end) => {
+                write!(f, "{CUT_OFF}{}", end.reason().unwrap_or_default())
+            }
             Self::Touch(touch) => touch.fmt(f),
             Self::Timing(moments) => moments.fmt(f),
         }

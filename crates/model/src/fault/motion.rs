@@ -1,9 +1,13 @@
 //! The error of a motion that did not reach its target.
 
-use skinrig_model::{HostDuration, Point3, PoseSample, Skin};
+use serde::{Deserialize, Serialize};
+
+use crate::frame::{Point3, Skin};
+use crate::pose::PoseSample;
+use crate::time::HostDuration;
 
 /// The tip did not settle at its target in time.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[error("{what}: expected to settle within {tolerance_mm} mm of {} in {allowed}, found {}", point(.target), self.found())]
 pub struct NotArrived {
     /// Name of the motion.
@@ -38,6 +42,7 @@ impl NotArrived {
 }
 
 /// `(x, y, z) mm` to the micrometre.
-pub(crate) fn point(p: &Point3<Skin>) -> String {
+#[must_use]
+pub fn point(p: &Point3<Skin>) -> String {
     format!("({:.3}, {:.3}, {:.3}) mm", p.x_mm, p.y_mm, p.z_mm)
 }
