@@ -141,7 +141,7 @@ fn a_trade_of_other_settings_leaves_that_of_the_session_alone() {
     );
     let said = std::fs::read_to_string(other["files"]["page"].as_str().unwrap()).unwrap();
     assert!(
-        said.contains("Not the session&#x27;s own settings: analysis.estimator=column_median"),
+        said.contains("Not the session&#39;s own settings: analysis.estimator=column_median"),
         "{said}"
     );
     trade(&[&set[..], &["--out", &page]].concat())
