@@ -256,6 +256,8 @@ pub(crate) struct Note {
     label: String,
     text: Text,
     test_id: &'static str,
+    /// Lines in a terminal; a longer note is cut.
+    most_lines: Option<usize>,
 }
 
 impl Note {
@@ -290,6 +292,13 @@ impl Note {
 
     pub(crate) fn test_id(self, test_id: &'static str) -> Self {
         Self { test_id, ..self }
+    }
+
+    pub(crate) fn at_most(self, lines: usize) -> Self {
+        Self {
+            most_lines: Some(lines),
+            ..self
+        }
     }
 }
 

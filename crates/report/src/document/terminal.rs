@@ -1,6 +1,6 @@
 //! Renders sections for a terminal: lines of 80 columns, labels on the left, an empty line between sections.
 
-use skinrig_text::{LongWords, Paint, hang};
+use skinrig_text::{LongWords, Paint, WIDTH, elide, hang};
 
 use super::{Block, Note, Section, Table, Tone};
 use crate::terminal::plain;
@@ -47,12 +47,28 @@ impl Note {
     pub(crate) fn lines(&self, paint: Paint) -> String {
         let label = format!("{:<LABEL$}", self.label);
         let text = hang(&label, &plain(&self.text.words()), LongWords::Cut);
+        let text = match self.most_lines {
+            Some(most) => cut(text, most),
+            None => text,
+        };
         match self.tone {
             Tone::Plain | Tone::Good => text,
             Tone::Warning | Tone::Bad => paint.warn(&text),
             Tone::Answer => paint.bold(&text),
         }
     }
+}
+
+/// The first lines of a wrapped text; `…` ends a cut one.
+fn cut(text: String, most_lines: usize) -> String {
+    let mut lines: Vec<&str> = text.lines().collect();
+    if lines.len() <= most_lines {
+        return text;
+    }
+    lines.truncate(most_lines);
+    let last = elide(lines.pop().unwrap_or_default(), WIDTH);
+    lines.push(&last);
+    lines.join("\n") + "\n"
 }
 
 impl Table {

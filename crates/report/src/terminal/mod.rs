@@ -2,20 +2,25 @@
 
 mod studies;
 mod summary;
-mod text;
 
 use skinrig_analysis::result::{
     Alignment, AlignmentStatus, Analysis, ClockFit, ClockMethod, Estimate, MapName, Metrics,
+    PressCounts,
 };
+use skinrig_model::text::visible;
 use skinrig_text::{Column as Cells, Paint, Style, WIDTH, clip};
 
 pub(crate) use self::summary::summary;
-pub(crate) use self::text::plain;
 use crate::document::{Column, Note, Row, Section, Table, terminal};
 use crate::format::{digits_of_error, grouped, interval, number, or_missing};
 use crate::input::ReportInput;
 use crate::page::findings::{fault, law};
 use crate::{course, derive};
+
+/// User text on one line, with control characters spelled out.
+pub(crate) fn plain(text: &str) -> String {
+    visible(&text.replace(['\n', '\t'], " ")).into_owned()
+}
 
 /// A formatted metric.
 pub(crate) struct MetricRow {
@@ -230,13 +235,17 @@ fn scored(a: &Analysis) -> Section {
     Section::plain().with(table).with_all(geometry)
 }
 
+/// The outcomes as a sum.
+fn sum(c: &PressCounts) -> String {
+    format!(
+        "{} planned = {} valid + {} missed + {} invalid + {} excluded",
+        c.planned, c.valid, c.missed, c.invalid, c.excluded
+    )
+}
+
 /// Outcomes of the presses, and why some do not count.
 fn presses(a: &Analysis) -> Section {
     let c = &a.counts;
-    let sum = format!(
-        "{} planned = {} valid + {} missed + {} invalid + {} excluded",
-        c.planned, c.valid, c.missed, c.invalid, c.excluded
-    );
     let wrong = "these counts do not add up: do not trust this result";
     let wrong = (!c.add_up()).then(|| Note::of(wrong).warning());
     let plural = if c.sync == 1 { "" } else { "es" };
@@ -255,7 +264,7 @@ fn presses(a: &Analysis) -> Section {
         Note::new("penalty", text)
     });
     Section::plain()
-        .with(Note::new("presses", sum))
+        .with(Note::new("presses", sum(c)))
         .with_all(wrong)
         .with_all((c.sync > 0).then(|| Note::of(sync)))
         .with_all(penalty)
