@@ -163,8 +163,7 @@ pub(crate) fn documents(results: &Results) -> Result<(String, String), Failure> 
     let input = results.report_input();
     let json =
         serde_json::to_string_pretty(&skinrig_report::json(&input)).map_err(Failure::internal)?;
-    let html = skinrig_report::html(&input).map_err(Failure::internal)?;
-    Ok((json, html))
+    Ok((json, skinrig_report::html(&input)))
 }
 
 /// Writes a whole file or none: a full disk leaves no partial file.

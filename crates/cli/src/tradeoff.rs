@@ -158,7 +158,7 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
         .file_name()
         .map(|n| n.to_string_lossy().into_owned());
     let text = serde_json::to_string_pretty(&document).map_err(Failure::internal)?;
-    let html = page(&result, &name.unwrap_or_default(), &rig).map_err(Failure::internal)?;
+    let html = page(&result, &name.unwrap_or_default(), &rig);
     write(&html_path, html.as_bytes())?;
     write(&json_path, text.as_bytes())?;
     if output.json {

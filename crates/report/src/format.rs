@@ -92,12 +92,16 @@ pub(crate) fn words<T: serde::Serialize>(variant: &T) -> String {
     }
 }
 
+/// `text` with a capital first letter.
+pub(crate) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(char::to_uppercase);
+    first.into_iter().flatten().chain(letters).collect()
+}
+
 /// Turns a remark into a sentence: capital first letter, full stop.
 pub(crate) fn sentence(remark: &str) -> String {
-    let mut letters = remark.chars();
-    let first = letters.next().map(char::to_uppercase);
-    let first = first.into_iter().flatten();
-    first.chain(letters).chain(['.']).collect()
+    capital(remark) + "."
 }
 
 /// Certainty of an alignment by event rates, as a clause.

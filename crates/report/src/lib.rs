@@ -3,8 +3,8 @@
 //! The report computes nothing beyond layout. Every number comes from [`skinrig_analysis::result::Analysis`]; the few
 //! summaries needed only for drawing (histogram bars, means per location) are in [`mod@derive`], with their formulas.
 //!
-//! User strings (prototype, operator, notes, file names) are escaped everywhere: by minijinja's auto-escape in HTML, by the
-//! [`svg`] builder in figures, and by `page::script_json` in script data.
+//! Pages and terminal texts are built as documents (`document`). User strings (prototype, operator, notes, file names) are
+//! escaped everywhere: by `markup` in HTML and figures, and by `document::html` in script data.
 //!
 //! Hooks for browser tests: every section, figure, button and the press table carries a `data-testid`.
 
@@ -26,27 +26,23 @@ pub mod trend;
 
 mod detector;
 mod document;
-mod error;
 mod format;
-mod frame;
-mod grid;
 mod input;
+mod json;
+mod markup;
 mod plot;
 mod tables;
 mod terminal;
 
-pub use document::{JSON_VERSION, Summary};
-pub use error::ReportError;
 pub use input::ReportInput;
+pub use json::{JSON_VERSION, Summary};
 pub use provenance::{
     DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakeRow, Variant,
 };
 
 /// The whole report as a self-contained HTML page.
-///
-/// # Errors
-/// [`ReportError`] when rendering fails; no known input causes this.
-pub fn html(input: &ReportInput<'_>) -> Result<String, ReportError> {
+#[must_use]
+pub fn html(input: &ReportInput<'_>) -> String {
     page::render(input)
 }
 
@@ -58,7 +54,7 @@ pub fn html(input: &ReportInput<'_>) -> Result<String, ReportError> {
 /// Absent values are `null`. New fields do not change the version; a field that changes its meaning or disappears does.
 #[must_use]
 pub fn json(input: &ReportInput<'_>) -> serde_json::Value {
-    document::json(input)
+    json::json(input)
 }
 
 /// The results as a terminal table: at most 80 columns, ends with a newline.

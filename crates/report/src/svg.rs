@@ -1,13 +1,13 @@
-//! Writes SVG: elements with escaped attributes and text.
+//! Draws SVG: shapes, texts, paths, and the style of figures.
 //!
 //! Why not a plotting crate: figures must follow the page's light and dark theme, so every colour that means "ink", "grid"
 //! or "camera 1" is a CSS class (`assets/frame/figure.css`) instead of a fixed value; each figure needs a title, a
 //! description and one element per press for scripts; and a page of 2,500 presses must stay small. Plotting crates provide
-//! none of this. The remaining work is small: elements here, axes and plots in `plot`.
+//! none of this. The remaining work is small: shapes here, axes and plots in `plot`.
 
 use std::fmt::{self, Display, Write};
 
-use skinrig_model::text::visible;
+use crate::markup::Markup;
 
 /// Style of the figures: classes and theme variables, light by default.
 pub(crate) const FIGURE_CSS: &str = include_str!("../assets/frame/figure.css");
@@ -25,29 +25,6 @@ pub(crate) fn plain_css() -> String {
     css
 }
 
-/// Writes text with the five XML specials escaped, control characters spelled out, and non-characters replaced.
-struct Escaping<'a>(&'a mut String);
-
-impl Write for Escaping<'_> {
-    fn write_str(&mut self, s: &str) -> fmt::Result {
-        for c in visible(s).chars() {
-            match c {
-                '&' => self.0.push_str("&amp;"),
-                '<' => self.0.push_str("&lt;"),
-                '>' => self.0.push_str("&gt;"),
-                '"' => self.0.push_str("&quot;"),
-                '\'' => self.0.push_str("&#39;"),
-                '\n' | '\t' => self.0.push(c),
-                '\u{fffe}' | '\u{ffff}' => {
-                    self.0.push(char::REPLACEMENT_CHARACTER);
-                }
-                c => self.0.push(c),
-            }
-        }
-        Ok(())
-    }
-}
-
 /// Coordinate with two decimals and no trailing zeros; non-finite values become 0 so that the file stays valid.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Px(pub f64);
@@ -62,70 +39,15 @@ impl Display for Px {
     }
 }
 
-/// Attributes: name and value. Values are escaped.
-pub(crate) type Attributes<'a> = &'a [(&'a str, &'a dyn Display)];
-
-/// An SVG document or fragment under construction.
-#[derive(Debug, Default)]
-pub struct Svg {
-    out: String,
-    open: Vec<&'static str>,
-}
-
-impl Svg {
-    /// An empty document.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    fn start(&mut self, tag: &str, attributes: Attributes<'_>) {
-        self.out.push('<');
-        self.out.push_str(tag);
-        for (name, value) in attributes {
-            self.out.push(' ');
-            self.out.push_str(name);
-            self.out.push_str("=\"");
-            // Writing to a String cannot fail.
-            let _ = write!(Escaping(&mut self.out), "{value}");
-            self.out.push('"');
-        }
-    }
-
-    /// Opens an element.
-    pub fn open(&mut self, tag: &'static str, attributes: Attributes<'_>) -> &mut Self {
-        self.start(tag, attributes);
-        self.out.push('>');
-        self.open.push(tag);
-        self
-    }
-
-    /// Closes the innermost open element, if any.
-    pub fn close(&mut self) -> &mut Self {
-        if let Some(tag) = self.open.pop() {
-            let _ = write!(self.out, "</{tag}>");
-        }
-        self
-    }
-
-    /// An element without content.
-    pub fn leaf(&mut self, tag: &str, attributes: Attributes<'_>) -> &mut Self {
-        self.start(tag, attributes);
-        self.out.push_str("/>");
-        self
-    }
-
-    /// An element that contains only text.
-    pub fn holding(&mut self, tag: &str, attributes: Attributes<'_>, text: &str) -> &mut Self {
-        self.start(tag, attributes);
-        self.out.push('>');
-        let _ = Escaping(&mut self.out).write_str(text);
-        let _ = write!(self.out, "</{tag}>");
-        self
-    }
-
+impl Markup {
     /// Text at (x, y), anchored `start`, `middle` or `end`.
-    pub fn text(&mut self, at: (f64, f64), class: &str, anchor: &str, text: &str) -> &mut Self {
+    pub(crate) fn text(
+        &mut self,
+        at: (f64, f64),
+        class: &str,
+        anchor: &str,
+        text: &str,
+    ) -> &mut Self {
         self.holding(
             "text",
             &[
@@ -139,7 +61,7 @@ impl Svg {
     }
 
     /// Text at (x, y), turned by `degrees`.
-    pub fn turned(
+    pub(crate) fn turned(
         &mut self,
         at: (f64, f64),
         class: &str,
@@ -160,7 +82,7 @@ impl Svg {
     }
 
     /// A straight line.
-    pub fn line(&mut self, class: &str, from: (f64, f64), to: (f64, f64)) -> &mut Self {
+    pub(crate) fn line(&mut self, class: &str, from: (f64, f64), to: (f64, f64)) -> &mut Self {
         self.leaf(
             "line",
             &[
@@ -174,20 +96,11 @@ impl Svg {
     }
 
     /// A path with the given data.
-    pub fn path(&mut self, class: &str, data: &str) -> &mut Self {
+    pub(crate) fn path(&mut self, class: &str, data: &str) -> &mut Self {
         if data.is_empty() {
             return self;
         }
         self.leaf("path", &[("class", &class), ("d", &data)])
-    }
-
-    /// Closes all open elements and returns the text.
-    #[must_use]
-    pub fn finish(mut self) -> String {
-        while !self.open.is_empty() {
-            self.close();
-        }
-        self.out
     }
 }
 
@@ -237,18 +150,6 @@ pub fn dots(points: impl IntoIterator<Item = (f64, f64)>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn specials_are_escaped_in_attributes_and_text() {
-        let mut svg = Svg::new();
-        svg.open("g", &[("data-x", &"\"><script>&'")]);
-        svg.text((1.0, f64::NAN), "a", "start", "</text><img onerror=x>\u{0}");
-        assert_eq!(
-            svg.finish(),
-            "<g data-x=\"&quot;&gt;&lt;script&gt;&amp;&#39;\"><text x=\"1\" y=\"0\" class=\"a\" \
-             text-anchor=\"start\">&lt;/text&gt;&lt;img onerror=x&gt;\\u{0}</text></g>"
-        );
-    }
 
     #[test]
     fn lines_are_short_and_break_where_a_value_is_missing() {

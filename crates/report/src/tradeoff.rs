@@ -2,22 +2,16 @@
 
 use std::fmt::Write as _;
 
-use minijinja::value::Serde;
-use minijinja::{Value, context};
 use skinrig_analysis::result::Estimate;
 use skinrig_analysis::tradeoff::{Cost, Row, Tradeoff};
-use skinrig_text::{Column, Paint, Table};
+use skinrig_text::{Column as Cells, Paint, Style};
 
 pub use crate::choices::label;
 use crate::choices::short;
-use crate::error::ReportError;
+use crate::document::{self, Block, Column, Document, Group, Section, Table, Text, lines};
 use crate::figures::tradeoff as figure;
 use crate::format::{interval, number};
-use crate::frame::Frame;
-use crate::grid::Grid;
-use crate::svg::FIGURE_CSS;
 
-const TEMPLATE: &str = include_str!("../assets/tradeoff/page.html");
 const CSS: &str = include_str!("../assets/tradeoff/page.css");
 
 /// Rows of a table.
@@ -67,6 +61,66 @@ fn ordered(result: &Tradeoff, rows: Rows) -> Vec<&Row> {
     first.into_iter().chain(on).chain(others).collect()
 }
 
+/// The chosen rows, for a page (units in one line) and a terminal of 100 columns.
+fn table(result: &Tradeoff, rows: Rows) -> Table {
+    let number_of = |name: &str, head: &str, width| {
+        Column::new(format!("#{name}")).terminal(head, Cells::right(width))
+    };
+    let mut table = Table::of(
+        "choices",
+        "All choices",
+        [
+            Column::of_terminals("", Cells::left(3)),
+            Column::new("Choice").terminal("", Cells::left(31).clipped()),
+            Column::new("#Front"),
+            number_of("RMSE (mm)", "RMSE\nmm", 6),
+            number_of("95 % interval", "95 % interval\nmm", 14),
+            number_of("n", "n\n", 4),
+            Column::new("#Penalised (mm)"),
+            number_of("Located (%)", "located\n%", 7),
+            number_of("Within (%)", "within\n%", 6),
+            number_of("CPU (µs)", "CPU\nµs", 7),
+            Column::new("#CPU range"),
+            number_of("Sent (kB/s)", "sent\nkB/s", 7),
+            number_of("Delay (ms)", "delay\nms", 6),
+        ],
+    )
+    .class("trade");
+    for (i, row) in ordered(result, rows).into_iter().enumerate() {
+        let name = label(&row.choice);
+        let (class, style) = match (row.competes, row.fronts.is_empty()) {
+            (_, false) => ("front", Some(Style::Bold)),
+            (false, true) => ("out", None),
+            (true, true) => ("", None),
+        };
+        let names = row.fronts.iter().map(|c| figure::name(*c));
+        let (low, high) = row.cpu_range_us;
+        let cells = [
+            fronts(row),
+            if row.competes {
+                name
+            } else {
+                format!("({name})")
+            },
+            names.collect::<Vec<_>>().join(", "),
+            number(row.rmse_mm.value, 2),
+            interval(&row.rmse_mm, 1.0, 2),
+            row.rmse_mm.n.to_string(),
+            number(row.penalised_rmse_mm.value, 2),
+            percent(&row.located_rate),
+            percent(&row.within_rate),
+            short(row.cpu_us),
+            format!("{} to {}", short(low), short(high)),
+            short(row.bytes_per_s / 1e3),
+            short(row.delay_ms),
+        ];
+        let own = (i == 0).then_some("the session's settings; all others change them");
+        let row = document::Row::new(cells).class(class).style(style);
+        table.add(row.remark(own));
+    }
+    table
+}
+
 /// The chosen rows. At most 100 columns, ends with a newline. `rig` describes the origin of the session.
 #[must_use]
 pub fn terminal_table(result: &Tradeoff, rows: Rows, rig: &str, color: bool) -> String {
@@ -85,55 +139,7 @@ pub fn terminal_table(result: &Tradeoff, rows: Rows, rig: &str, color: bool) -> 
         result.repeats,
         result.timed_presses,
     );
-    let paint = Paint::new(color);
-    let numbers = [6, 14, 4, 7, 6, 7, 7, 6].map(Column::right);
-    let mut columns = vec![Column::left(3), Column::left(31).clipped()];
-    columns.extend(numbers);
-    let table = Table::new(columns).gap(1);
-    for head in [
-        [
-            "",
-            "",
-            "RMSE",
-            "95 % interval",
-            "n",
-            "located",
-            "within",
-            "CPU",
-            "sent",
-            "delay",
-        ],
-        ["", "", "mm", "mm", "", "%", "%", "µs", "kB/s", "ms"],
-    ] {
-        let _ = writeln!(out, "{}", table.row(head));
-    }
-    for (i, row) in ordered(result, rows).into_iter().enumerate() {
-        let mut name = label(&row.choice);
-        if !row.competes {
-            name = format!("({name})");
-        }
-        let line = table.row([
-            fronts(row),
-            name,
-            number(row.rmse_mm.value, 2),
-            interval(&row.rmse_mm, 1.0, 2),
-            row.rmse_mm.n.to_string(),
-            percent(&row.located_rate),
-            percent(&row.within_rate),
-            short(row.cpu_us),
-            short(row.bytes_per_s / 1e3),
-            short(row.delay_ms),
-        ]);
-        let line = if row.fronts.is_empty() {
-            line
-        } else {
-            paint.bold(&line)
-        };
-        let _ = writeln!(out, "{line}");
-        if i == 0 {
-            out += "    ^ the session's settings; all others change them\n";
-        }
-    }
+    out += &lines(&[Block::from(table(result, rows))], Paint::new(color));
     if rows == Rows::Front {
         out += "\nShown: the session's own settings and the fronts. The page and -v have every choice.\n";
     }
@@ -170,70 +176,31 @@ pub fn protocol_lines(row: &Row) -> String {
     out
 }
 
-/// Columns of the page's table, with units.
-const COLUMNS: [&str; 12] = [
-    "Choice",
-    "#Front",
-    "#RMSE (mm)",
-    "#95 % interval",
-    "#n",
-    "#Penalised (mm)",
-    "#Located (%)",
-    "#Within (%)",
-    "#CPU (µs)",
-    "#CPU range",
-    "#Sent (kB/s)",
-    "#Delay (ms)",
-];
-
 /// A self-contained page with the figure and a table of all rows. `rig` describes the origin of the session.
-///
-/// # Errors
-/// [`ReportError`] when rendering fails; no known input causes this.
-pub fn page(result: &Tradeoff, session: &str, rig: &str) -> Result<String, ReportError> {
-    let frame = Frame {
-        templates: &[("tradeoff.html", TEMPLATE)],
-        styles: &[FIGURE_CSS, CSS],
-        script: "",
-    };
+#[must_use]
+pub fn page(result: &Tradeoff, session: &str, rig: &str) -> String {
     let figure = figure::fronts(result, rig, &format!("session {session}"));
-    let mut table = Grid::new("choices", "All choices", &COLUMNS);
     let rows = if result.rows.len() > MAX_ROWS {
         Rows::Front
     } else {
         Rows::All
     };
-    for (i, row) in ordered(result, rows).into_iter().enumerate() {
-        let class = match (row.competes, row.fronts.is_empty()) {
-            (false, _) => "out",
-            (true, false) => "front",
-            (true, true) => "",
-        };
-        table.row_of(cells(row, i == 0), class);
+    let choices = Section::new("choices", "All choices");
+    Document {
+        title: format!("Speed against accuracy: {session} · skinrig tradeoff"),
+        brand: "skinrig tradeoff",
+        heading: "Speed against accuracy".to_owned(),
+        heading_id: "heading",
+        subheads: vec![Text::from(format!("session {session}")), rig.into()],
+        skip: ("#choices", "Skip to the table"),
+        sections: vec![
+            Section::new("fronts", "Fronts").with(figure),
+            choices.with(Group::card().with(table(result, rows))),
+        ],
+        about: format!("Session {session}."),
+        data: Some(crate::tables::of_tradeoff(result, session)),
+        styles: vec![CSS],
+        ..Document::default()
     }
-    frame.render(context! { session, rig, figure => Value::from(Serde(figure)), table_of_choices => Value::from(Serde(table)) })
-}
-
-fn cells(row: &Row, is_own: bool) -> [String; COLUMNS.len()] {
-    let own = if is_own {
-        " (the session's settings; all others change them)"
-    } else {
-        ""
-    };
-    let names = row.fronts.iter().map(|c| figure::name(*c));
-    let (low, high) = row.cpu_range_us;
-    [
-        format!("{}{own}", label(&row.choice)),
-        names.collect::<Vec<_>>().join(", "),
-        number(row.rmse_mm.value, 2),
-        interval(&row.rmse_mm, 1.0, 2),
-        row.rmse_mm.n.to_string(),
-        number(row.penalised_rmse_mm.value, 2),
-        percent(&row.located_rate),
-        percent(&row.within_rate),
-        short(row.cpu_us),
-        format!("{} to {}", short(low), short(high)),
-        short(row.bytes_per_s / 1e3),
-        short(row.delay_ms),
-    ]
+    .html()
 }

@@ -71,11 +71,7 @@ fn counts_that_do_not_add_up_are_called_out() {
         tradeoff: None,
     };
     assert!(terminal_table(&input, false).contains("do not add up"));
-    assert!(
-        skinrig_report::html(&input)
-            .unwrap()
-            .contains("do not add up")
-    );
+    assert!(skinrig_report::html(&input).contains("do not add up"));
 }
 
 /// If the clocks of a session are unknown, its numbers never appear as results.
@@ -88,7 +84,7 @@ fn an_invalid_session_says_so_in_the_place_of_every_metric() {
             provenance: support::provenance(),
             tradeoff: None,
         };
-        let page = skinrig_report::html(&input).unwrap();
+        let page = skinrig_report::html(&input);
         (terminal_table(&input, false), json(&input), page)
     };
     let (table, document, page) = read(&analysis);
@@ -126,6 +122,9 @@ fn an_invalid_session_says_so_in_the_place_of_every_metric() {
         table.contains("INVALID   cameras swapped: ") && !table.contains(&rmse),
         "{table}"
     );
+    let evidence = &analysis.findings[0].evidence;
+    let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert_eq!(words(&table).matches(&**evidence).count(), 1, "{table}");
     assert_eq!(document["valid"], false);
     assert_eq!(document["summary"]["valid"], false);
 }
@@ -274,7 +273,7 @@ fn several_depths_have_lines_of_their_own_and_the_unit_says_so() {
     assert!(table.contains("RMSE at 2.25 mm depth"), "{table}");
     assert!(table.contains("250 location-depths"), "{table}");
     assert!(table.lines().all(|l| l.chars().count() <= 80), "{table}");
-    let page = skinrig_report::html(&input).unwrap();
+    let page = skinrig_report::html(&input);
     assert!(page.contains("RMSE at depth 2.25 mm"));
     assert!(page.contains("All 2 depths together"));
 }

@@ -56,7 +56,10 @@ fn the_page_shows_the_alarm_first_and_names_as_text() {
         commands: vec!["skinrig run --replay 'x<y'".to_owned()],
         missing: None,
     };
-    let html = page(&report, &[links], &[]).unwrap();
+    let html = page(&report, &[links], &[]);
+    if let Some(folder) = std::env::var_os("SKINRIG_REPORT_OUT") {
+        std::fs::write(std::path::Path::new(&folder).join("trends.html"), &html).unwrap();
+    }
     // Only the page's own script, and nothing else that starts like one.
     assert_eq!(html.matches("<script").count(), 1);
     assert!(!html.contains("<b>") && !html.contains('\u{1b}'));
@@ -69,7 +72,7 @@ fn the_page_shows_the_alarm_first_and_names_as_text() {
 /// A first night has no references: its series are there on request, under names instead of identifiers.
 #[test]
 fn series_without_a_reference_are_folded_and_have_names() {
-    let html = page(&after(1), &[], &[]).unwrap();
+    let html = page(&after(1), &[], &[]);
     let (_, rest) = html.split_once("data-testid=\"learning\"").unwrap();
     let (folded, _) = rest.split_once("</details>").unwrap();
     assert!(folded.starts_with('>'), "open: {}", &folded[..20]);
@@ -78,7 +81,7 @@ fn series_without_a_reference_are_folded_and_have_names() {
         "{folded}"
     );
     assert!(!html.contains("data-testid=\"series\""));
-    let known = page(&report(), &[Links::default()], &[]).unwrap();
+    let known = page(&report(), &[Links::default()], &[]);
     assert!(!known.contains("data-testid=\"learning\""));
     assert!(known.contains(">computer: write rate (disk)</th>"));
     assert!(!known.contains(">disk/computer/write_rate"));

@@ -15,6 +15,8 @@ pub struct Column {
     align: Align,
     width: usize,
     is_clipped: bool,
+    /// Spaces before the cell.
+    before: usize,
 }
 
 impl Column {
@@ -23,6 +25,7 @@ impl Column {
             align,
             width,
             is_clipped: false,
+            before: 0,
         }
     }
 
@@ -53,6 +56,12 @@ impl Column {
         }
     }
 
+    /// Puts this many spaces before the column.
+    #[must_use]
+    pub const fn after(self, before: usize) -> Self {
+        Self { before, ..self }
+    }
+
     /// `text` padded to the width of the column.
     #[must_use]
     pub fn cell(self, text: &str) -> String {
@@ -68,6 +77,7 @@ impl Column {
             Align::Centre => room / 2,
         };
         let after = room - before;
+        let before = self.before + before;
         format!("{:before$}{text}{:after$}", "", "")
     }
 }
@@ -134,6 +144,8 @@ mod tests {
         assert_eq!(table.row(["abcde", "1", "xy", ""]), " abcde    1  xy");
         let clipped = Table::new([Column::left(4).clipped(), Column::left(0)]);
         assert_eq!(clipped.row(["abcde", "f"]), "abc…  f");
+        let apart = Table::new([Column::right(3).after(2), Column::left(0).after(1)]).gap(0);
+        assert_eq!(apart.row(["ab", "c"]), "   ab c");
     }
 
     #[test]

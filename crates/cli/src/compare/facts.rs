@@ -109,7 +109,7 @@ fn protocol(header: &RunHeader) -> Value {
         return serde_json::json!({ "name": header.protocol_name, "plan": header.plan_sha256 });
     };
     let mut value = serde_json::to_value(&read).unwrap_or(Value::Null);
-    let hold_ms = read.motion.hold.0 as f64 * 1e-6;
+    let hold_ms = read.motion.hold.0 as f64 / 1e6;
     value["motion"]["hold"] = Value::from(format!("{hold_ms} ms"));
     if let Some(map) = value.as_object_mut() {
         IGNORED_KEYS.iter().for_each(|key| {

@@ -107,7 +107,7 @@ fn write_page(
     page: &Path,
 ) -> Result<PathBuf, Failure> {
     let results = page.with_extension("json");
-    let html = report::html(result).map_err(Failure::internal)?;
+    let html = report::html(result);
     let text = serde_json::to_string_pretty(document).map_err(Failure::internal)?;
     write(page, html.as_bytes())?;
     write(&results, text.as_bytes())?;

@@ -14,7 +14,6 @@ use skinrig_nightly::night::NIGHT_VERSION;
 use skinrig_nightly::{Night, NightExit, Verdict, Versions, junit};
 use skinrig_protocol::rig::RigFile;
 use skinrig_protocol::suite::{Measure, Suite};
-use skinrig_report::ReportError;
 use skinrig_report::night::{self, Trends, span};
 use skinrig_report::trend::sentence;
 
@@ -133,9 +132,6 @@ enum NightFileError {
         name: &'static str,
         source: io::Error,
     },
-    /// Rendering a page failed.
-    #[error(transparent)]
-    Page(#[from] ReportError),
     /// Rendering JUnit XML failed.
     #[error(transparent)]
     Junit(#[from] junit::SerializeError),
@@ -152,10 +148,7 @@ fn keep(
             .write(name, text)
             .map_err(|source| NightFileError::File { name, source })
     };
-    let page = |trends: Trends<'_>| {
-        let page = night::html(night, trends)?;
-        write(night_folder::PAGE, &page)
-    };
+    let page = |trends: Trends<'_>| write(night_folder::PAGE, &night::html(night, trends));
     write(night_folder::JUNIT, &junit::junit(night, &host_name())?)?;
     let Some(history) = history else {
         page(Trends::NotRequested)?;
@@ -166,7 +159,7 @@ fn keep(
     let after = trend::after(history, night, folder.path());
     match &after {
         Ok(after) => {
-            write(night_folder::TRENDS, &after.page()?)?;
+            write(night_folder::TRENDS, &after.page())?;
             page(Trends::Available {
                 report: &after.report,
                 links: &after.links,

@@ -7,7 +7,6 @@ use skinrig_hil::history::{self, AppendOutcome, Filter, HistoryError};
 use skinrig_hil::night_folder;
 use skinrig_nightly::trend::{Acceptance, History, Report, judge};
 use skinrig_nightly::{Night, NightExit};
-use skinrig_report::ReportError;
 use skinrig_report::trend::{Links, Style, page, terminal};
 
 use super::alarms;
@@ -41,7 +40,7 @@ pub(crate) fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
     let kept = alarms::keep(&args.history, &report);
     if let Some(file) = &args.html {
         let links: Vec<Links> = kept.iter().map(|k| k.links(file.parent())).collect();
-        let html = page(&report, &links, &history.accepted).map_err(Failure::internal)?;
+        let html = page(&report, &links, &history.accepted);
         std::fs::write(file, html)
             .map_err(|e| Failure::internal(format!("{}: {e}", file.display())))?;
     }
@@ -142,7 +141,7 @@ pub(super) struct After {
 
 impl After {
     /// Page of all charts, for the night's folder.
-    pub(super) fn page(&self) -> Result<String, ReportError> {
+    pub(super) fn page(&self) -> String {
         page(&self.report, &self.links, &self.accepted)
     }
 }

@@ -141,7 +141,7 @@ fn a_trade_of_other_settings_leaves_that_of_the_session_alone() {
     );
     let output = std::fs::read_to_string(other["files"]["page"].as_str().unwrap()).unwrap();
     assert!(
-        output.contains("Not the session&#x27;s own settings: analysis.estimator=column_median"),
+        output.contains("Not the session&#39;s own settings: analysis.estimator=column_median"),
         "{output}"
     );
     trade(&[&set[..], &["--out", &page]].concat())

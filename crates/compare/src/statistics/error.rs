@@ -62,7 +62,7 @@ pub enum ComparisonError {
     },
     /// All locations have the same difference.
     #[error(
-        "expected locations that differ, found the same difference ({b} - {a}) at each of {locations}: without any spread there \
+        "expected locations that differ, found the same difference ({b:.4} - {a:.4}) at each of {locations}: without any spread there \
          is no interval and no test"
     )]
     NoSpread {

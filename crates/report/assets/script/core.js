@@ -1,4 +1,4 @@
-// Common to the page's scripts: data tables, helpers, and the filter of presses. Runs after the script of all pages.
+// Common to the scripts of pages with data: tables, helpers, and the filter of presses. Runs after the script of all pages.
 // No dependencies.
 const report = (() => {
   const $ = (q, from = document) => from.querySelector(q);
@@ -13,10 +13,10 @@ const report = (() => {
   };
   for (const t of Object.values(data.tables)) t.data = t.data.map(unpacked);
   const table = name => data.tables[name];
-  const presses = table('presses');
+  const presses = table('presses') ?? { columns: [], data: [] };
   const C = Object.fromEntries(presses.columns.map((name, i) => [name, presses.data[i]]));
-  const total = C.press.length;
-  const rowOf = new Map(C.press.map((press, i) => [press, i]));
+  const total = C.press?.length ?? 0;
+  const rowOf = new Map(C.press?.map((press, i) => [press, i]));
   const text = (v, digits) => v === null || v === undefined ? '–' : digits === undefined ? String(v) : v.toFixed(digits);
   const el = (tag, content, cls) => {
     const e = document.createElement(tag);

@@ -1,150 +1,241 @@
-//! Owns the HTML page of a comparison: inputs of its template and script.
+//! Owns the HTML page of a comparison: verdicts, comparability, metrics, maps, causes, sessions.
 
-use minijinja::value::Serde;
-use minijinja::{Value, context};
-use serde::Serialize;
 use skinrig_compare::statistics::Verdict;
-use skinrig_compare::{Causes, Comparison, Severity};
+use skinrig_compare::{Causes, Comparison, Difference, Severity};
 
-use super::{figures, tables, text};
-use crate::error::ReportError;
-use crate::format::number;
-use crate::frame::{Frame, safe};
-use crate::grid::Grid;
-use crate::page::script_json;
-use crate::plot::Figure;
-use crate::svg::{FIGURE_CSS, plain_css};
+use super::{figures, metrics, tables, text};
+use crate::document::{Banner, Block, Document, Group, Note, Row, Section, Table, Text, soft};
+use crate::format::{capital, number};
 
-const TEMPLATE: &str = include_str!("../../assets/compare/page.html");
 const CSS: &str = include_str!("../../assets/compare/page.css");
-const SCRIPT: &str = include_str!("../../assets/compare/page.js");
-
-/// A skin against the first, for the template.
-#[derive(Serialize)]
-struct SkinCard {
-    letter: char,
-    name: String,
-    verdict: &'static str,
-    headline: String,
-    beyond: bool,
-    margin: Option<String>,
-    needed: Option<String>,
-    rows: Vec<MetricLine>,
-    figures: [Option<Figure>; 4],
-    causes: Option<CausesCard>,
-}
-
-#[derive(Serialize)]
-struct MetricLine {
-    name: String,
-    a: String,
-    b: String,
-    difference: String,
-    interval: String,
-    margin: String,
-    verdict: &'static str,
-    key: &'static str,
-    note: String,
-}
-
-#[derive(Serialize)]
-struct CausesCard {
-    carried_by: Option<&'static str>,
-    measured: Grid,
-    exchanged: Grid,
-    places: u32,
-    presses: [u32; 2],
-}
 
 /// The comparison as a self-contained HTML page.
-///
-/// # Errors
-/// [`ReportError`] when rendering fails; no known input causes this.
-pub fn html(result: &Comparison) -> Result<String, ReportError> {
-    let cards: Vec<SkinCard> = (1..result.skins.len())
-        .map(|k| skin_card(result, k))
-        .collect();
-    let of = |severity: Severity| {
-        let rows = result
-            .differences
-            .iter()
-            .filter(move |d| d.severity == severity);
-        rows.map(|d| {
-            context! {
-                key => d.key, what => d.what.clone(), reason => d.reason.clone(), overridden => d.overridden,
-                values => result.skins.iter().zip(&d.values)
-                    .map(|(s, v)| (s.letter.to_string(), v.clone())).collect::<Vec<_>>(),
-            }
-        })
-        .collect::<Vec<Value>>()
+#[must_use]
+pub fn html(result: &Comparison) -> String {
+    let stand_in = text::stand_in(result);
+    let heading = match &result.skins[..] {
+        [first, one] => format!("{} against {}", one.name, first.name),
+        skins => format!("{} skins against {}", skins.len() - 1, skins[0].name),
     };
-    let heading = match cards.as_slice() {
-        [one] => format!("{} against {}", one.name, result.skins[0].name),
-        many => format!("{} skins against {}", many.len(), result.skins[0].name),
-    };
-    let data = tables::script_data(result);
-    let frame = Frame {
-        templates: &[("comparison.html", TEMPLATE)],
-        styles: &[FIGURE_CSS, CSS],
-        script: SCRIPT,
-    };
-    frame.render(context! {
-        plain_css => safe(&plain_css()),
-        data => safe(&script_json(&data)?),
-        contents => [("verdict", "Verdict"), ("metrics", "Metrics"), ("maps", "Maps"), ("why", "Why"), ("sessions", "Sessions")],
+    let suffix = stand_in.map_or_else(String::new, |word| format!(" ({word})"));
+    let badge = |words: &str| Text::new().span("badge", words);
+    let limits = result
+        .limits
+        .as_ref()
+        .map(|l| badge(&format!("limits: {l}")));
+    let overridden = of(result, Severity::Blocking).map(|d| {
+        let values: Vec<String> = values(result, d)
+            .map(|(l, v)| format!("{l}: {v}"))
+            .collect();
+        let words = format!("{} ({}).", capital(&d.reason), values.join(", "));
+        Banner::invalid("despite", format!("Overridden: {}", d.what), words)
+    });
+    let others = 1..result.skins.len();
+    Document {
+        title: format!("{heading}{suffix} · skinrig comparison"),
+        brand: "skinrig comparison",
         heading,
-        stand_in => text::stand_in(result),
-        limits => result.limits.clone(),
-        margins => result.table.iter().any(|r| r.margin.is_some()),
-        alone => result.skins.iter().all(|s| s.sessions.len() == 1),
-        several => result.skins.len() > 2,
-        skins => result.skins.iter().map(|s| context! {
-            letter => s.letter.to_string(), name => s.name.clone(), text => text::skin(s),
-            sessions => s.sessions.iter().map(|f| context! {
-                file => f.file.clone(), id => f.session_id.clone(), started => f.started.clone(), rig => f.rig_name.clone(),
-            }).collect::<Vec<_>>(),
-        }).collect::<Vec<_>>(),
-        blocking => of(Severity::Blocking),
-        confounding => of(Severity::Confounding),
-        harmless => of(Severity::Harmless),
-        versus => Value::from(Serde(cards)),
-    })
+        heading_id: "heading",
+        subheads: result
+            .skins
+            .iter()
+            .map(|s| letter(s.letter).add(format!(" {}", text::skin(s))))
+            .collect(),
+        badges: limits.into_iter().chain(stand_in.map(badge)).collect(),
+        banners: stand_in
+            .map(Banner::stand_in)
+            .into_iter()
+            .chain(overridden)
+            .collect(),
+        skip: ("#verdict", "Skip to the verdict"),
+        sections: vec![
+            verdict(result),
+            Section::new("metrics", "Metrics")
+                .with_all(others.clone().map(|k| metrics::metrics(result, k).card())),
+            Section::new("maps", "Maps").with_all(others.clone().flat_map(|k| maps(result, k))),
+            Section::new("why", "Why they differ")
+                .listed("Why")
+                .with_all(others.map(|k| why(result, k))),
+            Section::new("sessions", "Sessions").with(Group::card().with(sessions(result))),
+        ],
+        data: Some(tables::script_data(result)),
+        styles: vec![CSS],
+        ..Document::default()
+    }
+    .html()
 }
 
-fn skin_card(result: &Comparison, k: usize) -> SkinCard {
+/// Letter of a skin, in a box.
+fn letter(letter: char) -> Text {
+    Text::new().span("letter", letter.to_string())
+}
+
+/// Differences of this severity.
+fn of(result: &Comparison, severity: Severity) -> impl Iterator<Item = &Difference> {
+    let all = result.differences.iter();
+    all.filter(move |d| d.severity == severity)
+}
+
+/// Values of a difference with the letters of their skins.
+fn values<'a>(
+    result: &'a Comparison,
+    difference: &'a Difference,
+) -> impl Iterator<Item = (char, &'a String)> {
+    let letters = result.skins.iter().map(|s| s.letter);
+    letters.zip(&difference.values)
+}
+
+fn verdict(result: &Comparison) -> Section {
+    let mut notes = Vec::new();
+    if result.table.iter().all(|r| r.margin.is_none()) {
+        let text = Text::from(
+            "No margins: no difference can be called equivalent. Give a file of limits with ",
+        );
+        notes.push(Note::of(text.code("--limits").add(".")).warning());
+    }
+    if result.skins.iter().all(|s| s.sessions.len() == 1) {
+        notes.push(Note::of(
+            "One session per skin: changes between sessions (mounting, light, calibration) cannot be separated from the \
+             skin. Intervals are over locations on the skin.",
+        ));
+    }
+    if result.skins.len() > 2 {
+        notes.push(Note::of(
+            "Verdicts are corrected for the number of skins (Holm).",
+        ));
+    }
+    let cards = (1..result.skins.len()).map(|k| verdict_card(result, k));
+    let left = Group::stack().with_all(cards).with_all(notes);
+    Section::new("verdict", "Verdict")
+        .hide_heading()
+        .with(Group::new("first").with(left).with(comparability(result)))
+}
+
+fn verdict_card(result: &Comparison, k: usize) -> Group {
     let skin = &result.skins[k];
     let row = result.headline();
     let found = row.and_then(|r| r.against_first.iter().find(|a| a.subject == k));
     let compared = found.and_then(|f| f.comparison.as_ref());
-    let margin = row.and_then(|r| Some(format!("{} mm", text::value(r, Some(r.margin?)))));
-    let causes = result.causes.get(k - 1).and_then(Option::as_ref);
-    let figures = [
-        figures::maps(result, k),
-        figures::margins(result, k),
-        figures::locations(result, k),
-        causes.map(|of| figures::causes(result, k, of)),
-    ];
-    SkinCard {
-        letter: skin.letter,
-        name: skin.name.clone(),
-        verdict: text::verdict(found.and_then(|f| f.verdict)),
-        headline: found.map(|f| text::headline(result, f)).unwrap_or_default(),
-        beyond: compared.is_some_and(|c| c.beyond_margin),
-        margin,
-        needed: compared.and_then(text::needed),
-        rows: lines(result, k),
-        figures,
-        causes: causes.map(|of| CausesCard {
-            carried_by: of.carried_by.map(skinrig_compare::Factor::name),
-            measured: measured(of, skin.letter),
-            exchanged: exchanged(of),
-            places: of.locations,
-            presses: of.presses,
-        }),
+    let verdict = found.and_then(|f| f.verdict);
+    let word = text::verdict(verdict);
+    let name = Text::from(format!("{} ", skin.letter)).bold(&*skin.name);
+    let is_decided = matches!(verdict, Some(Verdict::Better | Verdict::Worse));
+    let mut value = Text::from(word);
+    if is_decided && compared.is_some_and(|c| c.beyond_margin) {
+        value = value.span("unit", " by more than the margin");
     }
+    let headline = found.map(|f| text::headline(result, f)).unwrap_or_default();
+    let mut headline = Text::from(headline);
+    if let Some((row, margin)) = row.and_then(|r| Some((r, r.margin?))) {
+        let margin = text::value(row, Some(margin));
+        headline = headline.dot().add(format!("margin ± {margin} mm"));
+    }
+    let needed = compared.and_then(text::needed);
+    let cause = causes(result, k).map(|of| match of.carried_by {
+        Some(factor) => Text::from("Main cause: ")
+            .bold(factor.name())
+            .add(", see ")
+            .link("#why", "why")
+            .add("."),
+        None => "No single cause explains the difference.".into(),
+    });
+    Group::card()
+        .class("verdict")
+        .class(&word.replace(' ', "-"))
+        .test_id(format!("verdict-{}", skin.letter))
+        .with(Block::Text("name", name.add(" against A, by RMSE")))
+        .with(Block::Text("value", value))
+        .with(Block::Text("ci", headline))
+        .with_all(needed.map(|n| Block::Text("ci", format!("Undecided: {n}.").into())))
+        .with_all(cause.map(|text| Block::Text("ci why", text)))
 }
 
-fn measured(of: &Causes, letter: char) -> Grid {
+fn causes(result: &Comparison, k: usize) -> Option<&Causes> {
+    result.causes.get(k - 1).and_then(Option::as_ref)
+}
+
+fn comparability(result: &Comparison) -> Group {
+    let note = |d: &Difference, weight: &str| {
+        let mut text = Text::new().span("weight", weight).line_break();
+        for (skin, value) in values(result, d) {
+            text = text.then(letter(skin)).add(format!(" {value} \u{a0} "));
+        }
+        let text = text.line_break().span("soft", &*d.reason);
+        Note::new(&*d.what, text)
+    };
+    let blocking = of(result, Severity::Blocking).map(|d| note(d, "blocking, overridden").bad());
+    let confounding = of(result, Severity::Confounding).map(|d| note(d, "confounding").warning());
+    let notes: Vec<Note> = blocking.chain(confounding).collect();
+    let none = notes
+        .is_empty()
+        .then(|| Note::of("No recorded difference speaks against it.").good());
+    let harmless = of(result, Severity::Harmless).count();
+    let folded = (harmless > 0).then(|| {
+        let summary = text::counted(harmless, "harmless difference");
+        Group::folded(summary).with(differences(result))
+    });
+    Group::titled("Are they comparable?")
+        .test_id("comparability")
+        .with_all(none)
+        .with_all(notes)
+        .with_all(folded)
+}
+
+fn differences(result: &Comparison) -> Table {
+    let letters: Vec<String> = result.skins.iter().map(|s| s.letter.to_string()).collect();
+    let letters = letters.iter().map(String::as_str);
+    let columns = ["Difference"]
+        .into_iter()
+        .chain(letters)
+        .chain(["Why harmless"]);
+    let columns: Vec<&str> = columns.collect();
+    let rows = of(result, Severity::Harmless).map(|d| {
+        let cells = [&d.what].into_iter().chain(&d.values).chain([&d.reason]);
+        Row::new(cells.cloned())
+    });
+    Table::new("differences", "Harmless differences", &columns)
+        .class("differences")
+        .with(rows)
+}
+
+fn maps(result: &Comparison, k: usize) -> impl Iterator<Item = Block> {
+    let beside = [figures::margins(result, k), figures::locations(result, k)];
+    let pair = Group::new("pair").with_all(beside.into_iter().flatten());
+    figures::maps(result, k)
+        .map(Block::from)
+        .into_iter()
+        .chain([pair.into()])
+}
+
+fn why(result: &Comparison, k: usize) -> Block {
+    let skin = result.skins[k].letter;
+    let Some(of) = causes(result, k) else {
+        let text =
+            format!("{skin} and A share too few locations with counting presses to find causes.");
+        return Note::of(text).into();
+    };
+    let [a, b] = of.presses;
+    let presses = format!("{a} and {b} presses at {} shared locations.", of.locations);
+    let exchanged_note = "A calibration is valid only for its camera positions. Errors with the other skin's calibration \
+        therefore show how far the cameras moved.";
+    let tables = Group::stack()
+        .with(
+            Group::titled("Measured in both")
+                .with(measured(of, skin))
+                .with(soft(presses)),
+        )
+        .with(
+            Group::titled("Cross-evaluation")
+                .with(exchanged(of))
+                .with(soft(exchanged_note)),
+        );
+    Group::new("pair")
+        .with(figures::causes(result, k, of))
+        .with(tables)
+        .into()
+}
+
+fn measured(of: &Causes, letter: char) -> Table {
     let rows = of.measured.iter().map(|m| {
         let digits = |v: Option<f64>| {
             if v.is_some_and(|v| v.abs() >= 100.0) {
@@ -154,19 +245,20 @@ fn measured(of: &Causes, letter: char) -> Grid {
             }
         };
         let [a, b] = m.values.map(|v| number(v, digits(v)));
-        [format!("{} ({})", m.what, m.unit), a, b]
+        Row::new([format!("{} ({})", m.what, m.unit), a, b])
     });
     let columns = ["Quantity", "#A", &format!("#{letter}")];
-    Grid::new("measured", "Measured in both", &columns).with(rows)
+    let table = Table::new("measured", "Measured in both", &columns);
+    table.class("versus").with(rows)
 }
 
 /// Errors with the calibration and settings of each skin.
-fn exchanged(of: &Causes) -> Grid {
+fn exchanged(of: &Causes) -> Table {
     let rows = of.exchanged.iter().map(|x| {
         let [located, all] = x.located;
         let rmse = format!("{} ({located} of {all})", number(x.rmse_mm, 2));
         let skins = [x.presses, x.calibration, x.settings].map(|skin| skin.to_string());
-        skins.into_iter().chain([rmse])
+        Row::new(skins.into_iter().chain([rmse]))
     });
     let columns = [
         "Presses of",
@@ -174,41 +266,22 @@ fn exchanged(of: &Causes) -> Grid {
         "Settings of",
         "#RMSE, mm (located)",
     ];
-    Grid::new("exchanged", "Cross-evaluation", &columns).with(rows)
+    let table = Table::new("exchanged", "Cross-evaluation", &columns);
+    table.class("versus").with(rows)
 }
 
-fn lines(result: &Comparison, k: usize) -> Vec<MetricLine> {
-    let line = |row: &skinrig_compare::Row| {
-        let found = row.against_first.iter().find(|a| a.subject == k)?;
-        let c = found.comparison.as_ref();
-        let own = |i: usize| row.values.get(i).and_then(|v| v.value).map(|v| v.value);
-        let is_undecided = matches!(found.verdict, Some(Verdict::Undecided) | None);
-        Some(MetricLine {
-            name: text::heading(row),
-            a: text::value(row, c.map(|c| c.a.value).or(own(0))),
-            b: text::value(row, c.map(|c| c.b.value).or(own(k))),
-            difference: c.map_or_else(
-                || crate::format::NONE.to_owned(),
-                |c| text::signed(row, c.difference.value),
-            ),
-            interval: c.map_or_else(
-                || crate::format::NONE.to_owned(),
-                |c| text::interval(row, &c.difference),
-            ),
-            margin: row.margin.map_or_else(
-                || crate::format::NONE.to_owned(),
-                |m| format!("± {}", text::value(row, Some(m))),
-            ),
-            verdict: text::verdict(found.verdict),
-            key: row.metric.key(),
-            note: match (c, &found.error) {
-                (_, Some(why)) => why.clone(),
-                (Some(c), None) if is_undecided && row.margin.is_some() => {
-                    text::needed(c).unwrap_or_default()
-                }
-                _ => String::new(),
-            },
+fn sessions(result: &Comparison) -> Table {
+    let rows = result.skins.iter().flat_map(|s| {
+        s.sessions.iter().map(|f| {
+            Row::new([
+                letter(s.letter).add(format!(" {}", s.name)),
+                Text::new().code(&*f.session_id),
+                f.started.clone().into(),
+                f.rig_name.clone().into(),
+                f.file.clone().into(),
+            ])
         })
-    };
-    result.table.iter().filter_map(line).collect()
+    });
+    let columns = ["Skin", "Session", "Started", "Rig", "File"];
+    Table::new("sessions-table", "Sessions", &columns).with(rows)
 }

@@ -3,6 +3,8 @@
 use serde_json::{Value, json};
 use skinrig_compare::Comparison;
 
+use crate::tables::Table;
+
 /// Named tables in column-wise layout.
 pub(super) fn script_data(result: &Comparison) -> Value {
     json!({
@@ -15,102 +17,67 @@ pub(super) fn script_data(result: &Comparison) -> Value {
     })
 }
 
-fn table(columns: Vec<String>, rows: &[Vec<Value>]) -> Value {
-    let data: Vec<Vec<&Value>> = (0..columns.len())
-        .map(|c| rows.iter().map(|r| &r[c]).collect())
-        .collect();
-    json!({ "columns": columns, "data": data })
-}
-
 fn locations(result: &Comparison) -> Value {
-    let mut columns = vec!["x_mm".to_owned(), "y_mm".to_owned()];
-    for skin in &result.skins {
-        for name in [
-            "error_mm",
-            "vector_x_mm",
-            "vector_y_mm",
-            "presses",
-            "attempted",
-            "rank",
-            "difference_mm",
-            "difference_low_mm",
-            "difference_high_mm",
-        ] {
-            columns.push(format!("{}_{name}", skin.letter));
-        }
-    }
-    let rows: Vec<Vec<Value>> = result
-        .locations
-        .iter()
-        .map(|l| {
-            let mut row = vec![json!(l.at.x_mm), json!(l.at.y_mm)];
-            for here in &l.skins {
-                let d = here.difference_mm;
-                row.extend([
-                    json!(here.error_mm),
-                    json!(here.vector_mm.map(|v| v[0])),
-                    json!(here.vector_mm.map(|v| v[1])),
-                    json!(here.presses[0]),
-                    json!(here.presses[1]),
-                    json!(here.rank),
-                    json!(d.map(|d| d.value)),
-                    json!(d.and_then(|d| d.low)),
-                    json!(d.and_then(|d| d.high)),
-                ]);
-            }
-            row
-        })
-        .collect();
-    table(columns, &rows)
+    let table = Table::of(&result.locations)
+        .any("x_mm", |l| l.at.x_mm)
+        .any("y_mm", |l| l.at.y_mm);
+    let skins = result.skins.iter().enumerate();
+    let all = skins.fold(table, |table, (k, skin)| {
+        let name = |what: &str| format!("{}_{what}", skin.letter);
+        table
+            .any(name("error_mm"), |l| l.skins[k].error_mm)
+            .any(name("vector_x_mm"), |l| l.skins[k].vector_mm.map(|v| v[0]))
+            .any(name("vector_y_mm"), |l| l.skins[k].vector_mm.map(|v| v[1]))
+            .any(name("presses"), |l| l.skins[k].presses[0])
+            .any(name("attempted"), |l| l.skins[k].presses[1])
+            .any(name("rank"), |l| l.skins[k].rank)
+            .any(name("difference_mm"), |l| {
+                l.skins[k].difference_mm.map(|d| d.value)
+            })
+            .any(name("difference_low_mm"), |l| {
+                l.skins[k].difference_mm.and_then(|d| d.low)
+            })
+            .any(name("difference_high_mm"), |l| {
+                l.skins[k].difference_mm.and_then(|d| d.high)
+            })
+    });
+    all.finish()
 }
 
 fn metrics(result: &Comparison) -> Value {
-    let columns = [
-        "metric",
-        "unit",
-        "skin",
-        "a",
-        "b",
-        "difference",
-        "low",
-        "high",
-        "margin",
-        "verdict",
-    ];
-    let mut rows = Vec::new();
-    for row in &result.table {
-        for found in &row.against_first {
-            let c = found.comparison.as_ref();
-            rows.push(vec![
-                json!(row.metric.key()),
-                json!(row.unit),
-                json!(result.skins[found.subject].letter),
-                json!(c.map(|c| c.a.value)),
-                json!(c.map(|c| c.b.value)),
-                json!(c.map(|c| c.difference.value)),
-                json!(c.and_then(|c| c.difference.low)),
-                json!(c.and_then(|c| c.difference.high)),
-                json!(row.margin),
-                json!(found.verdict),
-            ]);
-        }
-    }
-    table(columns.map(str::to_owned).to_vec(), &rows)
+    let rows = result.table.iter();
+    let rows = rows.flat_map(|row| row.against_first.iter().map(move |found| (row, found)));
+    Table::of(rows)
+        .any("metric", |(row, _)| row.metric.key())
+        .any("unit", |(row, _)| row.unit)
+        .any("skin", |(_, f)| result.skins[f.subject].letter)
+        .any("a", |(_, f)| f.comparison.as_ref().map(|c| c.a.value))
+        .any("b", |(_, f)| f.comparison.as_ref().map(|c| c.b.value))
+        .any("difference", |(_, f)| {
+            f.comparison.as_ref().map(|c| c.difference.value)
+        })
+        .any("low", |(_, f)| {
+            f.comparison.as_ref().and_then(|c| c.difference.low)
+        })
+        .any("high", |(_, f)| {
+            f.comparison.as_ref().and_then(|c| c.difference.high)
+        })
+        .any("margin", |(row, _)| row.margin)
+        .any("verdict", |(_, f)| f.verdict)
+        .finish()
 }
 
 fn causes(result: &Comparison) -> Value {
-    let columns = ["skin", "factor", "mm2", "low_mm2", "high_mm2"];
-    let mut rows = Vec::new();
-    for (skin, causes) in result.skins.iter().skip(1).zip(&result.causes) {
-        for c in causes.iter().flat_map(|c| &c.contributions) {
-            rows.push(vec![
-                json!(skin.letter),
-                json!(c.factor),
-                json!(c.mm2.value),
-                json!(c.mm2.low),
-                json!(c.mm2.high),
-            ]);
-        }
-    }
-    table(columns.map(str::to_owned).to_vec(), &rows)
+    let skins = result.skins.iter().skip(1).zip(&result.causes);
+    let parts = skins.flat_map(|(skin, causes)| {
+        let parts = causes.iter().flat_map(|c| &c.contributions);
+        parts.map(move |part| (skin.letter, part))
+    });
+    Table::of(parts)
+        .any("skin", |(letter, _)| *letter)
+        .any("factor", |(_, part)| part.factor)
+        .any("mm2", |(_, part)| part.mm2.value)
+        .any("low_mm2", |(_, part)| part.mm2.low)
+        .any("high_mm2", |(_, part)| part.mm2.high)
+        .finish()
 }

@@ -7,8 +7,8 @@ use super::raster::{image, indexed_png};
 use crate::colour::{hex, viridis_rgb};
 use crate::format::grouped;
 use crate::input::ReportInput;
+use crate::markup::Markup;
 use crate::plot::{Axis, Figure, Plot, Scale, Sheet, WIDE, colour_bar, rectangle};
-use crate::svg::Svg;
 
 /// Number of colours; more would only enlarge the file.
 const LEVELS: u8 = 64;
@@ -100,7 +100,7 @@ fn png(picture: &Activity, most: u64) -> Option<Vec<u8>> {
 }
 
 /// Colour scale with decades.
-fn scale(svg: &mut Svg, most: u64, (x, top, height): (f64, f64, f64)) {
+fn scale(svg: &mut Markup, most: u64, (x, top, height): (f64, f64, f64)) {
     let end = (most.max(2) as f64).log10();
     let scale = Scale::new((0.0, end), (top + height, top));
     let marks = (0..=end.floor() as i32).map(|p| (f64::from(p), power_of_ten(p)));

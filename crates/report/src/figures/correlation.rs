@@ -3,8 +3,9 @@
 use super::origin::foot;
 use crate::format::number;
 use crate::input::ReportInput;
+use crate::markup::Markup;
 use crate::plot::{Canvas, Figure, HALF};
-use crate::svg::{Px, Svg};
+use crate::svg::Px;
 
 /// Correlation of each pair of calibrated parameters. `None` without a correlation matrix.
 #[must_use]
@@ -48,7 +49,7 @@ pub fn correlation(input: &ReportInput<'_>) -> Option<Figure> {
     ))
 }
 
-fn cell(svg: &mut Svg, (x, y): (f64, f64), step: f64, value: Option<f64>) {
+fn cell(svg: &mut Markup, (x, y): (f64, f64), step: f64, value: Option<f64>) {
     let class = match value {
         Some(v) if v < 0.0 => "f2",
         Some(_) => "f1",

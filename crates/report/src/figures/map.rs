@@ -8,10 +8,11 @@ use super::skin::{Layout, error_scale};
 use crate::colour::viridis;
 use crate::derive::{self, LocationSummary};
 use crate::input::ReportInput;
+use crate::markup::Markup;
 use crate::plot::{
     Canvas, Figure, LeftTexts, Place, Sample, column, draw_axes, press_path, scale_end, squares,
 };
-use crate::svg::{Px, Svg, dots, polyline};
+use crate::svg::{Px, dots, polyline};
 
 const SIZE: (f64, f64) = (900.0, 700.0);
 /// On a phone, scale and legend stand below the map.
@@ -19,7 +20,7 @@ const NARROW: ((f64, f64), f64) = ((740.0, 1280.0), 1.4);
 const SIDE_TO: (f64, f64) = (-680.0, 700.0);
 
 fn discs(
-    svg: &mut Svg,
+    svg: &mut Markup,
     (layout, place): (&Layout, &Place),
     locations: &[LocationSummary],
     value: impl Fn(&LocationSummary) -> Option<f64>,
@@ -208,7 +209,7 @@ pub(crate) fn skin_map(input: &ReportInput<'_>) -> Figure {
 }
 
 /// Edge of the probed area: one cell per location, clipped to the outline.
-fn cells(svg: &mut Svg, (layout, at): (&Layout, &Place), places: &[Point2], cell_mm: f64) {
+fn cells(svg: &mut Markup, (layout, at): (&Layout, &Place), places: &[Point2], cell_mm: f64) {
     let side = cell_mm * at.x.per_unit();
     let mut data = String::new();
     for place in places {

@@ -5,7 +5,8 @@ use std::fmt::Display;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
-use crate::svg::{Px, Svg};
+use crate::markup::Markup;
+use crate::svg::Px;
 
 /// Rectangle in a figure: left, top, width, height, px.
 pub(super) type Rectangle = (f64, f64, f64, f64);
@@ -43,7 +44,7 @@ pub(super) fn indexed_png(
 }
 
 /// Draws a PNG over the whole frame.
-pub(super) fn image(svg: &mut Svg, class: &str, frame: Rectangle, png: &[u8]) {
+pub(super) fn image(svg: &mut Markup, class: &str, frame: Rectangle, png: &[u8]) {
     let data = format!("data:image/png;base64,{}", STANDARD.encode(png));
     let attributes: [(&str, &dyn Display); 7] = [
         ("class", &class),

@@ -5,9 +5,9 @@ use skinrig_analysis::result::{Estimate, Reduction, ReductionRow, Thinning};
 use super::origin::foot;
 use crate::format::number;
 use crate::input::ReportInput;
+use crate::markup::Markup;
 use crate::plot::{Axis, Figure, Plot, Sample, Sheet, WIDE, extent, nice_above};
 use crate::published;
-use crate::svg::Svg;
 
 /// Content of one panel.
 struct Panel {
@@ -202,7 +202,7 @@ fn plot<'a>(study: &'a Reduction, panel: &Panel, with_bytes: bool) -> Plot<'a> {
 }
 
 /// Second scale above the plot: bytes per second during a press.
-fn bytes(svg: &mut Svg, study: &Reduction, place: &crate::plot::Place) {
+fn bytes(svg: &mut Markup, study: &Reduction, place: &crate::plot::Place) {
     let Some(curve) = study.curves.first() else {
         return;
     };

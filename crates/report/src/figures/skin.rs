@@ -5,8 +5,9 @@ use skinrig_model::{CameraModel, Point2, SENSOR_WIDTH};
 use crate::colour::viridis;
 use crate::derive::LocationSummary;
 use crate::input::ReportInput;
+use crate::markup::Markup;
 use crate::plot::{Axis, Place, Scale, colour_bar, extent, rectangle};
-use crate::svg::{Px, Svg, polyline};
+use crate::svg::{Px, polyline};
 
 /// Outline of the skin, and the ranges of a map that shows it with the cameras.
 pub(super) struct Layout {
@@ -92,7 +93,7 @@ impl Layout {
     /// must be unique in the page.
     pub(super) fn union_edge(
         &self,
-        svg: &mut Svg,
+        svg: &mut Markup,
         place: &Place,
         id: &str,
         class: &str,
@@ -121,7 +122,7 @@ impl Layout {
         );
     }
 
-    pub(super) fn cameras(&self, svg: &mut Svg, place: &Place, input: &ReportInput<'_>) {
+    pub(super) fn cameras(&self, svg: &mut Markup, place: &Place, input: &ReportInput<'_>) {
         for (i, camera) in input.analysis.geometry.cameras.iter().enumerate() {
             let (x, y) = self.px(place, camera.position);
             let [dx, dy] = camera.direction(camera.skew_deg);
@@ -148,7 +149,7 @@ impl Layout {
 }
 
 /// Colour bar in mm with title, at the right edge, with the number of locations above its end.
-pub(super) fn error_scale(svg: &mut Svg, title: &str, top_mm: f64, beyond: usize) {
+pub(super) fn error_scale(svg: &mut Markup, title: &str, top_mm: f64, beyond: usize) {
     let (x, top, height) = (786.0, 70.0, 260.0);
     svg.open("g", &[("class", &"colour-bar")]);
     for (i, line) in title.split('\n').enumerate() {

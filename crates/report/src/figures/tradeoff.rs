@@ -5,8 +5,9 @@ use skinrig_model::Estimator;
 
 use crate::choices::{label, short};
 use crate::format::number;
+use crate::markup::Markup;
 use crate::plot::{Axis, Figure, Place, Plot, Sample, Sheet, WIDE, extent};
-use crate::svg::{Px, Svg};
+use crate::svg::Px;
 
 /// Short name of a cost.
 pub(crate) const fn name(cost: Cost) -> &'static str {
@@ -130,7 +131,7 @@ fn plot(result: &Tradeoff, cost: Cost) -> Plot<'_> {
     }
 }
 
-fn mark(svg: &mut Svg, row: &Row, (x, y): (f64, f64)) {
+fn mark(svg: &mut Markup, row: &Row, (x, y): (f64, f64)) {
     let (classes, data) = mark_of(row.choice.estimator);
     let class = classes[usize::from(!row.competes)];
     let to = format!("translate({} {})", Px(x), Px(y));
@@ -143,7 +144,12 @@ fn mark(svg: &mut Svg, row: &Row, (x, y): (f64, f64)) {
 }
 
 /// Labels of the choices on a front, below their points where the line leaves room, unless they would overlap.
-fn labels(svg: &mut Svg, place: &Place, front: &[&Row], at: impl Fn(&Row) -> Option<(f64, f64)>) {
+fn labels(
+    svg: &mut Markup,
+    place: &Place,
+    front: &[&Row],
+    at: impl Fn(&Row) -> Option<(f64, f64)>,
+) {
     let (left, top, width, height) = place.frame();
     let (right, bottom) = (left + width, top + height);
     let mut taken: Vec<(f64, f64, f64)> = Vec::new();

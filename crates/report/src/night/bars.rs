@@ -3,7 +3,8 @@
 use skinrig_model::Limit;
 use skinrig_nightly::{Measurement, Verdict};
 
-use crate::svg::{Px, Svg};
+use crate::markup::Markup;
+use crate::svg::Px;
 
 /// Width of a bar in its own units; the page stretches it to its cell.
 const WIDTH: f64 = 120.0;
@@ -19,7 +20,7 @@ pub(super) fn bar(m: &Measurement) -> Option<String> {
     let x = |v: f64| ((v - from) / (to - from)).clamp(0.0, 1.0) * WIDTH;
     let low = x(limit.at_least.unwrap_or(from));
     let high = x(limit.at_most.unwrap_or(to));
-    let mut svg = Svg::new();
+    let mut svg = Markup::new();
     svg.open(
         "svg",
         &[

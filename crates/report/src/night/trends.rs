@@ -1,13 +1,12 @@
 //! Owns the trends section of a night's page.
 
-use minijinja::value::Serde;
-use minijinja::{Value, context};
 use skinrig_nightly::trend::Report;
 use skinrig_nightly::trend::report::cause_name;
 use skinrig_nightly::{Cause, Night};
 
 use super::text;
-use crate::trend::{Links, alarm_cards, since, with_names};
+use crate::document::{Block, Group, Note, Section, Text, Tone, paragraph};
+use crate::trend::{Links, alarms, since, with_names};
 
 /// Series listed per alarm; the others are counted.
 const MAX_LISTED: usize = 4;
@@ -74,39 +73,57 @@ impl<'a> Trends<'a> {
         }
     }
 
-    /// Template value.
-    pub(super) fn value(self) -> Value {
-        let (report, links, page) = match self {
+    /// The section of the page.
+    pub(super) fn section(self) -> Section {
+        let (state, tone, text) = match self {
             Self::NotRequested => {
                 let text = "No trends: this night is not part of a history (--history FILE).";
-                return context! { state => "not-requested", tone => "", text };
+                ("not-requested", Tone::Plain, text.to_owned())
             }
             Self::Unavailable(why) => {
                 let text = format!("No trends tonight: {why}. Limits were checked nevertheless.");
-                return context! { state => "unavailable", tone => "warn", text };
+                ("unavailable", Tone::Warning, text)
             }
-            Self::Available {
-                report,
-                links,
-                page,
-            } => (report, links, page),
+            Self::Available { report, .. } => {
+                let (state, tone) = if !report.alarms.is_empty() {
+                    ("moved", Tone::Bad)
+                } else if report.is_learning() {
+                    ("learning", Tone::Plain)
+                } else {
+                    ("steady", Tone::Good)
+                };
+                let text = format!("Trend: {}.", with_names(&report.headline, report));
+                (state, tone, text)
+            }
         };
-        let (state, tone) = if !report.alarms.is_empty() {
-            ("moved", "bad")
-        } else if report.is_learning() {
-            ("learning", "")
-        } else {
-            ("steady", "ok")
-        };
-        let alarms = alarm_cards(report, links).into_iter().map(|mut alarm| {
-            let others = alarm.series.len().saturating_sub(MAX_LISTED);
-            alarm.series.truncate(MAX_LISTED);
-            context! { card => Value::from(Serde(alarm)), others }
-        });
-        context! {
-            state, tone, page,
-            text => format!("Trend: {}.", with_names(&report.headline, report)),
-            alarms => alarms.collect::<Vec<_>>(),
+        let mut text = Text::from(text);
+        let mut groups = Vec::new();
+        if let Self::Available {
+            report,
+            links,
+            page,
+        } = self
+        {
+            text = text.add(" ").named_link("trends-page", page, "All charts");
+            groups.extend(alarms(report, links).into_iter().map(|alarm| {
+                let title = Text::new().link(format!("{page}#{}", alarm.id), &alarm.title);
+                let listed = alarm.charts.iter().take(MAX_LISTED);
+                let mut series: Vec<String> = listed.map(|(_, name)| name.words()).collect();
+                match alarm.charts.len().saturating_sub(MAX_LISTED) {
+                    0 => {}
+                    others => series.push(format!("and {others} more")),
+                }
+                Group::new("alarm")
+                    .test_id("alarm")
+                    .with(Block::Heading("h3", title))
+                    .with(paragraph(series.join("; ")))
+                    .with_all(alarm.blocks)
+            }));
         }
+        let card = Group::card().with(Note::of(text).tone(tone));
+        Section::new("trends", "Trends")
+            .hide_heading()
+            .test_id(format!("trends-{state}"))
+            .with(card.with_all(groups))
     }
 }

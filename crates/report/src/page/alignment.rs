@@ -2,16 +2,16 @@
 
 use skinrig_analysis::result::{Alignment, AlignmentStatus, Analysis};
 
+use crate::document::Table;
 use crate::format::{NONE, by_rates, number, sentence};
-use crate::grid::Grid;
 
 /// One row per map between two clocks.
-pub(super) fn maps(a: &Analysis) -> Option<Grid> {
+pub(super) fn maps(a: &Analysis) -> Option<Table> {
     let certificate = &a.alignment;
     if certificate.maps.is_empty() {
         return None;
     }
-    let mut grid = Grid::new(
+    let mut grid = Table::new(
         "alignment",
         "Alignment certificate",
         &[
@@ -70,12 +70,12 @@ fn half_widths(of: Option<(f64, f64)>, digits: usize) -> String {
 }
 
 /// One row per camera: edges sent, lost, doubled and spurious.
-pub(super) fn lines(a: &Analysis) -> Option<Grid> {
+pub(super) fn lines(a: &Analysis) -> Option<Table> {
     let lines = &a.alignment.lines;
     if lines.is_empty() {
         return None;
     }
-    let mut grid = Grid::new(
+    let mut grid = Table::new(
         "trigger-lines",
         "Trigger inputs",
         &[

@@ -2,14 +2,15 @@
 
 use skinrig_analysis::result::{Analysis, Estimate};
 
+use super::estimate;
+use crate::document::Table;
 use crate::format::{NONE, contact_map, interval, number};
-use crate::grid::Grid;
 use crate::published;
 
 /// Areas and taxels beside the published ones.
-pub(super) fn coverage(a: &Analysis) -> Option<Grid> {
+pub(super) fn coverage(a: &Analysis) -> Option<Table> {
     let c = a.coverage.as_ref()?;
-    let mut grid = Grid::new(
+    let mut grid = Table::new(
         "coverage",
         "Areas and taxels",
         &["Quantity", "#Session", "#95 % interval", "#Published"],
@@ -83,9 +84,9 @@ pub(super) fn coverage(a: &Analysis) -> Option<Grid> {
 }
 
 /// Contact map reconstruction error with its parameters.
-pub(super) fn cmre(a: &Analysis) -> Option<Grid> {
+pub(super) fn cmre(a: &Analysis) -> Option<Table> {
     let c = a.cmre.as_ref()?;
-    let mut grid = Grid::new(
+    let mut grid = Table::new(
         "cmre",
         "Contact map",
         &["Quantity", "#Session", "#95 % interval", "#n"],
@@ -132,9 +133,9 @@ fn percent_per_mm(a: &Analysis) -> f64 {
 }
 
 /// Data rates during presses and while idle.
-pub(super) fn bit_rates(a: &Analysis) -> Option<Grid> {
+pub(super) fn bit_rates(a: &Analysis) -> Option<Table> {
     let r = a.bit_rates.as_ref()?;
-    let mut grid = Grid::new(
+    let mut grid = Table::new(
         "bit-rates",
         "Data rates",
         &[
@@ -146,13 +147,8 @@ pub(super) fn bit_rates(a: &Analysis) -> Option<Grid> {
         ],
     );
     let row = |name: &str, e: &Estimate, scale: f64, digits: usize, theirs: &str| {
-        [
-            name.to_owned(),
-            number(e.value.map(|v| v * scale), digits),
-            interval(e, scale, digits),
-            e.n.to_string(),
-            theirs.to_owned(),
-        ]
+        let own = estimate(name, e, scale, digits);
+        own.into_iter().chain([theirs.to_owned()])
     };
     grid.row(row("press (kev/s)", &r.press_events_per_s, 1e-3, 2, "28.6"));
     grid.row(row("idle (kev/s)", &r.idle_events_per_s, 1e-3, 2, "9.1"));

@@ -2,17 +2,61 @@
 
 use skinrig_analysis::result::{Analysis, CalibrationResult};
 
+use crate::document::{Column, Group, Row, Table, Text, paragraph, soft};
 use crate::figures::model_name;
 use crate::format::{NONE, interval, number, words};
-use crate::grid::Grid;
+use crate::tables;
+
+/// The fitted parameters.
+pub(super) fn parameters(a: &Analysis) -> Group {
+    let card = Group::titled("Calibration").test_id("calibration");
+    let Some(c) = &a.calibration else {
+        return card.with(soft(
+            "No calibration: presses were located with the nominal geometry.",
+        ));
+    };
+    let about = Text::from("RMSE ")
+        .bold(number(Some(c.rmse_before_mm), 3))
+        .add(" mm before, ")
+        .bold(number(Some(c.rmse_after_mm), 3))
+        .add(format!(
+            " mm after, over {} calibration presses. This is in-sample; the scored RMSE above is held out.",
+            c.n
+        ));
+    let rows = tables::calibration(c).into_iter().map(|r| {
+        let error = r.standard_error;
+        let error = error.map(|se| format!("± {}", number(Some(se), 4)));
+        let interval = r
+            .interval
+            .map(|(low, high)| format!("[{}, {}]", number(Some(low), 4), number(Some(high), 4)));
+        Row::new([
+            r.name,
+            number(r.before, 4),
+            number(r.after, 4),
+            error.unwrap_or_else(|| "not determined".to_owned()),
+            interval.unwrap_or_else(|| NONE.to_owned()),
+        ])
+    });
+    let columns = [
+        Column::new("Parameter"),
+        Column::new("#Before"),
+        Column::new("#After"),
+        Column::new("#Standard error"),
+        Column::new("95 % interval").class("num nowrap"),
+    ];
+    let caption = "Fitted parameters before and after";
+    card.download("calibration", "calibration", "the calibration")
+        .with(paragraph(about))
+        .with(Table::of("parameters", caption, columns).with(rows))
+}
 
 /// The compared models.
-pub(super) fn models(a: &Analysis) -> Option<Grid> {
+pub(super) fn models(a: &Analysis) -> Option<Table> {
     let c = a.calibration.as_ref()?;
     if c.compared.is_empty() {
         return None;
     }
-    let mut grid = Grid::new(
+    let mut grid = Table::new(
         "model-table",
         "Models compared",
         &[
@@ -80,9 +124,9 @@ fn why(a: &Analysis, c: &CalibrationResult) -> String {
 }
 
 /// How well the data determine the fit.
-pub(super) fn fit(a: &Analysis) -> Option<Grid> {
+pub(super) fn fit(a: &Analysis) -> Option<Table> {
     let c = a.calibration.as_ref()?;
-    let mut grid = Grid::new("fit-table", "Fit", &["Quantity", "#Value"]);
+    let mut grid = Table::new("fit-table", "Fit", &["Quantity", "#Value"]);
     let mut row = |name: &str, value: String| {
         grid.row([name.to_owned(), value]);
     };

@@ -3,8 +3,8 @@
 use skinrig_analysis::result::{Analysis, Thinning};
 
 use crate::comparison::{Cell, rows};
+use crate::document::Table;
 use crate::format::{self, NONE, interval, number};
-use crate::grid::Grid;
 use crate::input::ReportInput;
 use crate::published::{self, Metric};
 
@@ -41,9 +41,9 @@ pub(crate) fn text(cell: &Cell, metric: Metric) -> String {
 }
 
 /// Comparison with MSOWS.
-pub(super) fn msows(input: &ReportInput<'_>) -> Grid {
+pub(super) fn msows(input: &ReportInput<'_>) -> Table {
     let session = format!("#{}", own_name(input));
-    let mut grid = Grid::new(
+    let mut grid = Table::new(
         "comparison-msows",
         "This session, the paper and MSOWS",
         &[
@@ -101,8 +101,8 @@ fn own_name(input: &ReportInput<'_>) -> String {
 }
 
 /// The paper's table of tactile localisation technologies, with the session as its last row.
-pub(super) fn skins(input: &ReportInput<'_>) -> Grid {
-    let mut grid = Grid::new(
+pub(super) fn skins(input: &ReportInput<'_>) -> Table {
+    let mut grid = Table::new(
         "comparison-skins",
         "Other skins that locate touch",
         &[
@@ -145,8 +145,8 @@ pub(super) fn skins(input: &ReportInput<'_>) -> Grid {
 }
 
 /// The paper's overview of optical tactile sensors, with the session as its last row.
-pub(super) fn sensors(input: &ReportInput<'_>) -> Grid {
-    let mut grid = Grid::new(
+pub(super) fn sensors(input: &ReportInput<'_>) -> Table {
+    let mut grid = Table::new(
         "comparison-sensors",
         "Optical tactile sensors",
         &[
@@ -181,9 +181,9 @@ pub(super) fn sensors(input: &ReportInput<'_>) -> Grid {
 }
 
 /// The public code's evaluation beside ours. `None` outside reference-code mode.
-pub(super) fn reference(a: &Analysis) -> Option<Grid> {
+pub(super) fn reference(a: &Analysis) -> Option<Table> {
     let r = a.reference.as_ref()?;
-    let mut grid = Grid::new(
+    let mut grid = Table::new(
         "reference-table",
         "In-sample, as published, beside held-out",
         &[
@@ -195,55 +195,49 @@ pub(super) fn reference(a: &Analysis) -> Option<Grid> {
     );
     let m = &a.scored;
     let mm = |v: Option<f64>| number(v, 2);
-    let published = |v: f64| number(Some(v), 2);
-    grid.row([
-        "presses".to_owned(),
-        r.presses.to_string(),
-        m.located_rate.n.to_string(),
-        "250".to_owned(),
-    ]);
-    grid.row([
-        "with two centroids".to_owned(),
-        r.with_centroids.to_string(),
-        NONE.to_owned(),
-        NONE.to_owned(),
-    ]);
-    grid.row([
-        "judged".to_owned(),
-        format!("{} inside the square", r.inside),
-        m.rmse_mm.n.to_string(),
-        NONE.to_owned(),
-    ]);
-    grid.row([
-        "RMSE (mm)".to_owned(),
-        mm(r.rmse_mm),
-        mm(m.rmse_mm.value),
-        published(published::RMSE_MM),
-    ]);
-    grid.row([
-        "RMSE along x (mm)".to_owned(),
-        mm(r.rmse_x_mm),
-        mm(m.rmse_x_mm.value),
-        published(published::RMSE_X_MM),
-    ]);
-    grid.row([
-        "RMSE along y (mm)".to_owned(),
-        mm(r.rmse_y_mm),
-        mm(m.rmse_y_mm.value),
-        published(published::RMSE_Y_MM),
-    ]);
-    grid.row([
-        "std of the error lengths (mm)".to_owned(),
-        mm(r.std_of_errors_mm),
-        NONE.to_owned(),
-        NONE.to_owned(),
-    ]);
-    grid.row([
-        "std between repetitions (mm)".to_owned(),
-        NONE.to_owned(),
-        mm(m.repeat_std_mm.value),
-        published(published::REPEAT_STD_MM),
-    ]);
+    let mut row = |name: &str, code: &str, ours: &str, published: &str| {
+        grid.row([name, code, ours, published]);
+    };
+    let inside = format!("{} inside the square", r.inside);
+    let scored = m.located_rate.n.to_string();
+    row("presses", &r.presses.to_string(), &scored, "250");
+    row(
+        "with two centroids",
+        &r.with_centroids.to_string(),
+        NONE,
+        NONE,
+    );
+    row("judged", &inside, &m.rmse_mm.n.to_string(), NONE);
+    for (name, code, ours, theirs) in [
+        ("RMSE (mm)", r.rmse_mm, m.rmse_mm, published::RMSE_MM),
+        (
+            "RMSE along x (mm)",
+            r.rmse_x_mm,
+            m.rmse_x_mm,
+            published::RMSE_X_MM,
+        ),
+        (
+            "RMSE along y (mm)",
+            r.rmse_y_mm,
+            m.rmse_y_mm,
+            published::RMSE_Y_MM,
+        ),
+    ] {
+        row(name, &mm(code), &mm(ours.value), &mm(Some(theirs)));
+    }
+    row(
+        "std of the error lengths (mm)",
+        &mm(r.std_of_errors_mm),
+        NONE,
+        NONE,
+    );
+    let theirs = mm(Some(published::REPEAT_STD_MM));
+    row(
+        "std between repetitions (mm)",
+        NONE,
+        &mm(m.repeat_std_mm.value),
+        &theirs,
+    );
     let own = a.calibration.as_ref();
     for (name, value) in &r.parameters {
         let index = own.and_then(|c| c.names.iter().position(|n| n == name));
@@ -269,12 +263,12 @@ pub(super) fn reference(a: &Analysis) -> Option<Grid> {
 }
 
 /// The public code's data reduction beside ours.
-pub(super) fn reference_reduction(a: &Analysis) -> Option<Grid> {
+pub(super) fn reference_reduction(a: &Analysis) -> Option<Table> {
     let r = a.reference.as_ref()?;
     if r.reduction.is_empty() {
         return None;
     }
-    let mut grid = Grid::new(
+    let mut grid = Table::new(
         "reference-reduction",
         "Data reduction as in the public code",
         &[

@@ -1,8 +1,8 @@
 //! Owns the audit's findings on the page.
 
-use minijinja::{Value, context};
 use skinrig_analysis::result::Finding;
 
+use crate::document::{Group, Text, paragraph};
 use crate::format::words;
 
 /// The violated law, as a statement that should hold.
@@ -27,11 +27,27 @@ pub(crate) fn fault(finding: &Finding) -> String {
     }
 }
 
-pub(super) fn values(findings: &[Finding]) -> Vec<Value> {
-    findings
-        .iter()
-        .map(|f| {
-            context! { law => law(f), fault => fault(f), evidence => f.evidence.clone(), advice => f.advice.clone() }
-        })
-        .collect()
+/// The card of all findings; `None` without any.
+pub(super) fn card(findings: &[Finding]) -> Option<Group> {
+    let finding = |f: &Finding| {
+        let fault = Text::new().bold(format!("Likely: {}.", fault(f))).add(" ");
+        Group::new("finding")
+            .with(paragraph(
+                fault.span("soft", format!("Violated: {}.", law(f))),
+            ))
+            .with(paragraph(&*f.evidence))
+            .with(paragraph(
+                Text::new().bold("Do:").add(format!(" {}", f.advice)),
+            ))
+    };
+    let faults = match findings.len() {
+        0 => return None,
+        1 => "1 fault".to_owned(),
+        n => format!("{n} faults"),
+    };
+    let card = Group::titled(format!("The plausibility audit found {faults}"))
+        .class("findings")
+        .attribute("role", "alert")
+        .test_id("findings");
+    Some(card.with_all(findings.iter().map(finding)))
 }

@@ -2,25 +2,21 @@
 
 use skinrig_analysis::result::{Analysis, Estimate, Latency};
 
-use crate::format::{NONE, interval, number};
-use crate::grid::Grid;
+use super::estimate;
+use crate::document::Table;
+use crate::format::{NONE, number};
 
 /// Detection rates and times beside the published numbers.
-pub(super) fn latency(a: &Analysis) -> Option<Grid> {
+pub(super) fn latency(a: &Analysis) -> Option<Table> {
     let l = a.latency.as_ref()?;
-    let mut grid = Grid::new(
+    let mut grid = Table::new(
         "latency-table",
         "Detection",
         &["Quantity", "#Session", "#95 % interval", "#n", "#Published"],
     );
     let row = |name: &str, e: &Estimate, scale: f64, digits: usize, theirs: &str| {
-        [
-            name.to_owned(),
-            number(e.value.map(|v| v * scale), digits),
-            interval(e, scale, digits),
-            e.n.to_string(),
-            theirs.to_owned(),
-        ]
+        let own = estimate(name, e, scale, digits);
+        own.into_iter().chain([theirs.to_owned()])
     };
     let chosen = l.chosen.and_then(|i| l.sweep.get(i as usize));
     grid.row([
@@ -88,7 +84,7 @@ pub(super) fn latency(a: &Analysis) -> Option<Grid> {
     Some(grid)
 }
 
-fn notes(grid: &mut Grid, l: &Latency) {
+fn notes(grid: &mut Table, l: &Latency) {
     let s = &l.settings;
     grid.note(format!(
         "One-sided CUSUM on counts of both cameras: bins of {} ms, Gaussian of {} ms, tuned to a rate {} times the \
@@ -129,21 +125,14 @@ fn notes(grid: &mut Grid, l: &Latency) {
 }
 
 /// Latency from the hardware-timestamped contact with its uncertainty budget.
-pub(super) fn from_contact(a: &Analysis) -> Option<Grid> {
+pub(super) fn from_contact(a: &Analysis) -> Option<Table> {
     let c = a.latency.as_ref()?.from_contact.as_ref()?;
-    let mut grid = Grid::new(
+    let mut grid = Table::new(
         "latency-from-contact",
         "Latency from the measured contact",
         &["Quantity", "#ms", "#95 % interval", "#n"],
     );
-    let row = |name: &str, e: &Estimate| {
-        [
-            name.to_owned(),
-            number(e.value, 2),
-            interval(e, 1.0, 2),
-            e.n.to_string(),
-        ]
-    };
+    let row = |name: &str, e: &Estimate| estimate(name, e, 1.0, 2);
     grid.row(row("5th percentile", &c.p5_ms));
     grid.marked_row(row("median", &c.median_ms), true);
     grid.row(row("95th percentile", &c.p95_ms));

@@ -4,16 +4,16 @@ use skinrig_analysis::result::{Analysis, LocatorResult};
 use skinrig_model::Locator;
 
 use crate::derive::locator_name;
+use crate::document::Table;
 use crate::format::{NONE, interval, number};
-use crate::grid::Grid;
 
 /// The compared locators.
-pub(super) fn locators(a: &Analysis) -> Option<Grid> {
+pub(super) fn locators(a: &Analysis) -> Option<Table> {
     let l = a.locator.as_ref()?;
     if l.compared.is_empty() {
         return None;
     }
-    let mut grid = Grid::new(
+    let mut grid = Table::new(
         "locator-table",
         "Locators compared",
         &[
@@ -78,12 +78,12 @@ fn why(a: &Analysis, l: &LocatorResult) -> String {
 }
 
 /// Stated and observed shares of the regions.
-pub(super) fn reliability(a: &Analysis) -> Option<Grid> {
+pub(super) fn reliability(a: &Analysis) -> Option<Table> {
     let l = a.locator.as_ref()?;
     if l.reliability.is_empty() {
         return None;
     }
-    let mut grid = Grid::new(
+    let mut grid = Table::new(
         "reliability-table",
         "Regions of the scored presses",
         &["#Stated (%)", "#inside (%)", "#95 % interval", "#presses"],

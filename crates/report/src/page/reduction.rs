@@ -2,8 +2,8 @@
 
 use skinrig_analysis::result::{Analysis, Estimate, Thinning};
 
+use crate::document::Table;
 use crate::format::{NONE, grouped, interval, number};
-use crate::grid::Grid;
 
 /// Display name of a kind of thinning.
 pub(crate) const fn thinning(kind: Thinning) -> &'static str {
@@ -14,10 +14,10 @@ pub(crate) const fn thinning(kind: Thinning) -> &'static str {
 }
 
 /// One row per kind and factor.
-pub(super) fn reduction(a: &Analysis) -> Option<Grid> {
+pub(super) fn reduction(a: &Analysis) -> Option<Table> {
     let study = a.reduction.as_ref()?;
     let within = format!("#within {} mm (%)", number(Some(study.within_mm), 1));
-    let mut grid = Grid::new(
+    let mut grid = Table::new(
         "reduction-table",
         "Data reduction, row by row",
         &[

@@ -1,7 +1,8 @@
 //! Owns axes: range, label and ticks, and their drawing around a plot.
 
 use super::scale::{Place, Scale, extent, nice_above, tick_label, ticks};
-use crate::svg::{Px, Svg};
+use crate::markup::Markup;
+use crate::svg::Px;
 
 /// Width of a tick digit, px: 0.6 of the 11 px in figure.css, rounded up.
 const DIGIT_PX: f64 = 6.7;
@@ -152,7 +153,7 @@ fn decades(low: f64, high: f64) -> Vec<(f64, String)> {
 }
 
 /// Draws grid, ticks and labels around a plot.
-pub(crate) fn draw(svg: &mut Svg, place: &Place, (x, y): (&Axis, &Axis), left_texts: LeftTexts) {
+pub(crate) fn draw(svg: &mut Markup, place: &Place, (x, y): (&Axis, &Axis), left_texts: LeftTexts) {
     let (left, top, width, height) = place.frame();
     let (right, bottom) = (left + width, top + height);
     let (xs, ys) = (x.marks(place.x), y.marks(place.y));
@@ -191,7 +192,7 @@ pub(crate) fn draw(svg: &mut Svg, place: &Place, (x, y): (&Axis, &Axis), left_te
 }
 
 /// Text whose distance from `at` grows with its size.
-fn below(svg: &mut Svg, (x, y): (f64, f64), class: &str, dy: &str, text: &str) {
+fn below(svg: &mut Markup, (x, y): (f64, f64), class: &str, dy: &str, text: &str) {
     let anchor: &str = "middle";
     svg.holding(
         "text",
@@ -206,7 +207,7 @@ fn below(svg: &mut Svg, (x, y): (f64, f64), class: &str, dy: &str, text: &str) {
     );
 }
 
-fn left_side(svg: &mut Svg, place: &Place, y: &Axis, ticks: &[(f64, String)]) {
+fn left_side(svg: &mut Markup, place: &Place, y: &Axis, ticks: &[(f64, String)]) {
     let (left, top, _, height) = place.frame();
     for (t, label) in ticks {
         svg.text((left - 7.0, place.y.at(*t) + 4.0), "tick", "end", label);
@@ -238,7 +239,7 @@ mod tests {
                 x: x.scale((100.0, 200.0)),
                 y: y.scale((200.0, 100.0)),
             };
-            let mut svg = Svg::new();
+            let mut svg = Markup::new();
             draw(&mut svg, &place, (&x, &y), LeftTexts::Shown);
             let drawn = svg.finish();
             let (_, rest) = drawn.split_once("translate(").unwrap();

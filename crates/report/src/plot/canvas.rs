@@ -1,6 +1,7 @@
 //! Owns [`Figure`] and the canvas that all figures are drawn on.
 
-use crate::svg::{Px, Svg, plain_css};
+use crate::markup::Markup;
+use crate::svg::{Px, plain_css};
 
 /// A figure.
 #[derive(Debug, Clone, serde::Serialize)]
@@ -43,7 +44,7 @@ type Narrow = ((f64, f64), f64);
 
 /// A figure under construction.
 pub(crate) struct Canvas {
-    pub(crate) svg: Svg,
+    pub(crate) svg: Markup,
     pub(crate) id: String,
     title: String,
     caption: String,
@@ -58,7 +59,7 @@ impl Canvas {
         size: (f64, f64),
         narrow: Option<Narrow>,
     ) -> Self {
-        let mut svg = Svg::new();
+        let mut svg = Markup::new();
         let view = |(w, h): (f64, f64)| format!("0 0 {} {}", Px(w), Px(h));
         let (wide, labelled) = (view(size), format!("{id}-title {id}-desc"));
         let view_on_phone = narrow.map(|(size, texts)| (view(size), texts));

@@ -2,7 +2,8 @@
 
 use super::path::{circle, diamond, rectangle};
 use super::scale::{Scale, tick_label, ticks};
-use crate::svg::{Px, Svg, dots};
+use crate::markup::Markup;
+use crate::svg::{Px, dots};
 
 /// Sample of one class of marks in a legend.
 #[derive(Debug, Clone, Copy)]
@@ -30,7 +31,7 @@ pub(crate) fn width(name: &str) -> f64 {
 }
 
 /// Draws a sample with its name at `(x, y)`: its left end, vertical middle.
-pub(crate) fn entry(svg: &mut Svg, (x, y): (f64, f64), sample: Sample, name: &str) {
+pub(crate) fn entry(svg: &mut Markup, (x, y): (f64, f64), sample: Sample, name: &str) {
     let middle = (x + WIDTH / 2.0, y);
     match sample {
         Sample::Line(class) => {
@@ -56,7 +57,7 @@ pub(crate) fn entry(svg: &mut Svg, (x, y): (f64, f64), sample: Sample, name: &st
 }
 
 /// Draws a column of samples from `(x, y)` downwards.
-pub(crate) fn column(svg: &mut Svg, (x, y): (f64, f64), entries: &[(Sample, &str)]) {
+pub(crate) fn column(svg: &mut Markup, (x, y): (f64, f64), entries: &[(Sample, &str)]) {
     for (i, (sample, name)) in entries.iter().enumerate() {
         entry(svg, (x, y + 21.0 * i as f64), *sample, name);
     }
@@ -64,7 +65,7 @@ pub(crate) fn column(svg: &mut Svg, (x, y): (f64, f64), entries: &[(Sample, &str
 
 /// Draws a colour bar with ticks: upright from (x, top) or lying, as long as `scale` runs.
 pub(crate) fn colour_bar(
-    svg: &mut Svg,
+    svg: &mut Markup,
     scale: Scale,
     across: (f64, f64),
     is_upright: bool,

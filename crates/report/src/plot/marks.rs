@@ -5,12 +5,13 @@ use skinrig_model::PressId;
 use super::axis::{self, Axis, LeftTexts};
 use super::path::{band, circle, diamond, press_path, rectangle, squares};
 use super::scale::Place;
-use crate::svg::{Svg, dots, polyline};
+use crate::markup::Markup;
+use crate::svg::{dots, polyline};
 
 /// Draws one or more marks.
-type Mark<'a> = Box<dyn FnOnce(&mut Svg, &Place) + 'a>;
+type Mark<'a> = Box<dyn FnOnce(&mut Markup, &Place) + 'a>;
 /// Draws marks below the frame, from this y in px on.
-type Below<'a> = Box<dyn FnOnce(&mut Svg, &Place, f64) + 'a>;
+type Below<'a> = Box<dyn FnOnce(&mut Markup, &Place, f64) + 'a>;
 /// Distance from the frame to the end of the marks below it, px.
 const BELOW: f64 = 38.0;
 
@@ -88,20 +89,20 @@ impl<'a> Plot<'a> {
     pub(crate) fn below(
         mut self,
         name: &'a str,
-        marks: impl FnOnce(&mut Svg, &Place, f64) + 'a,
+        marks: impl FnOnce(&mut Markup, &Place, f64) + 'a,
     ) -> Self {
         self.below = Some((name, Box::new(marks)));
         self
     }
 
     /// Any drawing, given the place of the plot.
-    pub(crate) fn draw(mut self, mark: impl FnOnce(&mut Svg, &Place) + 'a) -> Self {
+    pub(crate) fn draw(mut self, mark: impl FnOnce(&mut Markup, &Place) + 'a) -> Self {
         self.marks.push(Box::new(mark));
         self
     }
 
     /// A drawing over the marks that the frame does not cut.
-    pub(crate) fn over(mut self, mark: impl FnOnce(&mut Svg, &Place) + 'a) -> Self {
+    pub(crate) fn over(mut self, mark: impl FnOnce(&mut Markup, &Place) + 'a) -> Self {
         self.over = Some(Box::new(mark));
         self
     }
@@ -268,7 +269,7 @@ impl<'a> Plot<'a> {
     }
 
     /// Draws axes and marks.
-    pub(crate) fn render(self, svg: &mut Svg, place: &Place, left_texts: LeftTexts) {
+    pub(crate) fn render(self, svg: &mut Markup, place: &Place, left_texts: LeftTexts) {
         place.open(svg);
         axis::draw(svg, place, (&self.axes.0, &self.axes.1), left_texts);
         let (left, top, width, height) = place.frame();

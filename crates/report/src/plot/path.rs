@@ -2,10 +2,11 @@
 
 use skinrig_model::PressId;
 
-use crate::svg::{Px, Svg, polyline};
+use crate::markup::Markup;
+use crate::svg::{Px, polyline};
 
 /// A rectangle.
-pub(crate) fn rectangle(svg: &mut Svg, class: &str, frame: (f64, f64, f64, f64)) {
+pub(crate) fn rectangle(svg: &mut Markup, class: &str, frame: (f64, f64, f64, f64)) {
     let (x, y, width, height) = frame;
     svg.leaf(
         "rect",
@@ -20,7 +21,7 @@ pub(crate) fn rectangle(svg: &mut Svg, class: &str, frame: (f64, f64, f64, f64))
 }
 
 /// A circle.
-pub(crate) fn circle(svg: &mut Svg, class: &str, (x, y): (f64, f64), radius: f64) {
+pub(crate) fn circle(svg: &mut Markup, class: &str, (x, y): (f64, f64), radius: f64) {
     svg.leaf(
         "circle",
         &[
@@ -53,7 +54,7 @@ pub(crate) fn band(points: impl IntoIterator<Item = (f64, (f64, f64))>) -> Strin
 }
 
 /// A path with one segment (`M...`) per press, which the page's filter can hide.
-pub(crate) fn press_path(svg: &mut Svg, class: &str, data: &str, presses: &[PressId]) {
+pub(crate) fn press_path(svg: &mut Markup, class: &str, data: &str, presses: &[PressId]) {
     if data.is_empty() {
         return;
     }

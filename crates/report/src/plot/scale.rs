@@ -160,7 +160,7 @@ impl Place {
     }
 
     /// Opens the group of a plot, with its scales for the page's script.
-    pub(crate) fn open(&self, svg: &mut crate::svg::Svg) {
+    pub(crate) fn open(&self, svg: &mut crate::markup::Markup) {
         let (x, y) = (self.x.attribute(), self.y.attribute());
         svg.open("g", &[("class", &"plot"), ("data-x", &x), ("data-y", &y)]);
     }

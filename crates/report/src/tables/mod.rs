@@ -8,12 +8,13 @@ mod traces;
 use serde_json::{Map, Value, json};
 use skinrig_analysis::exclusion::Exclusion;
 use skinrig_analysis::result::{Analysis, CalibrationResult, PressResult, PressView};
+use skinrig_analysis::tradeoff::Tradeoff;
 use skinrig_model::PressId;
 use skinrig_settings::Settings;
 
 use crate::derive;
 use crate::input::ReportInput;
-use table::Table;
+pub(crate) use table::Table;
 
 /// Data for the script: session ID and named tables.
 pub(crate) fn script_data(input: &ReportInput<'_>) -> Value {
@@ -35,6 +36,11 @@ pub(crate) fn script_data(input: &ReportInput<'_>) -> Value {
     let tables = tables.chain(traces::all(input));
     let tables: Map<String, Value> = tables.map(|(name, t)| (name.to_owned(), t)).collect();
     json!({ "session": input.provenance.session_id, "tables": tables })
+}
+
+/// Data for the script of a tradeoff.
+pub(crate) fn of_tradeoff(result: &Tradeoff, session: &str) -> Value {
+    json!({ "session": session, "tables": { "tradeoff": traces::tradeoff(result) } })
 }
 
 fn parameters(c: &CalibrationResult) -> Value {

@@ -22,14 +22,14 @@ pub(super) fn rounded(value: Option<f64>, digits: i32) -> Value {
 }
 
 /// A table under construction: its rows, and column-wise what is shown of them.
-pub(super) struct Table<R> {
+pub(crate) struct Table<R> {
     rows: Vec<R>,
-    columns: Vec<&'static str>,
+    columns: Vec<String>,
     data: Vec<Value>,
 }
 
 impl<R> Table<R> {
-    pub(super) fn of(rows: impl IntoIterator<Item = R>) -> Self {
+    pub(crate) fn of(rows: impl IntoIterator<Item = R>) -> Self {
         Self {
             rows: rows.into_iter().collect(),
             columns: vec![],
@@ -38,10 +38,14 @@ impl<R> Table<R> {
     }
 
     /// A column of anything.
-    pub(super) fn any<C: Serialize>(mut self, name: &'static str, cell: impl Fn(&R) -> C) -> Self {
+    pub(crate) fn any<C: Serialize>(
+        mut self,
+        name: impl Into<String>,
+        cell: impl Fn(&R) -> C,
+    ) -> Self {
         let cells = self.rows.iter().map(|row| json!(cell(row)));
         self.data.push(packed(cells.collect()));
-        self.columns.push(name);
+        self.columns.push(name.into());
         self
     }
 
@@ -72,7 +76,7 @@ impl<R> Table<R> {
             .number(high, digits, |row| cell(row).high)
     }
 
-    pub(super) fn finish(self) -> Value {
+    pub(crate) fn finish(self) -> Value {
         json!({ "columns": self.columns, "data": self.data })
     }
 }

@@ -58,7 +58,7 @@ fn presses(motion: &Motion) -> Value {
         .finish()
 }
 
-fn tradeoff(result: &Tradeoff) -> Value {
+pub(super) fn tradeoff(result: &Tradeoff) -> Value {
     Table::of(&result.rows)
         .any("choice", |r| label(&r.choice))
         .estimate(["rmse_mm", "rmse_low_mm", "rmse_high_mm"], 4, |r| {

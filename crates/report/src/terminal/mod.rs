@@ -2,19 +2,25 @@
 
 mod studies;
 mod summary;
-mod text;
-
-use std::fmt::Write as _;
 
 use skinrig_analysis::result::{
     Alignment, AlignmentStatus, Analysis, ClockFit, ClockMethod, Estimate, MapName, Metrics,
+    PressCounts,
 };
-use skinrig_text::{Column, Paint, Table, WIDTH, clip};
+use skinrig_model::text::visible;
+use skinrig_text::{Column as Cells, Paint, Style, WIDTH, clip};
 
 pub(crate) use self::summary::summary;
-pub(crate) use self::text::{plain, wrap};
+use crate::document::{Column, Note, Row, Section, Table, terminal};
 use crate::format::{digits_of_error, grouped, interval, number, or_missing};
 use crate::input::ReportInput;
+use crate::page::findings::{fault, law};
+use crate::{course, derive};
+
+/// User text on one line, with control characters spelled out.
+pub(crate) fn plain(text: &str) -> String {
+    visible(&text.replace(['\n', '\t'], " ")).into_owned()
+}
 
 /// A formatted metric.
 pub(crate) struct MetricRow {
@@ -102,243 +108,239 @@ pub(crate) fn clock_method(method: ClockMethod) -> &'static str {
 
 /// See [`crate::terminal_table`].
 pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
-    let paint = Paint::new(color);
-    let (a, p) = (input.analysis, &input.provenance);
-    let mut out = String::new();
-    out += &wrap("session   ", &plain(or_missing(&p.session_id)));
-    if let Some(variant) = &p.variant {
-        out += &paint.warn(&wrap("VARIANT   ", &plain(&variant.to_string())));
-    }
-    if !p.overrides.is_empty() {
-        out += &wrap(
-            "recorded  ",
-            &plain(&format!("with --set {}", p.overrides.join(" --set "))),
-        );
-    }
-    let rig = plain(or_missing(&p.rig_name));
-    if let Some(word) = p.stand_in() {
-        let word = word.to_uppercase();
-        out += &paint.warn(&wrap(
-            "rig       ",
-            &format!("{rig} - {word}, not measured on hardware"),
-        ));
+    let a = input.analysis;
+    let studies = if a.is_valid() {
+        studies::all(a)
     } else {
-        out += &wrap("rig       ", &rig);
-    }
-    out += &wrap(
-        "protocol  ",
-        &plain(&format!(
-            "{}, seed {}",
-            or_missing(&p.protocol_name),
-            p.seed
-        )),
-    );
+        Section::plain().with(Note::new("studies", "withheld: the session is INVALID"))
+    };
+    let sections = [
+        head(input),
+        problems(a),
+        scored(a),
+        presses(a).with_all(clocks(a)).with_all(events(input)),
+        studies,
+    ];
+    terminal(&sections, Paint::new(color))
+}
+
+fn head(input: &ReportInput<'_>) -> Section {
+    let p = &input.provenance;
+    let variant = p.variant.as_ref();
+    let variant = variant.map(|v| Note::new("VARIANT", v.to_string()).warning());
+    let changes = (!p.overrides.is_empty()).then(|| p.overrides.join(" --set "));
+    let changes = changes.map(|changes| Note::new("recorded", format!("with --set {changes}")));
+    let rig = or_missing(&p.rig_name);
+    let rig = match p.stand_in() {
+        None => Note::new("rig", rig),
+        Some(word) => {
+            let word = word.to_uppercase();
+            Note::new("rig", format!("{rig} - {word}, not measured on hardware")).warning()
+        }
+    };
+    let protocol = format!("{}, seed {}", or_missing(&p.protocol_name), p.seed);
     let end = match &p.run_end_reason {
         Some(why) => format!("{}: {why}", or_missing(&p.run_end)),
         None => or_missing(&p.run_end).to_owned(),
     };
-    out += &wrap("run       ", &plain(&end));
-    out.push('\n');
-    let before = out.len();
-    for reason in a.invalid_because() {
-        out += &paint.warn(&wrap("INVALID   ", &plain(&reason)));
-    }
-    out += &paint.warn(&findings(a));
-    if let Some(text) = crate::derive::disagreement(a) {
-        out += &paint.warn(&wrap("warning   ", &text));
-    }
-    for warning in a.alignment.warnings.iter().chain(&a.warnings) {
-        out += &paint.warn(&wrap("warning   ", &plain(warning)));
-    }
-    if out.len() > before {
-        out.push('\n');
-    }
-
-    let table = Table::new([
-        Column::left(24),
-        Column::right(7),
-        Column::left(3),
-        Column::centre(20),
-        Column::right(6),
-    ])
-    .gap(1);
-    let presses = |name: &str, value: String, unit: &str, interval: String, n: u32| {
-        table.row([name, &value, unit, &interval, &n.to_string(), "presses"]) + "\n"
-    };
-    let millimetres = |name: &str, e: &Estimate| {
-        let (value, interval) = (number(e.value, 2), interval(e, 1.0, 2));
-        presses(name, value, "mm", interval, e.n)
-    };
-    let head = table.row(["scored presses", "value", "", "95 % interval", "n"]);
-    let _ = writeln!(out, "{}", paint.bold(&head));
-    for r in metric_rows(a) {
-        let n = r.n.to_string();
-        let line = table.row([&r.name, &r.value, r.unit, &r.interval, &n, r.what_n]);
-        let line = if r.key == "rmse" {
-            paint.bold(&line)
-        } else {
-            line
-        };
-        let _ = writeln!(out, "{line}");
-    }
-    let usable = a.is_valid();
-    if let Some(share) = a.scored.rmse_diagonal_percent.filter(|_| usable) {
-        let e = &a.scored.rmse_mm;
-        let scale = 100.0 / a.rig.outline.diagonal_mm();
-        out += &presses(
-            "RMSE, share of diagonal",
-            number(Some(share), 2),
-            "%",
-            interval(e, scale, 2),
-            e.n,
-        );
-    }
-    if usable && a.scored_without_exclusions != a.scored {
-        let e = &a.scored_without_exclusions.rmse_mm;
-        out += &millimetres("RMSE, no exclusions", e);
-    }
-    let f = &a.penalised;
-    if usable && f.failures > 0 {
-        out += &millimetres("RMSE, failures counted", &f.rmse_mm);
-    }
-    if let Some(note) = crate::derive::geometry_note(a).filter(|_| usable) {
-        out += &paint.warn(&wrap("geometry  ", &note));
-    }
-    for d in a.depths.iter().filter(|_| usable) {
-        out += &millimetres(&format!("RMSE at {} mm depth", d.depth_mm), &d.rmse_mm);
-    }
-    out.push('\n');
-
-    let c = &a.counts;
-    let _ = writeln!(
-        out,
-        "presses   {} planned = {} valid + {} missed + {} invalid + {} excluded",
-        c.planned, c.valid, c.missed, c.invalid, c.excluded
-    );
-    if !c.add_up() {
-        let _ = writeln!(
-            out,
-            "{}",
-            paint.warn("          these counts do not add up: do not trust this result")
-        );
-    }
-    if c.sync > 0 {
-        let plural = if c.sync == 1 { "" } else { "es" };
-        let _ = writeln!(
-            out,
-            "          and {} sync press{plural}, counted apart",
-            c.sync
-        );
-    }
-    if usable && f.failures > 0 {
-        let text = format!(
-            "{} failed, each counted as {} mm where failures count{}",
-            f.failures,
-            number(Some(f.penalty_mm), 1),
-            match f.beyond_penalty {
-                0 => String::new(),
-                n => format!("; {n} of them as their own larger error"),
-            }
-        );
-        out += &wrap("penalty   ", &text);
-    }
-    out += &left_out(a, false);
-    out += &left_out(a, true);
-    for (i, clock) in a.clocks.iter().enumerate() {
-        out += &clock_lines(i + 1, clock.as_ref());
-    }
-    out += &alignment_lines(&a.alignment);
-    if usable {
-        out += &studies::calibration(a);
-        if let Some(note) = crate::derive::locator_note(a) {
-            out += &wrap("locator   ", &note);
-        }
-    }
-    for (i, lost) in p.lost_bytes.iter().enumerate().filter(|(_, l)| **l > 0) {
-        let mut text = format!("camera {}: {} bytes lost", i + 1, grouped(*lost));
-        for time in crate::course::losses(p, i) {
-            text += &format!("; {time}");
-        }
-        out += &paint.warn(&wrap("loss      ", &text));
-    }
-    for text in crate::derive::off_sensor(a) {
-        out += &wrap("left out  ", &text);
-    }
-    for leg in p.several_legs() {
-        let first = format!("{:<10}", format!("leg {}", leg.number));
-        out += &wrap(&first, &plain(&crate::course::leg(leg)));
-    }
-    if let Some(text) = crate::course::retaken(p) {
-        out += &wrap("retaken   ", &text);
-        let reasons = crate::course::reasons(p);
-        for reason in reasons.iter().take(MAX_RULES) {
-            out += &wrap("          ", &plain(reason));
-        }
-        if let Some(more) = reasons.len().checked_sub(MAX_RULES + 1) {
-            let text = format!("and {} other reasons", more + 1);
-            out += &wrap("          ", &text);
-        }
-    }
-    for row in &p.interruptions {
-        let mut text = format!("{} at {} s", row.kind, number(Some(row.t_s), 1));
-        // The reason for the end of the run is shown above.
-        if !row.ended_run {
-            let _ = write!(text, ": {}", row.reason);
-        }
-        let text = plain(&text);
-        out += &paint.warn(&wrap("event     ", &text));
-    }
-    let studies = if usable {
-        studies::all(a)
-    } else {
-        wrap("studies   ", "withheld: the session is INVALID")
-    };
-    if !studies.is_empty() {
-        out.push('\n');
-        out += &studies;
-    }
-    out
+    Section::plain()
+        .with(Note::new("session", or_missing(&p.session_id)))
+        .with_all(variant)
+        .with_all(changes)
+        .with(rig)
+        .with(Note::new("protocol", protocol))
+        .with(Note::new("run", end))
 }
 
-/// Audit findings, shown before all numbers.
-fn findings(a: &Analysis) -> String {
-    use crate::page::findings::{fault, law};
-    let mut out = String::new();
-    for f in &a.findings {
-        let text = format!("{}. Violated: {}. {}", fault(f), law(f), f.evidence);
-        out += &wrap("fault     ", &plain(&text));
-        out += &wrap("          ", &plain(&format!("do: {}", f.advice)));
+/// What must be read before any number: violations, findings of the audit, warnings.
+fn problems(a: &Analysis) -> Section {
+    let violations = match a.alignment.is_usable() {
+        true => &[][..],
+        false => &a.alignment.violations[..],
+    };
+    let violations = violations.iter().map(|v| Note::new("INVALID", &**v));
+    let findings = a.findings.iter().flat_map(|f| {
+        let (fault, law, evidence) = (fault(f), law(f), &f.evidence);
+        let note = match f.invalidates {
+            true => Note::new("INVALID", format!("{fault}: {evidence}. Violated: {law}.")),
+            false => Note::new("fault", format!("{fault}. Violated: {law}. {evidence}")),
+        };
+        [note, Note::of(format!("do: {}", f.advice))]
+    });
+    let warnings = a.alignment.warnings.iter().chain(&a.warnings).cloned();
+    let warnings = derive::disagreement(a).into_iter().chain(warnings);
+    let warnings = warnings.map(|text| Note::new("warning", text));
+    let notes = violations.chain(findings).chain(warnings);
+    Section::plain().with_all(notes.map(Note::warning))
+}
+
+/// The metrics, and the RMSE counted in other ways.
+fn scored(a: &Analysis) -> Section {
+    let columns = [
+        Column::of_terminals("scored presses", Cells::left(24)),
+        Column::of_terminals("value", Cells::right(7)),
+        Column::of_terminals("", Cells::left(3)),
+        Column::of_terminals("95 % interval", Cells::centre(20)),
+        Column::of_terminals("n", Cells::right(6)),
+        Column::of_terminals("", Cells::left(0)),
+    ];
+    let row = |name: String, value: String, unit: &str, interval: String, n: u32, what: &str| {
+        Row::new([
+            name,
+            value,
+            unit.to_owned(),
+            interval,
+            n.to_string(),
+            what.to_owned(),
+        ])
+    };
+    let mut table = Table::of("scored", "Scored presses", columns);
+    for r in metric_rows(a) {
+        let style = (r.key == "rmse").then_some(Style::Bold);
+        let row = row(r.name, r.value, r.unit, r.interval, r.n, r.what_n);
+        table.add(row.style(style));
     }
-    out
+    if !a.is_valid() {
+        return Section::plain().with(table);
+    }
+    let rmse = &a.scored.rmse_mm;
+    if let Some(share) = a.scored.rmse_diagonal_percent {
+        let interval = interval(rmse, 100.0 / a.rig.outline.diagonal_mm(), 2);
+        let (name, value) = ("RMSE, share of diagonal", number(Some(share), 2));
+        table.add(row(
+            name.to_owned(),
+            value,
+            "%",
+            interval,
+            rmse.n,
+            "presses",
+        ));
+    }
+    let mut millimetres = |name: String, e: &Estimate| {
+        let (value, interval) = (number(e.value, 2), interval(e, 1.0, 2));
+        table.add(row(name, value, "mm", interval, e.n, "presses"));
+    };
+    if a.scored_without_exclusions != a.scored {
+        let all = &a.scored_without_exclusions.rmse_mm;
+        millimetres("RMSE, no exclusions".to_owned(), all);
+    }
+    if a.penalised.failures > 0 {
+        millimetres("RMSE, failures counted".to_owned(), &a.penalised.rmse_mm);
+    }
+    for d in &a.depths {
+        millimetres(format!("RMSE at {} mm depth", d.depth_mm), &d.rmse_mm);
+    }
+    let geometry = derive::geometry_note(a);
+    let geometry = geometry.map(|note| Note::new("geometry", note).warning());
+    Section::plain().with(table).with_all(geometry)
+}
+
+/// The outcomes as a sum.
+fn sum(c: &PressCounts) -> String {
+    format!(
+        "{} planned = {} valid + {} missed + {} invalid + {} excluded",
+        c.planned, c.valid, c.missed, c.invalid, c.excluded
+    )
+}
+
+/// Outcomes of the presses, and why some do not count.
+fn presses(a: &Analysis) -> Section {
+    let c = &a.counts;
+    let wrong = "these counts do not add up: do not trust this result";
+    let wrong = (!c.add_up()).then(|| Note::of(wrong).warning());
+    let plural = if c.sync == 1 { "" } else { "es" };
+    let sync = format!("and {} sync press{plural}, counted apart", c.sync);
+    let f = &a.penalised;
+    let penalty = (a.is_valid() && f.failures > 0).then(|| {
+        let beyond = match f.beyond_penalty {
+            0 => String::new(),
+            n => format!("; {n} of them as their own larger error"),
+        };
+        let penalty = number(Some(f.penalty_mm), 1);
+        let text = format!(
+            "{} failed, each counted as {penalty} mm where failures count{beyond}",
+            f.failures
+        );
+        Note::new("penalty", text)
+    });
+    Section::plain()
+        .with(Note::new("presses", sum(c)))
+        .with_all(wrong)
+        .with_all((c.sync > 0).then(|| Note::of(sync)))
+        .with_all(penalty)
+        .with_all(left_out(a, false))
+        .with_all(left_out(a, true))
+}
+
+/// Clocks, their alignment, and what the calibration made of them.
+fn clocks(a: &Analysis) -> Vec<Note> {
+    let fits = (1..).zip(&a.clocks);
+    let mut notes: Vec<Note> = fits.map(|(k, fit)| clock(k, fit.as_ref())).collect();
+    notes.push(alignment(&a.alignment));
+    if a.is_valid() {
+        notes.extend(studies::calibration(a));
+        let locator = derive::locator_note(a);
+        notes.extend(locator.map(|note| Note::new("locator", note)));
+    }
+    notes
+}
+
+/// Losses, legs, retakes and interruptions.
+fn events(input: &ReportInput<'_>) -> Vec<Note> {
+    let (a, p) = (input.analysis, &input.provenance);
+    let mut notes = Vec::new();
+    for (i, lost) in p.lost_bytes.iter().enumerate().filter(|(_, l)| **l > 0) {
+        let mut text = format!("camera {}: {} bytes lost", i + 1, grouped(*lost));
+        for time in course::losses(p, i) {
+            text += &format!("; {time}");
+        }
+        notes.push(Note::new("loss", text).warning());
+    }
+    let off_sensor = derive::off_sensor(a).into_iter();
+    notes.extend(off_sensor.map(|text| Note::new("left out", text)));
+    let legs = p.several_legs().iter();
+    notes.extend(legs.map(|leg| Note::new(format!("leg {}", leg.number), course::leg(leg))));
+    if let Some(text) = course::retaken(p) {
+        notes.push(Note::new("retaken", text));
+        let reasons = course::reasons(p);
+        let more = reasons.len().saturating_sub(MAX_RULES);
+        notes.extend(reasons.into_iter().take(MAX_RULES).map(Note::of));
+        notes.extend((more > 0).then(|| Note::of(format!("and {more} other reasons"))));
+    }
+    notes.extend(p.interruptions.iter().map(|row| {
+        // The reason for the end of the run is shown above.
+        let why = match row.ended_run {
+            true => String::new(),
+            false => format!(": {}", row.reason),
+        };
+        let text = format!("{} at {} s{why}", row.kind, number(Some(row.t_s), 1));
+        Note::new("event", text).warning()
+    }));
+    notes
 }
 
 /// Rules with their own line; the page lists all.
 const MAX_RULES: usize = 6;
 
-/// Rejected presses, one line per rule.
-fn left_out(a: &Analysis, sync: bool) -> String {
-    let rows = crate::derive::rejections(a, sync);
-    let first = if sync { "sync      " } else { "left out  " };
-    let indent = " ".repeat(first.len());
-    let mut out = String::new();
-    for (i, r) in rows.iter().take(MAX_RULES).enumerate() {
+/// Rejected presses, one line per rule; the run's end and the page give the details.
+fn left_out(a: &Analysis, sync: bool) -> Vec<Note> {
+    let rows = derive::rejections(a, sync);
+    let (shown, others) = rows.split_at(rows.len().min(MAX_RULES));
+    let labels = [if sync { "sync" } else { "left out" }].into_iter();
+    let labels = labels.chain(std::iter::repeat(""));
+    let lines = shown.iter().zip(labels).map(|(r, label)| {
         let text = plain(&format!("{} {}: {}", r.n, r.verdict, r.rule));
-        // One line each; the run's end and the page give the details.
-        let room = WIDTH - first.len();
-        out += &wrap(if i == 0 { first } else { &indent }, &clip(&text, room));
-    }
-    if rows.len() > MAX_RULES {
-        let more: u32 = rows[MAX_RULES..].iter().map(|r| r.n).sum();
-        out += &wrap(
-            &indent,
-            &format!("{more} by {} other rules", rows.len() - MAX_RULES),
-        );
-    }
-    out
+        Note::new(label, clip(&text, WIDTH - 10))
+    });
+    let more = (!others.is_empty()).then(|| {
+        let n: u32 = others.iter().map(|r| r.n).sum();
+        Note::of(format!("{n} by {} other rules", others.len()))
+    });
+    lines.chain(more).collect()
 }
 
 /// The alignment certificate in one or two lines.
-fn alignment_lines(certificate: &Alignment) -> String {
+fn alignment(certificate: &Alignment) -> Note {
     let mut parts = Vec::new();
     for (name, what) in [
         (MapName::Camera1FromBox, "camera 1"),
@@ -381,29 +383,26 @@ fn alignment_lines(certificate: &Alignment) -> String {
         AlignmentStatus::NotCertified => format!("{verdict}; {}", figures.join("; ")),
         _ => format!("{verdict}: {}", figures.join("; ")),
     };
-    wrap("alignment ", &text)
+    Note::new("alignment", text)
 }
 
-fn clock_lines(camera: usize, clock: Option<&ClockFit>) -> String {
-    let first = format!("clock {camera}   ");
-    let Some(c) = clock else {
-        return wrap(
-            &first,
+fn clock(camera: usize, fit: Option<&ClockFit>) -> Note {
+    let label = format!("clock {camera}");
+    let Some(c) = fit else {
+        return Note::new(
+            label,
             "not aligned: neither trigger marks nor sync presses fit",
         );
     };
-    let drift = format!(
-        "{} ± {}",
-        number(Some(c.drift_ppm), digits_of_error(c.drift_se_ppm)),
-        number(Some(c.drift_se_ppm), digits_of_error(c.drift_se_ppm))
-    );
+    let digits = digits_of_error(c.drift_se_ppm);
+    let [drift, error] = [c.drift_ppm, c.drift_se_ppm].map(|v| number(Some(v), digits));
     let text = format!(
-        "drift {drift} ppm, residual rms {} µs, max {} µs, n {} ({} rejected), from {}",
+        "drift {drift} ± {error} ppm, residual rms {} µs, max {} µs, n {} ({} rejected), from {}",
         number(Some(c.residual_rms_us), 2),
         number(Some(c.residual_max_us), 2),
         c.n,
         c.rejected,
         clock_method(c.method)
     );
-    wrap(&first, &text)
+    Note::new(label, text)
 }

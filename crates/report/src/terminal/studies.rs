@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 use skinrig_analysis::result::{
     Analysis, Estimate, Latency, Reduction, ReductionRow, ReferenceCode, Thinning,
 };
-use skinrig_text::{Column, Table};
+use skinrig_text::Column as Cells;
 
-use super::text::{plain, wrap};
+use crate::document::{Column, Note, Row, Section, Table};
 use crate::figures::model_name;
 use crate::format::{interval, number};
 
@@ -15,10 +15,8 @@ use crate::format::{interval, number};
 const FACTORS: [u32; 4] = [1, 16, 256, 1024];
 
 /// The calibration: error, model, reason, and how well it is determined.
-pub(super) fn calibration(a: &Analysis) -> String {
-    let Some(c) = &a.calibration else {
-        return String::new();
-    };
+pub(super) fn calibration(a: &Analysis) -> Option<Note> {
+    let c = a.calibration.as_ref()?;
     let mut text = format!(
         "RMSE {} -> {} mm over {} calibration presses; model {}, {} of {} parameters determined, {} of {} starts agree",
         number(Some(c.rmse_before_mm), 2),
@@ -39,24 +37,19 @@ pub(super) fn calibration(a: &Analysis) -> String {
             c.compared.len()
         );
     }
-    wrap("fit       ", &plain(&text))
+    Some(Note::new("fit", text))
 }
 
 /// All studies that were run.
-pub(super) fn all(a: &Analysis) -> String {
-    let mut out = String::new();
-    out += &areas(a);
-    out += &rates(a);
-    if let Some(l) = &a.latency {
-        out += &latency(l);
-    }
-    if let Some(r) = &a.reduction {
-        out += &reduction(r);
-    }
-    if let Some(r) = &a.reference {
-        out += &reference(r);
-    }
-    out
+pub(super) fn all(a: &Analysis) -> Section {
+    let reduced = a.reduction.as_ref();
+    Section::plain()
+        .with_all(areas(a))
+        .with_all(rates(a))
+        .with_all(a.latency.iter().flat_map(latency))
+        .with_all(reduced.map(reduction))
+        .with_all(reduced.map(reduction_note))
+        .with_all(a.reference.iter().flat_map(reference))
 }
 
 fn with(e: &Estimate, scale: f64, digits: usize) -> String {
@@ -64,14 +57,14 @@ fn with(e: &Estimate, scale: f64, digits: usize) -> String {
     format!("{value} {}", interval(e, scale, digits))
 }
 
-fn areas(a: &Analysis) -> String {
-    let mut out = String::new();
+fn areas(a: &Analysis) -> Vec<Note> {
+    let mut out = Vec::new();
     if let Some(t) = &a.threshold {
         let text = format!(
             "{} cluster events, chosen on {} calibration presses, rejects {} of them",
             t.events, t.n, t.left_out
         );
-        out += &wrap("threshold ", &text);
+        out.push(Note::new("threshold", text));
     }
     if let Some(c) = &a.coverage {
         let text = format!(
@@ -81,13 +74,13 @@ fn areas(a: &Analysis) -> String {
             number(c.probed_mm2, 0),
             c.locations
         );
-        out += &wrap("area      ", &text);
+        out.push(Note::new("area", text));
         let text = format!(
             "{} in the probed area; {} if the RMSE holds over the whole skin",
             with(&c.taxels_probed, 1.0, 1),
             with(&c.taxels_skin, 1.0, 1)
         );
-        out += &wrap("taxels    ", &text);
+        out.push(Note::new("taxels", text));
     }
     if let Some(c) = &a.cmre {
         let text = format!(
@@ -97,15 +90,13 @@ fn areas(a: &Analysis) -> String {
             c.settings.sigma_mm,
             c.percent.n
         );
-        out += &wrap("CMRE      ", &text);
+        out.push(Note::new("CMRE", text));
     }
     out
 }
 
-fn rates(a: &Analysis) -> String {
-    let Some(r) = &a.bit_rates else {
-        return String::new();
-    };
+fn rates(a: &Analysis) -> Option<Note> {
+    let r = a.bit_rates.as_ref()?;
     let text = format!(
         "press {} kB/s, idle {} kB/s at {} bits per event, n {}",
         with(&r.press_bytes_per_s, 1e-3, 1),
@@ -113,10 +104,10 @@ fn rates(a: &Analysis) -> String {
         r.bits_per_event,
         r.press_bytes_per_s.n
     );
-    wrap("data      ", &text)
+    Some(Note::new("data", text))
 }
 
-fn latency(l: &Latency) -> String {
+fn latency(l: &Latency) -> Vec<Note> {
     let chosen = l.chosen.and_then(|i| l.sweep.get(i as usize));
     let text = format!(
         "{} % of {} trials detected at h {}; onsets 5-95 % within {} ms; {} false alarms/s",
@@ -126,12 +117,12 @@ fn latency(l: &Latency) -> String {
         with(&l.width_ms, 1.0, 1),
         with(&l.false_alarms_per_s, 1.0, 2)
     );
-    let mut out = wrap("detection ", &text);
+    let mut out = vec![Note::new("detection", text)];
     if let Some(list) = crate::detector::false_detections(l) {
         let text = format!("fired before contact, and therefore not detected: {list}");
-        out += &wrap("          ", &text);
+        out.push(Note::of(text));
     }
-    out += &match &l.from_contact {
+    out.push(match &l.from_contact {
         Some(c) => {
             let text = format!(
                 "median {} ms after measured contact, ± {} ms each; 5 % {} ms, 95 % {} ms; {} before contact, {} missed",
@@ -142,13 +133,13 @@ fn latency(l: &Latency) -> String {
                 c.before_contact,
                 c.missed
             );
-            wrap("latency   ", &text)
+            Note::new("latency", text)
         }
-        None => wrap(
-            "latency   ",
+        None => Note::new(
+            "latency",
             "not from contact: contacts were not measured on an independent clock",
         ),
-    };
+    });
     if let Some(r) = &l.reduced {
         let text = format!(
             "{} % detected, 5-95 % within {} ms, {} false alarms/s",
@@ -156,69 +147,57 @@ fn latency(l: &Latency) -> String {
             with(&r.width_ms, 1.0, 1),
             with(&r.false_alarms_per_s, 1.0, 2)
         );
-        out += &wrap(
-            "          ",
-            &format!("1/{} of the events: {text}", r.factor),
-        );
+        out.push(Note::of(format!("1/{} of the events: {text}", r.factor)));
     }
-    for remark in crate::detector::remarks(l) {
-        out += &wrap("          ", &remark);
-    }
+    out.extend(crate::detector::remarks(l).into_iter().map(Note::of));
     out
 }
 
-fn reduction(study: &Reduction) -> String {
-    let within = format!("within {} mm (%)", study.within_mm);
-    let table = Table::new([
-        Column::left(9),
-        Column::right(6),
-        Column::right(22),
-        Column::right(9),
-        Column::right(17),
-        Column::right(12),
-    ])
-    .gap(1);
-    let head = [
-        "reduction",
-        "1/k",
-        "RMSE (mm)",
-        "pass (%)",
-        &within,
-        "located (%)",
+fn reduction(study: &Reduction) -> Table {
+    let columns = [
+        Column::of_terminals("reduction", Cells::left(9)),
+        Column::of_terminals("1/k", Cells::right(6)),
+        Column::of_terminals("RMSE (mm)", Cells::right(22)),
+        Column::of_terminals("pass (%)", Cells::right(9)),
+        Column::of_terminals(
+            format!("within {} mm (%)", study.within_mm),
+            Cells::right(17),
+        ),
+        Column::of_terminals("located (%)", Cells::right(12)),
     ];
-    let mut out = table.row(head) + "\n";
-    for curve in &study.curves {
+    let rows = study.curves.iter().flat_map(|curve| {
         let kind = match curve.thinning {
             Thinning::Exact => "exact",
             Thinning::Bernoulli => "Bernoulli",
         };
         let shown = curve.rows.iter().filter(|r| FACTORS.contains(&r.factor));
-        for row in shown {
-            out += &(table.row(reduction_cells(kind, row)) + "\n");
-        }
-    }
-    let text = format!(
+        shown.map(move |row| reduction_row(kind, row))
+    });
+    Table::of("reduction", "Data reduction", columns).with(rows)
+}
+
+fn reduction_note(study: &Reduction) -> Note {
+    Note::of(format!(
         "n {} presses, {} seeds; pass below {} mm, the 95th percentile at 1/1",
         study.presses,
         study.seeds,
         number(study.pass_threshold_mm, 2)
-    );
-    out + &wrap("          ", &text)
+    ))
 }
 
-fn reduction_cells(kind: &str, row: &ReductionRow) -> [String; 6] {
+fn reduction_row(kind: &str, row: &ReductionRow) -> Row {
     let percent = |e: &Estimate| number(e.value.map(|v| 100.0 * v), 1);
-    [
+    Row::new([
         kind.to_owned(),
         row.factor.to_string(),
         with(&row.rmse_mm, 1.0, 2),
         percent(&row.pass_rate),
         percent(&row.within_rate),
         percent(&row.located_rate),
-    ]
+    ])
 }
 
-fn reference(r: &ReferenceCode) -> String {
+fn reference(r: &ReferenceCode) -> Vec<Note> {
     let text = format!(
         "RMSE {} mm (x {}, y {}) in-sample, {} of {} presses inside the square: evaluated as in the public code, not \
          comparable with the numbers above",
@@ -228,18 +207,17 @@ fn reference(r: &ReferenceCode) -> String {
         r.inside,
         r.presses
     );
-    let mut out = wrap("reference ", &text);
+    let mut out = vec![Note::new("reference", text)];
     if !r.calibrated {
-        out += &wrap(
-            "          ",
+        out.push(Note::of(
             "nominal camera geometry: these presses determine no plausible calibration with the public code's choices",
-        );
+        ));
     }
     if !r.parameters.is_empty() {
         let each = r.parameters.iter();
         let each = each.map(|(name, value)| format!("{name} {}", number(Some(*value), 3)));
         let text = format!("parameters: {}", each.collect::<Vec<_>>().join(", "));
-        out += &wrap("          ", &text);
+        out.push(Note::of(text));
     }
     let shown = r
         .reduction
@@ -255,7 +233,7 @@ fn reference(r: &ReferenceCode) -> String {
         let text = format!(
             "pass rate in % as in the public code (missing presses counted as failed): {rates}"
         );
-        out += &wrap("          ", &text);
+        out.push(Note::of(text));
     }
     out
 }

@@ -1,76 +1,73 @@
 //! Owns the presentation of an alarm on a page, for trends and nights.
 
-use serde::Serialize;
 use skinrig_nightly::Cause;
-use skinrig_nightly::trend::{Alarm, Report};
+use skinrig_nightly::trend::{Alarm, Chart, Report};
 
 use super::name::{series_name, with_names};
 use super::{Links, cause, moved, since};
+use crate::document::{Block, Note, Text, Tone, paragraph, soft};
 
-/// An alarm for the macro in `assets/trend/alarm.html`.
-#[derive(Debug, Serialize)]
-pub(crate) struct AlarmCard {
+/// An alarm of a page.
+pub(crate) struct AlarmView<'a> {
     pub id: String,
     pub title: String,
-    /// `warn` or `bad`.
-    pub tone: &'static str,
-    pub cause: String,
-    pub changed: Vec<String>,
-    pub night: Option<String>,
-    pub session: Option<String>,
-    pub commands: Vec<String>,
-    pub missing: Option<String>,
-    pub series: Vec<DriftedSeries>,
-}
-
-/// A series of an alarm.
-#[derive(Debug, Serialize)]
-pub(crate) struct DriftedSeries {
-    pub name: String,
-    pub by: String,
-    /// Index of its chart in the report.
-    #[serde(skip)]
-    pub chart: usize,
+    /// Cause, changes, links and commands.
+    pub blocks: Vec<Block>,
+    /// Drifted series, with name and size of the drift.
+    pub charts: Vec<(&'a Chart, Text)>,
 }
 
 /// Presents the alarms of `report`, with their links.
-pub(crate) fn alarm_cards(report: &Report, links: &[Links]) -> Vec<AlarmCard> {
+pub(crate) fn alarms<'a>(report: &'a Report, links: &[Links]) -> Vec<AlarmView<'a>> {
     let none = Links::default();
     let links = links.iter().chain(std::iter::repeat(&none));
     let alarms = report.alarms.iter().zip(links);
-    alarms
-        .map(|(alarm, l)| alarm_card(report, alarm, l))
-        .collect()
+    alarms.map(|(alarm, l)| view(report, alarm, l)).collect()
 }
 
-fn alarm_card(report: &Report, alarm: &Alarm, links: &Links) -> AlarmCard {
-    let series = |at: &usize| DriftedSeries {
-        name: series_name(&report.charts[*at].series.name),
-        by: moved(&report.charts[*at]),
-        chart: *at,
+fn view<'a>(report: &'a Report, alarm: &Alarm, links: &Links) -> AlarmView<'a> {
+    let series = |at: &usize| {
+        let chart = &report.charts[*at];
+        let name = series_name(&chart.series.name);
+        (chart, format!("{name}: {}", moved(chart)).into())
     };
-    AlarmCard {
-        id: alarm.id.clone(),
-        title: format!(
-            "{} series moved, {}",
-            alarm.charts.len(),
-            since(report, alarm)
-        ),
-        tone: tone(alarm.attribution.cause),
-        cause: with_names(&cause(alarm), report),
-        changed: alarm.attribution.changed.clone(),
-        night: links.night.clone(),
-        session: links.session.clone(),
-        commands: links.commands.clone(),
-        missing: links.missing.clone(),
-        series: alarm.charts.iter().map(series).collect(),
+    let title = format!(
+        "{} series moved, {}",
+        alarm.charts.len(),
+        since(report, alarm)
+    );
+    let tone = match alarm.attribution.cause {
+        Some(Cause::Infrastructure) => Tone::Warning,
+        _ => Tone::Bad,
+    };
+    let cause = with_names(&cause(alarm), report);
+    let cause = Note::of(format!("Probable cause: {cause}")).tone(tone);
+    let changed = alarm.attribution.changed.iter();
+    let mut raised = Text::from(format!("Raised by night {}", alarm.id));
+    for (link, words) in [
+        (&links.night, "its page"),
+        (&links.session, "the session that shows it"),
+    ] {
+        if let Some(link) = link {
+            raised = raised.dot().link(link, words);
+        }
     }
-}
-
-/// CSS class for the colour of a cause.
-const fn tone(cause: Option<Cause>) -> &'static str {
-    match cause {
-        Some(Cause::Infrastructure) => "warn",
-        _ => "bad",
+    let mut blocks = vec![Block::Note(cause)];
+    blocks.extend(changed.map(|c| soft(format!("Changed: {c}"))));
+    blocks.push(paragraph(raised));
+    if !links.commands.is_empty() {
+        blocks.push(Block::Commands(links.commands.clone()));
+    }
+    blocks.extend(
+        links
+            .missing
+            .iter()
+            .map(|why| soft(format!("No session: {why}"))),
+    );
+    AlarmView {
+        id: alarm.id.clone(),
+        title,
+        blocks,
+        charts: alarm.charts.iter().map(series).collect(),
     }
 }

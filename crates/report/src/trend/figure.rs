@@ -4,8 +4,9 @@ use skinrig_nightly::trend::report::{day, format_number as number};
 use skinrig_nightly::trend::{Chart, Report};
 
 use super::name::series_name;
+use crate::markup::Markup;
 use crate::plot::{Axis, LeftTexts, Place, Plot, Scale, band, extent};
-use crate::svg::{Svg, dots, polyline};
+use crate::svg::{dots, polyline};
 
 /// Sizes of a chart in an alarm and in the table, px.
 const LARGE: (f64, f64) = (860.0, 250.0);
@@ -76,8 +77,8 @@ pub(super) fn small(report: &Report, chart: &Chart) -> String {
     svg.finish()
 }
 
-fn begin(chart: &Chart, (width, height): (f64, f64)) -> Svg {
-    let mut svg = Svg::new();
+fn begin(chart: &Chart, (width, height): (f64, f64)) -> Markup {
+    let mut svg = Markup::new();
     let view = format!("0 0 {width} {height}");
     svg.open(
         "svg",
@@ -95,7 +96,7 @@ fn begin(chart: &Chart, (width, height): (f64, f64)) -> Svg {
 }
 
 /// Reference band, limits, change point, values.
-fn marks(svg: &mut Svg, chart: &Chart, &Place { x, y }: &Place, large: bool) {
+fn marks(svg: &mut Markup, chart: &Chart, &Place { x, y }: &Place, large: bool) {
     let (left, right) = (x.px.0, x.px.1);
     if let Some(r) = chart.reference {
         // Two standard deviations of a new night: roughly where three nights in a row raise an alarm.

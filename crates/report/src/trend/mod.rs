@@ -9,13 +9,12 @@ mod terminal;
 use skinrig_nightly::trend::report::{cause_name, day, format_change, format_number as number};
 use skinrig_nightly::trend::{Alarm, Chart, Report};
 
-pub(crate) use alarm::alarm_cards;
+pub(crate) use alarm::alarms;
 pub(crate) use name::with_names;
 pub use page::page;
 pub use terminal::{Style, sentence, terminal};
 
-/// Alarm macro common to all pages, and its style.
-pub(crate) const ALARM_TEMPLATE: &str = include_str!("../../assets/trend/alarm.html");
+/// Style of an alarm on all pages.
 pub(crate) const ALARM_CSS: &str = include_str!("../../assets/trend/alarm.css");
 
 /// Files of an alarm, as links relative to the written page.

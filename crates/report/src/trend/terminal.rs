@@ -4,9 +4,12 @@ use std::fmt::Write as _;
 
 use skinrig_nightly::trend::report::format_number as number;
 use skinrig_nightly::trend::{Chart, Report};
-use skinrig_text::{Blocks, Column, LongWords, Paint, Table, WIDTH, cut, hang, sparkline, wrap};
+use skinrig_text::{
+    Blocks, Column as Cells, LongWords, Paint, Style as Look, WIDTH, cut, hang, sparkline, wrap,
+};
 
 use super::{Links, cause, moved, since, state, with_unit};
+use crate::document::{Block, Column, Row, Table, lines};
 use crate::terminal::plain;
 
 /// Columns of the name of a series; ASCII has no mark for a cut.
@@ -71,12 +74,8 @@ pub fn terminal(
     let charts = report.charts.iter().filter(|c| shown(&c.series.name));
     let charts: Vec<&Chart> = charts.collect();
     if !charts.is_empty() {
-        let nights = format!("last {} nights", SPARK.min(style.nights));
-        let head = table().row(["series", &nights, "last", " state"]);
-        let _ = writeln!(out, "\n{head}");
-    }
-    for chart in charts {
-        line(&mut out, report, chart, style);
+        out.push('\n');
+        out += &lines(&[Block::from(series(report, &charts, style))], paint);
     }
     out
 }
@@ -88,25 +87,27 @@ pub fn sentence(report: &Report) -> String {
     wrap(&text, WIDTH, LongWords::Keep).join("\n")
 }
 
-fn table() -> Table {
-    let columns = [Column::left(NAME), Column::left(SPARK), Column::right(13)];
-    Table::new(columns).gap(1)
-}
-
-fn line(out: &mut String, report: &Report, chart: &Chart, style: Style) {
-    let last = chart.nights.last();
-    let last = last.map_or_else(
-        || "-".to_owned(),
-        |n| with_unit(n.value, &chart.series.unit),
-    );
-    let line = table().row([
-        cut(&plain(&chart.series.name), NAME).to_owned(),
-        spark(report, chart, style),
-        last,
-        format!(" {}", state(chart)),
-    ]);
-    let paint = Paint::new(style.color && chart.open_excursion().is_some());
-    let _ = writeln!(out, "{}", paint.bold(&line));
+/// One row per series, under the identifiers that commands take.
+fn series(report: &Report, charts: &[&Chart], style: Style) -> Table {
+    let nights = format!("last {} nights", SPARK.min(style.nights));
+    let columns = [
+        Column::of_terminals("series", Cells::left(NAME)),
+        Column::of_terminals(nights, Cells::left(SPARK)),
+        Column::of_terminals("last", Cells::right(13)),
+        Column::of_terminals("state", Cells::left(0).after(1)),
+    ];
+    let row = |chart: &&Chart| {
+        let last = chart.nights.last();
+        let last = last.map(|n| with_unit(n.value, &chart.series.unit));
+        let row = Row::new([
+            cut(&plain(&chart.series.name), NAME).to_owned(),
+            spark(report, chart, style),
+            last.unwrap_or_else(|| "-".to_owned()),
+            state(chart).to_owned(),
+        ]);
+        row.style(chart.open_excursion().map(|_| Look::Bold))
+    };
+    Table::of("series", "Series", columns).with(charts.iter().map(row))
 }
 
 /// Sparkline: one block per night, the centre of the reference in the middle; a space for a night without a value.

@@ -218,10 +218,17 @@ fn what_a_device_says_neither_moves_the_cursor_nor_becomes_markup() {
     let mut night = bad_night();
     night.checks[1].attempts[0].evidence[0].what = "\u{1b}[2J<b>x</b> \u{7}".to_owned();
     assert!(!tree(&night, Paint::new(false)).contains(['\u{1b}', '\u{7}']));
-    let page = html(&night, Trends::NotRequested).unwrap_or_default();
+    let page = html(&night, Trends::NotRequested);
     assert!(page.contains("&lt;b&gt;x"), "{page}");
     assert!(!page.contains("<b>x</b>"));
     assert!(!page.contains("<script>alert"));
+}
+
+/// Keeps a page for a look, in the folder that the variable names.
+fn keep(name: &str, page: &str) {
+    if let Some(folder) = std::env::var_os("SKINRIG_REPORT_OUT") {
+        let _ = std::fs::write(std::path::Path::new(&folder).join(name), page);
+    }
 }
 
 /// States of the four causes on the page: `rig bad, skin unknown, ...`.
@@ -232,24 +239,26 @@ fn places(page: &str) -> Vec<&str> {
 
 #[test]
 fn the_page_says_first_where_to_look() {
-    let bad = html(&bad_night(), Trends::NotRequested).unwrap_or_default();
+    let bad = html(&bad_night(), Trends::NotRequested);
     assert!(bad.contains("<h1 data-testid=\"headline\">Look at the rig</h1>"));
     // Skin: its campaign is unusable because the rig was at fault.
     assert_eq!(places(&bad), ["bad", "unknown", "ok", "ok"]);
     assert!(bad.contains("href=\"golden.report.html\""));
     assert!(bad.contains("data-testid=\"emulated\""));
-    let good = html(&good_night(), Trends::NotRequested).unwrap_or_default();
+    let good = html(&good_night(), Trends::NotRequested);
+    keep("night-bad.html", &bad);
+    keep("night-good.html", &good);
     assert!(good.contains(">All within limits</h1>"));
     assert_eq!(places(&good), ["ok", "unknown", "ok", "ok"]);
     let mut unfinished = good_night();
     unfinished.finished = false;
-    let page = html(&unfinished, Trends::NotRequested).unwrap_or_default();
+    let page = html(&unfinished, Trends::NotRequested);
     assert!(page.contains("data-testid=\"unfinished\""));
 }
 
 #[test]
 fn the_page_loads_nothing_and_runs_only_its_own_script() {
-    let page = html(&bad_night(), Trends::NotRequested).unwrap_or_default();
+    let page = html(&bad_night(), Trends::NotRequested);
     assert!(page.contains("default-src 'none'"));
     assert!(page.contains("script-src 'sha256-"));
     for foreign in ["http://", "https://", "src=\"", "@import", "<link"] {

@@ -6,7 +6,7 @@ use skinrig_nightly::{Night, Verdict};
 use skinrig_report::night::{Trends, html};
 use skinrig_report::trend::Links;
 
-use crate::{bad_night, good_night};
+use crate::{bad_night, good_night, keep};
 
 const HOSTILE: &str = "golden/<b>\u{1b}[2J/press_events";
 
@@ -49,7 +49,7 @@ fn page(night: &Night, report: &Report) -> String {
         links: &links,
         page: "trends.html",
     };
-    html(night, trends).unwrap()
+    html(night, trends)
 }
 
 fn headline(page: &str) -> &str {
@@ -61,6 +61,7 @@ fn headline(page: &str) -> &str {
 fn what_moved_stands_in_the_headline_and_at_its_place() {
     let moved = report(&[HOSTILE], 30, 26);
     let good = page(&good_night(), &moved);
+    keep("night-moved.html", &good);
     assert_eq!(
         headline(&good),
         "All within limits, but the skin probably moved"
@@ -94,7 +95,7 @@ fn nothing_is_said_to_have_stood_still_before_there_is_a_reference() {
     let young = page(&good_night(), &report(&[HOSTILE], 11, 11));
     assert!(young.contains("too few nights for trends: 11 of the 12"));
     assert!(!young.contains("has not moved"));
-    let unavailable = html(&good_night(), Trends::Unavailable("<i>no</i> history")).unwrap();
+    let unavailable = html(&good_night(), Trends::Unavailable("<i>no</i> history"));
     assert!(unavailable.contains("No trends tonight: &lt;i&gt;no"));
     assert!(!unavailable.contains("has not moved"));
 }

@@ -12,7 +12,7 @@ fn clocks_robot_and_tradeoff_are_drawn_or_their_absence_is_told() {
     let mut with_reason = input(&analysis);
     let why = std::io::Error::other("s.tradeoff.json: expected <a> result");
     with_reason.tradeoff = Some(Err(&why));
-    let page = html(&with_reason).unwrap();
+    let page = html(&with_reason);
     assert!(page.contains("data-testid=\"tradeoff-unreadable\""));
     assert!(page.contains("expected &lt;a&gt; result") && !page.contains("\"no-tradeoff\""));
     let clocks = skinrig_report::figures::clock_residuals(&with_reason).unwrap();
@@ -39,7 +39,7 @@ fn clocks_robot_and_tradeoff_are_drawn_or_their_absence_is_told() {
     );
     analysis.motion = None;
     analysis.alignment.residuals.clear();
-    let page = html(&input(&analysis)).unwrap();
+    let page = html(&input(&analysis));
     for id in ["no-clock-residuals", "no-pose", "no-tradeoff"] {
         assert!(page.contains(&format!("data-testid=\"{id}\"")), "{id}");
     }
@@ -71,7 +71,7 @@ fn unpacked(column: &serde_json::Value) -> Vec<serde_json::Value> {
 #[test]
 fn packed_columns_hold_every_cell() {
     let analysis = support::analysis(4, 3);
-    let page = html(&input(&analysis)).unwrap();
+    let page = html(&input(&analysis));
     let data = page.split("id=\"report-data\">").nth(1).unwrap();
     let data: serde_json::Value =
         serde_json::from_str(data.split("</script>").next().unwrap()).unwrap();

@@ -14,12 +14,9 @@ use nights::Nights;
 const EVENTS_IN_WORDS: &str = "skin: press events (golden)";
 const EVENTS: &str = "golden/skin/press_events";
 
-/// Reads a page and restores its escaped slashes.
 #[track_caller]
 fn read(page: &Path) -> String {
-    std::fs::read_to_string(page)
-        .unwrap()
-        .replace("&#x2f;", "/")
+    std::fs::read_to_string(page).unwrap()
 }
 
 #[track_caller]

@@ -6,8 +6,9 @@ use skinrig_model::Point2;
 use super::{foot, scales};
 use crate::colour::{diverging, viridis};
 use crate::format::number;
+use crate::markup::Markup;
 use crate::plot::{Axis, Figure, Place, Plot, Sheet, WIDE, extent, scale_end};
-use crate::svg::{Px, Svg, polyline};
+use crate::svg::{Px, polyline};
 
 /// Maps of the first skin and of skin `k`.
 pub(in crate::compare) fn maps(result: &Comparison, k: usize) -> Option<Figure> {
@@ -132,7 +133,7 @@ fn tooltip(location: &Location) -> String {
         .join("\n")
 }
 
-fn disc(svg: &mut Svg, (x, y): (f64, f64), r: f64, fill: &str, ring: bool, location: &Location) {
+fn disc(svg: &mut Markup, (x, y): (f64, f64), r: f64, fill: &str, ring: bool, location: &Location) {
     let class = if ring { "disc sure" } else { "disc" };
     svg.open(
         "circle",
@@ -149,7 +150,7 @@ fn disc(svg: &mut Svg, (x, y): (f64, f64), r: f64, fill: &str, ring: bool, locat
 }
 
 fn error_disc(
-    svg: &mut Svg,
+    svg: &mut Markup,
     at: (f64, f64),
     r: f64,
     here: &LocationComparison,
@@ -167,7 +168,14 @@ fn error_disc(
     }
 }
 
-fn difference_disc(svg: &mut Svg, at: (f64, f64), r: f64, location: &Location, k: usize, end: f64) {
+fn difference_disc(
+    svg: &mut Markup,
+    at: (f64, f64),
+    r: f64,
+    location: &Location,
+    k: usize,
+    end: f64,
+) {
     let here = &location.skins[k];
     let Some(difference) = here.difference_mm else {
         return;

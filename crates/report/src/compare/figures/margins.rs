@@ -37,11 +37,12 @@ pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<Figur
     let names = rows.iter().map(|(row, ..)| row.name.clone());
     let mut plot = Plot::new(x, Axis::categories(names, "").downwards())
         .title(format!("← {letter} worse"))
-        .note(format!("{letter} better →"))
-        .draw(|svg, place| {
-            let (_, top, _, height) = place.frame();
+        .draw(move |svg, place| {
+            let (frame, top, width, height) = place.frame();
             let (left, right) = (place.x.at(-1.0), place.x.at(1.0));
             rectangle(svg, "tile", (left, top, right - left, height));
+            let better = format!("{letter} better →");
+            svg.text((frame + width, top - 9.0), "panel", "end", &better);
             svg.text(
                 (place.middle().0, top - 9.0),
                 "note",

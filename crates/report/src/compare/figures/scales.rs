@@ -1,8 +1,8 @@
 //! Owns the colour scales of the maps. Errors and differences have the same number of px per mm.
 
 use crate::colour::{diverging, viridis};
+use crate::markup::Markup;
 use crate::plot::{Sample, Scale, colour_bar, column};
-use crate::svg::Svg;
 
 /// Height of everything below the axes of the maps, px.
 pub(super) const HEIGHT: f64 = 96.0;
@@ -23,7 +23,7 @@ const LEGEND: [(Sample, &str); 3] = [
 ];
 
 /// Scale of the errors up to `end` mm, below the map that starts at `(left, y)`. Half as long as the scale of differences.
-pub(super) fn errors(svg: &mut Svg, (left, y): (f64, f64), width: f64, end: f64) {
+pub(super) fn errors(svg: &mut Markup, (left, y): (f64, f64), width: f64, end: f64) {
     let scale = Scale::new((0.0, end), (left, left + width / 2.0));
     colour_bar(svg, scale, (y, y + 13.0), false, viridis, None);
     svg.text((left, y + 50.0), "label", "start", "mean error (mm)");
@@ -31,7 +31,7 @@ pub(super) fn errors(svg: &mut Svg, (left, y): (f64, f64), width: f64, end: f64)
 
 /// Scale of the differences.
 pub(super) fn differences(
-    svg: &mut Svg,
+    svg: &mut Markup,
     (left, y): (f64, f64),
     width: f64,
     end: f64,
@@ -63,6 +63,6 @@ pub(super) fn differences(
 }
 
 /// Meaning of the marks.
-pub(super) fn marks(svg: &mut Svg, (left, y): (f64, f64)) {
+pub(super) fn marks(svg: &mut Markup, (left, y): (f64, f64)) {
     column(svg, (left, y + 4.0), &LEGEND);
 }
