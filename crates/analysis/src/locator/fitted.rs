@@ -4,9 +4,10 @@ use nalgebra::DMatrix;
 use skinrig_model::{Locator, Point2, SkinOutline, StereoGeometry};
 
 use super::inverse::Inverse;
-use super::prediction::{Prediction, ellipse};
+use super::prediction::{Prediction, Uncertainty, ellipse};
 use super::rays::Rays;
 use super::reading::Reading;
+use super::regions::Regions;
 use super::robust::response;
 use crate::result::{Analysis, LocationOutcome, LocatorModel, Region};
 use crate::triangulate::locate;
@@ -100,6 +101,7 @@ impl Fitted {
                 geometry_covariance: None,
                 cameras: None,
                 prior: None,
+                inflation: 1.0,
                 levels: Vec::new(),
             },
             way: Way::Rays(Box::new(Rays::new(&geometry, None))),
@@ -126,8 +128,8 @@ impl Fitted {
         &self.model
     }
 
-    pub(super) fn with_levels(mut self, levels: Vec<crate::result::RegionLevel>) -> Self {
-        self.model.levels = levels;
+    pub(super) fn with_regions(mut self, regions: Regions) -> Self {
+        (self.model.inflation, self.model.levels) = (regions.inflation, regions.levels);
         self
     }
 
@@ -137,7 +139,8 @@ impl Fitted {
         let prediction = self.predict(features)?;
         let factor = self.model.levels.iter().find(|l| l.level == LEVEL);
         let region = prediction
-            .covariance
+            .uncertainty
+            .and_then(|u| u.covariance(self.model.inflation))
             .zip(factor)
             .and_then(|(covariance, level)| ellipse(covariance, level.factor));
         Some(Location {
@@ -186,20 +189,19 @@ impl Fitted {
             Way::Rays(rays) => rays,
         };
         let crossing = rays.crossing(features.columns)?;
-        let covariance = self.model.scatter.map(|scatter| {
+        let uncertainty = self.model.scatter.map(|scatter| {
             let fixed = scatter.fixed_mm * scatter.fixed_mm;
             let column_px2 = scatter.column_px * scatter.column_px * relative;
-            let term = |i: usize| column_px2 * crossing.by_columns[i] + crossing.from_parameters[i];
-            [fixed + term(0), term(1), fixed + term(2)]
+            let by_columns = crossing.by_columns.map(|v| column_px2 * v);
+            Uncertainty::Crossing {
+                scatter: [fixed + by_columns[0], by_columns[1], fixed + by_columns[2]],
+                model: crossing.from_parameters,
+            }
         });
-        let finite = crossing
-            .at
-            .iter()
-            .chain(covariance.iter().flatten())
-            .all(|v| v.is_finite());
+        let finite = crossing.at.iter().all(|v| v.is_finite());
         finite.then_some(Prediction {
             at: crossing.at,
-            covariance,
+            uncertainty,
             extrapolated: false,
         })
     }

@@ -2,7 +2,7 @@
 //! the positions of the calibration presses as prior.
 
 use super::field::Field;
-use super::prediction::{Covariance, Prediction, inverted};
+use super::prediction::{ColumnUncertainty, Covariance, Prediction, Uncertainty, inverted};
 use super::reading::Reading;
 use crate::result::{FieldModel, PositionPrior};
 
@@ -97,16 +97,22 @@ impl Inverse {
         Some(inverse)
     }
 
-    /// Variance of a column about the expected one, px²: its scatter, the field's, and the geometry's where the field knows
-    /// nothing.
-    fn variance(&self, read: &Readings, at: [f64; 2]) -> [f64; 2] {
+    /// Variance of the expected column, px²: that of the field, and that of the geometry where the field knows nothing.
+    fn model_variance(&self, read: &Readings, at: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|k| {
             let open = self.fields[k].open(at);
             let slope = read.slopes[k];
             let geometry =
                 self.reading.parameter_variance(k, at, read.columns[k]) / (slope * slope);
-            read.noise[k] + self.fields[k].variance(open) + open * geometry
+            self.fields[k].variance(open) + open * geometry
         })
+    }
+
+    /// Change of what a camera is expected to read, in columns per mm.
+    fn slope(&self, read: &Readings, k: usize, at: [f64; 2]) -> [f64; 2] {
+        let (_, by) = self.reading.expected(k, at);
+        let (_, field_by) = self.fields[k].value(at);
+        [0, 1].map(|axis| by[axis] / read.slopes[k] + field_by[axis])
     }
 
     /// Half the squared distance from the prior's centre, and its slope.
@@ -151,18 +157,23 @@ impl Inverse {
                 .map(|[fixed, column]| fixed + column * response),
         };
         let mut at = self.start(&read)?;
-        let mut normal = None;
+        let mut model = [0.0; 2];
         for _ in 0..ROUNDS {
-            let variance = self.variance(&read, at);
-            let (reached, found) = self.descend(&read, variance, at);
-            (at, normal) = (reached, Some(found));
+            model = self.model_variance(&read, at);
+            let variance = [0, 1].map(|k| read.noise[k] + model[k]);
+            at = self.descend(&read, variance, at);
         }
         let open = [0, 1].map(|k| self.fields[k].open(at));
-        let covariance = inverted(normal?.matrix)?;
-        let finite = at.iter().chain(&covariance).all(|v| v.is_finite());
+        let columns = [0, 1].map(|k| ColumnUncertainty {
+            slope: self.slope(&read, k, at),
+            scatter: read.noise[k],
+            model: model[k],
+        });
+        let prior = self.precision;
+        let finite = at.iter().all(|v| v.is_finite());
         finite.then_some(Prediction {
             at,
-            covariance: Some(covariance),
+            uncertainty: Some(Uncertainty::Columns { prior, columns }),
             extrapolated: [0, 1].iter().any(|k| self.fields[*k].is_beyond(open[*k])),
         })
     }
@@ -182,7 +193,7 @@ impl Inverse {
     }
 
     /// Gauss-Newton steps, halved until they lead down.
-    fn descend(&self, read: &Readings, variance: [f64; 2], from: [f64; 2]) -> ([f64; 2], Normal) {
+    fn descend(&self, read: &Readings, variance: [f64; 2], from: [f64; 2]) -> [f64; 2] {
         let (mut at, mut normal) = (from, self.normal(read, variance, from));
         for _ in 0..STEPS {
             let Some([xx, xy, yy]) = inverted(normal.matrix) else {
@@ -206,6 +217,6 @@ impl Inverse {
             let Some(found) = lower else { break };
             (at, normal) = found;
         }
-        (at, normal)
+        at
     }
 }

@@ -132,6 +132,7 @@ impl Method for Geometry {
             geometry_covariance: rows(start),
             cameras: None,
             prior: None,
+            inflation: 1.0,
             levels: Vec::new(),
         };
         let fitted = Fitted::new(Locator::Geometry, start.geometry, model);
@@ -223,6 +224,7 @@ fn with_fields(
         geometry_covariance: rows(start).filter(|_| bearings),
         cameras: Some([camera(0, one), camera(1, two)]),
         prior: Some(prior(presses)),
+        inflation: 1.0,
         levels: Vec::new(),
     };
     let fitted = Fitted::new(locator, start.geometry, model).ok_or(Unfit::Degenerate)?;

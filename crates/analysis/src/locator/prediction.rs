@@ -5,12 +5,61 @@ use crate::result::Region;
 /// Symmetric 2 x 2 matrix: xx, xy, yy.
 pub(super) type Covariance = [f64; 3];
 
-/// Position and predicted covariance.
+/// A position and what is known about its error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Prediction {
     pub at: [f64; 2],
-    pub covariance: Option<Covariance>,
+    pub uncertainty: Option<Uncertainty>,
     pub extrapolated: bool,
+}
+
+/// Scatter of a press and uncertainty of the model, kept apart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Uncertainty {
+    /// Of the crossing of two rays, mm².
+    Crossing {
+        scatter: Covariance,
+        model: Covariance,
+    },
+    /// Of the position that explains both columns: precision of the prior, 1/mm², and the columns.
+    Columns {
+        prior: Covariance,
+        columns: [ColumnUncertainty; 2],
+    },
+}
+
+/// How well the column of one camera is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ColumnUncertainty {
+    /// Change per mm, px.
+    pub slope: [f64; 2],
+    /// Variance from press to press, px².
+    pub scatter: f64,
+    /// Variance of the expected column, px².
+    pub model: f64,
+}
+
+impl Uncertainty {
+    /// Covariance of the position with the model's variance multiplied by `inflation`; `None` if degenerate.
+    pub(super) fn covariance(&self, inflation: f64) -> Option<Covariance> {
+        match self {
+            Self::Crossing { scatter, model } => {
+                let sum = [0, 1, 2].map(|i| scatter[i] + inflation * model[i]);
+                sum.iter().all(|v| v.is_finite()).then_some(sum)
+            }
+            Self::Columns { prior, columns } => {
+                let mut precision = *prior;
+                for column in columns {
+                    let variance = column.scatter + inflation * column.model;
+                    let [x, y] = column.slope;
+                    precision[0] += x * x / variance;
+                    precision[1] += x * y / variance;
+                    precision[2] += y * y / variance;
+                }
+                inverted(precision)
+            }
+        }
+    }
 }
 
 /// Squared Mahalanobis distance of an error; `None` for a degenerate covariance.

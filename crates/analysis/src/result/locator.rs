@@ -75,6 +75,9 @@ pub struct LocatorModel {
     pub cameras: Option<[CameraField; 2]>,
     /// Where presses are expected; `None` for the geometry alone.
     pub prior: Option<PositionPrior>,
+    /// Factor on the variance that the fields, or the parameters of the geometry alone, state about themselves, from
+    /// held-out calibration presses.
+    pub inflation: f64,
     /// Squared size of a region of each level, in units of the predicted covariance, from held-out calibration presses;
     /// empty if there are too few.
     pub levels: Vec<RegionLevel>,

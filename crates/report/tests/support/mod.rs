@@ -635,6 +635,7 @@ fn locator() -> LocatorResult {
             geometry_covariance: None,
             cameras: None,
             prior: None,
+            inflation: 1.0,
             levels: Vec::new(),
         },
         reliability: [0.5, 0.8, 0.95]
