@@ -303,6 +303,7 @@ impl<'a> Learner<'a> {
                 };
                 let features = Features {
                     columns: press.columns,
+                    spreads: press.spreads,
                     cluster_events: press.cluster_events,
                 };
                 let Some(prediction) = fitted.predict(&features) else {

@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 use skinrig_model::{Locator, Point2, SkinOutline, StereoGeometry};
 
+use super::features::{CameraFeatures, Features};
 use super::inverse::Inverse;
 use super::prediction::{Prediction, Uncertainty, ellipse};
 use super::rays::Rays;
@@ -14,15 +15,6 @@ use crate::triangulate::locate;
 
 /// Level of the regions of the press table.
 pub(super) const LEVEL: f64 = 0.95;
-
-/// What the cameras say about a press. It holds no position: a locator cannot see where a press was made.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Features {
-    /// Centroid column in each camera, px.
-    pub columns: [f64; 2],
-    /// Clustered events in the weaker camera.
-    pub cluster_events: u32,
-}
 
 /// A position with what is known about its error.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,8 +67,7 @@ impl Fitted {
                     },
                     _ => return None,
                 };
-                let inverse = Inverse::new(reading, [&one.field, &two.field], prior)?;
-                Way::Inverse(Box::new(inverse))
+                Way::Inverse(Box::new(Inverse::new(reading, [one, two], prior)?))
             }
             (None, None) => Way::Rays(Box::new(Rays::new(&geometry, covariance))),
             _ => return None,
@@ -156,18 +147,13 @@ impl Fitted {
     pub fn outcome(
         &self,
         outline: &SkinOutline,
-        columns: [Option<f64>; 2],
-        cluster_events: u32,
+        cameras: [CameraFeatures; 2],
     ) -> (LocationOutcome, Option<Location>) {
-        let rays = locate(&self.geometry, outline, columns);
-        let (Some(sine), [Some(one), Some(two)]) = (rays.sine(), columns) else {
+        let rays = locate(&self.geometry, outline, cameras.map(|c| c.column));
+        let (Some(sine), Some(features)) = (rays.sine(), Features::new(cameras)) else {
             return (rays, None);
         };
-        let found = self.locate(&Features {
-            columns: [one, two],
-            cluster_events,
-        });
-        let Some(location) = found else {
+        let Some(location) = self.locate(&features) else {
             return (rays, None);
         };
         if matches!(self.way, Way::Rays(_)) {
@@ -185,7 +171,7 @@ impl Fitted {
     pub(super) fn predict(&self, features: &Features) -> Option<Prediction> {
         let relative = response(features.cluster_events, self.model.reference_events);
         let rays = match &self.way {
-            Way::Inverse(inverse) => return inverse.locate(features.columns, relative),
+            Way::Inverse(inverse) => return inverse.locate(features, relative),
             Way::Rays(rays) => rays,
         };
         let crossing = rays.crossing(features.columns)?;

@@ -21,21 +21,26 @@ pub(super) enum Uncertainty {
         scatter: Covariance,
         model: Covariance,
     },
-    /// Of the position that explains both columns: precision of the prior, 1/mm², and the columns.
-    Columns {
+    /// Of the position that explains all readings: precision of the prior, 1/mm², and the readings.
+    Readings {
         prior: Covariance,
-        columns: [ColumnUncertainty; 2],
+        readings: [ReadingUncertainty; READINGS],
     },
 }
 
-/// How well the column of one camera is known.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ColumnUncertainty {
+/// Column of each camera; spreads of columns and rows in camera 1, in camera 2.
+pub(super) const READINGS: usize = 6;
+
+/// How well a reading is known; all zero for a missing one.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct ReadingUncertainty {
     /// Change per mm, px.
     pub slope: [f64; 2],
+    /// Weight, below 1 for an outlier.
+    pub weight: f64,
     /// Variance from press to press, px².
     pub scatter: f64,
-    /// Variance of the expected column, px².
+    /// Variance of the expected reading, px².
     pub model: f64,
 }
 
@@ -47,14 +52,14 @@ impl Uncertainty {
                 let sum = [0, 1, 2].map(|i| scatter[i] + inflation * model[i]);
                 sum.iter().all(|v| v.is_finite()).then_some(sum)
             }
-            Self::Columns { prior, columns } => {
+            Self::Readings { prior, readings } => {
                 let mut precision = *prior;
-                for column in columns {
-                    let variance = column.scatter + inflation * column.model;
-                    let [x, y] = column.slope;
-                    precision[0] += x * x / variance;
-                    precision[1] += x * y / variance;
-                    precision[2] += y * y / variance;
+                for reading in readings.iter().filter(|r| r.weight > 0.0) {
+                    let known = reading.weight / (reading.scatter + inflation * reading.model);
+                    let [x, y] = reading.slope;
+                    precision[0] += known * x * x;
+                    precision[1] += known * x * y;
+                    precision[2] += known * y * y;
                 }
                 inverted(precision)
             }

@@ -4,8 +4,7 @@ use super::fitted::LEVEL;
 use super::prediction::{Uncertainty, distance};
 use super::robust::{log_density, student_weight};
 use super::{Features, Fitted};
-use crate::exact;
-use crate::metrics::{bootstrap_over_locations, mean};
+use crate::metrics::share_over_locations;
 use crate::result::{PressResult, RegionLevel, ReliabilityRow};
 use skinrig_model::{AnalysisSettings, PressRole, Verdict};
 
@@ -86,7 +85,7 @@ fn unlikelihood(reached: &[Reached], inflation: f64) -> Option<f64> {
     let off = libm::log(inflation) / LOOSE;
     let each = rows.iter();
     let sum: f64 = each
-        .map(|(d, log_root)| log_root + libm::log(size) - log_density(d / size))
+        .map(|(d, log_root)| log_root + libm::log(size) - log_density(d / size, 2.0))
         .sum();
     (n > 0.0 && sum.is_finite()).then_some(0.5 * off * off + sum)
 }
@@ -134,7 +133,7 @@ pub(crate) fn reliability(
         .filter(|p| p.role == PressRole::Score && p.verdict == Verdict::Valid);
     let reached: Vec<(u32, f64)> = scored
         .filter_map(|p| {
-            let (features, (dx, dy)) = (features(p)?, p.error_mm()?);
+            let (features, (dx, dy)) = (Features::of_press(p)?, p.error_mm()?);
             let uncertainty = fitted.predict(&features)?.uncertainty?;
             let covariance = uncertainty.covariance(fitted.model().inflation)?;
             Some((p.location.index(), distance(covariance, [dx, dy])?))
@@ -143,34 +142,15 @@ pub(crate) fn reliability(
     if reached.is_empty() {
         return Vec::new();
     }
-    let mut locations: Vec<u32> = reached.iter().map(|r| r.0).collect();
-    locations.sort_unstable();
-    locations.dedup();
     let row = |level: &RegionLevel| {
-        let inside = |d: f64| if d <= level.factor { 1.0 } else { 0.0 };
-        let values: Vec<(u32, f64)> = reached.iter().map(|(l, d)| (*l, inside(*d))).collect();
-        let mut share =
-            bootstrap_over_locations(&values, settings.bootstrap_resamples, settings.seed, mean);
-        if let (Some(value), Some(low), Some(high)) = (share.value, share.low, share.high) {
-            let ends = exact::share(value, locations.len(), (low, high));
-            (share.low, share.high) = (Some(ends.0), Some(ends.1));
-        }
+        let inside = |(location, d): &(u32, f64)| (*location, *d <= level.factor);
+        let inside: Vec<(u32, bool)> = reached.iter().map(inside).collect();
         ReliabilityRow {
             level: level.level,
-            inside: share,
+            inside: share_over_locations(&inside, settings.bootstrap_resamples, settings.seed),
         }
     };
     fitted.model().levels.iter().map(row).collect()
-}
-
-/// Features of a press; `None` unless both cameras see it.
-pub(crate) fn features(press: &PressResult) -> Option<Features> {
-    let [one, two] = press.views;
-    let (one, two) = (one?, two?);
-    Some(Features {
-        columns: [one.centroid_u?, two.centroid_u?],
-        cluster_events: one.cluster_events.min(two.cluster_events),
-    })
 }
 
 #[cfg(test)]

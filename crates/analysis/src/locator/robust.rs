@@ -20,10 +20,10 @@ pub(super) fn student_weight(square: f64, dimensions: f64) -> f64 {
     (FREEDOM + dimensions) / (FREEDOM + square)
 }
 
-/// Logarithm of the density of two numbers with this squared error in units of their variance, as for Student's t with 4
-/// degrees of freedom, up to a constant.
-pub(super) fn log_density(square: f64) -> f64 {
-    -0.5 * (FREEDOM + 2.0) * libm::log1p(square / FREEDOM)
+/// Logarithm of the density of `dimensions` numbers with this squared error in units of their variance, as for Student's t
+/// with 4 degrees of freedom, up to a constant.
+pub(super) fn log_density(square: f64, dimensions: f64) -> f64 {
+    -0.5 * (FREEDOM + dimensions) * libm::log1p(square / FREEDOM)
 }
 
 /// Robust standard deviation of numbers about zero, at least [`LEAST`].

@@ -300,6 +300,7 @@ fn press(
                 idle_rate_per_s: 2100.0,
                 idle_s: 0.8,
                 spread_u: Some(14.0),
+                spread_v: None,
                 width_u: Some(19.0),
             }
         })
