@@ -86,7 +86,7 @@ struct Candidate {
     over_repetitions: Option<Vec<f64>>,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct HeldOut {
     /// Estimate minus truth, mm; `None` without a position.
     error: Option<[f64; 2]>,
@@ -207,7 +207,7 @@ impl<'a> Learner<'a> {
         let bound_mm = (!compared.is_empty()).then(|| losses.bound_mm());
         let candidate = candidates.into_iter().nth(used)?;
         let held = candidate.held_out.unwrap_or_default();
-        let reached: Vec<Reached> = held.iter().filter_map(|h| h.reached).collect();
+        let reached: Vec<Reached> = held.into_iter().filter_map(|h| h.reached).collect();
         let regions = Regions::from_held_out(&reached, self.distinct_locations());
         let fitted = candidate.fit.ok()?.0.with_regions(regions);
         Some(LocatorChoice {

@@ -231,7 +231,7 @@ impl Inverse {
             let variance = std::array::from_fn(|i| read.noise[i] + model[i]);
             at = self.descend(&read, &variance, at);
         }
-        let readings = std::array::from_fn(|i| {
+        let readings: [ReadingUncertainty; READINGS] = std::array::from_fn(|i| {
             self.miss(&read, i, at)
                 .map_or_else(ReadingUncertainty::default, |miss| ReadingUncertainty {
                     slope: miss.slope,
@@ -244,7 +244,10 @@ impl Inverse {
         let finite = at.iter().all(|v| v.is_finite());
         finite.then_some(Prediction {
             at,
-            uncertainty: Some(Uncertainty::Readings { prior, readings }),
+            uncertainty: Some(Uncertainty::Readings {
+                prior,
+                readings: Box::new(readings),
+            }),
             extrapolated: self.fields.iter().any(|f| f.is_beyond(f.open(at))),
         })
     }

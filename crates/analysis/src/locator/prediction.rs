@@ -6,7 +6,7 @@ use crate::result::Region;
 pub(super) type Covariance = [f64; 3];
 
 /// A position and what is known about its error.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Prediction {
     pub at: [f64; 2],
     pub uncertainty: Option<Uncertainty>,
@@ -14,7 +14,7 @@ pub(super) struct Prediction {
 }
 
 /// Scatter of a press and uncertainty of the model, kept apart.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) enum Uncertainty {
     /// Of the crossing of two rays, mm².
     Crossing {
@@ -24,7 +24,7 @@ pub(super) enum Uncertainty {
     /// Of the position that explains all readings: precision of the prior, 1/mm², and the readings.
     Readings {
         prior: Covariance,
-        readings: [ReadingUncertainty; READINGS],
+        readings: Box<[ReadingUncertainty; READINGS]>,
     },
 }
 

@@ -25,7 +25,7 @@ const INFLATION_LOG2: std::ops::RangeInclusive<i32> = 0..=14;
 const LOOSE: f64 = 2.0;
 
 /// The error of a held-out calibration press, mm, and what was predicted about it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Reached {
     pub uncertainty: Uncertainty,
     pub error: [f64; 2],

@@ -200,7 +200,7 @@ fn shuffled(rows: &[PressResult]) -> Vec<Press<'_>> {
             .finalize()
     };
     let mut keyed: Vec<_> = presses.into_iter().map(|p| (key(&p), p)).collect();
-    keyed.sort_by(|a, b| a.0.cmp(&b.0));
+    keyed.sort_by_key(|k| k.0);
     keyed.into_iter().map(|(_, p)| p).collect()
 }
 
