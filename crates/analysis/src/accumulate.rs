@@ -145,6 +145,7 @@ pub(crate) fn press_view(
         idle_rate_per_s: per_s(tally.idle as f64, window.idle_s()),
         idle_s: window.idle_s(),
         spread_u: sighting.spread_u,
+        spread_v: sighting.spread_v,
         width_u: tally.width_u,
     }
 }

@@ -5,7 +5,7 @@ use skinrig_model::{CameraId, PressRole, Verdict};
 use crate::calibrate::{SessionCalibration, calibrate_session};
 use crate::check;
 use crate::input::SessionInput;
-use crate::locator::{self, Effort, Fitted, LocatorChoice};
+use crate::locator::{self, CameraFeatures, Effort, Fitted, LocatorChoice};
 use crate::result::{LocationOutcome, PressResult, PressView};
 use crate::sets::CalibrationSet;
 use crate::triangulate::locate;
@@ -54,17 +54,18 @@ pub(crate) fn locate_presses(
     }
     let outline = &input.rig.outline;
     for row in &mut presses {
-        let columns = row.views.map(|v| v.and_then(|v| v.centroid_u));
+        let cameras = CameraFeatures::of_press(row);
         match &locator {
             Some(choice) => {
-                let events = row.views.map(|v| v.map_or(0, |v| v.cluster_events));
-                let weaker = events[0].min(events[1]);
-                let (outcome, location) = choice.fitted.outcome(outline, columns, weaker);
+                let (outcome, location) = choice.fitted.outcome(outline, cameras);
                 row.location_outcome = outcome;
                 row.region = location.and_then(|l| l.region);
                 row.extrapolated = location.is_some_and(|l| l.extrapolated);
             }
-            None => row.location_outcome = locate(&calibrated.geometry, outline, columns),
+            None => {
+                let columns = cameras.map(|c| c.column);
+                row.location_outcome = locate(&calibrated.geometry, outline, columns);
+            }
         }
         let judged = row.role != PressRole::Sync && row.verdict == Verdict::Valid;
         if judged

@@ -258,6 +258,24 @@ pub(crate) fn bootstrap_over_locations(
     }
 }
 
+/// Share of values that are true, each with its location: interval over locations, exact for 0 and 1.
+#[must_use]
+pub fn share_over_locations(values: &[(u32, bool)], resamples: u32, seed: u64) -> Estimate {
+    let numbers: Vec<(u32, f64)> = values
+        .iter()
+        .map(|(location, is)| (*location, f64::from(u8::from(*is))))
+        .collect();
+    let mut share = bootstrap_over_locations(&numbers, resamples, seed, mean);
+    if let (Some(value), Some(low), Some(high)) = (share.value, share.low, share.high) {
+        let mut locations: Vec<u32> = values.iter().map(|v| v.0).collect();
+        locations.sort_unstable();
+        locations.dedup();
+        let ends = exact::share(value, locations.len(), (low, high));
+        (share.low, share.high) = (Some(ends.0), Some(ends.1));
+    }
+    share
+}
+
 fn bootstrap(places: &[LocationErrors], resamples: u32, seed: u64) -> [Option<(f64, f64)>; COUNT] {
     if places.len() < 2 || resamples < 2 {
         return [None; COUNT];

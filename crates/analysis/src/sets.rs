@@ -5,6 +5,7 @@
 
 use skinrig_model::{Point2, PressId, PressOutcome, PressRole, PressVerdict, Verdict};
 
+use crate::locator::Features;
 use crate::result::PressResult;
 
 /// Data of one press for the calibration.
@@ -18,6 +19,8 @@ pub struct CalibrationPress {
     pub repetition: u32,
     /// Centroid column in each camera, px.
     pub columns: [f64; 2],
+    /// Standard deviations of the columns and rows of the clustered events in each camera, px.
+    pub spreads: [Option<[f64; 2]>; 2],
     /// Measured position.
     pub truth: Point2,
     /// Number of clustered events in the weaker camera.
@@ -38,15 +41,15 @@ impl CalibrationSet {
         Self(
             usable
                 .filter_map(|p| {
-                    let [one, two] = p.views;
-                    let (one, two) = (one?, two?);
+                    let features = Features::of_press(p)?;
                     Some(CalibrationPress {
                         press: p.press,
                         location: p.location.index(),
                         repetition: p.repetition.index(),
-                        columns: [one.centroid_u?, two.centroid_u?],
+                        columns: features.columns,
+                        spreads: features.spreads,
                         truth: p.truth?,
-                        cluster_events: one.cluster_events.min(two.cluster_events),
+                        cluster_events: features.cluster_events,
                     })
                 })
                 .filter(|s| {

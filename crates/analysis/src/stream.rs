@@ -186,6 +186,7 @@ mod tests {
                 idle_rate_per_s,
                 idle_s: 1.0,
                 spread_u: None,
+                spread_v: None,
                 width_u: None,
             },
             3,

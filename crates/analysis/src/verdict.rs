@@ -343,6 +343,7 @@ mod tests {
                 idle_rate_per_s: 20.0,
                 idle_s: 0.5,
                 spread_u: None,
+                spread_v: None,
                 width_u: None,
             })
         };

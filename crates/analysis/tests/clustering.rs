@@ -85,6 +85,7 @@ fn clusters_of(events: &[Event], labels: &[u32]) -> Vec<Cluster> {
                 c.sum_u += u64::from(e.0);
                 c.sum_v += u64::from(e.1);
                 c.sum_uu += u64::from(e.0).pow(2);
+                c.sum_vv += u64::from(e.1).pow(2);
             }
             c
         })

@@ -63,7 +63,7 @@ fn folder(args: &ExportArgs, ending: &str) -> Result<Folder, Failure> {
     Folder::new(&path, &stem, args.overwrite).map_err(Failure::internal)
 }
 
-fn refused(e: ExportError) -> Failure {
+pub(crate) fn refused(e: ExportError) -> Failure {
     match e {
         ExportError::Session(e) => Failure::session(e),
         e => Failure::internal(e),

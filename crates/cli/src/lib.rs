@@ -6,6 +6,7 @@ mod terminal;
 
 mod analyses;
 mod args;
+mod challenge;
 pub mod check;
 mod compare;
 mod completions;
@@ -132,6 +133,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Salvage(a) => salvage::salvage(a, json),
         Command::Import(a) => import::import(a, &command_line(arguments), output),
         Command::Export(a) => export::export(a, json),
+        Command::Challenge(a) => challenge::challenge(a, json),
         Command::Inspect(a) => inspect::inspect(a, json),
         Command::Schema(a) => schema::schema(a),
         Command::Completions(a) => completions::completions(a),

@@ -9,6 +9,7 @@
 
 pub mod bundle;
 mod cameras;
+pub mod challenge;
 mod csv_files;
 mod error;
 mod folder;

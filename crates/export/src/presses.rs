@@ -178,7 +178,12 @@ fn view(table: &mut Columns<'_>, source: &Source<'_>, camera: usize) {
 
 /// Converts a host time to the recorded clock of `camera`. The analysis shifts later legs onto the
 /// clock of the first, which this undoes.
-fn recorded_us(source: &Source<'_>, clock: &ClockFit, camera: usize, t: HostTime) -> f64 {
+pub(crate) fn recorded_us(
+    source: &Source<'_>,
+    clock: &ClockFit,
+    camera: usize,
+    t: HostTime,
+) -> f64 {
     let legs = source.analysis.map_or(&[][..], |(_, legs)| legs);
     let leg = legs.iter().rev().find(|leg| leg.origin <= t);
     let moved_us = leg.map_or(0, |leg| leg.moved_us[camera]);

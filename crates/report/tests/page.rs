@@ -456,6 +456,51 @@ fn less_error_with_fewer_events_is_explained() {
     assert!(!caption(500.0, 0.01));
 }
 
+/// An ellipse is as large as its region and turned like it; a page of thousands draws some of them.
+#[test]
+fn regions_are_ellipses_of_their_size_on_the_skin_map() {
+    let mut analysis = support::analysis(4, 3);
+    let ellipses = |analysis: &skinrig_analysis::result::Analysis| -> Vec<Vec<f64>> {
+        let page = html(&input(analysis)).unwrap();
+        let Some((_, rest)) = page.split_once("<path class=\"region\" d=\"M") else {
+            return Vec::new();
+        };
+        // The first in the page is the map's: its layer comes before the legend.
+        let (path, _) = rest.split_once('"').unwrap();
+        let numbers = |one: &str| {
+            let words = one.split(|c: char| !(c.is_ascii_digit() || c == '.' || c == '-'));
+            words.filter_map(|w| w.parse().ok()).collect()
+        };
+        path.split('M').map(numbers).collect()
+    };
+    let without = ellipses(&analysis);
+    assert_eq!(without.len(), 1, "only the legend's");
+    let region = skinrig_analysis::result::Region {
+        semi_axes_mm: [6.0, 2.0],
+        angle_deg: 30.0,
+    };
+    for press in &mut analysis.presses {
+        press.region = Some(region);
+    }
+    let drawn = ellipses(&analysis);
+    let counted = analysis.scored.rmse_mm.n as usize;
+    assert_eq!(drawn.len(), counted);
+    for one in drawn {
+        // Start, then semi-axes, turn and flags, and the way to the other end of the longer axis.
+        let [_, _, major, minor, turn, _, _, dx, dy, ..] = one[..] else {
+            panic!("{one:?}");
+        };
+        assert!(
+            (major / minor - 3.0).abs() < 0.05 && (turn + 30.0).abs() < 1e-9,
+            "{one:?}"
+        );
+        assert!(
+            (dx.hypot(dy) - 2.0 * major).abs() < 0.1 && dx > 0.0 && dy < 0.0,
+            "{one:?}"
+        );
+    }
+}
+
 /// The probed area is drawn around the locations behind its number.
 #[test]
 fn the_probed_area_is_drawn_as_it_is_counted() {

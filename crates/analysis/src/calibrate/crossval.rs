@@ -179,6 +179,7 @@ mod tests {
                 location: i % 30,
                 repetition: 0,
                 columns,
+                spreads: [None; 2],
                 truth,
                 cluster_events: 100,
             });

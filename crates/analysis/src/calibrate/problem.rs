@@ -328,6 +328,7 @@ mod tests {
                 location: i,
                 repetition: 0,
                 columns: [180.0 + 25.0 * f64::from(i), 410.0 - 9.0 * f64::from(i)],
+                spreads: [None; 2],
                 truth: Point2::new(10.0, f64::from(i)),
                 cluster_events: 100,
             })

@@ -164,6 +164,7 @@ mod tests {
                     columns: planted
                         .cameras
                         .map(|c| column(c) + 6.0 * seeded::signed_unit(&mut noise)),
+                    spreads: [None; 2],
                     truth,
                     cluster_events: 100,
                 }

@@ -201,6 +201,7 @@ mod tests {
                 location: i as u32,
                 repetition: 0,
                 columns: [320.0; 2],
+                spreads: [None; 2],
                 truth: Point2::new(30.0 * angle.cos(), 30.0 * angle.sin()),
                 cluster_events: *events,
             }

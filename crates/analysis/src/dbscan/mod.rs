@@ -30,6 +30,8 @@ pub struct Cluster {
     pub sum_v: u64,
     /// Sum of the squares of their columns, px².
     pub sum_uu: u64,
+    /// Sum of the squares of their rows, px².
+    pub sum_vv: u64,
 }
 
 impl Cluster {
@@ -45,9 +47,19 @@ impl Cluster {
     /// Standard deviation of the columns, px; `None` without events.
     #[must_use]
     pub fn spread_u(&self) -> Option<f64> {
+        self.deviation(self.sum_u, self.sum_uu)
+    }
+
+    /// Standard deviation of the rows, px; `None` without events.
+    #[must_use]
+    pub fn spread_v(&self) -> Option<f64> {
+        self.deviation(self.sum_v, self.sum_vv)
+    }
+
+    fn deviation(&self, sum: u64, squares: u64) -> Option<f64> {
         let n = u128::from(self.events);
         // Integers: no cancellation.
-        let squares = n * u128::from(self.sum_uu) - u128::from(self.sum_u).pow(2);
+        let squares = n * u128::from(squares) - u128::from(sum).pow(2);
         (n > 0).then(|| (squares as f64).sqrt() / n as f64)
     }
 
@@ -59,6 +71,7 @@ impl Cluster {
             sum_u: self.sum_u + other.sum_u,
             sum_v: self.sum_v + other.sum_v,
             sum_uu: self.sum_uu + other.sum_uu,
+            sum_vv: self.sum_vv + other.sum_vv,
         }
     }
 }
@@ -356,21 +369,25 @@ impl Dbscan {
             let (row, column) = self.tiles.corner(index);
             let corner = row * WIDTH + column;
             let mut add = |label: u32, pixels: u64| {
-                let (mut n, mut right, mut squares, mut down) = (0, 0, 0, 0);
+                let (mut n, mut right, mut right_squares) = (0, 0, 0);
+                let (mut down, mut down_squares) = (0, 0);
                 for at in ones(pixels) {
                     let count = u64::from(grid.count((corner + offset(at)) as u32));
-                    let aside = (at % SIDE) as u64;
+                    let (aside, below) = ((at % SIDE) as u64, (at / SIDE) as u64);
                     n += count;
                     right += count * aside;
-                    squares += count * aside * aside;
-                    down += count * (at / SIDE) as u64;
+                    right_squares += count * aside * aside;
+                    down += count * below;
+                    down_squares += count * below * below;
                 }
                 let cluster = &mut clusters[label as usize];
                 cluster.events += n;
                 let first = column as u64;
                 cluster.sum_u += n * first + right;
-                cluster.sum_uu += (n * first + 2 * right) * first + squares;
-                cluster.sum_v += n * (row as u64 + top) + down;
+                cluster.sum_uu += (n * first + 2 * right) * first + right_squares;
+                let first = row as u64 + top;
+                cluster.sum_v += n * first + down;
+                cluster.sum_vv += (n * first + 2 * down) * first + down_squares;
             };
             for group in self.groups_of(index) {
                 add(group.label, group.core);

@@ -53,15 +53,15 @@ impl ColumnEstimate {
             CentroidRule::AllClusters => dbscan.clusters().iter().copied().reduce(Cluster::merged),
         };
         let centroid = chosen.and_then(|c| c.centroid());
+        let px = |bins: f64| bins * f64::from(side_px);
         Self {
             column: centroid.map(|(u, _)| column_px(u, side_px)),
             row: centroid.map(|(_, v)| column_px(v, side_px)),
             clusters: dbscan.clusters().len() as u32,
             // The grid holds at most u32::MAX events.
             events: chosen.map_or(0, |c| c.events) as u32,
-            spread_u: chosen
-                .and_then(|c| c.spread_u())
-                .map(|spread| spread * f64::from(side_px)),
+            spread_u: chosen.and_then(|c| c.spread_u()).map(px),
+            spread_v: chosen.and_then(|c| c.spread_v()).map(px),
         }
     }
 }

@@ -36,6 +36,8 @@ pub struct ColumnEstimate {
     pub events: u32,
     /// Standard deviation of their columns, px, for estimators that cluster.
     pub spread_u: Option<f64>,
+    /// The same of their rows, px.
+    pub spread_v: Option<f64>,
 }
 
 impl ColumnEstimate {
@@ -46,6 +48,7 @@ impl ColumnEstimate {
             clusters: 1,
             events,
             spread_u: None,
+            spread_v: None,
         }
     }
 }

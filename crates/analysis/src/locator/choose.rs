@@ -4,8 +4,8 @@ use rayon::prelude::*;
 use skinrig_model::{AnalysisSettings, CalibrationModel, Locator, StereoGeometry};
 
 use super::methods::{Hyperparameters, METHODS, Method, Start, Unfit, method};
-use super::prediction::distance;
-use super::{Features, Fitted, regions};
+use super::regions::{Reached, Regions};
+use super::{Features, Fitted};
 use crate::calibrate::{Folds, Losses, NO_FIX_ERROR_MM, Refit, SessionCalibration, covariance};
 use crate::calibrate::{root_mean_square, select_model};
 use crate::metrics::{bootstrap_over_locations, root_mean_square as rms};
@@ -80,18 +80,19 @@ pub(crate) fn choose(
 struct Candidate {
     method: &'static dyn Method,
     fit: Result<(Fitted, Option<Hyperparameters>), Unfit>,
-    /// For each press: error, mm, and squared distance in units of the predicted covariance, at held-out locations.
+    /// For each press: what it gives at held-out locations.
     held_out: Option<Vec<HeldOut>>,
     /// Errors in held-out repetitions, mm.
     over_repetitions: Option<Vec<f64>>,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct HeldOut {
     /// Estimate minus truth, mm; `None` without a position.
     error: Option<[f64; 2]>,
     error_mm: f64,
-    distance: f64,
+    /// `None` without a position, or if the locator knows nothing about its error.
+    reached: Option<Reached>,
 }
 
 impl Candidate {
@@ -205,11 +206,10 @@ impl<'a> Learner<'a> {
         };
         let bound_mm = (!compared.is_empty()).then(|| losses.bound_mm());
         let candidate = candidates.into_iter().nth(used)?;
-        let levels = candidate.held_out.as_deref().map_or_else(Vec::new, |held| {
-            let distances: Vec<f64> = held.iter().map(|h| h.distance).collect();
-            regions::levels(&distances, self.distinct_locations())
-        });
-        let fitted = candidate.fit.ok()?.0.with_levels(levels);
+        let held = candidate.held_out.unwrap_or_default();
+        let reached: Vec<Reached> = held.into_iter().filter_map(|h| h.reached).collect();
+        let regions = Regions::from_held_out(&reached, self.distinct_locations());
+        let fitted = candidate.fit.ok()?.0.with_regions(regions);
         Some(LocatorChoice {
             result: LocatorResult {
                 locator: fitted.locator(),
@@ -299,10 +299,11 @@ impl<'a> Learner<'a> {
                 let lost = HeldOut {
                     error: None,
                     error_mm: NO_FIX_ERROR_MM,
-                    distance: f64::INFINITY,
+                    reached: None,
                 };
                 let features = Features {
                     columns: press.columns,
+                    spreads: press.spreads,
                     cluster_events: press.cluster_events,
                 };
                 let Some(prediction) = fitted.predict(&features) else {
@@ -310,11 +311,12 @@ impl<'a> Learner<'a> {
                 };
                 let [x, y] = prediction.at;
                 let error = [x - press.truth.x_mm, y - press.truth.y_mm];
-                let reached = prediction.covariance.and_then(|c| distance(c, error));
+                let reached = prediction.uncertainty;
+                let reached = reached.map(|uncertainty| Reached { uncertainty, error });
                 HeldOut {
                     error: Some(error),
                     error_mm: libm::hypot(error[0], error[1]).min(NO_FIX_ERROR_MM),
-                    distance: reached.unwrap_or(f64::INFINITY),
+                    reached,
                 }
             };
             Some(held.iter().map(of).collect())

@@ -3,25 +3,18 @@
 use nalgebra::DMatrix;
 use skinrig_model::{Locator, Point2, SkinOutline, StereoGeometry};
 
+use super::features::{CameraFeatures, Features};
 use super::inverse::Inverse;
-use super::prediction::{Prediction, ellipse};
+use super::prediction::{Prediction, Uncertainty, ellipse};
 use super::rays::Rays;
 use super::reading::Reading;
+use super::regions::Regions;
 use super::robust::response;
 use crate::result::{Analysis, LocationOutcome, LocatorModel, Region};
 use crate::triangulate::locate;
 
 /// Level of the regions of the press table.
 pub(super) const LEVEL: f64 = 0.95;
-
-/// What the cameras say about a press. It holds no position: a locator cannot see where a press was made.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Features {
-    /// Centroid column in each camera, px.
-    pub columns: [f64; 2],
-    /// Clustered events in the weaker camera.
-    pub cluster_events: u32,
-}
 
 /// A position with what is known about its error.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,8 +67,7 @@ impl Fitted {
                     },
                     _ => return None,
                 };
-                let inverse = Inverse::new(reading, [&one.field, &two.field], prior)?;
-                Way::Inverse(Box::new(inverse))
+                Way::Inverse(Box::new(Inverse::new(reading, [one, two], prior)?))
             }
             (None, None) => Way::Rays(Box::new(Rays::new(&geometry, covariance))),
             _ => return None,
@@ -100,6 +92,7 @@ impl Fitted {
                 geometry_covariance: None,
                 cameras: None,
                 prior: None,
+                inflation: 1.0,
                 levels: Vec::new(),
             },
             way: Way::Rays(Box::new(Rays::new(&geometry, None))),
@@ -126,8 +119,8 @@ impl Fitted {
         &self.model
     }
 
-    pub(super) fn with_levels(mut self, levels: Vec<crate::result::RegionLevel>) -> Self {
-        self.model.levels = levels;
+    pub(super) fn with_regions(mut self, regions: Regions) -> Self {
+        (self.model.inflation, self.model.levels) = (regions.inflation, regions.levels);
         self
     }
 
@@ -137,7 +130,8 @@ impl Fitted {
         let prediction = self.predict(features)?;
         let factor = self.model.levels.iter().find(|l| l.level == LEVEL);
         let region = prediction
-            .covariance
+            .uncertainty
+            .and_then(|u| u.covariance(self.model.inflation))
             .zip(factor)
             .and_then(|(covariance, level)| ellipse(covariance, level.factor));
         Some(Location {
@@ -153,18 +147,13 @@ impl Fitted {
     pub fn outcome(
         &self,
         outline: &SkinOutline,
-        columns: [Option<f64>; 2],
-        cluster_events: u32,
+        cameras: [CameraFeatures; 2],
     ) -> (LocationOutcome, Option<Location>) {
-        let rays = locate(&self.geometry, outline, columns);
-        let (Some(sine), [Some(one), Some(two)]) = (rays.sine(), columns) else {
+        let rays = locate(&self.geometry, outline, cameras.map(|c| c.column));
+        let (Some(sine), Some(features)) = (rays.sine(), Features::new(cameras)) else {
             return (rays, None);
         };
-        let found = self.locate(&Features {
-            columns: [one, two],
-            cluster_events,
-        });
-        let Some(location) = found else {
+        let Some(location) = self.locate(&features) else {
             return (rays, None);
         };
         if matches!(self.way, Way::Rays(_)) {
@@ -182,24 +171,23 @@ impl Fitted {
     pub(super) fn predict(&self, features: &Features) -> Option<Prediction> {
         let relative = response(features.cluster_events, self.model.reference_events);
         let rays = match &self.way {
-            Way::Inverse(inverse) => return inverse.locate(features.columns, relative),
+            Way::Inverse(inverse) => return inverse.locate(features, relative),
             Way::Rays(rays) => rays,
         };
         let crossing = rays.crossing(features.columns)?;
-        let covariance = self.model.scatter.map(|scatter| {
+        let uncertainty = self.model.scatter.map(|scatter| {
             let fixed = scatter.fixed_mm * scatter.fixed_mm;
             let column_px2 = scatter.column_px * scatter.column_px * relative;
-            let term = |i: usize| column_px2 * crossing.by_columns[i] + crossing.from_parameters[i];
-            [fixed + term(0), term(1), fixed + term(2)]
+            let by_columns = crossing.by_columns.map(|v| column_px2 * v);
+            Uncertainty::Crossing {
+                scatter: [fixed + by_columns[0], by_columns[1], fixed + by_columns[2]],
+                model: crossing.from_parameters,
+            }
         });
-        let finite = crossing
-            .at
-            .iter()
-            .chain(covariance.iter().flatten())
-            .all(|v| v.is_finite());
+        let finite = crossing.at.iter().all(|v| v.is_finite());
         finite.then_some(Prediction {
             at: crossing.at,
-            covariance,
+            uncertainty,
             extrapolated: false,
         })
     }

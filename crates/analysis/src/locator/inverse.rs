@@ -1,10 +1,15 @@
-//! The position that both cameras see at their columns: least squares over the expected columns and the fields on them, with
-//! the positions of the calibration presses as prior.
+//! The position where all readings of both cameras are as expected: least squares over the columns with the fields on them
+//! and over the spreads of the events, with the positions of the calibration presses as prior.
 
+use super::Features;
 use super::field::Field;
-use super::prediction::{Covariance, Prediction, inverted};
+use super::prediction::{
+    Covariance, Prediction, READINGS, ReadingUncertainty, Uncertainty, inverted,
+};
 use super::reading::Reading;
-use crate::result::{FieldModel, PositionPrior};
+use super::robust::{log_density, student_weight};
+use super::spread::Spread;
+use crate::result::{CameraField, PositionPrior};
 
 /// Rounds of variances, and Gauss-Newton steps within a round.
 const ROUNDS: usize = 3;
@@ -21,17 +26,20 @@ pub(super) struct Inverse {
     fields: [Field; 2],
     /// Fixed variance and variance by events, px², per camera.
     scatter: [[f64; 2]; 2],
+    /// Columns and rows of camera 1, then of camera 2.
+    spreads: [Option<Spread>; 4],
     centre: [f64; 2],
     /// Inverse of the prior's covariance: xx, xy, yy, 1/mm².
     precision: Covariance,
     starts: Vec<Begin>,
 }
 
-/// A position to begin from, with what each camera is expected to read and the value of its field there.
+/// A position to begin from, with what each camera is expected to read and the values of the fields there.
 #[derive(Debug, Clone, Copy)]
 struct Begin {
     at: [f64; 2],
-    expected: [(f64, f64); 2],
+    expected: [f64; 2],
+    fields: [f64; READINGS],
 }
 
 /// What both cameras read.
@@ -40,14 +48,32 @@ struct Readings {
     values: [f64; 2],
     /// Change of a reading per column.
     slopes: [f64; 2],
+    /// Readings of the spreads, px; `None` if missing.
+    spreads: [Option<f64>; 4],
     /// Variances of the scatter, px².
-    noise: [f64; 2],
+    noise: [f64; READINGS],
 }
 
 impl Readings {
     /// Column minus the expected one, px.
     fn off(&self, k: usize, expected: f64, field: f64) -> f64 {
         (self.values[k] - expected) / self.slopes[k] - field
+    }
+}
+
+/// A reading minus the expected one, px, and the change of the expected one per mm.
+struct Miss {
+    off: f64,
+    slope: [f64; 2],
+}
+
+/// Half the loss of a miss, and its weight. Of the spreads, outliers lose weight: a second cluster widens them.
+fn loss(i: usize, off: f64, variance: f64) -> (f64, f64) {
+    let square = off * off / variance;
+    if i < 2 {
+        (0.5 * square, 1.0)
+    } else {
+        (-log_density(square, 1.0), student_weight(square, 1.0))
     }
 }
 
@@ -62,19 +88,22 @@ impl Inverse {
     /// `None` if a field or the prior contradicts itself.
     pub(super) fn new(
         reading: Reading,
-        fields: [&FieldModel; 2],
+        cameras: [&CameraField; 2],
         prior: &PositionPrior,
     ) -> Option<Self> {
-        let scatter = fields.map(|f| [f.fixed_px * f.fixed_px, f.column_px * f.column_px]);
-        let [xx, xy, yy] = prior.covariance_mm2;
-        let determinant = xx * yy - xy * xy;
-        let precision = [yy / determinant, -xy / determinant, xx / determinant];
-        if determinant <= 0.0 || precision.iter().any(|v| !v.is_finite()) {
-            return None;
+        let fields = cameras.map(|c| &c.field);
+        let scatter = fields.map(|f| [f.fixed_px, f.column_px].map(|s| s * s));
+        let precision = inverted(prior.covariance_mm2)?;
+        let mut spreads = [None, None, None, None];
+        for (k, camera) in cameras.iter().enumerate() {
+            for (axis, model) in camera.spreads.iter().flatten().enumerate() {
+                spreads[2 * k + axis] = Some(Spread::new(model)?);
+            }
         }
         let mut inverse = Self {
             reading,
             scatter,
+            spreads,
             centre: prior.centre_mm,
             precision,
             starts: Vec::new(),
@@ -88,25 +117,77 @@ impl Inverse {
         inverse.starts = positions
             .map(|at| Begin {
                 at,
-                expected: [0, 1].map(|k| {
-                    let (expected, _) = inverse.reading.expected(k, at);
-                    (expected, inverse.fields[k].value(at).0)
-                }),
+                expected: [0, 1].map(|k| inverse.reading.expected(k, at).0),
+                fields: std::array::from_fn(|i| inverse.field(i).map_or(0.0, |f| f.value(at).0)),
             })
             .collect();
         Some(inverse)
     }
 
-    /// Variance of a column about the expected one, px²: its scatter, the field's, and the geometry's where the field knows
-    /// nothing.
-    fn variance(&self, read: &Readings, at: [f64; 2]) -> [f64; 2] {
-        [0, 1].map(|k| {
-            let open = self.fields[k].open(at);
-            let slope = read.slopes[k];
-            let geometry =
-                self.reading.parameter_variance(k, at, read.columns[k]) / (slope * slope);
-            read.noise[k] + self.fields[k].variance(open) + open * geometry
+    /// The field of a reading.
+    fn field(&self, i: usize) -> Option<&Field> {
+        match i.checked_sub(2) {
+            None => Some(&self.fields[i]),
+            Some(spread) => self.spreads[spread].as_ref().map(|s| &s.field),
+        }
+    }
+
+    fn readings(&self, features: &Features, response: f64) -> Readings {
+        let read = [0, 1].map(|k| self.reading.of_column(k, features.columns[k]));
+        let spread = |i: usize| {
+            let own = features.spreads[i / 2]?;
+            Some(self.spreads[i].as_ref()?.reading(own[i % 2]))
+        };
+        let noise = |i: usize| {
+            let [fixed, column] = match i.checked_sub(2) {
+                None => self.scatter[i],
+                Some(spread) => self.spreads[spread]
+                    .as_ref()
+                    .map_or([0.0; 2], |s| s.scatter),
+            };
+            fixed + column * response
+        };
+        Readings {
+            columns: features.columns,
+            values: read.map(|(value, _)| value),
+            slopes: read.map(|(_, slope)| slope),
+            spreads: std::array::from_fn(spread),
+            noise: std::array::from_fn(noise),
+        }
+    }
+
+    /// `None` for a missing reading.
+    fn miss(&self, read: &Readings, i: usize, at: [f64; 2]) -> Option<Miss> {
+        let Some(spread) = i.checked_sub(2) else {
+            let (expected, by) = self.reading.expected(i, at);
+            let (field, field_by) = self.fields[i].value(at);
+            return Some(Miss {
+                off: read.off(i, expected, field),
+                slope: [0, 1].map(|axis| by[axis] / read.slopes[i] + field_by[axis]),
+            });
+        };
+        let value = read.spreads[spread]?;
+        let (expected, slope) = self.field(i)?.value(at);
+        Some(Miss {
+            off: value - expected,
+            slope,
         })
+    }
+
+    /// Variance of the expected reading, px²: that of the field, and that of the geometry where the field knows nothing.
+    fn model_variance(&self, read: &Readings, i: usize, at: [f64; 2]) -> f64 {
+        let Some(field) = self.field(i) else {
+            return 0.0;
+        };
+        let open = field.open(at);
+        let geometry = match i {
+            0 | 1 => {
+                let slope = read.slopes[i];
+                self.reading.parameter_variance(i, at, read.columns[i]) / (slope * slope)
+            }
+            _ => 0.0,
+        };
+        field.variance(open) + open * geometry
     }
 
     /// Half the squared distance from the prior's centre, and its slope.
@@ -117,64 +198,71 @@ impl Inverse {
         (0.5 * (slope[0] * dx + slope[1] * dy), slope)
     }
 
-    fn normal(&self, read: &Readings, variance: [f64; 2], at: [f64; 2]) -> Normal {
+    fn normal(&self, read: &Readings, variance: &[f64; READINGS], at: [f64; 2]) -> Normal {
         let (value, slope) = self.prior(at);
         let mut normal = Normal {
             value,
             matrix: self.precision,
             side: slope.map(|s| -s),
         };
-        for (k, variance) in variance.into_iter().enumerate() {
-            let (expected, by) = self.reading.expected(k, at);
-            let (field, field_by) = self.fields[k].value(at);
-            let off = read.off(k, expected, field);
-            let [x, y] = [0, 1].map(|axis| by[axis] / read.slopes[k] + field_by[axis]);
-            normal.value += 0.5 * off * off / variance;
-            normal.matrix[0] += x * x / variance;
-            normal.matrix[1] += x * y / variance;
-            normal.matrix[2] += y * y / variance;
-            normal.side[0] += x * off / variance;
-            normal.side[1] += y * off / variance;
+        for (i, variance) in variance.iter().enumerate() {
+            let Some(miss) = self.miss(read, i, at) else {
+                continue;
+            };
+            let (value, weight) = loss(i, miss.off, *variance);
+            let ([x, y], known) = (miss.slope, weight / variance);
+            normal.value += value;
+            normal.matrix[0] += known * x * x;
+            normal.matrix[1] += known * x * y;
+            normal.matrix[2] += known * y * y;
+            normal.side[0] += known * x * miss.off;
+            normal.side[1] += known * y * miss.off;
         }
         normal
     }
 
     /// The most likely position; `None` if no number is finite. `response`: as in [`super::robust::response`].
-    pub(super) fn locate(&self, columns: [f64; 2], response: f64) -> Option<Prediction> {
-        let read = [0, 1].map(|k| self.reading.of_column(k, columns[k]));
-        let read = Readings {
-            columns,
-            values: read.map(|(value, _)| value),
-            slopes: read.map(|(_, slope)| slope),
-            noise: self
-                .scatter
-                .map(|[fixed, column]| fixed + column * response),
-        };
+    pub(super) fn locate(&self, features: &Features, response: f64) -> Option<Prediction> {
+        let read = self.readings(features, response);
         let mut at = self.start(&read)?;
-        let mut normal = None;
+        let mut model = [0.0; READINGS];
         for _ in 0..ROUNDS {
-            let variance = self.variance(&read, at);
-            let (reached, found) = self.descend(&read, variance, at);
-            (at, normal) = (reached, Some(found));
+            model = std::array::from_fn(|i| self.model_variance(&read, i, at));
+            let variance = std::array::from_fn(|i| read.noise[i] + model[i]);
+            at = self.descend(&read, &variance, at);
         }
-        let open = [0, 1].map(|k| self.fields[k].open(at));
-        let covariance = inverted(normal?.matrix)?;
-        let finite = at.iter().chain(&covariance).all(|v| v.is_finite());
+        let readings: [ReadingUncertainty; READINGS] = std::array::from_fn(|i| {
+            self.miss(&read, i, at)
+                .map_or_else(ReadingUncertainty::default, |miss| ReadingUncertainty {
+                    slope: miss.slope,
+                    weight: loss(i, miss.off, read.noise[i] + model[i]).1.min(1.0),
+                    scatter: read.noise[i],
+                    model: model[i],
+                })
+        });
+        let prior = self.precision;
+        let finite = at.iter().all(|v| v.is_finite());
         finite.then_some(Prediction {
             at,
-            covariance: Some(covariance),
-            extrapolated: [0, 1].iter().any(|k| self.fields[*k].is_beyond(open[*k])),
+            uncertainty: Some(Uncertainty::Readings {
+                prior,
+                readings: Box::new(readings),
+            }),
+            extrapolated: self.fields.iter().any(|f| f.is_beyond(f.open(at))),
         })
     }
 
     /// The best of the starts.
     fn start(&self, read: &Readings) -> Option<[f64; 2]> {
         let cost = |begin: &Begin| {
-            let square = |k: usize| {
-                let (expected, field) = begin.expected[k];
-                read.off(k, expected, field).powi(2) / read.noise[k]
-            };
-            self.prior(begin.at).0 + 0.5 * (square(0) + square(1))
+            let each = (0..READINGS).filter_map(|i| {
+                let off = match i.checked_sub(2) {
+                    None => read.off(i, begin.expected[i], begin.fields[i]),
+                    Some(spread) => read.spreads[spread]? - begin.fields[i],
+                };
+                Some(loss(i, off, read.noise[i]).0)
+            });
+            self.prior(begin.at).0 + each.sum::<f64>()
         };
         let all = self.starts.iter().map(|s| (cost(s), s.at));
         let best = all.filter(|(cost, _)| cost.is_finite());
@@ -182,7 +270,7 @@ impl Inverse {
     }
 
     /// Gauss-Newton steps, halved until they lead down.
-    fn descend(&self, read: &Readings, variance: [f64; 2], from: [f64; 2]) -> ([f64; 2], Normal) {
+    fn descend(&self, read: &Readings, variance: &[f64; READINGS], from: [f64; 2]) -> [f64; 2] {
         let (mut at, mut normal) = (from, self.normal(read, variance, from));
         for _ in 0..STEPS {
             let Some([xx, xy, yy]) = inverted(normal.matrix) else {
@@ -206,6 +294,6 @@ impl Inverse {
             let Some(found) = lower else { break };
             (at, normal) = found;
         }
-        (at, normal)
+        at
     }
 }

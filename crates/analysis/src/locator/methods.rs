@@ -10,6 +10,7 @@ use super::rays::Rays;
 use super::reading::{Reading, polynomials};
 use super::robust::reference_events;
 use super::samples::samples;
+use super::spread::learn_spread;
 use crate::result::{CameraField, LocatorModel, PositionPrior};
 use crate::sets::{CalibrationPress, CalibrationSet};
 
@@ -20,6 +21,8 @@ pub enum Feature {
     Columns,
     /// Clustered events of the weaker camera.
     ClusterEvents,
+    /// Standard deviations of the columns and rows of the clustered events of both cameras.
+    Spreads,
 }
 
 /// What a method needs.
@@ -63,7 +66,14 @@ pub struct Start<'a> {
 
 /// Opaque hyperparameters of the fields of both cameras.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hyperparameters([Logs; 2]);
+pub struct Hyperparameters([CameraLogs; 2]);
+
+/// Of the column, and of the spreads of columns and rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct CameraLogs {
+    column: Logs,
+    spreads: Option<[Logs; 2]>,
+}
 
 /// A way to learn where presses are.
 pub trait Method: Sync {
@@ -101,7 +111,7 @@ struct DirectField;
 /// Smallest standard deviation of the prior along any direction, mm.
 const NARROWEST_MM: f64 = 1.0;
 
-const FEATURES: &[Feature] = &[Feature::Columns, Feature::ClusterEvents];
+const FEATURES: &[Feature] = &[Feature::Columns, Feature::ClusterEvents, Feature::Spreads];
 
 impl Method for Geometry {
     fn locator(&self) -> Locator {
@@ -109,7 +119,7 @@ impl Method for Geometry {
     }
 
     fn version(&self) -> u32 {
-        1
+        2
     }
 
     fn needs(&self) -> Needs {
@@ -132,6 +142,7 @@ impl Method for Geometry {
             geometry_covariance: rows(start),
             cameras: None,
             prior: None,
+            inflation: 1.0,
             levels: Vec::new(),
         };
         let fitted = Fitted::new(Locator::Geometry, start.geometry, model);
@@ -145,7 +156,7 @@ impl Method for GeometryField {
     }
 
     fn version(&self) -> u32 {
-        1
+        2
     }
 
     fn needs(&self) -> Needs {
@@ -175,7 +186,7 @@ impl Method for DirectField {
     }
 
     fn version(&self) -> u32 {
-        1
+        2
     }
 
     fn needs(&self) -> Needs {
@@ -203,26 +214,41 @@ fn with_fields(
     reading: &Reading,
     start: &Start<'_>,
 ) -> Result<(Fitted, Option<Hyperparameters>), Unfit> {
-    let field = |k: usize| {
-        let near = start.near.map(|h| &h.0[k]);
-        learn(&samples(reading, k, presses), near).ok_or(Unfit::Degenerate)
-    };
-    let [(one, logs_one), (two, logs_two)] = [field(0)?, field(1)?];
-    let polynomial = |k: usize| match reading {
-        Reading::Column(polynomials) => Some(polynomials[k]),
-        Reading::Bearing { .. } => None,
-    };
     let bearings = matches!(reading, Reading::Bearing { .. });
-    let camera = |k: usize, field| CameraField {
-        polynomial: polynomial(k),
-        field,
+    let camera = |k: usize| {
+        let near = start.near.map(|h| &h.0[k]);
+        let columns = samples(presses, |p| Some(reading.residual(k, p)));
+        let (field, column) = learn(&columns, near.map(|n| &n.column)).ok_or(Unfit::Degenerate)?;
+        let spread = |axis: usize| {
+            let near = near.and_then(|n| n.spreads.as_ref());
+            learn_spread(presses, (k, axis), near.map(|logs| &logs[axis]))
+        };
+        let (spreads, logs) = match spread(0).zip(spread(1)) {
+            Some(((u, logs_u), (v, logs_v))) => (Some([u, v]), Some([logs_u, logs_v])),
+            None => (None, None),
+        };
+        let field = CameraField {
+            polynomial: match reading {
+                Reading::Column(polynomials) => Some(polynomials[k]),
+                Reading::Bearing { .. } => None,
+            },
+            field,
+            spreads,
+        };
+        let logs = CameraLogs {
+            column,
+            spreads: logs,
+        };
+        Ok((field, logs))
     };
+    let [(one, logs_one), (two, logs_two)] = [camera(0)?, camera(1)?];
     let model = LocatorModel {
         reference_events: reference_events(presses),
         scatter: None,
         geometry_covariance: rows(start).filter(|_| bearings),
-        cameras: Some([camera(0, one), camera(1, two)]),
+        cameras: Some([one, two]),
         prior: Some(prior(presses)),
+        inflation: 1.0,
         levels: Vec::new(),
     };
     let fitted = Fitted::new(locator, start.geometry, model).ok_or(Unfit::Degenerate)?;

@@ -2,11 +2,12 @@
 //!
 //! A [`Method`] declares what it needs and fits calibration presses; a [`Fitted`] locator sees the [`Features`] of a press
 //! and returns a position, a 95 % region and a flag. Built in are the geometry (rays intersect), the field (the geometry
-//! predicts what each camera reads at a position, a Gaussian process corrects it, and the position that explains both
-//! readings best is found), and the direct field (the same with a polynomial instead of a geometry). `choose` compares them at
-//! held-out locations. Decision and measurements: `docs/adr/0038-*`.
+//! predicts what each camera reads at a position, a Gaussian process corrects it, and the position that explains all
+//! readings best is found), and the direct field (the same with a polynomial instead of a geometry). Both also read how far
+//! the events of a press spread, which tells the distance from a camera. `choose` compares them at held-out locations. Decision and measurements: `docs/adr/0038-*`.
 
 mod choose;
+mod features;
 mod field;
 mod fitted;
 mod inverse;
@@ -20,9 +21,11 @@ mod reading;
 mod regions;
 mod robust;
 mod samples;
+mod spread;
 
 pub(crate) use choose::{Effort, choose};
 pub use choose::{LocatorChoice, choose_locator, held_out_errors};
-pub use fitted::{Features, Fitted, Location};
+pub use features::{CameraFeatures, Features};
+pub use fitted::{Fitted, Location};
 pub use methods::{Feature, Hyperparameters, Method, Needs, Start, Unfit, method};
 pub(crate) use regions::reliability;

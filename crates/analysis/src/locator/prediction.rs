@@ -5,12 +5,66 @@ use crate::result::Region;
 /// Symmetric 2 x 2 matrix: xx, xy, yy.
 pub(super) type Covariance = [f64; 3];
 
-/// Position and predicted covariance.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A position and what is known about its error.
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Prediction {
     pub at: [f64; 2],
-    pub covariance: Option<Covariance>,
+    pub uncertainty: Option<Uncertainty>,
     pub extrapolated: bool,
+}
+
+/// Scatter of a press and uncertainty of the model, kept apart.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Uncertainty {
+    /// Of the crossing of two rays, mm².
+    Crossing {
+        scatter: Covariance,
+        model: Covariance,
+    },
+    /// Of the position that explains all readings: precision of the prior, 1/mm², and the readings.
+    Readings {
+        prior: Covariance,
+        readings: Box<[ReadingUncertainty; READINGS]>,
+    },
+}
+
+/// Column of each camera; spreads of columns and rows in camera 1, in camera 2.
+pub(super) const READINGS: usize = 6;
+
+/// How well a reading is known; all zero for a missing one.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct ReadingUncertainty {
+    /// Change per mm, px.
+    pub slope: [f64; 2],
+    /// Weight, below 1 for an outlier.
+    pub weight: f64,
+    /// Variance from press to press, px².
+    pub scatter: f64,
+    /// Variance of the expected reading, px².
+    pub model: f64,
+}
+
+impl Uncertainty {
+    /// Covariance of the position with the model's variance multiplied by `inflation`; `None` if degenerate.
+    pub(super) fn covariance(&self, inflation: f64) -> Option<Covariance> {
+        match self {
+            Self::Crossing { scatter, model } => {
+                let sum = [0, 1, 2].map(|i| scatter[i] + inflation * model[i]);
+                sum.iter().all(|v| v.is_finite()).then_some(sum)
+            }
+            Self::Readings { prior, readings } => {
+                let mut precision = *prior;
+                for reading in readings.iter().filter(|r| r.weight > 0.0) {
+                    let known = reading.weight / (reading.scatter + inflation * reading.model);
+                    let [x, y] = reading.slope;
+                    precision[0] += known * x * x;
+                    precision[1] += known * x * y;
+                    precision[2] += known * y * y;
+                }
+                inverted(precision)
+            }
+        }
+    }
 }
 
 /// Squared Mahalanobis distance of an error; `None` for a degenerate covariance.

@@ -55,6 +55,13 @@ impl Reading {
         }
     }
 
+    /// Column of a press minus the one expected where it was made, px.
+    pub(super) fn residual(&self, k: usize, press: &CalibrationPress) -> f64 {
+        let (value, slope) = self.of_column(k, press.columns[k]);
+        let at = [press.truth.x_mm, press.truth.y_mm];
+        (value - self.expected(k, at).0) / slope
+    }
+
     /// Variance of reading minus expected reading from the parameters of the geometry.
     pub(super) fn parameter_variance(&self, k: usize, at: [f64; 2], column: f64) -> f64 {
         let Self::Bearing {
@@ -202,6 +209,7 @@ mod tests {
             location: i,
             repetition: 0,
             columns: [0, 1].map(|k| planted.expected(k, at).0 + if i == 17 { 200.0 } else { 0.0 }),
+            spreads: [None; 2],
             truth: Point2::new(at[0], at[1]),
             cluster_events: 100,
         };

@@ -1,10 +1,10 @@
 //! Sizes of the 95 % regions from held-out calibration presses, and their check on the scored presses.
 
 use super::fitted::LEVEL;
-use super::prediction::distance;
+use super::prediction::{Uncertainty, distance};
+use super::robust::{log_density, student_weight};
 use super::{Features, Fitted};
-use crate::exact;
-use crate::metrics::{bootstrap_over_locations, mean};
+use crate::metrics::share_over_locations;
 use crate::result::{PressResult, RegionLevel, ReliabilityRow};
 use skinrig_model::{AnalysisSettings, PressRole, Verdict};
 
@@ -17,13 +17,86 @@ const TAIL_PRESSES: f64 = 2.0;
 /// A distance counts at most this many medians where the distribution is assumed.
 const BOUND_MEDIANS: f64 = 9.0;
 
-/// Sizes from the squared distances of held-out presses at `locations` locations; infinite: without a position.
+/// Rounds of the common size.
+const ROUNDS: usize = 30;
+/// Factors on the variance of the model that are compared: powers of two between these.
+const INFLATION_LOG2: std::ops::RangeInclusive<i32> = 0..=14;
+/// Standard deviation of the prior of the logarithm of that factor about 1.
+const LOOSE: f64 = 2.0;
+
+/// The error of a held-out calibration press, mm, and what was predicted about it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Reached {
+    pub uncertainty: Uncertainty,
+    pub error: [f64; 2],
+}
+
+/// How large regions are, from held-out calibration presses.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Regions {
+    /// Factor on the variance of the model.
+    pub inflation: f64,
+    /// Squared sizes in units of the covariance with that factor.
+    pub levels: Vec<RegionLevel>,
+}
+
+impl Regions {
+    /// From held-out presses that have a position; a region is a statement about those. `locations`: number of their
+    /// locations.
+    ///
+    /// A model learnt from few presses knows too little about how wrong it is between and beyond them: its variance is
+    /// multiplied by the most likely factor. What remains is a common size, which [`levels`] finds.
+    pub(super) fn from_held_out(reached: &[Reached], locations: usize) -> Self {
+        let likely = INFLATION_LOG2
+            .map(|log2| libm::exp2(f64::from(log2)))
+            .filter_map(|inflation| Some((unlikelihood(reached, inflation)?, inflation)))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let inflation = likely.map_or(1.0, |(_, inflation)| inflation);
+        let each = reached.iter();
+        let distances: Vec<f64> = each
+            .filter_map(|r| distance(r.uncertainty.covariance(inflation)?, r.error))
+            .collect();
+        Self {
+            inflation,
+            levels: levels(&distances, locations),
+        }
+    }
+}
+
+/// Negative logarithm of the posterior density of a factor on the variance of the model, up to a constant: errors are those
+/// of Student's t with 4 degrees of freedom and a common size. `None` if a covariance is degenerate.
+fn unlikelihood(reached: &[Reached], inflation: f64) -> Option<f64> {
+    let mut rows = Vec::with_capacity(reached.len());
+    for r in reached {
+        let covariance = r.uncertainty.covariance(inflation)?;
+        let [xx, xy, yy] = covariance;
+        rows.push((
+            distance(covariance, r.error)?,
+            0.5 * libm::log(xx * yy - xy * xy),
+        ));
+    }
+    let n = rows.len() as f64;
+    let mut size = 1.0;
+    for _ in 0..ROUNDS {
+        let each = rows.iter();
+        let sum: f64 = each.map(|(d, _)| d * student_weight(d / size, 2.0)).sum();
+        size = (sum / (2.0 * n)).max(f64::MIN_POSITIVE);
+    }
+    let off = libm::log(inflation) / LOOSE;
+    let each = rows.iter();
+    let sum: f64 = each
+        .map(|(d, log_root)| log_root + libm::log(size) - log_density(d / size, 2.0))
+        .sum();
+    (n > 0.0 && sum.is_finite()).then_some(0.5 * off * off + sum)
+}
+
+/// Sizes from the squared distances of held-out presses at `locations` locations.
 ///
 /// With enough presses a size is the conformal quantile: of n + 1 presses, the new one included, the share `level` lies
 /// inside, whatever the distribution. With fewer, errors are assumed normal with a scatter known from `locations - 2`
-/// degrees of freedom, and the larger of both counts. A level that most presses without position prevent is left out.
-pub(super) fn levels(distances: &[f64], locations: usize) -> Vec<RegionLevel> {
-    if locations < FEWEST {
+/// degrees of freedom, and the larger of both counts.
+fn levels(distances: &[f64], locations: usize) -> Vec<RegionLevel> {
+    if locations < FEWEST || distances.is_empty() {
         return Vec::new();
     }
     let mut sorted = distances.to_vec();
@@ -60,42 +133,24 @@ pub(crate) fn reliability(
         .filter(|p| p.role == PressRole::Score && p.verdict == Verdict::Valid);
     let reached: Vec<(u32, f64)> = scored
         .filter_map(|p| {
-            let (features, (dx, dy)) = (features(p)?, p.error_mm()?);
-            let covariance = fitted.predict(&features)?.covariance?;
+            let (features, (dx, dy)) = (Features::of_press(p)?, p.error_mm()?);
+            let uncertainty = fitted.predict(&features)?.uncertainty?;
+            let covariance = uncertainty.covariance(fitted.model().inflation)?;
             Some((p.location.index(), distance(covariance, [dx, dy])?))
         })
         .collect();
     if reached.is_empty() {
         return Vec::new();
     }
-    let mut locations: Vec<u32> = reached.iter().map(|r| r.0).collect();
-    locations.sort_unstable();
-    locations.dedup();
     let row = |level: &RegionLevel| {
-        let inside = |d: f64| if d <= level.factor { 1.0 } else { 0.0 };
-        let values: Vec<(u32, f64)> = reached.iter().map(|(l, d)| (*l, inside(*d))).collect();
-        let mut share =
-            bootstrap_over_locations(&values, settings.bootstrap_resamples, settings.seed, mean);
-        if let (Some(value), Some(low), Some(high)) = (share.value, share.low, share.high) {
-            let ends = exact::share(value, locations.len(), (low, high));
-            (share.low, share.high) = (Some(ends.0), Some(ends.1));
-        }
+        let inside = |(location, d): &(u32, f64)| (*location, *d <= level.factor);
+        let inside: Vec<(u32, bool)> = reached.iter().map(inside).collect();
         ReliabilityRow {
             level: level.level,
-            inside: share,
+            inside: share_over_locations(&inside, settings.bootstrap_resamples, settings.seed),
         }
     };
     fitted.model().levels.iter().map(row).collect()
-}
-
-/// Features of a press; `None` unless both cameras see it.
-pub(crate) fn features(press: &PressResult) -> Option<Features> {
-    let [one, two] = press.views;
-    let (one, two) = (one?, two?);
-    Some(Features {
-        columns: [one.centroid_u?, two.centroid_u?],
-        cluster_events: one.cluster_events.min(two.cluster_events),
-    })
 }
 
 #[cfg(test)]
@@ -119,11 +174,6 @@ mod tests {
             "{few}"
         );
         assert_eq!(levels(&[1.0; 4], 4), []);
-        // A tenth of the presses without position.
-        let open: Vec<f64> = (0..100)
-            .map(|i| if i % 10 == 0 { f64::INFINITY } else { 1.0 })
-            .collect();
-        assert_eq!(factor(&open, 100, 0.95), None);
-        assert_eq!(factor(&open, 100, 0.8), Some(1.0));
+        assert_eq!(levels(&[], 9), []);
     }
 }

@@ -1,6 +1,5 @@
-//! What a field learns from: for one camera, how far its columns are from those expected at the measured positions.
+//! What a field learns from: for one camera, how far a reading is from the one expected at the measured positions.
 
-use super::reading::Reading;
 use super::robust::{reference_events, response, scale, weight};
 use crate::sets::CalibrationPress;
 
@@ -13,9 +12,9 @@ pub(super) struct Sample {
     location: u32,
     /// Measured position, mm.
     pub at: [f64; 2],
-    /// Column minus the one expected here, px.
+    /// Reading minus the one expected here, px.
     pub residual: f64,
-    /// Variance of the column relative to a press of median response.
+    /// Variance of the reading relative to a press of median response.
     pub response: f64,
     /// Number of presses behind it.
     pub count: f64,
@@ -28,24 +27,27 @@ impl Sample {
     }
 }
 
-/// The observations of camera `k`, ordered by location, at most [`MOST`].
-pub(super) fn samples(reading: &Reading, k: usize, presses: &[CalibrationPress]) -> Vec<Sample> {
+/// The observations, ordered by location, at most [`MOST`]. `residual`: reading of a press minus the expected one, px; `None`
+/// if the press has none.
+pub(super) fn samples(
+    presses: &[CalibrationPress],
+    residual: impl Fn(&CalibrationPress) -> Option<f64>,
+) -> Vec<Sample> {
     let reference = reference_events(presses);
     let mut sorted: Vec<&CalibrationPress> = presses.iter().collect();
     sorted.sort_by(|a, b| {
         let key = |p: &CalibrationPress| (p.location, p.repetition);
-        let columns = || a.columns[k].total_cmp(&b.columns[k]);
-        key(a).cmp(&key(b)).then_with(columns)
+        let columns = |k: usize| a.columns[k].total_cmp(&b.columns[k]);
+        let by_columns = || columns(0).then_with(|| columns(1));
+        key(a).cmp(&key(b)).then_with(by_columns)
     });
     let all: Vec<Sample> = sorted
         .into_iter()
         .filter_map(|p| {
-            let at = [p.truth.x_mm, p.truth.y_mm];
-            let (value, slope) = reading.of_column(k, p.columns[k]);
             let sample = Sample {
                 location: p.location,
-                at,
-                residual: (value - reading.expected(k, at).0) / slope,
+                at: [p.truth.x_mm, p.truth.y_mm],
+                residual: residual(p)?,
                 response: response(p.cluster_events, reference),
                 count: 1.0,
             };

@@ -18,6 +18,7 @@ use skinrig_model::CentroidRule;
 use crate::dbscan::Dbscan;
 use crate::estimators::ColumnEstimate;
 use crate::grid::PixelGrid;
+use crate::locator::CameraFeatures;
 use crate::press_events::PackedEvent;
 use crate::result::Thinning;
 use crate::seeded;
@@ -27,8 +28,8 @@ use crate::seeded;
 pub(super) struct ThinnedView {
     /// Number of remaining events.
     pub events: u32,
-    /// Column of their centroid, px; `None` without a cluster.
-    pub column: Option<f64>,
+    /// What a locator sees of them.
+    pub features: CameraFeatures,
 }
 
 /// Thins the views of one camera, one after another.
@@ -131,13 +132,14 @@ impl Thinner {
     /// Centroid of the events on the grid.
     fn left(&mut self) -> ThinnedView {
         let events = self.grid.events();
-        let column = if events < self.min_samples {
-            None // no event has that many neighbours
+        let features = if events < self.min_samples {
+            CameraFeatures::default() // no event has that many neighbours
         } else {
             self.dbscan.run(&self.grid);
-            ColumnEstimate::of_clusters(&self.dbscan, self.centroid, 1).column
+            let estimate = ColumnEstimate::of_clusters(&self.dbscan, self.centroid, 1);
+            CameraFeatures::from(&estimate)
         };
-        ThinnedView { events, column }
+        ThinnedView { events, features }
     }
 }
 
@@ -183,8 +185,11 @@ mod tests {
                 chosen.iter().for_each(|(u, v)| assert!(grid.add(*u, *v)));
                 let mut dbscan = Dbscan::new(3.0, min_samples);
                 dbscan.run(&grid);
-                let column = dbscan.largest().and_then(|(_, c)| c.centroid()).map(|c| c.0);
-                ThinnedView { events: chosen.len() as u32, column }
+                let features = match chosen.len() < min_samples as usize {
+                    true => CameraFeatures::default(),
+                    false => CameraFeatures::from(&ColumnEstimate::of_clusters(&dbscan, rule, 1)),
+                };
+                ThinnedView { events: chosen.len() as u32, features }
             };
             prop_assert_eq!(thinner.load(&events(&pixels)), fresh(&pixels));
             let mut rng = seeded::generator(seed, 0);

@@ -121,8 +121,8 @@ impl Trials<'_> {
             f64::from(end.saturating_sub(start)) * 1e-6
         });
         let trial = |left: [ThinnedView; 2]| {
-            let columns = left.map(|l| l.column);
-            let estimate = accept(&self.locator.outcome(self.outline, columns, 0).0);
+            let cameras = left.map(|l| l.features);
+            let estimate = accept(&self.locator.outcome(self.outline, cameras).0);
             let truth = attempt.truth;
             let per_s = |k: usize| match windows_s[k] {
                 s if s > 0.0 => f64::from(left[k].events) / s,

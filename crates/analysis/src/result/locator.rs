@@ -75,6 +75,9 @@ pub struct LocatorModel {
     pub cameras: Option<[CameraField; 2]>,
     /// Where presses are expected; `None` for the geometry alone.
     pub prior: Option<PositionPrior>,
+    /// Factor on the variance that the fields, or the parameters of the geometry alone, state about themselves, from
+    /// held-out calibration presses.
+    pub inflation: f64,
     /// Squared size of a region of each level, in units of the predicted covariance, from held-out calibration presses;
     /// empty if there are too few.
     pub levels: Vec<RegionLevel>,
@@ -86,6 +89,17 @@ pub struct CameraField {
     /// The expected column, px: coefficients of 1, x, y, x², xy, y² (mm). `None`: the geometry says what is expected.
     pub polynomial: Option<[f64; 6]>,
     /// Correction of the expected column.
+    pub field: FieldModel,
+    /// Spread of the columns and rows of the events; `None` if too few presses have one.
+    pub spreads: Option<[SpreadField; 2]>,
+}
+
+/// How far the events of a press spread, by its position.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SpreadField {
+    /// Median of the calibration presses, px.
+    pub typical_px: f64,
+    /// `typical_px` times the logarithm of the spread divided by `typical_px`.
     pub field: FieldModel,
 }
 
@@ -110,7 +124,7 @@ pub struct FieldModel {
 pub struct FieldPoint {
     /// Measured position, mm.
     pub at_mm: [f64; 2],
-    /// Column minus the one expected there, px: the miss of the ray as an angle, divided by degrees per column.
+    /// Reading minus the one expected there, px; of a geometry: the miss of the ray as an angle, divided by degrees per column.
     pub residual_px: f64,
     /// Its variance, px²; large for weak presses and outliers.
     pub variance_px2: f64,

@@ -24,7 +24,7 @@ pub use latency::{
 };
 pub use locator::{
     CameraField, FieldModel, FieldPoint, LocatorComparison, LocatorModel, LocatorResult,
-    LocatorTest, PositionPrior, Region, RegionLevel, ReliabilityRow, Scatter,
+    LocatorTest, PositionPrior, Region, RegionLevel, ReliabilityRow, Scatter, SpreadField,
 };
 pub use motion::{Motion, MotionBin, PressMotion, TipSample};
 pub use reduction::{Reduction, ReductionCurve, ReductionRow, Thinning};
@@ -360,6 +360,9 @@ pub struct PressView {
     /// Standard deviation of the columns of the events in the cluster(s) behind the centroid, px; `None` without clusters.
     #[serde(default)]
     pub spread_u: Option<f64>,
+    /// The same of their rows, px; `None` also in results before version 9.
+    #[serde(default)]
+    pub spread_v: Option<f64>,
     /// Width of the narrowest range of columns with half of the events that the press added to the idle rate, px; `None` if
     /// it added too few.
     #[serde(default)]

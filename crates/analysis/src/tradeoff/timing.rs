@@ -4,7 +4,7 @@ use skinrig_model::{CameraId, PressRole};
 
 use super::replay::{Filter, Replay, after};
 use crate::estimators::PressEstimator;
-use crate::locator::Fitted;
+use crate::locator::{CameraFeatures, Fitted};
 use crate::metrics::quantile;
 use crate::press_events::{PackedEvent, RetainedPress};
 use crate::segment::Window;
@@ -59,9 +59,8 @@ pub(super) fn run(
                     let (events, from_us) = &views[k];
                     estimators[k].estimate(events, *from_us)
                 });
-                let events = found[0].events.min(found[1].events);
-                let columns = found.map(|f| f.column);
-                std::hint::black_box(candidate.locator.outcome(outline, columns, events));
+                let cameras = found.each_ref().map(CameraFeatures::from);
+                std::hint::black_box(candidate.locator.outcome(outline, cameras));
             }
             let spent_s = stopwatch() - begun;
             if repeat > 0 {

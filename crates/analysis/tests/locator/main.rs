@@ -9,7 +9,7 @@ mod symmetries;
 use skinrig_analysis::locator::LocatorChoice;
 use skinrig_analysis::sets::CalibrationSet;
 use skinrig_model::Locator;
-use skins::{Skin, errors, learn, rms};
+use skins::{Skin, Spreads, errors, learn, rms};
 
 /// Columns bend by several pixels, as behind a skin of uneven thickness.
 fn uneven(seed: u64) -> Skin {
@@ -55,6 +55,40 @@ fn scatter_alone_teaches_nothing_and_costs_little() {
     }
     assert!(kept >= 6, "{kept} of 8");
     assert!(ratios.iter().all(|r| *r < 1.06), "{ratios:?}");
+}
+
+/// The rays of both cameras are nearly parallel between them: there the spreads tell where along the rays a press is.
+#[test]
+fn spreads_that_tell_the_distance_make_a_field_better() {
+    for seed in 0..3 {
+        let columns = Skin {
+            noise_px: 8.0,
+            ..uneven(seed)
+        };
+        let spreads = Skin {
+            spreads: Spreads::Near(0.08),
+            ..columns.clone()
+        };
+        for locator in [Locator::Field, Locator::Direct] {
+            let without = rms(&columns, &learn(&columns, locator));
+            let with = rms(&spreads, &learn(&spreads, locator));
+            assert!(with < 0.85 * without, "{locator:?}: {with} {without}");
+        }
+    }
+}
+
+#[test]
+fn spreads_by_chance_change_little() {
+    for seed in 0..3 {
+        let columns = uneven(seed);
+        let spreads = Skin {
+            spreads: Spreads::Chance,
+            ..columns.clone()
+        };
+        let without = rms(&columns, &learn(&columns, Locator::Field));
+        let with = rms(&spreads, &learn(&spreads, Locator::Field));
+        assert!(with < 1.03 * without, "{with} {without}");
+    }
 }
 
 #[test]

@@ -30,6 +30,18 @@ impl Noise {
     }
 }
 
+/// How far the events of a press spread in a camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Spreads {
+    /// The cameras report none.
+    Absent,
+    /// The nearer the camera, the wider; relative scatter of a press with 100 cluster events, and every twentieth press three
+    /// times as wide.
+    Near(f64),
+    /// By chance.
+    Chance,
+}
+
 /// A skin with its presses.
 #[derive(Debug, Clone)]
 pub(crate) struct Skin {
@@ -51,6 +63,8 @@ pub(crate) struct Skin {
     /// Factor on the scatter of camera 2.
     pub(crate) blind: f64,
     pub(crate) repeats: u32,
+    /// How far the events of a press spread.
+    pub(crate) spreads: Spreads,
     /// Depths, mm, one repetition after another.
     pub(crate) depths: &'static [f64],
 }
@@ -68,6 +82,7 @@ impl Skin {
             weak: 0.5,
             blind: 1.0,
             repeats: 1,
+            spreads: Spreads::Absent,
             depths: &[2.0],
         }
     }
@@ -100,6 +115,21 @@ impl Skin {
                 .sum();
             0.5 * self.bend_px * sum
         };
+        // Apart from the rest: a skin differs from the same one without spreads in nothing else.
+        let mut chance = Noise::new(0x59ead ^ self.seed);
+        let mut widths = |camera: usize, at: Point2, events: u32| {
+            let eye = geometry.cameras[camera].position;
+            let outlier = if chance.unit() < 0.05 { 3.0 } else { 1.0 };
+            let mut scatter = || chance.normal() * (100.0 / f64::from(events)).sqrt();
+            match self.spreads {
+                Spreads::Absent => None,
+                Spreads::Near(relative) => {
+                    let width = outlier * 1500.0 / at.distance_mm(eye).max(10.0);
+                    Some([width, 0.5 * width].map(|w| w * (relative * scatter()).exp()))
+                }
+                Spreads::Chance => Some([30.0, 15.0].map(|w| w * (0.2 * scatter()).exp())),
+            }
+        };
         let step = 64.0 / f64::from(self.side - 1);
         let mut rows = Vec::new();
         let mut calibrating = 0;
@@ -123,7 +153,11 @@ impl Skin {
                     let off = if far { 60.0 * noise.normal() } else { 0.0 };
                     u + bend(k, at) + factor * spread * noise.normal() + off
                 };
-                let views = [view(column(0, one), events), view(column(1, two), events)];
+                let mut views = [view(column(0, one), events), view(column(1, two), events)];
+                for (k, view) in views.iter_mut().flatten().enumerate() {
+                    let both = widths(k, at, events);
+                    (view.spread_u, view.spread_v) = (both.map(|s| s[0]), both.map(|s| s[1]));
+                }
                 let lower_left = at.x_mm < 6.0 && at.y_mm < 0.0;
                 let mut role = PressRole::Score;
                 let turn = (location + location / self.side).is_multiple_of(2);
@@ -169,6 +203,7 @@ pub(crate) fn view(u: f64, events: u32) -> Option<PressView> {
         idle_rate_per_s: 10.0,
         idle_s: 0.5,
         spread_u: None,
+        spread_v: None,
         width_u: None,
     })
 }
@@ -196,11 +231,7 @@ pub(crate) fn learn_set(set: &CalibrationSet, locator: Locator) -> LocatorChoice
 }
 
 pub(crate) fn features(press: &PressResult) -> Features {
-    let [one, two] = press.views.map(Option::unwrap);
-    Features {
-        columns: [one.centroid_u.unwrap(), two.centroid_u.unwrap()],
-        cluster_events: one.cluster_events.min(two.cluster_events),
-    }
+    Features::of_press(press).unwrap()
 }
 
 /// A scored press that was located: press, error vector, location.

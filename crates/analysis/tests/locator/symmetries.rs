@@ -6,12 +6,13 @@ use skinrig_analysis::result::PressResult;
 use skinrig_analysis::sets::CalibrationSet;
 use skinrig_model::{Locator, Point2, StereoGeometry};
 
-use super::skins::{DRAWN, Skin, features, settings};
+use super::skins::{DRAWN, Skin, Spreads, features, settings};
 
 fn skin() -> Skin {
     Skin {
         bend_px: 12.0,
         side: 9,
+        spreads: Spreads::Near(0.08),
         ..Skin::new(4)
     }
 }

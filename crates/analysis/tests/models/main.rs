@@ -43,6 +43,7 @@ fn view(u: f64) -> Option<PressView> {
         idle_rate_per_s: 10.0,
         idle_s: 0.5,
         spread_u: None,
+        spread_v: None,
         width_u: None,
     })
 }

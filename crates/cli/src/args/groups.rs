@@ -20,7 +20,14 @@ const GROUPS: [(&str, &[&str]); 6] = [
     (
         "Sessions",
         &[
-            "sessions", "show", "tag", "verify", "salvage", "export", "inspect",
+            "sessions",
+            "show",
+            "tag",
+            "verify",
+            "salvage",
+            "export",
+            "challenge",
+            "inspect",
         ],
     ),
     ("Bench", &["doctor", "devices", "jog", "hil"]),

@@ -1,6 +1,7 @@
 //! The command line: commands, and the arguments that several of them share.
 
 mod bench;
+mod challenge;
 mod doctor;
 mod evaluate;
 mod files;
@@ -15,6 +16,7 @@ pub(crate) use self::bench::{
     ControlArgs, DetectArgs, DevicesArgs, JogArgs, NoteArgs, PlanArgs, ResumeArgs, RunArgs,
     StatusArgs, ViewArgs, WatchArgs,
 };
+pub(crate) use self::challenge::{ChallengeArgs, ChallengeCommand, MakeArgs, ScoreArgs};
 pub(crate) use self::doctor::DoctorArgs;
 pub(crate) use self::evaluate::{AnalyzeArgs, CompareArgs, CostKind, ReportArgs, TradeoffArgs};
 pub(crate) use self::files::{
@@ -215,6 +217,13 @@ pub(crate) enum Command {
         skinrig export sessions/NAME.session.sqlite --to bundle --out NAME.bundle"
     )]
     Export(ExportArgs),
+
+    /// Give a session's events away with the scored positions sealed, and score estimates from anywhere.
+    #[command(
+        after_help = "Examples:\n  skinrig challenge make sessions/NAME.session.sqlite --out challenge/\n  \
+        skinrig challenge score challenge/ estimates.csv --answers sessions/NAME.answers.json"
+    )]
+    Challenge(ChallengeArgs),
 
     /// Print what a RAW, HDF5 or session file contains.
     #[command(after_help = "Example:\n  skinrig inspect recording.raw")]

@@ -2,7 +2,7 @@
 
 use crate::support::{ROOT, skinrig};
 
-const COMMANDS: [&str; 29] = [
+const COMMANDS: [&str; 30] = [
     "init",
     "new",
     "doctor",
@@ -22,6 +22,7 @@ const COMMANDS: [&str; 29] = [
     "salvage",
     "import",
     "export",
+    "challenge",
     "inspect",
     "schema",
     "tradeoff",

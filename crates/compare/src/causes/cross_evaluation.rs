@@ -1,7 +1,7 @@
 //! Owns cross-evaluation: evaluates the presses of each skin with the calibration or the settings of the other.
 
 use serde::Serialize;
-use skinrig_analysis::locator::Fitted;
+use skinrig_analysis::locator::{CameraFeatures, Fitted};
 
 use super::factor::Reanalysis;
 use crate::locations::Locations;
@@ -76,11 +76,8 @@ fn rmse(
         let error = match (with, attempt.press.truth) {
             (None, _) => Some((x, y)),
             (Some(locator), Some(truth)) => {
-                let views = attempt.press.views;
-                let columns = views.map(|v| v.and_then(|v| v.centroid_u));
-                let events = views.map(|v| v.map_or(0, |v| v.cluster_events));
                 let outline = &attempt.session.analysis.rig.outline;
-                let (found, _) = locator.outcome(outline, columns, events[0].min(events[1]));
+                let (found, _) = locator.outcome(outline, CameraFeatures::of_press(attempt.press));
                 found
                     .estimate()
                     .map(|at| (at.x_mm - truth.x_mm, at.y_mm - truth.y_mm))

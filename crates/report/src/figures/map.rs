@@ -1,6 +1,6 @@
 //! Owns the maps of the skin: localisation errors, and spread between repetitions, per location.
 
-use skinrig_analysis::result::PressResult;
+use skinrig_analysis::result::{PressResult, Region};
 use skinrig_model::{Point2, PressId, PressRole};
 
 use super::origin::foot;
@@ -18,6 +18,8 @@ const SIZE: (f64, f64) = (900.0, 700.0);
 /// On a phone, scale and legend stand below the map.
 const NARROW: ((f64, f64), f64) = ((740.0, 1280.0), 1.4);
 const SIDE_TO: (f64, f64) = (-680.0, 700.0);
+/// Regions drawn; more would hide the map.
+const REGIONS: usize = 400;
 
 fn discs(
     svg: &mut Markup,
@@ -84,15 +86,18 @@ pub(crate) fn skin_map(input: &ReportInput<'_>) -> Figure {
         .iter()
         .filter(|p| p.role == PressRole::Score && !derive::is_counted(p))
         .collect();
+    let regions = regions(&counted);
     let caption = format!(
         "Localisation error over the skin. Discs: scored locations, coloured by the mean Euclidean error of their \
          presses. Lines run from each measured position (truth) to its estimate, which ends in a dot ({} presses at {} \
-         locations). Open squares: scored presses that do not count ({}; missed presses appear only at locations \
-         without a disc). Thin grey line: press path of the first repetition. Tinted: fields of view of camera 1 and \
+         locations). Thin ellipses: 95 % regions of {} presses, each the extent that the \
+         analysis states for its estimate. Open squares: scored presses that do not count ({}; missed presses appear only \
+         at locations without a disc). Thin grey line: press path of the first repetition. Tinted: fields of view of camera 1 and \
          camera 2; dotted: their overlap, where a press can be located. Grey edge: probed area, one square cell per \
          location.",
         counted.len(),
         locations.len(),
+        regions.len(),
         others.len()
     );
     let head = ["skin-map", "Skin map", &caption].map(str::to_owned);
@@ -175,6 +180,13 @@ pub(crate) fn skin_map(input: &ReportInput<'_>) -> Figure {
         }
     }
     let dense = if counted.len() > 600 { " dense" } else { "" };
+    let (ellipses, drawn): (String, Vec<PressId>) = regions
+        .iter()
+        .map(|(press, at, region)| (ellipse(&layout, place, *at, region), *press))
+        .unzip();
+    svg.open("g", &[("class", &"layer-regions")]);
+    press_path(svg, "region", &ellipses, &drawn);
+    svg.close();
     svg.open("g", &[("class", &format_args!("layer-vectors{dense}"))]);
     press_path(svg, "vector", &vectors, &numbers);
     press_path(svg, "dots tips", &dots(tips), &numbers);
@@ -208,6 +220,37 @@ pub(crate) fn skin_map(input: &ReportInput<'_>) -> Figure {
         .interactive("select")
 }
 
+/// Presses with a 95 % region about their estimate, evenly thinned to [`REGIONS`].
+fn regions(counted: &[&PressResult]) -> Vec<(PressId, Point2, Region)> {
+    let all: Vec<_> = counted
+        .iter()
+        .filter_map(|p| Some((p.press, p.estimate()?, p.region?)))
+        .collect();
+    let count = all.len().min(REGIONS);
+    (0..count).map(|i| all[i * all.len() / count]).collect()
+}
+
+/// Path of a region: two arcs between the ends of its longer axis.
+fn ellipse(layout: &Layout, place: &Place, at: Point2, region: &Region) -> String {
+    let scale = place.x.per_unit();
+    let [major, minor] = region.semi_axes_mm.map(|a| a * scale);
+    // The figure's y axis runs down.
+    let turn = -region.angle_deg;
+    let (sin, cos) = turn.to_radians().sin_cos();
+    let (x, y) = layout.px(place, at);
+    let (dx, dy) = (2.0 * major * cos, 2.0 * major * sin);
+    let (major, minor, turn) = (Px(major), Px(minor), Px(turn));
+    format!(
+        "M{} {}a{major} {minor} {turn} 1 0 {} {}a{major} {minor} {turn} 1 0 {} {}Z",
+        Px(x - dx / 2.0),
+        Px(y - dy / 2.0),
+        Px(dx),
+        Px(dy),
+        Px(-dx),
+        Px(-dy),
+    )
+}
+
 /// Edge of the probed area: one cell per location, clipped to the outline.
 fn cells(svg: &mut Markup, (layout, at): (&Layout, &Place), places: &[Point2], cell_mm: f64) {
     let side = cell_mm * at.x.per_unit();
@@ -228,13 +271,17 @@ fn cells(svg: &mut Markup, (layout, at): (&Layout, &Place), places: &[Point2], c
     svg.close();
 }
 
-const LEGEND: [(Sample, &str); 7] = [
+const LEGEND: [(Sample, &str); 8] = [
     (Sample::Area("fov strong f1 c1"), "seen by camera 1"),
     (Sample::Area("fov strong f2 c2"), "seen by camera 2"),
     (Sample::Line("overlap-edge"), "seen by both"),
     (Sample::Path("cell", "M-7 -7h14v14h-14Z"), "probed area"),
     (Sample::Line("path"), "press path"),
     (Sample::Line("vector"), "truth to estimate"),
+    (
+        Sample::Path("region", "M-10 0a10 5 0 1 0 20 0a10 5 0 1 0 -20 0Z"),
+        "95 % region",
+    ),
     (Sample::Path("other", "M-5 -5h10v10h-10Z"), "not counted"),
 ];
 

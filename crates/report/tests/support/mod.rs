@@ -319,6 +319,7 @@ fn press(
                 idle_rate_per_s: 2100.0,
                 idle_s: 0.8,
                 spread_u: Some(14.0),
+                spread_v: None,
                 width_u: Some(19.0),
             }
         })
@@ -656,6 +657,7 @@ fn locator() -> LocatorResult {
             geometry_covariance: None,
             cameras: None,
             prior: None,
+            inflation: 1.0,
             levels: Vec::new(),
         },
         reliability: [0.5, 0.8, 0.95]

@@ -1,0 +1,239 @@
+//! A challenge from a session to a score, and the tables that it refuses.
+
+use std::fs::read_to_string;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::support::{Lab, read_json, skinrig, text};
+
+/// A challenge of four calibrating and four scored presses.
+struct Challenge {
+    lab: Lab,
+    folder: PathBuf,
+    answers: PathBuf,
+    session: PathBuf,
+}
+
+impl Challenge {
+    fn new() -> Self {
+        let lab = Lab::new();
+        let more = [
+            "--set",
+            "evaluation.calibrate=[1]",
+            "--set",
+            "evaluation.score=[2]",
+            "--set",
+            "analysis.bootstrap_resamples=50",
+        ];
+        let session = lab.record("s", &more);
+        let folder = lab.path("challenge");
+        let made = [
+            "challenge",
+            "make",
+            &text(&session),
+            "--out",
+            &text(&folder),
+            "--json",
+        ];
+        let said = skinrig(&made).code(0).json();
+        assert_eq!(
+            (&said["calibrating"], &said["scored"]),
+            (&4.into(), &4.into())
+        );
+        let answers = PathBuf::from(said["answers"].as_str().unwrap());
+        assert_eq!(answers.parent(), session.parent());
+        Self {
+            lab,
+            folder,
+            answers,
+            session,
+        }
+    }
+
+    /// The answers: (press, x, y).
+    fn truths(&self) -> Vec<(u64, f64, f64)> {
+        let all = read_json(&self.answers);
+        let number = |p: &Value, name: &str| p[name].as_f64().unwrap();
+        let presses = all["presses"].as_array().unwrap().iter();
+        presses
+            .map(|p| {
+                (
+                    p["press"].as_u64().unwrap(),
+                    number(p, "x_mm"),
+                    number(p, "y_mm"),
+                )
+            })
+            .collect()
+    }
+
+    fn arguments(&self, table: &str) -> Vec<String> {
+        let path = self.lab.path("estimates.csv");
+        std::fs::write(&path, table).unwrap();
+        let folder = text(&self.folder);
+        let answers = text(&self.answers);
+        let words = [
+            "challenge",
+            "score",
+            &folder,
+            &text(&path),
+            "--answers",
+            &answers,
+            "--json",
+        ];
+        words.map(str::to_owned).into()
+    }
+
+    fn score(&self, table: &str) -> Value {
+        skinrig(&self.arguments(table)).code(0).json()
+    }
+
+    #[track_caller]
+    fn refuses(&self, table: &str, parts: &[&str]) {
+        skinrig(&self.arguments(table)).code(2).expect_stderr(parts);
+    }
+}
+
+fn table(header: &str, rows: impl IntoIterator<Item = String>) -> String {
+    let rows: Vec<String> = rows.into_iter().collect();
+    format!("{header}\n{}\n", rows.join("\n"))
+}
+
+fn rows(truths: &[(u64, f64, f64)], off_mm: f64) -> Vec<String> {
+    let row = |(press, x, y): &(u64, f64, f64)| format!("{press},{},{y}", x + off_mm);
+    truths.iter().map(row).collect()
+}
+
+#[test]
+fn estimates_are_scored_with_regions_and_without() {
+    let challenge = Challenge::new();
+    let truths = challenge.truths();
+    let said = challenge.score(&table("press,x_mm,y_mm", rows(&truths, 3.0)));
+    let near = |value: &Value, expected: f64| (value.as_f64().unwrap() - expected).abs() < 1e-9;
+    let metrics = &said["metrics"];
+    assert!(near(&metrics["rmse_mm"]["value"], 3.0), "{said}");
+    assert!(near(&metrics["rmse_mm"]["low"], 3.0) && near(&metrics["bias_x_mm"]["value"], 3.0));
+    assert_eq!(metrics["located_rate"]["value"], 1.0);
+    assert!(said["coverage"].is_null());
+    // One is not located; of the others, the region holds two.
+    let header = "press,x_mm,y_mm,region_major_mm,region_minor_mm,region_angle_deg";
+    let regions = ["4,1,0", "1,4,90", "1,4,0"];
+    let mut with: Vec<String> = rows(&truths, 3.0)
+        .iter()
+        .zip(regions)
+        .map(|(row, region)| format!("{row},{region}"))
+        .collect();
+    with.push(format!("{},,,,,", truths[3].0));
+    let said = challenge.score(&table(header, with));
+    assert_eq!(said["metrics"]["located_rate"]["value"], 0.75);
+    assert_eq!(said["coverage"]["n"], 3);
+    // (3, 0) is within 4 mm along x; within 1 mm along y and 4 mm along x; not within 1 mm along x.
+    assert!(near(&said["coverage"]["value"], 2.0 / 3.0), "{said}");
+}
+
+#[test]
+fn the_folder_gives_no_position_of_a_scored_press_away() {
+    let challenge = Challenge::new();
+    let presses = read_to_string(challenge.folder.join("challenge.presses.csv")).unwrap();
+    let scored: Vec<&str> = presses.lines().filter(|l| l.contains(",score,")).collect();
+    assert_eq!(scored.len(), 4, "{presses}");
+    assert!(scored.iter().all(|l| l.ends_with(",,,")), "{presses}");
+    for (_, x, y) in challenge.truths() {
+        for file in std::fs::read_dir(&challenge.folder).unwrap() {
+            let bytes = std::fs::read(file.unwrap().path()).unwrap();
+            let holds = |number: f64| {
+                let text = number.to_string();
+                let bits = number.to_le_bytes();
+                let found = |part: &[u8]| bytes.windows(part.len()).any(|w| w == part);
+                found(text.as_bytes()) || found(&bits)
+            };
+            assert!(!holds(x) && !holds(y));
+        }
+    }
+    // The order of the plan is gone, and the answers are not in the folder.
+    let answers = read_json(&challenge.answers);
+    let session: Vec<u64> = answers["presses"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| p["session_press"].as_u64().unwrap())
+        .collect();
+    assert!(!session.is_sorted(), "{session:?}");
+    let inside = text(&challenge.folder.join("answers.json"));
+    let made = [
+        "challenge",
+        "make",
+        &text(&challenge.session),
+        "--out",
+        &text(&challenge.folder),
+        "--answers",
+        &inside,
+    ];
+    skinrig(&made).code(2).expect_stderr(&["--answers"]);
+    assert!(!Path::new(&inside).exists());
+}
+
+#[test]
+fn a_wrong_table_is_refused_with_its_row() {
+    let challenge = Challenge::new();
+    let truths = challenge.truths();
+    let good = rows(&truths, 0.0);
+    let header = "press,x_mm,y_mm";
+    let changed = |i: usize, row: String| {
+        let mut all = good.clone();
+        all[i] = row;
+        table(header, all)
+    };
+    let (press, x, y) = truths[1];
+    let scored: Vec<u64> = truths.iter().map(|t| t.0).collect();
+    let given = (1..=8).find(|press| !scored.contains(press)).unwrap();
+    challenge.refuses(
+        &table(header, good[1..].to_vec()),
+        &["1 presses have no row", &format!("press {}", scored[0])],
+    );
+    challenge.refuses(
+        &table(header, [good.clone(), vec![good[1].clone()]].concat()),
+        &["row 6", "row 3"],
+    );
+    challenge.refuses(
+        &changed(1, format!("77,{x},{y}")),
+        &["row 3", "no press 77"],
+    );
+    challenge.refuses(
+        &changed(1, format!("{given},{x},{y}")),
+        &["row 3", "calibrates"],
+    );
+    challenge.refuses(
+        &changed(1, format!("{press},NaN,{y}")),
+        &["row 3", "x_mm", "NaN"],
+    );
+    challenge.refuses(&changed(1, format!("{press},inf,{y}")), &["row 3", "x_mm"]);
+    challenge.refuses(
+        &changed(1, format!("{press},{x},")),
+        &["row 3", "y_mm", "empty"],
+    );
+    challenge.refuses(&changed(1, format!("{press},{x},left")), &["row 3", "left"]);
+    challenge.refuses(
+        &changed(1, format!("{press},320,{y}")),
+        &["row 3", "mm in the skin frame"],
+    );
+    challenge.refuses(&table("press,x_m,y_m", good.clone()), &["row 1", "x_m"]);
+    challenge.refuses(&table("press,x_mm", good.clone()), &["row 1", "y_mm"]);
+    let metres = truths
+        .iter()
+        .map(|(p, x, y)| format!("{p},{},{}", 1e-3 * x, 1e-3 * y));
+    challenge.refuses(&table(header, metres), &["metres"]);
+    let region = "press,x_mm,y_mm,region_major_mm,region_minor_mm,region_angle_deg";
+    let regions = good.iter().map(|row| format!("{row},0,1,0"));
+    challenge.refuses(
+        &table(region, regions),
+        &["row 2", "region_major_mm", "above 0"],
+    );
+    // Answers of another challenge, or changed ones.
+    let changed =
+        read_to_string(&challenge.answers)
+            .unwrap()
+            .replacen("\"seed\": ", "\"seed\": 1", 1);
+    std::fs::write(&challenge.answers, changed).unwrap();
+    challenge.refuses(&table(header, good), &["SHA-256"]);
+}

@@ -1,0 +1,308 @@
+//! Makes a challenge: events, table of presses and description in one folder, the answers in a file outside it.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use skinrig_analysis::result::PressResult;
+use skinrig_model::{CameraId, CdEvent, Point2, PressRole, PressTiming, Verdict};
+use skinrig_recorder::RecorderError;
+
+use super::answers::{Answer, Answers, hash};
+use super::error::ChallengeError;
+use super::{DESCRIPTION, FORMAT, STEM};
+use crate::csv_files::CsvFiles;
+use crate::error::ExportError;
+use crate::folder::Folder;
+use crate::parquet_files::ParquetFiles;
+use crate::presses::recorded_us;
+use crate::source::{Source, TableName};
+use crate::table::{Column, Kind, Layout, Table, TableWriter, Values};
+
+/// Events from this long before the contact to this long after the release, µs.
+const MARGIN_US: f64 = 500_000.0;
+
+/// Description of a challenge, for people and programs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Description {
+    format: u32,
+    /// What to do.
+    task: String,
+    /// Presses whose position is given.
+    pub calibrating: u32,
+    /// Presses to locate.
+    pub scored: u32,
+    /// SHA-256 of the file of answers.
+    pub answers_sha256: String,
+}
+
+const TASK: &str = "Locate the presses with role `score`, in mm in the skin frame, from the events of both cameras. Events are \
+    those from 0.5 s before the contact to 0.5 s after the release; t_us counts from the contact. Write a CSV file with the \
+    columns press, x_mm, y_mm, one row for each of these presses, cells empty if not located; optionally the 95 % region as \
+    region_major_mm, region_minor_mm (semi-axes) and region_angle_deg (of the longer one, counter-clockwise from x).";
+
+impl Description {
+    /// Reads the description of the challenge in `folder`.
+    pub(super) fn read(folder: &Path) -> Result<Self, ChallengeError> {
+        let path = folder.join(DESCRIPTION);
+        let refused = |found: String| ChallengeError::NotAChallenge {
+            path: path.clone(),
+            expected: "the description of a challenge",
+            found,
+        };
+        let bytes = std::fs::read(&path).map_err(|e| refused(e.to_string()))?;
+        let found: Self = serde_json::from_slice(&bytes).map_err(|e| refused(e.to_string()))?;
+        match found.format {
+            FORMAT => Ok(found),
+            other => Err(refused(format!("format {other}"))),
+        }
+    }
+}
+
+/// A challenge that was made.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Made {
+    /// Files to give away.
+    pub files: Vec<PathBuf>,
+    /// The file to keep.
+    pub answers: PathBuf,
+    /// Presses whose position is given.
+    pub calibrating: u32,
+    /// Presses to locate.
+    pub scored: u32,
+}
+
+/// A press of the challenge.
+struct Press<'a> {
+    row: &'a PressResult,
+    timing: PressTiming,
+    truth: Point2,
+}
+
+/// Events of a camera between two recorded times, µs.
+pub type ReadEvents<'a> =
+    dyn FnMut(CameraId, (u64, u64)) -> Result<Vec<CdEvent>, RecorderError> + 'a;
+
+/// Writes the challenge of an analysed session into `folder`, and its answers to `answers`. `events` reads the events of a
+/// camera between two times of its recorded clock.
+///
+/// Scored presses that the analysis excludes for what the cameras saw stay in: not to locate them costs the located rate.
+///
+/// # Errors
+/// [`ChallengeError`] when too few presses are usable, or a file cannot be written.
+pub fn make(
+    source: &Source<'_>,
+    folder: &Path,
+    answers: &Path,
+    overwrite: bool,
+    events: &mut ReadEvents<'_>,
+) -> Result<Made, ChallengeError> {
+    let Some((analysis, _)) = source.analysis else {
+        return Err(ChallengeError::TooFew {
+            calibrating: 0,
+            scored: 0,
+        });
+    };
+    let presses = shuffled(&analysis.presses);
+    let is_scored = |p: &&Press<'_>| p.row.role == PressRole::Score;
+    let scored = presses.iter().filter(is_scored).count();
+    let calibrating = presses.len() - scored;
+    if scored == 0 || calibrating == 0 {
+        return Err(ChallengeError::TooFew {
+            calibrating,
+            scored,
+        });
+    }
+    let out = Folder::new(folder, STEM, overwrite)?;
+    let resolved = |path: &Path| std::fs::canonicalize(path).map_err(ExportError::file(path));
+    let parent = answers.parent().filter(|p| !p.as_os_str().is_empty());
+    let parent = parent.unwrap_or_else(|| Path::new("."));
+    if resolved(parent)?.starts_with(resolved(folder)?) {
+        return Err(ChallengeError::Unsealed {
+            path: answers.to_owned(),
+        });
+    }
+    let stem = answers.file_name().unwrap_or_default().to_string_lossy();
+    let sealed = Folder::new(parent, &stem, overwrite)?;
+    let settings = &analysis.settings;
+    let text = json(&Answers {
+        format: FORMAT,
+        session_id: source.reader.session_id().map_err(ExportError::from)?,
+        outline: analysis.rig.outline,
+        within_mm: settings.within_mm,
+        bootstrap_resamples: settings.bootstrap_resamples,
+        seed: settings.seed,
+        presses: (1..)
+            .zip(&presses)
+            .filter(|(_, p)| is_scored(p))
+            .map(|(press, p)| Answer {
+                press,
+                session_press: p.row.press.number(),
+                location: p.row.location.index(),
+                depth_mm: p.row.depth_mm,
+                x_mm: p.truth.x_mm,
+                y_mm: p.truth.y_mm,
+            })
+            .collect(),
+    });
+    let answers = write(&sealed, "", &text)?;
+    let description = json(&Description {
+        format: FORMAT,
+        task: TASK.to_owned(),
+        calibrating: calibrating as u32,
+        scored: scored as u32,
+        answers_sha256: hash(text.as_bytes()),
+    });
+    let mut files = vec![write(&out, ".json", &description)?];
+    let mut tables = CsvFiles::new(out.clone());
+    press_table(&presses).write(&mut tables)?;
+    files.extend(tables.into_paths());
+    let mut tables = ParquetFiles::new(out);
+    for camera in CameraId::ALL {
+        event_table(source, camera, &presses, events, &mut tables)?;
+    }
+    files.extend(tables.into_paths());
+    Ok(Made {
+        files,
+        answers,
+        calibrating: calibrating as u32,
+        scored: scored as u32,
+    })
+}
+
+/// Usable presses in an order that nobody can tell without the positions.
+fn shuffled(rows: &[PressResult]) -> Vec<Press<'_>> {
+    let usable = |row: &PressResult| match row.role {
+        PressRole::Sync => false,
+        PressRole::Calibrate => row.verdict == Verdict::Valid,
+        PressRole::Score => {
+            row.verdict == Verdict::Valid || row.rule.as_ref().is_some_and(|r| r.is_on_data())
+        }
+    };
+    let presses = rows.iter().filter(|row| usable(row)).filter_map(|row| {
+        Some(Press {
+            row,
+            timing: row.timing?,
+            truth: row.truth?,
+        })
+    });
+    let presses: Vec<Press<'_>> = presses.collect();
+    let mut secret = Sha256::new();
+    for p in &presses {
+        secret.update(p.truth.x_mm.to_le_bytes());
+        secret.update(p.truth.y_mm.to_le_bytes());
+        secret.update(p.timing.contact.0.to_le_bytes());
+    }
+    let secret = secret.finalize();
+    let key = |p: &Press<'_>| {
+        let own = Sha256::new().chain_update(secret);
+        own.chain_update(p.row.press.index().to_le_bytes())
+            .finalize()
+    };
+    let mut keyed: Vec<_> = presses.into_iter().map(|p| (key(&p), p)).collect();
+    keyed.sort_by_key(|k| k.0);
+    keyed.into_iter().map(|(_, p)| p).collect()
+}
+
+fn press_table(presses: &[Press<'_>]) -> Table {
+    let given = |p: &Press<'_>| p.row.role == PressRole::Calibrate;
+    let real = |of: &dyn Fn(&Press<'_>) -> Option<f64>| {
+        Values::Real(presses.iter().map(|p| of(p).unwrap_or(f64::NAN)).collect())
+    };
+    let names = presses.iter().map(|p| Some(p.row.role.name().to_owned()));
+    let location = |p: &Press<'_>| given(p).then(|| i64::from(p.row.location.number()));
+    let columns = [
+        ("press", Values::Int((1..=presses.len() as i64).collect())),
+        ("role", Values::Text(names.collect())),
+        ("depth_mm", real(&|p| Some(p.row.depth_mm))),
+        (
+            "release_s",
+            real(&|p| Some((p.timing.release.0 - p.timing.contact.0) as f64 * 1e-9)),
+        ),
+        (
+            "location",
+            Values::Count(presses.iter().map(location).collect()),
+        ),
+        ("x_mm", real(&|p| given(p).then_some(p.truth.x_mm))),
+        ("y_mm", real(&|p| given(p).then_some(p.truth.y_mm))),
+    ];
+    Table {
+        name: TableName::Presses.name(),
+        columns: columns.map(|(name, v)| (name.to_owned(), v)).into(),
+    }
+}
+
+/// Writes the events of a camera, press by press.
+fn event_table(
+    source: &Source<'_>,
+    camera: CameraId,
+    presses: &[Press<'_>],
+    events: &mut ReadEvents<'_>,
+    to: &mut dyn TableWriter,
+) -> Result<(), ExportError> {
+    let clock = source.analysis.and_then(|(a, _)| a.clocks[camera.index()]);
+    let column = |(name, kind): (&str, Kind)| Column {
+        name: name.to_owned(),
+        kind,
+    };
+    let columns = [
+        ("press", Kind::Int),
+        ("t_us", Kind::Int),
+        ("x_px", Kind::Pixel),
+        ("y_px", Kind::Pixel),
+        ("on", Kind::Flag),
+    ];
+    let layout = Layout {
+        name: TableName::Events(camera).name(),
+        columns: columns.map(column).into(),
+    };
+    let mut read = |p: &Press<'_>| -> Result<(f64, Vec<CdEvent>), ExportError> {
+        let Some(clock) = &clock else {
+            return Ok((0.0, Vec::new()));
+        };
+        let us = |t| recorded_us(source, clock, camera.index(), t);
+        let contact = us(p.timing.contact);
+        let from = (contact - MARGIN_US).max(0.0) as u64;
+        let to = (us(p.timing.release) + MARGIN_US).max(0.0) as u64;
+        Ok((contact, events(camera, (from, to))?))
+    };
+    let mut total = 0;
+    for p in presses {
+        total += read(p)?.1.len() as u64;
+    }
+    to.begin(&layout, total)?;
+    for (number, p) in (1..).zip(presses) {
+        let (contact, events) = read(p)?;
+        to.append(&[
+            Values::Int(vec![number; events.len()]),
+            Values::Int(
+                events
+                    .iter()
+                    .map(|e| (e.t_us as f64 - contact).round() as i64)
+                    .collect(),
+            ),
+            Values::Pixel(events.iter().map(|e| e.x).collect()),
+            Values::Pixel(events.iter().map(|e| e.y).collect()),
+            Values::Flag(
+                events
+                    .iter()
+                    .map(|e| e.polarity == skinrig_model::Polarity::On)
+                    .collect(),
+            ),
+        ])?;
+    }
+    to.end()
+}
+
+fn json(of: &impl Serialize) -> String {
+    // Finite numbers and text always serialise.
+    let mut text = serde_json::to_string_pretty(of).unwrap_or_default();
+    text.push('\n');
+    text
+}
+
+fn write(folder: &Folder, suffix: &str, text: &str) -> Result<PathBuf, ExportError> {
+    folder.write_atomic(suffix, |to| {
+        std::fs::write(to, text).map_err(ExportError::file(to))
+    })
+}

@@ -1,0 +1,24 @@
+//! A challenge: the events of a session's presses for anyone who wants to locate them, with the positions of the calibration
+//! presses, and the positions of the scored presses sealed away in a file of answers.
+//!
+//! Presses have new numbers in a random order, and times count from the contact, because the order of a path gives positions
+//! away. The order follows from a hash of the answers.
+
+mod answers;
+mod error;
+mod estimates;
+mod make;
+mod score;
+
+pub use answers::{Answer, Answers};
+pub use error::{ChallengeError, EstimateError};
+pub use estimates::{Estimates, Position};
+pub use make::{Made, ReadEvents, make};
+pub use score::{Judgement, score};
+
+/// Name of the description in the folder of a challenge.
+pub const DESCRIPTION: &str = "challenge.json";
+/// Suffix of the table of presses in that folder.
+pub(crate) const STEM: &str = "challenge";
+/// Version of the layout of description and answers.
+pub(crate) const FORMAT: u32 = 1;
