@@ -176,7 +176,7 @@ fn shuffled(rows: &[PressResult]) -> Vec<Press<'_>> {
         PressRole::Sync => false,
         PressRole::Calibrate => row.verdict == Verdict::Valid,
         PressRole::Score => {
-            row.verdict == Verdict::Valid || row.rule.as_ref().is_some_and(|r| r.is_on_data())
+            row.verdict == Verdict::Valid || row.rule().is_some_and(|r| r.is_on_data())
         }
     };
     let presses = rows.iter().filter(|row| usable(row)).filter_map(|row| {

@@ -89,8 +89,7 @@ fn row(answer: &Answer, found: Option<Position>) -> PressResult {
         depth_mm: answer.depth_mm,
         truth: Some(truth),
         verdict: Verdict::Valid,
-        reason: None,
-        rule: None,
+        cause: None,
         timing: None,
         views: [None; 2],
         location_outcome: found.map_or(LocationOutcome::Missing, |p| LocationOutcome::Located {
