@@ -461,7 +461,7 @@ fn less_error_with_fewer_events_is_explained() {
 fn regions_are_ellipses_of_their_size_on_the_skin_map() {
     let mut analysis = support::analysis(4, 3);
     let ellipses = |analysis: &skinrig_analysis::result::Analysis| -> Vec<Vec<f64>> {
-        let page = html(&input(analysis)).unwrap();
+        let page = html(&input(analysis));
         let Some((_, rest)) = page.split_once("<path class=\"region\" d=\"M") else {
             return Vec::new();
         };

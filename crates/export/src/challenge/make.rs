@@ -61,7 +61,7 @@ impl Description {
 
 /// A challenge that was made.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Made {
+pub struct ChallengeFiles {
     /// Files to give away.
     pub files: Vec<PathBuf>,
     /// The file to keep.
@@ -96,7 +96,7 @@ pub fn make(
     answers: &Path,
     overwrite: bool,
     events: &mut ReadEvents<'_>,
-) -> Result<Made, ChallengeError> {
+) -> Result<ChallengeFiles, ChallengeError> {
     let Some((analysis, _)) = source.analysis else {
         return Err(ChallengeError::TooFew {
             calibrating: 0,
@@ -162,7 +162,7 @@ pub fn make(
         event_table(source, camera, &presses, events, &mut tables)?;
     }
     files.extend(tables.into_paths());
-    Ok(Made {
+    Ok(ChallengeFiles {
         files,
         answers,
         calibrating: calibrating as u32,

@@ -13,7 +13,7 @@ mod score;
 pub use answers::{Answer, Answers};
 pub use error::{ChallengeError, EstimateError};
 pub use estimates::{Estimates, Position};
-pub use make::{Made, ReadEvents, make};
+pub use make::{ChallengeFiles, ReadEvents, make};
 pub use score::{Judgement, score};
 
 /// Name of the description in the folder of a challenge.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use skinrig_analysis::tradeoff::{Choice, Cost, Region, Row, Tradeoff};
-use skinrig_compare::{Comparison, ComparisonOptions, Facts, Metric, Session, Subject, compare};
+use skinrig_compare::{Comparison, ComparisonOptions, SessionFacts, Metric, Session, Subject, compare};
 use skinrig_model::{
     CalibrationModel, CentroidRule, Estimator, Locator, Point2, Precision, PressRole,
 };
@@ -28,7 +28,7 @@ fn subject(letter: char, scale: f64, values: &[(&str, &str)]) -> Subject {
     let values = values
         .iter()
         .map(|(k, v)| ((*k).to_owned(), (*v).to_owned()));
-    let facts = Facts {
+    let facts = SessionFacts {
         file: format!("{letter}.session.sqlite"),
         session_id: format!("{letter}1234567-89ab"),
         prototype: format!("<skin {letter}>"),
