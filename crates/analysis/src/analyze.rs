@@ -26,7 +26,7 @@ use crate::segment::{Window, windows};
 use crate::session_base::time_base;
 use crate::sets::ScoreSet;
 use crate::stream::{Silences, contacts_s};
-use crate::untimed::Untimed;
+use crate::tie::Untimed;
 use crate::{audit, bit_rates, caveats, check, cmre, coverage, latency, legs, reduction, verdict};
 
 /// Windows that overlap by less than this only touch, because their ends are rounded, µs.

@@ -11,8 +11,9 @@ use crate::input::{EventSource, SessionInput};
 use crate::press_spans::spans;
 use crate::rates::RateHistogram;
 use crate::result::{Activity, ClockFit, OffSensor, RatesDetections, RatesEvidence};
-use crate::timebase::{Tie, TimeBase};
-use crate::untimed::{self, Untimed};
+use crate::tie::{Tie, Untimed};
+use crate::timebase::TimeBase;
+use crate::untimed;
 
 /// Clock of a camera, and by-products of finding it.
 pub(crate) struct CameraClock {

@@ -5,8 +5,8 @@ use std::fmt;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use skinrig_model::{CameraId, ExcludedReason, InvalidReason, MissedReason, PressVerdict};
 
-use crate::rule::{JournalRule, Rule};
-use crate::untimed::Untimed;
+use crate::rule::{JournalRule, Rule, without_numbers};
+use crate::tie::Untimed;
 
 /// Why a press does not count. Its text has the press's numbers; presses are grouped by its [`rule`](Self::rule).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -218,33 +218,6 @@ pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
     from: D,
 ) -> Result<Option<Exclusion>, D::Error> {
     Read::deserialize(from).map(|read| read.cause)
-}
-
-/// `text` with `…` for every number, except the number of a camera.
-pub(crate) fn without_numbers(text: &str) -> String {
-    let mut out = String::new();
-    let mut rest = text;
-    while let Some(at) = rest.find(|c: char| c.is_ascii_digit()) {
-        let (before, number) = rest.split_at(at);
-        let end = number
-            .find(|c: char| !(c.is_ascii_digit() || c == '.'))
-            .unwrap_or(number.len());
-        // A full stop or an ellipsis after the number is not part of it.
-        let digits = number[..end].trim_end_matches('.');
-        if before.ends_with("camera ") {
-            out.push_str(before);
-            out.push_str(digits);
-        } else {
-            // A minus sign goes with its number; a hyphen stays.
-            let sign = before.strip_suffix('-');
-            let sign = sign.filter(|b| b.chars().next_back().is_none_or(|c| !c.is_alphanumeric()));
-            out.push_str(sign.unwrap_or(before));
-            out.push('…');
-        }
-        rest = &number[digits.len()..];
-    }
-    out.push_str(rest);
-    out
 }
 
 #[cfg(test)]

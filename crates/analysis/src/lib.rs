@@ -55,10 +55,11 @@ mod session_base;
 pub mod sets;
 mod stream;
 pub mod sums;
+pub mod tie;
 pub mod timebase;
 pub mod tradeoff;
 pub mod triangulate;
-pub mod untimed;
+mod untimed;
 pub mod verdict;
 mod width;
 

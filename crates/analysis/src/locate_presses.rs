@@ -8,8 +8,8 @@ use crate::input::SessionInput;
 use crate::locator::{self, CameraFeatures, Effort, Fitted, LocatorChoice};
 use crate::result::{LocationOutcome, PressResult, PressView};
 use crate::sets::CalibrationSet;
+use crate::tie::Untimed;
 use crate::triangulate::locate;
-use crate::untimed::Untimed;
 use crate::verdict;
 
 /// Observations of one camera, by rows of the plan.

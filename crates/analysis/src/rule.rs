@@ -5,8 +5,6 @@ use skinrig_model::{
     CameraId, ExcludedReason, InvalidReason, MissedReason, PressFault, PressFaultKind,
 };
 
-use crate::exclusion::without_numbers;
-
 /// Why a press does not count, without the press's numbers. Programs decide by it, and the results hash covers it.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -114,4 +112,31 @@ impl Rule {
             | Self::ByHand => false,
         }
     }
+}
+
+/// `text` with `…` for every number, except the number of a camera.
+pub(crate) fn without_numbers(text: &str) -> String {
+    let mut out = String::new();
+    let mut rest = text;
+    while let Some(at) = rest.find(|c: char| c.is_ascii_digit()) {
+        let (before, number) = rest.split_at(at);
+        let end = number
+            .find(|c: char| !(c.is_ascii_digit() || c == '.'))
+            .unwrap_or(number.len());
+        // A full stop or an ellipsis after the number is not part of it.
+        let digits = number[..end].trim_end_matches('.');
+        if before.ends_with("camera ") {
+            out.push_str(before);
+            out.push_str(digits);
+        } else {
+            // A minus sign goes with its number; a hyphen stays.
+            let sign = before.strip_suffix('-');
+            let sign = sign.filter(|b| b.chars().next_back().is_none_or(|c| !c.is_alphanumeric()));
+            out.push_str(sign.unwrap_or(before));
+            out.push('…');
+        }
+        rest = &number[digits.len()..];
+    }
+    out.push_str(rest);
+    out
 }

@@ -1,42 +1,13 @@
 //! Owns presses that a camera's clock does not time: those too far from all ties to the host's clock.
 
-use std::fmt;
-
-use serde::{Deserialize, Serialize};
 use skinrig_model::CameraId;
 
 use crate::clock::{MarksFit, fit_marks};
 use crate::input::SessionInput;
 use crate::press_spans::timings;
 use crate::session_base::time_base;
-use crate::timebase::{Tie, TimeBase, distance_us};
-
-/// A press too far from the ties of a clock.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Untimed {
-    /// Kind of tie.
-    pub tie: Tie,
-    /// Distance of the nearest tie from the contact or the release, µs.
-    pub distance_us: f64,
-    /// Maximum distance, µs.
-    pub limit_us: f64,
-}
-
-impl fmt::Display for Untimed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let what = match self.tie {
-            Tie::Exchange => "time exchange with the trigger box",
-            Tie::Train => "train seen",
-            Tie::Mark => "mark seen",
-        };
-        write!(
-            f,
-            "the nearest {what} is {:.1} s away, expected at most {} s",
-            self.distance_us * 1e-6,
-            self.limit_us * 1e-6
-        )
-    }
-}
+use crate::tie::{Tie, Untimed};
+use crate::timebase::{TimeBase, distance_us};
 
 /// Rows of the plan that the clock of `camera` does not time. `marks`: ties of its clock if there is no time base. Does not
 /// apply to a clock aligned by event rates, whose ties are the presses themselves.

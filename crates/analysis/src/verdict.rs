@@ -19,7 +19,7 @@ use crate::check;
 use crate::exclusion::Exclusion;
 use crate::result::{Estimate, LocationOutcome, PressCounts, PressResult, PressView};
 use crate::rule::Rule;
-use crate::untimed::Untimed;
+use crate::tie::Untimed;
 
 /// A verdict and its cause.
 #[derive(Debug, Clone, PartialEq)]

@@ -16,12 +16,13 @@ mod number;
 pub mod pose;
 pub mod preflight;
 pub mod press;
-pub mod press_fault;
+mod press_fault;
 pub mod pulse;
 pub mod quantile;
 pub mod reason;
 pub mod record;
-pub mod rig_fault;
+mod rig_fault;
+pub mod run_end;
 pub mod scene;
 pub mod settings;
 pub mod skin;
@@ -50,14 +51,12 @@ pub use press::{
 pub use press_fault::PressFaultKind;
 pub use pulse::{DecodedMark, DecodedSync, Label, Mark, MarkKind, PulseTrain, SentMark};
 pub use quantile::quantile;
-pub use reason::{
-    ExcludedReason, InterruptionReason, InvalidReason, MissedReason, ReasonRef, StopReason,
-};
+pub use reason::{ExcludedReason, InterruptionReason, InvalidReason, MissedReason, ReasonRef};
 pub use record::{
-    DeviceIdentity, InterruptionKind, MotionCommand, Record, ResumeHeader, RunEnd, RunHeader,
-    Setting,
+    DeviceIdentity, InterruptionKind, MotionCommand, Record, ResumeHeader, RunHeader, Setting,
 };
 pub use rig_fault::{RigFault, UnsupportedFault};
+pub use run_end::{RunEnd, StopReason};
 pub use scene::{SceneNeed, SimLevel};
 pub use settings::{
     AlignmentSettings, AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings,

@@ -4,12 +4,9 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::fault::{Causes, PressFault, RunFault, Suspension};
+use crate::fault::{CUT_OFF, Causes, PressFault, RunFault, Suspension};
 use crate::press_fault::PressFaultKind;
-use crate::record::RunEnd;
-
-/// Start of the text of an attempt that did not finish.
-pub(crate) const CUT_OFF: &str = "cut off: ";
+use crate::run_end::{RunEnd, StopReason};
 
 /// Why an attempt at a press is invalid.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -159,44 +156,6 @@ impl fmt::Display for InterruptionReason {
     }
 }
 
-/// Why a run stopped without a fault.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum StopReason {
-    /// The operator stopped it after a press.
-    Stop,
-    /// The operator aborted it: the tip retracted immediately.
-    Abort,
-    /// The operator switched the motors off: the tip stayed in place.
-    Halt,
-    /// A session of an older schema, or another program, has only this text.
-    Recorded {
-        /// The reason.
-        text: String,
-    },
-}
-
-impl StopReason {
-    /// The text for people.
-    #[must_use]
-    pub fn text(&self) -> &str {
-        match self {
-            Self::Stop => "operator: stop",
-            Self::Abort => "operator: abort",
-            Self::Halt => {
-                "operator: halt; the tip stayed where it was: check it before you power the robot again"
-            }
-            Self::Recorded { text } => text,
-        }
-    }
-}
-
-impl fmt::Display for StopReason {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.text())
-    }
-}
-
 /// Borrowed reason of a verdict or of an end, as JSON has it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(untagged)]
@@ -211,4 +170,16 @@ pub enum ReasonRef<'a> {
     Stopped(&'a StopReason),
     /// Of a run that failed.
     Faulted(&'a Causes<RunFault>),
+}
+
+impl RunEnd {
+    /// The reason, for JSON; `None` for a completed run.
+    #[must_use]
+    pub const fn cause(&self) -> Option<ReasonRef<'_>> {
+        match self {
+            Self::Completed => None,
+            Self::Stopped(reason) => Some(ReasonRef::Stopped(reason)),
+            Self::Faulted(causes) => Some(ReasonRef::Faulted(causes)),
+        }
+    }
 }

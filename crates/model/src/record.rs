@@ -6,14 +6,14 @@
 use serde::{Deserialize, Serialize};
 
 use crate::device_role::DeviceRole;
-use crate::fault::{Causes, RunFault};
 use crate::frame::{Point3, RigidTransform, Robot, Skin};
 use crate::id::AttemptId;
 use crate::pose::PoseSample;
 use crate::preflight::PreflightCheck;
 use crate::press::{PlannedPress, PressOutcome};
 use crate::pulse::SentMark;
-use crate::reason::{InterruptionReason, MissedReason, ReasonRef, StopReason};
+use crate::reason::{InterruptionReason, MissedReason};
+use crate::run_end::RunEnd;
 use crate::stream::{RawChunk, StreamFormat};
 use crate::time::HostTime;
 use crate::trigger_box::BoxReport;
@@ -174,78 +174,6 @@ impl InterruptionKind {
             Self::Abort => "abort",
             Self::Halt => "halt",
             Self::Fault => "fault",
-        }
-    }
-}
-
-/// End of a run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum RunEnd {
-    /// Every step of the plan was executed.
-    Completed,
-    /// The operator stopped or aborted it.
-    Stopped(StopReason),
-    /// A device, a limit or the recorder ended it. The first cause comes first.
-    Faulted(Causes<RunFault>),
-}
-
-impl RunEnd {
-    /// A run that ended with one fault.
-    #[must_use]
-    pub fn fault(fault: impl Into<RunFault>) -> Self {
-        Self::Faulted(Causes::one(fault.into()))
-    }
-
-    /// The same end with one more fault.
-    #[must_use]
-    pub fn and_fault(self, fault: impl Into<RunFault>) -> Self {
-        match self {
-            Self::Completed => Self::fault(fault),
-            Self::Stopped(reason) => Self::fault(RunFault::Stopped(reason)).and_fault(fault),
-            Self::Faulted(mut causes) => {
-                causes.push(fault.into());
-                Self::Faulted(causes)
-            }
-        }
-    }
-
-    /// `completed`, `stopped` or `faulted`.
-    #[must_use]
-    pub const fn name(&self) -> &'static str {
-        match self {
-            Self::Completed => "completed",
-            Self::Stopped(_) => "stopped",
-            Self::Faulted(_) => "faulted",
-        }
-    }
-
-    /// The faults that ended it; empty for other ends.
-    #[must_use]
-    pub fn faults(&self) -> &[RunFault] {
-        match self {
-            Self::Completed | Self::Stopped(_) => &[],
-            Self::Faulted(causes) => causes.as_slice(),
-        }
-    }
-
-    /// The reason, for JSON; `None` for a completed run.
-    #[must_use]
-    pub const fn cause(&self) -> Option<ReasonRef<'_>> {
-        match self {
-            Self::Completed => None,
-            Self::Stopped(reason) => Some(ReasonRef::Stopped(reason)),
-            Self::Faulted(causes) => Some(ReasonRef::Faulted(causes)),
-        }
-    }
-
-    /// Text of the reason, of any end but `Completed`.
-    #[must_use]
-    pub fn reason(&self) -> Option<String> {
-        match self {
-            Self::Completed => None,
-            Self::Stopped(reason) => Some(reason.to_string()),
-            Self::Faulted(causes) => Some(causes.to_string()),
         }
     }
 }

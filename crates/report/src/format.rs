@@ -133,6 +133,11 @@ pub(crate) fn or_missing(text: &str) -> &str {
     }
 }
 
+/// User text on one line, with control characters spelled out.
+pub(crate) fn plain(text: &str) -> String {
+    skinrig_model::text::visible(&text.replace(['\n', '\t'], " ")).into_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -130,7 +130,7 @@ pub fn terminal_table(result: &Tradeoff, rows: Rows, rig: &str, color: bool) -> 
          each calibrated (model {}) on {} of {} others.\n\
          A choice competes when it locates at least {} % of the presses; others are in brackets.\n\
          Front: c CPU time, b bytes, d delay. CPU: median of {} runs over {} presses, both cameras.\n\n",
-        crate::terminal::plain(rig),
+        crate::format::plain(rig),
         result.rows.len(),
         model(result),
         result.calibrating.0,

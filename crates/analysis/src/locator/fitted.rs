@@ -8,13 +8,10 @@ use super::inverse::Inverse;
 use super::prediction::{Prediction, Uncertainty, ellipse};
 use super::rays::Rays;
 use super::reading::Reading;
-use super::regions::Regions;
+use super::regions::{LEVEL, Regions};
 use super::robust::response;
 use crate::result::{Analysis, LocationOutcome, LocatorModel, Region};
 use crate::triangulate::locate;
-
-/// Level of the regions of the press table.
-pub(super) const LEVEL: f64 = 0.95;
 
 /// A position with what is known about its error.
 #[derive(Debug, Clone, Copy, PartialEq)]

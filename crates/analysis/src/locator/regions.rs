@@ -1,13 +1,11 @@
-//! Sizes of the 95 % regions from held-out calibration presses, and their check on the scored presses.
+//! Sizes of the 95 % regions from held-out calibration presses.
 
-use super::fitted::LEVEL;
 use super::prediction::{Uncertainty, distance};
 use super::robust::{log_density, student_weight};
-use super::{Features, Fitted};
-use crate::metrics::share_over_locations;
-use crate::result::{PressResult, RegionLevel, ReliabilityRow};
-use skinrig_model::{AnalysisSettings, PressRole, Verdict};
+use crate::result::RegionLevel;
 
+/// Level of the regions of the press table.
+pub(super) const LEVEL: f64 = 0.95;
 /// Levels of the regions.
 const LEVELS: [f64; 6] = [0.5, 0.7, 0.8, 0.9, LEVEL, 0.99];
 /// Fewest locations that determine a region.
@@ -120,37 +118,6 @@ fn levels(distances: &[f64], locations: usize) -> Vec<RegionLevel> {
         usable.then_some(RegionLevel { level, factor })
     };
     LEVELS.into_iter().filter_map(of).collect()
-}
-
-/// Shares of the valid scored presses inside the regions of each level.
-pub(crate) fn reliability(
-    fitted: &Fitted,
-    presses: &[PressResult],
-    settings: &AnalysisSettings,
-) -> Vec<ReliabilityRow> {
-    let scored = presses
-        .iter()
-        .filter(|p| p.role == PressRole::Score && p.verdict == Verdict::Valid);
-    let reached: Vec<(u32, f64)> = scored
-        .filter_map(|p| {
-            let (features, (dx, dy)) = (Features::of_press(p)?, p.error_mm()?);
-            let uncertainty = fitted.predict(&features)?.uncertainty?;
-            let covariance = uncertainty.covariance(fitted.model().inflation)?;
-            Some((p.location.index(), distance(covariance, [dx, dy])?))
-        })
-        .collect();
-    if reached.is_empty() {
-        return Vec::new();
-    }
-    let row = |level: &RegionLevel| {
-        let inside = |(location, d): &(u32, f64)| (*location, *d <= level.factor);
-        let inside: Vec<(u32, bool)> = reached.iter().map(inside).collect();
-        ReliabilityRow {
-            level: level.level,
-            inside: share_over_locations(&inside, settings.bootstrap_resamples, settings.seed),
-        }
-    };
-    fitted.model().levels.iter().map(row).collect()
 }
 
 #[cfg(test)]

@@ -1,6 +1,5 @@
 //! Time base of a session: all its epochs, and conversions between clocks.
 
-use serde::{Deserialize, Serialize};
 use skinrig_model::{AlignmentSettings, BoxReport, HostTime, TriggerEdge};
 
 use super::edges::Edges;
@@ -10,6 +9,7 @@ use super::line::{best_drift, clock};
 use super::reading::{Drift, Reading};
 use crate::leg::{LegLine, LegStart, edges_of, leg_at, recorded_of};
 use crate::result::{Alignment, AlignmentStatus, ClockFit};
+use crate::tie::Tie;
 
 /// Input of the time base.
 #[derive(Debug, Clone, Copy)]
@@ -26,18 +26,6 @@ pub struct TimeBaseInput<'a> {
     pub legs: &'a [LegStart],
     /// Host times at which the time base is used, µs: contacts and releases.
     pub used_at_us: &'a [f64],
-}
-
-/// Kind of observation that ties two clocks at an instant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Tie {
-    /// A time request from the host to the trigger box.
-    Exchange,
-    /// A reported train that a camera saw.
-    Train,
-    /// A mark sent by the host that a camera saw.
-    Mark,
 }
 
 /// The time base of a session.

@@ -19,7 +19,7 @@ mod residuals;
 mod smooth;
 mod wire;
 
-pub use self::base::{Tie, TimeBase, TimeBaseInput};
+pub use self::base::{TimeBase, TimeBaseInput};
 pub use self::edges::CameraClockError;
 pub(crate) use self::edges::distance_us;
 pub use self::reading::{Drift, Reading};

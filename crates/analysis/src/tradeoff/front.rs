@@ -1,35 +1,6 @@
 //! Pareto fronts and selection of a row.
 
-use serde::{Deserialize, Serialize};
-
-use super::{Row, Tradeoff};
-
-/// A cost to trade for accuracy.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Cost {
-    /// CPU time per press.
-    Cpu,
-    /// Bytes per second.
-    Bytes,
-    /// Time from contact to the estimate.
-    Delay,
-}
-
-impl Cost {
-    /// All costs.
-    pub const ALL: [Self; 3] = [Self::Cpu, Self::Bytes, Self::Delay];
-
-    /// Value of this cost in a row.
-    #[must_use]
-    pub const fn of(self, row: &Row) -> f64 {
-        match self {
-            Self::Cpu => row.cpu_us,
-            Self::Bytes => row.bytes_per_s,
-            Self::Delay => row.delay_ms,
-        }
-    }
-}
+use super::rows::{Cost, Row, Tradeoff};
 
 /// For points (error, cost), true if no other point dominates: none is as good in both and better in one. `None` does not
 /// compete.

@@ -15,7 +15,8 @@ use crate::press_spans::timings;
 use crate::result::{Analysis, ClockFit, Metrics, Penalised, PressView};
 use crate::segment::{Window, windows};
 use crate::sets::ScoreSet;
-use crate::untimed::{self, Untimed};
+use crate::tie::Untimed;
+use crate::untimed;
 
 /// A session whose presses can be located in many ways.
 pub(crate) struct Replay<'a> {

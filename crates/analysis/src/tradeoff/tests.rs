@@ -1,9 +1,10 @@
 //! Properties of the fronts, of the selection, and of the choices to try.
 
 use proptest::prelude::*;
-use skinrig_model::CalibrationModel;
+use skinrig_model::{CalibrationModel, Locator};
 
 use super::*;
+use crate::result::Estimate;
 
 fn row(rmse: Option<f64>, cost: f64, located: f64) -> Row {
     let estimate = |value: Option<f64>| Estimate {

@@ -2,7 +2,7 @@
 
 use skinrig_analysis::result::{AlignmentStatus, MapName};
 use skinrig_analysis::rule::Rule;
-use skinrig_analysis::timebase::Tie;
+use skinrig_analysis::tie::Tie;
 use skinrig_analysis::{EventSource, EventSourceError, SessionInput, analyze};
 use skinrig_model::{
     AlignmentSettings, AnalysisSettings, BoxReport, CameraId, CdEvent, HostTime, Point2, PressRole,

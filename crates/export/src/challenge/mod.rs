@@ -17,7 +17,7 @@ pub use make::{ChallengeFiles, ReadEvents, make};
 pub use score::{Judgement, score};
 
 /// Name of the description in the folder of a challenge.
-pub const DESCRIPTION: &str = "challenge.json";
+pub(crate) const DESCRIPTION: &str = "challenge.json";
 /// Suffix of the table of presses in that folder.
 pub(crate) const STEM: &str = "challenge";
 /// Version of the layout of description and answers.

@@ -5,14 +5,16 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::motion::{NotArrived, point};
+use super::surface::TouchFault;
 use super::suspension::Suspension;
 use crate::frame::{Point3, Skin};
 use crate::id::CameraId;
 use crate::press_fault::PressFaultKind;
-use crate::reason::CUT_OFF;
-use crate::record::RunEnd;
+use crate::run_end::RunEnd;
 use crate::time::{HostDuration, HostTime};
 
+/// Start of the text of an attempt that did not finish.
+pub(crate) const CUT_OFF: &str = "cut off: ";
 /// Message for a press that the operator's `pause_now` interrupted.
 const PAUSED: &str = "paused by the operator";
 
@@ -81,73 +83,6 @@ pub enum PressFault {
     Touch(TouchFault),
     /// A phase time or the hold is wrong.
     Timing(TimingFault),
-}
-
-/// Reason why a touch did not find the surface.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, thiserror::Error)]
-#[serde(rename_all = "snake_case")]
-pub enum TouchFault {
-    /// The robot did not report forces.
-    #[error("{during}: expected forces, found none")]
-    NoForce {
-        /// What needed them.
-        during: TouchPhase,
-    },
-    /// The tare received too few forces.
-    #[error("tare: expected forces for {0}, found fewer")]
-    ShortTare(HostDuration),
-    /// The motion down to the band did not arrive in time.
-    #[error(transparent)]
-    Late(NotArrived),
-    /// The force did not rise within the band.
-    #[error("expected the surface within {band_mm} mm of the frame's, found none down to {}", .lowest.as_ref().map_or_else(|| "an unknown height".to_owned(), point))]
-    NotFound {
-        /// Half width of the band, mm.
-        band_mm: f64,
-        /// Lowest tip position.
-        lowest: Option<Point3<Skin>>,
-    },
-    /// The force rose immediately at the start of the search.
-    #[error(
-        "expected the surface within {band_mm} mm of the frame's, found contact immediately, at {height_mm:.3} mm"
-    )]
-    ImmediateContact {
-        /// Half width of the band, mm.
-        band_mm: f64,
-        /// Height of the contact, mm.
-        height_mm: f64,
-    },
-    /// A press from the touched surface would go below the floor.
-    #[error(
-        "expected a press of {depth_mm} mm to stay above the floor at -{max_depth_mm} mm, found the surface at {height_mm:.3} mm"
-    )]
-    TooLow {
-        /// Depth of the press, mm.
-        depth_mm: f64,
-        /// Depth of the floor, mm, positive.
-        max_depth_mm: f64,
-        /// Height of the touched surface, mm.
-        height_mm: f64,
-    },
-}
-
-/// Phase of a touch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum TouchPhase {
-    /// The mean force at clearance height.
-    Tare,
-    /// The slow motion down until contact.
-    Search,
-}
-
-impl fmt::Display for TouchPhase {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Tare => "tare",
-            Self::Search => "search",
-        })
-    }
 }
 
 /// Moment of a press that [`PressTiming`](crate::PressTiming) needs.

@@ -12,7 +12,7 @@ use super::suspension::Suspension;
 use super::watchdog::WatchdogTrip;
 use crate::id::CameraId;
 use crate::preflight::PreflightCheck;
-use crate::reason::StopReason;
+use crate::run_end::StopReason;
 use crate::time::HostDuration;
 
 /// Reason why a run cannot start or continue. Each of them ends the run safely.

@@ -1,11 +1,10 @@
 //! Renders a document as a self-contained page, with a policy that allows only its own script.
 
-use std::fmt::Display;
-
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use sha2::{Digest, Sha256};
 
+use super::text::open;
 use super::{Banner, Block, Document, Fact, Group, Note, Section, Table, Text, Tone};
 use crate::markup::Markup;
 use crate::plot::Figure;
@@ -102,21 +101,6 @@ impl Document {
             out.close().close();
         }
     }
-}
-
-/// Opens an element without those attributes that are empty.
-pub(super) fn open<V: AsRef<str> + Display>(
-    out: &mut Markup,
-    tag: &'static str,
-    attributes: &[(&str, V)],
-) {
-    let present = attributes
-        .iter()
-        .filter(|(_, value)| !value.as_ref().is_empty());
-    let present: Vec<_> = present
-        .map(|(name, value)| (*name, value as &dyn Display))
-        .collect();
-    out.open(tag, &present);
 }
 
 fn paragraph(out: &mut Markup, class: &str, text: &Text) {

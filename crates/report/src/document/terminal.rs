@@ -3,7 +3,7 @@
 use skinrig_text::{LongWords, Paint, WIDTH, elide, hang};
 
 use super::{Block, Note, Section, Table, Tone};
-use crate::terminal::plain;
+use crate::format::plain;
 
 /// Columns of a label.
 const LABEL: usize = 10;

@@ -1,5 +1,7 @@
 //! Owns [`Text`]: the words of a paragraph or a cell, with emphasis, links and small drawings.
 
+use std::fmt::Display;
+
 use crate::markup::Markup;
 
 /// Words of one paragraph or cell. A terminal shows the words alone.
@@ -125,7 +127,7 @@ impl Text {
                     out.words(words);
                 }
                 Piece::Element(tag, attributes, inner) => {
-                    super::html::open(out, tag, attributes);
+                    open(out, tag, attributes);
                     inner.write(out);
                     out.close();
                 }
@@ -147,4 +149,19 @@ impl From<String> for Text {
     fn from(words: String) -> Self {
         Self::new().add(words)
     }
+}
+
+/// Opens an element without those attributes that are empty.
+pub(super) fn open<V: AsRef<str> + Display>(
+    out: &mut Markup,
+    tag: &'static str,
+    attributes: &[(&str, V)],
+) {
+    let present = attributes
+        .iter()
+        .filter(|(_, value)| !value.as_ref().is_empty());
+    let present: Vec<_> = present
+        .map(|(name, value)| (*name, value as &dyn Display))
+        .collect();
+    out.open(tag, &present);
 }

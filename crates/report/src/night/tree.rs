@@ -4,7 +4,7 @@ use skinrig_nightly::{Attempt, CheckResult, Measurement, Night, Part, Verdict};
 use skinrig_text::{Column, LongWords, Paint, Style, Table, WIDTH, hang, width};
 
 use super::text;
-use crate::terminal::plain;
+use crate::format::plain;
 
 /// Columns of a verdict.
 const VERDICT: usize = 12;

@@ -2,7 +2,7 @@
 
 use skinrig_analysis::result::{Analysis, Estimate};
 
-use super::estimate;
+use super::cells::estimate;
 use crate::document::Table;
 use crate::format::{NONE, contact_map, interval, number};
 use crate::published;

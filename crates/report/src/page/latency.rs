@@ -2,7 +2,7 @@
 
 use skinrig_analysis::result::{Analysis, Estimate, Latency};
 
-use super::estimate;
+use super::cells::estimate;
 use crate::document::Table;
 use crate::format::{NONE, number};
 

@@ -6,6 +6,7 @@
 mod alignment;
 mod areas;
 mod calibration;
+mod cells;
 mod comparison;
 pub(crate) mod findings;
 mod latency;
@@ -15,10 +16,11 @@ mod reduction;
 mod results;
 mod session;
 
-use skinrig_analysis::result::{Analysis, Estimate};
+use skinrig_analysis::result::Analysis;
 
-use crate::document::{Banner, Block, Document, Group, Note, Section, Table, Text, paragraph};
-use crate::format::{interval, number, or_missing};
+use self::cells::missing;
+use crate::document::{Banner, Block, Document, Group, Note, Section, Table, Text};
+use crate::format::or_missing;
 use crate::input::ReportInput;
 use crate::{derive, figures, tables};
 
@@ -128,30 +130,15 @@ fn card(a: &Analysis, table: Option<Table>) -> Option<Group> {
     table.filter(|_| a.is_valid()).map(Table::card)
 }
 
-/// Cells of an estimate: name, value, interval, number of samples. The numbers are multiplied by `scale`.
-fn estimate(name: &str, e: &Estimate, scale: f64, digits: usize) -> [String; 4] {
-    let value = number(e.value.map(|v| v * scale), digits);
-    let interval = interval(e, scale, digits);
-    [name.to_owned(), value, interval, e.n.to_string()]
-}
-
-/// Says in a card why something is missing.
-fn missing(test_id: &str, why: impl Into<Text>) -> Block {
-    let card = Group::card().class("soft");
-    let card = match test_id {
-        "" => card,
-        id => card.test_id(id),
-    };
-    card.with(paragraph(why)).into()
-}
-
 fn skin(input: &ReportInput<'_>) -> Section {
     let a = input.analysis;
     let cells = a.coverage.as_ref().is_some_and(|c| c.cell_mm.is_some());
+    let regions = a.presses.iter().any(|press| press.region.is_some());
     let layers = [
         ("fov", "fields of view", true),
         ("cells", "probed area", cells),
         ("path", "press path", true),
+        ("regions", "95 % regions", regions),
         ("vectors", "error vectors", true),
         ("others", "not counted", true),
     ];

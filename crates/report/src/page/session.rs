@@ -2,7 +2,8 @@
 
 use skinrig_analysis::result::{Analysis, ClockFit};
 
-use super::{alignment, missing};
+use super::alignment;
+use super::cells::missing;
 use crate::document::{Block, Fact, Group, Row, Section, Table, Text, soft};
 use crate::format::{NONE, digits_of_error, number, phrase};
 use crate::input::ReportInput;

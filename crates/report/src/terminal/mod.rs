@@ -7,20 +7,15 @@ use skinrig_analysis::result::{
     Alignment, AlignmentStatus, Analysis, ClockFit, ClockMethod, Estimate, MapName, Metrics,
     PressCounts,
 };
-use skinrig_model::text::visible;
 use skinrig_text::{Column as Cells, Paint, Style, WIDTH, clip};
 
 pub(crate) use self::summary::summary;
 use crate::document::{Column, Note, Row, Section, Table, terminal};
+use crate::format::plain;
 use crate::format::{digits_of_error, grouped, interval, number, or_missing};
 use crate::input::ReportInput;
 use crate::page::findings::{fault, law};
 use crate::{course, derive};
-
-/// User text on one line, with control characters spelled out.
-pub(crate) fn plain(text: &str) -> String {
-    visible(&text.replace(['\n', '\t'], " ")).into_owned()
-}
 
 /// A formatted metric.
 pub(crate) struct MetricRow {

@@ -10,7 +10,7 @@ use skinrig_text::{
 
 use super::{Links, cause, moved, since, state, with_unit};
 use crate::document::{Block, Column, Row, Table, lines};
-use crate::terminal::plain;
+use crate::format::plain;
 
 /// Columns of the name of a series; ASCII has no mark for a cut.
 const NAME: usize = 36;

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use skinrig_analysis::tradeoff::{Choice, Cost, Region, Row, Tradeoff};
-use skinrig_compare::{Comparison, ComparisonOptions, SessionFacts, Metric, Session, Subject, compare};
+use skinrig_compare::{
+    Comparison, ComparisonOptions, Metric, Session, SessionFacts, Subject, compare,
+};
 use skinrig_model::{
     CalibrationModel, CentroidRule, Estimator, Locator, Point2, Precision, PressRole,
 };
