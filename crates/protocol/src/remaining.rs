@@ -15,7 +15,7 @@ pub enum Route {
 }
 
 impl Plan {
-    /// Presses of a resumed run, given their histories: those selected by [`Retakes::wants`](crate::Retakes::wants), and
+    /// Presses of a resumed run, given their histories: those selected by [`Retakes::should_retake`](crate::Retakes::should_retake), and
     /// before them all sync presses. Empty if only sync presses are left.
     #[must_use]
     pub fn wanted(&self, histories: &[PressHistory]) -> Vec<bool> {
