@@ -108,7 +108,7 @@ fn regions_hold_on_eight_skins() {
 }
 
 #[test]
-#[ignore = "minutes: cargo test -p skinrig-analysis --test locator -- --ignored"]
+#[ignore = "minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig-analysis --test locator -- --ignored"]
 fn regions_hold_on_five_hundred_skins() {
     let rows = coverage(500).0;
     for (name, inside, all) in &rows {
@@ -120,7 +120,7 @@ fn regions_hold_on_five_hundred_skins() {
 
 /// Few presses, one corner, ten times the noise, one camera nearly blind, one depth, and all of it bent or straight.
 #[test]
-#[ignore = "half a minute: cargo test -p skinrig-analysis --test locator -- --ignored"]
+#[ignore = "half a minute: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig-analysis --test locator -- --ignored"]
 fn the_choice_is_never_much_worse_than_the_geometry_on_sixty_skins() {
     never_much_worse(60);
 }
