@@ -36,12 +36,12 @@ impl Challenge {
             &text(&folder),
             "--json",
         ];
-        let said = skinrig(&made).code(0).json();
+        let output = skinrig(&made).code(0).json();
         assert_eq!(
-            (&said["calibrating"], &said["scored"]),
+            (&output["calibrating"], &output["scored"]),
             (&4.into(), &4.into())
         );
-        let answers = PathBuf::from(said["answers"].as_str().unwrap());
+        let answers = PathBuf::from(output["answers"].as_str().unwrap());
         assert_eq!(answers.parent(), session.parent());
         Self {
             lab,
@@ -108,13 +108,13 @@ fn rows(truths: &[(u64, f64, f64)], off_mm: f64) -> Vec<String> {
 fn estimates_are_scored_with_regions_and_without() {
     let challenge = Challenge::new();
     let truths = challenge.truths();
-    let said = challenge.score(&table("press,x_mm,y_mm", rows(&truths, 3.0)));
+    let output = challenge.score(&table("press,x_mm,y_mm", rows(&truths, 3.0)));
     let near = |value: &Value, expected: f64| (value.as_f64().unwrap() - expected).abs() < 1e-9;
-    let metrics = &said["metrics"];
-    assert!(near(&metrics["rmse_mm"]["value"], 3.0), "{said}");
+    let metrics = &output["metrics"];
+    assert!(near(&metrics["rmse_mm"]["value"], 3.0), "{output}");
     assert!(near(&metrics["rmse_mm"]["low"], 3.0) && near(&metrics["bias_x_mm"]["value"], 3.0));
     assert_eq!(metrics["located_rate"]["value"], 1.0);
-    assert!(said["coverage"].is_null());
+    assert!(output["coverage"].is_null());
     // One is not located; of the others, the region holds two.
     let header = "press,x_mm,y_mm,region_major_mm,region_minor_mm,region_angle_deg";
     let regions = ["4,1,0", "1,4,90", "1,4,0"];
@@ -124,11 +124,11 @@ fn estimates_are_scored_with_regions_and_without() {
         .map(|(row, region)| format!("{row},{region}"))
         .collect();
     with.push(format!("{},,,,,", truths[3].0));
-    let said = challenge.score(&table(header, with));
-    assert_eq!(said["metrics"]["located_rate"]["value"], 0.75);
-    assert_eq!(said["coverage"]["n"], 3);
+    let output = challenge.score(&table(header, with));
+    assert_eq!(output["metrics"]["located_rate"]["value"], 0.75);
+    assert_eq!(output["coverage"]["n"], 3);
     // (3, 0) is within 4 mm along x; within 1 mm along y and 4 mm along x; not within 1 mm along x.
-    assert!(near(&said["coverage"]["value"], 2.0 / 3.0), "{said}");
+    assert!(near(&output["coverage"]["value"], 2.0 / 3.0), "{output}");
 }
 
 #[test]
@@ -236,4 +236,22 @@ fn a_wrong_table_is_refused_with_its_row() {
             .replacen("\"seed\": ", "\"seed\": 1", 1);
     std::fs::write(&challenge.answers, changed).unwrap();
     challenge.refuses(&table(header, good), &["SHA-256"]);
+}
+
+#[test]
+fn an_invalid_session_makes_no_challenge() {
+    let lab = Lab::new();
+    let session = lab.record("s", &["--fault", "box-noisy@arming"]);
+    let folder = lab.path("challenge");
+    let arguments = [
+        "challenge",
+        "make",
+        &text(&session),
+        "--out",
+        &text(&folder),
+    ];
+    skinrig(&arguments)
+        .code(2)
+        .expect_stderr(&["found an INVALID one"]);
+    assert!(!folder.exists());
 }

@@ -21,6 +21,12 @@ pub enum ChallengeError {
         /// Usable scored presses.
         scored: usize,
     },
+    /// The numbers of the session must not be used.
+    #[error("expected a session whose numbers can be used, found an INVALID one: {}", because.join("; "))]
+    InvalidSession {
+        /// Why, as the report states it.
+        because: Vec<String>,
+    },
     /// The answers would lie in the folder that is given away.
     #[error("{}: the answers would lie in the folder of the challenge\n  next: choose another file with --answers", path.display())]
     Unsealed {

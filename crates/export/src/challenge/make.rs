@@ -89,7 +89,7 @@ pub type ReadEvents<'a> =
 /// Scored presses that the analysis excludes for what the cameras saw stay in: not to locate them costs the located rate.
 ///
 /// # Errors
-/// [`ChallengeError`] when too few presses are usable, or a file cannot be written.
+/// [`ChallengeError`] when the session is INVALID, too few presses are usable, or a file cannot be written.
 pub fn make(
     source: &Source<'_>,
     folder: &Path,
@@ -103,6 +103,11 @@ pub fn make(
             scored: 0,
         });
     };
+    if !analysis.is_valid() {
+        return Err(ChallengeError::InvalidSession {
+            because: analysis.invalid_because(),
+        });
+    }
     let presses = shuffled(&analysis.presses);
     let is_scored = |p: &&Press<'_>| p.row.role == PressRole::Score;
     let scored = presses.iter().filter(is_scored).count();
