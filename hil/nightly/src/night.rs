@@ -73,7 +73,7 @@ pub struct Golden {
     pub session: String,
     /// Its report, relative to the night's folder.
     pub report: Option<String>,
-    /// Digest of the analysis results.
+    /// Hash of the analysis results, as in the results file: values and rules, no messages.
     pub results_sha256: Option<String>,
 }
 

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use sha2::{Digest, Sha256};
 use skinrig_hil::findings::Findings;
 use skinrig_hil::{Bench, GoldenRun, Problem};
 use skinrig_hil::{golden_values, run_evidence};
@@ -54,8 +53,7 @@ pub(super) fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Pr
     match analyze(&session) {
         Ok((results, html)) => {
             golden.files.report = Some(html);
-            let json = serde_json::to_vec(&results.analysis).unwrap_or_default();
-            golden.files.results_sha256 = Some(hex(&Sha256::digest(json)));
+            golden.files.results_sha256 = Some(results.provenance.results_hash.clone());
             let lost = results.provenance.lost_bytes;
             golden_values::add(&results.analysis, lost, &mut golden.findings);
         }
@@ -91,10 +89,6 @@ fn analyze(session: &Path) -> Result<(results::Results, String), Failure> {
 fn name(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default();
     name.to_string_lossy().into_owned()
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 fn problem(kind: EvidenceKind, subject: &str, failure: &Failure) -> Problem {
