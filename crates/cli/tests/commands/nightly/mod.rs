@@ -12,6 +12,7 @@ use skinrig_emulated_bench::{ArmFault, BenchConfig, BenchError, EmulatedBench, W
 use skinrig_model::{CameraId, RigFault};
 
 use crate::emulated_bench::Slot;
+use crate::support::{ROOT, files, only, read_json, text};
 
 const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
 const RIG: &str = include_str!("../../../../../hil/rigs/emulated.yaml");
@@ -238,6 +239,38 @@ fn a_healthy_bench_passes() {
     assert!(
         seen.value("watchdog_drill", "robot", "braked_within")
             .is_some()
+    );
+}
+
+/// The night holds the hash that the results file of its golden session holds.
+#[test]
+fn the_golden_session_is_named_with_its_results_hash() {
+    let Some(nights) = Nights::start() else {
+        return;
+    };
+    let protocol = Path::new(ROOT).join("protocols/quick-check.yaml");
+    let suite = format!(
+        "{SUITE}  golden: {{protocol: {}, lost: {{at_most: 0 B}}}}\n",
+        text(&protocol)
+    );
+    fs::write(nights.folder.path().join("suite.yaml"), suite).unwrap();
+
+    let result = nights.night("golden");
+    let golden = &result.night["golden"];
+    let report = golden["report"].as_str();
+    let report = report.unwrap_or_else(|| panic!("no report: {golden}\n{}", result.stderr));
+    let reports = files(
+        &only(&nights.folder.path().join("nights"), "-planted"),
+        report,
+    );
+    assert_eq!(reports.len(), 1, "{report}\n{}", result.stderr);
+    let results = read_json(&PathBuf::from(
+        text(&reports[0]).replace(".report.html", ".results.json"),
+    ));
+    assert!(results["provenance"]["results_hash"].is_string());
+    assert_eq!(
+        golden["results_sha256"],
+        results["provenance"]["results_hash"]
     );
 }
 
