@@ -12,7 +12,7 @@ use skinrig_emulated_bench::{ArmFault, BenchConfig, BenchError, EmulatedBench, W
 use skinrig_model::{CameraId, RigFault};
 
 use crate::emulated_bench::Slot;
-use crate::support::{ROOT, files, only, read_json, text};
+use crate::support::{ROOT, only, read_json, text};
 
 const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
 const RIG: &str = include_str!("../../../../../hil/rigs/emulated.yaml");
@@ -255,18 +255,16 @@ fn the_golden_session_is_named_with_its_results_hash() {
     );
     fs::write(nights.folder.path().join("suite.yaml"), suite).unwrap();
 
-    let result = nights.night("golden");
-    let golden = &result.night["golden"];
-    let report = golden["report"].as_str();
-    let report = report.unwrap_or_else(|| panic!("no report: {golden}\n{}", result.stderr));
-    let reports = files(
-        &only(&nights.folder.path().join("nights"), "-planted"),
-        report,
-    );
-    assert_eq!(reports.len(), 1, "{report}\n{}", result.stderr);
-    let results = read_json(&PathBuf::from(
-        text(&reports[0]).replace(".report.html", ".results.json"),
-    ));
+    // A machine too busy for the emulated devices may record no session: try again, in a folder of its own.
+    let mut attempts = (0..3).map(|attempt| {
+        let folder = nights.folder.path().join(format!("nights-{attempt}"));
+        let result = nights.night_in("golden", &folder);
+        eprintln!("attempt {attempt}: {}", result.stderr);
+        (folder, result.night["golden"].clone())
+    });
+    let analysed = attempts.find(|(_, golden)| golden["report"].is_string());
+    let (folder, golden) = analysed.expect("a golden session with a report");
+    let results = read_json(&only(&only(&folder, "-planted"), ".results.json"));
     assert!(results["provenance"]["results_hash"].is_string());
     assert_eq!(
         golden["results_sha256"],
