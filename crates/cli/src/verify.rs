@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use skinrig_export::{BundleReport, Folder, same_bytes, verify_bundle};
-use skinrig_recorder::{RecorderError, SessionReader, verify as recheck};
+use skinrig_recorder::{PressTally, RecorderError, SessionReader, verify as recheck};
 
 use crate::args::SessionArg;
 use crate::exit::{Exit, Failure, Outcome};
@@ -142,6 +142,17 @@ fn scratch() -> Result<PathBuf, Failure> {
     )))
 }
 
+/// Number of presses made, and of planned ones where they differ.
+fn presses(presses: PressTally, sync: PressTally) -> String {
+    let made = presses.made() + sync.made();
+    let planned = presses.planned + sync.planned;
+    if made == planned {
+        format!("{made} presses")
+    } else {
+        format!("{made} of {planned} planned presses")
+    }
+}
+
 fn session(path: &Path, json: bool) -> Outcome {
     if let Err(e @ RecorderError::NotASession { .. }) = SessionReader::open(path) {
         return Err(Failure::session(e));
@@ -172,13 +183,13 @@ fn session(path: &Path, json: bool) -> Outcome {
         }
         if let (true, Some(t)) = (report.is_sound(), report.totals) {
             outln!(
-                "{name}: sound{}; {} presses, {} events, {} chunks, {:.1} MB of camera bytes, {} pose samples",
+                "{name}: sound{}; {}, {} events, {} chunks, {:.1} MB of camera bytes, {} pose samples",
                 if report.sealed {
                     ", sealed"
                 } else {
                     ", but not sealed: camera bytes, poses and counts were checked, not every byte"
                 },
-                t.presses.planned + t.sync.planned,
+                presses(t.presses, t.sync),
                 t.cd_events,
                 t.chunks,
                 t.raw_bytes as f64 / 1e6,

@@ -19,8 +19,8 @@ pub struct Violation {
     pub step: usize,
     /// Part of the motion.
     pub segment: Segment,
-    /// The problem.
-    pub message: String,
+    /// The rule that it breaks.
+    pub rule: PlanRule,
     /// Accepted values.
     pub expected: String,
     /// Value in the plan.
@@ -29,6 +29,60 @@ pub struct Violation {
     pub excess: f64,
     /// Key of the protocol to change.
     pub key: &'static str,
+}
+
+/// A rule for the segments of a plan. Its text says how a segment breaks it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, thiserror::Error)]
+#[serde(rename_all = "snake_case")]
+pub enum PlanRule {
+    /// Times are 0 or more.
+    #[error("a negative time")]
+    Time,
+    /// Pauses are 0 or more.
+    #[error("a pause of negative length")]
+    Pause,
+    /// This limit of the plan is finite and above 0.
+    #[error("{0} is invalid")]
+    Limit(&'static str),
+    /// The settling tolerance is less than the clearance height.
+    #[error("a tip on the surface would count as clear")]
+    ToleranceBelowClearance,
+    /// Presses are numbered in order.
+    #[error("presses are not numbered in order")]
+    PressOrder,
+    /// This axis stays inside the workspace.
+    #[error("{0} leaves the workspace")]
+    Workspace(&'static str),
+    /// The speed limit.
+    #[error("the speed is outside its limit")]
+    Speed,
+    /// The tip moves sideways at clearance height.
+    #[error("lateral motion below clearance height")]
+    LateralClearance,
+    /// The deadline leaves time for the motion.
+    #[error("the deadline is too short")]
+    Deadline,
+    /// The distance to this keep-out.
+    #[error("comes too close to `{0}`")]
+    KeepOut(String),
+    /// The surface search stays between clearance height and the depth limit.
+    #[error("the surface search starts or ends too far from the surface")]
+    SearchBand,
+    /// The contact force of a surface search.
+    #[error("the contact force is outside its limit")]
+    ContactForce,
+    /// Presses stay inside the outline by its margin.
+    #[error("not on the skin")]
+    OnSkin,
+    /// Steps have the location and depth of their planned press.
+    #[error("the step is not the planned press")]
+    PlannedPress,
+    /// Presses start above their location.
+    #[error("the press starts away from its location")]
+    PressStart,
+    /// The depth limit.
+    #[error("the depth is outside its limit")]
+    Depth,
 }
 
 /// A part of the motion.
@@ -73,7 +127,7 @@ impl fmt::Display for Violation {
         write!(
             f,
             "{}: expected {}, found {}; change `{}`",
-            self.message, self.expected, self.found, self.key
+            self.rule, self.expected, self.found, self.key
         )
     }
 }
@@ -134,7 +188,7 @@ pub fn check(plan: &Plan, around: &Surroundings, home: Option<Point3<Skin>>) -> 
                 if duration.0 < 0 {
                     checker.add(
                         Segment::Plan,
-                        "a pause of negative length",
+                        PlanRule::Pause,
                         "0 s or more",
                         duration,
                         "repetitions.between.pause",
@@ -161,7 +215,7 @@ impl Checker<'_> {
     fn add(
         &mut self,
         segment: Segment,
-        message: &str,
+        rule: PlanRule,
         expected: impl fmt::Display,
         found: impl fmt::Display,
         key: &'static str,
@@ -170,7 +224,7 @@ impl Checker<'_> {
             press: self.press,
             step: self.step,
             segment,
-            message: message.to_owned(),
+            rule,
             expected: expected.to_string(),
             found: found.to_string(),
             excess: 0.0,
@@ -202,7 +256,7 @@ impl Checker<'_> {
             if !positive(value) {
                 self.add(
                     Segment::Plan,
-                    &format!("{name} is invalid"),
+                    PlanRule::Limit(name),
                     "a value above 0",
                     value,
                     key,
@@ -212,7 +266,7 @@ impl Checker<'_> {
         if l.position_tolerance_mm >= l.clearance_mm {
             self.add(
                 Segment::Plan,
-                "a tip on the surface would count as clear",
+                PlanRule::ToleranceBelowClearance,
                 format!("a tolerance below {} mm", l.clearance_mm),
                 format!("{} mm", l.position_tolerance_mm),
                 "motion.settle.tolerance",
@@ -223,7 +277,7 @@ impl Checker<'_> {
                 self.press = Some(press.id);
                 self.add(
                     Segment::Plan,
-                    "presses are not numbered in order",
+                    PlanRule::PressOrder,
                     PressId::from_index(k as u32),
                     press.id,
                     "path",
@@ -247,7 +301,7 @@ impl Checker<'_> {
                 };
                 self.add(
                     segment,
-                    &format!("{axis} leaves the workspace"),
+                    PlanRule::Workspace(axis),
                     format!("{} to {} mm", min[k], max[k]),
                     format!("{v:.3} mm"),
                     key,
@@ -262,7 +316,7 @@ impl Checker<'_> {
         if !(v > 0.0 && v <= max + TINY_MM) {
             self.add(
                 segment,
-                "the speed is outside its limit",
+                PlanRule::Speed,
                 format!("more than 0 and at most {max} mm/s"),
                 format!("{v} mm/s"),
                 key,
@@ -297,7 +351,7 @@ impl Checker<'_> {
         {
             self.add(
                 segment,
-                "lateral motion below clearance height",
+                PlanRule::LateralClearance,
                 format!("{clearance} mm or higher"),
                 format!("{lowest:.3} mm"),
                 "motion.clearance",
@@ -312,7 +366,7 @@ impl Checker<'_> {
         if least_s.is_nan() || deadline.as_secs_f64() <= least_s {
             self.add(
                 segment,
-                "the deadline is too short",
+                PlanRule::Deadline,
                 format!("more than {least_s:.3} s"),
                 deadline,
                 "motion",
@@ -332,7 +386,7 @@ impl Checker<'_> {
             if let Some(distance) = keep_out.too_close_mm(a, b, height_mm, 0.0) {
                 self.add(
                     segment,
-                    &format!("comes too close to `{}`", keep_out.name),
+                    PlanRule::KeepOut(keep_out.name.clone()),
                     format!("more than {} mm away", keep_out.margin_mm),
                     format!(
                         "{distance:.3} mm between ({:.3}, {:.3}) and ({:.3}, {:.3}) mm",
@@ -355,7 +409,7 @@ impl Checker<'_> {
         if !(band > 0.0 && band < room) {
             self.add(
                 Segment::Approach,
-                "the surface search starts or ends too far from the surface",
+                PlanRule::SearchBand,
                 format!("a band above 0 and below {room} mm"),
                 format!("{band} mm"),
                 "press.band",
@@ -367,7 +421,7 @@ impl Checker<'_> {
         if !(search.threshold_n > 0.0 && search.threshold_n < limits.max_force_n) {
             self.add(
                 Segment::Approach,
-                "the contact force is outside its limit",
+                PlanRule::ContactForce,
                 format!("more than 0 and less than {} N", limits.max_force_n),
                 format!("{} N", search.threshold_n),
                 "press.threshold",
@@ -387,7 +441,7 @@ impl Checker<'_> {
             };
             self.add(
                 Segment::Press,
-                "not on the skin",
+                PlanRule::OnSkin,
                 format!("at least {margin} mm inside the outline"),
                 found,
                 key,
@@ -423,7 +477,7 @@ impl Checker<'_> {
         if planned.is_none_or(|p| p.at != at || p.depth_mm != press.depth_mm) {
             self.add(
                 Segment::Plan,
-                "the step is not the planned press",
+                PlanRule::PlannedPress,
                 "the same location and depth",
                 format!("({}, {}) mm", at.x_mm, at.y_mm),
                 key,
@@ -433,7 +487,7 @@ impl Checker<'_> {
         if position.is_none_or(|p| p.distance_mm(above) > TINY_MM) {
             self.add(
                 Segment::Approach,
-                "the press starts away from its location",
+                PlanRule::PressStart,
                 format!(
                     "the tip above ({}, {}) mm at clearance height",
                     at.x_mm, at.y_mm
@@ -460,7 +514,7 @@ impl Checker<'_> {
         if !(depth > 0.0 && depth <= limits.max_depth_mm + TINY_MM) {
             self.add(
                 Segment::Press,
-                "the depth is outside its limit",
+                PlanRule::Depth,
                 format!("more than 0 and at most {} mm", limits.max_depth_mm),
                 format!("{depth} mm"),
                 if sync { "sync.depth" } else { "depth" },
@@ -472,7 +526,7 @@ impl Checker<'_> {
         if press.hold.0 < 0 || press.start_after_begin.is_some_and(|s| s.0 < 0) {
             self.add(
                 Segment::Press,
-                "a negative time",
+                PlanRule::Time,
                 "0 s or more",
                 press.hold,
                 "motion.hold",

@@ -77,7 +77,7 @@ impl Protocol {
             let same = |group: &&mut Vec<&Violation>| {
                 group
                     .first()
-                    .is_some_and(|v| v.message == violation.message && v.key == violation.key)
+                    .is_some_and(|v| v.rule == violation.rule && v.key == violation.key)
             };
             match groups.iter_mut().find(same) {
                 Some(group) => group.push(violation),
@@ -117,7 +117,7 @@ impl Protocol {
             ),
         };
         Some(Diagnostic {
-            message: worst.message.clone(),
+            message: worst.rule.to_string(),
             path: key.to_owned(),
             location: self.key_places.get(key)?.clone(),
             expected: Some(worst.expected.clone()),

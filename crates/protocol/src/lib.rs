@@ -39,7 +39,7 @@ mod svg;
 pub mod timing;
 
 pub use area::{Area, KeepOut, Surroundings};
-pub use check::{Segment, Violation, check};
+pub use check::{PlanRule, Segment, Violation, check};
 pub use faults::{FaultPhase, FaultTime, InvalidFault, PlantedFault};
 pub use limits::Limits;
 pub use phases::PressPhases;

@@ -139,6 +139,12 @@ pub struct PressTally {
 }
 
 impl PressTally {
+    /// Presses that were made, whatever their verdict.
+    #[must_use]
+    pub const fn made(&self) -> u64 {
+        self.valid + self.invalid + self.excluded
+    }
+
     /// Presses without a verdict; 0 in a finished session.
     #[must_use]
     pub const fn open(&self) -> u64 {

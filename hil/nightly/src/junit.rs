@@ -1,7 +1,7 @@
 //! A night as JUnit XML for CI servers: one test suite with one test case per check.
 //!
-//! FAIL becomes `failure`, INCONCLUSIVE becomes `failure` with its own type, and SKIPPED becomes `skipped`. INVALID, and failures
-//! caused by the computer or by skinrig, become `error`. MARGINAL passes; its output shows it.
+//! FAIL and INCONCLUSIVE become `failure`, and SKIPPED becomes `skipped`. INVALID, and failures caused by the computer or by skinrig,
+//! become `error`. The type of each is the rule that decided; the property `verdict` tells INCONCLUSIVE from FAIL and MARGINAL from PASS.
 
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -81,10 +81,13 @@ fn add_properties(suite: &mut TestSuite, night: &Night) {
     }
 }
 
+/// Type of a failure that no evidence explains.
+const BROKEN_LIMIT: &str = "broken-limit";
+
 fn test_case(night: &Night, check: &CheckResult) -> TestCase {
     let non_success = |kind: NonSuccessKind| {
         let mut status = TestCaseStatus::non_success(kind);
-        status.set_type(check.verdict.name());
+        status.set_type(check.rule.as_deref().unwrap_or(BROKEN_LIMIT));
         status.set_description(printable(&evidence_text(check)));
         status
     };
@@ -108,9 +111,9 @@ fn test_case(night: &Night, check: &CheckResult) -> TestCase {
     case
 }
 
-/// Cause, rule and evidence as kinds, for programs; the texts for people are in the message and in the description.
+/// Verdict, cause, rule and evidence as kinds, for programs; the texts for people are in the message and in the description.
 fn kinds(check: &CheckResult) -> Vec<(&'static str, String)> {
-    let mut all = Vec::new();
+    let mut all = vec![("verdict", check.verdict.name().to_owned())];
     all.extend(check.cause.map(|cause| ("cause", cause.name().to_owned())));
     all.extend(check.rule.iter().map(|rule| ("rule", rule.clone())));
     for e in check.attempts.iter().flat_map(|a| &a.evidence) {

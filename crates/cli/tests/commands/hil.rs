@@ -113,7 +113,7 @@ fn a_missing_bench_is_an_infrastructure_failure_and_the_night_is_stored() {
     assert_eq!(identity["attempts"].as_array().unwrap().len(), 2);
     let junit = std::fs::read_to_string(folder.join("junit.xml")).unwrap();
     let error = junit.lines().find(|line| line.contains("<error "));
-    assert!(error.unwrap().contains(" type=\"FAIL\"") && junit.contains("nobody near"));
+    assert!(error.unwrap().contains(" type=\"not-reachable\"") && junit.contains("nobody near"));
     let page = std::fs::read_to_string(folder.join("night.html")).unwrap();
     assert!(page.contains("Look at the computer and its cables"));
     assert!(Path::new(&history).exists());

@@ -262,7 +262,14 @@ fn a_killed_run_leaves_a_session_that_opens() {
         "{words}"
     );
     let verified = skinrig(&["verify", &text(&session)]).code(0).out;
-    assert!(verified.contains("sound, but not sealed"), "{verified}");
+    let presses = format!(
+        "; {} of 10 planned presses,",
+        count(&shown, "valid") + count(&shown, "invalid")
+    );
+    assert!(
+        verified.contains("sound, but not sealed") && verified.contains(&presses),
+        "{verified}"
+    );
     let listed = skinrig(&["sessions", &lab.text("s")]).code(0).out;
     assert!(listed.contains("cut off"), "{listed}");
     skinrig(&["analyze", &text(&session)]).code(0);

@@ -3,7 +3,7 @@
 use crate::common::{demo, parse, shipped};
 use proptest::prelude::*;
 use skinrig_model::{Point2, PressRole, SkinOutline};
-use skinrig_protocol::{Area, KeepOut, Plan, Segment, Step, Surroundings, Violation, check};
+use skinrig_protocol::{Area, KeepOut, Plan, PlanRule, Segment, Step, Surroundings, Violation, check};
 
 fn keys(violations: &[Violation]) -> Vec<(Segment, &str)> {
     let mut keys: Vec<_> = violations.iter().map(|v| (v.segment, v.key)).collect();
@@ -209,7 +209,7 @@ fn every_kind_of_damage_is_found() {
     });
     assert!(
         away.iter()
-            .any(|v| v.segment == Segment::Approach && v.message.contains("away from its location"))
+            .any(|v| v.segment == Segment::Approach && v.rule == PlanRule::PressStart)
     );
     let low = damaged(|p| {
         for step in &mut p.steps {
@@ -229,7 +229,7 @@ fn every_kind_of_damage_is_found() {
     assert!(
         wrong_place
             .iter()
-            .any(|v| v.message == "the step is not the planned press")
+            .any(|v| v.rule == PlanRule::PlannedPress)
     );
 }
 
@@ -246,7 +246,7 @@ fn presses_stay_inside_the_outline_not_its_bounding_box() {
     assert!(
         found
             .iter()
-            .all(|v| v.message == "not on the skin" && v.key == "path")
+            .all(|v| v.rule == PlanRule::OnSkin && v.key == "path")
     );
     // The margin counts as well: 2 mm from the right edge, 3 mm required.
     let protocol = demo(&["path.meander.origin=[58 mm, 2 mm]", "path.meander.count=1"]);
@@ -281,7 +281,7 @@ fn keep_outs_hold_for_presses_and_for_travel_between_them() {
     let tall = found(&[&wall("")]);
     assert!(
         tall.iter()
-            .all(|v| v.segment == Segment::Travel && v.message.contains("`wall`"))
+            .all(|v| v.segment == Segment::Travel && v.rule == PlanRule::KeepOut("wall".to_owned()))
     );
     assert!(tall.len() >= 3, "{tall:?}");
     assert_eq!(

@@ -128,13 +128,13 @@ fn document_is_well_formed_and_counts_add_up() {
     let types = |element: &str| -> Vec<String> {
         named(element).iter().map(|a| value(a, "type")).collect()
     };
-    assert_eq!(types("failure"), ["INCONCLUSIVE", "FAIL"]);
-    assert_eq!(types("error"), ["FAIL", "FAIL", "INVALID"]);
+    assert_eq!(types("failure"), ["broken-limit"; 2]);
+    assert_eq!(types("error"), ["broken-limit", "broken-limit", "device-at-fault"]);
     assert_eq!(
         value(named("skipped")[0], "message"),
         "not &quot;here&quot; &amp; &lt;now&gt;"
     );
-    // Kinds for programs: the cause, the rule and the evidence of each check.
+    // Kinds for programs: the verdict, the cause, the rule and the evidence of each check.
     let kinds = |name: &str| {
         let all = named("property").into_iter();
         let named = all.filter(|a| value(a, "name") == name);
@@ -143,6 +143,21 @@ fn document_is_well_formed_and_counts_add_up() {
     assert_eq!(
         kinds("cause"),
         ["infrastructure", "software", "rig", "rig", "skin"]
+    );
+    // The first is that of the night.
+    assert_eq!(
+        kinds("verdict"),
+        [
+            "INVALID",
+            "PASS",
+            "MARGINAL",
+            "FAIL",
+            "FAIL",
+            "INCONCLUSIVE",
+            "INVALID",
+            "FAIL",
+            "SKIPPED"
+        ]
     );
     assert_eq!(kinds("rule"), ["device-at-fault"]);
     assert_eq!(kinds("evidence"), ["camera1: read back"; 7]);
