@@ -108,12 +108,18 @@ pub(crate) fn provenance(
     })
 }
 
-/// Name of the rig, marked if mismatches were tolerated, even if only in a later leg.
+/// Name of the rig in the first leg, marked if mismatches were tolerated only in a later one.
 fn rig_name(reader: &SessionReader, header: &RunHeader) -> Result<String, RecorderError> {
     let mut name = header.rig_name.clone();
     let devices = reader.devices()?;
-    let mut settings = devices.iter().flat_map(|d| &d.settings);
-    if !name.contains(TOLERATED) && settings.any(|s| s.requested == Setting::TOLERATED) {
+    let legs = reader.legs()?;
+    let first_leg = legs.get(1).map_or(devices.len(), |leg| leg.devices_before);
+    let (first, later) = devices.split_at(first_leg.min(devices.len()));
+    let tolerated = |devices: &[skinrig_recorder::DeviceRow]| {
+        let mut settings = devices.iter().flat_map(|d| &d.settings);
+        settings.any(|s| s.requested == Setting::TOLERATED)
+    };
+    if tolerated(later) && !tolerated(first) {
         name.push_str(TOLERATED);
         name.push_str(" in a later leg");
     }

@@ -58,11 +58,12 @@ pub fn write_raw(
         .take(19)
         .collect::<String>()
         .replace('T', " ");
+    // The header has the fields of an EVK1; this one names what the events came from.
     let model = device.map_or("", |d| d.identity.model.as_str());
-    let more = if model.contains("re-encoded") {
-        vec![("skinrig_source".to_owned(), model.to_owned())]
-    } else {
-        Vec::new()
+    let source: Vec<&str> = model.split_whitespace().collect();
+    let more = match source.is_empty() {
+        true => Vec::new(),
+        false => vec![("skinrig_source".to_owned(), source.join(" "))],
     };
     let metadata = RawMetadata {
         more,

@@ -3,7 +3,9 @@
 use crate::common::{demo, parse, shipped};
 use proptest::prelude::*;
 use skinrig_model::{Point2, PressRole, SkinOutline};
-use skinrig_protocol::{Area, KeepOut, Plan, PlanRule, Segment, Step, Surroundings, Violation, check};
+use skinrig_protocol::{
+    Area, KeepOut, Plan, PlanRule, Segment, Step, Surroundings, Violation, check,
+};
 
 fn keys(violations: &[Violation]) -> Vec<(Segment, &str)> {
     let mut keys: Vec<_> = violations.iter().map(|v| (v.segment, v.key)).collect();
@@ -226,11 +228,7 @@ fn every_kind_of_damage_is_found() {
     assert_eq!(floor.len(), 246);
     assert_eq!(floor[0].segment, Segment::Press);
     let wrong_place = damaged(|p| p.presses[9].at = Point2::new(0.0, 0.0));
-    assert!(
-        wrong_place
-            .iter()
-            .any(|v| v.rule == PlanRule::PlannedPress)
-    );
+    assert!(wrong_place.iter().any(|v| v.rule == PlanRule::PlannedPress));
 }
 
 #[test]

@@ -129,7 +129,10 @@ fn document_is_well_formed_and_counts_add_up() {
         named(element).iter().map(|a| value(a, "type")).collect()
     };
     assert_eq!(types("failure"), ["broken-limit"; 2]);
-    assert_eq!(types("error"), ["broken-limit", "broken-limit", "device-at-fault"]);
+    assert_eq!(
+        types("error"),
+        ["broken-limit", "broken-limit", "device-at-fault"]
+    );
     assert_eq!(
         value(named("skipped")[0], "message"),
         "not &quot;here&quot; &amp; &lt;now&gt;"
