@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use skinrig_analysis::result::Estimate;
 use skinrig_export::Source;
-use skinrig_export::challenge::{self, ChallengeError, Judgement};
+use skinrig_export::challenge::{self, ChallengeError, Judgement, Making};
 use skinrig_model::CameraId;
 use skinrig_recorder::SessionReader;
-use skinrig_results::{ChunkIndex, events_between};
+use skinrig_results::{ChunkIndex, Origin, events_between};
 
 use crate::args::{ChallengeArgs, ChallengeCommand, MakeArgs, ScoreArgs};
 use crate::exit::{Exit, Failure, Outcome};
@@ -55,8 +55,15 @@ fn make(args: &MakeArgs, json: bool) -> Outcome {
     };
     let default: PathBuf = beside(&args.session, ".answers.json");
     let answers = args.answers.as_ref().unwrap_or(&default);
-    let made = challenge::make(&source, &args.out, answers, args.overwrite, &mut events)
-        .map_err(failure)?;
+    let mut salt = [0; 32];
+    getrandom::fill(&mut salt).map_err(Failure::internal)?;
+    let making = Making {
+        overwrite: args.overwrite,
+        origin: Origin::of(&header).map(Origin::name),
+        salt,
+    };
+    let made =
+        challenge::make(&source, &args.out, answers, &making, &mut events).map_err(failure)?;
     if json {
         crate::terminal::print_json(&serde_json::json!(made));
     } else {

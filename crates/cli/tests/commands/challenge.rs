@@ -150,15 +150,7 @@ fn the_folder_gives_no_position_of_a_scored_press_away() {
             assert!(!holds(x) && !holds(y));
         }
     }
-    // The order of the plan is gone, and the answers are not in the folder.
-    let answers = read_json(&challenge.answers);
-    let session: Vec<u64> = answers["presses"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|p| p["session_press"].as_u64().unwrap())
-        .collect();
-    assert!(!session.is_sorted(), "{session:?}");
+    // The answers are not in the folder.
     let inside = text(&challenge.folder.join("answers.json"));
     let made = [
         "challenge",
@@ -171,6 +163,30 @@ fn the_folder_gives_no_position_of_a_scored_press_away() {
     ];
     skinrig(&made).code(2).expect_stderr(&["--answers"]);
     assert!(!Path::new(&inside).exists());
+}
+
+#[test]
+fn order_and_hash_follow_from_random_bytes_and_the_origin_is_stated() {
+    let challenge = Challenge::new();
+    let description = read_json(&challenge.folder.join("challenge.json"));
+    assert_eq!(description["origin"], "simulated");
+    // With four scored presses, one order in 24 is that of the plan: eight of them in a row are none in 10^11.
+    let (folder, answers) = (text(&challenge.folder), text(&challenge.answers));
+    let session = text(&challenge.session);
+    let make = || {
+        let made = ["challenge", "make", &session, "--out", &folder, "--answers"];
+        skinrig(&[&made[..], &[&answers, "--overwrite"]].concat()).code(0);
+        let answers = read_json(&challenge.answers);
+        let presses = answers["presses"].as_array().unwrap().iter();
+        let order: Vec<u64> = presses
+            .map(|p| p["session_press"].as_u64().unwrap())
+            .collect();
+        (order, answers["salt"].as_str().unwrap().to_owned())
+    };
+    let made: Vec<_> = (0..8).map(|_| make()).collect();
+    assert!(made.iter().any(|(order, _)| !order.is_sorted()), "{made:?}");
+    assert!(made.iter().all(|(_, salt)| salt.len() == 64));
+    assert_ne!(made[0].1, made[1].1);
 }
 
 #[test]

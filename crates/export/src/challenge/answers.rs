@@ -14,6 +14,9 @@ use super::error::ChallengeError;
 pub struct Answers {
     /// Version of the layout.
     pub format: u32,
+    /// Random bytes in hexadecimal, which keep others from guessing the file from its hash; empty in older files.
+    #[serde(default)]
+    pub salt: String,
     /// Session behind the challenge.
     pub session_id: String,
     /// Outline of the skin.
@@ -47,9 +50,14 @@ pub struct Answer {
 
 /// SHA-256 of bytes, in hexadecimal.
 pub(super) fn hash(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+/// Bytes in hexadecimal.
+pub(super) fn hex(bytes: &[u8]) -> String {
     use std::fmt::Write as _;
-    let mut text = String::with_capacity(64);
-    for byte in Sha256::digest(bytes) {
+    let mut text = String::with_capacity(2 * bytes.len());
+    for byte in bytes {
         // Writing to a string cannot fail.
         let _ = write!(text, "{byte:02x}");
     }

@@ -8,7 +8,7 @@ use skinrig_analysis::result::PressResult;
 use skinrig_model::{CameraId, CdEvent, Point2, PressRole, PressTiming, Verdict};
 use skinrig_recorder::RecorderError;
 
-use super::answers::{Answer, Answers, hash};
+use super::answers::{Answer, Answers, hash, hex};
 use super::error::ChallengeError;
 use super::{DESCRIPTION, FORMAT, STEM};
 use crate::csv_files::CsvFiles;
@@ -28,6 +28,9 @@ pub(super) struct Description {
     format: u32,
     /// What to do.
     task: String,
+    /// What the events come from: `simulated`, `emulated`, `bench` or `imported`; missing if unknown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    origin: Option<String>,
     /// Presses whose position is given.
     pub calibrating: u32,
     /// Presses to locate.
@@ -57,6 +60,18 @@ impl Description {
             other => Err(refused(format!("format {other}"))),
         }
     }
+}
+
+/// How to make a challenge.
+#[derive(Debug, Clone, Copy)]
+pub struct Making {
+    /// Whether to replace existing files.
+    pub overwrite: bool,
+    /// What the events come from, for the description.
+    pub origin: Option<&'static str>,
+    /// Random bytes. They decide the order of the presses and are part of the sealed answers, so that nobody who knows the
+    /// positions of a plan can find out which press is which by trying.
+    pub salt: [u8; 32],
 }
 
 /// A challenge that was made.
@@ -94,7 +109,7 @@ pub fn make(
     source: &Source<'_>,
     folder: &Path,
     answers: &Path,
-    overwrite: bool,
+    making: &Making,
     events: &mut ReadEvents<'_>,
 ) -> Result<ChallengeFiles, ChallengeError> {
     let Some((analysis, _)) = source.analysis else {
@@ -108,7 +123,7 @@ pub fn make(
             because: analysis.invalid_because(),
         });
     }
-    let presses = shuffled(&analysis.presses);
+    let presses = shuffled(&analysis.presses, making.salt);
     let is_scored = |p: &&Press<'_>| p.row.role == PressRole::Score;
     let scored = presses.iter().filter(is_scored).count();
     let calibrating = presses.len() - scored;
@@ -118,7 +133,7 @@ pub fn make(
             scored,
         });
     }
-    let out = Folder::new(folder, STEM, overwrite)?;
+    let out = Folder::new(folder, STEM, making.overwrite)?;
     let resolved = |path: &Path| std::fs::canonicalize(path).map_err(ExportError::file(path));
     let parent = answers.parent().filter(|p| !p.as_os_str().is_empty());
     let parent = parent.unwrap_or_else(|| Path::new("."));
@@ -128,10 +143,11 @@ pub fn make(
         });
     }
     let stem = answers.file_name().unwrap_or_default().to_string_lossy();
-    let sealed = Folder::new(parent, &stem, overwrite)?;
+    let sealed = Folder::new(parent, &stem, making.overwrite)?;
     let settings = &analysis.settings;
     let text = json(&Answers {
         format: FORMAT,
+        salt: hex(&making.salt),
         session_id: source.reader.session_id().map_err(ExportError::from)?,
         outline: analysis.rig.outline,
         within_mm: settings.within_mm,
@@ -154,6 +170,7 @@ pub fn make(
     let description = json(&Description {
         format: FORMAT,
         task: TASK.to_owned(),
+        origin: making.origin.map(str::to_owned),
         calibrating: calibrating as u32,
         scored: scored as u32,
         answers_sha256: hash(text.as_bytes()),
@@ -175,8 +192,8 @@ pub fn make(
     })
 }
 
-/// Usable presses in an order that nobody can tell without the positions.
-fn shuffled(rows: &[PressResult]) -> Vec<Press<'_>> {
+/// Usable presses in an order that follows from the salt.
+fn shuffled(rows: &[PressResult], salt: [u8; 32]) -> Vec<Press<'_>> {
     let usable = |row: &PressResult| match row.role {
         PressRole::Sync => false,
         PressRole::Calibrate => row.verdict == Verdict::Valid,
@@ -191,22 +208,14 @@ fn shuffled(rows: &[PressResult]) -> Vec<Press<'_>> {
             truth: row.truth?,
         })
     });
-    let presses: Vec<Press<'_>> = presses.collect();
-    let mut secret = Sha256::new();
-    for p in &presses {
-        secret.update(p.truth.x_mm.to_le_bytes());
-        secret.update(p.truth.y_mm.to_le_bytes());
-        secret.update(p.timing.contact.0.to_le_bytes());
-    }
-    let secret = secret.finalize();
-    let key = |p: &Press<'_>| {
-        let own = Sha256::new().chain_update(secret);
+    let mut presses: Vec<Press<'_>> = presses.collect();
+    let salted = Sha256::new().chain_update(salt);
+    presses.sort_by_cached_key(|p| {
+        let own = salted.clone();
         own.chain_update(p.row.press.index().to_le_bytes())
             .finalize()
-    };
-    let mut keyed: Vec<_> = presses.into_iter().map(|p| (key(&p), p)).collect();
-    keyed.sort_by_key(|k| k.0);
-    keyed.into_iter().map(|(_, p)| p).collect()
+    });
+    presses
 }
 
 fn press_table(presses: &[Press<'_>]) -> Table {

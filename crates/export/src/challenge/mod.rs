@@ -2,7 +2,8 @@
 //! presses, and the positions of the scored presses sealed away in a file of answers.
 //!
 //! Presses have new numbers in a random order, and times count from the contact, because the order of a path gives positions
-//! away. The order follows from a hash of the answers.
+//! away. The order follows from random bytes, which the file of answers holds: its hash in the description commits to the positions
+//! without giving them away, even to someone who knows all positions of the plan.
 
 mod answers;
 mod error;
@@ -13,7 +14,7 @@ mod score;
 pub use answers::{Answer, Answers};
 pub use error::{ChallengeError, EstimateError};
 pub use estimates::{Estimates, Position};
-pub use make::{ChallengeFiles, ReadEvents, make};
+pub use make::{ChallengeFiles, Making, ReadEvents, make};
 pub use score::{Judgement, score};
 
 /// Name of the description in the folder of a challenge.
