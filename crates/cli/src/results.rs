@@ -161,9 +161,11 @@ pub(crate) fn write_shown(
 /// [`Failure::internal`] when one cannot be generated.
 pub(crate) fn documents(results: &Results) -> Result<(String, String), Failure> {
     let input = results.report_input();
-    let json =
-        serde_json::to_string_pretty(&skinrig_report::json(&input)).map_err(Failure::internal)?;
-    Ok((json, skinrig_report::html(&input)))
+    let (json, html) = rayon::join(
+        || serde_json::to_string_pretty(&skinrig_report::json(&input)),
+        || skinrig_report::html(&input),
+    );
+    Ok((json.map_err(Failure::internal)?, html))
 }
 
 /// Writes a whole file or none: a full disk leaves no partial file.

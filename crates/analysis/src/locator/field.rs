@@ -7,6 +7,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use super::exponential::{LANES, of_negatives};
 use super::likelihood::{Kernel, Likelihood, Logs, centre, first_weights, scatter};
 use super::quasi_newton::minimise;
 use super::samples::{Sample, thinned};
@@ -90,12 +91,45 @@ pub(super) fn learn(samples: &[Sample], from: Option<&Logs>) -> Option<(FieldMod
 #[derive(Debug, Clone)]
 pub(super) struct Field {
     kernel: Kernel,
-    at: Vec<[f64; 2]>,
+    /// Number of observations.
+    n: usize,
+    observations: Vec<Group>,
     factor: Cholesky<f64, Dyn>,
-    /// Weights of the observations.
-    alpha: DVector<f64>,
     /// Share of the field's variance that the observations explain where they are: the lowest tenth of them.
     explained: f64,
+}
+
+/// Observations side by side: positions, mm, and weights. The last group is filled up with weights of 0.
+#[derive(Debug, Clone, Copy)]
+struct Group {
+    x: [f64; LANES],
+    y: [f64; LANES],
+    alpha: [f64; LANES],
+}
+
+impl Group {
+    fn new(points: &[FieldPoint], alpha: &[f64]) -> Self {
+        let fill = |of: &dyn Fn(usize) -> f64| {
+            std::array::from_fn(|i| if i < points.len() { of(i) } else { 0.0 })
+        };
+        Self {
+            x: fill(&|i| points[i].at_mm[0]),
+            y: fill(&|i| points[i].at_mm[1]),
+            alpha: fill(&|i| alpha[i]),
+        }
+    }
+
+    /// Distances to a position along x and y, mm, and exp(-d² / (2 l²)) for the distance d and the length scale l.
+    fn near(&self, at: [f64; 2], per_length: f64) -> [[f64; LANES]; 3] {
+        let half = -0.5 * per_length * per_length;
+        let (mut dx, mut dy, mut exponents) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            dx[i] = at[0] - self.x[i];
+            dy[i] = at[1] - self.y[i];
+            exponents[i] = half * (dx[i] * dx[i] + dy[i] * dy[i]);
+        }
+        [dx, dy, of_negatives(&exponents)]
+    }
 }
 
 impl Field {
@@ -114,40 +148,47 @@ impl Field {
         let factor = Cholesky::new(noisy)?;
         let residuals = DVector::from_iterator(n, points.iter().map(|p| p.residual_px));
         let alpha = factor.solve(&residuals);
+        let groups = points
+            .chunks(LANES)
+            .zip(alpha.as_slice().chunks(LANES))
+            .map(|(points, alpha)| Group::new(points, alpha));
         let mut field = Self {
             kernel,
-            at: points.iter().map(|p| p.at_mm).collect(),
+            n,
+            observations: groups.collect(),
             factor,
-            alpha,
             explained: 0.0,
         };
-        let mut explained: Vec<f64> = field.at.iter().map(|at| 1.0 - field.open(*at)).collect();
+        let mut explained: Vec<f64> = points.iter().map(|p| 1.0 - field.open(p.at_mm)).collect();
         explained.sort_unstable_by(f64::total_cmp);
         field.explained = *explained.get(n / 10)?;
-        let usable = field.explained > 0.0 && field.alpha.iter().all(|a| a.is_finite());
+        let usable = field.explained > 0.0 && alpha.iter().all(|a| a.is_finite());
         usable.then_some(field)
     }
 
     /// Expected residual at a position, px, and its change per mm.
     pub(super) fn value(&self, at: [f64; 2]) -> (f64, [f64; 2]) {
-        let (mut value, mut by) = (0.0, [0.0; 2]);
-        let square = self.kernel.per_length * self.kernel.per_length;
-        for (own, alpha) in self.at.iter().zip(self.alpha.iter()) {
-            let part = alpha * self.kernel.of(at, *own);
-            value += part;
-            for axis in 0..2 {
-                by[axis] -= part * (at[axis] - own[axis]) * square;
+        let mut sums = [[0.0; LANES]; 3];
+        for group in &self.observations {
+            let [dx, dy, near] = group.near(at, self.kernel.per_length);
+            for i in 0..LANES {
+                let part = group.alpha[i] * near[i];
+                sums[0][i] += part;
+                sums[1][i] += part * dx[i];
+                sums[2][i] += part * dy[i];
             }
         }
-        (value, by)
+        let [value, x, y] = sums.map(|lanes| lanes.iter().sum::<f64>() * self.kernel.variance);
+        let square = self.kernel.per_length * self.kernel.per_length;
+        (value, [-x * square, -y * square])
     }
 
     /// Share of the field's variance that the observations leave open at a position, 0..=1.
     pub(super) fn open(&self, at: [f64; 2]) -> f64 {
-        let near = DVector::from_iterator(
-            self.at.len(),
-            self.at.iter().map(|own| self.kernel.of(at, *own)),
-        );
+        let groups = self.observations.iter();
+        let near = groups.flat_map(|g| g.near(at, self.kernel.per_length)[2]);
+        let near = near.map(|share| share * self.kernel.variance);
+        let near = DVector::from_iterator(self.n, near.take(self.n));
         let explained = match self.factor.l_dirty().solve_lower_triangular(&near) {
             Some(solved) => solved.norm_squared() / self.kernel.variance,
             None => 0.0,

@@ -17,7 +17,9 @@ const STEPS: usize = 30;
 /// Halvings of a step.
 const HALVINGS: usize = 20;
 /// A step shorter than this ends a round, mm.
-const SHORTEST_MM: f64 = 1e-10;
+const SHORTEST_MM: f64 = 1e-6;
+/// A round that moves the position less than this is the last, mm: variances change over the length scales of the fields.
+const LAST_MM: f64 = 1e-3;
 
 /// Fields of both cameras, ready to locate.
 #[derive(Debug, Clone)]
@@ -229,7 +231,11 @@ impl Inverse {
         for _ in 0..ROUNDS {
             model = std::array::from_fn(|i| self.model_variance(&read, i, at));
             let variance = std::array::from_fn(|i| read.noise[i] + model[i]);
-            at = self.descend(&read, &variance, at);
+            let from = at;
+            at = self.descend(&read, &variance, from);
+            if libm::hypot(at[0] - from[0], at[1] - from[1]) < LAST_MM {
+                break;
+            }
         }
         let readings: [ReadingUncertainty; READINGS] = std::array::from_fn(|i| {
             self.miss(&read, i, at)

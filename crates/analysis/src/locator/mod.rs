@@ -7,6 +7,7 @@
 //! the events of a press spread, which tells the distance from a camera. `choose` compares them at held-out locations. Decision and measurements: `docs/adr/0038-*`.
 
 mod choose;
+mod exponential;
 mod features;
 mod field;
 mod fitted;

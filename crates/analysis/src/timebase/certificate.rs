@@ -1,5 +1,7 @@
 //! The certificate: points, residuals, and uncertainty at the presses for every map.
 
+use std::cell::Cell;
+
 use skinrig_model::AlignmentSettings;
 
 use super::base::TimeBase;
@@ -7,6 +9,7 @@ use super::epoch_maps::{EpochMaps, pairs, trains};
 use super::held_out::coverage;
 use super::reading::Reading;
 use super::smooth::SmoothMap;
+use crate::distributions::student_quantile;
 use crate::metrics::quantile;
 use crate::result::{ClockMap, Knot, LineCounts, MapName};
 
@@ -56,8 +59,18 @@ impl TimeBase {
                 let largest = widths.iter().copied().reduce(f64::max)?;
                 Some((quantile(&mut widths, 0.5)?, largest))
             };
+            // Consecutive readings share their degrees of freedom, and a quantile takes longer than all the rest.
+            let last = Cell::new((f64::NAN, f64::NAN));
+            let interval = |r: &Reading| {
+                let (free, factor) = last.get();
+                if free != r.free {
+                    last.set((r.free, student_quantile(0.975, r.free)));
+                    return r.se_us * last.get().1;
+                }
+                r.se_us * factor
+            };
             ClockMap {
-                interval_us: usual(&|r| r.half_width_us(0.95)),
+                interval_us: usual(&interval),
                 bound_us: usual(&|r| r.bound_us),
                 ..map
             }
