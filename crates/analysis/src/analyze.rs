@@ -18,9 +18,9 @@ use crate::press_events::{RetainedPress, RetainedPresses, Retention};
 use crate::press_spans::{spans, timings};
 use crate::rates::RateHistogram;
 use crate::result::{
-    ANALYSIS_VERSION, Activity, Alignment, AlignmentStatus, Analysis, ClockFit, ClockMap,
-    ContactTiming, DepthResult, MapName, OffSensor, PressPicture, PressResult, PressView,
-    RateSeries, RateZoom, RatesEvidence,
+    ANALYSIS_VERSION, Activity, Alignment, AlignmentStatus, AlignmentViolation, Analysis, ClockFit,
+    ClockMap, ContactTiming, DepthResult, MapName, OffSensor, PressPicture, PressResult, PressView,
+    RateSeries, RateZoom, RatesEvidence, Warning, WarningCause,
 };
 use crate::segment::{Window, windows};
 use crate::session_base::time_base;
@@ -80,7 +80,7 @@ pub fn analyze_with_events(
         [first, second]
     });
     let cameras = [one?, two?];
-    let mut warnings: Vec<String> = Vec::new();
+    let mut warnings: Vec<Warning> = Vec::new();
     let LocatedPresses {
         presses,
         calibrated:
@@ -129,13 +129,11 @@ pub fn analyze_with_events(
     let both = [&scored.rmse_mm, &scored_without_exclusions.rmse_mm];
     warnings.extend(verdict::exclusion_warning(&presses, both));
     if scores.presses().is_empty() {
-        warnings.push("no scored press was attempted, so there are no metrics".to_owned());
+        warnings.push(WarningCause::NoScoredPress.into());
     }
     let scheduled = input.outcomes.iter().flatten().any(|o| o.scheduled);
     if scheduled {
-        warnings.push(
-            "press times and positions come from a schedule, not from a measurement".to_owned(),
-        );
+        warnings.push(WarningCause::Scheduled.into());
     }
     let [mut one, mut two] = cameras;
     let streams = Streams {
@@ -150,12 +148,12 @@ pub fn analyze_with_events(
     );
     let both_clocks = one.clock.is_some() && two.clock.is_some();
     if both_clocks && kept.left_out > 0 {
-        warnings.push(format!(
-            "{} of {} presses chosen for the studies did not fit into memory; the studies use only the first {}",
-            kept.left_out,
-            plan.kept.len(),
-            kept.presses.len()
-        ));
+        let left_out = WarningCause::StudyPressesLeftOut {
+            left_out: kept.left_out,
+            chosen: plan.kept.len(),
+            used: kept.presses.len(),
+        };
+        warnings.push(left_out.into());
     }
     let counts = verdict::count(&presses);
     let mut alignment = base.map_or_else(
@@ -216,7 +214,7 @@ fn uncertified(clocks: [Option<ClockFit>; 2]) -> Alignment {
 fn with_rates_evidence(
     found: Alignment,
     rates: Option<RatesEvidence>,
-    violations: Vec<String>,
+    violations: Vec<AlignmentViolation>,
 ) -> Alignment {
     let status = if violations.is_empty() {
         found.status
@@ -285,7 +283,7 @@ struct CameraResult {
     kept: Vec<RetentionPlan>,
     activity: Option<Activity>,
     off_sensor: OffSensor,
-    warnings: Vec<String>,
+    warnings: Vec<Warning>,
 }
 
 impl CameraResult {
@@ -391,25 +389,21 @@ fn camera_pass(
         .windows(2)
         .any(|w| w[1].start_us + OVERLAP_US < w[0].end_us)
     {
-        warnings
-            .push("press windows overlap: events in the overlap count in both presses".to_owned());
+        warnings.push(WarningCause::WindowsOverlap);
     }
     if collected.late > 0 {
-        warnings.push(format!(
-            "{} events are more than {} ms out of order; presses may miss them",
-            collected.late,
-            SLACK_US / 1000
-        ));
+        warnings.push(WarningCause::EventsOutOfOrder {
+            events: collected.late,
+            limit_ms: SLACK_US / 1000,
+        });
     }
-    if let Some(beyond) = collected
+    if let Some(events) = collected
         .rates
         .as_ref()
         .map(RateHistogram::beyond)
         .filter(|b| *b > 0)
     {
-        warnings.push(format!(
-            "{beyond} events have timestamps days away from all others and are not in the event rates"
-        ));
+        warnings.push(WarningCause::EventsDaysAway { events });
     }
     let off_sensor = collected.off_sensor;
     if off_sensor.share() > OffSensor::MAX_SHARE {
@@ -417,10 +411,8 @@ fn camera_pass(
         return Err(AnalysisError::OffSensor { camera, events, of });
     }
     if off_sensor.share() > OffSensor::WARNING_SHARE {
-        warnings.push(format!(
-            "{} of {} events are outside the sensor and ignored: the recording may be damaged, or from another sensor",
-            off_sensor.events, off_sensor.of
-        ));
+        let OffSensor { events, of } = off_sensor;
+        warnings.push(WarningCause::EventsOffSensor { events, of });
     }
     let (silences, contacts_s) = stream(input, &collected, clock.as_ref());
     let onsets = match (&collected.rates, &clock) {
@@ -448,7 +440,7 @@ fn camera_pass(
         off_sensor,
         warnings: warnings
             .into_iter()
-            .map(|w| format!("{camera}: {w}"))
+            .map(|cause| Warning::of_camera(camera, cause))
             .collect(),
     })
 }

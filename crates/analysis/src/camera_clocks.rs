@@ -10,7 +10,9 @@ use crate::event_cache::EventCache;
 use crate::input::{EventSource, SessionInput};
 use crate::press_spans::spans;
 use crate::rates::RateHistogram;
-use crate::result::{Activity, ClockFit, OffSensor, RatesDetections, RatesEvidence};
+use crate::result::{
+    Activity, AlignmentViolation, ClockFit, OffSensor, RatesDetections, RatesEvidence, WarningCause,
+};
 use crate::tie::{Tie, Untimed};
 use crate::timebase::TimeBase;
 use crate::untimed;
@@ -27,7 +29,7 @@ pub(crate) struct CameraClock {
     /// Per row of the plan: why the clock does not time it.
     pub untimed: Vec<Option<Untimed>>,
     pub off_sensor: OffSensor,
-    pub warnings: Vec<String>,
+    pub warnings: Vec<WarningCause>,
 }
 
 /// Clocks of both cameras.
@@ -36,7 +38,7 @@ pub(crate) struct CameraClocks {
     /// Certainty of the alignment by event rates; `None` if no camera was aligned by them.
     pub evidence: Option<RatesEvidence>,
     /// Reasons why that alignment cannot be used.
-    pub violations: Vec<String>,
+    pub violations: Vec<AlignmentViolation>,
 }
 
 impl CameraClocks {
@@ -85,9 +87,10 @@ impl CameraClocks {
                     reading.warnings.extend(fit.warnings);
                 }
                 Some(Err(why)) => {
-                    let why = format!("no clock alignment: {why}");
-                    self.violations.push(format!("{}: {why}", CameraId::ALL[k]));
-                    reading.warnings.push(why);
+                    let camera = CameraId::ALL[k];
+                    self.violations
+                        .push(AlignmentViolation::NoRatesClock { camera, why });
+                    reading.warnings.push(WarningCause::NoRatesClock { why });
                 }
                 None => {}
             }
@@ -95,9 +98,8 @@ impl CameraClocks {
         let limits = &input.settings.alignment;
         let sights = self.evidence.iter().flat_map(|e| e.cameras);
         for (camera, sights) in CameraId::ALL.into_iter().zip(sights) {
-            let beyond = sights.and_then(|s| unexplained(&s, limits.min_explained));
-            self.violations
-                .extend(beyond.map(|what| format!("{camera}: {what}")));
+            let beyond = sights.and_then(|s| unexplained(camera, &s, limits.min_explained));
+            self.violations.extend(beyond);
         }
         let least = limits.min_log_odds;
         if let Some(evidence) = self.evidence.filter(|e| e.log_odds < least) {
@@ -131,10 +133,10 @@ impl CameraClock {
         let by_marks = |u: &&Untimed| u.tie == Tie::Mark;
         let far = reading.untimed.iter().flatten().filter(by_marks).count();
         if far > 0 {
-            reading.warnings.push(format!(
-                "{far} presses are not timed: they are more than {} s from the nearest trigger mark seen",
-                input.settings.alignment.max_tie_distance_us * 1e-6
-            ));
+            reading.warnings.push(WarningCause::PressesFarFromMarks {
+                presses: far,
+                limit_s: input.settings.alignment.max_tie_distance_us * 1e-6,
+            });
         }
         reading
             .warnings
@@ -143,11 +145,10 @@ impl CameraClock {
             return Ok(reading);
         }
         if !input.marks.is_empty() {
-            reading.warnings.push(format!(
-                "too few trigger marks to fit the clock ({} sent, {} edges seen): using event rates instead",
-                input.marks.len(),
-                input.edges[k].len()
-            ));
+            reading.warnings.push(WarningCause::FewMarks {
+                sent: input.marks.len(),
+                edges: input.edges[k].len(),
+            });
         }
         let wanted = PassRequest {
             rates: reading.rates.take(),
@@ -171,49 +172,39 @@ impl CameraClock {
 }
 
 /// Why the plan does not match the recording of a camera.
-fn unexplained(sights: &RatesDetections, least: f64) -> Option<String> {
+fn unexplained(
+    camera: CameraId,
+    sights: &RatesDetections,
+    least: f64,
+) -> Option<AlignmentViolation> {
     let share = |n: u32, of: u32| f64::from(n) / f64::from(of.max(1));
     let (found, bursts) = (sights.found, sights.found + sights.strays);
-    let percent = 100.0 * least;
+    let least_percent = 100.0 * least;
     if share(found, sights.expected) < least {
-        return Some(format!(
-            "expected bursts of events at {percent:.0} % or more of the {} planned presses, found {found}",
-            sights.expected
-        ));
+        return Some(AlignmentViolation::PressesWithoutBursts {
+            camera,
+            least_percent,
+            presses: sights.expected,
+            found,
+        });
     }
-    (share(found, bursts) < least).then(|| {
-        format!(
-            "expected {percent:.0} % or more of the {bursts} bursts of events during the plan to be planned presses, \
-             found {found}: the recording has more presses than the schedule"
-        )
+    (share(found, bursts) < least).then_some(AlignmentViolation::BurstsWithoutPresses {
+        camera,
+        least_percent,
+        bursts,
+        found,
     })
 }
 
 /// Why an alignment by event rates is not certain enough.
-fn doubt(evidence: &RatesEvidence, least: f64) -> String {
-    let odds = evidence.log_odds;
-    let other = match evidence.runner_up_s {
-        Some(shifts_s) => {
-            let each = shifts_s.iter().zip(&evidence.cameras).zip(CameraId::ALL);
-            let each: Vec<String> = each
-                .filter(|((_, sights), _)| sights.is_some())
-                .map(|((shift_s, _), camera)| {
-                    format!(
-                        "{camera} {shift_s:+.1} s ({:+.1} presses)",
-                        shift_s / evidence.period_s
-                    )
-                })
-                .collect();
-            format!(
-                "presses later by {} fit about as well or better",
-                each.join(" and ")
-            )
-        }
-        None => "the plan may not belong to these recordings at all".to_owned(),
-    };
-    format!(
-        "alignment by event rates: expected log-odds of at least {least} (natural logarithm) against all other \
-         alignments, found {odds:.1}: {other}; check the schedule (presses, sync presses, period) against the \
-         recordings, or lower analysis.alignment.min_log_odds"
-    )
+fn doubt(evidence: &RatesEvidence, least: f64) -> AlignmentViolation {
+    let aligned = evidence.cameras.map(|sights| sights.is_some());
+    AlignmentViolation::UncertainRates {
+        least_log_odds: least,
+        log_odds: evidence.log_odds,
+        runner_up_s: evidence
+            .runner_up_s
+            .map(|shifts_s| [0, 1].map(|k| aligned[k].then_some(shifts_s[k]))),
+        period_s: evidence.period_s,
+    }
 }

@@ -3,13 +3,15 @@
 use skinrig_model::{AnalysisSettings, CameraId, Estimator, SENSOR_WIDTH};
 
 use crate::metrics::quantile;
-use crate::result::{Analysis, Estimate, PressResult, Reduction, ReductionRow};
+use crate::result::{
+    Analysis, Estimate, PressResult, Reduction, ReductionRow, Warning, WarningCause,
+};
 
 /// A thinned row is comparable if it locates at least this share of what all events locate.
 const COMPARABLE: f64 = 0.95;
 
 /// Caveats of a finished analysis.
-pub(crate) fn caveats(analysis: &Analysis) -> Vec<String> {
+pub(crate) fn caveats(analysis: &Analysis) -> Vec<Warning> {
     let dense = CameraId::ALL
         .into_iter()
         .filter_map(|camera| dense_background(&analysis.settings, &analysis.presses, camera));
@@ -26,7 +28,7 @@ fn dense_background(
     settings: &AnalysisSettings,
     presses: &[PressResult],
     camera: CameraId,
-) -> Option<String> {
+) -> Option<Warning> {
     if settings.estimator != Estimator::Dbscan || settings.bin_px != 1 {
         return None;
     }
@@ -41,33 +43,29 @@ fn dense_background(
     let neighbours = quantile(&mut events, 0.5)? * disc / pixels;
     let spread = neighbours.sqrt();
     (neighbours + 2.0 * spread >= f64::from(settings.min_samples)).then(|| {
-        format!(
-            "{camera}: in a press window the background alone puts {neighbours:.1} events within eps ({} px) of an \
-             event, and {} make a cluster (min_samples), so noise joins the clusters; a min_samples of {} prevents \
-             this",
-            settings.eps_px,
-            settings.min_samples,
-            (neighbours + 4.0 * spread).ceil() + 1.0
-        )
+        let cause = WarningCause::DenseBackground {
+            neighbours,
+            eps_px: settings.eps_px,
+            min_samples: settings.min_samples,
+            advised_min_samples: (neighbours + 4.0 * spread).ceil() + 1.0,
+        };
+        Warning::of_camera(camera, cause)
     })
 }
 
 /// A caveat if the scored presses and the held-out calibration locations have errors that differ by more than both
 /// intervals.
-fn calibration_disagrees(scored: &Estimate, left_out: &Estimate) -> Option<String> {
+fn calibration_disagrees(scored: &Estimate, left_out: &Estimate) -> Option<Warning> {
     let apart = scored.low? > left_out.high? || scored.high? < left_out.low?;
-    apart.then(|| {
-        format!(
-            "the RMSE of the scored presses, {}, and that of held-out calibration locations, {}, disagree: a few \
-             presses dominate one of them, or the rig changed in between",
-            in_words(scored),
-            in_words(left_out)
-        )
-    })
+    let cause = WarningCause::CalibrationDisagrees {
+        scored_rmse_mm: *scored,
+        held_out_rmse_mm: *left_out,
+    };
+    apart.then_some(cause.into())
 }
 
 /// A caveat if fewer events locate better than all events.
-fn fewer_events_do_better(reduction: &Reduction) -> Option<String> {
+fn fewer_events_do_better(reduction: &Reduction) -> Option<Warning> {
     reduction.curves.iter().find_map(|curve| {
         let (all, fewer) = curve.rows.split_first()?;
         let located = COMPARABLE * all.located_rate.value?;
@@ -77,22 +75,13 @@ fn fewer_events_do_better(reduction: &Reduction) -> Option<String> {
                 && row.located_rate.value.is_some_and(|share| share >= located)
         };
         let row = fewer.iter().find(better)?;
-        Some(format!(
-            "a random 1/{} of the events locates better than all of them: RMSE {} against {}; the clustering settings \
-             do not suit these event rates",
-            row.factor,
-            in_words(&row.rmse_mm),
-            in_words(&all.rmse_mm)
-        ))
+        let cause = WarningCause::FewerEventsBetter {
+            factor: row.factor,
+            rmse_mm: row.rmse_mm,
+            rmse_of_all_mm: all.rmse_mm,
+        };
+        Some(cause.into())
     })
-}
-
-fn in_words(rmse: &Estimate) -> String {
-    match (rmse.value, rmse.low, rmse.high) {
-        (Some(value), Some(low), Some(high)) => format!("{value:.2} mm [{low:.2}, {high:.2}]"),
-        (Some(value), ..) => format!("{value:.2} mm"),
-        _ => "none".to_owned(),
-    }
 }
 
 #[cfg(test)]
@@ -113,7 +102,9 @@ mod tests {
     fn intervals_that_touch_do_not_disagree() {
         let say = |scored, left_out| calibration_disagrees(&scored, &left_out);
         assert_eq!(say(estimate(2.0, 0.5), estimate(1.25, 0.25)), None);
-        let found = say(estimate(2.0, 0.5), estimate(1.0, 0.25)).unwrap();
+        let found = say(estimate(2.0, 0.5), estimate(1.0, 0.25))
+            .unwrap()
+            .to_string();
         assert!(
             found.contains("2.00 mm [1.50, 2.50]") && found.contains("1.00 mm [0.75, 1.25]"),
             "{found}"
@@ -151,7 +142,9 @@ mod tests {
         };
         let all = row(1, 2.0, 1.0);
         assert_eq!(say(vec![all, row(2, 1.9, 1.0), row(4, 0.5, 0.9)]), None);
-        let found = say(vec![all, row(2, 1.9, 1.0), row(4, 0.5, 0.96)]).unwrap();
+        let found = say(vec![all, row(2, 1.9, 1.0), row(4, 0.5, 0.96)])
+            .unwrap()
+            .to_string();
         assert!(found.starts_with("a random 1/4 of the events"), "{found}");
     }
 }

@@ -9,7 +9,7 @@ use skinrig_model::{CameraId, HostTime};
 use crate::clock::fit_marks;
 use crate::input::SessionInput;
 use crate::leg::{LegLine, LegStart, edges_of, leg_at};
-use crate::result::LegClock;
+use crate::result::{LegClock, Warning, WarningCause};
 use crate::timebase::TimeBase;
 
 /// Maximum advance of a leg's events before its host time, µs: half of the minimum pause between two legs.
@@ -139,7 +139,7 @@ pub(crate) fn nominal_only(
     legs: &[LegStart],
     clocks: &[LegClock],
     pressed_us: impl Iterator<Item = f64>,
-) -> Vec<String> {
+) -> Vec<Warning> {
     let mut pressed = vec![false; legs.len() + 1];
     for us in pressed_us {
         pressed[leg_at(legs, HostTime((us * 1e3) as i64))] = true;
@@ -147,13 +147,12 @@ pub(crate) fn nominal_only(
     let each = clocks.iter().zip(pressed).filter(|(_, pressed)| *pressed);
     let unknown = each.flat_map(|(leg, _)| {
         let cameras = CameraId::ALL.into_iter().zip(&leg.cameras);
-        cameras.filter(|(_, fit)| fit.is_none()).map(|(camera, _)| {
-            format!(
-                "leg {}, {camera}: expected trains or marks to fit its clock, found too few: it is aligned to the \
-                 other legs by its nominal start alone",
-                leg.number
-            )
-        })
+        cameras
+            .filter(|(_, fit)| fit.is_none())
+            .map(|(camera, _)| Warning {
+                leg: Some(leg.number),
+                ..Warning::of_camera(camera, WarningCause::NominalStart)
+            })
     });
     unknown.collect()
 }
@@ -225,7 +224,8 @@ mod tests {
         let pressed = [1e6, 11e6, 11.5e6, 15e6].into_iter();
         let said = nominal_only(&LEGS, &clocks, pressed);
         assert_eq!(said.len(), 1, "{said:?}");
-        assert!(said[0].starts_with("leg 2, camera 2: expected"), "{said:?}");
-        assert_eq!(nominal_only(&[], &[], [1e6].into_iter()), [""; 0]);
+        let text = said[0].to_string();
+        assert!(text.starts_with("leg 2, camera 2: expected"), "{text}");
+        assert_eq!(nominal_only(&[], &[], [1e6].into_iter()), []);
     }
 }

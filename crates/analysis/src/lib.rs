@@ -62,6 +62,7 @@ pub mod triangulate;
 mod untimed;
 pub mod verdict;
 mod width;
+mod with_text;
 
 pub use analyze::{analyze, analyze_with_events};
 pub use error::AnalysisError;

@@ -6,7 +6,7 @@ use crate::calibrate::{SessionCalibration, calibrate_session};
 use crate::check;
 use crate::input::SessionInput;
 use crate::locator::{self, CameraFeatures, Effort, Fitted, LocatorChoice};
-use crate::result::{LocationOutcome, PressResult, PressView};
+use crate::result::{LocationOutcome, PressResult, PressView, Warning};
 use crate::sets::CalibrationSet;
 use crate::tie::Untimed;
 use crate::triangulate::locate;
@@ -43,7 +43,7 @@ pub(crate) fn locate_presses(
     input: &SessionInput,
     seen: [CameraObservations<'_>; 2],
     effort: Effort,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> LocatedPresses {
     let mut presses = rows(input, seen);
     let calibrated = calibrate_session(input, &mut presses, warnings);

@@ -17,7 +17,10 @@ use skinrig_model::{
 
 use crate::check;
 use crate::exclusion::Exclusion;
-use crate::result::{Estimate, LocationOutcome, PressCounts, PressResult, PressView};
+use crate::result::{
+    CommonExclusion, Estimate, LocationOutcome, PressCounts, PressResult, PressView, Warning,
+    WarningCause,
+};
 use crate::rule::Rule;
 use crate::tie::Untimed;
 
@@ -215,18 +218,13 @@ pub fn put(row: &mut PressResult, judgement: Judgement) {
 /// RMSE of those that count (or differs at all, without an interval), or nothing counts. `rmse`: with and without
 /// exclusions.
 #[must_use]
-pub(crate) fn exclusion_warning(presses: &[PressResult], rmse: [&Estimate; 2]) -> Option<String> {
+pub(crate) fn exclusion_warning(presses: &[PressResult], rmse: [&Estimate; 2]) -> Option<Warning> {
     let [with, without] = rmse;
     let all = without.value?;
-    let left_out = without.n.saturating_sub(with.n);
-    let change = match (with.value, with.low, with.high) {
-        (Some(value), Some(low), Some(high)) if all < low || all > high => {
-            format!("from {all:.2} mm to {value:.2} mm, more than its 95 % interval")
-        }
-        (Some(value), None, _) | (Some(value), _, None) if all != value => {
-            format!("from {all:.2} mm to {value:.2} mm")
-        }
-        (None, ..) => format!("from {all:.2} mm to nothing"),
+    let beyond_interval = match (with.value, with.low, with.high) {
+        (Some(_), Some(low), Some(high)) if all < low || all > high => true,
+        (Some(value), None, _) | (Some(value), _, None) if all != value => false,
+        (None, ..) => false,
         _ => return None,
     };
     let mut causes: Vec<(Rule, &Exclusion)> = presses
@@ -235,18 +233,22 @@ pub(crate) fn exclusion_warning(presses: &[PressResult], rmse: [&Estimate; 2]) -
         .filter_map(|p| p.cause.as_ref().map(|cause| (cause.rule(), cause)))
         .collect();
     causes.sort_by(|a, b| a.0.cmp(&b.0));
-    let most = causes
+    let most_common = causes
         .chunk_by(|a, b| a.0 == b.0)
         .max_by_key(|group| group.len())
-        .map(|group| {
-            let label = group[0].1.label();
-            format!(" (most often, {} times: {label})", group.len())
-        })
-        .unwrap_or_default();
-    Some(format!(
-        "the RMSE depends on the exclusions: excluding {left_out} of {} located presses{most} changes it {change}",
-        without.n
-    ))
+        .map(|group| CommonExclusion {
+            presses: group.len(),
+            example: group[0].1.clone(),
+        });
+    let cause = WarningCause::ExclusionsMatter {
+        excluded: without.n.saturating_sub(with.n),
+        located: without.n,
+        most_common,
+        rmse_of_all_mm: all,
+        rmse_mm: with.value,
+        beyond_interval,
+    };
+    Some(cause.into())
 }
 
 /// Counts the verdicts.
@@ -394,7 +396,8 @@ mod tests {
             high: ends.map(|e| e.1),
             n,
         };
-        let weight = |a: &Estimate, b: &Estimate| exclusion_warning(&[], [a, b]);
+        let weight =
+            |a: &Estimate, b: &Estimate| exclusion_warning(&[], [a, b]).map(|w| w.to_string());
         let with = estimate(Some(0.17), 90, Some((0.16, 0.18)));
         let all = |value| estimate(Some(value), 100, None);
         assert_eq!(weight(&with, &all(0.175)), None);

@@ -70,6 +70,21 @@ pub enum CalibrationModel {
     Auto,
 }
 
+impl CalibrationModel {
+    /// Name in settings and messages.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Positions => "positions",
+            Self::PositionsSkews => "positions_skews",
+            Self::Full => "full",
+            Self::FullScale => "full_scale",
+            Self::Auto => "auto",
+        }
+    }
+}
+
 /// What turns the columns of both cameras into a position.
 #[derive(
     Debug,

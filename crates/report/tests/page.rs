@@ -50,7 +50,7 @@ fn the_page_refers_to_nothing_outside() {
 #[test]
 fn hostile_text_stays_text() {
     let mut analysis = support::analysis(4, 3);
-    analysis.warnings = vec![HOSTILE.into()];
+    analysis.warnings = vec![support::warning(HOSTILE.into())];
     for press in &mut analysis.presses {
         if press.cause.is_some() {
             press.cause = Some(Exclusion::Excluded(ExcludedReason::Recorded {

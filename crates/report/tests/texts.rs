@@ -2,6 +2,9 @@
 
 mod support;
 
+use skinrig_analysis::result::AlignmentViolation;
+use skinrig_analysis::timebase::CameraClockError;
+use skinrig_model::CameraId;
 use skinrig_report::{JSON_VERSION, ReportInput, json, terminal_summary, terminal_table};
 
 #[test]
@@ -43,7 +46,9 @@ fn terminal_table_of_an_empty_session() {
 #[test]
 fn a_terminal_gets_no_foreign_control_characters() {
     let mut analysis = support::analysis(3, 2);
-    analysis.warnings = vec!["\x1b]0;title\x07 and\x1b[2J".into(), "w".repeat(300)];
+    analysis.warnings = ["\x1b]0;title\x07 and\x1b[2J".to_owned(), "w".repeat(300)]
+        .map(support::warning)
+        .into();
     let mut provenance = support::provenance();
     provenance.session_id = "a\x1b[31mb".into();
     let table = terminal_table(
@@ -99,7 +104,10 @@ fn an_invalid_session_says_so_in_the_place_of_every_metric() {
     );
 
     analysis.alignment.status = skinrig_analysis::result::AlignmentStatus::Invalid;
-    analysis.alignment.violations = vec!["camera 2 from box: expected a clock, found none".into()];
+    analysis.alignment.violations = vec![AlignmentViolation::NoTrainsClock {
+        camera: CameraId::Two,
+        why: CameraClockError::NoTrain,
+    }];
     let (table, document, page) = read(&analysis);
     insta::assert_snapshot!("terminal_table_invalid", table);
     assert!(!table.contains(&rmse), "{table}");
@@ -183,7 +191,7 @@ fn the_summary_answers_first_in_few_lines() {
     };
     insta::assert_snapshot!("terminal_summary", summary(&analysis));
     analysis.warnings = (0..20)
-        .map(|i| format!("warning {i} {}", "long ".repeat(60)))
+        .map(|i| support::warning(format!("warning {i} {}", "long ".repeat(60))))
         .collect();
     let many = summary(&analysis);
     assert!(many.starts_with("RMSE  "), "{many}");

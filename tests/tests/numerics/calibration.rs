@@ -2,7 +2,7 @@
 
 use skinrig_analysis::analyze;
 use skinrig_analysis::calibrate::{ModelChoice, choose};
-use skinrig_analysis::result::CalibrationResult;
+use skinrig_analysis::result::{CalibrationResult, Warning, WarningCause};
 use skinrig_analysis::sets::CalibrationSet;
 use skinrig_model::{AnalysisSettings, CalibrationModel, Point2, PressRole, StereoGeometry};
 
@@ -10,7 +10,9 @@ use crate::hostile::holds_only_numbers;
 use crate::support::{PLANTED, session};
 
 /// The planted session; `calibrate` selects its calibration presses, and the full model is requested.
-fn calibrated(calibrate: impl Fn(Point2, usize) -> bool) -> (Option<CalibrationResult>, String) {
+fn calibrated(
+    calibrate: impl Fn(Point2, usize) -> bool,
+) -> (Option<CalibrationResult>, Vec<Warning>) {
     let (mut input, source) = session();
     input.settings.calibration = CalibrationModel::Full;
     input.settings.bootstrap_resamples = 20;
@@ -27,13 +29,13 @@ fn calibrated(calibrate: impl Fn(Point2, usize) -> bool) -> (Option<CalibrationR
     }
     let a = analyze(&input, &source).unwrap();
     holds_only_numbers(&a);
-    (a.calibration, a.warnings.join("; "))
+    (a.calibration, a.warnings)
 }
 
 #[test]
 fn enough_places_give_the_model_that_was_asked_for() {
-    let (found, output) = calibrated(|_, _| true);
-    assert_eq!(found.unwrap().model, CalibrationModel::Full, "{output}");
+    let (found, warnings) = calibrated(|_, _| true);
+    assert_eq!(found.unwrap().model, CalibrationModel::Full, "{warnings:?}");
 }
 
 #[test]
@@ -41,13 +43,13 @@ fn presses_that_do_not_determine_the_parameters_are_reported() {
     let centre = Point2::new(8.0, 2.0);
     let one_place = |at: Point2, _: usize| at == centre;
     let two_places = |at: Point2, kept: usize| at.x_mm < -13.0 && kept < 2;
-    for (name, (found, output)) in [
+    for (name, (found, warnings)) in [
         ("one press", calibrated(one_place)),
         ("two presses", calibrated(two_places)),
     ] {
-        assert!(!output.is_empty(), "{name}: nothing is said: {found:?}");
+        assert!(!warnings.is_empty(), "{name}: nothing is said: {found:?}");
         let smaller = found.is_none_or(|f| f.model != CalibrationModel::Full);
-        assert!(smaller, "{name}: {output}");
+        assert!(smaller, "{name}: {warnings:?}");
     }
 }
 
@@ -86,21 +88,22 @@ fn along(from: [f64; 2], to: [f64; 2], n: u32) -> Vec<Point2> {
         .collect()
 }
 
-const TOO_FEW_FOR_FULL: &str =
-    "the calibration presses cover too few locations for the calibration `full`";
+const TOO_FEW_FOR_FULL: WarningCause = WarningCause::FewLocationsForModel {
+    wanted: CalibrationModel::Full,
+    used: CalibrationModel::Positions,
+};
 
 /// A row of the planted session with too few locations.
 #[test]
 fn five_places_on_one_line_give_the_positions() {
-    let (found, output) = calibrated(|at, _| at.x_mm < -13.0);
+    let (found, warnings) = calibrated(|at, _| at.x_mm < -13.0);
     let found = found.unwrap();
     assert_eq!(
         (found.model, found.rank, found.n),
         (CalibrationModel::Positions, 4, 5)
     );
     // Scored locations far from the line may be worse, which gives another warning.
-    let expected = format!("{TOO_FEW_FOR_FULL}: using `positions`");
-    assert!(output.starts_with(&expected), "{output}");
+    assert_eq!(warnings[0].cause, TOO_FEW_FOR_FULL);
 }
 
 /// The angles of eight positions suffice even on one line: the positions are known, and a camera beside their line sees each
@@ -109,7 +112,7 @@ fn five_places_on_one_line_give_the_positions() {
 fn eight_places_on_a_line_beside_the_cameras_determine_eight_parameters() {
     for (from, to) in [([-5.0, -20.0], [-5.0, 20.0]), ([-14.0, -5.0], [26.0, -5.0])] {
         let found = chosen(&along(from, to, 8));
-        assert_eq!(found.warnings, [""; 0]);
+        assert_eq!(found.warnings, []);
         let result = found.calibration.unwrap();
         assert_eq!((result.model, result.rank), (CalibrationModel::Full, 8));
         for (value, planted) in result.values.iter().zip(PLANTED) {
@@ -129,11 +132,18 @@ fn a_line_through_a_camera_leaves_its_parameters_open() {
     assert_eq!((result.model, result.rank), (CalibrationModel::Full, 6));
     assert_eq!(
         found.warnings,
-        [
-            "the calibration presses determine 6 of the 8 parameters of the calibration `full`: the values of camera 2 x \
-             (mm), camera 2 y (mm), camera 2 skew (deg), camera 2 distortion W (1) are one of many equally good solutions; calibrate at \
-             more locations, spread over the skin"
-        ]
+        [WarningCause::OpenParameters {
+            determined: 6,
+            parameters: 8,
+            model: CalibrationModel::Full,
+            open: vec![
+                "camera 2 x (mm)".to_owned(),
+                "camera 2 y (mm)".to_owned(),
+                "camera 2 skew (deg)".to_owned(),
+                "camera 2 distortion W (1)".to_owned(),
+            ],
+        }
+        .into()]
     );
 }
 
@@ -148,9 +158,7 @@ fn repeated_presses_count_as_one_place() {
     assert_eq!(two.geometry, StereoGeometry::PAPER);
     assert_eq!(
         two.warnings,
-        [
-            "2 calibration locations are too few for any calibration: using the nominal camera geometry"
-        ]
+        [WarningCause::FewLocationsForAny { locations: 2 }.into()]
     );
 
     let four = chosen(&corners.repeat(5));
@@ -159,10 +167,7 @@ fn repeated_presses_count_as_one_place() {
         (result.model, result.rank, result.n),
         (CalibrationModel::Positions, 4, 20)
     );
-    assert_eq!(
-        four.warnings,
-        [format!("{TOO_FEW_FOR_FULL}: using `positions`")]
-    );
+    assert_eq!(four.warnings, [TOO_FEW_FOR_FULL.into()]);
 }
 
 /// Same via the plan: both repetitions of two locations calibrate, eight residuals for eight parameters.
@@ -186,6 +191,6 @@ fn two_places_pressed_twice_calibrate_nothing() {
     let usable = CalibrationSet::from_presses(&a.presses);
     assert_eq!(usable.sights().len(), 4);
     assert_eq!(a.calibration, None);
-    let output = "2 calibration locations are too few for any calibration: using the nominal camera geometry";
-    assert!(a.warnings.iter().any(|w| w == output), "{:?}", a.warnings);
+    let expected = WarningCause::FewLocationsForAny { locations: 2 }.into();
+    assert!(a.warnings.contains(&expected), "{:?}", a.warnings);
 }

@@ -162,7 +162,7 @@ pub fn judge(case: &Case, seed: u64) -> CaseVerdict {
         (_, Some(fault), _) => Observed::Named(fault, valid),
         (true, None, None) => Observed::Refused("no number".to_owned()),
         (false, None, _) if !analysis.alignment.is_usable() => {
-            Observed::Refused(analysis.alignment.violations.join("; "))
+            Observed::Refused(texts(&analysis.alignment.violations).join("; "))
         }
         (false, None, _) => {
             let faults: Vec<Fault> = analysis.findings.iter().map(|f| f.fault).collect();
@@ -195,7 +195,7 @@ pub fn judge(case: &Case, seed: u64) -> CaseVerdict {
                 f.evidence
             )
         })
-        .chain(analysis.alignment.violations.iter().cloned());
+        .chain(texts(&analysis.alignment.violations));
     CaseVerdict {
         observed,
         holds,
@@ -211,4 +211,8 @@ fn refused(case: &Case, why: String) -> CaseVerdict {
         numbers: None,
         findings: Vec::new(),
     }
+}
+
+fn texts<T: fmt::Display>(causes: &[T]) -> Vec<String> {
+    causes.iter().map(T::to_string).collect()
 }

@@ -7,12 +7,13 @@ use skinrig_model::{
 
 use super::crossval::Folds;
 use super::paired::{CHOICE, Difference, Losses, Step, select_model};
-use super::parameters::{MODELS, model_name, parameter_count};
+use super::parameters::{MODELS, parameter_count};
 use super::{Fit, different_places, error_lengths, largest_supported, threshold};
 use crate::input::SessionInput;
 use crate::metrics::{bootstrap_over_locations, root_mean_square as rms, spread_mm};
 use crate::result::{
-    CalibrationResult, Estimate, ModelComparison, ModelTest, PressResult, ThresholdChoice,
+    CalibrationResult, Estimate, ModelComparison, ModelTest, PressResult, ThresholdChoice, Warning,
+    WarningCause,
 };
 use crate::sets::{CalibrationPress, CalibrationSet};
 use crate::verdict;
@@ -33,7 +34,7 @@ pub(crate) struct SessionCalibration {
 pub(crate) fn calibrate_session(
     input: &SessionInput,
     presses: &mut [PressResult],
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> SessionCalibration {
     let settings = &input.settings;
     let nominal = &input.rig.nominal;
@@ -88,7 +89,7 @@ pub struct ModelChoice {
     /// In the order of the presses, mm; `None` without presses, or with too few locations for cross-validation.
     pub errors_mm: Option<Vec<f64>>,
     /// Warnings for the reader.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Fits the nested models, compares them by leave-locations-out cross-validation, and selects the one in
@@ -104,7 +105,7 @@ pub fn choose(
 }
 
 impl ModelChoice {
-    fn nominal(geometry: StereoGeometry, warnings: Vec<String>) -> Self {
+    fn nominal(geometry: StereoGeometry, warnings: Vec<Warning>) -> Self {
         Self {
             geometry,
             calibration: None,
@@ -127,8 +128,7 @@ impl ModelChoice {
             };
         }
         if sights.is_empty() {
-            let warning = "no usable calibration press: using the nominal camera geometry";
-            return Self::nominal(*nominal, vec![warning.to_owned()]);
+            return Self::nominal(*nominal, vec![WarningCause::NoCalibrationPress.into()]);
         }
         let mut start = *nominal;
         for camera in &mut start.cameras {
@@ -139,11 +139,8 @@ impl ModelChoice {
         let mut warnings = Vec::new();
         let named = wanted != CalibrationModel::Auto;
         if named && largest != wanted && largest != CalibrationModel::None {
-            warnings.push(format!(
-                "the calibration presses cover too few locations for the calibration `{}`: using `{}`",
-                model_name(wanted),
-                model_name(largest)
-            ));
+            let used = largest;
+            warnings.push(WarningCause::FewLocationsForModel { wanted, used }.into());
         }
         let candidates = candidates(sights, &start, places, settings);
         let locations = locations(sights);
@@ -151,11 +148,11 @@ impl ModelChoice {
         let index = match wanted {
             CalibrationModel::Auto => comparison.as_ref().map(|c| c.best).or_else(|| {
                 let best = candidates.iter().rposition(ModelCandidate::is_determined)?;
-                warnings.push(format!(
-                    "too few calibration locations ({places}) to compare calibrations by cross-validation: using `{}`, \
-                     the largest that they determine",
-                    model_name(candidates[best].model)
-                ));
+                let cause = WarningCause::FewLocationsToCompare {
+                    locations: places,
+                    used: candidates[best].model,
+                };
+                warnings.push(cause.into());
                 Some(best)
             }),
             _ => {
@@ -163,29 +160,25 @@ impl ModelChoice {
                 let fitted = |i: &usize| candidates[*i].fit.is_some();
                 let used = named.and_then(|named| (0..=named).rev().find(fitted));
                 if let Some(used) = used.filter(|i| Some(*i) != named) {
-                    warnings.push(format!(
-                        "the fit of the calibration `{}` found no plausible geometry: using `{}`, the next smaller one \
-                         that fits",
-                        model_name(largest),
-                        model_name(candidates[used].model)
-                    ));
+                    let cause = WarningCause::ImplausibleModel {
+                        wanted: largest,
+                        used: candidates[used].model,
+                    };
+                    warnings.push(cause.into());
                 }
                 used
             }
         };
         let used = index.map(|i| &candidates[i]);
         let Some((used, fit)) = used.and_then(|c| Some((c, c.fit.as_ref()?))) else {
-            warnings.push(if largest == CalibrationModel::None {
-                format!(
-                    "{places} calibration locations are too few for any calibration: using the nominal camera geometry"
-                )
+            let cause = if largest == CalibrationModel::None {
+                WarningCause::FewLocationsForAny { locations: places }
             } else if candidates.iter().any(|c| c.fit.is_some()) {
-                "the calibration presses determine no calibration: using the nominal camera geometry"
-                    .to_owned()
+                WarningCause::Undetermined
             } else {
-                "no calibration found a plausible geometry: using the nominal camera geometry"
-                    .to_owned()
-            });
+                WarningCause::NoPlausibleGeometry
+            };
+            warnings.push(cause.into());
             return Self::nominal(*nominal, warnings);
         };
         if let Some(comparison) = comparison.as_ref().filter(|_| named) {
@@ -322,61 +315,50 @@ impl<'a> Comparison<'a> {
     }
 
     /// A warning if the model in use has a significantly larger error than `better`.
-    fn clearly_worse(&self, used: &ModelCandidate, better: &ModelCandidate) -> Option<String> {
+    fn clearly_worse(&self, used: &ModelCandidate, better: &ModelCandidate) -> Option<Warning> {
         let (a, b) = (used.errors_mm.as_deref()?, better.errors_mm.as_deref()?);
         let found: Difference = self.losses.clearly_worse(a, b)?;
-        found.is_significant().then(|| {
-            format!(
-                "the calibration `{}` is significantly worse than `{}`: {:.2} mm against {:.2} mm at held-out \
-                 locations (errors bounded at {:.1} mm), a paired difference of {:.2} ± {:.2} mm (standard error)",
-                model_name(used.model),
-                model_name(better.model),
-                self.losses.rms_mm(a),
-                self.losses.rms_mm(b),
-                self.losses.bound_mm(),
-                found.mm,
-                found.standard_error_mm
-            )
-        })
+        let cause = WarningCause::WorseModel {
+            used: used.model,
+            better: better.model,
+            rmse_mm: self.losses.rms_mm(a),
+            better_rmse_mm: self.losses.rms_mm(b),
+            bound_mm: self.losses.bound_mm(),
+            difference_mm: found.mm,
+            standard_error_mm: found.standard_error_mm,
+        };
+        found.is_significant().then_some(cause.into())
     }
 }
 
 /// Warnings about a calibration.
-fn calibration_warnings(result: &CalibrationResult, sights: &[CalibrationPress]) -> Vec<String> {
+fn calibration_warnings(result: &CalibrationResult, sights: &[CalibrationPress]) -> Vec<Warning> {
     let mut out = Vec::new();
-    let open: Vec<&str> = result
-        .names
-        .iter()
-        .zip(&result.standard_errors)
-        .filter(|(_, error)| error.is_none())
-        .map(|(name, _)| name.as_str())
-        .collect();
-    let count = result.names.len();
-    if (result.rank as usize) < count {
-        out.push(format!(
-            "the calibration presses determine {} of the {count} parameters of the calibration `{}`: the values of {} \
-             are one of many equally good solutions; calibrate at more locations, spread over the skin",
-            result.rank,
-            model_name(result.model),
-            open.join(", ")
-        ));
+    let parameters = result.names.len();
+    if (result.rank as usize) < parameters {
+        let open = result.names.iter().zip(&result.standard_errors);
+        let open = open.filter(|(_, error)| error.is_none());
+        out.push(WarningCause::OpenParameters {
+            determined: result.rank,
+            parameters,
+            model: result.model,
+            open: open.map(|(name, _)| name.clone()).collect(),
+        });
     }
     if result.rmse_after_mm > result.rmse_before_mm {
-        out.push(format!(
-            "the calibration does not lower the error of its own presses ({:.2} mm before, {:.2} mm after); check for \
-             outliers",
-            result.rmse_before_mm, result.rmse_after_mm
-        ));
+        out.push(WarningCause::NoImprovement {
+            before_mm: result.rmse_before_mm,
+            after_mm: result.rmse_after_mm,
+        });
     }
-    let spread = spread_mm(sights.iter().map(|s| s.truth));
-    if sights.len() > 1 && result.rmse_after_mm >= spread {
-        out.push(format!(
-            "the calibrated geometry locates its own presses no better than their mean position would ({:.2} mm \
-             against {spread:.2} mm); check for swapped cameras, a wrong unit or a shifted order of presses",
-            result.rmse_after_mm
-        ));
+    let spread_mm = spread_mm(sights.iter().map(|s| s.truth));
+    if sights.len() > 1 && result.rmse_after_mm >= spread_mm {
+        out.push(WarningCause::NoBetterThanMean {
+            rmse_mm: result.rmse_after_mm,
+            spread_mm,
+        });
     }
-    out
+    out.into_iter().map(Warning::from).collect()
 }
 
 fn locations(sights: &[CalibrationPress]) -> Vec<u32> {

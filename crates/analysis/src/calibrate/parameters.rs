@@ -52,19 +52,6 @@ pub const fn parameter_count(model: CalibrationModel) -> usize {
     }
 }
 
-/// Name of a model in settings and messages.
-#[must_use]
-pub const fn model_name(model: CalibrationModel) -> &'static str {
-    match model {
-        CalibrationModel::None => "none",
-        CalibrationModel::Positions => "positions",
-        CalibrationModel::PositionsSkews => "positions_skews",
-        CalibrationModel::Full => "full",
-        CalibrationModel::FullScale => "full_scale",
-        CalibrationModel::Auto => "auto",
-    }
-}
-
 /// (x1, y1, x2, y2, skew 1, skew 2, W 1, W 2, scale 1, scale 2); scales are relative to the geometry itself: 1.
 pub(crate) fn parameters_of(geometry: &StereoGeometry) -> Parameters {
     let [a, b] = &geometry.cameras;

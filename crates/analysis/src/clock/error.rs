@@ -1,7 +1,10 @@
 //! Owns the reasons for which a camera has no clock from event rates.
 
+use serde::{Deserialize, Serialize};
+
 /// Why the presses in the event rates of a camera give no clock.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[serde(tag = "kind", rename_all = "snake_case")]
 pub enum RatesError {
     /// The session has fewer presses than a rhythm needs.
     #[error(
@@ -16,7 +19,7 @@ pub enum RatesError {
         "expected the presses in time order within two days, found {span_s:.0} s between the first and the last"
     )]
     Span {
-        /// From the first contact to the last release, s; negative or NaN if out of order.
+        /// From the first contact to the last release, s; negative if out of order.
         span_s: f64,
     },
     /// The camera times come from a broken time base.

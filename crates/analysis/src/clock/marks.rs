@@ -7,7 +7,7 @@ use skinrig_model::{Mark, SentMark, TriggerEdge};
 
 use super::line::{self, Pair};
 use super::{NO_CLOCK_DRIFT, NO_TIME_US};
-use crate::result::{ClockFit, ClockMethod};
+use crate::result::{ClockFit, ClockMethod, WarningCause};
 use crate::timebase::{Point, STEP_US, SmoothMap};
 
 /// Lower bound of the residual scale, µs: the camera's clock ticks in µs.
@@ -22,8 +22,8 @@ const SUSPICIOUS_RMS_US: f64 = 100.0;
 pub struct MarksFit {
     /// The fit.
     pub fit: ClockFit,
-    /// Warnings for the reader.
-    pub warnings: Vec<String>,
+    /// Warnings about this camera.
+    pub warnings: Vec<WarningCause>,
     /// Host times of the marks used by the fit, ascending, µs.
     pub seen_us: Vec<f64>,
 }
@@ -115,30 +115,23 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
     seen_us.sort_by(f64::total_cmp);
     let mut warnings = Vec::new();
     if line.rms_us > SUSPICIOUS_RMS_US {
-        warnings.push(format!(
-            "trigger marks fit the clock only to {:.0} µs rms (expected a few µs); check the trigger line",
-            line.rms_us
-        ));
+        let rms_us = line.rms_us;
+        warnings.push(WarningCause::MarksScatter { rms_us });
     }
     if fit.rejected > 0 {
-        warnings.push(format!(
-            "{} of {} trigger marks do not fit the clock and were rejected",
-            fit.rejected,
-            decoded.marks.len()
-        ));
+        warnings.push(WarningCause::MarksRejected {
+            rejected: fit.rejected,
+            of: decoded.marks.len(),
+        });
     }
     let unseen = sent.len().saturating_sub(decoded.marks.len());
     if unseen > 0 {
-        warnings.push(format!(
-            "{unseen} of {} trigger marks were not seen",
-            sent.len()
-        ));
+        let of = sent.len();
+        warnings.push(WarningCause::MarksUnseen { unseen, of });
     }
     if decoded.stray_edges > 0 {
-        warnings.push(format!(
-            "{} edges on trigger channel {channel} do not belong to a complete mark",
-            decoded.stray_edges
-        ));
+        let edges = decoded.stray_edges;
+        warnings.push(WarningCause::StrayEdges { edges, channel });
     }
     Some(MarksFit {
         fit,

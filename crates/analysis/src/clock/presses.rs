@@ -20,15 +20,15 @@ use super::shifts::{SAME_US, ShiftChoice, choose};
 use super::span::PressSpan;
 use super::tally::Plan;
 use crate::rates::RateHistogram;
-use crate::result::{ClockFit, ClockMethod, RatesDetections, RatesEvidence};
+use crate::result::{ClockFit, ClockMethod, RatesDetections, RatesEvidence, WarningCause};
 
 /// Clock of one camera from event rates, with its warnings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RatesFit {
     /// The fit.
     pub fit: ClockFit,
-    /// Warnings for the reader.
-    pub warnings: Vec<String>,
+    /// Warnings about this camera.
+    pub warnings: Vec<WarningCause>,
 }
 
 /// The clocks of both cameras from event rates.
@@ -184,17 +184,14 @@ impl Camera {
         let Self { map, line, .. } = &self;
         let mut warnings = Vec::new();
         if line.drift_se > UNKNOWN_DRIFT {
-            warnings.push(format!(
-                "the session is too short to find the clock drift from event rates ({:.0} ± {:.0} ppm): assuming 0",
-                line.drift * 1e6,
-                line.drift_se * 1e6
-            ));
+            warnings.push(WarningCause::DriftUnknown {
+                drift_ppm: line.drift * 1e6,
+                standard_error_ppm: line.drift_se * 1e6,
+            });
         }
         if line.rms_us > SUSPICIOUS_RMS_US {
-            warnings.push(format!(
-                "presses found in the event rates scatter by {:.0} ms rms about the clock fit",
-                line.rms_us * 1e-3
-            ));
+            let rms_ms = line.rms_us * 1e-3;
+            warnings.push(WarningCause::PressesScatter { rms_ms });
         }
         let n = line.n() as u32;
         RatesFit {

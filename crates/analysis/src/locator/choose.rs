@@ -3,13 +3,16 @@
 use rayon::prelude::*;
 use skinrig_model::{AnalysisSettings, CalibrationModel, Locator, StereoGeometry};
 
-use super::methods::{Hyperparameters, METHODS, Method, Start, Unfit, method};
+use super::methods::{Hyperparameters, METHODS, Method, Start, method};
 use super::regions::{Reached, Regions};
-use super::{Features, Fitted};
+use super::{Features, Fitted, Unfit};
 use crate::calibrate::{Folds, Losses, NO_FIX_ERROR_MM, Refit, SessionCalibration, covariance};
 use crate::calibrate::{root_mean_square, select_model};
 use crate::metrics::{bootstrap_over_locations, root_mean_square as rms};
-use crate::result::{CalibrationResult, LocatorComparison, LocatorResult, LocatorTest};
+use crate::result::{
+    CalibrationResult, LocatorComparison, LocatorFallback, LocatorResult, LocatorTest, Warning,
+    WarningCause,
+};
 use crate::sets::CalibrationSet;
 
 /// One-sided level of all comparisons of a choice together: another locator has to be better than the geometry beyond
@@ -33,7 +36,7 @@ pub struct LocatorChoice {
     /// How it was chosen; without reliability.
     pub result: LocatorResult,
     /// Warnings for the reader.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Compares the methods on `set` and returns the one in `settings.locator`; for `Auto` the geometry, unless another one is
@@ -170,12 +173,9 @@ impl<'a> Learner<'a> {
         };
         let mut warnings = Vec::new();
         if let Err(unfit) = &candidates[used].fit {
-            let text = format!(
-                "the locator `{}` cannot learn: {unfit}; using `geometry`",
-                candidates[used].method.locator().name()
-            );
-            (used, fallback) = (0, Some(text.clone()));
-            warnings.push(text);
+            let (wanted, why) = (candidates[used].method.locator(), *unfit);
+            (used, fallback) = (0, Some(LocatorFallback::CannotLearn { wanted, why }));
+            warnings.push(WarningCause::LocatorUnfit { wanted, why }.into());
         }
         let rows = candidates.iter().enumerate().map(|(i, candidate)| {
             let errors = errors[i].as_deref();
@@ -196,7 +196,7 @@ impl<'a> Learner<'a> {
                     ratio: step.difference.ratio(),
                     needed: step.difference.needed,
                 }),
-                unfit: candidate.fit.as_ref().err().map(ToString::to_string),
+                unfit: candidate.fit.as_ref().err().copied(),
                 chosen: i == used,
             }
         });
@@ -226,28 +226,29 @@ impl<'a> Learner<'a> {
     }
 
     /// Why an automatic choice ends at the geometry, if it does.
-    fn why_geometry(&self, candidates: &[Candidate], best: usize, learns: bool) -> Option<String> {
+    fn why_geometry(
+        &self,
+        candidates: &[Candidate],
+        best: usize,
+        learns: bool,
+    ) -> Option<LocatorFallback> {
         if best > 0 {
             return None;
         }
-        let text = if !learns {
-            "the nominal geometry is used as it is (`calibration: none`)".to_owned()
+        Some(if !learns {
+            LocatorFallback::NominalGeometry
         } else if candidates[0].held_out.is_none() {
-            format!(
-                "{} calibration locations are too few to compare locators by cross-validation",
-                self.distinct_locations()
-            )
+            LocatorFallback::FewLocations {
+                locations: self.distinct_locations(),
+            }
         } else if candidates.iter().skip(1).all(|c| c.held_out.is_none()) {
             let mut unfit = candidates.iter().filter_map(|c| c.fit.as_ref().err());
-            let reason = unfit.next().map_or_else(
-                || "a fit without some of the locations failed".to_owned(),
-                ToString::to_string,
-            );
-            format!("no field could be compared: {reason}")
+            LocatorFallback::NoneCompared {
+                why: unfit.next().copied(),
+            }
         } else {
-            "no field is better at held-out locations by more than noise explains".to_owned()
-        };
-        Some(text)
+            LocatorFallback::NoneBetter
+        })
     }
 
     fn candidate(&self, method: &'static dyn Method, effort: Effort) -> Candidate {

@@ -11,6 +11,7 @@ use super::reading::{Reading, polynomials};
 use super::robust::reference_events;
 use super::samples::samples;
 use super::spread::learn_spread;
+use super::unfit::Unfit;
 use crate::result::{CameraField, LocatorModel, PositionPrior};
 use crate::sets::{CalibrationPress, CalibrationSet};
 
@@ -32,25 +33,6 @@ pub struct Needs {
     pub features: &'static [Feature],
     /// Minimum number of calibration locations.
     pub locations: u32,
-}
-
-/// Why a method could not be fitted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Unfit {
-    /// Too few calibration locations.
-    #[error("it needs {needed} calibration locations, found {found}")]
-    Locations {
-        /// Required number.
-        needed: u32,
-        /// Number of the set.
-        found: u32,
-    },
-    /// The calibration locations lie on a line or a conic.
-    #[error("the calibration locations lie on a line or a curve; spread them over the skin")]
-    Line,
-    /// The kernel is not positive definite, or the residuals are not finite.
-    #[error("the residuals of the calibration presses determine no field")]
-    Degenerate,
 }
 
 /// Where a fit begins.

@@ -24,10 +24,12 @@ mod reliability;
 mod robust;
 mod samples;
 mod spread;
+mod unfit;
 
 pub(crate) use choose::{Effort, choose};
 pub use choose::{LocatorChoice, choose_locator, held_out_errors};
 pub use features::{CameraFeatures, Features};
 pub use fitted::{Fitted, Location};
-pub use methods::{Feature, Hyperparameters, Method, Needs, Start, Unfit, method};
+pub use methods::{Feature, Hyperparameters, Method, Needs, Start, method};
 pub(crate) use reliability::reliability;
+pub use unfit::Unfit;

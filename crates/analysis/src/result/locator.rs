@@ -4,6 +4,8 @@ use serde::{Deserialize, Serialize};
 use skinrig_model::Locator;
 
 use super::Estimate;
+use crate::locator::Unfit;
+use crate::with_text::with_text;
 
 /// The locator of an analysis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -14,7 +16,7 @@ pub struct LocatorResult {
     pub version: u32,
     /// Why another locator than the one in the settings is in use.
     #[serde(default)]
-    pub fallback: Option<String>,
+    pub fallback: Option<LocatorFallback>,
     /// Locators compared at held-out locations; empty if there were too few locations.
     pub compared: Vec<LocatorComparison>,
     /// Bound on errors in the comparison, mm, as in [`super::CalibrationResult::bound_mm`].
@@ -25,6 +27,44 @@ pub struct LocatorResult {
     /// Share of scored presses within the regions of several levels.
     pub reliability: Vec<ReliabilityRow>,
 }
+
+/// Why the geometry is in use: the locator in the settings cannot learn, or the automatic choice ends there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[serde(remote = "Self", tag = "kind", rename_all = "snake_case")]
+pub enum LocatorFallback {
+    /// The settings ask for another locator, which cannot learn.
+    #[error("the locator `{}` cannot learn: {why}; using `geometry`", .wanted.name())]
+    CannotLearn {
+        /// In the settings.
+        wanted: Locator,
+        /// Why not.
+        why: Unfit,
+    },
+    /// There is no calibration to learn with.
+    #[error("the nominal geometry is used as it is (`calibration: none`)")]
+    NominalGeometry,
+    /// Too few locations for a comparison.
+    #[error(
+        "{locations} calibration locations are too few to compare locators by cross-validation"
+    )]
+    FewLocations {
+        /// Calibration locations.
+        locations: usize,
+    },
+    /// No other locator could be compared.
+    #[error("no field could be compared: {}", .why.map_or_else(
+        || "a fit without some of the locations failed".to_owned(), |why| why.to_string()
+    ))]
+    NoneCompared {
+        /// Why the first of them cannot learn; `None` if all can, but not without some of the locations.
+        why: Option<Unfit>,
+    },
+    /// No other locator is better.
+    #[error("no field is better at held-out locations by more than noise explains")]
+    NoneBetter,
+}
+
+with_text!(LocatorFallback);
 
 /// A locator of the comparison.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -41,7 +81,7 @@ pub struct LocatorComparison {
     /// Comparison with the current locator at its turn; `None` for the first.
     pub test: Option<LocatorTest>,
     /// Why it could not be fitted.
-    pub unfit: Option<String>,
+    pub unfit: Option<Unfit>,
     /// True for the locator in use.
     pub chosen: bool,
 }

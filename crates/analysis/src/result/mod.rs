@@ -3,32 +3,41 @@
 mod alignment;
 mod audit;
 mod calibration;
+mod clock_map;
 mod coverage;
 mod latency;
 mod locator;
 mod motion;
 mod reduction;
 mod reference;
+#[cfg(test)]
+mod tests;
 mod validity;
+mod violation;
+mod warning;
 
 pub use alignment::{
-    Alignment, AlignmentStatus, ClockMap, ClockResidual, ClockResiduals, Knot, LineCounts, MapName,
-    RatesDetections, RatesEvidence,
+    Alignment, AlignmentStatus, ClockResidual, ClockResiduals, Knot, LineCounts, RatesDetections,
+    RatesEvidence,
 };
 pub use audit::{Fault, Finding, Law};
 pub use calibration::{CalibrationResult, ModelComparison, ModelTest, ThresholdChoice};
+pub use clock_map::{ClockMap, MapName};
 pub use coverage::{Activity, BitRates, Cmre, Coverage, OffSensor};
 pub use latency::{
     ContactLatency, ContactTiming, Latency, LatencyCourse, ReducedLatency, ThresholdRow,
     TrialBackground,
 };
 pub use locator::{
-    CameraField, FieldModel, FieldPoint, LocatorComparison, LocatorModel, LocatorResult,
-    LocatorTest, PositionPrior, Region, RegionLevel, ReliabilityRow, Scatter, SpreadField,
+    CameraField, FieldModel, FieldPoint, LocatorComparison, LocatorFallback, LocatorModel,
+    LocatorResult, LocatorTest, PositionPrior, Region, RegionLevel, ReliabilityRow, Scatter,
+    SpreadField,
 };
 pub use motion::{Motion, MotionBin, PressMotion, TipSample};
 pub use reduction::{Reduction, ReductionCurve, ReductionRow, Thinning};
 pub use reference::{ReferenceCode, ReferenceReduction};
+pub use violation::AlignmentViolation;
+pub use warning::{CommonExclusion, Warning, WarningCause};
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::{
@@ -40,7 +49,7 @@ use crate::exclusion::Exclusion;
 use crate::rule::Rule;
 
 /// Version of this layout and of the algorithms behind it; part of every result.
-pub const ANALYSIS_VERSION: u32 = 9;
+pub const ANALYSIS_VERSION: u32 = 10;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -106,7 +115,7 @@ pub struct Analysis {
     /// One row per planned press, in plan order.
     pub presses: Vec<PressResult>,
     /// Warnings for the reader: fallbacks, missing data, suspicious residuals.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// Events per pixel of a few scored presses, spread over the session and the skin.
     #[serde(default)]
     pub pictures: Vec<PressPicture>,

@@ -18,11 +18,12 @@ impl Analysis {
         } else {
             &self.alignment.violations[..]
         };
+        let clocks = clocks.iter().map(ToString::to_string);
         let found = self.findings.iter().filter(|f| f.invalidates);
         let found = found.map(|f| match f.camera {
             Some(camera) => format!("{} ({camera}): {}", f.fault.name(), f.evidence),
             None => format!("{}: {}", f.fault.name(), f.evidence),
         });
-        clocks.iter().cloned().chain(found).collect()
+        clocks.chain(found).collect()
     }
 }

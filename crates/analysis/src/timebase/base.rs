@@ -1,6 +1,6 @@
 //! Time base of a session: all its epochs, and conversions between clocks.
 
-use skinrig_model::{AlignmentSettings, BoxReport, HostTime, TriggerEdge};
+use skinrig_model::{AlignmentSettings, BoxReport, CameraId, HostTime, TriggerEdge};
 
 use super::edges::Edges;
 use super::epoch_maps::{EpochMaps, map_epoch, shared};
@@ -8,7 +8,7 @@ use super::epochs::epochs;
 use super::line::{best_drift, clock};
 use super::reading::{Drift, Reading};
 use crate::leg::{LegLine, LegStart, edges_of, leg_at, recorded_of};
-use crate::result::{Alignment, AlignmentStatus, ClockFit};
+use crate::result::{Alignment, AlignmentStatus, AlignmentViolation, ClockFit};
 use crate::tie::Tie;
 
 /// Input of the time base.
@@ -76,7 +76,7 @@ impl TimeBase {
         }
         pieces.sort_by(|a, b| a.span_us.0.total_cmp(&b.span_us.0));
         if pieces.is_empty() && violations.is_empty() {
-            violations.push("host from box: expected time exchanges, found none".to_owned());
+            violations.push(AlignmentViolation::NoExchanges);
         }
         let mut base = Self {
             alignment: Alignment::default(),
@@ -98,17 +98,22 @@ impl TimeBase {
         for k in 0..2 {
             let unknown = |at: &&f64| base.at(**at).is_none_or(|p| p.cameras[k].is_none());
             if let Some(at) = ties.used_at_us.iter().find(unknown) {
-                violations.push(format!(
-                    "camera {} from host: expected a map at {:.3} s, found none",
-                    k + 1,
-                    at * 1e-6
-                ));
+                violations.push(AlignmentViolation::NoMap {
+                    camera: CameraId::ALL[k],
+                    at_s: at * 1e-6,
+                });
             }
         }
         if !ties.used_at_us.is_empty() {
             violations.extend(base.beyond(&alignment, limits));
-            for k in 0..2 {
-                base.judge_untimed(k, ties, limits, &mut alignment.warnings, &mut violations);
+            for camera in CameraId::ALL {
+                base.judge_untimed(
+                    camera,
+                    ties,
+                    limits,
+                    &mut alignment.warnings,
+                    &mut violations,
+                );
             }
         }
         if !violations.is_empty() {

@@ -1,10 +1,10 @@
 //! Distinguishes implausibly drifting clocks from wires that lose edges.
 
-use skinrig_model::AlignmentSettings;
+use skinrig_model::{AlignmentSettings, CameraId, DeviceRole};
 
 use super::base::TimeBase;
 use super::edges::{NEAR_US, OffLineTrains};
-use crate::result::Alignment;
+use crate::result::{Alignment, AlignmentViolation};
 
 impl TimeBase {
     /// Trains that camera `k` saw away from the line of its clock, in all legs.
@@ -32,20 +32,20 @@ pub(super) fn drifting(
     drifts: [bool; 2],
     off_line: [OffLineTrains; 2],
     alignment: &Alignment,
-) -> Option<String> {
-    let (clock, k) = match drifts {
-        [true, true] => ("trigger box", 0),
-        [true, false] => ("camera 1", 0),
-        [false, true] => ("camera 2", 1),
+) -> Option<AlignmentViolation> {
+    let (clock, camera) = match drifts {
+        [true, true] => (DeviceRole::TriggerBox, CameraId::One),
+        [true, false] => (DeviceRole::Camera1, CameraId::One),
+        [false, true] => (DeviceRole::Camera2, CameraId::Two),
         [false, false] => return None,
     };
-    Some(format!(
-        "{clock}, clock drift: expected the trains that camera {} saw within {:.0} µs of a clock's line, found {} of \
-         {} up to {:.0} µs off it: they arrived, but this clock drifts faster than plausible, or jumps",
-        k + 1,
-        NEAR_US[1],
-        off_line[k].trains,
-        alignment.lines[k].trains_sent,
-        off_line[k].most_us
-    ))
+    let OffLineTrains { trains, most_us } = off_line[camera.index()];
+    Some(AlignmentViolation::ClockDrifts {
+        clock,
+        camera,
+        near_us: NEAR_US[1],
+        off_line: trains,
+        sent: alignment.lines[camera.index()].trains_sent,
+        furthest_us: most_us,
+    })
 }

@@ -11,6 +11,7 @@ use skinrig_model::TriggerEdge;
 use skinrig_model::pulse::{PulseTrain, ReadTrain, read_trains};
 
 use super::epochs::{Epoch, SentTrain};
+use super::error::CameraClockError;
 use super::smooth::{FLOOR_US, Figure, Point, STEP_US, SmoothMap, WANDER};
 use crate::clock::line::median;
 use crate::result::LineCounts;
@@ -126,38 +127,6 @@ pub(crate) fn beyond_us(ties: &[f64], at: f64) -> f64 {
         (Some(first), Some(last)) => (first - at).max(at - last).max(0.0),
         _ => f64::INFINITY,
     }
-}
-
-/// Why the edges that a camera saw give no clock.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum CameraClockError {
-    /// The box sent nothing.
-    #[error("the box reported no train")]
-    NoTrain,
-    /// No sent train is recognisable.
-    #[error("none of {sent} sent trains can be identified among {edges} edges")]
-    Unidentified {
-        /// Trains sent.
-        sent: usize,
-        /// Edges seen on the channel.
-        edges: usize,
-    },
-    /// The trains contradict each other, or their clock drifts too fast.
-    #[error(
-        "{identified} of {sent} sent trains can be identified, but they are not on a plausible clock line"
-    )]
-    NoLine {
-        /// Trains identified by their bits.
-        identified: usize,
-        /// Trains sent.
-        sent: usize,
-    },
-    /// Too few trains at their predicted positions.
-    #[error("only {seen} trains were seen")]
-    FewSeen {
-        /// Trains seen.
-        seen: usize,
-    },
 }
 
 /// Edges of one channel, sorted; used ones are removed.

@@ -1,10 +1,13 @@
 //! Maps of one epoch of the box's clock.
 
+use skinrig_model::CameraId;
+
 use super::edges::{CameraFromBox, Edges};
 use super::epochs::Epoch;
 use super::host::HostFromBox;
 use super::reading::Reading;
 use super::smooth::{FLOOR_US, Figure, Point, STEP_US, SmoothMap};
+use crate::result::AlignmentViolation;
 
 /// Maps of one epoch.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,32 +78,23 @@ pub(super) type Line = (Edges, Vec<(u64, u64)>);
 pub(super) fn map_epoch(
     epoch: &Epoch,
     lines: &mut [Line; 2],
-    violations: &mut Vec<String>,
+    violations: &mut Vec<AlignmentViolation>,
 ) -> Option<EpochMaps> {
     let Some(host) = HostFromBox::new(&epoch.ties) else {
-        violations.push(format!(
-            "host from box: expected time exchanges that fit a clock, found {} that do not",
-            epoch.ties.len()
-        ));
+        let exchanges = epoch.ties.len();
+        violations.push(AlignmentViolation::ExchangesFitNoClock { exchanges });
         return None;
     };
     if !host.consistent {
-        violations.push(
-            "host from box: expected consistent time exchanges, found some that exclude each other"
-                .to_owned(),
-        );
+        violations.push(AlignmentViolation::ExchangesInconsistent);
     }
     let (first, last) = (epoch.ties.first()?, epoch.ties.last()?);
     let [one, two] = lines;
-    let mut number = 0;
-    let cameras = [one, two].map(|(line, recorded)| {
-        number += 1;
-        line.map(epoch, recorded)
-            .map_err(|why| {
-                violations.push(format!(
-                    "camera {number} from box: expected a clock, found none: {why}"
-                ));
-            })
+    let cameras = [(CameraId::One, one), (CameraId::Two, two)].map(|(camera, line)| {
+        let (edges, recorded) = line;
+        edges
+            .map(epoch, recorded)
+            .map_err(|why| violations.push(AlignmentViolation::NoTrainsClock { camera, why }))
             .ok()
     });
     let between = SmoothMap::fit(&pairs(&cameras), STEP_US, FLOOR_US);

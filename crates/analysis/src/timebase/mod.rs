@@ -10,6 +10,7 @@ mod drifting;
 mod edges;
 mod epoch_maps;
 mod epochs;
+mod error;
 mod held_out;
 mod host;
 mod limits;
@@ -20,8 +21,8 @@ mod smooth;
 mod wire;
 
 pub use self::base::{TimeBase, TimeBaseInput};
-pub use self::edges::CameraClockError;
 pub(crate) use self::edges::distance_us;
+pub use self::error::CameraClockError;
 pub use self::reading::{Drift, Reading};
 pub(crate) use self::smooth::{Point, STEP_US, SmoothMap};
 pub use self::wire::{Wire, WireTrain, wire};

@@ -2,8 +2,9 @@
 
 use skinrig_model::{BoxReport, Label, TriggerEdge};
 
-use super::edges::{CameraClockError, Edges};
+use super::edges::Edges;
 use super::epochs::epochs;
+use super::error::CameraClockError;
 use crate::result::LineCounts;
 
 /// Pulses of a train.

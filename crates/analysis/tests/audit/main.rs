@@ -6,7 +6,7 @@ mod rigs;
 
 use rayon::prelude::*;
 use rigs::{Random, Session, SessionOptions, session, sound};
-use skinrig_analysis::result::{Fault, Finding};
+use skinrig_analysis::result::{Fault, Finding, WarningCause};
 use skinrig_analysis::{Analysis, SessionInput, analyze};
 use skinrig_model::{Causes, HostTime, InvalidReason, Point2, PressFault, PressVerdict};
 
@@ -397,7 +397,10 @@ fn a_stream_out_of_order_is_named() {
         .for_each(|events| events.reverse());
     let analysis = run(&s);
     assert!(
-        analysis.warnings.iter().any(|w| w.contains("out of order")),
+        analysis
+            .warnings
+            .iter()
+            .any(|w| matches!(w.cause, WarningCause::EventsOutOfOrder { .. })),
         "{:?}",
         analysis.warnings
     );

@@ -6,7 +6,8 @@ mod regions;
 mod skins;
 mod symmetries;
 
-use skinrig_analysis::locator::LocatorChoice;
+use skinrig_analysis::locator::Unfit;
+use skinrig_analysis::result::{LocatorFallback, WarningCause};
 use skinrig_analysis::sets::CalibrationSet;
 use skinrig_model::Locator;
 use skins::{Skin, Spreads, errors, learn, rms};
@@ -93,7 +94,6 @@ fn spreads_by_chance_change_little() {
 
 #[test]
 fn what_is_too_little_to_learn_from_gives_the_geometry_and_a_reason() {
-    let said = |choice: &LocatorChoice| choice.result.fallback.clone().unwrap();
     for presses in [0, 1, 2, 3, 4, 6, 11] {
         let skin = Skin {
             calibrating: presses,
@@ -101,15 +101,21 @@ fn what_is_too_little_to_learn_from_gives_the_geometry_and_a_reason() {
         };
         let named = learn(&skin, Locator::Field);
         assert_eq!(named.result.locator, Locator::Geometry);
-        assert!(
-            said(&named).contains("needs 12 calibration locations"),
-            "{}",
-            said(&named)
+        let wanted = Locator::Field;
+        let Some(LocatorFallback::CannotLearn {
+            why: why @ Unfit::Locations { needed: 12, .. },
+            ..
+        }) = named.result.fallback
+        else {
+            panic!("{:?}", named.result.fallback);
+        };
+        assert_eq!(
+            named.warnings,
+            [WarningCause::LocatorUnfit { wanted, why }.into()]
         );
-        assert_eq!(named.warnings.len(), 1);
         let auto = learn(&skin, Locator::Auto);
         assert_eq!(auto.result.locator, Locator::Geometry);
-        assert_eq!(auto.warnings, Vec::<String>::new());
+        assert_eq!(auto.warnings, []);
         assert!(errors(&skin, &auto).iter().all(|e| e.is_finite()));
     }
 }
@@ -144,8 +150,13 @@ fn degenerate_presses_end_in_numbers_or_reasons() {
         if kind == 3 {
             let direct = skins::learn_set(&set, Locator::Direct);
             assert_eq!(direct.result.locator, Locator::Geometry);
-            let reason = direct.result.fallback.unwrap();
-            assert!(reason.contains("lie on a line"), "{reason}");
+            assert_eq!(
+                direct.result.fallback,
+                Some(LocatorFallback::CannotLearn {
+                    wanted: Locator::Direct,
+                    why: Unfit::Line
+                })
+            );
         }
         for locator in [Locator::Auto, Locator::Field, Locator::Direct] {
             let choice = skins::learn_set(&set, locator);

@@ -8,7 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 use skinrig_analysis::calibrate::{ModelChoice, calibrate, choose};
-use skinrig_analysis::result::{LocationOutcome, PressResult, PressView};
+use skinrig_analysis::result::{LocationOutcome, PressResult, PressView, Warning, WarningCause};
 use skinrig_analysis::sets::CalibrationSet;
 use skinrig_model::{
     AnalysisSettings, CalibrationModel, LensKind, LensModel, LocationId, Point2, PressId,
@@ -222,14 +222,22 @@ fn a_named_model_is_used_compared_and_called_out() {
     let chosen: Vec<bool> = result.compared.iter().map(|c| c.chosen).collect();
     assert_eq!(chosen, [true, false, false, false]);
     assert!(
-        named.warnings.len() == 1
-            && named.warnings[0]
-                .starts_with("the calibration `positions` is significantly worse than `full`: "),
+        matches!(
+            named.warnings[..],
+            [Warning {
+                cause: WarningCause::WorseModel {
+                    used: CalibrationModel::Positions,
+                    better: CalibrationModel::Full,
+                    ..
+                },
+                ..
+            }]
+        ),
         "{:?}",
         named.warnings
     );
     let full = choose(&set, &DRAWN, &settings(CalibrationModel::Full, 1));
-    assert_eq!(full.warnings, Vec::<String>::new());
+    assert_eq!(full.warnings, []);
     // Comparing changes nothing in the fit.
     let alone = calibrate(&set, &DRAWN, CalibrationModel::Full, 1)
         .unwrap()
@@ -263,11 +271,11 @@ fn too_few_locations_use_the_largest_supported_model_with_a_note() {
         (result.model, result.compared.len()),
         (CalibrationModel::Positions, 0)
     );
-    assert!(
-        four.warnings[0].contains("too few calibration locations (4)"),
-        "{:?}",
-        four.warnings
-    );
+    let few = WarningCause::FewLocationsToCompare {
+        locations: 4,
+        used: CalibrationModel::Positions,
+    };
+    assert_eq!(four.warnings[0].cause, few);
     assert_eq!(four.errors_mm, None);
     let nine = of(9);
     let result = nine.calibration.unwrap();
@@ -277,14 +285,12 @@ fn too_few_locations_use_the_largest_supported_model_with_a_note() {
         .map(|c| c.rmse_mm.value.is_some())
         .collect();
     assert_eq!(values, [true, true, true, false]);
-    assert_eq!(nine.warnings, Vec::<String>::new());
+    assert_eq!(nine.warnings, []);
     let two = of(2);
     assert_eq!((two.geometry, two.calibration), (DRAWN, None));
     assert_eq!(
         two.warnings,
-        [
-            "2 calibration locations are too few for any calibration: using the nominal camera geometry"
-        ]
+        [WarningCause::FewLocationsForAny { locations: 2 }.into()]
     );
 }
 
@@ -307,12 +313,14 @@ fn a_failed_fit_falls_back_to_the_next_smaller_model_with_a_note() {
             let chosen = choose(&set, &DRAWN, &settings(model, seed));
             let used = chosen.calibration.as_ref().map(|c| c.model);
             assert_eq!(used, expected);
-            let said = |words: &str| chosen.warnings.iter().any(|w| w.contains(words));
-            assert_eq!(
-                said("found no plausible geometry: using `"),
-                used.is_some() && used != Some(model)
-            );
-            assert_eq!(said("using the nominal camera geometry"), used.is_none());
+            let warned = |cause: &WarningCause| chosen.warnings.iter().any(|w| w.cause == *cause);
+            let fell = used.filter(|used| *used != model);
+            let fallback = fell.map(|used| WarningCause::ImplausibleModel {
+                wanted: model,
+                used,
+            });
+            assert_eq!(fallback.is_some_and(|cause| warned(&cause)), fell.is_some());
+            assert_eq!(warned(&WarningCause::NoPlausibleGeometry), used.is_none());
             fallen += u32::from(used.is_some() && used != Some(model));
         }
     }
@@ -338,8 +346,14 @@ fn what_the_data_leave_open_is_reported() {
     assert_eq!(known, [false, false, true, true, false, true, false, true]);
     assert!(result.correlation[0].iter().all(Option::is_none));
     assert!(
-        chosen.warnings[0].starts_with(
-            "the calibration presses determine 6 of the 8 parameters of the calibration `full`"
+        matches!(
+            chosen.warnings[0].cause,
+            WarningCause::OpenParameters {
+                determined: 6,
+                parameters: 8,
+                model: CalibrationModel::Full,
+                ..
+            }
         ),
         "{:?}",
         chosen.warnings

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use proptest::prelude::*;
 use skinrig_analysis::exclusion::Exclusion;
-use skinrig_analysis::result::LocationOutcome;
+use skinrig_analysis::result::{LocationOutcome, WarningCause};
 use skinrig_analysis::rule::Rule;
 use skinrig_analysis::{
     AnalysisError, EventSource, EventSourceError, Retention, SessionInput, analyze,
@@ -340,9 +340,8 @@ fn a_session_without_anything_is_still_an_analysis() {
     );
     assert_eq!((a.counts.invalid, a.counts.add_up()), (50, true));
     assert!(
-        a.warnings
-            .iter()
-            .any(|w| w.contains("camera 2: no clock alignment")),
+        a.warnings.iter().any(|w| w.camera == Some(CameraId::Two)
+            && matches!(w.cause, WarningCause::NoRatesClock { .. })),
         "{:?}",
         a.warnings
     );
@@ -384,15 +383,20 @@ fn broken_times_are_errors_and_never_panic() {
     source.events[0].push(CdEvent { t_us: 0, ..last });
     let a = analyze(&input, &source).unwrap();
     assert_eq!(a.counts.valid, 50);
-    let said = a.warnings.join("; ");
-    assert!(
-        said.contains("camera 1: 1 events are more than 10 ms out of order"),
-        "{said}"
-    );
-    assert!(
-        said.contains("camera 1: 1 events have timestamps days away"),
-        "{said}"
-    );
+    let of_camera_1 = a
+        .warnings
+        .iter()
+        .filter(|w| w.camera == Some(CameraId::One));
+    let causes: Vec<_> = of_camera_1.map(|w| &w.cause).collect();
+    for expected in [
+        WarningCause::EventsOutOfOrder {
+            events: 1,
+            limit_ms: 10,
+        },
+        WarningCause::EventsDaysAway { events: 1 },
+    ] {
+        assert!(causes.contains(&&expected), "{expected:?}: {causes:?}");
+    }
 }
 
 #[test]
@@ -655,25 +659,22 @@ fn presses_named_by_hand_are_rows_with_that_rule() {
 fn a_background_that_makes_clusters_of_its_own_is_called_out() {
     let (mut input, source) = session();
     // About 40 background events in a press window: 0.1 of them in a neighbourhood of 10 px.
-    let warned = |input: &SessionInput| -> Vec<String> {
+    let suggested = |input: &SessionInput| -> Vec<f64> {
         let warnings = analyze(input, &source).unwrap().warnings;
-        let about = |w: &String| w.contains("noise joins the clusters");
-        warnings.into_iter().filter(about).collect()
+        let suggested = warnings.iter().filter_map(|w| match w.cause {
+            WarningCause::DenseBackground {
+                advised_min_samples,
+                ..
+            } => Some(advised_min_samples),
+            _ => None,
+        });
+        suggested.collect()
     };
-    assert_eq!(warned(&input), Vec::<String>::new());
+    assert_eq!(suggested(&input), [0.0; 0]);
     input.settings.eps_px = 50.0;
     input.settings.min_samples = 3;
-    let found = warned(&input);
+    let found = suggested(&input);
     assert_eq!(found.len(), 2, "{found:?}");
-    let suggested: u32 = found[0]
-        .split("min_samples of ")
-        .nth(1)
-        .unwrap()
-        .split(' ')
-        .next()
-        .unwrap()
-        .parse()
-        .unwrap();
-    input.settings.min_samples = suggested;
-    assert_eq!(warned(&input), Vec::<String>::new());
+    input.settings.min_samples = found[0] as u32;
+    assert_eq!(suggested(&input), [0.0; 0]);
 }

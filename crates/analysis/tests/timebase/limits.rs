@@ -8,7 +8,8 @@ use crate::bench::{Bench, CLEAN, Clock, Conditions, NOISY, Random, bench, run};
 
 fn status(b: &Bench, limits: &AlignmentSettings) -> (AlignmentStatus, String) {
     let a = b.align(limits).alignment;
-    (a.status, a.violations.join("; "))
+    let texts: Vec<String> = a.violations.iter().map(ToString::to_string).collect();
+    (a.status, texts.join("; "))
 }
 
 #[test]

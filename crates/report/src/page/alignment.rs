@@ -46,7 +46,7 @@ pub(super) fn maps(a: &Analysis) -> Option<Table> {
         grid.note(sentence(&by_rates(evidence)));
     }
     for warning in &certificate.warnings {
-        grid.note(sentence(warning));
+        grid.note(sentence(&warning.to_string()));
     }
     grid.note(
         "The 95 % interval covers the random error of trains and exchanges, assuming that both directions of an \
@@ -117,7 +117,10 @@ pub(super) fn lines(a: &Analysis) -> Option<Table> {
 pub(crate) fn words(certificate: &Alignment) -> String {
     match certificate.status {
         AlignmentStatus::Valid => "Valid: every figure is within its limit.".to_owned(),
-        AlignmentStatus::Invalid => format!("INVALID: {}.", certificate.violations.join("; ")),
+        AlignmentStatus::Invalid => {
+            let why = certificate.violations.iter().map(ToString::to_string);
+            format!("INVALID: {}.", why.collect::<Vec<_>>().join("; "))
+        }
         AlignmentStatus::NotCertified => {
             "Not certified: the session has no usable reports of a trigger box.".to_owned()
         }

@@ -35,7 +35,7 @@ pub(super) fn locators(a: &Analysis) -> Option<Table> {
             format!("{gain} ± {}", number(Some(t.standard_error_mm), 3))
         });
         let remark = match (&row.unfit, row.chosen) {
-            (Some(reason), _) => reason.clone(),
+            (Some(reason), _) => reason.to_string(),
             (None, true) => "used".to_owned(),
             (None, false) => String::new(),
         };

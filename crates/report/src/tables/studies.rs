@@ -55,7 +55,7 @@ fn locators(l: &LocatorResult) -> Value {
         })
         .number("gain_ratio", 4, |r| r.test.map(|t| t.ratio))
         .number("needed_ratio", 4, |r| r.test.map(|t| t.needed))
-        .any("unfit", |r| r.unfit.clone())
+        .any("unfit", |r| r.unfit.map(|why| why.to_string()))
         .flag("chosen", |r| r.chosen)
         .finish()
 }

@@ -153,7 +153,9 @@ fn problems(a: &Analysis) -> Section {
         true => &[][..],
         false => &a.alignment.violations[..],
     };
-    let violations = violations.iter().map(|v| Note::new("INVALID", &**v));
+    let violations = violations
+        .iter()
+        .map(|v| Note::new("INVALID", v.to_string()));
     let findings = a.findings.iter().flat_map(|f| {
         let (fault, law, evidence) = (fault(f), law(f), &f.evidence);
         let note = match f.invalidates {
@@ -162,7 +164,8 @@ fn problems(a: &Analysis) -> Section {
         };
         [note, Note::of(format!("do: {}", f.advice))]
     });
-    let warnings = a.alignment.warnings.iter().chain(&a.warnings).cloned();
+    let warnings = a.alignment.warnings.iter().chain(&a.warnings);
+    let warnings = warnings.map(ToString::to_string);
     let warnings = derive::disagreement(a).into_iter().chain(warnings);
     let warnings = warnings.map(|text| Note::new("warning", text));
     let notes = violations.chain(findings).chain(warnings);

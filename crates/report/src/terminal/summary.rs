@@ -117,7 +117,7 @@ fn remarks(input: &ReportInput<'_>) -> Vec<Note> {
     }
     all.extend(derive::disagreement(a).map(|text| ("warning", text)));
     let warnings = a.alignment.warnings.iter().chain(&a.warnings);
-    all.extend(warnings.map(|text| ("warning", text.clone())));
+    all.extend(warnings.map(|w| ("warning", w.to_string())));
     let notes = all.into_iter().map(|(label, text)| {
         let lines = if label == "do" {
             MAX_ADVICE

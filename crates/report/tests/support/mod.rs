@@ -3,6 +3,7 @@
 pub(crate) mod studies;
 
 use skinrig_analysis::exclusion::Exclusion;
+use skinrig_analysis::locator::Unfit;
 use skinrig_analysis::result::*;
 use skinrig_model::*;
 use skinrig_report::{DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakeRow};
@@ -132,10 +133,18 @@ pub(crate) fn analysis(side: u32, repetitions: u32) -> Analysis {
         legs: Vec::new(),
         contact_timing: Default::default(),
         settings: AnalysisSettings::default(),
-        rig: RigGeometry { outline, nominal: geometry, trigger_channel: Some(0), trigger_delay_us: [0; 2] },
+        rig: RigGeometry {
+            outline,
+            nominal: geometry,
+            trigger_channel: Some(0),
+            trigger_delay_us: [0; 2],
+        },
         geometry,
         counts,
-        clocks: [fit(ClockMethod::TriggerMarks, 12.345_6), fit(ClockMethod::EventRates, -3.21)],
+        clocks: [
+            fit(ClockMethod::TriggerMarks, 12.345_6),
+            fit(ClockMethod::EventRates, -3.21),
+        ],
         calibration: Some(CalibrationResult {
             model: CalibrationModel::Full,
             lens: LensKind::Exponential,
@@ -148,11 +157,30 @@ pub(crate) fn analysis(side: u32, repetitions: u32) -> Analysis {
             compared: studies::models(),
             bound_mm: Some(10.4),
             start: geometry,
-            names: ["camera 1 x (mm)", "camera 1 y (mm)", "camera 2 x (mm)", "camera 2 y (mm)", "camera 1 skew (deg)",
-                "camera 2 skew (deg)", "camera 1 distortion W (1)", "camera 2 distortion W (1)"].map(str::to_owned).to_vec(),
+            names: [
+                "camera 1 x (mm)",
+                "camera 1 y (mm)",
+                "camera 2 x (mm)",
+                "camera 2 y (mm)",
+                "camera 1 skew (deg)",
+                "camera 2 skew (deg)",
+                "camera 1 distortion W (1)",
+                "camera 2 distortion W (1)",
+            ]
+            .map(str::to_owned)
+            .to_vec(),
             start_values: vec![45.0, -30.0, 50.0, 40.0, -2.0, -1.0, -0.1, 0.05],
             values: vec![44.1, -32.2, 49.9, 39.6, -1.8, -1.5, -0.16, 0.071],
-            standard_errors: vec![Some(0.21), Some(0.18), Some(0.25), Some(0.2), Some(0.1), Some(0.11), Some(0.02), None],
+            standard_errors: vec![
+                Some(0.21),
+                Some(0.18),
+                Some(0.25),
+                Some(0.2),
+                Some(0.1),
+                Some(0.11),
+                Some(0.02),
+                None,
+            ],
             rmse_before_mm: 5.87,
             rmse_after_mm: 3.31,
             n: side * side,
@@ -181,7 +209,11 @@ pub(crate) fn analysis(side: u32, repetitions: u32) -> Analysis {
         depths: vec![],
         rates,
         presses,
-        warnings: vec!["camera 2 has no trigger marks; its clock was fitted from the event rates of the sync presses".into()],
+        warnings: vec![Warning {
+            leg: None,
+            camera: Some(CameraId::Two),
+            cause: WarningCause::FewMarks { sent: 14, edges: 3 },
+        }],
         pictures,
         zooms,
         motion: Some(studies::motion()),
@@ -646,7 +678,10 @@ fn locator() -> LocatorResult {
                 },
                 bounded_rmse_mm: None,
                 over_repetitions_mm: None,
-                unfit: Some("it needs 16 calibration locations, found 14".to_owned()),
+                unfit: Some(Unfit::Locations {
+                    needed: 16,
+                    found: 14,
+                }),
                 ..row(Locator::Direct, 0.0, false)
             },
         ],
@@ -672,4 +707,15 @@ fn locator() -> LocatorResult {
             })
             .to_vec(),
     }
+}
+
+/// A warning whose text contains `name`.
+pub(crate) fn warning(name: String) -> Warning {
+    WarningCause::OpenParameters {
+        determined: 7,
+        parameters: 8,
+        model: CalibrationModel::Full,
+        open: vec![name],
+    }
+    .into()
 }

@@ -1,0 +1,418 @@
+//! Owns the warnings of an analysis: what replaces a measurement, what is missing, what is suspicious.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+use skinrig_model::{CalibrationModel, CameraId, Locator};
+
+use super::Estimate;
+use crate::clock::RatesError;
+use crate::exclusion::Exclusion;
+use crate::locator::Unfit;
+use crate::with_text::with_text;
+
+/// A warning for the reader. In JSON `kind` and fields of its cause, where it belongs, and `text`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(remote = "Self")]
+pub struct Warning {
+    /// Leg concerned, from 1; `None` if it is not about one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub leg: Option<u32>,
+    /// Camera concerned; `None` if it is not about one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraId>,
+    /// The cause.
+    #[serde(flatten)]
+    pub cause: WarningCause,
+}
+
+with_text!(Warning);
+
+impl Warning {
+    /// A warning about one camera.
+    #[must_use]
+    pub(crate) const fn of_camera(camera: CameraId, cause: WarningCause) -> Self {
+        Self {
+            leg: None,
+            camera: Some(camera),
+            cause,
+        }
+    }
+}
+
+impl From<WarningCause> for Warning {
+    fn from(cause: WarningCause) -> Self {
+        Self {
+            leg: None,
+            camera: None,
+            cause,
+        }
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.leg, self.camera) {
+            (Some(leg), Some(camera)) => write!(f, "leg {leg}, {camera}: ")?,
+            (Some(leg), None) => write!(f, "leg {leg}: ")?,
+            (None, Some(camera)) => write!(f, "{camera}: ")?,
+            (None, None) => {}
+        }
+        self.cause.fmt(f)
+    }
+}
+
+/// What a warning is about.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum WarningCause {
+    /// Presses far from all trigger marks.
+    #[error(
+        "{presses} presses are not timed: they are more than {limit_s} s from the nearest trigger mark seen"
+    )]
+    PressesFarFromMarks {
+        /// Presses.
+        presses: usize,
+        /// Maximum distance, s.
+        limit_s: f64,
+    },
+    /// Contacts and releases far from all trains seen or exchanges with the box.
+    #[error(
+        "{instants} of {of} contacts and releases are more than {limit_s} s from the nearest train seen or the \
+         nearest exchange with the box; their presses are not timed"
+    )]
+    PressesFarFromTies {
+        /// Contacts and releases beyond the limit.
+        instants: usize,
+        /// All contacts and releases.
+        of: usize,
+        /// Maximum distance, s.
+        limit_s: f64,
+    },
+    /// Nothing but the nominal start places a leg's camera clock among the others.
+    #[error(
+        "expected trains or marks to fit its clock, found too few: it is aligned to the other legs by its nominal \
+         start alone"
+    )]
+    NominalStart,
+    /// Large residuals of the trigger marks.
+    #[error(
+        "trigger marks fit the clock only to {rms_us:.0} µs rms (expected a few µs); check the trigger line"
+    )]
+    MarksScatter {
+        /// RMS residual, µs.
+        rms_us: f64,
+    },
+    /// Trigger marks off the clock's line.
+    #[error("{rejected} of {of} trigger marks do not fit the clock and were rejected")]
+    MarksRejected {
+        /// Rejected marks.
+        rejected: u32,
+        /// Marks seen.
+        of: usize,
+    },
+    /// Trigger marks that the camera did not see.
+    #[error("{unseen} of {of} trigger marks were not seen")]
+    MarksUnseen {
+        /// Marks not seen.
+        unseen: usize,
+        /// Marks sent.
+        of: usize,
+    },
+    /// Edges that are part of no mark.
+    #[error("{edges} edges on trigger channel {channel} do not belong to a complete mark")]
+    StrayEdges {
+        /// Edges.
+        edges: u64,
+        /// Trigger channel.
+        channel: u8,
+    },
+    /// Too few trigger marks for a clock.
+    #[error(
+        "too few trigger marks to fit the clock ({sent} sent, {edges} edges seen): using event rates instead"
+    )]
+    FewMarks {
+        /// Marks sent.
+        sent: usize,
+        /// Edges seen, all channels.
+        edges: usize,
+    },
+    /// The event rates give no clock.
+    #[error("no clock alignment: {why}")]
+    NoRatesClock {
+        /// Why not.
+        why: RatesError,
+    },
+    /// The session is too short for a drift from event rates.
+    #[error(
+        "the session is too short to find the clock drift from event rates ({drift_ppm:.0} ± {standard_error_ppm:.0} ppm): \
+         assuming 0"
+    )]
+    DriftUnknown {
+        /// Estimate, ppm.
+        drift_ppm: f64,
+        /// Its standard error, ppm.
+        standard_error_ppm: f64,
+    },
+    /// Large residuals of the presses found in the event rates.
+    #[error("presses found in the event rates scatter by {rms_ms:.0} ms rms about the clock fit")]
+    PressesScatter {
+        /// RMS residual, ms.
+        rms_ms: f64,
+    },
+    /// Windows of two presses overlap.
+    #[error("press windows overlap: events in the overlap count in both presses")]
+    WindowsOverlap,
+    /// Events too late for their window.
+    #[error("{events} events are more than {limit_ms} ms out of order; presses may miss them")]
+    EventsOutOfOrder {
+        /// Events.
+        events: u64,
+        /// Maximum delay, ms.
+        limit_ms: u64,
+    },
+    /// Events at impossible times.
+    #[error(
+        "{events} events have timestamps days away from all others and are not in the event rates"
+    )]
+    EventsDaysAway {
+        /// Events.
+        events: u64,
+    },
+    /// Events outside the sensor.
+    #[error(
+        "{events} of {of} events are outside the sensor and ignored: the recording may be damaged, or from another sensor"
+    )]
+    EventsOffSensor {
+        /// Events outside.
+        events: u64,
+        /// All events.
+        of: u64,
+    },
+    /// The background alone makes clusters.
+    #[error(
+        "in a press window the background alone puts {neighbours:.1} events within eps ({eps_px} px) of an event, and \
+         {min_samples} make a cluster (min_samples), so noise joins the clusters; a min_samples of \
+         {advised_min_samples} prevents this"
+    )]
+    DenseBackground {
+        /// Events of the background expected in a neighbourhood.
+        neighbours: f64,
+        /// Radius of a neighbourhood, px.
+        eps_px: f64,
+        /// The setting.
+        min_samples: u32,
+        /// A setting beyond the background.
+        advised_min_samples: f64,
+    },
+    /// No metrics.
+    #[error("no scored press was attempted, so there are no metrics")]
+    NoScoredPress,
+    /// Times and positions that nobody measured.
+    #[error("press times and positions come from a schedule, not from a measurement")]
+    Scheduled,
+    /// The studies use fewer presses than planned.
+    #[error(
+        "{left_out} of {chosen} presses chosen for the studies did not fit into memory; the studies use only the first {used}"
+    )]
+    StudyPressesLeftOut {
+        /// Presses left out.
+        left_out: u32,
+        /// Presses chosen.
+        chosen: usize,
+        /// Presses used.
+        used: usize,
+    },
+    /// The exclusions change the RMSE.
+    #[error(
+        "the RMSE depends on the exclusions: excluding {excluded} of {located} located presses{} changes it from \
+         {rmse_of_all_mm:.2} mm to {}{}",
+        most(.most_common.as_ref()),
+        .rmse_mm.map_or_else(|| "nothing".to_owned(), |rmse| format!("{rmse:.2} mm")),
+        if *.beyond_interval { ", more than its 95 % interval" } else { "" }
+    )]
+    ExclusionsMatter {
+        /// Excluded presses with a position.
+        excluded: u32,
+        /// Presses with a position.
+        located: u32,
+        /// The most common rule.
+        most_common: Option<CommonExclusion>,
+        /// RMSE of all presses with a position, mm.
+        rmse_of_all_mm: f64,
+        /// RMSE of those that count, mm; `None` if none does.
+        rmse_mm: Option<f64>,
+        /// True if the RMSE of all is outside the 95 % interval of the RMSE.
+        beyond_interval: bool,
+    },
+    /// No press calibrates.
+    #[error("no usable calibration press: using the nominal camera geometry")]
+    NoCalibrationPress,
+    /// Too few locations for the calibration in the settings.
+    #[error(
+        "the calibration presses cover too few locations for the calibration `{}`: using `{}`",
+        .wanted.name(), .used.name()
+    )]
+    FewLocationsForModel {
+        /// In the settings.
+        wanted: CalibrationModel,
+        /// In use.
+        used: CalibrationModel,
+    },
+    /// Too few locations to compare calibrations.
+    #[error(
+        "too few calibration locations ({locations}) to compare calibrations by cross-validation: using `{}`, the \
+         largest that they determine",
+        .used.name()
+    )]
+    FewLocationsToCompare {
+        /// Distinct calibration locations.
+        locations: usize,
+        /// In use.
+        used: CalibrationModel,
+    },
+    /// The fit of a calibration failed.
+    #[error(
+        "the fit of the calibration `{}` found no plausible geometry: using `{}`, the next smaller one that fits",
+        .wanted.name(), .used.name()
+    )]
+    ImplausibleModel {
+        /// The model that did not fit.
+        wanted: CalibrationModel,
+        /// In use.
+        used: CalibrationModel,
+    },
+    /// Too few locations for any calibration.
+    #[error(
+        "{locations} calibration locations are too few for any calibration: using the nominal camera geometry"
+    )]
+    FewLocationsForAny {
+        /// Distinct calibration locations.
+        locations: usize,
+    },
+    /// No calibration is determined.
+    #[error("the calibration presses determine no calibration: using the nominal camera geometry")]
+    Undetermined,
+    /// No calibration fits.
+    #[error("no calibration found a plausible geometry: using the nominal camera geometry")]
+    NoPlausibleGeometry,
+    /// The calibration in the settings is worse than another.
+    #[error(
+        "the calibration `{}` is significantly worse than `{}`: {rmse_mm:.2} mm against {better_rmse_mm:.2} mm at \
+         held-out locations (errors bounded at {bound_mm:.1} mm), a paired difference of {difference_mm:.2} ± \
+         {standard_error_mm:.2} mm (standard error)",
+        .used.name(), .better.name()
+    )]
+    WorseModel {
+        /// In use.
+        used: CalibrationModel,
+        /// The best.
+        better: CalibrationModel,
+        /// Bounded error of the one in use at held-out locations, mm.
+        rmse_mm: f64,
+        /// The same of the best, mm.
+        better_rmse_mm: f64,
+        /// Bound on errors, mm.
+        bound_mm: f64,
+        /// Paired difference, mm.
+        difference_mm: f64,
+        /// Its standard error, mm.
+        standard_error_mm: f64,
+    },
+    /// Parameters of the calibration that the data do not determine.
+    #[error(
+        "the calibration presses determine {determined} of the {parameters} parameters of the calibration `{}`: the \
+         values of {} are one of many equally good solutions; calibrate at more locations, spread over the skin",
+        .model.name(), .open.join(", ")
+    )]
+    OpenParameters {
+        /// Determined directions in parameter space.
+        determined: u32,
+        /// Number of parameters.
+        parameters: usize,
+        /// In use.
+        model: CalibrationModel,
+        /// Names of the parameters without a determined value.
+        open: Vec<String>,
+    },
+    /// The calibration does not lower the error.
+    #[error(
+        "the calibration does not lower the error of its own presses ({before_mm:.2} mm before, {after_mm:.2} mm \
+         after); check for outliers"
+    )]
+    NoImprovement {
+        /// RMSE before, mm.
+        before_mm: f64,
+        /// RMSE after, mm.
+        after_mm: f64,
+    },
+    /// The calibration locates no better than a guess.
+    #[error(
+        "the calibrated geometry locates its own presses no better than their mean position would ({rmse_mm:.2} mm \
+         against {spread_mm:.2} mm); check for swapped cameras, a wrong unit or a shifted order of presses"
+    )]
+    NoBetterThanMean {
+        /// RMSE of the calibration presses, mm.
+        rmse_mm: f64,
+        /// Their RMS distance from their mean position, mm.
+        spread_mm: f64,
+    },
+    /// The locator in the settings cannot learn.
+    #[error("the locator `{}` cannot learn: {why}; using `geometry`", .wanted.name())]
+    LocatorUnfit {
+        /// In the settings.
+        wanted: Locator,
+        /// Why not.
+        why: Unfit,
+    },
+    /// Scored presses and held-out calibration locations have different errors.
+    #[error(
+        "the RMSE of the scored presses, {}, and that of held-out calibration locations, {}, disagree: a few presses \
+         dominate one of them, or the rig changed in between",
+        in_words(.scored_rmse_mm), in_words(.held_out_rmse_mm)
+    )]
+    CalibrationDisagrees {
+        /// RMSE of the scored presses, mm.
+        scored_rmse_mm: Estimate,
+        /// RMSE at held-out calibration locations, mm.
+        held_out_rmse_mm: Estimate,
+    },
+    /// Fewer events locate better than all.
+    #[error(
+        "a random 1/{factor} of the events locates better than all of them: RMSE {} against {}; the clustering \
+         settings do not suit these event rates",
+        in_words(.rmse_mm), in_words(.rmse_of_all_mm)
+    )]
+    FewerEventsBetter {
+        /// One in so many events is kept.
+        factor: u32,
+        /// RMSE with these events, mm.
+        rmse_mm: Estimate,
+        /// RMSE with all events, mm.
+        rmse_of_all_mm: Estimate,
+    },
+}
+
+/// The rule that excludes most presses.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CommonExclusion {
+    /// Presses that it excludes.
+    pub presses: usize,
+    /// Why the first of them does not count.
+    pub example: Exclusion,
+}
+
+fn most(common: Option<&CommonExclusion>) -> String {
+    common.map_or_else(String::new, |common| {
+        let (n, label) = (common.presses, common.example.label());
+        format!(" (most often, {n} times: {label})")
+    })
+}
+
+fn in_words(rmse: &Estimate) -> String {
+    match (rmse.value, rmse.low, rmse.high) {
+        (Some(value), Some(low), Some(high)) => format!("{value:.2} mm [{low:.2}, {high:.2}]"),
+        (Some(value), ..) => format!("{value:.2} mm"),
+        _ => "none".to_owned(),
+    }
+}
