@@ -4,6 +4,7 @@
 
 mod bundle;
 mod catalogue;
+mod causes;
 mod challenge;
 mod compare;
 // Beside the other tests of the whole system; here because it starts the program.
