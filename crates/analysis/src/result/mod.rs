@@ -48,7 +48,8 @@ use skinrig_model::{
 use crate::exclusion::Exclusion;
 use crate::rule::Rule;
 
-/// Version of this layout and of the algorithms behind it; part of every result.
+/// Version of this layout and of the algorithms behind it; part of every result. Results of another version are not read,
+/// except their summary. Version 9: causes of presses are types. Version 10: warnings and violations are.
 pub const ANALYSIS_VERSION: u32 = 10;
 
 /// The result of analysing one session.
