@@ -6,7 +6,7 @@ use skinrig_model::{Point2, PressRole, Verdict};
 
 use super::finding::finding;
 use crate::metrics::spread_mm;
-use crate::result::{Analysis, Fault, Finding, Law, PressResult};
+use crate::result::{Analysis, Evidence, Fault, Finding, Law, PressResult};
 
 /// Above this share of the error of a constant guess (mean position), an RMSE says nothing about the skin: cameras,
 /// positions or times are not what they seem, or the skin is dead.
@@ -29,11 +29,11 @@ pub(super) fn findings(analysis: &Analysis) -> Option<Finding> {
         spread_mm(truths.iter().copied()),
     );
     (places.len() >= MIN_PLACES && rmse_mm > MAX_SHARE * ignorance_mm).then(|| {
-        let evidence = format!(
-            "expected an error below that of a constant guess, found RMSE {rmse_mm:.1} mm where guessing the mean \
-             position gives {ignorance_mm:.1} mm (n {})",
-            truths.len()
-        );
+        let evidence = Evidence::NoBetterThanGuess {
+            rmse_mm,
+            guess_mm: ignorance_mm,
+            presses: truths.len(),
+        };
         let mut found = finding(Law::CentroidFollowsPosition, Fault::Unknown, None, evidence);
         found.invalidates = true;
         found

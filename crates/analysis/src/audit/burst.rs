@@ -6,7 +6,7 @@ use super::drift::has_bursts;
 use super::finding::finding;
 use super::observed_press::ObservedPress;
 use super::statistics::median;
-use crate::result::{Analysis, Fault, Finding, Law};
+use crate::result::{Analysis, Evidence, Fault, Finding, Law, PeakForce, Response};
 
 /// A camera is blind if its median response is below this many standard errors (noise alone gives 0).
 const MIN_MEDIAN: f64 = 1.0;
@@ -35,25 +35,20 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
     let blind = [&one, &two].map(|seen| blind(seen));
     if let [Some(a), Some(b)] = blind {
         let bursts = CameraId::ALL.map(|c| has_bursts(&analysis.rates[c.index()]));
-        let (fault, but) = if bursts == [true; 2] {
-            (
-                Fault::ClockWrong,
-                "; both cameras burst at other times".to_owned(),
-            )
-        } else if bursts == [false; 2]
-            && let Some(noise) = noise(presses_seen.iter())
-        {
-            (
-                Fault::NotTouched,
-                format!("; {noise}{}", forces(presses_seen)),
-            )
-        } else {
-            (Fault::CameraBlind, String::new())
+        let burst_elsewhere = bursts == [true; 2];
+        let is_quiet = bursts == [false; 2];
+        let noise_per_s = noise(presses_seen.iter()).filter(|_| is_quiet);
+        let fault = match (burst_elsewhere, noise_per_s) {
+            (true, _) => Fault::ClockWrong,
+            (false, Some(_)) => Fault::NotTouched,
+            (false, None) => Fault::CameraBlind,
         };
-        let evidence = format!(
-            "expected events to burst in presses, found {:.1} standard errors above idle in the median of {} (camera 1) and {:.1} of {} (camera 2){but}",
-            a.0, a.1, b.0, b.1
-        );
+        let evidence = Evidence::NoResponseOfEither {
+            responses: [a, b],
+            burst_elsewhere,
+            noise_per_s,
+            force: noise_per_s.and_then(|_| force(presses_seen)),
+        };
         let mut found = finding(Law::BurstWithMotion, fault, None, evidence);
         // The located events were not those of the presses.
         found.invalidates = true;
@@ -61,11 +56,12 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
     }
     let mut found: Vec<Finding> = Vec::new();
     for (camera, blind) in CameraId::ALL.into_iter().zip(blind) {
-        if let Some((usual, n)) = blind {
-            let rates = usual_rates(presses_seen, camera);
-            let evidence = format!(
-                "expected events to burst in presses, found {usual:.1} standard errors above idle in the median of {n} ({camera}){rates}"
-            );
+        if let Some(response) = blind {
+            let evidence = Evidence::NoResponse {
+                camera,
+                response,
+                rates_per_s: usual_rates(presses_seen, camera),
+            };
             found.push(finding(
                 Law::BurstWithMotion,
                 Fault::CameraBlind,
@@ -80,22 +76,26 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
             let (first, last) = (a.first.max(b.first), a.last.min(b.last));
             // Measured presses did happen.
             let there = |t: &&ObservedPress<'_>| (first..=last).contains(&t.press);
-            let (fault, but) = match noise(presses_seen.iter().filter(there)) {
-                Some(noise) => (Fault::NotTouched, format!("; {noise}")),
-                None => (Fault::PressesMissing, String::new()),
+            let noise_per_s = noise(presses_seen.iter().filter(there));
+            let fault = match noise_per_s {
+                Some(_) => Fault::NotTouched,
+                None => Fault::PressesMissing,
             };
-            let evidence = format!(
-                "expected a burst of events in each press, found none in either camera from {first} to {last}{but}"
-            );
+            let evidence = Evidence::NoBurstsOfEither {
+                first,
+                last,
+                noise_per_s,
+            };
             found.push(finding(Law::BurstWithMotion, fault, None, evidence));
         }
         stretches => {
             for (camera, stretch) in CameraId::ALL.into_iter().zip(stretches) {
                 if let Some(s) = stretch {
-                    let evidence = format!(
-                        "expected a burst of events in each press, found none of {camera} from {} to {}",
-                        s.first, s.last
-                    );
+                    let evidence = Evidence::NoBursts {
+                        camera,
+                        first: s.first,
+                        last: s.last,
+                    };
                     found.push(finding(
                         Law::BurstWithMotion,
                         Fault::CameraBlind,
@@ -111,7 +111,9 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
 
 /// Noise rates, if both cameras record noise before these presses; `None` if one does not, or if the presses were not
 /// measured.
-fn noise<'a>(presses_seen: impl Iterator<Item = &'a ObservedPress<'a>> + Clone) -> Option<String> {
+fn noise<'a>(
+    presses_seen: impl Iterator<Item = &'a ObservedPress<'a>> + Clone,
+) -> Option<[f64; 2]> {
     if presses_seen.clone().any(|t| t.outcome.scheduled) {
         return None;
     }
@@ -121,29 +123,24 @@ fn noise<'a>(presses_seen: impl Iterator<Item = &'a ObservedPress<'a>> + Clone) 
             .filter_map(|t| Some(t.sights[camera.index()].rates?.1));
         median(idle.collect()).filter(|rate| *rate > 0.0)
     });
-    let (one, two) = (one?, two?);
-    Some(format!(
-        "both cameras send noise ({one:.0} and {two:.0} events/s)"
-    ))
+    Some([one?, two?])
 }
 
 /// Median peak force, if the robot reports forces.
-fn forces(presses_seen: &[ObservedPress<'_>]) -> String {
+fn force(presses_seen: &[ObservedPress<'_>]) -> Option<PeakForce> {
     let peaks: Vec<f64> = presses_seen
         .iter()
         .filter_map(|t| t.outcome.peak_force_n)
         .collect();
-    let n = peaks.len();
-    median(peaks).map_or_else(String::new, |usual| {
-        format!("; largest force of a press {usual:.2} N in the median (n {n})")
-    })
+    let presses = peaks.len();
+    median(peaks).map(|median_n| PeakForce { median_n, presses })
 }
 
-/// (median response, presses) of a blind camera.
-fn blind(seen: &[(PressId, f64)]) -> Option<(f64, usize)> {
-    let n = seen.len();
-    let usual = median(seen.iter().map(|(_, response)| *response).collect())?;
-    (n >= MIN_PRESSES && usual < MIN_MEDIAN).then_some((usual, n))
+/// Response of a blind camera.
+fn blind(seen: &[(PressId, f64)]) -> Option<Response> {
+    let presses = seen.len();
+    let sigmas = median(seen.iter().map(|(_, response)| *response).collect())?;
+    (presses >= MIN_PRESSES && sigmas < MIN_MEDIAN).then_some(Response { sigmas, presses })
 }
 
 /// Consecutive presses without a burst.
@@ -177,8 +174,8 @@ fn longest_silent_run(seen: &[(PressId, f64)]) -> Option<SilentRun> {
     })
 }
 
-/// Median rates during and before presses, as evidence.
-fn usual_rates(presses_seen: &[ObservedPress<'_>], camera: CameraId) -> String {
+/// Median rates during and before presses, events per second.
+fn usual_rates(presses_seen: &[ObservedPress<'_>], camera: CameraId) -> Option<[f64; 2]> {
     let rates = || {
         presses_seen
             .iter()
@@ -186,10 +183,5 @@ fn usual_rates(presses_seen: &[ObservedPress<'_>], camera: CameraId) -> String {
     };
     let press = median(rates().map(|r| r.0).collect());
     let idle = median(rates().map(|r| r.1).collect());
-    match (press, idle) {
-        (Some(press), Some(idle)) => {
-            format!("; median rate {press:.0} events/s in presses, {idle:.0} before them")
-        }
-        _ => String::new(),
-    }
+    Some([press?, idle?])
 }

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeSet;
 
-use skinrig_model::{Point2, PressRole};
+use skinrig_model::{Point2, PressRole, PressVerdict};
 
 use super::finding::finding;
 use super::frames::Frame;
 use super::observed_press::ObservedPress;
 use super::statistics::median;
 use crate::input::SessionInput;
-use crate::result::{Fault, Finding, Law};
+use crate::result::{Evidence, Fault, Finding, FittingPlan, Law, OtherPlan};
 
 /// Larger median position errors are not settling errors, mm: a tenth of the paper's tip.
 const MAX_OFF_MM: f64 = 1.0;
@@ -63,10 +63,12 @@ fn unit(input: &SessionInput, path: &[&ObservedPress<'_>]) -> Option<Finding> {
     let outside = points.iter().filter(|p| !outline.box_contains(**p)).count();
     let large = 2 * outside > points.len() && extent > 2.0 * size_mm;
     (small || large).then(|| {
-        let evidence = format!(
-            "expected measured positions on a skin of {size_mm} mm, found them {extent:.3} mm wide with {outside} of {} beside it",
-            points.len()
-        );
+        let evidence = Evidence::Extent {
+            skin_mm: size_mm,
+            extent_mm: extent,
+            beside: outside,
+            presses: points.len(),
+        };
         finding(Law::AsCommanded, Fault::UnitOfPositions, None, evidence)
     })
 }
@@ -92,8 +94,8 @@ fn extent_mm(points: &[Point2]) -> f64 {
     range(|p| p.x_mm).max(range(|p| p.y_mm))
 }
 
-/// A reinterpretation of the plan: its fault, description, and [`residual_mm`].
-type Reading = (Fault, String, Option<(f64, f64)>);
+/// A reinterpretation of the plan: its fault, what it is, and [`residual_mm`].
+type Reading = (Fault, OtherPlan, Option<(f64, f64)>);
 
 /// Compares measured and planned positions; the fault is the reinterpretation of the plan that matches the measurement.
 fn position(input: &SessionInput, path: &[&ObservedPress<'_>]) -> Option<Finding> {
@@ -110,12 +112,18 @@ fn position(input: &SessionInput, path: &[&ObservedPress<'_>]) -> Option<Finding
         .chain(displaced(path))
         .map(|frame| {
             let left = residual_mm(path, 0, |p| frame.skin(p));
-            (frame.fault, format!("with {}", frame.description), left)
+            (
+                frame.fault,
+                OtherPlan::Frame {
+                    frame: frame.change,
+                },
+                left,
+            )
         })
         .collect();
     for by in (1..=MAX_SHIFT).flat_map(|k| [k, -k]) {
-        let what = format!("of the planned ones {by:+} rows on");
-        readings.push((Fault::IndexShifted, what, residual_mm(path, by, |p| p)));
+        let plan = OtherPlan::Shifted { rows: by };
+        readings.push((Fault::IndexShifted, plan, residual_mm(path, by, |p| p)));
     }
     // A reinterpretation fits if its residual is small against the planned positions.
     let fits = |(_, _, r): &Reading| {
@@ -125,23 +133,18 @@ fn position(input: &SessionInput, path: &[&ObservedPress<'_>]) -> Option<Finding
         .into_iter()
         .filter(fits)
         .min_by(|a, b| left_of(a.2).total_cmp(&left_of(b.2)));
-    let n = measured;
-    Some(match best {
-        Some((fault, what, left)) => {
-            let left = left_of(left);
-            let evidence = format!(
-                "expected measured positions within {MAX_OFF_MM} mm of the planned ones, found them {off:.2} mm off in the \
-                 median, and {left:.3} mm {what} (n {n})"
-            );
-            finding(Law::AsCommanded, fault, None, evidence)
-        }
-        None => {
-            let evidence = format!(
-                "expected measured positions within {MAX_OFF_MM} mm of the planned ones, found them {off:.2} mm off in the median (n {n})"
-            );
-            finding(Law::AsCommanded, Fault::RobotOff, None, evidence)
-        }
-    })
+    let fits = best.map(|(_, plan, left)| FittingPlan {
+        off_mm: left_of(left),
+        plan,
+    });
+    let evidence = Evidence::OffPlan {
+        limit_mm: MAX_OFF_MM,
+        off_mm: off,
+        fits,
+        presses: measured,
+    };
+    let fault = best.map_or(Fault::RobotOff, |(fault, ..)| fault);
+    Some(finding(Law::AsCommanded, fault, None, evidence))
 }
 
 fn left_of(residual: Option<(f64, f64)>) -> f64 {
@@ -157,10 +160,7 @@ fn displaced(path: &[&ObservedPress<'_>]) -> Option<Frame> {
         median(each.collect())
     };
     let by = [off(|p| p.x_mm)?, off(|p| p.y_mm)?];
-    Some(Frame::displaced(
-        by,
-        format!("({:+.1}, {:+.1}) mm added", by[0], by[1]),
-    ))
+    Some(Frame::displaced(by))
 }
 
 /// Median distance of measured positions, in another frame, from the planned ones `by` rows later, and the extent of the
@@ -200,9 +200,12 @@ fn depth(path: &[&ObservedPress<'_>]) -> Option<Finding> {
         return None;
     }
     let usual = median(pairs.iter().map(|(m, p)| m - p).collect())?;
-    let evidence = format!(
-        "expected the commanded depths within {MAX_DEPTH_OFF_MM} mm, found {wrong} of {n} off, {usual:+.2} mm in the median"
-    );
+    let evidence = Evidence::OffDepth {
+        limit_mm: MAX_DEPTH_OFF_MM,
+        wrong,
+        presses: n,
+        off_mm: usual,
+    };
     Some(finding(Law::AsCommanded, Fault::RobotOff, None, evidence))
 }
 
@@ -233,32 +236,31 @@ fn speed(path: &[&ObservedPress<'_>]) -> Option<Finding> {
     };
     let wrong = all.iter().filter(strange).count();
     (wrong as f64 > MAX_PRESSES * n as f64).then(|| {
-        let evidence = format!(
-            "expected indentations of equal depth to take equal time, found {wrong} of {n} off by more than a factor of {MAX_SPEED_FACTOR}"
-        );
+        let evidence = Evidence::UnequalTimes {
+            wrong,
+            presses: n,
+            factor: MAX_SPEED_FACTOR,
+        };
         finding(Law::AsCommanded, Fault::RobotOff, None, evidence)
     })
 }
 
 /// Presses that the journal reports as not executed as planned.
 fn refused(presses_seen: &[ObservedPress<'_>]) -> Option<Finding> {
-    let invalid = |t: &&ObservedPress<'_>| {
-        matches!(t.outcome.verdict, skinrig_model::PressVerdict::Invalid(_))
-    };
-    let (wrong, n) = (
-        presses_seen.iter().filter(invalid).count(),
-        presses_seen.len(),
-    );
-    let example = presses_seen
+    let reasons = presses_seen
         .iter()
-        .find(invalid)?
-        .outcome
-        .verdict
-        .reason()?;
+        .filter_map(|t| match &t.outcome.verdict {
+            PressVerdict::Invalid(reason) => Some(reason),
+            _ => None,
+        });
+    let (wrong, n) = (reasons.clone().count(), presses_seen.len());
+    let first = reasons.clone().next()?;
     (n >= MIN_PRESSES && wrong as f64 > MAX_PRESSES * n as f64).then(|| {
-        let evidence = format!(
-            "expected presses as planned, found {wrong} of {n} that the journal calls invalid, the first one: {example}"
-        );
+        let evidence = Evidence::JournalInvalid {
+            wrong,
+            presses: n,
+            first: first.clone(),
+        };
         finding(Law::AsCommanded, Fault::RobotOff, None, evidence)
     })
 }

@@ -7,7 +7,7 @@ use skinrig_model::{CameraId, PressRole, PressVerdict};
 use super::finding::finding;
 use super::observed_press::is_number;
 use crate::input::SessionInput;
-use crate::result::{Analysis, ClockMethod, Fault, Finding, Law};
+use crate::result::{Analysis, ClockMethod, Evidence, Fault, Finding, Law, SeenMarks};
 
 /// Largest share of planned but never attempted presses in a complete session.
 const MAX_MISSED: f64 = 0.1;
@@ -47,11 +47,13 @@ fn contradiction(input: &SessionInput) -> Option<Finding> {
     if disordered == 0 && negative == 0 && overlapping == 0 && doubled == 0 {
         return None;
     }
-    let evidence = format!(
-        "expected each press once, its moments in order and after the last press's, found {disordered} of {n} presses \
-         with moments out of order, {negative} before the session, {overlapping} overlapping another, {doubled} listed twice",
-        n = spans.len()
-    );
+    let evidence = Evidence::JournalContradictory {
+        presses: spans.len(),
+        disordered,
+        negative,
+        overlapping,
+        doubled,
+    };
     Some(finding(
         Law::Complete,
         Fault::JournalContradictory,
@@ -71,13 +73,8 @@ fn events(analysis: &Analysis) -> Vec<Finding> {
     };
     let silent: Vec<CameraId> = CameraId::ALL.into_iter().filter(|c| !counted(*c)).collect();
     if silent.len() == 2 && silent.iter().all(|c| elsewhere(*c) == 0) {
-        let evidence = "expected events of two cameras, found none of either (the kinematic simulation makes none)";
-        return vec![finding(
-            Law::Complete,
-            Fault::NoEvents,
-            None,
-            evidence.to_owned(),
-        )];
+        let evidence = Evidence::NoEventsOfEither;
+        return vec![finding(Law::Complete, Fault::NoEvents, None, evidence)];
     }
     let named = silent.into_iter().map(|camera| {
         let (first, last) = analysis.settings.crop_v[camera.index()];
@@ -86,13 +83,18 @@ fn events(analysis: &Analysis) -> Vec<Finding> {
                 Law::Complete,
                 Fault::NoEvents,
                 Some(camera),
-                format!("expected events of {camera}, found none in the whole recording"),
+                Evidence::NoEvents { camera },
             ),
             others => finding(
                 Law::Complete,
                 Fault::CameraBlind,
                 Some(camera),
-                format!("expected events of {camera} in rows {first} to {last}, found none there and {others} elsewhere"),
+                Evidence::NoEventsInCrop {
+                    camera,
+                    first_row: first,
+                    last_row: last,
+                    elsewhere: others,
+                },
             ),
         }
     });
@@ -112,10 +114,11 @@ fn truth(input: &SessionInput) -> Option<Finding> {
     let times = without(&|o| o.timing.is_none());
     let too_many = |count: usize| count as f64 > MAX_WITHOUT_TRUTH * n as f64;
     (too_many(positions) || too_many(times)).then(|| {
-        let evidence = format!(
-            "expected a measured time and position of each press done, found {positions} of {n} without a \
-             position and {times} of {n} without times"
-        );
+        let evidence = Evidence::NoTruth {
+            presses: n,
+            without_position: positions,
+            without_times: times,
+        };
         finding(Law::Complete, Fault::NoTruth, None, evidence)
     })
 }
@@ -131,9 +134,9 @@ fn missed(input: &SessionInput) -> Option<Finding> {
     }
     (planned == 0 || f64::from(missed) > MAX_MISSED * f64::from(planned)).then(|| {
         let evidence = if planned == 0 {
-            "expected presses other than sync presses in the plan, found none".to_owned()
+            Evidence::NoPlannedPress
         } else {
-            format!("expected {planned} presses, found {missed} never attempted")
+            Evidence::PressesMissed { planned, missed }
         };
         finding(Law::Complete, Fault::PressesMissing, None, evidence)
     })
@@ -154,26 +157,22 @@ fn triggers(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
         let used = used.map_or(0, |c| c.n);
         let edges = input.edges[camera.index()].iter();
         let edges = edges.filter(|e| e.channel == channel).count();
-        (f64::from(used) < MIN_MARKS * sent as f64).then_some((edges, used))
+        (f64::from(used) < MIN_MARKS * sent as f64).then_some(SeenMarks {
+            camera,
+            edges,
+            usable_marks: used,
+        })
     };
-    let found: Vec<_> = CameraId::ALL
-        .into_iter()
-        .filter_map(|c| Some((c, lost(c)?)))
-        .collect();
-    let camera = match found[..] {
-        [(camera, _)] => Some(camera),
+    let seen: Vec<SeenMarks> = CameraId::ALL.into_iter().filter_map(lost).collect();
+    let camera = match seen[..] {
+        [] => return Vec::new(),
+        [alone] => Some(alone.camera),
         _ => None,
     };
-    let seen = found
-        .iter()
-        .map(|(camera, (edges, used))| format!("{edges} edges and {used} usable marks ({camera})"));
-    let seen: Vec<String> = seen.collect();
-    if seen.is_empty() {
-        return Vec::new();
-    }
-    let evidence = format!(
-        "expected the {sent} marks sent on trigger channel {channel}, found {}",
-        seen.join(" and ")
-    );
+    let evidence = Evidence::MarksLost {
+        sent,
+        channel,
+        seen,
+    };
     vec![finding(Law::Complete, Fault::NoTriggers, camera, evidence)]
 }

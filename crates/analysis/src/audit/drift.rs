@@ -5,7 +5,7 @@ use skinrig_model::CameraId;
 use super::finding::finding;
 use super::statistics::median;
 use crate::input::SessionInput;
-use crate::result::{Analysis, Fault, Finding, Law, RateSeries};
+use crate::result::{Analysis, Evidence, Fault, Finding, Law, RateSeries};
 
 /// Largest plausible rate difference between two clocks, ppm: the tolerance of Ethernet crystals (IEEE 802.3, 100BASE-X: 125
 /// MHz within 100 ppm). Board crystals are specified within 10 to 50 ppm, so even two at opposite extremes are below this.
@@ -33,18 +33,22 @@ pub(super) fn findings(input: &SessionInput, analysis: &Analysis) -> Vec<Finding
             } else {
                 Fault::CameraBlind
             };
-            let evidence = format!(
-                "expected {timed} presses to show in the events of {camera}, found no alignment of the clocks in which they do"
-            );
+            let evidence = Evidence::NoAlignment {
+                presses: timed,
+                camera,
+            };
             return Some(finding(Law::ClockDrift, fault, Some(camera), evidence));
         };
         let (size, error) = (fit.drift_ppm.abs(), fit.drift_se_ppm);
         // With three points the error of the line is unknown, and `NaN` is not evidence.
         (size - SIGMAS * error > MAX_DRIFT_PPM).then(|| {
-            let evidence = format!(
-                "expected the clock of {camera} within {MAX_DRIFT_PPM} ppm of the host's, found {:.1} ± {error:.1} ppm (n {})",
-                fit.drift_ppm, fit.n
-            );
+            let evidence = Evidence::ClockDrift {
+                camera,
+                limit_ppm: MAX_DRIFT_PPM,
+                drift_ppm: fit.drift_ppm,
+                error_ppm: error,
+                n: fit.n,
+            };
             finding(Law::ClockDrift, Fault::ClockWrong, Some(camera), evidence)
         })
     };

@@ -3,14 +3,14 @@
 use skinrig_model::CameraId;
 
 use super::advice;
-use crate::result::{Fault, Finding, Law};
+use crate::result::{Evidence, Fault, Finding, Law};
 
 /// A finding with the advice for its fault.
 pub(super) fn finding(
     law: Law,
     fault: Fault,
     camera: Option<CameraId>,
-    evidence: String,
+    evidence: Evidence,
 ) -> Finding {
     Finding {
         law,

@@ -12,7 +12,7 @@ use super::readings::{Path, Reading, ScoredReading};
 use super::resection::{residuals, spread_deg};
 use super::segments::shifted_rest;
 use super::statistics::median;
-use crate::result::{Analysis, Fault, Finding, Law};
+use crate::result::{Analysis, Evidence, Fault, Finding, Law};
 
 /// Minimum number of locations for a statement; the nominal geometry compensates for a small number.
 const MIN_PLACES: usize = 3;
@@ -88,9 +88,11 @@ fn one_camera_twice(presses_seen: &[ObservedPress<'_>]) -> Option<Finding> {
     let same = off.iter().filter(|o| **o < SAME_PX).count();
     let n = off.len();
     (n >= MIN_PLACES && same as f64 >= SAME_SHARE * n as f64).then(|| {
-        let evidence = format!(
-            "expected different columns in the two cameras, found the same column, within {SAME_PX} px, in {same} of {n} presses"
-        );
+        let evidence = Evidence::SameColumns {
+            within_px: SAME_PX,
+            same,
+            presses: n,
+        };
         finding(
             Law::CentroidFollowsPosition,
             Fault::OneCameraTwice,
@@ -113,14 +115,13 @@ fn another_reading(path: &Path<'_>, as_is: &ScoredReading<'_>) -> Option<Finding
     let gain = as_is.cost - best.cost;
     let fault = best.reading.fault?;
     (gain > CLEARLY).then(|| {
-        let evidence = format!(
-            "expected columns on the viewing angles of the presses, found them {} off as the session is and {} off with {}: \
-             odds of e^{gain:.0} (n {} places)",
-            in_degrees(as_is),
-            in_degrees(&best),
-            best.reading.description,
-            path.places
-        );
+        let evidence = Evidence::OtherReading {
+            off_deg: off_deg(as_is),
+            other_off_deg: off_deg(&best),
+            reading: best.reading.what,
+            log_odds: gain,
+            places: path.places,
+        };
         let mut found = finding(Law::CentroidFollowsPosition, fault, None, evidence);
         // The cameras confirm the plan instead of the measurement.
         found.invalidates = true;
@@ -129,11 +130,8 @@ fn another_reading(path: &Path<'_>, as_is: &ScoredReading<'_>) -> Option<Finding
 }
 
 /// Robust standard deviations of both streams about their best-fitting cameras.
-fn in_degrees(judged: &ScoredReading<'_>) -> String {
-    let [one, two] = judged
-        .fits
-        .map(|f| f.map_or_else(|| "-".to_owned(), |f| format!("{:.1}", f.spread_deg)));
-    format!("{one} and {two} degrees (cameras 1 and 2)")
+fn off_deg(judged: &ScoredReading<'_>) -> [Option<f64>; 2] {
+    judged.fits.map(|f| f.map(|f| f.spread_deg))
 }
 
 /// A shift that starts at some press, in both streams or in one.
@@ -152,14 +150,12 @@ fn shifted_later(path: &Path<'_>, as_is: &ScoredReading<'_>) -> Option<Finding> 
     } else {
         Fault::IndexShifted
     };
-    let evidence = format!(
-        "expected columns on the viewing angles of their own presses, found those from press {} onwards at the \
-         position {:+} rows later: odds of e^{:.0} (n {} presses)",
-        path.presses_seen[rest.from].press,
-        rest.by,
-        rest.gain,
-        path.presses_seen.len() - rest.from
-    );
+    let evidence = Evidence::ShiftedRest {
+        from: path.presses_seen[rest.from].press,
+        rows: rest.by,
+        log_odds: rest.gain,
+        presses: path.presses_seen.len() - rest.from,
+    };
     let mut found = finding(Law::CentroidFollowsPosition, fault, camera, evidence);
     found.invalidates = true;
     Some(found)
@@ -204,27 +200,25 @@ fn not_following(
 ) -> Vec<Finding> {
     let law = Law::CentroidFollowsPosition;
     if lost.len() == 2 && covers_the_list(analysis, path) {
-        let evidence = format!(
-            "expected columns on the viewing angles of the presses, found them {} off, no better than in random order, \
-             while the located presses cover the area of the list (n {} locations)",
-            in_degrees(as_is),
-            path.places
-        );
+        let evidence = Evidence::RandomOrder {
+            off_deg: off_deg(as_is),
+            places: path.places,
+        };
         return vec![finding(law, Fault::OrderOfPresses, None, evidence)];
     }
     let one = |camera: &CameraId| {
         let k = camera.index();
-        let off = as_is.fits[k].map_or(f64::NAN, |f| f.spread_deg);
-        let evidence = format!(
-            "expected columns on the viewing angles of the presses, found them {off:.1} degrees off where a blind \
-             guess gives {:.1} ({camera}, n {} locations), and no other reading of the session explains them",
-            as_is.ignorance_deg[k], path.places
-        );
+        let evidence = Evidence::Unrelated {
+            camera: *camera,
+            off_deg: as_is.fits[k]?.spread_deg,
+            guess_deg: as_is.ignorance_deg[k],
+            places: path.places,
+        };
         let mut found = finding(law, Fault::Unknown, Some(*camera), evidence);
         found.invalidates = true;
-        found
+        Some(found)
     };
-    lost.iter().map(one).collect()
+    lost.iter().filter_map(one).collect()
 }
 
 /// True if the presses located with the nominal cameras spread as far as the listed positions, along both axes.
@@ -260,10 +254,13 @@ fn far_off(as_is: &ScoredReading<'_>, camera: CameraId) -> Option<Finding> {
     let [x, y, skew, ..] = fit.off;
     let far = libm::hypot(x, y) > FAR_MM || skew.abs() > FAR_DEG;
     far.then(|| {
-        let evidence = format!(
-            "expected {camera} within {FAR_MM} mm and {FAR_DEG} degrees of its position in the rig description, found \
-             it about ({x:+.0}, {y:+.0}) mm and {skew:+.0} degrees off"
-        );
+        let evidence = Evidence::CameraFar {
+            camera,
+            limit_mm: FAR_MM,
+            limit_deg: FAR_DEG,
+            off_mm: [x, y],
+            skew_deg: skew,
+        };
         finding(
             Law::CentroidFollowsPosition,
             Fault::GeometryOff,
@@ -294,15 +291,17 @@ fn fixed_pixel(path: &Path<'_>, camera: CameraId) -> Option<[f64; 3]> {
 fn on_a_fixed_pixel(fixed: [Option<[f64; 3]>; 2]) -> Option<Finding> {
     let (camera, [column, columns, angles], both) = match fixed {
         [None, None] => return None,
-        [Some(one), None] => (Some(CameraId::One), one, ""),
-        [None, Some(two)] => (Some(CameraId::Two), two, ""),
-        [Some(one), Some(_)] => (None, one, "; the other camera likewise"),
+        [Some(one), None] => (Some(CameraId::One), one, false),
+        [None, Some(two)] => (Some(CameraId::Two), two, false),
+        [Some(one), Some(_)] => (None, one, true),
     };
-    let name = camera.unwrap_or(CameraId::One);
-    let evidence = format!(
-        "expected columns that move with the presses, found them within {columns:.1} px of column {column:.0} in the median \
-         while the viewing angle scatters by {angles:.0} degrees ({name}{both})"
-    );
+    let evidence = Evidence::FixedColumn {
+        camera: camera.unwrap_or(CameraId::One),
+        within_px: columns,
+        column_px: column,
+        angle_deg: angles,
+        both,
+    };
     let law = Law::CentroidFollowsPosition;
     Some(finding(law, Fault::CameraBlind, camera, evidence))
 }

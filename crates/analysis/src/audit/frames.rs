@@ -2,7 +2,7 @@
 
 use skinrig_model::{Point2, SkinOutline};
 
-use crate::result::Fault;
+use crate::result::{Corner, Fault, FrameChange, Origin, Turn};
 
 /// Factors between common units of length: m and cm for mm, inches, and the reverse.
 const FACTORS: [f64; 6] = [1e-3, 0.1, 1.0 / 25.4, 1e3, 10.0, 25.4];
@@ -12,8 +12,8 @@ const FACTORS: [f64; 6] = [1e-3, 0.1, 1.0 / 25.4, 1e3, 10.0, 25.4];
 pub(super) struct Frame {
     /// Fault of the table.
     pub fault: Fault,
-    /// Description, as in "the positions with ...".
-    pub description: String,
+    /// What it is.
+    pub change: FrameChange,
     /// `[[xx, xy], [yx, yy]]`: rotation, mirroring and scale about `about`.
     matrix: [[f64; 2]; 2],
     about: Point2,
@@ -33,10 +33,10 @@ impl Frame {
     }
 
     /// A table displaced by this offset.
-    pub(super) fn displaced(by: [f64; 2], description: String) -> Self {
+    pub(super) fn displaced(by: [f64; 2]) -> Self {
         Self {
             fault: Fault::PositionsDisplaced,
-            description,
+            change: FrameChange::Displaced { by_mm: by },
             matrix: [[1.0, 0.0], [0.0, 1.0]],
             about: Point2::default(),
             by,
@@ -47,11 +47,14 @@ impl Frame {
     pub(super) fn all(outline: &SkinOutline) -> Vec<Self> {
         let centre = outline.centre;
         let mut all = Vec::new();
-        for (about, name) in [(Point2::default(), "0"), (centre, "the skin's centre")] {
-            for (fault, what, matrix) in TURNS {
+        for (about, origin) in [(Point2::default(), Origin::Zero), (centre, Origin::Centre)] {
+            for (fault, turn, matrix) in TURNS {
                 all.push(Self {
                     fault,
-                    description: format!("{what} about {name}"),
+                    change: FrameChange::Turned {
+                        turn,
+                        about: origin,
+                    },
                     matrix,
                     about,
                     by: [0.0; 2],
@@ -61,7 +64,7 @@ impl Frame {
         for factor in FACTORS {
             all.push(Self {
                 fault: Fault::UnitOfPositions,
-                description: format!("all multiplied by {factor:.3}"),
+                change: FrameChange::Scaled { factor },
                 matrix: [[factor, 0.0], [0.0, factor]],
                 about: Point2::default(),
                 by: [0.0; 2],
@@ -71,10 +74,13 @@ impl Frame {
             centre.x_mm - 0.5 * outline.width_mm,
             centre.y_mm - 0.5 * outline.height_mm,
         );
-        for (origin, name) in [(centre, "centre"), (corner, "lower left corner")] {
-            for (sign, verb) in [(1.0, "added"), (-1.0, "subtracted")] {
-                let by = [sign * origin.x_mm, sign * origin.y_mm];
-                all.push(Self::displaced(by, format!("the skin's {name} {verb}")));
+        for (at, origin) in [(centre, Corner::Centre), (corner, Corner::LowerLeft)] {
+            for (sign, is_added) in [(1.0, true), (-1.0, false)] {
+                let by = [sign * at.x_mm, sign * at.y_mm];
+                all.push(Self {
+                    change: FrameChange::OtherOrigin { origin, is_added },
+                    ..Self::displaced(by)
+                });
             }
         }
         all
@@ -82,32 +88,40 @@ impl Frame {
 }
 
 /// Reflections and rotations among the eight symmetries of the square.
-const TURNS: [(Fault, &str, [[f64; 2]; 2]); 7] = [
-    (Fault::AxisMirrored, "x mirrored", [[-1.0, 0.0], [0.0, 1.0]]),
-    (Fault::AxisMirrored, "y mirrored", [[1.0, 0.0], [0.0, -1.0]]),
+const TURNS: [(Fault, Turn, [[f64; 2]; 2]); 7] = [
     (
         Fault::AxisMirrored,
-        "x and y mirrored",
+        Turn::XMirrored,
+        [[-1.0, 0.0], [0.0, 1.0]],
+    ),
+    (
+        Fault::AxisMirrored,
+        Turn::YMirrored,
+        [[1.0, 0.0], [0.0, -1.0]],
+    ),
+    (
+        Fault::AxisMirrored,
+        Turn::BothMirrored,
         [[-1.0, 0.0], [0.0, -1.0]],
     ),
     (
         Fault::AxesExchanged,
-        "x and y exchanged",
+        Turn::Exchanged,
         [[0.0, 1.0], [1.0, 0.0]],
     ),
     (
         Fault::AxesExchanged,
-        "x and y exchanged and both mirrored",
+        Turn::ExchangedMirrored,
         [[0.0, -1.0], [-1.0, 0.0]],
     ),
     (
         Fault::AxesExchanged,
-        "x and y turned by 90 degrees",
+        Turn::Quarter,
         [[0.0, -1.0], [1.0, 0.0]],
     ),
     (
         Fault::AxesExchanged,
-        "x and y turned by -90 degrees",
+        Turn::QuarterBack,
         [[0.0, 1.0], [-1.0, 0.0]],
     ),
 ];

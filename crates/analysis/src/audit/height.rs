@@ -6,7 +6,7 @@ use super::finding::finding;
 use super::statistics::median;
 use crate::input::SessionInput;
 use crate::onsets::Onset;
-use crate::result::{Analysis, ClockMethod, Fault, Finding, Law, MapName};
+use crate::result::{Analysis, ClockMethod, Evidence, Fault, Finding, Law, MapName, OnsetHeight};
 
 /// Minimum number of presses: with fewer, no two of them enclose the median with 95 %.
 const MIN_PRESSES: usize = 6;
@@ -25,19 +25,17 @@ pub(super) fn findings(
     if !analysis.clocks.iter().all(measured) || !analysis.alignment.is_usable() {
         return None;
     }
-    let [one, two] = onsets.map(|onsets| Height::of(input, onsets));
+    let [one, two] = onsets.map(|onsets| OnsetHeight::of(input, onsets));
     let (one, two) = (one?, two?);
     // Late poses shift all contacts alike.
     let bound_us = analysis.alignment.bound_us(MapName::RobotFromHost);
     let most_ms = MAX_BEFORE_MS + 1e-3 * bound_us.unwrap_or(0.0);
     // An offset in a single camera is due to its clock or its noise.
-    let early = |h: &Height| h.low_mm > MAX_HEIGHT_MM && h.before_ms > most_ms;
+    let early = |h: &OnsetHeight| h.low_mm > MAX_HEIGHT_MM && h.before_ms > most_ms;
     (early(&one) && early(&two)).then(|| {
-        let evidence = format!(
-            "expected events to begin when the tip reaches the surface, found them begin above it in the median: {one} (camera 1), \
-             {two} (camera 2). Presses were that much deeper than is stated: the robot reports its tip higher than it is, or the \
-             surface lies higher than z = 0 of the skin's frame"
-        );
+        let evidence = Evidence::EarlyEvents {
+            heights: [one, two],
+        };
         finding(Law::AsCommanded, Fault::HeightOff, None, evidence)
     })
 }
@@ -46,18 +44,7 @@ fn is_measured(fit: &crate::result::ClockFit) -> bool {
     fit.method != ClockMethod::EventRates
 }
 
-/// Height above the surface at which the events of a camera begin.
-struct Height {
-    n: usize,
-    median_mm: f64,
-    /// 95 % interval of the median.
-    low_mm: f64,
-    high_mm: f64,
-    /// Median time before contact, ms.
-    before_ms: f64,
-}
-
-impl Height {
+impl OnsetHeight {
     /// Over the presses that the journal reports as valid.
     fn of(input: &SessionInput, onsets: &[Onset]) -> Option<Self> {
         let valid = |o: &&Onset| {
@@ -76,16 +63,6 @@ impl Height {
             high_mm: heights[high],
             before_ms: median(onsets.iter().map(|o| o.before_ms).collect())?,
         })
-    }
-}
-
-impl std::fmt::Display for Height {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(
-            f,
-            "{:.2} mm (95 %: {:.2} to {:.2}), {:.0} ms before the contact, n {}",
-            self.median_mm, self.low_mm, self.high_mm, self.before_ms, self.n
-        )
     }
 }
 

@@ -6,7 +6,7 @@ use skinrig_model::PressRole;
 
 use super::finding::finding;
 use super::observed_press::ObservedPress;
-use crate::result::{Fault, Finding, Law};
+use crate::result::{Evidence, Fault, Finding, Law};
 
 /// A contact this close to a listed one matches it, s.
 const NEAR_S: f64 = 0.3;
@@ -53,11 +53,7 @@ pub(super) fn findings(
     let from = begin - SYNC_LENGTHS * (end - begin) - SYNC_S;
     let before = |at: &&f64| **at < first - NEAR_S;
     let of_sync = |at: &&f64| before(at) && **at >= from && !sync.is_empty();
-    let seen: Vec<String> = made
-        .iter()
-        .filter(of_sync)
-        .map(|at| format!("{:+.1}", at - first))
-        .collect();
+    let seen = made.iter().filter(of_sync).map(|at| at - first);
     let unseen = sync
         .iter()
         .filter(|at| !near(**at, &made, NEAR_S))
@@ -65,19 +61,10 @@ pub(super) fn findings(
     let (more, fewer) = (unlisted.iter().filter(of_sync).count(), unseen.count());
     let mut found = Vec::new();
     if more > 0 || (fewer > 0 && begin_is_recorded(contacts_s, begin)) {
-        let planned: Vec<String> = sync
-            .iter()
-            .map(|at| format!("{:+.1}", at - first))
-            .collect();
-        let evidence = format!(
-            "expected sync presses at {} s from the first press of the path, found presses at {} s",
-            planned.join(", "),
-            if seen.is_empty() {
-                "no".to_owned()
-            } else {
-                seen.join(", ")
-            }
-        );
+        let evidence = Evidence::SyncTimes {
+            planned_s: sync.iter().map(|at| at - first).collect(),
+            found_s: seen.collect(),
+        };
         found.push(finding(
             Law::AsCommanded,
             Fault::SyncPattern,
@@ -91,13 +78,12 @@ pub(super) fn findings(
         .copied()
         .collect();
     if let (Some(a), Some(b)) = (others.first(), others.last()) {
-        let evidence = format!(
-            "expected the {} presses of the list, found {} more in both cameras, from {:.0} s to {:.0} s of the schedule",
-            listed.len(),
-            others.len(),
-            a,
-            b
-        );
+        let evidence = Evidence::Unlisted {
+            listed: listed.len(),
+            more: others.len(),
+            from_s: *a,
+            to_s: *b,
+        };
         found.push(finding(
             Law::AsCommanded,
             Fault::PressesUnlisted,

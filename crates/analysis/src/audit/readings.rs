@@ -12,7 +12,7 @@ use super::frames::Frame;
 use super::observed_press::ObservedPress;
 use super::resection::{Resection, resect, residual_deg};
 use super::statistics::median;
-use crate::result::Fault;
+use crate::result::{Fault, OtherReading};
 
 /// Maximum number of presses for the comparison; of more, every n-th is used.
 const MAX_PRESSES: usize = 600;
@@ -33,8 +33,8 @@ const SAME_DIRECTION: f64 = 0.7;
 pub(super) struct Reading {
     /// Fault that this reading implies; `None` for the session as recorded.
     pub fault: Option<Fault>,
-    /// Description.
-    pub description: String,
+    /// What it is.
+    pub what: OtherReading,
     /// Nominal camera of each stream.
     pub cameras: [usize; 2],
     /// Streams with mirrored columns.
@@ -124,7 +124,7 @@ impl<'a> Path<'a> {
     pub(crate) fn as_it_is(&self) -> Reading {
         Reading {
             fault: None,
-            description: "as recorded".to_owned(),
+            what: OtherReading::AsRecorded,
             cameras: [0, 1],
             mirrored: [false; 2],
             at: self.positions(),
@@ -137,26 +137,32 @@ impl<'a> Path<'a> {
     pub(crate) fn alternatives(&self) -> Vec<Reading> {
         let base = self.as_it_is();
         let mut all = Vec::new();
-        for (cameras, fault, description) in [
-            ([1, 0], Fault::CamerasSwapped, "cameras exchanged"),
-            ([0, 0], Fault::OneCameraTwice, "both streams of camera 1"),
-            ([1, 1], Fault::OneCameraTwice, "both streams of camera 2"),
+        let both = |camera| OtherReading::BothStreams { camera };
+        for (cameras, fault, what) in [
+            (
+                [1, 0],
+                Fault::CamerasSwapped,
+                OtherReading::CamerasExchanged,
+            ),
+            ([0, 0], Fault::OneCameraTwice, both(CameraId::One)),
+            ([1, 1], Fault::OneCameraTwice, both(CameraId::Two)),
         ] {
             all.push(Reading {
                 fault: Some(fault),
-                description: description.to_owned(),
+                what,
                 cameras,
                 ..base.clone()
             });
         }
-        for (mirrored, description) in [
-            ([true, false], "the picture of camera 1 mirrored"),
-            ([false, true], "the picture of camera 2 mirrored"),
-            ([true, true], "the pictures of both cameras mirrored"),
+        let picture = |camera| OtherReading::PictureMirrored { camera };
+        for (mirrored, what) in [
+            ([true, false], picture(CameraId::One)),
+            ([false, true], picture(CameraId::Two)),
+            ([true, true], OtherReading::PicturesMirrored),
         ] {
             all.push(Reading {
                 fault: Some(Fault::PictureTurned),
-                description: description.to_owned(),
+                what,
                 mirrored,
                 ..base.clone()
             });
@@ -171,7 +177,7 @@ impl<'a> Path<'a> {
             let at = (0..self.presses_seen.len()).map(|i| self.shifted(i, by));
             all.push(Reading {
                 fault: Some(Fault::IndexShifted),
-                description: format!("the press list shifted by {by:+} rows"),
+                what: OtherReading::ListShifted { rows: by },
                 at: at.collect(),
                 ..base.clone()
             });
@@ -185,7 +191,9 @@ impl<'a> Path<'a> {
         let base = self.as_it_is();
         Reading {
             fault: Some(frame.fault),
-            description: format!("the positions with {}", frame.description),
+            what: OtherReading::Frame {
+                frame: frame.change,
+            },
             at: base.at.iter().map(|p| p.map(|p| frame.skin(p))).collect(),
             ..base
         }
@@ -197,10 +205,10 @@ impl<'a> Path<'a> {
             return None;
         };
         let by = [0, 1].map(|k| -0.5 * (one.off[k] + two.off[k]));
-        let description = format!("({:+.0}, {:+.0}) mm added", by[0], by[1]);
         Some(Reading {
+            what: OtherReading::Displaced { by_mm: by },
             penalty: FREE_DISPLACEMENT,
-            ..self.in_frame(&Frame::displaced(by, description))
+            ..self.in_frame(&Frame::displaced(by))
         })
     }
 
@@ -208,7 +216,7 @@ impl<'a> Path<'a> {
     pub(crate) fn as_planned(&self) -> Reading {
         Reading {
             fault: Some(Fault::RobotOff),
-            description: "the planned positions instead of the measured ones".to_owned(),
+            what: OtherReading::AsPlanned,
             at: self.presses_seen.iter().map(|t| Some(t.planned)).collect(),
             ..self.as_it_is()
         }
@@ -236,12 +244,9 @@ impl<'a> Path<'a> {
             costs.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, by)| by)
         };
         let rows = [likeliest(0)?, likeliest(1)?];
-        (rows[0] != rows[1]).then(|| Reading {
+        (rows[0] != rows[1]).then_some(Reading {
             fault: Some(Fault::ClockWrong),
-            description: format!(
-                "the streams shifted by {:+} and {:+} presses (cameras 1 and 2)",
-                rows[0], rows[1]
-            ),
+            what: OtherReading::StreamsShifted { presses: rows },
             rows,
             penalty: FREE_SHIFTS,
             ..base
@@ -257,9 +262,9 @@ impl<'a> Path<'a> {
     /// The list reversed, and with every second line of the path reversed, which converts between a raster and a meander.
     fn reordered(&self, base: &Reading) -> Vec<Reading> {
         let n = self.presses_seen.len();
-        let reading = |description: &str, at: Vec<Option<Point2>>| Reading {
+        let reading = |what: OtherReading, at: Vec<Option<Point2>>| Reading {
             fault: Some(Fault::OrderOfPresses),
-            description: description.to_owned(),
+            what,
             at,
             ..base.clone()
         };
@@ -273,10 +278,9 @@ impl<'a> Path<'a> {
             }
         }
         if n > 2 {
-            all.push(reading("the press list reversed", reversed));
-            let description = "every second line of the press list reversed";
-            all.push(reading(description, odd));
-            all.push(reading(description, even));
+            all.push(reading(OtherReading::ListReversed, reversed));
+            all.push(reading(OtherReading::LinesReversed, odd));
+            all.push(reading(OtherReading::LinesReversed, even));
         }
         all
     }

@@ -4,13 +4,13 @@ use skinrig_model::{CameraId, HostTime};
 
 use super::finding::finding;
 use crate::input::SessionInput;
-use crate::result::{Analysis, Fault, Finding, Law};
+use crate::result::{Analysis, Evidence, Fault, Finding, Law, Silence};
 use crate::stream::Silences;
 
 /// Presses during silences, on the camera's clock.
 struct MissedPresses {
     presses: usize,
-    description: String,
+    silences: Vec<Silence>,
 }
 
 pub(super) fn findings(
@@ -43,10 +43,10 @@ pub(super) fn findings(
 
 fn findings_for(lost: [Option<MissedPresses>; 2], alone: Fault, both: Fault) -> Vec<Finding> {
     let say = |fault, camera, lost: &MissedPresses| {
-        let evidence = format!(
-            "expected events at all times, noise as before, found none {}: {} presses are not recorded",
-            lost.description, lost.presses
-        );
+        let evidence = Evidence::Silence {
+            silences: lost.silences.clone(),
+            presses: lost.presses,
+        };
         finding(Law::Complete, fault, camera, evidence)
     };
     match &lost {
@@ -77,7 +77,7 @@ fn lost(
         .flatten()
         .filter_map(|o| o.timing)
         .collect();
-    let (mut presses, mut description) = (0, Vec::new());
+    let (mut presses, mut silent) = (0, Vec::new());
     for (from, to) in silences.iter().flatten() {
         let (from, to) = (*from as f64, *to as f64);
         let inside = timings
@@ -87,17 +87,15 @@ fn lost(
         if n > 0 {
             presses += n;
             let host_s = |us: f64| clock.host_us_of_camera(us) * 1e-6;
-            description.push(if from == 0.0 {
-                format!("before {:.1} s", host_s(to))
-            } else if to >= u64::MAX as f64 {
-                format!("from {:.1} s on", host_s(from))
-            } else {
-                format!("from {:.1} s to {:.1} s", host_s(from), host_s(to))
+            let is_to_end = from != 0.0 && to >= u64::MAX as f64;
+            silent.push(Silence {
+                from_s: (from != 0.0).then(|| host_s(from)),
+                to_s: (!is_to_end).then(|| host_s(to)),
             });
         }
     }
-    (presses > 0).then(|| MissedPresses {
+    (presses > 0).then_some(MissedPresses {
         presses,
-        description: description.join(", "),
+        silences: silent,
     })
 }

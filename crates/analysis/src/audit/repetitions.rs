@@ -7,7 +7,7 @@ use skinrig_model::{CameraId, LocationId, RepetitionId};
 use super::finding::finding;
 use super::observed_press::ObservedPress;
 use super::statistics::median;
-use crate::result::{Fault, Finding, Law};
+use crate::result::{Evidence, Fault, Finding, Law};
 
 /// Smaller median differences between repetitions are ignored, px: the radius of a cluster.
 const MIN_MOVE_PX: f64 = 10.0;
@@ -59,10 +59,13 @@ fn disagreement(presses_seen: &[ObservedPress<'_>], camera: CameraId) -> Option<
         let scatter = median(moves.iter().map(|m| (m - moved).abs()).collect())?;
         let error = MEDIAN_ERROR * scatter / (n as f64).sqrt();
         if moved.abs() > MIN_MOVE_PX && moved.abs() > SIGMAS * error {
-            let evidence = format!(
-                "expected centroids at the same columns in each repetition, found {repetition} moved by {moved:.1} ± {error:.1} px \
-                 ({camera}, n {n})"
-            );
+            let evidence = Evidence::RepetitionMoved {
+                repetition: *repetition,
+                moved_px: moved,
+                error_px: error,
+                camera,
+                pairs: n,
+            };
             return Some(finding(
                 Law::RepetitionsAgree,
                 Fault::RigMoved,
@@ -72,10 +75,13 @@ fn disagreement(presses_seen: &[ObservedPress<'_>], camera: CameraId) -> Option<
         }
         let within = median(moves.iter().map(|m| m.abs()).collect())?;
         if within > MIN_MOVE_PX && within > MAX_SHARE * between {
-            let evidence = format!(
-                "expected repetitions of a location to agree, found {repetition} off by {within:.1} px in the median, \
-                 where locations differ by {between:.1} px from their middle ({camera}, n {n})"
-            );
+            let evidence = Evidence::RepetitionElsewhere {
+                repetition: *repetition,
+                off_px: within,
+                between_px: between,
+                camera,
+                pairs: n,
+            };
             let mut found = finding(
                 Law::RepetitionsAgree,
                 Fault::Unknown,

@@ -12,7 +12,7 @@ use skinrig_model::CameraId;
 
 use super::finding::finding;
 use super::observed_press::ObservedPress;
-use crate::result::{Fault, Finding, Law};
+use crate::result::{Evidence, Fault, Finding, Law};
 
 /// A contact this close to a press belongs to it, s.
 const NEAR_S: f64 = 0.15;
@@ -47,15 +47,15 @@ pub(super) fn findings(
         let contacts = contacts_s[camera.index()];
         let best = likelier_shift(&listed, contacts)?;
         let here = explained(&listed, contacts, 0.0);
-        let evidence = format!(
-            "expected the bursts of {camera} at the presses, found {here} of {} presses with one, and {} of them {:+.2} s \
-             later: odds of e^{:.0} ({} bursts)",
-            listed.len(),
-            best.explained,
-            best.shift_s,
-            best.gain,
-            contacts.len()
-        );
+        let evidence = Evidence::ShiftedBursts {
+            camera,
+            presses: listed.len(),
+            here,
+            there: best.explained,
+            shift_s: best.shift_s,
+            log_odds: best.gain,
+            bursts: contacts.len(),
+        };
         let mut found = finding(
             Law::BurstWithMotion,
             Fault::ClockWrong,

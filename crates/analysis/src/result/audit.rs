@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use skinrig_model::CameraId;
 
+use super::evidence::Evidence;
+
 /// A law that every valid session obeys.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -148,7 +150,7 @@ pub struct Finding {
     /// Camera concerned, if it is a single one.
     pub camera: Option<CameraId>,
     /// What was expected and what was found, with numbers and n.
-    pub evidence: String,
+    pub evidence: Evidence,
     /// What to do next.
     pub advice: String,
     /// True if the session's numbers must not be used ([`Fault::invalidates`], or established by the law itself).

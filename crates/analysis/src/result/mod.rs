@@ -5,9 +5,14 @@ mod audit;
 mod calibration;
 mod clock_map;
 mod coverage;
+mod evidence;
+mod evidence_parts;
+#[cfg(test)]
+mod evidence_tests;
 mod latency;
 mod locator;
 mod motion;
+mod other_reading;
 mod reduction;
 mod reference;
 #[cfg(test)]
@@ -24,6 +29,10 @@ pub use audit::{Fault, Finding, Law};
 pub use calibration::{CalibrationResult, ModelComparison, ModelTest, ThresholdChoice};
 pub use clock_map::{ClockMap, MapName};
 pub use coverage::{Activity, BitRates, Cmre, Coverage, OffSensor};
+pub use evidence::Evidence;
+pub(crate) use evidence_parts::{
+    FittingPlan, OnsetHeight, PeakForce, Response, SeenMarks, Silence,
+};
 pub use latency::{
     ContactLatency, ContactTiming, Latency, LatencyCourse, ReducedLatency, ThresholdRow,
     TrialBackground,
@@ -34,6 +43,8 @@ pub use locator::{
     SpreadField,
 };
 pub use motion::{Motion, MotionBin, PressMotion, TipSample};
+pub use other_reading::OtherReading;
+pub(crate) use other_reading::{Corner, FrameChange, Origin, OtherPlan, Turn};
 pub use reduction::{Reduction, ReductionCurve, ReductionRow, Thinning};
 pub use reference::{ReferenceCode, ReferenceReduction};
 pub use violation::AlignmentViolation;
@@ -49,7 +60,8 @@ use crate::exclusion::Exclusion;
 use crate::rule::Rule;
 
 /// Version of this layout and of the algorithms behind it; part of every result. Results of another version are not read,
-/// except their summary. Version 9: causes of presses are types. Version 10: warnings and violations are.
+/// except their summary. Version 9: causes of presses are types. Version 10: warnings, violations
+/// and evidence are.
 pub const ANALYSIS_VERSION: u32 = 10;
 
 /// The result of analysing one session.

@@ -11,7 +11,7 @@ use super::{AlignmentViolation, LocatorFallback, Warning};
 use crate::locator::Unfit;
 
 /// Reads each JSON, and compares its text and the JSON written again. Every kind of `T` needs a row.
-fn check<T: Serialize + DeserializeOwned + Display>(rows: &[(Value, &str)]) {
+pub(super) fn check<T: Serialize + DeserializeOwned + Display>(rows: &[(Value, &str)]) {
     for (row, text) in rows {
         let cause: T = serde_json::from_value(row.clone()).unwrap_or_else(|e| panic!("{row}: {e}"));
         assert_eq!(cause.to_string(), *text);

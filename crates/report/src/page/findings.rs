@@ -35,7 +35,7 @@ pub(super) fn card(findings: &[Finding]) -> Option<Group> {
             .with(paragraph(
                 fault.span("soft", format!("Violated: {}.", law(f))),
             ))
-            .with(paragraph(&*f.evidence))
+            .with(paragraph(f.evidence.to_string()))
             .with(paragraph(
                 Text::new().bold("Do:").add(format!(" {}", f.advice)),
             ))

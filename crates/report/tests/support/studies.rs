@@ -345,17 +345,29 @@ pub(crate) fn findings() -> Vec<Finding> {
             law: Law::CentroidFollowsPosition,
             fault: Fault::CamerasSwapped,
             camera: None,
-            evidence: "expected the centroid's column to follow the viewing angle in rank (at least 0.8), found -0.91 \
-                and -0.88 (n = 2512 and 2497); exchanged they follow with 0.97 and 0.96"
-                .into(),
-            advice: "check which camera wrote which file, and import again with the files exchanged".into(),
+            evidence: Evidence::OtherReading {
+                off_deg: [Some(14.2), Some(13.9)],
+                other_off_deg: [Some(0.9), Some(1.1)],
+                reading: OtherReading::CamerasExchanged,
+                log_odds: 812.0,
+                places: 256,
+            },
+            advice:
+                "check which camera wrote which file, and import again with the files exchanged"
+                    .into(),
             invalidates: false,
         },
         Finding {
             law: Law::ClockDrift,
             fault: Fault::ClockWrong,
             camera: Some(CameraId::Two),
-            evidence: "expected a drift within 100 ppm, found 312.4 ± 0.2 ppm (n = 2500)".into(),
+            evidence: Evidence::ClockDrift {
+                camera: CameraId::Two,
+                limit_ppm: 100.0,
+                drift_ppm: 312.4,
+                error_ppm: 0.2,
+                n: 2500,
+            },
             advice: "check the alignment of camera 2 before any time of it is used".into(),
             invalidates: false,
         },
