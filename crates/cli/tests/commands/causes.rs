@@ -1,4 +1,4 @@
-//! Programs find warnings and violations by their kind, and results of earlier versions, whose causes are texts, are replaced.
+//! Programs find warnings, violations and evidence by their kind, and results of earlier versions, whose causes are texts, are replaced.
 
 use std::path::Path;
 
@@ -42,6 +42,21 @@ fn programs_find_warnings_and_violations_by_kind() {
             .unwrap()
             .contains("expected log-odds of at least 1000")
     );
+}
+
+#[test]
+fn programs_find_the_evidence_of_a_finding_by_kind() {
+    let lab = Lab::new();
+    let mut data = Dataset::new(&lab);
+    data.cameras.reverse();
+    skinrig(&data.arguments(&lab.path("s"))).code(4);
+    let results = read_json(&only(&lab.path("s"), ".results.json"));
+    let finding = &results["analysis"]["findings"][0];
+    assert_eq!(finding["fault"], "cameras_swapped");
+    let evidence = &finding["evidence"];
+    assert_eq!(evidence["kind"], "other_reading");
+    assert_eq!(evidence["reading"]["kind"], "cameras_exchanged");
+    assert!(evidence["log_odds"].as_f64().unwrap() > 10.0, "{evidence}");
 }
 
 /// Replaces the violations in stored results.
