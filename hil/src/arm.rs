@@ -9,7 +9,7 @@ use skinrig_controller::{
 use skinrig_device::{Clock, DeviceError, Indenter, MotionLimits, RobotSample};
 use skinrig_model::{HostDuration, HostTime, Point2, Point3, PoseSample, Robot, Setting, Skin};
 use skinrig_nightly::{Evidence, EvidenceKind};
-use skinrig_protocol::plan::{OnTrip, RunLimits};
+use skinrig_protocol::plan::{RunLimits, TripReaction};
 use skinrig_protocol::rig::RigFile;
 use skinrig_protocol::{Surface, TouchSearch};
 
@@ -278,7 +278,7 @@ fn limits(
         position_tolerance_mm: TOLERANCE_MM,
         settle_time: SETTLE_TIME,
         max_acceleration_mm_s2: None,
-        on_trip: OnTrip::Retract,
+        on_trip: TripReaction::Retract,
     };
     let robot_limits = MotionLimits {
         min_mm: l.workspace.min_mm,

@@ -5,10 +5,10 @@ use skinrig_model::{CameraId, PressRole, Verdict};
 use crate::calibrate::{SessionCalibration, calibrate_session};
 use crate::check;
 use crate::input::SessionInput;
-use crate::locator::{self, CameraFeatures, Effort, Fitted, LocatorChoice};
+use crate::locator::{self, CameraFeatures, Effort, FittedLocator, LocatorChoice};
 use crate::result::{LocationOutcome, PressResult, PressView};
 use crate::sets::CalibrationSet;
-use crate::tie::Untimed;
+use crate::tie::UntimedPress;
 use crate::triangulate::locate;
 use crate::verdict;
 
@@ -20,7 +20,7 @@ pub(crate) struct CameraObservations<'a> {
     /// Rows with lost bytes in their window.
     pub data_lost: &'a [bool],
     /// Rows that this camera's clock does not time.
-    pub untimed: &'a [Option<Untimed>],
+    pub untimed: &'a [Option<UntimedPress>],
 }
 
 /// Every planned press with its verdict, and what located it.
@@ -32,9 +32,9 @@ pub(crate) struct LocatedPresses {
 
 impl LocatedPresses {
     /// The locator; the rays of the geometry if nothing could be learnt.
-    pub(crate) fn fitted(&self) -> Fitted {
+    pub(crate) fn fitted(&self) -> FittedLocator {
         let learnt = self.locator.as_ref().map(|l| l.fitted.clone());
-        learnt.unwrap_or_else(|| Fitted::rays(self.calibrated.geometry))
+        learnt.unwrap_or_else(|| FittedLocator::rays(self.calibrated.geometry))
     }
 }
 

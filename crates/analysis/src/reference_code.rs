@@ -13,7 +13,7 @@ use skinrig_model::{
 
 use crate::calibrate::calibrate;
 use crate::input::SessionInput;
-use crate::locator::Fitted;
+use crate::locator::FittedLocator;
 use crate::metrics::{mean, quantile, root_mean_square};
 use crate::press_events::RetainedPresses;
 use crate::reduction::{Attempt, Outcome, Trials};
@@ -143,7 +143,7 @@ fn reduction(
     }
     let settings = &analysis.settings;
     let trials = Trials {
-        locator: &Fitted::rays(*geometry),
+        locator: &FittedLocator::rays(*geometry),
         outline: &analysis.rig.outline,
         settings,
         min_samples: MIN_SAMPLES,

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use serde::{Serialize, Serializer};
-use skinrig_evk1::FoundState;
+use skinrig_evk1::CameraState;
 use skinrig_hil::lease::{self, LeaseState};
 use skinrig_omega3::enumerate::{Availability, SERIAL_UNKNOWN};
 use skinrig_omega3::load::LoadError;
@@ -240,7 +240,7 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
                     let next_step = f.next_step();
                     let place = |model: &str| format!("{model}, {}", f.place);
                     let found = match &f.state {
-                        FoundState::Ready(identity) => Line {
+                        CameraState::Ready(identity) => Line {
                             serial: Some(identity.serial.clone()),
                             role: wanted(&identity.serial).or_else(|| wanted(f.port.as_deref()?)),
                             firmware: Some(identity.firmware()),
@@ -250,20 +250,20 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
                                 identity.firmware(),
                             )
                         },
-                        FoundState::Busy => line(
+                        CameraState::Busy => line(
                             &place("camera"),
                             DeviceState::Busy,
                             "in use by another program".to_owned(),
                         ),
-                        FoundState::NoPermission => {
+                        CameraState::NoPermission => {
                             line(&place("camera"), DeviceState::NotPermitted, String::new())
                         }
-                        FoundState::NotEvk1(what) => line(
+                        CameraState::NotEvk1(what) => line(
                             &place("not an EVK1"),
                             DeviceState::OtherDevice,
                             what.clone(),
                         ),
-                        FoundState::Faulty(what) => {
+                        CameraState::Faulty(what) => {
                             line(&place("camera"), DeviceState::Faulty, what.clone())
                         }
                     };
@@ -302,7 +302,7 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
 /// Adds a line for each supported camera that is not an EVK1; returns bus and address of each.
 #[cfg(feature = "evk4")]
 fn other_cameras(lines: &mut Vec<Line>, wanted: &dyn Fn(&str) -> Option<String>) -> Vec<(u8, u8)> {
-    use skinrig_evk4::FoundState;
+    use skinrig_evk4::CameraState;
 
     let known = crate::rig::evt3_camera::evk1_places();
     let mut places = Vec::new();
@@ -310,7 +310,7 @@ fn other_cameras(lines: &mut Vec<Line>, wanted: &dyn Fn(&str) -> Option<String>)
     for found in skinrig_evk4::enumerate(&known).unwrap_or_default() {
         let (bus, device) = found.place;
         // Other devices with the same USB IDs are left to the EVK1's list.
-        if let FoundState::Ready(model, serial) = found.state {
+        if let CameraState::Ready(model, serial) = found.state {
             places.push(found.place);
             lines.push(Line {
                 device: "camera",

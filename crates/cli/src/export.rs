@@ -12,7 +12,7 @@ use skinrig_recorder::{SessionReader, tags_path};
 use crate::args::{ExportArgs, ExportKind, ExportTable};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::paths::{SESSION_SUFFIX, beside};
-use crate::results::{self, Choices, Results};
+use crate::results::{self, AnalysisRequest, Results};
 
 /// Writes the requested formats and prints the paths of the files.
 ///
@@ -114,7 +114,7 @@ fn files(
     let tabular = |kind: &ExportKind| kind.is_tabular();
     let needed = kinds.iter().any(tabular) && tables.iter().any(|t| t.needs_analysis());
     let results = if needed {
-        let found = results::analyze_shown(&args.session, Choices::default());
+        let found = results::analyze_shown(&args.session, AnalysisRequest::default());
         Some(found.map_err(without_analysis)?)
     } else {
         None
@@ -223,7 +223,7 @@ pub(crate) fn derived(
     header: &RunHeader,
     folder: &Folder,
 ) -> Result<Vec<PathBuf>, Failure> {
-    let mut results = results::analyze_shown(session, Choices::default())?;
+    let mut results = results::analyze_shown(session, AnalysisRequest::default())?;
     // Measured on one machine at one time: it does not follow from the session.
     results.tradeoff = None;
     let (json, html) = results::documents(&results)?;

@@ -4,7 +4,9 @@ use serde::Serialize;
 use skinrig_model::Point2;
 
 use crate::locations::Locations;
-use crate::statistics::{Better, ComparisonTarget, Interval, Pairing, Sample, Settings, compare};
+use crate::statistics::{
+    ComparisonTarget, ImprovementDirection, Interval, Pairing, Sample, Settings, compare,
+};
 use crate::subject::Subject;
 
 /// Results of one skin at one location.
@@ -120,7 +122,7 @@ fn difference(a: &[f64], b: &[f64], settings: &Settings) -> Option<Interval> {
     };
     let sample = |v: &[f64]| Sample::mean((0..).zip(v.iter().copied()));
     let question = ComparisonTarget {
-        better: Better::Lower,
+        better: ImprovementDirection::Lower,
         margin: None,
     };
     let settings = Settings {

@@ -8,7 +8,7 @@ use skinrig_model::{
     Robot, RunFault, Setting, Skin, WatchdogTrip,
 };
 use skinrig_protocol::area::Surroundings;
-use skinrig_protocol::plan::{OnTrip, RunLimits};
+use skinrig_protocol::plan::{RunLimits, TripReaction};
 
 use crate::settings::ControllerSettings;
 use crate::watchdog::{WatchLimits, Watchdog};
@@ -376,7 +376,7 @@ impl<'a> GuardedIndenter<'a> {
             return;
         }
         self.trip.get_or_insert_with(|| trip.clone());
-        let brake = trip.is_blind() || self.limits.on_trip == OnTrip::Brake;
+        let brake = trip.is_blind() || self.limits.on_trip == TripReaction::Brake;
         if brake || self.hold().is_err() {
             let _ = self.disarm();
         }

@@ -51,7 +51,7 @@ mod totals;
 mod worker;
 
 pub use catalogue::{SessionState, SessionSummary, list};
-pub use close_result::Sealed;
+pub use close_result::SealedSession;
 pub use codec::Codec;
 pub use error::{CopyError, RecorderError, RescueError, WriteFailure};
 pub use lock::writer_of;

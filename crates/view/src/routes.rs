@@ -97,7 +97,7 @@ struct Pair {
 
 /// A press, by its number from 1.
 #[derive(Debug, Deserialize)]
-struct Numbered {
+struct PressQuery {
     press: u32,
 }
 
@@ -213,7 +213,7 @@ async fn poses_route(
 async fn clusters_route(
     State(app): State<App>,
     named: QueryInput<SessionQuery>,
-    press: QueryInput<Numbered>,
+    press: QueryInput<PressQuery>,
 ) -> Answer {
     let (named, number) = (query(named)?, query(press)?.press);
     let index = number

@@ -51,7 +51,7 @@ pub fn session(rig: RigGeometry, settings: AnalysisSettings) -> SessionInput {
 
 /// A valid press as planned and measured.
 #[derive(Debug, Clone, Copy)]
-pub struct Touch {
+pub struct PlantedPress {
     /// Role.
     pub role: PressRole,
     /// Index of the repetition, from 0.
@@ -72,7 +72,7 @@ pub struct Touch {
     pub scheduled: bool,
 }
 
-impl Touch {
+impl PlantedPress {
     /// A press at its planned position, 2 mm deep.
     #[must_use]
     pub fn new(role: PressRole, repetition: u32, location: u32, at: Point2) -> Self {
@@ -109,7 +109,7 @@ pub fn timing(
 }
 
 /// Adds a press to `input` and returns its ID.
-pub fn press(input: &mut SessionInput, touch: Touch) -> PressId {
+pub fn press(input: &mut SessionInput, touch: PlantedPress) -> PressId {
     let id = PressId::from_index(input.planned.len() as u32);
     input.planned.push(PlannedPress {
         id,

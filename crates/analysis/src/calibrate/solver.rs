@@ -8,7 +8,7 @@
 use nalgebra::Cholesky;
 
 use super::parameters::{PARAMETERS, Parameters};
-use super::problem::{Normal, Problem};
+use super::problem::{NormalEquations, Problem};
 
 /// Maximum number of steps.
 const MAX_STEPS: usize = 200;
@@ -89,14 +89,14 @@ pub(crate) fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
     ended(at, here.cost, "not converged: too many steps")
 }
 
-fn is_flat(here: &Normal, count: usize) -> bool {
+fn is_flat(here: &NormalEquations, count: usize) -> bool {
     (0..count).all(|i| {
         let slope = here.gradient[i];
         slope * slope <= FLAT * FLAT * here.matrix[(i, i)] * here.cost
     })
 }
 
-fn step(here: &Normal, scale: &Parameters, damping: f64) -> Option<Parameters> {
+fn step(here: &NormalEquations, scale: &Parameters, damping: f64) -> Option<Parameters> {
     let mut matrix = here.matrix;
     for i in 0..PARAMETERS {
         // A parameter without any effect (or beyond the model's) stays where it is.

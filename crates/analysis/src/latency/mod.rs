@@ -26,7 +26,7 @@ use skinrig_model::{Background, PressRole};
 
 use self::bins::HostTimeView;
 use self::interval::{Estimates, Outcome, Plan};
-use self::smooth::Edges;
+use self::smooth::Boundary;
 use self::spans::{Neighbours, Spans};
 use self::trial::{Detector, Label, Trial};
 use crate::metrics::quantile;
@@ -61,8 +61,8 @@ pub fn study(analysis: &Analysis, kept: &RetainedPresses) -> Option<Latency> {
     }
     let usable = usable(analysis, &clocks, &presses);
     let edges = match settings.background {
-        Background::Before => Edges::Renormalised,
-        Background::After => Edges::ZeroPadded,
+        Background::Before => Boundary::Renormalised,
+        Background::After => Boundary::ZeroPadded,
     };
     let margin_ms = margin_ms(analysis, &clocks);
     let grid = sweep::thresholds(settings.thresholds);
@@ -97,7 +97,7 @@ pub fn study(analysis: &Analysis, kept: &RetainedPresses) -> Option<Latency> {
         } else {
             (covered_us.0 * 1e-3, covered_us.1 * 1e-3)
         },
-        zero_padded: edges == Edges::ZeroPadded,
+        zero_padded: edges == Boundary::ZeroPadded,
         decision_delay_ms: decision_delay_ms(&detector),
         earliest_ms: detector.earliest_ms,
         background_s: trials.iter().map(|t| t.background_s).sum(),

@@ -1,6 +1,6 @@
 //! Locators: what turns the columns of both cameras into a position, learnt from the calibration presses.
 //!
-//! A [`Method`] declares what it needs and fits calibration presses; a [`Fitted`] locator sees the [`Features`] of a press
+//! A [`Method`] declares what it needs and fits calibration presses; a [`FittedLocator`] locator sees the [`Features`] of a press
 //! and returns a position, a 95 % region and a flag. Built in are the geometry (rays intersect), the field (the geometry
 //! predicts what each camera reads at a position, a Gaussian process corrects it, and the position that explains all
 //! readings best is found), and the direct field (the same with a polynomial instead of a geometry). Both also read how far
@@ -28,6 +28,6 @@ mod spread;
 pub(crate) use choose::{Effort, choose};
 pub use choose::{LocatorChoice, choose_locator, held_out_errors};
 pub use features::{CameraFeatures, Features};
-pub use fitted::{Fitted, Location};
-pub use methods::{Feature, Hyperparameters, Method, Needs, Start, Unfit, method};
+pub use fitted::{FittedLocator, Location};
+pub use methods::{Feature, FitError, FitStart, Hyperparameters, Method, Requirements, method};
 pub(crate) use reliability::reliability;

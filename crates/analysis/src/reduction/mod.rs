@@ -16,7 +16,7 @@ mod trials;
 
 use skinrig_model::PressRole;
 
-use crate::locator::Fitted;
+use crate::locator::FittedLocator;
 use crate::metrics::{bootstrap_over_locations, mean, quantile};
 use crate::press_events::RetainedPresses;
 use crate::result::{Analysis, Reduction, ReductionCurve, Thinning};
@@ -33,7 +33,7 @@ pub fn study(analysis: &Analysis, kept: &RetainedPresses) -> Option<Reduction> {
         return None;
     }
     let trials = Trials {
-        locator: &Fitted::of(analysis),
+        locator: &FittedLocator::of(analysis),
         outline: &analysis.rig.outline,
         settings,
         min_samples: match settings.reduction.min_samples {

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use skinrig_model::{AnalysisSettings, CentroidRule, Point2, PressId, SkinOutline};
 
 use super::thinning::{ThinnedView, Thinner};
-use crate::locator::Fitted;
+use crate::locator::FittedLocator;
 use crate::press_events::{EventView, RetainedPress};
 use crate::result::{LocationOutcome, PressResult, Thinning};
 use crate::seeded;
@@ -78,7 +78,7 @@ impl Outcome {
 
 /// Parameters for thinning, clustering and locating presses.
 pub(crate) struct Trials<'a> {
-    pub locator: &'a Fitted,
+    pub locator: &'a FittedLocator,
     pub outline: &'a SkinOutline,
     /// Crop, radius, seeds and factors.
     pub settings: &'a AnalysisSettings,

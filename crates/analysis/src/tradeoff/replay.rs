@@ -12,10 +12,10 @@ use crate::locator::Effort;
 use crate::metrics::{Exclusions, metrics, penalised};
 use crate::press_events::{EventView, PackedEvent, RetainedPress, RetainedPresses};
 use crate::press_spans::timings;
-use crate::result::{Analysis, ClockFit, Metrics, Penalised, PressView};
+use crate::result::{Analysis, ClockFit, Metrics, PenalisedRmse, PressView};
 use crate::segment::{Window, windows};
 use crate::sets::ScoreSet;
-use crate::tie::Untimed;
+use crate::tie::UntimedPress;
 use crate::untimed;
 
 /// A session whose presses can be located in many ways.
@@ -26,13 +26,13 @@ pub(crate) struct Replay<'a> {
     /// Participating rows of the plan.
     rows: Vec<usize>,
     /// For all rows of the plan: why a camera's clock does not time them.
-    untimed: [Vec<Option<Untimed>>; 2],
+    untimed: [Vec<Option<UntimedPress>>; 2],
 }
 
 /// Result of one way of locating.
 pub(super) struct Outcome {
     pub metrics: Metrics,
-    pub penalised: Penalised,
+    pub penalised: PenalisedRmse,
     pub located: LocatedPresses,
     /// Events of both cameras in the window, mean over the retained scored presses.
     pub events_per_press: f64,

@@ -203,7 +203,7 @@ fn the_stored_form_locates_to_the_same_bits() {
         assert_eq!(stored, choice.result);
         let geometry = skins::calibrated(&skin.set()).geometry;
         let again =
-            skinrig_analysis::locator::Fitted::new(locator, geometry, stored.model).unwrap();
+            skinrig_analysis::locator::FittedLocator::new(locator, geometry, stored.model).unwrap();
         for press in skin.presses() {
             let features = skins::features(&press);
             assert_eq!(again.locate(&features), choice.fitted.locate(&features));

@@ -10,7 +10,7 @@ use super::facts::facts;
 use crate::analyses;
 use crate::args::CompareArgs;
 use crate::exit::Failure;
-use crate::results::{Choices, analyze_shown};
+use crate::results::{AnalysisRequest, analyze_shown};
 use crate::sessions::{copies, originals};
 
 /// Most skins in one comparison: letters A to H.
@@ -122,11 +122,14 @@ fn session(path: &Path, name: Option<&str>) -> Result<Session, Failure> {
     let analysis = match analyses::stored(path, &facts.session_id, name) {
         Some(analysis) => analysis,
         None => {
-            let choices = variant.as_ref().map_or_else(Choices::default, |v| Choices {
-                overrides: &v.changed,
-                reference_code: v.reference_code,
-                name: Some(&v.name),
-            });
+            let choices =
+                variant
+                    .as_ref()
+                    .map_or_else(AnalysisRequest::default, |v| AnalysisRequest {
+                        overrides: &v.changed,
+                        reference_code: v.reference_code,
+                        name: Some(&v.name),
+                    });
             analyze_shown(path, choices)
                 .map_err(|f| Failure {
                     message: format!("{}\n  ({}: no results)", f.message, path.display()),

@@ -20,7 +20,7 @@ use skinrig_report::trend::sentence;
 use super::args::HilRunArgs;
 use super::live::{self, NightProgress};
 use super::real_bench::RealBench;
-use super::trend::After;
+use super::trend::NightTrends;
 use super::{lease, trend};
 use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
@@ -118,7 +118,7 @@ pub(crate) fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome 
 }
 
 /// Trends after the night, if a history was given.
-type TrendOutcome = Option<Result<After, HistoryError>>;
+type TrendOutcome = Option<Result<NightTrends, HistoryError>>;
 
 /// A file of the night could not be written.
 #[derive(Debug, thiserror::Error)]

@@ -132,14 +132,14 @@ fn is_unicode() -> bool {
 }
 
 /// Trends up to a night.
-pub(super) struct After {
+pub(super) struct NightTrends {
     pub report: Report,
     /// Links by alarm, relative to the night's folder.
     pub links: Vec<Links>,
     accepted: Vec<Acceptance>,
 }
 
-impl After {
+impl NightTrends {
     /// Page of all charts, for the night's folder.
     pub(super) fn page(&self) -> String {
         page(&self.report, &self.links, &self.accepted)
@@ -147,7 +147,7 @@ impl After {
 }
 
 /// Adds a night, whose files are in `home`, to the history at `path`, and judges all nights up to it.
-pub(super) fn after(path: &Path, night: &Night, home: &Path) -> Result<After, HistoryError> {
+pub(super) fn after(path: &Path, night: &Night, home: &Path) -> Result<NightTrends, HistoryError> {
     history::append(path, night, home)?;
     let filter = Filter {
         rig: Some(night.rig.clone()),
@@ -156,7 +156,7 @@ pub(super) fn after(path: &Path, night: &Night, home: &Path) -> Result<After, Hi
     let history = history::load(path, &filter)?;
     let report = judge(&history);
     let kept = alarms::keep(path, &report);
-    Ok(After {
+    Ok(NightTrends {
         report,
         links: kept.iter().map(|k| k.links(Some(home))).collect(),
         accepted: history.accepted,

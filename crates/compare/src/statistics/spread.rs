@@ -1,6 +1,6 @@
 //! Standard deviation between repetitions, averaged over series.
 
-use super::influence::{Measure, Scale, from_terms};
+use super::influence::{Measure, RatioTransform, from_terms};
 use super::sample::{Clusters, Data, Position};
 
 /// Estimator of the standard deviation of a series.
@@ -94,5 +94,5 @@ pub(super) fn repeat_std(
         series.flat_map(one).collect()
     };
     let positions = kept.map(|(k, v)| (*k, terms(v)));
-    from_terms(positions.collect(), Scale::Same)
+    from_terms(positions.collect(), RatioTransform::Same)
 }

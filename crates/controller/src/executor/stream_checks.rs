@@ -5,7 +5,7 @@ use skinrig_model::pulse::LOOPBACK;
 use skinrig_model::{CameraId, HostDuration, PreflightCheck, Record, RunFault};
 
 use super::Executor;
-use crate::camera_streams::Collect;
+use crate::camera_streams::ReadMode;
 use crate::checks::Preflight;
 use crate::error::Halt;
 use crate::stream_probe::StreamProbe;
@@ -73,7 +73,7 @@ impl Executor<'_> {
         while !self.preflight.streams_fulfil(&done) && self.now() < until {
             self.tick(Some(until))?;
             // A chunk may take long to fill.
-            self.collect(Collect::Flush)?;
+            self.collect(ReadMode::Flush)?;
         }
         Ok(())
     }

@@ -4,7 +4,7 @@ use skinrig_controller::{ControlHandle, ControllerSettings, Floor, GuardError, J
 use skinrig_device::MotionLimits;
 use skinrig_model::{HostDuration, Point3, SimLevel, Skin};
 use skinrig_protocol::TouchSearch;
-use skinrig_protocol::plan::{OnTrip, RunLimits};
+use skinrig_protocol::plan::{RunLimits, TripReaction};
 use skinrig_sim::config::SimConfig;
 use skinrig_sim::rig::simulated_rig;
 
@@ -25,7 +25,7 @@ fn jog(max_depth_mm: Option<f64>, control: &ControlHandle) -> Jog<'static> {
         position_tolerance_mm: 0.1,
         settle_time: HostDuration::from_millis(50),
         max_acceleration_mm_s2: None,
-        on_trip: OnTrip::Retract,
+        on_trip: TripReaction::Retract,
     };
     let robot = MotionLimits {
         min_mm,

@@ -3,7 +3,7 @@
 use crate::error::{Evk1Error, UsbError};
 use crate::registers::{Field, Register};
 use crate::requests;
-use crate::tolerance::{Accept, Mismatches, Tolerance};
+use crate::tolerance::{Mismatches, Tolerance, ToleranceKey};
 use crate::usb::Transport;
 
 /// The registers of one camera. Borrows the transport, so that nothing interrupts a read-modify-write.
@@ -53,7 +53,7 @@ impl<'a> Registers<'a> {
         }
         if self.tolerance.everything {
             self.seen.add(
-                Accept::ReadStatus(status),
+                ToleranceKey::ReadStatus(status),
                 format!("expected status 0x40 of register reads, found {status:#04x}"),
             );
         }
@@ -127,7 +127,7 @@ impl<'a> Registers<'a> {
             return Err(Evk1Error::read_back(register, word, found));
         }
         self.seen.add(
-            Accept::ReadBack(register.address),
+            ToleranceKey::ReadBack(register.address),
             format!(
                 "expected {word:#010x} in {} after writing, found {found:#010x}",
                 register.name

@@ -21,8 +21,8 @@ use crate::identify::{Identity, identify_tolerating, open_serial};
 use crate::inbox::{Inbox, QueuedData};
 use crate::registers::{CHIP_ID, OVERFLOW_HITCOUNT, TEMPERATURE};
 use crate::report::StreamReport;
-use crate::settings::Checked;
-use crate::tolerance::{Accept, Mismatch, Mismatches, Tolerance};
+use crate::settings::ValidatedSettings;
+use crate::tolerance::{Mismatch, Mismatches, Tolerance, ToleranceKey};
 use crate::triggers::{self, CHANNELS, TriggerOut};
 use crate::usb::Transport;
 use crate::{noise_filter, pattern, sequences, sync};
@@ -36,7 +36,7 @@ pub struct Evk1 {
     seen: Mismatches,
     transport: Box<dyn Transport>,
     clock: Box<dyn Clock>,
-    settings: Option<Checked>,
+    settings: Option<ValidatedSettings>,
     /// Whether the pattern generator may be on.
     pattern: bool,
     stream: Option<Stream>,
@@ -72,7 +72,7 @@ fn reset(
         Err(e) if tolerance.failed_reset && e != UsbError::Gone => Ok(()),
         Err(e) if tolerance.everything && e != UsbError::Gone => {
             seen.add(
-                Accept::FailedReset,
+                ToleranceKey::FailedReset,
                 format!("expected a reset on the bus, found {e}"),
             );
             Ok(())
@@ -204,7 +204,7 @@ impl Evk1 {
     pub fn set_trigger_out(&mut self, pulses: Option<TriggerOut>) -> Result<(), Evk1Error> {
         if let Some(pulses) = pulses {
             pulses.check()?;
-            let mode = self.settings.as_ref().map(Checked::sync);
+            let mode = self.settings.as_ref().map(ValidatedSettings::sync);
             sync::check(mode.unwrap_or_default(), true)?;
         }
         if self.identity.fpga_version < sequences::TRIGGER_OUT_SINCE {
@@ -320,7 +320,7 @@ impl Evk1 {
 
     fn try_configure(&mut self, settings: &CameraSettings) -> Result<Vec<Setting>, Evk1Error> {
         self.expect_stopped()?;
-        let checked = Checked::new(settings)?;
+        let checked = ValidatedSettings::new(settings)?;
         self.give_pixels_back()?;
         let mut registers = self.registers();
         checked.write(&mut registers)?;
@@ -414,7 +414,10 @@ impl Evk1 {
     /// Reverts a failed start: transfers, time base, and the noise filter, which would drop everything and pass for the configured
     /// setting at the next start. Ignores further errors, because the first one is more informative.
     fn undo_start(&mut self) {
-        let filter = self.settings.as_ref().and_then(Checked::noise_filter);
+        let filter = self
+            .settings
+            .as_ref()
+            .and_then(ValidatedSettings::noise_filter);
         let _ = self.transport.stop_stream();
         let mut registers = self.registers();
         let _ = sequences::stop(&mut registers);
@@ -506,7 +509,7 @@ impl Evk1 {
         let failed = self.report.failed_transfers;
         if failed > 0 && !self.config.tolerance.failed_transfers {
             let found = format!("expected transfers that succeed, found {failed} that failed");
-            self.seen.add(Accept::FailedTransfers, found);
+            self.seen.add(ToleranceKey::FailedTransfers, found);
         }
         self.notes.extend(self.report.notes());
         let tolerated = self.seen.all().into_iter();

@@ -24,7 +24,7 @@ pub struct DecodedMarks {
 
 /// A received train, before error correction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ReadTrain {
+pub struct ReceivedTrain {
     /// Rising edge of its start pulse on the camera's clock, µs; inferred from the first rising edge that is there.
     pub t_us: u64,
     /// Data and check bits, the first one sent most significant (see [`PulseTrain::bits`]); 0 where unreadable.
@@ -52,7 +52,7 @@ pub struct ReadTrain {
 #[must_use]
 pub fn decode_marks(edges: &[TriggerEdge]) -> DecodedMarks {
     let mut out = DecodedMarks::default();
-    let named = |read: ReadTrain| fill(read.bits, read.erased).map(|label| (read, label));
+    let named = |read: ReceivedTrain| fill(read.bits, read.erased).map(|label| (read, label));
     let mut readings = read_trains(edges).into_iter().filter_map(named).peekable();
     let mut used = 0;
     while let Some((first, label)) = readings.next() {
@@ -84,10 +84,10 @@ pub fn decode_marks(edges: &[TriggerEdge]) -> DecodedMarks {
 /// pulse, and no edge at the positions of a pulse before the first or after the last. Most are noise or the same
 /// train again, read from a bit whose width equals that of a start; their labels distinguish them.
 #[must_use]
-pub fn read_trains(edges: &[TriggerEdge]) -> Vec<ReadTrain> {
+pub fn read_trains(edges: &[TriggerEdge]) -> Vec<ReceivedTrain> {
     let mut edges = edges.to_vec();
     edges.sort_by_key(|e| e.t_us);
-    let mut found: Vec<ReadTrain> = edges
+    let mut found: Vec<ReceivedTrain> = edges
         .iter()
         .enumerate()
         .filter(|(_, e)| !e.rising)
@@ -109,7 +109,7 @@ pub fn read_trains(edges: &[TriggerEdge]) -> Vec<ReadTrain> {
 }
 
 /// Reads the train that starts about `start_us`.
-fn read_train(edges: &[TriggerEdge], start_us: u64) -> Option<ReadTrain> {
+fn read_train(edges: &[TriggerEdge], start_us: u64) -> Option<ReceivedTrain> {
     let line = Line { edges };
     if line.has_pulse(start_us.checked_sub(PULSE_PERIOD_US)?) {
         return None;
@@ -141,7 +141,7 @@ fn read_train(edges: &[TriggerEdge], start_us: u64) -> Option<ReadTrain> {
     if line.has_pulse(rise_us) {
         return None;
     }
-    Some(ReadTrain {
+    Some(ReceivedTrain {
         t_us: t_us?,
         bits,
         erased,

@@ -5,7 +5,7 @@ use std::path::Path;
 use sha2::{Digest, Sha256};
 use skinrig_model::press::PressRole;
 use skinrig_model::*;
-use skinrig_recorder::{ChunkScanner, Sealed, SessionWriter};
+use skinrig_recorder::{ChunkScanner, SealedSession, SessionWriter};
 use sqlx::{ConnectOptions, sqlite::SqliteConnectOptions};
 
 /// EVT2 without wraps: enough to recompute facts.
@@ -342,7 +342,7 @@ fn attempts(ids: &[AttemptId], out: &mut Vec<Record>) -> HostTime {
 }
 
 /// Records `presses` presses and seals the session.
-pub(crate) fn sealed(path: &Path, presses: u32) -> Sealed {
+pub(crate) fn sealed(path: &Path, presses: u32) -> SealedSession {
     let mut writer = SessionWriter::create(path).unwrap();
     for record in records(presses) {
         writer.accept(record).unwrap();

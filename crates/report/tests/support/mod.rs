@@ -160,7 +160,7 @@ pub(crate) fn analysis(side: u32, repetitions: u32) -> Analysis {
         }),
         scored,
         scored_without_exclusions,
-        penalised: Penalised {
+        penalised: PenalisedRmse {
             penalty_mm: 28.3,
             derived: true,
             raised: false,
@@ -588,7 +588,7 @@ pub(crate) fn empty() -> Analysis {
         warnings: vec![],
         pictures: vec![],
         zooms: vec![],
-        penalised: Penalised {
+        penalised: PenalisedRmse {
             failures: 0,
             ..full.penalised
         },

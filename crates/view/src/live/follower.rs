@@ -24,9 +24,9 @@ const LEFT_ALONE: Duration = Duration::from_secs(10);
 
 /// Since when a session may be being sealed.
 #[derive(Default)]
-struct Sealing(Option<Instant>);
+struct SealTimer(Option<Instant>);
 
-impl Sealing {
+impl SealTimer {
     fn may_go_on(&mut self, run: Option<&RunState>, is_written: bool) -> bool {
         if run.is_some_and(|run| !run.is_over) || !is_written {
             self.0 = None;
@@ -46,7 +46,7 @@ pub(super) fn follow(
     let stop = Arc::new(AtomicBool::new(false));
     let mut snapshot = SessionSnapshot::new(path);
     let mut estimates = Estimates::new(path, &stop);
-    let mut sealing = Sealing::default();
+    let mut sealing = SealTimer::default();
     let mut unwatched: Option<Instant> = None;
     loop {
         // The writer first: a run that ends in between has then left its end in the file.

@@ -24,7 +24,7 @@ impl std::error::Error for Unavailable {}
 
 /// Build results.
 #[derive(Debug, Clone)]
-pub struct Built {
+pub struct BuildOutput {
     /// The firmware image.
     pub firmware: PathBuf,
     /// The board program.
@@ -38,14 +38,14 @@ pub struct Built {
 ///
 /// # Panics
 /// When the tools exist but the sources do not compile.
-pub fn build() -> Result<Built, Unavailable> {
+pub fn build() -> Result<BuildOutput, Unavailable> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let firmware_dir = here.join("../../trigger_box");
     check_tools()?;
     let (cache, scratch) = places(&sources(here, &firmware_dir)).unwrap_or_else(|e| {
         panic!("the emulated trigger box needs a place to build in: {e}");
     });
-    let built = Built {
+    let built = BuildOutput {
         firmware: cache.join("trigger_box.elf"),
         board: cache.join("board"),
     };

@@ -19,10 +19,10 @@ use std::time::{Duration, Instant};
 use skinrig_fuzz::mutate::{Dice, mutate};
 use skinrig_fuzz::{Target, target};
 
-use self::allocator::Counting;
+use self::allocator::CountingAllocator;
 
 #[global_allocator]
-static MEMORY: Counting = Counting::new();
+static MEMORY: CountingAllocator = CountingAllocator::new();
 
 /// Timeout of a case. Generous, because other programs compete for the processors.
 const HANGS: Duration = Duration::from_secs(120);

@@ -34,7 +34,7 @@ pub(crate) struct FinishedTransfer {
 
 /// Data delivered to the host from the data endpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Delivered {
+pub struct DeliveryTotals {
     /// Bytes.
     pub bytes: u64,
     /// CRC-32 (IEEE 802.3) over all of them.
@@ -70,7 +70,7 @@ struct State {
     /// Transfers until one fails.
     broken: Option<u32>,
     resets_fail: bool,
-    delivered: Delivered,
+    delivered: DeliveryTotals,
     ready: Readiness,
 }
 
@@ -102,7 +102,7 @@ impl Queues {
             cut: None,
             broken: None,
             resets_fail: false,
-            delivered: Delivered::default(),
+            delivered: DeliveryTotals::default(),
             ready,
         };
         Self {
@@ -256,7 +256,7 @@ impl Queues {
         // Only the thread that serves the file counts, so this is not interrupted.
         let mut crc = crc32fast::Hasher::new_with_initial_len(before.crc32, before.bytes);
         crc.update(bytes);
-        self.lock().delivered = Delivered {
+        self.lock().delivered = DeliveryTotals {
             bytes: before.bytes + bytes.len() as u64,
             crc32: crc.finalize(),
             transfers: before.transfers + 1,
@@ -353,7 +353,7 @@ impl Queues {
     }
 
     /// Data delivered to the host so far.
-    pub(crate) fn delivered(&self) -> Delivered {
+    pub(crate) fn delivered(&self) -> DeliveryTotals {
         self.lock().delivered
     }
 }
