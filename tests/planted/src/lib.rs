@@ -1,5 +1,6 @@
 //! Sessions created in memory, press by press: inputs of the analysis and events.
 
+use skinrig_analysis::result::PressView;
 use skinrig_analysis::{EventSource, EventSourceError, SessionInput};
 use skinrig_model::{
     AnalysisSettings, AttemptId, CameraId, CdEvent, HostTime, LocationId, Mark, MarkKind,
@@ -106,6 +107,24 @@ pub fn timing(
         release: after(release),
         clear: after(clear),
     }
+}
+
+/// What a camera saw of a press: one cluster of all its events, in column `u`.
+pub const fn view(u: f64, events: u32) -> Option<PressView> {
+    Some(PressView {
+        events,
+        on_events: events / 2,
+        clusters: 1,
+        cluster_events: events,
+        centroid_u: Some(u),
+        centroid_v: Some(270.0),
+        rate_per_s: 1e3,
+        idle_rate_per_s: 10.0,
+        idle_s: 0.5,
+        spread_u: None,
+        spread_v: None,
+        width_u: None,
+    })
 }
 
 /// Adds a press to `input` and returns its ID.

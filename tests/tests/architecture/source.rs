@@ -1,4 +1,5 @@
 //! Rules for our source files, tests included: length, first line, unsafe code, and words that only some files may use.
+
 use std::collections::BTreeSet;
 use std::path::Path;
 
