@@ -55,7 +55,7 @@ fn moves(legs: &[LegStart], lines: &[Option<LegLine>], k: usize) -> Vec<i64> {
         let begun = leg.checked_sub(1).map(|i| &legs[i]);
         begun.map_or(0.0, |b| b.origin.0 as f64 * 1e-3 - b.recorded_us[k] as f64)
     };
-    let wanted = |leg: usize| match (steadiest, &lines[leg]) {
+    let offset_of = |leg: usize| match (steadiest, &lines[leg]) {
         (Some((_, best)), Some(line)) => {
             let host_us = line.middle_us;
             let rate = 1.0 + best.fit.drift_ppm * 1e-6;
@@ -65,9 +65,9 @@ fn moves(legs: &[LegStart], lines: &[Option<LegLine>], k: usize) -> Vec<i64> {
         // Nothing ties its clocks: assume that they started together as in the best-known leg.
         (best, _) => start(leg) - start(best.map_or(0, |(leg, _)| leg)),
     };
-    let first = wanted(0);
+    let first = offset_of(0);
     (0..lines.len())
-        .map(|leg| (wanted(leg) - first).round() as i64)
+        .map(|leg| (offset_of(leg) - first).round() as i64)
         .collect()
 }
 
@@ -223,9 +223,12 @@ mod tests {
         ];
         // The third leg has no presses.
         let pressed = [1e6, 11e6, 11.5e6, 15e6].into_iter();
-        let said = nominal_only(&LEGS, &clocks, pressed);
-        assert_eq!(said.len(), 1, "{said:?}");
-        assert!(said[0].starts_with("leg 2, camera 2: expected"), "{said:?}");
+        let message = nominal_only(&LEGS, &clocks, pressed);
+        assert_eq!(message.len(), 1, "{message:?}");
+        assert!(
+            message[0].starts_with("leg 2, camera 2: expected"),
+            "{message:?}"
+        );
         assert_eq!(nominal_only(&[], &[], [1e6].into_iter()), [""; 0]);
     }
 }

@@ -41,11 +41,11 @@ impl LocatedPresses {
 /// Applies journal, data and rules to the presses, calibrates, learns to locate, and locates all presses.
 pub(crate) fn locate_presses(
     input: &SessionInput,
-    seen: [CameraObservations<'_>; 2],
+    observations: [CameraObservations<'_>; 2],
     effort: Effort,
     warnings: &mut Vec<String>,
 ) -> LocatedPresses {
-    let mut presses = rows(input, seen);
+    let mut presses = rows(input, observations);
     let calibrated = calibrate_session(input, &mut presses, warnings);
     let set = CalibrationSet::from_presses(&presses);
     let mut locator = locator::choose(&set, &calibrated, &input.settings, effort);
@@ -87,13 +87,13 @@ pub(crate) fn locate_presses(
     }
 }
 
-fn rows(input: &SessionInput, seen: [CameraObservations<'_>; 2]) -> Vec<PressResult> {
-    let has_clock = [0, 1].map(|k| seen[k].has_clock);
+fn rows(input: &SessionInput, observations: [CameraObservations<'_>; 2]) -> Vec<PressResult> {
+    let has_clock = [0, 1].map(|k| observations[k].has_clock);
     let pairs = input.planned.iter().zip(&input.outcomes).enumerate();
     pairs
         .map(|(i, (planned, outcome))| {
-            let views = [0, 1].map(|k| seen[k].views[i]);
-            let data_lost = [0, 1].map(|k| seen[k].data_lost[i]);
+            let views = [0, 1].map(|k| observations[k].views[i]);
+            let data_lost = [0, 1].map(|k| observations[k].data_lost[i]);
             let mut judgement = verdict::from_data(
                 planned.role,
                 outcome.as_ref(),
@@ -106,7 +106,7 @@ fn rows(input: &SessionInput, seen: [CameraObservations<'_>; 2]) -> Vec<PressRes
                 judgement = judgement.or_by_hand();
             }
             for camera in CameraId::ALL {
-                if let Some(untimed) = seen[camera.index()].untimed[i] {
+                if let Some(untimed) = observations[camera.index()].untimed[i] {
                     judgement = judgement.or_untimed(camera, untimed);
                 }
             }

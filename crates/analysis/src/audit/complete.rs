@@ -164,16 +164,16 @@ fn triggers(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
         [(camera, _)] => Some(camera),
         _ => None,
     };
-    let seen = found
+    let listed = found
         .iter()
         .map(|(camera, (edges, used))| format!("{edges} edges and {used} usable marks ({camera})"));
-    let seen: Vec<String> = seen.collect();
-    if seen.is_empty() {
+    let listed: Vec<String> = listed.collect();
+    if listed.is_empty() {
         return Vec::new();
     }
     let evidence = format!(
         "expected the {sent} marks sent on trigger channel {channel}, found {}",
-        seen.join(" and ")
+        listed.join(" and ")
     );
     vec![finding(Law::Complete, Fault::NoTriggers, camera, evidence)]
 }

@@ -36,12 +36,12 @@ pub(super) fn findings(
     };
     let near = |at: f64, all: &[f64], within: f64| all.iter().any(|l| (l - at).abs() <= within);
     let [one, two] = contacts_s;
-    let made: Vec<f64> = one
+    let by_both: Vec<f64> = one
         .iter()
         .copied()
         .filter(|at| near(*at, two, TOGETHER_S))
         .collect();
-    let unlisted: Vec<f64> = made
+    let unlisted: Vec<f64> = by_both
         .iter()
         .copied()
         .filter(|at| !near(*at, &listed, NEAR_S))
@@ -53,14 +53,14 @@ pub(super) fn findings(
     let from = begin - SYNC_LENGTHS * (end - begin) - SYNC_S;
     let before = |at: &&f64| **at < first - NEAR_S;
     let of_sync = |at: &&f64| before(at) && **at >= from && !sync.is_empty();
-    let seen: Vec<String> = made
+    let sync_offsets_s: Vec<String> = by_both
         .iter()
         .filter(of_sync)
         .map(|at| format!("{:+.1}", at - first))
         .collect();
     let unseen = sync
         .iter()
-        .filter(|at| !near(**at, &made, NEAR_S))
+        .filter(|at| !near(**at, &by_both, NEAR_S))
         .filter(|at| [one, two].iter().all(|all| !near(**at, all, NEAR_S)));
     let (more, fewer) = (unlisted.iter().filter(of_sync).count(), unseen.count());
     let mut found = Vec::new();
@@ -72,10 +72,10 @@ pub(super) fn findings(
         let evidence = format!(
             "expected sync presses at {} s from the first press of the path, found presses at {} s",
             planned.join(", "),
-            if seen.is_empty() {
+            if sync_offsets_s.is_empty() {
                 "no".to_owned()
             } else {
-                seen.join(", ")
+                sync_offsets_s.join(", ")
             }
         );
         found.push(finding(

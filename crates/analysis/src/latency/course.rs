@@ -51,8 +51,8 @@ pub fn course(trials: &[Trial], bin_ms: f64) -> LatencyCourse {
     let bins: Vec<(i64, [f32; 3])> = (from..to)
         .into_par_iter()
         .filter_map(|bin| {
-            let mut here: Vec<f64> = trials.iter().filter_map(|t| t.course.at(bin)).collect();
-            (2 * here.len() >= trials.len()).then(|| (bin, percentiles(&mut here)))
+            let mut bin_rates: Vec<f64> = trials.iter().filter_map(|t| t.course.at(bin)).collect();
+            (2 * bin_rates.len() >= trials.len()).then(|| (bin, percentiles(&mut bin_rates)))
         })
         .collect();
     let mut background: Vec<f64> = trials

@@ -22,12 +22,12 @@ pub(crate) struct Attempt<'a> {
 
 impl<'a> Attempt<'a> {
     /// A retained press with its row of the table; `None` without a measured position.
-    pub(crate) fn new(row: &PressResult, kept: &'a RetainedPress) -> Option<Self> {
+    pub(crate) fn new(row: &PressResult, retained: &'a RetainedPress) -> Option<Self> {
         Some(Self {
             press: row.press,
             location: row.location.index(),
             truth: row.truth?,
-            views: &kept.views,
+            views: &retained.views,
         })
     }
 

@@ -41,7 +41,7 @@ fn a_field_removes_structured_error_and_is_chosen() {
 /// Nothing to learn: one choice in ten may be wrong, and a wrong one costs a few percent.
 #[test]
 fn scatter_alone_teaches_nothing_and_costs_little() {
-    let mut kept = 0;
+    let mut retained = 0;
     let mut ratios = Vec::new();
     for seed in 0..8 {
         let skin = Skin {
@@ -49,11 +49,11 @@ fn scatter_alone_teaches_nothing_and_costs_little() {
             ..Skin::new(seed)
         };
         let auto = learn(&skin, Locator::Auto);
-        kept += u32::from(auto.result.locator == Locator::Geometry);
+        retained += u32::from(auto.result.locator == Locator::Geometry);
         let geometry = learn(&skin, Locator::Geometry);
         ratios.push(rms(&skin, &auto) / rms(&skin, &geometry));
     }
-    assert!(kept >= 6, "{kept} of 8");
+    assert!(retained >= 6, "{retained} of 8");
     assert!(ratios.iter().all(|r| *r < 1.06), "{ratios:?}");
 }
 
@@ -93,7 +93,7 @@ fn spreads_by_chance_change_little() {
 
 #[test]
 fn what_is_too_little_to_learn_from_gives_the_geometry_and_a_reason() {
-    let said = |choice: &LocatorChoice| choice.result.fallback.clone().unwrap();
+    let fallback_message = |choice: &LocatorChoice| choice.result.fallback.clone().unwrap();
     for presses in [0, 1, 2, 3, 4, 6, 11] {
         let skin = Skin {
             calibrating: presses,
@@ -102,9 +102,9 @@ fn what_is_too_little_to_learn_from_gives_the_geometry_and_a_reason() {
         let named = learn(&skin, Locator::Field);
         assert_eq!(named.result.locator, Locator::Geometry);
         assert!(
-            said(&named).contains("needs 12 calibration locations"),
+            fallback_message(&named).contains("needs 12 calibration locations"),
             "{}",
-            said(&named)
+            fallback_message(&named)
         );
         assert_eq!(named.warnings.len(), 1);
         let auto = learn(&skin, Locator::Auto);
@@ -202,11 +202,11 @@ fn the_stored_form_locates_to_the_same_bits() {
         let stored: skinrig_analysis::result::LocatorResult = serde_json::from_str(&text).unwrap();
         assert_eq!(stored, choice.result);
         let geometry = skins::calibrated(&skin.set()).geometry;
-        let again =
+        let restored =
             skinrig_analysis::locator::FittedLocator::new(locator, geometry, stored.model).unwrap();
         for press in skin.presses() {
             let features = skins::features(&press);
-            assert_eq!(again.locate(&features), choice.fitted.locate(&features));
+            assert_eq!(restored.locate(&features), choice.fitted.locate(&features));
         }
     }
 }

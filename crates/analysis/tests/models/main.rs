@@ -294,12 +294,12 @@ fn a_failed_fit_falls_back_to_the_next_smaller_model_with_a_note() {
             let chosen = choose(&set, &DRAWN, &settings(model, seed));
             let used = chosen.calibration.as_ref().map(|c| c.model);
             assert_eq!(used, expected);
-            let said = |words: &str| chosen.warnings.iter().any(|w| w.contains(words));
+            let warns = |words: &str| chosen.warnings.iter().any(|w| w.contains(words));
             assert_eq!(
-                said("found no plausible geometry: using `"),
+                warns("found no plausible geometry: using `"),
                 used.is_some() && used != Some(model)
             );
-            assert_eq!(said("using the nominal camera geometry"), used.is_none());
+            assert_eq!(warns("using the nominal camera geometry"), used.is_none());
             fallen += u32::from(used.is_some() && used != Some(model));
         }
     }

@@ -85,14 +85,14 @@ fn broken_times_are_errors_and_never_panic() {
     source.events[0].push(CdEvent { t_us: 0, ..last });
     let a = analyze(&input, &source).unwrap();
     assert_eq!(a.counts.valid, 50);
-    let said = a.warnings.join("; ");
+    let text = a.warnings.join("; ");
     assert!(
-        said.contains("camera 1: 1 events are more than 10 ms out of order"),
-        "{said}"
+        text.contains("camera 1: 1 events are more than 10 ms out of order"),
+        "{text}"
     );
     assert!(
-        said.contains("camera 1: 1 events have timestamps days away"),
-        "{said}"
+        text.contains("camera 1: 1 events have timestamps days away"),
+        "{text}"
     );
 }
 
@@ -187,9 +187,9 @@ proptest! {
         input.settings.min_cluster_events = min_cluster_events;
         input.settings.exclude_outside = exclude_outside;
         input.settings.min_ray_sine = min_ray_sine;
-        for (outcome, fate) in input.outcomes.iter_mut().zip(&fates) {
+        for (outcome, defect) in input.outcomes.iter_mut().zip(&fates) {
             let Some(o) = outcome else { continue };
-            match fate {
+            match defect {
                 0 => *outcome = None,
                 1 => o.verdict = PressVerdict::Missed(MissedReason::NeverAttempted),
                 2 => o.verdict = PressVerdict::cut_off(1),

@@ -61,21 +61,33 @@ fn each_failure_has_its_own_row_and_reason() {
     }
     let a = analyze(&input, &source).unwrap();
     let reason = |row: usize| (a.presses[row].verdict, a.presses[row].reason().unwrap());
-    let said = |v: Verdict, r: &str| (v, r.to_owned());
-    assert_eq!(reason(52), said(Verdict::Missed, "never attempted"));
-    assert_eq!(reason(51), said(Verdict::Missed, "operator: stop"));
-    assert_eq!(reason(50), said(Verdict::Invalid, "paused by the operator"));
+    let with_reason = |v: Verdict, r: &str| (v, r.to_owned());
+    assert_eq!(reason(52), with_reason(Verdict::Missed, "never attempted"));
+    assert_eq!(reason(51), with_reason(Verdict::Missed, "operator: stop"));
+    assert_eq!(
+        reason(50),
+        with_reason(Verdict::Invalid, "paused by the operator")
+    );
     assert_eq!(
         reason(49),
-        said(Verdict::Excluded, "not used: presses_used is [1]")
+        with_reason(Verdict::Excluded, "not used: presses_used is [1]")
     );
-    assert_eq!(reason(48), said(Verdict::Invalid, "no measured position"));
-    assert_eq!(reason(47), said(Verdict::Invalid, "no measured times"));
+    assert_eq!(
+        reason(48),
+        with_reason(Verdict::Invalid, "no measured position")
+    );
+    assert_eq!(
+        reason(47),
+        with_reason(Verdict::Invalid, "no measured times")
+    );
     assert_eq!(
         reason(46),
-        said(Verdict::Invalid, "data lost in window (camera 2)")
+        with_reason(Verdict::Invalid, "data lost in window (camera 2)")
     );
-    assert_eq!(reason(45), said(Verdict::Excluded, "no cluster (camera 2)"));
+    assert_eq!(
+        reason(45),
+        with_reason(Verdict::Excluded, "no cluster (camera 2)")
+    );
     let (v, r) = reason(44);
     assert!(
         v == Verdict::Excluded
