@@ -325,9 +325,9 @@ impl Arm<'_> {
     /// As [`go`](Self::go).
     pub(crate) fn go_above(&mut self, at: Point2) -> Result<PoseSample, Problem> {
         let high_mm = 2.0 * CLEARANCE_MM;
-        let here = self.pose()?.measured;
-        if here.z_mm < high_mm {
-            self.go(here.plane().at_height(high_mm), 2.0 * SLOW_MM_S)?;
+        let current = self.pose()?.measured;
+        if current.z_mm < high_mm {
+            self.go(current.plane().at_height(high_mm), 2.0 * SLOW_MM_S)?;
         }
         self.go(at.at_height(high_mm), 2.0 * SLOW_MM_S)?;
         self.go(at.at_height(self.search.band_mm), SLOW_MM_S)

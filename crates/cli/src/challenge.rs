@@ -62,20 +62,23 @@ fn make(args: &MakeArgs, json: bool) -> Outcome {
         origin: Origin::of(&header).map(Origin::name),
         salt,
     };
-    let made =
+    let challenge_files =
         challenge::make(&source, &args.out, answers, &making, &mut events).map_err(failure)?;
     if json {
-        crate::terminal::print_json(&serde_json::json!(made));
+        crate::terminal::print_json(&serde_json::json!(challenge_files));
     } else {
-        for path in &made.files {
+        for path in &challenge_files.files {
             outln!("{}", path.display());
         }
         outln!(
             "{} presses calibrate, {} to locate",
-            made.calibrating,
-            made.scored
+            challenge_files.calibrating,
+            challenge_files.scored
         );
-        outln!("answers  {}  (keep this file)", made.answers.display());
+        outln!(
+            "answers  {}  (keep this file)",
+            challenge_files.answers.display()
+        );
     }
     Ok(Exit::Ok)
 }

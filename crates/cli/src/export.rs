@@ -72,7 +72,7 @@ pub(crate) fn refused(e: ExportError) -> Failure {
 
 /// The requested tables, small ones first.
 fn tables(only: &[ExportTable]) -> Vec<TableName> {
-    let wanted = |table: &TableName| {
+    let is_selected = |table: &TableName| {
         let group = match table {
             TableName::Presses => ExportTable::Presses,
             TableName::Pose => ExportTable::Pose,
@@ -81,11 +81,11 @@ fn tables(only: &[ExportTable]) -> Vec<TableName> {
         };
         only.is_empty() || only.contains(&group)
     };
-    TableName::ALL.into_iter().filter(wanted).collect()
+    TableName::ALL.into_iter().filter(is_selected).collect()
 }
 
 /// Each requested format once.
-fn kinds(asked: &[ExportKind]) -> Vec<ExportKind> {
+fn kinds(requested: &[ExportKind]) -> Vec<ExportKind> {
     let all = [
         ExportKind::Parquet,
         ExportKind::Npz,
@@ -93,8 +93,9 @@ fn kinds(asked: &[ExportKind]) -> Vec<ExportKind> {
         ExportKind::Raw,
         ExportKind::Hdf5,
     ];
-    let wanted = |kind: &ExportKind| asked.contains(kind) || asked.contains(&ExportKind::All);
-    all.into_iter().filter(wanted).collect()
+    let is_selected =
+        |kind: &ExportKind| requested.contains(kind) || requested.contains(&ExportKind::All);
+    all.into_iter().filter(is_selected).collect()
 }
 
 /// Exports all formats except a bundle.

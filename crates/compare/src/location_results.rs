@@ -73,10 +73,10 @@ pub(crate) fn compare_locations(
         let mut sums = vec![[0.0; 2]; locations.len()];
         for attempt in locations.attempts(subject) {
             let i = attempt.location as usize;
-            let here = &mut all[i].skins[k];
-            here.presses[1] += 1;
+            let skin_result = &mut all[i].skins[k];
+            skin_result.presses[1] += 1;
             if let Some((x, y)) = attempt.error() {
-                here.presses[0] += 1;
+                skin_result.presses[0] += 1;
                 lengths[i][k].push(libm::hypot(x, y));
                 sums[i][0] += x;
                 sums[i][1] += y;

@@ -198,7 +198,7 @@ fn plan_inputs(
     rig: &RigFile,
     only: Option<&[String]>,
 ) -> Result<PlanInputs, Failure> {
-    let wanted = |name: &str| only.is_none_or(|o| o.iter().any(|w| w == name));
+    let is_selected = |name: &str| only.is_none_or(|o| o.iter().any(|w| w == name));
     let mut inputs = PlanInputs {
         golden: None,
         touch_points: rig.frame.touch_off.as_ref().map(|t| t.points.len()),
@@ -206,7 +206,7 @@ fn plan_inputs(
     for c in &suite.checks {
         if let Measure::Golden { protocol } = &c.measure
             && c.skip.is_none()
-            && wanted(c.name)
+            && is_selected(c.name)
         {
             let checked = check::load(protocol, &[])?;
             inputs.golden = Some(HostDuration::from_secs_f64(

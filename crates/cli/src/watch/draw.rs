@@ -100,14 +100,14 @@ fn latest(press: &LatestAttempt) -> String {
         .cameras
         .map(|signal| signal.map_or_else(|| "-".to_owned(), |s| format!("{:.1}", s.ratio())));
     let [x, y] = press.at_mm;
-    let again = match press.attempt {
+    let attempt_note = match press.attempt {
         1 => String::new(),
         n => format!(", attempt {n}"),
     };
     let reason = press.reason.as_deref();
     let reason = reason.map_or_else(String::new, |r| format!(": {r}"));
     format!(
-        "  {:>5}  ({x:>6.1}, {y:>6.1}) mm  {one:>7} {two:>7}  {}{again}{reason}",
+        "  {:>5}  ({x:>6.1}, {y:>6.1}) mm  {one:>7} {two:>7}  {}{attempt_note}{reason}",
         press.press, press.verdict
     )
 }

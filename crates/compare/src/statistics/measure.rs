@@ -43,11 +43,11 @@ pub(super) fn measure(
             let rate = ratio(c, &keep, RatioTransform::Same, |v| {
                 (f64::from(v.events), v.exposure)
             });
-            let kept = || c.iter().filter(|(k, _)| keep(**k)).flat_map(|(_, v)| v);
-            let events = kept()
+            let retained = || c.iter().filter(|(k, _)| keep(**k)).flat_map(|(_, v)| v);
+            let events = retained()
                 .map(|v: &Count| v.events)
                 .fold(0, u32::saturating_add);
-            let exposure = kept().map(|v| v.exposure).sum();
+            let exposure = retained().map(|v| v.exposure).sum();
             rate.map(|m| Measure {
                 shape: match m.shape {
                     InferenceData::Ratio(ratio) => InferenceData::Counts(events, exposure, ratio),
@@ -68,7 +68,7 @@ fn ratio<T>(
     scale: RatioTransform,
     term: impl Fn(&T) -> (f64, f64),
 ) -> Option<Measure> {
-    let kept = clusters.iter().filter(|(k, _)| keep(**k));
-    let locations = kept.map(|(k, v)| (*k, v.iter().map(&term).collect()));
+    let retained = clusters.iter().filter(|(k, _)| keep(**k));
+    let locations = retained.map(|(k, v)| (*k, v.iter().map(&term).collect()));
     from_terms(locations.collect(), scale)
 }

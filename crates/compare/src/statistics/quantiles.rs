@@ -70,8 +70,8 @@ fn percentile(
     q: f64,
     side: Side,
 ) -> Result<(ValuesByLocation, Percentile), ComparisonError> {
-    let kept = || clusters.iter().filter(|(k, _)| keep(**k));
-    let mut sorted: Vec<f64> = kept().flat_map(|(_, v)| v).map(|t| late(*t)).collect();
+    let retained = || clusters.iter().filter(|(k, _)| keep(**k));
+    let mut sorted: Vec<f64> = retained().flat_map(|(_, v)| v).map(|t| late(*t)).collect();
     if sorted.is_empty() {
         return Err(ComparisonError::Empty { side });
     }
@@ -89,12 +89,13 @@ fn percentile(
     let n = sorted.len() as f64;
     let below = sorted.partition_point(|t| *t <= value) as f64 / n;
     let residual = |t: &Option<f64>| below - f64::from(u8::from(late(*t) <= value));
-    let shares: Vec<f64> = kept()
+    let shares: Vec<f64> = retained()
         .map(|(_, v)| v.iter().map(residual).sum::<f64>() / n)
         .collect();
     let effective = scores::effective(below, n, error(&shares), shares.len());
     let density = density(&sorted[..times], sorted.len(), q);
-    let locations = kept().map(|(k, v)| (*k, v.iter().map(|t| residual(t) / density).collect()));
+    let locations =
+        retained().map(|(k, v)| (*k, v.iter().map(|t| residual(t) / density).collect()));
     let locations = locations.collect();
     let percentile = Percentile {
         value,

@@ -36,13 +36,13 @@ impl Executor<'_> {
         if !self.trigger.is_connected() {
             return Ok(());
         }
-        let seen = |probe: &StreamProbe| probe.all_saw_mark(&loopback);
+        let has_mark = |probe: &StreamProbe| probe.all_saw_mark(&loopback);
         let mut attempts = 0;
-        while attempts < ATTEMPTS && !self.preflight.streams_fulfil(seen) {
+        while attempts < ATTEMPTS && !self.preflight.streams_fulfil(has_mark) {
             attempts += 1;
             self.send_loopback()?;
             let share = HostDuration(loopback.within.0 / i64::from(ATTEMPTS));
-            self.probe_until(share, seen)?;
+            self.probe_until(share, has_mark)?;
         }
         self.preflight.check_streams(|probe| {
             CameraId::ALL.map(|c| probe.loopback_check(c, &loopback, attempts))

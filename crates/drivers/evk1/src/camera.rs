@@ -33,7 +33,7 @@ pub struct Evk1 {
     identity: Identity,
     config: Evk1Config,
     /// Tolerated mismatches.
-    seen: Mismatches,
+    mismatches: Mismatches,
     transport: Box<dyn Transport>,
     clock: Box<dyn Clock>,
     settings: Option<ValidatedSettings>,
@@ -56,22 +56,23 @@ const BY_PORT: &str = "usb-";
 fn registers_of<'a>(
     transport: &'a mut dyn Transport,
     config: &'a Evk1Config,
-    seen: &Mismatches,
+    mismatches: &Mismatches,
 ) -> Registers<'a> {
-    Registers::new(transport, &config.read_back_exceptions).tolerating(&config.tolerance, seen)
+    Registers::new(transport, &config.read_back_exceptions)
+        .tolerating(&config.tolerance, mismatches)
 }
 
 /// Resets the camera on the bus.
 fn reset(
     transport: &mut dyn Transport,
     tolerance: &Tolerance,
-    seen: &Mismatches,
+    mismatches: &Mismatches,
 ) -> Result<(), Evk1Error> {
     match transport.reset() {
         Ok(()) => Ok(()),
         Err(e) if tolerance.failed_reset && e != UsbError::Gone => Ok(()),
         Err(e) if tolerance.everything && e != UsbError::Gone => {
-            seen.add(
+            mismatches.add(
                 ToleranceKey::FailedReset,
                 format!("expected a reset on the bus, found {e}"),
             );
@@ -142,12 +143,16 @@ impl Evk1 {
         mut clock: Box<dyn Clock>,
     ) -> Result<Self, Evk1Error> {
         config.check()?;
-        let seen = Mismatches::default();
-        let identity =
-            identify_tolerating(transport.as_mut(), clock.as_mut(), &config.tolerance, &seen)?;
+        let mismatches = Mismatches::default();
+        let identity = identify_tolerating(
+            transport.as_mut(),
+            clock.as_mut(),
+            &config.tolerance,
+            &mismatches,
+        )?;
         // Data left by an earlier program would come first, with other times.
-        reset(transport.as_mut(), &config.tolerance, &seen)?;
-        let mut registers = registers_of(transport.as_mut(), &config, &seen);
+        reset(transport.as_mut(), &config.tolerance, &mismatches)?;
+        let mut registers = registers_of(transport.as_mut(), &config, &mismatches);
         // Its value is not meaningful yet, and the sensor may be unpowered.
         registers.read_unpowered(CHIP_ID)?;
         sequences::initialise(&mut registers, identity.fpga_version)?;
@@ -157,7 +162,7 @@ impl Evk1 {
             camera,
             identity,
             config,
-            seen,
+            mismatches,
             transport,
             clock,
             settings: None,
@@ -175,13 +180,13 @@ impl Evk1 {
     /// Mismatches tolerated so far, each with the key that accepts it.
     #[must_use]
     pub fn mismatches(&self) -> Vec<Mismatch> {
-        self.seen.all()
+        self.mismatches.all()
     }
 
     /// Shared list of mismatches, which grows while the camera runs.
     #[must_use]
     pub fn tolerated(&self) -> Mismatches {
-        self.seen.clone()
+        self.mismatches.clone()
     }
 
     /// Report of the current or last stream.
@@ -240,7 +245,7 @@ impl Evk1 {
         // The sensor must never stay powered, whichever step failed.
         let mut done = FirstError::default();
         done.after(back.map_err(|e| e.during("stopping the stream")));
-        let mut registers = registers_of(self.transport.as_mut(), &self.config, &self.seen);
+        let mut registers = registers_of(self.transport.as_mut(), &self.config, &self.mismatches);
         if streaming {
             done.after(sequences::stop(&mut registers));
         }
@@ -252,7 +257,7 @@ impl Evk1 {
     }
 
     fn registers(&mut self) -> Registers<'_> {
-        registers_of(self.transport.as_mut(), &self.config, &self.seen)
+        registers_of(self.transport.as_mut(), &self.config, &self.mismatches)
     }
 
     /// Converts to an error of the device trait, and remembers that the camera is disconnected.
@@ -326,7 +331,7 @@ impl Evk1 {
         checked.write(&mut registers)?;
         let mut read = checked.read_back(&mut registers)?;
         self.settings = Some(checked);
-        read.extend(self.seen.all().into_iter().map(|mismatch| Setting {
+        read.extend(self.mismatches.all().into_iter().map(|mismatch| Setting {
             name: format!("tolerated: {}", mismatch.key),
             requested: Setting::TOLERATED.to_owned(),
             read_back: mismatch.what,
@@ -344,14 +349,14 @@ impl Evk1 {
 
     fn try_pattern(
         &mut self,
-        wanted: Option<TestPattern>,
+        pattern: Option<TestPattern>,
     ) -> Result<Option<PatternScan>, Evk1Error> {
         self.expect_stopped()?;
-        let Some(wanted) = wanted else {
+        let Some(pattern) = pattern else {
             return self.give_pixels_back().map(|()| None);
         };
         self.pattern = true;
-        pattern::on(&mut self.registers(), wanted).map(Some)
+        pattern::on(&mut self.registers(), pattern).map(Some)
     }
 
     fn try_start(&mut self) -> Result<(), Evk1Error> {
@@ -361,7 +366,7 @@ impl Evk1 {
             None => (Vec::new(), SyncMode::default()),
         };
         let mut report = StreamReport::default();
-        let mut registers = registers_of(self.transport.as_mut(), &self.config, &self.seen);
+        let mut registers = registers_of(self.transport.as_mut(), &self.config, &self.mismatches);
         if std::mem::replace(&mut self.used, true) {
             report.left_over_bytes =
                 sequences::clear_left_over(&mut registers, self.clock.as_ref())?;
@@ -386,7 +391,7 @@ impl Evk1 {
             let end = clock.now() + HostDuration(span);
             clock.wait_until(end);
         };
-        let mut registers = registers_of(self.transport.as_mut(), &self.config, &self.seen);
+        let mut registers = registers_of(self.transport.as_mut(), &self.config, &self.mismatches);
         if let Err(error) = sequences::start(&mut registers, &mut wait) {
             self.undo_start();
             return Err(error);
@@ -509,10 +514,10 @@ impl Evk1 {
         let failed = self.report.failed_transfers;
         if failed > 0 && !self.config.tolerance.failed_transfers {
             let found = format!("expected transfers that succeed, found {failed} that failed");
-            self.seen.add(ToleranceKey::FailedTransfers, found);
+            self.mismatches.add(ToleranceKey::FailedTransfers, found);
         }
         self.notes.extend(self.report.notes());
-        let tolerated = self.seen.all().into_iter();
+        let tolerated = self.mismatches.all().into_iter();
         self.notes.extend(tolerated.map(|m| m.to_string()));
         received?;
         back.map_err(|e| e.during("stopping the stream"))?;

@@ -116,8 +116,8 @@ fn query_slot(
     let (state, camera) = match slot.open(clock) {
         Ok(Access::Open(mut usb)) => {
             // Mismatches tolerated here are reported when the camera is opened.
-            let seen = Mismatches::default();
-            match identify_tolerating(&mut usb, &mut clock.clone(), tolerance, &seen) {
+            let mismatches = Mismatches::default();
+            match identify_tolerating(&mut usb, &mut clock.clone(), tolerance, &mismatches) {
                 Ok(identity) => (CameraState::Ready(identity), Some(usb)),
                 Err(e) => (CameraState::of(e), None),
             }
@@ -217,8 +217,8 @@ pub fn identify(
     transport: &mut dyn Transport,
     clock: &mut dyn Clock,
 ) -> Result<Identity, Evk1Error> {
-    let seen = Mismatches::default();
-    identify_tolerating(transport, clock, &Tolerance::default(), &seen)
+    let mismatches = Mismatches::default();
+    identify_tolerating(transport, clock, &Tolerance::default(), &mismatches)
 }
 
 /// Like [`identify`], but accepts mismatches allowed by `tolerance`.
@@ -226,7 +226,7 @@ pub(crate) fn identify_tolerating(
     transport: &mut dyn Transport,
     clock: &mut dyn Clock,
     tolerance: &Tolerance,
-    seen: &Mismatches,
+    mismatches: &Mismatches,
 ) -> Result<Identity, Evk1Error> {
     let place = transport.place();
     let not_evk1 = |expected: &str, found: String| Evk1Error::NotEvk1 {
@@ -258,7 +258,7 @@ pub(crate) fn identify_tolerating(
         Err(e) => return Err(e),
     }
     await_fpga(transport, clock)?;
-    let mut registers = Registers::new(transport, &[]).tolerating(tolerance, seen);
+    let mut registers = Registers::new(transport, &[]).tolerating(tolerance, mismatches);
     registers.read_unpowered(ATIS_CONTROL)?; // The first read after power-up is unreliable.
     let serial = registers.read(SERIAL_MSB)?;
     let system = ask16(transport, requests::SYSTEM_ID, "reading the system ID")?;
@@ -284,7 +284,7 @@ pub(crate) fn identify_tolerating(
     )?;
     let [a, b, c, d, ..] = answer;
     let fx3_version = u32::from_le_bytes([a, b, c, d]);
-    let mut registers = Registers::new(transport, &[]).tolerating(tolerance, seen);
+    let mut registers = Registers::new(transport, &[]).tolerating(tolerance, mismatches);
     let fpga_version = registers.read(FPGA_VERSION)?;
     let identity = Identity {
         serial: format!("{serial:08x}"),

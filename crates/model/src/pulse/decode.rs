@@ -223,9 +223,9 @@ mod tests {
         })
     }
 
-    fn labels(seen: &DecodedMarks) -> Vec<(u64, Label)> {
-        let marks = seen.marks.iter().map(|m| (m.t_us, Label::Mark(m.mark)));
-        let syncs = seen.syncs.iter().map(|s| (s.t_us, Label::Sync(s.count)));
+    fn labels(decoded: &DecodedMarks) -> Vec<(u64, Label)> {
+        let marks = decoded.marks.iter().map(|m| (m.t_us, Label::Mark(m.mark)));
+        let syncs = decoded.syncs.iter().map(|s| (s.t_us, Label::Sync(s.count)));
         let mut all: Vec<_> = marks.chain(syncs).collect();
         all.sort();
         all
@@ -242,10 +242,10 @@ mod tests {
                 edge.t_us = (t0 as i64 + since + since * ppm / 1_000_000 + off) as u64;
             }
             let t_us = all[0].t_us;
-            let seen = decode_marks(&all);
-            prop_assert_eq!(seen.stray_edges, 0);
-            prop_assert_eq!(seen.lost_edges, 0);
-            prop_assert_eq!(labels(&seen), vec![(t_us, label)]);
+            let decoded = decode_marks(&all);
+            prop_assert_eq!(decoded.stray_edges, 0);
+            prop_assert_eq!(decoded.lost_edges, 0);
+            prop_assert_eq!(labels(&decoded), vec![(t_us, label)]);
         }
 
         #[test]
@@ -259,9 +259,9 @@ mod tests {
                 let since = (edge.t_us - t0) as i64;
                 edge.t_us = (t0 as i64 + since + since * ppm / 1_000_000) as u64;
             }
-            let seen = decode_marks(&all);
-            prop_assert_eq!(seen.stray_edges, 0);
-            let read: Vec<Label> = labels(&seen).into_iter().map(|(_, label)| label).collect();
+            let decoded = decode_marks(&all);
+            prop_assert_eq!(decoded.stray_edges, 0);
+            let read: Vec<Label> = labels(&decoded).into_iter().map(|(_, label)| label).collect();
             prop_assert_eq!(read, sent);
         }
 
@@ -275,18 +275,18 @@ mod tests {
                 all.remove(at);
             }
             all.extend(edges(Label::Sync(8), 10_000 + PulseTrain::DURATION_US));
-            let seen = decode_marks(&all);
+            let decoded = decode_marks(&all);
             let second = (10_000 + PulseTrain::DURATION_US, Label::Sync(8));
             // Without the falling edge of its start pulse, the start of a train is uncertain.
-            let wanted = if at == 1 && !doubled { vec![second] } else { vec![(10_000, mark(7)), second] };
-            prop_assert_eq!(labels(&seen), wanted);
+            let expected = if at == 1 && !doubled { vec![second] } else { vec![(10_000, mark(7)), second] };
+            prop_assert_eq!(labels(&decoded), expected);
         }
 
         #[test]
         fn any_edges_are_accepted(all in prop::collection::vec((any::<u64>(), any::<bool>()), 0..200)) {
             let all: Vec<_> = all.into_iter().map(|(t, rising)| TriggerEdge { t_us: t, channel: 0, rising }).collect();
-            let seen = decode_marks(&all);
-            prop_assert!(seen.stray_edges as usize <= all.len());
+            let decoded = decode_marks(&all);
+            prop_assert!(decoded.stray_edges as usize <= all.len());
         }
     }
 

@@ -54,7 +54,7 @@ pub(super) fn follow(
         let run = writer.as_ref().and_then(|_| lab.run(path));
         let may_be_sealing = sealing.may_go_on(run.as_ref(), writer.is_some());
         stop.store(may_be_sealing, Ordering::Relaxed);
-        let seen = if may_be_sealing {
+        let refreshed = if may_be_sealing {
             Ok(())
         } else {
             snapshot.refresh(estimates.newest().as_deref(), to)
@@ -80,7 +80,7 @@ pub(super) fn follow(
             "run",
             &json!({ "run": report, "writer": writer, "free_bytes": free_bytes }),
         );
-        match seen {
+        match refreshed {
             Err(e) if writer.is_none() || !is_beginning(&e) => {
                 publish(to, "over", &json!({ "error": e.to_string() }));
                 break;

@@ -44,9 +44,9 @@ struct FuzzedSdk(Mutex<Vec<u8>>);
 impl FuzzedSdk {
     fn take<const N: usize>(&self) -> Option<[u8; N]> {
         let mut left = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let said = left.first_chunk::<N>().copied()?;
+        let head = left.first_chunk::<N>().copied()?;
         left.drain(..N);
-        Some(said)
+        Some(head)
     }
 
     /// A quarter of the answers are errors, a quarter arbitrary, the rest valid.

@@ -51,7 +51,10 @@ pub fn folded(bytes: &[u8]) {
     if let Ok(raw) = codec::unfold(stored, u32::from_le_bytes(*claim) as usize) {
         assert_eq!(raw.len(), u32::from_le_bytes(*claim) as usize);
     }
-    if let Some(again) = codec::fold(stored) {
-        assert_eq!(codec::unfold(&again, stored.len()).as_deref(), Ok(stored));
+    if let Some(refolded) = codec::fold(stored) {
+        assert_eq!(
+            codec::unfold(&refolded, stored.len()).as_deref(),
+            Ok(stored)
+        );
     }
 }

@@ -62,13 +62,13 @@ pub(super) fn presses(t: &mut Table) {
         "the robot makes a press twice and goes on a period later",
         |s| {
             import(s, |b| {
-                let again = b.pressed[35];
+                let press = b.pressed[35];
                 later(b, 36, 2.0);
                 b.pressed.insert(
                     36,
                     ExecutedPress {
-                        contact_s: again.contact_s + 2.0,
-                        ..again
+                        contact_s: press.contact_s + 2.0,
+                        ..press
                     },
                 );
             })

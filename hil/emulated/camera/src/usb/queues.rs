@@ -239,13 +239,13 @@ impl Queues {
     /// The oldest finished transfer.
     pub(crate) fn reap(&self, file: u64) -> Result<FinishedTransfer, Errno> {
         let mut state = self.lock();
-        let gone = state.unplugged;
+        let is_unplugged = state.unplugged;
         let open = state.files.get_mut(&file).ok_or(Errno::NODEV)?;
         let finished = open.done.pop_front();
         state.update_readiness();
         match finished {
             Some(finished) => Ok(finished),
-            None if gone => Err(Errno::NODEV),
+            None if is_unplugged => Err(Errno::NODEV),
             None => Err(Errno::AGAIN),
         }
     }
@@ -375,14 +375,14 @@ impl State {
             if self.level == 0 || !(full || self.ended) {
                 return;
             }
-            let mut wanted = self.level.min(length);
+            let mut requested = self.level.min(length);
             if let Some(cut) = self.cut
-                && wanted > cut
+                && requested > cut
             {
-                wanted -= cut;
+                requested -= cut;
                 self.cut = None;
             }
-            let bytes = self.take(wanted);
+            let bytes = self.take(requested);
             if let Some(open) = self.files.get_mut(&file) {
                 open.waiting.pop_front();
             }
@@ -405,22 +405,22 @@ impl State {
             .find_map(|(file, open)| open.waiting.front().map(|t| (*file, *t)))
     }
 
-    /// Takes up to `wanted` bytes off the FIFO.
-    fn take(&mut self, wanted: usize) -> Vec<u8> {
-        let wanted = wanted.min(self.level);
-        self.level -= wanted;
+    /// Takes up to `requested` bytes off the FIFO.
+    fn take(&mut self, requested: usize) -> Vec<u8> {
+        let requested = requested.min(self.level);
+        self.level -= requested;
         if self.head == 0
             && let Some(first) = self.fifo.front()
-            && first.len() == wanted
+            && first.len() == requested
         {
             return self.fifo.pop_front().unwrap_or_default();
         }
-        let mut taken = Vec::with_capacity(wanted);
-        while taken.len() < wanted {
+        let mut taken = Vec::with_capacity(requested);
+        while taken.len() < requested {
             let Some(first) = self.fifo.front() else {
                 break;
             };
-            let end = first.len().min(self.head + wanted - taken.len());
+            let end = first.len().min(self.head + requested - taken.len());
             taken.extend_from_slice(&first[self.head..end]);
             if end == first.len() {
                 self.fifo.pop_front();
