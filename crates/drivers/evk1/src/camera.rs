@@ -19,6 +19,7 @@ use crate::config::Evk1Config;
 use crate::error::{Evk1Error, FirstError, UsbError};
 use crate::identify::{Identity, identify_tolerating, open_serial};
 use crate::inbox::{Inbox, QueuedData};
+use crate::overflow::{OVERFLOW_PERIOD, Overflow};
 use crate::registers::{CHIP_ID, OVERFLOW_HITCOUNT, TEMPERATURE};
 use crate::report::StreamReport;
 use crate::settings::ValidatedSettings;
@@ -89,25 +90,6 @@ struct Stream {
     overflow_hits: u16,
     overflow: Overflow,
 }
-
-/// Last reading of the camera's overflow counter.
-#[derive(Debug, Clone, Copy)]
-struct Overflow {
-    hits: u16,
-    read_at: HostTime,
-    /// Latest camera time at that reading, µs.
-    good_us: Option<u64>,
-}
-
-impl Overflow {
-    /// Whether data may have been lost since, given the counter value `hits`. True for a saturated counter.
-    const fn lost(self, hits: u16) -> bool {
-        hits != self.hits || hits == u16::MAX
-    }
-}
-
-/// Interval at which the overflow counter is read while streaming. A flush, for example before a verdict, reads it immediately.
-const OVERFLOW_PERIOD: HostDuration = HostDuration::from_millis(1_000);
 
 impl Evk1 {
     /// Opens the camera with this serial number (8 hexadecimal digits) or at this port (`usb-BUS-PORT.PORT`) through libusb. Data are stamped

@@ -17,6 +17,7 @@ pub mod error;
 pub mod identify;
 pub mod inbox;
 pub mod noise_filter;
+mod overflow;
 pub mod pattern;
 pub mod registers;
 pub mod report;

@@ -12,7 +12,7 @@ use crate::{noise_filter, sync, triggers};
 
 /// Validated settings.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ValidatedSettings {
+pub(crate) struct ValidatedSettings {
     settings: CameraSettings,
     biases: Values,
     map: Map,

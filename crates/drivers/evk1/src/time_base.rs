@@ -81,7 +81,7 @@ impl TimeJump {
 
 /// Checks the time base, which must advance in steps of 0 or 1.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct TimeBaseMonitor {
+pub(crate) struct TimeBaseMonitor {
     last: Option<u32>,
 }
 
