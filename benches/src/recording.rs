@@ -11,7 +11,7 @@ use skinrig_model::{
     AnalysisSettings, CdEvent, MarkKind, Point2, Polarity, PressId, PressRole, PressTiming,
     RigGeometry, SkinOutline, StereoGeometry,
 };
-use skinrig_planted::{Touch, mark, press as add, timing};
+use skinrig_planted::{PlantedPress, mark, press as add, timing};
 
 /// Presses of one repetition.
 pub const PRESSES: u32 = 289;
@@ -170,9 +170,9 @@ pub fn input() -> SessionInput {
         AnalysisSettings::default(),
     );
     for (role, location, at, contact) in sync.chain(grid) {
-        let touch = Touch {
+        let touch = PlantedPress {
             timing: timing(contact, [0.1, 0.2, 0.3, TOUCH_S, 0.7]),
-            ..Touch::new(role, 0, location, at)
+            ..PlantedPress::new(role, 0, location, at)
         };
         add(&mut input, touch);
     }

@@ -12,7 +12,7 @@ mod nights;
 
 use std::path::Path;
 
-use nights::{Bench, DrawnValue, Planted, head};
+use nights::{Bench, DrawnValue, PlantedChange, head};
 use skinrig_hil::history::append;
 use skinrig_model::Limit;
 use skinrig_nightly::night::{Attempt, CheckResult, Measurement, NIGHT_VERSION, Part};
@@ -27,7 +27,7 @@ fn main() {
         ("golden/skin/press_events", 112, 0.85),
         ("golden/skin/located", 112, 0.9),
     ] {
-        bench.planted.push(Planted {
+        bench.planted.push(PlantedChange {
             series,
             from,
             factor,

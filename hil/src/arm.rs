@@ -9,7 +9,7 @@ use skinrig_controller::{
 use skinrig_device::{Clock, DeviceError, Indenter, MotionLimits, RobotSample};
 use skinrig_model::{HostDuration, HostTime, Point2, Point3, PoseSample, Robot, Setting, Skin};
 use skinrig_nightly::{Evidence, EvidenceKind};
-use skinrig_protocol::plan::{OnTrip, RunLimits};
+use skinrig_protocol::plan::{RunLimits, TripReaction};
 use skinrig_protocol::rig::RigFile;
 use skinrig_protocol::{Surface, TouchSearch};
 
@@ -278,7 +278,7 @@ fn limits(
         position_tolerance_mm: TOLERANCE_MM,
         settle_time: SETTLE_TIME,
         max_acceleration_mm_s2: None,
-        on_trip: OnTrip::Retract,
+        on_trip: TripReaction::Retract,
     };
     let robot_limits = MotionLimits {
         min_mm: l.workspace.min_mm,
@@ -325,9 +325,9 @@ impl Arm<'_> {
     /// As [`go`](Self::go).
     pub(crate) fn go_above(&mut self, at: Point2) -> Result<PoseSample, Problem> {
         let high_mm = 2.0 * CLEARANCE_MM;
-        let here = self.pose()?.measured;
-        if here.z_mm < high_mm {
-            self.go(here.plane().at_height(high_mm), 2.0 * SLOW_MM_S)?;
+        let current = self.pose()?.measured;
+        if current.z_mm < high_mm {
+            self.go(current.plane().at_height(high_mm), 2.0 * SLOW_MM_S)?;
         }
         self.go(at.at_height(high_mm), 2.0 * SLOW_MM_S)?;
         self.go(at.at_height(self.search.band_mm), SLOW_MM_S)

@@ -5,7 +5,7 @@ use std::path::Path;
 use skinrig_controller::ControlHandle;
 use skinrig_device::{CameraSettings, Clock, EventCamera, Indenter, TriggerBox};
 use skinrig_model::{CameraId, HostDuration};
-use skinrig_nightly::{Evidence, Golden};
+use skinrig_nightly::{Evidence, GoldenSession};
 use skinrig_protocol::RigFile;
 use skinrig_protocol::rig::Drill;
 use skinrig_protocol::suite::Light;
@@ -34,7 +34,7 @@ pub struct Devices {
 #[derive(Debug, Clone, PartialEq)]
 pub struct GoldenRun {
     /// The session and its report, relative to the night's folder.
-    pub files: Golden,
+    pub files: GoldenSession,
     /// Name of the skin, from the protocol.
     pub skin: Option<String>,
     /// Version of the analysis.

@@ -1,6 +1,6 @@
 //! Findings of a check: measured values by device and metric, and evidence.
 
-use skinrig_nightly::{Evidence, EvidenceKind, Golden};
+use skinrig_nightly::{Evidence, EvidenceKind, GoldenSession};
 
 /// A measured value, or a metric that could not be measured.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,7 +38,7 @@ pub struct Findings {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GoldenRecord {
     /// The session and its report, relative to the night's folder.
-    pub files: Golden,
+    pub files: GoldenSession,
     /// Name of the skin, from the protocol.
     pub skin: Option<String>,
     /// Version of the analysis.

@@ -8,7 +8,7 @@ use skinrig_hil::history::{AppendOutcome, Filter, HistoryError, accept, append, 
 use skinrig_model::Limit;
 use skinrig_nightly::night::{Attempt, CheckResult, Measurement, NIGHT_VERSION, Part};
 use skinrig_nightly::trend::{Acceptance, History};
-use skinrig_nightly::{Golden, Night, NightExit, Verdict, Versions};
+use skinrig_nightly::{GoldenSession, Night, NightExit, Verdict, Versions};
 
 fn measured(metric: &str, value: Option<f64>) -> Measurement {
     let limit = Limit::at_least(90.0).with_margin(5.0);
@@ -81,7 +81,7 @@ fn night(day: u32, rig: &str, values: &[Option<f64>]) -> Night {
         ended_early: None,
         lease_note: None,
         checks: vec![check],
-        golden: Some(Golden {
+        golden: Some(GoldenSession {
             session: "golden.session.sqlite".to_owned(),
             report: None,
             results_sha256: None,

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use skinrig::results::{Choices, analyze_session};
+use skinrig::results::{AnalysisRequest, analyze_session};
 use skinrig_analysis::Analysis;
 use skinrig_analysis::result::{Evidence, Fault as Accused, Finding};
 use skinrig_model::{CameraId, HostTime, RigFault, RunEnd, SimLevel};
@@ -55,7 +55,9 @@ fn analysed_on(protocol: &str, config: &SimConfig) -> Analysis {
         "seed {}: {report:?}",
         config.seed
     );
-    analyze_session(&path, Choices::default()).unwrap().analysis
+    analyze_session(&path, AnalysisRequest::default())
+        .unwrap()
+        .analysis
 }
 
 /// Like [`analysed`], on a robot whose tip is this much higher than it reports from the start, µm.

@@ -205,10 +205,10 @@ fn systemd_verifies_the_units() {
             return;
         }
     };
-    let said = String::from_utf8_lossy(&output.stderr);
+    let messages = String::from_utf8_lossy(&output.stderr);
     // systemd also reads the machine's own units, and may report them.
-    let ours: Vec<&str> = said.lines().filter(|l| l.contains("skinrig")).collect();
-    assert!(ours.is_empty(), "{said}");
+    let ours: Vec<&str> = messages.lines().filter(|l| l.contains("skinrig")).collect();
+    assert!(ours.is_empty(), "{messages}");
 }
 
 /// Keys allowed in the rules, without braces.
@@ -431,6 +431,6 @@ fn the_suite_of_first_contact_leaves_the_robot_without_power() {
         "idle",
         "test_pattern",
     ];
-    let made: Vec<&str> = suite.checks.iter().map(|c| c.name).collect();
-    assert_eq!(made, still);
+    let names: Vec<&str> = suite.checks.iter().map(|c| c.name).collect();
+    assert_eq!(names, still);
 }

@@ -1,7 +1,7 @@
 //! planned = valid + missed + invalid + excluded, for any plan, fault or stop.
 
 use proptest::prelude::*;
-use skinrig::results::{Choices, analyze_session};
+use skinrig::results::{AnalysisRequest, analyze_session};
 use skinrig_model::{CameraId, Record, RigFault, SimLevel};
 use skinrig_recorder::{SessionReader, verify};
 use skinrig_results::Rescan;
@@ -121,7 +121,7 @@ proptest! {
         prop_assert_eq!(totals.sync.planned, u64::from(sync));
         prop_assert_eq!((totals.presses.valid + totals.sync.valid) as usize, report.valid);
 
-        let counts = analyze_session(&path, Choices::default()).unwrap().analysis.counts;
+        let counts = analyze_session(&path, AnalysisRequest::default()).unwrap().analysis.counts;
         prop_assert!(counts.add_up(), "{counts:?}");
         prop_assert_eq!(u64::from(counts.planned), totals.presses.planned);
         prop_assert_eq!(u64::from(counts.sync), totals.sync.planned);

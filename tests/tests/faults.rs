@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use skinrig::fault::FaultInjector;
-use skinrig::results::{Choices, analyze_session};
+use skinrig::results::{AnalysisRequest, analyze_session};
 use skinrig::rig::{self, gates};
 use skinrig_analysis::Analysis;
 use skinrig_analysis::result::PressResult;
@@ -274,7 +274,7 @@ fn judge(run: &Run, fault: PlantedFault, before: u64, without: &FaultFreeRun) ->
             ));
         }
     }
-    let analysis = analyze_session(&run.path, Choices::default()).map(|r| r.analysis);
+    let analysis = analyze_session(&run.path, AnalysisRequest::default()).map(|r| r.analysis);
     let usable = analysis.as_ref().is_ok_and(|a| a.is_valid());
     if let Ok(analysis) = &analysis
         && usable
@@ -427,7 +427,7 @@ fn each_fault_in_each_phase_ends_as_documented() {
     let ideal = run(experiment, None, lab.path().join("ideal.session.sqlite"));
     assert_eq!(ideal.report.end, RunEnd::Completed);
     assert_eq!(ideal.report.valid, plan.presses.len());
-    let analysis = analyze_session(&ideal.path, Choices::default())
+    let analysis = analyze_session(&ideal.path, AnalysisRequest::default())
         .unwrap()
         .analysis;
     assert!(analysis.is_valid(), "{:?}", analysis.invalid_because());

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use skinrig::results::{Choices, analyze_session};
+use skinrig::results::{AnalysisRequest, analyze_session};
 use skinrig_analysis::result::{AlignmentStatus, Analysis};
 use skinrig_model::{BoxReport, CameraId, PressVerdict, RigFault, RunEnd, SimLevel};
 use skinrig_recorder::SessionReader;
@@ -40,7 +40,7 @@ fn recorded(path: &std::path::Path, faults: Vec<Fault>) -> (SessionReader, Analy
     config.fault_sizes.lost_words = 999;
     let report = record(&protocol, &plan, simulated_rig(&config), path, |_, _| {}).unwrap();
     assert_eq!(report.end, RunEnd::Completed);
-    let results = analyze_session(path, Choices::default()).unwrap();
+    let results = analyze_session(path, AnalysisRequest::default()).unwrap();
     (SessionReader::open(path).unwrap(), results.analysis)
 }
 

@@ -91,7 +91,7 @@ pub(crate) struct Accumulator<'a> {
     most_kept: usize,
     zooms: Vec<(ZoomPlan, Vec<u32>, Vec<u32>)>,
     zoom_next: usize,
-    keeper: PressEventCollector,
+    event_collector: PressEventCollector,
     activity: Option<ActivityGrid>,
     cache: Option<EventCache>,
     /// Buffer for the events of a slice that are in the crop.
@@ -173,7 +173,7 @@ impl<'a> Accumulator<'a> {
     pub(crate) fn new(
         camera: CameraId,
         settings: &'a AnalysisSettings,
-        wanted: PassRequest<'a>,
+        request: PassRequest<'a>,
     ) -> Self {
         let PassRequest {
             windows,
@@ -182,7 +182,7 @@ impl<'a> Accumulator<'a> {
             kept,
             rates,
             cache,
-        } = wanted;
+        } = request;
         let zooms = zooms
             .into_iter()
             .map(|plan| {
@@ -214,7 +214,7 @@ impl<'a> Accumulator<'a> {
             most_kept: MAX_CACHED_EVENTS,
             zooms,
             zoom_next: 0,
-            keeper: PressEventCollector::new(kept),
+            event_collector: PressEventCollector::new(kept),
             bin_us: rate_bin_us(settings),
             views: Vec::new(),
             pictures: Vec::new(),
@@ -312,7 +312,7 @@ impl<'a> Accumulator<'a> {
 
     /// Counts events of the crop, in time order, for every output.
     fn count(&mut self, events: &[CdEvent]) {
-        self.keeper.take(events);
+        self.event_collector.take(events);
         self.count_in_zooms(events);
         if self.thinning.keeps_all() {
             self.count_in_windows(events);
@@ -404,7 +404,7 @@ impl<'a> Accumulator<'a> {
             }
             self.zoom_next += 1;
         }
-        self.keeper.advance(now.saturating_sub(SLACK_US));
+        self.event_collector.advance(now.saturating_sub(SLACK_US));
         let closes = self.open.iter().map(|o| o.window.end_us + SLACK_US);
         let opens = self
             .windows
@@ -516,7 +516,7 @@ impl<'a> Accumulator<'a> {
         });
         Ok(PassOutput {
             zooms: zooms.collect(),
-            kept: self.keeper.finish(),
+            kept: self.event_collector.finish(),
             activity: self.activity.map(|a| a.result(self.camera)),
             rates: self.rates,
             views: self.views,

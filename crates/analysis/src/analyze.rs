@@ -26,7 +26,7 @@ use crate::segment::{Window, windows};
 use crate::session_base::time_base;
 use crate::sets::ScoreSet;
 use crate::stream::{Silences, contacts_s};
-use crate::tie::Untimed;
+use crate::tie::UntimedPress;
 use crate::{audit, bit_rates, caveats, check, cmre, coverage, latency, legs, reduction, verdict};
 
 /// Windows that overlap by less than this only touch, because their ends are rounded, µs.
@@ -273,7 +273,7 @@ struct CameraResult {
     /// One entry per row of the plan.
     views: Vec<Option<PressView>>,
     data_lost: Vec<bool>,
-    untimed: Vec<Option<Untimed>>,
+    untimed: Vec<Option<UntimedPress>>,
     silences: Silences,
     /// Contacts detected in the counts, s on the host clock, if the presses come from a schedule.
     contacts_s: Vec<f64>,

@@ -13,7 +13,7 @@ use crate::rates::RateHistogram;
 use crate::result::{
     Activity, AlignmentViolation, ClockFit, OffSensor, RatesDetections, RatesEvidence, WarningCause,
 };
-use crate::tie::{Tie, Untimed};
+use crate::tie::{Tie, UntimedPress};
 use crate::timebase::TimeBase;
 use crate::untimed;
 
@@ -27,7 +27,7 @@ pub(crate) struct CameraClock {
     pub activity: Option<Activity>,
     pub cache: Option<EventCache>,
     /// Per row of the plan: why the clock does not time it.
-    pub untimed: Vec<Option<Untimed>>,
+    pub untimed: Vec<Option<UntimedPress>>,
     pub off_sensor: OffSensor,
     pub warnings: Vec<WarningCause>,
 }
@@ -130,7 +130,7 @@ impl CameraClock {
             off_sensor: OffSensor::default(),
             warnings: Vec::new(),
         };
-        let by_marks = |u: &&Untimed| u.tie == Tie::Mark;
+        let by_marks = |u: &&UntimedPress| u.tie == Tie::Mark;
         let far = reading.untimed.iter().flatten().filter(by_marks).count();
         if far > 0 {
             reading.warnings.push(WarningCause::PressesFarFromMarks {

@@ -59,8 +59,8 @@ impl Closeups {
             let highest = candidates.iter().map(|c| c.2).max().unwrap_or(0);
             let part = |i: usize| {
                 let share = (2 * i + 1) as f64 / (2 * count) as f64;
-                let wanted = f64::from(lowest) + share * f64::from(highest - lowest);
-                let away = |c: &&(usize, PressId, u32)| (f64::from(c.2) - wanted).abs();
+                let target = f64::from(lowest) + share * f64::from(highest - lowest);
+                let away = |c: &&(usize, PressId, u32)| (f64::from(c.2) - target).abs();
                 candidates[i * n / count..(i + 1) * n / count]
                     .iter()
                     .min_by(|a, b| away(a).total_cmp(&away(b)))

@@ -6,7 +6,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use skinrig_model::{CameraId, ExcludedReason, InvalidReason, MissedReason, PressVerdict};
 
 use crate::rule::{JournalRule, Rule, without_numbers};
-use crate::tie::Untimed;
+use crate::tie::UntimedPress;
 
 /// Why a press does not count. Its text has the press's numbers; presses are grouped by its [`rule`](Self::rule).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -37,7 +37,7 @@ pub enum Exclusion {
         /// The camera.
         camera: CameraId,
         /// The nearest tie of its clock.
-        nearest: Untimed,
+        nearest: UntimedPress,
     },
     /// No cluster of events in this camera.
     NoCluster {
@@ -182,14 +182,14 @@ impl fmt::Display for Exclusion {
 
 /// Fields of an exclusion in results: kind and fields for programs, and its two texts. Only `cause` is read back.
 #[derive(Serialize)]
-struct Written<'a> {
+struct ExclusionFields<'a> {
     reason: Option<String>,
     rule: Option<String>,
     cause: Option<&'a Exclusion>,
 }
 
 #[derive(Deserialize)]
-struct Read {
+struct StoredExclusion {
     cause: Option<Exclusion>,
 }
 
@@ -202,7 +202,7 @@ pub(crate) fn serialize<S: Serializer>(
     to: S,
 ) -> Result<S::Ok, S::Error> {
     let cause = cause.as_ref();
-    let written = Written {
+    let written = ExclusionFields {
         reason: cause.map(Exclusion::to_string),
         rule: cause.map(Exclusion::label),
         cause,
@@ -217,7 +217,7 @@ pub(crate) fn serialize<S: Serializer>(
 pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
     from: D,
 ) -> Result<Option<Exclusion>, D::Error> {
-    Read::deserialize(from).map(|read| read.cause)
+    StoredExclusion::deserialize(from).map(|read| read.cause)
 }
 
 #[cfg(test)]

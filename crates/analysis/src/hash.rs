@@ -77,7 +77,7 @@ pub fn results_hash(analysis: &Analysis) -> String {
         scored_without_exclusions: &analysis.scored_without_exclusions,
         presses: analysis.presses.iter().map(Row::of).collect(),
     };
-    let mut digest = Digesting(Sha256::new());
+    let mut digest = HashWriter(Sha256::new());
     // Neither the writer nor the types can fail: no maps with non-string keys, no I/O.
     if let Err(error) = serde_json::to_writer(&mut digest, &results) {
         digest.0.update(error.to_string());
@@ -86,9 +86,9 @@ pub fn results_hash(analysis: &Analysis) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
-struct Digesting(Sha256);
+struct HashWriter(Sha256);
 
-impl std::io::Write for Digesting {
+impl std::io::Write for HashWriter {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
         self.0.update(bytes);
         Ok(bytes.len())

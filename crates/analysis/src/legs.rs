@@ -55,7 +55,7 @@ fn moves(legs: &[LegStart], lines: &[Option<LegLine>], k: usize) -> Vec<i64> {
         let begun = leg.checked_sub(1).map(|i| &legs[i]);
         begun.map_or(0.0, |b| b.origin.0 as f64 * 1e-3 - b.recorded_us[k] as f64)
     };
-    let wanted = |leg: usize| match (steadiest, &lines[leg]) {
+    let offset_of = |leg: usize| match (steadiest, &lines[leg]) {
         (Some((_, best)), Some(line)) => {
             let host_us = line.middle_us;
             let rate = 1.0 + best.fit.drift_ppm * 1e-6;
@@ -65,9 +65,9 @@ fn moves(legs: &[LegStart], lines: &[Option<LegLine>], k: usize) -> Vec<i64> {
         // Nothing ties its clocks: assume that they started together as in the best-known leg.
         (best, _) => start(leg) - start(best.map_or(0, |(leg, _)| leg)),
     };
-    let first = wanted(0);
+    let first = offset_of(0);
     (0..lines.len())
-        .map(|leg| (wanted(leg) - first).round() as i64)
+        .map(|leg| (offset_of(leg) - first).round() as i64)
         .collect()
 }
 

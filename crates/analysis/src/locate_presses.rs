@@ -5,10 +5,10 @@ use skinrig_model::{CameraId, PressRole, Verdict};
 use crate::calibrate::{SessionCalibration, calibrate_session};
 use crate::check;
 use crate::input::SessionInput;
-use crate::locator::{self, CameraFeatures, Effort, Fitted, LocatorChoice};
+use crate::locator::{self, CameraFeatures, Effort, FittedLocator, LocatorChoice};
 use crate::result::{LocationOutcome, PressResult, PressView, Warning};
 use crate::sets::CalibrationSet;
-use crate::tie::Untimed;
+use crate::tie::UntimedPress;
 use crate::triangulate::locate;
 use crate::verdict;
 
@@ -20,7 +20,7 @@ pub(crate) struct CameraObservations<'a> {
     /// Rows with lost bytes in their window.
     pub data_lost: &'a [bool],
     /// Rows that this camera's clock does not time.
-    pub untimed: &'a [Option<Untimed>],
+    pub untimed: &'a [Option<UntimedPress>],
 }
 
 /// Every planned press with its verdict, and what located it.
@@ -32,20 +32,20 @@ pub(crate) struct LocatedPresses {
 
 impl LocatedPresses {
     /// The locator; the rays of the geometry if nothing could be learnt.
-    pub(crate) fn fitted(&self) -> Fitted {
+    pub(crate) fn fitted(&self) -> FittedLocator {
         let learnt = self.locator.as_ref().map(|l| l.fitted.clone());
-        learnt.unwrap_or_else(|| Fitted::rays(self.calibrated.geometry))
+        learnt.unwrap_or_else(|| FittedLocator::rays(self.calibrated.geometry))
     }
 }
 
 /// Applies journal, data and rules to the presses, calibrates, learns to locate, and locates all presses.
 pub(crate) fn locate_presses(
     input: &SessionInput,
-    seen: [CameraObservations<'_>; 2],
+    observations: [CameraObservations<'_>; 2],
     effort: Effort,
     warnings: &mut Vec<Warning>,
 ) -> LocatedPresses {
-    let mut presses = rows(input, seen);
+    let mut presses = rows(input, observations);
     let calibrated = calibrate_session(input, &mut presses, warnings);
     let set = CalibrationSet::from_presses(&presses);
     let mut locator = locator::choose(&set, &calibrated, &input.settings, effort);
@@ -87,13 +87,13 @@ pub(crate) fn locate_presses(
     }
 }
 
-fn rows(input: &SessionInput, seen: [CameraObservations<'_>; 2]) -> Vec<PressResult> {
-    let has_clock = [0, 1].map(|k| seen[k].has_clock);
+fn rows(input: &SessionInput, observations: [CameraObservations<'_>; 2]) -> Vec<PressResult> {
+    let has_clock = [0, 1].map(|k| observations[k].has_clock);
     let pairs = input.planned.iter().zip(&input.outcomes).enumerate();
     pairs
         .map(|(i, (planned, outcome))| {
-            let views = [0, 1].map(|k| seen[k].views[i]);
-            let data_lost = [0, 1].map(|k| seen[k].data_lost[i]);
+            let views = [0, 1].map(|k| observations[k].views[i]);
+            let data_lost = [0, 1].map(|k| observations[k].data_lost[i]);
             let mut judgement = verdict::from_data(
                 planned.role,
                 outcome.as_ref(),
@@ -106,7 +106,7 @@ fn rows(input: &SessionInput, seen: [CameraObservations<'_>; 2]) -> Vec<PressRes
                 judgement = judgement.or_by_hand();
             }
             for camera in CameraId::ALL {
-                if let Some(untimed) = seen[camera.index()].untimed[i] {
+                if let Some(untimed) = observations[camera.index()].untimed[i] {
                     judgement = judgement.or_untimed(camera, untimed);
                 }
             }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use skinrig_model::{Point2, SkinOutline, quantile as sorted_quantile};
 
 use crate::exact;
-use crate::result::{Estimate, Metrics, Penalised};
+use crate::result::{Estimate, Metrics, PenalisedRmse};
 use crate::seeded;
 use crate::sets::{ScoreSet, ScoredPress};
 use crate::sums::{self, Sum};
@@ -176,7 +176,12 @@ fn evaluate(places: &[&LocationErrors]) -> Values {
 /// which is the error of a blind guess. It is never below the RMSE of the counting presses, nor below that of all presses
 /// with an estimate. Therefore counting failures never lowers the RMSE, whatever is excluded.
 #[must_use]
-pub fn penalised(set: &ScoreSet, stated_mm: Option<f64>, resamples: u32, seed: u64) -> Penalised {
+pub fn penalised(
+    set: &ScoreSet,
+    stated_mm: Option<f64>,
+    resamples: u32,
+    seed: u64,
+) -> PenalisedRmse {
     let presses = set.presses();
     let stated = stated_mm.unwrap_or_else(|| spread_mm(presses.iter().map(|p| p.at)));
     let length = |p: &ScoredPress| p.found.map(|(_, [dx, dy])| libm::hypot(dx, dy));
@@ -192,7 +197,7 @@ pub fn penalised(set: &ScoreSet, stated_mm: Option<f64>, resamples: u32, seed: u
     let errors: Vec<(u32, f64)> = presses.iter().map(|p| (p.location, error(p))).collect();
     let failures = || presses.iter().filter(|p| !p.valid || p.found.is_none());
     let beyond = failures().filter(|p| length(p).is_some_and(|own| own > penalty));
-    Penalised {
+    PenalisedRmse {
         penalty_mm: penalty,
         derived: stated_mm.is_none(),
         raised: penalty > stated,

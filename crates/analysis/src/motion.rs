@@ -171,8 +171,8 @@ mod tests {
         course.push(&[broken]);
         let motion = course.finish().unwrap();
         assert_eq!((motion.samples, motion.broken), (180_000, 1));
-        let wanted = ((179_999.0 * 0.01 + 25.0) / 180_000.0f64).sqrt();
-        assert!((motion.rms_mm - wanted).abs() < 1e-9, "{}", motion.rms_mm);
+        let expected = ((179_999.0 * 0.01 + 25.0) / 180_000.0f64).sqrt();
+        assert!((motion.rms_mm - expected).abs() < 1e-9, "{}", motion.rms_mm);
         assert!((motion.max_mm - 5.0).abs() < 1e-9);
         assert!((MAX_BINS / 2..=MAX_BINS).contains(&motion.course.len()));
         let high: Vec<_> = motion.course.iter().filter(|b| b.max_mm > 1.0).collect();

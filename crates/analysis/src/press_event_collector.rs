@@ -93,17 +93,17 @@ mod tests {
 
     #[test]
     fn overlapping_views_get_all_of_their_events_in_order() {
-        let mut keeper = PressEventCollector::new(vec![plan(0, 100, 50), plan(1, 120, 50)]);
+        let mut collector = PressEventCollector::new(vec![plan(0, 100, 50), plan(1, 120, 50)]);
         for t_us in [99, 100, 149, 130, 150, 169, 170] {
-            keeper.take(&[CdEvent {
+            collector.take(&[CdEvent {
                 t_us,
                 x: 5,
                 y: 200,
                 polarity: Polarity::On,
             }]);
-            keeper.advance(t_us.saturating_sub(30));
+            collector.advance(t_us.saturating_sub(30));
         }
-        let done = keeper.finish();
+        let done = collector.finish();
         let times =
             |i: usize| -> Vec<u32> { done[i].view.events.iter().map(|e| e.t_us()).collect() };
         assert_eq!((done[0].row, times(0)), (0, vec![0, 30, 49]));

@@ -13,7 +13,7 @@ use skinrig_model::{
 
 use crate::calibrate::calibrate;
 use crate::input::SessionInput;
-use crate::locator::Fitted;
+use crate::locator::FittedLocator;
 use crate::metrics::{mean, quantile, root_mean_square};
 use crate::press_events::RetainedPresses;
 use crate::reduction::{Attempt, Outcome, Trials};
@@ -29,13 +29,13 @@ const MIN_SAMPLES: u32 = 1;
 /// Error of a press without an estimate if no press has one, mm.
 const ERROR_OF_NOTHING_MM: f64 = 1.0;
 
-/// The published numbers for an analysed session. `kept` holds the presses of the first repetition, including calibration
+/// The published numbers for an analysed session. `retained` holds the presses of the first repetition, including calibration
 /// presses; without them there is no data reduction.
 #[must_use]
 pub fn reference_code(
     input: &SessionInput,
     analysis: &Analysis,
-    kept: &RetainedPresses,
+    retained: &RetainedPresses,
 ) -> ReferenceCode {
     let mut presses = used(input, analysis);
     let (geometry, fit) = calibrated_on_all(input, &mut presses);
@@ -65,7 +65,7 @@ pub fn reference_code(
         rmse_mm: root_mean_square(&mut lengths),
         rmse_x_mm: root_mean_square(&mut x),
         rmse_y_mm: root_mean_square(&mut y),
-        reduction: reduction(analysis, &geometry, &presses, kept),
+        reduction: reduction(analysis, &geometry, &presses, retained),
     }
 }
 
@@ -131,9 +131,9 @@ fn reduction(
     analysis: &Analysis,
     geometry: &StereoGeometry,
     presses: &[PressResult],
-    kept: &RetainedPresses,
+    retained: &RetainedPresses,
 ) -> Vec<ReferenceReduction> {
-    let attempts: Vec<Attempt<'_>> = kept
+    let attempts: Vec<Attempt<'_>> = retained
         .presses
         .iter()
         .filter_map(|k| Attempt::new(presses.iter().find(|p| p.press == k.press)?, k))
@@ -143,7 +143,7 @@ fn reduction(
     }
     let settings = &analysis.settings;
     let trials = Trials {
-        locator: &Fitted::rays(*geometry),
+        locator: &FittedLocator::rays(*geometry),
         outline: &analysis.rig.outline,
         settings,
         min_samples: MIN_SAMPLES,

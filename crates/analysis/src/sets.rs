@@ -143,8 +143,8 @@ impl ScoreSet {
     /// Presses planned at this depth.
     #[must_use]
     pub fn at_depth(&self, depth_mm: f64) -> Self {
-        let here = self.0.iter().filter(|p| p.depth_mm == depth_mm);
-        Self(here.copied().collect())
+        let same_depth = self.0.iter().filter(|p| p.depth_mm == depth_mm);
+        Self(same_depth.copied().collect())
     }
 
     /// Presses, in plan order.

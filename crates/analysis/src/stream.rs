@@ -209,12 +209,12 @@ mod tests {
 
     #[test]
     fn unlisted_contacts_are_found() {
-        let made = [3.0, 6.0, 8.0, 9.0, 12.0, 20.0];
-        let rates = noisy(&[], &made);
+        let planted = [3.0, 6.0, 8.0, 9.0, 12.0, 20.0];
+        let rates = noisy(&[], &planted);
         let listed: Vec<(f64, f64)> = [3.0, 6.0, 9.0, 12.0].map(|s| (s, s + 0.5)).to_vec();
         let found = contacts_s(&rates, &CLOCK, &listed);
-        assert_eq!(found.len(), made.len(), "{found:?}");
-        for (a, b) in found.iter().zip(made) {
+        assert_eq!(found.len(), planted.len(), "{found:?}");
+        for (a, b) in found.iter().zip(planted) {
             assert!((a - b).abs() < 0.02, "{found:?}");
         }
     }

@@ -18,7 +18,7 @@ pub enum Tie {
 
 /// A press too far from the ties of a clock.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Untimed {
+pub struct UntimedPress {
     /// Kind of tie.
     pub tie: Tie,
     /// Distance of the nearest tie from the contact or the release, µs.
@@ -27,7 +27,7 @@ pub struct Untimed {
     pub limit_us: f64,
 }
 
-impl fmt::Display for Untimed {
+impl fmt::Display for UntimedPress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let what = match self.tie {
             Tie::Exchange => "time exchange with the trigger box",

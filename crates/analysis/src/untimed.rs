@@ -6,7 +6,7 @@ use crate::clock::{MarksFit, fit_marks};
 use crate::input::SessionInput;
 use crate::press_spans::timings;
 use crate::session_base::time_base;
-use crate::tie::{Tie, Untimed};
+use crate::tie::{Tie, UntimedPress};
 use crate::timebase::{TimeBase, distance_us};
 
 /// Rows of the plan that the clock of `camera` does not time. `marks`: ties of its clock if there is no time base. Does not
@@ -16,7 +16,7 @@ pub(crate) fn rows(
     camera: CameraId,
     base: Option<&TimeBase>,
     marks: Option<&MarksFit>,
-) -> Vec<Option<Untimed>> {
+) -> Vec<Option<UntimedPress>> {
     let limit_us = input.settings.alignment.max_tie_distance_us;
     let by_base = base.filter(|b| b.clocks[camera.index()].is_some());
     let furthest = |host_us: f64| -> Option<(Tie, f64)> {
@@ -33,7 +33,7 @@ pub(crate) fn rows(
         out[row] = far
             .filter(|(_, distance_us)| *distance_us > limit_us)
             .max_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(tie, distance_us)| Untimed {
+            .map(|(tie, distance_us)| UntimedPress {
                 tie,
                 distance_us,
                 limit_us,
@@ -43,7 +43,7 @@ pub(crate) fn rows(
 }
 
 /// Same for both cameras, from the session alone.
-pub(crate) fn of_session(input: &SessionInput) -> [Vec<Option<Untimed>>; 2] {
+pub(crate) fn of_session(input: &SessionInput) -> [Vec<Option<UntimedPress>>; 2] {
     let base = time_base(input);
     CameraId::ALL.map(|camera| {
         let k = camera.index();

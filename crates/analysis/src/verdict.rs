@@ -22,7 +22,7 @@ use crate::result::{
     WarningCause,
 };
 use crate::rule::Rule;
-use crate::tie::Untimed;
+use crate::tie::UntimedPress;
 
 /// A verdict and its cause.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,7 +64,7 @@ impl Judgement {
 
     /// Invalid because a camera's clock is unknown at the press, unless it is missed or invalid anyway.
     #[must_use]
-    pub(crate) fn or_untimed(self, camera: CameraId, nearest: Untimed) -> Self {
+    pub(crate) fn or_untimed(self, camera: CameraId, nearest: UntimedPress) -> Self {
         match self.verdict {
             Verdict::Missed | Verdict::Invalid => self,
             Verdict::Valid | Verdict::Excluded => {

@@ -26,10 +26,10 @@ pub(crate) fn width_u(grid: &PixelGrid, idle_events: u64, window: &Window) -> Op
     shortest(&columns, added / 2.0).map(|columns| columns as f64)
 }
 
-/// Length of the shortest range whose sum is at least `wanted`, above 0.
+/// Length of the shortest range whose sum is at least `target`, above 0.
 ///
 /// Candidate starts are kept by increasing prefix sum: a later start with a smaller prefix sum beats every earlier one.
-fn shortest(values: &[f64], wanted: f64) -> Option<usize> {
+fn shortest(values: &[f64], target: f64) -> Option<usize> {
     let mut sums = Vec::with_capacity(values.len() + 1);
     let mut sum = 0.0;
     sums.push(sum);
@@ -41,7 +41,7 @@ fn shortest(values: &[f64], wanted: f64) -> Option<usize> {
     let mut best: Option<usize> = None;
     for (end, sum) in sums.iter().enumerate() {
         while let Some(&begin) = begins.front()
-            && sum - sums[begin] >= wanted
+            && sum - sums[begin] >= target
         {
             best = Some(best.map_or(end - begin, |b| b.min(end - begin)));
             begins.pop_front();
@@ -101,9 +101,9 @@ mod tests {
 
     #[test]
     fn the_shortest_stretch_is_found_past_negative_values() {
-        let slow = |values: &[f64], wanted: f64| {
+        let slow = |values: &[f64], target: f64| {
             let all = (0..values.len()).flat_map(|a| (a + 1..=values.len()).map(move |b| (a, b)));
-            let enough = all.filter(|(a, b)| values[*a..*b].iter().sum::<f64>() >= wanted);
+            let enough = all.filter(|(a, b)| values[*a..*b].iter().sum::<f64>() >= target);
             enough.map(|(a, b)| b - a).min()
         };
         let mut state = 7u64;

@@ -13,20 +13,7 @@ const PLANTED: [f64; 8] = [
 ];
 
 fn view(u: f64) -> Option<PressView> {
-    Some(PressView {
-        events: 100,
-        on_events: 50,
-        clusters: 1,
-        cluster_events: 100,
-        centroid_u: Some(u),
-        centroid_v: Some(270.0),
-        rate_per_s: 1e3,
-        idle_rate_per_s: 10.0,
-        idle_s: 0.5,
-        spread_u: None,
-        spread_v: None,
-        width_u: None,
-    })
+    skinrig_planted::view(u, 100)
 }
 
 fn row(id: u32, role: PressRole, truth: Point2, columns: [f64; 2]) -> PressResult {

@@ -53,7 +53,7 @@ fn published_polygon() -> Vec<Point2> {
 fn areas_are_those_of_the_published_skin() {
     assert!((polygon_area_mm2(&published_polygon()) - 9328.12).abs() < 0.005);
     assert!((polygon_area_mm2(&SKIN.polygon(ARC_SEGMENTS)) - SKIN.area_mm2()).abs() < 0.007);
-    let seen = |at: [(f64, f64); 2], skews: [f64; 2], skin: &[Point2]| {
+    let views_of = |at: [(f64, f64); 2], skews: [f64; 2], skin: &[Point2]| {
         let views = [0, 1].map(|k| field_of_view(&camera(at[k], skews[k], 60.0, 0.0), skin));
         areas(&overlap(&views.map(Option::unwrap)))
     };
@@ -65,7 +65,7 @@ fn areas_are_those_of_the_published_skin() {
         (chamfers, [-1.92, -1.47], 8771.7),
         (optimised, [0.0, 0.0], 7996.0),
     ] {
-        let found = seen(at, skews, &skin);
+        let found = views_of(at, skews, &skin);
         assert!((found - expected).abs() < 0.1, "{found}");
     }
 }

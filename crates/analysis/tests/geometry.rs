@@ -22,8 +22,8 @@ fn numbers(value: &Value) -> Vec<f64> {
         .collect()
 }
 
-fn near(found: f64, wanted: f64) -> bool {
-    (found - wanted).abs() <= 1e-9 * (1.0 + wanted.abs())
+fn near(found: f64, expected: f64) -> bool {
+    (found - expected).abs() <= 1e-9 * (1.0 + expected.abs())
 }
 
 #[test]
@@ -56,14 +56,14 @@ fn every_case_of_the_public_solver_comes_out_right() {
         let ranges = numbers(&case["ranges_mm"]);
         // Far away the result is as uncertain as 1 / sine.
         let slack = 1.0 / hit.sine.abs();
-        for (found, wanted) in [
+        for (found, expected) in [
             (hit.at.x_mm, at[0].as_f64().unwrap()),
             (hit.at.y_mm, at[1].as_f64().unwrap()),
             (hit.range_mm[0], ranges[0]),
             (hit.range_mm[1], ranges[1]),
         ] {
-            let close = (found - wanted).abs() <= 1e-13 * (100.0 + wanted.abs()) * slack;
-            assert!(close, "{name}: found {found}, wanted {wanted}");
+            let close = (found - expected).abs() <= 1e-13 * (100.0 + expected.abs()) * slack;
+            assert!(close, "{name}: found {found}, expected {expected}");
         }
         assert!(near(hit.sine, case["sine"].as_f64().unwrap()), "{name}");
     }

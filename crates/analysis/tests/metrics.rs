@@ -43,8 +43,8 @@ fn measure(rows: &[PressResult], exclusions: Exclusions) -> Metrics {
     )
 }
 
-fn near(found: Option<f64>, wanted: f64) -> bool {
-    found.is_some_and(|f| (f - wanted).abs() < 1e-12)
+fn near(found: Option<f64>, expected: f64) -> bool {
+    found.is_some_and(|f| (f - expected).abs() < 1e-12)
 }
 
 #[test]

@@ -11,7 +11,7 @@ use skinrig_model::{
     AnalysisSettings, CameraId, CdEvent, Point2, PressRole, RigGeometry, SkinOutline,
     StereoGeometry,
 };
-use skinrig_planted::{Touch, press, timing};
+use skinrig_planted::{PlantedPress, press, timing};
 
 struct Recording(PathBuf);
 
@@ -62,10 +62,10 @@ fn schedule(positions: &str) -> SessionInput {
         AnalysisSettings::default(),
     );
     for ((role, at, contact), i) in presses.zip(0u32..) {
-        let touch = Touch {
+        let touch = PlantedPress {
             timing: timing(contact, [0.3, 0.2, 0.35, 0.55, 0.8]),
             scheduled: true,
-            ..Touch::new(role, 0, i.saturating_sub(3), at)
+            ..PlantedPress::new(role, 0, i.saturating_sub(3), at)
         };
         press(&mut input, touch);
     }

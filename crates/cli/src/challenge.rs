@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use skinrig_analysis::result::Estimate;
 use skinrig_export::Source;
-use skinrig_export::challenge::{self, ChallengeError, Judgement, Making};
+use skinrig_export::challenge::{self, ChallengeError, ChallengeOptions, Judgement};
 use skinrig_model::CameraId;
 use skinrig_recorder::SessionReader;
 use skinrig_results::{ChunkIndex, Origin, events_between};
@@ -13,7 +13,7 @@ use crate::args::{ChallengeArgs, ChallengeCommand, MakeArgs, ScoreArgs};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::export::refused;
 use crate::paths::beside;
-use crate::results::{self, Choices};
+use crate::results::{self, AnalysisRequest};
 
 /// Makes or scores a challenge.
 ///
@@ -34,7 +34,7 @@ fn failure(error: ChallengeError) -> Failure {
 }
 
 fn make(args: &MakeArgs, json: bool) -> Outcome {
-    let results = results::analyze_shown(&args.session, Choices::default())?;
+    let results = results::analyze_shown(&args.session, AnalysisRequest::default())?;
     let reader = SessionReader::open(&args.session).map_err(Failure::session)?;
     let header = reader.header().map_err(Failure::session)?;
     let index = |camera: CameraId| {
@@ -57,25 +57,28 @@ fn make(args: &MakeArgs, json: bool) -> Outcome {
     let answers = args.answers.as_ref().unwrap_or(&default);
     let mut salt = [0; 32];
     getrandom::fill(&mut salt).map_err(Failure::internal)?;
-    let making = Making {
+    let making = ChallengeOptions {
         overwrite: args.overwrite,
         origin: Origin::of(&header).map(Origin::name),
         salt,
     };
-    let made =
+    let challenge_files =
         challenge::make(&source, &args.out, answers, &making, &mut events).map_err(failure)?;
     if json {
-        crate::terminal::print_json(&serde_json::json!(made));
+        crate::terminal::print_json(&serde_json::json!(challenge_files));
     } else {
-        for path in &made.files {
+        for path in &challenge_files.files {
             outln!("{}", path.display());
         }
         outln!(
             "{} presses calibrate, {} to locate",
-            made.calibrating,
-            made.scored
+            challenge_files.calibrating,
+            challenge_files.scored
         );
-        outln!("answers  {}  (keep this file)", made.answers.display());
+        outln!(
+            "answers  {}  (keep this file)",
+            challenge_files.answers.display()
+        );
     }
     Ok(Exit::Ok)
 }

@@ -10,7 +10,7 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::sample_size;
 
 /// A protocol whose plan passed every check.
-pub struct Checked {
+pub struct CheckedProtocol {
     /// The protocol.
     pub protocol: Protocol,
     /// Its plan.
@@ -20,14 +20,14 @@ pub struct Checked {
 /// Findings about a protocol that was rejected, and its plan if it compiled.
 struct Rejection {
     found: Diagnostics,
-    planned: Option<Checked>,
+    planned: Option<CheckedProtocol>,
 }
 
 /// Reads, compiles and checks a protocol.
 ///
 /// # Errors
 /// [`Failure::input`] with every finding at once.
-pub fn load(path: &Path, overrides: &[String]) -> Result<Checked, Failure> {
+pub fn load(path: &Path, overrides: &[String]) -> Result<CheckedProtocol, Failure> {
     read(path, overrides)?.map_err(|rejection| Failure::findings(&rejection.found))
 }
 
@@ -35,12 +35,19 @@ pub fn load(path: &Path, overrides: &[String]) -> Result<Checked, Failure> {
 ///
 /// # Errors
 /// [`Failure::input`] with every finding at once.
-pub(crate) fn load_text(name: &str, text: &str, overrides: &[String]) -> Result<Checked, Failure> {
+pub(crate) fn load_text(
+    name: &str,
+    text: &str,
+    overrides: &[String],
+) -> Result<CheckedProtocol, Failure> {
     parse(name, text.as_bytes(), overrides)?
         .map_err(|rejection| Failure::findings(&rejection.found))
 }
 
-fn read(path: &Path, overrides: &[String]) -> Result<Result<Checked, Box<Rejection>>, Failure> {
+fn read(
+    path: &Path,
+    overrides: &[String],
+) -> Result<Result<CheckedProtocol, Box<Rejection>>, Failure> {
     let bytes = regular::read_text(path).map_err(|e| {
         Failure::input(format!("{}: cannot read the protocol: {e}", path.display()))
     })?;
@@ -51,7 +58,7 @@ fn parse(
     name: &str,
     bytes: &[u8],
     overrides: &[String],
-) -> Result<Result<Checked, Box<Rejection>>, Failure> {
+) -> Result<Result<CheckedProtocol, Box<Rejection>>, Failure> {
     let loader = regular::read_text;
     let protocol = match Protocol::parse(name, bytes, overrides, &loader) {
         Ok(protocol) => protocol,
@@ -67,7 +74,7 @@ fn parse(
         skinrig_analysis::check::before_recording(&plan.presses, &protocol.analysis, outline)
             .map_err(|e| Failure::input(format!("{name}: {e}")))?;
     }
-    let checked = Checked { protocol, plan };
+    let checked = CheckedProtocol { protocol, plan };
     Ok(match result {
         Ok(()) => Ok(checked),
         Err(found) => Err(Box::new(Rejection {
@@ -122,7 +129,7 @@ pub fn plan(args: &PlanArgs, json: bool) -> Outcome {
         Ok(checked) => Some(checked),
         Err(rejection) => rejection.planned.as_ref(),
     };
-    if let (Some(file), Some(Checked { protocol, plan })) = (&args.svg, drawn) {
+    if let (Some(file), Some(CheckedProtocol { protocol, plan })) = (&args.svg, drawn) {
         std::fs::write(file, path_svg(plan, &protocol.surroundings)).map_err(|e| {
             Failure::internal(format!("{}: cannot write the path: {e}", file.display()))
         })?;

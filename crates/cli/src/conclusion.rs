@@ -100,7 +100,7 @@ pub(crate) fn conclude(
 /// # Errors
 /// [`Failure::rig`] for a fault, and for presses lost to rig faults.
 pub(crate) fn end_of(session: &Path, report: &RunReport) -> Result<Option<String>, Failure> {
-    let kept = format!("everything recorded so far is kept: {}", session.display());
+    let kept_message = format!("everything recorded so far is kept: {}", session.display());
     match &report.end {
         RunEnd::Completed => match presses_lost_to_the_rig(session)? {
             Some(lost) => Err(Failure::rig(format!(
@@ -111,11 +111,11 @@ pub(crate) fn end_of(session: &Path, report: &RunReport) -> Result<Option<String
             None => Ok(None),
         },
         RunEnd::Stopped(reason) => Ok(Some(format!(
-            "stopped: {reason}; {kept}\n  next: {}",
+            "stopped: {reason}; {kept_message}\n  next: {}",
             next_step(session)
         ))),
         RunEnd::Faulted(causes) => Err(Failure::rig(format!(
-            "{causes}\n  {kept}\n  next: fix the cause named above (device, cable, file, disk space), then {}; \
+            "{causes}\n  {kept_message}\n  next: fix the cause named above (device, cable, file, disk space), then {}; \
              `skinrig show` lists what was kept",
             next_step(session)
         ))),
@@ -139,10 +139,10 @@ fn presses_lost_to_the_rig(session: &Path) -> Result<Option<String>, Failure> {
             session.display()
         ))
     })?;
-    let wanted = plan.wanted(&histories);
-    let all = plan.presses.iter().zip(&histories).zip(wanted);
+    let pending = plan.pending(&histories);
+    let all = plan.presses.iter().zip(&histories).zip(pending);
     let lost: Vec<_> = all
-        .filter(|((press, _), wanted)| *wanted && press.role != PressRole::Sync)
+        .filter(|((press, _), pending)| *pending && press.role != PressRole::Sync)
         .map(|((press, known), _)| {
             let reason = known.verdict.as_ref().and_then(PressVerdict::reason);
             format!(
@@ -183,7 +183,7 @@ fn next_step(session: &Path) -> String {
 }
 
 fn analyse(session: &Path, max_rmse_mm: Option<f64>, output: Output) -> Outcome {
-    let results = results::analyze_shown(session, results::Choices::default())?;
+    let results = results::analyze_shown(session, results::AnalysisRequest::default())?;
     let written = results::write_shown(&results, None, None)?;
     results::print_results(&results, output, &written);
     results::check_limit(&results, max_rmse_mm)

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use serde::{Serialize, Serializer};
-use skinrig_evk1::FoundState;
+use skinrig_evk1::CameraState;
 use skinrig_hil::lease::{self, LeaseState};
 use skinrig_omega3::enumerate::{Availability, SERIAL_UNKNOWN};
 use skinrig_omega3::load::LoadError;
@@ -158,7 +158,7 @@ fn robots(rig: Option<&RigFile>) -> Vec<Line> {
         next_step,
         ..Line::default()
     };
-    let wanted = rig.map(|r| r.robot.serial);
+    let expected = rig.map(|r| r.robot.serial);
     let library = rig.and_then(|r| r.robot.library.as_deref());
     let loaded = match skinrig_omega3::load::load(library) {
         Ok(loaded) => loaded,
@@ -193,7 +193,7 @@ fn robots(rig: Option<&RigFile>) -> Vec<Line> {
             Line {
                 serial: f.serial.map(|s| s.to_string()),
                 // The library reports 65535 for a device without a serial number.
-                role: (wanted == Some(f.serial.unwrap_or(SERIAL_UNKNOWN)))
+                role: (expected == Some(f.serial.unwrap_or(SERIAL_UNKNOWN)))
                     .then(|| "robot".to_owned()),
                 firmware: f.firmware.clone(),
                 ..line(
@@ -209,7 +209,7 @@ fn robots(rig: Option<&RigFile>) -> Vec<Line> {
         &mut lines,
         "robot",
         "omega.3",
-        wanted.map(|s| ("robot", s.to_string())),
+        expected.map(|s| ("robot", s.to_string())),
     );
     lines
 }
@@ -222,14 +222,14 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
         detail,
         ..Line::default()
     };
-    let wanted = |serial: &str| {
+    let role_of = |serial: &str| {
         let cameras = &rig?.cameras;
         let roles = ["camera1", "camera2"];
         let at = cameras.iter().position(|c| c.serial == serial)?;
         Some(roles[at].to_owned())
     };
     let mut lines = Vec::new();
-    let others = other_cameras(&mut lines, &wanted);
+    let others = other_cameras(&mut lines, &role_of);
     match skinrig_evk1::enumerate() {
         Err(e) => lines.push(line("USB", DeviceState::Faulty, e.to_string())),
         Ok(found) => lines.extend(
@@ -240,9 +240,9 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
                     let next_step = f.next_step();
                     let place = |model: &str| format!("{model}, {}", f.place);
                     let found = match &f.state {
-                        FoundState::Ready(identity) => Line {
+                        CameraState::Ready(identity) => Line {
                             serial: Some(identity.serial.clone()),
-                            role: wanted(&identity.serial).or_else(|| wanted(f.port.as_deref()?)),
+                            role: role_of(&identity.serial).or_else(|| role_of(f.port.as_deref()?)),
                             firmware: Some(identity.firmware()),
                             ..line(
                                 &place("EVK1 Gen3.1"),
@@ -250,20 +250,20 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
                                 identity.firmware(),
                             )
                         },
-                        FoundState::Busy => line(
+                        CameraState::Busy => line(
                             &place("camera"),
                             DeviceState::Busy,
                             "in use by another program".to_owned(),
                         ),
-                        FoundState::NoPermission => {
+                        CameraState::NoPermission => {
                             line(&place("camera"), DeviceState::NotPermitted, String::new())
                         }
-                        FoundState::NotEvk1(what) => line(
+                        CameraState::NotEvk1(what) => line(
                             &place("not an EVK1"),
                             DeviceState::OtherDevice,
                             what.clone(),
                         ),
-                        FoundState::Faulty(what) => {
+                        CameraState::Faulty(what) => {
                             line(&place("camera"), DeviceState::Faulty, what.clone())
                         }
                     };
@@ -301,8 +301,8 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
 
 /// Adds a line for each supported camera that is not an EVK1; returns bus and address of each.
 #[cfg(feature = "evk4")]
-fn other_cameras(lines: &mut Vec<Line>, wanted: &dyn Fn(&str) -> Option<String>) -> Vec<(u8, u8)> {
-    use skinrig_evk4::FoundState;
+fn other_cameras(lines: &mut Vec<Line>, role_of: &dyn Fn(&str) -> Option<String>) -> Vec<(u8, u8)> {
+    use skinrig_evk4::CameraState;
 
     let known = crate::rig::evt3_camera::evk1_places();
     let mut places = Vec::new();
@@ -310,12 +310,12 @@ fn other_cameras(lines: &mut Vec<Line>, wanted: &dyn Fn(&str) -> Option<String>)
     for found in skinrig_evk4::enumerate(&known).unwrap_or_default() {
         let (bus, device) = found.place;
         // Other devices with the same USB IDs are left to the EVK1's list.
-        if let FoundState::Ready(model, serial) = found.state {
+        if let CameraState::Ready(model, serial) = found.state {
             places.push(found.place);
             lines.push(Line {
                 device: "camera",
                 what: format!("{}, USB bus {bus} device {device}", model.name()),
-                role: wanted(&serial),
+                role: role_of(&serial),
                 serial: Some(serial),
                 state: DeviceState::Ready,
                 detail: format!("model {}", model.word()),
@@ -339,9 +339,9 @@ fn add_missing(
     lines: &mut Vec<Line>,
     device: &'static str,
     model: &str,
-    wanted: Option<(&str, String)>,
+    expected: Option<(&str, String)>,
 ) {
-    let (role, serial) = match wanted {
+    let (role, serial) = match expected {
         Some((role, serial)) => (Some(role.to_owned()), Some(serial)),
         None => (None, None),
     };
@@ -507,8 +507,8 @@ mod tests {
     /// State of camera 1 when `found` is the only camera.
     fn state_beside(found: Line) -> Option<DeviceState> {
         let mut lines = vec![found];
-        let wanted = Some(("camera1", "00001753".to_owned()));
-        add_missing(&mut lines, "camera", "EVK1", wanted);
+        let expected = Some(("camera1", "00001753".to_owned()));
+        add_missing(&mut lines, "camera", "EVK1", expected);
         lines.get(1).map(|l| l.state)
     }
 

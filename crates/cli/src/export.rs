@@ -12,7 +12,7 @@ use skinrig_recorder::{SessionReader, tags_path};
 use crate::args::{ExportArgs, ExportKind, ExportTable};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::paths::{SESSION_SUFFIX, beside};
-use crate::results::{self, Choices, Results};
+use crate::results::{self, AnalysisRequest, Results};
 
 /// Writes the requested formats and prints the paths of the files.
 ///
@@ -72,7 +72,7 @@ pub(crate) fn refused(e: ExportError) -> Failure {
 
 /// The requested tables, small ones first.
 fn tables(only: &[ExportTable]) -> Vec<TableName> {
-    let wanted = |table: &TableName| {
+    let is_selected = |table: &TableName| {
         let group = match table {
             TableName::Presses => ExportTable::Presses,
             TableName::Pose => ExportTable::Pose,
@@ -81,11 +81,11 @@ fn tables(only: &[ExportTable]) -> Vec<TableName> {
         };
         only.is_empty() || only.contains(&group)
     };
-    TableName::ALL.into_iter().filter(wanted).collect()
+    TableName::ALL.into_iter().filter(is_selected).collect()
 }
 
 /// Each requested format once.
-fn kinds(asked: &[ExportKind]) -> Vec<ExportKind> {
+fn kinds(requested: &[ExportKind]) -> Vec<ExportKind> {
     let all = [
         ExportKind::Parquet,
         ExportKind::Npz,
@@ -93,8 +93,9 @@ fn kinds(asked: &[ExportKind]) -> Vec<ExportKind> {
         ExportKind::Raw,
         ExportKind::Hdf5,
     ];
-    let wanted = |kind: &ExportKind| asked.contains(kind) || asked.contains(&ExportKind::All);
-    all.into_iter().filter(wanted).collect()
+    let is_selected =
+        |kind: &ExportKind| requested.contains(kind) || requested.contains(&ExportKind::All);
+    all.into_iter().filter(is_selected).collect()
 }
 
 /// Exports all formats except a bundle.
@@ -114,7 +115,7 @@ fn files(
     let tabular = |kind: &ExportKind| kind.is_tabular();
     let needed = kinds.iter().any(tabular) && tables.iter().any(|t| t.needs_analysis());
     let results = if needed {
-        let found = results::analyze_shown(&args.session, Choices::default());
+        let found = results::analyze_shown(&args.session, AnalysisRequest::default());
         Some(found.map_err(without_analysis)?)
     } else {
         None
@@ -223,7 +224,7 @@ pub(crate) fn derived(
     header: &RunHeader,
     folder: &Folder,
 ) -> Result<Vec<PathBuf>, Failure> {
-    let mut results = results::analyze_shown(session, Choices::default())?;
+    let mut results = results::analyze_shown(session, AnalysisRequest::default())?;
     // Measured on one machine at one time: it does not follow from the session.
     results.tradeoff = None;
     let (json, html) = results::documents(&results)?;

@@ -12,7 +12,7 @@ pub use skinrig_controller::ControlHandle;
 
 use crate::args::{CompareArgs, RunArgs};
 use crate::exit::Failure;
-use crate::results::{self, Choices};
+use crate::results::{self, AnalysisRequest};
 use crate::signals::Operator;
 use crate::terminal::Output;
 use crate::{analyses, check, compare, conclusion, run};
@@ -30,7 +30,7 @@ pub fn analysis_for_tables(
     session_id: &str,
 ) -> Result<(Analysis, Vec<LegStart>), Failure> {
     let Some(analysis) = analyses::stored(path, session_id, None) else {
-        let results = results::analyze_session(path, Choices::default())?;
+        let results = results::analyze_session(path, AnalysisRequest::default())?;
         return Ok((results.analysis, results.legs));
     };
     let legs = if reader.legs().map_err(Failure::session)?.len() > 1 {
@@ -79,7 +79,7 @@ pub fn variants(session: &Path, session_id: &str) -> Vec<String> {
 /// # Errors
 /// [`Failure::input`] for an unreadable session and for settings that do not parse; [`Failure::internal`] when a file
 /// cannot be written.
-pub fn analyze(session: &Path, choices: Choices<'_>, save: bool) -> Result<Value, Failure> {
+pub fn analyze(session: &Path, choices: AnalysisRequest<'_>, save: bool) -> Result<Value, Failure> {
     if let Some(name) = choices.name {
         analyses::parse(name).map_err(|e| Failure::input(format!("name `{name}`: {e}")))?;
     }

@@ -70,11 +70,11 @@ impl ProgressView {
     pub(crate) fn resumed(
         presses: &[PlannedPress],
         histories: &[PressHistory],
-        wanted: &[bool],
+        pending: &[bool],
         expected: HostDuration,
     ) -> Self {
         let mut view = Self::new(presses.len(), expected);
-        view.tracker = view.tracker.resumed(presses, histories, wanted);
+        view.tracker = view.tracker.resumed(presses, histories, pending);
         if let Display::Lines { tenths } = &mut view.display {
             *tenths = view.tracker.progress().done * 10 / presses.len().max(1);
         }
@@ -114,8 +114,8 @@ impl ProgressView {
             Display::Lines { tenths } => {
                 let planned = self.tracker.progress().planned.max(1);
                 // Presses given up at the end do not count as progress.
-                let made = done - self.tracker.progress().missed;
-                let reached = made * 10 / planned;
+                let attempted = done - self.tracker.progress().missed;
+                let reached = attempted * 10 / planned;
                 if reached > *tenths {
                     *tenths = reached;
                     errln!(

@@ -62,9 +62,9 @@ struct Prototype {
 /// [`Failure::input`] when the folder cannot be read, or has no session of the named prototype.
 pub(crate) fn prototypes(args: &PrototypesArgs, json: bool) -> Outcome {
     let mut sessions = list(&args.folder).map_err(Failure::session)?;
-    if let Some(wanted) = &args.prototype {
-        crate::sessions::of_prototype(&args.folder, wanted)?;
-        sessions.retain(|s| s.prototype() == Some(wanted));
+    if let Some(prototype_id) = &args.prototype {
+        crate::sessions::of_prototype(&args.folder, prototype_id)?;
+        sessions.retain(|s| s.prototype() == Some(prototype_id));
     }
     let all = gather(&sessions, args.analysis.as_deref());
     for copy in copies(&sessions) {

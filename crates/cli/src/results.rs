@@ -46,7 +46,7 @@ impl Results {
 
 /// How to analyse a session.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Choices<'a> {
+pub struct AnalysisRequest<'a> {
     /// Overrides of the session's own settings.
     pub overrides: &'a [String],
     /// Make the choices of the public code first, and evaluate its method too.
@@ -55,7 +55,7 @@ pub struct Choices<'a> {
     pub name: Option<&'a str>,
 }
 
-impl<'a> Choices<'a> {
+impl<'a> AnalysisRequest<'a> {
     const fn of_session(&self) -> skinrig_results::AnalysisOptions<'a> {
         skinrig_results::AnalysisOptions {
             overrides: self.overrides,
@@ -64,7 +64,7 @@ impl<'a> Choices<'a> {
     }
 }
 
-fn variant(choices: Choices<'_>) -> Variant {
+fn variant(choices: AnalysisRequest<'_>) -> Variant {
     let own = || analyses::default_name(choices.overrides, choices.reference_code);
     Variant {
         name: choices.name.map_or_else(own, str::to_owned),
@@ -79,7 +79,7 @@ fn variant(choices: Choices<'_>) -> Variant {
 /// [`Failure::input`] for an unreadable session or settings that do not parse.
 pub(crate) fn open(
     path: &Path,
-    choices: Choices<'_>,
+    choices: AnalysisRequest<'_>,
 ) -> Result<(AlignedSession, Option<Variant>), Failure> {
     let session = Session::open(path, choices.of_session())?;
     let changes = session.is_changed || choices.name.is_some();
@@ -91,13 +91,13 @@ pub(crate) fn open(
 ///
 /// # Errors
 /// [`Failure::input`] for an unreadable session or settings that do not parse.
-pub fn analyze_session(path: &Path, choices: Choices<'_>) -> Result<Results, Failure> {
+pub fn analyze_session(path: &Path, choices: AnalysisRequest<'_>) -> Result<Results, Failure> {
     let (aligned, variant) = open(path, choices)?;
     complete(path, aligned, variant)
 }
 
 /// Like [`analyze_session`], with its progress on the terminal.
-pub(crate) fn analyze_shown(path: &Path, choices: Choices<'_>) -> Result<Results, Failure> {
+pub(crate) fn analyze_shown(path: &Path, choices: AnalysisRequest<'_>) -> Result<Results, Failure> {
     let (aligned, variant) = open(path, choices)?;
     let _phase = Phase::reading("analysing", aligned.events.bytes_read());
     complete(path, aligned, variant)
@@ -249,7 +249,7 @@ pub fn check_limit(results: &Results, max_rmse_mm: Option<f64>) -> Outcome {
 /// # Errors
 /// See [`analyze_session`], `write_results`, [`check_limit`].
 pub fn analyze(args: &AnalyzeArgs, output: Output) -> Outcome {
-    let choices = Choices {
+    let choices = AnalysisRequest {
         overrides: &args.overrides,
         reference_code: args.reference_code,
         name: args.name.as_deref(),
@@ -311,11 +311,13 @@ pub fn report(args: &ReportArgs, json: bool) -> Outcome {
             Some(analyses::variant(&args.session, &id, name)?)
         }
     };
-    let choices = variant.as_ref().map_or_else(Choices::default, |v| Choices {
-        overrides: &v.changed,
-        reference_code: v.reference_code,
-        name: Some(&v.name),
-    });
+    let choices = variant
+        .as_ref()
+        .map_or_else(AnalysisRequest::default, |v| AnalysisRequest {
+            overrides: &v.changed,
+            reference_code: v.reference_code,
+            name: Some(&v.name),
+        });
     let results = analyze_shown(&args.session, choices)?;
     let older = replacement_note(&results, None);
     let paths = write_shown(&results, None, args.out.as_deref())?;

@@ -55,8 +55,8 @@ pub(crate) fn resume(args: &ResumeArgs, command_line: &str, output: Output) -> O
         opened => opened.map_err(refusal)?,
     };
     let found = read(session)?;
-    let wanted = found.plan.wanted(&found.histories);
-    if let (Some(end), false) = (&found.end, wanted.contains(&true)) {
+    let pending = found.plan.pending(&found.histories);
+    if let (Some(end), false) = (&found.end, pending.contains(&true)) {
         drop(writer);
         if SessionReader::open(session)
             .and_then(|reader| reader.seal())
@@ -67,7 +67,7 @@ pub(crate) fn resume(args: &ResumeArgs, command_line: &str, output: Output) -> O
         return Err(Failure::input(nothing_left(session, end)));
     }
     if !output.json {
-        outln!("{}", describe(session, &found, &wanted));
+        outln!("{}", describe(session, &found, &pending));
     }
     let header = ResumeHeader {
         operator: found.header.operator.clone(),
@@ -76,8 +76,8 @@ pub(crate) fn resume(args: &ResumeArgs, command_line: &str, output: Output) -> O
         software: crate::version::SOFTWARE.to_owned(),
         command_line: command_line.to_owned(),
     };
-    let (session, report) = if wanted.contains(&true) {
-        run_leg(args, &found, &wanted, header, writer, &operator)?
+    let (session, report) = if pending.contains(&true) {
+        run_leg(args, &found, &pending, header, writer, &operator)?
     } else {
         (session.clone(), end_only(&found, header, writer)?)
     };
@@ -189,14 +189,14 @@ fn read(session: &Path) -> Result<UnfinishedSession, Failure> {
 }
 
 /// State of the session and remaining work, for the terminal.
-fn describe(session: &Path, found: &UnfinishedSession, wanted: &[bool]) -> String {
+fn describe(session: &Path, found: &UnfinishedSession, pending: &[bool]) -> String {
     let ended = match &found.end {
         None => "cut off".to_owned(),
         Some(RunEnd::Stopped(reason)) => format!("stopped: {reason}"),
         Some(RunEnd::Faulted(causes)) => format!("faulted: {causes}"),
         Some(RunEnd::Completed) => "completed, with presses lost to rig faults".to_owned(),
     };
-    let all = || found.plan.presses.iter().zip(&found.histories).zip(wanted);
+    let all = || found.plan.presses.iter().zip(&found.histories).zip(pending);
     let valid = all().filter(|((_, h), _)| h.verdict == Some(PressVerdict::Valid));
     let interrupted: Vec<_> = all()
         .filter(|((_, h), _)| h.attempts > 0 && h.verdict.is_none())
@@ -208,7 +208,7 @@ fn describe(session: &Path, found: &UnfinishedSession, wanted: &[bool]) -> Strin
     };
     let of = |role: fn(PressRole) -> bool| -> Vec<&PlannedPress> {
         all()
-            .filter(|((p, _), wanted)| **wanted && role(p.role))
+            .filter(|((p, _), pending)| **pending && role(p.role))
             .map(|((p, _), _)| p)
             .collect()
     };
@@ -224,7 +224,7 @@ fn describe(session: &Path, found: &UnfinishedSession, wanted: &[bool]) -> Strin
         session.display(),
         found.legs,
         valid.count(),
-        wanted.len(),
+        pending.len(),
     )
 }
 
@@ -241,21 +241,21 @@ fn names(presses: &[&PlannedPress]) -> String {
 fn run_leg(
     args: &ResumeArgs,
     found: &UnfinishedSession,
-    wanted: &[bool],
+    pending: &[bool],
     header: ResumeHeader,
     writer: SessionWriter,
     operator: &Operator,
 ) -> Result<(PathBuf, RunReport), Failure> {
     let protocol = protocol_of(found)?;
-    let rest = rest_of(&protocol, &found.plan, wanted)?;
+    let rest = rest_of(&protocol, &found.plan, pending)?;
     let OpenedRig {
         rig,
         preflight,
         notes,
         bench,
-    } = open_rig(args, found, protocol, &rest, wanted)?;
+    } = open_rig(args, found, protocol, &rest, pending)?;
     let expected = skinrig_model::HostDuration::from_secs_f64(rest.summary().duration_s);
-    let view = ProgressView::resumed(&found.plan.presses, &found.histories, wanted, expected);
+    let view = ProgressView::resumed(&found.plan.presses, &found.histories, pending, expected);
     let folder = paths::folder_of(&args.session);
     let sink = SessionSink::new(writer, view, ReplayExpectations::default());
     let mut sink = sink
@@ -294,13 +294,13 @@ fn protocol_of(found: &UnfinishedSession) -> Result<Protocol, Failure> {
 }
 
 /// The remaining plan: with straight paths where they are free, else with the planned ones.
-fn rest_of(protocol: &Protocol, plan: &Plan, wanted: &[bool]) -> Result<Plan, Failure> {
-    let is_wanted = |id: skinrig_model::PressId| wanted.get(id.index() as usize) == Some(&true);
-    let straight = plan.remaining(is_wanted, Route::Straight);
+fn rest_of(protocol: &Protocol, plan: &Plan, pending: &[bool]) -> Result<Plan, Failure> {
+    let is_pending = |id: skinrig_model::PressId| pending.get(id.index() as usize) == Some(&true);
+    let straight = plan.remaining(is_pending, Route::Straight);
     if protocol.check(&straight).is_ok() {
         return Ok(straight);
     }
-    let planned = plan.remaining(is_wanted, Route::AsPlanned);
+    let planned = plan.remaining(is_pending, Route::AsPlanned);
     let checked = protocol.check(&planned);
     checked.map_err(|found| Failure::findings(&found))?;
     Ok(planned)
@@ -308,11 +308,11 @@ fn rest_of(protocol: &Protocol, plan: &Plan, wanted: &[bool]) -> Result<Plan, Fa
 
 /// Where the simulated skin was pressed in earlier legs. An attempt that is repeated does not count, so that it meets the same
 /// contact again.
-fn pressed_before(found: &UnfinishedSession, wanted: &[bool]) -> Vec<Point2> {
-    let all = found.plan.presses.iter().zip(&found.histories).zip(wanted);
-    all.flat_map(|((press, history), wanted)| {
-        let made = history.attempts.saturating_sub(u32::from(*wanted));
-        (0..made).map(|_| press.at)
+fn pressed_before(found: &UnfinishedSession, pending: &[bool]) -> Vec<Point2> {
+    let all = found.plan.presses.iter().zip(&found.histories).zip(pending);
+    all.flat_map(|((press, history), pending)| {
+        let attempted = history.attempts.saturating_sub(u32::from(*pending));
+        (0..attempted).map(|_| press.at)
     })
     .collect()
 }
@@ -340,7 +340,7 @@ fn open_rig(
     found: &UnfinishedSession,
     protocol: Protocol,
     rest: &Plan,
-    wanted: &[bool],
+    pending: &[bool],
 ) -> Result<OpenedRig, Failure> {
     let folder = paths::folder_of(&args.session);
     let header = &found.header;
@@ -370,7 +370,7 @@ fn open_rig(
             header.seed,
             args.real_time,
             faults,
-            pressed_before(found, wanted),
+            pressed_before(found, pending),
         )?;
         let mut preflight = gates::of_simulated(&rig, folder, summary.expected_bytes);
         preflight

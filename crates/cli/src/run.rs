@@ -28,7 +28,7 @@ use crate::terminal::Output;
 use skinrig_results::RigDocument;
 
 /// Header data of a session that do not depend on the rig.
-pub(crate) struct Intent<'a> {
+pub(crate) struct RunInputs<'a> {
     /// The protocol or schedule, byte for byte.
     pub text: &'a str,
     /// Its file name.
@@ -63,7 +63,7 @@ pub(crate) struct Intent<'a> {
 /// # Errors
 /// [`Failure::internal`] when the session cannot be created. A rig or recorder fault during the run is in the report.
 pub(crate) fn record(
-    intent: &Intent<'_>,
+    intent: &RunInputs<'_>,
     plan: &Plan,
     mut rig: Rig,
     folder: &Path,
@@ -113,7 +113,7 @@ pub(crate) fn record(
 
 /// Creates a new session file; retries if another process took the name.
 fn new_session(
-    intent: &Intent<'_>,
+    intent: &RunInputs<'_>,
     started: DateTime<Utc>,
     folder: &Path,
 ) -> Result<(PathBuf, SessionWriter), Failure> {
@@ -138,7 +138,7 @@ fn new_session(
 }
 
 fn header(
-    intent: &Intent<'_>,
+    intent: &RunInputs<'_>,
     plan: &Plan,
     rig: &Rig,
     started_at: &str,
@@ -212,7 +212,7 @@ fn new_run(
 /// Runs a protocol on the simulated rig.
 pub(crate) fn simulated(
     args: &RunArgs,
-    checked: check::Checked,
+    checked: check::CheckedProtocol,
     command_line: &str,
     output: Output,
     operator: &Operator,
@@ -260,7 +260,7 @@ pub(crate) fn simulated(
         );
     }
     let preflight = gates::of_simulated(&rig, &args.sessions, summary.expected_bytes);
-    let intent = Intent {
+    let intent = RunInputs {
         faults: &faults,
         ..intent_of(&protocol, seed, summary.duration_s, command_line)
     };
@@ -330,8 +330,8 @@ pub(crate) fn intent_of<'a>(
     seed: u64,
     duration_s: f64,
     command_line: &'a str,
-) -> Intent<'a> {
-    Intent {
+) -> RunInputs<'a> {
+    RunInputs {
         text: &protocol.text,
         file_name: &protocol.file_name,
         name: &protocol.name,
@@ -383,7 +383,7 @@ fn replay(
         .end()
         .map_err(Failure::session)?
         .map_or(HostDuration::ZERO, |(t, _)| HostDuration(t.0));
-    let intent = Intent {
+    let intent = RunInputs {
         text: &header.protocol_text,
         file_name: &header.protocol_name,
         name: &name,

@@ -11,7 +11,7 @@ use skinrig_model::{HostDuration, PressRole, Verdict};
 use crate::args::DetectArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::progress::clock_text;
-use crate::results::{Choices, analyze_shown};
+use crate::results::{AnalysisRequest, analyze_shown};
 
 /// Below this number of locations the estimated variance is poor: its 95 % interval spans a factor of 6 or more.
 const FEW_LOCATIONS: u32 = 12;
@@ -26,7 +26,7 @@ pub(crate) fn propose(
     args: &DetectArgs,
     json: bool,
 ) -> Outcome {
-    let analysis = analyze_shown(session, Choices::default())?.analysis;
+    let analysis = analyze_shown(session, AnalysisRequest::default())?.analysis;
     let refused = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", session.display()));
     let sample = errors(&analysis).map_err(|e| refused(&e))?;
     let measured = power::measure(&sample).map_err(|e| refused(&e))?;

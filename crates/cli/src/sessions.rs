@@ -18,8 +18,8 @@ use crate::exit::{Exit, Failure, Outcome};
 /// [`Failure::input`] when the folder cannot be read.
 pub(crate) fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
     let mut found = list(&args.folder).map_err(Failure::session)?;
-    if let Some(wanted) = &args.prototype {
-        found.retain(|s| s.prototype() == Some(wanted));
+    if let Some(prototype_id) = &args.prototype {
+        found.retain(|s| s.prototype() == Some(prototype_id));
     }
     found.retain(|s| args.tags.iter().all(|tag| s.has_tag(tag)));
     if json {
@@ -155,13 +155,13 @@ fn by_id(all: &[SessionSummary]) -> BTreeMap<&str, Vec<&SessionSummary>> {
 /// The sessions of a list in its order, without copies of the same session (`skinrig salvage` creates one).
 #[must_use]
 pub(crate) fn originals(all: &[SessionSummary]) -> Vec<&SessionSummary> {
-    let kept: BTreeSet<&Path> = by_id(all)
+    let chosen: BTreeSet<&Path> = by_id(all)
         .values()
         .filter_map(|copies| representative(copies).map(|s| s.path.as_path()))
         .collect();
     let broken = |s: &SessionSummary| matches!(s.state, SessionState::Broken { .. });
     all.iter()
-        .filter(|s| broken(s) || kept.contains(s.path.as_path()))
+        .filter(|s| broken(s) || chosen.contains(s.path.as_path()))
         .collect()
 }
 
@@ -170,13 +170,13 @@ pub(crate) fn originals(all: &[SessionSummary]) -> Vec<&SessionSummary> {
 pub(crate) fn copies(all: &[SessionSummary]) -> Vec<String> {
     let mut notes = Vec::new();
     for copies in by_id(all).values() {
-        let Some(kept) = representative(copies) else {
+        let Some(chosen) = representative(copies) else {
             continue;
         };
-        for copy in copies.iter().filter(|s| s.path != kept.path) {
-            let (copy, kept) = (copy.path.display(), kept.path.display());
+        for copy in copies.iter().filter(|s| s.path != chosen.path) {
+            let (copy, chosen) = (copy.path.display(), chosen.path.display());
             notes.push(format!(
-                "{copy} is a copy of the session {kept}; it is not counted again"
+                "{copy} is a copy of the session {chosen}; it is not counted again"
             ));
         }
     }

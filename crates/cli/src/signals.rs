@@ -17,7 +17,7 @@ static PRESSED: AtomicU8 = AtomicU8::new(0);
 pub(crate) struct Operator {
     control: ControlHandle,
     over: Arc<AtomicBool>,
-    asked: Arc<AtomicBool>,
+    requested: Arc<AtomicBool>,
     of_suite: bool,
     attended: bool,
 }
@@ -64,7 +64,7 @@ impl Operator {
         Self {
             control,
             over: Arc::default(),
-            asked: Arc::default(),
+            requested: Arc::default(),
             of_suite: false,
             attended: false,
         }
@@ -72,14 +72,15 @@ impl Operator {
 
     fn with_messages(messages: Messages, of_suite: bool) -> Result<Self, SignalError> {
         let flag = || Arc::new(AtomicBool::new(false));
-        let (control, over, asked) = (ControlHandle::new(), flag(), flag());
-        let (halter, is_over, is_asked) = (control.clone(), Arc::clone(&over), Arc::clone(&asked));
+        let (control, over, requested) = (ControlHandle::new(), flag(), flag());
+        let (halter, is_over, requested_flag) =
+            (control.clone(), Arc::clone(&over), Arc::clone(&requested));
         on_ctrl_c(move |times| {
             if is_over.load(Ordering::SeqCst) {
                 // The robot is at rest and the session is closed.
                 std::process::exit(i32::from(Exit::Stopped.code()));
             }
-            is_asked.store(true, Ordering::SeqCst);
+            requested_flag.store(true, Ordering::SeqCst);
             if let Some(messages) = messages.get(usize::from(times) - 1) {
                 errln!("\n{messages}");
             }
@@ -95,7 +96,7 @@ impl Operator {
         Ok(Self {
             control,
             over,
-            asked,
+            requested,
             of_suite,
             attended: true,
         })
@@ -116,7 +117,7 @@ impl Operator {
     /// True if ctrl-C was pressed or another signal requested an end.
     #[must_use]
     pub(crate) fn is_requested(&self) -> bool {
-        self.asked.load(Ordering::SeqCst)
+        self.requested.load(Ordering::SeqCst)
     }
 
     /// Called when the run is over and its session closed: from now on ctrl-C exits the program, except within a suite.
@@ -165,7 +166,7 @@ impl Signals {
     fn new() -> std::io::Result<Self> {
         use rustix::process::Signal;
         use tokio::signal::unix::{SignalKind, signal};
-        let mut wanted = vec![
+        let mut kinds = vec![
             (Signal::QUIT, 2),
             (Signal::XCPU, 2),
             (Signal::INT, 1),
@@ -181,13 +182,13 @@ impl Signals {
             (Signal::POWER, 1),
         ];
         if !hangup_is_ignored() {
-            wanted.push((Signal::HUP, 1));
+            kinds.push((Signal::HUP, 1));
         }
         let listen = |(kind, min_presses): (Signal, u8)| {
             Ok((signal(SignalKind::from_raw(kind.as_raw()))?, min_presses))
         };
         Ok(Self(
-            wanted
+            kinds
                 .into_iter()
                 .map(listen)
                 .collect::<std::io::Result<_>>()?,

@@ -8,7 +8,7 @@ use skinrig_model::{
     ExcludedReason, HostTime, InterruptionKind, PressId, PressOutcome, PressTiming, PressVerdict,
     Record,
 };
-use skinrig_recorder::{RecorderError, Sealed, SessionWriter};
+use skinrig_recorder::{RecorderError, SealedSession, SessionWriter};
 
 use crate::fault::FaultInjector;
 use crate::progress::ProgressView;
@@ -120,7 +120,7 @@ impl SessionSink {
     ///
     /// # Errors
     /// [`RecorderError`]; the session stays readable.
-    pub(crate) fn seal(mut self) -> Result<Sealed, RecorderError> {
+    pub(crate) fn seal(mut self) -> Result<SealedSession, RecorderError> {
         self.view.finish();
         self.fault_injector.before_the_seal()?;
         self.writer.finish_with_notice(|| errln!("{HELD_OPEN}"))

@@ -155,7 +155,7 @@ fn print(d: &Value, live: Option<&RunSnapshot>) {
     }
     for o in d["last_outcomes"].as_array().into_iter().flatten() {
         let number = o["attempt"].as_u64().unwrap_or(1);
-        let again = if number > 1 {
+        let attempt_note = if number > 1 {
             format!(", attempt {number}")
         } else {
             String::new()
@@ -163,7 +163,7 @@ fn print(d: &Value, live: Option<&RunSnapshot>) {
         let reason = o["reason"].as_str();
         let reason = reason.map_or_else(String::new, |r| format!(": {r}"));
         outln!(
-            "          press {}{again} {}{reason}",
+            "          press {}{attempt_note} {}{reason}",
             o["press"],
             o["verdict"].as_str().unwrap_or("-")
         );

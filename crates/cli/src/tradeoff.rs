@@ -11,7 +11,7 @@ use crate::analyses::tradeoff_path;
 use crate::args::{CostKind, TradeoffArgs};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::phase::Phase;
-use crate::results::{Choices, not_official, open, write};
+use crate::results::{AnalysisRequest, not_official, open, write};
 use crate::terminal::Output;
 use crate::tradeoff_file::FORMAT;
 
@@ -109,7 +109,7 @@ fn rig_in_words(header: &RunHeader) -> String {
 /// When the session cannot be analysed or a file cannot be written; [`Failure::limit`] when no choice meets a
 /// requirement.
 pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
-    let choices = Choices {
+    let choices = AnalysisRequest {
         overrides: &args.overrides,
         reference_code: false,
         name: None,

@@ -4,7 +4,9 @@ use serde::Serialize;
 use skinrig_model::Point2;
 
 use crate::locations::Locations;
-use crate::statistics::{Better, ComparisonTarget, Interval, Pairing, Sample, Settings, compare};
+use crate::statistics::{
+    ComparisonTarget, ImprovementDirection, Interval, Pairing, Sample, Settings, compare,
+};
 use crate::subject::Subject;
 
 /// Results of one skin at one location.
@@ -71,10 +73,10 @@ pub(crate) fn compare_locations(
         let mut sums = vec![[0.0; 2]; locations.len()];
         for attempt in locations.attempts(subject) {
             let i = attempt.location as usize;
-            let here = &mut all[i].skins[k];
-            here.presses[1] += 1;
+            let skin_result = &mut all[i].skins[k];
+            skin_result.presses[1] += 1;
             if let Some((x, y)) = attempt.error() {
-                here.presses[0] += 1;
+                skin_result.presses[0] += 1;
                 lengths[i][k].push(libm::hypot(x, y));
                 sums[i][0] += x;
                 sums[i][1] += y;
@@ -120,7 +122,7 @@ fn difference(a: &[f64], b: &[f64], settings: &Settings) -> Option<Interval> {
     };
     let sample = |v: &[f64]| Sample::mean((0..).zip(v.iter().copied()));
     let question = ComparisonTarget {
-        better: Better::Lower,
+        better: ImprovementDirection::Lower,
         margin: None,
     };
     let settings = Settings {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::locations::{Attempt, Locations};
-use crate::statistics::{Better, Count, Position, Sample, SampleFault};
+use crate::statistics::{Count, ImprovementDirection, Position, Sample, SampleFault};
 use crate::subject::Subject;
 
 /// A compared metric.
@@ -163,11 +163,11 @@ impl Metric {
 
     /// Direction in which the metric improves.
     #[must_use]
-    pub const fn better(self) -> Better {
+    pub const fn better(self) -> ImprovementDirection {
         match self {
-            Self::BiasX | Self::BiasY => Better::NearerZero,
-            Self::LocatedRate | Self::WithinRate | Self::Taxels => Better::Higher,
-            _ => Better::Lower,
+            Self::BiasX | Self::BiasY => ImprovementDirection::NearerZero,
+            Self::LocatedRate | Self::WithinRate | Self::Taxels => ImprovementDirection::Higher,
+            _ => ImprovementDirection::Lower,
         }
     }
 

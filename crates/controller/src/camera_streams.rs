@@ -9,7 +9,7 @@ use crate::continuity::{Continuity, StreamTiming};
 
 /// How to read the cameras.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Collect {
+pub(crate) enum ReadMode {
     /// Full chunks only.
     Poll,
     /// All data up to now.
@@ -78,13 +78,13 @@ impl CameraStreams {
     pub(crate) fn read(
         &mut self,
         camera: CameraId,
-        how: Collect,
+        how: ReadMode,
         now: HostTime,
     ) -> Result<(), DeviceError> {
         let device = &mut self.devices[camera.index()];
         match how {
-            Collect::Poll => device.poll(&mut self.chunks),
-            Collect::Flush => {
+            ReadMode::Poll => device.poll(&mut self.chunks),
+            ReadMode::Flush => {
                 let flushed = device.flush(&mut self.chunks);
                 self.continuity[camera.index()].flush(now, flushed)
             }

@@ -83,10 +83,10 @@ impl ExpectedDevice {
 #[must_use]
 pub fn identity_checks(
     role: DeviceRole,
-    wanted: Option<&ExpectedDevice>,
+    required: Option<&ExpectedDevice>,
     identity: &DeviceIdentity,
 ) -> Vec<PreflightCheck> {
-    let serial = wanted.and_then(|w| w.serial.as_deref());
+    let serial = required.and_then(|w| w.serial.as_deref());
     let mut checks = vec![
         PreflightCheck::new(
             format!("{role}: identity"),
@@ -97,7 +97,7 @@ pub fn identity_checks(
         )
         .about(CheckKind::Identity(role)),
     ];
-    for version in wanted.iter().flat_map(|w| &w.versions) {
+    for version in required.iter().flat_map(|w| &w.versions) {
         checks.push(
             PreflightCheck::new(
                 format!("{role}: version"),
@@ -121,12 +121,12 @@ pub fn differing(settings: &[Setting]) -> impl Iterator<Item = &Setting> {
 /// All checks of a configured device: its identity, required values and settings read back, and the robot's state.
 pub(crate) fn device_checks(
     role: DeviceRole,
-    wanted: Option<&ExpectedDevice>,
+    required: Option<&ExpectedDevice>,
     identity: &DeviceIdentity,
     settings: &[Setting],
 ) -> Vec<PreflightCheck> {
-    let mut checks = identity_checks(role, wanted, identity);
-    for (name, value) in wanted.iter().flat_map(|w| &w.settings) {
+    let mut checks = identity_checks(role, required, identity);
+    for (name, value) in required.iter().flat_map(|w| &w.settings) {
         let found = settings.iter().find(|s| s.name == *name);
         checks.push(
             PreflightCheck::new(
@@ -188,24 +188,24 @@ fn read_back(role: DeviceRole, settings: &[Setting]) -> PreflightCheck {
 }
 
 /// Equal as texts, or as numbers in single precision.
-fn is_same(wanted: &str, found: &str) -> bool {
-    if wanted == found {
+fn is_same(required: &str, found: &str) -> bool {
+    if required == found {
         return true;
     }
-    match (wanted.parse::<f64>(), found.parse::<f64>()) {
+    match (required.parse::<f64>(), found.parse::<f64>()) {
         (Ok(a), Ok(b)) => (a - b).abs() <= 1e-4 * a.abs().max(1e-3),
         _ => false,
     }
 }
 
-/// Whether the firmware text `found` contains the version `wanted` as a whole: `3.0` is in
+/// Whether the firmware text `found` contains the version `required` as a whole: `3.0` is in
 /// `FPGA 3.0, system 1c`, but not in `13.0` or `3.01`.
 #[must_use]
-pub fn contains_version(found: &str, wanted: &str) -> bool {
+pub fn contains_version(found: &str, required: &str) -> bool {
     let part = |c: char| c.is_ascii_alphanumeric() || c == '.';
-    found.match_indices(wanted).any(|(at, _)| {
+    found.match_indices(required).any(|(at, _)| {
         let before = found[..at].chars().next_back();
-        let after = found[at + wanted.len()..].chars().next();
+        let after = found[at + required.len()..].chars().next();
         !before.is_some_and(part) && !after.is_some_and(part)
     })
 }

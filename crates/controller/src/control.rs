@@ -48,7 +48,7 @@ struct Notes {
 /// The queue of notes is full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the queue of {MAX_NOTES} notes is full; try again")]
-pub struct NotesFull;
+pub struct NoteQueueFull;
 
 /// A request since the controller last checked, most urgent first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -123,12 +123,12 @@ impl ControlHandle {
     /// once [`notes_recorded`](Self::notes_recorded) has reached that number.
     ///
     /// # Errors
-    /// [`NotesFull`] if too many notes are queued: try again.
-    pub fn note(&self, text: String) -> Result<u64, NotesFull> {
+    /// [`NoteQueueFull`] if too many notes are queued: try again.
+    pub fn note(&self, text: String) -> Result<u64, NoteQueueFull> {
         let shared = &self.shared;
         let mut notes = shared.notes.lock().unwrap_or_else(PoisonError::into_inner);
         if notes.waiting.len() >= MAX_NOTES {
-            return Err(NotesFull);
+            return Err(NoteQueueFull);
         }
         notes.waiting.push_back(text);
         notes.taken_in += 1;
@@ -251,7 +251,7 @@ mod tests {
         for n in 1..=MAX_NOTES {
             assert_eq!(hand.note(n.to_string()), Ok(n as u64));
         }
-        assert_eq!(hand.note("one more".into()), Err(NotesFull));
+        assert_eq!(hand.note("one more".into()), Err(NoteQueueFull));
         let taken = hand.take_notes();
         assert_eq!(taken.len(), MAX_NOTES);
         assert_eq!((hand.take_notes().len(), hand.notes_recorded()), (0, 0));

@@ -8,7 +8,7 @@ use skinrig_model::{
     Robot, RunFault, Setting, Skin, WatchdogTrip,
 };
 use skinrig_protocol::area::Surroundings;
-use skinrig_protocol::plan::{OnTrip, RunLimits};
+use skinrig_protocol::plan::{RunLimits, TripReaction};
 
 use crate::settings::ControllerSettings;
 use crate::watchdog::{WatchLimits, Watchdog};
@@ -340,7 +340,7 @@ impl<'a> GuardedIndenter<'a> {
     pub fn poll(&mut self, clock: &dyn Clock, poses: &mut Vec<PoseSample>) -> Result<(), RunFault> {
         self.samples.clear();
         let answer = self.inner.poll(&mut self.samples);
-        let mut seen = Ok(());
+        let mut sample_check = Ok(());
         for s in &self.samples {
             let pose = PoseSample {
                 t: s.t,
@@ -348,10 +348,10 @@ impl<'a> GuardedIndenter<'a> {
                 measured: to_nanometre(self.skin_from_robot.apply(s.measured)),
                 force_n: s.force_n,
             };
-            let one = self.watchdog.check_sample(&pose);
-            let form_is_wrong = matches!(one, Err(WatchdogTrip::Feedback { .. }));
-            if seen.is_ok() || form_is_wrong {
-                seen = one;
+            let check = self.watchdog.check_sample(&pose);
+            let form_is_wrong = matches!(check, Err(WatchdogTrip::Feedback { .. }));
+            if sample_check.is_ok() || form_is_wrong {
+                sample_check = check;
             }
             if form_is_wrong {
                 break;
@@ -360,13 +360,13 @@ impl<'a> GuardedIndenter<'a> {
         }
         let looked = self.watchdog.check_poll(clock.now());
         // React to both: the second one may require the robot to brake.
-        for trip in [&seen, &looked]
+        for trip in [&sample_check, &looked]
             .into_iter()
             .filter_map(|r| r.as_ref().err())
         {
             self.react(trip);
         }
-        seen.and(looked)?;
+        sample_check.and(looked)?;
         answer.map_err(|e| self.hold_after(e))
     }
 
@@ -376,7 +376,7 @@ impl<'a> GuardedIndenter<'a> {
             return;
         }
         self.trip.get_or_insert_with(|| trip.clone());
-        let brake = trip.is_blind() || self.limits.on_trip == OnTrip::Brake;
+        let brake = trip.is_blind() || self.limits.on_trip == TripReaction::Brake;
         if brake || self.hold().is_err() {
             let _ = self.disarm();
         }

@@ -222,8 +222,8 @@ impl<'a> Jog<'a> {
         stop: StopCheck<'_>,
     ) -> Result<TouchOutcome, RunFault> {
         let above = self.look()?;
-        let here = above.commanded;
-        let t = self.command(here, search.speed_mm_s)?;
+        let current = above.commanded;
+        let t = self.command(current, search.speed_mm_s)?;
         let mut detector = TouchDetector::new(search, t);
         let until = t + search.tare + self.settings.first_pose_within;
         while detector.tare_n().is_none() {
@@ -239,8 +239,8 @@ impl<'a> Jog<'a> {
             self.tick()?;
             self.fresh.iter().for_each(|s| detector.feed(s));
         }
-        let lowest = here.z_mm - way_mm;
-        let t = self.command(here.plane().at_height(lowest), search.speed_mm_s)?;
+        let lowest = current.z_mm - way_mm;
+        let t = self.command(current.plane().at_height(lowest), search.speed_mm_s)?;
         detector.search_from(t);
         let until = t
             + HostDuration::from_secs_f64(2.0 * way_mm / search.speed_mm_s)
@@ -252,8 +252,8 @@ impl<'a> Jog<'a> {
             if let Some(found) = detector.touched() {
                 self.touched_mm = Some(found.measured.z_mm);
                 // Back along the same path, and no higher than the start.
-                let z_mm = (found.measured.z_mm + LIFT_MM).min(here.z_mm);
-                self.go(here.plane().at_height(z_mm), search.speed_mm_s, stop)?;
+                let z_mm = (found.measured.z_mm + LIFT_MM).min(current.z_mm);
+                self.go(current.plane().at_height(z_mm), search.speed_mm_s, stop)?;
                 return Ok(TouchOutcome::At(found));
             }
             if stop() {

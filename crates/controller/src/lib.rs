@@ -45,7 +45,7 @@ pub mod watchdog;
 pub use checks::{
     ExpectedDevice, Loopback, Preflight, contains_version, differing, identity_checks,
 };
-pub use control::{ControlHandle, NotesFull};
+pub use control::{ControlHandle, NoteQueueFull};
 pub use error::Problem;
 pub use guard::{Floor, GuardedIndenter};
 pub use jog::{Jog, MoveOutcome, TouchOutcome};

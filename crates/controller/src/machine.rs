@@ -85,12 +85,12 @@ impl Machine {
 
     /// During the end of a run: true once the operator has requested a halt. Other requests have no effect then.
     pub(crate) fn check_halt(&mut self, clock: &dyn Clock) -> bool {
-        let made = self.control.requests_made();
+        let count = self.control.requests_made();
         if self.control.is_halted() && self.halted_at.is_none() {
             self.halted_at = Some(clock.now());
             self.fire(Event::Halt);
         }
-        self.control.acknowledge(made);
+        self.control.acknowledge(count);
         self.halted_at.is_some()
     }
 

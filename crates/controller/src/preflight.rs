@@ -63,9 +63,9 @@ pub(crate) fn check_plan(
             return Err(plan_error("presses", expected, found));
         }
     }
-    let wanted = match histories {
+    let pending = match histories {
         None => vec![true; plan.presses.len()],
-        Some(histories) if histories.len() == plan.presses.len() => plan.wanted(histories),
+        Some(histories) if histories.len() == plan.presses.len() => plan.pending(histories),
         Some(histories) => {
             return Err(plan_error(
                 "histories",
@@ -74,7 +74,7 @@ pub(crate) fn check_plan(
             ));
         }
     };
-    let mut seen = vec![false; plan.presses.len()];
+    let mut has_step = vec![false; plan.presses.len()];
     let mut above: Option<Point3<Skin>> = None;
     for (n, step) in (1..).zip(&plan.steps) {
         let place = |what: &str| format!("step {n}, {what}");
@@ -100,7 +100,7 @@ pub(crate) fn check_plan(
             }
             Step::Press(press) => {
                 let name = place(&press.press.to_string());
-                match seen.get_mut(press.press.index() as usize) {
+                match has_step.get_mut(press.press.index() as usize) {
                     Some(done) if !*done => *done = true,
                     _ => {
                         return Err(plan_error(
@@ -163,12 +163,12 @@ pub(crate) fn check_plan(
             ));
         }
     }
-    if let Some(i) = (0..seen.len()).find(|i| seen[*i] != wanted[*i]) {
+    if let Some(i) = (0..has_step.len()).find(|i| has_step[*i] != pending[*i]) {
         let step = |is_above: bool| if is_above { "a step" } else { "no step" };
         return Err(plan_error(
             "steps",
-            format!("{} for {}", step(wanted[i]), PressId::from_index(i as u32)),
-            step(seen[i]),
+            format!("{} for {}", step(pending[i]), PressId::from_index(i as u32)),
+            step(has_step[i]),
         ));
     }
     Ok(())
@@ -267,11 +267,11 @@ pub(crate) fn motion_limits(
             limits.max_force_n, can.max_force_n
         ));
     }
-    if let Some(wanted) = limits.max_acceleration_mm_s2
-        && wanted > can.max_acceleration_mm_s2
+    if let Some(requested) = limits.max_acceleration_mm_s2
+        && requested > can.max_acceleration_mm_s2
     {
         remarks.push(format!(
-            "acceleration: the plan allows {wanted} mm/s², the robot is set up for at most {} mm/s²",
+            "acceleration: the plan allows {requested} mm/s², the robot is set up for at most {} mm/s²",
             can.max_acceleration_mm_s2
         ));
     }

@@ -31,8 +31,8 @@ impl PreflightRun {
         settings: &[Setting],
     ) {
         if let Some(preflight) = &self.preflight {
-            let wanted = preflight.expected.iter().find(|e| e.role == role);
-            let checks = device_checks(role, wanted, identity, settings);
+            let required = preflight.expected.iter().find(|e| e.role == role);
+            let checks = device_checks(role, required, identity, settings);
             self.checks.extend(checks);
         }
     }

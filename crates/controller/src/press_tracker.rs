@@ -381,7 +381,7 @@ mod tests {
         position_tolerance_mm: 0.1,
         settle_time: HostDuration::from_millis(2),
         max_acceleration_mm_s2: None,
-        on_trip: skinrig_protocol::OnTrip::Retract,
+        on_trip: skinrig_protocol::TripReaction::Retract,
     };
 
     /// Samples with these heights, one per millisecond from 1 ms on; the set point equals the tip.

@@ -86,18 +86,18 @@ impl ProgressTracker {
         }
     }
 
-    /// Continues a session with these press histories, of which the `wanted` ones remain to be done.
+    /// Continues a session with these press histories, of which the `pending` ones remain to be done.
     #[must_use]
     pub fn resumed(
         mut self,
         presses: &[PlannedPress],
         histories: &[PressHistory],
-        wanted: &[bool],
+        pending: &[bool],
     ) -> Self {
         self.plan(presses);
-        for ((last, history), wanted) in self.verdicts.iter_mut().zip(histories).zip(wanted) {
+        for ((last, history), pending) in self.verdicts.iter_mut().zip(histories).zip(pending) {
             *last = match &history.verdict {
-                _ if *wanted => None,
+                _ if *pending => None,
                 Some(PressVerdict::Missed(_)) | None => None,
                 Some(verdict) => Some(verdict.kind()),
             };
@@ -216,8 +216,8 @@ impl ProgressTracker {
         for edge in &chunk.triggers {
             self.edges[i].entry(edge.channel).or_default().push(*edge);
         }
-        let seen: u64 = self.edges[i].values_mut().map(take_marks).sum();
-        self.progress.cameras[i].marks_seen += seen;
+        let decoded: u64 = self.edges[i].values_mut().map(take_marks).sum();
+        self.progress.cameras[i].marks_seen += decoded;
         self.reached(chunk.host_time);
     }
 
@@ -254,13 +254,13 @@ fn take_marks(edges: &mut Vec<TriggerEdge>) -> u64 {
     let Some(newest) = edges.last().map(|e| e.t_us) else {
         return 0;
     };
-    let seen = decode_marks(edges);
-    let marks = seen.marks.iter().map(|m| m.t_us);
-    let read = marks.chain(seen.syncs.iter().map(|s| s.t_us)).max();
+    let decoded = decode_marks(edges);
+    let marks = decoded.marks.iter().map(|m| m.t_us);
+    let read = marks.chain(decoded.syncs.iter().map(|s| s.t_us)).max();
     // Edges older than a train that remain undecoded never will be.
     let done = read
         .map_or(0, |t| t + PulseTrain::DURATION_US)
         .max(newest.saturating_sub(2 * PulseTrain::DURATION_US));
     edges.retain(|e| e.t_us >= done);
-    seen.marks.len() as u64
+    decoded.marks.len() as u64
 }

@@ -166,7 +166,7 @@ mod tests {
     use skinrig_model::{
         DeviceIdentity, Point3, RigidTransform, Robot, Setting, SimLevel, Skin, StreamFormat,
     };
-    use skinrig_protocol::plan::{OnTrip, RunLimits};
+    use skinrig_protocol::plan::{RunLimits, TripReaction};
     use skinrig_protocol::{Retakes, Suspend};
     use skinrig_sim::config::SimConfig;
     use skinrig_sim::rig::simulated_rig;
@@ -270,7 +270,7 @@ mod tests {
                 position_tolerance_mm: 0.05,
                 settle_time: skinrig_model::HostDuration::from_millis(20),
                 max_acceleration_mm_s2: None,
-                on_trip: OnTrip::Retract,
+                on_trip: TripReaction::Retract,
             },
             surroundings: None,
             retakes: Retakes::NONE,

@@ -1,7 +1,7 @@
 //! The conditions that suspend a run: each with its hysteresis, evaluated once per window.
 
 use skinrig_model::{CameraId, HostDuration, HostTime, RawChunk, Suspension, WatchedQuantity};
-use skinrig_protocol::{Suspend, Threshold, UnderWay};
+use skinrig_protocol::{PressHandling, Suspend, Threshold};
 
 /// Averaging time of rates.
 const WINDOW: HostDuration = HostDuration::from_millis(1_000);
@@ -188,7 +188,7 @@ impl Suspender {
     }
 
     /// How a suspension treats the press in progress.
-    pub(crate) const fn press_under_way(&self) -> UnderWay {
+    pub(crate) const fn press_under_way(&self) -> PressHandling {
         self.settings.press
     }
 

@@ -91,13 +91,13 @@ pub fn seal_bundle(
 /// Manifest entry of a file in its present state.
 fn entry(folder: &Path, name: &str) -> Result<Entry, ExportError> {
     let path = folder.join(name);
-    let said = ExportError::file(&path);
-    let mut file = File::open(&path).map_err(&said)?;
+    let io_error = ExportError::file(&path);
+    let mut file = File::open(&path).map_err(&io_error)?;
     let mut hasher = Sha256::new();
     let mut buffer = vec![0; 1 << 20];
     let mut bytes = 0;
     loop {
-        let read = file.read(&mut buffer).map_err(&said)?;
+        let read = file.read(&mut buffer).map_err(&io_error)?;
         if read == 0 {
             break;
         }
@@ -156,22 +156,22 @@ pub fn verify_bundle(folder: &Path) -> Result<BundleReport, ExportError> {
         return Err(not("no session among its files".into()));
     }
     let mut problems = Vec::new();
-    for wanted in &manifest.files {
-        let name = &wanted.name;
+    for listed in &manifest.files {
+        let name = &listed.name;
         if !is_plain(name) {
             problems.push(format!("{name}: expected a file, found none"));
             continue;
         }
         let found = entry(folder, name)?;
-        if found.bytes != wanted.bytes {
+        if found.bytes != listed.bytes {
             problems.push(format!(
                 "{name}: expected {} bytes, found {}",
-                wanted.bytes, found.bytes
+                listed.bytes, found.bytes
             ));
-        } else if found.sha256 != wanted.sha256 {
+        } else if found.sha256 != listed.sha256 {
             problems.push(format!(
                 "{name}: expected SHA-256 {}, found {}",
-                wanted.sha256, found.sha256
+                listed.sha256, found.sha256
             ));
         }
     }

@@ -101,7 +101,7 @@ pub fn write_hdf5(
         match &mut writer {
             Some(writer) => writer.append(events),
             None => EventWriter::create(path, first.t_us)
-                .and_then(|made| writer.insert(made).append(events)),
+                .and_then(|created| writer.insert(created).append(events)),
         }
         .map_err(ExportError::file(path))
     })?;

@@ -116,14 +116,14 @@ fn header(layout: &Layout, rows: u64) -> Vec<u8> {
 
 impl TableWriter for NpzFile {
     fn begin(&mut self, layout: &Layout, rows: u64) -> Result<(), ExportError> {
-        let said = zip_error(&self.path);
+        let error_of = zip_error(&self.path);
         if let Some(archive) = &mut self.archive {
             let options = SimpleFileOptions::default()
                 .compression_method(CompressionMethod::Stored)
                 .large_file(true);
             archive
                 .start_file(format!("{}.npy", layout.name), options)
-                .map_err(&said)?;
+                .map_err(&error_of)?;
             archive
                 .write_all(&header(layout, rows))
                 .map_err(ExportError::file(&self.path))?;

@@ -109,9 +109,9 @@ fn encode(format: StreamFormat, events: &[CdEvent]) -> Vec<u8> {
 }
 
 /// Decoded events and edges.
-type Decoded = (Vec<CdEvent>, Vec<TriggerEdge>);
+type DecodedEvents = (Vec<CdEvent>, Vec<TriggerEdge>);
 
-fn push(decoder: &mut Decoder, bytes: &[u8], found: &mut Decoded) {
+fn push(decoder: &mut Decoder, bytes: &[u8], found: &mut DecodedEvents) {
     decoder.push_cd(bytes, &mut found.0, &mut found.1);
 }
 
@@ -134,7 +134,7 @@ proptest! {
         piece in 1_usize..50,
     ) {
         let bytes = encode(format, &events);
-        let mut whole = Decoded::default();
+        let mut whole = DecodedEvents::default();
         push(&mut Decoder::new(format), &bytes, &mut whole);
         prop_assert_eq!(whole.0.len() + whole.1.len(), events.len());
 
@@ -145,8 +145,8 @@ proptest! {
             .collect();
         cuts.sort_unstable();
         let (mut decoder, mut scanner) = (Decoder::new(format), Scanner::new(format));
-        let (mut found, mut counted, mut from) = (Decoded::default(), (0, Vec::new()), 0);
-        let mut take = |decoder: &mut Decoder, scanner: &mut Scanner, part: &[u8], found: &mut Decoded| {
+        let (mut found, mut counted, mut from) = (DecodedEvents::default(), (0, Vec::new()), 0);
+        let mut take = |decoder: &mut Decoder, scanner: &mut Scanner, part: &[u8], found: &mut DecodedEvents| {
             for part in part.chunks(piece) {
                 push(decoder, part, found);
                 let (facts, edges) = scanner.push(part);
@@ -154,7 +154,7 @@ proptest! {
                 counted.1.extend(edges);
             }
         };
-        let mut before = Decoded::default();
+        let mut before = DecodedEvents::default();
         push(&mut Decoder::new(format), &bytes[..cuts[0].0], &mut before);
         for (at, n) in cuts {
             if at < from {
@@ -179,7 +179,7 @@ proptest! {
             StreamFormat::Evt3 => 2,
             _ => 8,
         };
-        let mut rest = Decoded::default();
+        let mut rest = DecodedEvents::default();
         push(&mut Decoder::new(format), &bytes[from.next_multiple_of(word).min(bytes.len())..], &mut rest);
         if format != StreamFormat::Evt3 {
             prop_assert_eq!((found.0.len() - kept.0, found.1.len() - kept.1), (rest.0.len(), rest.1.len()));
@@ -199,7 +199,7 @@ fn losses_within_one_word_add_up() {
     let events = [event(70, 1), event(80, 2), event(200, 4), event(300, 5)];
     let bytes = encode(StreamFormat::Evt2, &events);
     let mut decoder = Decoder::new(StreamFormat::Evt2);
-    let mut found = Decoded::default();
+    let mut found = DecodedEvents::default();
     push(&mut decoder, &bytes[..6], &mut found);
     decoder.lost(3);
     push(&mut decoder, &bytes[9..10], &mut found);

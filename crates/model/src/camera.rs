@@ -67,18 +67,18 @@ impl CameraModel {
     /// strong distortion folds the image, so that two columns show `p`, the one nearer the axis.
     #[must_use]
     pub fn column_of_point(&self, p: Point2) -> Option<f64> {
-        let wanted = self.angle_of_point_deg(p) - self.skew_deg;
+        let target_deg = self.angle_of_point_deg(p) - self.skew_deg;
         let half = f64::from(SENSOR_WIDTH) / 2.0;
         let edge = self.fold();
         let (mut low, mut high) = (-edge, edge);
         let field = self.lens.angle_deg(low).0..=self.lens.angle_deg(high).0;
-        if !field.contains(&wanted) {
+        if !field.contains(&target_deg) {
             return None;
         }
         // The angle grows with s between the folds; bisection is exact to the last bits in 60 steps.
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
-            if self.lens.angle_deg(middle).0 < wanted {
+            if self.lens.angle_deg(middle).0 < target_deg {
                 low = middle;
             } else {
                 high = middle;

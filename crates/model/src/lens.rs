@@ -224,10 +224,10 @@ mod tests {
     #[test]
     fn the_projections_match_the_textbook() {
         // Halfway to an edge of 60°: 60/2, atan(tan 60 / 2), 2 atan(tan 30 / 2), 2 asin(sin 30 / 2).
-        let wanted = [30.0, 30.0, 40.893_394_649, 32.204_227_504, 28.955_024_372];
-        for (kind, wanted) in KINDS.into_iter().zip(wanted) {
+        let expected = [30.0, 30.0, 40.893_394_649, 32.204_227_504, 28.955_024_372];
+        for (kind, expected) in KINDS.into_iter().zip(expected) {
             let lens = LensModel::new(kind, 60.0, 0.0);
-            assert!((lens.angle(0.5).deg - wanted).abs() < 1e-8, "{kind:?}");
+            assert!((lens.angle(0.5).deg - expected).abs() < 1e-8, "{kind:?}");
             assert!((lens.angle(-1.0).deg + 60.0).abs() < 1e-12, "{kind:?}");
         }
     }
@@ -282,13 +282,13 @@ mod tests {
             s in -1.0f64..1.0, h in 20.0f64..80.0, w in -0.45f64..0.9, kind in 0usize..5,
         ) {
             let at = |s: f64, h: f64, w: f64| LensModel::new(KINDS[kind], h, w).angle(s);
-            let here = at(s, h, w);
+            let value = at(s, h, w);
             let d = 1e-6;
             let slope = |up: LensAngle, down: LensAngle| (up.deg - down.deg) / (2.0 * d);
             // The exponential lens has a kink in its second derivative at 0, the others none.
-            prop_assert!((slope(at(s + d, h, w), at(s - d, h, w)) - here.by_s).abs() < 1e-3);
-            prop_assert!((slope(at(s, h, w + d), at(s, h, w - d)) - here.by_w).abs() < 1e-5);
-            prop_assert!((slope(at(s, h + d, w), at(s, h - d, w)) - here.by_half_fov).abs() < 1e-6);
+            prop_assert!((slope(at(s + d, h, w), at(s - d, h, w)) - value.by_s).abs() < 1e-3);
+            prop_assert!((slope(at(s, h, w + d), at(s, h, w - d)) - value.by_w).abs() < 1e-5);
+            prop_assert!((slope(at(s, h + d, w), at(s, h - d, w)) - value.by_half_fov).abs() < 1e-6);
         }
     }
 }

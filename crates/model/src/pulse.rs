@@ -293,7 +293,7 @@ pub struct DecodedSync {
     pub t_us: u64,
 }
 
-pub use decode::{DecodedMarks, ReadTrain, decode_marks, read_trains};
+pub use decode::{DecodedMarks, ReceivedTrain, decode_marks, read_trains};
 
 #[cfg(test)]
 mod tests {

@@ -83,14 +83,14 @@ pub struct RunLimits {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_acceleration_mm_s2: Option<f64>,
     /// Reaction of the robot to an exceeded limit.
-    #[serde(default, skip_serializing_if = "OnTrip::is_retract")]
-    pub on_trip: OnTrip,
+    #[serde(default, skip_serializing_if = "TripReaction::is_retract")]
+    pub on_trip: TripReaction,
 }
 
 /// Reaction of the robot to an exceeded limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
-pub enum OnTrip {
+pub enum TripReaction {
     /// Hold, rise straight up off the skin, disarm; brake immediately if the feedback is unreliable.
     #[default]
     Retract,
@@ -98,7 +98,7 @@ pub enum OnTrip {
     Brake,
 }
 
-impl OnTrip {
+impl TripReaction {
     /// True for the default.
     #[must_use]
     pub(crate) const fn is_retract(&self) -> bool {

@@ -18,7 +18,7 @@ impl Plan {
     /// Presses of a resumed run, given their histories: those selected by [`Retakes::should_retake`](crate::Retakes::should_retake), and
     /// before them all sync presses. Empty if only sync presses are left.
     #[must_use]
-    pub fn wanted(&self, histories: &[PressHistory]) -> Vec<bool> {
+    pub fn pending(&self, histories: &[PressHistory]) -> Vec<bool> {
         let unknown = PressHistory::default();
         let wants = |i: usize| {
             let history = histories.get(i).unwrap_or(&unknown);
@@ -34,20 +34,20 @@ impl Plan {
         (0..n).map(|i| any && (is_sync(i) || wants(i))).collect()
     }
 
-    /// The same plan with only the steps that `wanted` presses need, in their order. The first press of a repetition starts at
+    /// The same plan with only the steps that `pending` presses need, in their order. The first press of a repetition starts at
     /// once, and omitted presses leave no time between the others. All presses stay listed.
     #[must_use]
-    pub fn remaining(&self, wanted: impl Fn(PressId) -> bool, route: Route) -> Self {
-        let is_wanted = |step: &Step| matches!(step, Step::Press(p) if wanted(p.press));
-        let first = self.steps.iter().position(is_wanted);
-        let last = self.steps.iter().rposition(is_wanted);
+    pub fn remaining(&self, pending: impl Fn(PressId) -> bool, route: Route) -> Self {
+        let is_pending = |step: &Step| matches!(step, Step::Press(p) if pending(p.press));
+        let first = self.steps.iter().position(is_pending);
+        let last = self.steps.iter().rposition(is_pending);
         let mut steps = Vec::new();
         if let (Some(first), Some(last)) = (first, last) {
             for (n, step) in self.steps.iter().enumerate().take(last + 1) {
                 // Whether a wanted press follows before the next step of the same kind.
                 let leads = |same: fn(&Step) -> bool| {
                     let rest = self.steps.iter().skip(n + 1);
-                    rest.take_while(|s| !same(s)).any(is_wanted)
+                    rest.take_while(|s| !same(s)).any(is_pending)
                 };
                 let is_kept = match step {
                     Step::Begin { .. } => leads(|s| matches!(s, Step::Begin { .. })),
@@ -55,7 +55,7 @@ impl Plan {
                     Step::Travel { .. } => {
                         route == Route::AsPlanned || leads(|s| matches!(s, Step::Travel { .. }))
                     }
-                    Step::Press(p) => wanted(p.press),
+                    Step::Press(p) => pending(p.press),
                 };
                 if is_kept {
                     steps.push(step.clone());
@@ -66,13 +66,13 @@ impl Plan {
             steps,
             ..self.clone()
         };
-        self.close_gaps(&mut rest, wanted);
+        self.close_gaps(&mut rest, pending);
         rest.allow_time();
         rest
     }
 
     /// Moves presses forward by the slots of the omitted presses before them.
-    fn close_gaps(&self, rest: &mut Self, wanted: impl Fn(PressId) -> bool) {
+    fn close_gaps(&self, rest: &mut Self, pending: impl Fn(PressId) -> bool) {
         let mut earlier = vec![HostDuration::ZERO; self.presses.len()];
         // Start of the last omitted slot, and the total time omitted in the block.
         let mut open: Option<HostDuration> = None;
@@ -87,7 +87,7 @@ impl Plan {
                     if let Some(from) = open.take() {
                         omitted = omitted + HostDuration(start.0 - from.0);
                     }
-                    if !wanted(p.press) {
+                    if !pending(p.press) {
                         open = Some(start);
                     }
                     if let Some(earlier) = earlier.get_mut(p.press.index() as usize) {

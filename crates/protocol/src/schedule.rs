@@ -9,7 +9,7 @@ use skinrig_model::{
 use skinrig_settings::{Collector, Diagnostics, Field, Settings, open};
 
 use crate::file::hex;
-use crate::keys::{Evaluate, NominalCamera, ScheduleKeys, calibration_possible, roles};
+use crate::keys::{NominalCamera, PressRoleKeys, ScheduleKeys, calibration_possible, roles};
 use crate::phases::PressPhases;
 use crate::protocol::Prototype;
 
@@ -330,7 +330,7 @@ fn overlap(field: &Field, least_s: f64, found_s: f64, out: &mut Collector) {
 }
 
 fn scheduled_roles(
-    evaluate: &Evaluate,
+    evaluate: &PressRoleKeys,
     repetitions: u32,
     field: &Field,
     out: &mut Collector,

@@ -147,10 +147,10 @@ fn shape(of: &'static Shape, definitions: &mut Definitions) -> Map<String, Value
             json!({"type": "number", low: range.min, "maximum": range.max})
         }
         Shape::Flag => json!({"type": "boolean"}),
-        Shape::Quantity(wanted, range) => json!({
+        Shape::Quantity(dimensions, range) => json!({
             "type": "string",
-            "pattern": pattern(wanted, range),
-            "examples": wanted.iter().map(|d| d.example()).collect::<Vec<_>>(),
+            "pattern": pattern(dimensions, range),
+            "examples": dimensions.iter().map(|d| d.example()).collect::<Vec<_>>(),
         }),
         Shape::Choice(words) => json!({"oneOf": choices(words)}),
         Shape::Tuple(of, names) => json!({
@@ -195,8 +195,8 @@ fn numbers() -> Value {
 }
 
 /// A regular expression for a number with one of the units, and a quotient.
-fn pattern(wanted: &[Dimension], range: &ValueRange) -> String {
-    let units: Vec<&str> = wanted
+fn pattern(dimensions: &[Dimension], range: &ValueRange) -> String {
+    let units: Vec<&str> = dimensions
         .iter()
         .flat_map(|d| d.units())
         .map(|(unit, _)| *unit)

@@ -30,7 +30,7 @@ pub struct Suspend {
     pub temperature: Option<Threshold>,
     /// How the current press is handled.
     #[setting(default = "finish")]
-    pub press: UnderWay,
+    pub press: PressHandling,
     /// How long every condition must be over before the run continues.
     #[setting(default = "5 s", above = 0, max = 3600)]
     pub resume_after: HostDuration,
@@ -76,7 +76,7 @@ impl Threshold {
 /// How the current press is handled when the run is suspended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
-pub enum UnderWay {
+pub enum PressHandling {
     /// Finish it; its outcome depends on the recorded data.
     #[default]
     Finish,

@@ -18,9 +18,9 @@ const EVENT_BYTES: usize = 13;
 
 /// Packed events.
 #[derive(Default)]
-pub(crate) struct Packed(Vec<u8>);
+pub(crate) struct PackedEvents(Vec<u8>);
 
-impl Packed {
+impl PackedEvents {
     pub(crate) fn push(&mut self, event: CdEvent) {
         let mut bytes = [0; EVENT_BYTES];
         bytes[..8].copy_from_slice(&event.t_us.to_le_bytes());

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
 use skinrig::exit::Failure;
 use skinrig::library::{self, CompareOptions, ControlHandle, ProtocolSource, Simulation};
-use skinrig::results::Choices;
+use skinrig::results::AnalysisRequest;
 
 use crate::error::raised;
 use crate::options::{overrides, to_python};
@@ -33,7 +33,7 @@ pub(crate) fn analyze<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let overrides = overrides(settings)?;
     let text = py.detach(|| {
-        let choices = Choices {
+        let choices = AnalysisRequest {
             overrides: &overrides,
             reference_code,
             name: name.as_deref(),

@@ -13,7 +13,7 @@ use skinrig_recorder::SessionReader;
 use skinrig_results::{ChunkIndex, Origin, events_between};
 
 use crate::error::{InputError, no_table, raised, unreadable};
-use crate::events::Packed;
+use crate::events::PackedEvents;
 use crate::options::to_python;
 use crate::table::Columns;
 
@@ -27,12 +27,12 @@ pub(crate) struct Session {
     reader: SessionReader,
     header: RunHeader,
     session_id: String,
-    analysed: Mutex<Option<Arc<Analysed>>>,
+    analysed: Mutex<Option<Arc<AnalysisTables>>>,
     chunks: [Mutex<Option<Arc<ChunkIndex>>>; 2],
 }
 
 /// Tables that depend on the analysis.
-struct Analysed {
+struct AnalysisTables {
     presses: Columns,
     results: Columns,
 }
@@ -46,7 +46,7 @@ impl Session {
         }
     }
 
-    fn analysed(&self) -> PyResult<Arc<Analysed>> {
+    fn analysed(&self) -> PyResult<Arc<AnalysisTables>> {
         let mut analysed = self.analysed.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(analysed) = &*analysed {
             return Ok(Arc::clone(analysed));
@@ -58,7 +58,7 @@ impl Session {
             analysis: Some((&analysis, &legs)),
             ..self.source()
         };
-        let found = Arc::new(Analysed {
+        let found = Arc::new(AnalysisTables {
             presses: Columns::of(&source, TableName::Presses).map_err(no_table)?,
             results: Columns::of(&source, TableName::Results).map_err(no_table)?,
         });
@@ -106,7 +106,12 @@ impl Session {
         Ok(Arc::clone(chunks.insert(Arc::new(read))))
     }
 
-    fn events_around(&self, press: u32, camera: CameraId, margin_us: f64) -> PyResult<Packed> {
+    fn events_around(
+        &self,
+        press: u32,
+        camera: CameraId,
+        margin_us: f64,
+    ) -> PyResult<PackedEvents> {
         let analysed = self.analysed()?;
         let moment = |what: &str| {
             let column = format!("camera{}_{what}_us", camera.number());
@@ -122,7 +127,7 @@ impl Session {
         // Camera times are whole microseconds from 0.
         let from_us = (contact_us - margin_us).ceil().max(0.0) as u64;
         let to_us = (release_us + margin_us).floor().max(0.0) as u64;
-        let mut events = Packed::default();
+        let mut events = PackedEvents::default();
         let chunks = self.chunks(camera)?;
         events_between(&self.reader, &chunks, (from_us, to_us), |event| {
             events.push(event);

@@ -7,7 +7,7 @@ use crate::rows::SessionTotals;
 
 /// A sealed session.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Sealed {
+pub struct SealedSession {
     /// The file, now read-only.
     pub path: PathBuf,
     /// Its size.
@@ -24,7 +24,7 @@ pub struct Sealed {
 #[derive(Debug)]
 pub(crate) enum CloseResult {
     /// The sealed session, or the reason why it is not sealed.
-    Sealed(Result<Sealed, RecorderError>),
+    Sealed(Result<SealedSession, RecorderError>),
     /// Path of the rescued session, or the reason why it is lost.
     Rescued(Result<PathBuf, RescueError>),
 }

@@ -37,6 +37,7 @@ mod leg;
 mod legacy_text;
 mod lock;
 mod migrations;
+mod open;
 mod pose;
 mod prepare;
 mod prepared;
@@ -51,7 +52,7 @@ mod totals;
 mod worker;
 
 pub use catalogue::{SessionState, SessionSummary, list};
-pub use close_result::Sealed;
+pub use close_result::SealedSession;
 pub use codec::Codec;
 pub use error::{CopyError, RecorderError, RescueError, WriteFailure};
 pub use lock::writer_of;

@@ -9,9 +9,9 @@ use tokio::runtime::Runtime;
 
 use crate::error::RecorderError;
 use crate::from_row::{header_from, planned_from};
+use crate::open;
 use crate::query::{Fault, each_row, enum_value, int, real, sha, text};
 use crate::rows::{DeviceRow, PressTally, Seal, SessionTotals};
-use crate::schema;
 use crate::seal::placeholder_of;
 use crate::totals;
 
@@ -52,7 +52,7 @@ impl SessionReader {
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
         let path = path.as_ref().to_owned();
         let runtime = runtime(&path)?;
-        let (conn, immutable) = runtime.block_on(schema::open(&path))?;
+        let (conn, immutable) = runtime.block_on(open::open(&path))?;
         Ok(Self {
             path,
             immutable,
@@ -64,7 +64,7 @@ impl SessionReader {
     /// cannot be sealed.
     pub(crate) fn reopen(&self) -> Result<Self, RecorderError> {
         let runtime = runtime(&self.path)?;
-        let conn = runtime.block_on(schema::connect(&self.path, self.immutable))?;
+        let conn = runtime.block_on(open::connect(&self.path, self.immutable))?;
         Ok(Self {
             path: self.path.clone(),
             immutable: self.immutable,
@@ -148,7 +148,7 @@ impl SessionReader {
 
     fn no_header(&self) -> RecorderError {
         match self.query("reading its header", async |conn| {
-            schema::is_blank(conn).await
+            open::is_blank(conn).await
         }) {
             Ok(true) => RecorderError::Empty {
                 path: self.path.clone(),

@@ -1,17 +1,16 @@
-//! Opening session files for writing and reading, and checking their schema.
+//! Creating session files, and opening them for writing; versions of the schema.
 
 use std::fs::File;
-use std::io::Read;
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqliteSynchronous};
-use sqlx::{ConnectOptions, Connection, Row, Sqlite, Transaction};
+use sqlx::{ConnectOptions, Sqlite, Transaction};
 
 use crate::error::RecorderError;
-use crate::migrations::{MIGRATOR, SCHEMA_VERSION};
-use crate::query::{Fault, each_row};
-use crate::sidecar::{reject_special_files, reject_super_journal, sidecar_path};
+use crate::migrations::MIGRATOR;
+use crate::query::Fault;
+use crate::sidecar::{reject_special_files, reject_super_journal};
 
 /// `skrg` in ASCII (`PRAGMA application_id`).
 pub(crate) const APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrg");
@@ -19,13 +18,13 @@ pub(crate) const APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrg");
 /// Page size in bytes, the largest that SQLite supports. Each page of camera bytes costs three system calls on its way
 /// through the log: 64 KiB pages sustained 500 MB/s, 16 KiB pages 380 (`cargo bench -p skinrig-bench --bench ingest`).
 /// The cost: an empty session has 1.4 MB, and a commit of one small row writes 128 KiB.
-const PAGE_BYTES: u32 = 65536;
+pub(crate) const PAGE_BYTES: u32 = 65536;
 
 /// Log pages that trigger a checkpoint: 16 MiB, which fit in the system's cache. A longer log was no faster.
 const CHECKPOINT_PAGES: u32 = 256;
 
 /// How long to wait for a lock of another program.
-const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
+pub(crate) const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Creates a session file with an empty schema.
 pub(crate) async fn create(path: &Path) -> Result<SqliteConnection, RecorderError> {
@@ -79,7 +78,7 @@ pub(crate) async fn create_version(path: &Path, version: u32) -> sqlx::Result<Sq
     Ok(conn)
 }
 
-fn writable(path: &Path) -> SqliteConnectOptions {
+pub(crate) fn writable(path: &Path) -> SqliteConnectOptions {
     SqliteConnectOptions::new()
         .filename(path)
         .pragma("wal_autocheckpoint", CHECKPOINT_PAGES.to_string())
@@ -144,214 +143,16 @@ fn allow_writing(path: &Path) -> std::io::Result<()> {
     std::fs::set_permissions(path, permissions)
 }
 
-/// Rolls back a transaction whose writer was killed; until then the file cannot be read.
-async fn roll_back(path: &Path) -> Result<(), RecorderError> {
-    let fault = |e: sqlx::Error| Fault::from(e).at(path, "rolling back an interrupted write");
-    let mut conn = writable(path).connect().await.map_err(fault)?;
-    sqlx::query("SELECT count(*) FROM sqlite_schema")
-        .execute(&mut conn)
-        .await
-        .map_err(fault)?;
-    conn.close().await.map_err(fault)
-}
-
-/// How long a reader waits for sealing: slightly longer than the writer waits for readers.
-const SEAL_WAIT: Duration = Duration::from_secs(90);
-/// Interval at which a reader checks whether sealing has ended.
-const POLL_INTERVAL: Duration = Duration::from_millis(10);
-
-/// Most rows that SQLite's thread reads ahead: waking two threads for each row costs more than the row.
-const ROWS_AHEAD: usize = 1024;
-
-/// Opens a session file for reading, after checking its first page. Also returns whether the file never changes.
-pub(crate) async fn open(path: &Path) -> Result<(SqliteConnection, bool), RecorderError> {
-    reject_special_files(path)?;
-    let from = Instant::now();
-    while crate::lock::is_being_sealed(path) && from.elapsed() < SEAL_WAIT {
-        std::thread::sleep(POLL_INTERVAL);
-    }
-    reject_super_journal(path)?;
-    let mut mode = check_first_page(path)?;
-    // Also while the journal mode changes, when the first page may already give the new mode.
-    if sidecar_path(path, "-journal").exists() && crate::lock::writer_of(path).is_none() {
-        roll_back(path).await?;
-        mode = check_first_page(path)?;
-    }
-    // A sealed file is in rollback mode, has no files beside it and never changes, unless it is just being sealed.
-    let immutable = mode == JournalMode::Rollback
-        && crate::lock::writer_of(path).is_none()
-        && !["-wal", "-journal"]
-            .iter()
-            .any(|end| sidecar_path(path, end).exists());
-    let mut conn = connect(path, immutable).await?;
-    let schema = check_schema(&mut conn).await;
-    let has_schema = schema.map_err(|fault| fault.at(path, "reading its schema"))?;
-    if has_schema {
-        Ok((conn, immutable))
-    } else {
-        Err(empty(path))
-    }
-}
-
-/// Opens a session file for reading, beside a connection that checked it; `immutable` as returned by [`open`].
-pub(crate) async fn connect(
-    path: &Path,
-    immutable: bool,
-) -> Result<SqliteConnection, RecorderError> {
-    SqliteConnectOptions::new()
-        .filename(path)
-        .read_only(true)
-        .immutable(immutable)
-        .foreign_keys(true)
-        .busy_timeout(BUSY_TIMEOUT)
-        .row_buffer_size(ROWS_AHEAD)
-        .thread_name(|_| "session-reader".to_owned())
-        .connect()
-        .await
-        .map_err(|e| Fault::from(e).at(path, "opening it"))
-}
-
-fn empty(path: &Path) -> RecorderError {
-    RecorderError::Empty {
-        path: path.to_owned(),
-    }
-}
-
-/// Whether the schema exists: a writer that ends early leaves a file without tables.
-async fn check_schema(conn: &mut SqliteConnection) -> Result<bool, Fault> {
-    check_schema_text(conn).await?;
-    check_schema_is_data(conn).await?;
-    let sql = "SELECT EXISTS (SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name <> '_sqlx_migrations')";
-    Ok(sqlx::query_scalar(sql).fetch_one(conn).await?)
-}
-
-/// Whether no row was ever written: the file holds only the schema.
-pub(crate) async fn is_blank(conn: &mut SqliteConnection) -> Result<bool, Fault> {
-    let sql =
-        "SELECT NOT EXISTS (SELECT 1 FROM session) AND NOT EXISTS (SELECT 1 FROM robot_from_skin)
-           AND NOT EXISTS (SELECT 1 FROM press) AND NOT EXISTS (SELECT 1 FROM attempt)
-           AND NOT EXISTS (SELECT 1 FROM device) AND NOT EXISTS (SELECT 1 FROM command)
-           AND NOT EXISTS (SELECT 1 FROM pose_block) AND NOT EXISTS (SELECT 1 FROM mark)
-           AND NOT EXISTS (SELECT 1 FROM chunk) AND NOT EXISTS (SELECT 1 FROM trigger_edge)
-           AND NOT EXISTS (SELECT 1 FROM interruption) AND NOT EXISTS (SELECT 1 FROM note)
-           AND NOT EXISTS (SELECT 1 FROM run_end) AND NOT EXISTS (SELECT 1 FROM table_digest)
-           AND NOT EXISTS (SELECT 1 FROM seal)";
-    Ok(sqlx::query_scalar(sql).fetch_one(conn).await?)
-}
-
-/// Checks that names in the schema are valid text; the SQLite client panics otherwise.
-async fn check_schema_text(conn: &mut SqliteConnection) -> Result<(), Fault> {
-    let sql = "SELECT CAST(sql AS BLOB) AS sql FROM sqlite_schema WHERE sql IS NOT NULL";
-    each_row(sqlx::query(sql), conn, |row| {
-        let text: &[u8] = row.try_get("sql")?;
-        match std::str::from_utf8(text) {
-            Ok(_) => Ok(()),
-            Err(_) => Err(Fault::bad("schema", "UTF-8 text", "other bytes")),
-        }
-    })
-    .await
-}
-
-/// Checks that the schema has only tables and their indices. Views, triggers, virtual tables and computed columns of an untrusted
-/// file would run code when it is read or written, for unlimited time or memory.
-async fn check_schema_is_data(conn: &mut SqliteConnection) -> Result<(), Fault> {
-    let runs = "SELECT type, CAST(name AS BLOB) AS name FROM sqlite_schema
-         WHERE type NOT IN ('table', 'index') OR coalesce(rootpage, 0) = 0
-         UNION ALL SELECT 'column', CAST(x.name AS BLOB) FROM sqlite_schema s JOIN pragma_table_xinfo(s.name) x
-         WHERE s.type = 'table' AND x.hidden <> 0
-         LIMIT 1";
-    match sqlx::query(runs).fetch_optional(conn).await? {
-        None => Ok(()),
-        Some(row) => {
-            let (kind, name): (&[u8], &[u8]) =
-                (row.try_get_unchecked("type")?, row.try_get("name")?);
-            let kind = String::from_utf8_lossy(kind);
-            let found = format!("{kind} `{}`", String::from_utf8_lossy(name).escape_debug());
-            Err(Fault::bad(
-                "schema",
-                "plain tables and their indices",
-                found,
-            ))
-        }
-    }
-}
-
-/// Journal mode according to the first page.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum JournalMode {
-    Rollback,
-    Log,
-}
-
-/// Layout: sqlite.org/fileformat.html sections 1.3 and 1.6.
-fn check_first_page(path: &Path) -> Result<JournalMode, RecorderError> {
-    let io = |source: std::io::Error| {
-        if source.kind() == std::io::ErrorKind::NotFound {
-            RecorderError::Missing {
-                path: path.to_owned(),
-            }
-        } else {
-            RecorderError::Io {
-                path: path.to_owned(),
-                doing: "reading it",
-                source,
-            }
-        }
-    };
-    let not = |found: &str| {
-        Err(RecorderError::NotASession {
-            path: path.to_owned(),
-            found: found.to_owned(),
-        })
-    };
-    let mut file = File::open(path).map_err(io)?;
-    let metadata = file.metadata().map_err(io)?;
-    // The writer creates the file first; its first pages may still be in the log or the journal beside it.
-    if metadata.len() == 0 {
-        return Err(empty(path));
-    }
-    let mut page = [0u8; 108];
-    if let Err(e) = file.read_exact(&mut page) {
-        return match e.kind() {
-            std::io::ErrorKind::UnexpectedEof => not("a file of less than 108 bytes"),
-            _ => Err(io(e)),
-        };
-    }
-    if &page[..16] != b"SQLite format 3\0" {
-        return not("a file that is not an SQLite database");
-    }
-    // Before the first checkpoint of a running session, the schema is only in the log.
-    let number =
-        |at: usize| u32::from_be_bytes([page[at], page[at + 1], page[at + 2], page[at + 3]]);
-    let (version, application) = (number(60), number(68));
-    if application != APPLICATION_ID && !(application == 0 && sidecar_path(path, "-wal").exists()) {
-        // An empty leaf as root of the schema: there is no table.
-        if application == 0 && page[100] == 0x0d && page[103..105] == [0, 0] {
-            return Err(empty(path));
-        }
-        return not("an SQLite database of another program");
-    }
-    if version > SCHEMA_VERSION {
-        return Err(RecorderError::NewerSchema {
-            path: path.to_owned(),
-            found: version,
-            supported: SCHEMA_VERSION,
-        });
-    }
-    Ok(match (page[18], page[19]) {
-        (1, 1) => JournalMode::Rollback,
-        _ => JournalMode::Log,
-    })
-}
-
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    use crate::digest::EarlierState;
-    use crate::sidecar::SUPER_JOURNAL_END;
+    use sqlx::Connection;
 
-    struct NullScanner;
+    use crate::digest::EarlierState;
+    use crate::migrations::SCHEMA_VERSION;
+
+    pub(crate) struct NullScanner;
     impl crate::ChunkScanner for NullScanner {
         fn new(_: skinrig_model::StreamFormat) -> Self {
             Self
@@ -467,148 +268,5 @@ mod tests {
             matches!(empty, Err(RecorderError::Empty { .. })),
             "{empty:?}"
         );
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn links_beside_a_session_are_rejected() {
-        let folder = tempfile::tempdir().unwrap();
-        let victim = folder.path().join("victim");
-        std::fs::write(&victim, "precious").unwrap();
-        for ending in ["-wal", "-shm", "-journal", "-lock"] {
-            let path = folder.path().join(format!("of{ending}.session.sqlite"));
-            let link = sidecar_path(&path, ending);
-            std::os::unix::fs::symlink(&victim, &link).unwrap();
-            assert!(crate::SessionWriter::create(&path).is_err(), "{ending}");
-            std::fs::remove_file(&link).unwrap();
-            drop(crate::SessionWriter::create(&path).unwrap());
-            std::os::unix::fs::symlink(&victim, &link).unwrap();
-            for refused in [
-                crate::SessionReader::open(&path).map(drop),
-                crate::SessionWriter::resume::<NullScanner>(&path).map(drop),
-                crate::SessionWriter::open_ended::<NullScanner>(&path).map(drop),
-            ] {
-                let refused = refused.unwrap_err().to_string();
-                assert!(refused.contains("a link beside it"), "{refused}");
-            }
-            assert_eq!(std::fs::read_to_string(&victim).unwrap(), "precious");
-        }
-    }
-
-    /// A hot journal of a transaction that changed nothing, with the name of a super-journal at its end.
-    fn journal_naming(name: &str, pages: u32) -> Vec<u8> {
-        let mut journal = SUPER_JOURNAL_END.to_vec();
-        for number in [0, 1, pages, 512, PAGE_BYTES] {
-            journal.extend(u32::to_be_bytes(number));
-        }
-        journal.resize(512, 0);
-        let lock_page = 0x4000_0000 / PAGE_BYTES + 1;
-        journal.extend(lock_page.to_be_bytes());
-        journal.extend(name.as_bytes());
-        let sum: u32 = name.bytes().map(u32::from).sum();
-        for number in [name.len() as u32, sum] {
-            journal.extend(number.to_be_bytes());
-        }
-        journal.extend(SUPER_JOURNAL_END);
-        journal
-    }
-
-    #[test]
-    fn a_journal_that_names_another_file_is_rejected() {
-        let folder = tempfile::tempdir().unwrap();
-        let victim = folder.path().join("victim");
-        let path = folder.path().join("a.session.sqlite");
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .build()
-            .unwrap();
-        let unprotected = |path: &Path| {
-            runtime.block_on(async {
-                let mut conn = writable(path).connect().await.unwrap();
-                let count = "SELECT count(*) FROM sqlite_schema";
-                sqlx::query(count).execute(&mut conn).await.unwrap();
-                conn.close().await.unwrap();
-            });
-        };
-        let forge = || {
-            std::fs::write(&victim, "precious").unwrap();
-            let pages = std::fs::metadata(&path).unwrap().len() / u64::from(PAGE_BYTES);
-            let journal = journal_naming(victim.to_str().unwrap(), pages as u32);
-            std::fs::write(sidecar_path(&path, "-journal"), journal).unwrap();
-        };
-        for mode in ["PRAGMA journal_mode = DELETE", "PRAGMA journal_mode = WAL"] {
-            let _ = std::fs::remove_file(&path);
-            runtime.block_on(async {
-                let mut conn = create(&path).await.unwrap();
-                sqlx::query(mode).execute(&mut conn).await.unwrap();
-                conn.close().await.unwrap();
-            });
-            forge();
-            for refused in [
-                crate::SessionReader::open(&path).map(drop),
-                crate::SessionWriter::resume::<NullScanner>(&path).map(drop),
-                crate::SessionWriter::open_ended::<NullScanner>(&path).map(drop),
-                runtime.block_on(reopen(&path)).map(drop),
-            ] {
-                let refused = refused.unwrap_err().to_string();
-                assert!(refused.contains("a journal beside it"), "{refused}");
-                assert_eq!(std::fs::read_to_string(&victim).unwrap(), "precious");
-            }
-            #[cfg(unix)]
-            {
-                let link = folder.path().join("link.session.sqlite");
-                std::os::unix::fs::symlink(&path, &link).unwrap();
-                assert!(crate::SessionReader::open(&link).is_err());
-                std::fs::remove_file(&link).unwrap();
-            }
-            // The reason for the rejection: SQLite itself does delete it.
-            unprotected(&path);
-            assert!(!victim.exists(), "{mode}");
-        }
-    }
-
-    #[test]
-    fn a_schema_with_code_is_rejected() {
-        let folder = tempfile::tempdir().unwrap();
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .build()
-            .unwrap();
-        for (name, found, hostile) in [
-            (
-                "view",
-                "view `note`",
-                [
-                    "DROP TABLE note",
-                    "CREATE VIEW note AS WITH RECURSIVE n(t_ns) AS (SELECT 1 UNION ALL SELECT t_ns + 1 FROM n)
-                     SELECT t_ns AS id, t_ns, 'x' AS text FROM n",
-                ],
-            ),
-            (
-                "column",
-                "column `text`",
-                [
-                    "DROP TABLE note",
-                    "CREATE TABLE note (id INTEGER PRIMARY KEY, t_ns, text AS (hex(zeroblob(400000000))))",
-                ],
-            ),
-            (
-                "trigger",
-                "trigger `more`",
-                [
-                    "SELECT 1",
-                    "CREATE TRIGGER more AFTER UPDATE ON attempt BEGIN DELETE FROM chunk; END",
-                ],
-            ),
-        ] {
-            let path = folder.path().join(name);
-            runtime.block_on(async {
-                let mut conn = create(&path).await.unwrap();
-                for statement in hostile {
-                    sqlx::query(statement).execute(&mut conn).await.unwrap();
-                }
-                conn.close().await.unwrap();
-            });
-            let refused = crate::SessionReader::open(&path).unwrap_err().to_string();
-            assert!(refused.contains(found), "{refused}");
-        }
     }
 }

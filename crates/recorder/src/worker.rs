@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use sqlx::Connection;
 use tokio::runtime::Runtime;
 
-use crate::close_result::{CloseResult, Sealed};
+use crate::close_result::{CloseResult, SealedSession};
 use crate::error::{RecorderError, WriteFailure};
 use crate::insert::Journal;
 use crate::prepared::PreparedResult;
@@ -151,7 +151,10 @@ fn is_held(error: &sqlx::Error) -> bool {
     code.is_some_and(|code| matches!(code & 0xFF, 5 | 6))
 }
 
-async fn seal_session(mut journal: Journal, shared: &Shared) -> Result<Sealed, RecorderError> {
+async fn seal_session(
+    mut journal: Journal,
+    shared: &Shared,
+) -> Result<SealedSession, RecorderError> {
     let path = journal.path.clone();
     let sql = |fault: Fault| fault.at(&path, "sealing");
     let totals = match journal.sealable().await.map_err(sql)? {
@@ -211,7 +214,7 @@ async fn seal_session(mut journal: Journal, shared: &Shared) -> Result<Sealed, R
     let mut permissions = metadata.permissions();
     permissions.set_readonly(true);
     std::fs::set_permissions(&path, permissions).map_err(io("making it read-only"))?;
-    Ok(Sealed {
+    Ok(SealedSession {
         path,
         bytes: metadata.len(),
         totals,

@@ -10,7 +10,7 @@ use skinrig_model::{Record, ResumeHeader, RunHeader};
 use sqlx::sqlite::SqliteConnection;
 use tokio::runtime::Runtime;
 
-use crate::close_result::{CloseResult, Sealed};
+use crate::close_result::{CloseResult, SealedSession};
 use crate::error::{RecorderError, RescueError, WriteFailure};
 use crate::hex::hex;
 use crate::insert::Journal;
@@ -248,7 +248,7 @@ impl SessionWriter {
     /// [`RecorderError::Unsealable`] before `Ended` and while a planned press has no verdict; [`RecorderError::HeldOpen`] if another
     /// program kept the session open for too long; [`RecorderError::WriteFailed`] after a failed write. The session then stays
     /// readable and unsealed.
-    pub fn finish(self) -> Result<Sealed, RecorderError> {
+    pub fn finish(self) -> Result<SealedSession, RecorderError> {
         self.finish_with_notice(|| {})
     }
 
@@ -256,7 +256,10 @@ impl SessionWriter {
     ///
     /// # Errors
     /// As [`finish`](Self::finish).
-    pub fn finish_with_notice(mut self, on_wait: impl FnOnce()) -> Result<Sealed, RecorderError> {
+    pub fn finish_with_notice(
+        mut self,
+        on_wait: impl FnOnce(),
+    ) -> Result<SealedSession, RecorderError> {
         if self.threads.is_none() {
             return Err(RecorderError::Unsealable {
                 path: self.path.clone(),

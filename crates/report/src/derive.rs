@@ -188,21 +188,21 @@ pub fn disagreement(analysis: &Analysis) -> Option<String> {
 #[must_use]
 pub(crate) fn geometry_note(analysis: &Analysis) -> Option<String> {
     use skinrig_model::CalibrationModel::{Auto, None as Nominal};
-    let asked = analysis.settings.calibration;
+    let requested = analysis.settings.calibration;
     if analysis.presses.is_empty() {
         return None;
     }
     match analysis.calibration.as_ref().map(|c| c.model) {
-        None if asked == Nominal => {
+        None if requested == Nominal => {
             Some("Located with the nominal camera geometry, uncalibrated, as configured".to_owned())
         }
         None => {
             Some("Located with the nominal camera geometry: no calibration was possible".to_owned())
         }
-        Some(used) if asked != Auto && used != asked => Some(format!(
+        Some(used) if requested != Auto && used != requested => Some(format!(
             "Calibrated with a smaller model ({}) than configured ({}), which could not be fitted",
             crate::figures::model_name(used),
-            crate::figures::model_name(asked)
+            crate::figures::model_name(requested)
         )),
         Some(_) => None,
     }

@@ -110,15 +110,15 @@ mod tests {
 
     #[test]
     fn a_missed_target_and_both_ends_of_the_grid_are_said() {
-        let said = |chosen, rate| choice(chosen, rate).remarks().join("; ");
-        assert_eq!(said(Some(5.0), 0.85), "");
-        let low = said(Some(3.0), 0.712);
+        let text = |chosen, rate| choice(chosen, rate).remarks().join("; ");
+        assert_eq!(text(Some(5.0), 0.85), "");
+        let low = text(Some(3.0), 0.712);
         assert!(low.contains("85 %") && low.contains("71.2 %"), "{low}");
         assert!(low.contains("the lowest candidate"), "{low}");
-        let high = said(Some(8.0), 0.9);
+        let high = text(Some(8.0), 0.9);
         assert!(high.contains("the highest candidate"), "{high}");
         assert!(!high.contains("no threshold"), "{high}");
-        assert!(said(None, 0.0).contains("detects anything"));
+        assert!(text(None, 0.0).contains("detects anything"));
         let mut one = choice(Some(3.0), 0.9);
         one.range = (3.0, 3.0);
         assert!(one.remarks().is_empty());

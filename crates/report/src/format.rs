@@ -173,8 +173,11 @@ mod tests {
             high: Some(value + 1.0),
             n: 3,
         };
-        let said = contact_map(&score(-12.17));
-        assert_eq!(said, "12.17 % outside [13.17 % outside to 11.17 % outside]");
+        let caption = contact_map(&score(-12.17));
+        assert_eq!(
+            caption,
+            "12.17 % outside [13.17 % outside to 11.17 % outside]"
+        );
         assert_eq!(
             contact_map(&score(0.5)),
             "0.50 % missing [0.50 % outside to 1.50 % missing]"

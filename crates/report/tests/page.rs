@@ -354,10 +354,10 @@ fn spread_at_a_location_is_the_sample_standard_deviation() {
         }
     }
     let summaries = skinrig_report::derive::locations(&analysis);
-    let here = summaries.iter().find(|l| l.location.index() == 1).unwrap();
-    assert!((here.std_mm.unwrap() - 2f64.sqrt()).abs() < 1e-12);
-    assert!((here.mean_error_mm - (5f64.sqrt() + 13f64.sqrt()) / 2.0).abs() < 1e-12);
-    assert_eq!(here.n, 2);
+    let summary = summaries.iter().find(|l| l.location.index() == 1).unwrap();
+    assert!((summary.std_mm.unwrap() - 2f64.sqrt()).abs() < 1e-12);
+    assert!((summary.mean_error_mm - (5f64.sqrt() + 13f64.sqrt()) / 2.0).abs() < 1e-12);
+    assert_eq!(summary.n, 2);
 }
 
 /// Presses rejected by a rule form one row with a count and an example; sync presses are listed separately.

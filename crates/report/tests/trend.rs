@@ -1,6 +1,6 @@
 //! Presentation of trends: names are escaped, and every line fits a terminal of 80 columns.
 
-use skinrig_nightly::trend::{History, NightHead, Point, Report, judge};
+use skinrig_nightly::trend::{History, NightSummary, Point, Report, judge};
 use skinrig_nightly::{Verdict, Versions};
 use skinrig_report::trend::{Links, Style, page, terminal};
 
@@ -30,7 +30,7 @@ fn after(nights: usize) -> Report {
             };
             history.add(name, "ev/s", point);
         }
-        history.nights.push(NightHead {
+        history.nights.push(NightSummary {
             id: format!("night-{night}"),
             started: format!("2026-10-{:02}T02:00:00Z", night % 31 + 1),
             suite: "nightly".to_owned(),

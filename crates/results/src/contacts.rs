@@ -151,8 +151,8 @@ mod tests {
             .map(|ms| pose(ms, -0.02 * ms as f64 + off(ms)))
             .collect();
         let found = crossing_se_us(&poses, HostTime(1_000_000_000)).unwrap();
-        let wanted = 10.0 * (11.0f64 / 9.0).sqrt() / 11f64.sqrt() / 20.0 * 1e3;
-        assert!((found / wanted - 1.0).abs() < 0.02, "{found} {wanted}");
+        let expected = 10.0 * (11.0f64 / 9.0).sqrt() / 11f64.sqrt() / 20.0 * 1e3;
+        assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");
         let still: Vec<_> = (-20..=20).map(|ms| pose(ms, 1.0)).collect();
         assert_eq!(crossing_se_us(&still, HostTime(1_000_000_000)), None);
     }

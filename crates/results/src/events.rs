@@ -24,7 +24,7 @@ pub struct SessionEvents {
 /// A pass over the events that was told to stop.
 #[derive(Debug, thiserror::Error)]
 #[error("reading the events was stopped")]
-pub struct Stopped;
+pub(crate) struct PassStopped;
 
 impl SessionEvents {
     /// Events of `path`, whose cameras send `formats`, in the camera times of its aligned `legs`.
@@ -41,7 +41,7 @@ impl SessionEvents {
         }
     }
 
-    /// Ends each pass with [`Stopped`], at the next chunk, once `stop` is set. The file is closed then.
+    /// Ends each pass with an error, at the next chunk, once `stop` is set. The file is closed then.
     #[must_use]
     pub fn stopping_on(mut self, stop: Arc<AtomicBool>) -> Self {
         self.stop = Some(stop);
@@ -83,7 +83,7 @@ impl EventSource for SessionEvents {
             !is_stopped()
         })?;
         if is_stopped() {
-            return Err(Stopped.into());
+            return Err(PassStopped.into());
         }
         Ok(())
     }

@@ -20,7 +20,7 @@ mod stages;
 mod window;
 
 pub use error::ResultsError;
-pub use events::{Rescan, SessionEvents, Stopped};
+pub use events::{Rescan, SessionEvents};
 pub use origin::Origin;
 pub use rig_document::RigDocument;
 pub use session::Session;

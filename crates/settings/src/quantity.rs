@@ -185,14 +185,14 @@ pub struct QuantityError {
     pub help: Option<String>,
 }
 
-/// Reads `text` as a quantity of one of the `wanted` dimensions (at least one).
+/// Reads `text` as a quantity of one of `dimensions` (at least one).
 ///
 /// # Errors
 /// [`QuantityError`] for anything else: a bare number, an unknown or unexpected unit, not a number, not finite.
-pub fn parse(text: &str, wanted: &[Dimension]) -> Result<Quantity, QuantityError> {
+pub fn parse(text: &str, dimensions: &[Dimension]) -> Result<Quantity, QuantityError> {
     let text = text.trim();
-    let expected = expectation(wanted);
-    let usual = wanted.first().map_or("mm", |d| d.usual_unit());
+    let expected = expectation(dimensions);
+    let usual = dimensions.first().map_or("mm", |d| d.usual_unit());
     let fail = |message: &str, found: String, help: Option<String>| QuantityError {
         message: message.to_owned(),
         expected: expected.clone(),
@@ -235,7 +235,7 @@ pub fn parse(text: &str, wanted: &[Dimension]) -> Result<Quantity, QuantityError
         ));
         return Err(fail("not a quantity", format!("`{shown}`"), help));
     }
-    for &dimension in wanted {
+    for &dimension in dimensions {
         if let Some((_, size)) = dimension.units().iter().find(|(name, _)| *name == unit) {
             let value = number * size / divisor;
             if !value.is_finite() {
@@ -254,7 +254,10 @@ pub fn parse(text: &str, wanted: &[Dimension]) -> Result<Quantity, QuantityError
             ));
         }
     }
-    let known = wanted.iter().flat_map(|d| d.units()).map(|(name, _)| *name);
+    let known = dimensions
+        .iter()
+        .flat_map(|d| d.units())
+        .map(|(name, _)| *name);
     let close = known
         .clone()
         .find(|name| name.eq_ignore_ascii_case(unit))
@@ -268,8 +271,8 @@ pub fn parse(text: &str, wanted: &[Dimension]) -> Result<Quantity, QuantityError
 }
 
 /// `a length with its unit, for example `4 mm` (mm, cm, m, um)`.
-fn expectation(wanted: &[Dimension]) -> String {
-    let each: Vec<String> = wanted
+fn expectation(dimensions: &[Dimension]) -> String {
+    let each: Vec<String> = dimensions
         .iter()
         .map(|d| {
             let units: Vec<&str> = d
@@ -360,10 +363,13 @@ mod tests {
 
     #[test]
     fn either_dimension() {
-        let wanted = [Dimension::Speed, Dimension::Time];
-        assert_eq!(parse("2 s", &wanted).unwrap().dimension, Dimension::Time);
+        let dimensions = [Dimension::Speed, Dimension::Time];
         assert_eq!(
-            parse("2 mm/s", &wanted).unwrap().dimension,
+            parse("2 s", &dimensions).unwrap().dimension,
+            Dimension::Time
+        );
+        assert_eq!(
+            parse("2 mm/s", &dimensions).unwrap().dimension,
             Dimension::Speed
         );
     }

@@ -212,8 +212,8 @@ pub(crate) fn read(
         (Shape::Number(range), Kind::Scalar { text, plain: true }) => {
             number(text, range, node, path, out)?
         }
-        (Shape::Quantity(wanted, range), Kind::Scalar { text, .. }) => {
-            measured(text, wanted, range, node, path, out)?
+        (Shape::Quantity(dimensions, range), Kind::Scalar { text, .. }) => {
+            measured(text, dimensions, range, node, path, out)?
         }
         (Shape::Choice(words), Kind::Scalar { text, .. }) => {
             choice(text, words, shape, node, path, out)?
@@ -364,13 +364,13 @@ fn number(
 
 fn measured(
     text: &str,
-    wanted: &[Dimension],
+    dimensions: &[Dimension],
     range: &ValueRange,
     node: &Node,
     path: &str,
     out: &mut Collector,
 ) -> Option<Value> {
-    match quantity::parse(text, wanted) {
+    match quantity::parse(text, dimensions) {
         Ok(q) if range.contains(q.value) => return Some(Value::Quantity(q.value, q.dimension)),
         Ok(q) => {
             out.error(node.span, path, "the value is out of range")
@@ -456,7 +456,7 @@ pub fn expectation(shape: &Shape) -> String {
         Shape::Whole { min, max } => format!("a whole number from {min} to {max}, without a unit"),
         Shape::Number(range) => format!("a number without a unit, {}", range.describe("")),
         Shape::Flag => "`true` or `false`".to_owned(),
-        Shape::Quantity(wanted, _) => wanted
+        Shape::Quantity(dimensions, _) => dimensions
             .iter()
             .map(|d| format!("{} such as `{}`", d.name(), d.example()))
             .collect::<Vec<_>>()
@@ -492,7 +492,7 @@ pub fn example(shape: &Shape) -> String {
         Shape::Whole { min, max } => 0.clamp(*min, *max).to_string(),
         Shape::Number(range) => plain_number(range).to_string(),
         Shape::Flag => "true".to_owned(),
-        Shape::Quantity(wanted, range) => wanted
+        Shape::Quantity(dimensions, range) => dimensions
             .first()
             .map_or_else(String::new, |d| quantity_example(*d, range)),
         Shape::Choice(words) | Shape::WordOr(words, _) => {

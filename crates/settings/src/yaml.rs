@@ -162,7 +162,7 @@ impl<'a> Reader<'a, '_> {
     }
 
     /// The key path of the current node.
-    fn here(&self) -> String {
+    fn position(&self) -> String {
         self.path
             .iter()
             .fold(String::new(), |path, part| join(&path, part))
@@ -198,14 +198,14 @@ impl<'a> Reader<'a, '_> {
         if let Some(tag) = event.tag() {
             let written = tag.original();
             self.collector
-                .error(span, self.here(), "tags are not used here")
+                .error(span, self.position(), "tags are not used here")
                 .expected("a plain value")
                 .found(quote(&written))
                 .help("remove the tag");
         }
         if event.anchor_id().is_some_and(|id| id != 0) {
             self.collector
-                .error(span, self.here(), "anchors are not used here")
+                .error(span, self.position(), "anchors are not used here")
                 .expected("a plain value")
                 .found("an anchor")
                 .help("remove the word that begins with `&`");
@@ -243,7 +243,7 @@ impl<'a> Reader<'a, '_> {
             Event::MappingStart(..) => self.mapping(span)?,
             Event::Alias(_) | Event::UnresolvedAlias(_) => {
                 self.collector
-                    .error(span, self.here(), "aliases are not used here")
+                    .error(span, self.position(), "aliases are not used here")
                     .expected("a value")
                     .found("an alias")
                     .help("write the value out in place of the alias");
@@ -273,7 +273,7 @@ impl<'a> Reader<'a, '_> {
                 Kind::Scalar { text, .. } => text.clone(),
                 _ => {
                     self.collector
-                        .error(key.span, self.here(), "a key must be a word")
+                        .error(key.span, self.position(), "a key must be a word")
                         .expected("a word before the colon")
                         .found(key.describe());
                     self.node(event, at)?;
@@ -282,7 +282,7 @@ impl<'a> Reader<'a, '_> {
             };
             self.path.push(text.clone());
             let value = self.node(event, at)?;
-            let path = self.here();
+            let path = self.position();
             self.path.pop();
             if entries.len() >= MOST_KEYS {
                 self.collector

@@ -104,9 +104,9 @@ fn measure(level: SimLevel, presses: usize) -> Result<(), DeviceError> {
         samples.clear();
         for camera in CameraId::ALL {
             let model = &truth.cameras[camera.index()];
-            let wanted = model.column_of_point(at);
+            let expected = model.column_of_point(at);
             let distance = model.position.distance_mm(at);
-            tally.add(&window[camera.index()], distance, wanted);
+            tally.add(&window[camera.index()], distance, expected);
         }
     }
     tally.print(level, presses);
@@ -115,7 +115,7 @@ fn measure(level: SimLevel, presses: usize) -> Result<(), DeviceError> {
 
 impl Tally {
     /// One press in one camera: its whole period, the press beginning at 2.0 s of 3.003 s.
-    fn add(&mut self, events: &[CdEvent], distance: f64, wanted: Option<f64>) {
+    fn add(&mut self, events: &[CdEvent], distance: f64, expected: Option<f64>) {
         let Some(last) = events.last() else { return };
         let zero = last.t_us.saturating_sub(PERIOD_MS as u64 * 1_000);
         let phase = |from: u64, to: u64| {
@@ -127,8 +127,8 @@ impl Tally {
         self.idle += phase(0, 2_080).count() as u64;
         self.press_s += 0.55;
         self.idle_s += 2.08;
-        let Some(wanted) = wanted else { return };
-        let near = |e: &&CdEvent| (f64::from(e.x) - wanted).abs() < 70.0;
+        let Some(expected) = expected else { return };
+        let near = |e: &&CdEvent| (f64::from(e.x) - expected).abs() < 70.0;
         for e in phase(2_100, 2_300).filter(near) {
             self.down[usize::from(e.polarity == Polarity::On)] += 1;
         }
@@ -144,7 +144,7 @@ impl Tally {
         let at = |q: f64| f64::from(columns[(q * (columns.len() - 1) as f64) as usize]);
         let spread = (at(0.84) - at(0.16)) / 2.0;
         self.spreads
-            .push((distance, spread, at(0.5) + 0.5 - wanted));
+            .push((distance, spread, at(0.5) + 0.5 - expected));
     }
 
     fn print(&self, level: SimLevel, presses: usize) {

@@ -11,7 +11,7 @@ use skinrig_model::{
     SENSOR_WIDTH, Setting, StreamFormat,
 };
 
-use crate::camera_stream::{Outgoing, Streaming};
+use crate::camera_stream::{OutputQueue, StreamState};
 use crate::config::SimConfig;
 use crate::drifting::DriftingClock;
 use crate::faults::{self, FaultTrigger, HOT_C, HOT_NS, HOT_RISE_NS, STORM_NS};
@@ -65,9 +65,9 @@ pub(crate) struct SimCamera {
     settings: CameraSettings,
     pattern: Option<PatternScan>,
     starts: u64,
-    streaming: Option<Streaming>,
+    streaming: Option<StreamState>,
     scanner: Scanner,
-    out: Outgoing,
+    out: OutputQueue,
     gone: bool,
 }
 
@@ -109,7 +109,7 @@ impl SimCamera {
             starts: 0,
             streaming: None,
             scanner: Scanner::new(StreamFormat::Evt2),
-            out: Outgoing::default(),
+            out: OutputQueue::default(),
             gone: false,
         }
     }
@@ -390,7 +390,7 @@ impl EventCamera for SimCamera {
             None => (self.make_pixels)(self.starts),
             Some(scan) => Some(Box::new(ScanModel::new(*scan)) as Box<dyn PixelModel>),
         };
-        self.streaming = Some(Streaming {
+        self.streaming = Some(StreamState {
             grid,
             pixels,
             has_region: self.pattern.is_none(),

@@ -15,7 +15,7 @@ use crate::line::TRIGGER_CHANNEL;
 use crate::scene::{GRID_NS, PixelEvent, PixelModel, TipSample};
 
 /// State that exists only while streaming.
-pub(crate) struct Streaming {
+pub(crate) struct StreamState {
     pub grid: i64,
     pub pixels: Option<Box<dyn PixelModel>>,
     /// Whether the events come from pixels, to which a region of interest applies.
@@ -30,7 +30,7 @@ pub(crate) struct Streaming {
 
 /// Bytes on their way to the host.
 #[derive(Default)]
-pub(crate) struct Outgoing {
+pub(crate) struct OutputQueue {
     pub seq: u64,
     pub bytes: Vec<u8>,
     /// Length of the previous chunk.
@@ -44,7 +44,7 @@ pub(crate) struct Outgoing {
     pub ready: VecDeque<RawChunk>,
 }
 
-impl Streaming {
+impl StreamState {
     /// Simulates one grid step, with or without an event storm, and encodes its events and edges into `fresh`.
     pub(crate) fn step(
         &mut self,
@@ -135,7 +135,7 @@ fn encode_edge(
     }
 }
 
-impl Outgoing {
+impl OutputQueue {
     /// Adds new bytes that arrived at `at`.
     pub(crate) fn take(
         &mut self,

@@ -36,7 +36,7 @@ pub struct World {
     /// Grid index of `tips[0]`.
     tips_from: i64,
     /// Next grid index of each camera; `None` while it does not stream.
-    wanted: [Option<i64>; 2],
+    requested: [Option<i64>; 2],
     /// The trigger line.
     pub line: Line,
     contacts: u32,
@@ -67,7 +67,7 @@ impl World {
             samples: VecDeque::new(),
             tips: VecDeque::new(),
             tips_from: 0,
-            wanted: [None; 2],
+            requested: [None; 2],
             line: Line::new(config),
             contacts: 0,
             contact_times: Vec::new(),
@@ -184,7 +184,7 @@ impl World {
             measured: self.motion.measure(),
             force_n: felt_n,
         });
-        if self.wanted.iter().any(Option::is_some) {
+        if self.requested.iter().any(Option::is_some) {
             if self.tips.is_empty() {
                 self.tips_from = self.grid;
             }
@@ -262,7 +262,7 @@ impl World {
 
     /// Starts keeping tips for camera `index`, from the current grid point, which it returns.
     pub fn watch(&mut self, index: usize) -> i64 {
-        self.wanted[index] = Some(self.grid);
+        self.requested[index] = Some(self.grid);
         let present = TipSample {
             t_ns: self.grid * GRID_NS,
             position: self.true_tip(),
@@ -277,7 +277,7 @@ impl World {
 
     /// Stops keeping tips for camera `index`.
     pub(crate) fn unwatch(&mut self, index: usize) {
-        self.wanted[index] = None;
+        self.requested[index] = None;
         self.forget();
     }
 
@@ -287,12 +287,12 @@ impl World {
         out.clear();
         let skip = usize::try_from(from - self.tips_from).unwrap_or(0);
         out.extend(self.tips.iter().skip(skip));
-        self.wanted[index] = Some(self.grid);
+        self.requested[index] = Some(self.grid);
         self.forget();
     }
 
     fn forget(&mut self) {
-        let needed = self.wanted.iter().flatten().min().copied();
+        let needed = self.requested.iter().flatten().min().copied();
         match needed {
             None => self.tips.clear(),
             Some(first) => {

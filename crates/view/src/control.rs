@@ -38,16 +38,20 @@ pub(crate) fn check(has_control: bool) -> Result<(), Problem> {
 pub(crate) fn control(
     lab: &dyn Lab,
     folder: &Folder,
-    asked: &ControlRequest,
+    message: &ControlRequest,
 ) -> Result<Value, Problem> {
-    let session = folder.session(&asked.session)?;
-    let state = lab.request(&session, &asked.request)?;
+    let session = folder.session(&message.session)?;
+    let state = lab.request(&session, &message.request)?;
     Ok(json!({ "state": state }))
 }
 
 /// Stores the note.
-pub(crate) fn note(lab: &dyn Lab, folder: &Folder, asked: &NoteRequest) -> Result<Value, Problem> {
-    let session = folder.session(&asked.session)?;
-    lab.note(&session, &asked.by, &asked.text)?;
+pub(crate) fn note(
+    lab: &dyn Lab,
+    folder: &Folder,
+    message: &NoteRequest,
+) -> Result<Value, Problem> {
+    let session = folder.session(&message.session)?;
+    lab.note(&session, &message.by, &message.text)?;
     Ok(json!({ "written": true }))
 }

@@ -82,22 +82,22 @@ impl Cache {
     ) -> Result<OpenSession, Problem> {
         let stamp = Stamp::of(path, variant);
         let reader = SessionReader::open(path)?;
-        let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let found = kept
+        let cache = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = cache
             .iter()
             .find(|(s, _)| *s == stamp)
             .map(|(_, k)| Arc::clone(k));
-        drop(kept);
+        drop(cache);
         let known = match found {
             Some(known) => known,
             None => Arc::new(ParsedSession::read(&reader, lab, path, variant)?),
         };
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        kept.retain(|(s, _)| s.path != stamp.path || s.variant != stamp.variant);
-        let excess = (kept.len() + 1).saturating_sub(MOST_KEPT);
-        kept.drain(..excess);
-        kept.push((stamp, Arc::clone(&known)));
-        drop(kept);
+        let mut cache = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        cache.retain(|(s, _)| s.path != stamp.path || s.variant != stamp.variant);
+        let excess = (cache.len() + 1).saturating_sub(MOST_KEPT);
+        cache.drain(..excess);
+        cache.push((stamp, Arc::clone(&known)));
+        drop(cache);
         Ok(OpenSession {
             path: path.to_owned(),
             reader,

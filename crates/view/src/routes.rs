@@ -97,7 +97,7 @@ struct Pair {
 
 /// A press, by its number from 1.
 #[derive(Debug, Deserialize)]
-struct Numbered {
+struct PressQuery {
     press: u32,
 }
 
@@ -105,8 +105,8 @@ type QueryInput<T> = Result<Query<T>, QueryRejection>;
 type JsonInput<T> = Result<Json<T>, JsonRejection>;
 type Answer = Result<Response, Problem>;
 
-fn query<T>(asked: QueryInput<T>) -> Result<T, Problem> {
-    let parsed = asked.map(|Query(parsed)| parsed);
+fn query<T>(parameters: QueryInput<T>) -> Result<T, Problem> {
+    let parsed = parameters.map(|Query(parsed)| parsed);
     parsed.map_err(|e| Problem::request(e.body_text()))
 }
 
@@ -213,7 +213,7 @@ async fn poses_route(
 async fn clusters_route(
     State(app): State<App>,
     named: QueryInput<SessionQuery>,
-    press: QueryInput<Numbered>,
+    press: QueryInput<PressQuery>,
 ) -> Answer {
     let (named, number) = (query(named)?, query(press)?.press);
     let index = number
@@ -227,10 +227,10 @@ async fn clusters_route(
 async fn download_route(
     State(app): State<App>,
     named: QueryInput<SessionQuery>,
-    asked: QueryInput<download::Request>,
+    parameters: QueryInput<download::Request>,
 ) -> Answer {
-    let (named, asked) = (query(named)?, query(asked)?);
-    let answer = move |s: &Shared| download::file(&s.open(&named)?, asked);
+    let (named, parameters) = (query(named)?, query(parameters)?);
+    let answer = move |s: &Shared| download::file(&s.open(&named)?, parameters);
     let (name, found) = app.compute(answer).await?;
     let mut answer = bytes("application/octet-stream", found);
     let safe = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
@@ -263,15 +263,15 @@ async fn live(State(app): State<App>, named: QueryInput<SessionQuery>) -> Answer
 
 async fn control_route(State(app): State<App>, sent: JsonInput<control::ControlRequest>) -> Answer {
     control::check(app.0.has_control)?;
-    let asked = body(sent)?;
-    let answer = move |s: &Shared| control::control(&*s.lab, &s.folder, &asked);
+    let parameters = body(sent)?;
+    let answer = move |s: &Shared| control::control(&*s.lab, &s.folder, &parameters);
     Ok(Json(app.compute(answer).await?).into_response())
 }
 
 async fn note(State(app): State<App>, sent: JsonInput<control::NoteRequest>) -> Answer {
     control::check(app.0.has_control)?;
-    let asked = body(sent)?;
-    let answer = move |s: &Shared| control::note(&*s.lab, &s.folder, &asked);
+    let parameters = body(sent)?;
+    let answer = move |s: &Shared| control::note(&*s.lab, &s.folder, &parameters);
     let found: Value = app.compute(answer).await?;
     Ok((StatusCode::OK, Json(found)).into_response())
 }

@@ -16,6 +16,6 @@ pub mod verdict;
 
 pub use cause::Cause;
 pub use evidence::{Evidence, EvidenceKind};
-pub use night::{Attempt, CheckResult, Golden, Measurement, Night, Part, Versions};
+pub use night::{Attempt, CheckResult, GoldenSession, Measurement, Night, Part, Versions};
 pub use rules::{Rule, RuleResult};
 pub use verdict::{NightExit, Verdict};

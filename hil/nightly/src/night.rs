@@ -46,7 +46,7 @@ pub struct Night {
     /// Checks in order of execution.
     pub checks: Vec<CheckResult>,
     /// The golden session, if there is one.
-    pub golden: Option<Golden>,
+    pub golden: Option<GoldenSession>,
     /// The worst verdict of the checks.
     pub verdict: Verdict,
     /// Exit code of the program.
@@ -68,7 +68,7 @@ pub struct Versions {
 
 /// The session of the golden skin.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Golden {
+pub struct GoldenSession {
     /// The session file, relative to the night's folder.
     pub session: String,
     /// Its report, relative to the night's folder.

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use skinrig_nightly::Night;
 use skinrig_nightly::trend::derived::RATIOS;
-use skinrig_nightly::trend::{Acceptance, History, NightHead};
+use skinrig_nightly::trend::{Acceptance, History, NightSummary};
 use tokio::runtime::Runtime;
 
 pub use error::HistoryError;
@@ -51,7 +51,7 @@ pub fn append(path: &Path, night: &Night, folder: &Path) -> Result<AppendOutcome
             found: format!("{}, which is unfinished", night.id),
         });
     }
-    let head = NightHead::of(night, relative(path, folder));
+    let head = NightSummary::of(night, relative(path, folder));
     let fault = |fault: QueryError| fault.at(path, "adding a night");
     let sha256 = write::digest(night).map_err(fault)?;
     runtime(path)?.block_on(async {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use skinrig_model::Limit;
-use skinrig_nightly::trend::{Acceptance, History, NightHead, Point};
+use skinrig_nightly::trend::{Acceptance, History, NightSummary, Point};
 use skinrig_nightly::{Verdict, Versions};
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
@@ -124,8 +124,8 @@ async fn points(
     Ok(())
 }
 
-fn head(row: &SqliteRow) -> Result<NightHead, QueryError> {
-    Ok(NightHead {
+fn head(row: &SqliteRow) -> Result<NightSummary, QueryError> {
+    Ok(NightSummary {
         id: row.try_get("night_id")?,
         started: row.try_get("started")?,
         suite: row.try_get("suite")?,

@@ -3,7 +3,7 @@
 use sha2::{Digest, Sha256};
 use skinrig_nightly::Night;
 use skinrig_nightly::night::{CheckResult, Measurement, Part};
-use skinrig_nightly::trend::{Acceptance, NightHead};
+use skinrig_nightly::trend::{Acceptance, NightSummary};
 use sqlx::{Sqlite, Transaction};
 
 use super::error::QueryError;
@@ -20,7 +20,7 @@ pub(super) fn digest(night: &Night) -> Result<String, QueryError> {
 /// Digest of the stored night with this name, if any.
 pub(super) async fn stored_digest(
     tx: &mut Rows<'_>,
-    head: &NightHead,
+    head: &NightSummary,
 ) -> Result<Option<String>, QueryError> {
     let found = sqlx::query_scalar("SELECT sha256 FROM night WHERE rig = ? AND night_id = ?")
         .bind(&head.rig)
@@ -34,7 +34,7 @@ pub(super) async fn stored_digest(
 pub(super) async fn night(
     tx: &mut Rows<'_>,
     night: &Night,
-    head: &NightHead,
+    head: &NightSummary,
     sha256: &str,
 ) -> Result<(), QueryError> {
     let versions = &head.versions;

@@ -175,13 +175,13 @@ fn noise_in_the_dark_needs_working_lamps_and_switches_them_on_again() {
 fn a_camera_that_cannot_be_opened_does_not_affect_the_other_one() {
     let mut bench = SimBench::new(SimLevel::Kinematic, Vec::new());
     bench.run_check(IDLE);
-    let gone = DeviceError::Lost {
+    let lost = DeviceError::Lost {
         role: DeviceRole::Camera1,
         serial: "00000001".to_owned(),
         detail: "unplugged".to_owned(),
     };
     bench.devices.as_mut().unwrap().cameras[0] =
-        Err(skinrig_hil::device_evidence::from_error(&gone));
+        Err(skinrig_hil::device_evidence::from_error(&lost));
     for (check, metric) in [(IDLE, "lost"), (PATTERN, "received"), (LIT, "rate")] {
         let found = bench.run_check(check);
         assert_eq!(

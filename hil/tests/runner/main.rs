@@ -39,12 +39,12 @@ fn a_metric_that_one_camera_lacks_fails_that_camera() {
     let night = run_suite(&suite, &script);
     let idle = result_of(&night, "idle");
     let parts = &idle.attempts[0].parts;
-    let told: Vec<_> = parts
+    let reported: Vec<_> = parts
         .iter()
         .map(|p| (p.subject.as_str(), p.verdict))
         .collect();
     assert_eq!(
-        told,
+        reported,
         [("camera1", Verdict::Pass), ("camera2", Verdict::Fail)]
     );
     assert_eq!(parts[1].measurements[0].value, None);

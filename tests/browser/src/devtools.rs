@@ -94,15 +94,15 @@ impl Devtools {
         }
     }
 
-    /// The next event that `wanted` accepts; earlier ones stay queued.
+    /// The next event that `accepts` accepts; earlier ones stay queued.
     pub(crate) fn wait(
         &mut self,
         what: &str,
-        wanted: impl Fn(&Event) -> bool,
+        accepts: impl Fn(&Event) -> bool,
     ) -> Result<Event, BrowserError> {
         let end = Instant::now() + PATIENCE;
         loop {
-            let at = self.events.iter().position(&wanted);
+            let at = self.events.iter().position(&accepts);
             if let Some(event) = at.and_then(|at| self.events.remove(at)) {
                 return Ok(event);
             }

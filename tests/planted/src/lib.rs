@@ -1,5 +1,6 @@
 //! Sessions created in memory, press by press: inputs of the analysis and events.
 
+use skinrig_analysis::result::PressView;
 use skinrig_analysis::{EventSource, EventSourceError, SessionInput};
 use skinrig_model::{
     AnalysisSettings, AttemptId, CameraId, CdEvent, HostTime, LocationId, Mark, MarkKind,
@@ -51,7 +52,7 @@ pub fn session(rig: RigGeometry, settings: AnalysisSettings) -> SessionInput {
 
 /// A valid press as planned and measured.
 #[derive(Debug, Clone, Copy)]
-pub struct Touch {
+pub struct PlantedPress {
     /// Role.
     pub role: PressRole,
     /// Index of the repetition, from 0.
@@ -72,7 +73,7 @@ pub struct Touch {
     pub scheduled: bool,
 }
 
-impl Touch {
+impl PlantedPress {
     /// A press at its planned position, 2 mm deep.
     #[must_use]
     pub fn new(role: PressRole, repetition: u32, location: u32, at: Point2) -> Self {
@@ -108,8 +109,26 @@ pub fn timing(
     }
 }
 
+/// What a camera saw of a press: one cluster of all its events, in column `u`.
+pub const fn view(u: f64, events: u32) -> Option<PressView> {
+    Some(PressView {
+        events,
+        on_events: events / 2,
+        clusters: 1,
+        cluster_events: events,
+        centroid_u: Some(u),
+        centroid_v: Some(270.0),
+        rate_per_s: 1e3,
+        idle_rate_per_s: 10.0,
+        idle_s: 0.5,
+        spread_u: None,
+        spread_v: None,
+        width_u: None,
+    })
+}
+
 /// Adds a press to `input` and returns its ID.
-pub fn press(input: &mut SessionInput, touch: Touch) -> PressId {
+pub fn press(input: &mut SessionInput, touch: PlantedPress) -> PressId {
     let id = PressId::from_index(input.planned.len() as u32);
     input.planned.push(PlannedPress {
         id,

@@ -59,7 +59,7 @@ fn check(case: &Case, bound: &Watch, factor: f64, by: [f64; 2]) {
     let g = StereoGeometry::paper_like([x1, y1, x2, y2, 0.7, -0.3, w1, w2]);
     let (h, skin) = transformed(&g, &SkinOutline::PAPER, factor, by);
     let columns = [Some(u1), Some(u2)];
-    let (here, there) = (
+    let (computed, there) = (
         locate(&g, &SkinOutline::PAPER, columns),
         locate(&h, &skin, columns),
     );
@@ -68,13 +68,13 @@ fn check(case: &Case, bound: &Watch, factor: f64, by: [f64; 2]) {
         | skinrig_analysis::result::LocationOutcome::Outside { sine, .. } => sine,
         _ => f64::NAN,
     };
-    let (Some(p), Some(q)) = (here.estimate(), there.estimate()) else {
+    let (Some(p), Some(q)) = (computed.estimate(), there.estimate()) else {
         // Parallel and behind depend on numbers that are invariant up to rounding.
-        if here.name() != there.name() {
-            let near = [sine(here), sine(there)]
+        if computed.name() != there.name() {
+            let near = [sine(computed), sine(there)]
                 .iter()
                 .all(|s| s.is_nan() || s.abs() < 1e-8);
-            assert!(near, "{here:?} {there:?} for {case:?}");
+            assert!(near, "{computed:?} {there:?} for {case:?}");
         }
         return;
     };
@@ -87,7 +87,7 @@ fn check(case: &Case, bound: &Watch, factor: f64, by: [f64; 2]) {
     let size = factor * (reach + 100.0) + by[0].abs() + by[1].abs();
     // Rounding of the axis ends rotates the axis, which moves the point in proportion to the range.
     let lever = (reach + 100.0) / 40.0;
-    let error = q.distance_mm(expected) * sine(here).abs() / (UNIT * size * lever);
+    let error = q.distance_mm(expected) * sine(computed).abs() / (UNIT * size * lever);
     bound.record(error, format!("{case:?}, factor {factor}, by {by:?}"));
 }
 

@@ -6,7 +6,7 @@ use skinrig_model::{
     AnalysisSettings, CalibrationModel, CameraId, CdEvent, HostTime, MarkKind, Point2, Polarity,
     PressRole, PressTiming, RigGeometry, SkinOutline, StereoGeometry,
 };
-use skinrig_planted::{Touch, mark, press};
+use skinrig_planted::{PlantedPress, mark, press};
 
 use crate::bounds::{self, UNIT, Watch};
 
@@ -79,7 +79,7 @@ fn session() -> SessionInput {
     for k in 0..PRESSES {
         let begins_us = FIRST_US + k * PERIOD_US;
         let t = |us: u64| HostTime(((begins_us + us) * 1000) as i64);
-        let touch = Touch {
+        let touch = PlantedPress {
             timing: PressTiming {
                 approach: t(0),
                 contact: t(0),
@@ -89,7 +89,7 @@ fn session() -> SessionInput {
                 clear: t(PRESS_US),
             },
             measured_depth_mm: None,
-            ..Touch::new(PressRole::Score, 0, k as u32, Point2::new(10.0, 2.0))
+            ..PlantedPress::new(PressRole::Score, 0, k as u32, Point2::new(10.0, 2.0))
         };
         let id = press(&mut input, touch);
         mark(&mut input, (MarkKind::Contact, id), t(0), 0, |_| begins_us);

@@ -5,7 +5,7 @@ use skinrig_model::{
     CalibrationModel, CameraModel, CdEvent, LensModel, MarkKind, Point2, Polarity, PressRole,
     RigGeometry, SENSOR_HEIGHT, SENSOR_WIDTH, SkinOutline, StereoGeometry,
 };
-use skinrig_planted::{Memory, Touch, mark, press};
+use skinrig_planted::{Memory, PlantedPress, mark, press};
 use skinrig_protocol::Schedule;
 
 /// SplitMix64.
@@ -329,7 +329,7 @@ impl Bench {
         let mut input = skinrig_planted::session(self.rig, settings);
         let mut random = Random::new(self.seed ^ 0x0b07);
         for (row, (plan, time)) in planned.iter().zip(&times).enumerate() {
-            let mut touch = Touch::new(
+            let mut touch = PlantedPress::new(
                 plan.role,
                 plan.repetition.index(),
                 plan.location.index(),
@@ -368,7 +368,7 @@ impl Bench {
         input: &mut SessionInput,
         robot: &Robot,
         id: skinrig_model::PressId,
-        touch: Touch,
+        touch: PlantedPress,
         random: &mut Random,
     ) {
         let cut_s = robot.line_cut.unwrap_or(2.0) * self.end_s();

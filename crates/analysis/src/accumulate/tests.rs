@@ -22,11 +22,11 @@ fn event(t_us: u64, y: u16, polarity: Polarity) -> CdEvent {
 
 fn run(windows: &[Window], events: &[CdEvent]) -> PassOutput {
     let settings = AnalysisSettings::default();
-    let wanted = PassRequest {
+    let request = PassRequest {
         windows,
         ..PassRequest::default()
     };
-    let mut all = Accumulator::new(CameraId::One, &settings, wanted);
+    let mut all = Accumulator::new(CameraId::One, &settings, request);
     events.chunks(2).for_each(|slice| all.take(slice));
     all.finish().unwrap()
 }
@@ -88,11 +88,11 @@ fn an_estimator_keeps_so_many_events_of_all_open_windows_and_no_more() {
             estimator,
             ..AnalysisSettings::default()
         };
-        let wanted = PassRequest {
+        let request = PassRequest {
             windows: &windows,
             ..PassRequest::default()
         };
-        let mut all = Accumulator::new(CameraId::Two, &settings, wanted);
+        let mut all = Accumulator::new(CameraId::Two, &settings, request);
         all.most_kept = most_kept;
         events.chunks(2).for_each(|slice| all.take(slice));
         all.finish().map(|done| done.views.len())
@@ -138,19 +138,19 @@ fn slices_of_any_size_equal_single_events() {
         })
         .collect();
     let settings = AnalysisSettings::default();
-    let seen = |size: usize| {
-        let wanted = PassRequest {
+    let counted = |size: usize| {
+        let request = PassRequest {
             windows: &windows,
             rates: Some(RateHistogram::new(10_000)),
             ..PassRequest::default()
         };
-        let mut all = Accumulator::new(CameraId::One, &settings, wanted);
+        let mut all = Accumulator::new(CameraId::One, &settings, request);
         events.chunks(size).for_each(|slice| all.take(slice));
         let done = all.finish().unwrap();
         assert_eq!(done.late, 0);
         (done.views, done.rates, done.activity)
     };
-    let whole = seen(events.len());
+    let whole = counted(events.len());
     let inside = |from: u64, to: u64| {
         let near = events.iter().filter(|e| (185..=360).contains(&e.y));
         near.filter(|e| (from..to).contains(&e.t_us)).count() as u32
@@ -162,6 +162,6 @@ fn slices_of_any_size_equal_single_events() {
         assert!((idle - f64::from(inside(w.idle_start_us, w.start_us))).abs() < 1e-6);
     }
     for size in [1, 7, 1_000, 1_024] {
-        assert_eq!(seen(size), whole, "slices of {size}");
+        assert_eq!(counted(size), whole, "slices of {size}");
     }
 }

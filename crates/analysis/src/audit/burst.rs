@@ -32,7 +32,7 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
             .filter_map(|t| Some((t.press, t.sights[camera.index()].response?)))
             .collect::<Vec<(PressId, f64)>>()
     });
-    let blind = [&one, &two].map(|seen| blind(seen));
+    let blind = [&one, &two].map(|press_bursts| blind(press_bursts));
     if let [Some(a), Some(b)] = blind {
         let bursts = CameraId::ALL.map(|c| has_bursts(&analysis.rates[c.index()]));
         let burst_elsewhere = bursts == [true; 2];
@@ -70,7 +70,7 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
             ));
         }
     }
-    let stretches = [&one, &two].map(|seen| longest_silent_run(seen));
+    let stretches = [&one, &two].map(|press_bursts| longest_silent_run(press_bursts));
     match stretches {
         [Some(a), Some(b)] if a.first <= b.last && b.first <= a.last => {
             let (first, last) = (a.first.max(b.first), a.last.min(b.last));
@@ -152,10 +152,10 @@ struct SilentRun {
 
 /// The longest significant stretch without bursts: the maximum sum of consecutive presses, where one without response counts
 /// 1 and one with a response -[`RESPONSE_WEIGHT`].
-fn longest_silent_run(seen: &[(PressId, f64)]) -> Option<SilentRun> {
-    let responds = |i: usize| seen[i].1 >= MIN_RESPONSE;
+fn longest_silent_run(press_bursts: &[(PressId, f64)]) -> Option<SilentRun> {
+    let responds = |i: usize| press_bursts[i].1 >= MIN_RESPONSE;
     let (mut best, mut sum, mut from) = ((0, 0..0), 0, 0);
-    for i in 0..seen.len() {
+    for i in 0..press_bursts.len() {
         sum += if responds(i) { -RESPONSE_WEIGHT } else { 1 };
         if sum <= 0 {
             (sum, from) = (0, i + 1);
@@ -164,13 +164,14 @@ fn longest_silent_run(seen: &[(PressId, f64)]) -> Option<SilentRun> {
         }
     }
     let (sum, range) = best;
-    let others = (0..seen.len()).filter(|i| !range.contains(i));
+    let others = (0..press_bursts.len()).filter(|i| !range.contains(i));
     let respond = others.clone().filter(|i| responds(*i)).count();
-    let long = sum >= MIN_STRETCH && range.len() as f64 >= MIN_STRETCH_SHARE * seen.len() as f64;
+    let long =
+        sum >= MIN_STRETCH && range.len() as f64 >= MIN_STRETCH_SHARE * press_bursts.len() as f64;
     let stands_out = respond > 0 && respond as f64 >= SHARE_ELSEWHERE * others.count() as f64;
     (long && stands_out).then(|| SilentRun {
-        first: seen[range.start].0,
-        last: seen[range.end - 1].0,
+        first: press_bursts[range.start].0,
+        last: press_bursts[range.end - 1].0,
     })
 }
 

@@ -274,8 +274,8 @@ fn far_off(as_is: &ScoredReading<'_>, camera: CameraId) -> Option<Finding> {
 /// of the columns (px) and the angles (degrees).
 fn fixed_pixel(path: &Path<'_>, camera: CameraId) -> Option<[f64; 3]> {
     let drawn = &path.rig.nominal.cameras[camera.index()];
-    let seen = columns(path, &path.as_it_is(), camera.index());
-    if seen.len() < MANY_PLACES {
+    let sights = columns(path, &path.as_it_is(), camera.index());
+    if sights.len() < MANY_PLACES {
         return None;
     }
     let spread = |values: Vec<f64>| {
@@ -283,8 +283,13 @@ fn fixed_pixel(path: &Path<'_>, camera: CameraId) -> Option<[f64; 3]> {
         let spread = median(values.iter().map(|v| (v - middle).abs()).collect())?;
         Some((middle, spread))
     };
-    let (column, columns) = spread(seen.iter().map(|c| c.0).collect())?;
-    let (_, angles) = spread(seen.iter().map(|c| drawn.angle_of_point_deg(c.1)).collect())?;
+    let (column, columns) = spread(sights.iter().map(|c| c.0).collect())?;
+    let (_, angles) = spread(
+        sights
+            .iter()
+            .map(|c| drawn.angle_of_point_deg(c.1))
+            .collect(),
+    )?;
     (columns < FIXED_PX && angles > MIN_SPREAD_DEG).then_some([column, columns, angles])
 }
 

@@ -5,14 +5,14 @@ use crate::result::{Fault, Finding, Law};
 /// Drops findings that follow from a more certain one; the most certain comes first.
 pub(crate) fn leading_first(mut found: Vec<Finding>) -> Vec<Finding> {
     found.sort_by_key(|f| (place(f), !f.invalidates));
-    let mut kept: Vec<Finding> = Vec::new();
+    let mut reported: Vec<Finding> = Vec::new();
     for finding in found {
-        let again = |k: &Finding| k.fault == finding.fault && k.camera == finding.camera;
-        if !kept.iter().any(|k| again(k) || explains(k, &finding)) {
-            kept.push(finding);
+        let repeats = |k: &Finding| k.fault == finding.fault && k.camera == finding.camera;
+        if !reported.iter().any(|k| repeats(k) || explains(k, &finding)) {
+            reported.push(finding);
         }
     }
-    kept
+    reported
 }
 
 /// Rank by directness: missing or contradictory data first, inferred faults last.

@@ -36,12 +36,12 @@ pub(super) fn findings(
     };
     let near = |at: f64, all: &[f64], within: f64| all.iter().any(|l| (l - at).abs() <= within);
     let [one, two] = contacts_s;
-    let made: Vec<f64> = one
+    let by_both: Vec<f64> = one
         .iter()
         .copied()
         .filter(|at| near(*at, two, TOGETHER_S))
         .collect();
-    let unlisted: Vec<f64> = made
+    let unlisted: Vec<f64> = by_both
         .iter()
         .copied()
         .filter(|at| !near(*at, &listed, NEAR_S))
@@ -53,17 +53,17 @@ pub(super) fn findings(
     let from = begin - SYNC_LENGTHS * (end - begin) - SYNC_S;
     let before = |at: &&f64| **at < first - NEAR_S;
     let of_sync = |at: &&f64| before(at) && **at >= from && !sync.is_empty();
-    let seen = made.iter().filter(of_sync).map(|at| at - first);
+    let offsets_s = by_both.iter().filter(of_sync).map(|at| at - first);
     let unseen = sync
         .iter()
-        .filter(|at| !near(**at, &made, NEAR_S))
+        .filter(|at| !near(**at, &by_both, NEAR_S))
         .filter(|at| [one, two].iter().all(|all| !near(**at, all, NEAR_S)));
     let (more, fewer) = (unlisted.iter().filter(of_sync).count(), unseen.count());
     let mut found = Vec::new();
     if more > 0 || (fewer > 0 && begin_is_recorded(contacts_s, begin)) {
         let evidence = Evidence::SyncTimes {
             planned_s: sync.iter().map(|at| at - first).collect(),
-            found_s: seen.collect(),
+            found_s: offsets_s.collect(),
         };
         found.push(finding(
             Law::AsCommanded,

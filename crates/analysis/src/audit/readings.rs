@@ -85,7 +85,7 @@ pub(super) struct Path<'a> {
 
 impl<'a> Path<'a> {
     pub(super) fn new(rig: &'a RigGeometry, presses_seen: &'a [ObservedPress<'a>]) -> Self {
-        let seen = |t: &&ObservedPress<'_>| t.sights.iter().any(|s| s.column.is_some());
+        let is_sighted = |t: &&ObservedPress<'_>| t.sights.iter().any(|s| s.column.is_some());
         let path: Vec<&ObservedPress<'_>> = presses_seen
             .iter()
             .filter(|t| t.role != PressRole::Sync)
@@ -93,7 +93,7 @@ impl<'a> Path<'a> {
         let places: BTreeSet<(u64, u64)> = path
             .iter()
             .copied()
-            .filter(|t| seen(t))
+            .filter(|t| is_sighted(t))
             .map(|t| (t.planned.x_mm.to_bits(), t.planned.y_mm.to_bits()))
             .collect();
         // In an imported recording positions come from a table, those of sync presses from the schedule.
@@ -365,13 +365,14 @@ impl<'a> Path<'a> {
 
     /// Columns of stream `k` and positions by `reading`.
     fn pairs(&self, reading: &Reading, k: usize) -> Vec<(f64, Point2)> {
-        let seen = self.presses_seen.iter().enumerate().step_by(self.stride);
-        seen.filter_map(|(i, touch)| {
-            let column = mirrored(touch.sights[k].column?, reading.mirrored[k]);
-            let row = usize::try_from(i as i64 + i64::from(reading.rows[k])).ok()?;
-            Some((column, (*reading.at.get(row)?)?))
-        })
-        .collect()
+        let presses = self.presses_seen.iter().enumerate().step_by(self.stride);
+        presses
+            .filter_map(|(i, touch)| {
+                let column = mirrored(touch.sights[k].column?, reading.mirrored[k]);
+                let row = usize::try_from(i as i64 + i64::from(reading.rows[k])).ok()?;
+                Some((column, (*reading.at.get(row)?)?))
+            })
+            .collect()
     }
 }
 

@@ -39,8 +39,8 @@ pub(crate) fn shifted_rest(
         cameras
             .iter()
             .map(|k| {
-                let seen = path.presses_seen[i].sights[*k].column.zip(as_is.fits[*k]);
-                match (seen, path.shifted(i, by)) {
+                let reading = path.presses_seen[i].sights[*k].column.zip(as_is.fits[*k]);
+                match (reading, path.shifted(i, by)) {
                     (Some((column, fit)), Some(at)) => {
                         let off = residual_deg(&fit.camera, column, at) / fit.spread_deg;
                         (0.5 * off * off).min(MAX_PRESS)

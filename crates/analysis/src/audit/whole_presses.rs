@@ -87,7 +87,7 @@ fn likelier_shift(listed: &[f64], contacts: &[f64]) -> Option<Shift> {
         return None;
     }
     let reach = MAX_SHIFT_PRESSES.max((MAX_SHIFT_SHARE * n as f64) as usize);
-    let here = explained(listed, contacts, 0.0);
+    let unshifted = explained(listed, contacts, 0.0);
     let proposing = (0..PROPOSING).chain(n - PROPOSING..n);
     let proposals = proposing.flat_map(|press| {
         let nearest = contacts.partition_point(|c| *c < listed[press]);
@@ -103,7 +103,7 @@ fn likelier_shift(listed: &[f64], contacts: &[f64]) -> Option<Shift> {
         Shift {
             shift_s,
             explained,
-            gain: 2.0 * UNEXPLAINED * (explained as f64 - here as f64),
+            gain: 2.0 * UNEXPLAINED * (explained as f64 - unshifted as f64),
         }
     });
     let best = judged.max_by(|a, b| a.gain.total_cmp(&b.gain))?;

@@ -83,14 +83,14 @@ impl Folds {
         count: usize,
         full: &Parameters,
     ) -> Option<Vec<f64>> {
-        self.each(|kept, held| {
+        self.each(|others, held| {
             let pick = |rows: &[usize]| rows.iter().map(|i| sights[*i]).collect::<Vec<_>>();
-            let geometry = fitted(&pick(kept), start, count, full)?;
+            let geometry = fitted(&pick(others), start, count, full)?;
             Some(error_lengths(&pick(held), &geometry))
         })
     }
 
-    /// Calls `held_out(kept, held)` for every fold, which returns one value per held-out press, and returns the values in
+    /// Calls `held_out(others, held)` for every fold, which returns one value per held-out press, and returns the values in
     /// the order of the presses; `None` if a fold has none.
     pub(crate) fn each<T: Send>(
         &self,
@@ -99,9 +99,9 @@ impl Folds {
         let folds: Vec<Option<Vec<T>>> = (0..self.count)
             .into_par_iter()
             .map(|fold| {
-                let (held, kept): (Vec<_>, Vec<_>) =
+                let (held, others): (Vec<_>, Vec<_>) =
                     (0..self.of_sight.len()).partition(|i| self.of_sight[*i] == fold);
-                held_out(&kept, &held)
+                held_out(&others, &held)
             })
             .collect();
         let mut folds: Vec<_> = folds.into_iter().map(|f| f.map(Vec::into_iter)).collect();
@@ -212,11 +212,11 @@ mod tests {
             let problem = Problem::coarse(sights, &start, 8);
             let full = problem.descend(parameters_of(&start)).parameters;
             let geometry = |fold: usize| {
-                let kept: Vec<CalibrationPress> = (0..sights.len())
+                let others: Vec<CalibrationPress> = (0..sights.len())
                     .filter(|i| folds.of_sight[*i] != fold)
                     .map(|i| sights[i])
                     .collect();
-                fitted(&kept, &start, 8, &full).unwrap()
+                fitted(&others, &start, 8, &full).unwrap()
             };
             let held = folds.held_out_errors(sights, &start, 8, &full).unwrap();
             (held, geometry(folds.of_sight[11]))
@@ -230,8 +230,8 @@ mod tests {
             assert!(a.position.distance_mm(b.position) < 1e-6);
         }
         for i in [11, 41] {
-            let wanted = error_lengths(&sights[i..=i], &geometry)[0];
-            assert!((after[i] - wanted).abs() < 1e-6);
+            let expected = error_lengths(&sights[i..=i], &geometry)[0];
+            assert!((after[i] - expected).abs() < 1e-6);
             assert!((after[i] - before[i]).abs() > 1.0);
         }
         // The others do use it.
@@ -253,13 +253,13 @@ mod tests {
                 .held_out_errors(&sights, &start, count, &full)
                 .unwrap();
             for fold in 0..folds.count {
-                let (out, kept): (Vec<_>, Vec<_>) =
+                let (out, others): (Vec<_>, Vec<_>) =
                     (0..sights.len()).partition(|i| folds.of_sight[*i] == fold);
                 let pick = |rows: &[usize]| rows.iter().map(|i| sights[*i]).collect::<Vec<_>>();
-                let searched = Fit::search(&pick(&kept), &start, model, 1).unwrap();
-                let wanted = error_lengths(&pick(&out), &searched.geometry);
-                for (i, wanted) in out.into_iter().zip(wanted) {
-                    let off = (held[i] - wanted).abs();
+                let searched = Fit::search(&pick(&others), &start, model, 1).unwrap();
+                let expected = error_lengths(&pick(&out), &searched.geometry);
+                for (i, expected) in out.into_iter().zip(expected) {
+                    let off = (held[i] - expected).abs();
                     assert!(off < 1e-6, "{model:?}, press {i}: {off} mm");
                 }
             }

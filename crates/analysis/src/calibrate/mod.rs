@@ -63,15 +63,18 @@ pub(crate) const NO_FIX_ERROR_MM: f64 = 141.421_356_237_309_5;
 /// Positions closer than this are one location, mm.
 const SAME_PLACE_MM: f64 = 0.1;
 
-/// The largest model, up to `wanted`, that the data support: at least as many distinct locations as parameters, which is two
+/// The largest model, up to `requested`, that the data support: at least as many distinct locations as parameters, which is two
 /// residuals per parameter.
 #[must_use]
-pub fn largest_supported_model(set: &CalibrationSet, wanted: CalibrationModel) -> CalibrationModel {
-    largest_supported(different_places(set.sights()), wanted)
+pub fn largest_supported_model(
+    set: &CalibrationSet,
+    requested: CalibrationModel,
+) -> CalibrationModel {
+    largest_supported(different_places(set.sights()), requested)
 }
 
-fn largest_supported(places: usize, wanted: CalibrationModel) -> CalibrationModel {
-    let most = parameter_count(wanted).min(places);
+fn largest_supported(places: usize, requested: CalibrationModel) -> CalibrationModel {
+    let most = parameter_count(requested).min(places);
     let mut largest_first = MODELS.into_iter().rev();
     largest_first
         .find(|m| parameter_count(*m) <= most)
@@ -169,7 +172,7 @@ impl Fit {
         let geometry = with_parameters(start, &end.parameters);
         let (residuals, jacobian) = problem.rows(&end.parameters);
         let locations: Vec<u32> = sights.iter().map(|s| s.location).collect();
-        let said = uncertainty::uncertainty(&residuals, &jacobian, &locations);
+        let uncertainty_report = uncertainty::uncertainty(&residuals, &jacobian, &locations);
         let lengths = error_lengths(sights, &geometry);
         let result = CalibrationResult {
             model,
@@ -178,10 +181,10 @@ impl Fit {
             names: NAMES[..count].iter().map(|n| (*n).to_owned()).collect(),
             start_values: parameters_of(start).as_slice()[..count].to_vec(),
             values: end.parameters.as_slice()[..count].to_vec(),
-            standard_errors: said.standard_errors,
-            correlation: said.correlation,
-            condition: said.condition,
-            rank: said.rank as u32,
+            standard_errors: uncertainty_report.standard_errors,
+            correlation: uncertainty_report.correlation,
+            condition: uncertainty_report.condition,
+            rank: uncertainty_report.rank as u32,
             rmse_before_mm: rmse_mm(sights, start),
             rmse_after_mm: root_mean_square(&lengths),
             n: sights.len() as u32,

@@ -178,8 +178,8 @@ mod tests {
         // The same presses at the same locations twice add no information.
         let twice = |v: [f64; 4]| [v, v].concat();
         let places = [0, 1, 2, 3, 0, 1, 2, 3];
-        let again = Losses::new(&places, [&twice(a)[..], &twice(b)[..]].into_iter());
-        let both = again.clearly_worse(&twice(a), &twice(b)).unwrap();
+        let doubled = Losses::new(&places, [&twice(a)[..], &twice(b)[..]].into_iter());
+        let both = doubled.clearly_worse(&twice(a), &twice(b)).unwrap();
         assert!((both.ratio() - found.ratio()).abs() < 1e-12 && both.needed == found.needed);
         assert_eq!(
             Losses::new(&[7, 7], [&a[..2]].into_iter()).clearly_worse(&a[..2], &b[..2]),

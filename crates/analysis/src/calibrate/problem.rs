@@ -192,7 +192,7 @@ pub(super) enum Measure {
 }
 
 /// Sum of squared residuals, half of its gradient `Jᵀr`, and the normal matrix `JᵀJ`.
-pub(super) struct Normal {
+pub(super) struct NormalEquations {
     pub cost: f64,
     pub gradient: Parameters,
     pub matrix: SMatrix<f64, PARAMETERS, PARAMETERS>,
@@ -214,7 +214,7 @@ pub(super) struct Problem<'a> {
 impl Problem<'_> {
     /// Everything that a step needs, in one pass over the presses and without allocation. Sums are in the order of the
     /// presses.
-    pub(super) fn normal(&self, p: &Parameters) -> Normal {
+    pub(super) fn normal(&self, p: &Parameters) -> NormalEquations {
         let stereo = StereoModel::at(self.base, p);
         let mut cost = 0.0;
         let mut gradient = [0.0; PARAMETERS];
@@ -232,7 +232,7 @@ impl Problem<'_> {
             }
         }
         let entry = |i: usize, j: usize| matrix[i.max(j)][i.min(j)];
-        Normal {
+        NormalEquations {
             cost,
             gradient: Parameters::from(gradient),
             matrix: SMatrix::from_fn(entry),

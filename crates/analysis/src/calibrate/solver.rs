@@ -8,7 +8,7 @@
 use nalgebra::Cholesky;
 
 use super::parameters::{PARAMETERS, Parameters};
-use super::problem::{Normal, Problem};
+use super::problem::{NormalEquations, Problem};
 
 /// Maximum number of steps.
 const MAX_STEPS: usize = 200;
@@ -32,7 +32,7 @@ pub(super) struct Descent {
 /// Minimises from `from`.
 pub(crate) fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
     let mut at = from;
-    let mut here = problem.normal(&at);
+    let mut current = problem.normal(&at);
     let mut scale = Parameters::repeat(0.0);
     let (mut damping, mut growth) = (FIRST_DAMPING, 2.0);
     let ended = |parameters, cost, termination| Descent {
@@ -41,36 +41,37 @@ pub(crate) fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
         termination,
     };
     for _ in 0..MAX_STEPS {
-        if !here.cost.is_finite() {
-            return ended(at, here.cost, "not converged: the error is not a number");
+        if !current.cost.is_finite() {
+            return ended(at, current.cost, "not converged: the error is not a number");
         }
-        if is_flat(&here, problem.count) {
-            return ended(at, here.cost, "converged: the gradient is zero");
+        if is_flat(&current, problem.count) {
+            return ended(at, current.cost, "converged: the gradient is zero");
         }
         for i in 0..PARAMETERS {
-            scale[i] = scale[i].max(here.matrix[(i, i)]);
+            scale[i] = scale[i].max(current.matrix[(i, i)]);
         }
-        let Some(step) = step(&here, &scale, damping) else {
+        let Some(step) = step(&current, &scale, damping) else {
             damping *= growth;
             growth *= 2.0;
             if damping > DAMPING.1 {
-                return ended(at, here.cost, "not converged: no step can be computed");
+                return ended(at, current.cost, "not converged: no step can be computed");
             }
             continue;
         };
-        let promised = damping * step.component_mul(&step).dot(&scale) - step.dot(&here.gradient);
-        if promised <= problem.tolerance * here.cost {
+        let promised =
+            damping * step.component_mul(&step).dot(&scale) - step.dot(&current.gradient);
+        if promised <= problem.tolerance * current.cost {
             return ended(
                 at,
-                here.cost,
+                current.cost,
                 "converged: the error does not change any more",
             );
         }
         let there = at + step;
         let next = problem.normal(&there);
-        let ratio = (here.cost - next.cost) / promised;
+        let ratio = (current.cost - next.cost) / promised;
         if ratio > MIN_GAIN_RATIO {
-            (at, here) = (there, next);
+            (at, current) = (there, next);
             let slack = 2.0 * ratio - 1.0;
             damping = (damping * (1.0 - slack * slack * slack).max(1.0 / 3.0)).max(DAMPING.0);
             growth = 2.0;
@@ -80,24 +81,24 @@ pub(crate) fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
             if damping > DAMPING.1 {
                 return ended(
                     at,
-                    here.cost,
+                    current.cost,
                     "converged to the resolution of floating point",
                 );
             }
         }
     }
-    ended(at, here.cost, "not converged: too many steps")
+    ended(at, current.cost, "not converged: too many steps")
 }
 
-fn is_flat(here: &Normal, count: usize) -> bool {
+fn is_flat(current: &NormalEquations, count: usize) -> bool {
     (0..count).all(|i| {
-        let slope = here.gradient[i];
-        slope * slope <= FLAT * FLAT * here.matrix[(i, i)] * here.cost
+        let slope = current.gradient[i];
+        slope * slope <= FLAT * FLAT * current.matrix[(i, i)] * current.cost
     })
 }
 
-fn step(here: &Normal, scale: &Parameters, damping: f64) -> Option<Parameters> {
-    let mut matrix = here.matrix;
+fn step(current: &NormalEquations, scale: &Parameters, damping: f64) -> Option<Parameters> {
+    let mut matrix = current.matrix;
     for i in 0..PARAMETERS {
         // A parameter without any effect (or beyond the model's) stays where it is.
         matrix[(i, i)] += if scale[i] > 0.0 {
@@ -106,7 +107,7 @@ fn step(here: &Normal, scale: &Parameters, damping: f64) -> Option<Parameters> {
             1.0
         };
     }
-    let step = -Cholesky::new(matrix)?.solve(&here.gradient);
+    let step = -Cholesky::new(matrix)?.solve(&current.gradient);
     step.iter().all(|v| v.is_finite()).then_some(step)
 }
 

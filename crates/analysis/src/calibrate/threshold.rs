@@ -40,12 +40,12 @@ pub(super) fn choose(
     }
     let penalty_mm = spread_mm(sights.iter().map(|s| s.truth));
     let penalty = penalty_mm * penalty_mm;
-    let kept: Vec<f64> = errors_mm
+    let retained_errors: Vec<f64> = errors_mm
         .iter()
         .map(|e| (e * e).min(2.0 * penalty))
         .collect();
     let ranked = RankedPresses::new(sights, floor);
-    let candidates = ranked.costs(&kept, penalty);
+    let candidates = ranked.costs(&retained_errors, penalty);
     let (mut best, at_floor) = (*candidates.first()?, *candidates.first()?);
     for candidate in &candidates {
         if candidate.cost < best.cost {
@@ -53,10 +53,11 @@ pub(super) fn choose(
         }
     }
     let gain = at_floor.cost - best.cost;
-    let chance = (gain > 0.0).then(|| chance(&ranked, sights, &kept, penalty, gain, seed));
+    let chance =
+        (gain > 0.0).then(|| chance(&ranked, sights, &retained_errors, penalty, gain, seed));
     let locations: Vec<u32> = sights.iter().map(|s| s.location).collect();
     let costs = |threshold: u32| -> Vec<f64> {
-        let each = sights.iter().zip(&kept);
+        let each = sights.iter().zip(&retained_errors);
         each.map(|(s, e)| {
             if s.cluster_events < threshold {
                 penalty
@@ -116,13 +117,13 @@ impl RankedPresses {
     }
 
     /// All candidates, given the costs of kept presses, mm².
-    fn costs(&self, kept: &[f64], penalty: f64) -> Vec<Candidate> {
+    fn costs(&self, retained_errors: &[f64], penalty: f64) -> Vec<Candidate> {
         let n = self.order.len();
-        let mut cost: f64 = self.order.iter().map(|i| kept[*i]).sum();
+        let mut cost: f64 = self.order.iter().map(|i| retained_errors[*i]).sum();
         let mut rank = 0;
         let of = |&(events, left_out): &(u32, usize)| {
             while rank < left_out {
-                cost += penalty - kept[self.order[rank]];
+                cost += penalty - retained_errors[self.order[rank]];
                 rank += 1;
             }
             Candidate {
@@ -140,7 +141,7 @@ impl RankedPresses {
 fn chance(
     ranked: &RankedPresses,
     sights: &[CalibrationPress],
-    kept: &[f64],
+    retained_errors: &[f64],
     penalty: f64,
     gain: f64,
     seed: u64,
@@ -153,7 +154,7 @@ fn chance(
     places.sort_by_key(|p| p.len());
     let mut rng = seeded::generator(seed, STREAM);
     let reached = (0..DEALS).filter(|_| {
-        let mut dealt = kept.to_vec();
+        let mut dealt = retained_errors.to_vec();
         for alike in places.chunk_by(|a, b| a.len() == b.len()) {
             let mut from: Vec<usize> = (0..alike.len()).collect();
             for i in (1..from.len()).rev() {
@@ -161,7 +162,7 @@ fn chance(
             }
             for (to, from) in alike.iter().zip(from) {
                 for (i, other) in to.iter().zip(alike[from]) {
-                    dealt[*i] = kept[*other];
+                    dealt[*i] = retained_errors[*other];
                 }
             }
         }
@@ -224,9 +225,9 @@ mod tests {
         assert!((found.penalty_mm - 30.0).abs() < 1e-9);
         assert_eq!(found.candidates[0].0, 20);
         // Cost of the choice: 20 presses of 3 mm, 3 of 30 mm.
-        let wanted = ((20.0 * 9.0 + 3.0 * 900.0) / 23.0f64).sqrt();
+        let expected = ((20.0 * 9.0 + 3.0 * 900.0) / 23.0f64).sqrt();
         let cost = found.candidates.iter().find(|c| c.0 == 41).unwrap().1;
-        assert!((cost - wanted).abs() < 1e-9);
+        assert!((cost - expected).abs() < 1e-9);
     }
 
     #[test]

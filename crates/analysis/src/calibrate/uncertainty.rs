@@ -176,13 +176,13 @@ mod tests {
     #[test]
     fn the_condition_is_that_of_scaled_columns() {
         let (residuals, mut jacobian, locations) = line();
-        let wanted = uncertainty(&residuals, &jacobian, &locations).condition;
+        let expected = uncertainty(&residuals, &jacobian, &locations).condition;
         jacobian.column_mut(1).scale_mut(1e9);
         let found = uncertainty(&residuals, &jacobian, &locations).condition;
-        assert!((found.unwrap() - wanted.unwrap()).abs() < 1e-9);
+        assert!((found.unwrap() - expected.unwrap()).abs() < 1e-9);
         // Unit columns at the angle whose cosine is c have the condition number sqrt((1 + c) / (1 - c)).
         let c: f64 = 66.0 / (12.0f64.sqrt() * 506.0f64.sqrt());
-        assert!((wanted.unwrap() - ((1.0 + c) / (1.0 - c)).sqrt()).abs() < 1e-9);
+        assert!((expected.unwrap() - ((1.0 + c) / (1.0 - c)).sqrt()).abs() < 1e-9);
     }
 
     #[test]

@@ -29,7 +29,7 @@ const BORDER_COLUMNS: [f64; 2] = [0.0, skinrig_model::SENSOR_WIDTH as f64];
 pub fn coverage(analysis: &Analysis) -> Option<Coverage> {
     let outline = &analysis.rig.outline;
     let cameras = &analysis.geometry.cameras;
-    let seen = |arc_segments: u32| {
+    let fields_of_view = |arc_segments: u32| {
         let skin = outline.polygon(arc_segments);
         let views = [
             field_of_view(&cameras[0], &skin)?,
@@ -38,8 +38,8 @@ pub fn coverage(analysis: &Analysis) -> Option<Coverage> {
         let overlap = overlap(&views);
         Some((views, overlap))
     };
-    let (_, exact) = seen(ARC_SEGMENTS)?;
-    let (views, overlap) = seen(DRAWN_ARC_SEGMENTS)?;
+    let (_, exact) = fields_of_view(ARC_SEGMENTS)?;
+    let (views, overlap) = fields_of_view(DRAWN_ARC_SEGMENTS)?;
     let (places, locations) = probed_places(analysis);
     let cell_mm = neighbour_distance_mm(&places);
     let skin_mm2 = outline.area_mm2();

@@ -16,7 +16,7 @@ pub(crate) use columns::ColumnCounts;
 pub use columns::Median;
 pub(crate) use peak::Peak;
 pub use real::Real;
-pub use streaming::Streaming;
+pub use streaming::StreamingEstimator;
 pub use thinning::Thinning;
 
 use skinrig_model::{AnalysisSettings, Estimator, Precision};
@@ -63,8 +63,8 @@ enum Kind {
     Median(Box<Median>),
     Peak64(Box<Peak<f64>>),
     Peak32(Box<Peak<f32>>),
-    Streaming64(Box<Streaming<f64>>),
-    Streaming32(Box<Streaming<f32>>),
+    Streaming64(Box<StreamingEstimator<f64>>),
+    Streaming32(Box<StreamingEstimator<f32>>),
 }
 
 impl PressEstimator {
@@ -79,10 +79,10 @@ impl PressEstimator {
             Estimator::HistogramPeak if wide => Kind::Peak64(Box::new(Peak::new(side, eps))),
             Estimator::HistogramPeak => Kind::Peak32(Box::new(Peak::new(side, eps))),
             Estimator::Streaming if wide => {
-                Kind::Streaming64(Box::new(Streaming::new(side, settings.forget_ms)))
+                Kind::Streaming64(Box::new(StreamingEstimator::new(side, settings.forget_ms)))
             }
             Estimator::Streaming => {
-                Kind::Streaming32(Box::new(Streaming::new(side, settings.forget_ms)))
+                Kind::Streaming32(Box::new(StreamingEstimator::new(side, settings.forget_ms)))
             }
         })
     }

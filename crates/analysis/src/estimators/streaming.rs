@@ -21,7 +21,7 @@ const MIN_SHARE: f64 = 0.1;
 /// heaviest bin, and takes the mean over it and its neighbours. It costs a sum over forty bins, whatever the number of
 /// events.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Streaming<R> {
+pub struct StreamingEstimator<R> {
     weights: [R; BINS],
     moments: [R; BINS],
     /// Decay factor of one step.
@@ -35,7 +35,7 @@ pub struct Streaming<R> {
     mask: u16,
 }
 
-impl<R: Real> Streaming<R> {
+impl<R: Real> StreamingEstimator<R> {
     /// For pixel bins of side `side_px`; the weight of an event is 1/e after `forget_ms` (above 0).
     #[must_use]
     pub fn new(side_px: u16, forget_ms: f64) -> Self {

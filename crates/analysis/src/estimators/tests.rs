@@ -154,8 +154,10 @@ fn an_estimator_has_no_state_between_presses() {
 
 #[test]
 fn the_running_histogram_is_small_and_forgets() {
-    assert!(size_of::<Streaming<f32>>() <= 360 && size_of::<Streaming<f64>>() <= 680);
-    let mut stream = Streaming::<f64>::new(1, 50.0);
+    assert!(
+        size_of::<StreamingEstimator<f32>>() <= 360 && size_of::<StreamingEstimator<f64>>() <= 680
+    );
+    let mut stream = StreamingEstimator::<f64>::new(1, 50.0);
     stream.restart(0);
     (0..2000).for_each(|i| stream.add(10 * i, 100));
     assert_eq!(stream.now().column, Some(100.0));
@@ -166,7 +168,7 @@ fn the_running_histogram_is_small_and_forgets() {
         "20 time constants later the first press is forgotten"
     );
     // After one time constant 1/e remains, within the width of a step.
-    let mut one = Streaming::<f64>::new(1, 50.0);
+    let mut one = StreamingEstimator::<f64>::new(1, 50.0);
     one.restart(0);
     (0..1_000_000).for_each(|_| one.add(0, 100));
     one.add(50_000, 600);

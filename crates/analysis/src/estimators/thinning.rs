@@ -55,17 +55,17 @@ mod tests {
 
     #[test]
     fn thinning_keeps_one_in_k_per_camera() {
-        let kept = |factor: u32, camera: CameraId, seed: u64| -> Vec<u64> {
+        let retained = |factor: u32, camera: CameraId, seed: u64| -> Vec<u64> {
             let thinning = Thinning::new(factor, camera, seed);
             let times = (0..100_000u64).map(|i| 7 * i + (1 << 50));
             times
                 .filter(|t| thinning.keeps_at(*t, 300, 200, t % 2 == 0))
                 .collect()
         };
-        assert_eq!(kept(1, CameraId::One, 3).len(), 100_000);
+        assert_eq!(retained(1, CameraId::One, 3).len(), 100_000);
         for factor in [2, 8, 64, 1000] {
             let expected = 1e5 / f64::from(factor);
-            let one = kept(factor, CameraId::One, 3);
+            let one = retained(factor, CameraId::One, 3);
             // Five standard deviations of a binomial count.
             assert!(
                 (one.len() as f64 - expected).abs() < 5.0 * expected.sqrt(),
@@ -73,8 +73,8 @@ mod tests {
             );
             let both = |other: Vec<u64>| other.iter().filter(|t| one.contains(t)).count() as f64;
             let chance = expected / f64::from(factor);
-            assert!(both(kept(factor, CameraId::Two, 3)) < chance + 5.0 * chance.sqrt() + 5.0);
-            assert!(both(kept(factor, CameraId::One, 4)) < chance + 5.0 * chance.sqrt() + 5.0);
+            assert!(both(retained(factor, CameraId::Two, 3)) < chance + 5.0 * chance.sqrt() + 5.0);
+            assert!(both(retained(factor, CameraId::One, 4)) < chance + 5.0 * chance.sqrt() + 5.0);
         }
     }
 }

@@ -14,14 +14,14 @@ const QUANTILES: [f64; 3] = [0.05, 0.5, 0.95];
 
 /// Rate of one trial, averaged over drawn bins; one of them begins at the contact.
 #[derive(Debug, Clone, PartialEq)]
-pub struct DrawnRates {
+pub struct PlottedRates {
     /// Number of the first drawn bin; negative before the contact.
     pub first: i64,
     /// Events per second in each bin.
     pub per_s: Vec<f64>,
 }
 
-impl DrawnRates {
+impl PlottedRates {
     /// The whole drawn bins of the (smoothed) counts on a grid.
     #[must_use]
     pub fn new(grid: Grid, counts: &[f64], bin_ms: f64) -> Self {
@@ -46,13 +46,13 @@ impl DrawnRates {
 pub fn course(trials: &[Trial], bin_ms: f64) -> LatencyCourse {
     let fine = bins_drawn_as_one(bin_ms);
     let from = trials.iter().map(|t| t.course.first).min().unwrap_or(0);
-    let end = |d: &DrawnRates| d.first + d.per_s.len() as i64;
+    let end = |d: &PlottedRates| d.first + d.per_s.len() as i64;
     let to = trials.iter().map(|t| end(&t.course)).max().unwrap_or(0);
     let bins: Vec<(i64, [f32; 3])> = (from..to)
         .into_par_iter()
         .filter_map(|bin| {
-            let mut here: Vec<f64> = trials.iter().filter_map(|t| t.course.at(bin)).collect();
-            (2 * here.len() >= trials.len()).then(|| (bin, percentiles(&mut here)))
+            let mut bin_rates: Vec<f64> = trials.iter().filter_map(|t| t.course.at(bin)).collect();
+            (2 * bin_rates.len() >= trials.len()).then(|| (bin, percentiles(&mut bin_rates)))
         })
         .collect();
     let mut background: Vec<f64> = trials

@@ -26,7 +26,7 @@ use skinrig_model::{Background, PressRole};
 
 use self::bins::HostTimeView;
 use self::interval::{Estimates, Outcome, Plan};
-use self::smooth::Edges;
+use self::smooth::Boundary;
 use self::spans::{Neighbours, Spans};
 use self::trial::{Detector, Label, Trial};
 use crate::metrics::quantile;
@@ -41,18 +41,18 @@ use crate::verdict;
 /// First random stream for thinning events; the bootstrap counts from 0.
 const THINNING: u64 = 1 << 40;
 
-/// Studies the scored presses among `kept` that were executed as planned, whether or not the cameras saw them; presses that
+/// Studies the scored presses among `retained` that were executed as planned, whether or not the cameras saw them; presses that
 /// the journal or the settings exclude by hand are not trials. `None` without any scored press or without a clock for both
 /// cameras.
 #[must_use]
-pub fn study(analysis: &Analysis, kept: &RetainedPresses) -> Option<Latency> {
+pub fn study(analysis: &Analysis, retained: &RetainedPresses) -> Option<Latency> {
     let [Some(one), Some(two)] = analysis.clocks else {
         return None;
     };
     let clocks = [one, two];
     let settings = &analysis.settings.latency;
     let role = |p: &&RetainedPress| analysis.presses.get(p.row).map(|r| r.role);
-    let presses = kept.presses.iter();
+    let presses = retained.presses.iter();
     let presses: Vec<&RetainedPress> = presses
         .filter(|p| role(p) == Some(PressRole::Score))
         .collect();
@@ -61,8 +61,8 @@ pub fn study(analysis: &Analysis, kept: &RetainedPresses) -> Option<Latency> {
     }
     let usable = usable(analysis, &clocks, &presses);
     let edges = match settings.background {
-        Background::Before => Edges::Renormalised,
-        Background::After => Edges::ZeroPadded,
+        Background::Before => Boundary::Renormalised,
+        Background::After => Boundary::ZeroPadded,
     };
     let margin_ms = margin_ms(analysis, &clocks);
     let grid = sweep::thresholds(settings.thresholds);
@@ -70,12 +70,12 @@ pub fn study(analysis: &Analysis, kept: &RetainedPresses) -> Option<Latency> {
     let trials = run(&usable, &detector, None);
     let found = DetectorResult::new(analysis, &detector, settings.target_rate, &trials);
 
-    let asked = settings.reduced;
-    let few = sweep::thresholds(asked.thresholds.into());
+    let reduced_settings = settings.reduced;
+    let few = sweep::thresholds(reduced_settings.thresholds.into());
     let few = Detector::new(settings, edges, few, margin_ms);
-    let thinning = Some((asked.factor, analysis.settings.seed));
+    let thinning = Some((reduced_settings.factor, analysis.settings.seed));
     let thinned = run(&usable, &few, thinning);
-    let reduced = DetectorResult::new(analysis, &few, asked.target_rate, &thinned);
+    let reduced = DetectorResult::new(analysis, &few, reduced_settings.target_rate, &thinned);
 
     let onset = |t: &Trial| found.chosen.and_then(|i| t.searches[i].onset_ms());
     let early = |t: &Trial| Some((t.label.press, t.searches[found.chosen?].false_alarm_ms()?));
@@ -97,7 +97,7 @@ pub fn study(analysis: &Analysis, kept: &RetainedPresses) -> Option<Latency> {
         } else {
             (covered_us.0 * 1e-3, covered_us.1 * 1e-3)
         },
-        zero_padded: edges == Edges::ZeroPadded,
+        zero_padded: edges == Boundary::ZeroPadded,
         decision_delay_ms: decision_delay_ms(&detector),
         earliest_ms: detector.earliest_ms,
         background_s: trials.iter().map(|t| t.background_s).sum(),
@@ -110,9 +110,9 @@ pub fn study(analysis: &Analysis, kept: &RetainedPresses) -> Option<Latency> {
         false_detections: trials.iter().filter_map(early).collect(),
         from_contact: from_contact(analysis, &clocks, &trials, &found),
         reduced: Some(ReducedLatency {
-            factor: asked.factor,
-            thresholds: asked.thresholds.into(),
-            target_rate: asked.target_rate,
+            factor: reduced_settings.factor,
+            thresholds: reduced_settings.thresholds.into(),
+            target_rate: reduced_settings.target_rate,
             threshold: reduced.chosen.map(|i| few.thresholds[i]),
             detected_rate: reduced.estimates.detected_rate,
             width_ms: reduced.estimates.width_ms,
@@ -140,22 +140,22 @@ fn usable<'a>(
     presses: &[&'a RetainedPress],
 ) -> Vec<UsablePress<'a>> {
     let neighbours = Neighbours::of(&analysis.presses);
-    let one = |kept: &&'a RetainedPress| {
-        let press = &analysis.presses[kept.row];
+    let one = |retained: &&'a RetainedPress| {
+        let press = &analysis.presses[retained.row];
         if !verdict::is_done_as_planned(press) {
             return None;
         }
         let contact_us = press.timing.map_or(0.0, |t| t.contact.0 as f64 * 1e-3);
         let late_us = |k: usize| analysis.alignment.off_line_us(k, &clocks[k], contact_us);
-        let sights = [0, 1].map(|k| HostTimeView::new(&kept.views[k], &clocks[k], late_us(k)));
+        let sights = [0, 1].map(|k| HostTimeView::new(&retained.views[k], &clocks[k], late_us(k)));
         let background = analysis.settings.latency.background;
         Some(UsablePress {
-            row: kept.row,
+            row: retained.row,
             label: Label {
-                press: kept.press,
+                press: retained.press,
                 location: press.location.index(),
             },
-            spans: Spans::of(&sights, neighbours[kept.row]?, background)?,
+            spans: Spans::of(&sights, neighbours[retained.row]?, background)?,
             sights,
         })
     };

@@ -5,7 +5,7 @@ const REACH_SIGMAS: f64 = 4.0;
 
 /// Assumption beyond the ends of a series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Edges {
+pub enum Boundary {
     /// Unknown: the taps inside are scaled to a sum of 1, so that a constant stays constant.
     Renormalised,
     /// Zeros, as in the public code: the first and last bins are too low.
@@ -52,7 +52,7 @@ impl Kernel {
 
     /// Smooths `counts`; the output has the same length, even if it is shorter than the kernel.
     #[must_use]
-    pub fn smooth(&self, counts: &[u32], edges: Edges) -> Vec<f64> {
+    pub fn smooth(&self, counts: &[u32], edges: Boundary) -> Vec<f64> {
         let n = counts.len();
         let input: Vec<f64> = counts.iter().map(|c| f64::from(*c)).collect();
         let mut out: Vec<f64> = input.iter().map(|x| self.taps[0] * x).collect();
@@ -66,7 +66,7 @@ impl Kernel {
                 *o += tap * x;
             }
         }
-        if edges == Edges::Renormalised {
+        if edges == Boundary::Renormalised {
             let reach = self.reach();
             for (i, o) in out.iter_mut().enumerate() {
                 let (before, after) = (i, n - 1 - i);

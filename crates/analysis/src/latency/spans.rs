@@ -76,7 +76,7 @@ impl Spans {
         let begin = latest(|s| s.host_us(0.0));
         let end = earliest(|s| s.host_us(f64::from(s.view().length_us)));
         let middle = 0.5 * latest(|s| s.host_us(s.view().release_us));
-        let (wanted, idle) = match background {
+        let (requested, idle) = match background {
             Background::Before => {
                 let idle_from = latest(|s| s.host_us(f64::from(s.view().idle_from_us)));
                 let window_from = earliest(|s| s.host_us(f64::from(s.view().window_us.0)));
@@ -91,11 +91,11 @@ impl Spans {
             }
         };
         let trial = (
-            wanted
+            requested
                 .0
                 .max(begin)
                 .max(neighbours.release_before_us + GUARD_US),
-            wanted
+            requested
                 .1
                 .min(end)
                 .min(neighbours.contact_after_us - GUARD_US),
@@ -111,7 +111,7 @@ impl Spans {
         usable.then_some(Self {
             trial_us: trial,
             background_us: idle,
-            shortened: trial.0 > wanted.0 + ROUNDING_US || trial.1 < wanted.1 - ROUNDING_US,
+            shortened: trial.0 > requested.0 + ROUNDING_US || trial.1 < requested.1 - ROUNDING_US,
         })
     }
 }

@@ -103,9 +103,9 @@ pub fn choose(rows: &[ThresholdRow], target_rate: f64) -> Option<usize> {
             .filter(|(_, r)| r.detected_rate > 0.0)
     };
     let best = candidates().map(|(_, r)| r.detected_rate);
-    let wanted = target_rate.min(best.fold(0.0, f64::max));
+    let required = target_rate.min(best.fold(0.0, f64::max));
     candidates()
-        .filter(|(_, r)| r.detected_rate >= wanted)
+        .filter(|(_, r)| r.detected_rate >= required)
         .min_by(|(_, a), (_, b)| a.false_alarms_per_s.total_cmp(&b.false_alarms_per_s))
         .map(|(i, _)| i)
 }

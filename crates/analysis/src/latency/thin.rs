@@ -11,12 +11,12 @@ use crate::seeded;
 #[must_use]
 pub fn choose_events(n: usize, factor: u32, rng: &mut Xoshiro256PlusPlus) -> Vec<usize> {
     let keep = ((n as f64 / f64::from(factor.max(1))).round_ties_even() as usize).min(n);
-    let mut kept = BTreeSet::new();
+    let mut retained = BTreeSet::new();
     for last in n - keep..n {
         let pick = seeded::index(rng, last + 1);
-        if !kept.insert(pick) {
-            kept.insert(last);
+        if !retained.insert(pick) {
+            retained.insert(last);
         }
     }
-    kept.into_iter().collect()
+    retained.into_iter().collect()
 }

@@ -4,9 +4,9 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use skinrig_model::{LatencySettings, PressId};
 
 use super::bins::{Grid, HostTimeView};
-use super::course::DrawnRates;
+use super::course::PlottedRates;
 use super::cusum::{Cusum, background_rate_per_s};
-use super::smooth::{Edges, Kernel};
+use super::smooth::{Boundary, Kernel};
 use super::spans::Spans;
 use super::thin::choose_events;
 
@@ -18,7 +18,7 @@ pub struct Detector {
     /// The smoothing kernel.
     pub kernel: Kernel,
     /// Treatment of the ends.
-    pub edges: Edges,
+    pub edges: Boundary,
     /// Rate increase that the detector is tuned to.
     pub alpha: f64,
     /// Required number of bins in a row.
@@ -35,7 +35,7 @@ impl Detector {
     #[must_use]
     pub fn new(
         settings: &LatencySettings,
-        edges: Edges,
+        edges: Boundary,
         thresholds: Vec<f64>,
         margin_ms: f64,
     ) -> Self {
@@ -80,7 +80,7 @@ impl Detector {
             searches: trips.map(search).collect(),
             background_s,
             background_per_s: events as f64 / background_s,
-            course: DrawnRates::new(grid, &smoothed, self.bin_ms),
+            course: PlottedRates::new(grid, &smoothed, self.bin_ms),
             background,
         }
     }
@@ -182,7 +182,7 @@ pub struct Trial {
     /// Background events per second.
     pub background_per_s: f64,
     /// Smoothed rate of the trial, for drawing.
-    pub course: DrawnRates,
+    pub course: PlottedRates,
     /// Smoothed counts of the background, for drawing.
     pub background: Vec<f64>,
 }

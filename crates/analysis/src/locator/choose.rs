@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 use skinrig_model::{AnalysisSettings, CalibrationModel, Locator, StereoGeometry};
 
-use super::methods::{Hyperparameters, METHODS, Method, Start, method};
-use super::regions::{Reached, Regions};
-use super::{Features, Fitted, Unfit};
+use super::methods::{FitStart, Hyperparameters, METHODS, Method, method};
+use super::regions::{HeldOutError, Regions};
+use super::{Features, FitError, FittedLocator};
 use crate::calibrate::{Folds, Losses, NO_FIX_ERROR_MM, Refit, SessionCalibration, covariance};
 use crate::calibrate::{root_mean_square, select_model};
 use crate::metrics::{bootstrap_over_locations, root_mean_square as rms};
@@ -32,7 +32,7 @@ pub(crate) enum Effort {
 #[derive(Debug, Clone)]
 pub struct LocatorChoice {
     /// The locator.
-    pub fitted: Fitted,
+    pub fitted: FittedLocator,
     /// How it was chosen; without reliability.
     pub result: LocatorResult,
     /// Warnings for the reader.
@@ -82,20 +82,20 @@ pub(crate) fn choose(
 /// A method on the whole set, and on parts of it.
 struct Candidate {
     method: &'static dyn Method,
-    fit: Result<(Fitted, Option<Hyperparameters>), Unfit>,
+    fit: Result<(FittedLocator, Option<Hyperparameters>), FitError>,
     /// For each press: what it gives at held-out locations.
-    held_out: Option<Vec<HeldOut>>,
+    held_out: Option<Vec<HeldOutResult>>,
     /// Errors in held-out repetitions, mm.
     over_repetitions: Option<Vec<f64>>,
 }
 
 #[derive(Debug, Clone)]
-struct HeldOut {
+struct HeldOutResult {
     /// Estimate minus truth, mm; `None` without a position.
     error: Option<[f64; 2]>,
     error_mm: f64,
     /// `None` without a position, or if the locator knows nothing about its error.
-    reached: Option<Reached>,
+    reached: Option<HeldOutError>,
 }
 
 impl Candidate {
@@ -108,7 +108,7 @@ impl Candidate {
 struct Learner<'a> {
     set: &'a CalibrationSet,
     settings: &'a AnalysisSettings,
-    start: Start<'a>,
+    start: FitStart<'a>,
     refit: Option<Refit>,
     parameters: usize,
     locations: Vec<u32>,
@@ -124,7 +124,7 @@ impl<'a> Learner<'a> {
         Self {
             set,
             settings,
-            start: Start {
+            start: FitStart {
                 geometry: *geometry,
                 covariance: calibration.and_then(covariance),
                 near: None,
@@ -207,7 +207,7 @@ impl<'a> Learner<'a> {
         let bound_mm = (!compared.is_empty()).then(|| losses.bound_mm());
         let candidate = candidates.into_iter().nth(used)?;
         let held = candidate.held_out.unwrap_or_default();
-        let reached: Vec<Reached> = held.into_iter().filter_map(|h| h.reached).collect();
+        let reached: Vec<HeldOutError> = held.into_iter().filter_map(|h| h.reached).collect();
         let regions = Regions::from_held_out(&reached, self.distinct_locations());
         let fitted = candidate.fit.ok()?.0.with_regions(regions);
         Some(LocatorChoice {
@@ -281,7 +281,7 @@ impl<'a> Learner<'a> {
         method: &dyn Method,
         folds: &Folds,
         near: Option<&Hyperparameters>,
-    ) -> Option<Vec<HeldOut>> {
+    ) -> Option<Vec<HeldOutResult>> {
         let presses = self.set.sights();
         folds.each(|kept, held| {
             let part = self.set.part(kept);
@@ -289,7 +289,7 @@ impl<'a> Learner<'a> {
                 Some(refit) => refit.geometry(&part)?,
                 None => self.start.geometry,
             };
-            let start = Start {
+            let start = FitStart {
                 geometry,
                 near,
                 ..self.start.clone()
@@ -297,7 +297,7 @@ impl<'a> Learner<'a> {
             let (fitted, _) = method.fit(&part, &start).ok()?;
             let of = |i: &usize| {
                 let press = &presses[*i];
-                let lost = HeldOut {
+                let lost = HeldOutResult {
                     error: None,
                     error_mm: NO_FIX_ERROR_MM,
                     reached: None,
@@ -313,8 +313,8 @@ impl<'a> Learner<'a> {
                 let [x, y] = prediction.at;
                 let error = [x - press.truth.x_mm, y - press.truth.y_mm];
                 let reached = prediction.uncertainty;
-                let reached = reached.map(|uncertainty| Reached { uncertainty, error });
-                HeldOut {
+                let reached = reached.map(|uncertainty| HeldOutError { uncertainty, error });
+                HeldOutResult {
                     error: Some(error),
                     error_mm: libm::hypot(error[0], error[1]).min(NO_FIX_ERROR_MM),
                     reached,

@@ -26,21 +26,21 @@ pub struct Location {
 
 /// A locator that has learnt.
 #[derive(Debug, Clone)]
-pub struct Fitted {
+pub struct FittedLocator {
     locator: Locator,
     geometry: StereoGeometry,
     model: LocatorModel,
-    way: Way,
+    way: Solver,
 }
 
 /// From columns to a position.
 #[derive(Debug, Clone)]
-enum Way {
+enum Solver {
     Rays(Box<Rays>),
     Inverse(Box<Inverse>),
 }
 
-impl Fitted {
+impl FittedLocator {
     /// From its serialised form and the geometry of the analysis; `None` if the form contradicts itself.
     #[must_use]
     pub fn new(locator: Locator, geometry: StereoGeometry, model: LocatorModel) -> Option<Self> {
@@ -64,9 +64,9 @@ impl Fitted {
                     },
                     _ => return None,
                 };
-                Way::Inverse(Box::new(Inverse::new(reading, [one, two], prior)?))
+                Solver::Inverse(Box::new(Inverse::new(reading, [one, two], prior)?))
             }
-            (None, None) => Way::Rays(Box::new(Rays::new(&geometry, covariance))),
+            (None, None) => Solver::Rays(Box::new(Rays::new(&geometry, covariance))),
             _ => return None,
         };
         Some(Self {
@@ -92,7 +92,7 @@ impl Fitted {
                 inflation: 1.0,
                 levels: Vec::new(),
             },
-            way: Way::Rays(Box::new(Rays::new(&geometry, None))),
+            way: Solver::Rays(Box::new(Rays::new(&geometry, None))),
         }
     }
 
@@ -153,7 +153,7 @@ impl Fitted {
         let Some(location) = self.locate(&features) else {
             return (rays, None);
         };
-        if matches!(self.way, Way::Rays(_)) {
+        if matches!(self.way, Solver::Rays(_)) {
             return (rays, rays.estimate().and(Some(location)));
         }
         let at = Point2::new(location.at[0], location.at[1]);
@@ -168,8 +168,8 @@ impl Fitted {
     pub(super) fn predict(&self, features: &Features) -> Option<Prediction> {
         let relative = response(features.cluster_events, self.model.reference_events);
         let rays = match &self.way {
-            Way::Inverse(inverse) => return inverse.locate(features, relative),
-            Way::Rays(rays) => rays,
+            Solver::Inverse(inverse) => return inverse.locate(features, relative),
+            Solver::Rays(rays) => rays,
         };
         let crossing = rays.crossing(features.columns)?;
         let uncertainty = self.model.scatter.map(|scatter| {

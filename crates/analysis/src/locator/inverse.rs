@@ -33,12 +33,12 @@ pub(super) struct Inverse {
     centre: [f64; 2],
     /// Inverse of the prior's covariance: xx, xy, yy, 1/mm².
     precision: Covariance,
-    starts: Vec<Begin>,
+    starts: Vec<StartPoint>,
 }
 
 /// A position to begin from, with what each camera is expected to read and the values of the fields there.
 #[derive(Debug, Clone, Copy)]
-struct Begin {
+struct StartPoint {
     at: [f64; 2],
     expected: [f64; 2],
     fields: [f64; READINGS],
@@ -64,7 +64,7 @@ impl Readings {
 }
 
 /// A reading minus the expected one, px, and the change of the expected one per mm.
-struct Miss {
+struct Residual {
     off: f64,
     slope: [f64; 2],
 }
@@ -80,7 +80,7 @@ fn loss(i: usize, off: f64, variance: f64) -> (f64, f64) {
 }
 
 /// The sum to minimise at a position, with its Gauss-Newton matrix and right side.
-struct Normal {
+struct NormalEquations {
     value: f64,
     matrix: Covariance,
     side: [f64; 2],
@@ -117,7 +117,7 @@ impl Inverse {
             .map(|p| p.at_mm)
             .chain([prior.centre_mm]);
         inverse.starts = positions
-            .map(|at| Begin {
+            .map(|at| StartPoint {
                 at,
                 expected: [0, 1].map(|k| inverse.reading.expected(k, at).0),
                 fields: std::array::from_fn(|i| inverse.field(i).map_or(0.0, |f| f.value(at).0)),
@@ -159,18 +159,18 @@ impl Inverse {
     }
 
     /// `None` for a missing reading.
-    fn miss(&self, read: &Readings, i: usize, at: [f64; 2]) -> Option<Miss> {
+    fn miss(&self, read: &Readings, i: usize, at: [f64; 2]) -> Option<Residual> {
         let Some(spread) = i.checked_sub(2) else {
             let (expected, by) = self.reading.expected(i, at);
             let (field, field_by) = self.fields[i].value(at);
-            return Some(Miss {
+            return Some(Residual {
                 off: read.off(i, expected, field),
                 slope: [0, 1].map(|axis| by[axis] / read.slopes[i] + field_by[axis]),
             });
         };
         let value = read.spreads[spread]?;
         let (expected, slope) = self.field(i)?.value(at);
-        Some(Miss {
+        Some(Residual {
             off: value - expected,
             slope,
         })
@@ -200,9 +200,9 @@ impl Inverse {
         (0.5 * (slope[0] * dx + slope[1] * dy), slope)
     }
 
-    fn normal(&self, read: &Readings, variance: &[f64; READINGS], at: [f64; 2]) -> Normal {
+    fn normal(&self, read: &Readings, variance: &[f64; READINGS], at: [f64; 2]) -> NormalEquations {
         let (value, slope) = self.prior(at);
-        let mut normal = Normal {
+        let mut normal = NormalEquations {
             value,
             matrix: self.precision,
             side: slope.map(|s| -s),
@@ -260,7 +260,7 @@ impl Inverse {
 
     /// The best of the starts.
     fn start(&self, read: &Readings) -> Option<[f64; 2]> {
-        let cost = |begin: &Begin| {
+        let cost = |begin: &StartPoint| {
             let each = (0..READINGS).filter_map(|i| {
                 let off = match i.checked_sub(2) {
                     None => read.off(i, begin.expected[i], begin.fields[i]),

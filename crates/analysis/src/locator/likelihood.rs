@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, SVector};
 
 use super::precision::Precision;
-use super::quasi_newton::Slope;
+use super::quasi_newton::ValueAndGradient;
 use super::robust::{LEAST, scale, weight};
 use super::samples::Sample;
 
@@ -85,7 +85,7 @@ impl Likelihood<'_> {
     }
 
     /// Negative logarithm of the prior.
-    fn prior(&self, logs: &Logs) -> Slope<LOGS> {
+    fn prior(&self, logs: &Logs) -> ValueAndGradient<LOGS> {
         let spread = Logs::from([LOOSE, LENGTH_PRIOR.1, LOOSE, LOOSE]);
         let off = (logs - self.centre).component_div(&spread);
         (0.5 * off.norm_squared(), off.component_div(&spread))
@@ -109,7 +109,7 @@ impl Likelihood<'_> {
     }
 
     /// Negative logarithm of the posterior density, up to a constant; `None` where the kernel is not positive definite.
-    pub(super) fn evaluate(&self, logs: &Logs) -> Option<Slope<LOGS>> {
+    pub(super) fn evaluate(&self, logs: &Logs) -> Option<ValueAndGradient<LOGS>> {
         let n = self.samples.len();
         let kernel = Kernel::new(logs);
         let smooth = self.smooth(kernel);

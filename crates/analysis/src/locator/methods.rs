@@ -4,14 +4,14 @@ use nalgebra::DMatrix;
 use skinrig_model::{Locator, StereoGeometry};
 
 use super::field::learn;
-use super::fitted::Fitted;
+use super::fit_error::FitError;
+use super::fitted::FittedLocator;
 use super::likelihood::Logs;
 use super::rays::Rays;
 use super::reading::{Reading, polynomials};
 use super::robust::reference_events;
 use super::samples::samples;
 use super::spread::learn_spread;
-use super::unfit::Unfit;
 use crate::result::{CameraField, LocatorModel, PositionPrior};
 use crate::sets::{CalibrationPress, CalibrationSet};
 
@@ -28,7 +28,7 @@ pub enum Feature {
 
 /// What a method needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Needs {
+pub struct Requirements {
     /// Features of each press.
     pub features: &'static [Feature],
     /// Minimum number of calibration locations.
@@ -37,7 +37,7 @@ pub struct Needs {
 
 /// Where a fit begins.
 #[derive(Debug, Clone)]
-pub struct Start<'a> {
+pub struct FitStart<'a> {
     /// Geometry fitted to the same presses (nominal without a calibration).
     pub geometry: StereoGeometry,
     /// Covariance of its ten parameters.
@@ -48,11 +48,11 @@ pub struct Start<'a> {
 
 /// Opaque hyperparameters of the fields of both cameras.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hyperparameters([CameraLogs; 2]);
+pub struct Hyperparameters([CameraHyperparameters; 2]);
 
 /// Of the column, and of the spreads of columns and rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct CameraLogs {
+struct CameraHyperparameters {
     column: Logs,
     spreads: Option<[Logs; 2]>,
 }
@@ -64,16 +64,16 @@ pub trait Method: Sync {
     /// Grows with every change of its numbers.
     fn version(&self) -> u32;
     /// What it needs.
-    fn needs(&self) -> Needs;
+    fn needs(&self) -> Requirements;
     /// Learns from calibration presses.
     ///
     /// # Errors
-    /// [`Unfit`] if they do not suffice.
+    /// [`FitError`] if they do not suffice.
     fn fit(
         &self,
         presses: &CalibrationSet,
-        start: &Start<'_>,
-    ) -> Result<(Fitted, Option<Hyperparameters>), Unfit>;
+        start: &FitStart<'_>,
+    ) -> Result<(FittedLocator, Option<Hyperparameters>), FitError>;
 }
 
 /// All methods, simplest first.
@@ -104,8 +104,8 @@ impl Method for Geometry {
         2
     }
 
-    fn needs(&self) -> Needs {
-        Needs {
+    fn needs(&self) -> Requirements {
+        Requirements {
             features: &[Feature::Columns],
             locations: 0,
         }
@@ -114,8 +114,8 @@ impl Method for Geometry {
     fn fit(
         &self,
         presses: &CalibrationSet,
-        start: &Start<'_>,
-    ) -> Result<(Fitted, Option<Hyperparameters>), Unfit> {
+        start: &FitStart<'_>,
+    ) -> Result<(FittedLocator, Option<Hyperparameters>), FitError> {
         let rays = Rays::new(&start.geometry, start.covariance.clone());
         let presses = presses.sights();
         let model = LocatorModel {
@@ -127,8 +127,8 @@ impl Method for Geometry {
             inflation: 1.0,
             levels: Vec::new(),
         };
-        let fitted = Fitted::new(Locator::Geometry, start.geometry, model);
-        fitted.map(|f| (f, None)).ok_or(Unfit::Degenerate)
+        let fitted = FittedLocator::new(Locator::Geometry, start.geometry, model);
+        fitted.map(|f| (f, None)).ok_or(FitError::Degenerate)
     }
 }
 
@@ -141,8 +141,8 @@ impl Method for GeometryField {
         2
     }
 
-    fn needs(&self) -> Needs {
-        Needs {
+    fn needs(&self) -> Requirements {
+        Requirements {
             features: FEATURES,
             locations: 12,
         }
@@ -151,8 +151,8 @@ impl Method for GeometryField {
     fn fit(
         &self,
         presses: &CalibrationSet,
-        start: &Start<'_>,
-    ) -> Result<(Fitted, Option<Hyperparameters>), Unfit> {
+        start: &FitStart<'_>,
+    ) -> Result<(FittedLocator, Option<Hyperparameters>), FitError> {
         enough(self.needs(), presses.sights())?;
         let reading = Reading::Bearing {
             geometry: start.geometry,
@@ -171,8 +171,8 @@ impl Method for DirectField {
         2
     }
 
-    fn needs(&self) -> Needs {
-        Needs {
+    fn needs(&self) -> Requirements {
+        Requirements {
             features: FEATURES,
             locations: 16,
         }
@@ -181,10 +181,10 @@ impl Method for DirectField {
     fn fit(
         &self,
         presses: &CalibrationSet,
-        start: &Start<'_>,
-    ) -> Result<(Fitted, Option<Hyperparameters>), Unfit> {
+        start: &FitStart<'_>,
+    ) -> Result<(FittedLocator, Option<Hyperparameters>), FitError> {
         enough(self.needs(), presses.sights())?;
-        let reading = Reading::Column(polynomials(presses.sights()).ok_or(Unfit::Line)?);
+        let reading = Reading::Column(polynomials(presses.sights()).ok_or(FitError::Line)?);
         with_fields(Locator::Direct, presses.sights(), &reading, start)
     }
 }
@@ -194,13 +194,14 @@ fn with_fields(
     locator: Locator,
     presses: &[CalibrationPress],
     reading: &Reading,
-    start: &Start<'_>,
-) -> Result<(Fitted, Option<Hyperparameters>), Unfit> {
+    start: &FitStart<'_>,
+) -> Result<(FittedLocator, Option<Hyperparameters>), FitError> {
     let bearings = matches!(reading, Reading::Bearing { .. });
     let camera = |k: usize| {
         let near = start.near.map(|h| &h.0[k]);
         let columns = samples(presses, |p| Some(reading.residual(k, p)));
-        let (field, column) = learn(&columns, near.map(|n| &n.column)).ok_or(Unfit::Degenerate)?;
+        let (field, column) =
+            learn(&columns, near.map(|n| &n.column)).ok_or(FitError::Degenerate)?;
         let spread = |axis: usize| {
             let near = near.and_then(|n| n.spreads.as_ref());
             learn_spread(presses, (k, axis), near.map(|logs| &logs[axis]))
@@ -217,7 +218,7 @@ fn with_fields(
             field,
             spreads,
         };
-        let logs = CameraLogs {
+        let logs = CameraHyperparameters {
             column,
             spreads: logs,
         };
@@ -233,7 +234,7 @@ fn with_fields(
         inflation: 1.0,
         levels: Vec::new(),
     };
-    let fitted = Fitted::new(locator, start.geometry, model).ok_or(Unfit::Degenerate)?;
+    let fitted = FittedLocator::new(locator, start.geometry, model).ok_or(FitError::Degenerate)?;
     Ok((fitted, Some(Hyperparameters([logs_one, logs_two]))))
 }
 
@@ -253,19 +254,19 @@ fn prior(presses: &[CalibrationPress]) -> PositionPrior {
     }
 }
 
-fn rows(start: &Start<'_>) -> Option<Vec<Vec<f64>>> {
+fn rows(start: &FitStart<'_>) -> Option<Vec<Vec<f64>>> {
     let covariance = start.covariance.as_ref()?;
     let row = |r: usize| covariance.row(r).iter().copied().collect();
     Some((0..covariance.nrows()).map(row).collect())
 }
 
-fn enough(needs: Needs, presses: &[CalibrationPress]) -> Result<(), Unfit> {
+fn enough(needs: Requirements, presses: &[CalibrationPress]) -> Result<(), FitError> {
     let mut locations: Vec<u32> = presses.iter().map(|p| p.location).collect();
     locations.sort_unstable();
     locations.dedup();
     let (needed, found) = (needs.locations, locations.len() as u32);
     if found < needed {
-        return Err(Unfit::Locations { needed, found });
+        return Err(FitError::Locations { needed, found });
     }
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! Locators: what turns the columns of both cameras into a position, learnt from the calibration presses.
 //!
-//! A [`Method`] declares what it needs and fits calibration presses; a [`Fitted`] locator sees the [`Features`] of a press
+//! A [`Method`] declares what it needs and fits calibration presses; a [`FittedLocator`] locator sees the [`Features`] of a press
 //! and returns a position, a 95 % region and a flag. Built in are the geometry (rays intersect), the field (the geometry
 //! predicts what each camera reads at a position, a Gaussian process corrects it, and the position that explains all
 //! readings best is found), and the direct field (the same with a polynomial instead of a geometry). Both also read how far
@@ -10,6 +10,7 @@ mod choose;
 mod exponential;
 mod features;
 mod field;
+mod fit_error;
 mod fitted;
 mod inverse;
 mod likelihood;
@@ -24,12 +25,11 @@ mod reliability;
 mod robust;
 mod samples;
 mod spread;
-mod unfit;
 
 pub(crate) use choose::{Effort, choose};
 pub use choose::{LocatorChoice, choose_locator, held_out_errors};
 pub use features::{CameraFeatures, Features};
-pub use fitted::{Fitted, Location};
-pub use methods::{Feature, Hyperparameters, Method, Needs, Start, method};
+pub use fit_error::FitError;
+pub use fitted::{FittedLocator, Location};
+pub use methods::{Feature, FitStart, Hyperparameters, Method, Requirements, method};
 pub(crate) use reliability::reliability;
-pub use unfit::Unfit;

@@ -10,7 +10,7 @@ const SUFFICIENT: f64 = 1e-4;
 const HALVINGS: usize = 25;
 
 /// Value and gradient.
-pub(super) type Slope<const N: usize> = (f64, SVector<f64, N>);
+pub(super) type ValueAndGradient<const N: usize> = (f64, SVector<f64, N>);
 
 /// The point that `steps` steps from `from` reach, with its value; earlier if a step gains less than `tolerance`. `None`
 /// if the function has no value at `from`.
@@ -18,7 +18,7 @@ pub(super) fn minimise<const N: usize>(
     from: SVector<f64, N>,
     steps: usize,
     tolerance: f64,
-    function: impl Fn(&SVector<f64, N>) -> Option<Slope<N>>,
+    function: impl Fn(&SVector<f64, N>) -> Option<ValueAndGradient<N>>,
 ) -> Option<(SVector<f64, N>, f64)> {
     let mut at = from;
     let (mut value, mut gradient) = function(&at)?;

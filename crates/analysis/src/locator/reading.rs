@@ -220,12 +220,12 @@ mod tests {
             ]
         };
         let presses: Vec<_> = (0..49).map(|i| press(i, grid(i))).collect();
-        let Reading::Column(wanted) = &planted else {
+        let Reading::Column(column) = &planted else {
             return;
         };
         let found = polynomials(&presses).unwrap();
-        for (found, wanted) in found.iter().flatten().zip(wanted.iter().flatten()) {
-            assert!((found - wanted).abs() < 0.02, "{found} {wanted}");
+        for (found, column) in found.iter().flatten().zip(column.iter().flatten()) {
+            assert!((found - column).abs() < 0.02, "{found} {column}");
         }
         let line: Vec<_> = (0..30)
             .map(|i| press(i, [f64::from(i), 2.0 * f64::from(i)]))

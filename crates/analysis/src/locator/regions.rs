@@ -24,7 +24,7 @@ const LOOSE: f64 = 2.0;
 
 /// The error of a held-out calibration press, mm, and what was predicted about it.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Reached {
+pub(super) struct HeldOutError {
     pub uncertainty: Uncertainty,
     pub error: [f64; 2],
 }
@@ -44,7 +44,7 @@ impl Regions {
     ///
     /// A model learnt from few presses knows too little about how wrong it is between and beyond them: its variance is
     /// multiplied by the most likely factor. What remains is a common size, which [`levels`] finds.
-    pub(super) fn from_held_out(reached: &[Reached], locations: usize) -> Self {
+    pub(super) fn from_held_out(reached: &[HeldOutError], locations: usize) -> Self {
         let likely = INFLATION_LOG2
             .map(|log2| libm::exp2(f64::from(log2)))
             .filter_map(|inflation| Some((unlikelihood(reached, inflation)?, inflation)))
@@ -63,7 +63,7 @@ impl Regions {
 
 /// Negative logarithm of the posterior density of a factor on the variance of the model, up to a constant: errors are those
 /// of Student's t with 4 degrees of freedom and a common size. `None` if a covariance is degenerate.
-fn unlikelihood(reached: &[Reached], inflation: f64) -> Option<f64> {
+fn unlikelihood(reached: &[HeldOutError], inflation: f64) -> Option<f64> {
     let mut rows = Vec::with_capacity(reached.len());
     for r in reached {
         let covariance = r.uncertainty.covariance(inflation)?;

@@ -3,13 +3,13 @@
 use skinrig_model::{AnalysisSettings, PressRole, Verdict};
 
 use super::prediction::distance;
-use super::{Features, Fitted};
+use super::{Features, FittedLocator};
 use crate::metrics::share_over_locations;
 use crate::result::{PressResult, RegionLevel, ReliabilityRow};
 
 /// Shares of the valid scored presses inside the regions of each level.
 pub(crate) fn reliability(
-    fitted: &Fitted,
+    fitted: &FittedLocator,
     presses: &[PressResult],
     settings: &AnalysisSettings,
 ) -> Vec<ReliabilityRow> {

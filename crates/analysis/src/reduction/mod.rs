@@ -16,7 +16,7 @@ mod trials;
 
 use skinrig_model::PressRole;
 
-use crate::locator::Fitted;
+use crate::locator::FittedLocator;
 use crate::metrics::{bootstrap_over_locations, mean, quantile};
 use crate::press_events::RetainedPresses;
 use crate::result::{Analysis, Reduction, ReductionCurve, Thinning};
@@ -26,14 +26,14 @@ pub(crate) use trials::{Attempt, Outcome, Trials};
 
 /// Thins the retained scored presses and locates them again; `None` if there are none.
 #[must_use]
-pub fn study(analysis: &Analysis, kept: &RetainedPresses) -> Option<Reduction> {
+pub fn study(analysis: &Analysis, retained: &RetainedPresses) -> Option<Reduction> {
     let settings = &analysis.settings;
-    let attempts = attempts(analysis, kept);
+    let attempts = attempts(analysis, retained);
     if attempts.is_empty() {
         return None;
     }
     let trials = Trials {
-        locator: &Fitted::of(analysis),
+        locator: &FittedLocator::of(analysis),
         outline: &analysis.rig.outline,
         settings,
         min_samples: match settings.reduction.min_samples {
@@ -83,8 +83,8 @@ pub fn study(analysis: &Analysis, kept: &RetainedPresses) -> Option<Reduction> {
 }
 
 /// Presses of the study.
-fn attempts<'a>(analysis: &Analysis, kept: &'a RetainedPresses) -> Vec<Attempt<'a>> {
-    let presses = kept.presses.iter().filter_map(|k| {
+fn attempts<'a>(analysis: &Analysis, retained: &'a RetainedPresses) -> Vec<Attempt<'a>> {
+    let presses = retained.presses.iter().filter_map(|k| {
         let row = analysis.presses.get(k.row)?;
         let attempt = Attempt::new(row, k)?;
         (row.role == PressRole::Score && verdict::is_done_as_planned(row)).then_some(attempt)

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use skinrig_model::{AnalysisSettings, CentroidRule, Point2, PressId, SkinOutline};
 
 use super::thinning::{ThinnedView, Thinner};
-use crate::locator::Fitted;
+use crate::locator::FittedLocator;
 use crate::press_events::{EventView, RetainedPress};
 use crate::result::{LocationOutcome, PressResult, Thinning};
 use crate::seeded;
@@ -22,12 +22,12 @@ pub(crate) struct Attempt<'a> {
 
 impl<'a> Attempt<'a> {
     /// A retained press with its row of the table; `None` without a measured position.
-    pub(crate) fn new(row: &PressResult, kept: &'a RetainedPress) -> Option<Self> {
+    pub(crate) fn new(row: &PressResult, retained: &'a RetainedPress) -> Option<Self> {
         Some(Self {
             press: row.press,
             location: row.location.index(),
             truth: row.truth?,
-            views: &kept.views,
+            views: &retained.views,
         })
     }
 
@@ -78,7 +78,7 @@ impl Outcome {
 
 /// Parameters for thinning, clustering and locating presses.
 pub(crate) struct Trials<'a> {
-    pub locator: &'a Fitted,
+    pub locator: &'a FittedLocator,
     pub outline: &'a SkinOutline,
     /// Crop, radius, seeds and factors.
     pub settings: &'a AnalysisSettings,

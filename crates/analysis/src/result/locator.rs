@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use skinrig_model::Locator;
 
 use super::Estimate;
-use crate::locator::Unfit;
+use crate::locator::FitError;
 use crate::with_text::with_text;
 
 /// The locator of an analysis.
@@ -38,7 +38,7 @@ pub enum LocatorFallback {
         /// In the settings.
         wanted: Locator,
         /// Why not.
-        why: Unfit,
+        why: FitError,
     },
     /// There is no calibration to learn with.
     #[error("the nominal geometry is used as it is (`calibration: none`)")]
@@ -57,7 +57,7 @@ pub enum LocatorFallback {
     ))]
     NoneCompared {
         /// Why the first of them cannot learn; `None` if all can, but not without some of the locations.
-        why: Option<Unfit>,
+        why: Option<FitError>,
     },
     /// No other locator is better.
     #[error("no field is better at held-out locations by more than noise explains")]
@@ -81,7 +81,7 @@ pub struct LocatorComparison {
     /// Comparison with the current locator at its turn; `None` for the first.
     pub test: Option<LocatorTest>,
     /// Why it could not be fitted.
-    pub unfit: Option<Unfit>,
+    pub unfit: Option<FitError>,
     /// True for the locator in use.
     pub chosen: bool,
 }

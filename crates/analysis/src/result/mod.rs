@@ -97,7 +97,7 @@ pub struct Analysis {
     /// Metrics over all scored presses with an estimate, ignoring exclusions.
     pub scored_without_exclusions: Metrics,
     /// RMSE over all attempted scored presses, including failed ones.
-    pub penalised: Penalised,
+    pub penalised: PenalisedRmse,
     /// Minimum number of cluster events, if chosen on the calibration presses.
     pub threshold: Option<ThresholdChoice>,
     /// Areas and taxels.
@@ -264,7 +264,7 @@ pub struct Metrics {
 
 /// RMSE with failures counted. Never below that of the counting presses, nor below that of all presses with an estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Penalised {
+pub struct PenalisedRmse {
     /// Minimum error of a failed press, mm. One with an estimate and a larger error counts its own error.
     pub penalty_mm: f64,
     /// True if the penalty was derived from the probed locations, false if set in the settings.

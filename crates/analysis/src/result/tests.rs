@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
 use super::{AlignmentViolation, LocatorFallback, Warning};
-use crate::locator::Unfit;
+use crate::locator::FitError;
 
 /// Reads each JSON, and compares its text and the JSON written again. Every kind of `T` needs a row.
 pub(super) fn check<T: Serialize + DeserializeOwned + Display>(rows: &[(Value, &str)]) {
@@ -356,7 +356,7 @@ fn every_reason_for_the_geometry_has_fields_and_a_text() {
             "no field is better at held-out locations by more than noise explains",
         ),
     ]);
-    check::<Unfit>(&[
+    check::<FitError>(&[
         (
             json!({"kind": "locations", "needed": 6, "found": 5}),
             "it needs 6 calibration locations, found 5",

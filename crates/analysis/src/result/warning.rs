@@ -8,7 +8,7 @@ use skinrig_model::{CalibrationModel, CameraId, Locator};
 use super::Estimate;
 use crate::clock::RatesError;
 use crate::exclusion::Exclusion;
-use crate::locator::Unfit;
+use crate::locator::FitError;
 use crate::with_text::with_text;
 
 /// A warning for the reader. In JSON `kind` and fields of its cause, where it belongs, and `text`.
@@ -363,7 +363,7 @@ pub enum WarningCause {
         /// In the settings.
         wanted: Locator,
         /// Why not.
-        why: Unfit,
+        why: FitError,
     },
     /// Scored presses and held-out calibration locations have different errors.
     #[error(

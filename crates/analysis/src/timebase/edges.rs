@@ -8,7 +8,7 @@
 use std::collections::HashMap;
 
 use skinrig_model::TriggerEdge;
-use skinrig_model::pulse::{PulseTrain, ReadTrain, read_trains};
+use skinrig_model::pulse::{PulseTrain, ReceivedTrain, read_trains};
 
 use super::epochs::{Epoch, SentTrain};
 use super::error::CameraClockError;
@@ -133,7 +133,7 @@ pub(crate) fn beyond_us(ties: &[f64], at: f64) -> f64 {
 pub(super) struct Edges {
     all: Vec<TriggerEdge>,
     used: Vec<bool>,
-    trains: Vec<ReadTrain>,
+    trains: Vec<ReceivedTrain>,
 }
 
 impl Edges {
@@ -380,13 +380,13 @@ fn jitter(matched: &[TrainMatch]) -> Option<(f64, u64)> {
 }
 
 /// (box time, camera time) of the identified trains, in order of box time.
-fn anchors(read: &[ReadTrain], sent: &[SentTrain]) -> Vec<(f64, u64)> {
+fn anchors(read: &[ReceivedTrain], sent: &[SentTrain]) -> Vec<(f64, u64)> {
     let by_word: HashMap<u32, usize> = sent
         .iter()
         .enumerate()
         .map(|(k, s)| (s.train.bits(), k))
         .collect();
-    let name = |r: &ReadTrain| {
+    let name = |r: &ReceivedTrain| {
         let k = match r.erased {
             0 => by_word.get(&r.bits).copied(),
             _ => named(r, sent),
@@ -405,7 +405,7 @@ fn anchors(read: &[ReadTrain], sent: &[SentTrain]) -> Vec<(f64, u64)> {
 }
 
 /// The only sent train with which all readable bits agree, if they contradict all others.
-fn named(read: &ReadTrain, sent: &[SentTrain]) -> Option<usize> {
+fn named(read: &ReceivedTrain, sent: &[SentTrain]) -> Option<usize> {
     let contradicted =
         |s: &SentTrain| ((s.train.bits() ^ read.bits) & !read.erased & WORD).count_ones();
     let mut found = None;

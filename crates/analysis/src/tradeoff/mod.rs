@@ -20,7 +20,7 @@ use skinrig_model::{AnalysisSettings, CalibrationModel, PressRole, ReductionSett
 
 use crate::error::AnalysisError;
 use crate::input::{EventSource, SessionInput};
-use crate::locator::Fitted;
+use crate::locator::FittedLocator;
 use crate::press_events::Retention;
 use replay::Replay;
 use timing::Candidate;
@@ -73,7 +73,7 @@ pub fn measure(
         (CalibrationModel::Auto, None) => CalibrationModel::None,
         (named, _) => named,
     };
-    let locator = Fitted::of(&analysis).locator();
+    let locator = FittedLocator::of(&analysis).locator();
     let press_s = replay.press_s(&reading.settings);
     let mut rows = Vec::new();
     let mut candidates = Vec::new();

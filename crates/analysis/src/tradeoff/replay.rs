@@ -12,27 +12,27 @@ use crate::locator::Effort;
 use crate::metrics::{Exclusions, metrics, penalised};
 use crate::press_events::{EventView, PackedEvent, RetainedPress, RetainedPresses};
 use crate::press_spans::timings;
-use crate::result::{Analysis, ClockFit, Metrics, Penalised, PressView};
+use crate::result::{Analysis, ClockFit, Metrics, PenalisedRmse, PressView};
 use crate::segment::{Window, windows};
 use crate::sets::ScoreSet;
-use crate::tie::Untimed;
+use crate::tie::UntimedPress;
 use crate::untimed;
 
 /// A session whose presses can be located in many ways.
 pub(crate) struct Replay<'a> {
     input: &'a SessionInput,
-    kept: &'a RetainedPresses,
+    retained: &'a RetainedPresses,
     clocks: [ClockFit; 2],
     /// Participating rows of the plan.
     rows: Vec<usize>,
     /// For all rows of the plan: why a camera's clock does not time them.
-    untimed: [Vec<Option<Untimed>>; 2],
+    untimed: [Vec<Option<UntimedPress>>; 2],
 }
 
 /// Result of one way of locating.
 pub(super) struct Outcome {
     pub metrics: Metrics,
-    pub penalised: Penalised,
+    pub penalised: PenalisedRmse,
     pub located: LocatedPresses,
     /// Events of both cameras in the window, mean over the retained scored presses.
     pub events_per_press: f64,
@@ -46,12 +46,17 @@ impl<'a> Replay<'a> {
     pub(super) fn new(
         input: &'a SessionInput,
         analysis: &Analysis,
-        kept: &'a RetainedPresses,
+        retained: &'a RetainedPresses,
     ) -> Option<Self> {
         let [Some(one), Some(two)] = analysis.clocks else {
             return None;
         };
-        let is_kept = |row: usize| kept.presses.binary_search_by_key(&row, |k| k.row).is_ok();
+        let is_kept = |row: usize| {
+            retained
+                .presses
+                .binary_search_by_key(&row, |k| k.row)
+                .is_ok()
+        };
         let timed = |row: usize| {
             input.outcomes[row]
                 .as_ref()
@@ -65,9 +70,9 @@ impl<'a> Replay<'a> {
             .filter(|row| whole || is_kept(*row))
             .collect();
         let scored = |k: &RetainedPress| input.planned[k.row].role == PressRole::Score;
-        kept.presses.iter().any(scored).then_some(Self {
+        retained.presses.iter().any(scored).then_some(Self {
             input,
-            kept,
+            retained,
             clocks: [one, two],
             rows,
             untimed: untimed::of_session(input),
@@ -88,7 +93,7 @@ impl<'a> Replay<'a> {
     /// Retained presses of a role.
     pub(super) fn presses(&self, role: PressRole) -> impl Iterator<Item = &'a RetainedPress> {
         let input = self.input;
-        self.kept
+        self.retained
             .presses
             .iter()
             .filter(move |k| input.planned[k.row].role == role)
@@ -157,13 +162,13 @@ impl<'a> Replay<'a> {
         let views = views.map(|of| self.of_rows(&of));
         let lost = lost.map(|of| self.of_rows(&of));
         let untimed = [0, 1].map(|k| self.of_rows(&self.untimed[k]));
-        let seen = [0, 1].map(|k| CameraObservations {
+        let observations = [0, 1].map(|k| CameraObservations {
             has_clock: true,
             views: &views[k],
             data_lost: &lost[k],
             untimed: &untimed[k],
         });
-        let located = locate_presses(&input, seen, Effort::Positions, &mut Vec::new());
+        let located = locate_presses(&input, observations, Effort::Positions, &mut Vec::new());
         let scores = ScoreSet::from_presses(&located.presses, &input.outcomes);
         Outcome {
             metrics: metrics(
@@ -217,7 +222,7 @@ impl<'a> Replay<'a> {
         let mut estimator = PressEstimator::new(settings, settings.crop_v[k]);
         let mut events = Vec::new();
         let mut out = Vec::new();
-        for press in &self.kept.presses {
+        for press in &self.retained.presses {
             let Some(window) = windows[press.row] else {
                 continue;
             };

@@ -4,7 +4,7 @@ use skinrig_model::{CameraId, PressRole};
 
 use super::replay::{Filter, Replay, after};
 use crate::estimators::PressEstimator;
-use crate::locator::{CameraFeatures, Fitted};
+use crate::locator::{CameraFeatures, FittedLocator};
 use crate::metrics::quantile;
 use crate::press_events::{PackedEvent, RetainedPress};
 use crate::segment::Window;
@@ -16,7 +16,7 @@ const MAX_PRESSES: usize = 24;
 /// One way of locating, ready for timing.
 pub(crate) struct Candidate {
     pub settings: AnalysisSettings,
-    pub locator: Fitted,
+    pub locator: FittedLocator,
 }
 
 /// Median, lowest and highest time of a press over the repeats, µs.

@@ -6,7 +6,7 @@ use skinrig_model::{
     RigGeometry, SkinOutline, StereoGeometry,
 };
 pub(crate) use skinrig_planted::Memory;
-use skinrig_planted::{Touch, mark, press, timing};
+use skinrig_planted::{PlantedPress, mark, press, timing};
 
 /// A session with its parameters.
 pub(crate) struct Session {
@@ -207,7 +207,7 @@ pub(crate) fn session(seed: u64, wishes: SessionOptions) -> Session {
     let mut events = [Vec::new(), Vec::new()];
     for (role, repetition, location, at, contact) in planned {
         let touch = touch(
-            Touch::new(role, repetition, location, at),
+            PlantedPress::new(role, repetition, location, at),
             contact,
             &mut random,
         );
@@ -291,10 +291,10 @@ pub(crate) fn session(seed: u64, wishes: SessionOptions) -> Session {
 }
 
 /// The executed press: slightly late, slightly off its location.
-fn touch(planned: Touch, contact: f64, random: &mut Random) -> Touch {
+fn touch(planned: PlantedPress, contact: f64, random: &mut Random) -> PlantedPress {
     let late = 0.005 * random.unit();
     let at = planned.at;
-    Touch {
+    PlantedPress {
         timing: timing(
             contact,
             [0.1, 0.1 + late, 0.3 + late, 0.45 + late, 0.6 + late],

@@ -12,12 +12,12 @@ use skinrig_analysis::result::{ClockFit, WarningCause};
 use skinrig_model::{HostTime, Mark, MarkKind, PressId, PulseTrain, SentMark, TriggerEdge};
 
 /// A planted camera clock: camera = offset + (1 + ppm) host, in whole µs, with jitter.
-struct Planted {
+struct PlantedClock {
     offset_us: f64,
     ppm: f64,
 }
 
-impl Planted {
+impl PlantedClock {
     fn camera_us(&self, host_us: f64) -> f64 {
         self.offset_us + host_us + self.ppm * 1e-6 * host_us
     }
@@ -46,7 +46,7 @@ fn marks(count: usize) -> Vec<SentMark> {
         .collect()
 }
 
-fn edges_of(sent: &[SentMark], clock: &Planted, jitter_us: f64) -> Vec<TriggerEdge> {
+fn edges_of(sent: &[SentMark], clock: &PlantedClock, jitter_us: f64) -> Vec<TriggerEdge> {
     let mut edges = Vec::new();
     for (i, mark) in sent.iter().enumerate() {
         let t = clock.camera_us(mark.t.0 as f64 * 1e-3) + jitter_us * noise(7 * i);
@@ -63,7 +63,7 @@ fn edges_of(sent: &[SentMark], clock: &Planted, jitter_us: f64) -> Vec<TriggerEd
     edges
 }
 
-fn check(fit: &ClockFit, planted: &Planted, span_s: f64, within_us: f64) {
+fn check(fit: &ClockFit, planted: &PlantedClock, span_s: f64, within_us: f64) {
     for k in 0..=10 {
         let host_us = 5e6 + span_s * 1e5 * f64::from(k);
         let error = fit.camera_us(host_us) - planted.camera_us(host_us);
@@ -82,7 +82,7 @@ fn marks_give_the_clock_to_a_fraction_of_a_microsecond_even_after_hours_and_at_h
         ((1u64 << 44) as f64 + 0.25, -41.7),
         (3e6, 0.0),
     ] {
-        let planted = Planted { offset_us, ppm };
+        let planted = PlantedClock { offset_us, ppm };
         let sent = marks(2500);
         let found = fit_marks(&edges_of(&sent, &planted, 2.0), 0, &sent).unwrap();
         assert_eq!((found.fit.n, found.fit.rejected), (5000, 0));
@@ -96,7 +96,7 @@ fn marks_give_the_clock_to_a_fraction_of_a_microsecond_even_after_hours_and_at_h
 
 #[test]
 fn lost_doubled_late_and_foreign_pulses_do_no_harm() {
-    let planted = Planted {
+    let planted = PlantedClock {
         offset_us: 9e6,
         ppm: 30.0,
     };
@@ -152,7 +152,7 @@ fn lost_doubled_late_and_foreign_pulses_do_no_harm() {
 
 #[test]
 fn too_few_marks_give_no_clock() {
-    let planted = Planted {
+    let planted = PlantedClock {
         offset_us: 9e6,
         ppm: 30.0,
     };
@@ -233,7 +233,7 @@ fn a_recording_that_begins_late_or_ends_early_is_still_aligned() {
 }
 
 /// A long recording: presses of very different strength, every seventh barely visible, slow decay after each.
-fn long_recording(presses: &[PressSpan], clock: &Planted) -> RateHistogram {
+fn long_recording(presses: &[PressSpan], clock: &PlantedClock) -> RateHistogram {
     let mut h = RateHistogram::new(10_000);
     let end = clock.camera_us(presses[presses.len() - 1].release_us) + 8e6;
     for bin in 0..(end / 1e4) as usize {
@@ -264,7 +264,7 @@ fn long_recording(presses: &[PressSpan], clock: &Planted) -> RateHistogram {
 fn drift_over_hours_is_followed() {
     let presses = rhythm(1200);
     for ppm in [-160.0, 0.0, 90.0] {
-        let planted = Planted {
+        let planted = PlantedClock {
             offset_us: 31e6,
             ppm,
         };
@@ -279,7 +279,7 @@ fn drift_over_hours_is_followed() {
 fn a_train_without_landmarks_has_no_odds() {
     // Equal steps, and the camera saw neither the beginning nor the end: all whole shifts look alike.
     let presses: Vec<PressSpan> = rhythm(103).split_off(3);
-    let planted = Planted {
+    let planted = PlantedClock {
         offset_us: 31e6,
         ppm: 0.0,
     };

@@ -17,8 +17,8 @@ fn slow_path(detector: &Detector, counts: &[u32], rate_per_s: f64) -> Vec<f64> {
         .map(|i| {
             let inside = |k: &i64| (0..counts.len() as i64).contains(&(i + k));
             let taps: f64 = match detector.edges {
-                Edges::Renormalised => (-half..=half).filter(inside).map(tap).sum(),
-                Edges::ZeroPadded => (-half..=half).map(tap).sum(),
+                Boundary::Renormalised => (-half..=half).filter(inside).map(tap).sum(),
+                Boundary::ZeroPadded => (-half..=half).map(tap).sum(),
             };
             let x: f64 = (-half..=half)
                 .filter(inside)
@@ -41,17 +41,17 @@ fn the_kernel_is_the_published_one_and_keeps_a_constant() {
     assert!((taps[0] + 2.0 * taps[1..].iter().sum::<f64>() - 1.0).abs() < 1e-15);
     // Also where there are fewer bins than taps.
     for n in [1, 6, 20, 21, 100] {
-        let smoothed = kernel.smooth(&vec![7; n], Edges::Renormalised);
+        let smoothed = kernel.smooth(&vec![7; n], Boundary::Renormalised);
         assert_eq!(smoothed.len(), n);
         assert!(
             smoothed.iter().all(|x| (x - 7.0).abs() < 1e-12),
             "{n}: {smoothed:?}"
         );
     }
-    let padded = kernel.smooth(&[7; 100], Edges::ZeroPadded);
+    let padded = kernel.smooth(&[7; 100], Boundary::ZeroPadded);
     assert!((padded[50] - 7.0).abs() < 1e-12 && padded[0] < 4.1 && padded[99] < 4.1);
     assert_eq!(
-        Kernel::gaussian(0.0, 0.2).smooth(&[3, 0, 5], Edges::ZeroPadded),
+        Kernel::gaussian(0.0, 0.2).smooth(&[3, 0, 5], Boundary::ZeroPadded),
         [3.0, 0.0, 5.0]
     );
 }
@@ -320,7 +320,7 @@ proptest! {
         let counts = random.counts(|bin| if bin < bins / 2 { rate } else { rate * step }, bins);
         let background = random.counts(|_| rate, 500);
         let detector = Detector {
-            edges: if padded { Edges::ZeroPadded } else { Edges::Renormalised },
+            edges: if padded { Boundary::ZeroPadded } else { Boundary::Renormalised },
             consecutive,
             // Never exactly on a value of the path, where the last digit would decide.
             thresholds: (0..20).map(|i| 0.7 + 1.013 * f64::from(i)).collect(),

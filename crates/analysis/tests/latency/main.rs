@@ -14,7 +14,7 @@ use skinrig_analysis::analyze;
 use skinrig_analysis::latency::bins::{Grid, HostTimeView};
 use skinrig_analysis::latency::cusum::background_rate_per_s;
 use skinrig_analysis::latency::interval::{Outcome, Plan};
-use skinrig_analysis::latency::smooth::{Edges, Kernel};
+use skinrig_analysis::latency::smooth::{Boundary, Kernel};
 use skinrig_analysis::latency::study;
 use skinrig_analysis::latency::sweep::{OnsetStatistics, choose, sweep, thresholds};
 use skinrig_analysis::latency::thin::choose_events;
@@ -47,7 +47,7 @@ impl Random {
 fn detector() -> Detector {
     let settings = LatencySettings::default();
     // About onsets, wherever they are.
-    let edges = Edges::Renormalised;
+    let edges = Boundary::Renormalised;
     Detector {
         earliest_ms: f64::NEG_INFINITY,
         ..Detector::new(

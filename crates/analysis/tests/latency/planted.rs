@@ -42,16 +42,16 @@ fn planted(latency_us: impl Fn(usize) -> Option<f64>) -> (Analysis, RetainedPres
     )
 }
 
-fn studied(analysis: &Analysis, kept: &RetainedPresses) -> Latency {
-    study(analysis, kept).unwrap()
+fn studied(analysis: &Analysis, retained: &RetainedPresses) -> Latency {
+    study(analysis, retained).unwrap()
 }
 
 #[test]
 fn planted_latencies_come_back_with_their_uncertainty() {
     // 10, 11, ... 34 ms; camera clocks differ by hours and 63 ppm.
-    let (mut analysis, kept) = planted(|n| Some(1e4 + 1e3 * n as f64));
+    let (mut analysis, retained) = planted(|n| Some(1e4 + 1e3 * n as f64));
     analysis.contact_timing.pose_interval_us = 1000.0;
-    let found = studied(&analysis, &kept);
+    let found = studied(&analysis, &retained);
     assert_eq!((found.trials, found.unusable, found.shortened), (25, 0, 0));
     assert_eq!(found.detected_rate.value, Some(1.0));
     assert!((found.background_rate_per_s - 800.0).abs() < 60.0);
@@ -146,7 +146,7 @@ fn assert_counts_are_listed(found: &Latency) {
 
 #[test]
 fn what_is_before_the_contact_or_never_comes_is_counted_apart() {
-    let (mut analysis, kept) = planted(|n| match n {
+    let (mut analysis, retained) = planted(|n| match n {
         0 => None,
         // Before the idle time that the background is taken from.
         1 => Some(-7.8e5),
@@ -159,7 +159,7 @@ fn what_is_before_the_contact_or_never_comes_is_counted_apart() {
         to: 20.0,
         count: 20,
     };
-    let found = studied(&analysis, &kept);
+    let found = studied(&analysis, &retained);
     assert_eq!(found.trials, 25);
     let rate = found.detected_rate.value.unwrap();
     assert!(
@@ -171,7 +171,7 @@ fn what_is_before_the_contact_or_never_comes_is_counted_apart() {
     let early: Vec<(PressId, f64)> = found.false_detections.clone();
     assert_eq!(early.len(), 2);
     for ((press, at), (n, planted)) in early.iter().zip([(1, -780.0), (2, -630.0)]) {
-        assert_eq!(*press, kept.presses[n].press);
+        assert_eq!(*press, retained.presses[n].press);
         assert!((at - planted).abs() < 2.5, "{at}");
     }
     // 23 trials search for 0.85 s, two only until their false alarm, minus half a kernel and the contact's uncertainty.
@@ -200,13 +200,16 @@ fn what_is_before_the_contact_or_never_comes_is_counted_apart() {
 #[test]
 fn contacts_that_were_not_measured_may_be_off_by_the_window() {
     // 40 ms before the scheduled contact throughout.
-    let (mut analysis, kept) = planted(|_| Some(-4e4));
+    let (mut analysis, retained) = planted(|_| Some(-4e4));
     assert_eq!(
-        studied(&analysis, &kept).detected_rate.value.unwrap_or(0.0),
+        studied(&analysis, &retained)
+            .detected_rate
+            .value
+            .unwrap_or(0.0),
         0.0
     );
     analysis.contact_timing.scheduled = true;
-    let found = studied(&analysis, &kept);
+    let found = studied(&analysis, &retained);
     assert_eq!(
         (found.earliest_ms, found.detected_rate.value),
         (-102.0, Some(1.0))
@@ -216,7 +219,7 @@ fn contacts_that_were_not_measured_may_be_off_by_the_window() {
 
 #[test]
 fn manual_exclusions_are_no_trials_and_missed_presses_are() {
-    let (mut analysis, kept) = planted(|_| Some(2e4));
+    let (mut analysis, retained) = planted(|_| Some(2e4));
     for (n, cause) in [
         (3, Exclusion::ByHand),
         (
@@ -232,14 +235,14 @@ fn manual_exclusions_are_no_trials_and_missed_presses_are() {
             },
         ),
     ] {
-        let press = &mut analysis.presses[kept.presses[n].row];
+        let press = &mut analysis.presses[retained.presses[n].row];
         press.verdict = skinrig_model::Verdict::Excluded;
         press.cause = Some(cause);
     }
-    let found = studied(&analysis, &kept);
+    let found = studied(&analysis, &retained);
     assert_eq!((found.trials, found.unusable), (23, 2));
     let tried = |n: usize| {
-        let press = kept.presses[n].press;
+        let press = retained.presses[n].press;
         found.onsets.iter().any(|o| o.0 == press)
     };
     assert_eq!([3, 4, 5].map(tried), [false, false, true]);
@@ -260,7 +263,7 @@ fn no_false_alarm_and_no_miss_is_not_certainty() {
         at_risk_s: 0.5,
     };
     let all: Vec<Outcome> = (0..12).map(one).collect();
-    let near = |found: Option<f64>, wanted: f64| (found.unwrap() - wanted).abs() < 1e-12;
+    let near = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-12;
     let found = plan.estimate(&all);
     let (detected, alarms) = (found.detected_rate, found.false_alarms_per_s);
     assert!(near(detected.low, 0.025f64.powf(1.0 / 6.0)) && detected.high == Some(1.0));
@@ -282,28 +285,28 @@ fn no_false_alarm_and_no_miss_is_not_certainty() {
 
 #[test]
 fn latency_from_the_contact_needs_a_contact_measured_apart_from_the_events() {
-    let (mut analysis, kept) = planted(|_| Some(2e4));
+    let (mut analysis, retained) = planted(|_| Some(2e4));
     analysis.contact_timing.scheduled = true;
-    assert_eq!(studied(&analysis, &kept).from_contact, None);
+    assert_eq!(studied(&analysis, &retained).from_contact, None);
     analysis.contact_timing.scheduled = false;
     let fit = analysis.clocks[1].as_mut().unwrap();
     fit.method = ClockMethod::EventRates;
-    let found = studied(&analysis, &kept);
+    let found = studied(&analysis, &retained);
     assert_eq!(found.from_contact, None);
     assert!(found.median_ms.value.is_some());
     analysis.clocks[0] = None;
-    assert_eq!(study(&analysis, &kept), None);
+    assert_eq!(study(&analysis, &retained), None);
 }
 
 #[test]
 fn neighbours_shorten_a_trial_and_the_study_reports_it() {
-    let (mut analysis, mut kept) = planted(|_| Some(2e4));
+    let (mut analysis, mut retained) = planted(|_| Some(2e4));
     // The press before the tenth is released 0.4 s before its contact.
-    let row = kept.presses[10].row;
+    let row = retained.presses[10].row;
     let contact = analysis.presses[row].timing.unwrap().contact;
     let before = analysis.presses[row - 1].timing.as_mut().unwrap();
     before.release = contact - HostDuration::from_millis(400);
-    let found = studied(&analysis, &kept);
+    let found = studied(&analysis, &retained);
     assert_eq!((found.trials, found.shortened), (25, 1));
     assert!((found.covered_ms.0 - 350.0).abs() < 0.1 && (found.covered_ms.1 - 850.0).abs() < 0.1);
     // 0.35 s to 0.05 s before that contact, 0.5 s before the others.
@@ -314,12 +317,12 @@ fn neighbours_shorten_a_trial_and_the_study_reports_it() {
     );
     assert_eq!(found.detected_rate.value, Some(1.0));
     // Without idle time there is no background, and without background no trial.
-    for press in &mut kept.presses {
+    for press in &mut retained.presses {
         for view in &mut press.views {
             view.idle_from_us = view.window_us.0;
         }
     }
-    let none = studied(&analysis, &kept);
+    let none = studied(&analysis, &retained);
     assert_eq!((none.trials, none.unusable, none.chosen), (0, 25, None));
     assert_eq!(
         (
@@ -333,21 +336,21 @@ fn neighbours_shorten_a_trial_and_the_study_reports_it() {
     assert!(!text.contains("NaN"), "{text}");
     assert_eq!(serde_json::from_str::<Latency>(&text).unwrap(), none);
     // Views that end before the contact.
-    kept.presses.truncate(3);
-    for view in kept.presses.iter_mut().flat_map(|p| &mut p.views) {
+    retained.presses.truncate(3);
+    for view in retained.presses.iter_mut().flat_map(|p| &mut p.views) {
         view.length_us = 900_000;
     }
-    assert_eq!(studied(&analysis, &kept).unusable, 3);
-    kept.presses.clear();
-    assert_eq!(study(&analysis, &kept), None);
+    assert_eq!(studied(&analysis, &retained).unusable, 3);
+    retained.presses.clear();
+    assert_eq!(study(&analysis, &retained), None);
 }
 
 #[test]
 fn the_published_choice_takes_its_background_after_the_press_and_pads_with_zeros() {
-    let (mut analysis, mut kept) = planted(|_| Some(2e4));
+    let (mut analysis, mut retained) = planted(|_| Some(2e4));
     analysis.settings.latency.background = Background::After;
     // It lasts to 2.4 s after the middle; presses come every 1.75 s and only the last has nothing after it.
-    let none = studied(&analysis, &kept);
+    let none = studied(&analysis, &retained);
     assert_eq!((none.trials, none.unusable), (1, 24));
     for press in &mut analysis.presses {
         let shift = HostDuration::from_secs_f64(2.0 * f64::from(press.press.index()));
@@ -355,10 +358,10 @@ fn the_published_choice_takes_its_background_after_the_press_and_pads_with_zeros
         timing.contact += shift;
         timing.release += shift;
     }
-    for view in kept.presses.iter_mut().flat_map(|p| &mut p.views) {
+    for view in retained.presses.iter_mut().flat_map(|p| &mut p.views) {
         view.length_us = 4_000_000;
     }
-    let found = studied(&analysis, &kept);
+    let found = studied(&analysis, &retained);
     assert_eq!(
         (found.trials, found.shortened, found.zero_padded),
         (25, 0, true)
@@ -375,13 +378,13 @@ fn the_published_choice_takes_its_background_after_the_press_and_pads_with_zeros
 
 #[test]
 fn the_study_does_not_depend_on_the_number_of_threads() {
-    let (analysis, kept) = planted(|n| (n % 5 > 0).then_some(1e4 + 2e3 * n as f64));
+    let (analysis, retained) = planted(|n| (n % 5 > 0).then_some(1e4 + 2e3 * n as f64));
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
             .unwrap();
-        serde_json::to_string(&pool.install(|| studied(&analysis, &kept))).unwrap()
+        serde_json::to_string(&pool.install(|| studied(&analysis, &retained))).unwrap()
     };
     assert_eq!(with(1), with(3));
 }

@@ -6,7 +6,7 @@ mod regions;
 mod skins;
 mod symmetries;
 
-use skinrig_analysis::locator::Unfit;
+use skinrig_analysis::locator::FitError;
 use skinrig_analysis::result::{LocatorFallback, WarningCause};
 use skinrig_analysis::sets::CalibrationSet;
 use skinrig_model::Locator;
@@ -42,7 +42,7 @@ fn a_field_removes_structured_error_and_is_chosen() {
 /// Nothing to learn: one choice in ten may be wrong, and a wrong one costs a few percent.
 #[test]
 fn scatter_alone_teaches_nothing_and_costs_little() {
-    let mut kept = 0;
+    let mut retained = 0;
     let mut ratios = Vec::new();
     for seed in 0..8 {
         let skin = Skin {
@@ -50,11 +50,11 @@ fn scatter_alone_teaches_nothing_and_costs_little() {
             ..Skin::new(seed)
         };
         let auto = learn(&skin, Locator::Auto);
-        kept += u32::from(auto.result.locator == Locator::Geometry);
+        retained += u32::from(auto.result.locator == Locator::Geometry);
         let geometry = learn(&skin, Locator::Geometry);
         ratios.push(rms(&skin, &auto) / rms(&skin, &geometry));
     }
-    assert!(kept >= 6, "{kept} of 8");
+    assert!(retained >= 6, "{retained} of 8");
     assert!(ratios.iter().all(|r| *r < 1.06), "{ratios:?}");
 }
 
@@ -103,7 +103,7 @@ fn what_is_too_little_to_learn_from_gives_the_geometry_and_a_reason() {
         assert_eq!(named.result.locator, Locator::Geometry);
         let wanted = Locator::Field;
         let Some(LocatorFallback::CannotLearn {
-            why: why @ Unfit::Locations { needed: 12, .. },
+            why: why @ FitError::Locations { needed: 12, .. },
             ..
         }) = named.result.fallback
         else {
@@ -154,7 +154,7 @@ fn degenerate_presses_end_in_numbers_or_reasons() {
                 direct.result.fallback,
                 Some(LocatorFallback::CannotLearn {
                     wanted: Locator::Direct,
-                    why: Unfit::Line
+                    why: FitError::Line
                 })
             );
         }
@@ -213,11 +213,11 @@ fn the_stored_form_locates_to_the_same_bits() {
         let stored: skinrig_analysis::result::LocatorResult = serde_json::from_str(&text).unwrap();
         assert_eq!(stored, choice.result);
         let geometry = skins::calibrated(&skin.set()).geometry;
-        let again =
-            skinrig_analysis::locator::Fitted::new(locator, geometry, stored.model).unwrap();
+        let restored =
+            skinrig_analysis::locator::FittedLocator::new(locator, geometry, stored.model).unwrap();
         for press in skin.presses() {
             let features = skins::features(&press);
-            assert_eq!(again.locate(&features), choice.fitted.locate(&features));
+            assert_eq!(restored.locate(&features), choice.fitted.locate(&features));
         }
     }
 }

@@ -4,12 +4,13 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use skinrig_analysis::calibrate::{ModelChoice, choose};
 use skinrig_analysis::locator::{Features, LocatorChoice, choose_locator};
-use skinrig_analysis::result::{LocationOutcome, PressResult, PressView};
+use skinrig_analysis::result::{LocationOutcome, PressResult};
 use skinrig_analysis::sets::CalibrationSet;
 use skinrig_model::{
     AnalysisSettings, LocationId, Locator, Point2, PressId, PressRole, RepetitionId,
     StereoGeometry, Verdict,
 };
+use skinrig_planted::view;
 
 /// The drawn rig: where calibrations start.
 pub(crate) const DRAWN: StereoGeometry =
@@ -189,23 +190,6 @@ impl Skin {
     pub(crate) fn set(&self) -> CalibrationSet {
         CalibrationSet::from_presses(&self.presses())
     }
-}
-
-pub(crate) fn view(u: f64, events: u32) -> Option<PressView> {
-    Some(PressView {
-        events,
-        on_events: events / 2,
-        clusters: 1,
-        cluster_events: events,
-        centroid_u: Some(u),
-        centroid_v: Some(270.0),
-        rate_per_s: 1e3,
-        idle_rate_per_s: 10.0,
-        idle_s: 0.5,
-        spread_u: None,
-        spread_v: None,
-        width_u: None,
-    })
 }
 
 pub(crate) fn settings(locator: Locator) -> AnalysisSettings {

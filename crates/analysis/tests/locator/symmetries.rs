@@ -45,8 +45,8 @@ fn holds(
         for (a, b) in presses.iter().zip(&changed) {
             let a = own.fitted.locate(&features(a)).unwrap();
             let b = other.fitted.locate(&features(b)).unwrap();
-            let wanted = moved(Point2::new(a.at[0], a.at[1]));
-            let off = libm::hypot(b.at[0] - wanted.x_mm, b.at[1] - wanted.y_mm);
+            let expected = moved(Point2::new(a.at[0], a.at[1]));
+            let off = libm::hypot(b.at[0] - expected.x_mm, b.at[1] - expected.y_mm);
             assert!(off < tolerance_mm, "{locator:?}: {off} mm");
             let (a, b) = (a.region.unwrap(), b.region.unwrap());
             let ratio = b.area_mm2() / a.area_mm2();

@@ -32,20 +32,7 @@ impl Noise {
 }
 
 fn view(u: f64) -> Option<PressView> {
-    Some(PressView {
-        events: 100,
-        on_events: 50,
-        clusters: 1,
-        cluster_events: 100,
-        centroid_u: Some(u),
-        centroid_v: Some(270.0),
-        rate_per_s: 1e3,
-        idle_rate_per_s: 10.0,
-        idle_s: 0.5,
-        spread_u: None,
-        spread_v: None,
-        width_u: None,
-    })
+    skinrig_planted::view(u, 100)
 }
 
 /// Presses at these places, `repeats` times, as `geometry` sees them with this noise of the centroids.

@@ -6,7 +6,7 @@ use skinrig_model::{
     SkinOutline, StereoGeometry,
 };
 pub(crate) use skinrig_planted::Memory;
-use skinrig_planted::{Touch, mark, press, timing};
+use skinrig_planted::{PlantedPress, mark, press, timing};
 
 pub(crate) const PLANTED: [f64; 8] = [43.0, -33.0, 47.5, 38.0, -1.2, 0.4, -0.11, 0.03];
 /// Camera clocks: offset (µs) and drift (ppm).
@@ -72,9 +72,9 @@ pub(crate) fn session() -> (SessionInput, Memory) {
     );
     let mut events = [Vec::new(), Vec::new()];
     for (role, repetition, location, at, contact) in plan() {
-        let touch = Touch {
+        let touch = PlantedPress {
             timing: timing(contact, [0.1, 0.1, 0.3, 0.45, 0.6]),
-            ..Touch::new(role, repetition, location, at)
+            ..PlantedPress::new(role, repetition, location, at)
         };
         let id = press(&mut input, touch);
         for (kind, t) in [

@@ -101,12 +101,16 @@ fn results_do_not_depend_on_times_and_costs_follow_the_choice() {
     let coarse = find(|c| c.bin_px = 16);
     assert!((coarse.bytes_per_s / own.bytes_per_s - 13.0 / 21.0).abs() < 1e-9);
     // So few events are left that nothing can be located: that is a failure, not an absence.
-    let gone = find(|c| c.thinning = 1024);
+    let thinned_away = find(|c| c.thinning = 1024);
     assert_eq!(
-        (gone.located_rate.value, gone.located_rate.n, gone.competes),
+        (
+            thinned_away.located_rate.value,
+            thinned_away.located_rate.n,
+            thinned_away.competes
+        ),
         (Some(0.0), 25, false)
     );
-    assert_eq!(gone.rmse_mm.value, None);
+    assert_eq!(thinned_away.rmse_mm.value, None);
     assert!(one.rows.iter().any(|r| r.fronts.contains(&Cost::Bytes)));
     let found = one.most_accurate(own.delay_ms, Cost::Delay).unwrap();
     assert!(found.rmse_mm.value <= own.rmse_mm.value);

@@ -159,9 +159,9 @@ fn presses_after_the_last_exchange_are_not_timed() {
 }
 
 /// Nothing happens in front of the cameras.
-struct Dark;
+struct NoEvents;
 
-impl EventSource for Dark {
+impl EventSource for NoEvents {
     fn for_each_slice(
         &self,
         _: CameraId,
@@ -184,9 +184,9 @@ fn session_of(b: &Bench, marks: bool) -> SessionInput {
     );
     for at in &b.presses {
         let middle = Point2::new(10.0, 5.0);
-        let touch = planted::Touch {
+        let touch = planted::PlantedPress {
             timing: planted::timing(at * 1e-6, [0.01, 0.15, 0.4, 0.5, 0.6]),
-            ..planted::Touch::new(PressRole::Score, 0, 0, middle)
+            ..planted::PlantedPress::new(PressRole::Score, 0, 0, middle)
         };
         planted::press(&mut input, touch);
     }
@@ -214,7 +214,7 @@ fn a_press_that_no_clock_reaches_is_refused_by_a_rule_that_names_itself() {
     b.cut_wire(1, 31e6);
     for (marks, output) in [(false, "train"), (true, "mark")] {
         let input = session_of(&b, marks);
-        let a = analyze(&input, &Dark).unwrap();
+        let a = analyze(&input, &NoEvents).unwrap();
         assert!(a.alignment.is_usable(), "{:?}", a.alignment);
         for (press, at) in a.presses.iter().zip(&b.presses) {
             let reason = press.reason().unwrap();
@@ -245,6 +245,6 @@ fn a_press_that_no_clock_reaches_is_refused_by_a_rule_that_names_itself() {
     let mut input = session_of(&b, false);
     input.settings.alignment.max_tie_distance_us = 60e6;
     input.settings.alignment.max_camera_interval_us = 1e3;
-    let a = analyze(&input, &Dark).unwrap();
+    let a = analyze(&input, &NoEvents).unwrap();
     assert_eq!(a.counts.invalid, 0);
 }

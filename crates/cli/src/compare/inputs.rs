@@ -10,7 +10,7 @@ use super::facts::facts;
 use crate::analyses;
 use crate::args::CompareArgs;
 use crate::exit::Failure;
-use crate::results::{Choices, analyze_shown};
+use crate::results::{AnalysisRequest, analyze_shown};
 use crate::sessions::{copies, originals};
 
 /// Most skins in one comparison: letters A to H.
@@ -59,12 +59,12 @@ fn skin_sessions(
         (Some(text), session_paths(folder, Some(text))?)
     };
     if paths.is_empty() {
-        let (what, wanted) = match name {
+        let (what, expected) = match name {
             Some(name) => (folder.display(), format!("sessions of prototype `{name}`")),
             None => (path.display(), "sessions".to_owned()),
         };
         return Err(Failure::input(format!(
-            "{what}: expected {wanted}, found none\n  next: `skinrig sessions {what}` lists what is there; --sessions \
+            "{what}: expected {expected}, found none\n  next: `skinrig sessions {what}` lists what is there; --sessions \
              names another folder"
         )));
     }
@@ -89,12 +89,12 @@ fn skin_sessions(
 /// The sessions of a folder, of one prototype or all. A broken file is an error; it is not skipped.
 fn session_paths(folder: &Path, prototype: Option<&str>) -> Result<Vec<PathBuf>, Failure> {
     let all = list(folder).map_err(Failure::session)?;
-    let mut wanted = all;
-    wanted.retain(|s| prototype.is_none() || s.prototype() == prototype);
-    for copy in copies(&wanted) {
+    let mut selected = all;
+    selected.retain(|s| prototype.is_none() || s.prototype() == prototype);
+    for copy in copies(&selected) {
         errln!("note: {copy}");
     }
-    Ok(originals(&wanted)
+    Ok(originals(&selected)
         .into_iter()
         .map(|s| s.path.clone())
         .collect())
@@ -122,11 +122,14 @@ fn session(path: &Path, name: Option<&str>) -> Result<Session, Failure> {
     let analysis = match analyses::stored(path, &facts.session_id, name) {
         Some(analysis) => analysis,
         None => {
-            let choices = variant.as_ref().map_or_else(Choices::default, |v| Choices {
-                overrides: &v.changed,
-                reference_code: v.reference_code,
-                name: Some(&v.name),
-            });
+            let choices =
+                variant
+                    .as_ref()
+                    .map_or_else(AnalysisRequest::default, |v| AnalysisRequest {
+                        overrides: &v.changed,
+                        reference_code: v.reference_code,
+                        name: Some(&v.name),
+                    });
             analyze_shown(path, choices)
                 .map_err(|f| Failure {
                     message: format!("{}\n  ({}: no results)", f.message, path.display()),

@@ -15,7 +15,7 @@ use skinrig_report::compare as report;
 use crate::args::CompareArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::phase::Phase;
-use crate::results::{Choices, open, write};
+use crate::results::{AnalysisRequest, open, write};
 
 /// Default file name of the page.
 const PAGE: &str = "comparison.html";
@@ -221,7 +221,7 @@ fn reanalyse(
 ) -> Result<Subject, Failure> {
     let mut subject = found.subject.clone();
     for (session, path) in subject.sessions.iter_mut().zip(&found.paths) {
-        let (aligned, _) = open(path, Choices::default())?;
+        let (aligned, _) = open(path, AnalysisRequest::default())?;
         let (mut input, events) = (aligned.input, aligned.events);
         let own = input.settings.exclude_press_numbers.clone();
         input.settings = AnalysisSettings {

@@ -26,13 +26,13 @@ pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
     let cameras: Vec<&Line> = case.survey.cameras().collect();
     match &devices {
         Ok(devices) => {
-            let seen: Vec<(&Line, Option<&UsbDevice>)> = cameras
+            let attached: Vec<(&Line, Option<&UsbDevice>)> = cameras
                 .iter()
                 .map(|l| (*l, devices.iter().find(|d| Some(d.place) == l.usb)))
                 .collect();
-            findings.extend(seen.iter().map(|(l, d)| hub(l, *d)));
-            findings.push(controllers(&seen));
-            findings.extend(seen.iter().map(|(l, d)| camera_speed(l, *d)));
+            findings.extend(attached.iter().map(|(l, d)| hub(l, *d)));
+            findings.push(controllers(&attached));
+            findings.extend(attached.iter().map(|(l, d)| camera_speed(l, *d)));
             findings.push(robot_speed(devices));
         }
         Err(why) => {
@@ -54,7 +54,11 @@ fn connected(case: &Case<'_>, devices: Option<&[UsbDevice]>) -> Vec<Finding> {
     let library = matches!(case.survey.library, Library::Loaded { .. });
     let on_bus = |vendor: u16| devices.map(|all| all.iter().any(|d| d.vendor == vendor));
     let finding = |role: &str| {
-        let check = check(AREA, role, format!("{} is connected", wanted(case, role)));
+        let check = check(
+            AREA,
+            role,
+            format!("{} is connected", expected_device(case, role)),
+        );
         let Some(line) = case.survey.role(role) else {
             // Without its library, the robot is not in the survey.
             return match on_bus(USB_VENDOR) {
@@ -121,7 +125,7 @@ fn with_detail(line: &Line) -> String {
 }
 
 /// The device that the rig file names for a role.
-fn wanted(case: &Case<'_>, role: &str) -> String {
+fn expected_device(case: &Case<'_>, role: &str) -> String {
     let Some(rig) = case.rig else {
         return role.to_owned();
     };
@@ -152,14 +156,14 @@ fn hub(line: &Line, device: Option<&UsbDevice>) -> Finding {
     }
 }
 
-fn controllers(seen: &[(&Line, Option<&UsbDevice>)]) -> Finding {
+fn controllers(attached: &[(&Line, Option<&UsbDevice>)]) -> Finding {
     let check = check(
         AREA,
         "cameras: controllers",
         "each camera on its own USB controller",
     );
     let of = |(_, device): &(&Line, Option<&UsbDevice>)| device.and_then(|d| d.controller.clone());
-    match seen.iter().map(of).collect::<Vec<_>>().as_slice() {
+    match attached.iter().map(of).collect::<Vec<_>>().as_slice() {
         [Some(one), Some(two)] if one == two => check.warning(
             format!("both on {one}"),
             "plug one camera into a port of another controller (`lsusb -t` shows the tree), or add one: two cameras at full rate lose data \

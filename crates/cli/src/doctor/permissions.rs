@@ -44,8 +44,8 @@ fn cameras(case: &Case<'_>, user: Option<&User>) -> Vec<Finding> {
     let lines: Vec<&Line> = case.survey.cameras().collect();
     let expected = "may be opened";
     if lines.is_empty() {
-        let asked = case.survey.lines.iter().find(|l| l.what == "USB");
-        let why = match asked {
+        let usb = case.survey.lines.iter().find(|l| l.what == "USB");
+        let why = match usb {
             _ if case.survey.left_alone => LEFT_ALONE,
             Some(line) => line.detail.as_str(),
             None => "no camera on the bus",
@@ -75,17 +75,17 @@ fn robot(case: &Case<'_>, user: Option<&User>) -> Vec<Finding> {
         let mut of_maker = all.iter().filter(|d| d.vendor == USB_VENDOR);
         of_maker.next().map(usb::UsbDevice::node)
     });
-    let asked = |state: DeviceState| {
+    let has_state = |state: DeviceState| {
         let robots = case.survey.lines.iter().filter(|l| l.device == "robot");
         robots.into_iter().any(|l| l.state == state)
     };
     vec![match (node, user) {
-        (node, _) if asked(DeviceState::NotPermitted) => {
+        (node, _) if has_state(DeviceState::NotPermitted) => {
             let node = node.unwrap_or_default();
             let (rights, next) = access_denied(case, user, &node);
             check().problem(format!("refused: {node}{rights}"), next)
         }
-        _ if asked(DeviceState::Ready) || asked(DeviceState::Busy) => check().ok("opened"),
+        _ if has_state(DeviceState::Ready) || has_state(DeviceState::Busy) => check().ok("opened"),
         (Some(node), Some(user)) => match case.machine.node(&node) {
             Some(rights) if rights.is_open_to(user) => check().ok(node),
             Some(_) => {

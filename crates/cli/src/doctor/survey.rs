@@ -67,10 +67,10 @@ impl Survey {
 
     /// Cameras on the bus, usable or not.
     pub(super) fn cameras(&self) -> impl Iterator<Item = &Line> {
-        let seen = |l: &&Line| l.device == "camera" && l.usb.is_some();
+        let is_attached = |l: &&Line| l.device == "camera" && l.usb.is_some();
         self.lines
             .iter()
-            .filter(seen)
+            .filter(is_attached)
             .filter(|l| l.state != DeviceState::OtherDevice)
     }
 }

@@ -27,15 +27,15 @@ pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
 }
 
 fn library(case: &Case<'_>) -> Finding {
-    let wanted = case.rig.and_then(|r| r.robot.library_version.as_deref());
-    let expected = wanted.map_or_else(
+    let required = case.rig.and_then(|r| r.robot.library_version.as_deref());
+    let expected = required.map_or_else(
         || "a libdrd that this build can use".to_owned(),
         |v| format!("SDK {v}"),
     );
     let check = check(AREA, "robot library", expected);
     match &case.survey.library {
         Library::Loaded { version, .. }
-            if wanted.is_some_and(|w| !contains_version(version, w)) =>
+            if required.is_some_and(|w| !contains_version(version, w)) =>
         {
             check.problem(format!("SDK {version}"), ACCEPT)
         }
@@ -93,10 +93,10 @@ fn firmware(
     case: &Case<'_>,
     role: &str,
     key: &str,
-    wanted: impl Fn(&RigFile) -> Option<String>,
+    required: impl Fn(&RigFile) -> Option<String>,
 ) -> Finding {
-    let wanted = case.rig.and_then(wanted);
-    let expected = match (&wanted, case.rig) {
+    let required = case.rig.and_then(required);
+    let expected = match (&required, case.rig) {
         (Some(version), _) => version.clone(),
         (None, Some(_)) => format!("any: {key} is not set"),
         (None, None) => "any: no rig file".to_owned(),
@@ -104,23 +104,23 @@ fn firmware(
     let check = check(AREA, role, expected);
     match line_of(case, role).and_then(|l| l.firmware.as_deref()) {
         None => check.not_checked("not queried"),
-        Some(found) if wanted.is_none_or(|w| contains_version(found, &w)) => check.ok(found),
+        Some(found) if required.is_none_or(|w| contains_version(found, &w)) => check.ok(found),
         Some(found) => check.problem(found, ACCEPT),
     }
 }
 
 fn trigger_box(case: &Case<'_>) -> Finding {
     let supported = format!("firmware {FIRMWARE_VERSION} with protocol {PROTOCOL_VERSION}");
-    let wanted = |rig: &RigFile| rig.trigger_box.as_ref()?.firmware.clone();
+    let required = |rig: &RigFile| rig.trigger_box.as_ref()?.firmware.clone();
     let flash = |line: &Line| line.next_step.clone().unwrap_or_default();
     match case.survey.role("trigger_box") {
         Some(line) if line.state == DeviceState::OtherFirmware => {
             box_check(&supported).problem(line.detail.as_str(), flash(line))
         }
-        Some(line) if line.firmware.is_some() && case.rig.and_then(wanted).is_none() => {
+        Some(line) if line.firmware.is_some() && case.rig.and_then(required).is_none() => {
             box_check(&supported).ok(line.detail.as_str())
         }
-        _ => firmware(case, "trigger_box", "trigger_box.firmware", wanted),
+        _ => firmware(case, "trigger_box", "trigger_box.firmware", required),
     }
 }
 

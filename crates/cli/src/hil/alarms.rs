@@ -52,9 +52,9 @@ pub(super) fn keep(history: &Path, report: &Report) -> Vec<AlarmEvidence> {
         let night = &report.nights[alarm.raised];
         let home = history::folder_of(history, &night.folder);
         let page = home.join(night_folder::PAGE);
-        let kept = history::folder_of(history, "alarms").join(file_name_part(&alarm.id));
+        let evidence_folder = history::folder_of(history, "alarms").join(file_name_part(&alarm.id));
         let session = match &night.golden {
-            Some(golden) => copy(&home.join(golden), &kept),
+            Some(golden) => copy(&home.join(golden), &evidence_folder),
             None => Err(MissingEvidence::NoGolden),
         };
         AlarmEvidence {

@@ -36,7 +36,7 @@ const POSITION_TIMEOUT: Duration = Duration::from_secs(2);
 /// # Errors
 /// [`Problem`] when the drill could not be carried out.
 pub(super) fn watchdog(bench: &mut RealBench) -> Result<DrillResult, Problem> {
-    let mut holder = Holder::start(&bench.rig().file_name)?;
+    let mut holder = ArmHolder::start(&bench.rig().file_name)?;
     let held = holder.wait_until_held(bench)?;
     let killed = Instant::now();
     holder.kill()?;
@@ -57,12 +57,12 @@ pub(super) fn watchdog(bench: &mut RealBench) -> Result<DrillResult, Problem> {
 
 /// The process that holds the arm. When its standard input closes, or its parent dies, it releases
 /// the arm and ends.
-struct Holder {
+struct ArmHolder {
     child: Child,
     lines: Receiver<String>,
 }
 
-impl Holder {
+impl ArmHolder {
     fn start(rig: &str) -> Result<Self, Problem> {
         let program = std::env::current_exe().map_err(|e| software(&e))?;
         let mut command = Command::new(program);
@@ -134,7 +134,7 @@ impl Holder {
     }
 }
 
-impl Drop for Holder {
+impl Drop for ArmHolder {
     fn drop(&mut self) {
         // These calls fail only if the process has already ended. If it does not release the arm in time, its supervisor brakes it.
         drop(self.child.stdin.take());

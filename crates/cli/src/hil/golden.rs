@@ -6,12 +6,12 @@ use skinrig_hil::findings::Findings;
 use skinrig_hil::{Bench, GoldenRun, Problem};
 use skinrig_hil::{golden_values, run_evidence};
 use skinrig_model::RunEnd;
-use skinrig_nightly::{Evidence, EvidenceKind, Golden};
+use skinrig_nightly::{Evidence, EvidenceKind, GoldenSession};
 use skinrig_protocol::{Plan, Protocol};
 
 use super::real_bench::RealBench;
 use crate::exit::Failure;
-use crate::results::{self, Choices};
+use crate::results::{self, AnalysisRequest};
 use crate::rig::{bench, gates};
 use crate::{check, run};
 
@@ -41,7 +41,7 @@ pub(super) fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Pr
     }
     findings.evidence.extend(run_evidence::from_report(&report));
     let mut golden = GoldenRun {
-        files: Golden {
+        files: GoldenSession {
             session: name(&session),
             report: None,
             results_sha256: None,
@@ -81,7 +81,7 @@ fn protocol(bench: &RealBench, file: &Path) -> Result<(Protocol, Plan), Problem>
 }
 
 fn analyze(session: &Path) -> Result<(results::Results, String), Failure> {
-    let results = results::analyze_session(session, Choices::default())?;
+    let results = results::analyze_session(session, AnalysisRequest::default())?;
     let (_, html) = results::write_results(&results, None, None)?;
     Ok((results, name(&html)))
 }

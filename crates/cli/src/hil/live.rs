@@ -82,13 +82,13 @@ pub(super) fn paint(stream: &impl IsTerminal) -> Paint {
 
 impl NightObserver for NightProgress {
     fn attempt_started(&mut self, _night: &Night, check: &Check, attempt: usize) {
-        let again = match attempt {
+        let repetition = match attempt {
             1 => String::new(),
             n => format!(", attempt {n}"),
         };
         match &self.display {
-            Display::Bar(bar) => bar.set_message(format!("{}{again}", check.title)),
-            Display::Lines if attempt > 1 => errln!("{}{again}", check.title),
+            Display::Bar(bar) => bar.set_message(format!("{}{repetition}", check.title)),
+            Display::Lines if attempt > 1 => errln!("{}{repetition}", check.title),
             Display::Lines => {}
         }
     }

@@ -20,7 +20,7 @@ use skinrig_report::trend::sentence;
 use super::args::HilRunArgs;
 use super::live::{self, NightProgress};
 use super::real_bench::RealBench;
-use super::trend::After;
+use super::trend::NightTrends;
 use super::{lease, trend};
 use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
@@ -118,7 +118,7 @@ pub(crate) fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome 
 }
 
 /// Trends after the night, if a history was given.
-type TrendOutcome = Option<Result<After, HistoryError>>;
+type TrendOutcome = Option<Result<NightTrends, HistoryError>>;
 
 /// A file of the night could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -198,7 +198,7 @@ fn plan_inputs(
     rig: &RigFile,
     only: Option<&[String]>,
 ) -> Result<PlanInputs, Failure> {
-    let wanted = |name: &str| only.is_none_or(|o| o.iter().any(|w| w == name));
+    let is_selected = |name: &str| only.is_none_or(|o| o.iter().any(|w| w == name));
     let mut inputs = PlanInputs {
         golden: None,
         touch_points: rig.frame.touch_off.as_ref().map(|t| t.points.len()),
@@ -206,7 +206,7 @@ fn plan_inputs(
     for c in &suite.checks {
         if let Measure::Golden { protocol } = &c.measure
             && c.skip.is_none()
-            && wanted(c.name)
+            && is_selected(c.name)
         {
             let checked = check::load(protocol, &[])?;
             inputs.golden = Some(HostDuration::from_secs_f64(

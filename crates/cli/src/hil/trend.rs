@@ -37,9 +37,9 @@ pub(crate) fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
             report.charts.len()
         )));
     }
-    let kept = alarms::keep(&args.history, &report);
+    let alarm_links = alarms::keep(&args.history, &report);
     if let Some(file) = &args.html {
-        let links: Vec<Links> = kept.iter().map(|k| k.links(file.parent())).collect();
+        let links: Vec<Links> = alarm_links.iter().map(|k| k.links(file.parent())).collect();
         let html = page(&report, &links, &history.accepted);
         std::fs::write(file, html)
             .map_err(|e| Failure::internal(format!("{}: {e}", file.display())))?;
@@ -47,11 +47,14 @@ pub(crate) fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
     if json {
         let mut value = serde_json::to_value(&report).map_err(Failure::internal)?;
         value["accepted"] = serde_json::to_value(&history.accepted).map_err(Failure::internal)?;
-        let sessions: Vec<_> = kept.iter().map(|k| k.session.as_ref().ok()).collect();
+        let sessions: Vec<_> = alarm_links
+            .iter()
+            .map(|k| k.session.as_ref().ok())
+            .collect();
         value["sessions"] = serde_json::to_value(sessions).map_err(Failure::internal)?;
         crate::terminal::print_json(&value);
     } else {
-        let links: Vec<Links> = kept.iter().map(|k| k.links(None)).collect();
+        let links: Vec<Links> = alarm_links.iter().map(|k| k.links(None)).collect();
         let style = Style {
             unicode: !args.ascii && is_unicode(),
             color: crate::terminal::is_coloured(&std::io::stdout()),
@@ -132,14 +135,14 @@ fn is_unicode() -> bool {
 }
 
 /// Trends up to a night.
-pub(super) struct After {
+pub(super) struct NightTrends {
     pub report: Report,
     /// Links by alarm, relative to the night's folder.
     pub links: Vec<Links>,
     accepted: Vec<Acceptance>,
 }
 
-impl After {
+impl NightTrends {
     /// Page of all charts, for the night's folder.
     pub(super) fn page(&self) -> String {
         page(&self.report, &self.links, &self.accepted)
@@ -147,7 +150,7 @@ impl After {
 }
 
 /// Adds a night, whose files are in `home`, to the history at `path`, and judges all nights up to it.
-pub(super) fn after(path: &Path, night: &Night, home: &Path) -> Result<After, HistoryError> {
+pub(super) fn after(path: &Path, night: &Night, home: &Path) -> Result<NightTrends, HistoryError> {
     history::append(path, night, home)?;
     let filter = Filter {
         rig: Some(night.rig.clone()),
@@ -155,10 +158,10 @@ pub(super) fn after(path: &Path, night: &Night, home: &Path) -> Result<After, Hi
     };
     let history = history::load(path, &filter)?;
     let report = judge(&history);
-    let kept = alarms::keep(path, &report);
-    Ok(After {
+    let alarm_links = alarms::keep(path, &report);
+    Ok(NightTrends {
         report,
-        links: kept.iter().map(|k| k.links(Some(home))).collect(),
+        links: alarm_links.iter().map(|k| k.links(Some(home))).collect(),
         accepted: history.accepted,
     })
 }

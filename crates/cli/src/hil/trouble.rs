@@ -2,7 +2,7 @@
 //! enumerates bus or port again to find the reason.
 
 use skinrig_device::DeviceError;
-use skinrig_evk1::{Evk1Error, FoundState, UsbError};
+use skinrig_evk1::{CameraState, Evk1Error, UsbError};
 use skinrig_hil::Problem;
 use skinrig_nightly::{Evidence, EvidenceKind};
 use skinrig_omega3::OmegaError;
@@ -76,13 +76,13 @@ fn camera_not_found(held: usize) -> EvidenceKind {
         .into_iter()
         .map(|found| found.state)
         .collect();
-    let any = |is: fn(&FoundState) -> bool| states.iter().any(is);
-    let busy = states.iter().filter(|s| matches!(s, FoundState::Busy));
+    let any = |is: fn(&CameraState) -> bool| states.iter().any(is);
+    let busy = states.iter().filter(|s| matches!(s, CameraState::Busy));
     if busy.count() > held {
         EvidenceKind::Busy
-    } else if any(|s| matches!(s, FoundState::NoPermission)) {
+    } else if any(|s| matches!(s, CameraState::NoPermission)) {
         EvidenceKind::NotPermitted
-    } else if any(|s| matches!(s, FoundState::Faulty(_))) {
+    } else if any(|s| matches!(s, CameraState::Faulty(_))) {
         EvidenceKind::DeviceLost
     } else {
         EvidenceKind::Absent

@@ -67,11 +67,11 @@ pub(crate) enum RecordingError {
 #[error("cannot start a reading thread: {0}")]
 pub(crate) struct ThreadError(#[from] io::Error);
 
-type Item = Result<(Vec<u8>, ChunkFacts, Vec<TriggerEdge>), RecordingError>;
+type QueuedChunk = Result<(Vec<u8>, ChunkFacts, Vec<TriggerEdge>), RecordingError>;
 
 /// Input side of the queue, used by the reading thread.
 pub(crate) struct ChunkFeed {
-    queue: SyncSender<Item>,
+    queue: SyncSender<QueuedChunk>,
     scanner: Scanner,
     encoder: Option<evt2::Encoder>,
     bytes: Vec<u8>,
@@ -167,7 +167,7 @@ pub(crate) struct FileCamera {
     identity: DeviceIdentity,
     format: StreamFormat,
     clock: SimClock,
-    queue: Receiver<Item>,
+    queue: Receiver<QueuedChunk>,
     waiting: Option<(Vec<u8>, ChunkFacts, Vec<TriggerEdge>)>,
     base_us: Option<u64>,
     /// End of the last chunk handed over, after the file's first word.

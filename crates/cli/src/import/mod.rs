@@ -29,7 +29,7 @@ use skinrig_sim::SimClock;
 use crate::args::ImportArgs;
 use crate::conclusion::conclude;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::run::{Intent, record};
+use crate::run::{RunInputs, record};
 use crate::signals::Operator;
 use crate::sink::ReplayExpectations;
 use crate::terminal::Output;
@@ -103,7 +103,7 @@ pub(crate) fn import(args: &ImportArgs, command_line: &str, output: Output) -> O
             args.camera2.display()
         );
     }
-    let intent = Intent {
+    let intent = RunInputs {
         text: &schedule.text,
         file_name: &schedule.file_name,
         name: &schedule.name,

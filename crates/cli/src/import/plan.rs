@@ -2,7 +2,7 @@
 
 use skinrig_model::{HostDuration, HostTime, PlannedPress, Point3, Robot};
 use skinrig_protocol::{
-    OnTrip, Plan, PressStep, Retakes, RunLimits, Schedule, Step, Surface, Suspend,
+    Plan, PressStep, Retakes, RunLimits, Schedule, Step, Surface, Suspend, TripReaction,
 };
 
 /// Height of the scheduled tip before the first press, mm. Nothing moves.
@@ -62,7 +62,7 @@ pub(super) fn compile(schedule: &Schedule, presses: Vec<PlannedPress>, times: &[
             position_tolerance_mm: 0.05,
             settle_time: SETTLE,
             max_acceleration_mm_s2: None,
-            on_trip: OnTrip::Retract,
+            on_trip: TripReaction::Retract,
         },
         surroundings: None,
         retakes: Retakes::NONE,

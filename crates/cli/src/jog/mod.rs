@@ -1,7 +1,7 @@
 //! `skinrig jog`: moves the robot with typed commands, under the same guard as runs, and records touched points.
 
+mod command;
 mod log;
-mod order;
 mod points;
 mod refusal;
 
@@ -19,7 +19,7 @@ use skinrig_controller::{
 use skinrig_device::{Clock, Indenter, MotionLimits, RealClock};
 use skinrig_hil::lease::Lease;
 use skinrig_model::{HostDuration, Point3, PoseSample, RigidTransform, Robot, SimLevel, Skin};
-use skinrig_protocol::plan::{OnTrip, RunLimits};
+use skinrig_protocol::plan::{RunLimits, TripReaction};
 use skinrig_protocol::{Surface, TouchSearch};
 use skinrig_sim::{SimConfig, in_real_time, simulated_rig};
 
@@ -28,8 +28,8 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::hil::lease;
 use crate::rig::bench;
 use crate::signals;
+use command::JogCommand;
 use log::Log;
-use order::Order;
 use points::NamedPoint;
 use refusal::{InputError, Refusal};
 
@@ -130,7 +130,7 @@ fn limits(bench: &Bench) -> (RunLimits, MotionLimits) {
         position_tolerance_mm: TOLERANCE_MM,
         settle_time: HostDuration::from_millis(50),
         max_acceleration_mm_s2: None,
-        on_trip: OnTrip::Retract,
+        on_trip: TripReaction::Retract,
     };
     let robot = MotionLimits {
         min_mm: bench.min_mm,
@@ -311,10 +311,10 @@ impl Console {
                 }
             };
             log.line(self.jog.now(), "order", &line);
-            let answer = match order::parse(&line) {
+            let answer = match command::parse(&line) {
                 Ok(None) => continue,
-                Ok(Some(Order::Quit)) => return Ok(Exit::Ok),
-                Ok(Some(order)) => self.execute(order),
+                Ok(Some(JogCommand::Quit)) => return Ok(Exit::Ok),
+                Ok(Some(command)) => self.execute(command),
                 Err(e) => Err(Refusal::Input(e.into())),
             };
             log.path_of_tip(&self.jog.take_trace());
@@ -344,25 +344,25 @@ impl Console {
         }
     }
 
-    fn execute(&mut self, order: Order) -> Result<String, Refusal> {
+    fn execute(&mut self, command: JogCommand) -> Result<String, Refusal> {
         let stop = Arc::clone(&self.stop);
         let stop = move || stop.load(Ordering::SeqCst);
-        match order {
-            Order::By(axis, by_mm) => {
+        match command {
+            JogCommand::By(axis, by_mm) => {
                 let mut target = self.jog.look()?.commanded.to_array();
                 target[axis] += by_mm;
                 self.go(target, &stop)
             }
-            Order::To(target) => self.go(target, &stop),
-            Order::Speed(speed_mm_s) => {
+            JogCommand::To(target) => self.go(target, &stop),
+            JogCommand::Speed(speed_mm_s) => {
                 self.speed_mm_s = speed_mm_s;
                 Ok(format!("speed {speed_mm_s} mm/s"))
             }
-            Order::Where => self.place(),
-            Order::Touch(way_mm) => self.touch(way_mm, &stop),
-            Order::Point(name, skin) => self.point(name, skin),
-            Order::Points => Ok(self.block()),
-            Order::Help | Order::Quit => Ok(order::HELP.to_owned()),
+            JogCommand::Where => self.place(),
+            JogCommand::Touch(way_mm) => self.touch(way_mm, &stop),
+            JogCommand::Point(name, skin) => self.point(name, skin),
+            JogCommand::Points => Ok(self.block()),
+            JogCommand::Help | JogCommand::Quit => Ok(command::HELP.to_owned()),
         }
     }
 

@@ -3,7 +3,7 @@
 use skinrig_controller::{GuardError, RunFault};
 use skinrig_device::DeviceError;
 
-use super::order::OrderError;
+use super::command::JogCommandError;
 
 /// Why a command was not executed.
 pub(super) enum Refusal {
@@ -18,7 +18,7 @@ pub(super) enum Refusal {
 pub(super) enum InputError {
     /// The line is not a command.
     #[error(transparent)]
-    Order(#[from] OrderError),
+    Command(#[from] JogCommandError),
     /// `point` without a touch before it.
     #[error("expected a touch since the last point, found none; `touch` first")]
     NoTouch,

@@ -87,12 +87,12 @@ pub(crate) fn init(args: &InitArgs, json: bool) -> Outcome {
         crate::terminal::print_json(&serde_json::json!({ "files": rows.collect::<Vec<_>>() }));
         return Ok(Exit::Ok);
     }
-    let kept = match (count(WriteOutcome::Kept), count(WriteOutcome::Updated)) {
+    let skipped = match (count(WriteOutcome::Kept), count(WriteOutcome::Updated)) {
         (0, 0) => String::new(),
-        (kept, updated) => format!(", {updated} updated, {kept} kept"),
+        (skipped, updated) => format!(", {updated} updated, {skipped} kept"),
     };
     outln!(
-        "{}: {} files written{kept}",
+        "{}: {} files written{skipped}",
         folder.display(),
         count(WriteOutcome::New)
     );

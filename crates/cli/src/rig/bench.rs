@@ -12,7 +12,7 @@ use skinrig_evk1::biases::parse_bias_file;
 use skinrig_evk1::{Evk1, Evk1Config, Evk1Error, Tolerance};
 use skinrig_model::{CameraId, HostDuration, RigGeometry, SkinOutline, StereoGeometry};
 use skinrig_omega3::axes::{Axes, Axis};
-use skinrig_omega3::config::{Initialise, RedundantEncoders, SupervisorCommand, Watchdog};
+use skinrig_omega3::config::{InitialiseRule, RedundantEncoders, SupervisorCommand, Watchdog};
 use skinrig_omega3::enumerate::SERIAL_UNKNOWN;
 use skinrig_omega3::{Omega, OmegaConfig, OmegaError};
 use skinrig_protocol::Protocol;
@@ -240,7 +240,7 @@ pub(crate) fn omega_config(rig: &RigFile) -> Result<OmegaConfig, Failure> {
     config.gains.d = robot.derivative_gain;
     config.watchdog = Watchdog::ArmMilliseconds(f64::from(robot.watchdog_steps) * 0.125);
     if robot.auto_init && robot.sample_is_off {
-        config.initialise = Initialise::SampleIsOff;
+        config.initialise = InitialiseRule::SampleIsOff;
     }
     if robot.needs_redundant_encoders {
         config.redundant_encoders = RedundantEncoders::Required;

@@ -36,7 +36,7 @@ pub(crate) fn open(
     camera: CameraId,
     clock: RealClock,
 ) -> Result<Box<dyn EventCamera>, Failure> {
-    use skinrig_evk4::{Evt3Camera, FoundState, Model, Neuromorphic};
+    use skinrig_evk4::{CameraState, Evt3Camera, Model, Neuromorphic};
 
     let Some(model) = Model::of_word(setup.model.name()) else {
         return Err(Failure::input(format!(
@@ -46,8 +46,8 @@ pub(crate) fn open(
     };
     let found = skinrig_evk4::enumerate(&evk1_places())
         .map_err(|e| Failure::rig(format!("{camera}: cannot list USB devices: {e}")))?;
-    let matches_setup = |state: &FoundState| match state {
-        FoundState::Ready(of, serial) => *of == model && *serial == setup.serial,
+    let matches_setup = |state: &CameraState| match state {
+        CameraState::Ready(of, serial) => *of == model && *serial == setup.serial,
         _ => false,
     };
     if !found.iter().any(|f| matches_setup(&f.state)) {
@@ -74,7 +74,7 @@ pub(crate) fn open(
 pub(crate) fn evk1_places() -> Vec<(u8, u8)> {
     let found = skinrig_evk1::enumerate().unwrap_or_default();
     let ready =
-        |f: &&skinrig_evk1::FoundDevice| matches!(f.state, skinrig_evk1::FoundState::Ready(_));
+        |f: &&skinrig_evk1::FoundDevice| matches!(f.state, skinrig_evk1::CameraState::Ready(_));
     found.iter().filter(ready).map(|f| f.address).collect()
 }
 

@@ -235,9 +235,9 @@ mod tests {
 
     #[test]
     fn a_session_that_does_not_fit_fails() {
-        let here = Path::new(".");
-        assert!(!disk(here, 1.0, 1.0).failed());
-        let full = disk(here, 1e18, 0.0);
+        let base = Path::new(".");
+        assert!(!disk(base, 1.0, 1.0).failed());
+        let full = disk(base, 1e18, 0.0);
         assert!(
             full.failed() && full.next_step.contains("--sessions"),
             "{full:?}"

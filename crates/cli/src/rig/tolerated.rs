@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use skinrig_evk1::{Accept, Mismatches};
+use skinrig_evk1::{Mismatches, ToleranceKey};
 use skinrig_model::CameraId;
 use skinrig_protocol::rig::{CameraSetup, RigFile};
 
@@ -31,7 +31,7 @@ impl ToleratedMismatches {
         let mut lines = String::new();
         for camera in CameraId::ALL {
             let of_camera = self.0.iter().filter(|(c, _)| *c == camera);
-            let mismatches: BTreeSet<Accept> = of_camera
+            let mismatches: BTreeSet<ToleranceKey> = of_camera
                 .flat_map(|(_, mismatches)| mismatches.all())
                 .map(|mismatch| mismatch.key)
                 .collect();
@@ -48,34 +48,37 @@ impl ToleratedMismatches {
     }
 }
 
-fn keys(setup: &CameraSetup, mismatches: &BTreeSet<Accept>) -> String {
+fn keys(setup: &CameraSetup, mismatches: &BTreeSet<ToleranceKey>) -> String {
     let mut statuses: BTreeSet<u8> = setup.read_status.iter().copied().collect();
     let mut registers: BTreeSet<u32> = setup.read_back_exceptions.iter().copied().collect();
     let (mut reset, mut transfers) = (false, false);
     for key in mismatches {
         match key {
-            Accept::ReadStatus(status) => drop(statuses.insert(*status)),
-            Accept::ReadBack(address) => drop(registers.insert(*address)),
-            Accept::FailedReset => reset = true,
-            Accept::FailedTransfers => transfers = true,
+            ToleranceKey::ReadStatus(status) => drop(statuses.insert(*status)),
+            ToleranceKey::ReadBack(address) => drop(registers.insert(*address)),
+            ToleranceKey::FailedReset => reset = true,
+            ToleranceKey::FailedTransfers => transfers = true,
         }
     }
     let list = |items: Vec<String>| items.join(", ");
     let mut lines = String::new();
     if mismatches
         .iter()
-        .any(|k| matches!(k, Accept::ReadStatus(_)))
+        .any(|k| matches!(k, ToleranceKey::ReadStatus(_)))
     {
         let items = statuses.iter().map(|s| format!("\"{s:#04x}\"")).collect();
         lines += &format!("    read_status: [{}]\n", list(items));
     }
-    if mismatches.iter().any(|k| matches!(k, Accept::ReadBack(_))) {
+    if mismatches
+        .iter()
+        .any(|k| matches!(k, ToleranceKey::ReadBack(_)))
+    {
         let items = registers.iter().map(|a| format!("\"{a:#06x}\"")).collect();
         lines += &format!("    read_back_exceptions: [{}]\n", list(items));
     }
     for (is_tolerated, key) in [
-        (reset, Accept::FailedReset),
-        (transfers, Accept::FailedTransfers),
+        (reset, ToleranceKey::FailedReset),
+        (transfers, ToleranceKey::FailedTransfers),
     ] {
         if is_tolerated {
             lines += &format!("    {key}\n");

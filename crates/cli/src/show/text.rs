@@ -170,8 +170,8 @@ fn device(device: &Device) {
         device.serial,
         device.firmware
     );
-    for (name, asked, read_back) in &device.settings {
-        outln!("    {name:<24} asked {asked}  read back {read_back}");
+    for (name, requested, read_back) in &device.settings {
+        outln!("    {name:<24} asked {requested}  read back {read_back}");
     }
 }
 

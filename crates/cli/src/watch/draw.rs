@@ -3,7 +3,7 @@
 use skinrig_model::text::is_hidden;
 use skinrig_model::{HostDuration, PressRole};
 
-use super::frame::{Frame, LatestAttempt, Place};
+use super::frame::{Frame, LatestAttempt, LocationStatus};
 use crate::progress::{clock_text, eta_text};
 use crate::remote::RunSnapshot;
 use crate::rig::gates;
@@ -100,14 +100,14 @@ fn latest(press: &LatestAttempt) -> String {
         .cameras
         .map(|signal| signal.map_or_else(|| "-".to_owned(), |s| format!("{:.1}", s.ratio())));
     let [x, y] = press.at_mm;
-    let again = match press.attempt {
+    let attempt_note = match press.attempt {
         1 => String::new(),
         n => format!(", attempt {n}"),
     };
     let reason = press.reason.as_deref();
     let reason = reason.map_or_else(String::new, |r| format!(": {r}"));
     format!(
-        "  {:>5}  ({x:>6.1}, {y:>6.1}) mm  {one:>7} {two:>7}  {}{again}{reason}",
+        "  {:>5}  ({x:>6.1}, {y:>6.1}) mm  {one:>7} {two:>7}  {}{attempt_note}{reason}",
         press.press, press.verdict
     )
 }
@@ -118,7 +118,7 @@ fn map(frame: &Frame) -> Vec<String> {
     let (Some(x), Some(y)) = (axis(0), axis(1)) else {
         return Vec::new();
     };
-    let mut cells = vec![vec![None::<Place>; x.cells]; y.cells];
+    let mut cells = vec![vec![None::<LocationStatus>; x.cells]; y.cells];
     for place in &frame.places {
         let cell = &mut cells[y.cells - 1 - y.of(place.at_mm[1])][x.of(place.at_mm[0])];
         match cell {
@@ -134,8 +134,8 @@ fn map(frame: &Frame) -> Vec<String> {
     let now = live
         .filter(|press| press.role != PressRole::Sync)
         .map(|press| (y.cells - 1 - y.of(press.at_mm[1]), x.of(press.at_mm[0])));
-    let row = |(i, row): (usize, &Vec<Option<Place>>)| {
-        let cell = |(j, cell): (usize, &Option<Place>)| match cell {
+    let row = |(i, row): (usize, &Vec<Option<LocationStatus>>)| {
+        let cell = |(j, cell): (usize, &Option<LocationStatus>)| match cell {
             _ if now == Some((i, j)) => "@ ",
             None => "  ",
             Some(place) => mark(place),
@@ -148,7 +148,7 @@ fn map(frame: &Frame) -> Vec<String> {
     lines
 }
 
-fn mark(place: &Place) -> &'static str {
+fn mark(place: &LocationStatus) -> &'static str {
     match (place.valid, place.failed) {
         (_, 1..) => "x ",
         (0, 0) => ". ",
@@ -195,7 +195,7 @@ mod tests {
 
     #[test]
     fn each_place_shows_its_progress() {
-        let place = |planned, valid, failed| Place {
+        let place = |planned, valid, failed| LocationStatus {
             at_mm: [0.0; 2],
             planned,
             valid,

@@ -46,7 +46,7 @@ pub(super) struct Frame {
     /// Calibrating and scored presses.
     pub presses: PressTally,
     /// Locations of the path with their progress.
-    pub places: Vec<Place>,
+    pub places: Vec<LocationStatus>,
     /// The latest attempts, oldest first.
     pub latest: Vec<LatestAttempt>,
     /// The latest interruptions, oldest first.
@@ -59,7 +59,7 @@ pub(super) struct Frame {
 
 /// A location of the path.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Place {
+pub(super) struct LocationStatus {
     /// Position, skin frame, mm.
     pub at_mm: [f64; 2],
     /// Presses planned there.
@@ -274,8 +274,8 @@ fn latest(presses: &[(PlannedPress, Vec<AttemptRow>)]) -> Vec<(&PlannedPress, &P
 }
 
 /// The locations of the path in the order of their first press, without sync presses.
-fn places(presses: &[(PlannedPress, Vec<AttemptRow>)]) -> Vec<Place> {
-    let mut places: Vec<Place> = Vec::new();
+fn places(presses: &[(PlannedPress, Vec<AttemptRow>)]) -> Vec<LocationStatus> {
+    let mut places: Vec<LocationStatus> = Vec::new();
     let mut known: BTreeMap<[u64; 2], usize> = BTreeMap::new();
     for (planned, attempts) in presses {
         if planned.role == PressRole::Sync {
@@ -283,7 +283,7 @@ fn places(presses: &[(PlannedPress, Vec<AttemptRow>)]) -> Vec<Place> {
         }
         let at_mm = [planned.at.x_mm, planned.at.y_mm];
         let index = *known.entry(at_mm.map(f64::to_bits)).or_insert_with(|| {
-            places.push(Place {
+            places.push(LocationStatus {
                 at_mm,
                 planned: 0,
                 valid: 0,

@@ -106,8 +106,8 @@ fn counts(
         let mut overlaps = spans.map(|(from, to)| first <= to && from <= last);
         overlaps.any(|it| it)
     };
-    let wanted: Vec<ChunkMeta> = chunks.iter().filter(touches).copied().collect();
-    for chunk in wanted {
+    let selected: Vec<ChunkMeta> = chunks.iter().filter(touches).copied().collect();
+    for chunk in selected {
         let bytes = reader.chunk_bytes(chunk.camera, chunk.seq)?;
         // A chunk decoded alone has its own time origin; align it by its last word.
         let alone = Scanner::new(format).push(&bytes).0.last_us;

@@ -28,7 +28,7 @@ impl Challenge {
         ];
         let session = lab.record("s", &more);
         let folder = lab.path("challenge");
-        let made = [
+        let command = [
             "challenge",
             "make",
             &text(&session),
@@ -36,7 +36,7 @@ impl Challenge {
             &text(&folder),
             "--json",
         ];
-        let output = skinrig(&made).code(0).json();
+        let output = skinrig(&command).code(0).json();
         assert_eq!(
             (&output["calibrating"], &output["scored"]),
             (&4.into(), &4.into())
@@ -152,7 +152,7 @@ fn the_folder_gives_no_position_of_a_scored_press_away() {
     }
     // The answers are not in the folder.
     let inside = text(&challenge.folder.join("answers.json"));
-    let made = [
+    let command = [
         "challenge",
         "make",
         &text(&challenge.session),
@@ -161,7 +161,7 @@ fn the_folder_gives_no_position_of_a_scored_press_away() {
         "--answers",
         &inside,
     ];
-    skinrig(&made).code(2).expect_stderr(&["--answers"]);
+    skinrig(&command).code(2).expect_stderr(&["--answers"]);
     assert!(!Path::new(&inside).exists());
 }
 
@@ -174,8 +174,8 @@ fn order_and_hash_follow_from_random_bytes_and_the_origin_is_stated() {
     let (folder, answers) = (text(&challenge.folder), text(&challenge.answers));
     let session = text(&challenge.session);
     let make = || {
-        let made = ["challenge", "make", &session, "--out", &folder, "--answers"];
-        skinrig(&[&made[..], &[&answers, "--overwrite"]].concat()).code(0);
+        let command = ["challenge", "make", &session, "--out", &folder, "--answers"];
+        skinrig(&[&command[..], &[&answers, "--overwrite"]].concat()).code(0);
         let answers = read_json(&challenge.answers);
         let presses = answers["presses"].as_array().unwrap().iter();
         let order: Vec<u64> = presses
@@ -183,10 +183,13 @@ fn order_and_hash_follow_from_random_bytes_and_the_origin_is_stated() {
             .collect();
         (order, answers["salt"].as_str().unwrap().to_owned())
     };
-    let made: Vec<_> = (0..8).map(|_| make()).collect();
-    assert!(made.iter().any(|(order, _)| !order.is_sorted()), "{made:?}");
-    assert!(made.iter().all(|(_, salt)| salt.len() == 64));
-    assert_ne!(made[0].1, made[1].1);
+    let command: Vec<_> = (0..8).map(|_| make()).collect();
+    assert!(
+        command.iter().any(|(order, _)| !order.is_sorted()),
+        "{command:?}"
+    );
+    assert!(command.iter().all(|(_, salt)| salt.len() == 64));
+    assert_ne!(command[0].1, command[1].1);
 }
 
 #[test]

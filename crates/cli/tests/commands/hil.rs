@@ -156,13 +156,13 @@ fn a_bench_has_one_holder_whichever_command_asks() {
     }
     assert!(files(&lab.path("out"), "").is_empty());
     // Listing devices must not reset the lease holder's box.
-    let asked = || {
+    let requests = || {
         let listed = without_bench(&leases, &["devices", "--rig", EMULATED, "--json"]).code(0);
         let lines = listed.json()["devices"].as_array().unwrap().clone();
         let boxed = |l: &&Value| l["device"] == "trigger box";
         lines.iter().find(boxed).unwrap().clone()
     };
-    let boxed = asked();
+    let boxed = requests();
     assert_eq!(boxed["state"], "busy");
     assert!(
         boxed["next_step"]
@@ -176,7 +176,7 @@ fn a_bench_has_one_holder_whichever_command_asks() {
         (&"held".into(), &"maria".into())
     );
     drop(held);
-    assert_eq!(asked()["state"], "absent");
+    assert_eq!(requests()["state"], "absent");
     let plain = without_bench(&leases, &["hil", "lease"]).code(0);
     assert!(plain.out.contains("free; last: ") && plain.out.contains(&text(Path::new(&path))));
 }

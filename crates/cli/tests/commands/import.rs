@@ -90,8 +90,8 @@ fn import_wrong(
 
 #[test]
 fn positions_and_cameras_that_are_taken_for_others_make_the_session_invalid() {
-    type Moved = fn(Point2) -> Point2;
-    let cases: [(&str, Moved, bool); 4] = [
+    type PositionMap = fn(Point2) -> Point2;
+    let cases: [(&str, PositionMap, bool); 4] = [
         ("axes exchanged", |p| Point2::new(p.y_mm, p.x_mm), false),
         ("axis mirrored", |p| Point2::new(p.x_mm, -p.y_mm), false),
         (

@@ -302,11 +302,13 @@ fn a_disk_that_fills_up_stops_the_run_which_can_be_resumed() {
     // The amount written before the first press is unspecified: raise the limit until some of it fits.
     for blocks in (1_000..40_000).step_by(1_000) {
         let lab = Lab::new();
-        let said = on_a_full_disk(&lab.text("s"), blocks);
-        if said.code == Some(1) {
+        let run_output = on_a_full_disk(&lab.text("s"), blocks);
+        if run_output.code == Some(1) {
             continue;
         }
-        said.code(3).expect_stderr(&["recorder", "kept", "next:"]);
+        run_output
+            .code(3)
+            .expect_stderr(&["recorder", "kept", "next:"]);
         let session = only(&lab.path("s"), ".session.sqlite");
         // The disk was full before the header: an empty session.
         let header = skinrig(&["show", &text(&session)]);

@@ -120,11 +120,11 @@ fn a_press_has_one_number_everywhere() {
             cells[column("attempts")] == "2",
         )
     });
-    let again: Vec<u64> = attempts
-        .filter(|(_, again)| *again)
+    let repeated: Vec<u64> = attempts
+        .filter(|(_, repeated)| *repeated)
         .map(|(press, _)| press)
         .collect();
-    assert_eq!(again, [SPOILT]);
+    assert_eq!(repeated, [SPOILT]);
     let plan = skinrig(&["--json", "plan", SMALL]).code(0).json();
     assert_eq!(plan["plan"]["presses"][0]["press"], 1);
     let planned = find(&plan["plan"]["presses"], SPOILT);

@@ -103,9 +103,13 @@ fn all_errors_of_a_protocol_are_reported_at_once() {
 fn the_plan_is_drawn_and_printed_step_by_step() {
     let lab = Lab::new();
     let svg = lab.text("path.svg");
-    let said = skinrig(&["plan", SMALL, "--steps", "--svg", &svg]).code(0);
-    let steps = said.out.lines().filter(|l| l.contains("  press ")).count();
-    assert_eq!(steps, 10, "{}", said.out);
+    let result = skinrig(&["plan", SMALL, "--steps", "--svg", &svg]).code(0);
+    let steps = result
+        .out
+        .lines()
+        .filter(|l| l.contains("  press "))
+        .count();
+    assert_eq!(steps, 10, "{}", result.out);
     let drawn = std::fs::read_to_string(&svg).unwrap();
     assert!(
         drawn.starts_with("<svg") || drawn.starts_with("<?xml"),
@@ -173,11 +177,11 @@ fn a_session_whose_clocks_are_beyond_a_limit_is_invalid_everywhere() {
     assert_eq!(good["analysis"]["clocks"][0]["method"], "time_base");
 
     let strict = "analysis.alignment.max_camera_interval=0.5us";
-    let said = skinrig(&["analyze", &session, "--json", "--set", strict]).code(4);
-    let document = said.json();
+    let result = skinrig(&["analyze", &session, "--json", "--set", strict]).code(4);
+    let document = result.json();
     assert_eq!(document["valid"], false);
     assert_eq!(document["analysis"]["alignment"]["status"], "invalid");
-    said.expect_stderr(&["INVALID", "camera 1 from box", "at most 0.5 µs", "next:"]);
+    result.expect_stderr(&["INVALID", "camera 1 from box", "at most 0.5 µs", "next:"]);
     let shown = skinrig(&["analyze", &session, "--set", strict]).code(4).out;
     assert!(
         shown.starts_with("INVALID   use no number of this session"),

@@ -22,8 +22,8 @@ fn number_before(text: &str, word: &str) -> u64 {
 #[test]
 fn a_run_ends_with_results_that_add_up_and_files_that_exist() {
     let lab = Lab::new();
-    let said = skinrig(&["run", "-v", SMALL, "--sessions", &lab.text("s")]).code(0);
-    let out = &said.out;
+    let run_output = skinrig(&["run", "-v", SMALL, "--sessions", &lab.text("s")]).code(0);
+    let out = &run_output.out;
     for part in [
         "presses   10: 0 calibrate, 8 score, 2 sync",
         "path ",
@@ -205,8 +205,8 @@ fn exports_hold_exactly_what_was_recorded_and_inspect_reads_them() {
     let lab = Lab::new();
     let session = lab.record("s", &[]);
     let out = lab.text("e");
-    let said = skinrig(&["export", &text(&session), "--to", "all", "--out", &out]).code(0);
-    let written: Vec<&str> = said.out.lines().collect();
+    let run_output = skinrig(&["export", &text(&session), "--to", "all", "--out", &out]).code(0);
+    let written: Vec<&str> = run_output.out.lines().collect();
     assert_eq!(written.len(), 15, "{written:#?}");
     let reader = SessionReader::open(&session).unwrap();
 

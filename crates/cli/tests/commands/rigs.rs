@@ -229,8 +229,8 @@ fn touched_points_become_the_frame_of_a_rig_file() {
     }
     lines += "points\nquit\n";
     let log = lab.text("jog.log");
-    let said = jog(&lines, &log).code(0);
-    let block = said.out.split("frame:\n").nth(1).unwrap();
+    let jog_output = jog(&lines, &log).code(0);
+    let block = jog_output.out.split("frame:\n").nth(1).unwrap();
     let end = block
         .find("\n\n")
         .or_else(|| block.find("disarmed"))
@@ -283,10 +283,10 @@ fn a_wrong_line_of_a_file_ends_the_jog_with_the_robot_disarmed() {
     .enumerate()
     {
         let log = lab.text(&format!("{i}.log"));
-        let said = jog(&format!("{line}\nz +1mm\n"), &log)
+        let jog_output = jog(&format!("{line}\nz +1mm\n"), &log)
             .code(2)
             .expect_stderr(&[words]);
-        assert!(said.out.contains("disarmed at"), "{said:?}");
+        assert!(jog_output.out.contains("disarmed at"), "{jog_output:?}");
         let log = std::fs::read_to_string(log).unwrap();
         assert!(
             log.contains("\trefused\t") && !log.contains("z +1mm"),
@@ -390,17 +390,17 @@ fn an_idle_jog_disarms() {
     // Standard input stays open, like an abandoned terminal.
     let mut input = child.stdin.take().unwrap();
     input.write_all(b"where\n").unwrap();
-    let mut said = String::new();
+    let mut jog_output = String::new();
     child
         .stdout
         .take()
         .unwrap()
-        .read_to_string(&mut said)
+        .read_to_string(&mut jog_output)
         .unwrap();
-    assert_eq!(child.wait().unwrap().code(), Some(0), "{said}");
+    assert_eq!(child.wait().unwrap().code(), Some(0), "{jog_output}");
     drop(input);
     for words in ["0.2 s without input", "no input for 0.2 s", "disarmed at"] {
-        assert!(said.contains(words), "{words}: {said}");
+        assert!(jog_output.contains(words), "{words}: {jog_output}");
     }
     let logged = std::fs::read_to_string(&log).unwrap();
     assert!(

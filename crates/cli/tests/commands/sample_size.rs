@@ -10,16 +10,19 @@ fn a_session_gives_the_sample_size_of_the_next_one() {
         let arguments = ["--json", "plan", "--from", &session, "--detect"];
         skinrig(&[&arguments[..], more].concat()).code(0).json()
     };
-    let said = ask(&["1 mm"]);
-    let proposals = said["plan"]["proposals"].as_array().unwrap();
+    let answer = ask(&["1 mm"]);
+    let proposals = answer["plan"]["proposals"].as_array().unwrap();
     let presses = |i: usize| proposals[i]["presses"].as_u64().unwrap();
-    let cheapest = said["plan"]["cheapest"].as_u64().unwrap() as usize;
+    let cheapest = answer["plan"]["cheapest"].as_u64().unwrap() as usize;
     assert!((0..proposals.len()).all(|i| presses(i) >= presses(cheapest)));
     assert!(proposals[0]["seconds"].as_f64().unwrap() > 0.0);
-    let locations =
-        |said: &serde_json::Value| said["plan"]["proposals"][0]["locations"].as_u64().unwrap();
+    let locations = |answer: &serde_json::Value| {
+        answer["plan"]["proposals"][0]["locations"]
+            .as_u64()
+            .unwrap()
+    };
     // A tenth of the difference takes more locations; units do not matter.
-    assert!(locations(&ask(&["0.1 mm"])) > locations(&said));
+    assert!(locations(&ask(&["0.1 mm"])) > locations(&answer));
     assert_eq!(ask(&["100 um"]), ask(&["0.1 mm"]));
     assert!(locations(&ask(&["0.1 mm", "--power", "0.95"])) > locations(&ask(&["0.1 mm"])));
     assert!(locations(&ask(&["0.1 mm", "--common", "0.9"])) < locations(&ask(&["0.1 mm"])));
@@ -34,8 +37,8 @@ fn a_session_gives_the_sample_size_of_the_next_one() {
         .code(2)
         .expect_stderr(&["--from"]);
     for (wrong, part) in [("0 mm", "above 0"), ("3 s", "length")] {
-        let said = skinrig(&["plan", "--from", &session, "--detect", wrong]);
-        said.code(2).expect_stderr(&[part]);
+        let answer = skinrig(&["plan", "--from", &session, "--detect", wrong]);
+        answer.code(2).expect_stderr(&[part]);
     }
     let sure = [
         "plan", "--from", &session, "--detect", "1 mm", "--power", "1",

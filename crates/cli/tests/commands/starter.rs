@@ -56,16 +56,16 @@ fn a_new_lab_runs_and_user_files_are_not_overwritten() {
         message.contains("cd here && skinrig run protocols/demo.yaml"),
         "{message}"
     );
-    let here = lab.path("here");
-    at(&here, &["run", "protocols/quick-check.yaml"]).code(0);
-    only(&here.join("sessions"), ".session.sqlite");
+    let base = lab.path("here");
+    at(&base, &["run", "protocols/quick-check.yaml"]).code(0);
+    only(&base.join("sessions"), ".session.sqlite");
     let (own, schema) = (
-        here.join("protocols/demo.yaml"),
-        here.join("protocols/skinrig.schema.json"),
+        base.join("protocols/demo.yaml"),
+        base.join("protocols/skinrig.schema.json"),
     );
     std::fs::write(&own, "mine").unwrap();
     std::fs::write(&schema, "old").unwrap();
-    let message = at(&here, &["init"]).code(0).out;
+    let message = at(&base, &["init"]).code(0).out;
     assert!(message.contains("0 files written, 1 updated"), "{message}");
     assert_eq!(std::fs::read_to_string(&own).unwrap(), "mine");
     assert_ne!(std::fs::read_to_string(&schema).unwrap(), "old");

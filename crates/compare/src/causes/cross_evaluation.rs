@@ -1,7 +1,7 @@
 //! Owns cross-evaluation: evaluates the presses of each skin with the calibration or the settings of the other.
 
 use serde::Serialize;
-use skinrig_analysis::locator::{CameraFeatures, Fitted};
+use skinrig_analysis::locator::{CameraFeatures, FittedLocator};
 
 use super::factor::Reanalysis;
 use crate::locations::Locations;
@@ -31,20 +31,21 @@ pub(crate) fn cross_evaluate(
     locations: &Locations,
     shared: &[u32],
 ) -> Vec<CrossEvaluation> {
-    let locator = |s: &Subject| s.sessions.first().map(|s| Fitted::of(&s.analysis));
+    let locator = |s: &Subject| s.sessions.first().map(|s| FittedLocator::of(&s.analysis));
     let (Some(of_a), Some(of_b)) = (locator(a), locator(b)) else {
         return Vec::new();
     };
-    let row = |presses: &Subject, calibration: &Subject, settings: char, with: Option<&Fitted>| {
-        let (rmse_mm, located) = rmse(presses, locations, shared, with);
-        CrossEvaluation {
-            presses: presses.letter,
-            calibration: calibration.letter,
-            settings,
-            rmse_mm,
-            located,
-        }
-    };
+    let row =
+        |presses: &Subject, calibration: &Subject, settings: char, with: Option<&FittedLocator>| {
+            let (rmse_mm, located) = rmse(presses, locations, shared, with);
+            CrossEvaluation {
+                presses: presses.letter,
+                calibration: calibration.letter,
+                settings,
+                rmse_mm,
+                located,
+            }
+        };
     let mut rows = vec![
         row(a, a, a.letter, None),
         row(a, b, a.letter, Some(&of_b)),
@@ -62,7 +63,7 @@ fn rmse(
     subject: &Subject,
     locations: &Locations,
     shared: &[u32],
-    with: Option<&Fitted>,
+    with: Option<&FittedLocator>,
 ) -> (Option<f64>, [u32; 2]) {
     let (mut sum, mut located, mut all) = (0.0, 0u32, 0u32);
     for attempt in locations

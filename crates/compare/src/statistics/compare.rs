@@ -5,7 +5,7 @@ use super::error::{ComparisonError, Side};
 use super::inference::Inference;
 use super::influence::Measure;
 use super::measure::measure;
-use super::question::{Better, ComparisonTarget, Pairing, Settings};
+use super::question::{ComparisonTarget, ImprovementDirection, Pairing, Settings};
 use super::sample::{Data, Kind, Sample};
 use super::spread::RepeatEstimator;
 use super::{components, notes, presses_needed};
@@ -56,15 +56,16 @@ pub fn compare(
         interval: difference.interval(2.0 * settings.alpha),
         p: difference.p_above(-margin).max(difference.p_below(margin)),
     });
-    let p_difference = if question.better == Better::NearerZero && a.kind() == Kind::Mean {
-        p_of_distance(
-            &difference,
-            &Inference::difference(&of[0], &of[1], -1.0, settings),
-        )
-    } else {
-        2.0 * difference.p_above(0.0).min(difference.p_below(0.0))
-    }
-    .min(1.0);
+    let p_difference =
+        if question.better == ImprovementDirection::NearerZero && a.kind() == Kind::Mean {
+            p_of_distance(
+                &difference,
+                &Inference::difference(&of[0], &of[1], -1.0, settings),
+            )
+        } else {
+            2.0 * difference.p_above(0.0).min(difference.p_below(0.0))
+        }
+        .min(1.0);
     let values = [of[0].value, of[1].value];
     let verdict = verdict(values, p_difference, tost.map(|t| t.p), question, settings);
     let components = components::of(&of, settings.pairing);

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::question::{Better, Pairing};
+use super::question::{ImprovementDirection, Pairing};
 use super::{Kind, Side};
 
 /// A value with its 1 - alpha interval.
@@ -153,11 +153,11 @@ pub struct Comparison {
 }
 
 /// [`Verdict::Better`] or [`Verdict::Worse`] by the values alone.
-pub(super) fn direction(a: f64, b: f64, better: Better) -> Verdict {
+pub(super) fn direction(a: f64, b: f64, better: ImprovementDirection) -> Verdict {
     let gain = match better {
-        Better::Lower => a - b,
-        Better::Higher => b - a,
-        Better::NearerZero => a.abs() - b.abs(),
+        ImprovementDirection::Lower => a - b,
+        ImprovementDirection::Higher => b - a,
+        ImprovementDirection::NearerZero => a.abs() - b.abs(),
     };
     if gain > 0.0 {
         Verdict::Better

@@ -2,7 +2,7 @@
 
 use super::bootstrap;
 use super::comparison::Interval;
-use super::influence::{BOOTSTRAP_FROM, Measure, Ratio, Shape, correlation, error};
+use super::influence::{BOOTSTRAP_FROM, InferenceData, Measure, Ratio, correlation, error};
 use super::mover::{Limits, mover_limits};
 use super::question::{Pairing, Settings};
 use skinrig_analysis::distributions::{student_cdf, student_quantile};
@@ -78,7 +78,7 @@ impl Inference {
                     (b.value, Limits::of(b, Some(a))),
                 ];
                 let least = match a.shape {
-                    Shape::Share(_) | Shape::Counts(..) => error,
+                    InferenceData::Share(_) | InferenceData::Counts(..) => error,
                     _ => 0.0,
                 };
                 IntervalMethod::Limits {

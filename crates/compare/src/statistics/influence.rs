@@ -10,21 +10,21 @@ use super::percentile::Percentile;
 pub(super) const BOOTSTRAP_FROM: usize = 8;
 
 /// One number per press, grouped by location number, ascending.
-pub(super) type ByLocation = Vec<(u32, Vec<f64>)>;
+pub(super) type ValuesByLocation = Vec<(u32, Vec<f64>)>;
 
 /// Value of a metric, influence of its presses, and data for inference.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Measure {
     pub value: f64,
     /// Influence of each press; the mean over all presses is 0.
-    pub by_location: ByLocation,
+    pub by_location: ValuesByLocation,
     /// Data for inference.
-    pub shape: Shape,
+    pub shape: InferenceData,
 }
 
 /// Data for inference besides influences.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Shape {
+pub(super) enum InferenceData {
     /// Function of a ratio of sums over locations.
     Ratio(Ratio),
     /// Share of this many trials.
@@ -37,7 +37,7 @@ pub(super) enum Shape {
     Width(Percentile, Percentile, f64),
 }
 
-impl Shape {
+impl InferenceData {
     /// Ratio for the bootstrap; `None` if too few locations contribute.
     pub(super) fn ratio(&self) -> Option<&Ratio> {
         match self {
@@ -60,12 +60,12 @@ pub(super) struct Ratio {
     /// (sum - ratio * weight, weight) of each location, in ascending order of location number.
     pub terms: Vec<(f64, f64)>,
     /// Mapping from ratio to metric.
-    pub scale: Scale,
+    pub scale: RatioTransform,
 }
 
 /// Mapping from a ratio to the metric.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Scale {
+pub(super) enum RatioTransform {
     /// Identity.
     Same,
     /// Square root.
@@ -74,7 +74,7 @@ pub(super) enum Scale {
     Circles(f64),
 }
 
-impl Scale {
+impl RatioTransform {
     /// Metric and its derivative with respect to the ratio; the derivative is 0 at the end of the range.
     pub(super) fn of(self, ratio: f64) -> (f64, f64) {
         match self {
@@ -127,7 +127,10 @@ pub(super) fn correlation(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Computes the ratio of sums from (value, weight) of each press; `None` without presses.
-pub(super) fn from_terms(locations: Vec<(u32, Vec<(f64, f64)>)>, scale: Scale) -> Option<Measure> {
+pub(super) fn from_terms(
+    locations: Vec<(u32, Vec<(f64, f64)>)>,
+    scale: RatioTransform,
+) -> Option<Measure> {
     let all = || locations.iter().flat_map(|(_, v)| v);
     let n = all().count();
     if n == 0 {
@@ -153,7 +156,7 @@ pub(super) fn from_terms(locations: Vec<(u32, Vec<(f64, f64)>)>, scale: Scale) -
     Some(Measure {
         value,
         by_location: locations.collect(),
-        shape: Shape::Ratio(Ratio {
+        shape: InferenceData::Ratio(Ratio {
             ratio,
             terms,
             scale,

@@ -1,7 +1,7 @@
 //! Computes the value of a metric and the influence of its presses from a sample.
 
 use super::error::{ComparisonError, Side};
-use super::influence::{Measure, Scale, Shape, from_terms};
+use super::influence::{InferenceData, Measure, RatioTransform, from_terms};
 use super::quantiles;
 use super::sample::{Clusters, Count, Data};
 use super::spread::{self, RepeatEstimator};
@@ -18,10 +18,12 @@ pub(super) fn measure(
 ) -> Result<Measure, ComparisonError> {
     let empty = ComparisonError::Empty { side };
     let found = match data {
-        Data::Mean(c) => ratio(c, &keep, Scale::Same, |v| (*v, 1.0)),
-        Data::Rms(c) => ratio(c, &keep, Scale::Root, |v| (v * v, 1.0)),
+        Data::Mean(c) => ratio(c, &keep, RatioTransform::Same, |v| (*v, 1.0)),
+        Data::Rms(c) => ratio(c, &keep, RatioTransform::Root, |v| (v * v, 1.0)),
         Data::Taxels(area_mm2, c) => {
-            let found = ratio(c, &keep, Scale::Circles(*area_mm2), |v| (v * v, 1.0));
+            let found = ratio(c, &keep, RatioTransform::Circles(*area_mm2), |v| {
+                (v * v, 1.0)
+            });
             if found.as_ref().is_some_and(|m| !m.value.is_finite()) {
                 return Err(ComparisonError::NoError { side });
             }
@@ -29,22 +31,26 @@ pub(super) fn measure(
         }
         Data::RepeatStd(c) => spread::repeat_std(c, estimator, &keep),
         Data::Share(c) => {
-            let share = ratio(c, &keep, Scale::Same, |v| (f64::from(u8::from(*v)), 1.0));
+            let share = ratio(c, &keep, RatioTransform::Same, |v| {
+                (f64::from(u8::from(*v)), 1.0)
+            });
             share.map(|m| Measure {
-                shape: Shape::Share(m.presses()),
+                shape: InferenceData::Share(m.presses()),
                 ..m
             })
         }
         Data::CountRate(c) => {
-            let rate = ratio(c, &keep, Scale::Same, |v| (f64::from(v.events), v.exposure));
-            let kept = || c.iter().filter(|(k, _)| keep(**k)).flat_map(|(_, v)| v);
-            let events = kept()
+            let rate = ratio(c, &keep, RatioTransform::Same, |v| {
+                (f64::from(v.events), v.exposure)
+            });
+            let retained = || c.iter().filter(|(k, _)| keep(**k)).flat_map(|(_, v)| v);
+            let events = retained()
                 .map(|v: &Count| v.events)
                 .fold(0, u32::saturating_add);
-            let exposure = kept().map(|v| v.exposure).sum();
+            let exposure = retained().map(|v| v.exposure).sum();
             rate.map(|m| Measure {
                 shape: match m.shape {
-                    Shape::Ratio(ratio) => Shape::Counts(events, exposure, ratio),
+                    InferenceData::Ratio(ratio) => InferenceData::Counts(events, exposure, ratio),
                     other => other,
                 },
                 ..m
@@ -59,10 +65,10 @@ pub(super) fn measure(
 fn ratio<T>(
     clusters: &Clusters<T>,
     keep: impl Fn(u32) -> bool,
-    scale: Scale,
+    scale: RatioTransform,
     term: impl Fn(&T) -> (f64, f64),
 ) -> Option<Measure> {
-    let kept = clusters.iter().filter(|(k, _)| keep(**k));
-    let locations = kept.map(|(k, v)| (*k, v.iter().map(&term).collect()));
+    let retained = clusters.iter().filter(|(k, _)| keep(**k));
+    let locations = retained.map(|(k, v)| (*k, v.iter().map(&term).collect()));
     from_terms(locations.collect(), scale)
 }

@@ -45,5 +45,5 @@ pub use comparison::{
 };
 pub use error::{ComparisonError, Side};
 pub use family::{AdjustedComparison, Pair, PairSelection, compare_all};
-pub use question::{Better, ComparisonTarget, Pairing, Settings};
+pub use question::{ComparisonTarget, ImprovementDirection, Pairing, Settings};
 pub use sample::{Count, Kind, Position, Sample, SampleFault};

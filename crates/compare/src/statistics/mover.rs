@@ -1,6 +1,6 @@
 //! Limits of a difference from the limits of its parts (MOVER).
 
-use super::influence::{Measure, Shape, error};
+use super::influence::{InferenceData, Measure, error};
 use super::percentile::Percentile;
 use super::scores;
 
@@ -23,15 +23,15 @@ impl Limits {
     pub(super) fn of(measure: &Measure, other: Option<&Measure>) -> Self {
         let error_of = |of: &Measure| error(&of.totals());
         match &measure.shape {
-            Shape::Ratio(_) => Self::Plain(measure.value, error_of(measure)),
-            Shape::Share(trials) => {
+            InferenceData::Ratio(_) => Self::Plain(measure.value, error_of(measure)),
+            InferenceData::Share(trials) => {
                 let (p, n) = (measure.value, f64::from(*trials));
                 let worth = scores::effective(p, n, error_of(measure), measure.locations());
                 Self::Share(p, worth)
             }
-            Shape::Counts(events, exposure, _) => {
+            InferenceData::Counts(events, exposure, _) => {
                 let effect = |of: &Measure| match of.shape {
-                    Shape::Counts(events, exposure, _) => {
+                    InferenceData::Counts(events, exposure, _) => {
                         scores::overdispersion(events, exposure, error_of(of))
                     }
                     _ => None,
@@ -39,8 +39,10 @@ impl Limits {
                 let effect = effect(measure).or_else(|| effect(other?)).unwrap_or(1.0);
                 Self::Rate(f64::from(*events) / effect, exposure / effect)
             }
-            Shape::Percentile(at) => Self::Percentile(at.clone()),
-            Shape::Width(low, high, together) => Self::Width(low.clone(), high.clone(), *together),
+            InferenceData::Percentile(at) => Self::Percentile(at.clone()),
+            InferenceData::Width(low, high, together) => {
+                Self::Width(low.clone(), high.clone(), *together)
+            }
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::comparison::Note;
 use super::error::Side;
-use super::influence::{BOOTSTRAP_FROM, Measure, Shape};
+use super::influence::{BOOTSTRAP_FROM, InferenceData, Measure};
 use super::sample::Data;
 use super::spread::RepeatEstimator;
 
@@ -19,17 +19,17 @@ pub(super) fn notes(data: [&Data; 2], of: &[Measure; 2]) -> Vec<Note> {
     }
     for (side, of) in [Side::A, Side::B].into_iter().zip(of) {
         match &of.shape {
-            Shape::Percentile(at) | Shape::Width(at, ..) if at.missed() > 0 => {
+            InferenceData::Percentile(at) | InferenceData::Width(at, ..) if at.missed() > 0 => {
                 notes.push(Note::Missed {
                     side,
                     missed: at.missed(),
                     trials: of.presses(),
                 });
             }
-            Shape::Share(_) if of.value <= 0.0 || of.value >= 1.0 => {
+            InferenceData::Share(_) if of.value <= 0.0 || of.value >= 1.0 => {
                 notes.push(Note::AtTheBorder { side });
             }
-            Shape::Counts(0, ..) => notes.push(Note::AtTheBorder { side }),
+            InferenceData::Counts(0, ..) => notes.push(Note::AtTheBorder { side }),
             _ => {}
         }
     }

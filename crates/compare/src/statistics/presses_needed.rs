@@ -2,7 +2,7 @@
 
 use super::comparison::{Components, PressesNeeded, RequiredDesign, Verdict, direction};
 use super::influence::Measure;
-use super::question::{Better, ComparisonTarget, Settings};
+use super::question::{ComparisonTarget, ImprovementDirection, Settings};
 use skinrig_analysis::distributions::student_quantile;
 
 /// Upper limit of the search for locations.
@@ -29,7 +29,7 @@ pub(super) fn presses_needed(
     let difference = of[1].value - of[0].value;
     // Values of opposite sign can be equally far from zero and still differ.
     let distance = match question.better {
-        Better::NearerZero => of[1].value.abs() - of[0].value.abs(),
+        ImprovementDirection::NearerZero => of[1].value.abs() - of[0].value.abs(),
         _ => difference,
     };
     let room = question.margin.map(|margin| margin - difference.abs());

@@ -5,7 +5,7 @@
 //! off the times.
 
 use super::error::{ComparisonError, Side};
-use super::influence::{ByLocation, Measure, Shape, correlation, error};
+use super::influence::{InferenceData, Measure, ValuesByLocation, correlation, error};
 use super::percentile::{Percentile, between};
 use super::sample::{Clusters, late};
 use super::scores;
@@ -34,7 +34,7 @@ pub(super) fn quantile(
     Ok(Measure {
         value: percentile.value,
         by_location: locations,
-        shape: Shape::Percentile(percentile),
+        shape: InferenceData::Percentile(percentile),
     })
 }
 
@@ -49,7 +49,7 @@ pub(super) fn width(
 ) -> Result<Measure, ComparisonError> {
     let (early, low) = percentile(clusters, &keep, 0.05, side)?;
     let (late, high) = percentile(clusters, &keep, 0.95, side)?;
-    let totals = |locations: &ByLocation| -> Vec<f64> {
+    let totals = |locations: &ValuesByLocation| -> Vec<f64> {
         locations.iter().map(|(_, u)| u.iter().sum()).collect()
     };
     let together = correlation(&totals(&early), &totals(&late));
@@ -60,7 +60,7 @@ pub(super) fn width(
         by_location: pairs
             .map(|((k, a), (_, b))| (*k, difference(a, b)))
             .collect(),
-        shape: Shape::Width(low, high, together),
+        shape: InferenceData::Width(low, high, together),
     })
 }
 
@@ -69,9 +69,9 @@ fn percentile(
     keep: impl Fn(u32) -> bool,
     q: f64,
     side: Side,
-) -> Result<(ByLocation, Percentile), ComparisonError> {
-    let kept = || clusters.iter().filter(|(k, _)| keep(**k));
-    let mut sorted: Vec<f64> = kept().flat_map(|(_, v)| v).map(|t| late(*t)).collect();
+) -> Result<(ValuesByLocation, Percentile), ComparisonError> {
+    let retained = || clusters.iter().filter(|(k, _)| keep(**k));
+    let mut sorted: Vec<f64> = retained().flat_map(|(_, v)| v).map(|t| late(*t)).collect();
     if sorted.is_empty() {
         return Err(ComparisonError::Empty { side });
     }
@@ -89,12 +89,13 @@ fn percentile(
     let n = sorted.len() as f64;
     let below = sorted.partition_point(|t| *t <= value) as f64 / n;
     let residual = |t: &Option<f64>| below - f64::from(u8::from(late(*t) <= value));
-    let shares: Vec<f64> = kept()
+    let shares: Vec<f64> = retained()
         .map(|(_, v)| v.iter().map(residual).sum::<f64>() / n)
         .collect();
     let effective = scores::effective(below, n, error(&shares), shares.len());
     let density = density(&sorted[..times], sorted.len(), q);
-    let locations = kept().map(|(k, v)| (*k, v.iter().map(|t| residual(t) / density).collect()));
+    let locations =
+        retained().map(|(k, v)| (*k, v.iter().map(|t| residual(t) / density).collect()));
     let locations = locations.collect();
     let percentile = Percentile {
         value,

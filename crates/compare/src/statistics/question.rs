@@ -7,7 +7,7 @@ use super::error::ComparisonError;
 /// Direction in which a metric improves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Better {
+pub enum ImprovementDirection {
     /// Lower is better: errors, latencies, false alarms, bytes.
     Lower,
     /// Higher is better: success rates, taxels, response.
@@ -20,7 +20,7 @@ pub enum Better {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ComparisonTarget {
     /// Direction in which the metric improves.
-    pub better: Better,
+    pub better: ImprovementDirection,
     /// Equivalence margin in the unit of the metric; `None`: never equivalent.
     pub margin: Option<f64>,
 }

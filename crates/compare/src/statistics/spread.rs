@@ -1,6 +1,6 @@
 //! Standard deviation between repetitions, averaged over series.
 
-use super::influence::{Measure, Scale, from_terms};
+use super::influence::{Measure, RatioTransform, from_terms};
 use super::sample::{Clusters, Data, Position};
 
 /// Estimator of the standard deviation of a series.
@@ -35,14 +35,14 @@ impl RepeatEstimator {
 
 /// Sample standard deviation of positions about their mean (Euclidean), mm.
 fn of_all(series: &[Position], without: Option<usize>) -> f64 {
-    let kept = || {
+    let retained = || {
         let all = series.iter().enumerate();
         all.filter(|(i, _)| Some(*i) != without).map(|(_, p)| p)
     };
-    let n = kept().count() as f64;
-    let mean = |f: fn(&Position) -> f64| kept().map(f).sum::<f64>() / n;
+    let n = retained().count() as f64;
+    let mean = |f: fn(&Position) -> f64| retained().map(f).sum::<f64>() / n;
     let (x, y) = (mean(|p| p.x_mm), mean(|p| p.y_mm));
-    let squares = kept().map(|p| (p.x_mm - x).powi(2) + (p.y_mm - y).powi(2));
+    let squares = retained().map(|p| (p.x_mm - x).powi(2) + (p.y_mm - y).powi(2));
     (squares.sum::<f64>() / (n - 1.0)).sqrt()
 }
 
@@ -83,7 +83,7 @@ pub(super) fn repeat_std(
         RepeatEstimator::All => of_all,
         RepeatEstimator::Pairs => of_pairs,
     };
-    let kept = clusters.iter().filter(|(k, _)| keep(**k));
+    let retained = clusters.iter().filter(|(k, _)| keep(**k));
     let terms = |positions: &[Position]| {
         let series = positions.chunk_by(|a, b| a.series == b.series);
         let one = |series: &[Position]| {
@@ -93,6 +93,6 @@ pub(super) fn repeat_std(
         };
         series.flat_map(one).collect()
     };
-    let positions = kept.map(|(k, v)| (*k, terms(v)));
-    from_terms(positions.collect(), Scale::Same)
+    let positions = retained.map(|(k, v)| (*k, terms(v)));
+    from_terms(positions.collect(), RatioTransform::Same)
 }

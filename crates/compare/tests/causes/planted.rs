@@ -7,7 +7,7 @@ use skinrig_model::{
     AnalysisSettings, CalibrationModel, CameraId, CdEvent, HostTime, MarkKind, Point2, Point3,
     PressRole, PressTiming, RigGeometry, SimLevel, Skin, StereoGeometry,
 };
-use skinrig_planted::{Memory, Touch, mark, press};
+use skinrig_planted::{Memory, PlantedPress, mark, press};
 use skinrig_sim::SimConfig;
 use skinrig_sim::geometric::GeometricModel;
 use skinrig_sim::scene::{GRID_NS, PixelModel, TipSample};
@@ -191,12 +191,12 @@ fn add(input: &mut SessionInput, number: u32, at: Point2, measured: Point2) {
         release: t(300),
         clear: t(350),
     };
-    let touch = Touch {
+    let touch = PlantedPress {
         depth_mm: DEPTH_MM,
         timing,
         measured_at: measured,
         measured_depth_mm: Some(DEPTH_MM),
-        ..Touch::new(role, repetition, location, at)
+        ..PlantedPress::new(role, repetition, location, at)
     };
     let id = press(input, touch);
     for (kind, t) in [

@@ -1,14 +1,14 @@
 //! Tests comparisons of several prototypes at once.
 
 use skinrig_compare::statistics::{
-    Better, ComparisonError, ComparisonTarget, Pair, PairSelection, Sample, Settings, Verdict,
-    compare_all,
+    ComparisonError, ComparisonTarget, ImprovementDirection, Pair, PairSelection, Sample, Settings,
+    Verdict, compare_all,
 };
 
 use crate::populations::Draws;
 
 const QUESTION: ComparisonTarget = ComparisonTarget {
-    better: Better::Lower,
+    better: ImprovementDirection::Lower,
     margin: None,
 };
 

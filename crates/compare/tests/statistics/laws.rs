@@ -3,8 +3,8 @@
 
 use proptest::prelude::*;
 use skinrig_compare::statistics::{
-    Better, Comparison, ComparisonTarget, Interval, Kind, Pairing, Position, Sample, Settings,
-    Verdict, compare, estimate,
+    Comparison, ComparisonTarget, ImprovementDirection, Interval, Kind, Pairing, Position, Sample,
+    Settings, Verdict, compare, estimate,
 };
 
 use crate::populations::{Draws, SimulatedPair};
@@ -119,7 +119,7 @@ proptest! {
         let by = turn % a.len();
         turned.rotate_left(by);
         turned.reverse();
-        let question = ComparisonTarget { better: Better::Lower, margin: Some(0.5) };
+        let question = ComparisonTarget { better: ImprovementDirection::Lower, margin: Some(0.5) };
         let of = |a: &[(u32, f64)]| {
             let [a, b] = [a, &b[..]].map(|v| Sample::rms(v.iter().copied()).unwrap());
             compare(&a, &b, &question, &settings(Pairing::SharedLocations)).unwrap()
@@ -142,7 +142,7 @@ proptest! {
         for make in make {
             let of = |unit: f64| {
                 let scaled = |v: &[(u32, f64)]| make(v.iter().map(|(k, x)| (*k, unit * x)).collect());
-                let question = ComparisonTarget { better: Better::Lower, margin: Some(0.5 * unit) };
+                let question = ComparisonTarget { better: ImprovementDirection::Lower, margin: Some(0.5 * unit) };
                 let settings = settings(Pairing::SharedLocations);
                 compare(&scaled(&a), &scaled(&b), &question, &settings).unwrap()
             };
@@ -162,7 +162,7 @@ proptest! {
 #[test]
 fn a_clear_difference_is_found_and_equal_skins_are_equivalent() {
     let question = ComparisonTarget {
-        better: Better::Lower,
+        better: ImprovementDirection::Lower,
         margin: Some(0.5),
     };
     let verdict = |shift: f64| {

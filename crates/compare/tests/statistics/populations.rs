@@ -1,7 +1,7 @@
 //! Simulates skins: locations with their own errors, repetitions with noise, and known true values.
 
 use skinrig_analysis::seeded;
-use skinrig_compare::statistics::{Better, Count, Kind, Position, Sample};
+use skinrig_compare::statistics::{Count, ImprovementDirection, Kind, Position, Sample};
 
 /// Seeded random numbers.
 pub(crate) struct Draws(Box<dyn FnMut() -> f64>);
@@ -92,11 +92,11 @@ impl SimulatedPair {
         Self { shift, ..self }
     }
 
-    pub(crate) fn better(&self) -> Better {
+    pub(crate) fn better(&self) -> ImprovementDirection {
         match self.kind {
-            Kind::Share | Kind::Taxels => Better::Higher,
-            Kind::Mean => Better::NearerZero,
-            _ => Better::Lower,
+            Kind::Share | Kind::Taxels => ImprovementDirection::Higher,
+            Kind::Mean => ImprovementDirection::NearerZero,
+            _ => ImprovementDirection::Lower,
         }
     }
 

@@ -2,8 +2,8 @@
 
 use skinrig_compare::statistics::power::{Target, measure, plan};
 use skinrig_compare::statistics::{
-    Better, ComparisonError, ComparisonTarget, Kind, PressesNeeded, Sample, Settings, Verdict,
-    compare,
+    ComparisonError, ComparisonTarget, ImprovementDirection, Kind, PressesNeeded, Sample, Settings,
+    Verdict, compare,
 };
 
 use crate::levels::Trial;
@@ -130,7 +130,7 @@ fn a_required_design_decides() {
     let settings = Settings::default();
     for (shift, margin) in [(0.5, None), (-0.3, Some(1.0))] {
         let question = ComparisonTarget {
-            better: Better::Lower,
+            better: ImprovementDirection::Lower,
             margin,
         };
         let ask = |n: u32| {
@@ -162,7 +162,7 @@ fn values_that_do_not_vary_promise_no_verdict() {
         Sample::share(presses)
     };
     let question = ComparisonTarget {
-        better: Better::Higher,
+        better: ImprovementDirection::Higher,
         margin: Some(0.01),
     };
     let found = compare(&side(), &side(), &question, &Settings::default()).unwrap();

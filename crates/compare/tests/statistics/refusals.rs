@@ -2,12 +2,12 @@
 //! is NaN.
 
 use skinrig_compare::statistics::{
-    Better, ComparisonError, ComparisonTarget, Count, Note, Pairing, Position, Sample, SampleFault,
-    Settings, compare, estimate,
+    ComparisonError, ComparisonTarget, Count, ImprovementDirection, Note, Pairing, Position,
+    Sample, SampleFault, Settings, compare, estimate,
 };
 
 const LOWER: ComparisonTarget = ComparisonTarget {
-    better: Better::Lower,
+    better: ImprovementDirection::Lower,
     margin: Some(0.5),
 };
 
@@ -93,7 +93,7 @@ fn without_spread_there_is_no_interval() {
 fn a_share_of_0_or_1_still_has_an_interval() {
     let all = |success: bool| Sample::share((0..20).map(|i| (i / 2, success)));
     let question = ComparisonTarget {
-        better: Better::Higher,
+        better: ImprovementDirection::Higher,
         margin: None,
     };
     let found = compare(&all(true), &all(true), &question, &Settings::default()).unwrap();

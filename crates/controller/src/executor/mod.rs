@@ -21,7 +21,7 @@ use skinrig_model::{
 };
 use skinrig_protocol::plan::Plan;
 
-use crate::camera_streams::{CameraStreams, Collect};
+use crate::camera_streams::{CameraStreams, ReadMode};
 use crate::error::Halt;
 use crate::guard::GuardedIndenter;
 use crate::journal::Journal;
@@ -137,7 +137,7 @@ impl<'a> Executor<'a> {
     /// Polls every device without waiting.
     fn observe(&mut self) -> Result<(), RunFault> {
         let poses = self.observe_poses();
-        let cameras = self.collect(Collect::Poll);
+        let cameras = self.collect(ReadMode::Poll);
         let line = self.observe_box();
         if self.journal.is_ending() {
             for e in [cameras, line].into_iter().filter_map(Result::err) {
@@ -179,7 +179,7 @@ impl<'a> Executor<'a> {
 
     /// Emits the data of both cameras, including those before a failure. A camera that needs longer for a flush delivers
     /// the rest later: see [`CameraStreams::is_flushed_to`].
-    fn collect(&mut self, how: Collect) -> Result<(), RunFault> {
+    fn collect(&mut self, how: ReadMode) -> Result<(), RunFault> {
         let mut answer = Ok(());
         for camera in CameraId::ALL {
             let now = self.clock.now();

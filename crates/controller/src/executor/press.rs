@@ -6,7 +6,7 @@ use skinrig_protocol::plan::PressStep;
 
 use super::Executor;
 use super::search::Probe;
-use crate::camera_streams::Collect;
+use crate::camera_streams::ReadMode;
 use crate::error::Halt;
 use crate::journal::was_rejected;
 use crate::open_press::OpenPress;
@@ -199,7 +199,7 @@ impl Executor<'_> {
 
     /// Emits all bytes and poses so far, then the outcome. Returns whether to repeat the press.
     pub(super) fn close_press(&mut self, fault: Option<PressFault>) -> Result<bool, RunFault> {
-        let flushed = self.observe().and(self.collect(Collect::Flush));
+        let flushed = self.observe().and(self.collect(ReadMode::Flush));
         if self.journal.is_ending() {
             if let Err(e) = flushed {
                 self.journal.problem("", e);

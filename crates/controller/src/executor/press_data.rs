@@ -3,7 +3,7 @@
 use skinrig_model::{CameraId, HostTime, PressFault};
 
 use super::Executor;
-use crate::camera_streams::Collect;
+use crate::camera_streams::ReadMode;
 use crate::error::Halt;
 use crate::open_press::OpenPress;
 
@@ -16,13 +16,13 @@ impl Executor<'_> {
         }
         let end = self.end_of_press();
         let within = self.settings.data_within;
-        self.collect(Collect::Flush)?;
+        self.collect(ReadMode::Flush)?;
         // A camera that never completes a flush is a fault.
         while !self.cameras.is_flushed_to(end)
             || self.cameras.is_behind(end) && self.now() < end + within
         {
             self.tick(None)?;
-            self.collect(Collect::Flush)?;
+            self.collect(ReadMode::Flush)?;
         }
         let Some(press) = self.trackers.press_mut() else {
             return Ok(());

@@ -13,7 +13,7 @@ impl Executor<'_> {
     /// Handles the operator's requests.
     pub(super) fn handle_requests(&mut self) -> Result<(), Halt> {
         self.write_notes()?;
-        let asked = self.machine.requests_made();
+        let requests = self.machine.requests_made();
         for request in self.machine.take_requests() {
             let before = self.machine.state();
             let (event, kind, reason) = match request {
@@ -41,7 +41,7 @@ impl Executor<'_> {
                     .emit(Record::Interruption { kind, t, reason })?;
             }
         }
-        self.machine.acknowledge(asked);
+        self.machine.acknowledge(requests);
         if self.machine.take_interruption() {
             return Err(Halt::PausedNow);
         }

@@ -5,7 +5,7 @@ use skinrig_model::pulse::LOOPBACK;
 use skinrig_model::{CameraId, HostDuration, PreflightCheck, Record, RunFault};
 
 use super::Executor;
-use crate::camera_streams::Collect;
+use crate::camera_streams::ReadMode;
 use crate::checks::Preflight;
 use crate::error::Halt;
 use crate::stream_probe::StreamProbe;
@@ -36,13 +36,13 @@ impl Executor<'_> {
         if !self.trigger.is_connected() {
             return Ok(());
         }
-        let seen = |probe: &StreamProbe| probe.all_saw_mark(&loopback);
+        let has_mark = |probe: &StreamProbe| probe.all_saw_mark(&loopback);
         let mut attempts = 0;
-        while attempts < ATTEMPTS && !self.preflight.streams_fulfil(seen) {
+        while attempts < ATTEMPTS && !self.preflight.streams_fulfil(has_mark) {
             attempts += 1;
             self.send_loopback()?;
             let share = HostDuration(loopback.within.0 / i64::from(ATTEMPTS));
-            self.probe_until(share, seen)?;
+            self.probe_until(share, has_mark)?;
         }
         self.preflight.check_streams(|probe| {
             CameraId::ALL.map(|c| probe.loopback_check(c, &loopback, attempts))
@@ -73,7 +73,7 @@ impl Executor<'_> {
         while !self.preflight.streams_fulfil(&done) && self.now() < until {
             self.tick(Some(until))?;
             // A chunk may take long to fill.
-            self.collect(Collect::Flush)?;
+            self.collect(ReadMode::Flush)?;
         }
         Ok(())
     }

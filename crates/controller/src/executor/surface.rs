@@ -49,12 +49,12 @@ impl Executor<'_> {
 
     /// After a repetition, if the protocol requires it: checks the surface, then returns to the previous location.
     pub(super) fn check_surface_after(&mut self, step: usize) -> Result<(), Halt> {
-        let wanted = self
+        let due = self
             .plan
             .surface_check
             .as_ref()
             .is_some_and(|c| c.each_repetition);
-        let (true, Some(repetition)) = (wanted, self.repetition_ends(step)) else {
+        let (true, Some(repetition)) = (due, self.repetition_ends(step)) else {
             return Ok(());
         };
         let Some(from) = self.indenter.position() else {

@@ -4,10 +4,10 @@ use skinrig_device::DeviceError;
 use skinrig_model::{
     CameraId, HostTime, InterruptionKind, InterruptionReason as Reason, Record, RunFault,
 };
-use skinrig_protocol::UnderWay;
+use skinrig_protocol::PressHandling;
 
 use super::Executor;
-use crate::camera_streams::Collect;
+use crate::camera_streams::ReadMode;
 use crate::error::Halt;
 use crate::states::{Event, State};
 use crate::suspend::{SuspensionEnd, WindowMeasurements};
@@ -28,7 +28,7 @@ impl Executor<'_> {
         };
         // A chunk may take long to fill, and its data belong to this window. If it is not yet complete, the next turn tries again.
         if !self.cameras.is_flushed_to(window_end) {
-            self.collect(Collect::Flush)?;
+            self.collect(ReadMode::Flush)?;
         }
         if !self.cameras.is_flushed_to(window_end) {
             return Ok(());
@@ -43,8 +43,8 @@ impl Executor<'_> {
             && let Some(suspension) = self.suspender.take_pending()
         {
             let (event, kind) = match self.suspender.press_under_way() {
-                UnderWay::Finish => (Event::Pause, InterruptionKind::Pause),
-                UnderWay::BreakOff => (Event::PauseNow, InterruptionKind::PauseNow),
+                PressHandling::Finish => (Event::Pause, InterruptionKind::Pause),
+                PressHandling::BreakOff => (Event::PauseNow, InterruptionKind::PauseNow),
             };
             self.interrupt(event, kind, now, Reason::Suspended(suspension))?;
             self.suspender.hold(now, suspension);

@@ -25,7 +25,7 @@ impl Jog<'_> {
         self.command(target, speed_mm_s)
     }
 
-    /// Appends every sample of this duration to `seen`, including those before a fault; stops early when `enough` returns true for
+    /// Appends every sample of this duration to `samples`, including those before a fault; stops early when `enough` returns true for
     /// a sample. Monitors force and pose stream.
     ///
     /// # Errors
@@ -33,13 +33,13 @@ impl Jog<'_> {
     pub fn watch(
         &mut self,
         span: HostDuration,
-        seen: &mut Vec<PoseSample>,
+        samples: &mut Vec<PoseSample>,
         mut enough: impl FnMut(&PoseSample) -> bool,
     ) -> Result<(), RunFault> {
         let until = self.clock.now() + span;
         while self.clock.now() < until {
             let looked = self.tick();
-            seen.extend_from_slice(&self.fresh);
+            samples.extend_from_slice(&self.fresh);
             looked?;
             if self.fresh.iter().any(&mut enough) {
                 break;

@@ -76,7 +76,7 @@ impl RunResult {
             });
             assert_eq!(ends.count(), 1, "{case}: press {press} ends once");
         }
-        let position = |wanted: &dyn Fn(&Record) -> bool| self.records.iter().position(wanted);
+        let position = |matches: &dyn Fn(&Record) -> bool| self.records.iter().position(matches);
         for press in 0..n {
             let outcome =
                 position(&|r| matches!(r, Record::Outcome(o) if o.attempt.press.index() == press));
@@ -153,12 +153,12 @@ fn a_good_run() {
     let limits = w.limits.as_ref().map(|l| (l.min_mm, l.max_mm));
     // Skin x -40..60, y -50..55, z -3..40, each 0.05 wider, rotated by 90 degrees and shifted.
     let (min, max) = limits.unwrap_or_default();
-    for (found, wanted) in min
+    for (found, expected) in min
         .iter()
         .chain(&max)
         .zip([-50.05, -43.05, 8.95, 55.05, 57.05, 52.05])
     {
-        assert!((found - wanted).abs() < 1e-9, "{min:?} {max:?}");
+        assert!((found - expected).abs() < 1e-9, "{min:?} {max:?}");
     }
     for (o, planned) in result.outcomes().iter().zip(plan().presses) {
         let t = o.timing.as_ref().map(|t| {

@@ -12,7 +12,7 @@ use skinrig_device::{
     Clock, DeviceError, Indenter, IndenterCapabilities, MotionLimits, RobotSample,
 };
 use skinrig_model::{DeviceIdentity, DeviceRole, HostTime, Point3, Robot, Setting};
-use skinrig_protocol::plan::{OnTrip, RunLimits};
+use skinrig_protocol::plan::{RunLimits, TripReaction};
 
 use crate::mock::{LIMITS, MS, robot_from_skin};
 
@@ -84,7 +84,7 @@ struct RobotModel {
     /// A delivered or stale sample forbids all motion but a rise; or, if blind, all motion.
     tripped: bool,
     blind: bool,
-    on_trip: OnTrip,
+    on_trip: TripReaction,
     /// Commands since the last poll.
     received: Vec<&'static str>,
     commands: u32,
@@ -276,7 +276,7 @@ impl Clock for ModelClock {
 }
 
 /// Runs one case. Returns the number of motions that reached the robot, to detect a guard that rejects all.
-fn play(acts: &[Act], on_trip: OnTrip) -> Result<u32, TestCaseError> {
+fn play(acts: &[Act], on_trip: TripReaction) -> Result<u32, TestCaseError> {
     let limits = RunLimits { on_trip, ..LIMITS };
     let model: Shared = Arc::new(Mutex::new(RobotModel {
         tip: [0.0, 0.0, 10.0],
@@ -397,7 +397,7 @@ fn step(
             act,
             answer
         );
-        let brake = b.on_trip == OnTrip::Brake;
+        let brake = b.on_trip == TripReaction::Brake;
         prop_assert!(
             !brake || b.received.contains(&"disarm"),
             "{:?}: {:?}",
@@ -424,9 +424,9 @@ fn cases(count: u32) {
     let mut runner = proptest::test_runner::TestRunner::new(config);
     let answer = runner.run(&acts, |(acts, brake)| {
         let on_trip = if brake {
-            OnTrip::Brake
+            TripReaction::Brake
         } else {
-            OnTrip::Retract
+            TripReaction::Retract
         };
         moved.set(moved.get() + u64::from(play(&acts, on_trip)?));
         Ok(())

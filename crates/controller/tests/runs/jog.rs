@@ -4,7 +4,7 @@ use skinrig_controller::{ControlHandle, ControllerSettings, Floor, GuardError, J
 use skinrig_device::MotionLimits;
 use skinrig_model::{HostDuration, Point3, SimLevel, Skin};
 use skinrig_protocol::TouchSearch;
-use skinrig_protocol::plan::{OnTrip, RunLimits};
+use skinrig_protocol::plan::{RunLimits, TripReaction};
 use skinrig_sim::config::SimConfig;
 use skinrig_sim::rig::simulated_rig;
 
@@ -25,7 +25,7 @@ fn jog(max_depth_mm: Option<f64>, control: &ControlHandle) -> Jog<'static> {
         position_tolerance_mm: 0.1,
         settle_time: HostDuration::from_millis(50),
         max_acceleration_mm_s2: None,
-        on_trip: OnTrip::Retract,
+        on_trip: TripReaction::Retract,
     };
     let robot = MotionLimits {
         min_mm,
@@ -54,8 +54,8 @@ fn jog(max_depth_mm: Option<f64>, control: &ControlHandle) -> Jog<'static> {
 }
 
 fn down_to(jog: &mut Jog<'_>, z_mm: f64) -> Result<f64, RunFault> {
-    let here = jog.look()?.commanded;
-    jog.go(here.plane().at_height(z_mm), 10.0, &NEVER_STOP)?;
+    let position = jog.look()?.commanded;
+    jog.go(position.plane().at_height(z_mm), 10.0, &NEVER_STOP)?;
     Ok(jog.look()?.measured.z_mm)
 }
 
@@ -91,8 +91,8 @@ fn a_halt_leaves_the_tip_in_place() {
     let mut moved = jog(Some(5.0), &control);
     down_to(&mut moved, -12.0).unwrap();
     // During the downward motion the motors switch off: no retraction.
-    let here = moved.look().unwrap().commanded;
-    let target: Point3<Skin> = here.plane().at_height(-17.0);
+    let position = moved.look().unwrap().commanded;
+    let target: Point3<Skin> = position.plane().at_height(-17.0);
     let halting = || {
         control.halt();
         false

@@ -2,13 +2,13 @@
 
 use skinrig_controller::{ControllerSettings, RunFault, WatchLimits, Watchdog, WatchdogTrip};
 use skinrig_model::{HostTime, Point3, PoseSample, RunEnd};
-use skinrig_protocol::plan::OnTrip;
+use skinrig_protocol::plan::TripReaction;
 
 use crate::course::{RunResult, faults, run_plan};
 use crate::mock::*;
 
 /// A run that starts with this tip position, on a robot that sinks this far when its brakes open.
-fn from(start: [f64; 3], sinks_mm: f64, on_trip: OnTrip) -> RunResult {
+fn from(start: [f64; 3], sinks_mm: f64, on_trip: TripReaction) -> RunResult {
     let mut plan = plan();
     plan.limits.on_trip = on_trip;
     let faults = Faults {
@@ -32,7 +32,7 @@ fn a_braked_arm_in_contact_rises_before_anything_else() {
         [-40.03, -50.02, -1.0],
     ];
     for start in starts {
-        for on_trip in [OnTrip::Retract, OnTrip::Brake] {
+        for on_trip in [TripReaction::Retract, TripReaction::Brake] {
             let result = from(start, 0.03, on_trip);
             let case = format!("{start:?} {on_trip:?}: {:?}", result.report.end);
             assert_eq!(result.report.end, RunEnd::Completed, "{case}");
@@ -51,7 +51,7 @@ fn a_braked_arm_in_contact_rises_before_anything_else() {
 #[test]
 fn a_tip_that_sinks_below_its_start_trips() {
     for start_mm in [-3.04, -3.4] {
-        let result = from([10.0, 2.0, start_mm], 0.08, OnTrip::Retract);
+        let result = from([10.0, 2.0, start_mm], 0.08, TripReaction::Retract);
         let depth = |e: &RunFault| matches!(e, RunFault::Watchdog(WatchdogTrip::Depth { .. }));
         assert!(
             result.report.end.faults().iter().any(depth),

@@ -204,8 +204,8 @@ fn resume(plan: &Plan, rest: &Plan, histories: &[PressHistory], faults: Faults) 
 }
 
 fn rest_of(plan: &Plan, histories: &[PressHistory]) -> Plan {
-    let wanted = plan.wanted(histories);
-    plan.remaining(|id| wanted[id.index() as usize], Route::Straight)
+    let pending = plan.pending(histories);
+    plan.remaining(|id| pending[id.index() as usize], Route::Straight)
 }
 
 fn cut_off_in_the_second_press() -> [PressHistory; 3] {

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use skinrig_controller::suspend::{Hysteresis, Transition};
 use skinrig_controller::{RecordSink, Run, SinkFault};
 use skinrig_model::{HostDuration, HostTime, InterruptionKind, Record, RunEnd};
-use skinrig_protocol::{Suspend, Threshold, UnderWay};
+use skinrig_protocol::{PressHandling, Suspend, Threshold};
 
 use crate::course::{START, faults, run_plan};
 use crate::mock::*;
@@ -103,7 +103,7 @@ impl RecordSink for Disk {
 /// A run whose disk is full for some time: records of interruptions, its end, and the number of valid presses.
 fn run(
     low_ms: std::ops::Range<i64>,
-    press: UnderWay,
+    press: PressHandling,
     operator: Option<(u64, OperatorAction)>,
 ) -> (Vec<(InterruptionKind, i64, String)>, RunEnd, usize) {
     let mut plan = plan();
@@ -141,7 +141,7 @@ fn run(
 
 #[test]
 fn a_full_disk_suspends_and_the_run_continues() {
-    let (rows, end, valid) = run(500..5_000, UnderWay::Finish, None);
+    let (rows, end, valid) = run(500..5_000, PressHandling::Finish, None);
     assert_eq!((end, valid), (RunEnd::Completed, 3), "{rows:?}");
     let [(pause, at, why), (resume, then, because)] = rows.as_slice() else {
         panic!("{rows:?}");
@@ -166,7 +166,7 @@ fn a_full_disk_suspends_and_the_run_continues() {
 
 #[test]
 fn a_disk_that_stays_full_ends_the_run() {
-    let (rows, end, valid) = run(500..i64::MAX, UnderWay::BreakOff, None);
+    let (rows, end, valid) = run(500..i64::MAX, PressHandling::BreakOff, None);
     let RunEnd::Faulted(causes) = end else {
         panic!("{end:?}");
     };
@@ -181,7 +181,7 @@ fn a_disk_that_stays_full_ends_the_run() {
 #[test]
 fn a_condition_that_began_during_a_pause_suspends_after_it() {
     let pause = Some((100, OperatorAction::Pause)); // at 0.5 s; resumes a second later
-    let (rows, end, valid) = run(600..8_000, UnderWay::Finish, pause);
+    let (rows, end, valid) = run(600..8_000, PressHandling::Finish, pause);
     assert_eq!((end, valid), (RunEnd::Completed, 3), "{rows:?}");
     let words: Vec<&str> = rows.iter().map(|(_, _, why)| why.as_str()).collect();
     assert_eq!(words[..2], ["operator: pause", "operator: resume"]);

@@ -241,8 +241,8 @@ fn a_further_leg_checks_the_surface_before_it_presses() {
             ..PressHistory::default()
         };
         let histories = vec![done, cut_off, PressHistory::default()];
-        let wanted = plan.wanted(&histories);
-        let rest = plan.remaining(|id| wanted[id.index() as usize], Route::Straight);
+        let pending = plan.pending(&histories);
+        let rest = plan.remaining(|id| pending[id.index() as usize], Route::Straight);
         let mut rig = simulated_rig(&SimConfig::new(5, SimLevel::Kinematic));
         rig.robot_from_skin.translation_mm[2] -= off_mm;
         let header = RunHeader {

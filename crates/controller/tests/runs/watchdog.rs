@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use skinrig_controller::{ControllerSettings, WatchLimits, Watchdog, WatchdogTrip};
 use skinrig_model::{HostTime, Point3, PoseSample, Record, RunEnd};
-use skinrig_protocol::plan::OnTrip;
+use skinrig_protocol::plan::TripReaction;
 
 use crate::course::{START, faults, run_plan};
 use crate::mock::*;
@@ -171,7 +171,7 @@ fn every_cause_ends_the_press_within_two_ticks() {
         ),
     ];
     for (strike, words) in causes {
-        for on_trip in [OnTrip::Retract, OnTrip::Brake] {
+        for on_trip in [TripReaction::Retract, TripReaction::Brake] {
             let case = format!("{strike:?}, {on_trip:?}");
             let mut plan = plan();
             plan.limits.on_trip = on_trip;
@@ -214,7 +214,7 @@ fn every_cause_ends_the_press_within_two_ticks() {
                 strike,
                 FeedbackFault::Nan | FeedbackFault::Twice | FeedbackFault::Silence
             );
-            let brakes = blind || on_trip == OnTrip::Brake;
+            let brakes = blind || on_trip == TripReaction::Brake;
             let first = w.robot_calls.iter().find(|(t, _)| *t >= broken_at);
             let expected = if brakes { "disarm" } else { "hold" };
             assert!(

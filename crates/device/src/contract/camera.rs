@@ -140,8 +140,8 @@ fn camera_pattern(
         .expect("camera: the rig's settings must be accepted");
     let pixels = camera.test_pattern(None);
     assert_eq!(pixels, Ok(None), "camera: no pattern is always possible");
-    let wanted = |rate_ev_s| Some(TestPattern { rate_ev_s });
-    let scan = match camera.test_pattern(wanted(200e3)) {
+    let pattern = |rate_ev_s| Some(TestPattern { rate_ev_s });
+    let scan = match camera.test_pattern(pattern(200e3)) {
         Ok(scan) => scan.expect("camera must report its test pattern"),
         Err(DeviceError::Refused { .. }) => return,
         Err(e) => panic!("camera: a pattern must be made or refused: {e}"),
@@ -152,7 +152,7 @@ fn camera_pattern(
     );
     for rate_ev_s in [0.0, -1.0, 1e12, f64::NAN] {
         expect_error!(
-            camera.test_pattern(wanted(rate_ev_s)),
+            camera.test_pattern(pattern(rate_ev_s)),
             DeviceError::Refused { .. },
             format!("camera: a pattern of {rate_ev_s} events/s must be refused")
         );

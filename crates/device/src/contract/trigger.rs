@@ -53,9 +53,9 @@ pub fn trigger_box(
         match answered(clock.as_mut(), || device.send(mark)) {
             Err(DeviceError::State { .. }) => {}
             // On a real clock the train may end before the request reaches the box.
-            Ok(again) if clock.now() >= sent.t + train + HostDuration(-sent.uncertainty_ns) => {
-                last = Some(again.t);
-                free = over_for_certain(again, train);
+            Ok(retry) if clock.now() >= sent.t + train + HostDuration(-sent.uncertainty_ns) => {
+                last = Some(retry.t);
+                free = over_for_certain(retry, train);
             }
             other => {
                 panic!("trigger box: a mark during a train must be a State error: found {other:?}")

@@ -164,11 +164,13 @@ impl<D: Send + 'static> Worker<D> {
     }
 
     /// Takes the reply if it is available; otherwise the call stays pending.
-    fn answer<T>(&mut self, asked: &mut Option<Call<T>>) -> Result<Option<T>, DeviceError> {
-        let Some(call) = asked else { return Ok(None) };
+    fn answer<T>(&mut self, call_slot: &mut Option<Call<T>>) -> Result<Option<T>, DeviceError> {
+        let Some(call) = call_slot else {
+            return Ok(None);
+        };
         match call.reply.try_recv() {
             Ok(answer) => {
-                *asked = None;
+                *call_slot = None;
                 self.silent = false;
                 Ok(Some(answer))
             }
@@ -196,9 +198,9 @@ impl<D: Send + 'static> Worker<D> {
             true => HostDuration::ZERO,
             false => self.timeouts.set_up,
         };
-        let mut asked = Some(self.request(doing, within, call)?);
+        let mut call_slot = Some(self.request(doing, within, call)?);
         loop {
-            if let Some(answer) = self.answer(&mut asked)? {
+            if let Some(answer) = self.answer(&mut call_slot)? {
                 return Ok(answer);
             }
             let next = self.clock.now() + LOOK;

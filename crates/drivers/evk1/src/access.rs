@@ -3,7 +3,7 @@
 use crate::error::{Evk1Error, UsbError};
 use crate::registers::{Field, Register};
 use crate::requests;
-use crate::tolerance::{Accept, Mismatches, Tolerance};
+use crate::tolerance::{Mismatches, Tolerance, ToleranceKey};
 use crate::usb::Transport;
 
 /// The registers of one camera. Borrows the transport, so that nothing interrupts a read-modify-write.
@@ -11,7 +11,7 @@ pub struct Registers<'a> {
     transport: &'a mut dyn Transport,
     exceptions: &'a [u32],
     tolerance: Tolerance,
-    seen: Mismatches,
+    mismatches: Mismatches,
 }
 
 impl<'a> Registers<'a> {
@@ -21,16 +21,16 @@ impl<'a> Registers<'a> {
             transport,
             exceptions,
             tolerance: Tolerance::default(),
-            seen: Mismatches::default(),
+            mismatches: Mismatches::default(),
         }
     }
 
-    /// Accepts mismatches allowed by `tolerance`; adds mismatches that are only tolerated to `seen`.
+    /// Accepts mismatches allowed by `tolerance`; adds mismatches that are only tolerated to `mismatches`.
     #[must_use]
-    pub(crate) fn tolerating(self, tolerance: &Tolerance, seen: &Mismatches) -> Self {
+    pub(crate) fn tolerating(self, tolerance: &Tolerance, mismatches: &Mismatches) -> Self {
         Self {
             tolerance: tolerance.clone(),
-            seen: seen.clone(),
+            mismatches: mismatches.clone(),
             ..self
         }
     }
@@ -52,8 +52,8 @@ impl<'a> Registers<'a> {
             return true;
         }
         if self.tolerance.everything {
-            self.seen.add(
-                Accept::ReadStatus(status),
+            self.mismatches.add(
+                ToleranceKey::ReadStatus(status),
                 format!("expected status 0x40 of register reads, found {status:#04x}"),
             );
         }
@@ -126,8 +126,8 @@ impl<'a> Registers<'a> {
         if !self.tolerance.everything {
             return Err(Evk1Error::read_back(register, word, found));
         }
-        self.seen.add(
-            Accept::ReadBack(register.address),
+        self.mismatches.add(
+            ToleranceKey::ReadBack(register.address),
             format!(
                 "expected {word:#010x} in {} after writing, found {found:#010x}",
                 register.name

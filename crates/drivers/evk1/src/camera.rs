@@ -19,10 +19,11 @@ use crate::config::Evk1Config;
 use crate::error::{Evk1Error, FirstError, UsbError};
 use crate::identify::{Identity, identify_tolerating, open_serial};
 use crate::inbox::{Inbox, QueuedData};
+use crate::overflow::{OVERFLOW_PERIOD, Overflow};
 use crate::registers::{CHIP_ID, OVERFLOW_HITCOUNT, TEMPERATURE};
 use crate::report::StreamReport;
-use crate::settings::Checked;
-use crate::tolerance::{Accept, Mismatch, Mismatches, Tolerance};
+use crate::settings::ValidatedSettings;
+use crate::tolerance::{Mismatch, Mismatches, Tolerance, ToleranceKey};
 use crate::triggers::{self, CHANNELS, TriggerOut};
 use crate::usb::Transport;
 use crate::{noise_filter, pattern, sequences, sync};
@@ -33,10 +34,10 @@ pub struct Evk1 {
     identity: Identity,
     config: Evk1Config,
     /// Tolerated mismatches.
-    seen: Mismatches,
+    mismatches: Mismatches,
     transport: Box<dyn Transport>,
     clock: Box<dyn Clock>,
-    settings: Option<Checked>,
+    settings: Option<ValidatedSettings>,
     /// Whether the pattern generator may be on.
     pattern: bool,
     stream: Option<Stream>,
@@ -56,23 +57,24 @@ const BY_PORT: &str = "usb-";
 fn registers_of<'a>(
     transport: &'a mut dyn Transport,
     config: &'a Evk1Config,
-    seen: &Mismatches,
+    mismatches: &Mismatches,
 ) -> Registers<'a> {
-    Registers::new(transport, &config.read_back_exceptions).tolerating(&config.tolerance, seen)
+    Registers::new(transport, &config.read_back_exceptions)
+        .tolerating(&config.tolerance, mismatches)
 }
 
 /// Resets the camera on the bus.
 fn reset(
     transport: &mut dyn Transport,
     tolerance: &Tolerance,
-    seen: &Mismatches,
+    mismatches: &Mismatches,
 ) -> Result<(), Evk1Error> {
     match transport.reset() {
         Ok(()) => Ok(()),
         Err(e) if tolerance.failed_reset && e != UsbError::Gone => Ok(()),
         Err(e) if tolerance.everything && e != UsbError::Gone => {
-            seen.add(
-                Accept::FailedReset,
+            mismatches.add(
+                ToleranceKey::FailedReset,
                 format!("expected a reset on the bus, found {e}"),
             );
             Ok(())
@@ -88,25 +90,6 @@ struct Stream {
     overflow_hits: u16,
     overflow: Overflow,
 }
-
-/// Last reading of the camera's overflow counter.
-#[derive(Debug, Clone, Copy)]
-struct Overflow {
-    hits: u16,
-    read_at: HostTime,
-    /// Latest camera time at that reading, µs.
-    good_us: Option<u64>,
-}
-
-impl Overflow {
-    /// Whether data may have been lost since, given the counter value `hits`. True for a saturated counter.
-    const fn lost(self, hits: u16) -> bool {
-        hits != self.hits || hits == u16::MAX
-    }
-}
-
-/// Interval at which the overflow counter is read while streaming. A flush, for example before a verdict, reads it immediately.
-const OVERFLOW_PERIOD: HostDuration = HostDuration::from_millis(1_000);
 
 impl Evk1 {
     /// Opens the camera with this serial number (8 hexadecimal digits) or at this port (`usb-BUS-PORT.PORT`) through libusb. Data are stamped
@@ -142,12 +125,16 @@ impl Evk1 {
         mut clock: Box<dyn Clock>,
     ) -> Result<Self, Evk1Error> {
         config.check()?;
-        let seen = Mismatches::default();
-        let identity =
-            identify_tolerating(transport.as_mut(), clock.as_mut(), &config.tolerance, &seen)?;
+        let mismatches = Mismatches::default();
+        let identity = identify_tolerating(
+            transport.as_mut(),
+            clock.as_mut(),
+            &config.tolerance,
+            &mismatches,
+        )?;
         // Data left by an earlier program would come first, with other times.
-        reset(transport.as_mut(), &config.tolerance, &seen)?;
-        let mut registers = registers_of(transport.as_mut(), &config, &seen);
+        reset(transport.as_mut(), &config.tolerance, &mismatches)?;
+        let mut registers = registers_of(transport.as_mut(), &config, &mismatches);
         // Its value is not meaningful yet, and the sensor may be unpowered.
         registers.read_unpowered(CHIP_ID)?;
         sequences::initialise(&mut registers, identity.fpga_version)?;
@@ -157,7 +144,7 @@ impl Evk1 {
             camera,
             identity,
             config,
-            seen,
+            mismatches,
             transport,
             clock,
             settings: None,
@@ -175,13 +162,13 @@ impl Evk1 {
     /// Mismatches tolerated so far, each with the key that accepts it.
     #[must_use]
     pub fn mismatches(&self) -> Vec<Mismatch> {
-        self.seen.all()
+        self.mismatches.all()
     }
 
     /// Shared list of mismatches, which grows while the camera runs.
     #[must_use]
     pub fn tolerated(&self) -> Mismatches {
-        self.seen.clone()
+        self.mismatches.clone()
     }
 
     /// Report of the current or last stream.
@@ -204,7 +191,7 @@ impl Evk1 {
     pub fn set_trigger_out(&mut self, pulses: Option<TriggerOut>) -> Result<(), Evk1Error> {
         if let Some(pulses) = pulses {
             pulses.check()?;
-            let mode = self.settings.as_ref().map(Checked::sync);
+            let mode = self.settings.as_ref().map(ValidatedSettings::sync);
             sync::check(mode.unwrap_or_default(), true)?;
         }
         if self.identity.fpga_version < sequences::TRIGGER_OUT_SINCE {
@@ -240,7 +227,7 @@ impl Evk1 {
         // The sensor must never stay powered, whichever step failed.
         let mut done = FirstError::default();
         done.after(back.map_err(|e| e.during("stopping the stream")));
-        let mut registers = registers_of(self.transport.as_mut(), &self.config, &self.seen);
+        let mut registers = registers_of(self.transport.as_mut(), &self.config, &self.mismatches);
         if streaming {
             done.after(sequences::stop(&mut registers));
         }
@@ -252,7 +239,7 @@ impl Evk1 {
     }
 
     fn registers(&mut self) -> Registers<'_> {
-        registers_of(self.transport.as_mut(), &self.config, &self.seen)
+        registers_of(self.transport.as_mut(), &self.config, &self.mismatches)
     }
 
     /// Converts to an error of the device trait, and remembers that the camera is disconnected.
@@ -320,13 +307,13 @@ impl Evk1 {
 
     fn try_configure(&mut self, settings: &CameraSettings) -> Result<Vec<Setting>, Evk1Error> {
         self.expect_stopped()?;
-        let checked = Checked::new(settings)?;
+        let checked = ValidatedSettings::new(settings)?;
         self.give_pixels_back()?;
         let mut registers = self.registers();
         checked.write(&mut registers)?;
         let mut read = checked.read_back(&mut registers)?;
         self.settings = Some(checked);
-        read.extend(self.seen.all().into_iter().map(|mismatch| Setting {
+        read.extend(self.mismatches.all().into_iter().map(|mismatch| Setting {
             name: format!("tolerated: {}", mismatch.key),
             requested: Setting::TOLERATED.to_owned(),
             read_back: mismatch.what,
@@ -344,14 +331,14 @@ impl Evk1 {
 
     fn try_pattern(
         &mut self,
-        wanted: Option<TestPattern>,
+        pattern: Option<TestPattern>,
     ) -> Result<Option<PatternScan>, Evk1Error> {
         self.expect_stopped()?;
-        let Some(wanted) = wanted else {
+        let Some(pattern) = pattern else {
             return self.give_pixels_back().map(|()| None);
         };
         self.pattern = true;
-        pattern::on(&mut self.registers(), wanted).map(Some)
+        pattern::on(&mut self.registers(), pattern).map(Some)
     }
 
     fn try_start(&mut self) -> Result<(), Evk1Error> {
@@ -361,7 +348,7 @@ impl Evk1 {
             None => (Vec::new(), SyncMode::default()),
         };
         let mut report = StreamReport::default();
-        let mut registers = registers_of(self.transport.as_mut(), &self.config, &self.seen);
+        let mut registers = registers_of(self.transport.as_mut(), &self.config, &self.mismatches);
         if std::mem::replace(&mut self.used, true) {
             report.left_over_bytes =
                 sequences::clear_left_over(&mut registers, self.clock.as_ref())?;
@@ -386,7 +373,7 @@ impl Evk1 {
             let end = clock.now() + HostDuration(span);
             clock.wait_until(end);
         };
-        let mut registers = registers_of(self.transport.as_mut(), &self.config, &self.seen);
+        let mut registers = registers_of(self.transport.as_mut(), &self.config, &self.mismatches);
         if let Err(error) = sequences::start(&mut registers, &mut wait) {
             self.undo_start();
             return Err(error);
@@ -414,7 +401,10 @@ impl Evk1 {
     /// Reverts a failed start: transfers, time base, and the noise filter, which would drop everything and pass for the configured
     /// setting at the next start. Ignores further errors, because the first one is more informative.
     fn undo_start(&mut self) {
-        let filter = self.settings.as_ref().and_then(Checked::noise_filter);
+        let filter = self
+            .settings
+            .as_ref()
+            .and_then(ValidatedSettings::noise_filter);
         let _ = self.transport.stop_stream();
         let mut registers = self.registers();
         let _ = sequences::stop(&mut registers);
@@ -506,10 +496,10 @@ impl Evk1 {
         let failed = self.report.failed_transfers;
         if failed > 0 && !self.config.tolerance.failed_transfers {
             let found = format!("expected transfers that succeed, found {failed} that failed");
-            self.seen.add(Accept::FailedTransfers, found);
+            self.mismatches.add(ToleranceKey::FailedTransfers, found);
         }
         self.notes.extend(self.report.notes());
-        let tolerated = self.seen.all().into_iter();
+        let tolerated = self.mismatches.all().into_iter();
         self.notes.extend(tolerated.map(|m| m.to_string()));
         received?;
         back.map_err(|e| e.during("stopping the stream"))?;

@@ -5,7 +5,7 @@ use skinrig_model::{CameraId, HostTime, RawChunk, StreamFormat};
 
 use crate::inbox::{Block, WORD};
 use crate::report::StreamReport;
-use crate::time_base::{Gate, Watch};
+use crate::time_base::{Gate, TimeBaseMonitor};
 
 /// Converts blocks to chunks. It lives as long as the camera, so that chunk numbers and unwrapped time continue through stop and start.
 #[derive(Debug)]
@@ -15,7 +15,7 @@ pub(crate) struct Chunker {
     scanner: Scanner,
     gate: Gate,
     after_loss: bool,
-    watch: Watch,
+    watch: TimeBaseMonitor,
     /// Whether this stream has no time yet.
     fresh: bool,
     /// The first time of this stream.
@@ -35,7 +35,7 @@ impl Chunker {
             scanner: Scanner::new(StreamFormat::Evt2),
             gate: Gate::AwaitTime,
             after_loss: false,
-            watch: Watch::default(),
+            watch: TimeBaseMonitor::default(),
             fresh: true,
             began_us: None,
             last_us: 0,

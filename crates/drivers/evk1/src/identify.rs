@@ -57,12 +57,12 @@ pub struct FoundDevice {
     /// Port as `usb-BUS-PORT.PORT`, which can replace an unreadable serial number.
     pub port: Option<String>,
     /// State of the device.
-    pub state: FoundState,
+    pub state: CameraState,
 }
 
 /// State of a device.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum FoundState {
+pub enum CameraState {
     /// A usable EVK1 Gen3.1.
     Ready(Identity),
     /// In use by another program; not queried.
@@ -80,13 +80,13 @@ impl FoundDevice {
     #[must_use]
     pub fn next_step(&self) -> Option<String> {
         match &self.state {
-            FoundState::Ready(_) | FoundState::NotEvk1(_) => None,
-            FoundState::Busy => Some(
+            CameraState::Ready(_) | CameraState::NotEvk1(_) => None,
+            CameraState::Busy => Some(
                 "end the program that uses the camera (another skinrig, a viewer), or reconnect it"
                     .to_owned(),
             ),
-            FoundState::NoPermission => Some(UDEV_STEP.to_owned()),
-            FoundState::Faulty(_) => Some(format!(
+            CameraState::NoPermission => Some(UDEV_STEP.to_owned()),
+            CameraState::Faulty(_) => Some(format!(
                 "unplug the camera, wait 5 s, reconnect it; a camera that always responds like this may be opened by `skinrig run --tolerant`{}",
                 self.port.as_ref().map_or_else(String::new, |port| format!(
                     ", with `serial: {port}` in the rig file if it does not report its serial number"
@@ -116,14 +116,14 @@ fn query_slot(
     let (state, camera) = match slot.open(clock) {
         Ok(Access::Open(mut usb)) => {
             // Mismatches tolerated here are reported when the camera is opened.
-            let seen = Mismatches::default();
-            match identify_tolerating(&mut usb, &mut clock.clone(), tolerance, &seen) {
-                Ok(identity) => (FoundState::Ready(identity), Some(usb)),
-                Err(e) => (FoundState::of(e), None),
+            let mismatches = Mismatches::default();
+            match identify_tolerating(&mut usb, &mut clock.clone(), tolerance, &mismatches) {
+                Ok(identity) => (CameraState::Ready(identity), Some(usb)),
+                Err(e) => (CameraState::of(e), None),
             }
         }
-        Ok(Access::Treuzell) => (FoundState::NotEvk1(TREUZELL.to_owned()), None),
-        Err(e) => (FoundState::of(e.during("opening")), None),
+        Ok(Access::Treuzell) => (CameraState::NotEvk1(TREUZELL.to_owned()), None),
+        Err(e) => (CameraState::of(e.during("opening")), None),
     };
     let found = FoundDevice {
         place: slot.place(),
@@ -136,7 +136,7 @@ fn query_slot(
 
 const TREUZELL: &str = "a Treuzell camera (EVK3, EVK4 or alike: interface subclass 0x19), which shares its USB IDs with the EVK1";
 
-impl FoundState {
+impl CameraState {
     fn of(error: Evk1Error) -> Self {
         match error {
             Evk1Error::Usb {
@@ -153,7 +153,7 @@ impl FoundState {
     }
 }
 
-impl fmt::Display for FoundState {
+impl fmt::Display for CameraState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Ready(id) => write!(f, "EVK1 Gen3.1, serial {}, {}", id.serial, id.firmware()),
@@ -189,7 +189,7 @@ pub(crate) fn open_serial(
         match query_slot(&slot, clock, tolerance) {
             (
                 FoundDevice {
-                    state: FoundState::Ready(identity),
+                    state: CameraState::Ready(identity),
                     ..
                 },
                 Some(camera),
@@ -217,8 +217,8 @@ pub fn identify(
     transport: &mut dyn Transport,
     clock: &mut dyn Clock,
 ) -> Result<Identity, Evk1Error> {
-    let seen = Mismatches::default();
-    identify_tolerating(transport, clock, &Tolerance::default(), &seen)
+    let mismatches = Mismatches::default();
+    identify_tolerating(transport, clock, &Tolerance::default(), &mismatches)
 }
 
 /// Like [`identify`], but accepts mismatches allowed by `tolerance`.
@@ -226,7 +226,7 @@ pub(crate) fn identify_tolerating(
     transport: &mut dyn Transport,
     clock: &mut dyn Clock,
     tolerance: &Tolerance,
-    seen: &Mismatches,
+    mismatches: &Mismatches,
 ) -> Result<Identity, Evk1Error> {
     let place = transport.place();
     let not_evk1 = |expected: &str, found: String| Evk1Error::NotEvk1 {
@@ -258,7 +258,7 @@ pub(crate) fn identify_tolerating(
         Err(e) => return Err(e),
     }
     await_fpga(transport, clock)?;
-    let mut registers = Registers::new(transport, &[]).tolerating(tolerance, seen);
+    let mut registers = Registers::new(transport, &[]).tolerating(tolerance, mismatches);
     registers.read_unpowered(ATIS_CONTROL)?; // The first read after power-up is unreliable.
     let serial = registers.read(SERIAL_MSB)?;
     let system = ask16(transport, requests::SYSTEM_ID, "reading the system ID")?;
@@ -284,7 +284,7 @@ pub(crate) fn identify_tolerating(
     )?;
     let [a, b, c, d, ..] = answer;
     let fx3_version = u32::from_le_bytes([a, b, c, d]);
-    let mut registers = Registers::new(transport, &[]).tolerating(tolerance, seen);
+    let mut registers = Registers::new(transport, &[]).tolerating(tolerance, mismatches);
     let fpga_version = registers.read(FPGA_VERSION)?;
     let identity = Identity {
         serial: format!("{serial:08x}"),

@@ -12,13 +12,13 @@ use crate::{noise_filter, sync, triggers};
 
 /// Validated settings.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Checked {
+pub(crate) struct ValidatedSettings {
     settings: CameraSettings,
     biases: Values,
     map: Map,
 }
 
-impl Checked {
+impl ValidatedSettings {
     /// Checks all of `settings`; nothing is written.
     ///
     /// # Errors

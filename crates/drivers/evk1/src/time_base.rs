@@ -81,11 +81,11 @@ impl TimeJump {
 
 /// Checks the time base, which must advance in steps of 0 or 1.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Watch {
+pub(crate) struct TimeBaseMonitor {
     last: Option<u32>,
 }
 
-impl Watch {
+impl TimeBaseMonitor {
     /// Resets the state: at a start, and after a loss.
     pub fn reset(&mut self) {
         self.last = None;
@@ -164,7 +164,7 @@ mod tests {
 
     #[test]
     fn jumps_differ_from_progress_and_wraps() {
-        let mut watch = Watch::default();
+        let mut watch = TimeBaseMonitor::default();
         let mut jumps = Vec::new();
         let mut stream = vec![high(RANGE - 1), high(RANGE - 1), high(0), high(1)];
         stream.extend([CD; 40]);

@@ -22,7 +22,7 @@ pub struct Tolerance {
 
 /// A camera key of the rig file that accepts a mismatch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Accept {
+pub enum ToleranceKey {
     /// Accepts register reads with this status byte.
     ReadStatus(u8),
     /// Accepts a failed reset on the bus.
@@ -33,7 +33,7 @@ pub enum Accept {
     ReadBack(u32),
 }
 
-impl fmt::Display for Accept {
+impl fmt::Display for ToleranceKey {
     /// Formats the key as in a rig file.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -49,7 +49,7 @@ impl fmt::Display for Accept {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mismatch {
     /// The key that accepts it.
-    pub key: Accept,
+    pub key: ToleranceKey,
     /// Expected and found values.
     pub what: String,
 }
@@ -75,7 +75,7 @@ impl Mismatches {
         self.lock().clone()
     }
 
-    pub(crate) fn add(&self, key: Accept, what: impl Into<String>) {
+    pub(crate) fn add(&self, key: ToleranceKey, what: impl Into<String>) {
         let what = what.into();
         let mut all = self.lock();
         if !all.iter().any(|m| m.key == key) {

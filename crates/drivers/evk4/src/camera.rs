@@ -25,12 +25,12 @@ pub struct Evt3Camera {
     settings: StreamSettings,
     stream: Option<Box<dyn Packets>>,
     scanner: Scanner,
-    filling: Filling,
+    filling: PartialChunk,
 }
 
 /// The current chunk.
 #[derive(Default)]
-struct Filling {
+struct PartialChunk {
     seq: u64,
     bytes: Vec<u8>,
     arrived: HostTime,
@@ -58,7 +58,7 @@ impl Evt3Camera {
             settings: StreamSettings::default(),
             stream: None,
             scanner: Scanner::with_geometry(StreamFormat::Evt3, model.geometry()),
-            filling: Filling::default(),
+            filling: PartialChunk::default(),
         }
     }
 

@@ -19,5 +19,5 @@ mod stream_settings;
 pub use camera::Evt3Camera;
 pub use link::{Link, LinkError, Packet, Packets};
 pub use model::Model;
-pub use neuromorphic::{FoundDevice, FoundState, Neuromorphic, enumerate};
+pub use neuromorphic::{CameraState, FoundDevice, Neuromorphic, enumerate};
 pub use stream_settings::{StreamSettings, TimeBase, UnsupportedSetting};

@@ -167,12 +167,12 @@ pub struct FoundDevice {
     /// Bus and address, as shown by `lsusb`.
     pub place: (u8, u8),
     /// State of the device.
-    pub state: FoundState,
+    pub state: CameraState,
 }
 
 /// State of a device.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum FoundState {
+pub enum CameraState {
     /// A usable camera with its serial number.
     Ready(Model, String),
     /// In use by another program; not queried.
@@ -200,9 +200,9 @@ pub fn enumerate(known: &[(u8, u8)]) -> Result<Vec<FoundDevice>, LinkError> {
         let ids = (descriptor.vendor_id(), descriptor.product_id());
         if !known.contains(&place) && Model::ALL.iter().any(|m| usb_ids(*m).contains(&ids)) {
             let state = query(&device, ids).unwrap_or_else(|e| match e {
-                rusb::Error::Busy => FoundState::Busy,
-                rusb::Error::Access => FoundState::NoPermission,
-                other => FoundState::Faulty(other.to_string()),
+                rusb::Error::Busy => CameraState::Busy,
+                rusb::Error::Access => CameraState::NoPermission,
+                other => CameraState::Faulty(other.to_string()),
             });
             found.push(FoundDevice { place, state });
         }
@@ -218,7 +218,7 @@ const fn usb_ids(model: Model) -> &'static [(u16, u16)] {
     }
 }
 
-fn query(device: &rusb::Device<rusb::Context>, ids: (u16, u16)) -> rusb::Result<FoundState> {
+fn query(device: &rusb::Device<rusb::Context>, ids: (u16, u16)) -> rusb::Result<CameraState> {
     let mut handle = device.open()?;
     for model in Model::ALL {
         if !usb_ids(model).contains(&ids) {
@@ -230,10 +230,10 @@ fn query(device: &rusb::Device<rusb::Context>, ids: (u16, u16)) -> rusb::Result<
             Model::SilkyVga => centuryarks_vga::Device::read_serial(&mut handle)?,
         };
         if let Some(serial) = serial {
-            return Ok(FoundState::Ready(model, serial));
+            return Ok(CameraState::Ready(model, serial));
         }
     }
-    Ok(FoundState::Other)
+    Ok(CameraState::Other)
 }
 
 #[cfg(test)]
@@ -269,11 +269,11 @@ mod tests {
         assert_eq!(slave.clock, prophesee_evk4::Clock::External);
     }
 
-    trait Said {
+    trait DebugReport {
         fn report(&self) -> (String, String);
     }
 
-    impl<T: std::fmt::Debug> Said for (T, T) {
+    impl<T: std::fmt::Debug> DebugReport for (T, T) {
         fn report(&self) -> (String, String) {
             (format!("{:?}", self.0), format!("{:?}", self.1))
         }

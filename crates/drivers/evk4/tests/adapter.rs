@@ -37,7 +37,7 @@ struct Script {
     ends: Option<i64>,
 }
 
-struct Running {
+struct ScriptRun {
     script: Script,
     next_ms: i64,
     dropped: u64,
@@ -50,7 +50,7 @@ impl Link for Script {
 
     fn stream(&mut self, settings: &StreamSettings) -> Result<Box<dyn Packets>, LinkError> {
         assert_eq!(settings.trigger, settings.time_base == TimeBase::Master);
-        Ok(Box::new(Running {
+        Ok(Box::new(ScriptRun {
             next_ms: self.clock.now().0 / MS,
             script: self.clone(),
             dropped: 0,
@@ -58,7 +58,7 @@ impl Link for Script {
     }
 }
 
-impl Packets for Running {
+impl Packets for ScriptRun {
     fn next(&mut self, take: &mut dyn FnMut(Packet<'_>)) -> Result<bool, LinkError> {
         let now = self.script.clock.now().0;
         let mut after_loss = false;

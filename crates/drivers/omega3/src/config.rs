@@ -27,7 +27,7 @@ pub struct OmegaConfig {
     /// The device's watchdog.
     pub watchdog: Watchdog,
     /// Whether the robot may initialise itself, which moves the arm through its workspace.
-    pub initialise: Initialise,
+    pub initialise: InitialiseRule,
     /// Requirement on the redundant encoders.
     pub redundant_encoders: RedundantEncoders,
     /// Process that brakes the arm if this one dies.
@@ -48,7 +48,7 @@ impl Default for OmegaConfig {
             gains: Gains::default(),
             trips: Trips::default(),
             watchdog: Watchdog::ArmMilliseconds(10.0),
-            initialise: Initialise::Never,
+            initialise: InitialiseRule::Never,
             redundant_encoders: RedundantEncoders::Reported,
             supervisor: None,
             timeouts: Timeouts::default(),
@@ -245,7 +245,7 @@ pub enum Watchdog {
 
 /// Whether the robot may initialise itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Initialise {
+pub enum InitialiseRule {
     /// Never: a robot that is not initialised is rejected.
     Never,
     /// Allowed: the sample and tools are off the bench and hands are clear, because the arm may move through its whole workspace.

@@ -8,7 +8,7 @@ use skinrig_drd_abi::{
 use skinrig_model::Setting;
 
 use crate::brake::brake;
-use crate::config::{Initialise, OmegaConfig, RedundantEncoders, Timeouts, Watchdog};
+use crate::config::{InitialiseRule, OmegaConfig, RedundantEncoders, Timeouts, Watchdog};
 use crate::enumerate::{self, FoundDevice};
 use crate::error::OmegaError;
 use crate::remark::Remark;
@@ -360,7 +360,8 @@ impl OpenProcedure<'_> {
 
     /// Rejects a robot that is not initialised, unless it may initialise itself.
     fn allow_initialisation(&self) -> Result<(), OmegaError> {
-        if self.sdk.is_initialized(self.id) || self.config.initialise == Initialise::SampleIsOff {
+        if self.sdk.is_initialized(self.id) || self.config.initialise == InitialiseRule::SampleIsOff
+        {
             return Ok(());
         }
         self.unsuitable(

@@ -92,7 +92,7 @@ impl Owner {
             .spawn(body)
             .map_err(|e| OmegaError::Thread(e.to_string()))?;
         let mut within = timeouts.open;
-        if config.initialise == crate::config::Initialise::SampleIsOff {
+        if config.initialise == crate::config::InitialiseRule::SampleIsOff {
             within += timeouts.initialise;
         }
         let opened = match opened.recv_timeout(within) {

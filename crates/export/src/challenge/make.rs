@@ -64,7 +64,7 @@ impl Description {
 
 /// How to make a challenge.
 #[derive(Debug, Clone, Copy)]
-pub struct Making {
+pub struct ChallengeOptions {
     /// Whether to replace existing files.
     pub overwrite: bool,
     /// What the events come from, for the description.
@@ -95,7 +95,7 @@ struct Press<'a> {
 }
 
 /// Events of a camera between two recorded times, µs.
-pub type ReadEvents<'a> =
+pub type EventQuery<'a> =
     dyn FnMut(CameraId, (u64, u64)) -> Result<Vec<CdEvent>, RecorderError> + 'a;
 
 /// Writes the challenge of an analysed session into `folder`, and its answers to `answers`. `events` reads the events of a
@@ -109,8 +109,8 @@ pub fn make(
     source: &Source<'_>,
     folder: &Path,
     answers: &Path,
-    making: &Making,
-    events: &mut ReadEvents<'_>,
+    making: &ChallengeOptions,
+    events: &mut EventQuery<'_>,
 ) -> Result<ChallengeFiles, ChallengeError> {
     let Some((analysis, _)) = source.analysis else {
         return Err(ChallengeError::TooFew {
@@ -251,7 +251,7 @@ fn event_table(
     source: &Source<'_>,
     camera: CameraId,
     presses: &[Press<'_>],
-    events: &mut ReadEvents<'_>,
+    events: &mut EventQuery<'_>,
     to: &mut dyn TableWriter,
 ) -> Result<(), ExportError> {
     let clock = source.analysis.and_then(|(a, _)| a.clocks[camera.index()]);

@@ -14,7 +14,7 @@ mod score;
 pub use answers::{Answer, Answers};
 pub use error::{ChallengeError, EstimateError};
 pub use estimates::{Estimates, Position};
-pub use make::{ChallengeFiles, Making, ReadEvents, make};
+pub use make::{ChallengeFiles, ChallengeOptions, EventQuery, make};
 pub use score::{Judgement, score};
 
 /// Name of the description in the folder of a challenge.

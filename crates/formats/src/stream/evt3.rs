@@ -32,11 +32,11 @@ pub(super) struct Words {
     /// Column and polarity of the next vector.
     vector: Option<(u16, Polarity)>,
     /// An OTHERS word with an incomplete payload.
-    other: Option<Other>,
+    other: Option<OtherWord>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Other {
+struct OtherWord {
     t_us: u64,
     subtype: u16,
     payload: u32,
@@ -135,7 +135,7 @@ impl Words {
             ),
             0xe => {
                 output.stats.monitoring += 1;
-                self.other = Some(Other {
+                self.other = Some(OtherWord {
                     t_us,
                     subtype: data,
                     payload: 0,

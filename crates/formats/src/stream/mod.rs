@@ -159,7 +159,7 @@ impl Decoder {
         events: &mut Vec<CdEvent>,
         triggers: &mut Vec<TriggerEdge>,
     ) {
-        self.push(bytes, &mut sink::Collect { events, triggers });
+        self.push(bytes, &mut sink::CollectingSink { events, triggers });
     }
 
     /// Statistics since the start. Bytes of an unfinished word are in [`StreamStats::trailing_bytes`].

@@ -38,12 +38,12 @@ impl<F: FnMut(&[CdEvent])> EventSink for CdSlices<F> {
 }
 
 /// Appends to vectors.
-pub(super) struct Collect<'a> {
+pub(super) struct CollectingSink<'a> {
     pub events: &'a mut Vec<CdEvent>,
     pub triggers: &'a mut Vec<TriggerEdge>,
 }
 
-impl EventSink for Collect<'_> {
+impl EventSink for CollectingSink<'_> {
     fn on_cd(&mut self, events: &[CdEvent]) {
         self.events.extend_from_slice(events);
     }

@@ -24,7 +24,7 @@ pub struct DecodedMarks {
 
 /// A received train, before error correction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ReadTrain {
+pub struct ReceivedTrain {
     /// Rising edge of its start pulse on the camera's clock, µs; inferred from the first rising edge that is there.
     pub t_us: u64,
     /// Data and check bits, the first one sent most significant (see [`PulseTrain::bits`]); 0 where unreadable.
@@ -52,7 +52,7 @@ pub struct ReadTrain {
 #[must_use]
 pub fn decode_marks(edges: &[TriggerEdge]) -> DecodedMarks {
     let mut out = DecodedMarks::default();
-    let named = |read: ReadTrain| fill(read.bits, read.erased).map(|label| (read, label));
+    let named = |read: ReceivedTrain| fill(read.bits, read.erased).map(|label| (read, label));
     let mut readings = read_trains(edges).into_iter().filter_map(named).peekable();
     let mut used = 0;
     while let Some((first, label)) = readings.next() {
@@ -84,10 +84,10 @@ pub fn decode_marks(edges: &[TriggerEdge]) -> DecodedMarks {
 /// pulse, and no edge at the positions of a pulse before the first or after the last. Most are noise or the same
 /// train again, read from a bit whose width equals that of a start; their labels distinguish them.
 #[must_use]
-pub fn read_trains(edges: &[TriggerEdge]) -> Vec<ReadTrain> {
+pub fn read_trains(edges: &[TriggerEdge]) -> Vec<ReceivedTrain> {
     let mut edges = edges.to_vec();
     edges.sort_by_key(|e| e.t_us);
-    let mut found: Vec<ReadTrain> = edges
+    let mut found: Vec<ReceivedTrain> = edges
         .iter()
         .enumerate()
         .filter(|(_, e)| !e.rising)
@@ -109,7 +109,7 @@ pub fn read_trains(edges: &[TriggerEdge]) -> Vec<ReadTrain> {
 }
 
 /// Reads the train that starts about `start_us`.
-fn read_train(edges: &[TriggerEdge], start_us: u64) -> Option<ReadTrain> {
+fn read_train(edges: &[TriggerEdge], start_us: u64) -> Option<ReceivedTrain> {
     let line = Line { edges };
     if line.has_pulse(start_us.checked_sub(PULSE_PERIOD_US)?) {
         return None;
@@ -141,7 +141,7 @@ fn read_train(edges: &[TriggerEdge], start_us: u64) -> Option<ReadTrain> {
     if line.has_pulse(rise_us) {
         return None;
     }
-    Some(ReadTrain {
+    Some(ReceivedTrain {
         t_us: t_us?,
         bits,
         erased,
@@ -223,9 +223,9 @@ mod tests {
         })
     }
 
-    fn labels(seen: &DecodedMarks) -> Vec<(u64, Label)> {
-        let marks = seen.marks.iter().map(|m| (m.t_us, Label::Mark(m.mark)));
-        let syncs = seen.syncs.iter().map(|s| (s.t_us, Label::Sync(s.count)));
+    fn labels(decoded: &DecodedMarks) -> Vec<(u64, Label)> {
+        let marks = decoded.marks.iter().map(|m| (m.t_us, Label::Mark(m.mark)));
+        let syncs = decoded.syncs.iter().map(|s| (s.t_us, Label::Sync(s.count)));
         let mut all: Vec<_> = marks.chain(syncs).collect();
         all.sort();
         all
@@ -242,10 +242,10 @@ mod tests {
                 edge.t_us = (t0 as i64 + since + since * ppm / 1_000_000 + off) as u64;
             }
             let t_us = all[0].t_us;
-            let seen = decode_marks(&all);
-            prop_assert_eq!(seen.stray_edges, 0);
-            prop_assert_eq!(seen.lost_edges, 0);
-            prop_assert_eq!(labels(&seen), vec![(t_us, label)]);
+            let decoded = decode_marks(&all);
+            prop_assert_eq!(decoded.stray_edges, 0);
+            prop_assert_eq!(decoded.lost_edges, 0);
+            prop_assert_eq!(labels(&decoded), vec![(t_us, label)]);
         }
 
         #[test]
@@ -259,9 +259,9 @@ mod tests {
                 let since = (edge.t_us - t0) as i64;
                 edge.t_us = (t0 as i64 + since + since * ppm / 1_000_000) as u64;
             }
-            let seen = decode_marks(&all);
-            prop_assert_eq!(seen.stray_edges, 0);
-            let read: Vec<Label> = labels(&seen).into_iter().map(|(_, label)| label).collect();
+            let decoded = decode_marks(&all);
+            prop_assert_eq!(decoded.stray_edges, 0);
+            let read: Vec<Label> = labels(&decoded).into_iter().map(|(_, label)| label).collect();
             prop_assert_eq!(read, sent);
         }
 
@@ -275,18 +275,18 @@ mod tests {
                 all.remove(at);
             }
             all.extend(edges(Label::Sync(8), 10_000 + PulseTrain::DURATION_US));
-            let seen = decode_marks(&all);
+            let decoded = decode_marks(&all);
             let second = (10_000 + PulseTrain::DURATION_US, Label::Sync(8));
             // Without the falling edge of its start pulse, the start of a train is uncertain.
-            let wanted = if at == 1 && !doubled { vec![second] } else { vec![(10_000, mark(7)), second] };
-            prop_assert_eq!(labels(&seen), wanted);
+            let expected = if at == 1 && !doubled { vec![second] } else { vec![(10_000, mark(7)), second] };
+            prop_assert_eq!(labels(&decoded), expected);
         }
 
         #[test]
         fn any_edges_are_accepted(all in prop::collection::vec((any::<u64>(), any::<bool>()), 0..200)) {
             let all: Vec<_> = all.into_iter().map(|(t, rising)| TriggerEdge { t_us: t, channel: 0, rising }).collect();
-            let seen = decode_marks(&all);
-            prop_assert!(seen.stray_edges as usize <= all.len());
+            let decoded = decode_marks(&all);
+            prop_assert!(decoded.stray_edges as usize <= all.len());
         }
     }
 

@@ -17,4 +17,4 @@ pub(crate) use motion::{LimitKeys, MotionKeys, MotionParts};
 pub(crate) use path::{Circles, Csv, LineDirection, Meander, Order, Path, Random};
 pub(crate) use protocol::ProtocolKeys;
 pub(crate) use ranges::MOST_POINTS;
-pub(crate) use schedule::{Evaluate, ScheduleKeys};
+pub(crate) use schedule::{PressRoleKeys, ScheduleKeys};

@@ -4,7 +4,7 @@ use skinrig_model::{HostDuration, MarkKind, Point3, Skin};
 use skinrig_settings::{Collector, Dimension, Field, Setting, Settings, Shape, Value, ValueRange};
 
 use super::ranges::{DEPTH_MM, POSITIVE_LENGTH_MM, POSITIVE_SPAN_S, SPAN_S, SPEED_MM_S};
-use crate::plan::OnTrip;
+use crate::plan::TripReaction;
 use crate::protocol::Pace;
 
 /// How the robot moves. A pace is a speed, or the time that the motion takes.
@@ -34,14 +34,15 @@ pub(crate) struct MotionKeys {
     pub period_s: Option<f64>,
     /// When a pose counts as settled.
     #[setting(default)]
-    pub settle: Settle,
+    pub settle: SettleCriterion,
     /// Where the tip waits before the run; above the centre of the outline at clearance height when absent.
     pub home: Option<Point3<Skin>>,
 }
 
 /// Condition for a settled pose.
 #[derive(Settings)]
-pub(crate) struct Settle {
+#[settings(name = "settle")]
+pub(crate) struct SettleCriterion {
     /// Largest distance from the target.
     #[setting(default = "0.05 mm", above = 0.0, max = 10.0)]
     pub tolerance_mm: f64,
@@ -95,7 +96,7 @@ pub(crate) struct LimitKeys {
     pub max_consecutive_invalid: u32,
     /// Reaction of the robot to an exceeded limit.
     #[setting(default = "retract")]
-    pub on_trip: OnTrip,
+    pub on_trip: TripReaction,
 }
 
 /// A box in the skin frame.

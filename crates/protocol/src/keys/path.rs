@@ -138,12 +138,13 @@ pub(crate) struct Repetitions {
     pub count: u32,
     /// What happens between two repetitions.
     #[setting(default)]
-    pub between: Between,
+    pub between: RepetitionPause,
 }
 
 /// What happens between two repetitions.
 #[derive(Settings)]
-pub(crate) struct Between {
+#[settings(name = "between")]
+pub(crate) struct RepetitionPause {
     /// Go back above the first location before the pause; otherwise after it.
     #[setting(default = "true")]
     pub return_to_start: bool,
@@ -157,7 +158,7 @@ pub(crate) enum Order {
     /// The order of the path.
     Listed,
     /// A random order.
-    Shuffled(Shuffled),
+    Shuffled(ShuffleKeys),
 }
 
 /// Orders with a name.
@@ -172,12 +173,13 @@ enum OrderName {
 #[settings(name = "order")]
 struct OrderKeys {
     /// Each repetition runs its presses (all locations at all depths) in its own random order.
-    shuffled: Shuffled,
+    shuffled: ShuffleKeys,
 }
 
 /// A random order.
 #[derive(Settings)]
-pub(crate) struct Shuffled {
+#[settings(name = "shuffled")]
+pub(crate) struct ShuffleKeys {
     /// Seed of the order; the run's seed when absent.
     pub seed: Option<u64>,
 }

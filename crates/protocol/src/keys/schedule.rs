@@ -50,7 +50,7 @@ pub(crate) struct ScheduleKeys {
     /// How to read the CSV of press positions.
     pub csv: PositionsCsv,
     /// Which presses calibrate and which are scored. Presses that calibrate never score.
-    pub evaluation: Evaluate,
+    pub evaluation: PressRoleKeys,
     /// The rig: outline and nominal cameras, where calibration starts.
     pub rig: NominalRig,
     /// Settings of the analysis.
@@ -91,18 +91,19 @@ pub(crate) struct PositionsCsv {
 
 /// Which presses calibrate and which are scored: by repetition, or alternating within each repetition.
 #[derive(Settings)]
-#[settings(no_default, exactly_one("repetitions", "alternate"))]
-pub(crate) struct Evaluate {
+#[settings(name = "evaluate", no_default, exactly_one("repetitions", "alternate"))]
+pub(crate) struct PressRoleKeys {
     /// By repetition, as in a protocol.
     pub repetitions: Option<Evaluation>,
     /// Within each repetition; for recordings with a single one. Neighbours calibrate each other's surroundings, so this is less
     /// meaningful than repetitions.
-    pub alternate: Option<Alternate>,
+    pub alternate: Option<AlternatingPresses>,
 }
 
 /// Every n-th press calibrates, all others are scored.
 #[derive(Settings)]
-pub(crate) struct Alternate {
+#[settings(name = "alternate")]
+pub(crate) struct AlternatingPresses {
     /// 2: every second press calibrates.
     #[setting(min = 2, max = 1000)]
     pub calibrate_every: u32,

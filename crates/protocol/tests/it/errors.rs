@@ -370,13 +370,13 @@ fn a_suspension_needs_room_between_its_levels() {
         limit.is_some_and(|t| t.is_beyond(60.1) && t.is_calm(50.0) && t.lasting.0 == 2_000_000_000),
         "{found:?}"
     );
-    for (levels, told) in [
+    for (levels, part) in [
         ("{above: 60 deg, resume_below: 50 degC}", "an angle"),
         ("{above: 60 degC, resume_below: 60 °C}", "not apart"),
         ("{above: 300 degC, resume_below: 60 °C}", "150"),
     ] {
         let error = hot(levels).unwrap_err().to_string();
-        assert!(error.contains(told), "{error}");
+        assert!(error.contains(part), "{error}");
     }
     for turned in [
         "{below: 6 GB, resume_above: 5 GB}",

@@ -66,15 +66,15 @@ fn missing_presses_follow_the_sync_presses() {
         ..PressHistory::default()
     };
     let mut histories = vec![done; plan.presses.len()];
-    let none = plan.wanted(&histories);
+    let none = plan.pending(&histories);
     assert!(none.iter().all(|w| !w), "no press is left");
     // A sync press alone does not restart the run.
     histories[0].verdict = None;
-    assert_eq!(plan.wanted(&histories), none);
+    assert_eq!(plan.pending(&histories), none);
     histories[sync].verdict = Some(PressVerdict::cut_off(1));
     let mut expected = vec![false; plan.presses.len()];
     expected[..=sync].fill(true);
-    assert_eq!(plan.wanted(&histories), expected);
+    assert_eq!(plan.pending(&histories), expected);
 }
 
 #[test]
@@ -155,16 +155,16 @@ proptest! {
         let name = ["demo", "circles", "depth-sweep", "quick-check"][name];
         let protocol = shipped_protocol(name);
         let plan = protocol.compile();
-        let wanted = |id: PressId| {
+        let pending = |id: PressId| {
             let mixed = (seed ^ u64::from(id.index())).wrapping_mul(0x9e37_79b9_7f4a_7c15);
             (mixed >> 32) % 8 < eighths
         };
         for route in [Route::Straight, Route::AsPlanned] {
-            let rest = plan.remaining(wanted, route);
+            let rest = plan.remaining(pending, route);
             let found = check(&rest, &protocol.surroundings, Some(protocol.motion.home));
             prop_assert_eq!(found, vec![]);
             let expected: Vec<PressId> =
-                presses(&plan).iter().map(|p| p.press).filter(|id| wanted(*id)).collect();
+                presses(&plan).iter().map(|p| p.press).filter(|id| pending(*id)).collect();
             let found: Vec<PressId> = presses(&rest).iter().map(|p| p.press).collect();
             prop_assert_eq!(found, expected);
             prop_assert_eq!(&rest.presses, &plan.presses);

@@ -381,8 +381,8 @@ pub(crate) fn check_examples() {
         }
     }
     fn complete<T>(all: &[T], number: fn(&T) -> usize, variants: usize) {
-        let seen: std::collections::BTreeSet<usize> = all.iter().map(number).collect();
-        assert!(seen.into_iter().eq(0..variants));
+        let numbers: std::collections::BTreeSet<usize> = all.iter().map(number).collect();
+        assert!(numbers.into_iter().eq(0..variants));
     }
     complete(&run_faults(), run, 19);
     complete(&device_errors(), device, 7);

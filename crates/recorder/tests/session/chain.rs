@@ -200,8 +200,8 @@ fn every_seal_of_many_legs_is_verified() {
     let report = verify::<Evt2>(&path).unwrap();
     assert_eq!((report.problems, report.remarks), (vec![], vec![]));
     let legs = SessionReader::open(&path).unwrap().legs().unwrap();
-    let kept: Vec<_> = legs.iter().map(|leg| leg.tree_sha256).collect();
-    assert_eq!(kept, trees);
+    let hashes: Vec<_> = legs.iter().map(|leg| leg.tree_sha256).collect();
+    assert_eq!(hashes, trees);
     assert!(trees.iter().flatten().count() >= 3);
 }
 

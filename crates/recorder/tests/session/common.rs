@@ -5,8 +5,9 @@ use std::path::Path;
 use sha2::{Digest, Sha256};
 use skinrig_model::press::PressRole;
 use skinrig_model::*;
-use skinrig_recorder::{ChunkScanner, Sealed, SessionWriter};
-use sqlx::{ConnectOptions, sqlite::SqliteConnectOptions};
+use skinrig_recorder::{ChunkScanner, SealedSession, SessionWriter};
+use sqlx::ConnectOptions;
+use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 
 /// EVT2 without wraps: enough to recompute facts.
 #[derive(Default)]
@@ -342,7 +343,7 @@ fn attempts(ids: &[AttemptId], out: &mut Vec<Record>) -> HostTime {
 }
 
 /// Records `presses` presses and seals the session.
-pub(crate) fn sealed(path: &Path, presses: u32) -> Sealed {
+pub(crate) fn sealed(path: &Path, presses: u32) -> SealedSession {
     let mut writer = SessionWriter::create(path).unwrap();
     for record in records(presses) {
         writer.accept(record).unwrap();
@@ -350,8 +351,8 @@ pub(crate) fn sealed(path: &Path, presses: u32) -> Sealed {
     writer.finish().unwrap()
 }
 
-/// Executes statements on a session file.
-pub(crate) fn change(path: &Path, statements: &[&'static str]) {
+/// Works on a session file without opening it as a session.
+pub(crate) fn with_file<T>(path: &Path, work: impl AsyncFnOnce(&mut SqliteConnection) -> T) -> T {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .build()
         .unwrap();
@@ -361,8 +362,17 @@ pub(crate) fn change(path: &Path, statements: &[&'static str]) {
             .connect()
             .await
             .unwrap();
-        for statement in statements {
-            sqlx::query(*statement).execute(&mut conn).await.unwrap();
-        }
-    });
+        work(&mut conn).await
+    })
+}
+
+pub(crate) async fn execute(conn: &mut SqliteConnection, statements: &[&'static str]) {
+    for statement in statements {
+        sqlx::query(*statement).execute(&mut *conn).await.unwrap();
+    }
+}
+
+/// Executes statements on a session file.
+pub(crate) fn change(path: &Path, statements: &[&'static str]) {
+    with_file(path, async |conn| execute(conn, statements).await);
 }

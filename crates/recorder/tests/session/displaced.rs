@@ -59,31 +59,31 @@ impl Run {
         for record in std::mem::take(&mut self.rest) {
             self.writer.accept(record).unwrap();
         }
-        let kept = match self.writer.finish() {
+        let rescued = match self.writer.finish() {
             Err(RecorderError::Rescued { to, displaced }) => {
                 assert_eq!(displaced.to_string(), error.to_string());
                 to
             }
             other => panic!("{other:?}"),
         };
-        assert!(!sibling(&kept, "-wal").exists());
-        let report = verify::<Evt2>(&kept).unwrap();
+        assert!(!sibling(&rescued, "-wal").exists());
+        let report = verify::<Evt2>(&rescued).unwrap();
         assert_eq!((report.problems, report.sealed), (vec![], false));
-        let reader = SessionReader::open(&kept).unwrap();
+        let reader = SessionReader::open(&rescued).unwrap();
         assert!(matches!(
             reader.end().unwrap(),
             Some((_, RunEnd::Stopped(_)))
         ));
         let known = reader.history().unwrap();
         drop(reader);
-        let mut leg = SessionWriter::resume::<Evt2>(&kept).unwrap();
+        let mut leg = SessionWriter::resume::<Evt2>(&rescued).unwrap();
         for record in further_leg(&known) {
             leg.accept(record).unwrap();
         }
         leg.finish().unwrap();
-        let report = verify::<Evt2>(&kept).unwrap();
+        let report = verify::<Evt2>(&rescued).unwrap();
         assert_eq!((report.problems, report.sealed), (vec![], true));
-        (self.root, kept)
+        (self.root, rescued)
     }
 }
 
@@ -92,8 +92,8 @@ fn a_renamed_file_is_detected() {
     let run = begin();
     let new = run.folder().join("b.session.sqlite");
     std::fs::rename(&run.path, &new).unwrap();
-    let (root, kept) = run.into_rescued("moved to");
-    assert_eq!(kept, new);
+    let (root, rescued) = run.into_rescued("moved to");
+    assert_eq!(rescued, new);
     // No log file is left under the old name.
     let left = std::fs::read_dir(root.path().join("sessions")).unwrap();
     let left: Vec<_> = left.map(|e| e.unwrap().file_name()).collect();
@@ -105,8 +105,8 @@ fn a_removed_file_is_copied() {
     let run = begin();
     std::fs::remove_file(&run.path).unwrap();
     let expected = run.folder().join("a.rescued.session.sqlite");
-    let (_root, kept) = run.into_rescued("it was removed");
-    assert_eq!(kept, expected);
+    let (_root, rescued) = run.into_rescued("it was removed");
+    assert_eq!(rescued, expected);
 }
 
 #[test]
@@ -116,16 +116,16 @@ fn a_renamed_folder_is_followed() {
     std::fs::rename(run.folder(), &new).unwrap();
     // The folder is created again.
     std::fs::create_dir(run.folder()).unwrap();
-    let (_root, kept) = run.into_rescued("moved to");
-    assert_eq!(kept, new.join("a.session.sqlite"));
+    let (_root, rescued) = run.into_rescued("moved to");
+    assert_eq!(rescued, new.join("a.session.sqlite"));
 }
 
 #[test]
 fn a_removed_folder_leads_to_a_copy_above_it() {
     let run = begin();
     std::fs::remove_dir_all(run.folder()).unwrap();
-    let (root, kept) = run.into_rescued("it was removed");
-    assert_eq!(kept, root.path().join("a.rescued.session.sqlite"));
+    let (root, rescued) = run.into_rescued("it was removed");
+    assert_eq!(rescued, root.path().join("a.rescued.session.sqlite"));
 }
 
 #[test]
@@ -134,9 +134,9 @@ fn a_removed_log_loses_nothing() {
         let run = begin();
         std::fs::remove_file(sibling(&run.path, ending)).unwrap();
         let path = run.path.clone();
-        let (_root, kept) =
+        let (_root, rescued) =
             run.into_rescued(&format!("{ending}: the file of the current run is missing"));
-        assert_eq!(kept, path);
+        assert_eq!(rescued, path);
     }
 }
 
@@ -160,8 +160,8 @@ fn another_file_in_its_place_is_left_alone() {
         );
         let path = run.path.clone();
         let copy = run.folder().join("a.rescued.session.sqlite");
-        let (_root, kept) = run.into_rescued("another file in its place");
-        assert_eq!(kept, if own_is_kept { new } else { copy });
+        let (_root, rescued) = run.into_rescued("another file in its place");
+        assert_eq!(rescued, if own_is_kept { new } else { copy });
         assert_eq!(std::fs::read(&path).unwrap(), bytes);
         let report = verify::<Evt2>(&path).unwrap();
         assert_eq!((report.problems, report.sealed), (vec![], true));
@@ -174,11 +174,11 @@ fn the_next_free_name_is_used() {
     let first = run.folder().join("a.rescued.session.sqlite");
     std::fs::write(&first, "precious").unwrap();
     std::fs::remove_file(&run.path).unwrap();
-    let (_root, kept) = run.into_rescued("removed");
+    let (_root, rescued) = run.into_rescued("removed");
     assert!(
-        kept.ends_with("a.rescued-2.session.sqlite"),
+        rescued.ends_with("a.rescued-2.session.sqlite"),
         "{}",
-        kept.display()
+        rescued.display()
     );
     assert_eq!(std::fs::read_to_string(first).unwrap(), "precious");
 }

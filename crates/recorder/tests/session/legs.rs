@@ -4,10 +4,8 @@ use proptest::prelude::*;
 use sha2::{Digest as _, Sha256};
 use skinrig_model::*;
 use skinrig_recorder::{LegRow, RecorderError, SessionReader, SessionWriter, verify};
-use sqlx::ConnectOptions;
-use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 
-use crate::common::{Evt2, further_leg, header, records, sealed, stopped};
+use crate::common::{Evt2, execute, further_leg, header, records, sealed, stopped, with_file};
 
 const PRESSES: u32 = 5;
 
@@ -213,27 +211,6 @@ fn one_writer_at_a_time_and_the_header_of_a_leg_first() {
         Err(RecorderError::Unsealable { .. })
     ));
     assert_sound(&path, false);
-}
-
-/// Runs statements on the unchanged file.
-fn with_file<T>(path: &std::path::Path, work: impl AsyncFnOnce(&mut SqliteConnection) -> T) -> T {
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .build()
-        .unwrap();
-    runtime.block_on(async {
-        let mut conn = SqliteConnectOptions::new()
-            .filename(path)
-            .connect()
-            .await
-            .unwrap();
-        work(&mut conn).await
-    })
-}
-
-async fn execute(conn: &mut SqliteConnection, statements: &[&'static str]) {
-    for statement in statements {
-        sqlx::query(*statement).execute(&mut *conn).await.unwrap();
-    }
 }
 
 #[test]

@@ -75,15 +75,15 @@ for press in range(4):
     for press in 0..4i64 {
         let from = press * 20_000 + 4_000 - lag - 10_000;
         let to = press * 20_000 + 15_000 - lag + 10_000;
-        let seen: Vec<_> = events
+        let decoded: Vec<_> = events
             .iter()
             .filter(|e| (from..=to).contains(&(e.0 as i64)))
             .collect();
-        let sum = |f: fn(&(u64, u64, u64, u64)) -> u64| seen.iter().map(|e| f(e)).sum::<u64>();
-        assert!(seen.len() > 5);
+        let sum = |f: fn(&(u64, u64, u64, u64)) -> u64| decoded.iter().map(|e| f(e)).sum::<u64>();
+        assert!(decoded.len() > 5);
         expected += &format!(
             "{} {} {} {} {}\n",
-            seen.len(),
+            decoded.len(),
             sum(|e| e.0),
             sum(|e| e.1),
             sum(|e| e.2),

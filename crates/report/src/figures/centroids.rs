@@ -12,12 +12,12 @@ use crate::plot::{Axis, Figure, Plot, Sheet, WIDE, extent};
 #[must_use]
 pub(crate) fn centroid_tracks(input: &ReportInput<'_>) -> Figure {
     let presses = &input.analysis.presses;
-    let seen = |camera: usize| {
+    let view_of = |camera: usize| {
         let column = move |p: &PressResult| p.views[camera].and_then(|v| v.centroid_u);
         let found = presses.iter().filter_map(move |p| Some((p, column(p)?)));
         found.filter(|(_, u)| u.is_finite())
     };
-    let counts = [seen(0).count(), seen(1).count()];
+    let counts = [view_of(0).count(), view_of(1).count()];
     let caption = format!(
         "Column of the event cluster's centroid for each press, in the order of the plan. A: camera 1 ({} \
          presses), B: camera 2 ({} presses). Open squares: presses that are not valid.",
@@ -29,7 +29,7 @@ pub(crate) fn centroid_tracks(input: &ReportInput<'_>) -> Figure {
         let label = ["", "press number in the plan"][camera];
         let at = |(p, u): (&PressResult, f64)| (p.press, (f64::from(p.press.number()), u));
         let (valid, others): (Vec<_>, Vec<_>) =
-            seen(camera).partition(|(p, _)| p.verdict == Verdict::Valid);
+            view_of(camera).partition(|(p, _)| p.verdict == Verdict::Valid);
         let columns = (0.0, f64::from(SENSOR_WIDTH));
         Plot::new(
             Axis::linear((first - 0.5, last + 0.5), label).ticks(14),

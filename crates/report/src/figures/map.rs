@@ -115,12 +115,12 @@ pub(crate) fn skin_map(input: &ReportInput<'_>) -> Figure {
     let coverage = input.analysis.coverage.as_ref();
     for (i, camera) in input.analysis.geometry.cameras.iter().enumerate() {
         let class = format!("fov f{0} c{0}", i + 1);
-        let seen = coverage.map(|c| &c.views[i]).filter(|v| !v.is_empty());
-        let data = seen.map_or_else(
+        let view = coverage.map(|c| &c.views[i]).filter(|v| !v.is_empty());
+        let data = view.map_or_else(
             || layout.field_of_view(place, camera),
             |v| layout.polygons(place, v),
         );
-        if seen.is_some_and(|v| v.len() > 1) {
+        if view.is_some_and(|v| v.len() > 1) {
             svg.path(&format!("{class} no-edge"), &data);
             let id = format!("skin-map-view-{}", i + 1);
             layout.union_edge(svg, place, &id, &format!("fov-edge c{}", i + 1), &data);

@@ -116,11 +116,11 @@ pub(crate) fn press_rates(input: &ReportInput<'_>) -> Option<Figure> {
         contact. Dashed lines: contact and release. One column per press, camera 1 above, camera 2 below."
         .to_owned();
     let row = |camera: usize| {
-        let here = |press: &PressId| {
+        let is_shown = |press: &PressId| {
             let of = |z: &&RateZoom| z.press == *press && z.camera.index() == camera;
             zooms.iter().find(of)
         };
-        let all = || presses.iter().filter_map(here);
+        let all = || presses.iter().filter_map(is_shown);
         let (divisor, name) = unit(all().flat_map(|z| z.on_per_s.iter().chain(&z.off_per_s)));
         let label = format!("camera {} ({name})", camera + 1);
         let x_label = ["", "time since contact (s)"][camera];

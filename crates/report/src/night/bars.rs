@@ -80,9 +80,9 @@ fn scale(value: f64, limit: &Limit) -> (f64, f64) {
     let named = || named.iter().flatten().copied();
     // A scale with one limit starts at zero; one with two limits does not.
     let both = limit.at_least.is_some() && limit.at_most.is_some();
-    let wanted = || named().take(if both { 3 } else { 4 });
-    let low = wanted().fold(f64::INFINITY, f64::min);
-    let high = wanted().fold(f64::NEG_INFINITY, f64::max);
+    let listed = || named().take(if both { 3 } else { 4 });
+    let low = listed().fold(f64::INFINITY, f64::min);
+    let high = listed().fold(f64::NEG_INFINITY, f64::max);
     let room = ((high - low) * BEYOND).max(f64::MIN_POSITIVE);
     let room = if room < 1e-300 { 1.0 } else { room };
     let below = if low == 0.0 && limit.at_least.is_none() {

@@ -80,9 +80,9 @@ impl Axis {
     }
 
     /// About this many ticks.
-    pub(crate) fn ticks(self, wanted: u32) -> Self {
+    pub(crate) fn ticks(self, requested: u32) -> Self {
         Self {
-            ticks: Ticks::About(wanted),
+            ticks: Ticks::About(requested),
             ..self
         }
     }
@@ -132,8 +132,8 @@ impl Axis {
         match &self.ticks {
             Ticks::Named(marks) => marks.clone(),
             Ticks::Decades => decades(low, high),
-            Ticks::About(wanted) => {
-                let at = ticks(low, high, *wanted);
+            Ticks::About(requested) => {
+                let at = ticks(low, high, *requested);
                 let step = if at.len() > 1 { at[1] - at[0] } else { 1.0 };
                 at.iter().map(|t| (*t, tick_label(*t, step))).collect()
             }

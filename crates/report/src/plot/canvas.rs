@@ -40,7 +40,7 @@ impl Figure {
 }
 
 /// Size of a figure, px, and of its texts relative to a page, on a phone.
-type Narrow = ((f64, f64), f64);
+type PhoneLayout = ((f64, f64), f64);
 
 /// A figure under construction.
 pub(crate) struct Canvas {
@@ -49,7 +49,7 @@ pub(crate) struct Canvas {
     title: String,
     caption: String,
     size: (f64, f64),
-    narrow: Option<Narrow>,
+    narrow: Option<PhoneLayout>,
 }
 
 impl Canvas {
@@ -57,7 +57,7 @@ impl Canvas {
     pub(crate) fn new(
         [id, title, caption]: [String; 3],
         size: (f64, f64),
-        narrow: Option<Narrow>,
+        narrow: Option<PhoneLayout>,
     ) -> Self {
         let mut svg = Markup::new();
         let view = |(w, h): (f64, f64)| format!("0 0 {} {}", Px(w), Px(h));

@@ -99,12 +99,12 @@ pub(crate) fn colour_bar(
         );
     }
     let marks = marks.unwrap_or_else(|| {
-        let wanted = if scale.data.0 < 0.0 || is_upright {
+        let requested = if scale.data.0 < 0.0 || is_upright {
             5
         } else {
             3
         };
-        let at = ticks(scale.data.0, scale.data.1, wanted);
+        let at = ticks(scale.data.0, scale.data.1, requested);
         let step = if at.len() > 1 {
             at[1] - at[0]
         } else {

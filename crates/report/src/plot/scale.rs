@@ -1,13 +1,13 @@
 //! Owns scales: maps from data to pixels, round ticks and round ends.
 
-/// About `wanted` tick positions inside `low..=high`, at 1, 2 or 5 times a power of ten; none for 0.
+/// About `requested` tick positions inside `low..=high`, at 1, 2 or 5 times a power of ten; none for 0.
 #[must_use]
-pub(crate) fn ticks(low: f64, high: f64, wanted: u32) -> Vec<f64> {
+pub(crate) fn ticks(low: f64, high: f64, requested: u32) -> Vec<f64> {
     let span = high - low;
-    if wanted == 0 || !(span.is_finite() && span > 0.0) {
+    if requested == 0 || !(span.is_finite() && span > 0.0) {
         return vec![];
     }
-    let raw = span / f64::from(wanted);
+    let raw = span / f64::from(requested);
     let power = 10f64.powf(raw.log10().floor());
     let steps = [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter();
     let step = steps.clone().find(|s| *s >= raw * 0.999);

@@ -6,7 +6,7 @@ use skinrig_model::Limit;
 use skinrig_nightly::judge::{RepeatRule, judge_attempt};
 use skinrig_nightly::rules::apply_cross_check_rules;
 use skinrig_nightly::{
-    Cause, CheckResult, Evidence, EvidenceKind, Golden, Measurement, Night, NightExit, Part,
+    Cause, CheckResult, Evidence, EvidenceKind, GoldenSession, Measurement, Night, NightExit, Part,
     Verdict, Versions,
 };
 use skinrig_report::night::{Trends, html, tree};
@@ -101,7 +101,7 @@ fn night(checks: Vec<CheckResult>) -> Night {
         ended_early: None,
         lease_note: None,
         checks,
-        golden: Some(Golden {
+        golden: Some(GoldenSession {
             session: "golden.session.sqlite".to_owned(),
             report: Some("golden.report.html".to_owned()),
             results_sha256: None,

@@ -1,7 +1,7 @@
 //! Trends on the page of a night: drift comes first, and names are escaped.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 
-use skinrig_nightly::trend::{History, NightHead, Point, Report, judge};
+use skinrig_nightly::trend::{History, NightSummary, Point, Report, judge};
 use skinrig_nightly::{Night, Verdict};
 use skinrig_report::night::{Trends, html};
 use skinrig_report::trend::Links;
@@ -31,7 +31,7 @@ fn report(series: &[&str], nights: usize, change: usize) -> Report {
         let mut night = good_night();
         night.id = format!("night-{at}");
         night.started = format!("2026-10-{:02}T02:00:00Z", at + 1);
-        history.nights.push(NightHead::of(&night, ""));
+        history.nights.push(NightSummary::of(&night, ""));
     }
     judge(&history)
 }

@@ -1,5 +1,6 @@
 //! Made-up studies for the report tests, shaped like real ones. None of their numbers was measured.
 
+use skinrig_analysis::locator::FitError;
 use skinrig_analysis::result::*;
 use skinrig_model::*;
 
@@ -426,5 +427,78 @@ pub(crate) fn motion() -> Motion {
                 })
                 .collect(),
         }],
+    }
+}
+
+/// A field that won against the geometry.
+pub(crate) fn locator() -> LocatorResult {
+    let around = |value: f64, n: u32| Estimate {
+        value: Some(value),
+        low: Some(0.9 * value),
+        high: Some(1.1 * value),
+        n,
+    };
+    let row = |locator, rmse: f64, chosen| LocatorComparison {
+        locator,
+        rmse_mm: around(rmse, 40),
+        bounded_rmse_mm: Some(0.97 * rmse),
+        over_repetitions_mm: Some(0.9 * rmse),
+        test: None,
+        unfit: None,
+        chosen,
+    };
+    LocatorResult {
+        locator: Locator::Field,
+        version: 1,
+        fallback: None,
+        compared: vec![
+            row(Locator::Geometry, 3.0, false),
+            LocatorComparison {
+                test: Some(LocatorTest {
+                    against: Locator::Geometry,
+                    gain_mm: 0.9,
+                    standard_error_mm: 0.2,
+                    ratio: 4.5,
+                    needed: 1.7,
+                }),
+                ..row(Locator::Field, 2.1, true)
+            },
+            LocatorComparison {
+                rmse_mm: Estimate {
+                    value: None,
+                    low: None,
+                    high: None,
+                    n: 0,
+                },
+                bounded_rmse_mm: None,
+                over_repetitions_mm: None,
+                unfit: Some(FitError::Locations {
+                    needed: 16,
+                    found: 14,
+                }),
+                ..row(Locator::Direct, 0.0, false)
+            },
+        ],
+        bound_mm: Some(12.0),
+        model: LocatorModel {
+            reference_events: 800.0,
+            scatter: None,
+            geometry_covariance: None,
+            cameras: None,
+            prior: None,
+            inflation: 1.0,
+            levels: Vec::new(),
+        },
+        reliability: [0.5, 0.8, 0.95]
+            .map(|level| ReliabilityRow {
+                level,
+                inside: Estimate {
+                    value: Some(level - 0.02),
+                    low: Some(level - 0.08),
+                    high: Some((level + 0.04).min(1.0)),
+                    n: 80,
+                },
+            })
+            .to_vec(),
     }
 }

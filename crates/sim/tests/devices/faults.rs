@@ -162,13 +162,13 @@ fn a_lost_start_pulse_makes_one_train_of_one_camera_unreadable() {
     ready(&mut rig);
     let mut take = press_all(&mut rig, &places(3), &[5_000]).unwrap();
     take.stop(&mut rig);
-    let seen = CameraId::ALL.map(|camera| {
+    let decoded = CameraId::ALL.map(|camera| {
         let (mut events, mut edges) = (Vec::new(), Vec::new());
         Decoder::new(StreamFormat::Evt2).push_cd(&take.bytes(camera), &mut events, &mut edges);
-        let seen = decode_marks(&edges);
-        (seen.marks.len(), seen.stray_edges)
+        let decoded = decode_marks(&edges);
+        (decoded.marks.len(), decoded.stray_edges)
     });
-    assert_eq!(seen, [(3, 0), (2, 62)]);
+    assert_eq!(decoded, [(3, 0), (2, 62)]);
 }
 
 #[test]
@@ -185,12 +185,12 @@ fn a_noisy_line_corrupts_no_mark_and_affects_only_one_camera() {
     let mut take = press_all(&mut rig, &places(8), &[5_000]).unwrap();
     take.stop(&mut rig);
     let syncs: Vec<u32> = (0..12).collect();
-    let seen = CameraId::ALL.map(|camera| {
+    let decoded = CameraId::ALL.map(|camera| {
         let (mut events, mut edges) = (Vec::new(), Vec::new());
         Decoder::new(StreamFormat::Evt2).push_cd(&take.bytes(camera), &mut events, &mut edges);
         decode_marks(&edges)
     });
-    let [clean, noisy] = &seen;
+    let [clean, noisy] = &decoded;
     assert_eq!((clean.stray_edges, clean.lost_edges), (0, 0));
     assert_eq!(
         clean.syncs.iter().map(|s| s.count).collect::<Vec<_>>(),
@@ -198,7 +198,7 @@ fn a_noisy_line_corrupts_no_mark_and_affects_only_one_camera() {
     );
     assert_eq!(clean.marks.len(), 8);
     assert!(noisy.stray_edges > 20 && noisy.lost_edges > 10, "{noisy:?}");
-    let marks = |seen: &DecodedMarks| seen.marks.iter().map(|m| m.mark).collect::<Vec<_>>();
+    let marks = |decoded: &DecodedMarks| decoded.marks.iter().map(|m| m.mark).collect::<Vec<_>>();
     assert!(marks(noisy).iter().all(|m| marks(clean).contains(m)));
     assert!(noisy.syncs.iter().all(|s| syncs.contains(&s.count)));
     assert!(noisy.marks.len() + noisy.syncs.len() >= 10, "{noisy:?}");

@@ -24,9 +24,9 @@ const LEFT_ALONE: Duration = Duration::from_secs(10);
 
 /// Since when a session may be being sealed.
 #[derive(Default)]
-struct Sealing(Option<Instant>);
+struct SealTimer(Option<Instant>);
 
-impl Sealing {
+impl SealTimer {
     fn may_go_on(&mut self, run: Option<&RunState>, is_written: bool) -> bool {
         if run.is_some_and(|run| !run.is_over) || !is_written {
             self.0 = None;
@@ -46,7 +46,7 @@ pub(super) fn follow(
     let stop = Arc::new(AtomicBool::new(false));
     let mut snapshot = SessionSnapshot::new(path);
     let mut estimates = Estimates::new(path, &stop);
-    let mut sealing = Sealing::default();
+    let mut sealing = SealTimer::default();
     let mut unwatched: Option<Instant> = None;
     loop {
         // The writer first: a run that ends in between has then left its end in the file.
@@ -54,7 +54,7 @@ pub(super) fn follow(
         let run = writer.as_ref().and_then(|_| lab.run(path));
         let may_be_sealing = sealing.may_go_on(run.as_ref(), writer.is_some());
         stop.store(may_be_sealing, Ordering::Relaxed);
-        let seen = if may_be_sealing {
+        let refreshed = if may_be_sealing {
             Ok(())
         } else {
             snapshot.refresh(estimates.newest().as_deref(), to)
@@ -80,7 +80,7 @@ pub(super) fn follow(
             "run",
             &json!({ "run": report, "writer": writer, "free_bytes": free_bytes }),
         );
-        match seen {
+        match refreshed {
             Err(e) if writer.is_none() || !is_beginning(&e) => {
                 publish(to, "over", &json!({ "error": e.to_string() }));
                 break;

@@ -44,9 +44,9 @@ impl Parts {
         true
     }
 
-    /// All parts newer than `seen`, as one block.
-    pub(super) fn since(&self, seen: u64) -> Bytes {
-        let new = self.parts.iter().filter(|p| p.version > seen);
+    /// All parts newer than `last_version`, as one block.
+    pub(super) fn since(&self, last_version: u64) -> Bytes {
+        let new = self.parts.iter().filter(|p| p.version > last_version);
         let blocks: Vec<&[u8]> = new.map(|p| p.event.as_ref()).collect();
         Bytes::from(blocks.concat())
     }
@@ -74,9 +74,9 @@ mod tests {
             &all[..],
             b"event: run\ndata: 1\n\nevent: presses\ndata: \"a\"\n\n"
         );
-        let seen = parts.version;
-        assert!(parts.since(seen).is_empty());
+        let last_version = parts.version;
+        assert!(parts.since(last_version).is_empty());
         assert!(parts.set("run", &2) && parts.set("run", &3));
-        assert_eq!(&parts.since(seen)[..], b"event: run\ndata: 3\n\n");
+        assert_eq!(&parts.since(last_version)[..], b"event: run\ndata: 3\n\n");
     }
 }

@@ -18,7 +18,7 @@ use crate::folder::name_of;
 const POSES_NS: i64 = 2_000_000_000;
 
 /// What never changes, read once.
-struct Head {
+struct FixedData {
     formats: [StreamFormat; 2],
     nominal: StereoGeometry,
 }
@@ -26,7 +26,7 @@ struct Head {
 /// The session as last seen.
 pub(super) struct SessionSnapshot {
     path: PathBuf,
-    head: Option<Head>,
+    head: Option<FixedData>,
     stamp: Option<[Option<(u64, SystemTime)>; 2]>,
     rows: Vec<(PlannedPress, Vec<AttemptRow>)>,
     /// Presses with an outcome.
@@ -126,7 +126,7 @@ impl SessionSnapshot {
                         expected: "the description of a rig".to_owned(),
                         found: e.to_string(),
                     })?;
-                self.head.insert(Head {
+                self.head.insert(FixedData {
                     formats: header.stream_formats,
                     nominal: rig.geometry.nominal,
                 })

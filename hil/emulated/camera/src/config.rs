@@ -213,8 +213,9 @@ mod tests {
             panic!("{camera:?}")
         };
         assert_eq!(scene.camera, CameraId::ALL[1]);
-        let again: BusConfig = serde_json::from_str(&serde_json::to_string(&bus).unwrap()).unwrap();
-        assert_eq!(again, bus);
+        let restored: BusConfig =
+            serde_json::from_str(&serde_json::to_string(&bus).unwrap()).unwrap();
+        assert_eq!(restored, bus);
         let wrong = text.replace("drift_ppm", "drift");
         let error = serde_json::from_str::<BusConfig>(&wrong).unwrap_err();
         assert!(error.to_string().contains("drift"), "{error}");

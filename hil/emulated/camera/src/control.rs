@@ -11,7 +11,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 pub use crate::evk1::Counters;
-pub use crate::usb::queues::Delivered;
+pub use crate::usb::queues::DeliveryTotals;
 use crate::usb::usbfs::Setup;
 
 /// Environment variable with the folder of the bus, for processes under test.
@@ -61,7 +61,7 @@ impl Request {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Observation {
     /// Data delivered to the host.
-    pub delivered: Delivered,
+    pub delivered: DeliveryTotals,
     /// Its counters.
     pub counters: Counters,
 }

@@ -39,13 +39,13 @@ impl ArmView {
     /// # Errors
     /// When the firmware died.
     pub fn state(&self) -> io::Result<ArmState> {
-        let gone = || {
+        let connection_lost = || {
             io::Error::new(
                 io::ErrorKind::BrokenPipe,
                 "the firmware of the emulated arm died",
             )
         };
-        self.page.read().ok_or_else(gone)
+        self.page.read().ok_or_else(connection_lost)
     }
 }
 
@@ -145,12 +145,12 @@ impl EmulatedArm {
     pub fn wait_until(
         &self,
         within: Duration,
-        wanted: impl Fn(&ArmState) -> bool,
+        condition: impl Fn(&ArmState) -> bool,
     ) -> io::Result<ArmState> {
         let started = Instant::now();
         loop {
             let state = self.state()?;
-            if wanted(&state) {
+            if condition(&state) {
                 return Ok(state);
             }
             if started.elapsed() > within {

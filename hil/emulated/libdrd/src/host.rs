@@ -29,13 +29,13 @@ pub struct Link {
     pub odd_bools: bool,
     /// Index of the device with an arm.
     arm: i8,
-    open: Mutex<Open>,
+    open: Mutex<OpenDevices>,
     journal: Option<Writer>,
 }
 
 /// Devices opened by this process.
 #[derive(Debug, Default)]
-struct Open {
+struct OpenDevices {
     ids: Vec<i8>,
     default: Option<i8>,
 }

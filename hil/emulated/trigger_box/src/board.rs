@@ -95,7 +95,7 @@ impl EmulatedBox {
         }
     }
 
-    fn launch(built: &crate::build::Built, options: &BoardOptions) -> io::Result<Self> {
+    fn launch(built: &crate::build::BuildOutput, options: &BoardOptions) -> io::Result<Self> {
         let dir = tempfile::tempdir()?;
         let port = options
             .port

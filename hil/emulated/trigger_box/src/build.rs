@@ -24,7 +24,7 @@ impl std::error::Error for Unavailable {}
 
 /// Build results.
 #[derive(Debug, Clone)]
-pub struct Built {
+pub struct BuildOutput {
     /// The firmware image.
     pub firmware: PathBuf,
     /// The board program.
@@ -38,14 +38,14 @@ pub struct Built {
 ///
 /// # Panics
 /// When the tools exist but the sources do not compile.
-pub fn build() -> Result<Built, Unavailable> {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let firmware_dir = here.join("../../trigger_box");
+pub fn build() -> Result<BuildOutput, Unavailable> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let firmware_dir = folder.join("../../trigger_box");
     check_tools()?;
-    let (cache, scratch) = places(&sources(here, &firmware_dir)).unwrap_or_else(|e| {
+    let (cache, scratch) = places(&sources(folder, &firmware_dir)).unwrap_or_else(|e| {
         panic!("the emulated trigger box needs a place to build in: {e}");
     });
-    let built = Built {
+    let built = BuildOutput {
         firmware: cache.join("trigger_box.elf"),
         board: cache.join("board"),
     };
@@ -53,7 +53,7 @@ pub fn build() -> Result<Built, Unavailable> {
         return Ok(built);
     }
     run_make(&firmware_dir, scratch.path(), "trigger_box.elf");
-    run_make(here, scratch.path(), "board");
+    run_make(folder, scratch.path(), "board");
     // Of concurrent builds the first one wins; the results are equal.
     let created = scratch.keep();
     if fs::rename(&created, &cache).is_err() {
@@ -124,8 +124,8 @@ fn has_header(compiler: &str, header: &str) -> io::Result<bool> {
 }
 
 /// All sources, in a fixed order.
-fn sources(here: &Path, firmware: &Path) -> Vec<PathBuf> {
-    let mut files = vec![here.join("board.c"), here.join("Makefile")];
+fn sources(folder: &Path, firmware: &Path) -> Vec<PathBuf> {
+    let mut files = vec![folder.join("board.c"), folder.join("Makefile")];
     let mut of_firmware: Vec<PathBuf> = fs::read_dir(firmware)
         .into_iter()
         .flatten()

@@ -9,7 +9,7 @@ mod build;
 mod edges;
 
 pub use board::{BoardOptions, EmulatedBox, NoiseDone, NoisePerMillion, ResetCause};
-pub use build::{Built, Unavailable, build};
+pub use build::{BuildOutput, Unavailable, build};
 pub use edges::{
     BoardClock, BoardMessage, CAMERA_1, CAMERA_2, CYCLES_PER_US, Edge, EdgeStream, INPUT, SPARE,
     trigger_edges,

@@ -141,9 +141,9 @@ interpose_openat!(
 #[unsafe(no_mangle)]
 pub(crate) unsafe extern "C" fn opendir(path: *const c_char) -> *mut DIR {
     // SAFETY: a caller of `opendir` passes a C string.
-    let here = unsafe { CStr::from_ptr(path) };
-    let there = redirect::root().and_then(|root| redirect::redirected(root, here));
-    let path = there.as_deref().unwrap_or(here);
+    let requested = unsafe { CStr::from_ptr(path) };
+    let there = redirect::root().and_then(|root| redirect::redirected(root, requested));
+    let path = there.as_deref().unwrap_or(requested);
     let original = original!(OpenDir, c"opendir");
     // SAFETY: a C string.
     unsafe { original(path.as_ptr()) }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::history::NightHead;
+use super::history::NightSummary;
 use crate::cause::Cause;
 
 /// Probable cause of an alarm.
@@ -40,7 +40,11 @@ pub(crate) fn series_cause(series: &str) -> Cause {
 }
 
 /// Attributes a change of `series` between the nights `before` and `after`.
-pub(super) fn attribute(before: &NightHead, after: &NightHead, series: &[&str]) -> Attribution {
+pub(super) fn attribute(
+    before: &NightSummary,
+    after: &NightSummary,
+    series: &[&str],
+) -> Attribution {
     let changes = changes(before, after);
     let changed: Vec<String> = changes.iter().map(|(_, text)| text.clone()).collect();
     let has = |part| changes.iter().any(|(p, _)| *p == part);
@@ -115,7 +119,7 @@ pub(super) fn attribute(before: &NightHead, after: &NightHead, series: &[&str]) 
     }
 }
 
-fn changes(before: &NightHead, after: &NightHead) -> Vec<(Component, String)> {
+fn changes(before: &NightSummary, after: &NightSummary) -> Vec<(Component, String)> {
     let mut differences = Vec::new();
     let mut differ = |part, what: &str, a: &str, b: &str| {
         if a != b {

@@ -4,7 +4,7 @@ use serde::Serialize;
 use skinrig_model::quantile;
 
 use super::change::{self, ChangeWindow};
-use super::history::{Acceptance, NightHead, Point, Series};
+use super::history::{Acceptance, NightSummary, Point, Series};
 use super::reference::{MAX_NIGHTS, MIN_NIGHTS, Reference, Sample};
 use super::run_length::Rule;
 
@@ -106,7 +106,7 @@ struct ChartBuilder {
 #[must_use]
 pub fn chart(
     series: &Series,
-    nights: &[NightHead],
+    nights: &[NightSummary],
     accepted: &[Acceptance],
     rules: [Rule; 2],
 ) -> Chart {
@@ -143,7 +143,7 @@ pub fn chart(
 }
 
 /// Nights at which the reference of the series restarts, oldest first.
-fn restarts(series: &str, nights: &[NightHead], accepted: &[Acceptance]) -> Vec<usize> {
+fn restarts(series: &str, nights: &[NightSummary], accepted: &[Acceptance]) -> Vec<usize> {
     let concerns = |a: &&Acceptance| a.series.as_deref().is_none_or(|s| s == series);
     let place = |a: &Acceptance| nights.iter().position(|n| n.id == a.night);
     let mut all: Vec<usize> = accepted.iter().filter(concerns).filter_map(place).collect();

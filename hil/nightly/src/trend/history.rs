@@ -10,7 +10,7 @@ use crate::verdict::Verdict;
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct History {
     /// Oldest first.
-    pub nights: Vec<NightHead>,
+    pub nights: Vec<NightSummary>,
     /// One series per metric, sorted by name.
     pub series: Vec<Series>,
     /// Accepted changes.
@@ -19,7 +19,7 @@ pub struct History {
 
 /// Metadata of a night.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct NightHead {
+pub struct NightSummary {
     /// As in [`Night::id`].
     pub id: String,
     /// Start time, RFC 3339, UTC.
@@ -91,7 +91,7 @@ pub struct Acceptance {
     pub at: String,
 }
 
-impl NightHead {
+impl NightSummary {
     /// Metadata of `night`, whose files are in `folder`.
     #[must_use]
     pub fn of(night: &Night, folder: impl Into<String>) -> Self {
@@ -132,7 +132,7 @@ impl History {
     /// Appends a night.
     pub fn push(&mut self, night: &Night, folder: impl Into<String>) {
         let at = self.nights.len();
-        self.nights.push(NightHead::of(night, folder));
+        self.nights.push(NightSummary::of(night, folder));
         let checks = night.checks.iter();
         let last = checks.flat_map(|c| Some((c, c.attempts.last()?)));
         for (check, attempt) in last {

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::cause::{self, Attribution};
 use super::chart::{Chart, Direction, Excursion, chart};
 use super::derived::ratios;
-use super::history::{History, NightHead};
+use super::history::{History, NightSummary};
 use super::reference::MIN_NIGHTS;
 use super::run_length::{Rule, rules};
 use crate::cause::Cause;
@@ -30,7 +30,7 @@ pub struct Report {
     /// One chart per series, those of open alarms first.
     pub charts: Vec<Chart>,
     /// The nights, oldest first.
-    pub nights: Vec<NightHead>,
+    pub nights: Vec<NightSummary>,
     /// Rules that raise alarms.
     pub rules: [Rule; 2],
 }
@@ -109,7 +109,7 @@ pub fn judge(history: &History) -> Report {
 }
 
 /// Groups excursions whose changes may have started in the same night into alarms: open ones and past ones.
-fn alarms(charts: &[Chart], nights: &[NightHead]) -> (Vec<Alarm>, Vec<Alarm>) {
+fn alarms(charts: &[Chart], nights: &[NightSummary]) -> (Vec<Alarm>, Vec<Alarm>) {
     let each = charts.iter().enumerate();
     let mut all: Vec<(usize, &Excursion)> = each
         .flat_map(|(at, c)| c.excursions.iter().map(move |e| (at, e)))
@@ -203,7 +203,7 @@ pub fn format_number(value: f64) -> String {
 
 /// Date of a night.
 #[must_use]
-pub fn day(night: &NightHead) -> &str {
+pub fn day(night: &NightSummary) -> &str {
     night.started.get(..10).unwrap_or(&night.started)
 }
 
@@ -219,7 +219,7 @@ pub const fn cause_name(cause: Option<Cause>) -> &'static str {
     }
 }
 
-fn headline(charts: &[Chart], alarms: &[Alarm], nights: &[NightHead]) -> String {
+fn headline(charts: &[Chart], alarms: &[Alarm], nights: &[NightSummary]) -> String {
     let Some(alarm) = alarms.first() else {
         let learning = charts.iter().filter(|c| c.reference.is_none()).count();
         return if charts.is_empty() {

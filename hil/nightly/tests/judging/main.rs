@@ -283,12 +283,12 @@ proptest! {
         must_pass in 1..4u32,
     ) {
         let rule = RepeatRule { at_most, must_pass };
-        let mut made = 1;
-        while made < verdicts.len() && rule.should_repeat(&attempts(&verdicts[..made])) {
-            made += 1;
+        let mut attempt_count = 1;
+        while attempt_count < verdicts.len() && rule.should_repeat(&attempts(&verdicts[..attempt_count])) {
+            attempt_count += 1;
         }
-        prop_assert!(made <= 1 + at_most as usize);
-        let verdicts = &verdicts[..made];
+        prop_assert!(attempt_count <= 1 + at_most as usize);
+        let verdicts = &verdicts[..attempt_count];
         let together = rule.combine(&attempts(verdicts));
         let failed = verdicts.iter().any(|v| !v.is_good());
         if failed {
@@ -296,9 +296,9 @@ proptest! {
             let changed = row >= must_pass as usize;
             prop_assert_eq!(together.verdict == Verdict::Marginal, changed);
             prop_assert!(changed || !together.verdict.is_good());
-            prop_assert_eq!(together.explanation.is_some(), made > 1);
+            prop_assert_eq!(together.explanation.is_some(), attempt_count > 1);
         } else {
-            prop_assert_eq!(made, 1);
+            prop_assert_eq!(attempt_count, 1);
             prop_assert_eq!(together.verdict, verdicts[0]);
             prop_assert_eq!(together.explanation, None);
         }
@@ -311,8 +311,8 @@ proptest! {
     ) {
         let exit = NightExit::of(checks.iter().map(|(v, c)| (*v, Some(*c))));
         let bad: Vec<_> = checks.iter().filter(|(v, _)| !v.is_good()).collect();
-        let made = checks.iter().any(|(v, _)| *v != Verdict::Skipped);
-        prop_assert_eq!(exit == NightExit::Pass, made && bad.is_empty());
+        let attempt_count = checks.iter().any(|(v, _)| *v != Verdict::Skipped);
+        prop_assert_eq!(exit == NightExit::Pass, attempt_count && bad.is_empty());
         let invalid = bad.iter().any(|(v, _)| *v == Verdict::Invalid);
         prop_assert_eq!(exit == NightExit::Invalid, invalid);
         if exit == NightExit::Infrastructure {

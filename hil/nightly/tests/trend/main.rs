@@ -8,7 +8,7 @@
 
 mod nights;
 
-use nights::{Bench, Planted};
+use nights::{Bench, PlantedChange};
 use skinrig_nightly::Cause;
 use skinrig_nightly::trend::report::NIGHTS_PER_FALSE_ALARM;
 use skinrig_nightly::trend::run_length::rules;
@@ -32,7 +32,7 @@ fn chart<'a>(report: &'a Report, series: &str) -> &'a Chart {
 /// twenty nights.
 fn delay(seed: u64, series: &'static str, spread: f64, from: usize, factor: f64) -> Option<usize> {
     let mut bench = Bench::new(seed).spread(series, spread);
-    bench.planted.push(Planted {
+    bench.planted.push(PlantedChange {
         series,
         from,
         factor,
@@ -86,7 +86,7 @@ fn with_quarter_lower(planted: &[&'static str]) -> History {
     let mut bench = Bench::new(3);
     bench.gaps = [0, 0];
     for series in planted {
-        bench.planted.push(Planted {
+        bench.planted.push(PlantedChange {
             series,
             from: 60,
             factor: 0.75,
@@ -161,7 +161,7 @@ fn an_accepted_change_starts_a_new_reference() {
 fn reference_needs_enough_nights_and_skips_invalid_ones() {
     let mut bench = Bench::new(1);
     bench.gaps = [0, 0];
-    bench.planted.push(Planted {
+    bench.planted.push(PlantedChange {
         series: EVENTS,
         from: 6,
         factor: 0.5,

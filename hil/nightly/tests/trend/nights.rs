@@ -3,7 +3,7 @@
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
-use skinrig_nightly::trend::{History, NightHead, Point};
+use skinrig_nightly::trend::{History, NightSummary, Point};
 use skinrig_nightly::{Verdict, Versions};
 
 /// Distribution of a metric on an unchanged bench.
@@ -175,7 +175,7 @@ const OTHERS: &[(&str, &str, &str, &str, Kind)] = &[
 
 /// A planted change of a bench.
 #[derive(Debug, Clone)]
-pub(crate) struct Planted {
+pub(crate) struct PlantedChange {
     /// Prefix of the names of the affected series.
     pub series: &'static str,
     /// First affected night.
@@ -190,7 +190,7 @@ pub(crate) struct Bench {
     metrics: Vec<Metric>,
     temperature: f64,
     /// Planted changes.
-    pub planted: Vec<Planted>,
+    pub planted: Vec<PlantedChange>,
     /// One in `gaps[0]` nights is missing; one in `gaps[1]` is INVALID with wrong values. 0: none.
     pub gaps: [u64; 2],
 }
@@ -262,7 +262,7 @@ impl Bench {
         let (missing, invalid) = (one_in(gaps[0]), one_in(gaps[1]));
         let drawn = metrics.iter_mut().map(|metric| {
             let mut value = metric.draw(random, *temperature);
-            let hits = |p: &&Planted| metric.name.starts_with(p.series) && at >= p.from;
+            let hits = |p: &&PlantedChange| metric.name.starts_with(p.series) && at >= p.from;
             for p in planted.iter().filter(hits) {
                 value *= p.factor;
             }
@@ -315,8 +315,8 @@ impl Bench {
 }
 
 /// Metadata of night number `at`; its ID contains the number.
-pub(crate) fn head(at: usize) -> NightHead {
-    NightHead {
+pub(crate) fn head(at: usize) -> NightSummary {
+    NightSummary {
         id: format!("night-{at:04}"),
         started: date(at),
         suite: "nightly".to_owned(),

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use serde_json::json;
-use skinrig_browser::{Browser, BrowserError, Page, Size};
+use skinrig_browser::{Page, Size};
 
 use crate::downloads::{AT_A_TIME, buttons, rows};
-use crate::reading::{LIGHTNESS, complaints, identifiers, misfits};
-use crate::{picture_folder, save_picture, skinrig};
+use crate::reading::{LIGHTNESS, complaints, identifiers};
+use crate::{check_phone, picture_folder, save_picture, skinrig, with_page};
 
 /// Page that compares two simulated skins.
 fn comparison() -> &'static PathBuf {
@@ -42,18 +42,7 @@ fn comparison() -> &'static PathBuf {
 }
 
 fn with_comparison(test: impl FnOnce(&mut Page<'_>)) {
-    let mut browser = match Browser::start() {
-        Ok(browser) => browser,
-        Err(BrowserError::Absent(reason)) => {
-            println!("skipped: no browser: {reason}");
-            return;
-        }
-        Err(e) => panic!("{e}"),
-    };
-    let file = comparison();
-    let mut page = browser.page().unwrap();
-    page.open(file).unwrap();
-    test(&mut page);
+    with_page(|| comparison(), test);
 }
 
 #[test]
@@ -117,17 +106,7 @@ fn it_is_dark_prints_and_fits_a_phone() {
         let pdf = page.pdf().unwrap();
         assert!(pdf.starts_with(b"%PDF-"));
         std::fs::write(picture_folder().join("comparison.pdf"), &pdf).unwrap();
-        page.resize(Size::PHONE).unwrap();
-        let width = page
-            .evaluate("document.documentElement.scrollWidth")
-            .unwrap();
-        assert!(
-            width.as_u64().unwrap() <= u64::from(Size::PHONE.width),
-            "{width}"
-        );
-        save_picture(page, "comparison-phone", true);
-        let found = misfits(page);
-        assert!(found.is_empty(), "{found:#?}");
+        check_phone(page, "comparison-phone");
         let found = identifiers(page);
         assert!(found.is_empty(), "{found:?}");
     });

@@ -17,7 +17,7 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 use skinrig::exit::Exit;
-use skinrig_browser::{Browser, BrowserError, Page};
+use skinrig_browser::{Browser, BrowserError, Page, Size};
 
 /// A run at two depths, its results and its report.
 struct Session {
@@ -99,8 +99,8 @@ fn session() -> &'static Session {
     })
 }
 
-/// Runs a test with the report open; prints a note and passes without a browser.
-fn with_report(test: impl FnOnce(&mut Page<'_>, &Session)) {
+/// Runs a test on a page; prints a note and passes without a browser, before `file` is called.
+fn with_page<'a>(file: impl FnOnce() -> &'a Path, test: impl FnOnce(&mut Page<'_>)) {
     let mut browser = match Browser::start() {
         Ok(browser) => browser,
         Err(BrowserError::Absent(reason)) => {
@@ -109,10 +109,30 @@ fn with_report(test: impl FnOnce(&mut Page<'_>, &Session)) {
         }
         Err(e) => panic!("{e}"),
     };
-    let session = session();
+    let file = file();
     let mut page = browser.page().unwrap();
-    page.open(&session.report).unwrap();
-    test(&mut page, session);
+    page.open(file).unwrap();
+    test(&mut page);
+}
+
+/// Runs a test with the report open.
+fn with_report(test: impl FnOnce(&mut Page<'_>, &Session)) {
+    with_page(|| &session().report, |page| test(page, session()));
+}
+
+/// Asserts that a page on a phone does not scroll sideways, and saves its picture.
+fn check_phone(page: &mut Page<'_>, name: &str) {
+    page.resize(Size::PHONE).unwrap();
+    let width = page
+        .evaluate("document.documentElement.scrollWidth")
+        .unwrap();
+    assert!(
+        width.as_u64().unwrap() <= u64::from(Size::PHONE.width),
+        "{width}"
+    );
+    save_picture(page, name, true);
+    let misfits = reading::misfits(page);
+    assert!(misfits.is_empty(), "{misfits:#?}");
 }
 
 /// Saves a screenshot of the page.

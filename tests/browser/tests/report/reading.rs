@@ -3,7 +3,7 @@
 use serde_json::json;
 use skinrig_browser::{Page, Size};
 
-use crate::{picture_folder, save_picture, with_report};
+use crate::{check_phone, picture_folder, save_picture, with_report};
 
 /// All errors and warnings of a page, and all requests except for itself.
 pub(crate) fn complaints(page: &mut Page<'_>, own_ending: &str) -> Vec<String> {
@@ -259,17 +259,7 @@ fn the_print_view_omits_interactive_parts() {
 #[test]
 fn a_phone_scrolls_one_way_only() {
     with_report(|page, _| {
-        page.resize(Size::PHONE).unwrap();
-        let width = page
-            .evaluate("document.documentElement.scrollWidth")
-            .unwrap();
-        assert!(
-            width.as_u64().unwrap() <= u64::from(Size::PHONE.width),
-            "{width}"
-        );
-        save_picture(page, "phone", true);
-        let found = misfits(page);
-        assert!(found.is_empty(), "{found:#?}");
+        check_phone(page, "phone");
     });
 }
 

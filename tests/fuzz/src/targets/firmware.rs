@@ -48,7 +48,7 @@ fn drive(bytes: &[u8]) {
     let script = Arc::new(Mutex::new(Script {
         left: bytes.to_vec(),
         line: Vec::new(),
-        asked: FrameReader::default(),
+        requests: FrameReader::default(),
         greeted: false,
     }));
     let dial = Line(script);
@@ -74,7 +74,7 @@ fn drive(bytes: &[u8]) {
 struct Script {
     left: Vec<u8>,
     line: Vec<u8>,
-    asked: FrameReader,
+    requests: FrameReader,
     greeted: bool,
 }
 
@@ -98,8 +98,8 @@ impl Script {
             body.extend(GREETING);
         } else {
             let n = self.take(1).first().map_or(0, |n| usize::from(n % 100));
-            let said = self.take(n);
-            body.extend(said);
+            let reply = self.take(n);
+            body.extend(reply);
         }
         self.line.extend(frame::encode(&body).unwrap_or_default());
     }
@@ -127,7 +127,7 @@ impl Wire for Line {
             return Err(io::ErrorKind::BrokenPipe.into());
         }
         for byte in bytes {
-            if let Some(request) = script.asked.push(*byte) {
+            if let Some(request) = script.requests.push(*byte) {
                 script.answer(&request);
             }
         }

@@ -8,7 +8,7 @@ use skinrig_drd_abi::{
 };
 use skinrig_omega3::OmegaConfig;
 use skinrig_omega3::brake::brake;
-use skinrig_omega3::config::{Initialise, Timeouts};
+use skinrig_omega3::config::{InitialiseRule, Timeouts};
 use skinrig_omega3::sdk::{
     CallError, CallResult, Generator, GeneratorLimits, Quantity, Reading, Sdk,
 };
@@ -16,7 +16,7 @@ use skinrig_omega3::{enumerate, open};
 
 /// Lists, opens, initialises and brakes a robot with such a library.
 pub fn answers(bytes: &[u8]) {
-    let sdk = Hostile(Mutex::new(bytes.to_vec()));
+    let sdk = FuzzedSdk(Mutex::new(bytes.to_vec()));
     if let Ok(found) = enumerate::list(&sdk) {
         for robot in &found {
             assert!(!robot.to_string().is_empty());
@@ -24,7 +24,7 @@ pub fn answers(bytes: &[u8]) {
         }
     }
     let config = OmegaConfig {
-        initialise: Initialise::SampleIsOff,
+        initialise: InitialiseRule::SampleIsOff,
         timeouts: Timeouts {
             brake_attempts: 3,
             brake_retry: Duration::ZERO,
@@ -39,14 +39,14 @@ pub fn answers(bytes: &[u8]) {
 }
 
 /// Takes its answers from these bytes, and gives valid ones when they run out.
-struct Hostile(Mutex<Vec<u8>>);
+struct FuzzedSdk(Mutex<Vec<u8>>);
 
-impl Hostile {
+impl FuzzedSdk {
     fn take<const N: usize>(&self) -> Option<[u8; N]> {
         let mut left = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let said = left.first_chunk::<N>().copied()?;
+        let head = left.first_chunk::<N>().copied()?;
         left.drain(..N);
-        Some(said)
+        Some(head)
     }
 
     /// A quarter of the answers are errors, a quarter arbitrary, the rest valid.
@@ -87,7 +87,7 @@ impl Hostile {
     }
 }
 
-impl Sdk for Hostile {
+impl Sdk for FuzzedSdk {
     fn version(&self) -> SdkVersion {
         let number = || self.answer(10, i32::from_le_bytes).unwrap_or_default();
         SdkVersion::new(number(), number(), number())

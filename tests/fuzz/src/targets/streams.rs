@@ -4,9 +4,9 @@ use skinrig_formats::{Decoder, EventSink, Scanner};
 use skinrig_model::{CdEvent, StreamFormat, TriggerEdge};
 use skinrig_recorder::codec;
 
-struct Forget;
+struct NullSink;
 
-impl EventSink for Forget {
+impl EventSink for NullSink {
     fn on_cd(&mut self, _: &[CdEvent]) {}
     fn on_trigger(&mut self, _: TriggerEdge) {}
 }
@@ -24,7 +24,7 @@ pub fn any_format(bytes: &[u8]) {
     ][usize::from(choice & 3)];
     let (first, second) = words.split_at(words.len().min(usize::from(choice >> 2) * 37));
     let (mut decoder, mut scanner) = (Decoder::new(format), Scanner::new(format));
-    decoder.push(first, &mut Forget);
+    decoder.push(first, &mut NullSink);
     let _ = scanner.push(first);
     assert_eq!(
         decoder.stats(),
@@ -34,7 +34,7 @@ pub fn any_format(bytes: &[u8]) {
     let origin_us = decoder.last_us().unwrap_or_default();
     decoder.restart(origin_us);
     scanner.restart(origin_us);
-    decoder.push(second, &mut Forget);
+    decoder.push(second, &mut NullSink);
     let _ = scanner.push(second);
     assert_eq!(
         decoder.stats(),
@@ -51,7 +51,10 @@ pub fn folded(bytes: &[u8]) {
     if let Ok(raw) = codec::unfold(stored, u32::from_le_bytes(*claim) as usize) {
         assert_eq!(raw.len(), u32::from_le_bytes(*claim) as usize);
     }
-    if let Some(again) = codec::fold(stored) {
-        assert_eq!(codec::unfold(&again, stored.len()).as_deref(), Ok(stored));
+    if let Some(refolded) = codec::fold(stored) {
+        assert_eq!(
+            codec::unfold(&refolded, stored.len()).as_deref(),
+            Ok(stored)
+        );
     }
 }

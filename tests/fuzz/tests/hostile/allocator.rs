@@ -11,12 +11,12 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 const REFUSED: usize = 1 << 30;
 
 /// Counts for the whole process.
-pub struct Counting {
+pub struct CountingAllocator {
     held: AtomicUsize,
     peak: AtomicUsize,
 }
 
-impl Counting {
+impl CountingAllocator {
     pub const fn new() -> Self {
         Self {
             held: AtomicUsize::new(0),
@@ -48,7 +48,7 @@ impl Counting {
 
 // SAFETY: every method hands its arguments unchanged to the system's allocator and its answer back, or answers null, which the
 // trait allows at any time; the counters have no influence on either.
-unsafe impl GlobalAlloc for Counting {
+unsafe impl GlobalAlloc for CountingAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         if layout.size() > REFUSED {
             return std::ptr::null_mut();

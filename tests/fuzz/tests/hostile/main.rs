@@ -19,10 +19,10 @@ use std::time::{Duration, Instant};
 use skinrig_fuzz::mutate::{Dice, mutate};
 use skinrig_fuzz::{Target, target};
 
-use self::allocator::Counting;
+use self::allocator::CountingAllocator;
 
 #[global_allocator]
-static MEMORY: Counting = Counting::new();
+static MEMORY: CountingAllocator = CountingAllocator::new();
 
 /// Timeout of a case. Generous, because other programs compete for the processors.
 const HANGS: Duration = Duration::from_secs(120);
@@ -42,10 +42,10 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 fn watch() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
-        let told = std::panic::take_hook();
+        let default_hook = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |info| {
             PANICS.fetch_add(1, Relaxed);
-            told(info);
+            default_hook(info);
         }));
         std::thread::spawn(|| {
             loop {
@@ -204,9 +204,10 @@ fn memory_and_panics_are_noticed() {
         ..target("csv")
     };
     run(&greedy, "greedy", &[]);
-    let told = catch_unwind(|| run(&greedy, "greedy", &[0; 8])).unwrap_err();
+    let panic = catch_unwind(|| run(&greedy, "greedy", &[0; 8])).unwrap_err();
     assert!(
-        told.downcast_ref::<String>()
+        panic
+            .downcast_ref::<String>()
             .unwrap()
             .contains("expected no panic and at most 1048584 bytes")
     );

@@ -92,10 +92,10 @@ fn record_presses(bench: &EmulatedBench, folder: &Path, presses: usize) -> Tally
             .arg(&sessions)
             .arg(&protocol);
         let output = command.output().unwrap();
-        let said = all_output(&output);
-        tally.refused += said.matches("motion refused").count();
+        let messages = all_output(&output);
+        tally.refused += messages.matches("motion refused").count();
         if !output.status.success() {
-            let last = said.lines().rev().take(12).collect::<Vec<_>>();
+            let last = messages.lines().rev().take(12).collect::<Vec<_>>();
             tally.ended.push(last.join(" | "));
         }
         for file in fs::read_dir(&sessions).into_iter().flatten() {

@@ -48,9 +48,9 @@ fn all_output(output: &Output) -> String {
 }
 
 fn assert_success(output: &Output) -> String {
-    let said = all_output(output);
-    assert!(output.status.success(), "{}\n{said}", output.status);
-    said
+    let message = all_output(output);
+    assert!(output.status.success(), "{}\n{message}", output.status);
+    message
 }
 
 fn run(mut command: Command, rig: &[&str], sessions: &Path) -> Output {
@@ -72,7 +72,7 @@ fn run_in_real_time(bench: &EmulatedBench, sessions: &Path) -> (PathBuf, String)
     for attempt in 1.. {
         let folder = sessions.join(attempt.to_string());
         let output = run(bench.command(SKINRIG).unwrap(), &rig, &folder);
-        let said = all_output(&output);
+        let message = all_output(&output);
         let starved = [
             "expected a pose sample no older than",
             "the session is INVALID",
@@ -80,7 +80,7 @@ fn run_in_real_time(bench: &EmulatedBench, sessions: &Path) -> (PathBuf, String)
             "the live arm was not polled",
         ]
         .iter()
-        .any(|sign| said.contains(sign));
+        .any(|sign| message.contains(sign));
         if attempt == 4 || !starved {
             return (folder, assert_success(&output));
         }
@@ -111,8 +111,8 @@ fn the_quick_check_on_the_emulated_bench_agrees_with_the_simulated_one() {
     let Some((_slot, bench)) = start() else {
         return;
     };
-    let (emulated, said) = run_in_real_time(&bench, &emulated);
-    assert!(said.contains("rig       emulated"), "{said}");
+    let (emulated, message) = run_in_real_time(&bench, &emulated);
+    assert!(message.contains("rig       emulated"), "{message}");
     assert_success(&run(Command::new(SKINRIG), &[], &simulated));
 
     let (bench, sim) = (results(&emulated), results(&simulated));

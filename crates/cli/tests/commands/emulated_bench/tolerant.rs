@@ -32,8 +32,9 @@ fn rig(folder: &Path, more: &str) -> PathBuf {
 /// The quick check with one press.
 fn protocol(folder: &Path) -> PathBuf {
     let text = fs::read_to_string(workspace_root().join("protocols/quick-check.yaml")).unwrap();
-    let kept = |line: &&str| !line.trim_start().starts_with("- [") || line.contains("the centre");
-    let text: Vec<&str> = text.lines().filter(kept).collect();
+    let is_compared =
+        |line: &&str| !line.trim_start().starts_with("- [") || line.contains("the centre");
+    let text: Vec<&str> = text.lines().filter(is_compared).collect();
     let path = folder.join("one-press.yaml");
     fs::write(&path, text.join("\n")).unwrap();
     path

@@ -68,7 +68,7 @@ impl NightResult {
         name: &str,
         verdict: &str,
         cause: &str,
-        seen: &[(&str, &str)],
+        observed: &[(&str, &str)],
     ) {
         let check = self.check(name);
         let all = format!("{name}: {check:#}\n{}", self.stderr);
@@ -80,7 +80,7 @@ impl NightResult {
             .iter()
             .flat_map(|a| a["evidence"].as_array().unwrap())
             .collect();
-        for (kind, subject) in seen {
+        for (kind, subject) in observed {
             let there = evidence
                 .iter()
                 .any(|e| e["kind"] == *kind && e["subject"] == *subject);
@@ -216,28 +216,35 @@ fn a_healthy_bench_passes() {
     };
     let all = "identity,settings,disk,trigger_loopback,noise_dark,noise_lit,test_pattern,robot_state,repeatability,step_response,depth,force_ceiling,\
                watchdog_drill,stop_drill";
-    let mut seen = nights.night(all);
+    let mut observed = nights.night(all);
     // A machine too busy for the emulated devices reports infrastructure: try again.
     for _ in 0..2 {
-        let checks = seen.night["checks"].as_array().unwrap();
+        let checks = observed.night["checks"].as_array().unwrap();
         if !checks.iter().any(|c| c["cause"] == "infrastructure") {
             break;
         }
-        eprintln!("once more: {}", seen.stderr);
-        seen = nights.night(all);
+        eprintln!("once more: {}", observed.stderr);
+        observed = nights.night(all);
     }
     for name in all.split(',') {
-        let verdict = &seen.check(name)["verdict"];
-        assert_eq!(verdict, "PASS", "{:#}\n{}", seen.check(name), seen.stderr);
+        let verdict = &observed.check(name)["verdict"];
+        assert_eq!(
+            verdict,
+            "PASS",
+            "{:#}\n{}",
+            observed.check(name),
+            observed.stderr
+        );
     }
-    assert_eq!(seen.exit, 0, "{}", seen.stderr);
+    assert_eq!(observed.exit, 0, "{}", observed.stderr);
     // A touch registers at 0.2 N: 0.4 mm deep in this skin of 500 N/m.
-    let surface_mm = seen.value("depth", "robot", "surface").unwrap();
+    let surface_mm = observed.value("depth", "robot", "surface").unwrap();
     assert!((0.2..0.6).contains(&surface_mm), "{surface_mm}");
-    let peak_n = seen.value("force_ceiling", "robot", "peak").unwrap();
+    let peak_n = observed.value("force_ceiling", "robot", "peak").unwrap();
     assert!((0.9..1.5).contains(&peak_n), "{peak_n}");
     assert!(
-        seen.value("watchdog_drill", "robot", "braked_within")
+        observed
+            .value("watchdog_drill", "robot", "braked_within")
             .is_some()
     );
 }
@@ -281,20 +288,20 @@ fn unexplained_limit_failures_blame_the_rig() {
     nights.lamps_obey("true");
     nights.inject(RigFault::CameraStorm(CameraId::One));
     nights.inject(RigFault::RobotSlow);
-    let seen = nights.night("noise_dark,noise_lit,step_response");
-    let metric_verdict = |check, subject, metric| seen.metric_verdict(check, subject, metric);
+    let observed = nights.night("noise_dark,noise_lit,step_response");
+    let metric_verdict = |check, subject, metric| observed.metric_verdict(check, subject, metric);
     for camera in ["camera1", "camera2"] {
         // The lamps stayed on.
         assert_eq!(metric_verdict("noise_dark", camera, "rate"), "FAIL");
     }
     assert_eq!(metric_verdict("noise_lit", "camera1", "hot_pixels"), "FAIL");
     assert_eq!(metric_verdict("noise_lit", "camera2", "hot_pixels"), "PASS");
-    let hot = seen.value("noise_lit", "camera1", "hot_pixels");
+    let hot = observed.value("noise_lit", "camera1", "hot_pixels");
     assert!(hot >= Some(40.0) && hot <= Some(46.0), "{hot:?}");
     assert_eq!(metric_verdict("step_response", "robot", "settling"), "FAIL");
     assert_eq!(metric_verdict("step_response", "robot", "error"), "PASS");
     for check in ["noise_dark", "noise_lit", "step_response"] {
-        seen.assert_check(1, check, "FAIL", "rig", &[]);
+        observed.assert_check(1, check, "FAIL", "rig", &[]);
     }
 }
 
@@ -307,6 +314,6 @@ fn a_full_disk_is_the_infrastructure_s() {
         eprintln!("skipped: no full disk: this user may not mount a small one");
         return;
     };
-    let seen = nights.night_in("disk", &tiny.0);
-    seen.assert_check(3, "disk", "FAIL", "infrastructure", &[("disk", "computer")]);
+    let observed = nights.night_in("disk", &tiny.0);
+    observed.assert_check(3, "disk", "FAIL", "infrastructure", &[("disk", "computer")]);
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use chrono::{Days, NaiveDate};
 use skinrig_hil::history::append;
 use skinrig_nightly::night::{Attempt, CheckResult, Measurement, NIGHT_VERSION, Part};
-use skinrig_nightly::{Golden, Night, NightExit, Verdict, Versions};
+use skinrig_nightly::{GoldenSession, Night, NightExit, Verdict, Versions};
 
 use crate::support::{Lab, ProgramOutput, program, run_to_end, skinrig};
 
@@ -41,7 +41,7 @@ fn night(at: usize, golden: Option<&str>, measured: &[(&str, &str, &str, &str, f
         ended_early: None,
         lease_note: None,
         checks: measured.iter().map(check).collect(),
-        golden: golden.map(|session| Golden {
+        golden: golden.map(|session| GoldenSession {
             session: session.to_owned(),
             report: None,
             results_sha256: None,

@@ -52,7 +52,7 @@ fn draws_are_seeded_and_within_range() {
     let all: Vec<Vec<usize>> = draws(5, 100, 3).collect();
     assert_eq!(all, draws(5, 100, 3).collect::<Vec<_>>());
     assert_ne!(all, draws(5, 100, 4).collect::<Vec<_>>());
-    let mut seen = [0; 5];
-    all.iter().flatten().for_each(|i| seen[*i] += 1);
-    assert!(seen.iter().all(|n| *n > 60), "{seen:?}");
+    let mut counts = [0; 5];
+    all.iter().flatten().for_each(|i| counts[*i] += 1);
+    assert!(counts.iter().all(|n| *n > 60), "{counts:?}");
 }

@@ -12,7 +12,7 @@ use skinrig_device::{
 };
 use skinrig_model::*;
 use skinrig_protocol::area::Surroundings;
-use skinrig_protocol::plan::{OnTrip, Plan, PressStep, RunLimits, Step};
+use skinrig_protocol::plan::{Plan, PressStep, RunLimits, Step, TripReaction};
 use skinrig_protocol::{Retakes, Surface, Suspend};
 
 pub(crate) use devices::*;
@@ -346,5 +346,5 @@ pub(crate) const LIMITS: RunLimits = RunLimits {
     position_tolerance_mm: 0.05,
     settle_time: HostDuration::from_millis(20),
     max_acceleration_mm_s2: None,
-    on_trip: OnTrip::Retract,
+    on_trip: TripReaction::Retract,
 };

@@ -100,11 +100,11 @@ expected bias_diff_on >= bias_diff + 75 = 374 mV with bias_diff 299 mV and bias_
     proptest! {
         #[test]
         fn written_biases_read_back(on in 394..=1800_i64, off in 0..=214_i64, fo in 1250..=1800_i64, pr in 975..=1800_i64) {
-            let wanted: Values = [("bias_diff_on", on), ("bias_diff_off", off), ("bias_fo", fo), ("bias_pr", pr)]
+            let requested: Values = [("bias_diff_on", on), ("bias_diff_off", off), ("bias_fo", fo), ("bias_pr", pr)]
                 .map(|(n, v)| (n.to_owned(), v))
                 .into();
-            let text = write_bias_file(&wanted).unwrap();
-            prop_assert_eq!(parse_bias_file(&text).unwrap(), complete(&wanted).unwrap());
+            let text = write_bias_file(&requested).unwrap();
+            prop_assert_eq!(parse_bias_file(&text).unwrap(), complete(&requested).unwrap());
         }
 
         #[test]

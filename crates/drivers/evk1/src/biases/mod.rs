@@ -145,16 +145,16 @@ fn code(table: &[u16], first_mv: i64, mv: i64) -> u32 {
         .map_or(0, u32::from)
 }
 
-/// All biases: `wanted` plus the defaults of the others.
+/// All biases: `requested` plus the defaults of the others.
 ///
 /// # Errors
 /// [`Evk1Error::Refused`] for an unknown name, a value out of range, or a broken interlock.
-pub fn complete(wanted: &Values) -> Result<Values, Evk1Error> {
+pub fn complete(requested: &Values) -> Result<Values, Evk1Error> {
     let mut values: Values = BIASES
         .iter()
         .map(|b| (b.name.to_owned(), b.default_mv))
         .collect();
-    for (name, &mv) in wanted {
+    for (name, &mv) in requested {
         let Some(bias) = named(name) else {
             let names = BIASES.map(|b| b.name).join(", ");
             return Err(Evk1Error::refused(format!("a bias out of {names}"), name));
@@ -257,8 +257,8 @@ mod tests {
     }
 
     fn refusal(changes: &[(&str, i64)]) -> String {
-        let wanted = changes.iter().map(|&(n, v)| (n.to_owned(), v)).collect();
-        complete(&wanted).unwrap_err().to_string()
+        let requested = changes.iter().map(|&(n, v)| (n.to_owned(), v)).collect();
+        complete(&requested).unwrap_err().to_string()
     }
 
     #[test]
@@ -350,8 +350,8 @@ expected a bias out of bias_diff, bias_diff_off, bias_diff_on, bias_fo, bias_hpf
             &[("bias_fo", 1399), ("bias_refr", 1350)],
             &[("bias_fo", 1400), ("bias_refr", 1300)],
         ] {
-            let wanted = allowed.iter().map(|&(n, v)| (n.to_owned(), v)).collect();
-            complete(&wanted).unwrap();
+            let requested = allowed.iter().map(|&(n, v)| (n.to_owned(), v)).collect();
+            complete(&requested).unwrap();
         }
     }
 

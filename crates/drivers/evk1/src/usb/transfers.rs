@@ -323,8 +323,8 @@ impl Drop for Transfers {
 /// The event thread: runs until the last transfer returns.
 fn serve(context: &Context, shared: &Shared) {
     /// Notifies waiting threads when the event thread exits, including by panic.
-    struct End<'a>(&'a Shared);
-    impl Drop for End<'_> {
+    struct ExitNotifier<'a>(&'a Shared);
+    impl Drop for ExitNotifier<'_> {
         fn drop(&mut self) {
             let mut flight = self.0.flight();
             flight.ending = true;
@@ -332,7 +332,7 @@ fn serve(context: &Context, shared: &Shared) {
             self.0.landed.notify_all();
         }
     }
-    let _end = End(shared);
+    let _end = ExitNotifier(shared);
     loop {
         match context.handle_events(Some(LOOK_UP)) {
             Ok(()) | Err(rusb::Error::Interrupted) => {}

@@ -3,7 +3,7 @@
 use skinrig_device::{CameraSettings, DeviceError, EventCamera, RealClock};
 use skinrig_emulated_camera::control::DeviceCommand;
 use skinrig_emulated_camera::harness::on_bus;
-use skinrig_evk1::{Evk1, Evk1Config, FoundState, enumerate};
+use skinrig_evk1::{CameraState, Evk1, Evk1Config, enumerate};
 use skinrig_model::CameraId;
 
 use crate::bench::{FIRST, events, noise, open, until};
@@ -90,7 +90,10 @@ fn an_unresponsive_camera_times_out() {
         );
         drop(camera);
         let found = enumerate().unwrap();
-        assert!(matches!(found[0].state, FoundState::Faulty(_)), "{found:?}");
+        assert!(
+            matches!(found[0].state, CameraState::Faulty(_)),
+            "{found:?}"
+        );
         remote.order(FIRST, DeviceCommand::Silence(false)).unwrap();
         remote.order(FIRST, DeviceCommand::FailReads(true)).unwrap();
         let (config, clock) = (Evk1Config::default(), RealClock::start());

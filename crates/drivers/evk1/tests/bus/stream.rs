@@ -83,9 +83,9 @@ fn garbage_is_kept_unchanged() {
         remote
             .order(FIRST, DeviceCommand::Garbage(garbage.clone()))
             .unwrap();
-        let wanted: Vec<u8> = garbage.iter().flat_map(|w| w.to_le_bytes()).collect();
+        let expected: Vec<u8> = garbage.iter().flat_map(|w| w.to_le_bytes()).collect();
         until(&mut camera, &mut chunks, |c| {
-            bytes(c).windows(wanted.len()).any(|w| w == wanted)
+            bytes(c).windows(expected.len()).any(|w| w == expected)
         })
         .unwrap();
         camera.stop(&mut chunks).unwrap();

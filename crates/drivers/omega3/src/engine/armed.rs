@@ -10,7 +10,7 @@ use crate::span::span;
 use crate::tare::TareAverage;
 use crate::trajectory::{Trajectory, norm};
 
-pub(super) struct Armed {
+pub(super) struct ArmedState {
     pub(super) trajectory: Trajectory,
     pub(super) monitor: Monitor,
     pub(super) correction: Correction,
@@ -49,7 +49,7 @@ pub(super) fn rises(set_point: Point3<Robot>, target: Point3<Robot>) -> bool {
     up > 0.0 && (up >= aside || aside <= MAX_SIDEWAYS_MM)
 }
 
-impl Armed {
+impl ArmedState {
     /// Checks that a new reading arrived in time.
     pub(super) fn check_silence(&self, now: HostTime, trips: &Trips) -> Result<(), Trip> {
         let limit = trips.max_silence;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use skinrig_device::{Clock, DeviceError, MotionLimits};
 use skinrig_drd_abi::{ForceOffCause, StatusField};
 
-use super::armed::{Armed, TareState};
+use super::armed::{ArmedState, TareState};
 use super::{CONTROL_EVERY, Engine, STATUS_EVERY, State, span};
 use crate::config::Envelope;
 use crate::correction::Correction;
@@ -163,7 +163,7 @@ impl<C: Clock> Engine<C> {
         freshness.set_rate(khz);
         let mut trajectory = Trajectory::at_rest(self.config.motion, tip);
         trajectory.set_acceleration(limits.max_acceleration_mm_s2);
-        self.state = State::Armed(Box::new(Armed {
+        self.state = State::Armed(Box::new(ArmedState {
             trajectory,
             monitor: Monitor::new(self.config.trips, *limits, now, tip.to_array()),
             correction: Correction::none(self.config.motion, tip.to_array()),

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use skinrig_device::{Clock, DeviceError, MotionLimits, limits};
 use skinrig_model::{DeviceRole, HostDuration, Point3, Robot, Setting};
 
-use armed::{Armed, rises};
+use armed::{ArmedState, rises};
 
 use crate::brake::{BrakeUnconfirmed, brake};
 use crate::config::{OmegaConfig, Timeouts};
@@ -31,7 +31,7 @@ enum State {
     /// Motors off.
     Parked,
     /// Motors live.
-    Armed(Box<Armed>),
+    Armed(Box<ArmedState>),
     /// Braked after a fault, until disarmed.
     Tripped(Trip),
     /// Disconnected, until reopened.

@@ -5,7 +5,7 @@ use skinrig_drd_abi::ErrorCode;
 use super::scripted::Scripted;
 use crate::OmegaConfig;
 use crate::Remark;
-use crate::config::{Initialise, RedundantEncoders, SupervisorCommand, Timeouts, Watchdog};
+use crate::config::{InitialiseRule, RedundantEncoders, SupervisorCommand, Timeouts, Watchdog};
 use crate::enumerate;
 use crate::open::open;
 use crate::supervisor::brake_all;
@@ -106,7 +106,7 @@ fn initialisation_requires_that_the_sample_is_off_and_ends_braked() {
     let sdk = Scripted::default();
     sdk.with(|s| s.initialised = false);
     let config = OmegaConfig {
-        initialise: Initialise::SampleIsOff,
+        initialise: InitialiseRule::SampleIsOff,
         ..OmegaConfig::default()
     };
     let mut before = None;

@@ -3,7 +3,7 @@
 use emulated_libdrd::{ArmConfig, DeviceConfig, EmulatedArm, Fault, Mode, Setting, When};
 use skinrig_device::{DeviceError, Indenter, RealClock};
 use skinrig_drd_abi::ErrorCode;
-use skinrig_omega3::config::Initialise;
+use skinrig_omega3::config::InitialiseRule;
 use skinrig_omega3::{Omega, OmegaError, Remark};
 
 use crate::support::*;
@@ -91,7 +91,7 @@ fn an_uninitialised_arm_is_rejected_unless_the_sample_is_off() {
     let still = arm.state().expect("arm state");
     assert_eq!((still.mode, still.initialised), (Mode::Reset, false));
     let mut config = config(&arm);
-    config.initialise = Initialise::SampleIsOff;
+    config.initialise = InitialiseRule::SampleIsOff;
     let omega = Omega::open(config, RealClock::start()).expect("robot initialises and opens");
     let state = arm.state().expect("arm state");
     assert!(state.initialised && state.mode == Mode::Brake, "{state:?}");
@@ -107,7 +107,7 @@ fn a_hanging_initialisation_times_out_and_brakes() {
     arm.inject(When::Now, Fault::AutoInitHangs)
         .expect("fault injected");
     let mut config = config(&arm);
-    config.initialise = Initialise::SampleIsOff;
+    config.initialise = InitialiseRule::SampleIsOff;
     config.timeouts.open = std::time::Duration::from_secs(1);
     config.timeouts.initialise = std::time::Duration::from_secs(1);
     let error = match Omega::open(config, RealClock::start()) {

@@ -155,7 +155,7 @@ fn without_skew(edges: &[Edge]) -> Vec<Edge> {
 fn assert_train(edges: &[Edge], mark: Mark) {
     let start = edges[0].cycle;
     let found: Vec<(u64, bool)> = edges.iter().map(|e| (e.cycle - start, e.high)).collect();
-    let wanted: Vec<(u64, bool)> = PulseTrain::new(mark)
+    let expected: Vec<(u64, bool)> = PulseTrain::new(mark)
         .unwrap()
         .pulses()
         .flat_map(|(at, width)| {
@@ -165,7 +165,7 @@ fn assert_train(edges: &[Edge], mark: Mark) {
             ]
         })
         .collect();
-    assert_eq!(found, wanted, "the train of {mark:?}");
+    assert_eq!(found, expected, "the train of {mark:?}");
 }
 
 fn syncs_in(reports: &[BoxReport]) -> Vec<(u32, BoxTime)> {

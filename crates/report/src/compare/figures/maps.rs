@@ -110,22 +110,29 @@ fn vectors(result: &Comparison, place: &Place, skin: usize, times: f64) -> Strin
     result.locations.iter().filter_map(vector).collect()
 }
 
-fn tested(here: &LocationComparison) -> bool {
-    here.difference_mm
+fn tested(location_result: &LocationComparison) -> bool {
+    location_result
+        .difference_mm
         .is_some_and(|d| d.low.is_some() && d.high.is_some())
 }
 
 /// Tooltip of a location.
 fn tooltip(location: &Location) -> String {
-    let skins = location.skins.iter().zip('A'..).map(|(here, letter)| {
-        let rank = here.rank.map_or(String::new(), |r| format!(", rank {r}"));
-        format!(
-            "{letter}: {} mm ({} of {} presses{rank})",
-            number(here.error_mm, 2),
-            here.presses[0],
-            here.presses[1]
-        )
-    });
+    let skins = location
+        .skins
+        .iter()
+        .zip('A'..)
+        .map(|(location_result, letter)| {
+            let rank = location_result
+                .rank
+                .map_or(String::new(), |r| format!(", rank {r}"));
+            format!(
+                "{letter}: {} mm ({} of {} presses{rank})",
+                number(location_result.error_mm, 2),
+                location_result.presses[0],
+                location_result.presses[1]
+            )
+        });
     let at = format!("({}, {}) mm", location.at.x_mm, location.at.y_mm);
     std::iter::once(at)
         .chain(skins)
@@ -153,13 +160,13 @@ fn error_disc(
     svg: &mut Markup,
     at: (f64, f64),
     r: f64,
-    here: &LocationComparison,
+    location_result: &LocationComparison,
     end: f64,
     location: &Location,
 ) {
-    match here.error_mm {
+    match location_result.error_mm {
         Some(error) => disc(svg, at, r, &viridis(error / end), false, location),
-        None if here.presses[1] > 0 => {
+        None if location_result.presses[1] > 0 => {
             let (x, y) = at;
             let cross = format!("M{} {}l8 8m0 -8l-8 8", Px(x - 4.0), Px(y - 4.0));
             svg.path("cross", &cross);
@@ -176,11 +183,11 @@ fn difference_disc(
     k: usize,
     end: f64,
 ) {
-    let here = &location.skins[k];
-    let Some(difference) = here.difference_mm else {
+    let location_result = &location.skins[k];
+    let Some(difference) = location_result.difference_mm else {
         return;
     };
-    let sign = here.sign();
+    let sign = location_result.sign();
     disc(
         svg,
         at,
@@ -229,9 +236,9 @@ fn magnification(result: &Comparison, k: usize) -> f64 {
     let large = lengths
         .get((0.95 * lengths.len() as f64) as usize)
         .or(lengths.last());
-    let wanted = 7.0 / large.copied().unwrap_or(1.0).max(1e-3);
+    let factor = 7.0 / large.copied().unwrap_or(1.0).max(1e-3);
     [20.0, 10.0, 5.0, 2.0]
         .into_iter()
-        .find(|t| *t <= wanted)
+        .find(|t| *t <= factor)
         .unwrap_or(1.0)
 }

@@ -1,6 +1,6 @@
 //! Owns the figure of differences in units of their margins, which shows equivalence at a glance.
 
-use skinrig_compare::statistics::{Better, Comparison as Compared, Verdict};
+use skinrig_compare::statistics::{Comparison as Compared, ImprovementDirection, Verdict};
 use skinrig_compare::{Comparison, Row};
 
 use super::{foot, sign_class};
@@ -104,9 +104,9 @@ pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<Figur
 /// Sign and scale that turn a difference so that positive is better.
 fn improvement_factor(row: &Row, c: &Compared) -> f64 {
     match row.metric.better() {
-        Better::Lower => -1.0,
-        Better::Higher => 1.0,
-        Better::NearerZero if c.a.value > 0.0 => -1.0,
-        Better::NearerZero => 1.0,
+        ImprovementDirection::Lower => -1.0,
+        ImprovementDirection::Higher => 1.0,
+        ImprovementDirection::NearerZero if c.a.value > 0.0 => -1.0,
+        ImprovementDirection::NearerZero => 1.0,
     }
 }

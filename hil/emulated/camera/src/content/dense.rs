@@ -10,7 +10,7 @@ use crate::random::Splitmix;
 /// Random pixels in the pattern, a power of two.
 const PATTERN: usize = 1 << 13;
 
-pub(crate) struct Dense {
+pub(crate) struct DenseContent {
     /// EVT2 words without their time.
     words: Vec<u32>,
     next: usize,
@@ -19,7 +19,7 @@ pub(crate) struct Dense {
     due: f64,
 }
 
-impl Dense {
+impl DenseContent {
     pub(crate) fn new(mev_per_s: f64) -> Self {
         let mut random = Splitmix(1);
         let words = (0..PATTERN)

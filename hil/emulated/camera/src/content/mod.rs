@@ -10,7 +10,7 @@ use crate::config::Content;
 use crate::error::BusError;
 use crate::random::Splitmix;
 use crate::world::World;
-use dense::Dense;
+use dense::DenseContent;
 use recorded::RecordedEvents;
 use scene::Scene;
 
@@ -22,7 +22,7 @@ pub(crate) enum Source {
         random: Splitmix,
         next_ns: f64,
     },
-    Dense(Dense),
+    Dense(DenseContent),
     RecordedEvents(RecordedEvents),
     Scene(Box<Scene>),
 }
@@ -46,7 +46,7 @@ impl Source {
                 next_ns: f64::NEG_INFINITY,
             },
             Content::Dense { mev_per_s } => {
-                Self::Dense(Dense::new(positive("a rate in Mev/s", *mev_per_s)?))
+                Self::Dense(DenseContent::new(positive("a rate in Mev/s", *mev_per_s)?))
             }
             Content::File { path } => Self::RecordedEvents(RecordedEvents::open(path)?),
             Content::Scene(scene) => Self::Scene(Box::new(Scene::new(scene)?)),
@@ -64,7 +64,7 @@ impl Source {
     }
 
     /// The source, if it provides encoded words instead of events.
-    pub(crate) fn dense(&mut self) -> Option<&mut Dense> {
+    pub(crate) fn dense(&mut self) -> Option<&mut DenseContent> {
         match self {
             Self::Dense(dense) => Some(dense),
             _ => None,

@@ -16,13 +16,13 @@ pub(crate) struct Scene {
     skin_from_robot: RigidTransform<Skin, Robot>,
     /// Tip position before the first report.
     rest: Point3<Skin>,
-    running: Option<Running>,
+    running: Option<SceneRun>,
     /// Events that belong to the next packet.
     ahead: Vec<PixelEvent>,
 }
 
 /// Pixels of the current run.
-struct Running {
+struct SceneRun {
     pixels: Box<dyn PixelModel>,
     /// Whether the lamps are on.
     lit: bool,
@@ -66,7 +66,7 @@ impl Scene {
     }
 
     /// New pixel models: the same pixels with new noise.
-    fn begin(&mut self, lit: bool, last: TipSample) -> Running {
+    fn begin(&mut self, lit: bool, last: TipSample) -> SceneRun {
         let (scene, geometric) = (&self.scene, &self.config.geometric);
         let pixels: Box<dyn PixelModel> = match (self.config.level, lit) {
             (SimLevel::Optical, true) => Box::new(OpticalModel::new(scene)),
@@ -75,7 +75,7 @@ impl Scene {
             (_, false) => Box::new(GeometricModel::new(scene, &geometric.dark())),
         };
         self.scene.start += 1;
-        Running { pixels, lit, last }
+        SceneRun { pixels, lit, last }
     }
 
     fn tip(&self, world: &World, t_ns: i64) -> Point3<Skin> {

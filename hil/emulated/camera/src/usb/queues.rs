@@ -34,7 +34,7 @@ pub(crate) struct FinishedTransfer {
 
 /// Data delivered to the host from the data endpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Delivered {
+pub struct DeliveryTotals {
     /// Bytes.
     pub bytes: u64,
     /// CRC-32 (IEEE 802.3) over all of them.
@@ -70,7 +70,7 @@ struct State {
     /// Transfers until one fails.
     broken: Option<u32>,
     resets_fail: bool,
-    delivered: Delivered,
+    delivered: DeliveryTotals,
     ready: Readiness,
 }
 
@@ -102,7 +102,7 @@ impl Queues {
             cut: None,
             broken: None,
             resets_fail: false,
-            delivered: Delivered::default(),
+            delivered: DeliveryTotals::default(),
             ready,
         };
         Self {
@@ -239,13 +239,13 @@ impl Queues {
     /// The oldest finished transfer.
     pub(crate) fn reap(&self, file: u64) -> Result<FinishedTransfer, Errno> {
         let mut state = self.lock();
-        let gone = state.unplugged;
+        let is_unplugged = state.unplugged;
         let open = state.files.get_mut(&file).ok_or(Errno::NODEV)?;
         let finished = open.done.pop_front();
         state.update_readiness();
         match finished {
             Some(finished) => Ok(finished),
-            None if gone => Err(Errno::NODEV),
+            None if is_unplugged => Err(Errno::NODEV),
             None => Err(Errno::AGAIN),
         }
     }
@@ -256,7 +256,7 @@ impl Queues {
         // Only the thread that serves the file counts, so this is not interrupted.
         let mut crc = crc32fast::Hasher::new_with_initial_len(before.crc32, before.bytes);
         crc.update(bytes);
-        self.lock().delivered = Delivered {
+        self.lock().delivered = DeliveryTotals {
             bytes: before.bytes + bytes.len() as u64,
             crc32: crc.finalize(),
             transfers: before.transfers + 1,
@@ -353,7 +353,7 @@ impl Queues {
     }
 
     /// Data delivered to the host so far.
-    pub(crate) fn delivered(&self) -> Delivered {
+    pub(crate) fn delivered(&self) -> DeliveryTotals {
         self.lock().delivered
     }
 }
@@ -375,14 +375,14 @@ impl State {
             if self.level == 0 || !(full || self.ended) {
                 return;
             }
-            let mut wanted = self.level.min(length);
+            let mut requested = self.level.min(length);
             if let Some(cut) = self.cut
-                && wanted > cut
+                && requested > cut
             {
-                wanted -= cut;
+                requested -= cut;
                 self.cut = None;
             }
-            let bytes = self.take(wanted);
+            let bytes = self.take(requested);
             if let Some(open) = self.files.get_mut(&file) {
                 open.waiting.pop_front();
             }
@@ -405,22 +405,22 @@ impl State {
             .find_map(|(file, open)| open.waiting.front().map(|t| (*file, *t)))
     }
 
-    /// Takes up to `wanted` bytes off the FIFO.
-    fn take(&mut self, wanted: usize) -> Vec<u8> {
-        let wanted = wanted.min(self.level);
-        self.level -= wanted;
+    /// Takes up to `requested` bytes off the FIFO.
+    fn take(&mut self, requested: usize) -> Vec<u8> {
+        let requested = requested.min(self.level);
+        self.level -= requested;
         if self.head == 0
             && let Some(first) = self.fifo.front()
-            && first.len() == wanted
+            && first.len() == requested
         {
             return self.fifo.pop_front().unwrap_or_default();
         }
-        let mut taken = Vec::with_capacity(wanted);
-        while taken.len() < wanted {
+        let mut taken = Vec::with_capacity(requested);
+        while taken.len() < requested {
             let Some(first) = self.fifo.front() else {
                 break;
             };
-            let end = first.len().min(self.head + wanted - taken.len());
+            let end = first.len().min(self.head + requested - taken.len());
             taken.extend_from_slice(&first[self.head..end]);
             if end == first.len() {
                 self.fifo.pop_front();

@@ -47,16 +47,16 @@ impl Node {
         let file = self.queues.open();
         let mut wire = Wire::new(stream);
         // A broken connection means that the process ended: close the device, like the kernel.
-        while let Ok(Some(asked)) = wire.next() {
-            if self.answer(file, &mut wire, asked).is_err() {
+        while let Ok(Some(ioctl)) = wire.next() {
+            if self.answer(file, &mut wire, ioctl).is_err() {
                 break;
             }
         }
         self.queues.close(file);
     }
 
-    fn answer(&self, file: u64, wire: &mut Wire, asked: IoctlRequest) -> io::Result<()> {
-        let IoctlRequest { request, argument } = asked;
+    fn answer(&self, file: u64, wire: &mut Wire, ioctl: IoctlRequest) -> io::Result<()> {
+        let IoctlRequest { request, argument } = ioctl;
         let queues = &self.queues;
         let result = match request {
             usbfs::GET_CAPABILITIES => {

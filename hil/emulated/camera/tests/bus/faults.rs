@@ -90,8 +90,8 @@ fn a_transfer_may_end_within_a_word_and_contain_garbage() {
                 .order(SERIAL, DeviceCommand::Garbage(garbage.clone()))
                 .unwrap();
             let found = |bytes: &[u8]| {
-                let wanted: Vec<u8> = garbage.iter().flat_map(|w| w.to_le_bytes()).collect();
-                bytes.windows(wanted.len()).any(|w| w == wanted)
+                let expected: Vec<u8> = garbage.iter().flat_map(|w| w.to_le_bytes()).collect();
+                bytes.windows(expected.len()).any(|w| w == expected)
             };
             for _ in 0..1000 {
                 camera.transfer().unwrap();

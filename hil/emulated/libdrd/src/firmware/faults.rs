@@ -6,7 +6,7 @@ use crate::config::{Fault, Setting, When};
 /// Scheduled and active faults.
 #[derive(Debug, Default)]
 pub struct Faults {
-    waiting: Vec<Waiting>,
+    waiting: Vec<PendingFault>,
     active: Vec<Fault>,
     /// Last reported pose before it froze.
     frozen: Option<(u64, Vector, Vector)>,
@@ -15,7 +15,7 @@ pub struct Faults {
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Waiting {
+enum PendingFault {
     At(u64, Fault),
     IntoMove(f64, Fault),
     Below(f64, Fault),
@@ -47,11 +47,11 @@ impl Faults {
     /// Schedules a fault.
     pub fn inject(&mut self, now_ns: u64, when: When, fault: Fault) {
         self.waiting.push(match when {
-            When::Now => Waiting::At(now_ns, fault),
-            When::After(s) => Waiting::At(later(now_ns, s), fault),
-            When::IntoMove(s) => Waiting::IntoMove(s, fault),
-            When::Below(z_m) => Waiting::Below(z_m, fault),
-            When::Contact => Waiting::Contact(fault),
+            When::Now => PendingFault::At(now_ns, fault),
+            When::After(s) => PendingFault::At(later(now_ns, s), fault),
+            When::IntoMove(s) => PendingFault::IntoMove(s, fault),
+            When::Below(z_m) => PendingFault::Below(z_m, fault),
+            When::Contact => PendingFault::Contact(fault),
         });
     }
 
@@ -66,8 +66,8 @@ impl Faults {
     /// Handles an accepted move or tracked target.
     pub(crate) fn move_began(&mut self, now_ns: u64) {
         for waiting in &mut self.waiting {
-            if let Waiting::IntoMove(s, fault) = *waiting {
-                *waiting = Waiting::At(later(now_ns, s), fault);
+            if let PendingFault::IntoMove(s, fault) = *waiting {
+                *waiting = PendingFault::At(later(now_ns, s), fault);
             }
         }
     }
@@ -80,10 +80,10 @@ impl Faults {
         let mut due = Vec::new();
         self.waiting.retain(|waiting| {
             let (come, fault) = match *waiting {
-                Waiting::At(t, fault) => (now_ns >= t, fault),
-                Waiting::IntoMove(_, fault) => (false, fault),
-                Waiting::Below(z, fault) => (z_m < z, fault),
-                Waiting::Contact(fault) => (touching, fault),
+                PendingFault::At(t, fault) => (now_ns >= t, fault),
+                PendingFault::IntoMove(_, fault) => (false, fault),
+                PendingFault::Below(z, fault) => (z_m < z, fault),
+                PendingFault::Contact(fault) => (touching, fault),
             };
             if come {
                 due.push(fault);

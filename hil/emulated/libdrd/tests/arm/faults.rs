@@ -140,10 +140,10 @@ fn unplugging_fails_every_call_until_the_next_open() {
     let sdk = &bench.sdk;
     inject(&bench, When::Below(0.04), Fault::Lost);
     assert!(bench.move_to([0.0125, 0.0, 0.0]) >= 0);
-    let gone = bench.arm.wait_until(WITHIN, |s| !s.connected).unwrap();
+    let disconnected = bench.arm.wait_until(WITHIN, |s| !s.connected).unwrap();
     assert!(
-        gone.mode == Mode::Brake && gone.force_off_cause == 5,
-        "{gone:?}"
+        disconnected.mode == Mode::Brake && disconnected.force_off_cause == 5,
+        "{disconnected:?}"
     );
     let lost = |result: i32| assert_eq!((result, bench.last_error()), (-1, 2));
     lost(bench.move_to([0.0125, 0.0, 0.0]));

@@ -94,14 +94,14 @@ fn without_a_watchdog_the_motors_stay_on_until_another_program_brakes() {
     let arm = EmulatedArm::spawn(&ArmConfig::default()).unwrap();
     let program = Program::start(&arm, 0);
     program.signal("-KILL");
-    let gone = arm.wait_until(WITHIN, |s| !s.held).unwrap();
+    let released = arm.wait_until(WITHIN, |s| !s.held).unwrap();
     // After many times the longest watchdog, the arm still applies the last force of the dead program.
     let later = arm
-        .wait_until(WITHIN, |s| s.t_ns > gone.t_ns + 300_000_000)
+        .wait_until(WITHIN, |s| s.t_ns > released.t_ns + 300_000_000)
         .unwrap();
     assert_eq!(
         (later.mode, later.motor_force_n),
-        (Mode::Force, gone.motor_force_n)
+        (Mode::Force, released.motor_force_n)
     );
     assert!(later.motor_force_n[2] > 0.5, "{later:?}");
 

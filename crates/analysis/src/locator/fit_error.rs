@@ -7,7 +7,7 @@ use crate::with_text::with_text;
 /// Why a method could not be fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[serde(remote = "Self", tag = "kind", rename_all = "snake_case")]
-pub enum Unfit {
+pub enum FitError {
     /// Too few calibration locations.
     #[error("it needs {needed} calibration locations, found {found}")]
     Locations {
@@ -24,4 +24,4 @@ pub enum Unfit {
     Degenerate,
 }
 
-with_text!(Unfit);
+with_text!(FitError);

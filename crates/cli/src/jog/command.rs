@@ -5,7 +5,7 @@ use skinrig_settings::quantity::{self, QuantityError};
 
 /// A typed command.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Order {
+pub(super) enum JogCommand {
     /// Move along an axis, 0 to 2, by a distance, mm.
     By(usize, f64),
     /// Move straight to a point, mm.
@@ -39,7 +39,7 @@ quit                          hold, retract, disarm";
 
 /// Invalid command.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub(crate) enum OrderError {
+pub(crate) enum JogCommandError {
     /// The first word is unknown.
     #[error(
         "expected x, y, z, to, speed, where, touch, point, points, help or quit, found `{found}`"
@@ -93,18 +93,18 @@ const TOUCH_WAY_MM: f64 = 5.0;
 /// Parses a line; `None` for blank lines and comments.
 ///
 /// # Errors
-/// [`OrderError`] for an invalid command.
-pub(super) fn parse(line: &str) -> Result<Option<Order>, OrderError> {
+/// [`JogCommandError`] for an invalid command.
+pub(super) fn parse(line: &str) -> Result<Option<JogCommand>, JogCommandError> {
     let line = line.split('#').next().unwrap_or("").trim();
     let (word, rest) = match line.split_once(char::is_whitespace) {
         Some((word, rest)) => (word, rest.trim()),
         None => (line, ""),
     };
-    let bare = |order: Order| {
+    let bare = |command: JogCommand| {
         if rest.is_empty() {
-            Ok(Some(order))
+            Ok(Some(command))
         } else {
-            Err(OrderError::Argument {
+            Err(JogCommandError::Argument {
                 word: word.to_owned(),
                 found: rest.to_owned(),
             })
@@ -114,55 +114,55 @@ pub(super) fn parse(line: &str) -> Result<Option<Order>, OrderError> {
         "" => Ok(None),
         "x" | "y" | "z" => {
             let axis = usize::from(word == "y") + 2 * usize::from(word == "z");
-            Ok(Some(Order::By(axis, length(rest)?)))
+            Ok(Some(JogCommand::By(axis, length(rest)?)))
         }
-        "to" => Ok(Some(Order::To(triple(rest)?))),
+        "to" => Ok(Some(JogCommand::To(triple(rest)?))),
         "speed" => match measured(rest, Dimension::Speed)? {
-            v if v > 0.0 => Ok(Some(Order::Speed(v))),
-            mm_s => Err(OrderError::Speed { mm_s }),
+            v if v > 0.0 => Ok(Some(JogCommand::Speed(v))),
+            mm_s => Err(JogCommandError::Speed { mm_s }),
         },
-        "touch" if rest.is_empty() => Ok(Some(Order::Touch(TOUCH_WAY_MM))),
+        "touch" if rest.is_empty() => Ok(Some(JogCommand::Touch(TOUCH_WAY_MM))),
         "touch" => match length(rest)? {
-            v if v > 0.0 => Ok(Some(Order::Touch(v))),
-            mm => Err(OrderError::Way { mm }),
+            v if v > 0.0 => Ok(Some(JogCommand::Touch(v))),
+            mm => Err(JogCommandError::Way { mm }),
         },
         "point" => point(rest).map(Some),
-        "where" => bare(Order::Where),
-        "points" => bare(Order::Points),
-        "help" => bare(Order::Help),
-        "quit" => bare(Order::Quit),
-        other => Err(OrderError::Word {
+        "where" => bare(JogCommand::Where),
+        "points" => bare(JogCommand::Points),
+        "help" => bare(JogCommand::Help),
+        "quit" => bare(JogCommand::Quit),
+        other => Err(JogCommandError::Word {
             found: other.to_owned(),
         }),
     }
 }
 
-fn point(rest: &str) -> Result<Order, OrderError> {
+fn point(rest: &str) -> Result<JogCommand, JogCommandError> {
     let (name, place) = match rest.split_once(" at ") {
         Some((name, place)) => (name.trim(), Some(triple(place.trim())?)),
         None => (rest, None),
     };
     let plain = |c: char| c.is_alphanumeric() || c == '-' || c == '_';
     if name.is_empty() || !name.chars().all(plain) {
-        return Err(OrderError::Point {
+        return Err(JogCommandError::Point {
             found: rest.to_owned(),
         });
     }
-    Ok(Order::Point(name.to_owned(), place))
+    Ok(JogCommand::Point(name.to_owned(), place))
 }
 
-fn measured(text: &str, dimension: Dimension) -> Result<f64, OrderError> {
+fn measured(text: &str, dimension: Dimension) -> Result<f64, JogCommandError> {
     quantity::parse(text, &[dimension])
         .map(|q| q.value)
-        .map_err(OrderError::Quantity)
+        .map_err(JogCommandError::Quantity)
 }
 
-fn length(text: &str) -> Result<f64, OrderError> {
+fn length(text: &str) -> Result<f64, JogCommandError> {
     measured(text, Dimension::Length)
 }
 
 /// Three lengths: each with its unit, or one unit for all at the end. Commas between them are allowed.
-fn triple(text: &str) -> Result<[f64; 3], OrderError> {
+fn triple(text: &str) -> Result<[f64; 3], JogCommandError> {
     let flat = text.replace(',', " ");
     let words: Vec<&str> = flat.split_whitespace().collect();
     let one = |a: &str, unit: &str| length(&format!("{a}{unit}"));
@@ -178,7 +178,7 @@ fn triple(text: &str) -> Result<[f64; 3], OrderError> {
         }
         [x, y, z, unit] => Ok([one(x, unit)?, one(y, unit)?, one(z, unit)?]),
         [x, a, y, b, z, c] => Ok([one(x, a)?, one(y, b)?, one(z, c)?]),
-        _ => Err(OrderError::Coordinates {
+        _ => Err(JogCommandError::Coordinates {
             found: text.to_owned(),
         }),
     }
@@ -190,24 +190,31 @@ mod tests {
 
     #[test]
     fn commands_are_parsed() {
-        let order = |line: &str| parse(line).unwrap();
-        assert_eq!(order("x +1mm"), Some(Order::By(0, 1.0)));
-        assert_eq!(order("  z -0.5 mm # down"), Some(Order::By(2, -0.5)));
+        let parsed = |line: &str| parse(line).unwrap();
+        assert_eq!(parsed("x +1mm"), Some(JogCommand::By(0, 1.0)));
+        assert_eq!(parsed("  z -0.5 mm # down"), Some(JogCommand::By(2, -0.5)));
         for line in [
             "to 0 -1 5 mm",
             "to 0mm -1mm 5mm",
             "to 0 mm -1 mm 5 mm",
             "to 0, -1, 5mm",
         ] {
-            assert_eq!(order(line), Some(Order::To([0.0, -1.0, 5.0])), "{line}");
+            assert_eq!(
+                parsed(line),
+                Some(JogCommand::To([0.0, -1.0, 5.0])),
+                "{line}"
+            );
         }
-        assert_eq!(order("speed 0.5 cm/s"), Some(Order::Speed(5.0)));
-        assert_eq!(order("touch"), Some(Order::Touch(5.0)));
-        assert_eq!(order("touch 12mm"), Some(Order::Touch(12.0)));
-        assert_eq!(order("point nw"), Some(Order::Point("nw".into(), None)));
-        let named = Order::Point("nw".into(), Some([-30.0, 40.0, 0.0]));
-        assert_eq!(order("point nw at -3 4 0 cm"), Some(named));
-        assert_eq!((order(""), order("# nothing")), (None, None));
+        assert_eq!(parsed("speed 0.5 cm/s"), Some(JogCommand::Speed(5.0)));
+        assert_eq!(parsed("touch"), Some(JogCommand::Touch(5.0)));
+        assert_eq!(parsed("touch 12mm"), Some(JogCommand::Touch(12.0)));
+        assert_eq!(
+            parsed("point nw"),
+            Some(JogCommand::Point("nw".into(), None))
+        );
+        let named = JogCommand::Point("nw".into(), Some([-30.0, 40.0, 0.0]));
+        assert_eq!(parsed("point nw at -3 4 0 cm"), Some(named));
+        assert_eq!((parsed(""), parsed("# nothing")), (None, None));
         for line in [
             "x",
             "x 1",
