@@ -37,6 +37,7 @@ mod leg;
 mod legacy_text;
 mod lock;
 mod migrations;
+mod notification;
 mod pose;
 mod prepare;
 mod prepared;
