@@ -35,14 +35,14 @@ pub enum NotificationFault {
         server: String,
     },
     /// The server rejected user name or password.
-    #[error(
-        "expected {server} to accept the login, found {found}; check `username` and the secret that `password` names"
-    )]
+    #[error("expected {server} to accept the login, found {found}; check {check}")]
     Login {
         /// Host and port.
         server: String,
         /// Reply code, or that it offers no login.
         found: String,
+        /// The keys to check.
+        check: String,
     },
     /// The server rejected the message for good.
     #[error("expected {server} to accept the message, found code {code}; check {check}")]

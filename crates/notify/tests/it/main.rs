@@ -1,0 +1,7 @@
+//! Messages on real sockets of this computer.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod channels;
+mod notifier;
+mod servers;
+mod support;
