@@ -40,7 +40,7 @@ pub(crate) fn closed_port() -> u16 {
 /// A server that accepts connections and never answers.
 pub(crate) fn silent() -> Server<()> {
     let mut open = Vec::new();
-    Server::start(move |stream, _| {
+    Server::start(move |stream, _: &Sender<()>| {
         open.push(stream);
         Some(())
     })
