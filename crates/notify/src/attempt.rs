@@ -6,7 +6,7 @@ use skinrig_model::{NotificationChannel, NotificationFault};
 
 use crate::clock::Clock;
 use crate::message::Message;
-use crate::notifier::Policy;
+use crate::policy::Policy;
 
 /// A way to send messages.
 pub trait Channel: Send {

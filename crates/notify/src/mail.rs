@@ -14,8 +14,8 @@ use skinrig_model::{NotificationChannel, NotificationFault};
 use skinrig_protocol::notify::Mail;
 
 use crate::attempt::Channel;
+use crate::error::OpenError;
 use crate::message::Message;
-use crate::open::OpenError;
 use crate::secret::SecretText;
 use crate::smtp::Encryption;
 

@@ -3,44 +3,16 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
 
-use skinrig_model::{HostDuration, Notification, NotificationChannel, NotificationFault, Occasion};
-use skinrig_protocol::Notify;
+use skinrig_model::{Notification, NotificationChannel, NotificationFault, Occasion};
 
 use crate::attempt::{Channel, deliver};
 use crate::clock::{Clock, Pending};
 use crate::message::Message;
+use crate::policy::Policy;
 
 /// Most messages that wait for one channel.
 const QUEUE: u32 = 8;
-
-/// Limits of the tries.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Policy {
-    /// Most tries per message and channel.
-    pub tries: u32,
-    /// Wait before the second try; doubled before each further one.
-    pub backoff: Duration,
-    /// How long [`Notifier::finish`] waits for results.
-    pub grace: Duration,
-}
-
-impl Policy {
-    /// The limits of the settings.
-    #[must_use]
-    pub fn of(settings: &Notify) -> Self {
-        Self {
-            tries: settings.tries,
-            backoff: duration(settings.backoff),
-            grace: duration(settings.grace),
-        }
-    }
-}
-
-pub(crate) fn duration(of: HostDuration) -> Duration {
-    Duration::from_nanos(of.0.max(0).unsigned_abs())
-}
 
 /// A message on one channel, and its result.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,7 +4,7 @@ use std::fmt;
 
 use skinrig_protocol::notify::Secret;
 
-use crate::open::OpenError;
+use crate::error::OpenError;
 
 /// A password, token or address that must not be shown or recorded.
 pub(crate) struct SecretText(pub(crate) String);

@@ -7,7 +7,7 @@ use lettre::transport::smtp::client::{SmtpConnection, TlsParameters};
 use lettre::transport::smtp::extension::ClientId;
 use skinrig_protocol::notify::{Mail, MailSecurity};
 
-use crate::open::OpenError;
+use crate::error::OpenError;
 
 /// Encryption of the connection.
 pub(crate) enum Encryption {

@@ -8,8 +8,8 @@ use ureq::http::{HeaderValue, Uri};
 use ureq::{Agent, Error};
 
 use crate::attempt::Channel;
+use crate::error::OpenError;
 use crate::message::Message;
-use crate::open::OpenError;
 use crate::secret::SecretText;
 
 /// A webhook.
@@ -43,10 +43,11 @@ impl WebhookChannel {
             .http_status_as_error(false)
             // A redirected POST would lose its body or show the token to another server.
             .max_redirects(0)
-            .max_redirects_will_error(false)
-            .build();
+            .max_redirects_will_error(false);
+        #[cfg(feature = "tls")]
+        let config = config.tls_config(crate::tls::of_this_computer());
         Ok(Self {
-            agent: Agent::new_with_config(config),
+            agent: config.build().into(),
             server: format!("{}:{port}", uri.host().unwrap_or_default()),
             authorization: authorization.transpose()?,
             uri,
