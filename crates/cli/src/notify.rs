@@ -13,7 +13,7 @@ use skinrig_protocol::suite::Suite;
 
 use crate::exit::Failure;
 use crate::host::host_name;
-use crate::rig::bench;
+use crate::rig::{bench, inputs};
 
 /// The clock of this computer.
 struct SystemClock;
@@ -31,7 +31,7 @@ fn now() -> String {
 /// Opens the channels of `settings`, which are in `file`, before anything else is opened.
 ///
 /// # Errors
-/// [`Failure::input`] if a secret is missing, or this build lacks what a channel needs.
+/// [`Failure::input`] if a secret or program is missing, or this build lacks what a channel needs.
 pub(crate) fn open(settings: &Notify, file: &str) -> Result<Notifier, Failure> {
     with_policy(settings, file, Policy::of(settings))
 }
@@ -42,6 +42,15 @@ pub(crate) fn with_policy(
     file: &str,
     policy: Policy,
 ) -> Result<Notifier, Failure> {
+    if let Some(command) = &settings.command {
+        let found = inputs::program(&command.run, std::env::var_os("PATH").as_deref());
+        found.map_err(|why| {
+            Failure::input(format!(
+                "{file}: notify.command.run: expected a program that this user may run, found {why}\n  \
+                 next: give an existing program, by its path or by a name in PATH"
+            ))
+        })?;
+    }
     let environment = |name: &str| std::env::var(name).ok();
     let channels = skinrig_notify::channels(settings, &environment)
         .map_err(|e| Failure::input(format!("{file}: {e}")))?;

@@ -123,7 +123,7 @@ pub struct Notification {
     pub ended_at: String,
     /// Number of tries that ended.
     pub tries: u32,
-    /// Why it was not sent; `None`: the receiver accepted it.
+    /// Why it was not sent, or has no result; `None`: the receiver accepted it.
     pub fault: Option<NotificationFault>,
 }
 
@@ -132,12 +132,18 @@ impl fmt::Display for Notification {
         let (channel, occasion) = (self.channel, self.occasion.name());
         match &self.fault {
             None => write!(f, "{channel}: {occasion}: sent"),
-            Some(fault) => write!(
-                f,
-                "{channel}: {occasion}: not sent ({} {}): {fault}",
-                self.tries,
-                if self.tries == 1 { "try" } else { "tries" }
-            ),
+            Some(fault) => {
+                let result = match fault {
+                    NotificationFault::GraceOver { .. } => "unknown whether it was sent",
+                    _ => "not sent",
+                };
+                let tries = if self.tries == 1 { "try" } else { "tries" };
+                let number = self.tries;
+                write!(
+                    f,
+                    "{channel}: {occasion}: {result} ({number} {tries}): {fault}"
+                )
+            }
         }
     }
 }

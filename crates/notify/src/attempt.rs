@@ -1,7 +1,5 @@
 //! One channel, and the tries to send a message on it.
 
-use std::time::Duration;
-
 use skinrig_model::{NotificationChannel, NotificationFault};
 
 use crate::clock::Clock;
@@ -20,25 +18,31 @@ pub trait Channel: Send {
     fn send(&mut self, message: &Message) -> Result<(), NotificationFault>;
 }
 
-/// Tries until the message is accepted, the fault is final, the tries are used up or `is_over`. Returns the number of tries, and the
-/// fault of the last one.
+/// Tries until the message is accepted, the fault is final, the tries are used up or `is_over`. Calls `ended` after each try with its
+/// number and fault. Returns the number of tries, and the fault of the last one.
 pub(crate) fn deliver(
     channel: &mut dyn Channel,
     message: &Message,
     policy: Policy,
     clock: &dyn Clock,
     is_over: &dyn Fn() -> bool,
+    ended: &dyn Fn(u32, &NotificationFault),
 ) -> (u32, Option<NotificationFault>) {
     let mut wait = policy.backoff;
-    for number in 1.. {
-        match channel.send(message) {
-            Ok(()) => return (number, None),
-            Err(fault) if number >= policy.tries || !fault.is_transient() || is_over() => {
-                return (number, Some(fault));
-            }
-            Err(_) => clock.back_off(wait),
+    let mut tries = 1;
+    loop {
+        let Err(fault) = channel.send(message) else {
+            return (tries, None);
+        };
+        ended(tries, &fault);
+        if tries >= policy.tries || !fault.is_transient() {
+            return (tries, Some(fault));
         }
-        wait = wait.saturating_mul(2).min(Duration::from_secs(3_600));
+        clock.back_off(wait);
+        if is_over() {
+            return (tries, Some(fault));
+        }
+        wait = wait.saturating_mul(2);
+        tries += 1;
     }
-    (policy.tries, None)
 }

@@ -44,24 +44,37 @@ impl Delivery {
     }
 }
 
+/// A message on one channel so far.
+#[derive(Default)]
+struct Progress {
+    /// Number of tries that ended, and the fault of the last one.
+    tries: u32,
+    last: Option<NotificationFault>,
+    result: Option<Delivery>,
+}
+
 /// State shared with the threads.
 struct Shared {
     clock: Arc<dyn Clock>,
     policy: Policy,
     pending: Pending,
-    /// In the order of posting; `None`: without a result.
-    results: Mutex<Vec<Option<Delivery>>>,
+    /// In the order of posting.
+    results: Mutex<Vec<Progress>>,
     is_over: AtomicBool,
 }
 
 impl Shared {
     fn end(&self, number: usize, delivery: Delivery) {
-        let mut results = self.results.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(result) = results.get_mut(number) {
-            *result = Some(delivery);
-        }
-        drop(results);
+        self.update(number, |progress| progress.result = Some(delivery));
         self.pending.remove();
+    }
+
+    fn update(&self, number: usize, change: impl FnOnce(&mut Progress)) {
+        let mut results = self.results.lock().unwrap_or_else(PoisonError::into_inner);
+        // After the end, the results are gone.
+        if let Some(progress) = results.get_mut(number) {
+            change(progress);
+        }
     }
 }
 
@@ -129,7 +142,7 @@ impl Notifier {
                 .results
                 .lock()
                 .unwrap_or_else(PoisonError::into_inner)
-                .push(None);
+                .push(Progress::default());
             self.shared.pending.add();
             match queue.try_send((number, Arc::clone(&message))) {
                 Ok(()) => {}
@@ -157,13 +170,19 @@ impl Notifier {
         let results = std::mem::take(&mut *results.unwrap_or_else(PoisonError::into_inner));
         let ended_at = shared.clock.civil_time();
         let all = posted.into_iter().zip(results);
-        all.map(|((channel, message), result)| {
+        all.map(|((channel, message), progress)| {
+            let Progress {
+                tries,
+                last,
+                result,
+            } = progress;
             result.unwrap_or_else(|| Delivery {
                 channel,
-                tries: 0,
+                tries,
                 ended_at: ended_at.clone(),
                 fault: Some(NotificationFault::GraceOver {
                     grace_s: shared.policy.grace.as_secs(),
+                    last: last.map(Box::new),
                 }),
                 message,
             })
@@ -185,6 +204,12 @@ fn work(mut channel: Box<dyn Channel>, posted: &Receiver<Posted>, shared: &Share
             shared.policy,
             shared.clock.as_ref(),
             &is_over,
+            &|tries, fault| {
+                shared.update(number, |progress| {
+                    progress.tries = tries;
+                    progress.last = Some(fault.clone());
+                });
+            },
         );
         let delivery = Delivery {
             channel: channel.name(),

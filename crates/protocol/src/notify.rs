@@ -35,7 +35,7 @@ pub struct Notify {
     /// Wait before the second try; doubled before each further one.
     #[setting(default = "1 s", value = HostDuration::from_millis(1_000), min = 0.1, max = 60)]
     pub backoff: HostDuration,
-    /// How long the end of a run or night waits for results. A message without result is then reported and recorded as not sent.
+    /// How long the end of a run or night waits for results. A message without a result is then reported and recorded as such.
     #[setting(default = "10 s", value = HostDuration::from_millis(10_000), min = 1, max = 60)]
     pub grace: HostDuration,
 }
@@ -102,7 +102,7 @@ pub struct Webhook {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Settings)]
 #[settings(name = "notify_command")]
 pub struct NotifyCommand {
-    /// The program and its arguments, without a shell. It must exit with 0 within `timeout`.
+    /// The program and its arguments, without a shell; sessions record them. It must exit with 0 within `timeout`.
     #[setting(items = 1..=20, read = plains, example = "[/usr/local/bin/notify-lab]")]
     pub run: Vec<String>,
 }

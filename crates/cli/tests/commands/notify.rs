@@ -131,12 +131,15 @@ fn a_dead_server_costs_the_grace_and_nothing_else() {
         webhook(hooks.port)
     );
     run(&lab, &notify, &FAULT).code(3).expect_stderr(&[
-        "warning: mail: fault: not sent (0 tries): expected a result within the grace of 1 s",
+        "warning: mail: fault: unknown whether it was sent (0 tries): expected a result within the grace of 1 s",
         "note: webhook: fault: sent",
     ]);
     assert_eq!(hooks.received().len(), 1);
     let records = recorded(&lab);
-    let over = NotificationFault::GraceOver { grace_s: 1 };
+    let over = NotificationFault::GraceOver {
+        grace_s: 1,
+        last: None,
+    };
     assert_eq!((records[0].tries, &records[0].fault), (0, &Some(over)));
     assert_eq!(records[1].fault, None);
 }
@@ -187,6 +190,9 @@ fn a_missing_secret_ends_the_command_before_the_run() {
         "next: export NOTIFY_OTHER=",
     ]);
     assert!(files(&lab.path("sessions"), "").is_empty());
+    run(&lab, "  command: {run: [/nowhere/notify]}\n", &[])
+        .code(2)
+        .expect_stderr(&["rig.yaml: notify.command.run: expected a program"]);
     let (rig, sessions) = (lab.text("without.yaml"), lab.text("sessions"));
     std::fs::write(&rig, RIG).unwrap();
     skinrig(&["run", SMALL, "--sessions", &sessions, "--notify", &rig])

@@ -106,13 +106,15 @@ pub enum NotificationFault {
         /// Which part.
         what: String,
     },
-    /// The grace was over before the last try ended.
+    /// The grace was over before the last try ended: unknown whether the message was sent.
     #[error(
-        "expected a result within the grace of {grace_s} s, found none; check the server, or raise `notify.grace`"
+        "expected a result within the grace of {grace_s} s, found none; check the server, or raise `notify.grace`{}", last_try(.last)
     )]
     GraceOver {
         /// `notify.grace`, s.
         grace_s: u64,
+        /// Fault of the last try that ended, if any.
+        last: Option<Box<NotificationFault>>,
     },
     /// Too many messages waited for this channel.
     #[error("expected at most {limit} waiting messages, found more; check why the channel is slow")]
@@ -135,4 +137,9 @@ impl NotificationFault {
                 | Self::Slow { .. }
         )
     }
+}
+
+fn last_try(last: &Option<Box<NotificationFault>>) -> String {
+    let last = last.as_ref().map(|fault| format!("; last try: {fault}"));
+    last.unwrap_or_default()
 }

@@ -99,14 +99,17 @@ fn a_message_without_result_at_the_end_of_the_grace_is_reported_as_such() {
     dead.entered.recv().unwrap();
     good.entered.recv().unwrap();
     let results = notifier.finish();
-    let over = Some(Fault::GraceOver { grace_s: 10 });
+    let over = Some(Fault::GraceOver {
+        grace_s: 10,
+        last: None,
+    });
     assert_eq!(results.len(), 2);
     assert!(results.iter().all(|r| r.fault == over));
     let record = results[0].notification().unwrap();
     assert_eq!(record.occasion, Occasion::Fault);
     assert_eq!(
         record.to_string(),
-        "command: fault: not sent (0 tries): expected a result within the grace of 10 s, found none; check the server, or raise `notify.grace`"
+        "command: fault: unknown whether it was sent (0 tries): expected a result within the grace of 10 s, found none; check the server, or raise `notify.grace`"
     );
 }
 
@@ -141,4 +144,51 @@ fn only_chosen_occasions_are_sent_and_tests_always() {
     assert_eq!(results.len(), 1);
     assert_eq!(results[0].fault, None);
     assert_eq!(results[0].notification(), None);
+}
+
+/// A channel whose first try fails and whose second one does not end before the grace.
+struct Failing {
+    gate: Gate,
+    tries: u32,
+}
+
+impl Channel for Failing {
+    fn name(&self) -> NotificationChannel {
+        NotificationChannel::Webhook
+    }
+
+    fn send(&mut self, message: &Message) -> Result<(), Fault> {
+        self.tries += 1;
+        if self.tries == 1 {
+            return Err(busy());
+        }
+        self.gate.send(message)
+    }
+}
+
+fn busy() -> Fault {
+    Fault::Busy {
+        server: "hooks.example.org:443".to_owned(),
+        code: 503,
+    }
+}
+
+#[test]
+fn a_result_after_the_grace_still_counts_the_tries_that_ended() {
+    let ((entered, was_entered), (open, is_open)) = (channel(), channel());
+    let gate = Gate {
+        entered,
+        open: is_open,
+        sent: Arc::default(),
+    };
+    let failing = Box::new(Failing { gate, tries: 0 });
+    let on = [Occasion::Fault];
+    let mut notifier = Notifier::start(&on, vec![failing], POLICY, clock(true)).unwrap();
+    notifier.post(message());
+    was_entered.recv().unwrap();
+    let results = notifier.finish();
+    open.send(()).unwrap();
+    let last = Some(Box::new(busy()));
+    let over = Fault::GraceOver { grace_s: 10, last };
+    assert_eq!((results[0].tries, &results[0].fault), (1, &Some(over)));
 }
