@@ -102,6 +102,7 @@ fn night(at: usize, drawn: &[DrawnValue<'_>]) -> Night {
         finished: true,
         ended_early: None,
         lease_note: None,
+        notifications: Vec::new(),
         checks,
         golden: None,
         verdict: Verdict::Pass,

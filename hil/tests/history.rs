@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use skinrig_hil::history::{AppendOutcome, Filter, HistoryError, accept, append, load, suites};
-use skinrig_model::Limit;
+use skinrig_model::{Limit, Notification, NotificationChannel, Occasion};
 use skinrig_nightly::night::{Attempt, CheckResult, Measurement, NIGHT_VERSION, Part};
 use skinrig_nightly::trend::{Acceptance, History};
 use skinrig_nightly::{GoldenSession, Night, NightExit, Verdict, Versions};
@@ -80,6 +80,7 @@ fn night(day: u32, rig: &str, values: &[Option<f64>]) -> Night {
         finished: true,
         ended_early: None,
         lease_note: None,
+        notifications: Vec::new(),
         checks: vec![check],
         golden: Some(GoldenSession {
             session: "golden.session.sqlite".to_owned(),
@@ -110,6 +111,23 @@ fn nights_are_read_back_unchanged_in_any_order_and_added_only_once() {
             AppendOutcome::AlreadyPresent
         );
     }
+    // Messages are sent after a night is added: they do not make it another night.
+    let told = Night {
+        notifications: vec![Notification {
+            channel: NotificationChannel::Command,
+            occasion: Occasion::NightMarginal,
+            subject: "night MARGINAL".to_owned(),
+            raised_at: "2026-11-03T02:10:00Z".to_owned(),
+            ended_at: "2026-11-03T02:10:01Z".to_owned(),
+            tries: 1,
+            fault: None,
+        }],
+        ..nights[0].clone()
+    };
+    assert_eq!(
+        append(&path, &told, folder.path()).unwrap(),
+        AppendOutcome::AlreadyPresent
+    );
     let mut expected = History::default();
     for night in &nights {
         expected.push(night, night.id.clone());

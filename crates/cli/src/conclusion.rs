@@ -13,14 +13,15 @@ use crate::signals::Operator;
 use crate::sink::SessionSink;
 use crate::terminal::Output;
 
-/// Seals the session and prints further problems. Returns the path of the session, which differs if the file was moved or
+/// Sends messages about the end of the run, seals the session and prints further problems. Returns the path of the session, which differs if the file was moved or
 /// removed during the run.
 pub(crate) fn close(
-    sink: SessionSink,
+    mut sink: SessionSink,
     mut path: PathBuf,
     mut report: RunReport,
     operator: &Operator,
 ) -> Result<(PathBuf, RunReport), Failure> {
+    sink.notify(&report, &path);
     let mut lost = None;
     if let Err(error) = sink.seal() {
         let is_complete = matches!(error, RecorderError::HeldOpen { .. });

@@ -25,6 +25,7 @@ mod jog;
 pub mod library;
 mod man;
 mod new;
+mod notify;
 mod paths;
 mod phase;
 mod progress;

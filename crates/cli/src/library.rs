@@ -183,6 +183,7 @@ pub fn simulate(simulation: Simulation, control: ControlHandle) -> Result<PathBu
         ProtocolSource::Text(text) => check::load_text(NO_FILE, text, &overrides)?,
     };
     let args = RunArgs {
+        notify: None,
         protocol: None,
         overrides: Vec::new(),
         replay: None,

@@ -11,6 +11,7 @@ use skinrig_model::{
     DeviceRole, HostTime, PlannedPress, Point2, PressHistory, PressRole, PressVerdict, Record,
     ResumeHeader, RunEnd, RunHeader, SimLevel,
 };
+use skinrig_notify::Notifier;
 use skinrig_protocol::rig::RigFile;
 use skinrig_protocol::{Plan, Protocol, Route};
 use skinrig_recorder::{DeviceRow, RecorderError, SessionReader, SessionWriter};
@@ -21,6 +22,7 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::fault::FaultInjector;
 use crate::hil::lease;
 use crate::host::host_name;
+use crate::notify::{self, RunMessages};
 use crate::paths;
 use crate::progress::ProgressView;
 use crate::rig::tolerated::ToleratedMismatches;
@@ -252,6 +254,7 @@ fn run_leg(
         rig,
         preflight,
         notes,
+        notifier,
         bench,
     } = open_rig(args, found, protocol, &rest, pending)?;
     let expected = skinrig_model::HostDuration::from_secs_f64(rest.summary().duration_s);
@@ -262,7 +265,8 @@ fn run_leg(
         .on_disk_of(folder)
         .controlled(&args.session, operator.control())
         .with_notes(notes)
-        .with_faults(FaultInjector::new(&args.faults));
+        .with_faults(FaultInjector::new(&args.faults))
+        .notifying(notifier.map(|notifier| RunMessages::new(notifier, &found.header)));
     let settings = bench::settings(&rig.kind);
     let session_header = found.header.clone();
     let report = Run::new(&rest, session_header, rig, operator.control(), &mut sink)
@@ -323,6 +327,8 @@ struct OpenedRig {
     preflight: Preflight,
     /// Notes for the session.
     notes: Vec<String>,
+    /// For messages about the end of the leg.
+    notifier: Option<Notifier>,
     /// The bench, held until the session is closed; `None` for the simulated rig.
     bench: Option<OpenBench>,
 }
@@ -359,6 +365,7 @@ fn open_rig(
                 file.display()
             )));
         }
+        let notifier = notify::for_run(args.notify.as_deref(), None)?;
         let level = found.document.rig["level"].as_str().unwrap_or_default();
         let level: SimLevel = level
             .parse()
@@ -381,6 +388,7 @@ fn open_rig(
             rig,
             preflight,
             notes,
+            notifier,
             bench: None,
         });
     }
@@ -400,6 +408,8 @@ fn open_rig(
     }
     planted::refuse(&args.faults, &bench::display_name(&file))?;
     same_bench(&file, found)?;
+    let rig_notify = Some((file.file_name.as_str(), file.notify.as_ref()));
+    let notifier = notify::for_run(args.notify.as_deref(), rig_notify)?;
     let lease = lease::take(&file, &format!("resume {}", args.session.display()))?;
     let (rig, tolerated) = bench::open(&file, &protocol)?;
     let notes = same_devices(&rig, &found.devices, args.allow_other_device)?;
@@ -411,6 +421,7 @@ fn open_rig(
         rig,
         preflight,
         notes,
+        notifier,
         bench: Some(OpenBench {
             tolerated,
             file,

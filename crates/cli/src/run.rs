@@ -9,6 +9,7 @@ use skinrig_model::{
     AnalysisSettings, CameraId, HostDuration, HostTime, InterruptionKind, PressVerdict, RunHeader,
     SimLevel,
 };
+use skinrig_notify::Notifier;
 use skinrig_protocol::{Plan, PlantedFault, Protocol};
 use skinrig_recorder::{RecorderError, SessionReader, SessionWriter};
 
@@ -19,6 +20,7 @@ use crate::exit::{Failure, Outcome};
 use crate::fault::FaultInjector;
 use crate::hil::lease;
 use crate::host::host_name;
+use crate::notify::{self, RunMessages};
 use crate::paths;
 use crate::progress::ProgressView;
 use crate::rig::{self, RepeatedOperator, bench, gates, planted};
@@ -58,7 +60,7 @@ pub(crate) struct RunInputs<'a> {
 }
 
 /// Records `plan` on `rig` into a new session in `folder`, after the `preflight`; imports and replays have none, because
-/// they have no devices to check.
+/// they have no devices to check. The `notifier` sends messages about the end.
 ///
 /// # Errors
 /// [`Failure::internal`] when the session cannot be created. A rig or recorder fault during the run is in the report.
@@ -68,6 +70,7 @@ pub(crate) fn record(
     mut rig: Rig,
     folder: &Path,
     preflight: Option<Preflight>,
+    notifier: Option<Notifier>,
     operator: &Operator,
 ) -> Result<(PathBuf, RunReport), Failure> {
     let outline = &rig.geometry.outline;
@@ -84,7 +87,8 @@ pub(crate) fn record(
         ProgressView::hidden(intent.expected)
     };
     let mut sink = SessionSink::new(writer, view, intent.known.clone())
-        .with_faults(FaultInjector::new(intent.faults));
+        .with_faults(FaultInjector::new(intent.faults))
+        .notifying(notifier.map(|notifier| RunMessages::new(notifier, &header)));
     let control = operator.control();
     if preflight.is_some() {
         sink = sink.on_disk_of(folder).controlled(&path, control);
@@ -224,6 +228,7 @@ pub(crate) fn simulated(
             .map_err(|e| Failure::input(format!("--level: {e}")))?,
         None => protocol.scene.level,
     };
+    let notifier = notify::for_run(args.notify.as_deref(), None)?;
     let seed = args.seed.unwrap_or(protocol.seed);
     plan.seed = seed;
     let summary = plan.summary();
@@ -270,6 +275,7 @@ pub(crate) fn simulated(
         rig,
         &args.sessions,
         Some(preflight),
+        notifier,
         operator,
     )
 }
@@ -307,6 +313,8 @@ fn on_bench(
         outln!("{summary}");
         outln!("rig       {}\n", bench::display_name(&file));
     }
+    let rig_notify = Some((file.file_name.as_str(), file.notify.as_ref()));
+    let notifier = notify::for_run(args.notify.as_deref(), rig_notify)?;
     // Held until the session is closed.
     let _lease = lease::take(&file, &format!("run {}", protocol.name))?;
     let (rig, tolerated) = bench::open(&file, &protocol)?;
@@ -318,6 +326,7 @@ fn on_bench(
         rig,
         &args.sessions,
         Some(preflight),
+        notifier,
         operator,
     );
     tolerated.propose(&file);
@@ -399,7 +408,7 @@ fn replay(
         faults: &[],
     };
     let rig = rig::replayed(recording, &header, &document)?;
-    record(&intent, &plan, rig, folder, None, operator)
+    record(&intent, &plan, rig, folder, None, None, operator)
 }
 
 /// Facts from the recording that no device provides: schedule, exclusions, and the operator's actions.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use skinrig_controller::{ControlHandle, RecordSink, SinkFault};
+use skinrig_controller::{ControlHandle, RecordSink, RunReport, SinkFault};
 use skinrig_model::{
     ExcludedReason, HostTime, InterruptionKind, PressId, PressOutcome, PressTiming, PressVerdict,
     Record,
@@ -11,6 +11,7 @@ use skinrig_model::{
 use skinrig_recorder::{RecorderError, SealedSession, SessionWriter};
 
 use crate::fault::FaultInjector;
+use crate::notify::{self, RunMessages};
 use crate::progress::ProgressView;
 use crate::remote::Remote;
 use crate::rig::gates;
@@ -59,6 +60,8 @@ pub(crate) struct SessionSink {
     /// Notes to write once the leg has begun.
     notes: Vec<String>,
     fault_injector: FaultInjector,
+    /// Messages about the end of the run.
+    messages: Option<RunMessages>,
     /// Control from other terminals; dropped last, when the session is closed.
     remote: Option<Remote>,
 }
@@ -79,6 +82,7 @@ impl SessionSink {
             folder: None,
             notes: Vec::new(),
             fault_injector: FaultInjector::default(),
+            messages: None,
             remote: None,
         }
     }
@@ -114,6 +118,28 @@ impl SessionSink {
     pub(crate) fn with_faults(mut self, fault_injector: FaultInjector) -> Self {
         self.fault_injector = fault_injector;
         self
+    }
+
+    /// Sends messages about the end of the run.
+    #[must_use]
+    pub(crate) fn notifying(mut self, messages: Option<RunMessages>) -> Self {
+        self.messages = messages;
+        self
+    }
+
+    /// Sends messages about the end of the run in `session`, and records the results.
+    pub(crate) fn notify(&mut self, report: &RunReport, session: &Path) {
+        let Some(messages) = self.messages.take() else {
+            return;
+        };
+        for notification in messages.send(report, session) {
+            self.view.print(&notify::line(&notification));
+            let record = Record::Notification(Box::new(notification));
+            if let Err(e) = self.writer.accept(record) {
+                self.view
+                    .print(&format!("warning: the session does not record this: {e}"));
+            }
+        }
     }
 
     /// Seals the session.

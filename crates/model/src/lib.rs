@@ -12,6 +12,7 @@ pub mod frame;
 pub mod id;
 pub mod lens;
 pub mod limit;
+pub mod notification;
 mod number;
 pub mod pose;
 pub mod preflight;
@@ -35,14 +36,15 @@ pub use camera::{CameraModel, SENSOR_HEIGHT, SENSOR_WIDTH, StereoGeometry};
 pub use device_role::DeviceRole;
 pub use event::{CdEvent, Polarity, TriggerEdge};
 pub use fault::{
-    Causes, DeviceError, GuardError, NoCause, NotArrived, NotAtRest, PressFault, PressMoment,
-    RunFault, SinkFault, SurfaceFault, SurfaceFinding, Suspension, TimingFault, TouchFault,
-    TouchPhase, WatchdogTrip, WatchedQuantity,
+    Causes, DeviceError, GuardError, NoCause, NotArrived, NotAtRest, NotificationFault, PressFault,
+    PressMoment, RunFault, SinkFault, SurfaceFault, SurfaceFinding, Suspension, TimingFault,
+    TouchFault, TouchPhase, WatchdogTrip, WatchedQuantity,
 };
 pub use frame::{Point2, Point3, RigidTransform, Robot, Skin};
 pub use id::{AttemptId, CameraId, LocationId, PressId, RepetitionId, as_index};
 pub use lens::{LensAngle, LensKind, LensModel};
 pub use limit::{Limit, Side};
+pub use notification::{Notification, NotificationChannel, Occasion};
 pub use pose::PoseSample;
 pub use preflight::{CheckKind, CheckVerdict, PreflightCheck};
 pub use press::{

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::device_role::DeviceRole;
 use crate::frame::{Point3, RigidTransform, Robot, Skin};
 use crate::id::AttemptId;
+use crate::notification::Notification;
 use crate::pose::PoseSample;
 use crate::preflight::PreflightCheck;
 use crate::press::{PlannedPress, PressOutcome};
@@ -244,7 +245,9 @@ pub enum Record {
         /// The note.
         text: String,
     },
-    /// The last record.
+    /// A message about the run was sent, or not. The only record that may follow [`Record::Ended`].
+    Notification(Box<Notification>),
+    /// The last record, except for notifications.
     Ended {
         /// Time.
         t: HostTime,

@@ -21,7 +21,10 @@ pub(crate) fn json_of(place: &str, reason: Option<ReasonRef<'_>>) -> Result<Opti
 }
 
 /// The cause in a column; `None` in sessions of an older schema.
-fn cause_from<T: DeserializeOwned>(row: &SqliteRow, column: &str) -> Result<Option<T>, Fault> {
+pub(crate) fn cause_from<T: DeserializeOwned>(
+    row: &SqliteRow,
+    column: &str,
+) -> Result<Option<T>, Fault> {
     let Some(json) = text_if_present(row, column)? else {
         return Ok(None);
     };

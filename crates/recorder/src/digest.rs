@@ -27,7 +27,7 @@ const fn table(name: &'static str, since: u32, rows: &'static str) -> Table {
 }
 
 /// In the order in which the tree hash covers them.
-const TABLES: [Table; 21] = [
+const TABLES: [Table; 22] = [
     table("session", 1, "SELECT * FROM session ORDER BY id LIMIT ?1"),
     Table {
         name: "leg",
@@ -143,6 +143,11 @@ const TABLES: [Table; 21] = [
         ],
     },
     table("note", 1, "SELECT * FROM note ORDER BY id LIMIT ?1"),
+    table(
+        "notification",
+        12,
+        "SELECT * FROM notification ORDER BY id LIMIT ?1",
+    ),
     Table {
         name: "run_end",
         since: 1,

@@ -214,6 +214,9 @@ impl Journal {
                     .await?;
                 Ok(())
             }
+            Record::Notification(it) => {
+                crate::notification::insert(&mut self.conn, self.leg, &it).await
+            }
             Record::Ended { t, end } => {
                 sqlx::query(
                     "INSERT INTO run_end (id, t_ns, status, reason, cause) VALUES (1, ?, ?, ?, ?)",

@@ -49,6 +49,7 @@ impl LegOffset {
             | Record::Resumed(_)
             | Record::Device { .. }
             | Record::Preflight(_)
+            | Record::Notification(_)
             | Record::Missed(..) => {}
             Record::Intent { t, .. }
             | Record::Command { t, .. }

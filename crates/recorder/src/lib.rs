@@ -37,6 +37,7 @@ mod leg;
 mod legacy_text;
 mod lock;
 mod migrations;
+mod notification;
 mod open;
 mod pose;
 mod prepare;

@@ -240,6 +240,7 @@ pub(crate) mod tests {
                 "DROP TABLE preflight",
                 "DROP TABLE leg",
                 "DROP TABLE gap",
+                "DROP TABLE notification",
                 "DROP TABLE previous_table_digest",
                 "DROP TABLE previous_seal",
                 "ALTER TABLE attempt DROP COLUMN leg",
@@ -256,7 +257,7 @@ pub(crate) mod tests {
             }
             crate::digest::digest_tables(&mut conn).await.unwrap()
         });
-        let later = ["box_report", "preflight", "leg", "gap"];
+        let later = ["box_report", "preflight", "leg", "gap", "notification"];
         assert!(digests.iter().all(|d| !later.contains(&d.name.as_str())));
         assert_eq!(digests.len(), 15);
         let reader = crate::SessionReader::open(&path).unwrap();

@@ -186,7 +186,7 @@ impl SessionWriter {
     /// Accepts one record. `Started`, `Resumed`, `Intent`, `Outcome` and `Ended` return when they and all earlier records
     /// are on disk. Others return at once, or block while 64 MiB of records are queued. No call blocks for more than 30 s.
     ///
-    /// The first record is `Started`, or `Resumed` in a further leg; the last is `Ended`. An `Outcome` must follow its `Intent`.
+    /// The first record is `Started`, or `Resumed` in a further leg; the last is `Ended`, except for `Notification`. An `Outcome` must follow its `Intent`.
     ///
     /// # Errors
     /// [`RecorderError::Record`] for a record out of order, or a header whose digests do not match its texts: nothing of it is
@@ -232,6 +232,7 @@ impl SessionWriter {
             }
             (Phase::Started, Record::Ended { .. }) => Ok(Phase::Ended),
             (Phase::Started, _) => Ok(Phase::Started),
+            (Phase::Ended, Record::Notification(_)) => Ok(Phase::Ended),
             (Phase::Ended, _) => out_of_order("no records after the end of the run", "a record"),
         }
     }

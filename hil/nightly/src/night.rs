@@ -1,7 +1,7 @@
 //! Results of a night: a tree from the suite down to single measurements, as stored and displayed.
 
 use serde::{Deserialize, Serialize};
-use skinrig_model::Limit;
+use skinrig_model::{Limit, Notification};
 
 use crate::cause::Cause;
 use crate::evidence::Evidence;
@@ -51,6 +51,9 @@ pub struct Night {
     pub verdict: Verdict,
     /// Exit code of the program.
     pub exit: NightExit,
+    /// Messages about the night; not part of its digest in a history.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notifications: Vec<Notification>,
 }
 
 /// Versions whose change may explain a change of a metric.

@@ -10,9 +10,13 @@ use super::error::QueryError;
 
 type Rows<'a> = Transaction<'a, Sqlite>;
 
-/// SHA-256 of the night's JSON, in hexadecimal.
+/// SHA-256 of the night's JSON without its messages, which are sent after the history has the night; in hexadecimal.
 pub(super) fn digest(night: &Night) -> Result<String, QueryError> {
-    let json = serde_json::to_vec(night).map_err(|e| QueryError::Damaged(e.to_string()))?;
+    let measured = Night {
+        notifications: Vec::new(),
+        ..night.clone()
+    };
+    let json = serde_json::to_vec(&measured).map_err(|e| QueryError::Damaged(e.to_string()))?;
     let sum = Sha256::digest(&json);
     Ok(sum.iter().map(|byte| format!("{byte:02x}")).collect())
 }

@@ -201,6 +201,7 @@ pub(crate) fn blank() -> Night {
         finished: false,
         ended_early: None,
         lease_note: None,
+        notifications: Vec::new(),
         checks: Vec::new(),
         golden: None,
         verdict: Verdict::Fail,

@@ -87,6 +87,9 @@ const RESTRICTED: &[(&str, &[&str])] = &[
         &["skinrig-recorder", "skinrig-hil", "skinrig-view", "skinrig"],
     ),
     ("axum", &["skinrig-view"]),
+    ("lettre", &["skinrig-notify"]),
+    ("ureq", &["skinrig-notify"]),
+    ("rustls", &["skinrig-notify"]),
     ("serde_yaml", &["skinrig-settings"]),
     ("serde-saphyr", &["skinrig-settings"]),
     ("rust-hdf5", &["skinrig-formats"]),
@@ -143,8 +146,9 @@ const LICENCE_BY_TEXT: &[(&str, &str)] = &[
     ("neuromorphic-types", "MIT"),
 ];
 
-/// Libraries for networking, except those of `skinrig view`: axum and hyper, HTTP/1.1 alone.
-const NETWORK_LIBRARIES: [&str; 12] = [
+/// Libraries for networking, except those of `skinrig view` (axum and hyper, HTTP/1.1 alone) and of messages (lettre and ureq, clients
+/// alone).
+const NETWORK_LIBRARIES: [&str; 11] = [
     "actix-web",
     "curl",
     "h2",
@@ -155,7 +159,6 @@ const NETWORK_LIBRARIES: [&str; 12] = [
     "rustls",
     "tonic",
     "tungstenite",
-    "ureq",
     "zmq",
 ];
 

@@ -75,6 +75,10 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["replay", "level", "real_time"])]
     pub rig: Option<PathBuf>,
 
+    /// Send messages by the `notify` of this rig file or suite [default: of the rig file].
+    #[arg(long, value_name = "FILE", conflicts_with = "replay")]
+    pub notify: Option<PathBuf>,
+
     /// Accept mismatches of the rig's cameras (status bytes, resets, transfers, register read-backs), and print the rig file keys that
     /// accept them permanently. The session records it.
     #[arg(long, requires = "rig")]
@@ -119,6 +123,10 @@ pub(crate) struct ResumeArgs {
     /// The rig file of the bench [default: the one the session was recorded with].
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
+
+    /// Send messages by the `notify` of this rig file or suite [default: of the rig file].
+    #[arg(long, value_name = "FILE")]
+    pub notify: Option<PathBuf>,
 
     /// Accept camera mismatches for this leg, as `run --tolerant` does; the leg records it.
     #[arg(long, conflicts_with = "real_time")]

@@ -39,7 +39,7 @@ impl Verdict {
 /// One check and its result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub(super) struct Finding {
-    /// `rig file`, `permissions`, `cables`, `USB speed`, `versions`, `disk`, `real time`, `power`, `clock` or `bench`.
+    /// `rig file`, `permissions`, `cables`, `USB speed`, `versions`, `disk`, `real time`, `power`, `clock`, `bench` or `notify`.
     pub area: &'static str,
     /// What was checked.
     pub check: String,

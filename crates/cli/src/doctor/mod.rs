@@ -12,6 +12,7 @@ mod disk;
 mod finding;
 mod inputs;
 mod machine;
+mod notify;
 mod permissions;
 mod power;
 mod real_time;
@@ -45,7 +46,7 @@ pub(crate) fn doctor(args: &DoctorArgs, json: bool) -> Outcome {
     } else {
         Survey::query(rig.as_ref())
     };
-    let findings = examine(&Case {
+    let mut findings = examine(&Case {
         machine: &Machine::current(),
         rig: rig.as_ref(),
         inputs: &rig.as_ref().map(rig_inputs::all).unwrap_or_default(),
@@ -53,6 +54,9 @@ pub(crate) fn doctor(args: &DoctorArgs, json: bool) -> Outcome {
         sessions: &args.sessions,
         lease: lease.as_deref(),
     });
+    if let Some(file) = &args.notify {
+        findings.extend(notify::findings(file)?);
+    }
     if json {
         crate::terminal::print_json(&finding::json(rig.as_ref(), &findings));
     } else {

@@ -32,6 +32,8 @@ pub(super) fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Pr
         rig,
         &folder,
         Some(preflight),
+        // The night tells people about itself.
+        None,
         bench.operator(),
     )
     .map_err(|f| problem(EvidenceKind::Disk, "computer", &f))?;

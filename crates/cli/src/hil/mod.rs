@@ -9,6 +9,7 @@ mod golden;
 pub(crate) mod hold;
 pub(crate) mod lease;
 mod live;
+mod messages;
 mod real_bench;
 pub(crate) mod run;
 pub(crate) mod trend;

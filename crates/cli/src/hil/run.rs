@@ -21,10 +21,11 @@ use super::args::HilRunArgs;
 use super::live::{self, NightProgress};
 use super::real_bench::RealBench;
 use super::trend::NightTrends;
-use super::{lease, trend};
+use super::{lease, messages, trend};
 use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::host::host_name;
+use crate::notify;
 use crate::rig::{bench, inputs};
 use crate::signals::Operator;
 
@@ -43,6 +44,10 @@ pub(crate) fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome 
     bench::refuse_without_sample(&rig)?;
     inputs::check(&rig)?;
     known_checks(&suite, args.only.as_deref())?;
+    let settings = suite.notify.as_ref().map(|n| (&suite.file_name, n));
+    let settings = settings.or_else(|| rig.notify.as_ref().map(|n| (&rig.file_name, n)));
+    let notifier = settings.map(|(file, settings)| notify::open(settings, file));
+    let notifier = notifier.transpose()?;
     let clock = RealClock::start();
     let runner = SuiteRunner {
         only: args.only.as_deref(),
@@ -79,12 +84,20 @@ pub(crate) fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome 
     let mut live = NightProgress::new(folder.clone(), &suite);
     let mut bench =
         RealBench::new(rig, folder.path().to_owned(), operator, command_line).holding(lease);
-    let night = runner.run(night, &mut bench, &mut live);
-    let write_error = live.finish();
+    let mut night = runner.run(night, &mut bench, &mut live);
+    let mut write_error = live.finish();
     bench.close();
     bench.propose();
     drop(bench);
     let trends = keep(&night, &folder, args.history.as_deref());
+    if let Some(notifier) = notifier {
+        let after = trends.as_ref().ok().and_then(Option::as_ref);
+        let after = after.and_then(|after| after.as_ref().ok());
+        night.notifications = messages::send(notifier, &night, &folder, after);
+        if let Err(e) = folder.write_json(&night) {
+            write_error.get_or_insert(e);
+        }
+    }
     if json {
         crate::terminal::print_json(&serde_json::to_value(&night).map_err(Failure::internal)?);
     } else {
@@ -238,6 +251,7 @@ fn blank(id: String, suite: &Suite, rig: &RigFile, started: String) -> Night {
         finished: false,
         ended_early: None,
         lease_note: None,
+        notifications: Vec::new(),
         checks: Vec::new(),
         golden: None,
         verdict: Verdict::Fail,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glob::{Pattern, PatternError};
 use skinrig_hil::history::{self, AppendOutcome, Filter, HistoryError};
 use skinrig_hil::night_folder;
-use skinrig_nightly::trend::{Acceptance, History, Report, judge};
+use skinrig_nightly::trend::{Acceptance, Alarm, History, Report, judge};
 use skinrig_nightly::{Night, NightExit};
 use skinrig_report::trend::{Links, Style, page, terminal};
 
@@ -139,6 +139,10 @@ pub(super) struct NightTrends {
     pub report: Report,
     /// Links by alarm, relative to the night's folder.
     pub links: Vec<Links>,
+    /// Number of alarms that this night raised.
+    pub raised: usize,
+    /// Golden session that the first of them keeps.
+    pub raised_session: Option<PathBuf>,
     accepted: Vec<Acceptance>,
 }
 
@@ -159,7 +163,13 @@ pub(super) fn after(path: &Path, night: &Night, home: &Path) -> Result<NightTren
     let history = history::load(path, &filter)?;
     let report = judge(&history);
     let alarm_links = alarms::keep(path, &report);
+    let is_of_night = |alarm: &Alarm| report.nights[alarm.raised].id == night.id;
+    let raised = report.alarms.iter().zip(&alarm_links);
+    let raised: Vec<_> = raised.filter(|(alarm, _)| is_of_night(alarm)).collect();
+    let sessions = raised.iter().map(|(_, kept)| kept.session.as_ref().ok());
     Ok(NightTrends {
+        raised: raised.len(),
+        raised_session: sessions.flatten().next().cloned(),
         report,
         links: alarm_links.iter().map(|k| k.links(Some(home))).collect(),
         accepted: history.accepted,

@@ -119,7 +119,7 @@ pub(crate) fn import(args: &ImportArgs, command_line: &str, output: Output) -> O
         faults: &[],
     };
     let operator = Operator::listen().map_err(Failure::internal)?;
-    let (session, report) = record(&intent, &plan, rig, &args.sessions, None, &operator)?;
+    let (session, report) = record(&intent, &plan, rig, &args.sessions, None, None, &operator)?;
     let unreadable = report
         .end
         .faults()

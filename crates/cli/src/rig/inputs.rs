@@ -106,7 +106,10 @@ pub fn check(rig: &RigFile) -> Result<(), Failure> {
 
 /// The file that running `words` would start, found as the system does: a name with a slash is a path, any other name is
 /// searched in the folders of `path`.
-fn program(words: &[String], path: Option<&std::ffi::OsStr>) -> Result<PathBuf, UnusableInput> {
+pub(crate) fn program(
+    words: &[String],
+    path: Option<&std::ffi::OsStr>,
+) -> Result<PathBuf, UnusableInput> {
     let Some(name) = words.first().filter(|name| !name.is_empty()) else {
         return Err(UnusableInput::NoProgram);
     };

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use serde::{Serialize, Serializer};
 use skinrig_analysis::result::Estimate;
 use skinrig_model::{
-    CameraId, InterruptionKind, LocationId, PlannedPress, PreflightCheck, PressId, PressRole,
-    PressVerdict, RepetitionId, RunEnd,
+    CameraId, InterruptionKind, LocationId, Notification, PlannedPress, PreflightCheck, PressId,
+    PressRole, PressVerdict, RepetitionId, RunEnd,
 };
 use skinrig_recorder::{
     AttemptRow, DeviceRow, LegRow, Loss, RecorderError, SessionReader, SessionTotals,
@@ -44,6 +44,8 @@ pub(super) struct Description {
     pub interruptions: Vec<(f64, &'static str, String)>,
     /// Time, s; text.
     pub notes: Vec<(f64, String)>,
+    /// Messages about the ends of its legs.
+    pub notifications: Vec<Notification>,
     /// `completed`, `stopped` or `faulted`; `None` without an end.
     pub end: Option<&'static str>,
     pub end_reason: Option<String>,
@@ -190,6 +192,7 @@ impl Description {
         let interruptions = reader.interruptions()?.into_iter();
         let notes = reader.notes()?.into_iter();
         Ok(Self {
+            notifications: reader.notifications()?,
             sealed: reader.seal()?.is_some(),
             written_by: skinrig_recorder::writer_of(&args.session),
             totals: reader.totals()?,

@@ -38,6 +38,9 @@ pub(super) fn print(d: &Description) {
     for (t_s, text) in &d.notes {
         outln!("{t_s:>9.3} s  note: {text}");
     }
+    for notification in &d.notifications {
+        outln!("notified  {notification}");
+    }
     if let Some(rows) = &d.presses {
         outln!("\n press  role       rep  loc      x      y  depth  verdict");
         rows.iter().for_each(press);

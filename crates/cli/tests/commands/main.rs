@@ -29,6 +29,7 @@ mod interrupt;
 mod json;
 #[cfg(target_os = "linux")]
 mod nightly;
+mod notify;
 mod numbering;
 mod operator;
 mod options;
@@ -38,6 +39,8 @@ mod replay;
 mod resume;
 mod rigs;
 mod sample_size;
+#[path = "../../../notify/tests/it/servers.rs"]
+mod servers;
 mod special;
 mod starter;
 mod strangers;

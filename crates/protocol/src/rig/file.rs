@@ -15,6 +15,7 @@ use super::tip::Tip;
 use super::trigger_box::BoxSetup;
 use super::variables::{self, Environment};
 use crate::file::hex;
+use crate::notify::Notify;
 use crate::surface::Surface;
 
 /// A skinrig rig file: the devices of a bench, the position of the skin and the bench's limits.
@@ -65,6 +66,8 @@ pub struct RigFile {
     /// Permissions for suites of checks on this bench.
     #[setting(default)]
     pub hil: HilSetup,
+    /// Messages about runs on this bench, and about its nights if the suite has no `notify`; absent: none.
+    pub notify: Option<Notify>,
 }
 
 /// Whether the drivers control hardware.
@@ -115,6 +118,9 @@ impl RigFile {
         let bias_files = self.cameras.iter_mut().map(|c| &mut c.bias_file);
         for path in bias_files.chain([&mut self.robot.library]).flatten() {
             *path = folder.join(&path);
+        }
+        if let Some(notify) = &mut self.notify {
+            notify.in_folder(folder);
         }
         self
     }

@@ -4,16 +4,21 @@ use std::path::Path;
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
-use skinrig_model::HostDuration;
-use skinrig_settings::{Diagnostics, Settings, open};
+use skinrig_model::{HostDuration, Occasion};
+use skinrig_settings::{Choice, Collector, Diagnostics, Field, Settings, open};
 
 use super::catalogue;
 use super::check::{Check, Measure};
 use crate::file::hex;
+use crate::notify::Notify;
 
 /// A skinrig suite: checks of a bench, with limits set before the measurement.
 #[derive(Debug, Clone, PartialEq, Serialize, Settings)]
-#[settings(name = "suite", version = "skinrig_suite")]
+#[settings(
+    name = "suite",
+    version = "skinrig_suite",
+    check(Self::nights_are_notified)
+)]
 pub struct Suite {
     /// The file's name as given to [`Suite::parse`].
     #[setting(skip)]
@@ -38,6 +43,8 @@ pub struct Suite {
     /// The checks, each with its limits.
     #[setting(shape = catalogue::CHECKS, read = catalogue::checks)]
     pub checks: Vec<Check>,
+    /// Messages about nights; absent: the rig file's.
+    pub notify: Option<Notify>,
 }
 
 /// Rules for repeating a failed check, and for the resulting verdict. The result keeps every attempt.
@@ -69,12 +76,28 @@ impl Suite {
         }
     }
 
+    /// Rejects a `notify` that no night would use.
+    fn nights_are_notified(root: &Field, out: &mut Collector) {
+        let on = root.at("notify.on");
+        let occasions = on.items().iter().filter_map(Field::as_word);
+        let occasions: Vec<Occasion> = occasions.filter_map(Occasion::from_word).collect();
+        if on.path == "notify.on" && !occasions.iter().any(|o| o.is_of_a_night()) {
+            let message = "no night has any of these occasions";
+            out.error(on.span, on.path.as_str(), message)
+                .expected("at least one of `night_...` and `trend_alarm`")
+                .found("occasions of runs alone");
+        }
+    }
+
     /// Resolves paths against the folder of the file.
     fn in_folder(mut self, folder: &Path) -> Self {
         for check in &mut self.checks {
             if let Measure::Golden { protocol } = &mut check.measure {
                 *protocol = folder.join(&protocol);
             }
+        }
+        if let Some(notify) = &mut self.notify {
+            notify.in_folder(folder);
         }
         self
     }

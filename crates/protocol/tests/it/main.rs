@@ -6,6 +6,7 @@ mod errors;
 mod laws;
 mod limits;
 mod missing;
+mod notify;
 mod remaining;
 mod rig;
 mod schedules;

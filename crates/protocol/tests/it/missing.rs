@@ -189,7 +189,11 @@ fn the_help_for_a_missing_key_fixes_the_file() {
     let languages = [
         Language {
             schema: rig_schema_json(),
-            files: files(&["hil/rigs/bench.example.yaml", "hil/rigs/emulated.yaml"]),
+            files: [
+                files(&["hil/rigs/bench.example.yaml", "hil/rigs/emulated.yaml"]),
+                vec![("notify.yaml".to_owned(), crate::notify::example())],
+            ]
+            .concat(),
             parse: |name, text| {
                 let value = |_: &str| Some("value".to_owned());
                 RigFile::parse(name, text.as_bytes(), &value).map(drop)
@@ -197,7 +201,11 @@ fn the_help_for_a_missing_key_fixes_the_file() {
         },
         Language {
             schema: suite_schema_json(),
-            files: files(&["hil/nightly.yaml"]),
+            files: [
+                files(&["hil/nightly.yaml"]),
+                vec![("notify.yaml".to_owned(), crate::notify::example_suite())],
+            ]
+            .concat(),
             parse: |name, text| Suite::parse(name, text.as_bytes()).map(drop),
         },
         Language {

@@ -1,8 +1,8 @@
 //! Reading the journal: presses and attempts, commands, marks, notes and the end of the run.
 
 use skinrig_model::{
-    BoxReport, CheckKind, CheckVerdict, HostTime, Mark, MarkKind, MotionCommand, PlannedPress,
-    Point3, PreflightCheck, PressId, PressOutcome, RunEnd, SentMark,
+    BoxReport, CheckKind, CheckVerdict, HostTime, Mark, MarkKind, MotionCommand, Notification,
+    PlannedPress, Point3, PreflightCheck, PressId, PressOutcome, RunEnd, SentMark,
 };
 
 use super::SessionReader;
@@ -10,6 +10,7 @@ use crate::box_row::report_from;
 use crate::cause::{EndColumns, end_from, interruption_from};
 use crate::error::RecorderError;
 use crate::from_row::{attempt_from, planned_from};
+use crate::notification;
 use crate::query::{self, enum_value, has_table, int, num, opt_text, real, text};
 use crate::rows::{AttemptRow, CommandRow, InterruptionRow, NoteRow};
 
@@ -159,6 +160,19 @@ impl SessionReader {
                 text: text(row, "text")?,
             })
         })
+    }
+
+    /// Messages about the ends of all legs, in order; empty in sessions before schema 12.
+    ///
+    /// # Errors
+    /// If the file is damaged.
+    pub fn notifications(&self) -> Result<Vec<Notification>, RecorderError> {
+        const DOING: &str = "reading notifications";
+        if !self.query(DOING, async |conn| has_table(conn, "notification").await)? {
+            return Ok(Vec::new());
+        }
+        let sql = "SELECT * FROM notification ORDER BY id";
+        self.query_all(DOING, sql, notification::from_row)
     }
 
     /// Time and kind of the run's end; `None` for a run in progress or a crashed one.

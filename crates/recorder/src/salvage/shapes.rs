@@ -29,7 +29,7 @@ const fn table(name: &'static str, least: usize, insert: &'static str) -> TableS
 }
 
 /// All tables, parents before children.
-pub(super) const TABLES: [TableSpec; 21] = [
+pub(super) const TABLES: [TableSpec; 22] = [
     table(
         "session",
         20,
@@ -101,6 +101,14 @@ pub(super) const TABLES: [TableSpec; 21] = [
         "INSERT INTO interruption VALUES (?, ?, ?, ?, ?)",
     ),
     table("note", 3, "INSERT INTO note VALUES (?, ?, ?)"),
+    TableSpec {
+        words: Some((2, &["mail", "webhook", "command"])),
+        ..table(
+            "notification",
+            10,
+            "INSERT INTO notification VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        )
+    },
     table("table_digest", 3, ""),
     table(
         "previous_seal",

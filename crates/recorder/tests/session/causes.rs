@@ -167,7 +167,8 @@ fn causes_of_older_sessions_are_their_text() {
                 "ALTER TABLE interruption DROP COLUMN cause",
                 "ALTER TABLE run_end DROP COLUMN cause",
                 "ALTER TABLE leg DROP COLUMN previous_cause",
-                "DELETE FROM _sqlx_migrations WHERE version = 20261125000000",
+                "DROP TABLE notification",
+                "DELETE FROM _sqlx_migrations WHERE version >= 20261125000000",
                 "PRAGMA user_version = 10",
             ],
         );

@@ -112,6 +112,10 @@ fn earlier_legs_cannot_be_rewritten() {
         ("UPDATE attempt SET leg = 2 WHERE press = 1 AND number = 1", "attempt"),
         ("UPDATE note SET text = 'tip not cleaned' WHERE id = 1", "note"),
         (
+            "UPDATE notification SET reason = NULL, cause = NULL WHERE id = 2",
+            "notification",
+        ),
+        (
             "UPDATE leg SET previous_tree_sha256 = zeroblob(32) WHERE number = 2",
             "tree hash",
         ),

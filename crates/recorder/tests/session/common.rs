@@ -226,7 +226,31 @@ pub(crate) fn records(presses: u32) -> Vec<Record> {
     };
     out.push(Record::Missed(last, MissedReason::RunEnded(stopped())));
     out.push(Record::Ended { t, end: stopped() });
+    out.extend(notifications().map(|n| Record::Notification(Box::new(n))));
     out
+}
+
+/// Messages about the end of [`records`]: one sent, one not.
+pub(crate) fn notifications() -> [Notification; 2] {
+    let sent = Notification {
+        channel: NotificationChannel::Mail,
+        occasion: Occasion::Stop,
+        subject: "run stopped".into(),
+        raised_at: "2026-01-02T03:05:00Z".into(),
+        ended_at: "2026-01-02T03:05:01Z".into(),
+        tries: 1,
+        fault: None,
+    };
+    let failed = Notification {
+        channel: NotificationChannel::Webhook,
+        tries: 3,
+        fault: Some(NotificationFault::TimedOut {
+            server: "hooks.example.org:443".into(),
+            limit_s: 5,
+        }),
+        ..sent.clone()
+    };
+    [sent, failed]
 }
 
 /// All records of a further leg that makes the sync press again and every press that has no valid attempt: its clocks and its

@@ -24,6 +24,7 @@ fn read_all(path: &Path) {
     let _ = (
         reader.commands(),
         reader.notes(),
+        reader.notifications(),
         reader.interruptions(),
         reader.end(),
         reader.totals(),

@@ -340,6 +340,7 @@ fn check_older_schema(was_sealed: bool) {
                 "DROP TABLE preflight",
                 "DROP TABLE leg",
                 "DROP TABLE gap",
+                "DROP TABLE notification",
                 "ALTER TABLE attempt DROP COLUMN leg",
                 "ALTER TABLE attempt DROP COLUMN touched_mm",
                 "ALTER TABLE attempt DROP COLUMN faults",

@@ -137,6 +137,10 @@ fn all_records_round_trip() {
     assert_eq!(reader.box_reports().unwrap(), reports);
     assert_eq!(reader.notes().unwrap()[0].text, "tip cleaned");
     assert_eq!(
+        reader.notifications().unwrap(),
+        crate::common::notifications()
+    );
+    assert_eq!(
         reader.interruptions().unwrap()[0].kind,
         InterruptionKind::Stop
     );

@@ -100,6 +100,7 @@ fn night(checks: Vec<CheckResult>) -> Night {
         finished: true,
         ended_early: None,
         lease_note: None,
+        notifications: Vec::new(),
         checks,
         golden: Some(GoldenSession {
             session: "golden.session.sqlite".to_owned(),

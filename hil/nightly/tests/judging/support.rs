@@ -78,6 +78,7 @@ pub(crate) fn night(checks: Vec<CheckResult>) -> Night {
         finished: true,
         ended_early: None,
         lease_note: None,
+        notifications: Vec::new(),
         checks,
         golden: None,
         verdict: Verdict::Fail,

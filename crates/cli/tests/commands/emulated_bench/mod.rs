@@ -2,6 +2,7 @@
 
 mod endurance;
 mod first_contact;
+mod notify;
 mod slot;
 mod tolerant;
 

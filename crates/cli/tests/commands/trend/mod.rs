@@ -5,8 +5,10 @@ mod nights;
 
 use std::path::{Path, PathBuf};
 
+use skinrig_model::Occasion;
 use skinrig_nightly::{Night, NightExit, Verdict};
 
+use crate::servers::http;
 use crate::support::{files, only, skinrig, text};
 use nights::Nights;
 
@@ -352,6 +354,61 @@ fn an_alarm_that_is_raised_tonight_leads_to_tonight() {
         element_text(&shown, "headline"),
         "All within limits, but the computer probably moved"
     );
+}
+
+/// The messages are sent after the history has the night, so `night.json` may differ from then on; adding it again changes nothing.
+#[test]
+fn a_night_tells_of_its_verdict_and_of_the_alarms_that_it_raised() {
+    let nights = Nights::new();
+    nights.add_disk(0..40, 38);
+    let server = http(&[200]);
+    let notify = format!(
+        "notify: {{on: [night_pass, trend_alarm], webhook: {{url: \"http://127.0.0.1:{}/\"}}}}\n",
+        server.port
+    );
+    let history = ["--history", &nights.history];
+    let (ran, folder) = nights.run_notifying(&notify, &history);
+    ran.code(0).expect_stderr(&[
+        "note: webhook: night_pass: sent",
+        "note: webhook: trend_alarm: sent",
+    ]);
+    let told: Vec<serde_json::Value> = server
+        .received()
+        .iter()
+        .map(|request| serde_json::from_str(&request.body).unwrap())
+        .collect();
+    assert_eq!(told.len(), 2);
+    let page = |name: &str| text(&folder.join(name));
+    assert_eq!(told[0]["night"]["verdict"], "PASS");
+    assert_eq!(told[0]["night"]["page"], page("night.html"));
+    assert_eq!(told[1]["alarms"]["raised"], 1);
+    assert_eq!(told[1]["alarms"]["page"], page("trends.html"));
+    let headline = told[1]["alarms"]["headline"].as_str().unwrap();
+    assert!(
+        headline.contains("disk/computer/write_rate moved"),
+        "{headline}"
+    );
+    let json = std::fs::read_to_string(folder.join("night.json")).unwrap();
+    let night: Night = serde_json::from_str(&json).unwrap();
+    let sent: Vec<_> = night
+        .notifications
+        .iter()
+        .map(|n| (n.occasion, &n.fault))
+        .collect();
+    assert_eq!(
+        sent,
+        [(Occasion::NightPass, &None), (Occasion::TrendAlarm, &None)]
+    );
+    // The alarm goes on, but it was told; the second night has another verdict than the chosen ones.
+    let notify = notify.replace("night_pass", "night_fail");
+    let (ran, folder) = nights.run_notifying(&notify, &history);
+    ran.code(0);
+    assert_eq!(server.received(), []);
+    let json = std::fs::read_to_string(folder.join("night.json")).unwrap();
+    assert!(!json.contains("notifications"), "{json}");
+    nights
+        .trend(&["--rebuild", &nights.lab.text("nights")])
+        .expect_stderr(&["0 nights added, 2 already present, 0 skipped"]);
 }
 
 #[test]

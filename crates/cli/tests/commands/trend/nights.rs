@@ -40,6 +40,7 @@ fn night(at: usize, golden: Option<&str>, measured: &[(&str, &str, &str, &str, f
         finished: true,
         ended_early: None,
         lease_note: None,
+        notifications: Vec::new(),
         checks: measured.iter().map(check).collect(),
         golden: golden.map(|session| GoldenSession {
             session: session.to_owned(),
@@ -163,7 +164,12 @@ impl Nights {
 
     /// Runs a night of one check that needs no device; returns output and folder.
     pub(super) fn run(&self, more: &[&str]) -> (ProgramOutput, PathBuf) {
-        std::fs::write(self.lab.path("suite.yaml"), SUITE).unwrap();
+        self.run_notifying("", more)
+    }
+
+    /// Like [`run`](Self::run), with these lines at the end of the suite.
+    pub(super) fn run_notifying(&self, lines: &str, more: &[&str]) -> (ProgramOutput, PathBuf) {
+        std::fs::write(self.lab.path("suite.yaml"), format!("{SUITE}{lines}")).unwrap();
         let (suite, out) = (self.lab.text("suite.yaml"), self.lab.text("nights"));
         let rig = "hil/rigs/emulated.yaml";
         let run = ["hil", "run", &*suite, "--rig", rig, "--out", &*out];
