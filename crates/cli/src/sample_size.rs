@@ -5,8 +5,9 @@ use std::path::Path;
 use serde_json::json;
 use skinrig_analysis::Analysis;
 use skinrig_compare::statistics::Sample;
-use skinrig_compare::statistics::power::{self, MetricVariance, PowerPlan, Proposal, Target};
+use skinrig_compare::statistics::power::{self, MetricVariance, PowerPlan, Target};
 use skinrig_model::{HostDuration, PressRole, Verdict};
+use skinrig_text::{Column, Table};
 
 use crate::args::DetectArgs;
 use crate::exit::{Exit, Failure, Outcome};
@@ -84,22 +85,40 @@ fn print(plan: &PowerPlan, session: &Path) {
         shown(100.0 * alpha)
     );
     outln!("press each of the two skins at the same");
-    outln!("  locations x repetitions = presses   half width   time for one skin");
+    let [number, word] = [Column::right, Column::left];
+    let table = Table::new([
+        word(1),
+        number(9),
+        number(11),
+        number(7),
+        number(10),
+        word(0),
+    ]);
+    let heads = [
+        "",
+        "locations",
+        "repetitions",
+        "presses",
+        "half width",
+        "time for one skin",
+    ];
+    outln!("{}", table.row(heads));
     for (i, proposal) in plan.proposals.iter().enumerate() {
-        let mark = if i == plan.cheapest { '*' } else { ' ' };
-        let Proposal {
-            locations,
-            repetitions,
-            presses,
-            half_width,
-            seconds,
-        } = proposal;
-        let time = seconds.map_or_else(
+        let mark = if i == plan.cheapest { "*" } else { "" };
+        let time = proposal.seconds.map_or_else(
             || "unknown".to_owned(),
             |s| clock_text(HostDuration::from_secs_f64(s)),
         );
         outln!(
-            "{mark} {locations:>9} x {repetitions:>11} = {presses:>7}   {half_width:>7.3} mm   {time}"
+            "{}",
+            table.row([
+                mark.to_owned(),
+                proposal.locations.to_string(),
+                proposal.repetitions.to_string(),
+                proposal.presses.to_string(),
+                format!("{:.3} mm", proposal.half_width),
+                time,
+            ])
         );
     }
     outln!("* fewest presses; half width: expected, of the interval of the difference");

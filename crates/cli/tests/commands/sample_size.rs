@@ -28,7 +28,7 @@ fn a_session_gives_the_sample_size_of_the_next_one() {
     assert!(locations(&ask(&["0.1 mm", "--common", "0.9"])) < locations(&ask(&["0.1 mm"])));
     let table = skinrig(&["plan", "--from", &session, "--detect", "0.1 mm"]).code(0);
     assert!(
-        table.out.contains("locations x repetitions"),
+        table.out.contains("locations  repetitions  presses"),
         "{}",
         table.out
     );

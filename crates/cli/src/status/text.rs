@@ -1,0 +1,157 @@
+//! Terminal text of `skinrig status`.
+
+use skinrig_model::{HostDuration, RunEnd};
+use skinrig_recorder::{PressTally, SessionTotals};
+
+use super::state::{LastOutcome, Status, Stored};
+use crate::progress::{clock_text, eta_text};
+use crate::remote::RunSnapshot;
+use crate::rig::gates;
+
+/// `: reason`, or nothing.
+fn because(reason: Option<&str>) -> String {
+    reason.map_or_else(String::new, |why| format!(": {why}"))
+}
+
+/// The current state of the session, in words.
+fn state(status: &Status) -> String {
+    let stored = status.stored.as_ref();
+    let end = stored.and_then(|s| s.end.0.as_ref());
+    let is_sealed = stored.is_some_and(|s| s.sealed);
+    let next = match stored.map(|s| s.rig_kind.as_str()) {
+        Some("imported" | "replayed") => "run it again".to_owned(),
+        _ => format!("`skinrig resume {}` continues it", status.session.display()),
+    };
+    match (&status.live, &status.writer, end) {
+        (Some(live), by, _) => {
+            let by = by.as_deref().unwrap_or("process unknown");
+            format!("{} ({by})", live.state)
+        }
+        (None, Some(by), _) => {
+            let why = because(status.silence.as_deref());
+            format!("written by {by}, which does not respond{why}")
+        }
+        (None, None, Some(RunEnd::Completed)) if is_sealed => "completed".to_owned(),
+        (None, None, Some(end)) => {
+            let sealed = if is_sealed { "" } else { ", not sealed" };
+            let reason = because(end.reason().as_deref());
+            format!("{}{sealed}{reason}; {next}", end.name())
+        }
+        (None, None, None) => format!("cut off: no program is running it; {next}"),
+    }
+}
+
+/// Prints the state, one label a line, then what happened last.
+pub(super) fn print(status: &Status) {
+    outln!("session   {}", status.session.display());
+    outln!("state     {}", state(status));
+    let stored = status.stored.as_ref();
+    if let Some(s) = stored {
+        outln!(
+            "run       {} on {}, rig {}; begun {} by {}; leg {}",
+            s.protocol,
+            s.prototype,
+            s.rig,
+            s.started_at,
+            s.operator,
+            s.legs
+        );
+    }
+    match (&status.live, stored) {
+        (Some(live), _) => print_live(live),
+        (None, Some(stored)) => print_planned(&stored.totals),
+        (None, None) => {}
+    }
+    let lost = stored.map_or(0, |s| s.totals.lost_bytes);
+    outln!("lost      {lost} bytes of the camera streams in the session file");
+    match status.disk_free_bytes {
+        Some(free) => outln!("disk      {} free", gates::size(free as f64)),
+        None => outln!("disk      free space unknown"),
+    }
+    if let Some(stored) = stored {
+        print_latest(stored);
+    }
+}
+
+/// The latest outcomes, interruptions and notes.
+fn print_latest(stored: &Stored) {
+    for LastOutcome {
+        press,
+        attempt,
+        verdict,
+    } in &stored.last_outcomes
+    {
+        let again = match attempt {
+            0 | 1 => String::new(),
+            number => format!(", attempt {number}"),
+        };
+        let reason = because(verdict.reason().as_deref());
+        outln!("          press {press}{again} {}{reason}", verdict.name());
+    }
+    let earlier = stored.interruption_count - stored.last_interruptions.len();
+    if earlier > 0 {
+        outln!("          {earlier} earlier interruptions");
+    }
+    for row in &stored.last_interruptions {
+        let (t, kind) = (row.t.as_secs_f64(), row.kind.name());
+        outln!("          {t:.3} s  {kind}: {}", row.reason);
+    }
+    for row in &stored.last_notes {
+        outln!("          {:.3} s  note: {}", row.t.as_secs_f64(), row.text);
+    }
+}
+
+fn print_live(live: &RunSnapshot) {
+    let press = live.press.as_ref().map_or_else(String::new, |p| {
+        let block = match p.role {
+            skinrig_model::PressRole::Sync => "sync".to_owned(),
+            _ => format!("repetition {}", p.repetition),
+        };
+        let [x, y] = p.at_mm;
+        format!(" ({block}, at ({x:.1}, {y:.1}) mm)")
+    });
+    outln!(
+        "press     {} of {}{press}; {} done: {} valid, {} invalid, {} missed, {} excluded; {} retaken",
+        live.press.as_ref().map_or(0, |p| p.number),
+        live.planned,
+        live.done,
+        live.valid,
+        live.invalid,
+        live.missed,
+        live.excluded,
+        live.retaken
+    );
+    let seconds = HostDuration::from_secs_f64;
+    let elapsed = seconds(live.elapsed_s);
+    let waited = std::time::Duration::try_from_secs_f64(live.waited_s).unwrap_or_default();
+    outln!(
+        "time      {} of rig time in this leg; eta {}",
+        clock_text(elapsed),
+        eta_text(elapsed, live.eta_s.map(seconds), waited)
+    );
+    let [one, two] = live.cameras.each_ref().map(|c| {
+        c.events_per_s
+            .map_or_else(|| "-".to_owned(), |r| format!("{:.1}", r / 1e3))
+    });
+    let [a, b] = &live.cameras;
+    outln!(
+        "streams   camera 1 {one}, camera 2 {two} kev/s; trigger {} sent, {}+{} seen; {}+{} bytes lost in this leg",
+        live.marks_sent,
+        a.marks_seen,
+        b.marks_seen,
+        a.lost_bytes,
+        b.lost_bytes
+    );
+}
+
+fn print_planned(totals: &SessionTotals) {
+    let both = |of: fn(&PressTally) -> u64| of(&totals.presses) + of(&totals.sync);
+    outln!(
+        "press     {} planned: {} valid, {} invalid, {} missed, {} excluded",
+        both(|t| t.planned),
+        both(|t| t.valid),
+        both(|t| t.invalid),
+        both(|t| t.missed),
+        both(|t| t.excluded)
+    );
+}
