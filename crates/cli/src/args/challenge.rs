@@ -29,6 +29,14 @@ pub(crate) enum ChallengeCommand {
         One row per scored press; empty cells: not located. Exit code 2 names the row that is wrong."
     )]
     Score(ScoreArgs),
+
+    /// Let another program learn and locate presses, and score it beside skinrig.
+    #[command(
+        after_help = "Example:\n  skinrig challenge run sessions/NAME.session.sqlite -- python3 guest.py\n\n\
+        The program reads JSON lines from standard input and answers on standard output; docs/how-to/guests.md states them.\n\
+        It never receives the position of a scored press. Exit code 2 tells what was wrong with which answer."
+    )]
+    Run(ExamineArgs),
 }
 
 /// Arguments of `challenge make`.
@@ -62,4 +70,23 @@ pub(crate) struct ScoreArgs {
     /// File of the answers.
     #[arg(long, value_name = "FILE")]
     pub answers: PathBuf,
+}
+
+/// Arguments of `challenge run`.
+#[derive(Debug, Args)]
+pub(crate) struct ExamineArgs {
+    /// The session file.
+    pub session: PathBuf,
+
+    /// Send the events of every press, too.
+    #[arg(long)]
+    pub events: bool,
+
+    /// Seconds that the program may take for one press, 60 times as much to learn [default: 10].
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    pub timeout: Option<u64>,
+
+    /// The program and its arguments.
+    #[arg(last = true, required = true, value_name = "COMMAND")]
+    pub command: Vec<String>,
 }

@@ -16,7 +16,9 @@ pub(crate) use self::bench::{
     ControlArgs, DetectArgs, DevicesArgs, JogArgs, NoteArgs, PlanArgs, ResumeArgs, RunArgs,
     StatusArgs, ViewArgs, WatchArgs,
 };
-pub(crate) use self::challenge::{ChallengeArgs, ChallengeCommand, MakeArgs, ScoreArgs};
+pub(crate) use self::challenge::{
+    ChallengeArgs, ChallengeCommand, ExamineArgs, MakeArgs, ScoreArgs,
+};
 pub(crate) use self::doctor::DoctorArgs;
 pub(crate) use self::evaluate::{AnalyzeArgs, CompareArgs, CostKind, ReportArgs, TradeoffArgs};
 pub(crate) use self::files::{

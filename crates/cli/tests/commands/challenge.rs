@@ -274,3 +274,135 @@ fn an_invalid_session_makes_no_challenge() {
         .expect_stderr(&["found an INVALID one"]);
     assert!(!folder.exists());
 }
+
+/// Answers of a guest in a shell: its name after `fit`, then `locate` for every press, `$n`.
+fn guest(locate: &str, end: &str) -> Vec<String> {
+    let name = r#"{"name":"shell","version":"7"}"#;
+    let script = format!(
+        r#"while read -r l; do case "$l" in *'"fit"'*) echo '{name}';; *'"locate"'*) n=${{l#*'"press":'}}; n=${{n%%,*}}; {locate};; esac; done; {end}"#
+    );
+    ["sh", "-c", &script].map(str::to_owned).into()
+}
+
+fn examine(session: &Path, options: &[&str], guest: &[String]) -> crate::support::ProgramOutput {
+    let session = text(session);
+    let mut arguments = vec!["challenge", "run", &session, "--json"];
+    arguments.extend_from_slice(options);
+    arguments.push("--");
+    arguments.extend(guest.iter().map(String::as_str));
+    skinrig(&arguments)
+}
+
+#[test]
+fn a_guest_is_scored_as_its_table_would_be_and_sees_no_scored_position() {
+    let challenge = Challenge::new();
+    let log = text(&challenge.lab.path("lines"));
+    let constant = r#"echo "{\"press\":$n,\"x_mm\":1.5,\"y_mm\":-2}""#;
+    let locate = format!("echo \"$l\" >>'{log}'; {constant}");
+    let found = examine(&challenge.session, &[], &guest(&locate, "true")).code(0);
+    let found = found.json();
+    let truths = challenge.truths();
+    let square = |(_, x, y): &(u64, f64, f64)| (x - 1.5).powi(2) + (y + 2.0).powi(2);
+    let rmse = (truths.iter().map(square).sum::<f64>() / truths.len() as f64).sqrt();
+    let of = |who: &str| found[who]["metrics"]["rmse_mm"]["value"].as_f64().unwrap();
+    assert!((of("guest") - rmse).abs() < 1e-9, "{found:#}");
+    assert!(of("own") < rmse && found["difference_mm"]["value"].as_f64() > Some(0.0));
+    assert_eq!(found["guest"]["coverage"], Value::Null);
+    assert_eq!(
+        (&found["name"], &found["version"]),
+        (&"shell".into(), &"7".into())
+    );
+    assert_eq!(found["calibrating"], 4);
+    // Four locations are too few to leave some out.
+    assert_eq!(found["left_out"], Value::Null);
+    let lines = read_to_string(&log).unwrap();
+    assert_eq!(lines.lines().count(), truths.len());
+    for (_, x, y) in truths {
+        assert!(!lines.contains(&x.to_string()) && !lines.contains(&y.to_string()));
+    }
+    for name in ["_mm", "depth", "release", "events\":{", "location"] {
+        assert!(!lines.contains(name), "{name}: {lines}");
+    }
+    // With events, as many as the analysis clustered or more.
+    std::fs::remove_file(&log).unwrap();
+    examine(&challenge.session, &["--events"], &guest(&locate, "true")).code(0);
+    for line in read_to_string(&log).unwrap().lines() {
+        let line: Value = serde_json::from_str(line).unwrap();
+        for camera in line["cameras"].as_array().unwrap() {
+            let clustered = camera["cluster_events"].as_u64().unwrap() as usize;
+            let columns = ["t_us", "x_px", "y_px", "on"];
+            let counts = columns.map(|c| camera["events"][c].as_array().unwrap().len());
+            assert!(clustered > 0 && counts[0] >= clustered, "{counts:?}");
+            assert!(counts.iter().all(|n| *n == counts[0]));
+        }
+    }
+}
+
+#[test]
+fn a_guest_that_does_not_do_its_part_is_refused_with_the_reason() {
+    let challenge = Challenge::new();
+    let good = r#"echo "{\"press\":$n,\"x_mm\":1.5,\"y_mm\":-2}""#;
+    for (locate, end, parts) in [
+        (
+            "exit 3",
+            "true",
+            vec!["`locate` of press", "exit status: 3"],
+        ),
+        (
+            good,
+            "exit 4",
+            vec!["the end of its input", "exit status: 4"],
+        ),
+        (
+            good,
+            "echo done",
+            vec!["no line after the last press", "done"],
+        ),
+        ("echo loading", "true", vec!["`loading`", "standard error"]),
+        (r#"echo "{\"press\":99}""#, "true", vec!["found press 99"]),
+        (
+            r#"echo "{\"press\":$n,\"x_mm\":320,\"y_mm\":240}""#,
+            "true",
+            vec!["mm in the skin frame"],
+        ),
+        (
+            r#"echo "{\"press\":$n,\"x_mm\":0.01,\"y_mm\":0.02}""#,
+            "true",
+            vec!["metres"],
+        ),
+        (":", "true", vec!["within 1 s", "--timeout"]),
+    ] {
+        let output = examine(&challenge.session, &["--timeout", "1"], &guest(locate, end));
+        output.code(2).expect_stderr(&parts);
+    }
+    let absent = ["/nowhere/guest".to_owned()];
+    let output = examine(&challenge.session, &[], &absent).code(2);
+    output.expect_stderr(&["/nowhere/guest", "after `--`"]);
+}
+
+#[test]
+fn the_documented_guest_is_worse_at_places_that_it_did_not_learn() {
+    let Ok(python) = std::env::var("SKINRIG_PYTHON") else {
+        eprintln!("skipped: no SKINRIG_PYTHON, an interpreter with tests/python/requirements.txt");
+        return;
+    };
+    let lab = Lab::new();
+    let points: Vec<String> = (0..12)
+        .map(|i| format!("[{} mm, {} mm]", -14 + 12 * (i % 4), -16 + 15 * (i / 4)))
+        .collect();
+    let points = format!("path.points=[{}]", points.join(", "));
+    let more = [
+        "evaluation.calibrate=[1]",
+        "evaluation.score=[2]",
+        "analysis.bootstrap_resamples=50",
+        &points,
+    ];
+    let more: Vec<&str> = more.iter().flat_map(|set| ["--set", *set]).collect();
+    let session = lab.record("s", &more);
+    let script = format!("{}/docs/how-to/guest.py", crate::support::ROOT);
+    let found = examine(&session, &[], &[python, script]).code(0).json();
+    let rmse = |of: &Value| of["metrics"]["rmse_mm"]["value"].as_f64().unwrap();
+    let left_out = &found["left_out"]["guest"];
+    assert!(rmse(left_out) > 2.0 * rmse(&found["guest"]), "{found:#}");
+    assert_eq!(found["calibrating"], left_out["presses"]);
+}

@@ -53,6 +53,9 @@ pub enum ChallengeError {
         /// The hash of the file.
         found: String,
     },
+    /// A guest did not do its part.
+    #[error(transparent)]
+    Guest(#[from] super::guest::GuestError),
     /// The table of estimates is refused.
     #[error("{}: {error}", path.display())]
     Table {

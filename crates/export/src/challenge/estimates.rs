@@ -198,16 +198,29 @@ impl Estimates {
             presses,
             has_regions: columns.region.is_some(),
         };
-        estimates.check_unit(&rows, outline, last)?;
-        Ok(estimates)
+        match estimates.implausible(outline) {
+            None => Ok(estimates),
+            Some(Implausible::FarAway {
+                press,
+                at,
+                away_mm,
+                most_mm,
+            }) => Err(EstimateError::FarAway {
+                row: rows.get(&press).copied().unwrap_or(last),
+                x_mm: at[0],
+                y_mm: at[1],
+                away_mm,
+                most_mm,
+            }),
+            Some(Implausible::Tiny { extent_mm }) => Err(EstimateError::Tiny {
+                row: last,
+                extent_mm,
+            }),
+        }
     }
 
-    fn check_unit(
-        &self,
-        rows: &BTreeMap<u32, u64>,
-        outline: &SkinOutline,
-        last: u64,
-    ) -> Result<(), EstimateError> {
+    /// The first sign that the positions are not in mm in the skin frame.
+    pub(super) fn implausible(&self, outline: &SkinOutline) -> Option<Implausible> {
         let (centre, most_mm) = (outline.centre, outline.diagonal_mm());
         let mut extent_mm: Option<f64> = None;
         for (press, position) in &self.presses {
@@ -216,22 +229,30 @@ impl Estimates {
             };
             let away_mm = (x - centre.x_mm).hypot(y - centre.y_mm);
             if away_mm > most_mm {
-                return Err(EstimateError::FarAway {
-                    row: rows.get(press).copied().unwrap_or(last),
-                    x_mm: *x,
-                    y_mm: *y,
+                return Some(Implausible::FarAway {
+                    press: *press,
+                    at: [*x, *y],
                     away_mm,
                     most_mm,
                 });
             }
             extent_mm = Some(extent_mm.unwrap_or(0.0).max(x.hypot(*y)));
         }
-        match extent_mm {
-            Some(extent_mm) if extent_mm < TINY * most_mm => Err(EstimateError::Tiny {
-                row: last,
-                extent_mm,
-            }),
-            _ => Ok(()),
-        }
+        let extent_mm = extent_mm.filter(|extent| *extent < TINY * most_mm)?;
+        Some(Implausible::Tiny { extent_mm })
     }
+}
+
+/// Positions in pixels, metres or another frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Implausible {
+    /// A position is far from the skin.
+    FarAway {
+        press: u32,
+        at: [f64; 2],
+        away_mm: f64,
+        most_mm: f64,
+    },
+    /// All positions together are near zero.
+    Tiny { extent_mm: f64 },
 }

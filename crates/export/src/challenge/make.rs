@@ -88,10 +88,36 @@ pub struct ChallengeFiles {
 }
 
 /// A press of the challenge.
-struct Press<'a> {
-    row: &'a PressResult,
+pub(super) struct Press<'a> {
+    pub row: &'a PressResult,
     timing: PressTiming,
-    truth: Point2,
+    pub truth: Point2,
+}
+
+impl Press<'_> {
+    pub(super) fn is_scored(&self) -> bool {
+        self.row.role == PressRole::Score
+    }
+
+    /// Recorded time of the contact on a camera's clock, µs, and the events about the press; none without a clock.
+    pub(super) fn events(
+        &self,
+        source: &Source<'_>,
+        camera: CameraId,
+        events: &mut EventQuery<'_>,
+    ) -> Result<(f64, Vec<CdEvent>), ExportError> {
+        let Some(clock) = source
+            .analysis
+            .and_then(|(a, _)| a.clocks[camera.index()].as_ref())
+        else {
+            return Ok((0.0, Vec::new()));
+        };
+        let us = |t| recorded_us(source, clock, camera.index(), t);
+        let contact = us(self.timing.contact);
+        let from = (contact - MARGIN_US).max(0.0) as u64;
+        let to = (us(self.timing.release) + MARGIN_US).max(0.0) as u64;
+        Ok((contact, events(camera, (from, to))?))
+    }
 }
 
 /// Events of a camera between two recorded times, µs.
@@ -112,27 +138,9 @@ pub fn make(
     making: &ChallengeOptions,
     events: &mut EventQuery<'_>,
 ) -> Result<ChallengeFiles, ChallengeError> {
-    let Some((analysis, _)) = source.analysis else {
-        return Err(ChallengeError::TooFew {
-            calibrating: 0,
-            scored: 0,
-        });
-    };
-    if !analysis.is_valid() {
-        return Err(ChallengeError::InvalidSession {
-            because: analysis.invalid_because(),
-        });
-    }
-    let presses = shuffled(&analysis.presses, making.salt);
-    let is_scored = |p: &&Press<'_>| p.row.role == PressRole::Score;
-    let scored = presses.iter().filter(is_scored).count();
+    let presses = chosen(source, making.salt)?;
+    let scored = presses.iter().filter(|p| p.is_scored()).count();
     let calibrating = presses.len() - scored;
-    if scored == 0 || calibrating == 0 {
-        return Err(ChallengeError::TooFew {
-            calibrating,
-            scored,
-        });
-    }
     let out = Folder::new(folder, STEM, making.overwrite)?;
     let resolved = |path: &Path| std::fs::canonicalize(path).map_err(ExportError::file(path));
     let parent = answers.parent().filter(|p| !p.as_os_str().is_empty());
@@ -144,28 +152,9 @@ pub fn make(
     }
     let stem = answers.file_name().unwrap_or_default().to_string_lossy();
     let sealed = Folder::new(parent, &stem, making.overwrite)?;
-    let settings = &analysis.settings;
-    let text = json(&Answers {
-        format: FORMAT,
-        salt: hex(&making.salt),
-        session_id: source.reader.session_id().map_err(ExportError::from)?,
-        outline: analysis.rig.outline,
-        within_mm: settings.within_mm,
-        bootstrap_resamples: settings.bootstrap_resamples,
-        seed: settings.seed,
-        presses: (1..)
-            .zip(&presses)
-            .filter(|(_, p)| is_scored(p))
-            .map(|(press, p)| Answer {
-                press,
-                session_press: p.row.press.number(),
-                location: p.row.location.index(),
-                depth_mm: p.row.depth_mm,
-                x_mm: p.truth.x_mm,
-                y_mm: p.truth.y_mm,
-            })
-            .collect(),
-    });
+    let numbered = (1..).zip(&presses).filter(|(_, p)| p.is_scored());
+    let numbered: Vec<(u32, &Press<'_>)> = numbered.collect();
+    let text = json(&answers_about(source, &numbered, making.salt)?);
     let answers = write(&sealed, "", &text)?;
     let description = json(&Description {
         format: FORMAT,
@@ -189,6 +178,72 @@ pub fn make(
         answers,
         calibrating: calibrating as u32,
         scored: scored as u32,
+    })
+}
+
+/// The presses of a challenge in an order that follows from the salt.
+///
+/// # Errors
+/// [`ChallengeError`] when the session is INVALID, or too few presses are usable.
+pub(super) fn chosen<'a>(
+    source: &Source<'a>,
+    salt: [u8; 32],
+) -> Result<Vec<Press<'a>>, ChallengeError> {
+    let Some((analysis, _)) = source.analysis else {
+        return Err(ChallengeError::TooFew {
+            calibrating: 0,
+            scored: 0,
+        });
+    };
+    if !analysis.is_valid() {
+        return Err(ChallengeError::InvalidSession {
+            because: analysis.invalid_because(),
+        });
+    }
+    let presses = shuffled(&analysis.presses, salt);
+    let scored = presses.iter().filter(|p| p.is_scored()).count();
+    let calibrating = presses.len() - scored;
+    if scored == 0 || calibrating == 0 {
+        return Err(ChallengeError::TooFew {
+            calibrating,
+            scored,
+        });
+    }
+    Ok(presses)
+}
+
+/// Where numbered presses were made, and how they are scored.
+pub(super) fn answers_about(
+    source: &Source<'_>,
+    presses: &[(u32, &Press<'_>)],
+    salt: [u8; 32],
+) -> Result<Answers, ChallengeError> {
+    let Some((analysis, _)) = source.analysis else {
+        return Err(ChallengeError::TooFew {
+            calibrating: 0,
+            scored: 0,
+        });
+    };
+    let settings = &analysis.settings;
+    Ok(Answers {
+        format: FORMAT,
+        salt: hex(&salt),
+        session_id: source.reader.session_id().map_err(ExportError::from)?,
+        outline: analysis.rig.outline,
+        within_mm: settings.within_mm,
+        bootstrap_resamples: settings.bootstrap_resamples,
+        seed: settings.seed,
+        presses: presses
+            .iter()
+            .map(|(press, p)| Answer {
+                press: *press,
+                session_press: p.row.press.number(),
+                location: p.row.location.index(),
+                depth_mm: p.row.depth_mm,
+                x_mm: p.truth.x_mm,
+                y_mm: p.truth.y_mm,
+            })
+            .collect(),
     })
 }
 
@@ -254,7 +309,6 @@ fn event_table(
     events: &mut EventQuery<'_>,
     to: &mut dyn TableWriter,
 ) -> Result<(), ExportError> {
-    let clock = source.analysis.and_then(|(a, _)| a.clocks[camera.index()]);
     let column = |(name, kind): (&str, Kind)| Column {
         name: name.to_owned(),
         kind,
@@ -270,23 +324,13 @@ fn event_table(
         name: TableName::Events(camera).name(),
         columns: columns.map(column).into(),
     };
-    let mut read = |p: &Press<'_>| -> Result<(f64, Vec<CdEvent>), ExportError> {
-        let Some(clock) = &clock else {
-            return Ok((0.0, Vec::new()));
-        };
-        let us = |t| recorded_us(source, clock, camera.index(), t);
-        let contact = us(p.timing.contact);
-        let from = (contact - MARGIN_US).max(0.0) as u64;
-        let to = (us(p.timing.release) + MARGIN_US).max(0.0) as u64;
-        Ok((contact, events(camera, (from, to))?))
-    };
     let mut total = 0;
     for p in presses {
-        total += read(p)?.1.len() as u64;
+        total += p.events(source, camera, events)?.1.len() as u64;
     }
     to.begin(&layout, total)?;
     for (number, p) in (1..).zip(presses) {
-        let (contact, events) = read(p)?;
+        let (contact, events) = p.events(source, camera, events)?;
         to.append(&[
             Values::Int(vec![number; events.len()]),
             Values::Int(

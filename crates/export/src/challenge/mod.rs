@@ -8,12 +8,14 @@
 mod answers;
 mod error;
 mod estimates;
+mod guest;
 mod make;
 mod score;
 
 pub use answers::{Answer, Answers};
 pub use error::{ChallengeError, EstimateError};
 pub use estimates::{Estimates, Position};
+pub use guest::{Examination, Guest, GuestError, LeftOut, Timeouts, examine};
 pub use make::{ChallengeFiles, ChallengeOptions, EventQuery, make};
 pub use score::{Judgement, score};
 

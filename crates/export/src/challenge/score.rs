@@ -47,7 +47,8 @@ pub fn score(folder: &Path, table: &Path, answers: &Path) -> Result<Judgement, C
     Ok(judge(&answers, &estimates))
 }
 
-fn judge(answers: &Answers, estimates: &Estimates) -> Judgement {
+/// Scores estimates.
+pub(super) fn judge(answers: &Answers, estimates: &Estimates) -> Judgement {
     let found = |answer: &Answer| estimates.presses.get(&answer.press).copied().flatten();
     let rows: Vec<PressResult> = answers.presses.iter().map(|a| row(a, found(a))).collect();
     let set = ScoreSet::from_presses(&rows, &[]);
