@@ -130,6 +130,8 @@ pub fn compare(options: CompareOptions) -> Result<Value, Failure> {
         limits: options.limits,
         within: options.within_mm,
         despite: options.despite,
+        sequential: false,
+        looks: None,
         analysis: options.analysis,
         out: options.out,
     })

@@ -7,7 +7,9 @@ use crate::causes::{Causes, Reanalysis, causes};
 use crate::comparability::{Difference, Severity, differences};
 use crate::location_results::{Location, compare_locations};
 use crate::locations::Locations;
-use crate::statistics::{Pairing, Settings, Verdict};
+use crate::metrics::Metric;
+use crate::sequential::{SequentialComparison, first_repetitions, look};
+use crate::statistics::{AlphaSpending, Pairing, Settings, Verdict};
 use crate::subject::{SessionFacts, Subject};
 use crate::table::{Margins, Row, table};
 
@@ -24,6 +26,8 @@ pub struct ComparisonOptions {
     pub overrides: Vec<String>,
     /// Statistical settings.
     pub settings: Settings,
+    /// Look after each repetition of exactly two skins, and spend alpha over the looks; `None`: one look at all data.
+    pub sequential: Option<AlphaSpending>,
 }
 
 /// Summary of one skin.
@@ -55,8 +59,10 @@ pub struct Comparison {
     pub limits: Option<String>,
     /// Limit of the pass rate, mm.
     pub within_mm: f64,
-    /// Statistical settings, including the pairing that was used.
+    /// Statistical settings, including the pairing that was used. Of a sequential comparison those of its last look.
     pub settings: Settings,
+    /// Looks of a sequential comparison; everything else then uses the presses of the last look.
+    pub sequential: Option<SequentialComparison>,
     /// One row per metric.
     pub table: Vec<Row>,
     /// All locations.
@@ -103,7 +109,6 @@ pub fn compare(
     reanalyses: &Reanalyses,
     options: &ComparisonOptions,
 ) -> Comparison {
-    let locations = Locations::of(subjects);
     let mut settings = options.settings;
     let differences = differences(subjects, &options.overrides);
     if differences
@@ -112,6 +117,26 @@ pub fn compare(
     {
         settings.pairing = Pairing::Independent;
     }
+    let is_blocked = differences
+        .iter()
+        .any(|d| d.severity == Severity::Blocking && !d.overridden);
+    let looked = match (options.sequential, subjects) {
+        (Some(spending), [a, b]) if !is_blocked => {
+            let margin = options.margins.iter().find(|(m, _)| *m == Metric::Rmse);
+            let pair = [a.clone(), b.clone()];
+            Some(look(&pair, margin.map(|m| m.1), spending, &settings))
+        }
+        _ => None,
+    };
+    let (sequential, chosen) = match looked {
+        Some((sequential, chosen, own)) => {
+            settings = own;
+            (Some(sequential), Some(chosen))
+        }
+        None => (None, None),
+    };
+    let subjects = chosen.as_ref().map_or(subjects, |c| c.as_slice());
+    let locations = Locations::of(subjects);
     let own_within = subjects.first().and_then(|s| s.sessions.first());
     let within_mm = options
         .within_mm
@@ -135,6 +160,7 @@ pub fn compare(
         limits: options.limits.clone(),
         within_mm,
         settings,
+        sequential,
         table: Vec::new(),
         locations: Vec::new(),
         causes: Vec::new(),
@@ -144,11 +170,21 @@ pub fn compare(
         return result;
     }
     result.table = table(subjects, &locations, within_mm, &options.margins, &settings);
-    result.locations = compare_locations(subjects, &locations, &settings);
+    // Marks on the map are at the ordinary level.
+    let ordinary = Settings {
+        pairing: settings.pairing,
+        ..options.settings
+    };
+    result.locations = compare_locations(subjects, &locations, &ordinary);
     let others = subjects.iter().skip(1).enumerate();
     result.causes = others
         .map(|(i, other)| {
             let reanalysis = reanalyses.get(i).and_then(Option::as_ref);
+            let reanalysis = reanalysis.map(|pair| match &result.sequential {
+                Some(s) => first_repetitions(pair, s.looks.len() as u32),
+                None => pair.clone(),
+            });
+            let reanalysis = reanalysis.as_ref();
             let reanalysis = reanalysis.map(|[first, second]| Reanalysis { first, second });
             causes(&subjects[0], other, reanalysis, RESAMPLES, settings.seed)
         })

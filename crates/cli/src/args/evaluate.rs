@@ -64,6 +64,15 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "KEY")]
     pub despite: Vec<String>,
 
+    /// Look after each complete repetition of exactly two skins and stop at the first look that decides on the RMSE. Alpha is spent
+    /// over the looks, so it may be asked again after every new repetition.
+    #[arg(long)]
+    pub sequential: bool,
+
+    /// Number of looks, declared before the first, which share alpha equally [default: unlimited; look k spends alpha / (k (k + 1))].
+    #[arg(long, value_name = "N", requires = "sequential", value_parser = clap::value_parser!(u32).range(1..=i64::from(skinrig_compare::statistics::MOST_LOOKS)))]
+    pub looks: Option<u32>,
+
     /// Compare this named variant (`skinrig analyze --name`) of every session [default: the official analyses].
     #[arg(long, value_name = "NAME", value_parser = crate::analyses::parse)]
     pub analysis: Option<String>,

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use skinrig_compare::statistics::AlphaSpending;
 use skinrig_compare::{ComparisonOptions, Metric};
 use skinrig_protocol::Limits;
 
@@ -13,6 +14,12 @@ const FILE: &str = "limits.yaml";
 
 /// Options of the comparison; the command line overrides the limits file.
 pub(super) fn choices(args: &CompareArgs) -> Result<ComparisonOptions, Failure> {
+    if args.sequential && args.skins.len() != 2 {
+        return Err(Failure::input(format!(
+            "--sequential: expected 2 skins, found {}\n  next: compare them two at a time",
+            args.skins.len()
+        )));
+    }
     let named = args.limits.as_deref();
     let file = named.or_else(|| Some(Path::new(FILE)).filter(|p| p.is_file()));
     let read = file.map(|path| {
@@ -43,6 +50,9 @@ pub(super) fn choices(args: &CompareArgs) -> Result<ComparisonOptions, Failure> 
         limits: (!limits.name.is_empty()).then(|| limits.name.clone()),
         within_mm: args.within.or(limits.within_mm),
         overrides: args.despite.clone(),
+        sequential: args.sequential.then_some(AlphaSpending {
+            planned_looks: args.looks,
+        }),
         ..ComparisonOptions::default()
     })
 }

@@ -90,6 +90,50 @@ fn shape_without_facts(mut document: Value) -> String {
     shape(&document)
 }
 
+/// Two repetitions of each: two looks.
+#[test]
+fn a_sequential_comparison_looks_after_each_repetition() {
+    let lab = Lab::new();
+    let a = record(&lab, "a", "1", &[]);
+    let b = record(&lab, "b", "2", &[]);
+    let output = skinrig(&["compare", &a, &b, "--sequential"]).code(0);
+    assert!(output.out.contains("LOOKS     not yet: "), "{output:?}");
+    assert!(output.out.contains("99.17 % interval"), "{output:?}");
+    let json = skinrig(&["--json", "compare", &a, &b, "--sequential", "--looks", "2"])
+        .code(0)
+        .json();
+    let looks = json["sequential"]["looks"].as_array().unwrap();
+    assert_eq!(looks.len(), 2);
+    assert!(looks[1]["presses"][0].as_u64() > looks[0]["presses"][0].as_u64());
+    assert_eq!(json["skins"][0]["attempted"], 8);
+    assert_eq!(looks[1]["spent"], 0.05);
+    assert_eq!(json["sequential"]["outlook"]["status"], "spent");
+    assert_eq!(json["settings"]["alpha"], 0.025);
+    // The skin with fewer repetitions decides how many looks there are.
+    let short = record(
+        &lab,
+        "c",
+        "3",
+        &[
+            "--set",
+            "repetitions.count=1",
+            "--set",
+            "evaluation.score=[1]",
+        ],
+    );
+    let json = skinrig(&["--json", "compare", &a, &short, "--sequential"])
+        .code(0)
+        .json();
+    assert_eq!(json["sequential"]["complete"], serde_json::json!([2, 1]));
+    assert_eq!(json["skins"][0]["attempted"], 4);
+    skinrig(&["compare", &a, &b, &short, "--sequential"])
+        .code(2)
+        .expect_stderr(&["--sequential: expected 2 skins, found 3"]);
+    skinrig(&["compare", &a, &b, "--looks", "2"])
+        .code(2)
+        .expect_stderr(&["--sequential"]);
+}
+
 #[test]
 fn what_may_not_be_compared_is_refused_and_can_be_lifted_by_name() {
     let lab = Lab::new();

@@ -37,6 +37,7 @@ mod quantiles;
 mod question;
 mod sample;
 mod scores;
+mod spending;
 mod spread;
 
 pub use compare::{compare, estimate};
@@ -47,3 +48,4 @@ pub use error::{ComparisonError, Side};
 pub use family::{AdjustedComparison, Pair, PairSelection, compare_all};
 pub use question::{ComparisonTarget, ImprovementDirection, Pairing, Settings};
 pub use sample::{Count, Kind, Position, Sample, SampleFault};
+pub use spending::{AlphaSpending, MOST_LOOKS, Outlook};

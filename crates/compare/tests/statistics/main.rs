@@ -7,3 +7,4 @@ mod levels;
 mod populations;
 mod power;
 mod refusals;
+mod sequential;

@@ -102,6 +102,20 @@ impl SimulatedPair {
 
     /// Draws a pair of samples. With `naive` every press is its own location, as if presses were independent.
     pub(crate) fn draw(&self, draws: &mut Draws, naive: bool) -> [Sample; 2] {
+        let presses = self.draw_presses(draws);
+        self.samples(&presses, self.presses(), draws, naive)
+    }
+
+    /// Draws a pair of skins and returns their samples after each repetition.
+    pub(crate) fn draw_looks(&self, draws: &mut Draws) -> Vec<[Sample; 2]> {
+        let presses = self.draw_presses(draws);
+        let looks = 1..=self.presses();
+        looks
+            .map(|look| self.samples(&presses, look, draws, false))
+            .collect()
+    }
+
+    fn draw_presses(&self, draws: &mut Draws) -> [Vec<Press>; 2] {
         let mut presses: [Vec<Press>; 2] = [Vec::new(), Vec::new()];
         for location in 0..self.locations {
             let shared = [SHARED * draws.normal(), SHARED * draws.normal()];
@@ -118,13 +132,26 @@ impl SimulatedPair {
                 }
             }
         }
+        presses
+    }
+
+    /// Samples of the first repetitions.
+    fn samples(
+        &self,
+        presses: &[Vec<Press>; 2],
+        repetitions: u32,
+        draws: &mut Draws,
+        naive: bool,
+    ) -> [Sample; 2] {
         let key = |p: &Press| match (naive, self.kind) {
             (false, _) => p.location,
             (true, Kind::RepeatStd) => p.location * SERIES + p.repetition / self.repetitions,
             (true, _) => p.location * self.presses() + p.repetition,
         };
         let mut side = 0.0;
-        presses.map(|presses| {
+        presses.each_ref().map(|presses| {
+            let first = presses.iter().filter(|p| p.repetition < repetitions);
+            let presses: Vec<&Press> = first.collect();
             let sample = self.sample(&presses, key, side * self.shift, draws);
             side += 1.0;
             sample
@@ -140,7 +167,7 @@ impl SimulatedPair {
 
     fn sample(
         &self,
-        presses: &[Press],
+        presses: &[&Press],
         key: impl Fn(&Press) -> u32,
         shift: f64,
         draws: &mut Draws,

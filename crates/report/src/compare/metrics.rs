@@ -15,23 +15,24 @@ pub(super) fn metrics(result: &Comparison, k: usize) -> Table {
         Column::new(format!("#{page}")).terminal(terminal, Cells::right(width))
     };
     let title = format!("{letter} against A");
+    let interval = format!("{} interval", text::level(result));
     let columns = [
         Column::new("Metric").terminal(&*title, Cells::left(26)),
         number("A", "A", 7),
         number(&letter.to_string(), &letter.to_string(), 8),
         number(&format!("{letter} − A"), &format!("{letter} - A"), 9),
-        number("95 % interval", "95 % interval", 18),
+        number(&interval, &interval, 18),
         Column::new("#Margin"),
         Column::new(format!("Verdict on {letter}")).terminal("verdict", Cells::left(0).after(2)),
         Column::new("").class("soft"),
     ];
-    let rows = result.table.iter().filter_map(|row| metric(row, k));
+    let rows = result.table.iter().filter_map(|row| metric(result, row, k));
     let mut table = Table::of(format!("metrics-{letter}"), title, columns);
     table.download("metrics");
     table.class("versus").gap(0).with(rows)
 }
 
-fn metric(row: &skinrig_compare::Row, k: usize) -> Option<Row> {
+fn metric(result: &Comparison, row: &skinrig_compare::Row, k: usize) -> Option<Row> {
     let found = row.against_first.iter().find(|a| a.subject == k)?;
     let c = found.comparison.as_ref();
     let own = |i: usize| row.values.get(i).and_then(|v| v.value).map(|v| v.value);
@@ -48,7 +49,7 @@ fn metric(row: &skinrig_compare::Row, k: usize) -> Option<Row> {
     );
     let verdict = text::verdict(found.verdict);
     let pill = format!("pill {}", verdict.replace(' ', "-"));
-    let note = found.error.clone().or_else(|| needed(row, found));
+    let note = found.error.clone().or_else(|| needed(result, row, found));
     let style = match found.verdict {
         Some(Verdict::Worse) => Some(Style::Warning),
         Some(Verdict::Better) => Some(Style::Bold),
@@ -68,10 +69,14 @@ fn metric(row: &skinrig_compare::Row, k: usize) -> Option<Row> {
     Some(row.style(style))
 }
 
-/// Presses that would decide an undecided metric with a margin.
-pub(super) fn needed(row: &skinrig_compare::Row, found: &BaselineComparison) -> Option<String> {
+/// Presses that would decide an undecided metric with a margin; looks have their own outlook.
+pub(super) fn needed(
+    result: &Comparison,
+    row: &skinrig_compare::Row,
+    found: &BaselineComparison,
+) -> Option<String> {
     let is_undecided = matches!(found.verdict, Some(Verdict::Undecided) | None);
     let c = found.comparison.as_ref();
-    c.filter(|_| is_undecided && row.margin.is_some())
+    c.filter(|_| is_undecided && row.margin.is_some() && result.sequential.is_none())
         .and_then(text::needed)
 }

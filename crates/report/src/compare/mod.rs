@@ -1,6 +1,7 @@
 //! Owns the presentation of a skin comparison: terminal table, JSON, HTML page with figures.
 
 mod figures;
+mod looks;
 mod metrics;
 mod page;
 mod tables;

@@ -3,7 +3,7 @@
 use skinrig_compare::statistics::Verdict;
 use skinrig_compare::{Causes, Comparison, Difference, Severity};
 
-use super::{figures, metrics, tables, text};
+use super::{figures, looks, metrics, tables, text};
 use crate::document::{Banner, Block, Document, Group, Note, Row, Section, Table, Text, soft};
 use crate::format::{capital, number};
 
@@ -51,6 +51,16 @@ pub fn html(result: &Comparison) -> String {
         sections: vec![
             verdict(result),
             Section::new("metrics", "Metrics")
+                .with_all(
+                    result
+                        .sequential
+                        .as_ref()
+                        .filter(|s| !s.looks.is_empty())
+                        .map(|s| {
+                            looks::table(s, result.skins.get(1).map_or('B', |skin| skin.letter))
+                                .card()
+                        }),
+                )
                 .with_all(others.clone().map(|k| metrics::metrics(result, k).card())),
             Section::new("maps", "Maps").with_all(others.clone().flat_map(|k| maps(result, k))),
             Section::new("why", "Why they differ")
@@ -130,7 +140,13 @@ fn verdict_card(result: &Comparison, k: usize) -> Group {
         let margin = text::value(row, Some(margin));
         headline = headline.dot().add(format!("margin ± {margin} mm"));
     }
-    let needed = compared.and_then(text::needed);
+    let sequential = result.sequential.as_ref();
+    let needed = match sequential {
+        Some(of) => Some(capital(&looks::conclusion(of, skin.letter))),
+        None => compared
+            .and_then(text::needed)
+            .map(|n| format!("Undecided: {n}")),
+    };
     let cause = causes(result, k).map(|of| match of.carried_by {
         Some(factor) => Text::from("Main cause: ")
             .bold(factor.name())
@@ -146,7 +162,7 @@ fn verdict_card(result: &Comparison, k: usize) -> Group {
         .with(Block::Text("name", name.add(" against A, by RMSE")))
         .with(Block::Text("value", value))
         .with(Block::Text("ci", headline))
-        .with_all(needed.map(|n| Block::Text("ci", format!("Undecided: {n}.").into())))
+        .with_all(needed.map(|n| Block::Text("ci", format!("{n}.").into())))
         .with_all(cause.map(|text| Block::Text("ci why", text)))
 }
 

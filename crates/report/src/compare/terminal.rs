@@ -3,7 +3,7 @@
 use skinrig_compare::{Causes, Comparison, Difference, Severity};
 use skinrig_text::{Column as Cells, Paint};
 
-use super::{metrics, text};
+use super::{looks, metrics, text};
 use crate::document::{Column, Note, Row, Section, Table, Tone, terminal};
 use crate::format::number;
 
@@ -13,7 +13,9 @@ const MAX_HARMLESS: usize = 4;
 /// At most 80 columns, ends with a newline. `color` adds ANSI escapes without changing the layout.
 #[must_use]
 pub fn terminal_table(result: &Comparison, color: bool) -> String {
-    let mut sections = vec![verdicts(result), skins(result), comparability(result)];
+    let mut sections = vec![verdicts(result)];
+    sections.extend(sequential(result));
+    sections.extend([skins(result), comparability(result)]);
     for (k, skin) in result.skins.iter().enumerate().skip(1) {
         if !result.table.is_empty() {
             sections.extend(against(result, k));
@@ -54,6 +56,14 @@ fn verdicts(result: &Comparison) -> Section {
         );
         Some(Note::new("VERDICT", text).tone(Tone::Answer))
     }))
+}
+
+/// Conclusion and looks of a sequential comparison.
+fn sequential(result: &Comparison) -> Option<Section> {
+    let (of, skin) = (result.sequential.as_ref()?, result.skins.get(1)?);
+    let conclusion = looks::conclusion(of, skin.letter);
+    let section = Section::plain().with(Note::new("LOOKS", conclusion).tone(Tone::Answer));
+    Some(section.with_all((!of.looks.is_empty()).then(|| looks::table(of, skin.letter))))
 }
 
 fn skins(result: &Comparison) -> Section {
@@ -110,7 +120,7 @@ fn against(result: &Comparison, k: usize) -> [Section; 2] {
     let hint = "no margins: nothing can be equivalent (--limits FILE or --margin rmse=0.5mm)";
     let undecided = result.table.iter().find_map(|row| {
         let found = row.against_first.iter().find(|a| a.subject == k)?;
-        let needed = metrics::needed(row, found)?;
+        let needed = metrics::needed(result, row, found)?;
         Some(Note::new("undecided", format!("{}: {needed}", row.name)))
     });
     [

@@ -5,6 +5,13 @@ use skinrig_compare::{BaselineComparison, Comparison as Result, Row, Skin};
 
 use crate::format::{NONE, number};
 
+/// Level of the intervals of metrics: `95 %`, or that of the last look.
+pub(super) fn level(result: &Result) -> String {
+    let percent = 100.0 * (1.0 - result.settings.alpha);
+    let digits = if result.sequential.is_some() { 2 } else { 0 };
+    format!("{} %", number(Some(percent), digits))
+}
+
 /// Value in the display unit of the row.
 pub(super) fn value(row: &Row, value: Option<f64>) -> String {
     number(value.map(|v| v * row.format.scale), row.format.digits)

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use skinrig_analysis::tradeoff::{Choice, Cost, Region, Row, Tradeoff};
+use skinrig_compare::statistics::AlphaSpending;
 use skinrig_compare::{
     Comparison, ComparisonOptions, Metric, Session, SessionFacts, Subject, compare,
 };
@@ -48,6 +49,10 @@ fn subject(letter: char, scale: f64, values: &[(&str, &str)]) -> Subject {
 }
 
 fn comparison(margin_mm: Option<f64>) -> Comparison {
+    compared(margin_mm, None)
+}
+
+fn compared(margin_mm: Option<f64>, sequential: Option<AlphaSpending>) -> Comparison {
     let a = [("protocol.motion.hold", "0.5 s"), ("camera1.serial", "1")];
     let b = [("protocol.motion.hold", "0.7 s"), ("camera1.serial", "2")];
     let subjects = [subject('A', 1.0, &a), subject('B', 1.6, &b)];
@@ -55,6 +60,7 @@ fn comparison(margin_mm: Option<f64>) -> Comparison {
         margins: margin_mm.map(|mm| (Metric::Rmse, mm)).into_iter().collect(),
         limits: margin_mm.map(|_| "lab.limits.yaml".to_owned()),
         overrides: vec!["hold".to_owned(), "protocol.motion.hold".to_owned()],
+        sequential,
         ..ComparisonOptions::default()
     };
     compare(&subjects, &vec![None], &options)
@@ -139,6 +145,18 @@ fn a_comparison_on_a_terminal() {
         "comparison_without_margins",
         report::terminal_table(&comparison(None), false)
     );
+}
+
+#[test]
+fn the_looks_of_a_sequential_comparison_on_a_terminal() {
+    let planned = AlphaSpending {
+        planned_looks: Some(3),
+    };
+    let text = report::terminal_table(&compared(None, Some(planned)), false);
+    assert!(text.lines().all(|l| l.chars().count() <= 80), "{text}");
+    insta::assert_snapshot!("sequential", text);
+    let page = report::html(&compared(None, Some(planned)));
+    assert!(page.contains("repetition 1"));
 }
 
 #[test]

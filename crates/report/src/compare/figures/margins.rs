@@ -27,8 +27,9 @@ pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<Figur
     }
     let letter = result.skins[k].letter;
     let caption = format!(
-        "Differences with 95 % intervals in units of each metric's margin. Right is better. Differences within the \
-         band are equivalent. Arrows: beyond {MAX_MARGINS} margins."
+        "Differences with {} intervals in units of each metric's margin. Right is better. Differences within the \
+         band are equivalent. Arrows: beyond {MAX_MARGINS} margins.",
+        text::level(result)
     );
     let n = rows.len();
     // Arrows beyond the last margin stay inside the frame.

@@ -1,0 +1,179 @@
+//! Sequential comparison: after each repetition of both skins, whether the RMSE decides, with alpha spent over the looks.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use skinrig_analysis::result::PressResult;
+use skinrig_model::{PressRole, RepetitionId, Verdict as PressVerdict};
+
+use crate::locations::Locations;
+use crate::metrics::Metric;
+use crate::statistics::{
+    AlphaSpending, ComparisonTarget, Interval, Outlook, Sample, Settings, Verdict, compare,
+};
+use crate::subject::Subject;
+
+/// One look at the data: the first repetitions of both skins, as many of each.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Look {
+    /// Repetitions of each skin.
+    pub repetitions: u32,
+    /// Presses of A and B that count.
+    pub presses: [u32; 2],
+    /// Alpha spent at this look: the interval has the level 1 - alpha.
+    pub alpha: f64,
+    /// Alpha spent up to this look.
+    pub spent: f64,
+    /// B - A in mm; valid together with all other looks.
+    pub difference_mm: Option<Interval>,
+    /// Verdict on B; `None` if the skins cannot be compared yet.
+    pub verdict: Option<Verdict>,
+    /// Why they cannot.
+    pub refused: Option<String>,
+}
+
+/// All looks up to the first that decides.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SequentialComparison {
+    /// How alpha is spent.
+    pub spending: AlphaSpending,
+    /// Alpha over all looks.
+    pub alpha: f64,
+    /// The looks; the last one decides if any does.
+    pub looks: Vec<Look>,
+    /// Complete repetitions of A and B.
+    pub complete: [u32; 2],
+    /// Repetitions of A and B with scored presses that were never made.
+    pub incomplete: [u32; 2],
+    /// What to expect of further repetitions.
+    pub outlook: Outlook,
+}
+
+impl SequentialComparison {
+    /// The look that decided.
+    #[must_use]
+    pub fn decision(&self) -> Option<&Look> {
+        let last = self.looks.last();
+        last.filter(|_| self.outlook == Outlook::Decided)
+    }
+}
+
+/// Takes looks until one decides or the data end. Also returns both skins with only the presses of the last look, and the
+/// settings of that look: what is computed with them from these presses is valid whenever somebody stops.
+pub(crate) fn look(
+    subjects: &[Subject; 2],
+    margin: Option<f64>,
+    spending: AlphaSpending,
+    settings: &Settings,
+) -> (SequentialComparison, [Subject; 2], Settings) {
+    let repetitions = subjects.each_ref().map(Repetitions::of);
+    let complete = repetitions.each_ref().map(|r| r.complete.len() as u32);
+    let question = ComparisonTarget {
+        better: Metric::Rmse.better(),
+        margin,
+    };
+    let last = complete[0].min(complete[1]);
+    let mut looks = Vec::new();
+    let (mut outlook, mut spent) = (Outlook::Unknown, 0.0);
+    let mut used = (
+        first_repetitions(subjects, 0),
+        spending.settings(settings, 1).unwrap_or(*settings),
+    );
+    for number in 1..=last {
+        let Some(own) = spending.settings(settings, number) else {
+            outlook = Outlook::Spent;
+            break;
+        };
+        spent += own.alpha;
+        let chosen = first_repetitions(subjects, number);
+        let locations = Locations::of(&chosen);
+        let samples = chosen.each_ref().map(|s| {
+            let presses = locations.attempts(s);
+            let errors = presses.filter_map(|p| Some((p.location, p.error_mm()?)));
+            Sample::rms(errors)
+        });
+        let found = match samples {
+            [Ok(a), Ok(b)] => compare(&a, &b, &question, &own).map_err(|e| e.to_string()),
+            [Err(fault), _] | [_, Err(fault)] => Err(fault.to_string()),
+        };
+        if let Ok(found) = &found {
+            outlook = spending.outlook(found, number, settings);
+        } else if number == spending.most() {
+            outlook = Outlook::Spent;
+        }
+        let counted = chosen.each_ref().map(|s| {
+            let presses = locations.attempts(s);
+            presses.filter(|p| p.error().is_some()).count() as u32
+        });
+        looks.push(Look {
+            repetitions: number,
+            presses: counted,
+            alpha: own.alpha,
+            spent,
+            difference_mm: found.as_ref().ok().map(|c| c.difference),
+            verdict: found.as_ref().ok().map(|c| c.verdict),
+            refused: found.err(),
+        });
+        used = (chosen, own);
+        if outlook == Outlook::Decided {
+            break;
+        }
+    }
+    let result = SequentialComparison {
+        spending,
+        alpha: settings.alpha,
+        looks,
+        complete,
+        incomplete: repetitions.each_ref().map(|r| r.incomplete),
+        outlook,
+    };
+    (result, used.0, used.1)
+}
+
+/// Scored repetitions of a skin, in the order in which they were made: index of the session, repetition.
+struct Repetitions {
+    complete: Vec<(usize, RepetitionId)>,
+    incomplete: u32,
+}
+
+impl Repetitions {
+    fn of(subject: &Subject) -> Self {
+        let mut order: Vec<usize> = (0..subject.sessions.len()).collect();
+        order.sort_by_key(|i| &subject.sessions[*i].facts.started);
+        let (mut complete, mut incomplete) = (Vec::new(), 0);
+        for session in order {
+            let presses = &subject.sessions[session].analysis.presses;
+            let mut whole: BTreeMap<RepetitionId, bool> = BTreeMap::new();
+            for press in presses.iter().filter(|p| p.role == PressRole::Score) {
+                *whole.entry(press.repetition).or_insert(true) &=
+                    press.verdict != PressVerdict::Missed;
+            }
+            for (repetition, is_whole) in whole {
+                if is_whole {
+                    complete.push((session, repetition));
+                } else {
+                    incomplete += 1;
+                }
+            }
+        }
+        Self {
+            complete,
+            incomplete,
+        }
+    }
+}
+
+/// Both skins without the scored presses beyond the first `number` complete repetitions.
+pub(crate) fn first_repetitions(subjects: &[Subject; 2], number: u32) -> [Subject; 2] {
+    subjects.each_ref().map(|subject| {
+        let all = Repetitions::of(subject).complete;
+        let first = &all[..all.len().min(number as usize)];
+        let mut subject = subject.clone();
+        for (i, session) in subject.sessions.iter_mut().enumerate() {
+            let is_used =
+                |p: &PressResult| p.role != PressRole::Score || first.contains(&(i, p.repetition));
+            session.analysis.presses.retain(is_used);
+        }
+        subject
+    })
+}
