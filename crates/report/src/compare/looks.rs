@@ -6,7 +6,7 @@ use skinrig_text::Column as Cells;
 
 use super::text;
 use crate::document::{Column, Row, Table};
-use crate::format::{NONE, number};
+use crate::format::number;
 
 /// Decided or not yet, in one sentence without a full stop.
 pub(super) fn conclusion(of: &SequentialComparison, letter: char) -> String {
@@ -32,6 +32,9 @@ pub(super) fn conclusion(of: &SequentialComparison, letter: char) -> String {
             format!(
                 "a look needs a complete scored repetition of both, found {a} of A and {b} of {letter}"
             )
+        }
+        _ if of.looks.last().is_some_and(|look| look.refused.is_some()) => {
+            "the last look allows no comparison, for the reason above".to_owned()
         }
         Outlook::More { repetitions } => format!(
             "about {} expected if the measured difference is real",
@@ -61,14 +64,13 @@ pub(super) fn table(of: &SequentialComparison, letter: char) -> Table {
             .terminal(format!("{letter} - A (mm)"), Cells::left(0).after(2)),
     ];
     let rows = of.looks.iter().map(|look| {
-        let difference = match (&look.difference_mm, &look.refused) {
-            (Some(difference), _) => format!(
+        let difference = match &look.difference_mm {
+            Some(difference) => format!(
                 "{} {}",
                 number(Some(difference.value), 2),
                 millimetres(difference)
             ),
-            (None, Some(why)) => why.clone(),
-            (None, None) => NONE.to_owned(),
+            None => text::verdict(None).to_owned(),
         };
         Row::new([
             format!("repetition {}", look.repetitions),
