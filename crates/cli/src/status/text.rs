@@ -86,7 +86,7 @@ fn print_latest(stored: &Stored) {
             number => format!(", attempt {number}"),
         };
         let reason = because(verdict.reason().as_deref());
-        outln!("          press {press}{again} {}{reason}", verdict.name());
+        outln!("          {press}{again} {}{reason}", verdict.name());
     }
     let earlier = stored.interruption_count - stored.last_interruptions.len();
     if earlier > 0 {

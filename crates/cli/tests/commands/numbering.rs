@@ -82,7 +82,7 @@ fn a_press_has_one_number_everywhere() {
     // `status`: the last five outcomes include the spoiled press.
     let status = skinrig(&["status", &s]).code(0).out;
     assert!(
-        status.contains(&format!("press {SPOILT}, attempt 2 valid")),
+        status.contains(&format!("          press {SPOILT}, attempt 2 valid")),
         "{status}"
     );
     counts_from_one(&status);
