@@ -1,4 +1,5 @@
 //! Sequential comparisons of simulated skins: false decisions, coverage at the stop, early stops, and what to expect.
+#![expect(clippy::print_stdout, reason = "shows the rates that docs state")]
 
 use skinrig_compare::statistics::{
     AlphaSpending, Comparison, ComparisonTarget, ImprovementDirection, Kind, Outlook, Settings,
