@@ -141,7 +141,7 @@ impl<'a> Run<'a> {
     }
 
     /// Makes it a further leg of a session: the plan must be the remaining one of the session
-    /// ([`Plan::remaining`] with the presses of [`Plan::wanted`]), the header that of the session.
+    /// ([`Plan::remaining`] with the presses of [`Plan::pending`]), the header that of the session.
     #[must_use]
     pub fn resumed(mut self, resume: Resume) -> Self {
         self.leg.resume = Some(resume);
