@@ -1,13 +1,13 @@
-//! Measured values and evidence of a golden campaign, in the units of the suite's metrics.
+//! Measured values of a golden campaign, in the units of the suite's metrics.
 
 use skinrig_analysis::Analysis;
-use skinrig_analysis::result::{Estimate, Fault, PressResult};
+use skinrig_analysis::result::{Estimate, PressResult};
 use skinrig_model::{Point2, PressRole};
-use skinrig_nightly::EvidenceKind;
 
+use crate::device_evidence::SKIN;
 use crate::findings::Findings;
+use crate::golden_evidence;
 
-const SKIN: &str = "skin";
 /// Minimum number of presses for localisation metrics.
 const PRESSES: u64 = 12;
 /// Minimum number of locations for the spread between repetitions.
@@ -33,7 +33,7 @@ const CLOCK_METRICS: [&str; 8] = [
 /// Adds the metrics of `analysis` to `findings`, and evidence of problems that make them unreliable.
 /// `lost_bytes` is by camera.
 pub fn add(analysis: &Analysis, lost_bytes: [u64; 2], findings: &mut Findings) {
-    evidence(analysis, lost_bytes, findings);
+    golden_evidence::add(analysis, lost_bytes, findings);
     if !analysis.is_valid() {
         // Without clocks no event can be assigned to a press.
         for metric in CLOCK_METRICS {
@@ -76,55 +76,6 @@ fn valid(analysis: &Analysis, findings: &mut Findings) {
     findings
         .value(SKIN, "valid", 100.0 * share)
         .with_samples(counts.planned as usize, PRESSES);
-}
-
-fn evidence(analysis: &Analysis, lost_bytes: [u64; 2], findings: &mut Findings) {
-    for violation in &analysis.alignment.violations {
-        let what = format!("the clocks of the session are not aligned: {violation}");
-        findings.add_evidence(EvidenceKind::TriggerFault, "trigger box", what);
-    }
-    for finding in &analysis.findings {
-        let what = format!("{}; {}", finding.evidence, finding.advice);
-        let camera = finding.camera.map(|c| ["camera1", "camera2"][c.index()]);
-        let (kind, subject) = evidence_of(finding.fault, camera.unwrap_or("camera1"));
-        findings.add_evidence(kind, subject, what);
-    }
-    for (camera, lost) in ["camera1", "camera2"].into_iter().zip(lost_bytes) {
-        if lost > 0 {
-            let what = format!("expected no lost data, found {lost} bytes lost");
-            findings.add_evidence(EvidenceKind::DataLost, camera, what);
-        }
-    }
-}
-
-/// Kind of evidence and device of an audit finding. Contradictions between the recording and the
-/// rig file are faults of the rig, not of the skin.
-const fn evidence_of(fault: Fault, camera: &'static str) -> (EvidenceKind, &'static str) {
-    match fault {
-        Fault::CameraBlind | Fault::NoEvents => (EvidenceKind::DeviceLost, camera),
-        Fault::RecordingShort | Fault::RecordingGap => (EvidenceKind::DataLost, camera),
-        Fault::CamerasSwapped
-        | Fault::OneCameraTwice
-        | Fault::PictureTurned
-        | Fault::GeometryOff
-        | Fault::RigMoved => (EvidenceKind::OtherDevice, camera),
-        Fault::NoTriggers | Fault::ClockWrong => (EvidenceKind::TriggerFault, "trigger box"),
-        Fault::RobotOff
-        | Fault::HeightOff
-        | Fault::NoTruth
-        | Fault::UnitOfPositions
-        | Fault::AxisMirrored
-        | Fault::AxesExchanged
-        | Fault::PositionsDisplaced => (EvidenceKind::State, "robot"),
-        Fault::NotTouched
-        | Fault::IndexShifted
-        | Fault::OrderOfPresses
-        | Fault::PressesUnlisted
-        | Fault::SyncPattern
-        | Fault::PressesMissing
-        | Fault::JournalContradictory
-        | Fault::Unknown => (EvidenceKind::Audit, SKIN),
-    }
 }
 
 fn estimate(findings: &mut Findings, metric: &'static str, e: Estimate, unit: f64, needs: u64) {
@@ -289,34 +240,5 @@ impl Sample {
         let half = Z * self.variance_of_mean().sqrt();
         half.is_finite()
             .then_some([self.mean - half, self.mean + half])
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use skinrig_nightly::Cause;
-    use skinrig_nightly::rules::RULES;
-
-    use super::*;
-
-    #[test]
-    fn contradictions_of_the_rig_file_are_faults_of_the_rig() {
-        let faults = [
-            (Fault::CamerasSwapped, "camera2"),
-            (Fault::OneCameraTwice, "camera2"),
-            (Fault::PictureTurned, "camera2"),
-            (Fault::GeometryOff, "camera2"),
-            (Fault::RecordingShort, "camera2"),
-            (Fault::AxisMirrored, "robot"),
-            (Fault::AxesExchanged, "robot"),
-            (Fault::PositionsDisplaced, "robot"),
-            (Fault::UnitOfPositions, "robot"),
-        ];
-        for (fault, device) in faults {
-            let (kind, subject) = evidence_of(fault, "camera2");
-            assert_eq!(subject, device, "{fault:?}");
-            let rule = RULES.iter().find(|r| r.kinds.contains(&kind));
-            assert_eq!(rule.and_then(|r| r.cause), Some(Cause::Rig), "{fault:?}");
-        }
     }
 }

@@ -8,6 +8,7 @@ pub mod bench;
 pub mod checks;
 pub mod device_evidence;
 pub mod findings;
+mod golden_evidence;
 pub mod golden_values;
 pub mod history;
 pub mod lease;

@@ -100,8 +100,7 @@ fn refusal(error: RecorderError) -> Failure {
                 problems.len() as u64 + more_problems
             );
             for problem in &problems {
-                let own = format!("{name}: ");
-                words += &format!("\n  {}", problem.strip_prefix(&own).unwrap_or(problem));
+                words += &format!("\n  {problem}");
             }
             if more_problems > 0 {
                 words += &format!("\n  and {more_problems} more");

@@ -1,10 +1,11 @@
 //! `skinrig verify`: checks a session or a bundle.
 
 use std::collections::BTreeSet;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use skinrig_export::{BundleReport, Folder, same_bytes, verify_bundle};
-use skinrig_recorder::{PressTally, RecorderError, SessionReader, verify as recheck};
+use skinrig_recorder::{PressTally, Problem, RecorderError, SessionReader, verify as recheck};
 
 use crate::args::SessionArg;
 use crate::exit::{Exit, Failure, Outcome};
@@ -31,15 +32,19 @@ fn bundle(folder: &Path, json: bool) -> Outcome {
         let id = SessionReader::open(&inside).and_then(|reader| reader.session_id());
         let id = id.map_err(Failure::session)?;
         if id != report.session_id {
-            let place = &report.session;
-            let problem = format!(
-                "{place}: expected session {}, found {id}",
-                report.session_id
-            );
-            report.problems.push(problem);
+            let expected = format!("session {}", report.session_id);
+            report
+                .problems
+                .push(Problem::new(&report.session, expected, id));
         }
         let session = recheck::<Rescan>(&inside).map_err(Failure::session)?;
-        report.problems.extend(session.problems);
+        report.more_problems = session.more_problems;
+        report
+            .problems
+            .extend(session.problems.into_iter().map(|problem| Problem {
+                place: format!("{}: {}", report.session, problem.place),
+                ..problem
+            }));
         // A manifest can be forged, the session's seal cannot: everything else must follow from the session.
         if report.problems.is_empty() {
             report
@@ -47,15 +52,14 @@ fn bundle(folder: &Path, json: bool) -> Outcome {
                 .extend(compare_with_rebuilt(folder, &report)?);
         }
     }
-    let (name, problems) = (folder.display(), report.problems.len());
+    let name = folder.display();
+    let problems = report.problems.len() as u64 + report.more_problems;
     if json {
         let mut shown = serde_json::to_value(&report).map_err(Failure::internal)?;
         shown["sound"] = (problems == 0).into();
         crate::terminal::print_json(&shown);
     } else {
-        for problem in &report.problems {
-            outln!("{name}: {problem}");
-        }
+        print_problems(&name, &report.problems, report.more_problems);
         if problems == 0 {
             outln!(
                 "{name}: sound; session {} is as it was sealed, and the other {} files follow from it",
@@ -77,7 +81,7 @@ fn bundle(folder: &Path, json: bool) -> Outcome {
 }
 
 /// Derives the files of a bundle from its session again, in a scratch folder, and compares them with the bundle's.
-fn compare_with_rebuilt(folder: &Path, report: &BundleReport) -> Result<Vec<String>, Failure> {
+fn compare_with_rebuilt(folder: &Path, report: &BundleReport) -> Result<Vec<Problem>, Failure> {
     let place = scratch()?;
     let found = compare_rebuilt_files(folder, report, &place);
     // Leftovers in the scratch folder are not a fault of the bundle.
@@ -89,7 +93,7 @@ fn compare_rebuilt_files(
     folder: &Path,
     report: &BundleReport,
     place: &Path,
-) -> Result<Vec<String>, Failure> {
+) -> Result<Vec<Problem>, Failure> {
     let inside = folder.join(&report.session);
     let reader = SessionReader::open(&inside).map_err(Failure::session)?;
     let header = reader.header().map_err(Failure::session)?;
@@ -108,21 +112,36 @@ fn compare_rebuilt_files(
             .into_owned();
         let bundled = folder.join(&name);
         if !report.names.contains(&name) {
-            problems.push(format!("{name}: expected this file, found none"));
+            problems.push(Problem::new(&name, "this file", "none"));
         } else if !same_bytes(&file, &bundled).map_err(Failure::internal)? {
-            problems.push(format!(
-                "{name}: expected the content that follows from the sealed session, found other content; a bundle of another version \
-                than {software} must be exported again"
+            problems.push(Problem::new(
+                &name,
+                "the content that follows from the sealed session",
+                format_args!(
+                    "other content; a bundle of another version than {software} must be exported again"
+                ),
             ));
         }
         known.insert(name);
     }
     let unknown = report.names.iter().filter(|name| !known.contains(*name));
-    problems.extend(
-        unknown
-            .map(|name| format!("{name}: expected no such file: the session does not produce it")),
-    );
+    problems.extend(unknown.map(|name| {
+        Problem::new(
+            name,
+            "only files that follow from the session",
+            "another file",
+        )
+    }));
     Ok(problems)
+}
+
+fn print_problems(name: &impl Display, problems: &[Problem], more: u64) {
+    for problem in problems {
+        outln!("{name}: {problem}");
+    }
+    if more > 0 {
+        outln!("{name}: and {more} more");
+    }
 }
 
 /// Creates a scratch folder.
@@ -168,16 +187,7 @@ fn session(path: &Path, json: bool) -> Outcome {
             "totals": report.totals,
         }));
     } else {
-        for problem in &report.problems {
-            // Some problems name the file themselves.
-            let problem = problem
-                .strip_prefix(&format!("{name}: "))
-                .unwrap_or(problem);
-            outln!("{name}: {problem}");
-        }
-        if report.more_problems > 0 {
-            outln!("{name}: and {} more", report.more_problems);
-        }
+        print_problems(&name, &report.problems, report.more_problems);
         for remark in &report.remarks {
             outln!("{name}: note: {remark}");
         }

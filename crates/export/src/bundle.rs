@@ -7,6 +7,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use skinrig_recorder::Problem;
 
 use crate::error::ExportError;
 
@@ -49,7 +50,9 @@ pub struct BundleReport {
     /// Their names.
     pub names: Vec<String>,
     /// Files that differ from the manifest, are missing, or are not listed.
-    pub problems: Vec<String>,
+    pub problems: Vec<Problem>,
+    /// Number of problems of the session beyond those in `problems`.
+    pub more_problems: u64,
 }
 
 /// Writes the manifest with the hashes of all files of `folder`, as the last step: a folder without it is not a bundle.
@@ -159,19 +162,21 @@ pub fn verify_bundle(folder: &Path) -> Result<BundleReport, ExportError> {
     for listed in &manifest.files {
         let name = &listed.name;
         if !is_plain(name) {
-            problems.push(format!("{name}: expected a file, found none"));
+            problems.push(Problem::new(name, "a file", "none"));
             continue;
         }
         let found = entry(folder, name)?;
         if found.bytes != listed.bytes {
-            problems.push(format!(
-                "{name}: expected {} bytes, found {}",
-                listed.bytes, found.bytes
+            problems.push(Problem::new(
+                name,
+                format_args!("{} bytes", listed.bytes),
+                found.bytes,
             ));
         } else if found.sha256 != listed.sha256 {
-            problems.push(format!(
-                "{name}: expected SHA-256 {}, found {}",
-                listed.sha256, found.sha256
+            problems.push(Problem::new(
+                name,
+                format_args!("SHA-256 {}", listed.sha256),
+                found.sha256,
             ));
         }
     }
@@ -179,15 +184,20 @@ pub fn verify_bundle(folder: &Path) -> Result<BundleReport, ExportError> {
         let name = other.map_err(ExportError::file(folder))?.file_name();
         let name = name.to_string_lossy();
         if name != MANIFEST && !listed.contains(&*name) {
-            problems.push(format!("{name}: not listed in the manifest"));
+            problems.push(Problem::new(
+                name,
+                "only files listed in the manifest",
+                "another file",
+            ));
         }
     }
-    problems.sort();
+    problems.sort_by(|a, b| a.place.cmp(&b.place));
     Ok(BundleReport {
         session_id: manifest.session_id,
         session: manifest.session,
         files: manifest.files.len(),
         names: manifest.files.into_iter().map(|f| f.name).collect(),
         problems,
+        more_problems: 0,
     })
 }

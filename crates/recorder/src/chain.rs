@@ -8,6 +8,7 @@ use crate::hex::hex;
 use crate::query::{Fault, each_row, has_table, int, num, opt_int, sha, text};
 use crate::rows::SessionTotals;
 use crate::totals;
+use crate::verify::Problem;
 
 /// Result of checking the seal that a leg removed.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -16,8 +17,8 @@ pub(crate) enum PreviousSeal {
     Verified,
     /// An old version of skinrig archived only its tree hash, which cannot be recomputed.
     Unverifiable,
-    /// The rows differ from it; one text per difference.
-    Mismatch(Vec<String>),
+    /// The rows differ from it.
+    Mismatch(Vec<Problem>),
 }
 
 /// Archives the seal, if any, that leg `leg` removes from a file with schema version `schema`.
@@ -102,19 +103,21 @@ async fn check_previous_seal(
             } else {
                 (locations[0], locations[1])
             };
-            let problems = format!(
-                "expected the removed seal {expected} and {found}, found it only {expected}"
+            let problem = Problem::new(
+                "previous seal",
+                format_args!("it {expected} and {found}"),
+                format_args!("it only {expected}"),
             );
-            return Ok(Some(PreviousSeal::Mismatch(vec![problems])));
+            return Ok(Some(PreviousSeal::Mismatch(vec![problem])));
         }
     };
     let mut problems = Vec::new();
     let archived = sha(&row, "tree_sha256")?;
     if archived != tree {
-        problems.push(format!(
-            "expected tree hash {} of the previous seal, found {}",
+        problems.push(Problem::new(
+            "tree hash of the previous seal",
             hex(&archived),
-            hex(&tree)
+            hex(&tree),
         ));
     }
     if opt_int(&row, "schema_version")?.is_none() {
@@ -151,31 +154,34 @@ async fn check_previous_seal(
     let computed = digest_earlier(conn, &earlier).await?;
     for table in &computed {
         if !recorded.contains(table) {
-            problems.push(format!(
-                "{}: rows of earlier legs differ from the sealed rows",
-                table.name
+            problems.push(Problem::new(
+                &table.name,
+                "the sealed rows of earlier legs",
+                "other rows",
             ));
         }
     }
     if computed.len() != recorded.len() {
-        problems.push(format!(
-            "expected the digests of {} tables, found {}",
+        problems.push(Problem::new(
+            "digests of tables",
             computed.len(),
-            recorded.len()
+            recorded.len(),
         ));
     }
     if tree_hash(&computed) != tree {
-        let found = hex(&tree_hash(&computed));
-        problems.push(format!(
-            "expected rows with tree hash {} of the previous seal, found {found}",
-            hex(&tree)
+        problems.push(Problem::new(
+            "tree hash of the rows",
+            format_args!("{} of the previous seal", hex(&tree)),
+            hex(&tree_hash(&computed)),
         ));
     }
     let poses = recorded.iter().find(|t| t.name == "pose_block");
     let counted = totals::totals_before(conn, &earlier, poses.map_or(0, |t| t.rows)).await?;
     if counted != totals {
-        problems.push(format!(
-            "expected the counts of the previous seal, {totals:?}, found {counted:?}"
+        problems.push(Problem::new(
+            "counts of the previous seal",
+            format_args!("{totals:?}"),
+            format_args!("{counted:?}"),
         ));
     }
     Ok(Some(if problems.is_empty() {

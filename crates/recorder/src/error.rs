@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::verify::Problem;
+
 /// Failure to write or read a session.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -58,12 +60,12 @@ pub enum RecorderError {
     },
     /// The session to resume fails verification. Nothing in it was changed.
     #[error("{}: expected a sound session to resume, found {} problem(s): {}; nothing was changed: `skinrig salvage` copies \
-        the intact parts into a new session", path.display(), problems.len() as u64 + more_problems, problems.join("; "))]
+        the intact parts into a new session", path.display(), problems.len() as u64 + more_problems, join(problems))]
     Unsound {
         /// The session file.
         path: PathBuf,
         /// Problems found.
-        problems: Vec<String>,
+        problems: Vec<Problem>,
         /// Number of problems beyond those in `problems`.
         more_problems: u64,
     },
@@ -240,6 +242,11 @@ pub enum CopyError {
     /// SQLite failed.
     #[error(transparent)]
     Sql(#[from] Box<sqlx::Error>),
+}
+
+fn join(problems: &[Problem]) -> String {
+    let texts: Vec<_> = problems.iter().map(Problem::to_string).collect();
+    texts.join("; ")
 }
 
 fn attempts(attempts: &[(PathBuf, CopyError)]) -> String {

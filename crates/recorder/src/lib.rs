@@ -68,5 +68,5 @@ pub use sidecar::SESSION_SUFFIX;
 pub use tags::{
     Annotation, AnnotationNote, Annotations, annotate, annotations, is_valid_tag, tags_path,
 };
-pub use verify::{ChunkScanner, VerifyReport, verify};
+pub use verify::{ChunkScanner, Problem, VerifyReport, verify};
 pub use writer::SessionWriter;

@@ -13,11 +13,13 @@ mod chain;
 mod edges;
 mod gaps;
 mod legs;
+mod problem;
 mod report;
 mod seal;
 mod sqlite;
 mod stream;
 
+pub use self::problem::Problem;
 pub use self::report::VerifyReport;
 use self::stream::Stream;
 use crate::error::RecorderError;
@@ -62,7 +64,7 @@ pub fn verify<S: ChunkScanner>(path: impl AsRef<Path>) -> Result<VerifyReport, R
         Err(e) if e.is_system_failure() => return Err(e),
         Err(e) => {
             let mut report = VerifyReport::default();
-            report.add(e);
+            report.add(Problem::from(e));
             return Ok(report);
         }
     };
@@ -71,8 +73,8 @@ pub fn verify<S: ChunkScanner>(path: impl AsRef<Path>) -> Result<VerifyReport, R
     }
     let mut report = check_all::<S>(&reader);
     drop(reader);
-    if let Some(problem) = report.system_failure {
-        return Err(RecorderError::Unread(problem));
+    if let Some(failure) = report.system_failure {
+        return Err(RecorderError::Unread(failure));
     }
     if report.sealed && report.is_sound() {
         seal::protect(path, &mut report);
@@ -172,7 +174,7 @@ fn check_header(reader: &SessionReader, report: &mut VerifyReport) -> Option<[St
     for (index, press) in (0u32..).zip(&header.presses) {
         let expected = PressId::from_index(index);
         if press.id != expected {
-            report.add(format!("presses: expected {expected}, found {}", press.id));
+            report.mismatch("presses", expected, press.id);
             break;
         }
     }
@@ -181,7 +183,7 @@ fn check_header(reader: &SessionReader, report: &mut VerifyReport) -> Option<[St
         && header.rig_kind != "imported"
         && matches!(reader.end(), Ok(Some((_, RunEnd::Completed))))
     {
-        report.add("device: expected the devices of a completed run, found none");
+        report.mismatch("device", "the devices of a completed run", "none");
     }
     Some(header.stream_formats)
 }
@@ -191,10 +193,8 @@ fn check_poses(reader: &SessionReader, report: &mut VerifyReport) -> Result<(), 
     while let Some((id, samples)) = reader.pose_block_after(after)? {
         if let (Some(first), Some(end)) = (samples.first(), samples.last()) {
             if first.t < last {
-                report.add(format!(
-                    "pose block {id}: expected times from {last}, found {}",
-                    first.t
-                ));
+                let place = format!("pose block {id}");
+                report.mismatch(place, format!("times from {last}"), first.t);
             }
             last = end.t;
         }
@@ -212,7 +212,7 @@ fn check_plan(header: &RunHeader, report: &mut VerifyReport) {
     }
     let plan = match serde_json::from_str::<Presses>(&header.plan_json) {
         Ok(plan) => plan,
-        Err(e) => return report.add(format!("plan: expected JSON with its presses, found: {e}")),
+        Err(e) => return report.mismatch("plan", "JSON with its presses", e),
     };
     if plan.presses.is_empty() {
         return;
@@ -220,10 +220,11 @@ fn check_plan(header: &RunHeader, report: &mut VerifyReport) {
     report.expect_equal("press: rows", &plan.presses.len(), &header.presses.len());
     for (planned, row) in plan.presses.iter().zip(&header.presses) {
         if planned != row {
-            report.add(format!(
-                "{}: expected the press of the stored plan, found a different location, depth or role",
-                row.id
-            ));
+            report.mismatch(
+                row.id,
+                "the press of the stored plan",
+                "a different location, depth or role",
+            );
         }
     }
 }
@@ -240,23 +241,27 @@ fn check_journal(reader: &SessionReader, report: &mut VerifyReport) {
     for (planned, attempts) in report.ok_or_add(reader.presses()).unwrap_or_default() {
         for (number, attempt) in (1u32..).zip(&attempts) {
             if attempt.id.number != number {
-                report.add(format!("{}: expected attempt {number}", attempt.id));
+                report.mismatch(
+                    planned.id,
+                    format!("attempt {number}"),
+                    format!("attempt {}", attempt.id.number),
+                );
             }
             let verdict = attempt.outcome.as_ref().map(|o| &o.verdict);
             if let Some(next) = attempts.get(number as usize) {
                 match verdict {
-                    None => report.add(format!(
-                        "{}: expected a verdict for a repeated attempt, found none",
-                        attempt.id
-                    )),
+                    None => {
+                        report.mismatch(attempt.id, "a verdict for a repeated attempt", "none");
+                    }
                     // Every leg repeats the sync presses.
                     Some(PressVerdict::Valid | PressVerdict::Excluded(_))
                         if planned.role != PressRole::Sync || leg_of(attempt) == leg_of(next) =>
                     {
-                        report.add(format!(
-                            "{}: expected no further attempt, found one after a valid or excluded attempt",
-                            attempt.id
-                        ));
+                        report.mismatch(
+                            attempt.id,
+                            "no further attempt",
+                            "one after a valid or excluded attempt",
+                        );
                     }
                     Some(_) => {}
                 }
@@ -266,18 +271,12 @@ fn check_journal(reader: &SessionReader, report: &mut VerifyReport) {
                     t.approach, t.contact, t.at_depth, t.retract, t.release, t.clear,
                 ];
                 if !moments.is_sorted() {
-                    report.add(format!(
-                        "{}: expected phase times in order, found them out of order",
-                        attempt.id
-                    ));
+                    report.mismatch(attempt.id, "phase times in order", "them out of order");
                 }
             }
         }
         if ended && attempts.last().is_none_or(|a| a.outcome.is_none()) {
-            report.add(format!(
-                "{}: expected a verdict in an ended run, found none",
-                planned.id
-            ));
+            report.mismatch(planned.id, "a verdict in an ended run", "none");
         }
     }
     report.ok_or_add(reader.preflight());
@@ -303,10 +302,11 @@ fn check_box_reports(reader: &SessionReader, report: &mut VerifyReport) {
             }
         };
         if at < last[like] {
-            report.add(format!(
-                "box report received at {taken}: expected box times from {} µs without a reset, found {} µs",
-                last[like].us, at.us
-            ));
+            report.mismatch(
+                format!("box report received at {taken}"),
+                format!("box times from {} µs without a reset", last[like].us),
+                format!("{} µs", at.us),
+            );
         }
         last[like] = at;
     }

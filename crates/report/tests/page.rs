@@ -59,7 +59,6 @@ fn hostile_text_stays_text() {
         }
     }
     if let Some(c) = &mut analysis.calibration {
-        c.termination = HOSTILE.into();
         c.names[0] = HOSTILE.into();
     }
     let text = || HOSTILE.to_owned();

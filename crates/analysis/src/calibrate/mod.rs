@@ -192,7 +192,7 @@ impl Fit {
             outliers: lengths.iter().filter(|e| **e > problem.bound_mm).count() as u32,
             starts: STARTS,
             starts_agreeing: 0,
-            termination: end.termination.to_owned(),
+            termination: end.termination,
             compared: Vec::new(),
             bound_mm: None,
         };

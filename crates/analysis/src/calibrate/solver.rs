@@ -9,6 +9,7 @@ use nalgebra::Cholesky;
 
 use super::parameters::{PARAMETERS, Parameters};
 use super::problem::{NormalEquations, Problem};
+use crate::result::Termination;
 
 /// Maximum number of steps.
 const MAX_STEPS: usize = 200;
@@ -26,7 +27,7 @@ pub(super) struct Descent {
     pub parameters: Parameters,
     pub cost: f64,
     /// Why it ended.
-    pub termination: &'static str,
+    pub termination: Termination,
 }
 
 /// Minimises from `from`.
@@ -42,10 +43,10 @@ pub(crate) fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
     };
     for _ in 0..MAX_STEPS {
         if !current.cost.is_finite() {
-            return ended(at, current.cost, "not converged: the error is not a number");
+            return ended(at, current.cost, Termination::NotANumber);
         }
         if is_flat(&current, problem.count) {
-            return ended(at, current.cost, "converged: the gradient is zero");
+            return ended(at, current.cost, Termination::ZeroGradient);
         }
         for i in 0..PARAMETERS {
             scale[i] = scale[i].max(current.matrix[(i, i)]);
@@ -54,18 +55,14 @@ pub(crate) fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
             damping *= growth;
             growth *= 2.0;
             if damping > DAMPING.1 {
-                return ended(at, current.cost, "not converged: no step can be computed");
+                return ended(at, current.cost, Termination::NoStep);
             }
             continue;
         };
         let promised =
             damping * step.component_mul(&step).dot(&scale) - step.dot(&current.gradient);
         if promised <= problem.tolerance * current.cost {
-            return ended(
-                at,
-                current.cost,
-                "converged: the error does not change any more",
-            );
+            return ended(at, current.cost, Termination::NoChange);
         }
         let there = at + step;
         let next = problem.normal(&there);
@@ -79,15 +76,11 @@ pub(crate) fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
             damping *= growth;
             growth *= 2.0;
             if damping > DAMPING.1 {
-                return ended(
-                    at,
-                    current.cost,
-                    "converged to the resolution of floating point",
-                );
+                return ended(at, current.cost, Termination::FloatingPoint);
             }
         }
     }
-    ended(at, current.cost, "not converged: too many steps")
+    ended(at, current.cost, Termination::TooManySteps)
 }
 
 fn is_flat(current: &NormalEquations, count: usize) -> bool {
@@ -192,11 +185,7 @@ mod tests {
             let ours = minimise(&problem, start);
             let (theirs, _) = LevenbergMarquardt::new().minimize(Reference(problem, start));
             let cost = theirs.0.normal(&theirs.1).cost;
-            assert!(
-                ours.termination.starts_with("converged"),
-                "{}",
-                ours.termination
-            );
+            assert!(ours.termination.is_converged(), "{:?}", ours.termination);
             assert!(
                 (ours.cost - cost).abs() < 1e-10 * cost,
                 "{count}: {} {cost}",

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use skinrig_model::{CalibrationModel, LensKind, StereoGeometry};
 
-use super::Estimate;
+use super::{Estimate, Termination};
 
 /// A calibration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -41,7 +41,7 @@ pub struct CalibrationResult {
     /// See `starts`.
     pub starts_agreeing: u32,
     /// Why the optimiser stopped.
-    pub termination: String,
+    pub termination: Termination,
     /// Models compared by leave-locations-out cross-validation, smallest first; empty without a choice, or with too few
     /// locations.
     pub compared: Vec<ModelComparison>,

@@ -15,6 +15,7 @@ mod motion;
 mod other_reading;
 mod reduction;
 mod reference;
+mod termination;
 #[cfg(test)]
 mod tests;
 mod validity;
@@ -47,6 +48,7 @@ pub use other_reading::OtherReading;
 pub(crate) use other_reading::{Corner, FrameChange, Origin, OtherPlan, Turn};
 pub use reduction::{Reduction, ReductionCurve, ReductionRow, Thinning};
 pub use reference::{ReferenceCode, ReferenceReduction};
+pub use termination::Termination;
 pub use violation::AlignmentViolation;
 pub use warning::{CommonExclusion, Warning, WarningCause};
 

@@ -65,7 +65,12 @@ fn a_moved_bundle_verifies_and_detects_any_change() {
         std::fs::write(&path, good).unwrap();
     }
     std::fs::write(moved.join("more"), "x").unwrap();
-    assert!(verify().code(4).out.contains("not listed in the manifest"));
+    assert!(
+        verify()
+            .code(4)
+            .out
+            .contains("only files listed in the manifest")
+    );
     std::fs::remove_file(moved.join("more")).unwrap();
     verify().code(0);
 

@@ -18,7 +18,8 @@ pub(super) fn check(reader: &SessionReader, report: &mut VerifyReport) {
             )),
             PreviousSeal::Mismatch(differences) => {
                 for difference in differences {
-                    report.add(format!("leg {leg}: {difference}"));
+                    let place = format!("leg {leg}: {}", difference.place);
+                    report.mismatch(place, difference.expected, difference.found);
                 }
             }
         }

@@ -15,7 +15,7 @@ pub(super) fn check(camera: CameraId, index: &[ChunkMeta], report: &mut VerifyRe
         if let Some(time) = meta.lost_time {
             let place = format!("gap before {camera} chunk {}", meta.seq);
             if meta.lost_before == 0 {
-                report.add(format!("{place}: expected lost bytes, found none"));
+                report.mismatch(&place, "lost bytes", "none");
             }
             let ends = match (time.to_us, after_us) {
                 (Some(to), Some(after)) => to <= after,
@@ -23,11 +23,12 @@ pub(super) fn check(camera: CameraId, index: &[ChunkMeta], report: &mut VerifyRe
                 (None, Some(_)) => false,
             };
             if !ends {
-                report.add(format!(
-                    "{place}: expected it to end with the first time after it, {} µs, found {}",
-                    describe(after_us),
-                    describe(time.to_us)
-                ));
+                let first = describe(after_us);
+                report.mismatch(
+                    &place,
+                    format!("it to end with the first time after it, {first}"),
+                    describe(time.to_us),
+                );
             }
             let in_leg = index[..n].iter().rev();
             let before_us = match meta.restart_us {
@@ -42,11 +43,12 @@ pub(super) fn check(camera: CameraId, index: &[ChunkMeta], report: &mut VerifyRe
                 (None, before) => before.is_none(),
             };
             if !begins {
-                report.add(format!(
-                    "{place}: expected it to begin with the last time before it, {} µs, or earlier, found {}",
-                    describe(before_us),
-                    describe(time.from_us)
-                ));
+                let last = describe(before_us);
+                report.mismatch(
+                    &place,
+                    format!("it to begin with the last time before it, {last}, or earlier"),
+                    describe(time.from_us),
+                );
             }
         }
         if meta.restart_us.is_some() {
@@ -66,5 +68,5 @@ fn last_time<'a>(chunks: impl Iterator<Item = &'a ChunkMeta>) -> Option<u64> {
 }
 
 fn describe(us: Option<u64>) -> String {
-    us.map_or_else(|| "none".to_owned(), |us| us.to_string())
+    us.map_or_else(|| "none".to_owned(), |us| format!("{us} µs"))
 }

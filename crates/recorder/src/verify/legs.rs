@@ -28,10 +28,7 @@ fn order(legs: &[LegRow], report: &mut VerifyReport) -> Result<(), RecorderError
         report.expect_equal("leg", &number, &leg.number);
         let end = before.end.as_ref().map_or(before.origin, |(t, _)| *t);
         if leg.origin <= end.max(before.origin) {
-            report.add(format!(
-                "{place}: expected to begin after {end}, found {}",
-                leg.origin
-            ));
+            report.mismatch(&place, format!("it to begin after {end}"), leg.origin);
         }
         let earlier = |before: [u64; 2], now: [u64; 2]| before[0] > now[0] || before[1] > now[1];
         if earlier(before.camera_origin_us, leg.camera_origin_us)
@@ -39,9 +36,11 @@ fn order(legs: &[LegRow], report: &mut VerifyReport) -> Result<(), RecorderError
             || before.devices_before > leg.devices_before
             || before.preflight_before > leg.preflight_before
         {
-            report.add(format!(
-                "{place}: expected origins at or after those of the previous leg, found earlier ones"
-            ));
+            report.mismatch(
+                place,
+                "origins at or after those of the previous leg",
+                "earlier ones",
+            );
         }
     }
     Ok(())
@@ -69,10 +68,11 @@ fn chunks(
                     leg.camera_origin_us[k] <= t && next.is_none_or(|n| t < n.camera_origin_us[k])
                 });
             if !host || !camera_time {
-                report.add(format!(
-                    "{camera} chunk {}: expected times within leg {}, found times outside",
-                    meta.seq, leg.number
-                ));
+                report.mismatch(
+                    format!("{camera} chunk {}", meta.seq),
+                    format!("times within leg {}", leg.number),
+                    "times outside",
+                );
             }
         }
     }
@@ -93,17 +93,19 @@ fn attempts(
             if let (Some(intent), Some(timing)) = (attempt.intent, timing)
                 && leg_at(intent) != leg_at(timing.clear)
             {
-                report.add(format!(
-                    "{}: expected phase times within leg {}, found times outside",
+                let leg = leg_at(intent);
+                report.mismatch(
                     attempt.id,
-                    leg_at(intent)
-                ));
+                    format!("phase times within leg {leg}"),
+                    "times outside",
+                );
             }
             if attempt.intent < last && attempt.intent.is_some() {
-                report.add(format!(
-                    "{}: expected to begin after the previous attempt, found earlier",
-                    attempt.id
-                ));
+                report.mismatch(
+                    attempt.id,
+                    "it to begin after the previous attempt",
+                    "earlier",
+                );
             }
             last = attempt.intent.or(last);
         }
@@ -123,10 +125,11 @@ fn resets(
             noticed: leg.origin,
         };
         if !reports.iter().any(|(_, output)| *output == reset) {
-            report.add(format!(
-                "leg {}: expected a reset of the box's clock at its origin, found none",
-                leg.number
-            ));
+            report.mismatch(
+                format!("leg {}", leg.number),
+                "a reset of the box's clock at its origin",
+                "none",
+            );
         }
     }
     Ok(())

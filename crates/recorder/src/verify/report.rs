@@ -1,5 +1,8 @@
 //! Result of a verification.
 
+use std::fmt::{Debug, Display};
+
+use super::problem::Problem;
 use crate::error::RecorderError;
 use crate::rows::SessionTotals;
 
@@ -12,7 +15,7 @@ pub struct VerifyReport {
     /// Whether the file has a seal. Without one, there are no hashes over the whole file to check.
     pub sealed: bool,
     /// Problems found; empty for a sound session.
-    pub problems: Vec<String>,
+    pub problems: Vec<Problem>,
     /// Number of problems beyond those in `problems`.
     pub more_problems: u64,
     /// Remarks that are not problems.
@@ -30,9 +33,9 @@ impl VerifyReport {
         self.problems.is_empty()
     }
 
-    pub(super) fn add(&mut self, problem: impl ToString) {
+    pub(super) fn add(&mut self, problem: Problem) {
         if self.problems.len() < MAX_LISTED {
-            self.problems.push(problem.to_string());
+            self.problems.push(problem);
         } else {
             self.more_problems += 1;
         }
@@ -60,18 +63,32 @@ impl VerifyReport {
         if error.is_system_failure() {
             self.system_failure.get_or_insert(error.to_string());
         } else {
-            self.add(error);
+            self.add(error.into());
         }
     }
 
-    pub(super) fn expect_equal<T: PartialEq + std::fmt::Debug>(
+    /// Adds what differs from the expectation.
+    pub(super) fn mismatch(
         &mut self,
-        what: &str,
+        place: impl Display,
+        expected: impl Display,
+        found: impl Display,
+    ) {
+        self.add(Problem::new(place, expected, found));
+    }
+
+    pub(super) fn expect_equal<T: PartialEq + Debug>(
+        &mut self,
+        place: &str,
         expected: &T,
         found: &T,
     ) {
         if expected != found {
-            self.add(format!("{what}: expected {expected:?}, found {found:?}"));
+            self.mismatch(
+                place,
+                format_args!("{expected:?}"),
+                format_args!("{found:?}"),
+            );
         }
     }
 }

@@ -57,7 +57,7 @@ pub(super) fn check(
     };
     for table in &computed {
         if !recorded.contains(table) {
-            report.add(format!("{}: rows differ from the sealed rows", table.name));
+            report.mismatch(&table.name, "the sealed rows", "other rows");
         }
     }
     report.expect_equal("seal: tables", &computed.len(), &recorded.len());
@@ -76,9 +76,13 @@ pub(super) fn check(
             report.expect_equal("seal: file hash", &hex(&seal.file_sha256), &hex(&found));
         }
         Ok(Stamp::Misplaced) => {
-            report.add("seal: file hash: expected exactly once on the page of the seal, found missing or repeated");
+            report.mismatch(
+                "seal: file hash",
+                "it exactly once on the page of the seal",
+                "it missing or repeated",
+            );
         }
-        Err(e) => report.add(format!("seal: file hash: {e}")),
+        Err(e) => report.mismatch("seal: file hash", "a readable file", e),
     }
     let ends = reader.query("counting ends", async |conn| {
         let row = sqlx::query("SELECT count(*) AS n FROM run_end")
@@ -87,7 +91,7 @@ pub(super) fn check(
         num::<u64>(&row, "n")
     });
     if report.ok_or_add(ends) == Some(0) {
-        report.add("seal: expected the run's end in a sealed session, found none");
+        report.mismatch("seal", "the run's end in a sealed session", "none");
     }
 }
 

@@ -22,6 +22,6 @@ pub(super) fn check(reader: &SessionReader, report: &mut VerifyReport) {
         Ok(problems)
     });
     for message in report.ok_or_add(messages).unwrap_or_default() {
-        report.add(format!("sqlite: {message}"));
+        report.mismatch("sqlite", "an intact database", message);
     }
 }

@@ -65,16 +65,14 @@ impl Stream {
             let place = format!("{camera} chunk {}", meta.seq);
             let expected = previous.map_or(0, |p| p + 1);
             if meta.seq != expected {
-                report.add(format!(
-                    "{camera}: expected chunk {expected}, found chunk {}",
-                    meta.seq
-                ));
+                report.mismatch(
+                    camera,
+                    format!("chunk {expected}"),
+                    format!("chunk {}", meta.seq),
+                );
             }
             if meta.host_time < host {
-                report.add(format!(
-                    "{place}: expected host time from {host}, found {}",
-                    meta.host_time
-                ));
+                report.mismatch(&place, format!("host time from {host}"), meta.host_time);
             }
             (previous, host) = (Some(meta.seq), meta.host_time);
             let chunk = reader.query("checking a chunk", async |conn| {
@@ -92,17 +90,18 @@ impl Stream {
             })?;
             let (is_sound, scanned) = chunk;
             if !is_sound {
-                report.add(format!("{place}: stored bytes do not match stored_sha256"));
+                report.mismatch(&place, "the stored bytes of stored_sha256", "other bytes");
             }
             let Some(Some((facts, edges))) = report.ok_or_add(scanned) else {
                 continue;
             };
             report.expect_equal(&format!("{place}: facts"), &facts, &meta.facts);
             if let Some(recorded) = differ(meta, &edges)? {
-                report.add(format!(
-                    "{place}: expected the {} trigger edges in its bytes, found {recorded} different ones in trigger_edge",
-                    edges.len(),
-                ));
+                report.mismatch(
+                    &place,
+                    format!("the {} trigger edges in its bytes", edges.len()),
+                    format!("{recorded} different ones in trigger_edge"),
+                );
             }
         }
         Ok(())

@@ -96,7 +96,7 @@ fn lost_time_extends_from_the_last_time_to_the_next() {
         ]
     );
     let report = verify::<Evt2>(&path).unwrap();
-    assert_eq!(report.problems, Vec::<String>::new());
+    assert_eq!(report.problems, []);
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn a_gap_that_contradicts_its_surroundings_is_detected() {
         change(&path, &[statement]);
         let problems = verify::<Evt2>(&path).unwrap().problems;
         assert!(
-            problems.iter().any(|p| p.contains(words)),
+            problems.iter().any(|p| p.to_string().contains(words)),
             "{statement}: {problems:?}"
         );
     }
@@ -150,5 +150,5 @@ fn gaps_of_an_older_session_are_inferred() {
     let index = reader.chunk_index(CAMERA).unwrap();
     assert!(index.iter().all(|m| m.lost_time.is_none()));
     let report = verify::<Evt2>(&path).unwrap();
-    assert_eq!(report.problems, Vec::<String>::new());
+    assert_eq!(report.problems, []);
 }

@@ -162,7 +162,7 @@ fn all_records_round_trip() {
     assert_eq!(gaps.len(), 1);
     assert!(gaps[0].0 < 5_040_000 && gaps[0].1 >= 5_039_936, "{gaps:?}");
     let report = verify::<Evt2>(&path).unwrap();
-    assert_eq!(report.problems, Vec::<String>::new());
+    assert_eq!(report.problems, []);
     assert!(report.sealed);
 }
 

@@ -178,7 +178,7 @@ fn an_intact_session_is_recovered_completely() {
     assert!(report.is_whole(), "{report:?}");
     assert_eq!(hurt, 0);
     let to = case.folder.path().join("to");
-    assert_eq!(verify::<Evt2>(&to).unwrap().problems, Vec::<String>::new());
+    assert_eq!(verify::<Evt2>(&to).unwrap().problems, []);
     let notes = SessionReader::open(&to).unwrap().notes().unwrap();
     assert!(
         notes.last().unwrap().text.ends_with("no known losses"),

@@ -186,7 +186,7 @@ pub(crate) fn analysis(side: u32, repetitions: u32) -> Analysis {
             rmse_before_mm: 5.87,
             rmse_after_mm: 3.31,
             n: side * side,
-            termination: "converged: relative reduction of the sum of squares below 1e-10".into(),
+            termination: Termination::NoChange,
         }),
         scored,
         scored_without_exclusions,
