@@ -83,25 +83,29 @@ impl Folds {
         count: usize,
         full: &Parameters,
     ) -> Option<Vec<f64>> {
-        self.each(|others, held| {
+        self.each(|_, others, held| {
             let pick = |rows: &[usize]| rows.iter().map(|i| sights[*i]).collect::<Vec<_>>();
             let geometry = fitted(&pick(others), start, count, full)?;
             Some(error_lengths(&pick(held), &geometry))
         })
     }
 
-    /// Calls `held_out(others, held)` for every fold, which returns one value per held-out press, and returns the values in
-    /// the order of the presses; `None` if a fold has none.
+    /// Indices of the presses in a fold, and of all others.
+    pub(crate) fn split(&self, fold: usize) -> (Vec<usize>, Vec<usize>) {
+        (0..self.of_sight.len()).partition(|i| self.of_sight[*i] == fold)
+    }
+
+    /// Calls `held_out(fold, others, held)` for every fold, which returns one value per held-out press, and returns the values
+    /// in the order of the presses; `None` if a fold has none.
     pub(crate) fn each<T: Send>(
         &self,
-        held_out: impl Fn(&[usize], &[usize]) -> Option<Vec<T>> + Sync,
+        held_out: impl Fn(usize, &[usize], &[usize]) -> Option<Vec<T>> + Sync,
     ) -> Option<Vec<T>> {
         let folds: Vec<Option<Vec<T>>> = (0..self.count)
             .into_par_iter()
             .map(|fold| {
-                let (held, others): (Vec<_>, Vec<_>) =
-                    (0..self.of_sight.len()).partition(|i| self.of_sight[*i] == fold);
-                held_out(&others, &held)
+                let (held, others) = self.split(fold);
+                held_out(fold, &others, &held)
             })
             .collect();
         let mut folds: Vec<_> = folds.into_iter().map(|f| f.map(Vec::into_iter)).collect();

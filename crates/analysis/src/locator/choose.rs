@@ -3,8 +3,10 @@
 use rayon::prelude::*;
 use skinrig_model::{AnalysisSettings, CalibrationModel, Locator, StereoGeometry};
 
-use super::methods::{FitStart, Hyperparameters, METHODS, Method, method};
+use super::methods::{Feature, FitStart, Hyperparameters, METHODS, Method, method};
+use super::parts::Parts;
 use super::regions::{HeldOutError, Regions};
+use super::spread::SpreadFits;
 use super::{Features, FitError, FittedLocator};
 use crate::calibrate::{Folds, Losses, NO_FIX_ERROR_MM, Refit, SessionCalibration, covariance};
 use crate::calibrate::{root_mean_square, select_model};
@@ -63,8 +65,8 @@ pub fn held_out_errors(
     locator: Locator,
 ) -> Option<Vec<Option<[f64; 2]>>> {
     let learner = Learner::new(set, geometry, calibration, settings);
-    let candidate = learner.candidate(method(locator), Effort::Full);
-    let held = candidate.held_out?;
+    let candidates = learner.candidates(vec![method(locator)], Effort::Full);
+    let held = candidates.into_iter().next()?.held_out?;
     Some(held.into_iter().map(|h| h.error).collect())
 }
 
@@ -128,6 +130,7 @@ impl<'a> Learner<'a> {
                 geometry: *geometry,
                 covariance: calibration.and_then(covariance),
                 near: None,
+                spreads: None,
             },
             refit: calibration.map(Refit::new),
             parameters: calibration.map_or(0, |c| c.values.len()),
@@ -153,10 +156,7 @@ impl<'a> Learner<'a> {
                 (own, named) => own == named,
             })
             .collect();
-        let candidates: Vec<Candidate> = methods
-            .into_par_iter()
-            .map(|method| self.candidate(method, effort))
-            .collect();
+        let candidates = self.candidates(methods, effort);
         let errors: Vec<Option<Vec<f64>>> = candidates.iter().map(Candidate::errors_mm).collect();
         let slices: Vec<Option<&[f64]>> = errors.iter().map(Option::as_deref).collect();
         let losses = Losses::new(&self.locations, slices.iter().flatten().copied());
@@ -251,50 +251,75 @@ impl<'a> Learner<'a> {
         })
     }
 
-    fn candidate(&self, method: &'static dyn Method, effort: Effort) -> Candidate {
-        let fit = method.fit(self.set, &self.start);
-        let mut candidate = Candidate {
-            method,
-            fit,
-            held_out: None,
-            over_repetitions: None,
+    /// Fits all methods, with cross-validations if there is the effort for them.
+    fn candidates(&self, methods: Vec<&'static dyn Method>, effort: Effort) -> Vec<Candidate> {
+        let reads_spreads = |m: &&dyn Method| m.needs().features.contains(&Feature::Spreads);
+        let spreads = methods
+            .iter()
+            .any(reads_spreads)
+            .then(|| SpreadFits::learn(self.set.sights(), None));
+        let spreads = spreads.as_ref();
+        let [over_locations, over_repetitions] = match effort {
+            Effort::Full => self.cross_validations(spreads),
+            Effort::Positions => [None, None],
         };
-        let (Effort::Full, Ok((_, near))) = (effort, &candidate.fit) else {
-            return candidate;
+        let start = FitStart {
+            spreads,
+            ..self.start.clone()
         };
-        let near = *near;
-        let folds = Folds::deal(self.set.sights(), self.settings.seed);
-        if folds.count() > 1 && self.parameters <= folds.least_kept() {
-            candidate.held_out = self.held_out(method, &folds, near.as_ref());
-        }
+        methods
+            .into_par_iter()
+            .map(|method| {
+                let fit = method.fit(self.set, &start);
+                let near = fit.as_ref().map(|(_, near)| near.as_ref());
+                let held_out = |parts: &Option<Parts>| {
+                    let near = near.ok()?;
+                    self.held_out(method, parts.as_ref()?, near)
+                };
+                Candidate {
+                    method,
+                    held_out: held_out(&over_locations),
+                    over_repetitions: held_out(&over_repetitions)
+                        .map(|held| held.iter().map(|h| h.error_mm).collect()),
+                    fit,
+                }
+            })
+            .collect()
+    }
+
+    /// Over locations and over repetitions; `None` if there are too few.
+    fn cross_validations(&self, spreads: Option<&SpreadFits>) -> [Option<Parts>; 2] {
+        let geometry = |part: &CalibrationSet| match &self.refit {
+            Some(refit) => refit.geometry(part),
+            None => Some(self.start.geometry),
+        };
+        let parts = |folds: Folds| Parts::new(folds, self.set, geometry, spreads);
+        let locations = Folds::deal(self.set.sights(), self.settings.seed);
+        let enough = locations.count() > 1 && self.parameters <= locations.least_kept();
         let repetitions = Folds::by_repetition(self.set.sights());
-        if repetitions.count() > 1 {
-            let held = self.held_out(method, &repetitions, near.as_ref());
-            candidate.over_repetitions = held.map(|held| held.iter().map(|h| h.error_mm).collect());
-        }
-        candidate
+        let repeated = repetitions.count() > 1;
+        [
+            enough.then(|| parts(locations)),
+            repeated.then(|| parts(repetitions)),
+        ]
     }
 
     /// Every press located by fits of everything, geometry and hyperparameters included, to the other folds.
     fn held_out(
         &self,
         method: &dyn Method,
-        folds: &Folds,
+        parts: &Parts,
         near: Option<&Hyperparameters>,
     ) -> Option<Vec<HeldOutResult>> {
         let presses = self.set.sights();
-        folds.each(|kept, held| {
-            let part = self.set.part(kept);
-            let geometry = match &self.refit {
-                Some(refit) => refit.geometry(&part)?,
-                None => self.start.geometry,
-            };
+        parts.each(|part, held| {
             let start = FitStart {
-                geometry,
+                geometry: part.geometry?,
                 near,
+                spreads: part.spreads.as_ref(),
                 ..self.start.clone()
             };
-            let (fitted, _) = method.fit(&part, &start).ok()?;
+            let (fitted, _) = method.fit(&part.presses, &start).ok()?;
             let of = |i: &usize| {
                 let press = &presses[*i];
                 let lost = HeldOutResult {

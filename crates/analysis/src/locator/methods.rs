@@ -11,7 +11,7 @@ use super::rays::Rays;
 use super::reading::{Reading, polynomials};
 use super::robust::reference_events;
 use super::samples::samples;
-use super::spread::learn_spread;
+use super::spread::SpreadFits;
 use crate::result::{CameraField, LocatorModel, PositionPrior};
 use crate::sets::{CalibrationPress, CalibrationSet};
 
@@ -44,18 +44,13 @@ pub struct FitStart<'a> {
     pub(crate) covariance: Option<DMatrix<f64>>,
     /// Hyperparameters of a fit to almost the same presses.
     pub(crate) near: Option<&'a Hyperparameters>,
+    /// Fields of the spreads of the same presses. They are the same for all methods.
+    pub(super) spreads: Option<&'a SpreadFits>,
 }
 
-/// Opaque hyperparameters of the fields of both cameras.
+/// Opaque hyperparameters of the fields of the columns of both cameras.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hyperparameters([CameraHyperparameters; 2]);
-
-/// Of the column, and of the spreads of columns and rows.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct CameraHyperparameters {
-    column: Logs,
-    spreads: Option<[Logs; 2]>,
-}
+pub struct Hyperparameters([Logs; 2]);
 
 /// A way to learn where presses are.
 pub trait Method: Sync {
@@ -198,33 +193,21 @@ fn with_fields(
 ) -> Result<(FittedLocator, Option<Hyperparameters>), FitError> {
     let bearings = matches!(reading, Reading::Bearing { .. });
     let camera = |k: usize| {
-        let near = start.near.map(|h| &h.0[k]);
         let columns = samples(presses, |p| Some(reading.residual(k, p)));
-        let (field, column) =
-            learn(&columns, near.map(|n| &n.column)).ok_or(FitError::Degenerate)?;
-        let spread = |axis: usize| {
-            let near = near.and_then(|n| n.spreads.as_ref());
-            learn_spread(presses, (k, axis), near.map(|logs| &logs[axis]))
-        };
-        let (spreads, logs) = match spread(0).zip(spread(1)) {
-            Some(((u, logs_u), (v, logs_v))) => (Some([u, v]), Some([logs_u, logs_v])),
-            None => (None, None),
-        };
+        let near = start.near.map(|h| &h.0[k]);
+        let (field, logs) = learn(&columns, near).ok_or(FitError::Degenerate)?;
         let field = CameraField {
             polynomial: match reading {
                 Reading::Column(polynomials) => Some(polynomials[k]),
                 Reading::Bearing { .. } => None,
             },
             field,
-            spreads,
-        };
-        let logs = CameraHyperparameters {
-            column,
-            spreads: logs,
+            spreads: start.spreads.and_then(|spreads| spreads.fields(k)),
         };
         Ok((field, logs))
     };
-    let [(one, logs_one), (two, logs_two)] = [camera(0)?, camera(1)?];
+    let (one, two) = rayon::join(|| camera(0), || camera(1));
+    let ((one, logs_one), (two, logs_two)) = (one?, two?);
     let model = LocatorModel {
         reference_events: reference_events(presses),
         scatter: None,

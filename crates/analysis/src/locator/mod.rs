@@ -15,6 +15,7 @@ mod fitted;
 mod inverse;
 mod likelihood;
 mod methods;
+mod parts;
 mod precision;
 mod prediction;
 mod quasi_newton;

@@ -17,13 +17,42 @@ pub(super) fn reading(spread_px: f64, typical_px: f64) -> f64 {
     typical_px * libm::log(spread_px / typical_px)
 }
 
+/// A learnt field, with its hyperparameters.
+type SpreadFit = (SpreadField, Logs);
+
+/// Fields of the spreads along columns and rows, by camera; `None` if too few presses have them.
+#[derive(Debug, Clone)]
+pub(super) struct SpreadFits([Option<[SpreadFit; 2]>; 2]);
+
+impl SpreadFits {
+    /// Learns them from `presses`; `near`: fits to almost the same presses.
+    pub(super) fn learn(presses: &[CalibrationPress], near: Option<&Self>) -> Self {
+        let spread = |k: usize, axis: usize| {
+            let near = near.and_then(|fits| fits.0[k].as_ref());
+            learn_spread(presses, (k, axis), near.map(|fits| &fits[axis].1))
+        };
+        let camera = |k: usize| {
+            let (columns, rows) = rayon::join(|| spread(k, 0), || spread(k, 1));
+            columns.zip(rows).map(|(columns, rows)| [columns, rows])
+        };
+        let (one, two) = rayon::join(|| camera(0), || camera(1));
+        Self([one, two])
+    }
+
+    /// The fields of camera `k`.
+    pub(super) fn fields(&self, k: usize) -> Option<[SpreadField; 2]> {
+        let fits = self.0[k].as_ref()?;
+        Some(fits.each_ref().map(|(field, _)| field.clone()))
+    }
+}
+
 /// Learns how the spread along an axis (0: columns, 1: rows) in camera `k` depends on the position; `None` if too few presses
 /// have one.
-pub(super) fn learn_spread(
+fn learn_spread(
     presses: &[CalibrationPress],
     (k, axis): (usize, usize),
     near: Option<&Logs>,
-) -> Option<(SpreadField, Logs)> {
+) -> Option<SpreadFit> {
     let spread = |p: &CalibrationPress| p.spreads[k].map(|s| s[axis]);
     let mut all: Vec<f64> = presses.iter().filter_map(spread).collect();
     if all.len() < FEWEST {
