@@ -2,9 +2,11 @@
 
 import json
 import shutil
+import textwrap
 
 import matplotlib
-from conftest import ROOT
+import skinrig
+from conftest import ROOT, SMALL
 
 matplotlib.use("Agg")
 
@@ -38,3 +40,15 @@ def test_the_page_runs(tmp_path, monkeypatch, session_path):
     exec(compile(code, "python.md", "exec"), names)
     assert is_picture(tmp_path / "errors.png") and is_picture(tmp_path / "press.png")
     assert len(names["comparison"]["skins"]) == 2
+
+
+def test_the_figure_of_two_skins_is_drawn(tmp_path, monkeypatch):
+    for skin in ["simulated skin", "cloudy skin"]:
+        skinrig.simulate(SMALL, tmp_path / "sessions", {"prototype.id": skin})
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs/tutorial/two-skins.md").read_text()
+    (code,) = [block.split("```")[0] for block in page.split("```python\n")[1:]]
+    names = {}
+    exec(compile(textwrap.dedent(code), "two-skins.md", "exec"), names)
+    assert is_picture(tmp_path / "skins.png")
+    assert set(names["scored"].prototype) == {"simulated skin", "cloudy skin"}

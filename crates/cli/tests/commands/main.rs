@@ -46,6 +46,7 @@ mod starter;
 mod strangers;
 mod streams;
 mod support;
+mod tours;
 mod tradeoff;
 mod trend;
 mod variants;
