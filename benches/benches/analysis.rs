@@ -16,6 +16,7 @@ use skinrig_bench::files::{Files, Memory};
 use skinrig_bench::memory::{peak_mb, reset_peak};
 use skinrig_bench::{Table, recording};
 use skinrig_model::{CalibrationModel, PressRole, SkinOutline, StereoGeometry};
+use skinrig_simd::InstructionSet;
 
 /// Events of a dense press: one period of a recording at a realistic rate.
 const PRESS_EVENTS: usize = 20_000;
@@ -57,6 +58,24 @@ fn clustering() {
         std::hint::black_box(events.iter().filter(core).count());
     });
     println!("{}", table.run(3));
+    let mut table = Table::new(
+        "the same by instruction set, without counting the events",
+        "kev",
+        "one core",
+    );
+    for (k, set) in InstructionSet::available().into_iter().enumerate() {
+        let mut dbscan = Dbscan::new(10.0, 10).with_instructions(set);
+        let grid = grid.clone();
+        let work = move || {
+            std::hint::black_box(dbscan.run(&grid).len());
+        };
+        let units = PRESS_EVENTS as f64 / 1e3;
+        match k {
+            0 => table.baseline(set.name(), units, work),
+            _ => table.row(set.name(), units, work),
+        };
+    }
+    println!("{}", table.run(200));
 }
 
 fn cluster(dbscan: &mut Dbscan, grid: &mut PixelGrid, events: &[(u16, u16)]) {

@@ -8,6 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use skinrig_bench::Table;
 use skinrig_formats::{Decoder, Scanner, evt2::Encoder};
 use skinrig_model::{CdEvent, Polarity, StreamFormat};
+use skinrig_simd::InstructionSet;
 
 const CHUNK: usize = 128 * 1024;
 
@@ -144,6 +145,13 @@ fn digest(sum: u64, e: &CdEvent) -> u64 {
         .wrapping_add(u64::from(e.polarity.bit()))
 }
 
+/// The instruction sets of processors that lack the best ones of this one.
+fn other_sets() -> Vec<InstructionSet> {
+    let mut sets = InstructionSet::available();
+    sets.pop();
+    sets
+}
+
 fn decode_table(title: &str, format: StreamFormat, bytes: &[u8], events: usize) {
     let mev = events as f64 / 1e6;
     let title = format!(
@@ -192,6 +200,26 @@ fn decode_table(title: &str, format: StreamFormat, bytes: &[u8], events: usize) 
         }
         assert_eq!(sum, reference, "same events as the straightforward decoder");
     });
+    for set in other_sets() {
+        table.row(&format!("for_each_slice, {}", set.name()), mev, move || {
+            let mut decoder = Decoder::new(format).with_instructions(set);
+            for chunk in bytes.chunks(CHUNK) {
+                decoder.for_each_slice(chunk, |slice| {
+                    black_box(slice);
+                });
+            }
+        });
+        table.row(
+            &format!("Scanner (counts only), {}", set.name()),
+            mev,
+            move || {
+                let mut scanner = Scanner::new(format).with_instructions(set);
+                for chunk in bytes.chunks(CHUNK) {
+                    black_box(scanner.push(chunk));
+                }
+            },
+        );
+    }
     let (mut kept, mut edges) = (Vec::with_capacity(events), Vec::new());
     table.row("push_cd (to a Vec)", mev, move || {
         let mut decoder = Decoder::new(format);
@@ -251,6 +279,21 @@ fn idle_table() {
             }
             assert_eq!(count, events);
         });
+        for set in other_sets() {
+            let bytes = &bytes;
+            table.row(
+                &format!("for_each_slice, {}", set.name()),
+                gigabytes,
+                move || {
+                    let mut decoder = Decoder::new(StreamFormat::Evt2).with_instructions(set);
+                    for chunk in bytes.chunks(CHUNK) {
+                        decoder.for_each_slice(chunk, |slice| {
+                            black_box(slice);
+                        });
+                    }
+                },
+            );
+        }
         table.row("Scanner (counts only)", gigabytes, || {
             let mut scanner = Scanner::new(StreamFormat::Evt2);
             let mut count = 0;

@@ -6,6 +6,7 @@ use proptest::prelude::*;
 use serde_json::Value;
 use skinrig_analysis::dbscan::{Cluster, Dbscan, NOISE};
 use skinrig_analysis::grid::PixelGrid;
+use skinrig_simd::InstructionSet;
 
 type Event = (u16, u16);
 
@@ -199,11 +200,13 @@ proptest! {
         min_samples in prop_oneof![Just(10u32), Just(1), 1u32..40],
     ) {
         let expected = reference(&events, eps, min_samples);
-        let mut dbscan = Dbscan::new(eps, min_samples);
-        // Buffers of an earlier run must have no effect.
-        dbscan.run(&grid_of(&[(3, 3), (3, 4), (600, 470)]));
-        prop_assert_eq!(labels(&mut dbscan, &events), expected.clone());
-        prop_assert_eq!(dbscan.clusters(), &clusters_of(&events, &expected)[..]);
+        for set in InstructionSet::available() {
+            let mut dbscan = Dbscan::new(eps, min_samples).with_instructions(set);
+            // Buffers of an earlier run must have no effect.
+            dbscan.run(&grid_of(&[(3, 3), (3, 4), (600, 470)]));
+            prop_assert_eq!(labels(&mut dbscan, &events), expected.clone(), "{:?}", set);
+            prop_assert_eq!(dbscan.clusters(), &clusters_of(&events, &expected)[..]);
+        }
     }
 
     #[test]

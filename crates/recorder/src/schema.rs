@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqliteSynchronous};
-use sqlx::{ConnectOptions, Sqlite, Transaction};
+use sqlx::{ConnectOptions, Connection, Sqlite, Transaction};
 
 use crate::error::RecorderError;
 use crate::migrations::MIGRATOR;
@@ -20,7 +20,7 @@ pub(crate) const APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrg");
 /// The cost: an empty session has 1.4 MB, and a commit of one small row writes 128 KiB.
 pub(crate) const PAGE_BYTES: u32 = 65536;
 
-/// Log pages that trigger a checkpoint: 16 MiB, which fit in the system's cache. A longer log was no faster.
+/// Log pages after which a commit copies them into the file, unless [`crate::checkpoint`] does it beside the commits: 16 MiB.
 const CHECKPOINT_PAGES: u32 = 256;
 
 /// How long to wait for a lock of another program.
@@ -52,7 +52,11 @@ pub(crate) fn create_file(path: &Path) -> Result<(), RecorderError> {
 pub(crate) async fn create_schema(path: &Path) -> Result<SqliteConnection, RecorderError> {
     let fault = |e: sqlx::Error| Fault::from(e).at(path, "creating the schema");
     let mut conn = new_file(path).await.map_err(fault)?;
-    MIGRATOR.run(&mut conn).await.map_err(|e| fault(e.into()))?;
+    // One transaction: each costs two waits for the disk.
+    let mut all = conn.begin_with("BEGIN IMMEDIATE").await.map_err(fault)?;
+    let done = migrate(&mut all).await;
+    done.map_err(|fault| fault.at(path, "creating the schema"))?;
+    all.commit().await.map_err(fault)?;
     Ok(conn)
 }
 
@@ -85,6 +89,29 @@ pub(crate) fn writable(path: &Path) -> SqliteConnectOptions {
         .foreign_keys(true)
         .busy_timeout(BUSY_TIMEOUT)
         .thread_name(|_| "session-sqlite".to_owned())
+}
+
+/// Opens the log of a session that is being written, for [`crate::checkpoint`].
+pub(crate) async fn connect_checkpoints(path: &Path) -> Result<SqliteConnection, Fault> {
+    let mut conn = writable(path)
+        .create_if_missing(false)
+        .synchronous(SqliteSynchronous::Full)
+        .thread_name(|_| "session-checkpoint".to_owned())
+        .connect()
+        .await?;
+    // Opens the log now: later the files may have other names.
+    sqlx::query("SELECT count(*) FROM sqlite_schema")
+        .execute(&mut conn)
+        .await?;
+    Ok(conn)
+}
+
+/// Leaves checkpoints of a connection to [`crate::checkpoint`].
+pub(crate) async fn disable_checkpoints(conn: &mut SqliteConnection) -> Result<(), Fault> {
+    sqlx::query("PRAGMA wal_autocheckpoint = 0")
+        .execute(conn)
+        .await?;
+    Ok(())
 }
 
 /// Opens an existing session for writing, in its current journal mode: sealed sessions are in rollback mode.
@@ -146,8 +173,6 @@ fn allow_writing(path: &Path) -> std::io::Result<()> {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-
-    use sqlx::Connection;
 
     use crate::digest::EarlierState;
     use crate::migrations::SCHEMA_VERSION;

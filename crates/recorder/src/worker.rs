@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use sqlx::Connection;
 use tokio::runtime::Runtime;
 
+use crate::checkpoint::Checkpoints;
 use crate::close_result::{CloseResult, SealedSession};
 use crate::error::{RecorderError, WriteFailure};
 use crate::insert::Journal;
@@ -24,6 +25,7 @@ const SEAL_RETRY_INTERVAL: Duration = Duration::from_millis(20);
 pub(crate) struct Worker {
     pub runtime: Runtime,
     pub journal: Journal,
+    pub checkpoints: Checkpoints,
     pub shared: Arc<Shared>,
 }
 
@@ -80,8 +82,11 @@ impl Worker {
         let Self {
             runtime,
             journal,
+            mut checkpoints,
             shared,
         } = self;
+        // The log can only be emptied by the last connection.
+        checkpoints.close();
         let result = match close {
             CloseMode::Seal if !failed => {
                 let sealed = runtime.block_on(seal_session(journal, &shared));
@@ -138,9 +143,12 @@ impl Worker {
     }
 
     fn commit(&mut self, written: u64) -> Result<(), Fault> {
-        self.runtime.block_on(self.journal.commit())?;
+        let bytes = self.runtime.block_on(self.journal.commit())?;
         self.shared.mark_durable(written);
-        Ok(())
+        match bytes {
+            Some(bytes) => self.checkpoints.committed(bytes),
+            None => Ok(()),
+        }
     }
 }
 

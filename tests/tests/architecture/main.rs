@@ -87,6 +87,7 @@ const RESTRICTED: &[(&str, &[&str])] = &[
         &["skinrig-recorder", "skinrig-hil", "skinrig-view", "skinrig"],
     ),
     ("axum", &["skinrig-view"]),
+    ("fearless_simd", &["skinrig-simd"]),
     ("lettre", &["skinrig-notify"]),
     ("ureq", &["skinrig-notify"]),
     ("rustls", &["skinrig-notify"]),
@@ -161,6 +162,16 @@ const NETWORK_LIBRARIES: [&str; 11] = [
     "tungstenite",
     "zmq",
 ];
+
+/// The program runs on any x86-64; crate `simd` uses what the processor has.
+#[test]
+fn no_build_flag_asks_for_a_processor() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let config = std::fs::read_to_string(root.join(".cargo/config.toml")).unwrap();
+    for flag in ["rustflags", "target-cpu", "target-feature"] {
+        assert!(!config.contains(flag), "{flag}");
+    }
+}
 
 #[test]
 fn no_networking_library_is_linked() {

@@ -13,6 +13,8 @@
 
 mod tiles;
 
+use skinrig_simd::InstructionSet;
+
 use self::tiles::{Part, SIDE, Tiles, WIDTH, ones};
 use crate::grid::PixelGrid;
 
@@ -82,6 +84,7 @@ impl Cluster {
 /// the events near a pixel, joining core pixels and finding borders take a few words each.
 #[derive(Debug, Clone)]
 pub struct Dbscan {
+    instructions: InstructionSet,
     min_samples: u32,
     tiles: Tiles,
     /// True if all pixels of a tile are within eps of each other.
@@ -129,6 +132,7 @@ impl Dbscan {
         let tiles = Tiles::new(eps_px);
         let own = |at| tiles.masks(at).first() == Some(&u64::MAX);
         Self {
+            instructions: InstructionSet::best(),
             min_samples,
             tile_is_near: (0..SIDE * SIDE).all(own),
             tiles,
@@ -141,13 +145,26 @@ impl Dbscan {
         }
     }
 
+    /// Uses other instructions than the best ones of this processor, with the same results.
+    #[must_use]
+    pub fn with_instructions(mut self, instructions: InstructionSet) -> Self {
+        self.instructions = instructions;
+        self
+    }
+
     /// Clusters the events of `grid`; the result is valid until the next call.
     pub fn run(&mut self, grid: &PixelGrid) -> &[Cluster] {
-        self.load(grid);
-        self.find_core(grid);
-        self.join();
-        self.number();
-        self.sum(grid);
+        // Pixels are counted and found in words of bits: POPCNT and TZCNT.
+        self.instructions.run(
+            #[inline(always)]
+            || {
+                self.load(grid);
+                self.find_core(grid);
+                self.join();
+                self.number();
+                self.sum(grid);
+            },
+        );
         &self.clusters
     }
 
@@ -200,6 +217,7 @@ impl Dbscan {
     }
 
     /// Loads pixels and events of each tile.
+    #[inline(always)]
     fn load(&mut self, grid: &PixelGrid) {
         self.height = grid.height();
         for tile in self.occupied.drain(..) {
@@ -230,6 +248,7 @@ impl Dbscan {
         }
     }
 
+    #[inline(always)]
     fn find_core(&mut self, grid: &PixelGrid) {
         self.groups.clear();
         self.parents.clear();
@@ -266,7 +285,7 @@ impl Dbscan {
     }
 
     /// True if enough events are in the disc around a pixel of the tile whose first pixel has index `corner`.
-    #[inline]
+    #[inline(always)]
     fn is_core(&self, grid: &PixelGrid, tile: usize, corner: usize, at: usize) -> bool {
         let parts = self.tiles.parts(at);
         let (mut events, mut repeated) = (0, 0);
@@ -296,6 +315,7 @@ impl Dbscan {
     }
 
     /// Core pixels of a tile that form one cluster with the one at `first`.
+    #[inline(always)]
     fn connected(&self, first: usize, core: u64) -> u64 {
         if self.tile_is_near {
             return core;
@@ -310,6 +330,7 @@ impl Dbscan {
     }
 
     /// Joins groups with pixels within eps of each other.
+    #[inline(always)]
     fn join(&mut self) {
         let parents = &mut self.parents;
         for (a, Group { tile, core, .. }) in self.groups.iter().enumerate() {
@@ -361,6 +382,7 @@ impl Dbscan {
     }
 
     /// Computes the sums of the clusters.
+    #[inline(always)]
     fn sum(&mut self, grid: &PixelGrid) {
         let mut clusters = std::mem::take(&mut self.clusters);
         let top = u64::from(grid.rows().0);
@@ -405,6 +427,7 @@ impl Dbscan {
     }
 
     /// True if a disc around a pixel of the tile may contain core pixels.
+    #[inline(always)]
     fn is_near_core(&self, tile: usize) -> bool {
         let core = |by| self.all[tile.wrapping_add(by)].core;
         self.tiles.steps().iter().any(|step| core(step.by) != 0)

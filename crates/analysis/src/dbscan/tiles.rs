@@ -196,7 +196,7 @@ fn masks(half: &[usize], rows: isize, columns: isize) -> [u64; SIDE * SIDE] {
 }
 
 /// Positions of the ones in a word, ascending.
-#[inline]
+#[inline(always)]
 pub(super) fn ones(mut word: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let bit = word.trailing_zeros() as usize;

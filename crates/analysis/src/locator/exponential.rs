@@ -34,7 +34,7 @@ const TAYLOR: [f64; 14] = [
 /// exp of each number, which must be 0 or negative, to two units in the last place.
 ///
 /// Each step is a loop of its own over all lanes, which the compiler turns into vector instructions.
-#[inline]
+#[inline(always)]
 pub(super) fn of_negatives(x: &[f64; LANES]) -> [f64; LANES] {
     let (mut r, mut power, mut sum) = ([0.0; LANES], [0.0; LANES], [TAYLOR[0]; LANES]);
     for i in 0..LANES {

@@ -6,6 +6,7 @@
 //! freedom); none is dropped.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use skinrig_simd::InstructionSet;
 
 use super::exponential::{LANES, of_negatives};
 use super::likelihood::{Kernel, Likelihood, Logs, centre, first_weights, scatter};
@@ -90,6 +91,7 @@ pub(super) fn learn(samples: &[Sample], from: Option<&Logs>) -> Option<(FieldMod
 /// A field that predicts.
 #[derive(Debug, Clone)]
 pub(super) struct Field {
+    instructions: InstructionSet,
     kernel: Kernel,
     /// Number of observations.
     n: usize,
@@ -120,6 +122,7 @@ impl Group {
     }
 
     /// Distances to a position along x and y, mm, and exp(-d² / (2 l²)) for the distance d and the length scale l.
+    #[inline(always)]
     fn near(&self, at: [f64; 2], per_length: f64) -> [[f64; LANES]; 3] {
         let half = -0.5 * per_length * per_length;
         let (mut dx, mut dy, mut exponents) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
@@ -153,6 +156,7 @@ impl Field {
             .zip(alpha.as_slice().chunks(LANES))
             .map(|(points, alpha)| Group::new(points, alpha));
         let mut field = Self {
+            instructions: InstructionSet::best(),
             kernel,
             n,
             observations: groups.collect(),
@@ -168,6 +172,18 @@ impl Field {
 
     /// Expected residual at a position, px, and its change per mm.
     pub(super) fn value(&self, at: [f64; 2]) -> (f64, [f64; 2]) {
+        let sums = self.instructions.run(
+            #[inline(always)]
+            || self.sums(at),
+        );
+        let [value, x, y] = sums.map(|lanes| lanes.iter().sum::<f64>() * self.kernel.variance);
+        let square = self.kernel.per_length * self.kernel.per_length;
+        (value, [-x * square, -y * square])
+    }
+
+    /// Sums over the observations, lane by lane: shares of the value, and these times the distances along x and y.
+    #[inline(always)]
+    fn sums(&self, at: [f64; 2]) -> [[f64; LANES]; 3] {
         let mut sums = [[0.0; LANES]; 3];
         for group in &self.observations {
             let [dx, dy, near] = group.near(at, self.kernel.per_length);
@@ -178,17 +194,23 @@ impl Field {
                 sums[2][i] += part * dy[i];
             }
         }
-        let [value, x, y] = sums.map(|lanes| lanes.iter().sum::<f64>() * self.kernel.variance);
-        let square = self.kernel.per_length * self.kernel.per_length;
-        (value, [-x * square, -y * square])
+        sums
     }
 
     /// Share of the field's variance that the observations leave open at a position, 0..=1.
     pub(super) fn open(&self, at: [f64; 2]) -> f64 {
-        let groups = self.observations.iter();
-        let near = groups.flat_map(|g| g.near(at, self.kernel.per_length)[2]);
-        let near = near.map(|share| share * self.kernel.variance);
-        let near = DVector::from_iterator(self.n, near.take(self.n));
+        let mut near = DVector::zeros(self.observations.len() * LANES);
+        self.instructions.run(
+            #[inline(always)]
+            || {
+                let places = near.as_mut_slice().as_chunks_mut::<LANES>().0;
+                for (place, group) in places.iter_mut().zip(&self.observations) {
+                    let shares = group.near(at, self.kernel.per_length)[2];
+                    *place = shares.map(|share| share * self.kernel.variance);
+                }
+            },
+        );
+        let near = near.resize_vertically(self.n, 0.0);
         let explained = match self.factor.l_dirty().solve_lower_triangular(&near) {
             Some(solved) => solved.norm_squared() / self.kernel.variance,
             None => 0.0,
@@ -229,6 +251,16 @@ mod tests {
         let (near, far) = (field.open([0.0, 0.0]), field.open([300.0, 0.0]));
         assert!(near < 0.2 && far > 0.999, "{near} {far}");
         assert!(!field.is_beyond(near) && field.is_beyond(far));
+        for instructions in InstructionSet::available() {
+            let other = Field {
+                instructions,
+                ..field.clone()
+            };
+            for at in [[-10.0, 0.0], [3.0, 8.0], [0.3, 0.1], [300.0, 0.0]] {
+                assert_eq!(other.value(at), field.value(at), "{instructions:?}");
+                assert_eq!(other.open(at), field.open(at), "{instructions:?}");
+            }
+        }
         assert!(field.value([300.0, 0.0]).0.abs() < 1e-9);
         let outlier = &model.points[7];
         assert!(outlier.variance_px2 > 10.0 * model.points[8].variance_px2);

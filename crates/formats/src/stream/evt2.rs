@@ -43,12 +43,12 @@ struct Run {
 }
 
 impl Run {
-    #[inline]
+    #[inline(always)]
     fn base_us(&self) -> u64 {
         self.epoch_us + (u64::from(self.high) << 6)
     }
 
-    #[inline]
+    #[inline(always)]
     fn event(w: u32, base_us: u64) -> CdEvent {
         CdEvent {
             t_us: base_us + u64::from(w >> 22 & 0x3f),
@@ -59,7 +59,7 @@ impl Run {
     }
 
     /// Bits that no plain word has: nonzero for a word of another type, or of a pixel outside the sensor.
-    #[inline]
+    #[inline(always)]
     fn foreign_bits(&self, w: u32) -> u32 {
         // The highest bit is set when x < width and y < height.
         let inside =
@@ -68,7 +68,7 @@ impl Run {
     }
 
     /// Processes a group if it is plain; its events go to `out`.
-    #[inline]
+    #[inline(always)]
     fn group<const KEEP: bool>(&mut self, group: &Group, out: &mut [CdEvent; GROUP]) -> bool {
         let (mut foreign, mut any, mut all) = ([0; LANES], [0; LANES], [u32::MAX; LANES]);
         for words in group.as_chunks::<LANES>().0 {
@@ -93,7 +93,7 @@ impl Run {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn events_only<const KEEP: bool>(&mut self, group: &Group, out: &mut [CdEvent; GROUP]) {
         if KEEP {
             let base_us = self.base_us();
@@ -106,7 +106,7 @@ impl Run {
     }
 
     /// Processes a group of time base words if they are in order.
-    #[inline]
+    #[inline(always)]
     fn time_only(&mut self, group: &Group) -> bool {
         let high = |k: usize| u32::from_le_bytes(group[k]) ^ TIME_HIGH_FLAG;
         let mut steps = [high(0).wrapping_sub(self.high), 0, 0, 0];
@@ -124,7 +124,7 @@ impl Run {
     }
 
     /// Processes a group of both kinds if its time base words are in order.
-    #[inline]
+    #[inline(always)]
     fn mixed<const KEEP: bool>(&mut self, group: &Group, out: &mut [CdEvent; GROUP]) -> bool {
         let (mut high, mut steps, mut events) = (self.high, 0, 0);
         for w in group {
@@ -153,7 +153,7 @@ impl Run {
         in_order
     }
 
-    #[inline]
+    #[inline(always)]
     fn count_on(&mut self, group: &Group) {
         let mut on = [0; LANES];
         for words in group.as_chunks::<LANES>().0 {
@@ -165,6 +165,7 @@ impl Run {
     }
 
     /// Processes one word if it is plain.
+    #[inline(always)]
     fn word<const KEEP: bool>(&mut self, w: u32, buffer: &mut [CdEvent; BLOCK]) -> bool {
         if self.foreign_bits(w) != 0 {
             return false;
@@ -183,6 +184,42 @@ impl Run {
         self.events += 1;
         self.on += u64::from(w >> 28);
         true
+    }
+
+    /// Decodes plain words into `buffer`, and returns the bytes used and whether they ended because the buffer is full.
+    #[inline(always)]
+    fn words<const KEEP: bool>(
+        mut self,
+        bytes: &[u8],
+        buffer: &mut [CdEvent; BLOCK],
+    ) -> (Self, usize, bool) {
+        let (all, _) = bytes.as_chunks();
+        let (mut words, mut full) = (0, false);
+        for group in all.as_chunks::<GROUP>().0 {
+            let place = if KEEP { self.events } else { 0 };
+            let Some(out) = buffer.get_mut(place..).and_then(<[_]>::first_chunk_mut) else {
+                full = true;
+                break;
+            };
+            if !self.group::<KEEP>(group, out) {
+                break;
+            }
+            words += GROUP;
+        }
+        if !full {
+            // The words before one that is not plain fit; the last words of the input, fewer than a group, may not.
+            for word in &all[words..] {
+                if KEEP && self.events == BLOCK {
+                    full = true;
+                    break;
+                }
+                if !self.word::<KEEP>(u32::from_le_bytes(*word), buffer) {
+                    break;
+                }
+                words += 1;
+            }
+        }
+        (self, words * 4, full)
     }
 }
 
@@ -241,7 +278,7 @@ impl Words {
         bytes: &[u8],
         output: &mut Output,
     ) -> (usize, bool) {
-        let mut run = Run {
+        let run = Run {
             width: output.geometry.width.into(),
             height: output.geometry.height.into(),
             epoch_us: self.base.epoch_us(),
@@ -250,34 +287,12 @@ impl Words {
             on: 0,
         };
         let buffer = &mut output.buffer;
-        let (all, _) = bytes.as_chunks();
-        let (mut words, mut full) = (0, false);
-        for group in all.as_chunks::<GROUP>().0 {
-            let place = if KEEP { run.events } else { 0 };
-            let Some(out) = buffer.get_mut(place..).and_then(<[_]>::first_chunk_mut) else {
-                full = true;
-                break;
-            };
-            if !run.group::<KEEP>(group, out) {
-                break;
-            }
-            words += GROUP;
-        }
-        if !full {
-            // The words before one that is not plain fit; the last words of the input, fewer than a group, may not.
-            for word in &all[words..] {
-                if KEEP && run.events == BLOCK {
-                    full = true;
-                    break;
-                }
-                if !run.word::<KEEP>(u32::from_le_bytes(*word), buffer) {
-                    break;
-                }
-                words += 1;
-            }
-        }
-        self.finish_run::<KEEP>(&bytes[..words * 4], &run, output);
-        (words * 4, full)
+        let (run, used, full) = output.instructions.run(
+            #[inline(always)]
+            || run.words::<KEEP>(bytes, buffer),
+        );
+        self.finish_run::<KEEP>(&bytes[..used], &run, output);
+        (used, full)
     }
 
     /// Accounts for a run that used `bytes`.

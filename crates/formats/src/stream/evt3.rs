@@ -13,6 +13,7 @@
 use skinrig_model::{CdEvent, Polarity, TriggerEdge};
 
 use super::clock::TimeBase;
+use super::evt3_run::{Counts, Run};
 use super::output::Output;
 use super::sink::{EventSink, Monitoring};
 
@@ -20,6 +21,8 @@ use super::sink::{EventSink, Monitoring};
 pub(crate) const TIME_HIGH_BITS: u32 = 12;
 /// Range of the stream's time, µs.
 pub const RANGE_US: u64 = 1 << 24;
+/// Coordinates that 11 bits express.
+const MAX_SIDE: u16 = 2048;
 
 /// State of an EVT3 stream between two words.
 #[derive(Debug, Clone, Default)]
@@ -69,14 +72,76 @@ impl Words {
     /// Decodes whole words.
     pub(super) fn run<const KEEP: bool>(
         &mut self,
-        bytes: &[u8],
+        mut bytes: &[u8],
         output: &mut Output,
         sink: &mut impl EventSink,
     ) {
-        let (words, _) = bytes.as_chunks();
-        for word in words {
+        while !bytes.is_empty() {
+            // A run starts with an empty buffer and reports no first time.
+            output.flush(sink);
+            if let Some(run) = self.plain_run(output) {
+                let (used, full) = self.plain_words::<KEEP>(bytes, run, output);
+                bytes = &bytes[used..];
+                if full {
+                    continue;
+                }
+            }
+            // The end of the input, or the next word is not plain.
+            let Some((word, rest)) = bytes.split_first_chunk() else {
+                return;
+            };
             self.word::<KEEP>(u16::from_le_bytes(*word), output, sink);
+            bytes = rest;
         }
+    }
+
+    /// A run from here; `None` unless events have a time and a row.
+    fn plain_run(&self, output: &Output) -> Option<Run> {
+        let (width, height) = (output.geometry.width, output.geometry.height);
+        let y = self.y.filter(|y| *y < height)?;
+        let is_ready = self.knows_time() && output.chunk_first_us.is_some();
+        is_ready.then(|| Run {
+            // More columns than the format can express.
+            width: width.min(MAX_SIDE),
+            height: height.min(MAX_SIDE),
+            base_us: self.base.base_us(),
+            t_us: self.base.base_us() + u64::from(self.low),
+            time_high_word: 0x8000 | self.base.high() as u16,
+            row: u32::from(y) << 16,
+            vector: self.vector,
+            counts: Counts::default(),
+        })
+    }
+
+    /// Decodes plain words into the empty buffer, and returns the bytes used and whether they ended because the buffer is
+    /// full.
+    fn plain_words<const KEEP: bool>(
+        &mut self,
+        bytes: &[u8],
+        run: Run,
+        output: &mut Output,
+    ) -> (usize, bool) {
+        let buffer = &mut output.buffer;
+        let (run, used, full) = output.instructions.run(
+            #[inline(always)]
+            || run.words::<KEEP>(bytes, buffer),
+        );
+        self.low = (run.t_us - run.base_us) as u16;
+        self.y = Some((run.row >> 16) as u16);
+        self.vector = run.vector;
+        let counts = run.counts;
+        if counts.events + counts.time_low + counts.time_high > 0 {
+            output.timed(run.t_us);
+        }
+        if KEEP {
+            output.len = counts.events;
+        }
+        output.stats.cd_on += counts.on as u64;
+        output.stats.cd_off += (counts.events - counts.on) as u64;
+        output.stats.time_low += counts.time_low as u64;
+        output.stats.time_high += counts.time_high as u64;
+        output.stats.address += counts.address as u64;
+        (used, full)
     }
 
     #[inline]

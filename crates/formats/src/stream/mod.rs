@@ -5,12 +5,15 @@ pub mod evt2;
 pub mod evt21;
 mod evt2_encode;
 pub mod evt3;
+mod evt3_group;
+mod evt3_run;
 mod output;
 mod scan;
 mod sink;
 mod stats;
 
 use skinrig_model::{CdEvent, StreamFormat, TriggerEdge};
+use skinrig_simd::InstructionSet;
 
 pub use scan::Scanner;
 pub use sink::{EventSink, Monitoring};
@@ -109,6 +112,13 @@ impl Decoder {
             partial_len: 0,
             torn_len: 0,
         }
+    }
+
+    /// Uses other instructions than the best ones of this processor, with the same results.
+    #[must_use]
+    pub fn with_instructions(mut self, instructions: InstructionSet) -> Self {
+        self.output.instructions = instructions;
+        self
     }
 
     /// Starts a new stream, for example after a restart of the device. No state carries over; times

@@ -1,6 +1,7 @@
 //! Output of the decoder: a small reused buffer of events, and the counts.
 
 use skinrig_model::{CdEvent, Polarity, TriggerEdge};
+use skinrig_simd::InstructionSet;
 
 use super::clock::Step;
 use super::sink::{EventSink, Monitoring};
@@ -12,6 +13,8 @@ pub(super) const BLOCK: usize = 1024;
 #[derive(Debug, Clone)]
 pub(super) struct Output {
     pub geometry: Geometry,
+    /// Instructions of the loops that process plain words.
+    pub instructions: InstructionSet,
     pub stats: StreamStats,
     /// Time of the last timed word.
     pub last_us: Option<u64>,
@@ -31,6 +34,7 @@ impl Output {
         };
         Self {
             geometry,
+            instructions: InstructionSet::best(),
             stats: StreamStats::default(),
             last_us: None,
             chunk_first_us: None,

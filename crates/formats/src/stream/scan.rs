@@ -1,6 +1,7 @@
 //! Counts the content of a chunk without keeping its events.
 
 use skinrig_model::{CdEvent, ChunkFacts, StreamFormat, TriggerEdge};
+use skinrig_simd::InstructionSet;
 
 use super::Decoder;
 use super::sink::EventSink;
@@ -34,6 +35,14 @@ impl Scanner {
     pub fn with_geometry(format: StreamFormat, geometry: Geometry) -> Self {
         Self {
             decoder: Decoder::with_geometry(format, geometry),
+        }
+    }
+
+    /// Uses other instructions than the best ones of this processor, with the same results.
+    #[must_use]
+    pub fn with_instructions(self, instructions: InstructionSet) -> Self {
+        Self {
+            decoder: self.decoder.with_instructions(instructions),
         }
     }
 

@@ -4,6 +4,7 @@
 mod cause_examples;
 mod causes;
 mod chain;
+mod checkpoints;
 mod common;
 mod crash;
 mod damage;
