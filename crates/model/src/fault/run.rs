@@ -202,7 +202,7 @@ mod tests {
 
     #[test]
     fn invalid_presses_in_a_row_name_each_kind_of_fault_once() {
-        let late = |ms| PressFault::DataLate {
+        let late = |ms: i64| PressFault::DataLate {
             camera: CameraId::One,
             end: HostTime(ms * 1_000_000),
             waited: HostDuration::from_millis(1000),
