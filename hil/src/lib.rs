@@ -19,5 +19,6 @@ mod streams;
 mod test_volume;
 
 pub use bench::{Bench, Devices, DrillResult, GoldenRun, Problem, Slot};
+pub use checks::disk_write_rate;
 pub use findings::{Findings, GoldenRecord};
 pub use runner::{NightObserver, SuiteRunner};

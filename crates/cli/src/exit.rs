@@ -48,7 +48,8 @@ impl Exit {
         0  done\n  \
         1  fault of skinrig or of this machine\n  \
         2  bad input: command line, protocol, schedule, data or session file\n  \
-        3  rig fault, a failed check before a run, or presses lost to rig faults (recorded data are kept)\n  \
+        3  rig fault, failed check before a run, or presses lost to rig faults\n     \
+        (recorded data are kept)\n  \
         4  a limit was not met (--max-rmse, verify, an INVALID session)\n  \
         5  stopped by the operator (recorded data are kept)";
 }

@@ -42,10 +42,12 @@ fn harmless(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// True if `stream` is a terminal and colour is not disabled (`NO_COLOR`, <https://no-color.org>).
+/// True if `stream` is a terminal or colour is forced (`CLICOLOR_FORCE`, <https://bixense.com/clicolors>), and colour is not
+/// disabled (`NO_COLOR`, <https://no-color.org>).
 pub(crate) fn is_coloured(stream: &impl IsTerminal) -> bool {
-    let unwanted = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
-    stream.is_terminal() && !unwanted
+    let value = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty());
+    let is_forced = value("CLICOLOR_FORCE").is_some_and(|v| v != "0");
+    (stream.is_terminal() || is_forced) && value("NO_COLOR").is_none()
 }
 
 /// Writes to standard output.

@@ -6,6 +6,7 @@ use skinrig_analysis::tradeoff::{Cost, Plan, Row, Tradeoff, measure};
 use skinrig_model::RunHeader;
 use skinrig_report::tradeoff::{Rows, label, page, protocol_lines, terminal_table};
 use skinrig_results::Origin;
+use skinrig_text::Paint;
 
 use crate::analyses::tradeoff_path;
 use crate::args::{CostKind, TradeoffArgs};
@@ -69,9 +70,11 @@ fn print_recommendation(recommendation: &Recommendation<'_>, own: Option<&str>) 
     };
     let bound = |bound: Option<f64>| bound.map_or("-".to_owned(), |mm| format!("{mm:.2}"));
     let rmse = &row.rmse_mm;
+    let paint = Paint::new(crate::terminal::is_coloured(&std::io::stdout()));
+    let chosen = format!("{name}: RMSE {} mm", bound(rmse.value));
     outln!(
-        "  {name}: RMSE {} mm, 95 % interval [{}, {}], n {}; {:.3} ms of CPU time per press\n",
-        bound(rmse.value),
+        "  {}, 95 % interval [{}, {}], n {};\n  {:.3} ms of CPU time per press\n",
+        paint.bold(&chosen),
         bound(rmse.low),
         bound(rmse.high),
         rmse.n,

@@ -40,7 +40,10 @@ export const session = async (name, about, signal) => {
   };
   const map = skinMap(s.outline_mm, s.cameras, choose);
   const list = el('div');
+  let all = [];
+  const step = by => { const next = all[all.indexOf(chosen) + by]; if (next) choose(next); };
   const presses = rows => {
+    all = rows;
     map.draw(rows);
     list.replaceChildren(table('Presses', ['Press', 'Role', 'x, y (mm)', 'Depth (mm)', 'Verdict', 'Error (mm)', 'Reason'], rows.map(p => [
       el('button', { type: 'button', 'aria-label': `Go to press ${p.press}`, onclick: () => choose(p) }, String(p.press)), p.role,
@@ -52,7 +55,7 @@ export const session = async (name, about, signal) => {
     if (!playing || signal.aborted) return;
     const next = Number(time.value) + Math.min(now - last, 200) / 1000 * Number(speed.value);
     last = now;
-    if (next >= s.span_s[1]) playing = false;
+    if (next >= s.span_s[1]) { playing = false; play.textContent = 'Play'; }
     time.value = next;
     if (!busy) draw();
     requestAnimationFrame(tick);
@@ -63,6 +66,7 @@ export const session = async (name, about, signal) => {
     last = performance.now();
     requestAnimationFrame(tick);
   } }, 'Play');
+  const [previous, next] = [['Previous press', -1], ['Next press', 1]].map(([text, by]) => el('button', { type: 'button', onclick: () => step(by) }, text));
   time.addEventListener('input', draw);
   accumulation.addEventListener('change', draw);
   const save = (what, format, label) => el('button', { type: 'button', onclick: () => download({ ...span(), what, format }).catch(e => { said.textContent = e.message; }) }, label);
@@ -73,12 +77,14 @@ export const session = async (name, about, signal) => {
   const summary = !a ? 'not analysed: `skinrig analyze` measures the errors' : a.valid
     ? `${a.calibrated ? 'RMSE' : 'residual against the nominal geometry'} ${number(a.rmse_mm[0])} mm (${number(a.rmse_mm[1])} to ${number(a.rmse_mm[2])}), n = ${a.n}; clock certificate: ${a.certificate.status}`
     : `INVALID: ${a.invalid_because.join('; ')}`;
-  if (!s.writer) draw();
+  // A press to look at; at the start of a session there are few events.
+  const first = s.presses.find(p => p.role === 'score' && p.times_s);
+  if (!s.writer) { if (first) choose(first); else draw(); }
   return [card,
     el('p', { class: `notice ${a && !a.valid ? 'bad' : ''}` }, summary),
     el('div', { class: 'two' }, el('section', { class: 'card', id: 'map', 'aria-label': 'Skin map' }, map.svg, el('p', { class: 'soft' }, 'Colour: error, from 0 mm (blue) to 5 mm and more (red); without an error, the verdict. Lines: rays of both cameras.')),
       el('section', { class: 'card', 'aria-label': 'Playback' }, el('div', { class: 'cameras fig' }, pictures.map(p => p.canvas)),
-        el('div', { class: 'transport' }, play, timeLabel, speedLabel, windowLabel), said,
+        el('div', { class: 'transport' }, previous, play, next, timeLabel, speedLabel, windowLabel), said,
         el('div', { class: 'transport' }, save('events_camera1', 'csv', 'Events 1 as CSV'), save('events_camera2', 'csv', 'Events 2 as CSV'), save('pose', 'csv', 'Path as CSV'), save('presses', 'npz', 'Presses as npz')))),
     el('section', { class: 'card' }, el('h2', {}, 'Presses'), list),
   ];

@@ -52,7 +52,7 @@ pub(super) fn disk(check: &Check, bench: &mut dyn Bench, findings: &mut Findings
         Ok(timing) => {
             let read_mb_s = timing.bytes as f64 / timing.read_s.max(1e-9) / 1e6;
             findings
-                .value(COMPUTER, "write_rate", timing.bytes as f64 / timing.write_s.max(1e-9))
+                .value(COMPUTER, "write_rate", timing.write_rate_b_s())
                 .with_note(format!(
                     "{:.0} MB, synced after {:.3} s; read back at {read_mb_s:.0} MB/s, possibly from the cache",
                     timing.bytes as f64 / 1e6,
@@ -63,6 +63,15 @@ pub(super) fn disk(check: &Check, bench: &mut dyn Bench, findings: &mut Findings
     }
 }
 
+/// Bytes per second that the disk of `folder` takes, synced. The amount is written to a file without a name.
+///
+/// # Errors
+/// Evidence of a disk that cannot be written, or that returns other bytes, with the next step.
+pub fn disk_write_rate(folder: &Path, amount_b: u64) -> Result<f64, Problem> {
+    let timing = write_and_read(folder, amount_b)?;
+    Ok(timing.write_rate_b_s())
+}
+
 const FREE_SPACE_STEP: &str = "free some space, or choose another folder with --sessions";
 
 /// Amount and duration of the test.
@@ -70,6 +79,12 @@ struct DiskTiming {
     bytes: u64,
     write_s: f64,
     read_s: f64,
+}
+
+impl DiskTiming {
+    fn write_rate_b_s(&self) -> f64 {
+        self.bytes as f64 / self.write_s.max(1e-9)
+    }
 }
 
 /// A file without a name: the system deletes it when the handle closes, even after a crash.

@@ -19,6 +19,8 @@ use skinrig_protocol::suite::{Check, Measure};
 use crate::bench::Bench;
 use crate::findings::Findings;
 
+pub use self::disk::disk_write_rate;
+
 /// Runs one attempt at `check`. Devices may stay open; the robot is braked and the cameras are stopped afterwards.
 pub fn run(check: &Check, bench: &mut dyn Bench) -> Findings {
     let mut findings = Findings::default();

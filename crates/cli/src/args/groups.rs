@@ -2,7 +2,12 @@
 
 use clap::{Command, CommandFactory, FromArgMatches};
 
+use skinrig_text::{LongWords, Paint, hang};
+
 use super::Cli;
+
+/// Writes the styles of the help; clap removes them where no colours are wanted.
+const HELP: Paint = Paint::new(true);
 
 /// Heading and commands of each group, in the order of a campaign.
 const GROUPS: [(&str, &[&str]); 6] = [
@@ -53,7 +58,8 @@ pub(crate) fn command() -> Command {
     let command = Cli::command();
     let list = list(&command);
     command.help_template(format!(
-        "{{before-help}}{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{list}\nOptions:\n{{options}}{{after-help}}"
+        "{{before-help}}{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{list}\n{}\n{{options}}{{after-help}}",
+        HELP.bold("Options:")
     ))
 }
 
@@ -62,11 +68,12 @@ fn list(command: &Command) -> String {
     let width = widest.map(|name| name.len()).max().unwrap_or_default();
     let mut text = String::new();
     for (heading, names) in GROUPS {
-        text += &format!("{heading}:\n");
+        text += &format!("{}\n", HELP.bold(&format!("{heading}:")));
         for name in names {
             let about = command.find_subcommand(name).and_then(Command::get_about);
             let about = about.map(ToString::to_string).unwrap_or_default();
-            text += &format!("  {name:width$}  {about}\n");
+            let name = HELP.bold(&format!("{name:width$}"));
+            text += &hang(&format!("  {name}  "), &about, LongWords::Keep);
         }
         text += "\n";
     }

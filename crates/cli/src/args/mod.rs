@@ -34,7 +34,7 @@ use crate::hil::args::{HilArgs, HoldArmArgs};
 #[derive(Debug, Parser)]
 #[command(name = "skinrig", version = crate::version::VERSION, about, after_help = Exit::HELP, arg_required_else_help = true)]
 pub(crate) struct Cli {
-    /// Print results as JSON on standard output; progress and messages stay on standard error.
+    /// Print results as JSON; messages go to standard error.
     #[arg(long, global = true)]
     pub json: bool,
 

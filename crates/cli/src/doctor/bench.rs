@@ -1,6 +1,6 @@
 //! Checks that the bench is free: its lease, busy devices and the processes that use them, runs in the sessions folder.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use skinrig_hil::lease::{self, LeaseState};
 use skinrig_omega3::enumerate::USB_VENDOR;
@@ -122,15 +122,19 @@ fn run(case: &Case<'_>) -> Finding {
     if !case.sessions.is_dir() {
         return check.ok(format!("{folder} does not exist yet"));
     }
-    let running = sessions::files(case.sessions)
-        .into_iter()
-        .flatten()
-        .find_map(|s| writer_of(&s).map(|by| (s, by)));
-    match running {
+    match running(case.sessions) {
         None => check.ok("none"),
         Some((session, by)) => check.warning(
             format!("{} is written by {by}", session.display()),
             format!("skinrig status {}", session.display()),
         ),
     }
+}
+
+/// The session in `folder` that is being written, and by whom.
+pub(super) fn running(folder: &Path) -> Option<(PathBuf, String)> {
+    let sessions = sessions::files(folder).into_iter().flatten();
+    sessions
+        .into_iter()
+        .find_map(|s| writer_of(&s).map(|by| (s, by)))
 }

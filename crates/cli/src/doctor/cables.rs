@@ -5,14 +5,17 @@ use skinrig_protocol::rig::RigKind;
 
 use super::case::Case;
 use super::finding::{Finding, check};
+use super::rates::CAMERA_B_S;
 use super::survey::{LEFT_ALONE, Library, name_of};
 use super::usb::{self, UsbDevice};
 use crate::devices::{DeviceState, Line};
 
 const AREA: &str = "cables";
 const SPEED: &str = "USB speed";
-/// Speed that a camera needs, Mbit/s: at 50 Mev/s it sends 200 MB/s.
+/// Speed that a camera needs, Mbit/s.
 const CAMERA_MBIT: u64 = 5000;
+/// Most bits of 5000 Mbit/s that carry data: 8 of 10 (USB 3, 8b/10b coding).
+const CODING: f64 = 0.8;
 /// Speed of the robot, Mbit/s (USB 2.0 high speed).
 const ROBOT_MBIT: u64 = 480;
 
@@ -182,11 +185,21 @@ fn camera_speed(line: &Line, device: Option<&UsbDevice>) -> Finding {
         format!("{CAMERA_MBIT} Mbit/s or more (USB 3)"),
     );
     match device.and_then(|d| d.speed_mbit) {
-        Some(mbit) if mbit >= CAMERA_MBIT => check.ok(format!("{mbit} Mbit/s")),
-        Some(mbit) => check.problem(
-            format!("{mbit} Mbit/s"),
-            "use a USB 3 port (blue, or marked SS) and a USB 3 cable; push the plug home: half in, it is a USB 2 plug",
-        ),
+        Some(mbit) if mbit >= CAMERA_MBIT => {
+            let times = CODING * mbit as f64 * 1e6 / 8.0 / CAMERA_B_S;
+            let found = format!("{mbit} Mbit/s");
+            check
+                .ok(found)
+                .means(format!("{times:.1} times a camera's peak"))
+        }
+        Some(mbit) => {
+            let percent = 100.0 * mbit as f64 * 1e6 / 8.0 / CAMERA_B_S;
+            let finding = check.problem(
+                format!("{mbit} Mbit/s"),
+                "use a USB 3 port (blue, or marked SS) and a USB 3 cable; push the plug home: half in, it is a USB 2 plug",
+            );
+            finding.means(format!("{percent:.0} % of a camera's peak"))
+        }
         None => check.not_checked("the kernel does not report its speed"),
     }
 }
@@ -195,7 +208,9 @@ fn robot_speed(devices: &[UsbDevice]) -> Finding {
     let check = check(SPEED, "robot", format!("{ROBOT_MBIT} Mbit/s (USB 2.0)"));
     let robot = devices.iter().find(|d| d.vendor == USB_VENDOR);
     match robot.map(|d| d.speed_mbit) {
-        Some(Some(mbit)) if mbit >= ROBOT_MBIT => check.ok(format!("{mbit} Mbit/s")),
+        Some(Some(mbit)) if mbit >= ROBOT_MBIT => check
+            .ok(format!("{mbit} Mbit/s"))
+            .means("the robot's full speed"),
         Some(Some(mbit)) => check.warning(
             format!("{mbit} Mbit/s"),
             "use another port and cable: the control loop polls the arm thousands of times a second",

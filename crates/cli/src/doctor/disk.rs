@@ -1,7 +1,8 @@
-//! Checks free space and file system of the sessions folder. The preflight measures write speed.
+//! Checks free space, write speed and file system of the sessions folder.
 
 use std::path::{Path, PathBuf};
 
+use super::bench;
 use super::case::Case;
 use super::finding::{Finding, check};
 use crate::rig::gates::size;
@@ -12,6 +13,8 @@ const MIN_FREE_B: f64 = 2e9;
 const DATA_RATE_B_S: f64 = 20e6;
 /// A session of this length should fit, s. The preflight uses the length of the protocol instead.
 const ROOM_FOR_S: f64 = 3600.0;
+/// The session's log holds every byte before the session does.
+const WRITES_PER_BYTE: f64 = 2.0;
 
 /// All findings about the disk.
 pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
@@ -19,7 +22,11 @@ pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
     let absolute = std::path::absolute(case.sessions).unwrap_or_else(|_| case.sessions.to_owned());
     let existing = absolute.ancestors().find(|f| f.exists());
     let existing = existing.unwrap_or(Path::new("/"));
-    vec![space(case, existing), file_system(case, existing)]
+    vec![
+        space(case, existing),
+        speed(case, existing),
+        file_system(case, existing),
+    ]
 }
 
 fn space(case: &Case<'_>, folder: &Path) -> Finding {
@@ -40,13 +47,52 @@ fn space(case: &Case<'_>, folder: &Path) -> Finding {
         Err(why) => check.not_checked(why),
         Ok(free_b) if free_b < keep_b => check.problem(size(free_b), next),
         Ok(free_b) => {
-            let room_s = (free_b - keep_b) / rate_b_s;
-            let found = format!("{}: room for {:.1} h", size(free_b), room_s / 3600.0);
-            if room_s < ROOM_FOR_S {
-                check.warning(found, next)
+            let room_b = free_b - keep_b;
+            let hours = |b_s: f64| format!("{:.1} h", room_b / b_s / 3600.0);
+            let mut meaning = format!("{} at {}/s", hours(rate_b_s), size(rate_b_s));
+            if let Some(demo_b_s) = crate::new::demo_rate_b_s() {
+                meaning += &format!(" (demo: {:.0} h)", room_b / demo_b_s / 3600.0);
+            }
+            let finding = if room_b / rate_b_s < ROOM_FOR_S {
+                check.warning(size(free_b), next)
+            } else {
+                check.ok(size(free_b))
+            };
+            finding.means(meaning)
+        }
+    }
+}
+
+fn speed(case: &Case<'_>, folder: &Path) -> Finding {
+    let rate_b_s = case
+        .rig
+        .map_or(DATA_RATE_B_S, |r| r.preflight.data_rate_b_s);
+    let need_b_s = WRITES_PER_BYTE * rate_b_s;
+    let check = check(
+        AREA,
+        "write speed",
+        format!(
+            "at least {}/s: a run writes {}/s (preflight.data_rate), first to its log",
+            size(need_b_s),
+            size(rate_b_s)
+        ),
+    );
+    if bench::running(case.sessions).is_some() {
+        return check.not_checked("a run writes to this folder now; measuring would disturb it");
+    }
+    match (case.machine.write_b_s)(folder) {
+        Err(fault) => check.problem(fault.what, fault.next),
+        Ok(b_s) => {
+            let found = format!("{}/s", size(b_s));
+            let finding = if b_s < need_b_s {
+                check.warning(
+                    found,
+                    "end programs that use the disk, or choose a faster one with --sessions",
+                )
             } else {
                 check.ok(found)
-            }
+            };
+            finding.means(format!("{:.1} times what a run writes", b_s / need_b_s))
         }
     }
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 use skinrig_protocol::rig::RigFile;
-use skinrig_text::{Column, Table, widest};
+use skinrig_text::{Column, LongWords, Paint, Style, hang, widest};
 
 use crate::rig::bench::display_name;
 
@@ -34,6 +34,15 @@ impl Verdict {
             Self::NotChecked => "not checked",
         }
     }
+
+    const fn style(self) -> Style {
+        match self {
+            Self::Ok => Style::Good,
+            Self::Warning => Style::Warning,
+            Self::Problem => Style::Error,
+            Self::NotChecked => Style::Undecided,
+        }
+    }
 }
 
 /// One check and its result.
@@ -49,8 +58,28 @@ pub(super) struct Finding {
     pub expected: String,
     /// What was found, or why the check was not possible.
     pub found: String,
+    /// What a measured figure means for recording: how long, how fast, with which margin.
+    pub meaning: Option<String>,
     /// Next step, a command if there is one.
     pub next_step: Option<String>,
+}
+
+impl Finding {
+    /// The finding with what its figure means.
+    pub(super) fn means(self, meaning: impl Into<String>) -> Self {
+        Self {
+            meaning: Some(meaning.into()),
+            ..self
+        }
+    }
+
+    /// Found, and what it means.
+    fn explained(&self) -> String {
+        match &self.meaning {
+            Some(meaning) => format!("{}: {meaning}", self.found),
+            None => self.found.clone(),
+        }
+    }
 }
 
 /// A check without its result.
@@ -81,6 +110,7 @@ impl Check {
             verdict,
             expected: self.expected,
             found: found.into(),
+            meaning: None,
             next_step: next,
         }
     }
@@ -117,6 +147,12 @@ fn count(findings: &[Finding], verdict: Verdict) -> usize {
     findings.iter().filter(|f| f.verdict == verdict).count()
 }
 
+/// `1 problem`, `2 problems`.
+fn counted(n: usize, what: &str) -> String {
+    let plural = if n == 1 { "" } else { "s" };
+    format!("{n} {what}{plural}")
+}
+
 /// The findings as JSON.
 pub(super) fn json(rig: Option<&RigFile>, findings: &[Finding]) -> serde_json::Value {
     serde_json::json!({
@@ -130,34 +166,36 @@ pub(super) fn json(rig: Option<&RigFile>, findings: &[Finding]) -> serde_json::V
 }
 
 /// The findings as a table, by area. States what was expected only where a check did not pass.
-pub(super) fn table(rig: Option<&RigFile>, findings: &[Finding]) -> String {
+pub(super) fn table(rig: Option<&RigFile>, findings: &[Finding], paint: Paint) -> String {
     let mut out = match rig {
         Some(rig) => format!("rig       {}\n", display_name(rig)),
         None => "rig       none (--rig FILE also checks against a rig file)\n".to_owned(),
     };
     let widest = widest(findings.iter().map(|f| f.check.as_str()));
-    let table = Table::new([Column::left(11), Column::left(widest)]).indent(2);
     let mut area = "";
     for f in findings {
         if f.area != area {
             area = f.area;
-            out += &format!("{area}\n");
+            out += &format!("{}\n", paint.bold(area));
         }
-        out += &table.row([f.verdict.name(), &f.check, &f.found]);
-        out.push('\n');
+        let verdict = Column::left(11).cell(f.verdict.name());
+        let check = Column::left(widest).cell(&f.check);
+        let head = format!("  {}  {check}  ", paint.apply(f.verdict.style(), &verdict));
+        out += &hang(&head, &f.explained(), LongWords::Keep);
         if f.verdict != Verdict::Ok {
             out += &format!("{:15}expected: {}\n", "", f.expected);
         }
         if let Some(next) = &f.next_step {
-            out += &format!("{:15}next: {next}\n", "");
+            let label = paint.apply(Style::Help, "next:");
+            out += &format!("{:15}{label} {next}\n", "");
         }
     }
     let total = |verdict| count(findings, verdict);
     out += &format!(
-        "{} ok, {} warnings, {} problems, {} not checked\n",
+        "{} ok, {}, {}, {} not checked\n",
         total(Verdict::Ok),
-        total(Verdict::Warning),
-        total(Verdict::Problem),
+        counted(total(Verdict::Warning), "warning"),
+        counted(total(Verdict::Problem), "problem"),
         total(Verdict::NotChecked)
     );
     out

@@ -34,6 +34,30 @@ pub(super) struct Machine {
     root: PathBuf,
     /// Free bytes of a folder.
     pub free_b: fn(&Path) -> io::Result<f64>,
+    /// Measures how fast a folder takes bytes, bytes/s.
+    pub write_b_s: WriteSpeed,
+}
+
+/// Measures how fast a folder takes bytes, bytes/s.
+pub(super) type WriteSpeed = fn(&Path) -> Result<f64, SpeedFault>;
+
+/// The write speed cannot be measured.
+#[derive(Debug)]
+pub(super) struct SpeedFault {
+    /// Why.
+    pub what: String,
+    /// Next step.
+    pub next: String,
+}
+
+/// Enough to fill the cache of a small disk, and to be written in about a second by one that is fast enough.
+const PROBE_BYTES: u64 = 64 << 20;
+
+fn write_b_s(folder: &Path) -> Result<f64, SpeedFault> {
+    skinrig_hil::disk_write_rate(folder, PROBE_BYTES).map_err(|problem| SpeedFault {
+        what: problem.what,
+        next: problem.next.unwrap_or_default(),
+    })
 }
 
 impl Machine {
@@ -42,15 +66,21 @@ impl Machine {
         Self {
             root: PathBuf::from("/"),
             free_b: crate::rig::gates::free_bytes,
+            write_b_s,
         }
     }
 
-    /// A machine planted in `root`, with this free space everywhere.
+    /// A machine planted in `root`, with this free space and write speed everywhere.
     #[cfg(test)]
-    pub(super) fn with_root(root: &Path, free_b: fn(&Path) -> io::Result<f64>) -> Self {
+    pub(super) fn with_root(
+        root: &Path,
+        free_b: fn(&Path) -> io::Result<f64>,
+        write_b_s: WriteSpeed,
+    ) -> Self {
         Self {
             root: root.to_owned(),
             free_b,
+            write_b_s,
         }
     }
 

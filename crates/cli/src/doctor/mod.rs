@@ -15,6 +15,7 @@ mod machine;
 mod notify;
 mod permissions;
 mod power;
+mod rates;
 mod real_time;
 mod survey;
 #[cfg(test)]
@@ -31,6 +32,7 @@ use crate::rig::inputs as rig_inputs;
 use case::Case;
 use finding::{Finding, Verdict};
 use machine::Machine;
+use skinrig_text::Paint;
 use survey::Survey;
 
 /// `skinrig doctor`.
@@ -60,7 +62,11 @@ pub(crate) fn doctor(args: &DoctorArgs, json: bool) -> Outcome {
     if json {
         crate::terminal::print_json(&finding::json(rig.as_ref(), &findings));
     } else {
-        crate::terminal::out(format_args!("{}", finding::table(rig.as_ref(), &findings)));
+        let paint = Paint::new(crate::terminal::is_coloured(&std::io::stdout()));
+        crate::terminal::out(format_args!(
+            "{}",
+            finding::table(rig.as_ref(), &findings, paint)
+        ));
     }
     Ok(if findings.iter().any(|f| f.verdict == Verdict::Problem) {
         Exit::Rig

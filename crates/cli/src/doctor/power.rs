@@ -60,7 +60,9 @@ fn governor(case: &Case<'_>) -> Finding {
     let found: Vec<String> = counts.iter().map(|(g, n)| format!("{g} on {n}")).collect();
     match counts.keys().map(String::as_str).collect::<Vec<_>>()[..] {
         [] => check.not_checked("this kernel does not control the processor frequency"),
-        ["performance"] => check.ok(found.join(", ")),
+        ["performance"] => check
+            .ok(found.join(", "))
+            .means("no slow wake-up"),
         _ => check.warning(
             found.join(", "),
             "sudo cpupower frequency-set -g performance; permanently: your distribution's power profile",

@@ -8,6 +8,7 @@ use super::access::{CAP_IPC_LOCK, CAP_SYS_NICE};
 use super::case::Case;
 use super::finding::{Check, Finding, check};
 use super::machine::MachineError;
+use super::rates::CAMERA_B_S;
 use crate::rig::gates::size;
 
 const AREA: &str = "real time";
@@ -83,7 +84,9 @@ fn priority(case: &Case<'_>, limits: &Limits) -> Finding {
     );
     match soft(limits, "Max realtime priority") {
         Err(why) => check.not_checked(why),
-        Ok(n) if n > 0 => check.ok(format!("up to {}", n.min(99))),
+        Ok(n) if n > 0 => check
+            .ok(format!("up to {}", n.min(99)))
+            .means("control goes before all else"),
         Ok(_) if has_capability(case, CAP_SYS_NICE) => check.ok("by CAP_SYS_NICE"),
         Ok(_) => check.warning("none", raise_limits(case)),
     }
@@ -93,7 +96,7 @@ fn locked_memory(case: &Case<'_>, limits: &Limits) -> Finding {
     let check = check(AREA, "locked memory", "unlimited (RLIMIT_MEMLOCK)");
     match soft(limits, "Max locked memory") {
         Err(why) => check.not_checked(why),
-        Ok(u64::MAX) => check.ok("unlimited"),
+        Ok(u64::MAX) => check.ok("unlimited").means("control never waits for swap"),
         Ok(_) if has_capability(case, CAP_IPC_LOCK) => check.ok("by CAP_IPC_LOCK"),
         Ok(bytes) => check.warning(size(bytes as f64), raise_limits(case)),
     }
@@ -113,7 +116,12 @@ fn usb_buffers(case: &Case<'_>) -> Finding {
     match case.machine.number(file) {
         None => check.not_checked(format!("cannot read {file}")),
         Some(0) => check.ok("unlimited"),
-        Some(mb) if mb >= need_mb => check.ok(format!("{mb} MiB")),
+        Some(mb) if mb >= need_mb => {
+            let times = mb as f64 / need_mb as f64;
+            check
+                .ok(format!("{mb} MiB"))
+                .means(format!("{times:.1} times both cameras' transfers"))
+        }
         Some(mb) => check.problem(
             format!("{mb} MiB"),
             format!("echo 64 | sudo tee {file}; permanently: usbcore.usbfs_memory_mb=64 on the kernel's command line"),
@@ -123,13 +131,18 @@ fn usb_buffers(case: &Case<'_>) -> Finding {
 
 /// Twice the largest backlog of both cameras: the recorder needs as much again.
 fn memory(case: &Case<'_>) -> Finding {
-    let need_b = (4 * Evk1Config::default().backlog_bytes) as f64;
+    let backlog_b = Evk1Config::default().backlog_bytes as f64;
+    let need_b = 4.0 * backlog_b;
     let check = check(AREA, "memory", format!("{} available", size(need_b)));
     match case.machine.table("/proc/meminfo") {
         Err(why) => check.not_checked(why),
         Ok(table) => match kib(&table, "MemAvailable") {
             None => check.not_checked("/proc/meminfo has no line MemAvailable"),
-            Some(bytes) if bytes >= need_b => check.ok(size(bytes)),
+            Some(bytes) if bytes >= need_b => check.ok(size(bytes)).means(format!(
+                "{:.0} times the buffers for {:.1} s",
+                bytes / need_b,
+                backlog_b / CAMERA_B_S
+            )),
             Some(bytes) => check.warning(
                 size(bytes),
                 "end other programs: a browser, a desktop, other analyses",
@@ -158,7 +171,9 @@ fn pressure(case: &Case<'_>) -> Finding {
     let word = some.and_then(|l| l.split(' ').find_map(|w| w.strip_prefix("avg60=")));
     match word.and_then(|w| w.parse::<f64>().ok()) {
         None => check.not_checked("/proc/pressure/memory has no avg60"),
-        Some(percent) if percent <= MAX_PRESSURE_PERCENT => check.ok(format!("{percent} %")),
+        Some(percent) if percent <= MAX_PRESSURE_PERCENT => check
+            .ok(format!("{percent} %"))
+            .means("nothing waits for swapping"),
         Some(percent) => check.warning(
             format!("{percent} %"),
             "end the program that uses most memory (`ps --sort=-rss -eo pid,rss,comm | head`); pauses for swapping lose data",

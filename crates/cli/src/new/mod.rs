@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 pub(crate) use self::files::ProtocolKind;
 use self::files::{LAB, PROTOCOL_SCHEMA, StarterFile};
 use crate::args::{InitArgs, NewArgs};
+use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
 
 /// Outcome of writing a file.
@@ -21,6 +22,14 @@ enum WriteOutcome {
     Updated,
     /// Existing file, unchanged.
     Kept,
+}
+
+/// Bytes of both cameras per second of the demonstration, at the published event rates.
+pub(crate) fn demo_rate_b_s() -> Option<f64> {
+    let demo = ProtocolKind::Demo.file();
+    let checked = check::load_text(demo.name(), &demo.content(), &[]).ok()?;
+    let summary = checked.plan.summary();
+    Some(summary.expected_bytes / summary.duration_s)
 }
 
 /// Writes one protocol of a kind, and the schema for editors beside it. Never overwrites a protocol.

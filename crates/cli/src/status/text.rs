@@ -2,11 +2,18 @@
 
 use skinrig_model::{HostDuration, RunEnd};
 use skinrig_recorder::{PressTally, SessionTotals};
+use skinrig_text::{LongWords, hang};
 
 use super::state::{LastOutcome, Status, Stored};
 use crate::progress::{clock_text, eta_text};
 use crate::remote::RunSnapshot;
 use crate::rig::gates;
+
+/// Prints `text` beside a label, wrapped; commands and paths stay whole.
+fn line(label: &str, text: &str) {
+    let text = hang(&format!("{label:<10}"), text, LongWords::Keep);
+    crate::terminal::out(format_args!("{text}"));
+}
 
 /// `: reason`, or nothing.
 fn because(reason: Option<&str>) -> String {
@@ -43,19 +50,15 @@ fn state(status: &Status) -> String {
 
 /// Prints the state, one label a line, then what happened last.
 pub(super) fn print(status: &Status) {
-    outln!("session   {}", status.session.display());
-    outln!("state     {}", state(status));
+    line("session", &status.session.display().to_string());
+    line("state", &state(status));
     let stored = status.stored.as_ref();
     if let Some(s) = stored {
-        outln!(
-            "run       {} on {}, rig {}; begun {} by {}; leg {}",
-            s.protocol,
-            s.prototype,
-            s.rig,
-            s.started_at,
-            s.operator,
-            s.legs
+        let run = format!(
+            "{} on {}, rig {}; begun {} by {}; leg {}",
+            s.protocol, s.prototype, s.rig, s.started_at, s.operator, s.legs
         );
+        line("run", &run);
     }
     match (&status.live, stored) {
         (Some(live), _) => print_live(live),
@@ -63,10 +66,13 @@ pub(super) fn print(status: &Status) {
         (None, None) => {}
     }
     let lost = stored.map_or(0, |s| s.totals.lost_bytes);
-    outln!("lost      {lost} bytes of the camera streams in the session file");
+    line(
+        "lost",
+        &format!("{lost} bytes of the camera streams in the session file"),
+    );
     match status.disk_free_bytes {
-        Some(free) => outln!("disk      {} free", gates::size(free as f64)),
-        None => outln!("disk      free space unknown"),
+        Some(free) => line("disk", &format!("{} free", gates::size(free as f64))),
+        None => line("disk", "free space unknown"),
     }
     if let Some(stored) = stored {
         print_latest(stored);
@@ -86,18 +92,21 @@ fn print_latest(stored: &Stored) {
             number => format!(", attempt {number}"),
         };
         let reason = because(verdict.reason().as_deref());
-        outln!("          {press}{again} {}{reason}", verdict.name());
+        line("", &format!("{press}{again} {}{reason}", verdict.name()));
     }
     let earlier = stored.interruption_count - stored.last_interruptions.len();
     if earlier > 0 {
-        outln!("          {earlier} earlier interruptions");
+        line("", &format!("{earlier} earlier interruptions"));
     }
     for row in &stored.last_interruptions {
         let (t, kind) = (row.t.as_secs_f64(), row.kind.name());
-        outln!("          {t:.3} s  {kind}: {}", row.reason);
+        line("", &format!("{t:.3} s {kind}: {}", row.reason));
     }
     for row in &stored.last_notes {
-        outln!("          {:.3} s  note: {}", row.t.as_secs_f64(), row.text);
+        line(
+            "",
+            &format!("{:.3} s note: {}", row.t.as_secs_f64(), row.text),
+        );
     }
 }
 
@@ -110,8 +119,8 @@ fn print_live(live: &RunSnapshot) {
         let [x, y] = p.at_mm;
         format!(" ({block}, at ({x:.1}, {y:.1}) mm)")
     });
-    outln!(
-        "press     {} of {}{press}; {} done: {} valid, {} invalid, {} missed, {} excluded; {} retaken",
+    let text = format!(
+        "{} of {}{press}; {} done: {} valid, {} invalid, {} missed, {} excluded; {} retaken",
         live.press.as_ref().map_or(0, |p| p.number),
         live.planned,
         live.done,
@@ -121,37 +130,37 @@ fn print_live(live: &RunSnapshot) {
         live.excluded,
         live.retaken
     );
+    line("press", &text);
     let seconds = HostDuration::from_secs_f64;
     let elapsed = seconds(live.elapsed_s);
     let waited = std::time::Duration::try_from_secs_f64(live.waited_s).unwrap_or_default();
-    outln!(
-        "time      {} of rig time in this leg; eta {}",
+    let text = format!(
+        "{} of rig time in this leg; eta {}",
         clock_text(elapsed),
         eta_text(elapsed, live.eta_s.map(seconds), waited)
     );
+    line("time", &text);
     let [one, two] = live.cameras.each_ref().map(|c| {
         c.events_per_s
             .map_or_else(|| "-".to_owned(), |r| format!("{:.1}", r / 1e3))
     });
     let [a, b] = &live.cameras;
-    outln!(
-        "streams   camera 1 {one}, camera 2 {two} kev/s; trigger {} sent, {}+{} seen; {}+{} bytes lost in this leg",
-        live.marks_sent,
-        a.marks_seen,
-        b.marks_seen,
-        a.lost_bytes,
-        b.lost_bytes
+    let text = format!(
+        "camera 1 {one}, camera 2 {two} kev/s; trigger {} sent, {}+{} seen; {}+{} bytes lost in this leg",
+        live.marks_sent, a.marks_seen, b.marks_seen, a.lost_bytes, b.lost_bytes
     );
+    line("streams", &text);
 }
 
 fn print_planned(totals: &SessionTotals) {
     let both = |of: fn(&PressTally) -> u64| of(&totals.presses) + of(&totals.sync);
-    outln!(
-        "press     {} planned: {} valid, {} invalid, {} missed, {} excluded",
+    let text = format!(
+        "{} planned: {} valid, {} invalid, {} missed, {} excluded",
         both(|t| t.planned),
         both(|t| t.valid),
         both(|t| t.invalid),
         both(|t| t.missed),
         both(|t| t.excluded)
     );
+    line("press", &text);
 }

@@ -1,29 +1,153 @@
-//! Draws a frame as text: about 80 columns, no control characters.
+//! Draws a frame as text for a terminal of any width.
 
 use skinrig_model::text::is_hidden;
 use skinrig_model::{HostDuration, PressRole};
+use skinrig_text::{Column, LongWords, Paint, Style, Table, WIDTH, clip, wrap};
 
-use super::frame::{Frame, LatestAttempt, LocationStatus};
+use super::failures::{CameraLoss, Failure};
+use super::frame::{Frame, LatestAttempt};
+use super::map::map;
 use crate::progress::{clock_text, eta_text};
 use crate::remote::RunSnapshot;
 use crate::rig::gates;
 
-/// Maximum size of the map, columns and rows.
-const MAX_CELLS: [usize; 2] = [36, 18];
+/// Number of causes shown.
+const CAUSES: usize = 4;
+/// Narrowest terminal that lines fit.
+const NARROW: usize = 40;
+/// Columns from which the latest presses show their places.
+const PLACE_FROM: usize = 60;
+/// Less free space than this is pointed out, bytes.
+const LOW_DISK_BYTES: u64 = 2_000_000_000;
 
-/// The frame as text.
-#[must_use]
-pub(super) fn text(frame: &Frame) -> String {
+/// Where a frame is drawn.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Canvas {
+    columns: usize,
+    /// Lines of the terminal; `None` without one.
+    rows: Option<usize>,
+    paint: Paint,
+}
+
+impl Canvas {
+    /// A terminal of this size; without one, lines of the usual width.
+    pub(super) fn new(size: Option<(u16, u16)>, paint: Paint) -> Self {
+        Self {
+            columns: size.map_or(WIDTH, |(_, columns)| usize::from(columns).max(NARROW)),
+            rows: size.map(|(rows, _)| usize::from(rows)),
+            paint,
+        }
+    }
+
+    /// A line with a label in the first nine columns, wrapped.
+    fn line(&self, label: &str, style: Option<Style>, text: &str) -> Vec<String> {
+        // Text from untrusted files must not move the cursor.
+        let plain = text.replace(|c: char| c.is_control() || is_hidden(c), " ");
+        let label = format!("{label:<9}");
+        let room = self.columns.saturating_sub(label.len());
+        let wrapped = wrap(&plain, room, LongWords::Cut);
+        let paint = |(i, text): (usize, &String)| {
+            let line = format!("{:<9}{text}", if i == 0 { &label } else { "" });
+            match style {
+                Some(style) => self.paint.apply(style, &line),
+                None => line,
+            }
+        };
+        wrapped.iter().enumerate().map(paint).collect()
+    }
+}
+
+/// The frame as text: what needs attention first, then progress, map, latest presses and interruptions. On a low terminal the
+/// map and the latest presses are left out.
+pub(super) fn text(frame: &Frame, canvas: Canvas) -> String {
+    let mut lines = canvas.line("session", None, &frame.session.display().to_string());
+    lines.extend(state(frame, canvas));
+    lines.extend(attention(frame, canvas));
+    lines.extend(progress(frame, canvas));
+    let mut tail = failures(frame, canvas);
+    tail.extend(interruptions(frame, canvas));
+    for more in [
+        latest(frame, canvas),
+        under_blank(map(frame, canvas.columns)),
+    ] {
+        let height = lines.len() + more.len() + tail.len();
+        if canvas.rows.is_none_or(|rows| height < rows) {
+            lines.extend(more);
+        }
+    }
+    lines.extend(tail);
+    lines.join("\n")
+}
+
+/// The lines below an empty one, if there are any.
+fn under_blank(lines: Vec<String>) -> Vec<String> {
+    let blank = (!lines.is_empty()).then(String::new);
+    blank.into_iter().chain(lines).collect()
+}
+
+fn state(frame: &Frame, canvas: Canvas) -> Vec<String> {
+    let mut lines = canvas.line("state", None, &frame.state);
+    let run = format!(
+        "{} on {}, rig {}; begun {}",
+        frame.protocol, frame.prototype, frame.rig, frame.started_at
+    );
+    lines.extend(canvas.line("run", None, &run));
+    lines
+}
+
+/// What the operator should look at.
+fn attention(frame: &Frame, canvas: Canvas) -> Vec<String> {
+    let mut lines = Vec::new();
+    let last = frame
+        .latest
+        .last()
+        .and_then(|press| press.reason.as_deref());
+    if let (n @ 1.., Some(reason)) = (frame.failures_in_a_row, last) {
+        let which = match n {
+            1 => "the last attempt is invalid".to_owned(),
+            n => format!("the last {n} attempts are invalid"),
+        };
+        let text = format!("{which}: {reason}");
+        lines.extend(canvas.line("FAILING", Some(Style::Error), &text));
+    }
+    for (k, loss) in frame.losses.iter().enumerate() {
+        let live = frame.live.as_ref().map_or(0, |l| l.cameras[k].lost_bytes);
+        if loss.bytes.max(live) > 0 {
+            let text = format!("camera {}: {}", k + 1, lost(*loss, live));
+            lines.extend(canvas.line("LOST", Some(Style::Error), &text));
+        }
+    }
+    if let Some(free) = frame.disk_free_bytes.filter(|b| *b < LOW_DISK_BYTES) {
+        let free = gates::size(free as f64);
+        let text = format!(
+            "expected at least {} free, found {free}",
+            gates::size(LOW_DISK_BYTES as f64)
+        );
+        lines.extend(canvas.line("DISK", Some(Style::Warning), &text));
+    }
+    lines
+}
+
+/// `4096 bytes in 2 gaps, 1.3 ms`. The run may have lost bytes that are not in the file yet.
+fn lost(loss: CameraLoss, live_bytes: u64) -> String {
+    let mut text = format!("{} bytes", loss.bytes.max(live_bytes));
+    if loss.gaps > 0 {
+        let plural = if loss.gaps == 1 { "" } else { "s" };
+        text += &format!(" in {} gap{plural}", loss.gaps);
+        if let Some(us) = loss.lost_us {
+            text += &format!(", {:.1} ms", us as f64 / 1e3);
+        }
+    }
+    text + "; presses in the gaps are invalid"
+}
+
+fn progress(frame: &Frame, canvas: Canvas) -> Vec<String> {
     let p = &frame.presses;
-    let mut lines = vec![
-        format!("session  {}", frame.session.display()),
-        format!("state    {}", frame.state),
-        format!(
-            "run      {} on {}, rig {}; begun {}",
-            frame.protocol, frame.prototype, frame.rig, frame.started_at
-        ),
-        format!(
-            "presses  {} planned: {} valid, {} invalid, {} missed, {} excluded, {} to go",
+    let mut lines = canvas.line(
+        "presses",
+        None,
+        &format!(
+            "{} planned: {} valid, {} invalid, {} missed, {} excluded, {} to go",
             p.planned,
             p.valid,
             p.invalid,
@@ -31,36 +155,17 @@ pub(super) fn text(frame: &Frame) -> String {
             p.excluded,
             p.open()
         ),
-    ];
+    );
     if let Some(live) = &frame.live {
-        lines.extend(of_run(live));
+        lines.extend(of_run(live, canvas));
     }
     let free = frame.disk_free_bytes.map(|b| gates::size(b as f64));
     let free = free.unwrap_or_else(|| "unknown".into());
-    lines.push(format!("disk     {free} free"));
-    lines.push(String::new());
-    lines.extend(map(frame));
-    if !frame.latest.is_empty() {
-        lines.push(String::new());
-        lines.push("latest presses            signal to noise, camera 1 and 2".to_owned());
-        lines.extend(frame.latest.iter().map(latest));
-    }
-    if !frame.faults.is_empty() {
-        lines.push(String::new());
-        let more = frame.fault_count - frame.faults.len();
-        lines.push(match more {
-            0 => "interruptions".to_owned(),
-            n => format!("interruptions ({n} earlier ones)"),
-        });
-        let faults = frame.faults.iter();
-        lines.extend(faults.map(|f| format!("  {:>10.3} s  {}: {}", f.t_s, f.kind, f.reason)));
-    }
-    // Text from untrusted files must not move the cursor.
-    let plain = |line: String| line.replace(|c: char| c.is_control() || is_hidden(c), " ");
-    lines.into_iter().map(plain).collect::<Vec<_>>().join("\n")
+    lines.extend(canvas.line("disk", None, &format!("{free} free")));
+    lines
 }
 
-fn of_run(live: &RunSnapshot) -> Vec<String> {
+fn of_run(live: &RunSnapshot, canvas: Canvas) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(p) = &live.press {
         let block = match p.role {
@@ -68,152 +173,156 @@ fn of_run(live: &RunSnapshot) -> Vec<String> {
             PressRole::Calibrate | PressRole::Score => format!("repetition {}", p.repetition),
         };
         let [x, y] = p.at_mm;
-        lines.push(format!(
-            "now      press {} of {} ({block}) at ({x:.1}, {y:.1}) mm; {} retaken",
+        let text = format!(
+            "press {} of {} ({block}) at ({x:.1}, {y:.1}) mm; {} retaken",
             p.number, live.planned, live.retaken
-        ));
+        );
+        lines.extend(canvas.line("now", None, &text));
     }
     let seconds = HostDuration::from_secs_f64;
     let elapsed = seconds(live.elapsed_s);
     let waited = std::time::Duration::try_from_secs_f64(live.waited_s).unwrap_or_default();
-    lines.push(format!(
-        "time     {} of rig time in this leg; eta {}",
+    let text = format!(
+        "{} of rig time in this leg; eta {}",
         clock_text(elapsed),
         eta_text(elapsed, live.eta_s.map(seconds), waited)
-    ));
+    );
+    lines.extend(canvas.line("time", None, &text));
     for (k, camera) in live.cameras.iter().enumerate() {
         let rate = camera.events_per_s.map(|r| format!("{:.1}", r / 1e3));
-        lines.push(format!(
-            "camera {} {:>9} kev/s; {} of {} marks seen; {} bytes lost",
-            k + 1,
+        let text = format!(
+            "{:>7} kev/s; {} of {} marks seen",
             rate.as_deref().unwrap_or("-"),
             camera.marks_seen,
-            live.marks_sent,
-            camera.lost_bytes
-        ));
+            live.marks_sent
+        );
+        lines.extend(canvas.line(&format!("camera {}", k + 1), None, &text));
     }
     lines
 }
 
-fn latest(press: &LatestAttempt) -> String {
-    let [one, two] = press
-        .cameras
-        .map(|signal| signal.map_or_else(|| "-".to_owned(), |s| format!("{:.1}", s.ratio())));
-    let [x, y] = press.at_mm;
-    let attempt_note = match press.attempt {
-        1 => String::new(),
-        n => format!(", attempt {n}"),
-    };
-    let reason = press.reason.as_deref();
-    let reason = reason.map_or_else(String::new, |r| format!(": {r}"));
-    format!(
-        "  {:>5}  ({x:>6.1}, {y:>6.1}) mm  {one:>7} {two:>7}  {}{attempt_note}{reason}",
-        press.press, press.verdict
-    )
+/// Invalid attempts by cause.
+fn failures(frame: &Frame, canvas: Canvas) -> Vec<String> {
+    let mut lines = Vec::new();
+    for failure in frame.failures.iter().take(CAUSES) {
+        let count = format!("{:>5} x", failure.attempts);
+        lines.extend(canvas.line(&count, None, &cause(failure)));
+    }
+    let rest: usize = frame.failures.iter().skip(CAUSES).map(|f| f.attempts).sum();
+    if rest > 0 {
+        lines.extend(canvas.line(&format!("{rest:>5} x"), None, "other causes"));
+    }
+    if !lines.is_empty() {
+        lines.insert(0, canvas.paint.bold("invalid attempts, by cause"));
+    }
+    under_blank(lines)
 }
 
-/// Map of the locations from above, y up: one character each, or several locations per character if there are too many.
-fn map(frame: &Frame) -> Vec<String> {
-    let axis = |k: usize| Axis::new(frame.places.iter().map(|p| p.at_mm[k]), MAX_CELLS[k]);
-    let (Some(x), Some(y)) = (axis(0), axis(1)) else {
-        return Vec::new();
+fn cause(failure: &Failure) -> String {
+    let numbers: Vec<String> = failure.presses.iter().map(ToString::to_string).collect();
+    let which = match failure.presses.len() {
+        1 => "press",
+        _ => "latest presses",
     };
-    let mut cells = vec![vec![None::<LocationStatus>; x.cells]; y.cells];
-    for place in &frame.places {
-        let cell = &mut cells[y.cells - 1 - y.of(place.at_mm[1])][x.of(place.at_mm[0])];
-        match cell {
-            None => *cell = Some(place.clone()),
-            Some(sum) => {
-                sum.planned += place.planned;
-                sum.valid += place.valid;
-                sum.failed += place.failed;
-            }
-        }
-    }
-    let live = frame.live.as_ref().and_then(|live| live.press.as_ref());
-    let now = live
-        .filter(|press| press.role != PressRole::Sync)
-        .map(|press| (y.cells - 1 - y.of(press.at_mm[1]), x.of(press.at_mm[0])));
-    let row = |(i, row): (usize, &Vec<Option<LocationStatus>>)| {
-        let cell = |(j, cell): (usize, &Option<LocationStatus>)| match cell {
-            _ if now == Some((i, j)) => "@ ",
-            None => "  ",
-            Some(place) => mark(place),
+    let good = match failure.made_good {
+        0 => String::new(),
+        n => format!("; {n} made good by a retake"),
+    };
+    format!("{} ({which} {}{good})", failure.reason, numbers.join(", "))
+}
+
+fn latest(frame: &Frame, canvas: Canvas) -> Vec<String> {
+    let has_place = canvas.columns >= PLACE_FROM;
+    let place = Column::right(if has_place { 20 } else { 0 });
+    let number = Column::right(7);
+    let table = Table::new([number, place, number, number]).gap(1);
+    let row = |cells: [&str; 5]| clip(&table.row(cells), canvas.columns);
+    let of = |press: &LatestAttempt| {
+        let [x, y] = press.at_mm;
+        let at = if has_place {
+            format!("({x:.1}, {y:.1}) mm")
+        } else {
+            String::new()
         };
-        let text: String = row.iter().enumerate().map(cell).collect();
-        format!("  {}", text.trim_end())
+        let ratio = |k: usize| {
+            press.cameras[k].map_or_else(|| "-".to_owned(), |s| format!("{:.1}", s.ratio()))
+        };
+        let again = match press.attempt {
+            1 => String::new(),
+            n => format!(", attempt {n}"),
+        };
+        let verdict = format!(" {}{again}", press.verdict);
+        row([
+            &press.press.to_string(),
+            &at,
+            &ratio(0),
+            &ratio(1),
+            &verdict,
+        ])
     };
-    let mut lines: Vec<String> = cells.iter().enumerate().map(row).collect();
-    lines.push("  . to do  o begun  # done  x not all valid  @ now".to_owned());
-    lines
+    let mut lines: Vec<String> = frame.latest.iter().map(of).collect();
+    if !lines.is_empty() {
+        let head = row([
+            "press",
+            if has_place { "place" } else { "" },
+            "SNR 1",
+            "SNR 2",
+            "",
+        ]);
+        lines.insert(0, canvas.paint.bold(&head));
+    }
+    under_blank(lines)
 }
 
-fn mark(place: &LocationStatus) -> &'static str {
-    match (place.valid, place.failed) {
-        (_, 1..) => "x ",
-        (0, 0) => ". ",
-        (valid, 0) if valid < place.planned => "o ",
-        _ => "# ",
+fn interruptions(frame: &Frame, canvas: Canvas) -> Vec<String> {
+    let mut lines = Vec::new();
+    for f in &frame.faults {
+        let text = format!("{}: {}", f.kind, f.reason);
+        lines.extend(canvas.line(&format!("{:>6.1} s", f.t_s), None, &text));
     }
-}
-
-/// Maps coordinates along one axis to cells.
-struct Axis {
-    from: f64,
-    span: f64,
-    cells: usize,
-}
-
-impl Axis {
-    fn new(values: impl Iterator<Item = f64>, most: usize) -> Option<Self> {
-        let mut values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
-        values.sort_by(f64::total_cmp);
-        values.dedup_by(|a, b| (*a - *b).abs() < 0.01);
-        let (from, to) = (*values.first()?, *values.last()?);
-        Some(Self {
-            from,
-            span: to - from,
-            cells: values.len().min(most),
-        })
+    if !lines.is_empty() {
+        let head = match frame.fault_count - frame.faults.len() {
+            0 => "interruptions".to_owned(),
+            n => format!("interruptions ({n} earlier ones)"),
+        };
+        lines.insert(0, canvas.paint.bold(&head));
     }
-
-    fn of(&self, value: f64) -> usize {
-        if self.span == 0.0 {
-            return 0;
-        }
-        let last = (self.cells - 1) as f64;
-        // Only non-finite values are outside; they become 0.
-        ((value - self.from) / self.span * last)
-            .round()
-            .clamp(0.0, last) as usize
-    }
+    under_blank(lines)
 }
 
 #[cfg(test)]
 mod tests {
+    use skinrig_text::width;
+
     use super::*;
 
     #[test]
-    fn each_place_shows_its_progress() {
-        let place = |planned, valid, failed| LocationStatus {
-            at_mm: [0.0; 2],
-            planned,
-            valid,
-            failed,
-        };
-        let marks = [(2, 0, 0), (2, 1, 0), (2, 2, 0), (2, 1, 1)];
-        let marks = marks.map(|(p, v, f)| mark(&place(p, v, f)));
-        assert_eq!(marks, [". ", "o ", "# ", "x "]);
+    fn lines_fit_a_narrow_terminal_and_hostile_text_is_plain() {
+        let canvas = Canvas::new(Some((24, 44)), Paint::new(false));
+        let reason =
+            "the last 3 attempts are invalid: camera 1 sent no bytes\u{1b}[2J for a long time";
+        let lines = canvas.line("FAILING", None, reason);
+        assert!(
+            lines.len() > 1 && lines.iter().all(|l| width(l) <= 44),
+            "{lines:?}"
+        );
+        assert!(lines[1].starts_with("         "));
+        assert!(!lines.concat().contains('\u{1b}'));
     }
 
     #[test]
-    fn places_spread_over_the_map() {
-        let axis = Axis::new([4.0, -4.0, 0.0, 4.0].into_iter(), 18).unwrap();
-        assert_eq!(axis.cells, 3);
-        assert_eq!([-4.0, 0.0, 4.0].map(|v| axis.of(v)), [0, 1, 2]);
-        let many = Axis::new((0..100).map(f64::from), 18).unwrap();
-        assert_eq!((many.cells, many.of(0.0), many.of(99.0)), (18, 0, 17));
-        assert_eq!(Axis::new([1.0].into_iter(), 5).unwrap().of(1.0), 0);
-        assert!(Axis::new([].into_iter(), 5).is_none());
+    fn losses_are_described_with_their_length() {
+        let loss = CameraLoss {
+            bytes: 64,
+            gaps: 2,
+            lost_us: Some(1_300),
+        };
+        assert!(lost(loss, 0).starts_with("64 bytes in 2 gaps, 1.3 ms;"));
+        let none = CameraLoss {
+            bytes: 0,
+            gaps: 0,
+            lost_us: Some(0),
+        };
+        assert!(lost(none, 8).starts_with("8 bytes;"));
     }
 }

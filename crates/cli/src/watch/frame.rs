@@ -9,6 +9,7 @@ use skinrig_controller::State;
 use skinrig_model::{AttemptId, PlannedPress, PressOutcome, PressRole, PressVerdict, RunEnd};
 use skinrig_recorder::{AttemptRow, PressTally, RecorderError, SessionReader};
 
+use super::failures::{self, CameraLoss, EndedAttempt, Failure};
 use super::signal::{Signal, signals};
 use crate::paths;
 use crate::remote::{RemoteError, Reply, Request, RunSnapshot, ask};
@@ -47,6 +48,12 @@ pub(super) struct Frame {
     pub presses: PressTally,
     /// Locations of the path with their progress.
     pub places: Vec<LocationStatus>,
+    /// Invalid attempts since the last other one.
+    pub failures_in_a_row: usize,
+    /// Invalid attempts by cause, most frequent first.
+    pub failures: Vec<Failure>,
+    /// Lost bytes of each camera, in the file.
+    pub losses: [CameraLoss; 2],
     /// The latest attempts, oldest first.
     pub latest: Vec<LatestAttempt>,
     /// The latest interruptions, oldest first.
@@ -174,25 +181,27 @@ impl Follower {
         let end = reader.end()?.map(|(_, end)| end);
         let sealed = reader.seal()?.is_some();
         let (tally, _) = reader.tallies()?;
-        let latest = latest(&presses);
+        let losses = failures::losses(&reader)?;
+        let ended = failures::ended(&presses);
+        let latest = &ended[ended.len().saturating_sub(LATEST)..];
         if let Some(head) = &self.head {
-            let is_new =
-                |o: &&(&PlannedPress, &PressOutcome)| !self.signals.contains_key(&o.1.attempt);
-            let new: Vec<&PressOutcome> = latest.iter().filter(is_new).map(|o| o.1).collect();
+            let outcomes = latest.iter().map(|a| a.outcome);
+            let is_new = |o: &&PressOutcome| !self.signals.contains_key(&o.attempt);
+            let new: Vec<&PressOutcome> = outcomes.filter(is_new).collect();
             if !new.is_empty() {
                 self.signals.extend(signals(&reader, head.formats, &new)?);
             }
         }
         drop(reader);
-        let row = |(planned, outcome): &(&PlannedPress, &PressOutcome)| LatestAttempt {
-            press: planned.id.number(),
-            attempt: outcome.attempt.number,
-            at_mm: [planned.at.x_mm, planned.at.y_mm],
-            verdict: outcome.verdict.name().to_owned(),
-            reason: outcome.verdict.reason(),
+        let row = |a: &EndedAttempt<'_>| LatestAttempt {
+            press: a.planned.id.number(),
+            attempt: a.outcome.attempt.number,
+            at_mm: [a.planned.at.x_mm, a.planned.at.y_mm],
+            verdict: a.outcome.verdict.name().to_owned(),
+            reason: a.outcome.verdict.reason(),
             cameras: self
                 .signals
-                .get(&outcome.attempt)
+                .get(&a.outcome.attempt)
                 .copied()
                 .unwrap_or_default(),
         };
@@ -220,6 +229,9 @@ impl Follower {
             started_at: of(|h| &h.started_at),
             presses: tally,
             places: places(&presses),
+            failures_in_a_row: failures::failures_in_a_row(&ended),
+            failures: failures::failures(&ended),
+            losses,
             latest,
             faults: faults.collect(),
             fault_count,
@@ -258,19 +270,6 @@ fn state(
             "cut off: no program is running it; `skinrig resume` continues it".to_owned()
         }
     }
-}
-
-/// The attempts that ended last, oldest first, without missed presses.
-fn latest(presses: &[(PlannedPress, Vec<AttemptRow>)]) -> Vec<(&PlannedPress, &PressOutcome)> {
-    let mut all: Vec<(&PlannedPress, &PressOutcome)> = presses
-        .iter()
-        .flat_map(|(planned, attempts)| attempts.iter().map(move |a| (planned, a)))
-        .filter_map(|(planned, attempt)| Some((planned, attempt.outcome.as_ref()?)))
-        .filter(|(_, outcome)| !matches!(outcome.verdict, PressVerdict::Missed(_)))
-        .collect();
-    // A press that a further leg repeated precedes later ones in the plan.
-    all.sort_by_key(|(_, outcome)| outcome.timing.map(|t| t.release));
-    all.split_off(all.len().saturating_sub(LATEST))
 }
 
 /// The locations of the path in the order of their first press, without sync presses.

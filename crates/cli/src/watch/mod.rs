@@ -4,14 +4,18 @@
 //! that the run reports on request. It cannot affect the run.
 
 mod draw;
+mod failures;
 mod frame;
+mod map;
 mod signal;
 
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use console::Term;
 use skinrig_recorder::{RecorderError, writer_of};
+use skinrig_text::Paint;
 
 use crate::args::WatchArgs;
 use crate::exit::{Exit, Failure, Outcome};
@@ -106,11 +110,14 @@ fn show(frame: &Frame, json: bool, once: bool) -> Result<(), Failure> {
         crate::terminal::print_json(&value);
         return Ok(());
     }
-    let clear = if once || !std::io::stdout().is_terminal() {
-        ""
-    } else {
-        CLEAR
-    };
-    crate::terminal::out(format_args!("{clear}{}\n", draw::text(frame)));
+    let stdout = std::io::stdout();
+    let size = stdout.is_terminal().then(|| Term::stdout().size());
+    let paint = Paint::new(crate::terminal::is_coloured(&stdout));
+    let redraws = size.is_some() && !once;
+    // What was printed once can be scrolled back.
+    let size = size.map(|(rows, columns)| (if once { u16::MAX } else { rows }, columns));
+    let clear = if redraws { CLEAR } else { "" };
+    let text = draw::text(frame, draw::Canvas::new(size, paint));
+    crate::terminal::out(format_args!("{clear}{text}\n"));
     Ok(())
 }

@@ -33,6 +33,7 @@ mod notify;
 mod numbering;
 mod operator;
 mod options;
+mod pictures;
 mod pipeline;
 mod python;
 mod replay;
@@ -46,6 +47,8 @@ mod starter;
 mod strangers;
 mod streams;
 mod support;
+#[cfg(unix)]
+mod terminal_picture;
 mod tours;
 mod tradeoff;
 mod trend;

@@ -37,7 +37,7 @@ fn a_run_in_real_time_is_shown_with_its_path_its_rates_and_its_signals() {
         "kev/s",
         "eta 0:00:",
         "@",
-        "signal to noise",
+        "SNR 2",
         " free",
     ] {
         assert!(words.contains(word), "{word} in {words}");
@@ -51,6 +51,65 @@ fn a_run_in_real_time_is_shown_with_its_path_its_rates_and_its_signals() {
     let states: Vec<&str> = output.lines().filter(|l| l.starts_with("state ")).collect();
     assert_eq!(states.last(), Some(&"state    stopped"), "{states:?}");
     assert_eq!(run.end().0, Some(5));
+}
+
+/// Camera 1 stops sending in the third hold: presses fail, one after the other, until the run gives up.
+#[test]
+fn failing_presses_are_shown_with_their_cause_while_the_run_goes_on() {
+    let lab = Lab::new();
+    let folder = lab.text("s");
+    let fault = "camera1-stalled@hold:3";
+    let mut run = LiveRun::of(program(&[
+        "run",
+        SMALL,
+        "--real-time",
+        "--sessions",
+        &folder,
+        "--fault",
+        fault,
+    ]));
+    run.wait_for("1 invalid");
+    let session = text(&only(&lab.path("s"), ".session.sqlite"));
+    let frame = skinrig(&["watch", &session, "--once", "--json"])
+        .code(0)
+        .json();
+    assert_eq!(frame["live"]["state"], "running", "{frame}");
+    assert!(frame["failures_in_a_row"].as_u64() >= Some(1), "{frame}");
+    let failure = &frame["failures"][0];
+    assert_eq!(failure["kinds"][0], "data_late", "{frame}");
+    let seen = skinrig(&["watch", &session, "--once"]).code(0).out;
+    for part in [
+        "FAILING  the last",
+        "data late: camera 1",
+        "invalid attempts, by cause",
+        "  invalid",
+    ] {
+        assert!(seen.contains(part), "{part} in {seen}");
+    }
+    assert!(seen.lines().all(|l| l.chars().count() <= 80), "{seen}");
+    skinrig(&["control", &session, "stop", "--wait", "60 s"]);
+    run.end();
+    let seen = skinrig(&["watch", &session]).code(0).out;
+    assert!(
+        seen.contains("state    faulted") || seen.contains("state    stopped"),
+        "{seen}"
+    );
+}
+
+/// A camera that loses bytes, and presses that a retake makes good.
+#[test]
+fn losses_and_retakes_are_shown() {
+    let lab = Lab::new();
+    let session = text(&lab.record("s", &["--fault", "camera1-drops@hold:4"]));
+    let frame = skinrig(&["watch", &session, "--json"]).code(0).json();
+    assert!(frame["losses"][0]["bytes"].as_u64() > Some(0), "{frame}");
+    assert_eq!(frame["losses"][1]["bytes"], 0);
+    assert_eq!(frame["failures"][0]["made_good"], 1, "{frame}");
+    let seen = skinrig(&["watch", &session]).code(0).out;
+    for part in ["LOST     camera 1: ", "1 x  ", "1 made good by a retake"] {
+        assert!(seen.contains(part), "{part} in {seen}");
+    }
+    assert!(!seen.contains("FAILING"), "{seen}");
 }
 
 #[test]

@@ -57,7 +57,8 @@ pub enum RunFault {
     },
     /// Too many consecutive presses were invalid.
     #[error(
-        "invalid presses: expected fewer than {limit} in a row (`limits.max_consecutive_invalid`), found {limit}: {faults}"
+        "invalid presses: expected fewer than {limit} in a row (`limits.max_consecutive_invalid`), found {limit}: {}",
+        of_each_kind(faults)
     )]
     InvalidInARow {
         /// The limit, which was reached.
@@ -168,6 +169,21 @@ fn count(failed: &[PreflightCheck]) -> String {
     }
 }
 
+/// The first fault of each kind, and the number of others.
+fn of_each_kind(faults: &Causes<PressFault>) -> String {
+    let mut shown: Vec<&PressFault> = Vec::new();
+    for fault in faults.iter() {
+        if shown.iter().all(|s| s.kind() != fault.kind()) {
+            shown.push(fault);
+        }
+    }
+    let text = joined(&shown);
+    match faults.as_slice().len() - shown.len() {
+        0 => text,
+        others => format!("{text}; and {others} more of these kinds"),
+    }
+}
+
 /// Description of each failed check.
 fn descriptions(failed: &[PreflightCheck]) -> Vec<String> {
     let one = |c: &PreflightCheck| {
@@ -177,4 +193,33 @@ fn descriptions(failed: &[PreflightCheck]) -> Vec<String> {
         )
     };
     failed.iter().map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::HostTime;
+
+    #[test]
+    fn invalid_presses_in_a_row_name_each_kind_of_fault_once() {
+        let late = |ms: i64| PressFault::DataLate {
+            camera: CameraId::One,
+            end: HostTime(ms * 1_000_000),
+            waited: HostDuration::from_millis(1000),
+            reached: None,
+        };
+        let silent = PressFault::NoData {
+            camera: CameraId::One,
+        };
+        let mut faults = Causes::one(silent);
+        faults.push(late(5000));
+        faults.push(late(9000));
+        let text = RunFault::InvalidInARow { limit: 3, faults }.to_string();
+        assert!(
+            text.contains("found 3: camera 1 sent no bytes; data late"),
+            "{text}"
+        );
+        assert!(text.ends_with("; and 1 more of these kinds"), "{text}");
+        assert!(!text.contains("9.0"), "{text}");
+    }
 }

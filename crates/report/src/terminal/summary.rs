@@ -139,8 +139,9 @@ fn other_counts(a: &Analysis) -> impl Iterator<Item = String> {
     });
     let failed = &a.penalised;
     let failures = (failed.failures > 0).then(|| {
+        let plural = if failed.failures == 1 { "" } else { "s" };
         format!(
-            "{} mm with the {} failures counted, n {} presses",
+            "{} mm with the {} failure{plural} counted, n {} presses",
             number(failed.rmse_mm.value, 2),
             failed.failures,
             failed.rmse_mm.n

@@ -71,10 +71,10 @@ impl SessionSnapshot {
 
     /// The last attempts in a row, newest first, that ended invalid.
     pub(super) fn failures_in_a_row(&self) -> usize {
-        let outcomes = self.rows.iter().flat_map(|(_, attempts)| attempts);
-        let mut ended: Vec<(HostTime, Verdict)> = outcomes
-            .filter_map(|a| a.outcome.as_ref())
-            .filter_map(|o| Some((o.timing?.release, o.verdict.kind())))
+        let attempts = self.rows.iter().flat_map(|(_, attempts)| attempts);
+        // A failed attempt may have no other time than its start.
+        let mut ended: Vec<(HostTime, Verdict)> = attempts
+            .filter_map(|a| Some((a.intent?, a.outcome.as_ref()?.verdict.kind())))
             .collect();
         ended.sort_by_key(|(t, _)| *t);
         let newest = ended.iter().rev();

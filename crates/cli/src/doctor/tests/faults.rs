@@ -3,6 +3,7 @@
 use std::fs;
 
 use super::super::finding::Verdict;
+use super::super::machine::SpeedFault;
 use super::super::survey::Library;
 use super::{Bench, CAMERA_1, CAMERA_2, ROBOT_NODE, lamp};
 use crate::devices::DeviceState;
@@ -192,6 +193,25 @@ pub(super) const FAULTS: &[Fault] = &[
         |b| b.free_b = |_| Ok(73.9e9),
         ("disk", "free", Verdict::Warning),
         "--sessions",
+    ),
+    (
+        "a disk too slow for a run and its log",
+        |b| b.write_b_s = |_| Ok(39e6),
+        ("disk", "write speed", Verdict::Warning),
+        "a faster one",
+    ),
+    (
+        "a folder that takes no file",
+        |b| {
+            b.write_b_s = |_| {
+                Err(SpeedFault {
+                    what: "permission denied".to_owned(),
+                    next: "give this user write access".to_owned(),
+                })
+            };
+        },
+        ("disk", "write speed", Verdict::Problem),
+        "write access",
     ),
     (
         "sessions in memory",

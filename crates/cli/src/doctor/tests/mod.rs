@@ -1,6 +1,8 @@
 //! Tests on a planted machine: a healthy one has no findings, and each fault has exactly its own.
 
 mod faults;
+#[path = "../../../tests/commands/terminal_picture.rs"]
+mod terminal_picture;
 
 use std::fs;
 use std::io;
@@ -12,7 +14,7 @@ use skinrig_protocol::rig::RigFile;
 use tempfile::TempDir;
 
 use super::finding::Verdict;
-use super::machine::Machine;
+use super::machine::{Machine, WriteSpeed};
 use super::survey::{Library, Survey};
 use super::*;
 use crate::devices::{DeviceState, Line};
@@ -32,6 +34,7 @@ struct Bench {
     rig: Option<RigFile>,
     inputs: Vec<Input>,
     free_b: fn(&Path) -> io::Result<f64>,
+    write_b_s: WriteSpeed,
 }
 
 impl Bench {
@@ -83,7 +86,7 @@ impl Bench {
     }
 
     fn findings(&self) -> Vec<Finding> {
-        let machine = Machine::with_root(self.folder.path(), self.free_b);
+        let machine = Machine::with_root(self.folder.path(), self.free_b, self.write_b_s);
         examine(&Case {
             machine: &machine,
             rig: self.rig.as_ref(),
@@ -156,6 +159,7 @@ fn healthy() -> Bench {
         rig: RigFile::parse("rig.yaml", rig.as_bytes(), &|_| None).ok(),
         inputs: vec![lamp(Ok("/usr/local/bin/lamp"))],
         free_b: |_| Ok(500e9),
+        write_b_s: |_| Ok(300e6),
     };
     fs::create_dir(b.path("sessions")).unwrap();
     let gid = fs::metadata(b.path("sessions")).unwrap().gid();
@@ -297,9 +301,10 @@ fn checks_of_an_empty_machine_state_why_they_are_not_possible() {
     bench.survey.library = Library::Absent(6);
     bench.free_b = |_| Err(io::Error::other("no such call"));
     let findings = bench.findings();
-    // A missing folder has no run, and no device is in use.
+    // A missing folder has no run, no device is in use, and the write speed is measured.
     for f in &findings {
-        let fine = f.area == "bench" && f.verdict == Verdict::Ok;
+        let fine = f.area == "bench" || f.check == "write speed";
+        let fine = fine && f.verdict == Verdict::Ok;
         assert!(fine || f.verdict == Verdict::NotChecked, "{f:?}");
         assert!(!f.found.is_empty(), "{f:?}");
     }
@@ -320,8 +325,12 @@ fn table_and_json_are_pinned() {
     bench.remove("proc/pressure/memory");
     let findings = bench.findings();
     let folder = bench.folder.path().display().to_string();
-    let table = finding::table(bench.rig.as_ref(), &findings);
+    let table = finding::table(bench.rig.as_ref(), &findings, Paint::new(false));
     insta::assert_snapshot!("table", table.replace(&folder, "/planted"));
+    let picture = finding::table(bench.rig.as_ref(), &findings, Paint::new(true));
+    let picture = picture.replace(&folder, "/planted");
+    let command = "skinrig doctor --rig bench.yaml";
+    terminal_picture::assert_picture("doctor", command, &picture);
     let of = |verdict| findings.iter().find(|f| f.verdict == verdict).cloned();
     let some: Vec<Finding> = [Verdict::Ok, Verdict::Problem, Verdict::NotChecked]
         .into_iter()
