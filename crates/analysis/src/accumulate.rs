@@ -15,6 +15,7 @@ use crate::error::AnalysisError;
 use crate::estimators::{ColumnEstimate, PressEstimator, Thinning};
 use crate::event_cache::EventCache;
 use crate::grid::PixelGrid;
+use crate::indentation::{PhaseCollector, PhasePlan, PressPhases};
 use crate::input::EventSource;
 use crate::press_event_collector::{PressEventCollector, RetentionPlan};
 use crate::press_events::PackedEvent;
@@ -62,6 +63,8 @@ pub(crate) struct PassRequest<'a> {
     pub zooms: Vec<ZoomPlan>,
     /// Presses whose events are kept, sorted by start.
     pub kept: Vec<RetentionPlan>,
+    /// Presses whose phases are counted, sorted by start.
+    pub phases: Vec<PhasePlan>,
     /// Histogram to fill, if this pass fills it; the pass then also counts the activity.
     pub rates: Option<RateHistogram>,
     /// Cache for the events of the crop, for a second pass.
@@ -92,6 +95,7 @@ pub(crate) struct Accumulator<'a> {
     zooms: Vec<(ZoomPlan, Vec<u32>, Vec<u32>)>,
     zoom_next: usize,
     event_collector: PressEventCollector,
+    phase_collector: PhaseCollector,
     activity: Option<ActivityGrid>,
     cache: Option<EventCache>,
     /// Buffer for the events of a slice that are in the crop.
@@ -159,6 +163,7 @@ pub(crate) struct PassOutput {
     pub zooms: Vec<RateZoom>,
     /// Complete views only.
     pub kept: Vec<RetentionPlan>,
+    pub phases: Vec<PressPhases>,
     pub activity: Option<Activity>,
     /// All events of the crop, for a second pass; `None` if the cache overflowed or an event was late.
     pub cache: Option<EventCache>,
@@ -180,6 +185,7 @@ impl<'a> Accumulator<'a> {
             pictured,
             zooms,
             kept,
+            phases,
             rates,
             cache,
         } = request;
@@ -215,6 +221,7 @@ impl<'a> Accumulator<'a> {
             zooms,
             zoom_next: 0,
             event_collector: PressEventCollector::new(kept),
+            phase_collector: PhaseCollector::new(phases, settings.crop_v[camera.index()]),
             bin_us: rate_bin_us(settings),
             views: Vec::new(),
             pictures: Vec::new(),
@@ -315,10 +322,12 @@ impl<'a> Accumulator<'a> {
         self.event_collector.take(events);
         self.count_in_zooms(events);
         if self.thinning.keeps_all() {
+            self.phase_collector.take(events);
             self.count_in_windows(events);
         } else {
             let kept = events.iter().filter(|e| self.thinning.keeps(e)).copied();
             let kept: Vec<CdEvent> = kept.collect();
+            self.phase_collector.take(&kept);
             self.count_in_windows(&kept);
         }
     }
@@ -405,6 +414,7 @@ impl<'a> Accumulator<'a> {
             self.zoom_next += 1;
         }
         self.event_collector.advance(now.saturating_sub(SLACK_US));
+        self.phase_collector.advance(now.saturating_sub(SLACK_US));
         let closes = self.open.iter().map(|o| o.window.end_us + SLACK_US);
         let opens = self
             .windows
@@ -517,6 +527,7 @@ impl<'a> Accumulator<'a> {
         Ok(PassOutput {
             zooms: zooms.collect(),
             kept: self.event_collector.finish(),
+            phases: self.phase_collector.finish(),
             activity: self.activity.map(|a| a.result(self.camera)),
             rates: self.rates,
             views: self.views,

@@ -8,6 +8,7 @@ use crate::calibrate::SessionCalibration;
 use crate::camera_clocks::{CameraClock, CameraClocks};
 use crate::closeups::{Closeups, keep_plans, zoom_plans};
 use crate::error::AnalysisError;
+use crate::indentation::{self, PressPhases, phase_plans};
 use crate::input::{EventSource, SessionInput};
 use crate::locate_presses::{CameraObservations, LocatedPresses, locate_presses};
 use crate::locator::Effort;
@@ -96,6 +97,12 @@ pub fn analyze_with_events(
         Effort::Full,
         &mut warnings,
     );
+    let indentation = indentation::estimate(
+        input,
+        &presses,
+        &geometry,
+        [&cameras[0].phases, &cameras[1].phases],
+    );
     let scores = ScoreSet::from_presses(&presses, &input.outcomes);
     let measure = |set: &ScoreSet, exclusions| {
         metrics(
@@ -173,6 +180,7 @@ pub fn analyze_with_events(
         contact_timing: contact_timing(input, scheduled),
         calibration,
         locator: locator.map(|l| l.result),
+        indentation,
         scored,
         scored_without_exclusions,
         depths,
@@ -281,6 +289,7 @@ struct CameraResult {
     pictures: Vec<PressPicture>,
     zooms: Vec<RateZoom>,
     kept: Vec<RetentionPlan>,
+    phases: Vec<PressPhases>,
     activity: Option<Activity>,
     off_sensor: OffSensor,
     warnings: Vec<Warning>,
@@ -356,6 +365,7 @@ fn camera_pass(
             pictures: Vec::new(),
             zooms: Vec::new(),
             kept: Vec::new(),
+            phases: Vec::new(),
             activity,
             cache: None,
             late: 0,
@@ -368,6 +378,7 @@ fn camera_pass(
                 pictured: &plan.pictures,
                 zooms: zoom_plans(input, plan, &clock),
                 kept: keep_plans(input, plan, &list, &clock),
+                phases: phase_plans(input, &list, &clock),
                 rates: fresh,
                 cache: None,
             };
@@ -436,6 +447,7 @@ fn camera_pass(
         pictures: collected.pictures,
         zooms: collected.zooms,
         kept: collected.kept,
+        phases: collected.phases,
         activity: collected.activity,
         off_sensor,
         warnings: warnings

@@ -4,8 +4,8 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::result::{
-    Analysis, CalibrationResult, LocationOutcome, Metrics, PressCounts, PressResult, PressView,
-    Region,
+    Analysis, CalibrationResult, Indentation, LocationOutcome, Metrics, PressCounts, PressResult,
+    PressView, Region,
 };
 use crate::rule::Rule;
 use skinrig_model::{
@@ -24,6 +24,7 @@ struct Results<'a> {
     scored: &'a Metrics,
     scored_without_exclusions: &'a Metrics,
     presses: Vec<Row<'a>>,
+    indentation: &'a Option<Indentation>,
 }
 
 #[derive(Serialize)]
@@ -76,6 +77,7 @@ pub fn results_hash(analysis: &Analysis) -> String {
         scored: &analysis.scored,
         scored_without_exclusions: &analysis.scored_without_exclusions,
         presses: analysis.presses.iter().map(Row::of).collect(),
+        indentation: &analysis.indentation,
     };
     let mut digest = HashWriter(Sha256::new());
     // Neither the writer nor the types can fail: no maps with non-string keys, no I/O.

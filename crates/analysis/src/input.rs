@@ -76,6 +76,9 @@ pub struct SessionInput {
     /// Descent before each contact, in plan order; `None` if the surface was detected by touch, or poses were not measured
     /// or read. May be shorter than the plan: missing entries are `None`.
     pub descents: Vec<Option<Descent>>,
+    /// Mean force during the hold, N, in plan order; `None` if the robot reports none. May be shorter than the plan: missing
+    /// entries are `None`.
+    pub hold_forces_n: Vec<Option<f64>>,
     /// Start of further legs, in order; empty for a session with a single leg.
     pub legs: Vec<LegStart>,
     /// The rig.

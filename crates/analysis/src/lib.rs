@@ -31,6 +31,7 @@ mod exact;
 pub mod exclusion;
 pub mod grid;
 mod hash;
+mod indentation;
 pub mod input;
 pub mod latency;
 mod leg;

@@ -1,6 +1,6 @@
 //! The tidy table of presses: one row per planned press, with its last attempt and the views of both cameras.
 
-use skinrig_analysis::result::{ClockFit, PressResult, PressView};
+use skinrig_analysis::result::{ClockFit, PressIndentation, PressResult, PressView, Ranged};
 use skinrig_model::{HostTime, PlannedPress, PressTiming};
 use skinrig_recorder::AttemptRow;
 
@@ -13,6 +13,7 @@ struct Row<'a> {
     planned: PlannedPress,
     attempts: Vec<AttemptRow>,
     found: Option<&'a PressResult>,
+    indentation: Option<&'a PressIndentation>,
 }
 
 impl Row<'_> {
@@ -65,7 +66,9 @@ pub(crate) fn table(source: &Source<'_>) -> Result<Table, ExportError> {
     let prototype = source.header.prototype.clone();
     let found = source.analysis.map(|(analysis, _)| &analysis.presses);
     let rows = source.reader.presses()?.into_iter().enumerate();
+    let indented = source.analysis.and_then(|(a, _)| a.indentation.as_ref());
     let rows = rows.map(|(i, (planned, attempts))| Row {
+        indentation: indented.and_then(|all| all.of(planned.id)),
         planned,
         attempts,
         // In plan order, like the presses.
@@ -147,6 +150,23 @@ fn outcome(table: &mut Columns<'_>) {
         let found = r.found.filter(|f| f.estimate().is_some())?;
         Some(i64::from(found.extrapolated))
     });
+    ranged(table, "estimate_depth", "mm", |p| p.depth_mm);
+    ranged(table, "estimate_force", "n", |p| p.force_n);
+    table.real("rest_mm", |r| r.indentation?.rest_mm);
+}
+
+/// An estimate and its 95 % interval.
+fn ranged(
+    table: &mut Columns<'_>,
+    name: &str,
+    unit: &str,
+    of: impl Fn(&PressIndentation) -> Option<Ranged>,
+) {
+    let own = |r: &Row<'_>| of(r.indentation?);
+    table.real(&format!("{name}_{unit}"), |r| Some(own(r)?.value));
+    let ends = |r: &Row<'_>| own(r)?.interval;
+    table.real(&format!("{name}_low_{unit}"), |r| Some(ends(r)?[0]));
+    table.real(&format!("{name}_high_{unit}"), |r| Some(ends(r)?[1]));
 }
 
 /// Columns on the view of a camera.

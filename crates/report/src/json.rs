@@ -11,8 +11,8 @@ use crate::provenance::Variant;
 /// Value of the document's `format` field.
 pub(crate) const JSON_FORMAT: &str = "skinrig-report";
 /// Version of the document's layout. Version 1 counted presses, repetitions and locations from 0; version 2 counts from 1;
-/// version 3 has warnings and reasons as `kind`, fields and `text`.
-pub const JSON_VERSION: u32 = 3;
+/// version 3 has warnings and reasons as `kind`, fields and `text`; version 4 has depth and force in `indentation`.
+pub const JSON_VERSION: u32 = 4;
 
 /// Analysis fields that hold bulk data for figures.
 const BULK: [&str; 5] = ["rates", "pictures", "zooms", "activity", "motion"];

@@ -1,7 +1,7 @@
 //! Timing of contacts and descents from the pose stream of a session.
 
 use skinrig_analysis::Descent;
-use skinrig_model::{HostDuration, HostTime, PoseSample, PressOutcome};
+use skinrig_model::{HostDuration, HostTime, PlannedPress, PoseSample, PressOutcome, PressRole};
 use skinrig_recorder::{RecorderError, SessionReader};
 
 /// Maximum number of contacts to examine, evenly spread.
@@ -68,6 +68,35 @@ pub(crate) fn descents(
         found[*row] = Some(descent(&poses));
     }
     Ok(found)
+}
+
+/// Mean force during the hold of each press, N; empty if the planned depths are all the same, `None` for a press without
+/// reported forces.
+///
+/// # Errors
+/// When the poses cannot be read.
+pub(crate) fn hold_forces(
+    reader: &SessionReader,
+    planned: &[PlannedPress],
+    outcomes: &[Option<PressOutcome>],
+) -> Result<Vec<Option<f64>>, RecorderError> {
+    let mut own = planned.iter().filter(|p| p.role != PressRole::Sync);
+    let first = own.next().map(|p| p.depth_mm);
+    if own.all(|p| Some(p.depth_mm) == first) {
+        return Ok(Vec::new());
+    }
+    let of = |outcome: &Option<PressOutcome>| {
+        let reported = outcome
+            .as_ref()
+            .filter(|o| !o.scheduled && o.peak_force_n.is_some());
+        let Some(timing) = reported.and_then(|o| o.timing) else {
+            return Ok(None);
+        };
+        let poses = reader.poses(timing.at_depth, timing.retract)?;
+        let sum: f64 = poses.iter().map(|p| p.force_n).sum();
+        Ok((!poses.is_empty()).then(|| sum / poses.len() as f64))
+    };
+    outcomes.iter().map(of).collect()
 }
 
 /// The descent at the end of these poses.

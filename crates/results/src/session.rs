@@ -62,6 +62,7 @@ impl Session {
         }
         let (pose_interval_us, crossing_se_us) = contacts::timing(reader, &outcomes)?;
         let descents = contacts::descents(reader, &outcomes)?;
+        let hold_forces_n = contacts::hold_forces(reader, &planned, &outcomes)?;
         let [one, two] = CameraId::ALL;
         let further = reader.legs()?.into_iter().skip(1);
         let legs = further.map(|leg| LegStart::recorded(leg.origin, leg.camera_origin_us));
@@ -85,6 +86,7 @@ impl Session {
             pose_interval_us,
             crossing_se_us,
             descents,
+            hold_forces_n,
             legs: legs.collect(),
             rig: self.rig,
             settings: self.settings.clone(),

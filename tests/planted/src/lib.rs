@@ -44,6 +44,7 @@ pub fn session(rig: RigGeometry, settings: AnalysisSettings) -> SessionInput {
         pose_interval_us: None,
         crossing_se_us: None,
         descents: Vec::new(),
+        hold_forces_n: Vec::new(),
         legs: Vec::new(),
         rig,
         settings,

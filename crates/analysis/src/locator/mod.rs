@@ -33,4 +33,8 @@ pub use features::{CameraFeatures, Features};
 pub use fit_error::FitError;
 pub use fitted::{FittedLocator, Location};
 pub use methods::{Feature, FitStart, Hyperparameters, Method, Requirements, method};
+pub(crate) use precision::Precision;
+pub(crate) use quasi_newton::{ValueAndGradient, minimise};
 pub(crate) use reliability::reliability;
+pub(crate) use robust::{log_density, student_weight};
+pub(crate) use samples::thinned;

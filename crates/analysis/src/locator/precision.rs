@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// A factorised covariance matrix `L Lᵀ`, with `L⁻¹`.
-pub(super) struct Precision {
+pub(crate) struct Precision {
     factor: Cholesky<f64, Dyn>,
     /// `L⁻¹`, lower triangular.
     root: DMatrix<f64>,
@@ -11,7 +11,7 @@ pub(super) struct Precision {
 
 impl Precision {
     /// `None` unless the matrix is positive definite; only its lower triangle is read.
-    pub(super) fn of(covariance: DMatrix<f64>) -> Option<Self> {
+    pub(crate) fn of(covariance: DMatrix<f64>) -> Option<Self> {
         let factor = Cholesky::new(covariance)?;
         let lower = factor.l_dirty();
         let n = lower.nrows();
@@ -32,18 +32,18 @@ impl Precision {
     }
 
     /// Logarithm of the square root of the determinant of the covariance.
-    pub(super) fn log_root_determinant(&self) -> f64 {
+    pub(crate) fn log_root_determinant(&self) -> f64 {
         let diagonal = self.factor.l_dirty().diagonal();
         diagonal.iter().map(|d| libm::log(*d)).sum()
     }
 
     /// The inverse times a vector.
-    pub(super) fn times(&self, vector: &DVector<f64>) -> DVector<f64> {
+    pub(crate) fn times(&self, vector: &DVector<f64>) -> DVector<f64> {
         self.factor.solve(vector)
     }
 
     /// Element of the inverse, `i >= j`.
-    pub(super) fn element(&self, i: usize, j: usize) -> f64 {
+    pub(crate) fn element(&self, i: usize, j: usize) -> f64 {
         let below = self.root.nrows() - i;
         let (a, b) = (self.root.column(i), self.root.column(j));
         a.rows(i, below).dot(&b.rows(i, below))

@@ -10,11 +10,11 @@ const SUFFICIENT: f64 = 1e-4;
 const HALVINGS: usize = 25;
 
 /// Value and gradient.
-pub(super) type ValueAndGradient<const N: usize> = (f64, SVector<f64, N>);
+pub(crate) type ValueAndGradient<const N: usize> = (f64, SVector<f64, N>);
 
 /// The point that `steps` steps from `from` reach, with its value; earlier if a step gains less than `tolerance`. `None`
 /// if the function has no value at `from`.
-pub(super) fn minimise<const N: usize>(
+pub(crate) fn minimise<const N: usize>(
     from: SVector<f64, N>,
     steps: usize,
     tolerance: f64,

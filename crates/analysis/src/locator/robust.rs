@@ -16,13 +16,13 @@ pub(super) fn weight(square: f64, dimensions: f64) -> f64 {
 }
 
 /// The same without a limit, as the most likely variance requires.
-pub(super) fn student_weight(square: f64, dimensions: f64) -> f64 {
+pub(crate) fn student_weight(square: f64, dimensions: f64) -> f64 {
     (FREEDOM + dimensions) / (FREEDOM + square)
 }
 
 /// Logarithm of the density of `dimensions` numbers with this squared error in units of their variance, as for Student's t
 /// with 4 degrees of freedom, up to a constant.
-pub(super) fn log_density(square: f64, dimensions: f64) -> f64 {
+pub(crate) fn log_density(square: f64, dimensions: f64) -> f64 {
     -0.5 * (FREEDOM + dimensions) * libm::log1p(square / FREEDOM)
 }
 

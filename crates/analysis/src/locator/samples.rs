@@ -87,7 +87,7 @@ fn mean(group: &[Sample], sigma: f64) -> Sample {
 }
 
 /// At most `most` of the samples, evenly spaced.
-pub(super) fn thinned<T: Clone>(all: &[T], most: usize) -> Vec<T> {
+pub(crate) fn thinned<T: Clone>(all: &[T], most: usize) -> Vec<T> {
     let count = all.len().min(most);
     (0..count)
         .map(|i| all[i * all.len() / count].clone())

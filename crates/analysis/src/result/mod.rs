@@ -9,6 +9,7 @@ mod evidence;
 mod evidence_parts;
 #[cfg(test)]
 mod evidence_tests;
+mod indentation;
 mod latency;
 mod locator;
 mod motion;
@@ -33,6 +34,10 @@ pub use coverage::{Activity, BitRates, Cmre, Coverage, OffSensor};
 pub use evidence::Evidence;
 pub(crate) use evidence_parts::{
     FittingPlan, OnsetHeight, PeakForce, Response, SeenMarks, Silence,
+};
+pub use indentation::{
+    Indentation, NoQuantity, PressIndentation, Quantity, QuantityAtDepth, QuantityErrors, Ranged,
+    ZeroReturn,
 };
 pub use latency::{
     ContactLatency, ContactTiming, Latency, LatencyCourse, ReducedLatency, ThresholdRow,
@@ -63,8 +68,8 @@ use crate::rule::Rule;
 
 /// Version of this layout and of the algorithms behind it; part of every result. Results of another version are not read,
 /// except their summary. Version 9: causes of presses are types. Version 10: warnings, violations
-/// and evidence are.
-pub const ANALYSIS_VERSION: u32 = 10;
+/// and evidence are. Version 11: depth and force are estimated.
+pub const ANALYSIS_VERSION: u32 = 11;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -94,6 +99,9 @@ pub struct Analysis {
     /// The locator that turned columns into positions; `None` in results before version 8: the geometry.
     #[serde(default)]
     pub locator: Option<LocatorResult>,
+    /// Depth and force estimated from the events; `None` unless the calibration presses have several depths.
+    #[serde(default)]
+    pub indentation: Option<Indentation>,
     /// Metrics over the valid, not excluded scored presses.
     pub scored: Metrics,
     /// Metrics over all scored presses with an estimate, ignoring exclusions.

@@ -93,6 +93,7 @@ fn input(s: &JoinedLegs) -> SessionInput {
         pose_interval_us: None,
         crossing_se_us: None,
         descents: Vec::new(),
+        hold_forces_n: Vec::new(),
         legs: vec![s.leg],
         rig: RigGeometry {
             outline: SkinOutline::PAPER,

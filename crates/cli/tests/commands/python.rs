@@ -114,6 +114,27 @@ fn presses(session: &Path, analysis: &Analysis) -> Truth {
         put("region_angle_deg", json!(region.map(|r| r.angle_deg)));
         let beyond = estimate.map(|_| u8::from(found.extrapolated));
         put("extrapolated", json!(beyond));
+        let own = analysis.indentation.as_ref();
+        let own = own.and_then(|all| all.of(planned.id));
+        for (name, unit, of) in [
+            ("depth", "mm", own.and_then(|p| p.depth_mm)),
+            ("force", "n", own.and_then(|p| p.force_n)),
+        ] {
+            let ends = of.and_then(|r| r.interval);
+            put(
+                &format!("estimate_{name}_{unit}"),
+                json!(of.map(|r| r.value)),
+            );
+            put(
+                &format!("estimate_{name}_low_{unit}"),
+                json!(ends.map(|e| e[0])),
+            );
+            put(
+                &format!("estimate_{name}_high_{unit}"),
+                json!(ends.map(|e| e[1])),
+            );
+        }
+        put("rest_mm", json!(own.and_then(|p| p.rest_mm)));
         views(&mut put, analysis, i, [t.contact, t.release]);
     }
     table

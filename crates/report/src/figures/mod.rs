@@ -6,6 +6,7 @@ mod clocks;
 mod correlation;
 mod errors;
 mod histogram;
+mod indentation;
 mod latency_course;
 mod latency_onsets;
 mod latency_roc;
@@ -30,6 +31,7 @@ pub use clocks::clock_residuals;
 pub use correlation::correlation;
 pub(crate) use errors::error_distribution;
 pub(crate) use errors::error_scatter;
+pub use indentation::indentation;
 pub(crate) use latency_course::latency_course;
 pub(crate) use latency_onsets::latency_onsets;
 pub(crate) use latency_roc::latency_roc;
@@ -68,6 +70,7 @@ pub fn all(input: &ReportInput<'_>) -> Vec<Figure> {
         correlation,
         residuals,
         reliability,
+        indentation,
         threshold,
         reduction,
         latency_course,

@@ -9,6 +9,7 @@ mod calibration;
 mod cells;
 mod comparison;
 pub(crate) mod findings;
+pub(crate) mod indentation;
 mod latency;
 mod locator;
 mod notices;
@@ -92,6 +93,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> String {
             Some(events(input)),
             single(input),
             Some(fitted(input)),
+            indentation::indentation(input),
             Some(data_reduction(input)),
             Some(detection(input)),
             rates(a),

@@ -3,7 +3,8 @@
 use serde_json::Value;
 use skinrig_analysis::result::{
     Activity, Analysis, BitRates, CalibrationResult, Cmre, Coverage, Estimate, Latency,
-    LocatorResult, ModelComparison, Reduction, ReferenceReduction, ThresholdChoice,
+    LocatorResult, ModelComparison, QuantityAtDepth, Reduction, ReferenceReduction,
+    ThresholdChoice,
 };
 
 use super::table::Table;
@@ -12,6 +13,7 @@ use crate::{comparison, derive};
 /// All tables of the analysis, by name.
 pub(super) fn all(a: &Analysis) -> Vec<(&'static str, Value)> {
     let latency = a.latency.as_ref();
+    let depth = a.indentation.as_ref().and_then(|i| i.depth.as_ref());
     let calibration = a.calibration.as_ref();
     let reference = a.reference.as_ref();
     let activity = Some(&a.activity).filter(|all| !all.is_empty());
@@ -23,6 +25,7 @@ pub(super) fn all(a: &Analysis) -> Vec<(&'static str, Value)> {
         ("models", calibration.map(|c| models(&c.compared))),
         ("locators", a.locator.as_ref().map(locators)),
         ("reliability", a.locator.as_ref().map(reliability)),
+        ("indentation", depth.map(|q| indentation(&q.depths))),
         ("correlation", calibration.map(correlation)),
         ("residuals", calibration.map(|_| residuals(a))),
         ("threshold", a.threshold.as_ref().map(threshold)),
@@ -57,6 +60,20 @@ fn locators(l: &LocatorResult) -> Value {
         .number("needed_ratio", 4, |r| r.test.map(|t| t.needed))
         .any("unfit", |r| r.unfit.map(|why| why.to_string()))
         .flag("chosen", |r| r.chosen)
+        .finish()
+}
+
+fn indentation(rows: &[QuantityAtDepth]) -> Value {
+    Table::of(rows)
+        .number("depth_mm", 4, |r| r.depth_mm)
+        .estimate(["rmse_mm", "rmse_low_mm", "rmse_high_mm"], 5, |r| {
+            &r.scored.rmse
+        })
+        .number("bias_mm", 5, |r| r.scored.bias.value)
+        .number("covered", 5, |r| r.scored.covered.value)
+        .number("left_out_rmse_mm", 5, |r| r.left_out.rmse.value)
+        .number("left_out_bias_mm", 5, |r| r.left_out.bias.value)
+        .number("left_out_covered", 5, |r| r.left_out.covered.value)
         .finish()
 }
 

@@ -10,6 +10,7 @@ use skinrig_text::Column as Cells;
 use crate::document::{Column, Note, Row, Section, Table};
 use crate::figures::model_name;
 use crate::format::{interval, number};
+use crate::page::indentation::line;
 
 /// Factors with their own line; the page lists all.
 const FACTORS: [u32; 4] = [1, 16, 256, 1024];
@@ -45,6 +46,7 @@ pub(super) fn all(a: &Analysis) -> Section {
     let reduced = a.reduction.as_ref();
     Section::plain()
         .with_all(areas(a))
+        .with_all(line(a).map(|text| Note::new("depth", text)))
         .with_all(rates(a))
         .with_all(a.latency.iter().flat_map(latency))
         .with_all(reduced.map(reduction))

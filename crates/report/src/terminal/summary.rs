@@ -8,6 +8,7 @@ use crate::document::{Note, Tone};
 use crate::format::{grouped, interval, number, or_missing};
 use crate::input::ReportInput;
 use crate::page::findings::fault;
+use crate::page::indentation::line;
 use crate::provenance::InterruptionRow;
 
 /// Lines of a summary. With three paths and the next step below it, a command ends with a dozen lines.
@@ -62,6 +63,9 @@ fn head(input: &ReportInput<'_>) -> Vec<Note> {
         );
         Note::new("RMSE", text).tone(Tone::Answer)
     });
+    if a.is_valid() {
+        notes.extend(line(a).map(|text| Note::new("depth", text)));
+    }
     if let Some(variant) = &p.variant {
         notes.push(Note::new("VARIANT", variant.to_string()).warning());
     }

@@ -129,6 +129,7 @@ pub(crate) fn analysis(side: u32, repetitions: u32) -> Analysis {
         .map(|c| studies::activity(&mut noise, c))
         .to_vec();
     Analysis {
+        indentation: None,
         locator: Some(studies::locator()),
         version: ANALYSIS_VERSION,
         alignment: alignment(),

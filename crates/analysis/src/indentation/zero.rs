@@ -1,0 +1,141 @@
+//! Owns the return to zero: what is left of the change by a press when the time after it ends.
+//!
+//! A pixel fires when its brightness has moved by a threshold, so that it returns to within a threshold, not to zero: on the
+//! way back it may keep an event. The share of such pixels is a property of the camera; the median over the calibration
+//! presses is subtracted.
+
+use skinrig_model::AnalysisSettings;
+
+use super::collector::PressPhases;
+use super::phases::AFTER;
+use crate::metrics::{bootstrap_over_locations, mean, root_mean_square};
+use crate::result::ZeroReturn;
+
+/// Shortest time after the release that says anything, s.
+const SHORTEST_S: f64 = 0.5;
+
+/// Events left per changed pixel, by camera; medians over calibration presses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Habit([f64; 2]);
+
+/// True if the time after the releases is long enough.
+pub(super) fn is_observed(press: &PressPhases) -> bool {
+    press.seconds[AFTER] >= SHORTEST_S
+}
+
+impl Habit {
+    /// From calibration presses; `None` if none changed a pixel.
+    pub(super) fn new(presses: &[[&PressPhases; 2]]) -> Option<Self> {
+        let median = |k: usize| {
+            let each = presses.iter().map(|p| p[k].rest);
+            let mut shares: Vec<f64> = each
+                .filter(|r| r.pixels > 0)
+                .map(|r| r.toward as f64 / r.pixels as f64)
+                .collect();
+            shares.sort_unstable_by(f64::total_cmp);
+            shares.get(shares.len() / 2).copied()
+        };
+        Some(Self([median(0)?, median(1)?]))
+    }
+
+    /// What is left of a press of this depth, mm, averaged over both cameras by their changes; `None` if no pixel changed.
+    pub(super) fn rest_mm(&self, cameras: [&PressPhases; 2], depth_mm: f64) -> Option<f64> {
+        let (mut left, mut size) = (0.0, 0.0);
+        for (camera, habit) in cameras.iter().zip(self.0) {
+            left += camera.rest.toward as f64 - habit * camera.rest.pixels as f64;
+            size += camera.rest.size as f64;
+        }
+        (size > 0.0).then(|| depth_mm * left / size)
+    }
+}
+
+/// The return of the scored presses: location and rest, mm, in plan order.
+pub(super) fn zero_return(
+    after_s: f64,
+    rests: &[(u32, f64)],
+    settings: &AnalysisSettings,
+) -> ZeroReturn {
+    let estimate = |of: fn(&mut [f64]) -> Option<f64>| {
+        bootstrap_over_locations(rests, settings.bootstrap_resamples, settings.seed, of)
+    };
+    let mean_mm = estimate(mean);
+    let trend_mm = trend(rests);
+    let beyond = |low: f64, high: f64| low > ZeroReturn::LIMIT_MM || high < -ZeroReturn::LIMIT_MM;
+    let drifts = mean_mm
+        .low
+        .zip(mean_mm.high)
+        .is_some_and(|(l, h)| beyond(l, h))
+        || trend_mm.is_some_and(|t| t.abs() > ZeroReturn::LIMIT_MM);
+    ZeroReturn {
+        after_s,
+        mean_mm,
+        rms_mm: estimate(root_mean_square),
+        trend_mm,
+        drifts,
+    }
+}
+
+/// Change of a straight line through the rests from the first to the last, mm.
+fn trend(rests: &[(u32, f64)]) -> Option<f64> {
+    let n = rests.len() as f64;
+    if rests.len() < 3 {
+        return None;
+    }
+    let centre = (n - 1.0) / 2.0;
+    let each = || {
+        rests
+            .iter()
+            .enumerate()
+            .map(|(i, (_, mm))| (i as f64 - centre, *mm))
+    };
+    let spread: f64 = each().map(|(t, _)| t * t).sum();
+    let product: f64 = each().map(|(t, mm)| t * mm).sum();
+    Some(product / spread * (n - 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::image::{ImageSums, ReturnSums};
+    use super::super::phases::PHASES;
+    use super::*;
+
+    fn camera(toward: i64, pixels: u64) -> PressPhases {
+        PressPhases {
+            row: 0,
+            events: [[0; 2]; PHASES],
+            seconds: [1.0; PHASES],
+            images: [ImageSums::default(); 2],
+            rest: ReturnSums {
+                toward,
+                size: 5 * pixels,
+                pixels,
+            },
+        }
+    }
+
+    #[test]
+    fn what_every_press_keeps_is_no_rest() {
+        let usual = camera(300, 1_000);
+        let habit = Habit::new(&[[&usual, &usual]; 3]).unwrap();
+        assert_eq!(habit.rest_mm([&usual, &usual], 2.0), Some(0.0));
+        // A tenth of the change by the press is left besides.
+        let more = camera(300 + 500, 1_000);
+        let rest = habit.rest_mm([&more, &more], 2.0).unwrap();
+        assert!((rest - 0.2).abs() < 1e-12, "{rest}");
+        assert_eq!(habit.rest_mm([&camera(0, 0), &camera(0, 0)], 2.0), None);
+    }
+
+    #[test]
+    fn a_steady_rest_and_a_growing_one_are_drift() {
+        let settings = AnalysisSettings::default();
+        let of = |rest: &dyn Fn(u32) -> f64| {
+            let rests: Vec<(u32, f64)> = (0..60).map(|i| (i % 12, rest(i))).collect();
+            zero_return(2.0, &rests, &settings)
+        };
+        let scatter = |i: u32| 0.02 * (f64::from((i * 7919) % 17) / 8.0 - 1.0);
+        assert!(!of(&|i| scatter(i)).drifts);
+        assert!(of(&|i| 0.08 + scatter(i)).drifts);
+        let growing = of(&|i| -0.05 + 0.1 * f64::from(i) / 59.0 + scatter(i));
+        assert!(growing.drifts && (growing.trend_mm.unwrap() - 0.1).abs() < 0.02);
+    }
+}
