@@ -10,8 +10,10 @@ use crate::closeups::{Closeups, keep_plans, zoom_plans};
 use crate::error::AnalysisError;
 use crate::indentation::{self, PressPhases, phase_plans};
 use crate::input::{EventSource, SessionInput};
-use crate::locate_presses::{CameraObservations, LocatedPresses, locate_presses};
-use crate::locator::Effort;
+use crate::locate_presses::{
+    CalibrationOrigin, CameraObservations, LocatedPresses, locate_presses, locate_recalibrated,
+};
+use crate::locator::{EarlierCalibration, Effort};
 use crate::metrics::{Exclusions, metrics, penalised};
 use crate::onsets::{Onset, onsets};
 use crate::press_event_collector::RetentionPlan;
@@ -58,6 +60,28 @@ pub fn analyze_with_events(
     source: &dyn EventSource,
     keep: Retention,
 ) -> Result<(Analysis, RetainedPresses), AnalysisError> {
+    analyze_by(input, source, keep, CalibrationOrigin::Session)
+}
+
+/// Like [`analyze_with_events`], by the calibration of an earlier session, corrected by the calibration presses of this one.
+///
+/// # Errors
+/// [`AnalysisError::Recalibration`] if the earlier calibration does not fit; else see [`analyze`].
+pub fn analyze_recalibrated(
+    input: &SessionInput,
+    source: &dyn EventSource,
+    keep: Retention,
+    earlier: &EarlierCalibration,
+) -> Result<(Analysis, RetainedPresses), AnalysisError> {
+    analyze_by(input, source, keep, CalibrationOrigin::Earlier(earlier))
+}
+
+fn analyze_by(
+    input: &SessionInput,
+    source: &dyn EventSource,
+    keep: Retention,
+    origin: CalibrationOrigin<'_>,
+) -> Result<(Analysis, RetainedPresses), AnalysisError> {
     check::input(input)?;
     let plan = Closeups::choose(input, keep);
     let base = time_base(input);
@@ -82,6 +106,18 @@ pub fn analyze_with_events(
     });
     let cameras = [one?, two?];
     let mut warnings: Vec<Warning> = Vec::new();
+    let observations = [cameras[0].observations(), cameras[1].observations()];
+    let (located, recalibration) = match origin {
+        CalibrationOrigin::Session => {
+            let located = locate_presses(input, observations, Effort::Full, &mut warnings);
+            (located, None)
+        }
+        CalibrationOrigin::Earlier(earlier) => {
+            let (located, about) =
+                locate_recalibrated(input, observations, earlier, &mut warnings)?;
+            (located, Some(about))
+        }
+    };
     let LocatedPresses {
         presses,
         calibrated:
@@ -91,12 +127,7 @@ pub fn analyze_with_events(
                 threshold,
             },
         locator,
-    } = locate_presses(
-        input,
-        [cameras[0].observations(), cameras[1].observations()],
-        Effort::Full,
-        &mut warnings,
-    );
+    } = located;
     let indentation = indentation::estimate(
         input,
         &presses,
@@ -179,6 +210,7 @@ pub fn analyze_with_events(
         legs,
         contact_timing: contact_timing(input, scheduled),
         calibration,
+        recalibration,
         locator: locator.map(|l| l.result),
         indentation,
         scored,

@@ -23,6 +23,7 @@ mod rays;
 mod reading;
 mod regions;
 mod reliability;
+mod remount;
 mod robust;
 mod samples;
 mod spread;
@@ -36,5 +37,6 @@ pub use methods::{Feature, FitStart, Hyperparameters, Method, Requirements, meth
 pub(crate) use precision::Precision;
 pub(crate) use quasi_newton::{ValueAndGradient, minimise};
 pub(crate) use reliability::reliability;
+pub use remount::{EarlierCalibration, Recalibrated};
 pub(crate) use robust::{log_density, student_weight};
 pub(crate) use samples::thinned;

@@ -36,6 +36,7 @@ mod options;
 mod pictures;
 mod pipeline;
 mod python;
+mod remounted;
 mod replay;
 mod resume;
 mod rigs;
