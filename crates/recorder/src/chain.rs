@@ -5,10 +5,10 @@ use sqlx::sqlite::SqliteConnection;
 
 use crate::digest::{EarlierState, TableDigest, digest_earlier, tree_hash};
 use crate::hex::hex;
+use crate::problem::Problem;
 use crate::query::{Fault, each_row, has_table, int, num, opt_int, sha, text};
 use crate::rows::SessionTotals;
 use crate::totals;
-use crate::verify::Problem;
 
 /// Result of checking the seal that a leg removed.
 #[derive(Debug, Clone, PartialEq, Eq)]

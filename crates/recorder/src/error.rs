@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::verify::Problem;
+use crate::problem::Problem;
 
 /// Failure to write or read a session.
 #[derive(Debug, thiserror::Error)]
@@ -287,5 +287,32 @@ impl RecorderError {
         };
         let code: i32 = error.code().and_then(|c| c.parse().ok()).unwrap_or(0);
         matches!(code & 0xff, 3 | 5 | 6 | 7 | 8 | 10 | 13 | 14) && code != 522
+    }
+}
+
+impl From<RecorderError> for Problem {
+    fn from(error: RecorderError) -> Self {
+        match error {
+            RecorderError::Damaged {
+                place,
+                expected,
+                found,
+                ..
+            } => Self::new(place, expected, found),
+            RecorderError::Sql { doing, source, .. } => Self::new(doing, "readable rows", source),
+            RecorderError::Io { doing, source, .. } => Self::new(doing, "a readable file", source),
+            RecorderError::NotFound { expected, .. } => Self::new("session", expected, "none"),
+            RecorderError::NotASession { found, .. } => {
+                Self::new("file", "a skinrig session", found)
+            }
+            RecorderError::NewerSchema {
+                found, supported, ..
+            } => Self::new(
+                "schema version",
+                format_args!("up to {supported}"),
+                format_args!("{found}, of a newer skinrig"),
+            ),
+            other => Self::new("session", "a readable session", other),
+        }
     }
 }

@@ -43,6 +43,7 @@ mod open;
 mod pose;
 mod prepare;
 mod prepared;
+mod problem;
 mod query;
 mod queue;
 mod rescue;
@@ -58,6 +59,7 @@ pub use close_result::SealedSession;
 pub use codec::Codec;
 pub use error::{CopyError, RecorderError, RescueError, WriteFailure};
 pub use lock::writer_of;
+pub use problem::Problem;
 pub use queue::QueueLoad;
 pub use reader::SessionReader;
 pub use rows::{
@@ -69,5 +71,5 @@ pub use sidecar::SESSION_SUFFIX;
 pub use tags::{
     Annotation, AnnotationNote, Annotations, annotate, annotations, is_valid_tag, tags_path,
 };
-pub use verify::{ChunkScanner, Problem, VerifyReport, verify};
+pub use verify::{ChunkScanner, VerifyReport, verify};
 pub use writer::SessionWriter;

@@ -13,17 +13,16 @@ mod chain;
 mod edges;
 mod gaps;
 mod legs;
-mod problem;
 mod report;
 mod seal;
 mod sqlite;
 mod stream;
 
-pub use self::problem::Problem;
 pub use self::report::VerifyReport;
 use self::stream::Stream;
 use crate::error::RecorderError;
 use crate::hex::hex;
+use crate::problem::Problem;
 use crate::reader::SessionReader;
 use crate::rows::AttemptRow;
 

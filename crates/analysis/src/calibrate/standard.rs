@@ -48,7 +48,7 @@ pub(crate) fn standard_fit(
         outliers: 0,
         starts: 0,
         starts_agreeing: 0,
-        termination: String::new(),
+        termination: None,
         compared: Vec::new(),
         bound_mm: None,
     }

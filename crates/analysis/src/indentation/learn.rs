@@ -67,7 +67,7 @@ impl Learnt {
         let regression = Regression::fit(&pairs, None).ok_or(NoQuantity::Degenerate)?;
         let presses: Vec<CalibrationPress> = teachers.iter().map(|t| t.press).collect();
         let folds = Folds::deal(&presses, seed);
-        let held = folds.each(|kept, held| {
+        let held = folds.each(|_, kept, held| {
             let part: Vec<_> = kept.iter().map(|i| pairs[*i]).collect();
             let fitted = Regression::fit(&part, Some(regression.logs()))?;
             let each = held.par_iter().map(|i| fitted.predict(&pairs[*i].0));

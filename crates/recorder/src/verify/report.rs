@@ -2,8 +2,8 @@
 
 use std::fmt::{Debug, Display};
 
-use super::problem::Problem;
 use crate::error::RecorderError;
+use crate::problem::Problem;
 use crate::rows::SessionTotals;
 
 /// Most problems listed in full; further ones are only counted.

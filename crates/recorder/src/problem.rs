@@ -4,8 +4,6 @@ use std::fmt::{self, Display};
 
 use serde::Serialize;
 
-use crate::error::RecorderError;
-
 /// Something in a session or bundle that is not as it was recorded. Does not repeat the path of the session or bundle.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Problem {
@@ -37,32 +35,5 @@ impl Display for Problem {
             found,
         } = self;
         write!(f, "{place}: expected {expected}, found {found}")
-    }
-}
-
-impl From<RecorderError> for Problem {
-    fn from(error: RecorderError) -> Self {
-        match error {
-            RecorderError::Damaged {
-                place,
-                expected,
-                found,
-                ..
-            } => Self::new(place, expected, found),
-            RecorderError::Sql { doing, source, .. } => Self::new(doing, "readable rows", source),
-            RecorderError::Io { doing, source, .. } => Self::new(doing, "a readable file", source),
-            RecorderError::NotFound { expected, .. } => Self::new("session", expected, "none"),
-            RecorderError::NotASession { found, .. } => {
-                Self::new("file", "a skinrig session", found)
-            }
-            RecorderError::NewerSchema {
-                found, supported, ..
-            } => Self::new(
-                "schema version",
-                format_args!("up to {supported}"),
-                format_args!("{found}, of a newer skinrig"),
-            ),
-            other => Self::new("session", "a readable session", other),
-        }
     }
 }
