@@ -63,6 +63,13 @@ pub(crate) fn out(text: Arguments<'_>) {
     }
 }
 
+/// Moves the cursor to the upper left corner of the terminal and clears the screen.
+pub(crate) fn clear_screen() {
+    let mut out = std::io::stdout().lock();
+    // What follows reports the errors of the terminal.
+    let _ = out.write_all(b"\x1b[H\x1b[J");
+}
+
 /// Writes to standard error; its errors cannot be reported anywhere.
 pub(crate) fn err(text: Arguments<'_>) {
     let text = text.to_string();

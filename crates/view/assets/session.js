@@ -4,6 +4,7 @@ import { $, el, number, table } from '/app/dom.js';
 import { skinMap } from '/app/map.js';
 import { cameraPicture } from '/app/camera.js';
 import { live } from '/app/live.js';
+const height = mm => `${number(Math.abs(mm))} mm ${mm < 0 ? 'into' : 'above'} the skin`;
 export const session = async (name, about, signal) => {
   const s = await json('session', { session: name });
   $('#title').textContent = s.prototype;
@@ -27,7 +28,7 @@ export const session = async (name, about, signal) => {
       const counts = found.map((f, k) => pictures[k].events(f, inPress ? chosen.views?.[k] : null));
       const { poses } = await json('poses', { session: name, from_s: window_.to_s - 0.05, to_s: window_.to_s }, { signal });
       map.mark(chosen, poses.at(-1)?.slice(1, 4));
-      said.textContent = `${number(window_.to_s, 3)} s: ${counts[0]} and ${counts[1]} events; tip ${poses.length ? number(poses.at(-1)[3]) + ' mm above the skin' : 'unknown'}`
+      said.textContent = `${number(window_.to_s, 3)} s: ${counts[0]} and ${counts[1]} events; tip ${poses.length ? height(poses.at(-1)[3]) : 'unknown'}`
         + (s.clocks_measured.every(Boolean) ? '' : '; camera times from arrivals, good to milliseconds');
     } catch (error) { if (!signal.aborted) said.textContent = error.message; playing = false; }
     busy = false;

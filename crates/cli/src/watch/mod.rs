@@ -23,9 +23,6 @@ use crate::sessions;
 
 use frame::{Follower, Frame};
 
-/// Moves the cursor to the upper left corner and clears the screen.
-const CLEAR: &str = "\u{1b}[H\u{1b}[J";
-
 /// Shows a run until its session is sealed or its process has ended.
 ///
 /// # Errors
@@ -116,8 +113,10 @@ fn show(frame: &Frame, json: bool, once: bool) -> Result<(), Failure> {
     let redraws = size.is_some() && !once;
     // What was printed once can be scrolled back.
     let size = size.map(|(rows, columns)| (if once { u16::MAX } else { rows }, columns));
-    let clear = if redraws { CLEAR } else { "" };
     let text = draw::text(frame, draw::Canvas::new(size, paint));
-    crate::terminal::out(format_args!("{clear}{text}\n"));
+    if redraws {
+        crate::terminal::clear_screen();
+    }
+    crate::terminal::out(format_args!("{text}\n"));
     Ok(())
 }

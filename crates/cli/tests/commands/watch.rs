@@ -113,6 +113,21 @@ fn losses_and_retakes_are_shown() {
 }
 
 #[test]
+fn a_terminal_is_cleared_before_each_frame() {
+    let lab = Lab::new();
+    let session = text(&lab.record("s", &[]));
+    let watch = format!("'{}' watch '{session}'", env!("CARGO_BIN_EXE_skinrig"));
+    let mut terminal = std::process::Command::new("script");
+    let Ok(output) = terminal.args(["-qec", &watch, "/dev/null"]).output() else {
+        eprintln!("skipped: no `script`, which runs a program in a terminal");
+        return;
+    };
+    let shown = String::from_utf8(output.stdout).unwrap();
+    assert!(shown.contains("\u{1b}[H\u{1b}[J"), "{shown:?}");
+    assert!(!shown.contains("\\u{1b}"), "{shown:?}");
+}
+
+#[test]
 fn eight_readers_of_a_run_meet_no_lock_and_change_nothing() {
     let lab = Lab::new();
     let watchers: Vec<_> = (0..WATCHERS)
