@@ -62,6 +62,7 @@ def analyze(
     *,
     name: Optional[str] = None,
     reference_code: bool = False,
+    calibration_from: Optional[_Path] = None,
     save: bool = False,
 ) -> dict[str, Any]:
     """Analyse a session as `skinrig analyze` does; `settings` are the keys and values of `--set`. `save` writes the files too."""

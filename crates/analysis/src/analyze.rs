@@ -9,8 +9,10 @@ use crate::camera_clocks::{CameraClock, CameraClocks};
 use crate::closeups::{Closeups, keep_plans, zoom_plans};
 use crate::error::AnalysisError;
 use crate::input::{EventSource, SessionInput};
-use crate::locate_presses::{CameraObservations, LocatedPresses, locate_presses};
-use crate::locator::Effort;
+use crate::locate_presses::{
+    CalibrationOrigin, CameraObservations, LocatedPresses, locate_presses, locate_recalibrated,
+};
+use crate::locator::{EarlierCalibration, Effort};
 use crate::metrics::{Exclusions, metrics, penalised};
 use crate::onsets::{Onset, onsets};
 use crate::press_event_collector::RetentionPlan;
@@ -57,6 +59,28 @@ pub fn analyze_with_events(
     source: &dyn EventSource,
     keep: Retention,
 ) -> Result<(Analysis, RetainedPresses), AnalysisError> {
+    analyze_by(input, source, keep, CalibrationOrigin::Session)
+}
+
+/// Like [`analyze_with_events`], by the calibration of an earlier session, corrected by the calibration presses of this one.
+///
+/// # Errors
+/// [`AnalysisError::Recalibration`] if the earlier calibration does not fit; else see [`analyze`].
+pub fn analyze_recalibrated(
+    input: &SessionInput,
+    source: &dyn EventSource,
+    keep: Retention,
+    earlier: &EarlierCalibration,
+) -> Result<(Analysis, RetainedPresses), AnalysisError> {
+    analyze_by(input, source, keep, CalibrationOrigin::Earlier(earlier))
+}
+
+fn analyze_by(
+    input: &SessionInput,
+    source: &dyn EventSource,
+    keep: Retention,
+    origin: CalibrationOrigin<'_>,
+) -> Result<(Analysis, RetainedPresses), AnalysisError> {
     check::input(input)?;
     let plan = Closeups::choose(input, keep);
     let base = time_base(input);
@@ -81,6 +105,18 @@ pub fn analyze_with_events(
     });
     let cameras = [one?, two?];
     let mut warnings: Vec<Warning> = Vec::new();
+    let observations = [cameras[0].observations(), cameras[1].observations()];
+    let (located, recalibration) = match origin {
+        CalibrationOrigin::Session => {
+            let located = locate_presses(input, observations, Effort::Full, &mut warnings);
+            (located, None)
+        }
+        CalibrationOrigin::Earlier(earlier) => {
+            let (located, about) =
+                locate_recalibrated(input, observations, earlier, &mut warnings)?;
+            (located, Some(about))
+        }
+    };
     let LocatedPresses {
         presses,
         calibrated:
@@ -90,12 +126,7 @@ pub fn analyze_with_events(
                 threshold,
             },
         locator,
-    } = locate_presses(
-        input,
-        [cameras[0].observations(), cameras[1].observations()],
-        Effort::Full,
-        &mut warnings,
-    );
+    } = located;
     let scores = ScoreSet::from_presses(&presses, &input.outcomes);
     let measure = |set: &ScoreSet, exclusions| {
         metrics(
@@ -172,6 +203,7 @@ pub fn analyze_with_events(
         legs,
         contact_timing: contact_timing(input, scheduled),
         calibration,
+        recalibration,
         locator: locator.map(|l| l.result),
         scored,
         scored_without_exclusions,

@@ -3,6 +3,69 @@
 use skinrig_model::{CameraId, PressId};
 
 use crate::input::EventSourceError;
+use crate::result::RemountPart;
+
+/// Why a session cannot use the calibration of an earlier one.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RecalibrationError {
+    /// The earlier session must not be used.
+    #[error(
+        "the earlier session is INVALID: {}\n  next: take the calibration from a valid session",
+        .because.join("; ")
+    )]
+    EarlierInvalid {
+        /// Why.
+        because: Vec<String>,
+    },
+    /// The earlier session calibrated nothing.
+    #[error(
+        "expected a calibration in the earlier session, found only the nominal camera geometry\n  next: take the calibration \
+         from a session whose protocol calibrates"
+    )]
+    EarlierUncalibrated,
+    /// Too few presses correct it.
+    #[error(
+        "expected at least {needed} valid calibration presses to correct the earlier calibration, found {found}\n  next: add \
+         calibrating locations to the protocol; five, spread over the skin, are enough"
+    )]
+    FewPresses {
+        /// Required number.
+        needed: usize,
+        /// Number of the session.
+        found: usize,
+    },
+    /// The skin moved further than a remount does.
+    #[error(
+        "expected a correction of at most {limit} standard deviations of a remount, found {sigmas:.1}: {part} {value:.2}\n  next: \
+         calibrate in full, or describe your holder below `analysis.remount` in the protocol or with --set"
+    )]
+    TooLarge {
+        /// The part of the move.
+        part: RemountPart,
+        /// Its value, mm or degrees.
+        value: f64,
+        /// The same in standard deviations.
+        sigmas: f64,
+        /// `analysis.remount.max_sigmas`.
+        limit: f64,
+    },
+    /// No remount explains the presses.
+    #[error(
+        "the earlier calibration does not fit: no remount explains the {presses} calibration presses (chance {chance:.1e}, at least \
+         {limit} expected)\n  next: calibrate in full; was another skin mounted, or a lens turned?"
+    )]
+    DoesNotFit {
+        /// Probability of such a disagreement if it did.
+        chance: f64,
+        /// `analysis.remount.min_chance`.
+        limit: f64,
+        /// Presses that correct.
+        presses: usize,
+    },
+    /// Numbers that are not finite.
+    #[error("the calibration presses determine no correction\n  next: calibrate in full")]
+    Degenerate,
+}
 
 /// Why there is no analysis. All other problems become rows, counts or warnings in the result.
 #[derive(Debug, thiserror::Error)]
@@ -95,6 +158,9 @@ pub enum AnalysisError {
         /// The limit.
         most: usize,
     },
+    /// The calibration of an earlier session cannot be used.
+    #[error("--calibration-from: {0}")]
+    Recalibration(#[from] RecalibrationError),
     /// The session is invalid, and its numbers must not be used.
     #[error("the session is INVALID: {0}")]
     Invalid(String),

@@ -64,8 +64,8 @@ pub mod verdict;
 mod width;
 mod with_text;
 
-pub use analyze::{analyze, analyze_with_events};
-pub use error::AnalysisError;
+pub use analyze::{analyze, analyze_recalibrated, analyze_with_events};
+pub use error::{AnalysisError, RecalibrationError};
 pub use hash::results_hash;
 pub use input::{Descent, EarlierAttempt, EventSource, EventSourceError, SessionInput};
 pub use leg::LegStart;

@@ -2,11 +2,14 @@
 
 use skinrig_model::{CameraId, PressRole, Verdict};
 
-use crate::calibrate::{SessionCalibration, calibrate_session};
+use crate::calibrate::{SessionCalibration, calibrate_session, reject_presses};
 use crate::check;
+use crate::error::RecalibrationError;
 use crate::input::SessionInput;
-use crate::locator::{self, CameraFeatures, Effort, FittedLocator, LocatorChoice};
-use crate::result::{LocationOutcome, PressResult, PressView, Warning};
+use crate::locator::{
+    self, CameraFeatures, EarlierCalibration, Effort, FittedLocator, LocatorChoice,
+};
+use crate::result::{LocationOutcome, PressResult, PressView, Recalibration, Warning};
 use crate::sets::CalibrationSet;
 use crate::tie::UntimedPress;
 use crate::triangulate::locate;
@@ -38,6 +41,49 @@ impl LocatedPresses {
     }
 }
 
+/// Where the calibration comes from.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum CalibrationOrigin<'a> {
+    /// The calibration presses of the session.
+    Session,
+    /// An earlier session, corrected by these presses.
+    Earlier(&'a EarlierCalibration),
+}
+
+/// Like [`locate_presses`], by the calibration of an earlier session. Its threshold on cluster events applies too.
+///
+/// # Errors
+/// [`RecalibrationError`] if the earlier calibration does not fit.
+pub(crate) fn locate_recalibrated(
+    input: &SessionInput,
+    observations: [CameraObservations<'_>; 2],
+    earlier: &EarlierCalibration,
+    warnings: &mut Vec<Warning>,
+) -> Result<(LocatedPresses, Recalibration), RecalibrationError> {
+    let mut presses = rows(input, observations);
+    let threshold = earlier.threshold().cloned();
+    if let Some(choice) = &threshold {
+        reject_presses(&mut presses, choice.events);
+    }
+    let set = CalibrationSet::from_presses(&presses);
+    let centre = input.rig.outline.centre;
+    let corrected = earlier.correct(&set, [centre.x_mm, centre.y_mm], &input.settings)?;
+    warnings.extend(corrected.warnings());
+    let calibrated = SessionCalibration {
+        geometry: corrected.geometry,
+        calibration: Some(corrected.calibration),
+        threshold,
+    };
+    let located = located(
+        input,
+        presses,
+        calibrated,
+        Some(corrected.locator),
+        Effort::Full,
+    );
+    Ok((located, corrected.about))
+}
+
 /// Applies journal, data and rules to the presses, calibrates, learns to locate, and locates all presses.
 pub(crate) fn locate_presses(
     input: &SessionInput,
@@ -52,6 +98,17 @@ pub(crate) fn locate_presses(
     if let Some(choice) = &mut locator {
         warnings.append(&mut choice.warnings);
     }
+    located(input, presses, calibrated, locator, effort)
+}
+
+/// Locates all presses.
+fn located(
+    input: &SessionInput,
+    mut presses: Vec<PressResult>,
+    calibrated: SessionCalibration,
+    mut locator: Option<LocatorChoice>,
+    effort: Effort,
+) -> LocatedPresses {
     let outline = &input.rig.outline;
     for row in &mut presses {
         let cameras = CameraFeatures::of_press(row);

@@ -11,6 +11,7 @@ use skinrig_report::{Summary, Variant};
 
 use crate::exit::Failure;
 use crate::paths::{beside, folder_of};
+use crate::results::AnalysisRequest;
 
 pub(crate) use self::stored::stored;
 pub(crate) use self::summary::{SummaryError, summary};
@@ -79,13 +80,21 @@ pub(crate) fn parse(text: &str) -> Result<String, NameError> {
 }
 
 /// Default name of a variant, built from the settings it changes.
-pub(crate) fn default_name(changed: &[String], reference_code: bool) -> String {
-    let reference = reference_code.then(|| "reference-code".to_owned());
-    let words = changed
+pub(crate) fn default_name(choices: AnalysisRequest<'_>) -> String {
+    let reference = choices.reference_code.then(|| "reference-code".to_owned());
+    let file = choices.calibration_from.and_then(Path::file_name);
+    let earlier = file.map(|file| {
+        let file = file.to_string_lossy();
+        let name = file.split('.').next().unwrap_or_default();
+        format!("calibration-from-{name}")
+    });
+    let words = choices
+        .overrides
         .iter()
         .map(|o| o.trim().replacen("analysis.", "", 1));
     let exact = reference
         .into_iter()
+        .chain(earlier)
         .chain(words)
         .collect::<Vec<_>>()
         .join("_");
@@ -185,8 +194,18 @@ mod tests {
     fn a_variant_is_named_after_its_changes() {
         let name = |changed: &[&str], reference| {
             let changed: Vec<String> = changed.iter().map(|c| (*c).to_owned()).collect();
-            default_name(&changed, reference)
+            default_name(AnalysisRequest {
+                overrides: &changed,
+                reference_code: reference,
+                ..AnalysisRequest::default()
+            })
         };
+        let from = Path::new("lab/skin-7.session.sqlite");
+        let earlier = default_name(AnalysisRequest {
+            calibration_from: Some(from),
+            ..AnalysisRequest::default()
+        });
+        assert_eq!(earlier, "calibration-from-skin-7");
         assert_eq!(name(&["analysis.min_samples=5"], false), "min_samples=5");
         assert_eq!(name(&[], true), "reference-code");
         assert_eq!(

@@ -53,6 +53,8 @@ pub struct AnalysisRequest<'a> {
     pub reference_code: bool,
     /// Name of the variant.
     pub name: Option<&'a str>,
+    /// Take the calibration of this session, and correct it by the calibration presses.
+    pub calibration_from: Option<&'a Path>,
 }
 
 impl<'a> AnalysisRequest<'a> {
@@ -60,16 +62,18 @@ impl<'a> AnalysisRequest<'a> {
         skinrig_results::AnalysisOptions {
             overrides: self.overrides,
             reference_code: self.reference_code,
+            calibration_from: self.calibration_from,
         }
     }
 }
 
 fn variant(choices: AnalysisRequest<'_>) -> Variant {
-    let own = || analyses::default_name(choices.overrides, choices.reference_code);
+    let own = || analyses::default_name(choices);
     Variant {
         name: choices.name.map_or_else(own, str::to_owned),
         changed: choices.overrides.to_vec(),
         reference_code: choices.reference_code,
+        calibration_from: choices.calibration_from.map(Path::to_owned),
     }
 }
 
@@ -253,6 +257,7 @@ pub fn analyze(args: &AnalyzeArgs, output: Output) -> Outcome {
         overrides: &args.overrides,
         reference_code: args.reference_code,
         name: args.name.as_deref(),
+        calibration_from: args.calibration_from.as_deref(),
     };
     let results = analyze_shown(&args.session, choices)?;
     if let (Some(variant), Some(out)) = (&results.provenance.variant, &args.out) {
@@ -317,6 +322,7 @@ pub fn report(args: &ReportArgs, json: bool) -> Outcome {
             overrides: &v.changed,
             reference_code: v.reference_code,
             name: Some(&v.name),
+            calibration_from: v.calibration_from.as_deref(),
         });
     let results = analyze_shown(&args.session, choices)?;
     let older = replacement_note(&results, None);

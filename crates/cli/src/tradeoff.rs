@@ -112,6 +112,7 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
     let choices = AnalysisRequest {
         overrides: &args.overrides,
         reference_code: false,
+        calibration_from: None,
         name: None,
     };
     let (aligned, variant) = open(&args.session, choices)?;

@@ -22,6 +22,7 @@ pub mod pulse;
 pub mod quantile;
 pub mod reason;
 pub mod record;
+mod remount;
 mod rig_fault;
 pub mod run_end;
 pub mod scene;
@@ -57,6 +58,7 @@ pub use reason::{ExcludedReason, InterruptionReason, InvalidReason, MissedReason
 pub use record::{
     DeviceIdentity, InterruptionKind, MotionCommand, Record, ResumeHeader, RunHeader, Setting,
 };
+pub use remount::RemountSettings;
 pub use rig_fault::{RigFault, UnsupportedFault};
 pub use run_end::{RunEnd, StopReason};
 pub use scene::{SceneNeed, SimLevel};

@@ -6,6 +6,7 @@ use skinrig_settings::{Choice, Collector, Field, Setting, Settings, ValueRange};
 use crate::camera::StereoGeometry;
 use crate::id::PressId;
 use crate::lens::LensKind;
+use crate::remount::RemountSettings;
 use crate::skin::SkinOutline;
 
 /// Times are kept in whole nanoseconds.
@@ -431,6 +432,9 @@ pub struct AnalysisSettings {
     /// What turns the columns of both cameras into a position; learnt from the calibration presses alone.
     #[setting(default = "auto")]
     pub locator: Locator,
+    /// How far the skin is expected to have moved since an earlier calibration (`skinrig analyze --calibration-from`).
+    #[setting(default)]
+    pub remount: RemountSettings,
     /// Least error of a failed press in the RMSE with failures counted; absent: the RMS distance of the scored presses
     /// from their mean, the error of a constant estimate. Raised to the RMSE of the presses with an estimate if that is
     /// larger.

@@ -20,15 +20,17 @@ const LISTEN_EVERY: Duration = Duration::from_millis(100);
 /// Analyses a session and returns the results, as `skinrig analyze` does.
 ///
 /// `settings` are the keys and values of `--set`, for example `{"analysis.min_samples": 5}`. With `save` the results and the
-/// report are written beside the session, those of other settings as a variant with the name `name`.
+/// report are written beside the session, those of other settings as a variant with the name `name`. `calibration_from` is an
+/// earlier session of the same skin, whose calibration the calibration presses correct.
 #[pyfunction]
-#[pyo3(signature = (path, settings=None, *, name=None, reference_code=false, save=false))]
+#[pyo3(signature = (path, settings=None, *, name=None, reference_code=false, calibration_from=None, save=false))]
 pub(crate) fn analyze<'py>(
     py: Python<'py>,
     path: PathBuf,
     settings: Option<&Bound<'py, PyDict>>,
     name: Option<String>,
     reference_code: bool,
+    calibration_from: Option<PathBuf>,
     save: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     let overrides = overrides(settings)?;
@@ -37,6 +39,7 @@ pub(crate) fn analyze<'py>(
             overrides: &overrides,
             reference_code,
             name: name.as_deref(),
+            calibration_from: calibration_from.as_deref(),
         };
         library::analyze(&path, choices, save).map(|document| document.to_string())
     });

@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use skinrig_analysis::exclusion::Exclusion;
-use skinrig_analysis::result::{Analysis, Latency, LocatorComparison, OffSensor, PressResult};
+use skinrig_analysis::result::{
+    Analysis, Latency, LocatorComparison, Move, OffSensor, PressResult,
+};
 use skinrig_analysis::rule::Rule;
 use skinrig_analysis::triangulate::locate;
 use skinrig_model::{CameraId, LocationId, Locator, Point2, PressId, PressRole, Verdict, quantile};
@@ -333,4 +335,25 @@ pub(crate) fn locator_note(analysis: &Analysis) -> Option<String> {
         }
         _ => name.to_owned(),
     })
+}
+
+/// Origin of a calibration that is not the session's own, and how far the skin moved since.
+#[must_use]
+pub(crate) fn recalibration_note(a: &Analysis) -> Option<String> {
+    let r = a.recalibration.as_ref()?;
+    let moved = |m: &Move, unit: &str| {
+        let error = number(Some(m.standard_error), 2);
+        format!("{} ± {error} {unit}", number(Some(m.value), 2))
+    };
+    Some(format!(
+        "calibration of session {} of {}, corrected by {} presses: skin and cameras shifted by {} along x and {} along y and turned \
+         by {} (value ± standard error); {} % of remounts disagree as much with the presses",
+        r.from.session_id,
+        r.from.started,
+        r.presses,
+        moved(&r.shift_mm[0], "mm"),
+        moved(&r.shift_mm[1], "mm"),
+        moved(&r.turn_deg, "degrees"),
+        number(Some(100.0 * r.chance), 1),
+    ))
 }

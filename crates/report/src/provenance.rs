@@ -1,6 +1,7 @@
 //! Owns the description of a session's origin, as the report shows it.
 
 use std::fmt;
+use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::{InvalidReason, LostTime, PreflightCheck, RunEnd};
@@ -85,6 +86,9 @@ pub struct Variant {
     /// True if it uses the choices of the public code.
     #[serde(default)]
     pub reference_code: bool,
+    /// Session whose calibration it corrects.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration_from: Option<PathBuf>,
 }
 
 impl fmt::Display for Variant {
@@ -96,12 +100,20 @@ impl fmt::Display for Variant {
         )?;
         if self.reference_code {
             f.write_str("the choices of the public code")?;
+            if !self.changed.is_empty() || self.calibration_from.is_some() {
+                f.write_str(", ")?;
+            }
+        }
+        if let Some(session) = &self.calibration_from {
+            write!(f, "the calibration of {}", session.display())?;
             if !self.changed.is_empty() {
                 f.write_str(", ")?;
             }
         }
         match &self.changed[..] {
-            [] if !self.reference_code => f.write_str("no changed settings"),
+            [] if !self.reference_code && self.calibration_from.is_none() => {
+                f.write_str("no changed settings")
+            }
             changed => f.write_str(&changed.join(", ")),
         }
     }

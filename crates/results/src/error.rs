@@ -6,6 +6,8 @@ use skinrig_analysis::AnalysisError;
 use skinrig_protocol::Diagnostics;
 use skinrig_recorder::RecorderError;
 
+use crate::earlier::EarlierMismatch;
+
 /// Why a session has no analysis.
 #[derive(Debug, thiserror::Error)]
 pub enum ResultsError {
@@ -44,6 +46,14 @@ pub enum ResultsError {
     /// The session's protocol or schedule does not parse with the overrides.
     #[error("{0}")]
     Settings(Diagnostics),
+    /// The calibration of an earlier session cannot be about this one.
+    #[error("--calibration-from {}: {why}", path.display())]
+    Earlier {
+        /// The earlier session.
+        path: PathBuf,
+        /// Why not.
+        why: EarlierMismatch,
+    },
     /// The analysis rejects its input.
     #[error(transparent)]
     Analysis(#[from] AnalysisError),

@@ -10,6 +10,7 @@
 //! [`analyze`] runs all four. The command line parses its arguments, calls this crate and prints.
 
 mod contacts;
+mod earlier;
 mod error;
 mod events;
 mod origin;
@@ -19,6 +20,7 @@ mod settings;
 mod stages;
 mod window;
 
+pub use earlier::EarlierMismatch;
 pub use error::ResultsError;
 pub use events::{Rescan, SessionEvents};
 pub use origin::Origin;

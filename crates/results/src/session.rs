@@ -24,7 +24,8 @@ pub struct Session {
     /// True if they differ from the recorded settings.
     pub is_changed: bool,
     pub(crate) reference_code: bool,
-    rig: RigGeometry,
+    pub(crate) calibration_from: Option<PathBuf>,
+    pub(crate) rig: RigGeometry,
 }
 
 impl Session {
@@ -44,9 +45,12 @@ impl Session {
         Ok(Self {
             path: path.to_owned(),
             reader,
-            is_changed: settings != rig.analysis || options.reference_code,
+            is_changed: settings != rig.analysis
+                || options.reference_code
+                || options.calibration_from.is_some(),
             settings,
             reference_code: options.reference_code,
+            calibration_from: options.calibration_from.map(Path::to_owned),
             header,
             rig: rig.geometry,
         })

@@ -1,5 +1,7 @@
 //! Owns the choice of settings for analysing a session.
 
+use std::path::Path;
+
 use skinrig_model::{AnalysisSettings, RunHeader};
 use skinrig_protocol::{Protocol, REFERENCE_CODE, Schedule};
 
@@ -12,6 +14,8 @@ pub struct AnalysisOptions<'a> {
     pub overrides: &'a [String],
     /// First apply the choices of the public code, and also evaluate as it does.
     pub reference_code: bool,
+    /// Take the calibration of this session, and correct it by the calibration presses.
+    pub calibration_from: Option<&'a Path>,
 }
 
 impl AnalysisOptions<'_> {

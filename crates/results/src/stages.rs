@@ -5,10 +5,13 @@ use std::path::Path;
 use skinrig_analysis::motion::MotionCourse;
 use skinrig_analysis::reference_code::reference_code;
 use skinrig_analysis::result::{Motion, PressResult};
-use skinrig_analysis::{Analysis, LegStart, Retention, SessionInput, analyze_with_events, legs};
+use skinrig_analysis::{
+    Analysis, LegStart, Retention, SessionInput, analyze_recalibrated, analyze_with_events, legs,
+};
 use skinrig_model::HostTime;
 use skinrig_recorder::{RecorderError, SessionReader};
 
+use crate::earlier;
 use crate::error::ResultsError;
 use crate::events::SessionEvents;
 use crate::session::Session;
@@ -84,7 +87,12 @@ impl AlignedSession {
         } else {
             Retention::Scored
         };
-        let (analysis, kept) = analyze_with_events(&self.input, &self.events, keep)?;
+        let earlier = self.session.calibration_from.as_deref();
+        let earlier = earlier.map(|path| earlier::calibration(&self.session, path));
+        let (analysis, kept) = match earlier.transpose()? {
+            None => analyze_with_events(&self.input, &self.events, keep)?,
+            Some(earlier) => analyze_recalibrated(&self.input, &self.events, keep, &earlier)?,
+        };
         let reference = wants_reference.then(|| reference_code(&self.input, &analysis, &kept));
         let motion = motion(&self.session.reader, &analysis)?;
         Ok(AnalyzedSession {

@@ -65,7 +65,7 @@ pub(crate) fn calibrate_session(
 }
 
 /// Sets the verdict of valid presses of both roles with fewer cluster events than `threshold` in either camera.
-fn reject_presses(presses: &mut [PressResult], threshold: u32) {
+pub(crate) fn reject_presses(presses: &mut [PressResult], threshold: u32) {
     let judged = |p: &&mut PressResult| p.role != PressRole::Sync && p.verdict == Verdict::Valid;
     for press in presses.iter_mut().filter(judged) {
         let views = press.views;

@@ -17,6 +17,7 @@ mod parameters;
 mod problem;
 mod refit;
 mod solver;
+mod standard;
 mod threshold;
 mod uncertainty;
 
@@ -27,7 +28,7 @@ use crate::result::CalibrationResult;
 use crate::seeded;
 use crate::sets::{CalibrationPress, CalibrationSet};
 pub use choose::{ModelChoice, choose};
-pub(crate) use choose::{SessionCalibration, calibrate_session};
+pub(crate) use choose::{SessionCalibration, calibrate_session, reject_presses};
 pub(crate) use crossval::Folds;
 pub(crate) use paired::{Losses, select_model};
 pub(crate) use parameters::PARAMETERS;
@@ -38,6 +39,7 @@ pub(crate) use problem::StereoModel;
 use problem::{Measure, Problem};
 pub(crate) use refit::{Refit, covariance};
 use solver::{Descent, minimise};
+pub(crate) use standard::standard_fit;
 
 /// Bound on an error vector while the starts compete, mm: a quarter of the skin's side.
 const COARSE_BOUND_MM: f64 = 25.0;

@@ -8,8 +8,9 @@ use super::inverse::Inverse;
 use super::prediction::{Prediction, Uncertainty, ellipse};
 use super::rays::Rays;
 use super::reading::Reading;
-use super::regions::{LEVEL, Regions};
+use super::regions::{LEVEL, Regions, size};
 use super::robust::response;
+use crate::calibrate::PARAMETERS;
 use crate::result::{Analysis, LocationOutcome, LocatorModel, Region};
 use crate::triangulate::locate;
 
@@ -40,20 +41,20 @@ enum Solver {
     Inverse(Box<Inverse>),
 }
 
+/// The covariance with these rows, if there is one; `None` if it has another size than the parameters.
+fn matrix(rows: Option<&[Vec<f64>]>) -> Option<Option<DMatrix<f64>>> {
+    let Some(rows) = rows else { return Some(None) };
+    let size = PARAMETERS;
+    let fits = rows.len() == size && rows.iter().all(|r| r.len() == size);
+    fits.then(|| Some(DMatrix::from_fn(size, size, |i, j| rows[i][j])))
+}
+
 impl FittedLocator {
     /// From its serialised form and the geometry of the analysis; `None` if the form contradicts itself.
     #[must_use]
     pub fn new(locator: Locator, geometry: StereoGeometry, model: LocatorModel) -> Option<Self> {
-        let covariance = match &model.geometry_covariance {
-            None => None,
-            Some(rows) => {
-                let size = rows.len();
-                if size != crate::calibrate::PARAMETERS || rows.iter().any(|r| r.len() != size) {
-                    return None;
-                }
-                Some(DMatrix::from_fn(size, size, |i, j| rows[i][j]))
-            }
-        };
+        let covariance = matrix(model.geometry_covariance.as_deref())?;
+        let remount = matrix(model.remount_covariance.as_deref())?;
         let way = match (&model.cameras, &model.prior) {
             (Some([one, two]), Some(prior)) => {
                 let reading = match (one.polynomial, two.polynomial) {
@@ -61,10 +62,16 @@ impl FittedLocator {
                     (None, None) => Reading::Bearing {
                         geometry,
                         covariance,
+                        remount,
                     },
                     _ => return None,
                 };
-                Solver::Inverse(Box::new(Inverse::new(reading, [one, two], prior)?))
+                Solver::Inverse(Box::new(Inverse::new(
+                    reading,
+                    [one, two],
+                    prior,
+                    size(&model, LEVEL),
+                )?))
             }
             (None, None) => Solver::Rays(Box::new(Rays::new(&geometry, covariance))),
             _ => return None,
@@ -87,6 +94,7 @@ impl FittedLocator {
                 reference_events: 1.0,
                 scatter: None,
                 geometry_covariance: None,
+                remount_covariance: None,
                 cameras: None,
                 prior: None,
                 inflation: 1.0,

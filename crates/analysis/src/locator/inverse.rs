@@ -34,6 +34,8 @@ pub(super) struct Inverse {
     /// Inverse of the prior's covariance: xx, xy, yy, 1/mm².
     precision: Covariance,
     starts: Vec<StartPoint>,
+    /// Factor of the regions on all variances; the variance of a remount has its own size.
+    size: f64,
 }
 
 /// A position to begin from, with what each camera is expected to read and the values of the fields there.
@@ -92,6 +94,7 @@ impl Inverse {
         reading: Reading,
         cameras: [&CameraField; 2],
         prior: &PositionPrior,
+        size: f64,
     ) -> Option<Self> {
         let fields = cameras.map(|c| &c.field);
         let scatter = fields.map(|f| [f.fixed_px, f.column_px].map(|s| s * s));
@@ -109,6 +112,7 @@ impl Inverse {
             centre: prior.centre_mm,
             precision,
             starts: Vec::new(),
+            size,
             fields: [Field::new(fields[0])?, Field::new(fields[1])?],
         };
         let positions = fields[0]
@@ -182,14 +186,18 @@ impl Inverse {
             return 0.0;
         };
         let open = field.open(at);
-        let geometry = match i {
-            0 | 1 => {
-                let slope = read.slopes[i];
-                self.reading.parameter_variance(i, at, read.columns[i]) / (slope * slope)
-            }
-            _ => 0.0,
-        };
-        field.variance(open) + open * geometry
+        field.variance(open) + open * self.parameter_variances(read, i, at)[0]
+    }
+
+    /// Variances of the expected reading from the parameters of the geometry: those that the field corrects, and those of a
+    /// remount, px².
+    fn parameter_variances(&self, read: &Readings, i: usize, at: [f64; 2]) -> [f64; 2] {
+        if i > 1 {
+            return [0.0; 2];
+        }
+        let slope = read.slopes[i];
+        let both = self.reading.parameter_variances(i, at, read.columns[i]);
+        both.map(|v| v / (slope * slope))
     }
 
     /// Half the squared distance from the prior's centre, and its slope.
@@ -227,10 +235,12 @@ impl Inverse {
     pub(super) fn locate(&self, features: &Features, response: f64) -> Option<Prediction> {
         let read = self.readings(features, response);
         let mut at = self.start(&read)?;
-        let mut model = [0.0; READINGS];
+        let (mut model, mut noise) = ([0.0; READINGS], read.noise);
         for _ in 0..ROUNDS {
             model = std::array::from_fn(|i| self.model_variance(&read, i, at));
-            let variance = std::array::from_fn(|i| read.noise[i] + model[i]);
+            noise =
+                std::array::from_fn(|i| read.noise[i] + self.parameter_variances(&read, i, at)[1]);
+            let variance = std::array::from_fn(|i| noise[i] + model[i]);
             let from = at;
             at = self.descend(&read, &variance, from);
             if libm::hypot(at[0] - from[0], at[1] - from[1]) < LAST_MM {
@@ -241,8 +251,8 @@ impl Inverse {
             self.miss(&read, i, at)
                 .map_or_else(ReadingUncertainty::default, |miss| ReadingUncertainty {
                     slope: miss.slope,
-                    weight: loss(i, miss.off, read.noise[i] + model[i]).1.min(1.0),
-                    scatter: read.noise[i],
+                    weight: loss(i, miss.off, noise[i] + model[i]).1.min(1.0),
+                    scatter: read.noise[i] + (noise[i] - read.noise[i]) / self.size,
                     model: model[i],
                 })
         });

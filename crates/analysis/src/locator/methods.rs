@@ -117,6 +117,7 @@ impl Method for Geometry {
             reference_events: reference_events(presses),
             scatter: rays.scatter(presses),
             geometry_covariance: rows(start),
+            remount_covariance: None,
             cameras: None,
             prior: None,
             inflation: 1.0,
@@ -152,6 +153,7 @@ impl Method for GeometryField {
         let reading = Reading::Bearing {
             geometry: start.geometry,
             covariance: start.covariance.clone(),
+            remount: None,
         };
         with_fields(Locator::Field, presses.sights(), &reading, start)
     }
@@ -212,6 +214,7 @@ fn with_fields(
         reference_events: reference_events(presses),
         scatter: None,
         geometry_covariance: rows(start).filter(|_| bearings),
+        remount_covariance: None,
         cameras: Some([one, two]),
         prior: Some(prior(presses)),
         inflation: 1.0,

@@ -22,6 +22,8 @@ pub(super) enum Reading {
     Bearing {
         geometry: StereoGeometry,
         covariance: Option<DMatrix<f64>>,
+        /// Covariance that remains after a remount, which the fields do not know.
+        remount: Option<DMatrix<f64>>,
     },
     /// Columns, px: one polynomial per camera in mm.
     Column([[f64; TERMS]; 2]),
@@ -55,22 +57,8 @@ impl Reading {
         }
     }
 
-    /// Column of a press minus the one expected where it was made, px.
-    pub(super) fn residual(&self, k: usize, press: &CalibrationPress) -> f64 {
-        let (value, slope) = self.of_column(k, press.columns[k]);
-        let at = [press.truth.x_mm, press.truth.y_mm];
-        (value - self.expected(k, at).0) / slope
-    }
-
-    /// Variance of reading minus expected reading from the parameters of the geometry.
-    pub(super) fn parameter_variance(&self, k: usize, at: [f64; 2], column: f64) -> f64 {
-        let Self::Bearing {
-            geometry,
-            covariance: Some(covariance),
-        } = self
-        else {
-            return 0.0;
-        };
+    /// Change of reading minus expected reading by the parameters of the geometry.
+    fn slopes(geometry: &StereoGeometry, k: usize, at: [f64; 2], column: f64) -> DVector<f64> {
         let own = parameters_of(geometry);
         let off = |p: usize, by: f64| {
             let mut moved = own;
@@ -78,11 +66,39 @@ impl Reading {
             let camera = &with_parameters(geometry, &moved).cameras[k];
             camera.angle_of_column_deg(column) - bearing(camera, at).0
         };
-        let slope = DVector::from_fn(PARAMETERS, |p, _| {
+        DVector::from_fn(PARAMETERS, |p, _| {
             let step = STEP * SPREAD[p];
             (off(p, step) - off(p, -step)) / (2.0 * step)
-        });
-        slope.dot(&(covariance * &slope)).max(0.0)
+        })
+    }
+
+    /// Column of a press minus the one expected where it was made, px.
+    pub(super) fn residual(&self, k: usize, press: &CalibrationPress) -> f64 {
+        let (value, slope) = self.of_column(k, press.columns[k]);
+        let at = [press.truth.x_mm, press.truth.y_mm];
+        (value - self.expected(k, at).0) / slope
+    }
+
+    /// Variance of reading minus expected reading from the parameters of the geometry: those that fields correct, and those of
+    /// a remount.
+    pub(super) fn parameter_variances(&self, k: usize, at: [f64; 2], column: f64) -> [f64; 2] {
+        let Self::Bearing {
+            geometry,
+            covariance,
+            remount,
+        } = self
+        else {
+            return [0.0; 2];
+        };
+        let both = [covariance, remount];
+        if both.iter().all(|c| c.is_none()) {
+            return [0.0; 2];
+        }
+        let slope = Self::slopes(geometry, k, at, column);
+        both.map(|c| {
+            c.as_ref()
+                .map_or(0.0, |c| slope.dot(&(c * &slope)).max(0.0))
+        })
     }
 }
 
@@ -182,6 +198,7 @@ mod tests {
         let reading = Reading::Bearing {
             geometry,
             covariance: None,
+            remount: None,
         };
         slope_is_right(&reading);
         for column in [40.0, 320.0, 600.0] {

@@ -2,7 +2,7 @@
 
 use super::prediction::{Uncertainty, distance};
 use super::robust::{log_density, student_weight};
-use crate::result::RegionLevel;
+use crate::result::{LocatorModel, RegionLevel};
 
 /// Level of the regions of the press table.
 pub(super) const LEVEL: f64 = 0.95;
@@ -118,6 +118,13 @@ fn levels(distances: &[f64], locations: usize) -> Vec<RegionLevel> {
         usable.then_some(RegionLevel { level, factor })
     };
     LEVELS.into_iter().filter_map(of).collect()
+}
+
+/// How much larger the variances are than the model states: by the region of a level, in units of that of two normal
+/// coordinates. 1 without regions.
+pub(super) fn size(model: &LocatorModel, level: f64) -> f64 {
+    let found = model.levels.iter().find(|l| l.level == level);
+    found.map_or(1.0, |l| l.factor / (-2.0 * libm::log(1.0 - level)))
 }
 
 #[cfg(test)]

@@ -111,6 +111,9 @@ pub struct LocatorModel {
     /// Covariance of the ten parameters of the geometry, row by row, as in [`super::CalibrationResult::names`]; `None` if
     /// unknown or not used.
     pub geometry_covariance: Option<Vec<Vec<f64>>>,
+    /// Of a field after a remount: covariance that the correction leaves in the same parameters, everywhere on the skin.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub remount_covariance: Option<Vec<Vec<f64>>>,
     /// What each camera sees; `None` for the geometry alone.
     pub cameras: Option<[CameraField; 2]>,
     /// Where presses are expected; `None` for the geometry alone.
@@ -180,7 +183,7 @@ pub struct PositionPrior {
 }
 
 /// Scatter of the crossing of two rays: a part of its own, and one from the columns that grows as cluster events become fewer.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Scatter {
     /// Standard deviation of either coordinate, mm.
     pub fixed_mm: f64,

@@ -13,6 +13,7 @@ mod latency;
 mod locator;
 mod motion;
 mod other_reading;
+mod recalibration;
 mod reduction;
 mod reference;
 mod termination;
@@ -46,6 +47,7 @@ pub use locator::{
 pub use motion::{Motion, MotionBin, PressMotion, TipSample};
 pub use other_reading::OtherReading;
 pub(crate) use other_reading::{Corner, FrameChange, Origin, OtherPlan, Turn};
+pub use recalibration::{CameraMove, EarlierSession, Move, Recalibration, RemountPart};
 pub use reduction::{Reduction, ReductionCurve, ReductionRow, Thinning};
 pub use reference::{ReferenceCode, ReferenceReduction};
 pub use termination::Termination;
@@ -91,6 +93,9 @@ pub struct Analysis {
     pub contact_timing: ContactTiming,
     /// The calibration, if there was one.
     pub calibration: Option<CalibrationResult>,
+    /// Origin of the calibration, if it is that of an earlier session.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recalibration: Option<Recalibration>,
     /// The locator that turned columns into positions; `None` in results before version 8: the geometry.
     #[serde(default)]
     pub locator: Option<LocatorResult>,

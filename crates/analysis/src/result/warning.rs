@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use skinrig_model::{CalibrationModel, CameraId, Locator};
+use skinrig_model::{CalibrationModel, CameraId, Locator, PressId};
 
 use super::Estimate;
 use crate::clock::RatesError;
@@ -356,6 +356,28 @@ pub enum WarningCause {
         rmse_mm: f64,
         /// Their RMS distance from their mean position, mm.
         spread_mm: f64,
+    },
+    /// The presses fit the earlier calibration badly.
+    #[error(
+        "the presses fit the calibration of the earlier session badly: {:.1} % of remounts disagree as much; calibrate in full \
+         if the numbers matter",
+        100.0 * .chance
+    )]
+    RemountUnusual {
+        /// Probability of such a disagreement.
+        chance: f64,
+    },
+    /// Outliers among the presses that correct an earlier calibration.
+    #[error(
+        "{} of {of} presses that correct the earlier calibration are outliers and count less: {}",
+        .presses.len(),
+        .presses.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+    )]
+    RemountOutliers {
+        /// The outliers.
+        presses: Vec<PressId>,
+        /// Presses that correct.
+        of: u32,
     },
     /// The locator in the settings cannot learn.
     #[error("the locator `{}` cannot learn: {why}; using `geometry`", .wanted.name())]

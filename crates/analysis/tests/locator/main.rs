@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod regions;
+mod remount;
 mod skins;
 mod symmetries;
 

@@ -68,6 +68,58 @@ pub(crate) struct Skin {
     pub(crate) spreads: Spreads,
     /// Depths, mm, one repetition after another.
     pub(crate) depths: &'static [f64],
+    /// Presses of another session with the same skin have other scatter.
+    pub(crate) session: u64,
+    /// How the skin was mounted since the session 0.
+    pub(crate) remount: Remount,
+}
+
+/// Skin and cameras turn about (10, 2) mm and shift; then each camera shifts and turns.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Remount {
+    pub(crate) shift_mm: [f64; 2],
+    /// Counter-clockwise.
+    pub(crate) turn_deg: f64,
+    /// x and y, mm; clockwise turn, degrees.
+    pub(crate) cameras: [[f64; 3]; 2],
+}
+
+impl Remount {
+    /// A remount with normal parts of these standard deviations: of the whole in mm and degrees, of a camera.
+    pub(crate) fn drawn(seed: u64, whole: f64, camera: f64) -> Self {
+        let mut noise = Noise::new(0x4e_0017 ^ seed);
+        let mut part = |sd: f64| sd * noise.normal();
+        Self {
+            shift_mm: [part(whole), part(whole)],
+            turn_deg: part(whole),
+            cameras: [0; 2].map(|_| [part(camera), part(camera), part(camera)]),
+        }
+    }
+
+    pub(crate) fn forth(&self, at: Point2) -> Point2 {
+        let (sin, cos) = self.turn_deg.to_radians().sin_cos();
+        let (x, y) = (at.x_mm - 10.0, at.y_mm - 2.0);
+        let [dx, dy] = self.shift_mm;
+        Point2::new(10.0 + dx + cos * x - sin * y, 2.0 + dy + sin * x + cos * y)
+    }
+
+    fn back(&self, at: Point2) -> Point2 {
+        let (sin, cos) = self.turn_deg.to_radians().sin_cos();
+        let [dx, dy] = self.shift_mm;
+        let (x, y) = (at.x_mm - 10.0 - dx, at.y_mm - 2.0 - dy);
+        Point2::new(10.0 + cos * x + sin * y, 2.0 - sin * x + cos * y)
+    }
+
+    fn of_geometry(&self, mut geometry: StereoGeometry) -> StereoGeometry {
+        for (camera, [dx, dy, turn]) in geometry.cameras.iter_mut().zip(self.cameras) {
+            for point in [&mut camera.position, &mut camera.aim] {
+                let moved = self.forth(*point);
+                *point = Point2::new(moved.x_mm + dx, moved.y_mm + dy);
+            }
+            camera.skew_deg += turn;
+        }
+        geometry
+    }
 }
 
 impl Skin {
@@ -85,6 +137,8 @@ impl Skin {
             repeats: 1,
             spreads: Spreads::Absent,
             depths: &[2.0],
+            session: 0,
+            remount: Remount::default(),
         }
     }
 
@@ -116,8 +170,13 @@ impl Skin {
                 .sum();
             0.5 * self.bend_px * sum
         };
+        let geometry = self.remount.of_geometry(geometry);
+        let bend = |camera: usize, at: Point2| bend(camera, self.remount.back(at));
+        if self.session > 0 {
+            noise = Noise::new((0x5e55 ^ self.seed).wrapping_mul(0x9e37_79b9) + self.session);
+        }
         // Apart from the rest: a skin differs from the same one without spreads in nothing else.
-        let mut chance = Noise::new(0x59ead ^ self.seed);
+        let mut chance = Noise::new(0x59ead ^ self.seed ^ (self.session << 32));
         let mut widths = |camera: usize, at: Point2, events: u32| {
             let eye = geometry.cameras[camera].position;
             let outlier = if chance.unit() < 0.05 { 3.0 } else { 1.0 };

@@ -27,6 +27,11 @@ pub struct AnalyzeArgs {
     #[arg(long)]
     pub reference_code: bool,
 
+    /// Take the calibration of an earlier session of the same skin and correct it by the calibration presses of this one (three or
+    /// more): the skin was mounted again. The result is a variant.
+    #[arg(long, value_name = "SESSION")]
+    pub calibration_from: Option<PathBuf>,
+
     /// Where to write the results [default: beside the session].
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,

@@ -129,6 +129,7 @@ fn session(path: &Path, name: Option<&str>) -> Result<Session, Failure> {
                         overrides: &v.changed,
                         reference_code: v.reference_code,
                         name: Some(&v.name),
+                        calibration_from: v.calibration_from.as_deref(),
                     });
             analyze_shown(path, choices)
                 .map_err(|f| Failure {

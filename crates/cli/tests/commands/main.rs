@@ -35,6 +35,7 @@ mod operator;
 mod options;
 mod pipeline;
 mod python;
+mod remounted;
 mod replay;
 mod resume;
 mod rigs;

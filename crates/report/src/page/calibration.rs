@@ -5,7 +5,7 @@ use skinrig_analysis::result::{Analysis, CalibrationResult};
 use crate::document::{Column, Group, Row, Table, Text, paragraph, soft};
 use crate::figures::model_name;
 use crate::format::{NONE, interval, number, words};
-use crate::tables;
+use crate::{derive, tables};
 
 /// The fitted parameters.
 pub(super) fn parameters(a: &Analysis) -> Group {
@@ -23,6 +23,7 @@ pub(super) fn parameters(a: &Analysis) -> Group {
             " mm after, over {} calibration presses. This is in-sample; the scored RMSE above is held out.",
             c.n
         ));
+    let origin = derive::recalibration_note(a);
     let rows = tables::calibration(c).into_iter().map(|r| {
         let error = r.standard_error;
         let error = error.map(|se| format!("± {}", number(Some(se), 4)));
@@ -47,6 +48,7 @@ pub(super) fn parameters(a: &Analysis) -> Group {
     let caption = "Fitted parameters before and after";
     card.download("calibration", "calibration", "the calibration")
         .with(paragraph(about))
+        .with_all(origin.map(soft))
         .with(Table::of("parameters", caption, columns).with(rows))
 }
 

@@ -277,6 +277,8 @@ fn clocks(a: &Analysis) -> Vec<Note> {
     notes.push(alignment(&a.alignment));
     if a.is_valid() {
         notes.extend(studies::calibration(a));
+        let origin = derive::recalibration_note(a);
+        notes.extend(origin.map(|note| Note::new("remount", note)));
         let locator = derive::locator_note(a);
         notes.extend(locator.map(|note| Note::new("locator", note)));
     }

@@ -484,6 +484,7 @@ pub(crate) fn locator() -> LocatorResult {
             reference_events: 800.0,
             scatter: None,
             geometry_covariance: None,
+            remount_covariance: None,
             cameras: None,
             prior: None,
             inflation: 1.0,
