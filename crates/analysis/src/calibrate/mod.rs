@@ -194,7 +194,7 @@ impl Fit {
             outliers: lengths.iter().filter(|e| **e > problem.bound_mm).count() as u32,
             starts: STARTS,
             starts_agreeing: 0,
-            termination: Some(end.termination),
+            termination: end.termination,
             compared: Vec::new(),
             bound_mm: None,
         };

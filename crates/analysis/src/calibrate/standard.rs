@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use skinrig_model::{CalibrationModel, StereoGeometry};
 
 use super::parameters::{NAMES, PARAMETERS, parameter_count, parameters_of};
-use crate::result::CalibrationResult;
+use crate::result::{CalibrationResult, Termination};
 
 /// The calibration that leads from `start` to `values`, with this covariance, without presses. Scales are relative to
 /// `start` in the values, to the result in the covariance.
@@ -48,7 +48,7 @@ pub(crate) fn standard_fit(
         outliers: 0,
         starts: 0,
         starts_agreeing: 0,
-        termination: None,
+        termination: Termination::NoChange,
         compared: Vec::new(),
         bound_mm: None,
     }

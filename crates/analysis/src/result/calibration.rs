@@ -40,8 +40,8 @@ pub struct CalibrationResult {
     pub starts: u32,
     /// See `starts`.
     pub starts_agreeing: u32,
-    /// Why the optimiser stopped; `None` for a corrected earlier calibration.
-    pub termination: Option<Termination>,
+    /// Why the optimiser stopped.
+    pub termination: Termination,
     /// Models compared by leave-locations-out cross-validation, smallest first; empty without a choice, or with too few
     /// locations.
     pub compared: Vec<ModelComparison>,

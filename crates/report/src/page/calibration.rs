@@ -153,12 +153,10 @@ pub(super) fn fit(a: &Analysis) -> Option<Table> {
         "starts that reach the best optimum",
         format!("{} of {}", c.starts_agreeing, c.starts),
     );
-    if let Some(termination) = c.termination {
-        grid.note(format!(
-            "The optimiser stopped with: {}.",
-            termination.text()
-        ));
-    }
+    grid.note(format!(
+        "The optimiser stopped with: {}.",
+        c.termination.text()
+    ));
     if (c.rank as usize) < c.names.len() {
         grid.note("The data do not determine all parameters; see the correlation and the standard errors.");
     }

@@ -187,7 +187,7 @@ pub(crate) fn analysis(side: u32, repetitions: u32) -> Analysis {
             rmse_before_mm: 5.87,
             rmse_after_mm: 3.31,
             n: side * side,
-            termination: Some(Termination::NoChange),
+            termination: Termination::NoChange,
         }),
         scored,
         scored_without_exclusions,

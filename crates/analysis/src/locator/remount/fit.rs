@@ -8,7 +8,7 @@ use super::motion::{NUMBERS, Numbers, RigidMotion, Spread, geometry_after};
 use crate::locator::field::Field;
 use crate::locator::reading::Reading;
 use crate::locator::robust::{log_density, response, weight};
-use crate::result::{LocatorModel, Scatter};
+use crate::result::{LocatorModel, Scatter, Termination};
 use crate::sets::CalibrationPress;
 
 /// Steps of a descent, and halvings of a step.
@@ -52,6 +52,7 @@ pub(super) struct Fit {
     /// Negative logarithm of the posterior density, up to a constant.
     objective: f64,
     information: Spread,
+    termination: Termination,
 }
 
 /// How presses count.
@@ -86,6 +87,7 @@ pub(super) struct Outcome {
     pub square: f64,
     /// Descents, and how many of them ended at the best.
     pub starts: [u32; 2],
+    pub termination: Termination,
 }
 
 impl Expectation<'_> {
@@ -164,6 +166,7 @@ impl Expectation<'_> {
     /// Gauss-Newton steps from `at`, halved until they lead down. `None` if a number is not finite.
     fn descend(&self, mut at: Numbers, weighting: Weighting) -> Option<Fit> {
         let mut fit = None;
+        let mut termination = Termination::TooManySteps;
         for _ in 0..STEPS {
             let (misses, variances) = (self.misses(&at), self.variances(&at));
             let squares = Self::squares(&misses, &variances);
@@ -186,6 +189,7 @@ impl Expectation<'_> {
                 weights,
                 objective,
                 information,
+                termination,
             });
             if !objective.is_finite() {
                 return None;
@@ -197,14 +201,18 @@ impl Expectation<'_> {
                 let lower = Self::objective(&there, &found, weighting) < objective;
                 lower.then_some(there)
             });
-            let Some(there) = lower else { break };
+            let Some(there) = lower else {
+                termination = Termination::FloatingPoint;
+                break;
+            };
             let length = (there - at).norm();
             at = there;
             if length < SHORTEST {
+                termination = Termination::NoChange;
                 break;
             }
         }
-        fit
+        fit.map(|fit: Fit| Fit { termination, ..fit })
     }
 
     /// Change of all misses by each number.
@@ -248,6 +256,7 @@ impl Expectation<'_> {
             numbers: self.numbers(&best.at),
             covariance: self.root * covariance * self.root.transpose(),
             weights: best.weights.clone(),
+            termination: best.termination,
             square,
             starts: [ends.len() as u32, ends.iter().filter(same).count() as u32],
         })

@@ -315,6 +315,7 @@ impl EarlierCalibration {
             rmse_after_mm: rmse_mm(presses, &geometry),
             n: presses.len() as u32,
             outliers: outliers as u32,
+            termination: outcome.termination,
             starts: outcome.starts[0],
             starts_agreeing: outcome.starts[1],
             ..standard_fit(&self.geometry, model, values, &all)
