@@ -43,7 +43,7 @@ fn evt3(random: &[(u8, u16)], vectors: bool) -> Vec<u8> {
     let mut words = vec![0x8000 | high, 0x6001, 7];
     for (kind, any) in random {
         let data = any & 0x0fff;
-        let pixel = (any & 0x0800) | any % 310;
+        let pixel = (any & 0x0800) | (any % 310);
         words.push(match kind {
             0..100 if vectors => {
                 [0x3000 | pixel, 0x4000 | data, 0x5000 | data][any.count_ones() as usize % 3]
@@ -81,7 +81,7 @@ fn evt2(random: &[(u8, u16)], quiet: bool) -> Vec<u8> {
             }
             100 => any << 16 | any,
             101 => 0x8000_0000 | any << 8,
-            _ => (any & 1) << 28 | (any & 0x3f) << 22 | any % 310 << 11 | any % 90,
+            _ => (any & 1) << 28 | (any & 0x3f) << 22 | ((any % 310) << 11) | (any % 90),
         }
     });
     words.flat_map(u32::to_le_bytes).collect()

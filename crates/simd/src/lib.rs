@@ -31,7 +31,7 @@ enum Tier {
 
 impl InstructionSet {
     /// The instructions that the program is built for, on every processor.
-    pub const BASELINE: Self = Self(Tier::Baseline);
+    const BASELINE: Self = Self(Tier::Baseline);
 
     /// The best one. The processor is asked once.
     #[must_use]

@@ -3,7 +3,7 @@
 use skinrig_model::*;
 use skinrig_recorder::{ChunkMeta, SessionReader, SessionWriter};
 
-use crate::common::records;
+use crate::common::header;
 
 const CHUNK: usize = 4 << 20;
 const CHUNKS: u64 = 26;
@@ -26,8 +26,7 @@ fn the_log_of_a_busy_stream_starts_anew() {
     let path = folder.path().join("a.session.sqlite");
     let log = folder.path().join("a.session.sqlite-wal");
     let mut writer = SessionWriter::create(&path).unwrap();
-    let started = records(1).into_iter().next().unwrap();
-    writer.accept(started).unwrap();
+    writer.accept(Record::Started(Box::new(header(4)))).unwrap();
     let mut most = 0;
     for seq in 0..CHUNKS {
         let chunk = RawChunk {
