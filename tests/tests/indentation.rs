@@ -229,7 +229,7 @@ fn a_small_sweep_is_learnt_and_says_how_sure_it_is() {
     let found = analysis.indentation.expect("depths vary");
     let depth = found.depth.expect("a depth");
     println!("{}", line("depth", &depth));
-    assert_eq!(depth.taught_by, 27);
+    assert!(depth.taught_by >= 18, "{}", depth.taught_by);
     assert!(value(depth.scored.rmse) < 0.35, "{}", line("depth", &depth));
     assert!(value(depth.left_out.covered) > 0.85);
     let force = found.force.expect("a force");

@@ -2,6 +2,8 @@
 
 #[path = "page/compare.rs"]
 mod compare;
+#[path = "page/indentation.rs"]
+mod indentation;
 mod support;
 #[path = "page/traces.rs"]
 mod traces;

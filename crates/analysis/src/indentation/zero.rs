@@ -11,6 +11,8 @@ use super::phases::AFTER;
 use crate::metrics::{bootstrap_over_locations, mean, root_mean_square};
 use crate::result::ZeroReturn;
 
+/// Standard errors to the end of a 95 % interval.
+const NORMAL: f64 = 1.96;
 /// Shortest time after the release that says anything, s.
 const SHORTEST_S: f64 = 0.5;
 
@@ -59,38 +61,41 @@ pub(super) fn zero_return(
         bootstrap_over_locations(rests, settings.bootstrap_resamples, settings.seed, of)
     };
     let mean_mm = estimate(mean);
-    let trend_mm = trend(rests);
+    let trend = trend(rests);
     let beyond = |low: f64, high: f64| low > ZeroReturn::LIMIT_MM || high < -ZeroReturn::LIMIT_MM;
     let drifts = mean_mm
         .low
         .zip(mean_mm.high)
         .is_some_and(|(l, h)| beyond(l, h))
-        || trend_mm.is_some_and(|t| t.abs() > ZeroReturn::LIMIT_MM);
+        || trend.is_some_and(|(mm, se)| mm.abs() - NORMAL * se > ZeroReturn::LIMIT_MM);
     ZeroReturn {
         after_s,
         mean_mm,
         rms_mm: estimate(root_mean_square),
-        trend_mm,
+        trend_mm: trend.map(|(mm, _)| mm),
         drifts,
     }
 }
 
-/// Change of a straight line through the rests from the first to the last, mm.
-fn trend(rests: &[(u32, f64)]) -> Option<f64> {
+/// Change of a straight line through the rests from the first to the last, and its standard error, mm.
+fn trend(rests: &[(u32, f64)]) -> Option<(f64, f64)> {
     let n = rests.len() as f64;
     if rests.len() < 3 {
         return None;
     }
     let centre = (n - 1.0) / 2.0;
+    let mean = rests.iter().map(|r| r.1).sum::<f64>() / n;
     let each = || {
         rests
             .iter()
             .enumerate()
-            .map(|(i, (_, mm))| (i as f64 - centre, *mm))
+            .map(|(i, r)| (i as f64 - centre, r.1 - mean))
     };
     let spread: f64 = each().map(|(t, _)| t * t).sum();
-    let product: f64 = each().map(|(t, mm)| t * mm).sum();
-    Some(product / spread * (n - 1.0))
+    let slope = each().map(|(t, mm)| t * mm).sum::<f64>() / spread;
+    let squares: f64 = each().map(|(t, mm)| (mm - slope * t).powi(2)).sum();
+    let se = (squares / (n - 2.0) / spread).sqrt();
+    Some((slope * (n - 1.0), se * (n - 1.0)))
 }
 
 #[cfg(test)]
@@ -134,6 +139,7 @@ mod tests {
         };
         let scatter = |i: u32| 0.02 * (f64::from((i * 7919) % 17) / 8.0 - 1.0);
         assert!(!of(&|i| scatter(i)).drifts);
+        assert!(!of(&|i| 10.0 * scatter(i)).drifts);
         assert!(of(&|i| 0.08 + scatter(i)).drifts);
         let growing = of(&|i| -0.05 + 0.1 * f64::from(i) / 59.0 + scatter(i));
         assert!(growing.drifts && (growing.trend_mm.unwrap() - 0.1).abs() < 0.02);

@@ -103,7 +103,7 @@ pub struct ZeroReturn {
     pub rms_mm: Estimate,
     /// Change of the rest from the first to the last scored press, mm: a straight line in order of the plan.
     pub trend_mm: Option<f64>,
-    /// True if the mean is beyond [`ZeroReturn::LIMIT_MM`] with its interval, or the trend is beyond it.
+    /// True if mean or trend is beyond [`ZeroReturn::LIMIT_MM`] with its 95 % interval.
     pub drifts: bool,
 }
 

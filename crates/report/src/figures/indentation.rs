@@ -54,6 +54,7 @@ pub fn indentation(input: &ReportInput<'_>) -> Option<Figure> {
                    at its location."
         .to_owned();
     let sheet = Sheet::new("indentation", "Estimated depth", caption, WIDE)
+        .columns(&[1.0, 1.0])
         .legend([
             (Sample::Dot("dots c1"), "scored presses"),
             (Sample::Dot("dots c2"), "left-out locations"),
