@@ -17,7 +17,9 @@ fn a_session_is_analysed_with_an_earlier_calibration_or_the_reason_is_given() {
         text(&lab.record(folder, &[&calibrates, more].concat()))
     };
     let earlier = record("a", &["--seed", "1"]);
-    let later = record("b", &["--seed", "2"]);
+    // The seed also numbers the simulated cameras.
+    let later = record("b", &["--seed", "1"]);
+    let replaced = record("d", &["--seed", "2"]);
     let other = record("c", &["--set", "prototype.id=skin 9"]);
     let analyze = |session: &str, from: &str| {
         skinrig(&[
@@ -52,6 +54,8 @@ fn a_session_is_analysed_with_an_earlier_calibration_or_the_reason_is_given() {
     assert!(report.contains("skin and cameras shifted by"));
     let same = analyze(&later, &later).code(2);
     assert!(same.err.contains("found this one"), "{same:#?}");
+    let cameras = analyze(&later, &replaced).code(2);
+    assert!(cameras.err.contains("sim-00000002-c1"), "{cameras:#?}");
     let other = analyze(&later, &other).code(2);
     assert!(other.err.contains("found `skin 9`"), "{other:#?}");
 }
