@@ -12,7 +12,8 @@ pub fn indentation(input: &ReportInput<'_>) -> Option<Figure> {
     let a = input.analysis;
     let found = a.indentation.as_ref().filter(|_| a.is_valid())?;
     found.depth.as_ref()?;
-    let (mut known, mut unseen): (Vec<(f64, Ranged)>, Vec<(f64, Ranged)>) = Default::default();
+    let mut known: Vec<(f64, Ranged)> = Vec::new();
+    let mut unseen: Vec<(f64, Ranged)> = Vec::new();
     for press in &found.presses {
         let Some(measured) = press.measured_mm else {
             continue;
