@@ -1,5 +1,4 @@
 //! Depth and force estimated on optically simulated skins: errors at unseen places, coverage of intervals, return to zero.
-#![expect(clippy::print_stdout, reason = "the long measurement prints its table")]
 
 use skinrig_analysis::result::{Analysis, Quantity};
 use skinrig_analysis::{SessionInput, analyze, seeded};

@@ -147,6 +147,7 @@ struct Summary {
     inside: f64,
 }
 
+#[expect(clippy::print_stdout, reason = "the long measurement prints its table")]
 fn summary(rows: &[Row]) -> Summary {
     let mut ratios: Vec<f64> = rows.iter().map(|r| r.five / r.full).collect();
     ratios.sort_by(f64::total_cmp);

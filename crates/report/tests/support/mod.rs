@@ -130,6 +130,7 @@ pub(crate) fn analysis(side: u32, repetitions: u32) -> Analysis {
         .to_vec();
     Analysis {
         indentation: None,
+        recalibration: None,
         locator: Some(studies::locator()),
         version: ANALYSIS_VERSION,
         alignment: alignment(),
