@@ -3,7 +3,8 @@
 
 use std::ops::Range;
 
-use skinrig::results::{AnalysisRequest, analyze_session};
+use skinrig::analysis_request::AnalysisRequest;
+use skinrig::results::analyze_session;
 use skinrig_analysis::Analysis;
 use skinrig_analysis::result::{Evidence, Fault as Accused, Finding};
 use skinrig_model::{CameraId, HostTime, RigFault, RunEnd, SimLevel};

@@ -1,7 +1,8 @@
 //! planned = valid + missed + invalid + excluded, for any plan, fault or stop.
 
 use proptest::prelude::*;
-use skinrig::results::{AnalysisRequest, analyze_session};
+use skinrig::analysis_request::AnalysisRequest;
+use skinrig::results::analyze_session;
 use skinrig_model::{CameraId, Record, RigFault, SimLevel};
 use skinrig_recorder::{SessionReader, verify};
 use skinrig_results::Rescan;

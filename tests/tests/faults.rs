@@ -10,8 +10,9 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
+use skinrig::analysis_request::AnalysisRequest;
 use skinrig::fault::FaultInjector;
-use skinrig::results::{AnalysisRequest, analyze_session};
+use skinrig::results::analyze_session;
 use skinrig::rig::{self, gates};
 use skinrig_analysis::Analysis;
 use skinrig_analysis::result::PressResult;

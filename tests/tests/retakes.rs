@@ -3,7 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use skinrig::results::{AnalysisRequest, analyze_session};
+use skinrig::analysis_request::AnalysisRequest;
+use skinrig::results::analyze_session;
 use skinrig_analysis::result::{AlignmentStatus, Analysis};
 use skinrig_model::{BoxReport, CameraId, PressVerdict, RigFault, RunEnd, SimLevel};
 use skinrig_recorder::SessionReader;

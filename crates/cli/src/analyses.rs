@@ -9,9 +9,9 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 use skinrig_report::{Summary, Variant};
 
+use crate::analysis_request::AnalysisRequest;
 use crate::exit::Failure;
 use crate::paths::{beside, folder_of};
-use crate::results::AnalysisRequest;
 
 pub(crate) use self::stored::stored;
 pub(crate) use self::summary::{SummaryError, summary};

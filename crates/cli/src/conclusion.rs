@@ -7,6 +7,7 @@ use skinrig_model::{PressRole, PressVerdict, RunEnd};
 use skinrig_protocol::Plan;
 use skinrig_recorder::{RecorderError, SessionReader};
 
+use crate::analysis_request::AnalysisRequest;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::results;
 use crate::signals::Operator;
@@ -184,7 +185,7 @@ fn next_step(session: &Path) -> String {
 }
 
 fn analyse(session: &Path, max_rmse_mm: Option<f64>, output: Output) -> Outcome {
-    let results = results::analyze_shown(session, results::AnalysisRequest::default())?;
+    let results = results::analyze_shown(session, AnalysisRequest::default())?;
     let written = results::write_shown(&results, None, None)?;
     results::print_results(&results, output, &written);
     results::check_limit(&results, max_rmse_mm)

@@ -9,10 +9,11 @@ use skinrig_export::{
 use skinrig_model::{CameraId, RunHeader};
 use skinrig_recorder::{SessionReader, tags_path};
 
+use crate::analysis_request::AnalysisRequest;
 use crate::args::{ExportArgs, ExportKind, ExportTable};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::paths::{SESSION_SUFFIX, beside};
-use crate::results::{self, AnalysisRequest, Results};
+use crate::results::{self, Results};
 
 /// Writes the requested formats and prints the paths of the files.
 ///

@@ -5,6 +5,7 @@
 mod terminal;
 
 mod analyses;
+pub mod analysis_request;
 mod args;
 mod challenge;
 pub mod check;

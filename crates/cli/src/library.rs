@@ -10,9 +10,10 @@ use skinrig_results::{AnalysisOptions, Session};
 
 pub use skinrig_controller::ControlHandle;
 
+use crate::analysis_request::AnalysisRequest;
 use crate::args::{CompareArgs, RunArgs};
 use crate::exit::Failure;
-use crate::results::{self, AnalysisRequest};
+use crate::results;
 use crate::signals::Operator;
 use crate::terminal::Output;
 use crate::{analyses, check, compare, conclusion, run};

@@ -9,6 +9,7 @@ use skinrig_report::{Provenance, ReportInput, Variant};
 use skinrig_results::{AlignedSession, AnalyzedSession, Session};
 
 use crate::analyses;
+use crate::analysis_request::AnalysisRequest;
 use crate::args::{AnalyzeArgs, ReportArgs};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::phase::Phase;
@@ -40,29 +41,6 @@ impl Results {
                 .tradeoff
                 .as_ref()
                 .map(|t| t.as_ref().map_err(|e| e as _)),
-        }
-    }
-}
-
-/// How to analyse a session.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct AnalysisRequest<'a> {
-    /// Overrides of the session's own settings.
-    pub overrides: &'a [String],
-    /// Make the choices of the public code first, and evaluate its method too.
-    pub reference_code: bool,
-    /// Name of the variant.
-    pub name: Option<&'a str>,
-    /// Take the calibration of this session, and correct it by the calibration presses.
-    pub calibration_from: Option<&'a Path>,
-}
-
-impl<'a> AnalysisRequest<'a> {
-    const fn of_session(&self) -> skinrig_results::AnalysisOptions<'a> {
-        skinrig_results::AnalysisOptions {
-            overrides: self.overrides,
-            reference_code: self.reference_code,
-            calibration_from: self.calibration_from,
         }
     }
 }

@@ -9,10 +9,11 @@ use skinrig_compare::statistics::power::{self, MetricVariance, PowerPlan, Target
 use skinrig_model::{HostDuration, PressRole, Verdict};
 use skinrig_text::{Column, Table};
 
+use crate::analysis_request::AnalysisRequest;
 use crate::args::DetectArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::progress::clock_text;
-use crate::results::{AnalysisRequest, analyze_shown};
+use crate::results::analyze_shown;
 
 /// Below this number of locations the estimated variance is poor: its 95 % interval spans a factor of 6 or more.
 const FEW_LOCATIONS: u32 = 12;

@@ -9,10 +9,11 @@ use skinrig_results::Origin;
 use skinrig_text::Paint;
 
 use crate::analyses::tradeoff_path;
+use crate::analysis_request::AnalysisRequest;
 use crate::args::{CostKind, TradeoffArgs};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::phase::Phase;
-use crate::results::{AnalysisRequest, not_official, open, write};
+use crate::results::{not_official, open, write};
 use crate::terminal::Output;
 use crate::tradeoff_file::FORMAT;
 

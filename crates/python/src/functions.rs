@@ -7,9 +7,9 @@ use std::time::Duration;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
+use skinrig::analysis_request::AnalysisRequest;
 use skinrig::exit::Failure;
 use skinrig::library::{self, CompareOptions, ControlHandle, ProtocolSource, Simulation};
-use skinrig::results::AnalysisRequest;
 
 use crate::error::raised;
 use crate::options::{overrides, to_python};

@@ -6,7 +6,7 @@ use skinrig_analysis::AnalysisError;
 use skinrig_protocol::Diagnostics;
 use skinrig_recorder::RecorderError;
 
-use crate::earlier::EarlierMismatch;
+use crate::earlier_mismatch::EarlierMismatch;
 
 /// Why a session has no analysis.
 #[derive(Debug, thiserror::Error)]

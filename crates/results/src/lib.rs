@@ -11,6 +11,7 @@
 
 mod contacts;
 mod earlier;
+mod earlier_mismatch;
 mod error;
 mod events;
 mod origin;
@@ -20,7 +21,7 @@ mod settings;
 mod stages;
 mod window;
 
-pub use earlier::EarlierMismatch;
+pub use earlier_mismatch::EarlierMismatch;
 pub use error::ResultsError;
 pub use events::{Rescan, SessionEvents};
 pub use origin::Origin;

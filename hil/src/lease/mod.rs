@@ -23,6 +23,9 @@ pub use file::{VARIABLE, folder};
 pub use owner::Owner;
 use owner::{Entry, VERSION};
 
+/// How often an entry that cannot be read is read, over one heartbeat.
+const SETTLE_READS: u32 = 10;
+
 /// Intervals of a lease.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LeaseTiming {
@@ -124,7 +127,7 @@ impl Lease {
                 path: path.to_owned(),
             });
         }
-        let previous = file::read(&mut file).map_err(file_error)?;
+        let previous = settled(&mut file, timing).map_err(file_error)?;
         let previous = previous.filter(|e| !e.released);
         if let Some(entry) = &previous
             && entry.owner.host != owner.host
@@ -255,6 +258,18 @@ fn lock(file: &File, lock_wait: Duration) -> io::Result<bool> {
             Err(TryLockError::Error(e)) => return Err(e),
         }
     }
+}
+
+/// Reads the entry. One that cannot be read may be half written by a holder whose lock is invisible here: it is read again.
+fn settled(file: &mut File, timing: LeaseTiming) -> io::Result<Option<Entry>> {
+    for _ in 0..SETTLE_READS {
+        let entry = file::read(file)?;
+        if entry.is_some() || file.metadata()?.len() == 0 {
+            return Ok(entry);
+        }
+        std::thread::sleep(timing.heartbeat.min(timing.expiry) / 10);
+    }
+    Ok(None)
 }
 
 /// Whether the holder of `last` still sends heartbeats.

@@ -45,7 +45,11 @@ fn entry(path: &Path) -> serde_json::Value {
 fn rewrite(path: &Path, change: impl Fn(&mut serde_json::Value)) {
     let mut value = entry(path);
     change(&mut value);
-    std::fs::write(path, value.to_string()).unwrap();
+    // In place, as holders write it: never empty in between.
+    let text = value.to_string();
+    let mut file = std::fs::OpenOptions::new().write(true).open(path).unwrap();
+    file.write_all(text.as_bytes()).unwrap();
+    file.set_len(text.len() as u64).unwrap();
 }
 
 /// Waits for the holder's next heartbeat.

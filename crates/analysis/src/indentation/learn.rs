@@ -185,11 +185,11 @@ mod tests {
 
     #[test]
     fn a_model_too_sure_of_itself_is_widened() {
-        // Errors follow a model variance 16 times as large as stated.
+        // Errors follow a model variance 16 times as large as stated. Without noise a common size would explain them.
         let errors: Vec<(Prediction, f64)> = (0..200)
             .map(|i| {
-                let model = if i % 2 == 0 { 1e-4 } else { 1e-2 };
-                let noise = 1e-5;
+                let model = if i % 2 == 0 { 1e-6 } else { 1e-2 };
+                let noise = 1e-3;
                 let sign = if i % 4 < 2 { 1.0 } else { -1.0 };
                 let prediction = Prediction {
                     mean: 0.0,
@@ -201,6 +201,6 @@ mod tests {
             })
             .collect();
         let found = Intervals::from_held_out(&errors).inflation;
-        assert!(found >= 4.0, "{found}");
+        assert!((8.0..=32.0).contains(&found), "{found}");
     }
 }

@@ -200,6 +200,15 @@ fn clocks_and_events() -> Vec<(Value, &'static str)> {
             "camera 1: presses found in the event rates scatter by 45 ms rms about the clock fit",
         ),
         (
+            json!({"kind": "remount_unusual", "chance": 0.02}),
+            "the presses fit the calibration of the earlier session badly: 2.0 % of remounts disagree as much; calibrate in \
+             full if the numbers matter",
+        ),
+        (
+            json!({"kind": "remount_outliers", "presses": [3, 7], "of": 5}),
+            "2 of 5 presses that correct the earlier calibration are outliers and count less: press 3, press 7",
+        ),
+        (
             json!({"camera": "camera1", "kind": "windows_overlap"}),
             "camera 1: press windows overlap: events in the overlap count in both presses",
         ),

@@ -16,11 +16,12 @@ use skinrig_recorder::{RecorderError, SessionReader};
 use skinrig_results::{ChunkIndex, Origin, events_between};
 
 use self::process::Process;
+use crate::analysis_request::AnalysisRequest;
 use crate::args::{ChallengeArgs, ChallengeCommand, ExamineArgs, MakeArgs, ScoreArgs};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::export::refused;
 use crate::paths::beside;
-use crate::results::{self, AnalysisRequest};
+use crate::results;
 
 /// Makes or scores a challenge.
 ///

@@ -8,9 +8,10 @@ use skinrig_recorder::{SessionReader, list};
 
 use super::facts::facts;
 use crate::analyses;
+use crate::analysis_request::AnalysisRequest;
 use crate::args::CompareArgs;
 use crate::exit::Failure;
-use crate::results::{AnalysisRequest, analyze_shown};
+use crate::results::analyze_shown;
 use crate::sessions::{copies, originals};
 
 /// Most skins in one comparison: letters A to H.

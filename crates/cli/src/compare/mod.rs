@@ -12,10 +12,11 @@ use skinrig_compare::{Comparison, Reanalyses, Session, Subject, compare as compa
 use skinrig_model::AnalysisSettings;
 use skinrig_report::compare as report;
 
+use crate::analysis_request::AnalysisRequest;
 use crate::args::CompareArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::phase::Phase;
-use crate::results::{AnalysisRequest, open, write};
+use crate::results::{open, write};
 
 /// Default file name of the page.
 const PAGE: &str = "comparison.html";

@@ -10,8 +10,9 @@ use skinrig_nightly::{Evidence, EvidenceKind, GoldenSession};
 use skinrig_protocol::{Plan, Protocol};
 
 use super::real_bench::RealBench;
+use crate::analysis_request::AnalysisRequest;
 use crate::exit::Failure;
-use crate::results::{self, AnalysisRequest};
+use crate::results;
 use crate::rig::{bench, gates};
 use crate::{check, run};
 

@@ -169,11 +169,12 @@ fn count(failed: &[PreflightCheck]) -> String {
     }
 }
 
-/// The first fault of each kind, and the number of others.
+/// The first fault of each kind and camera, and the number of others.
 fn of_each_kind(faults: &Causes<PressFault>) -> String {
     let mut shown: Vec<&PressFault> = Vec::new();
     for fault in faults.iter() {
-        if shown.iter().all(|s| s.kind() != fault.kind()) {
+        let key = (fault.kind(), fault.camera());
+        if shown.iter().all(|s| (s.kind(), s.camera()) != key) {
             shown.push(fault);
         }
     }

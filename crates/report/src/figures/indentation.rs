@@ -1,6 +1,7 @@
 //! Owns the figure of the estimated depths: against the measured ones, and errors by depth.
 
 use skinrig_analysis::result::Ranged;
+use skinrig_model::{PressRole, Verdict};
 
 use super::origin::foot;
 use crate::input::ReportInput;
@@ -14,14 +15,15 @@ pub fn indentation(input: &ReportInput<'_>) -> Option<Figure> {
     found.depth.as_ref()?;
     let mut known: Vec<(f64, Ranged)> = Vec::new();
     let mut unseen: Vec<(f64, Ranged)> = Vec::new();
-    for press in &found.presses {
+    let valid = a.presses.iter().filter(|p| p.verdict == Verdict::Valid);
+    for (role, press) in valid.filter_map(|p| Some((p.role, found.of(p.press)?))) {
         let Some(measured) = press.measured_mm else {
             continue;
         };
         match (press.left_out_mm, press.depth_mm) {
             (Some(estimate), _) => unseen.push((measured, estimate)),
-            (None, Some(estimate)) => known.push((measured, estimate)),
-            (None, None) => {}
+            (None, Some(estimate)) if role == PressRole::Score => known.push((measured, estimate)),
+            _ => {}
         }
     }
     let all = || known.iter().chain(&unseen);

@@ -11,7 +11,7 @@ use crate::input::ReportInput;
 pub(super) fn indentation(input: &ReportInput<'_>) -> Option<Section> {
     let a = input.analysis;
     let found = a.indentation.as_ref().filter(|_| a.is_valid())?;
-    let section = Section::new("indentation", "Depth and force")
+    let section = Section::new("depth-and-force", "Depth and force")
         .with_all(figures::indentation(input))
         .with_all(found.depth.as_ref().map(|_| totals(found).card()))
         .with_all(found.depth.as_ref().map(|q| by_depth(q).card()))
@@ -100,7 +100,7 @@ fn by_depth(depth: &Quantity) -> Table {
 fn zero(found: &Indentation) -> Option<Note> {
     let zero = found.zero.as_ref()?;
     let text = format!(
-        "{}; trend over the session {} mm. Measured {} s after the release, relative to the calibration presses.",
+        "{}. Trend over the session {} mm. Measured {} s after the release, relative to the calibration presses.",
         rest(zero),
         number(zero.trend_mm, 3),
         number(Some(zero.after_s), 1),
@@ -116,7 +116,7 @@ fn zero(found: &Indentation) -> Option<Note> {
 
 fn rest(zero: &ZeroReturn) -> String {
     format!(
-        "mean {} mm {}, RMS {} mm, limit {} mm",
+        "Mean {} mm {}, RMS {} mm, limit {} mm",
         number(zero.mean_mm.value, 3),
         interval(&zero.mean_mm, 1.0, 3),
         number(zero.rms_mm.value, 3),
