@@ -16,8 +16,8 @@ const CHUNK: usize = 1 << 20;
 const CHUNKS: u64 = 256;
 
 const METHOD: &str = "bytes as they came per second until all are durable (WAL, synchronous=FULL, closed);
-  every byte goes into the log, with an fsync, and from there into the file on a thread of its own, with another one, while a third
-  thread hashes (SHA-256, CRC-32) and folds what comes next";
+  the limit of busy streams is the one thread in SQLite: every byte goes into the log and from there into the file,
+  with an fsync after each, while another thread hashes (SHA-256, CRC-32) and folds what comes next";
 
 /// EVT2 words: a time word every 16 µs and `events` random events between two of them.
 fn evt2(events: u32, bytes: usize) -> Vec<u8> {

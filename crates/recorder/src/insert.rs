@@ -60,17 +60,16 @@ impl Journal {
         self.pending_bytes >= COMMIT_BYTES || self.pending_records >= COMMIT_RECORDS
     }
 
-    /// Commits, so that everything written so far is durable; returns the bytes of the records, or `None` without records.
-    pub(crate) async fn commit(&mut self) -> Result<Option<usize>, Fault> {
+    /// Commits, so that everything written so far is durable.
+    pub(crate) async fn commit(&mut self) -> Result<(), Fault> {
         self.flush_poses().await?;
-        let bytes = self.opened.is_some().then_some(self.pending_bytes);
-        if bytes.is_some() {
+        if self.opened.is_some() {
             sqlx::query("COMMIT").execute(&mut self.conn).await?;
             self.opened = None;
         }
         self.pending_bytes = 0;
         self.pending_records = 0;
-        Ok(bytes)
+        Ok(())
     }
 
     /// Writes one record in the current transaction.

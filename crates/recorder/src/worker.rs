@@ -8,7 +8,6 @@ use std::time::{Duration, Instant};
 use sqlx::Connection;
 use tokio::runtime::Runtime;
 
-use crate::checkpoint::Checkpoints;
 use crate::close_result::{CloseResult, SealedSession};
 use crate::error::{RecorderError, WriteFailure};
 use crate::insert::Journal;
@@ -25,7 +24,6 @@ const SEAL_RETRY_INTERVAL: Duration = Duration::from_millis(20);
 pub(crate) struct Worker {
     pub runtime: Runtime,
     pub journal: Journal,
-    pub checkpoints: Checkpoints,
     pub shared: Arc<Shared>,
 }
 
@@ -82,11 +80,8 @@ impl Worker {
         let Self {
             runtime,
             journal,
-            mut checkpoints,
             shared,
         } = self;
-        // The log can only be emptied by the last connection.
-        checkpoints.close();
         let result = match close {
             CloseMode::Seal if !failed => {
                 let sealed = runtime.block_on(seal_session(journal, &shared));
@@ -143,12 +138,9 @@ impl Worker {
     }
 
     fn commit(&mut self, written: u64) -> Result<(), Fault> {
-        let bytes = self.runtime.block_on(self.journal.commit())?;
+        self.runtime.block_on(self.journal.commit())?;
         self.shared.mark_durable(written);
-        match bytes {
-            Some(bytes) => self.checkpoints.committed(bytes),
-            None => Ok(()),
-        }
+        Ok(())
     }
 }
 

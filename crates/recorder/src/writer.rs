@@ -10,7 +10,6 @@ use skinrig_model::{Record, ResumeHeader, RunHeader};
 use sqlx::sqlite::SqliteConnection;
 use tokio::runtime::Runtime;
 
-use crate::checkpoint::Checkpoints;
 use crate::close_result::{CloseResult, SealedSession};
 use crate::error::{RecorderError, RescueError, WriteFailure};
 use crate::hex::hex;
@@ -25,7 +24,7 @@ use crate::{prepare, resume, schema, sidecar};
 
 /// Writes one session file.
 ///
-/// Three threads work for it: one checks, hashes and folds camera bytes, one writes the file, and one copies its log. If it is dropped without
+/// Two threads work for it: one checks, hashes and folds camera bytes, the other owns the file. If it is dropped without
 /// [`finish`](Self::finish), all accepted records are committed and the session stays readable but unsealed. Do not use it on a thread
 /// that runs async tasks.
 #[derive(Debug)]
@@ -139,15 +138,12 @@ impl SessionWriter {
     fn start(
         &mut self,
         runtime: Runtime,
-        mut conn: SqliteConnection,
+        conn: SqliteConnection,
         preparer: Preparer,
         leg: u32,
     ) -> Result<(), RecorderError> {
-        let beside = runtime.block_on(schema::disable_checkpoints(&mut conn));
-        beside.map_err(|fault| fault.at(&self.path, "leaving checkpoints to their thread"))?;
         let worker = Worker {
             runtime,
-            checkpoints: Checkpoints::start(&self.path)?,
             journal: Journal::new(self.path.clone(), conn, leg),
             shared: Arc::clone(&self.shared),
         };

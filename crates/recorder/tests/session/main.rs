@@ -4,7 +4,6 @@
 mod cause_examples;
 mod causes;
 mod chain;
-mod checkpoints;
 mod common;
 mod crash;
 mod damage;
