@@ -14,7 +14,6 @@ mod box_row;
 pub mod catalogue;
 mod cause;
 mod chain;
-mod checkpoint;
 pub mod codec;
 pub mod error;
 pub mod reader;
