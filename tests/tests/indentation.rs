@@ -254,7 +254,7 @@ fn a_single_depth_is_not_estimated() {
 }
 
 #[test]
-#[ignore = "minutes: the figures of ADR 45"]
+#[ignore = "minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig-tests --test indentation -- --ignored --nocapture (figures of ADR 45)"]
 fn sweeps_of_several_seeds() {
     let number = |name: &str, default: usize| {
         std::env::var(name).map_or(default, |v| v.parse().expect("a number"))
