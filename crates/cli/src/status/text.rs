@@ -9,7 +9,7 @@ use crate::progress::{clock_text, eta_text};
 use crate::remote::RunSnapshot;
 use crate::rig::gates;
 
-/// Prints `text` beside a label, wrapped; commands and paths stay whole.
+/// Prints `text` beside a label, wrapped; long words such as paths stay whole.
 fn line(label: &str, text: &str) {
     let text = hang(&format!("{label:<10}"), text, LongWords::Keep);
     crate::terminal::out(format_args!("{text}"));
@@ -25,10 +25,6 @@ fn state(status: &Status) -> String {
     let stored = status.stored.as_ref();
     let end = stored.and_then(|s| s.end.0.as_ref());
     let is_sealed = stored.is_some_and(|s| s.sealed);
-    let next = match stored.map(|s| s.rig_kind.as_str()) {
-        Some("imported" | "replayed") => "run it again".to_owned(),
-        _ => format!("`skinrig resume {}` continues it", status.session.display()),
-    };
     match (&status.live, &status.writer, end) {
         (Some(live), by, _) => {
             let by = by.as_deref().unwrap_or("process unknown");
@@ -42,16 +38,34 @@ fn state(status: &Status) -> String {
         (None, None, Some(end)) => {
             let sealed = if is_sealed { "" } else { ", not sealed" };
             let reason = because(end.reason().as_deref());
-            format!("{}{sealed}{reason}; {next}", end.name())
+            format!("{}{sealed}{reason}", end.name())
         }
-        (None, None, None) => format!("cut off: no program is running it; {next}"),
+        (None, None, None) => "cut off: no program is running it".to_owned(),
     }
+}
+
+/// What continues a session that no program runs and that is not completed.
+fn next_step(status: &Status) -> Option<String> {
+    let stored = status.stored.as_ref();
+    let end = stored.and_then(|s| s.end.0.as_ref());
+    let completed = stored.is_some_and(|s| s.sealed) && matches!(end, Some(RunEnd::Completed));
+    if status.live.is_some() || status.writer.is_some() || completed {
+        return None;
+    }
+    Some(match stored.map(|s| s.rig_kind.as_str()) {
+        Some("imported" | "replayed") => "import or replay it again".to_owned(),
+        _ => format!("skinrig resume {}", status.session.display()),
+    })
 }
 
 /// Prints the state, one label a line, then what happened last.
 pub(super) fn print(status: &Status) {
     line("session", &status.session.display().to_string());
     line("state", &state(status));
+    if let Some(next) = next_step(status) {
+        // On one line, to be copied.
+        crate::terminal::out(format_args!("{:<10}{next}\n", "next"));
+    }
     let stored = status.stored.as_ref();
     if let Some(s) = stored {
         let run = format!(
