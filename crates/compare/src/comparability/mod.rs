@@ -71,7 +71,11 @@ fn settings_of(session: &Session) -> Vec<(String, String)> {
         crate::flatten::flatten("analysis", &settings, &mut facts);
     }
     let calibration = analysis.calibration.as_ref();
-    let origin = calibration.map_or("nominal geometry", |_| "the session's own presses");
+    let origin = match (calibration, &analysis.recalibration) {
+        (None, _) => "nominal geometry",
+        (Some(_), None) => "the session's own presses",
+        (Some(_), Some(_)) => "an earlier session, corrected",
+    };
     facts.push(("calibration.origin".to_owned(), origin.to_owned()));
     if let Some(c) = calibration {
         facts.push((

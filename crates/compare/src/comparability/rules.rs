@@ -246,7 +246,7 @@ pub const RULES: &[Rule] = &[
         "calibration.origin",
         "calibration-origin",
         Confounding,
-        "one skin was calibrated, the other was not",
+        "the calibrations of the skins come from different presses",
     ),
     rule(
         "calibration.",

@@ -6,9 +6,12 @@
 mod planted;
 
 use planted::{PlantedCause, record};
+use skinrig_analysis::result::{CameraMove, EarlierSession, Move, Recalibration};
 use skinrig_compare::causes::causes;
 use skinrig_compare::statistics::Verdict;
-use skinrig_compare::{ComparisonOptions, Factor, Metric, Reanalysis, compare};
+use skinrig_compare::{
+    ComparisonOptions, Factor, Metric, Reanalysis, Severity, compare, differences,
+};
 
 /// Planted causes, and the factor that must be reported.
 const PLANTS: [(PlantedCause, Factor); 6] = [
@@ -118,4 +121,42 @@ fn a_worse_skin_is_worse_and_another_session_of_the_same_is_not_better() {
         .filter_map(|l| l.skins[2].rank)
         .collect();
     assert_eq!(ranks.iter().sum::<u32>(), 325, "ranks 1 to 25");
+}
+
+#[test]
+fn a_corrected_earlier_calibration_differs_from_one_of_its_own() {
+    let skin = record(1, PlantedCause::Nothing);
+    let (own, mut corrected) = (skin.skin('A', None), skin.skin('B', None));
+    let none = Move {
+        value: 0.0,
+        standard_error: 0.1,
+        expected: 1.0,
+    };
+    let camera = CameraMove {
+        shift_mm: [none; 2],
+        turn_deg: none,
+    };
+    corrected.sessions[0].analysis.recalibration = Some(Recalibration {
+        from: EarlierSession {
+            session_id: "earlier".into(),
+            content_sha256: None,
+            started: String::new(),
+        },
+        presses: 5,
+        outliers: Vec::new(),
+        shift_mm: [none; 2],
+        turn_deg: none,
+        cameras: [camera; 2],
+        chance: 0.5,
+    });
+    let found = differences(&[own, corrected], &[]);
+    let found = found
+        .iter()
+        .find(|d| d.key == "calibration-origin")
+        .unwrap();
+    assert_eq!(found.severity, Severity::Confounding);
+    assert_eq!(
+        found.values,
+        ["the session's own presses", "an earlier session, corrected"]
+    );
 }
