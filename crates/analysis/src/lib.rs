@@ -33,6 +33,7 @@ pub mod grid;
 mod hash;
 mod indentation;
 pub mod input;
+mod lanes;
 pub mod latency;
 mod leg;
 pub mod legs;

@@ -3,10 +3,9 @@
 //! A linear part, a part that varies smoothly with the place, and a smooth part of all features; noise is fixed or grows as
 //! events become fewer. Presses beyond what the others predict lose weight.
 
-use nalgebra::{Cholesky, DVector, Dyn};
-
 use super::features::{FEATURES, Observation};
-use super::kernel::{Input, Likelihood, Logs, centre, covariance, noise};
+use super::kernel::{Input, Kernel, Likelihood, Logs, centre};
+use crate::lanes::{Factor, Group};
 use crate::locator::{minimise, thinned};
 
 /// Maximum number of presses of a fit, and of those that determine the hyperparameters.
@@ -31,8 +30,8 @@ pub(super) struct Regression {
     /// Median events.
     reference: f64,
     inputs: Vec<Input>,
-    alpha: DVector<f64>,
-    factor: Cholesky<f64, Dyn>,
+    alpha: Vec<Group>,
+    factor: Factor,
 }
 
 /// Logarithm of the quantity of a press.
@@ -65,15 +64,13 @@ impl Regression {
         let reference = *events.get(events.len() / 2)?;
         let standard = |(o, _): &(Observation, f64)| standardised(o, &scales, reference);
         let inputs: Vec<Input> = pairs.iter().map(standard).collect();
-        let (logs, weights) = learn(&inputs, &targets, near)?;
-        let likelihood = Likelihood {
-            inputs: &inputs,
-            targets: &targets,
-            weights: &weights,
+        let (logs, factor, alpha) = {
+            let all = Likelihood::new(&inputs, &targets);
+            let (logs, weights) = learn(&all, &inputs, &targets, near)?;
+            let (factor, alpha) = all.solved(&logs, &weights)?;
+            (logs, factor, alpha)
         };
-        let factor = Cholesky::new(likelihood.noisy(&logs))?;
-        let alpha = factor.solve(&likelihood.targets());
-        let finite = alpha.iter().all(|a| a.is_finite());
+        let finite = alpha.as_flattened().iter().all(|a| a.is_finite());
         finite.then_some(Self {
             logs,
             scales,
@@ -92,15 +89,16 @@ impl Regression {
 
     pub(super) fn predict(&self, observation: &Observation) -> Option<Prediction> {
         let input = standardised(observation, &self.scales, self.reference);
-        let near = self.inputs.iter();
-        let near = near.map(|other| covariance(&input, other, &self.logs));
-        let near = DVector::from_iterator(self.inputs.len(), near);
-        let explained = self.factor.l_dirty().solve_lower_triangular(&near)?;
-        let own = covariance(&input, &input, &self.logs);
+        let kernel = Kernel::new(&self.logs);
+        let near = kernel.covariances(&input, &self.inputs);
+        // The weights are zero beyond the last press.
+        let products = near.as_flattened().iter().zip(self.alpha.as_flattened());
+        let mean: f64 = products.map(|(near, alpha)| near * alpha).sum();
+        let explained = self.factor.explained(near);
         let prediction = Prediction {
-            mean: self.level + near.dot(&self.alpha),
-            model: (own - explained.norm_squared()).max(0.0),
-            noise: noise(&input, &self.logs),
+            mean: self.level + mean,
+            model: (kernel.variance(&input) - explained).max(0.0),
+            noise: kernel.noise(&input),
         };
         prediction.mean.is_finite().then_some(prediction)
     }
@@ -114,29 +112,28 @@ fn standardised(o: &Observation, scales: &[(f64, f64); FEATURES], reference: f64
     }
 }
 
-/// Hyperparameters and weights.
-fn learn(inputs: &[Input], targets: &[f64], near: Option<&Logs>) -> Option<(Logs, Vec<f64>)> {
+/// Hyperparameters and weights. `all`: of the same inputs and targets.
+fn learn(
+    all: &Likelihood<'_>,
+    inputs: &[Input],
+    targets: &[f64],
+    near: Option<&Logs>,
+) -> Option<(Logs, Vec<f64>)> {
     let mut weights = vec![1.0; inputs.len()];
     let mut logs = near.copied().unwrap_or_else(centre);
     let steps = if near.is_some() { NEAR_STEPS } else { STEPS };
     let rows: Vec<usize> = (0..inputs.len()).collect();
     let rows = thinned(&rows, LEARNING);
+    let part: Vec<Input> = rows.iter().map(|i| inputs[*i]).collect();
+    let values: Vec<f64> = rows.iter().map(|i| targets[*i]).collect();
+    let likelihood = Likelihood::new(&part, &values);
     for _ in 0..ROUNDS {
-        let part: Vec<Input> = rows.iter().map(|i| inputs[*i]).collect();
-        let values: Vec<f64> = rows.iter().map(|i| targets[*i]).collect();
         let shares: Vec<f64> = rows.iter().map(|i| weights[*i]).collect();
-        let likelihood = Likelihood {
-            inputs: &part,
-            targets: &values,
-            weights: &shares,
-        };
-        logs = minimise(logs, steps, TOLERANCE, |at| likelihood.evaluate(at))?.0;
-        let all = Likelihood {
-            inputs,
-            targets,
-            weights: &weights,
-        };
-        weights = all.new_weights(&logs)?;
+        logs = minimise(logs, steps, TOLERANCE, |at| {
+            likelihood.evaluate(at, &shares)
+        })?
+        .0;
+        weights = all.new_weights(&logs, &weights)?;
     }
     Some((logs, weights))
 }

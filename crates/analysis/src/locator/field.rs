@@ -5,13 +5,14 @@
 //! [`LEARNING`] observations. Observations beyond what the others predict get less weight (Student's t with 4 degrees of
 //! freedom); none is dropped.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use skinrig_simd::InstructionSet;
 
-use super::exponential::{LANES, of_negatives};
-use super::likelihood::{Kernel, Likelihood, Logs, centre, first_weights, scatter};
+use super::likelihood::{
+    Kernel, Likelihood, Logs, centre, first_weights, scatter, smooth, squares,
+};
 use super::quasi_newton::minimise;
 use super::samples::{Sample, thinned};
+use crate::lanes::{Factor, Group, LANES, total};
 use crate::result::{FieldModel, FieldPoint};
 
 /// Observations that choose among the starts, and that determine the hyperparameters.
@@ -32,15 +33,13 @@ pub(super) fn learn(samples: &[Sample], from: Option<&Logs>) -> Option<(FieldMod
     let mut weights = first_weights(samples);
     let centre = centre(samples);
     let rows: Vec<usize> = (0..samples.len()).collect();
+    let positions = |samples: &[Sample]| samples.iter().map(|s| s.at).collect::<Vec<_>>();
     let descend = |most: usize, weights: &[f64], start: Logs| {
         let rows = thinned(&rows, most);
         let part: Vec<Sample> = rows.iter().map(|i| samples[*i]).collect();
         let weights: Vec<f64> = rows.iter().map(|i| weights[*i]).collect();
-        let likelihood = Likelihood {
-            samples: &part,
-            weights: &weights,
-            centre,
-        };
+        let squares = squares(&positions(&part));
+        let likelihood = Likelihood::new(&part, &weights, centre, &squares);
         minimise(start, STEPS, TOLERANCE, |logs| likelihood.evaluate(logs))
     };
     let mut logs = match from {
@@ -55,23 +54,17 @@ pub(super) fn learn(samples: &[Sample], from: Option<&Logs>) -> Option<(FieldMod
             best.min_by(|a, b| a.1.total_cmp(&b.1))?.0
         }
     };
+    let all = squares(&positions(samples));
     for _ in 0..ROUNDS {
         logs = descend(LEARNING, &weights, logs)?.0;
+        let smooth = smooth(InstructionSet::best(), &Kernel::new(&logs), &all);
         for _ in 0..UPDATES {
-            let likelihood = Likelihood {
-                samples,
-                weights: &weights,
-                centre,
-            };
-            weights = likelihood.new_weights(&logs)?;
+            let likelihood = Likelihood::new(samples, &weights, centre, &all);
+            weights = likelihood.new_weights(&logs, &smooth)?;
         }
     }
     let kernel = Kernel::new(&logs);
-    let likelihood = Likelihood {
-        samples,
-        weights: &weights,
-        centre,
-    };
+    let likelihood = Likelihood::new(samples, &weights, centre, &all);
     let [fixed, column] = scatter(&logs).map(f64::sqrt);
     let points = samples.iter().enumerate().map(|(i, s)| FieldPoint {
         at_mm: s.at,
@@ -93,45 +86,42 @@ pub(super) fn learn(samples: &[Sample], from: Option<&Logs>) -> Option<(FieldMod
 pub(super) struct Field {
     instructions: InstructionSet,
     kernel: Kernel,
-    /// Number of observations.
-    n: usize,
-    observations: Vec<Group>,
-    factor: Cholesky<f64, Dyn>,
+    observations: Vec<Observations>,
+    factor: Factor,
     /// Share of the field's variance that the observations explain where they are: the lowest tenth of them.
     explained: f64,
 }
 
 /// Observations side by side: positions, mm, and weights. The last group is filled up with weights of 0.
 #[derive(Debug, Clone, Copy)]
-struct Group {
-    x: [f64; LANES],
-    y: [f64; LANES],
-    alpha: [f64; LANES],
+struct Observations {
+    x: Group,
+    y: Group,
+    alpha: Group,
 }
 
-impl Group {
-    fn new(points: &[FieldPoint], alpha: &[f64]) -> Self {
-        let fill = |of: &dyn Fn(usize) -> f64| {
-            std::array::from_fn(|i| if i < points.len() { of(i) } else { 0.0 })
+impl Observations {
+    fn new(points: &[FieldPoint], alpha: &Group) -> Self {
+        let fill = |of: &dyn Fn(&FieldPoint) -> f64| {
+            std::array::from_fn(|i| points.get(i).map_or(0.0, of))
         };
         Self {
-            x: fill(&|i| points[i].at_mm[0]),
-            y: fill(&|i| points[i].at_mm[1]),
-            alpha: fill(&|i| alpha[i]),
+            x: fill(&|p| p.at_mm[0]),
+            y: fill(&|p| p.at_mm[1]),
+            alpha: *alpha,
         }
     }
 
-    /// Distances to a position along x and y, mm, and exp(-d² / (2 l²)) for the distance d and the length scale l.
+    /// Distances to a position along x and y, mm, and covariances with it.
     #[inline(always)]
-    fn near(&self, at: [f64; 2], per_length: f64) -> [[f64; LANES]; 3] {
-        let half = -0.5 * per_length * per_length;
-        let (mut dx, mut dy, mut exponents) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    fn near(&self, at: [f64; 2], kernel: &Kernel) -> [Group; 3] {
+        let (mut dx, mut dy, mut squares) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for i in 0..LANES {
             dx[i] = at[0] - self.x[i];
             dy[i] = at[1] - self.y[i];
-            exponents[i] = half * (dx[i] * dx[i] + dy[i] * dy[i]);
+            squares[i] = dx[i] * dx[i] + dy[i] * dy[i];
         }
-        [dx, dy, of_negatives(&exponents)]
+        [dx, dy, kernel.of(&squares)]
     }
 }
 
@@ -140,34 +130,37 @@ impl Field {
     pub(super) fn new(model: &FieldModel) -> Option<Self> {
         let points = &model.points;
         let n = points.len();
+        let instructions = InstructionSet::best();
         let kernel = Kernel {
             variance: model.amplitude_px * model.amplitude_px,
             per_length: 1.0 / model.length_mm,
         };
-        let noisy = DMatrix::from_fn(n, n, |i, j| {
-            let noise = if i == j { points[i].variance_px2 } else { 0.0 };
-            kernel.of(points[i].at_mm, points[j].at_mm) + noise
-        });
-        let factor = Cholesky::new(noisy)?;
-        let residuals = DVector::from_iterator(n, points.iter().map(|p| p.residual_px));
-        let alpha = factor.solve(&residuals);
-        let groups = points
-            .chunks(LANES)
-            .zip(alpha.as_slice().chunks(LANES))
-            .map(|(points, alpha)| Group::new(points, alpha));
-        let mut field = Self {
-            instructions: InstructionSet::best(),
-            kernel,
-            n,
-            observations: groups.collect(),
-            factor,
-            explained: 0.0,
-        };
-        let mut explained: Vec<f64> = points.iter().map(|p| 1.0 - field.open(p.at_mm)).collect();
+        let positions: Vec<[f64; 2]> = points.iter().map(|p| p.at_mm).collect();
+        let mut noisy = smooth(instructions, &kernel, &squares(&positions));
+        noisy.add_to_diagonal(|i| kernel.variance + points[i].variance_px2);
+        let factor = Factor::of(noisy)?;
+        let alpha = factor.solve(points.iter().map(|p| p.residual_px));
+        // What the observations with covariance S and noise N leave open where they are: the diagonal of S - S (S + N)⁻¹ S,
+        // which is N - N (S + N)⁻¹ N.
+        let diagonal = points.iter().zip(factor.inverse_diagonal());
+        let mut explained: Vec<f64> = diagonal
+            .map(|(point, q)| {
+                let noise = point.variance_px2;
+                1.0 - ((noise - noise * q * noise) / kernel.variance).clamp(0.0, 1.0)
+            })
+            .collect();
         explained.sort_unstable_by(f64::total_cmp);
-        field.explained = *explained.get(n / 10)?;
-        let usable = field.explained > 0.0 && alpha.iter().all(|a| a.is_finite());
-        usable.then_some(field)
+        let explained = *explained.get(n / 10)?;
+        let groups = points.chunks(LANES).zip(&alpha);
+        let observations = groups.map(|(points, alpha)| Observations::new(points, alpha));
+        let usable = explained > 0.0 && alpha.as_flattened().iter().all(|a| a.is_finite());
+        usable.then(|| Self {
+            instructions,
+            kernel,
+            observations: observations.collect(),
+            factor,
+            explained,
+        })
     }
 
     /// Expected residual at a position, px, and its change per mm.
@@ -176,17 +169,17 @@ impl Field {
             #[inline(always)]
             || self.sums(at),
         );
-        let [value, x, y] = sums.map(|lanes| lanes.iter().sum::<f64>() * self.kernel.variance);
+        let [value, x, y] = sums.map(|lanes| total(&lanes));
         let square = self.kernel.per_length * self.kernel.per_length;
         (value, [-x * square, -y * square])
     }
 
-    /// Sums over the observations, lane by lane: shares of the value, and these times the distances along x and y.
+    /// Sums over the observations, lane by lane: parts of the value, and these times the distances along x and y.
     #[inline(always)]
-    fn sums(&self, at: [f64; 2]) -> [[f64; LANES]; 3] {
+    fn sums(&self, at: [f64; 2]) -> [Group; 3] {
         let mut sums = [[0.0; LANES]; 3];
         for group in &self.observations {
-            let [dx, dy, near] = group.near(at, self.kernel.per_length);
+            let [dx, dy, near] = group.near(at, &self.kernel);
             for i in 0..LANES {
                 let part = group.alpha[i] * near[i];
                 sums[0][i] += part;
@@ -199,22 +192,16 @@ impl Field {
 
     /// Share of the field's variance that the observations leave open at a position, 0..=1.
     pub(super) fn open(&self, at: [f64; 2]) -> f64 {
-        let mut near = DVector::zeros(self.observations.len() * LANES);
-        self.instructions.run(
+        let near = self.instructions.run(
             #[inline(always)]
             || {
-                let places = near.as_mut_slice().as_chunks_mut::<LANES>().0;
-                for (place, group) in places.iter_mut().zip(&self.observations) {
-                    let shares = group.near(at, self.kernel.per_length)[2];
-                    *place = shares.map(|share| share * self.kernel.variance);
-                }
+                let covariances = self.observations.iter();
+                covariances
+                    .map(|group| group.near(at, &self.kernel)[2])
+                    .collect()
             },
         );
-        let near = near.resize_vertically(self.n, 0.0);
-        let explained = match self.factor.l_dirty().solve_lower_triangular(&near) {
-            Some(solved) => solved.norm_squared() / self.kernel.variance,
-            None => 0.0,
-        };
+        let explained = self.factor.explained(near) / self.kernel.variance;
         (1.0 - explained).clamp(0.0, 1.0)
     }
 

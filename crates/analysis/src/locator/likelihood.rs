@@ -1,11 +1,12 @@
 //! The likelihood of a field's hyperparameters, and the weights of its observations.
 
-use nalgebra::{DMatrix, DVector, SVector};
+use nalgebra::SVector;
+use skinrig_simd::InstructionSet;
 
-use super::precision::Precision;
 use super::quasi_newton::ValueAndGradient;
 use super::robust::{LEAST, scale, weight};
 use super::samples::Sample;
+use crate::lanes::{Factor, Group, LANES, Lower, of_negatives};
 
 /// Logarithms of amplitude (px), length scale (mm), fixed scatter and scatter by events (px).
 const LOGS: usize = 4;
@@ -32,26 +33,44 @@ impl Kernel {
         }
     }
 
-    /// Squared distance in length scales.
-    fn square(&self, a: [f64; 2], b: [f64; 2]) -> f64 {
-        let (x, y) = (
-            (a[0] - b[0]) * self.per_length,
-            (a[1] - b[1]) * self.per_length,
-        );
-        x * x + y * y
+    /// Covariances for squared distances, mm².
+    #[inline(always)]
+    pub(super) fn of(&self, squares: &Group) -> Group {
+        let half = -0.5 * self.per_length * self.per_length;
+        of_negatives(&squares.map(|square| half * square)).map(|share| share * self.variance)
     }
+}
 
-    pub(super) fn of(&self, a: [f64; 2], b: [f64; 2]) -> f64 {
-        self.variance * libm::exp(-0.5 * self.square(a, b))
-    }
+/// Squared distances between positions, mm²; zeros on the diagonal.
+pub(super) fn squares(at: &[[f64; 2]]) -> Lower {
+    Lower::from_fn(at.len(), |i, j| {
+        let [x, y] = [0, 1].map(|axis| at[i][axis] - at[j][axis]);
+        x * x + y * y
+    })
+}
+
+/// The covariances of a field between positions with these squared distances, below the diagonal; zeros on the diagonal.
+pub(super) fn smooth(instructions: InstructionSet, kernel: &Kernel, squares: &Lower) -> Lower {
+    instructions.run(
+        #[inline(always)]
+        || {
+            Lower::combine(
+                [squares],
+                #[inline(always)]
+                |[squares]| kernel.of(squares),
+            )
+        },
+    )
 }
 
 /// What the likelihood depends on besides the hyperparameters.
 pub(super) struct Likelihood<'a> {
-    pub samples: &'a [Sample],
-    pub weights: &'a [f64],
+    samples: &'a [Sample],
+    weights: &'a [f64],
     /// Centre of the priors.
-    pub centre: Logs,
+    centre: Logs,
+    squares: &'a Lower,
+    instructions: InstructionSet,
 }
 
 /// Centre of the priors: amplitude and scatter of the size of the residuals.
@@ -77,7 +96,23 @@ pub(super) fn scatter(logs: &Logs) -> [f64; 2] {
     [2, 3].map(|i| libm::exp(2.0 * logs[i]))
 }
 
-impl Likelihood<'_> {
+impl<'a> Likelihood<'a> {
+    /// Of weighted samples, with the squared distances of their positions.
+    pub(super) fn new(
+        samples: &'a [Sample],
+        weights: &'a [f64],
+        centre: Logs,
+        squares: &'a Lower,
+    ) -> Self {
+        Self {
+            samples,
+            weights,
+            centre,
+            squares,
+            instructions: InstructionSet::best(),
+        }
+    }
+
     /// Variance of an observation under these logarithms.
     pub(super) fn variance(&self, i: usize, logs: &Logs) -> f64 {
         let [fixed, column] = scatter(logs);
@@ -91,46 +126,40 @@ impl Likelihood<'_> {
         (0.5 * off.norm_squared(), off.component_div(&spread))
     }
 
-    fn residuals(&self) -> DVector<f64> {
-        DVector::from_iterator(self.samples.len(), self.samples.iter().map(|s| s.residual))
-    }
-
-    /// Covariance of the observations without their scatter.
-    fn smooth(&self, kernel: Kernel) -> DMatrix<f64> {
-        let n = self.samples.len();
-        let mut matrix = DMatrix::zeros(n, n);
-        for j in 0..n {
-            for i in j + 1..n {
-                matrix[(i, j)] = kernel.of(self.samples[i].at, self.samples[j].at);
-            }
-            matrix[(j, j)] = kernel.variance;
-        }
-        matrix
+    fn residuals(&self) -> impl Iterator<Item = f64> {
+        self.samples.iter().map(|s| s.residual)
     }
 
     /// Negative logarithm of the posterior density, up to a constant; `None` where the kernel is not positive definite.
     pub(super) fn evaluate(&self, logs: &Logs) -> Option<ValueAndGradient<LOGS>> {
-        let n = self.samples.len();
         let kernel = Kernel::new(logs);
-        let smooth = self.smooth(kernel);
+        let smooth = smooth(self.instructions, &kernel, self.squares);
         let mut noisy = smooth.clone();
-        for i in 0..n {
-            noisy[(i, i)] += self.variance(i, logs);
-        }
-        let precision = Precision::of(noisy)?;
-        let residuals = self.residuals();
-        let alpha = precision.times(&residuals);
+        noisy.add_to_diagonal(|i| kernel.variance + self.variance(i, logs));
+        let factor = Factor::of(noisy)?;
+        let alpha = factor.solve(self.residuals());
         let (mut value, mut by) = self.prior(logs);
-        value += precision.log_root_determinant() + 0.5 * residuals.dot(&alpha);
-        let slope = |i: usize, j: usize| precision.element(i, j) - alpha[i] * alpha[j];
+        let fit: f64 = self
+            .residuals()
+            .zip(alpha.as_flattened())
+            .map(|(r, a)| r * a)
+            .sum();
+        value += factor.log_root_determinant() + 0.5 * fit;
+        let inverse = factor.inverse();
+        let parts = [&inverse, &smooth, self.squares];
+        let [amplitude, length] = self.instructions.run(
+            #[inline(always)]
+            || Lower::sums(parts, &alpha, slopes),
+        );
+        let per_length = kernel.per_length * kernel.per_length;
+        by[0] += 2.0 * amplitude;
+        by[1] += length * per_length;
         let [fixed, column] = scatter(logs);
-        for j in 0..n {
-            for i in j + 1..n {
-                let part = slope(i, j) * smooth[(i, j)];
-                by[0] += 2.0 * part;
-                by[1] += part * kernel.square(self.samples[i].at, self.samples[j].at);
-            }
-            let own = slope(j, j);
+        for (j, alpha) in alpha.as_flattened()[..self.samples.len()]
+            .iter()
+            .enumerate()
+        {
+            let own = inverse.get(j, j) - alpha * alpha;
             by[0] += own * kernel.variance;
             by[2] += own * self.samples[j].variance(fixed, 0.0) / self.weights[j];
             by[3] += own * self.samples[j].variance(0.0, column) / self.weights[j];
@@ -139,25 +168,35 @@ impl Likelihood<'_> {
         finite.then_some((value, by))
     }
 
-    /// Weights by how far each observation is from what the others predict.
-    pub(super) fn new_weights(&self, logs: &Logs) -> Option<Vec<f64>> {
-        let n = self.samples.len();
-        let mut noisy = self.smooth(Kernel::new(logs));
-        for i in 0..n {
-            noisy[(i, i)] += self.variance(i, logs);
-        }
-        let precision = Precision::of(noisy)?;
-        let alpha = precision.times(&self.residuals());
+    /// Weights by how far each observation is from what the others predict. `smooth`: as from [`smooth`].
+    pub(super) fn new_weights(&self, logs: &Logs, smooth: &Lower) -> Option<Vec<f64>> {
+        let kernel = Kernel::new(logs);
+        let mut noisy = smooth.clone();
+        noisy.add_to_diagonal(|i| kernel.variance + self.variance(i, logs));
+        let factor = Factor::of(noisy)?;
+        let alpha = factor.solve(self.residuals());
         let [fixed, column] = scatter(logs);
-        let each = (0..n).map(|i| {
+        let each = factor.inverse_diagonal().into_iter().enumerate();
+        let each = each.zip(alpha.as_flattened()).map(|((i, q), alpha)| {
             // Leave-one-out prediction: residual `alpha / q`, variance `1 / q`, with q the diagonal of the inverse.
-            let q = precision.element(i, i);
             let full = self.samples[i].variance(fixed, column) + LEAST * LEAST;
             let predicted = (1.0 / q - self.variance(i, logs)).max(0.0) + full;
-            weight(alpha[i] * alpha[i] / (q * q) / predicted, 1.0)
+            weight(alpha * alpha / (q * q) / predicted, 1.0)
         });
         Some(each.collect())
     }
+}
+
+/// Change of the likelihood with the covariance, times the covariance; and that times the squared distance. Of the groups of the
+/// inverse of the noisy covariance, of the covariance and of the squared distances, and of the weighted residuals.
+#[inline(always)]
+fn slopes([inverse, smooth, squares]: [&Group; 3], alpha: &Group, by_column: f64) -> [Group; 2] {
+    let mut parts = [[0.0; LANES]; 2];
+    for i in 0..LANES {
+        parts[0][i] = (inverse[i] - alpha[i] * by_column) * smooth[i];
+        parts[1][i] = parts[0][i] * squares[i];
+    }
+    parts
 }
 
 /// Weights of the samples before anything is known: by the size of the residual alone.
@@ -178,11 +217,9 @@ mod tests {
     fn slopes_are_those_of_the_value() {
         let samples = planted(30);
         let weights = first_weights(&samples);
-        let likelihood = Likelihood {
-            samples: &samples,
-            weights: &weights,
-            centre: centre(&samples),
-        };
+        let at: Vec<[f64; 2]> = samples.iter().map(|s| s.at).collect();
+        let squares = squares(&at);
+        let likelihood = Likelihood::new(&samples, &weights, centre(&samples), &squares);
         let at = Logs::from([0.3, 2.5, -1.2, -0.7]);
         let (_, by) = likelihood.evaluate(&at).unwrap();
         for i in 0..LOGS {

@@ -7,7 +7,6 @@
 //! the events of a press spread, which tells the distance from a camera. `choose` compares them at held-out locations. Decision and measurements: `docs/adr/0038-*`.
 
 mod choose;
-mod exponential;
 mod features;
 mod field;
 mod fit_error;
@@ -16,7 +15,6 @@ mod inverse;
 mod likelihood;
 mod methods;
 mod parts;
-mod precision;
 mod prediction;
 mod quasi_newton;
 mod rays;
@@ -34,7 +32,6 @@ pub use features::{CameraFeatures, Features};
 pub use fit_error::FitError;
 pub use fitted::{FittedLocator, Location};
 pub use methods::{Feature, FitStart, Hyperparameters, Method, Requirements, method};
-pub(crate) use precision::Precision;
 pub(crate) use quasi_newton::{ValueAndGradient, minimise};
 pub(crate) use reliability::reliability;
 pub use remount::{EarlierCalibration, Recalibrated};

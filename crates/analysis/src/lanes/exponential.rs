@@ -4,8 +4,7 @@
 //! machine. Cody and Waite, Software Manual for the Elementary Functions (1980), chapter 6: exp(x) = 2^k exp(r) with |r| <= ln(2) / 2; the
 //! factor exp(r) is its Taylor series to the 13th power, whose rest is below 5e-18.
 
-/// Numbers in step.
-pub(super) const LANES: usize = 8;
+use super::{Group, LANES};
 
 /// Below this the result is 0: the smallest normal number is exp(-708.4).
 const LOWEST: f64 = -708.0;
@@ -35,7 +34,7 @@ const TAYLOR: [f64; 14] = [
 ///
 /// Each step is a loop of its own over all lanes, which the compiler turns into vector instructions.
 #[inline(always)]
-pub(super) fn of_negatives(x: &[f64; LANES]) -> [f64; LANES] {
+pub(crate) fn of_negatives(x: &Group) -> Group {
     let (mut r, mut power, mut sum) = ([0.0; LANES], [0.0; LANES], [TAYLOR[0]; LANES]);
     for i in 0..LANES {
         let shifted = x[i] * std::f64::consts::LOG2_E + ROUNDING;
