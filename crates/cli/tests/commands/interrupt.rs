@@ -10,6 +10,11 @@ use serde_json::Value;
 use crate::replay::assert_replays;
 use crate::support::{Lab, ROOT, SMALL, files, only, program, run_to_end, show, skinrig, text};
 
+/// A run in real time that goes on for seven minutes, so that it never ends by itself while a test is looking at it.
+pub(crate) const LIVE: [&str; 5] = ["run", SMALL, "--real-time", "--set", "repetitions.count=60"];
+/// Its presses: two sync presses and four locations.
+pub(crate) const LIVE_PRESSES: u64 = 2 + 60 * 4;
+
 /// A running program, past its first press.
 pub(crate) struct LiveRun {
     child: Child,
@@ -18,14 +23,9 @@ pub(crate) struct LiveRun {
 
 impl LiveRun {
     pub(crate) fn new(folder: &Path) -> Self {
-        let folder = text(folder);
-        Self::of(program(&[
-            "run",
-            SMALL,
-            "--real-time",
-            "--sessions",
-            &folder,
-        ]))
+        let mut command = program(&LIVE);
+        command.arg("--sessions").arg(folder);
+        Self::of(command)
     }
 
     pub(crate) fn of(mut command: Command) -> Self {
@@ -92,7 +92,7 @@ fn assert_ended_early(folder: &Path, word: &str) -> PathBuf {
     assert!(count(&shown, "missed") >= 1, "{shown}");
     assert_eq!(
         count(&shown, "valid") + count(&shown, "missed") + count(&shown, "invalid"),
-        10,
+        LIVE_PRESSES,
         "{shown}"
     );
     assert!(!shown["interruptions"].as_array().unwrap().is_empty());
@@ -157,7 +157,7 @@ fn ctrl_c_three_times_switches_the_motors_off_and_seals() {
     let lab = Lab::new();
     // Between presses a stop would end the run before the second ctrl-C, so the tip must be in the skin for some seconds.
     let folder = lab.text("s");
-    let mut arguments = vec!["run", SMALL, "--real-time", "--no-analysis"];
+    let mut arguments = [&LIVE[..], &["--no-analysis"]].concat();
     for set in ["motion.hold=3s", "motion.period=5s", "sync.interval=5s"] {
         arguments.extend(["--set", set]);
     }
@@ -198,8 +198,9 @@ fn nohup_is_respected() {
     command.current_dir(ROOT).args([
         "-c",
         &format!(
-            "trap '' HUP; exec '{}' run {SMALL} --real-time --no-analysis --sessions '{}'",
+            "trap '' HUP; exec '{}' {} --no-analysis --sessions '{}'",
             env!("CARGO_BIN_EXE_skinrig"),
+            LIVE.join(" "),
             lab.text("s")
         ),
     ]);
@@ -263,7 +264,7 @@ fn a_killed_run_leaves_a_session_that_opens() {
     );
     let verified = skinrig(&["verify", &text(&session)]).code(0).out;
     let presses = format!(
-        "; {} of 10 planned presses,",
+        "; {} of {LIVE_PRESSES} planned presses,",
         count(&shown, "valid") + count(&shown, "invalid")
     );
     assert!(

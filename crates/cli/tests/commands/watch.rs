@@ -3,7 +3,7 @@
 
 use std::process::Stdio;
 
-use crate::interrupt::LiveRun;
+use crate::interrupt::{LIVE, LIVE_PRESSES, LiveRun};
 use crate::support::{Lab, SMALL, only, program, read_json, skinrig, text};
 
 const WATCHERS: usize = 8;
@@ -13,16 +13,16 @@ fn a_run_in_real_time_is_shown_with_its_path_its_rates_and_its_signals() {
     let lab = Lab::new();
     let mut run = LiveRun::new(&lab.path("s"));
     // The first press has nothing to be compared with.
-    run.wait_for("press 3/10");
+    run.wait_for(&format!("press 3/{LIVE_PRESSES}"));
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
     let frame = skinrig(&["watch", &lab.text("s"), "--once", "--json"]);
     let frame = frame.code(0).json();
     assert_eq!(frame["live"]["state"], "running", "{frame}");
     assert_eq!(frame["sealed"], false);
-    assert_eq!(frame["presses"]["planned"], 8);
-    // Four locations, twice each; the two sync presses do not count.
+    assert_eq!(frame["presses"]["planned"], LIVE_PRESSES - 2);
+    // Four locations, sixty times each; the two sync presses do not count.
     assert_eq!(frame["places"].as_array().unwrap().len(), 4, "{frame}");
-    assert_eq!(frame["places"][0]["planned"], 2);
+    assert_eq!(frame["places"][0]["planned"], 60);
     let latest = frame["latest"].as_array().unwrap().last().unwrap();
     assert_eq!(latest["verdict"], "valid", "{frame}");
     for camera in 0..2 {
@@ -35,7 +35,7 @@ fn a_run_in_real_time_is_shown_with_its_path_its_rates_and_its_signals() {
         "state    running",
         "camera 2",
         "kev/s",
-        "eta 0:00:",
+        "eta 0:0",
         "@",
         "SNR 2",
         " free",
@@ -59,15 +59,8 @@ fn failing_presses_are_shown_with_their_cause_while_the_run_goes_on() {
     let lab = Lab::new();
     let folder = lab.text("s");
     let fault = "camera1-stalled@hold:3";
-    let mut run = LiveRun::of(program(&[
-        "run",
-        SMALL,
-        "--real-time",
-        "--sessions",
-        &folder,
-        "--fault",
-        fault,
-    ]));
+    let arguments = [&LIVE[..], &["--sessions", &folder, "--fault", fault]].concat();
+    let mut run = LiveRun::of(program(&arguments));
     run.wait_for("1 invalid");
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
     let frame = skinrig(&["watch", &session, "--once", "--json"])

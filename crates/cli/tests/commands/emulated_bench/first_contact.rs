@@ -10,7 +10,7 @@ use std::time::Duration;
 use emulated_libdrd::{ArmState, Contact, Mode};
 use skinrig_emulated_bench::{ArmFault, EmulatedBench, When};
 
-use super::{start, workspace_root};
+use super::{in_real_time, start, workspace_root};
 
 const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
 /// Upper limit for waiting on an answer; waits end as soon as it arrives.
@@ -180,7 +180,11 @@ impl Steps {
 
 #[test]
 fn the_steps_of_a_first_contact_show_what_they_must() {
-    let Some((_slot, bench)) = start() else {
+    in_real_time(take_the_steps);
+}
+
+fn take_the_steps() {
+    let Some(bench) = start() else {
         return;
     };
     let mut steps = Steps {

@@ -3,6 +3,7 @@
 mod endurance;
 mod first_contact;
 mod notify;
+mod real_time;
 mod slot;
 mod tolerant;
 
@@ -13,21 +14,20 @@ use std::process::{Command, Output};
 use serde_json::Value;
 use skinrig_emulated_bench::{BenchConfig, BenchError, EmulatedBench};
 
-pub(crate) use slot::Slot;
+pub(crate) use real_time::in_real_time;
 
 const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
 /// Seed of the cameras' true geometry and noise, also for the simulated run.
 const SEED: u64 = 1;
 
 /// Starts a bench; `None`, with the reason on standard error, where it cannot run.
-fn start() -> Option<(Slot, EmulatedBench)> {
-    let slot = Slot::wait();
+fn start() -> Option<EmulatedBench> {
     let bench = EmulatedBench::start(&BenchConfig {
         seed: SEED,
         ..BenchConfig::default()
     });
     match bench {
-        Ok(bench) => Some((slot, bench)),
+        Ok(bench) => Some(bench),
         Err(BenchError::Box(reason)) => {
             eprintln!("skipped: no emulated bench: {reason}");
             None
@@ -65,31 +65,6 @@ fn run(mut command: Command, rig: &[&str], sessions: &Path) -> Output {
     command.output().unwrap()
 }
 
-/// Runs on the emulated bench, up to four times. A machine that delays the robot's thread by a tenth of a second, or the serial
-/// line until the host's clock is unknown, correctly gets a safe end or an invalid session;
-/// the run is then repeated.
-fn run_in_real_time(bench: &EmulatedBench, sessions: &Path) -> (PathBuf, String) {
-    let rig = ["--rig", "hil/rigs/emulated.yaml"];
-    for attempt in 1.. {
-        let folder = sessions.join(attempt.to_string());
-        let output = run(bench.command(SKINRIG).unwrap(), &rig, &folder);
-        let message = all_output(&output);
-        let starved = [
-            "expected a pose sample no older than",
-            "the session is INVALID",
-            "no reply to",
-            "the live arm was not polled",
-        ]
-        .iter()
-        .any(|sign| message.contains(sign));
-        if attempt == 4 || !starved {
-            return (folder, assert_success(&output));
-        }
-        eprintln!("the machine is too busy for real time, once more");
-    }
-    unreachable!("the fourth attempt returns")
-}
-
 fn only_file(folder: &Path, ending: &str) -> PathBuf {
     let found: Vec<PathBuf> = fs::read_dir(folder)
         .unwrap()
@@ -107,12 +82,18 @@ fn results(folder: &Path) -> Value {
 
 #[test]
 fn the_quick_check_on_the_emulated_bench_agrees_with_the_simulated_one() {
+    in_real_time(compare_with_simulation);
+}
+
+fn compare_with_simulation() {
     let folder = tempfile::tempdir().unwrap();
     let (emulated, simulated) = (folder.path().join("emulated"), folder.path().join("sim"));
-    let Some((_slot, bench)) = start() else {
+    let Some(bench) = start() else {
         return;
     };
-    let (emulated, message) = run_in_real_time(&bench, &emulated);
+    let rig = ["--rig", "hil/rigs/emulated.yaml"];
+    let output = run(bench.command(SKINRIG).unwrap(), &rig, &emulated);
+    let message = assert_success(&output);
     assert!(message.contains("rig       emulated"), "{message}");
     assert_success(&run(Command::new(SKINRIG), &[], &simulated));
 

@@ -5,7 +5,7 @@ use std::fs;
 use skinrig_model::{NotificationFault, Occasion};
 use skinrig_recorder::SessionReader;
 
-use super::{SKINRIG, all_output, only_file, run, start, workspace_root};
+use super::{SKINRIG, all_output, in_real_time, only_file, run, start, workspace_root};
 use crate::servers::http;
 
 const SECRET: &str = "correct-horse-battery";
@@ -13,7 +13,11 @@ const SECRET: &str = "correct-horse-battery";
 /// The preflight fails at once: the disk has less than a petabyte.
 #[test]
 fn a_run_on_a_bench_tells_by_its_rig_file_and_records_no_secret() {
-    let Some((_slot, bench)) = start() else {
+    in_real_time(tell_by_the_rig_file);
+}
+
+fn tell_by_the_rig_file() {
+    let Some(bench) = start() else {
         return;
     };
     let server = http(&[200]);

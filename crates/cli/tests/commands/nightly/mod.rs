@@ -11,7 +11,7 @@ use serde_json::Value;
 use skinrig_emulated_bench::{ArmFault, BenchConfig, BenchError, EmulatedBench, When};
 use skinrig_model::{CameraId, RigFault};
 
-use crate::emulated_bench::Slot;
+use crate::emulated_bench::in_real_time;
 use crate::support::{ROOT, only, read_json, text};
 
 const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
@@ -43,7 +43,6 @@ checks:
 /// A bench and the folder of its nights.
 struct Nights {
     bench: EmulatedBench,
-    _slot: Slot,
     folder: tempfile::TempDir,
 }
 
@@ -112,7 +111,6 @@ impl NightResult {
 
 impl Nights {
     fn start() -> Option<Self> {
-        let slot = Slot::wait();
         let bench = match EmulatedBench::start(&BenchConfig::default()) {
             Ok(bench) => bench,
             Err(BenchError::Box(reason)) => {
@@ -124,11 +122,7 @@ impl Nights {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("suite.yaml"), SUITE).unwrap();
         fs::write(folder.path().join("rig.yaml"), RIG).unwrap();
-        Some(Self {
-            bench,
-            _slot: slot,
-            folder,
-        })
+        Some(Self { bench, folder })
     }
 
     /// Runs these checks of the suite.
@@ -211,21 +205,16 @@ impl Drop for TinyDisk {
 
 #[test]
 fn a_healthy_bench_passes() {
+    in_real_time(pass_all_checks);
+}
+
+fn pass_all_checks() {
     let Some(nights) = Nights::start() else {
         return;
     };
     let all = "identity,settings,disk,trigger_loopback,noise_dark,noise_lit,test_pattern,robot_state,repeatability,step_response,depth,force_ceiling,\
                watchdog_drill,stop_drill";
-    let mut observed = nights.night(all);
-    // A machine too busy for the emulated devices reports infrastructure: try again.
-    for _ in 0..2 {
-        let checks = observed.night["checks"].as_array().unwrap();
-        if !checks.iter().any(|c| c["cause"] == "infrastructure") {
-            break;
-        }
-        eprintln!("once more: {}", observed.stderr);
-        observed = nights.night(all);
-    }
+    let observed = nights.night(all);
     for name in all.split(',') {
         let verdict = &observed.check(name)["verdict"];
         assert_eq!(
@@ -252,6 +241,10 @@ fn a_healthy_bench_passes() {
 /// The night holds the hash that the results file of its golden session holds.
 #[test]
 fn the_golden_session_is_named_with_its_results_hash() {
+    in_real_time(name_the_golden_session);
+}
+
+fn name_the_golden_session() {
     let Some(nights) = Nights::start() else {
         return;
     };
@@ -262,15 +255,10 @@ fn the_golden_session_is_named_with_its_results_hash() {
     );
     fs::write(nights.folder.path().join("suite.yaml"), suite).unwrap();
 
-    // A machine too busy for the emulated devices may record no session: try again, in a folder of its own.
-    let mut attempts = (0..3).map(|attempt| {
-        let folder = nights.folder.path().join(format!("nights-{attempt}"));
-        let result = nights.night_in("golden", &folder);
-        eprintln!("attempt {attempt}: {}", result.stderr);
-        (folder, result.night["golden"].clone())
-    });
-    let analysed = attempts.find(|(_, golden)| golden["report"].is_string());
-    let (folder, golden) = analysed.expect("a golden session with a report");
+    let folder = nights.folder.path().join("nights");
+    let result = nights.night_in("golden", &folder);
+    let golden = &result.night["golden"];
+    assert!(golden["report"].is_string(), "{}", result.stderr);
     let results = read_json(&only(&only(&folder, "-planted"), ".results.json"));
     assert!(results["provenance"]["results_hash"].is_string());
     assert_eq!(
@@ -282,6 +270,10 @@ fn the_golden_session_is_named_with_its_results_hash() {
 /// Broken limits without evidence point at the rig.
 #[test]
 fn unexplained_limit_failures_blame_the_rig() {
+    in_real_time(blame_the_rig);
+}
+
+fn blame_the_rig() {
     let Some(mut nights) = Nights::start() else {
         return;
     };
@@ -307,6 +299,10 @@ fn unexplained_limit_failures_blame_the_rig() {
 
 #[test]
 fn a_full_disk_is_the_infrastructure_s() {
+    in_real_time(fill_a_disk);
+}
+
+fn fill_a_disk() {
     let Some(nights) = Nights::start() else {
         return;
     };
