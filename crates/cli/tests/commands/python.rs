@@ -246,7 +246,7 @@ fn assert_documented(page: &str, table: &Truth) {
         let name = ["camera1_", "camera2_"]
             .iter()
             .find_map(|camera| name.strip_prefix(camera))
-            .map_or(name.clone(), |rest| format!("cameraN_{rest}"));
+            .map_or_else(|| name.clone(), |rest| format!("cameraN_{rest}"));
         assert!(
             page.contains(&format!("`{name}`")),
             "docs/reference/exports.md: {name}"
