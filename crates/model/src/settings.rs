@@ -301,7 +301,7 @@ pub struct CmreSettings {
     pub sr_mm: f64,
 }
 
-/// Limits of the alignment certificate (docs/reference/time-base.md gives the reasons); a session beyond one of them is invalid.
+/// Limits of the alignment certificate (docs/reference/time-base.md); a session beyond one of them is invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default)]
 #[settings(name = "alignment")]

@@ -1,6 +1,6 @@
 //! Messages about runs and nights, sent by mail, webhook or command without delaying a run.
 //!
-//! An [`Event`] becomes a [`Message`], once. A [`Notifier`] has one thread and one bounded queue per channel, tries each message a
+//! Each [`Event`] becomes one [`Message`]. A [`Notifier`] has one thread and one bounded queue per channel, tries each message a
 //! limited number of times, and waits for results at the end for a limited time. Every result is a record without secrets.
 
 mod attempt;

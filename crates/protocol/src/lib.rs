@@ -7,8 +7,8 @@
 //! 4. [`Plan::summary`] and [`path_svg`] display it.
 //!
 //! [`Schedule`] describes a recording made without skinrig, for imports; [`RigFile`] a bench; [`Limits`] the margins
-//! of a comparison; [`Suite`] the checks of a bench. The keys of each language are declared in a table, which
-//! also yields its JSON Schema ([`schema_json`], [`schedule_schema_json`], [`rig_schema_json`], [`limits_schema_json`],
+//! of a comparison; [`Suite`] the checks of a bench. The settings structs declare the keys of each
+//! language and yield its JSON Schema ([`schema_json`], [`schedule_schema_json`], [`rig_schema_json`], [`limits_schema_json`],
 //! [`suite_schema_json`]).
 
 pub mod area;

@@ -65,8 +65,8 @@ pub fn terminal_table(input: &ReportInput<'_>, color: bool) -> String {
     terminal::table(input, color)
 }
 
-/// The answer and what qualifies it in at most eight lines of at most 80 columns: the RMSE with its interval, or that there is
-/// none; the counts; the gravest faults, losses and warnings. Ends with a newline; `color` as in [`terminal_table`].
+/// Summary in at most eight lines of at most 80 columns: RMSE with its interval, or a note that there is none; counts; the
+/// gravest faults, losses and warnings. Ends with a newline; `color` as in [`terminal_table`].
 #[must_use]
 pub fn terminal_summary(input: &ReportInput<'_>, color: bool) -> String {
     terminal::summary(input, color)

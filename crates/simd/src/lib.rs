@@ -1,11 +1,11 @@
-//! Instruction sets of the processor, chosen while the program runs.
+//! Selects the processor's instruction set at run time.
 //!
 //! The program is built for any x86-64. [`InstructionSet::run`] compiles a loop once for each of three levels of the x86-64 psABI
 //! and calls the one that the processor supports. The loops are ordinary code that the compiler vectorises: no operation differs
 //! between the levels, so that results are the same to the last bit. Products and sums of floating-point numbers are not
 //! fused, because Rust never fuses them by itself.
 //!
-//! A value exists only for a level that the processor supports, so that all of this is safe code.
+//! A value exists only for a level that the processor supports, which keeps this code safe.
 
 #[cfg(target_arch = "x86_64")]
 use fearless_simd::{
@@ -13,13 +13,13 @@ use fearless_simd::{
     x86::{Avx2, Sse4_2},
 };
 
-/// A set of instructions that this processor supports.
+/// An instruction set that this processor supports.
 #[derive(Clone, Copy)]
 pub struct InstructionSet(Tier);
 
 #[derive(Clone, Copy)]
 enum Tier {
-    /// What the program is built for.
+    /// Target of the build.
     Baseline,
     /// x86-64-v2: POPCNT, SSE4.2.
     #[cfg(target_arch = "x86_64")]
@@ -30,10 +30,10 @@ enum Tier {
 }
 
 impl InstructionSet {
-    /// The instructions that the program is built for, on every processor.
+    /// Target of the build, supported by every processor.
     const BASELINE: Self = Self(Tier::Baseline);
 
-    /// The best one. The processor is asked once.
+    /// The best supported set, detected once.
     #[must_use]
     pub fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
@@ -47,7 +47,7 @@ impl InstructionSet {
         Self::BASELINE
     }
 
-    /// All that this processor supports, the baseline first: for tests that compare their results.
+    /// All supported sets, baseline first, for tests that compare their results.
     #[must_use]
     pub fn available() -> Vec<Self> {
         let mut sets = vec![Self::BASELINE];
@@ -72,8 +72,8 @@ impl InstructionSet {
         }
     }
 
-    /// Runs `work` compiled for these instructions: the closure and everything inlined into it. Mark both `#[inline(always)]`; a
-    /// function that is called instead is compiled for the baseline.
+    /// Runs `work` compiled for this set: the closure and everything inlined into it. Mark both `#[inline(always)]`; a
+    /// function that is not inlined is compiled for the baseline.
     #[inline(always)]
     pub fn run<R>(self, work: impl FnOnce() -> R) -> R {
         match self.0 {

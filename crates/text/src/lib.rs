@@ -10,19 +10,19 @@ pub use style::{Paint, Style, starts_with_style};
 pub use table::{Column, Table};
 pub use wrap::{LongWords, WIDTH, hang, wrap};
 
-/// Columns that `text` takes; escape sequences of colours take none.
+/// Display width of `text` in columns; colour escapes count 0.
 #[must_use]
 pub fn width(text: &str) -> usize {
     textwrap::core::display_width(text)
 }
 
-/// Width of the widest of `texts`; 0 without any.
+/// Largest display width among `texts`; 0 if there are none.
 #[must_use]
 pub fn widest<'a>(texts: impl IntoIterator<Item = &'a str>) -> usize {
     texts.into_iter().map(width).max().unwrap_or(0)
 }
 
-/// `text` in at most `most` columns; a cut text ends with `…`.
+/// Shortens `text` to at most `most` columns; a shortened text ends with `…`.
 #[must_use]
 pub fn clip(text: &str, most: usize) -> String {
     if width(text) <= most {
@@ -32,13 +32,13 @@ pub fn clip(text: &str, most: usize) -> String {
     }
 }
 
-/// The beginning of `text` and `…`, in at most `most` columns.
+/// Beginning of `text` followed by `…`, at most `most` columns.
 #[must_use]
 pub fn elide(text: &str, most: usize) -> String {
     format!("{}…", cut(text, most.saturating_sub(1)).trim_end())
 }
 
-/// The beginning of `text`, in at most `most` columns.
+/// Beginning of `text`, at most `most` columns.
 #[must_use]
 pub fn cut(text: &str, most: usize) -> &str {
     let ends = text.char_indices().map(|(at, c)| at + c.len_utf8());

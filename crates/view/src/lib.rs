@@ -1,8 +1,8 @@
-//! A local server and its page: a folder of sessions, each one live and afterwards.
+//! Local server and page for a folder of sessions, during and after their recording.
 //!
-//! [`Server::open`] binds the port and prints nothing; [`Server::run`] serves until ctrl-C or SIGTERM. The server reads: sessions through
-//! [`SessionReader`](skinrig_recorder::SessionReader), opened anew for each answer so that a run can seal its session, and everything else
-//! through a [`Lab`], which the command line implements. It writes nothing, and reaches a run only if it was opened with control.
+//! [`Server::open`] binds the port and prints nothing; [`Server::run`] serves until ctrl-C or SIGTERM. It reads sessions through
+//! [`SessionReader`](skinrig_recorder::SessionReader), reopened for each answer so that a run can seal its session, and everything else
+//! through a [`Lab`], which the command line implements. It writes nothing, and controls runs only if opened with control.
 //!
 //! - `access`: the token, and the checks against other pages and other names of this machine.
 //! - `routes`: the table of addresses. `assets`: the page itself.

@@ -1,4 +1,4 @@
-//! The Python code in `docs/reference/session-file.md` reads the same events as the reader.
+//! `docs/reference/press_events.py` reads the same events as the reader.
 
 use std::process::Command;
 
@@ -7,7 +7,7 @@ use skinrig_recorder::SessionReader;
 
 use crate::common::{ALIGNMENT_US, sealed};
 
-const DOC: &str = include_str!("../../../../docs/reference/session-file.md");
+const CODE: &str = include_str!("../../../../docs/reference/press_events.py");
 
 #[test]
 fn the_documented_python_reads_the_events_of_a_press() {
@@ -18,18 +18,11 @@ fn the_documented_python_reads_the_events_of_a_press() {
         println!("skipped: python3 with numpy is not installed");
         return;
     }
-    let code = DOC
-        .split("```python\n")
-        .nth(1)
-        .unwrap()
-        .split("```")
-        .next()
-        .unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
     sealed(&path, 6);
     let script = format!(
-        "{code}
+        "{CODE}
 import sys
 for press in range(4):
     t, x, y, p = press_events(sys.argv[1], press, 2, 10_000)

@@ -1,4 +1,4 @@
-//! `derive(Settings)` and `derive(Choice)`: turn the declarations of `skinrig-settings` into code. See there for their use.
+//! `derive(Settings)` and `derive(Choice)`: turn the declarations of `skinrig-settings` into code. That crate shows their use.
 //!
 //! # Attributes of a struct: `#[settings(...)]`
 //! - `name = "motion"`: name in the JSON Schema; by default the struct's name in snake case.
