@@ -255,13 +255,15 @@ impl Dbscan {
         for &index in &self.occupied {
             let tile = self.all[index];
             let corner = self.corner(index);
-            let core = if self.tile_is_near && tile.events >= self.min_samples {
-                tile.occupied
+            let mut core = 0;
+            if self.tile_is_near && tile.events >= self.min_samples {
+                core = tile.occupied;
             } else {
-                ones(tile.occupied)
-                    .filter(|at| self.is_core(grid, index, corner, *at))
-                    .fold(0, |all, at| all | 1 << at)
-            };
+                // No `fold`: it would be a function of its own, compiled for the baseline.
+                for at in ones(tile.occupied) {
+                    core |= u64::from(self.is_core(grid, index, corner, at)) << at;
+                }
+            }
             if core == 0 {
                 continue;
             }
@@ -323,8 +325,11 @@ impl Dbscan {
         let (mut all, mut fresh) = (0, 1 << first);
         while fresh != 0 {
             all |= fresh;
-            let near = ones(fresh).filter_map(|at| self.tiles.masks(at).first());
-            fresh = near.fold(0, |near, mask| near | mask) & core & !all;
+            let mut near = 0;
+            for at in ones(fresh) {
+                near |= self.tiles.masks(at).first().copied().unwrap_or(0);
+            }
+            fresh = near & core & !all;
         }
         all
     }

@@ -22,10 +22,12 @@ const LEARNING: usize = 120;
 const STARTS_MM: [f64; 3] = [8.0, 20.0, 50.0];
 /// Steps of a descent, and the gain in log likelihood that ends it.
 const STEPS: usize = 40;
-const TOLERANCE: f64 = 1e-5;
+const TOLERANCE: f64 = 1e-3;
 /// Rounds of weights, and updates of the weights within a round.
 const ROUNDS: usize = 2;
 const UPDATES: usize = 3;
+/// Weights that change less than this are settled.
+const SETTLED: f64 = 0.01;
 
 /// Learns a field from the samples; `from`: hyperparameters of a fit to almost the same samples. `None` if no start gives a
 /// positive definite kernel.
@@ -60,7 +62,13 @@ pub(super) fn learn(samples: &[Sample], from: Option<&Logs>) -> Option<(FieldMod
         let smooth = smooth(InstructionSet::best(), &Kernel::new(&logs), &all);
         for _ in 0..UPDATES {
             let likelihood = Likelihood::new(samples, &weights, centre, &all);
-            weights = likelihood.new_weights(&logs, &smooth)?;
+            let new = likelihood.new_weights(&logs, &smooth)?;
+            let moved = weights.iter().zip(&new).map(|(old, new)| (old - new).abs());
+            let settled = moved.fold(0.0, f64::max) < SETTLED;
+            weights = new;
+            if settled {
+                break;
+            }
         }
     }
     let kernel = Kernel::new(&logs);
@@ -88,6 +96,8 @@ pub(super) struct Field {
     kernel: Kernel,
     observations: Vec<Observations>,
     factor: Factor,
+    /// Position of each observation, and the share of the field's variance that they leave open there, 0..=1.
+    open: Vec<([f64; 2], f64)>,
     /// Share of the field's variance that the observations explain where they are: the lowest tenth of them.
     explained: f64,
 }
@@ -143,12 +153,14 @@ impl Field {
         // What the observations with covariance S and noise N leave open where they are: the diagonal of S - S (S + N)⁻¹ S,
         // which is N - N (S + N)⁻¹ N.
         let diagonal = points.iter().zip(factor.inverse_diagonal());
-        let mut explained: Vec<f64> = diagonal
+        let open: Vec<([f64; 2], f64)> = diagonal
             .map(|(point, q)| {
                 let noise = point.variance_px2;
-                1.0 - ((noise - noise * q * noise) / kernel.variance).clamp(0.0, 1.0)
+                let open = (noise - noise * q * noise) / kernel.variance;
+                (point.at_mm, open.clamp(0.0, 1.0))
             })
             .collect();
+        let mut explained: Vec<f64> = open.iter().map(|(_, open)| 1.0 - open).collect();
         explained.sort_unstable_by(f64::total_cmp);
         let explained = *explained.get(n / 10)?;
         let groups = points.chunks(LANES).zip(&alpha);
@@ -159,6 +171,7 @@ impl Field {
             kernel,
             observations: observations.collect(),
             factor,
+            open,
             explained,
         })
     }
@@ -188,6 +201,15 @@ impl Field {
             }
         }
         sums
+    }
+
+    /// Share of the field's variance that the observations leave open at the position of one of them, 0..=1; as
+    /// [`Field::open`] where observation `i` is elsewhere.
+    pub(super) fn open_at_observation(&self, i: usize, at: [f64; 2]) -> f64 {
+        match self.open.get(i) {
+            Some((position, open)) if *position == at => *open,
+            _ => self.open(at),
+        }
     }
 
     /// Share of the field's variance that the observations leave open at a position, 0..=1.
@@ -234,6 +256,10 @@ mod tests {
             );
             let right = field.value([at[0] + 1e-4, at[1]]).0;
             assert!(((right - value) / 1e-4 - by[0]).abs() < 1e-4);
+        }
+        for (i, point) in model.points.iter().enumerate() {
+            let at = point.at_mm;
+            assert!((field.open_at_observation(i, at) - field.open(at)).abs() < 1e-9);
         }
         let (near, far) = (field.open([0.0, 0.0]), field.open([300.0, 0.0]));
         assert!(near < 0.2 && far > 0.999, "{near} {far}");

@@ -38,12 +38,19 @@ pub(super) struct Inverse {
     size: f64,
 }
 
-/// A position to begin from, with what each camera is expected to read and the values of the fields there.
+/// A position, with what each camera is expected to read and the fields there: values, px, and changes per mm.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    at: [f64; 2],
+    expected: [(f64, [f64; 2]); 2],
+    fields: [(f64, [f64; 2]); READINGS],
+}
+
+/// A place to begin from, with the shares of the fields' variances that the observations leave open there.
 #[derive(Debug, Clone, Copy)]
 struct StartPoint {
-    at: [f64; 2],
-    expected: [f64; 2],
-    fields: [f64; READINGS],
+    place: Place,
+    open: [f64; READINGS],
 }
 
 /// What both cameras read.
@@ -115,19 +122,32 @@ impl Inverse {
             size,
             fields: [Field::new(fields[0])?, Field::new(fields[1])?],
         };
-        let positions = fields[0]
-            .points
-            .iter()
-            .map(|p| p.at_mm)
-            .chain([prior.centre_mm]);
+        let positions = fields[0].points.iter().map(|p| p.at_mm);
+        let positions = positions.chain([prior.centre_mm]).enumerate();
         inverse.starts = positions
-            .map(|at| StartPoint {
-                at,
-                expected: [0, 1].map(|k| inverse.reading.expected(k, at).0),
-                fields: std::array::from_fn(|i| inverse.field(i).map_or(0.0, |f| f.value(at).0)),
+            .map(|(i, at)| StartPoint {
+                place: inverse.place(at),
+                open: inverse.open_of(|field| field.open_at_observation(i, at)),
             })
             .collect();
         Some(inverse)
+    }
+
+    fn place(&self, at: [f64; 2]) -> Place {
+        Place {
+            at,
+            expected: [0, 1].map(|k| self.reading.expected(k, at)),
+            fields: std::array::from_fn(|i| self.field(i).map_or((0.0, [0.0; 2]), |f| f.value(at))),
+        }
+    }
+
+    /// Shares of the fields' variances that the observations leave open at a position; 0 without a field.
+    fn open(&self, at: [f64; 2]) -> [f64; READINGS] {
+        self.open_of(|field| field.open(at))
+    }
+
+    fn open_of(&self, open: impl Fn(&Field) -> f64) -> [f64; READINGS] {
+        std::array::from_fn(|i| self.field(i).map_or(0.0, &open))
     }
 
     /// The field of a reading.
@@ -163,29 +183,27 @@ impl Inverse {
     }
 
     /// `None` for a missing reading.
-    fn miss(&self, read: &Readings, i: usize, at: [f64; 2]) -> Option<Residual> {
+    fn miss(&self, read: &Readings, i: usize, place: &Place) -> Option<Residual> {
+        let (field, field_by) = place.fields[i];
         let Some(spread) = i.checked_sub(2) else {
-            let (expected, by) = self.reading.expected(i, at);
-            let (field, field_by) = self.fields[i].value(at);
+            let (expected, by) = place.expected[i];
             return Some(Residual {
                 off: read.off(i, expected, field),
                 slope: [0, 1].map(|axis| by[axis] / read.slopes[i] + field_by[axis]),
             });
         };
-        let value = read.spreads[spread]?;
-        let (expected, slope) = self.field(i)?.value(at);
+        self.spreads[spread].as_ref()?;
         Some(Residual {
-            off: value - expected,
-            slope,
+            off: read.spreads[spread]? - field,
+            slope: field_by,
         })
     }
 
     /// Variance of the expected reading, px²: that of the field, and that of the geometry where the field knows nothing.
-    fn model_variance(&self, read: &Readings, i: usize, at: [f64; 2]) -> f64 {
+    fn model_variance(&self, read: &Readings, i: usize, at: [f64; 2], open: f64) -> f64 {
         let Some(field) = self.field(i) else {
             return 0.0;
         };
-        let open = field.open(at);
         field.variance(open) + open * self.parameter_variances(read, i, at)[0]
     }
 
@@ -208,15 +226,20 @@ impl Inverse {
         (0.5 * (slope[0] * dx + slope[1] * dy), slope)
     }
 
-    fn normal(&self, read: &Readings, variance: &[f64; READINGS], at: [f64; 2]) -> NormalEquations {
-        let (value, slope) = self.prior(at);
+    fn normal(
+        &self,
+        read: &Readings,
+        variance: &[f64; READINGS],
+        place: &Place,
+    ) -> NormalEquations {
+        let (value, slope) = self.prior(place.at);
         let mut normal = NormalEquations {
             value,
             matrix: self.precision,
             side: slope.map(|s| -s),
         };
         for (i, variance) in variance.iter().enumerate() {
-            let Some(miss) = self.miss(read, i, at) else {
+            let Some(miss) = self.miss(read, i, place) else {
                 continue;
             };
             let (value, weight) = loss(i, miss.off, *variance);
@@ -234,21 +257,29 @@ impl Inverse {
     /// The most likely position; `None` if no number is finite. `response`: as in [`super::robust::response`].
     pub(super) fn locate(&self, features: &Features, response: f64) -> Option<Prediction> {
         let read = self.readings(features, response);
-        let mut at = self.start(&read)?;
+        let StartPoint {
+            mut place,
+            mut open,
+        } = *self.start(&read)?;
         let (mut model, mut noise) = ([0.0; READINGS], read.noise);
-        for _ in 0..ROUNDS {
-            model = std::array::from_fn(|i| self.model_variance(&read, i, at));
-            noise =
-                std::array::from_fn(|i| read.noise[i] + self.parameter_variances(&read, i, at)[1]);
+        for round in 0..ROUNDS {
+            let from = place.at;
+            if round > 0 {
+                open = self.open(from);
+            }
+            model = std::array::from_fn(|i| self.model_variance(&read, i, from, open[i]));
+            noise = std::array::from_fn(|i| {
+                read.noise[i] + self.parameter_variances(&read, i, from)[1]
+            });
             let variance = std::array::from_fn(|i| noise[i] + model[i]);
-            let from = at;
-            at = self.descend(&read, &variance, from);
+            place = self.descend(&read, &variance, place);
+            let at = place.at;
             if libm::hypot(at[0] - from[0], at[1] - from[1]) < LAST_MM {
                 break;
             }
         }
         let readings: [ReadingUncertainty; READINGS] = std::array::from_fn(|i| {
-            self.miss(&read, i, at)
+            self.miss(&read, i, &place)
                 .map_or_else(ReadingUncertainty::default, |miss| ReadingUncertainty {
                     slope: miss.slope,
                     weight: loss(i, miss.off, noise[i] + model[i]).1.min(1.0),
@@ -256,6 +287,7 @@ impl Inverse {
                     model: model[i],
                 })
         });
+        let at = place.at;
         let prior = self.precision;
         let finite = at.iter().all(|v| v.is_finite());
         finite.then_some(Prediction {
@@ -264,30 +296,36 @@ impl Inverse {
                 prior,
                 readings: Box::new(readings),
             }),
-            extrapolated: self.fields.iter().any(|f| f.is_beyond(f.open(at))),
+            extrapolated: self
+                .fields
+                .iter()
+                .zip(open)
+                .any(|(f, open)| f.is_beyond(open)),
         })
     }
 
     /// The best of the starts.
-    fn start(&self, read: &Readings) -> Option<[f64; 2]> {
-        let cost = |begin: &StartPoint| {
+    fn start(&self, read: &Readings) -> Option<&StartPoint> {
+        let cost = |place: &Place| {
             let each = (0..READINGS).filter_map(|i| {
+                let (field, _) = place.fields[i];
                 let off = match i.checked_sub(2) {
-                    None => read.off(i, begin.expected[i], begin.fields[i]),
-                    Some(spread) => read.spreads[spread]? - begin.fields[i],
+                    None => read.off(i, place.expected[i].0, field),
+                    Some(spread) => read.spreads[spread]? - field,
                 };
                 Some(loss(i, off, read.noise[i]).0)
             });
-            self.prior(begin.at).0 + each.sum::<f64>()
+            self.prior(place.at).0 + each.sum::<f64>()
         };
-        let all = self.starts.iter().map(|s| (cost(s), s.at));
+        let all = self.starts.iter().map(|s| (cost(&s.place), s));
         let best = all.filter(|(cost, _)| cost.is_finite());
-        best.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, at)| at)
+        best.min_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, start)| start)
     }
 
     /// Gauss-Newton steps, halved until they lead down.
-    fn descend(&self, read: &Readings, variance: &[f64; READINGS], from: [f64; 2]) -> [f64; 2] {
-        let (mut at, mut normal) = (from, self.normal(read, variance, from));
+    fn descend(&self, read: &Readings, variance: &[f64; READINGS], from: Place) -> Place {
+        let (mut place, mut normal) = (from, self.normal(read, variance, &from));
         for _ in 0..STEPS {
             let Some([xx, xy, yy]) = inverted(normal.matrix) else {
                 break;
@@ -299,8 +337,8 @@ impl Inverse {
             }
             let mut lower = None;
             for _ in 0..HALVINGS {
-                let there = [at[0] + step[0], at[1] + step[1]];
-                let found = self.normal(read, variance, there);
+                let there = self.place([place.at[0] + step[0], place.at[1] + step[1]]);
+                let found = self.normal(read, variance, &there);
                 if found.value < normal.value {
                     lower = Some((there, found));
                     break;
@@ -308,8 +346,8 @@ impl Inverse {
                 step = step.map(|s| 0.5 * s);
             }
             let Some(found) = lower else { break };
-            (at, normal) = found;
+            (place, normal) = found;
         }
-        at
+        place
     }
 }

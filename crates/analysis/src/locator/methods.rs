@@ -134,7 +134,7 @@ impl Method for GeometryField {
     }
 
     fn version(&self) -> u32 {
-        2
+        3
     }
 
     fn needs(&self) -> Requirements {
@@ -165,7 +165,7 @@ impl Method for DirectField {
     }
 
     fn version(&self) -> u32 {
-        2
+        3
     }
 
     fn needs(&self) -> Requirements {

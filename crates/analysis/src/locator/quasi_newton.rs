@@ -23,10 +23,11 @@ pub(crate) fn minimise<const N: usize>(
     let mut at = from;
     let (mut value, mut gradient) = function(&at)?;
     let mut inverse = SMatrix::<f64, N, N>::identity();
+    let mut scaled = false;
     for _ in 0..steps {
         let mut direction = -(inverse * gradient);
         if direction.dot(&gradient) >= 0.0 {
-            inverse = SMatrix::identity();
+            (inverse, scaled) = (SMatrix::identity(), false);
             direction = -gradient;
         }
         let longest = direction.amax();
@@ -57,6 +58,11 @@ pub(crate) fn minimise<const N: usize>(
         }
         let curvature = step.dot(&turn);
         if curvature > 1e-12 {
+            // The first step tells the size of the curvature (Nocedal and Wright, Numerical Optimization, 2nd edition, equation 6.20).
+            if !scaled {
+                inverse *= curvature / turn.norm_squared();
+                scaled = true;
+            }
             let shift = SMatrix::identity() - step * turn.transpose() / curvature;
             inverse = shift * inverse * shift.transpose() + step * step.transpose() / curvature;
         }

@@ -40,7 +40,8 @@ struct Gauge {
 
 impl Gauge {
     fn start() -> Self {
-        let (ended, late_ns) = (Arc::new(AtomicBool::new(false)), Arc::default());
+        let ended = Arc::new(AtomicBool::new(false));
+        let late_ns = Arc::new(AtomicU64::new(0));
         let (end, latest) = (Arc::clone(&ended), Arc::clone(&late_ns));
         let thread = std::thread::spawn(move || {
             while !end.load(Ordering::Relaxed) {
