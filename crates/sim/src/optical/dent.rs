@@ -75,7 +75,7 @@ pub(super) struct Dent {
     pub(super) own_columns: Range<usize>,
     pub(super) own_rows: Range<usize>,
     /// Loss per mm of indentation, for each column of the sensor.
-    loss_per_mm: Vec<f64>,
+    pub(super) loss_per_mm: Vec<f64>,
     /// Part of the light that comes from behind the dent, for each column; 0 where it blocks nothing.
     pub(super) shadow: Vec<f64>,
     /// Light returned by the flanks in units of the column's undisturbed light and of `x`, for each column.

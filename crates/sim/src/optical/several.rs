@@ -75,11 +75,6 @@ impl<'a> Sights<'a> {
             to: self.light(v, 1) - 1.0,
         }
     }
-
-    /// Most that the light of any row changes per change of lost light.
-    fn most(&self) -> f64 {
-        self.0.iter().map(|s| s.shadow + s.shine).sum()
-    }
 }
 
 /// Pixels of one camera over an optically modelled skin that several tips touch.
@@ -96,7 +91,7 @@ pub struct SeveralTips {
     creep_step: f64,
     /// Per column: least change of light that causes an event since its last evaluation.
     slack: Vec<f64>,
-    /// Per column and tip: lost light at that time.
+    /// Per column and tip: depth at that time, mm.
     evaluated: Vec<f64>,
     first_ns: i64,
     last: Option<(i64, Vec<Point3<Skin>>)>,
@@ -224,20 +219,21 @@ impl SeveralTips {
             .fold(first..end, |a, b| a.start.min(b.start)..a.end.max(b.end));
         let mut sights = Sights::default();
         for u in all {
-            sights.look(touches, u);
             let evaluated = &mut self.evaluated[u * touches.len()..][..touches.len()];
-            let lost = |t: &Touch| t.dent.lost(u, t.ramp.to_mm);
-            let moved: f64 = touches
+            // No light changes faster than its loss at depth 0.
+            let part = |(t, mm): (&Touch, &f64)| (t.ramp.to_mm - mm).abs() * t.dent.loss_per_mm[u];
+            let moved: f64 = touches.iter().zip(&*evaluated).map(part).sum();
+            let most: f64 = touches
                 .iter()
-                .zip(&*evaluated)
-                .map(|(t, e)| (lost(t) - e).abs())
+                .map(|t| t.dent.shadow[u] + t.dent.shine[u])
                 .sum();
-            if moved * sights.most() < self.slack[u] {
+            if moved * most < self.slack[u] {
                 continue;
             }
-            for (e, t) in evaluated.iter_mut().zip(touches) {
-                *e = lost(t);
+            for (mm, t) in evaluated.iter_mut().zip(touches) {
+                *mm = t.ramp.to_mm;
             }
+            sights.look(touches, u);
             self.slack[u] = evaluate(&mut self.pixels, &sights, u, t_ns, out);
         }
     }
