@@ -41,6 +41,7 @@ mod locate_presses;
 pub mod locator;
 pub mod metrics;
 pub mod motion;
+pub mod multi_touch;
 mod onsets;
 mod pixels;
 mod press_event_collector;

@@ -72,17 +72,17 @@ pub(super) struct Dent {
     pub(super) columns: Range<usize>,
     pub(super) rows: Range<usize>,
     /// Columns and rows that this dent itself changes.
-    own_columns: Range<usize>,
-    own_rows: Range<usize>,
+    pub(super) own_columns: Range<usize>,
+    pub(super) own_rows: Range<usize>,
     /// Loss per mm of indentation, for each column of the sensor.
-    loss_per_mm: Vec<f64>,
-    /// Part of the light that comes from behind the dent, for each column.
-    shadow: Vec<f64>,
+    pub(super) loss_per_mm: Vec<f64>,
+    /// Part of the light that comes from behind the dent, for each column; 0 where it blocks nothing.
+    pub(super) shadow: Vec<f64>,
     /// Light returned by the flanks in units of the column's undisturbed light and of `x`, for each column.
-    shine: Vec<f64>,
+    pub(super) shine: Vec<f64>,
     /// Weights of shadow and shine, for each row of the sensor.
-    shadow_rows: Vec<f64>,
-    shine_rows: Vec<f64>,
+    pub(super) shadow_rows: Vec<f64>,
+    pub(super) shine_rows: Vec<f64>,
 }
 
 impl Dent {

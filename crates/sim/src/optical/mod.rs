@@ -6,45 +6,31 @@
 //! optics. Formulas, constants and limits: `docs/explanation/optical-model.md`.
 //!
 //! Data flow: `light` (once) -> `dent` (once per touched place) -> `pixels` (every millisecond with a change).
-//! `noise` is added independently.
+//! `noise` is added independently. `several` does the same for tips whose dents overlap.
 
 mod config;
+mod contact;
 mod dent;
 mod light;
 mod noise;
 mod pixels;
+mod several;
+#[cfg(test)]
+mod several_tests;
 #[cfg(test)]
 mod tests;
 
 pub use config::{InvalidOpticalSetting, OpticalConfig};
+pub use several::SeveralTips;
 
 use crate::random::{Purpose, Stream};
 use crate::scene::{GRID_NS, PixelEvent, PixelModel, SceneConfig, TipSample};
-use skinrig_model::Point2;
 
+use contact::Contact;
 use dent::Dent;
-use light::{Column, Illumination, Vec2};
+use light::{Column, Illumination};
 use noise::Noise;
 use pixels::{Pixels, Ramp};
-
-/// Depth below which a relaxing dent is dropped, mm: no pixel can detect it.
-const GONE_MM: f64 = 1e-5;
-
-/// Depth and position of the indentation. The optical effect of a held depth `d` is
-/// `(1 - creep) d + creep m` with `m' = (d - m) / tau`: the standard linear solid, driven by depth.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Contact {
-    /// Position of first touch.
-    place: Vec2,
-    /// Depth of the tip, mm.
-    depth_mm: f64,
-    /// The creeping part `m`, mm.
-    memory_mm: f64,
-    /// The effective depth, mm.
-    effect_mm: f64,
-    /// The effective depth as pixels see it, after their latency, mm.
-    seen_mm: f64,
-}
 
 /// Pixels of one camera over the optically modelled skin.
 #[derive(Debug, Clone)]
@@ -98,13 +84,7 @@ impl OpticalModel {
         let light = Illumination::new(&scene.outline, &config);
         let columns = light::columns(&scene.camera, &scene.outline, &light, &config);
         let noise = Noise::new(scene, &config, &columns);
-        let contact = Contact {
-            place: [scene.outline.centre.x_mm, scene.outline.centre.y_mm],
-            depth_mm: 0.0,
-            memory_mm: 0.0,
-            effect_mm: 0.0,
-            seen_mm: 0.0,
-        };
+        let contact = Contact::none(scene);
         let dent = Dent::new(scene, &config, &light, &columns, contact.place, None);
         let mut pixels = Pixels::new(
             scene,
@@ -121,7 +101,7 @@ impl OpticalModel {
             noise,
             contact,
             dent,
-            creep_step: -libm::expm1(-(GRID_NS as f64 * 1e-6) / config.creep_time_ms),
+            creep_step: Contact::creep_step(&config),
             first_ns: 0,
             last: None,
         }
@@ -143,48 +123,22 @@ impl OpticalModel {
         out[begin..].sort_unstable_by_key(|e| (e.t_ns, e.y, e.x, e.polarity.bit()));
     }
 
-    fn indent(&mut self, t_ns: i64, [x, y, z]: [f64; 3]) -> Ramp {
-        let c = &mut self.contact;
-        // The base is rigid: the depth is limited to the skin's thickness.
-        let on_skin = z < 0.0 && self.scene.outline.contains(Point2::new(x, y));
-        let depth_mm = if on_skin {
-            (-z).min(self.scene.skin_thickness_mm)
-        } else {
-            0.0
-        };
-        let (dx, dy) = (x - c.place[0], y - c.place[1]);
-        let elsewhere = dx * dx + dy * dy > self.config.same_place_mm * self.config.same_place_mm;
-        if depth_mm > 0.0 && elsewhere {
-            if c.depth_mm == 0.0 {
-                // A new touch; the remainder of the previous dent is dropped.
-                (c.memory_mm, c.effect_mm, c.seen_mm) = (0.0, 0.0, 0.0);
-            }
-            c.place = [x, y];
+    fn indent(&mut self, t_ns: i64, tip: [f64; 3]) -> Ramp {
+        let step = self.creep_step;
+        let (ramp, moved) = self
+            .contact
+            .indent(&self.scene, &self.config, step, t_ns, tip);
+        if moved {
             self.dent = Dent::new(
                 &self.scene,
                 &self.config,
                 &self.light,
                 &self.columns,
-                c.place,
+                self.contact.place,
                 Some(&self.dent),
             );
             self.pixels.start_dent(&self.dent);
         }
-        c.depth_mm = depth_mm;
-        c.memory_mm += (depth_mm - c.memory_mm) * self.creep_step;
-        if depth_mm == 0.0 && c.memory_mm < GONE_MM {
-            c.memory_mm = 0.0;
-        }
-        let creep = self.config.creep_fraction;
-        let effect_mm = (1.0 - creep) * depth_mm + creep * c.memory_mm;
-        let late = f64::from(self.config.latency_us) / (GRID_NS as f64 * 1e-3);
-        let seen_mm = effect_mm - (effect_mm - c.effect_mm) * late;
-        let ramp = Ramp {
-            t_ns,
-            from_mm: c.seen_mm,
-            to_mm: seen_mm,
-        };
-        (c.effect_mm, c.seen_mm) = (effect_mm, seen_mm);
         ramp
     }
 }

@@ -5,6 +5,8 @@
 //! pixel stores the two values of `x` at which it emits next, each column the two depths, and no other pixel
 //! is evaluated while the dent moves.
 
+use std::ops::Range;
+
 use skinrig_model::{Polarity, SENSOR_HEIGHT, SENSOR_WIDTH};
 
 use crate::random::Stream;
@@ -28,15 +30,15 @@ pub(super) struct Ramp {
     pub(super) to_mm: f64,
 }
 
-/// The lost light of one column during a step: `x` changes linearly from `from` to `to`.
+/// The light of a pixel during a step: `x` changes linearly from `from` to `to`.
 #[derive(Debug, Clone, Copy)]
-struct Loss {
-    t_ns: i64,
-    from: f64,
-    to: f64,
+pub(super) struct Change {
+    pub(super) t_ns: i64,
+    pub(super) from: f64,
+    pub(super) to: f64,
 }
 
-impl Loss {
+impl Change {
     fn at_us(&self, us: i64) -> f64 {
         self.from + (self.to - self.from) * (us as f64 / STEP_US as f64)
     }
@@ -154,7 +156,7 @@ impl Pixels {
 
     /// Simulates one grid step with the given dent.
     pub(super) fn step(&mut self, dent: &Dent, ramp: Ramp, out: &mut Vec<PixelEvent>) {
-        self.release(dent, ramp, out);
+        self.release_in_dent(dent, ramp, out);
         if ramp.from_mm == ramp.to_mm && !self.fresh {
             return;
         }
@@ -165,7 +167,7 @@ impl Pixels {
                 for v in dent.rows.clone() {
                     let pixel = &self.skin[self.index(u, v)];
                     if loss.to > pixel.high || loss.to < pixel.low {
-                        self.emit(dent, u, v, loss, 0, out);
+                        self.emit((u, v), dent.contrast(u, v), loss, 0, out);
                     }
                 }
                 self.set_next_in_column(dent, u);
@@ -196,63 +198,95 @@ impl Pixels {
         u * self.rows + v - self.first_row
     }
 
-    /// Pixels whose refractory time ends in this step take the light at that time as their reference.
-    fn release(&mut self, dent: &Dent, ramp: Ramp, out: &mut Vec<PixelEvent>) {
+    /// Every pixel gets its next thresholds on the light itself: `x` is its change, the contrast 1.
+    pub(super) fn start_by_light(&mut self) {
+        for pixel in &mut self.skin {
+            pixel.set_next(1.0);
+        }
+    }
+
+    /// Rows with pixels of the skin.
+    pub(super) const fn skin_rows(&self) -> Range<usize> {
+        self.first_row..self.first_row + self.rows
+    }
+
+    /// Columns of the pixels in their refractory times.
+    pub(super) fn held_columns(&self) -> impl Iterator<Item = usize> {
+        self.held.iter().map(|(x, _)| usize::from(*x))
+    }
+
+    /// How far `x` of a pixel is from the next event; negative beyond it.
+    pub(super) fn slack(&self, u: usize, v: usize, x: f64) -> f64 {
+        let pixel = &self.skin[self.index(u, v)];
+        (pixel.high - x).min(x - pixel.low)
+    }
+
+    fn release_in_dent(&mut self, dent: &Dent, ramp: Ramp, out: &mut Vec<PixelEvent>) {
+        let see = |u, v| (loss_of(dent, ramp, u), dent.contrast(u, v));
+        self.release(ramp.t_ns, see, |u, x| dent.depth_of_loss(u, x), out);
+    }
+
+    /// Pixels whose refractory time ends in the step from `t_ns` take the light at that time as their reference. `see` returns the
+    /// change and contrast of a pixel, `bound` the bound of a column for an `x`.
+    pub(super) fn release(
+        &mut self,
+        t_ns: i64,
+        see: impl Fn(usize, usize) -> (Change, f64),
+        bound: impl Fn(usize, f64) -> f64,
+        out: &mut Vec<PixelEvent>,
+    ) {
         let mut k = 0;
         while k < self.held.len() {
             let (x, y) = self.held[k];
             let (u, v) = (usize::from(x), usize::from(y));
             let end_ns =
                 self.last_ns[v * usize::from(SENSOR_WIDTH) + u].saturating_add(self.refractory_ns);
-            if end_ns >= ramp.t_ns + GRID_NS {
+            if end_ns >= t_ns + GRID_NS {
                 k += 1;
                 continue;
             }
             self.held.swap_remove(k);
-            let loss = loss_of(dent, ramp, u);
-            let us = ((end_ns - ramp.t_ns) / NS_PER_US).max(0);
-            let c = dent.contrast(u, v);
+            let (change, c) = see(u, v);
+            let us = ((end_ns - t_ns) / NS_PER_US).max(0);
             let i = self.index(u, v);
             self.skin[i].held = false;
-            self.skin[i].reference = 1.0 + loss.at_us(us) * c;
+            self.skin[i].reference = 1.0 + change.at_us(us) * c;
             self.skin[i].set_next(c);
             // Emitting may hold the pixel again, at the list's end, until a later step.
-            self.emit(dent, u, v, loss, us, out);
+            self.emit((u, v), c, change, us, out);
             let (low, high) = (self.skin[i].low, self.skin[i].high);
-            self.low_mm[u] = self.low_mm[u].max(dent.depth_of_loss(u, low));
-            self.high_mm[u] = self.high_mm[u].min(dent.depth_of_loss(u, high));
+            self.low_mm[u] = self.low_mm[u].max(bound(u, low));
+            self.high_mm[u] = self.high_mm[u].min(bound(u, high));
         }
     }
 
-    /// Emits all events of one pixel from `from_us` to the end of the step.
-    fn emit(
+    /// Emits all events of one pixel of contrast `c` from `from_us` to the end of the step.
+    pub(super) fn emit(
         &mut self,
-        dent: &Dent,
-        u: usize,
-        v: usize,
-        loss: Loss,
+        (u, v): (usize, usize),
+        c: f64,
+        change: Change,
         mut from_us: i64,
         out: &mut Vec<PixelEvent>,
     ) {
-        let c = dent.contrast(u, v);
         let i = self.index(u, v);
         loop {
             let pixel = &mut self.skin[i];
-            let (bound, rising) = if loss.to > pixel.high {
+            let (bound, rising) = if change.to > pixel.high {
                 (pixel.high, true)
-            } else if loss.to < pixel.low {
+            } else if change.to < pixel.low {
                 (pixel.low, false)
             } else {
                 return;
             };
-            let part = (bound - loss.from) / (loss.to - loss.from);
+            let part = (bound - change.from) / (change.to - change.from);
             let us = if part > 0.0 {
                 (part * STEP_US as f64) as i64
             } else {
                 0
             };
             let us = us.clamp(from_us, STEP_US - 1);
-            let t_ns = loss.t_ns + us * NS_PER_US;
+            let t_ns = change.t_ns + us * NS_PER_US;
             out.push(PixelEvent {
                 t_ns,
                 x: u as u16,
@@ -267,7 +301,7 @@ impl Pixels {
                 return;
             }
             from_us = end_us;
-            pixel.reference = 1.0 + loss.at_us(end_us) * c;
+            pixel.reference = 1.0 + change.at_us(end_us) * c;
             pixel.set_next(c);
         }
     }
@@ -285,8 +319,8 @@ impl Pixels {
     }
 }
 
-fn loss_of(dent: &Dent, ramp: Ramp, u: usize) -> Loss {
-    Loss {
+fn loss_of(dent: &Dent, ramp: Ramp, u: usize) -> Change {
+    Change {
         t_ns: ramp.t_ns,
         from: dent.lost(u, ramp.from_mm),
         to: dent.lost(u, ramp.to_mm),

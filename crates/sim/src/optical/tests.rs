@@ -9,7 +9,7 @@ use super::{OpticalConfig, OpticalModel};
 use crate::contacts::Contacts;
 use crate::scene::{GRID_NS, PixelEvent, PixelModel, SceneConfig, TipSample};
 
-fn scene(id: CameraId) -> SceneConfig {
+pub(super) fn scene(id: CameraId) -> SceneConfig {
     SceneConfig {
         seed: 11,
         start: 0,
@@ -23,7 +23,7 @@ fn scene(id: CameraId) -> SceneConfig {
     }
 }
 
-fn quiet(id: CameraId) -> OpticalModel {
+pub(super) fn quiet(id: CameraId) -> OpticalModel {
     OpticalModel::with_config(&scene(id), OpticalConfig::default().without_noise()).unwrap()
 }
 
@@ -35,7 +35,7 @@ fn tip(ms: i64, x_mm: f64, y_mm: f64, z_mm: f64) -> TipSample {
 }
 
 /// A press at `p`: 100 ms down from 1 mm above the skin, 100 ms held, 100 ms up, then 200 ms of rest.
-fn press(p: Point2, depth_mm: f64) -> Vec<TipSample> {
+pub(super) fn press(p: Point2, depth_mm: f64) -> Vec<TipSample> {
     (0..=500)
         .map(|ms| {
             let part = (ms as f64 / 100.0)
@@ -47,7 +47,7 @@ fn press(p: Point2, depth_mm: f64) -> Vec<TipSample> {
         .collect()
 }
 
-fn run(model: &mut OpticalModel, tips: &[TipSample]) -> Vec<PixelEvent> {
+pub(super) fn run(model: &mut OpticalModel, tips: &[TipSample]) -> Vec<PixelEvent> {
     let mut out = Vec::new();
     model.advance(tips, &mut out);
     out
@@ -57,7 +57,7 @@ fn ms(e: &PixelEvent) -> i64 {
     e.t_ns / GRID_NS
 }
 
-const P: Point2 = Point2::new(-6.0, 14.0);
+pub(super) const P: Point2 = Point2::new(-6.0, 14.0);
 
 /// FNV-1a, 64 bit: sufficient to detect a difference.
 fn digest(events: &[PixelEvent]) -> u64 {
@@ -211,7 +211,7 @@ fn pressing_darkens_and_releasing_brightens() {
     }
 }
 
-fn mean_column(events: &[PixelEvent]) -> f64 {
+pub(super) fn mean_column(events: &[PixelEvent]) -> f64 {
     events.iter().map(|e| f64::from(e.x)).sum::<f64>() / events.len() as f64
 }
 
