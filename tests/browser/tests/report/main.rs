@@ -10,6 +10,7 @@ mod acting;
 mod comparison;
 mod downloads;
 mod reading;
+mod view;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
