@@ -118,7 +118,7 @@ fn stream() -> Vec<u8> {
             y: 0,
             polarity: Polarity::On,
         };
-        encoder.event(event, &mut bytes).unwrap();
+        encoder.cd(event, &mut bytes).unwrap();
     }
     bytes
 }

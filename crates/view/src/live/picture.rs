@@ -145,7 +145,7 @@ mod tests {
                 y: 4,
                 polarity: Polarity::On,
             };
-            encoder.event(event, &mut bytes).unwrap();
+            encoder.cd(event, &mut bytes).unwrap();
         }
         let picture = from_bytes(StreamFormat::Evt2, &bytes, 7.0).unwrap();
         assert_eq!((picture.events, picture.unix_s), (3, Some(7.0)));
