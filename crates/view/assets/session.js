@@ -1,5 +1,5 @@
 // One session: map, both cameras, time slider, table of presses; live while it is being recorded.
-import { $, el } from '/app/dom.js';
+import { $, el, fileName } from '/app/dom.js';
 import { player, summary } from '/app/player.js';
 import { labelled, transport } from '/app/transport.js';
 import { saving } from '/app/saving.js';
@@ -19,7 +19,7 @@ export const session = async (named, about, signal) => {
     show: t => it.show(t, controls.accumulation_s()),
   });
   $('#title').textContent = s.prototype;
-  $('#sub').textContent = `${s.started_at}, ${s.protocol}, ${s.rig} (${s.origin ?? 'origin unknown'})`;
+  $('#sub').textContent = `${s.started_at}, ${fileName(s.protocol)}, ${s.rig} (${s.origin ?? 'origin unknown'})`;
   const card = s.writer ? live(named.session, about, {
     presses: it.presses, pictures: all => { if (!controls.isPlaying()) all.forEach((p, k) => it.pictures[k].counts(p)); },
     tip: tip => { if (!controls.isPlaying()) it.map.mark(it.chosen(), tip); },

@@ -1,6 +1,6 @@
 // The lab's shelf: sessions with search, two of them side by side or by their settings, trends of prototypes, nights.
 import { address, json } from '/app/api.js';
-import { $, el, number, problem, table } from '/app/dom.js';
+import { $, el, fileName, number, problem, table } from '/app/dom.js';
 import { trend } from '/app/trend.js';
 const official = a => a.name ?? 'official';
 const rmse = a => a.rmse_mm ? `${number(a.rmse_mm[0])} mm` : a.trouble;
@@ -39,7 +39,7 @@ export const shelf = async about => {
     const fits = s => words.every(w => JSON.stringify(s).toLowerCase().includes(w));
     const rows = found.sessions.filter(fits).reverse();
     list.replaceChildren(table('Sessions', ['Session', 'Prototype', 'Protocol', 'Rig', 'Valid', 'State', 'Analyses (RMSE)', 'Tags'], rows.map(s => [
-      el('a', { href: address({ session: s.name }) }, s.started_at ?? s.name), s.prototype, s.protocol_name, s.rig_name,
+      el('a', { href: address({ session: s.name }) }, s.started_at ?? s.name), s.prototype, s.protocol_name && fileName(s.protocol_name), s.rig_name,
       s.presses ? `${s.presses.valid}/${s.presses.planned}` : null, s.writer ? 'recording' : s.end ?? s.reason ?? s.state, el('div', {}, analyses(s)), (s.tags ?? []).join(' '),
     ])));
   };

@@ -9,6 +9,7 @@
 mod acting;
 mod comparison;
 mod downloads;
+mod latency;
 mod reading;
 mod view;
 
