@@ -56,7 +56,7 @@ export const player = async (named, on, signal) => {
       [whole, strip].forEach(line => line.at(t));
       const mark = s.marks.findLast(m => m[0] <= t && m[0] > t - Math.max(MARK_S, accumulation_s));
       said.textContent = `${number(t, 3)} s: ${counts[0]} and ${counts[1]} events; tip ${tip ? height(tip[3]) : 'unknown'}`
-        + (mark ? `; clock mark: ${mark[1]}, press ${mark[2]}` : '')
+        + (mark ? `; clock mark: ${mark[1].replaceAll('_', ' ')}, press ${mark[2]}` : '')
         + (s.clocks_measured.every(Boolean) ? '' : '; camera times from arrivals, good to milliseconds');
       shown = { t_s: t, press: inPress ? chosen.press : null, events: counts, tip_mm: tip?.slice(1, 4) ?? null };
       return true;

@@ -1,19 +1,16 @@
 //! Time from an event to its pixel on the page of `skinrig view`, with ten pages open. Takes as long as the run, so it is ignored.
 
-use std::io::{Read, Write};
-use std::net::TcpStream;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
+use serde_json::json;
 use skinrig::library::Program;
-use skinrig_browser::{Browser, BrowserError};
+use skinrig_browser::{Browser, BrowserError, Page};
 use skinrig_view::{Options, Server};
 
 use crate::{picture_folder, save_picture, skinrig};
 
-/// Pages besides the one in the browser.
-const FURTHER_PAGES: usize = 9;
+/// Open pages, in two browsers.
+const PAGES: usize = 10;
 /// Step of the times at which events are assumed, s.
 const STEP_S: f64 = 0.001;
 
@@ -45,33 +42,31 @@ fn session_in(folder: &Path) -> PathBuf {
     }
 }
 
-/// Reads a live stream to its end and counts its bytes.
-fn further_page(server: &Server, session: &str, bytes: &Arc<AtomicU64>) {
-    let mut page = TcpStream::connect(server.address()).unwrap();
-    let (host, token) = (server.address(), server.token());
-    let request = format!(
-        "GET /api/live?session={session} HTTP/1.1\r\nHost: {host}\r\nAuthorization: Bearer {token}\r\n\r\n"
-    );
-    page.write_all(request.as_bytes()).unwrap();
-    let bytes = Arc::clone(bytes);
-    std::thread::spawn(move || {
-        let mut buffer = vec![0; 1 << 16];
-        while let Ok(found @ 1..) = page.read(&mut buffer) {
-            bytes.fetch_add(found as u64, Ordering::Relaxed);
+/// A browser, if there is one.
+fn browser() -> Option<Browser> {
+    match Browser::start() {
+        Ok(browser) => Some(browser),
+        Err(BrowserError::Absent(reason)) => {
+            println!("skipped: no browser: {reason}");
+            None
         }
-    });
+        Err(e) => panic!("{e}"),
+    }
+}
+
+/// Opens `count` tabs of the page.
+fn open_tabs(page: &mut Page<'_>, link: &str, count: usize) {
+    for _ in 0..count {
+        page.call("Target.createTarget", json!({ "url": link }))
+            .unwrap();
+    }
 }
 
 #[test]
 #[ignore = "a run in real time"]
 fn events_reach_the_page_soon_and_none_is_lost() {
-    let mut browser = match Browser::start() {
-        Ok(browser) => browser,
-        Err(BrowserError::Absent(reason)) => {
-            println!("skipped: no browser: {reason}");
-            return;
-        }
-        Err(e) => panic!("{e}"),
+    let (Some(mut first), Some(mut second)) = (browser(), browser()) else {
+        return;
     };
     let folder = picture_folder().join("live");
     let _ = std::fs::remove_dir_all(&folder);
@@ -102,13 +97,13 @@ fn events_reach_the_page_soon_and_none_is_lost() {
         control: false,
     };
     let server = Server::open(options, Program).unwrap();
-    let bytes = Arc::default();
     let link = server.link();
-    for _ in 0..FURTHER_PAGES {
-        further_page(&server, name, &bytes);
-    }
     std::thread::spawn(move || server.run_until(std::future::pending()));
-    let mut page = browser.page().unwrap();
+    let (mut page, mut other) = (first.page().unwrap(), second.page().unwrap());
+    // A browser opens six connections to a server at most.
+    open_tabs(&mut page, &link, PAGES / 2 - 1);
+    open_tabs(&mut other, &link, PAGES / 2);
+    page.call("Page.bringToFront", json!({})).unwrap();
     page.visit(&link).unwrap();
     page.evaluate(COLLECT).unwrap();
     page.wait_for("window.drawn.length > 200").unwrap();
@@ -119,12 +114,11 @@ fn events_reach_the_page_soon_and_none_is_lost() {
     let ages = ages(&drawn);
     let quantile = |share: f64| ages[((ages.len() - 1) as f64 * share) as usize] * 1e3;
     println!(
-        "{} pictures; event to pixel: median {:.0} ms, p95 {:.0} ms, p99 {:.0} ms; {} bytes to {FURTHER_PAGES} further pages",
+        "{} pictures; event to pixel: median {:.0} ms, p95 {:.0} ms, p99 {:.0} ms; {PAGES} pages",
         drawn.len(),
         quantile(0.5),
         quantile(0.95),
         quantile(0.99),
-        bytes.load(Ordering::Relaxed),
     );
     let reader = skinrig_recorder::SessionReader::open(&session).unwrap();
     for camera in skinrig_model::CameraId::ALL {
