@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use skinrig_controller::{ControlHandle, RecordSink, RunReport, SinkFault};
 use skinrig_model::{
-    ExcludedReason, HostTime, InterruptionKind, PressId, PressOutcome, PressTiming, PressVerdict,
-    Record,
+    CameraId, ExcludedReason, HostTime, InterruptionKind, PressId, PressOutcome, PressTiming,
+    PressVerdict, Record,
 };
 use skinrig_recorder::{RecorderError, SealedSession, SessionWriter};
 
@@ -193,6 +193,16 @@ impl RecordSink for SessionSink {
         Some(free_b as u64)
     }
 
+    fn wants_newest(&mut self) -> Option<usize> {
+        self.remote.as_ref()?.wants_newest()
+    }
+
+    fn newest(&mut self, camera: CameraId, bytes: Vec<u8>) {
+        if let Some(remote) = &self.remote {
+            remote.show_newest(camera, bytes);
+        }
+    }
+
     fn accept(&mut self, mut record: Record) -> Result<(), SinkFault> {
         match &mut record {
             Record::Intent { t, .. } => self.begun = *t,
@@ -208,6 +218,9 @@ impl RecordSink for SessionSink {
         }
         // Show a record only after it is on the disk. Bulk data, which are expensive to copy, are only counted.
         let is_bulk = matches!(&record, Record::Chunk(_) | Record::Poses(_));
+        if let (Some(remote), Record::Chunk(chunk)) = (&self.remote, &record) {
+            remote.show_chunk(chunk);
+        }
         let shown = if is_bulk {
             self.view.update(&record);
             None

@@ -1,6 +1,5 @@
 //! `skinrig view`: arguments of the server, and what it asks of the rest of the program.
 
-use std::collections::BTreeMap;
 use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
 
@@ -9,12 +8,14 @@ use serde_json::{Value, json};
 use skinrig_analysis::Analysis;
 use skinrig_controller::State;
 use skinrig_hil::history::{self, Filter};
-use skinrig_recorder::SessionReader;
-use skinrig_view::{AnalysisEntry, Lab, LabError, Options, RunState, Server};
+use skinrig_view::{
+    AnalysisEntry, Lab, LabError, NewestBytes, Options, RunState, Server, SettingDifference,
+    SettingValues,
+};
 
 use crate::args::ViewArgs;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::remote::{Reply, Request, RunRequest, ask};
+use crate::remote::{NewestEvents, Reply, Request, RunRequest, ask};
 use crate::rig::gates;
 use crate::{analyses, compare, control, paths, prototypes, sessions};
 
@@ -90,6 +91,19 @@ impl Lab for Program {
         }
     }
 
+    fn newest(&self, session: &Path) -> Option<[NewestBytes; 2]> {
+        let Ok(Reply::Newest([one, two])) = ask(session, &Request::Newest) else {
+            return None;
+        };
+        let of = |found: NewestEvents| {
+            Some(NewestBytes {
+                bytes: found.bytes()?,
+                unix_s: found.unix_s,
+            })
+        };
+        Some([of(one)?, of(two)?])
+    }
+
     fn request(&self, session: &Path, request: &str) -> Result<String, LabError> {
         let name = request.replace('_', "-");
         let what = RunRequest::from_str(&name, false).map_err(|_| {
@@ -142,11 +156,26 @@ impl Lab for Program {
         all.map(entry).collect()
     }
 
-    fn facts(&self, session: &Path) -> Result<BTreeMap<String, String>, LabError> {
-        let unreadable = |e| lab_error(Failure::session(e));
-        let reader = SessionReader::open(session).map_err(unreadable)?;
-        let header = reader.header().map_err(unreadable)?;
-        compare::values(session, &reader, &header).map_err(lab_error)
+    fn differences(
+        &self,
+        sides: [(&Path, Option<&str>); 2],
+    ) -> Result<(Vec<SettingDifference>, usize), LabError> {
+        let (found, of) = compare::fact_differences(sides).map_err(lab_error)?;
+        let rows = found.into_iter().map(|d| {
+            let mut values = d.values.into_iter();
+            let mut value = || values.next().unwrap_or_default();
+            SettingDifference {
+                label: d.what,
+                key: d.fact.unwrap_or_default(),
+                values: SettingValues {
+                    a: value(),
+                    b: value(),
+                },
+                severity: d.severity.name(),
+                reason: d.reason,
+            }
+        });
+        Ok((rows.collect(), of))
     }
 
     fn prototypes(&self, folder: &Path) -> Result<Value, LabError> {

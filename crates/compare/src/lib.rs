@@ -15,7 +15,7 @@ mod subject;
 mod table;
 
 pub use causes::{Causes, Contribution, CrossEvaluation, Factor, FactorMeasurement, Reanalysis};
-pub use comparability::{Difference, RULES, Rule, Severity, differences};
+pub use comparability::{Difference, RULES, Rule, Severity, differences, fact_differences};
 pub use flatten::flatten;
 pub use location_results::{Location, LocationComparison};
 pub use metrics::{DisplayFormat, Metric};

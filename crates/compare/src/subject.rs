@@ -26,6 +26,9 @@ pub struct SessionFacts {
     pub rig_name: String,
     /// All other facts by path: `protocol.motion.hold`, `bias.camera1.bias_fo`, `simulation.geometric.halo_mm`, ...
     pub values: BTreeMap<String, String>,
+    /// Documentation of the settings among them, by path.
+    #[serde(skip)]
+    pub docs: BTreeMap<String, String>,
 }
 
 /// A session with its results.

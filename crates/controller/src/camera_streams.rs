@@ -91,6 +91,11 @@ impl CameraStreams {
         }
     }
 
+    /// See [`EventCamera::newest`].
+    pub(crate) fn newest(&mut self, camera: CameraId, most: usize) -> Option<Vec<u8>> {
+        self.devices[camera.index()].newest(most)
+    }
+
     /// Stops a camera and reads its remaining data; returns the result and the camera's notes.
     pub(crate) fn stop(&mut self, camera: CameraId) -> (Result<(), DeviceError>, Vec<String>) {
         let device = &mut self.devices[camera.index()];

@@ -3,7 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use skinrig_model::{
-    AttemptId, HostDuration, HostTime, MissedReason, PoseSample, PressHistory, PressId,
+    AttemptId, CameraId, HostDuration, HostTime, MissedReason, PoseSample, PressHistory, PressId,
     PressOutcome, PressVerdict, Record, RunFault, SinkFault,
 };
 
@@ -80,6 +80,16 @@ impl<'a> Journal<'a> {
             press,
             number: before.unwrap_or(0) + 1,
         }
+    }
+
+    /// See [`RecordSink::wants_newest`].
+    pub(crate) fn wants_newest(&mut self) -> Option<usize> {
+        self.sink.wants_newest()
+    }
+
+    /// See [`RecordSink::newest`].
+    pub(crate) fn newest(&mut self, camera: CameraId, bytes: Vec<u8>) {
+        self.sink.newest(camera, bytes);
     }
 
     /// Free space of the sink in bytes, if known.

@@ -1,6 +1,6 @@
 //! The consumer of records.
 
-use skinrig_model::{Record, SinkFault};
+use skinrig_model::{CameraId, Record, SinkFault};
 
 /// Consumes every record of a run, in order.
 pub trait RecordSink {
@@ -20,6 +20,14 @@ pub trait RecordSink {
     fn check(&mut self) -> Result<(), SinkFault> {
         Ok(())
     }
+
+    /// Most bytes per camera that [`newest`](Self::newest) takes at the next tick, while somebody looks at the newest events; otherwise `None`.
+    fn wants_newest(&mut self) -> Option<usize> {
+        None
+    }
+
+    /// Takes a copy of the newest bytes of a camera that are in no chunk yet.
+    fn newest(&mut self, _camera: CameraId, _bytes: Vec<u8>) {}
 
     /// Free space in bytes; `None` if unknown.
     fn free_bytes(&mut self) -> Option<u64> {

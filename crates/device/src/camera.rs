@@ -86,6 +86,17 @@ pub struct PatternScan {
     pub rows: u16,
 }
 
+/// Bytes per word of every stream format, or a multiple of it.
+const WORD_BYTES: usize = 4;
+
+/// The last whole words of a chunk, at most `most` bytes.
+#[must_use]
+pub fn newest_words(chunk: &[u8], most: usize) -> Vec<u8> {
+    let end = chunk.len() / WORD_BYTES * WORD_BYTES;
+    let begin = end.saturating_sub(most).div_ceil(WORD_BYTES) * WORD_BYTES;
+    chunk[begin..end].to_vec()
+}
+
 /// A source of raw event bytes.
 ///
 /// States: stopped -> [`start`](Self::start) -> streaming -> [`stop`](Self::stop) -> stopped.
@@ -132,6 +143,12 @@ pub trait EventCamera: Send {
     /// # Errors
     /// [`DeviceError::Lost`]; chunks already appended stay valid.
     fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError>;
+
+    /// A copy of the newest bytes that are in no chunk yet, whole words, at most `most` bytes: for a look at what is happening. They are also
+    /// part of the next chunk. `None` if the camera does not offer them, or needs longer: call again. The default does not.
+    fn newest(&mut self, _most: usize) -> Option<Vec<u8>> {
+        None
+    }
 
     /// Appends notes about events that the bytes do not show since the last call: bytes without a time discarded at the start, jumps of the
     /// time base, overflows counted by the camera. The default has none.

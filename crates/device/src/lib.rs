@@ -15,7 +15,7 @@ pub mod trigger;
 
 pub use camera::{
     CameraCapabilities, CameraSettings, EventCamera, NoiseFilter, PatternScan, Roi, SyncMode,
-    TestPattern,
+    TestPattern, newest_words,
 };
 pub use clock::{Clock, RealClock};
 pub use detached::{DetachedBox, DetachedCamera, Timeouts};

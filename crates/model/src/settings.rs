@@ -511,6 +511,12 @@ impl Crop {
 }
 
 impl AnalysisSettings {
+    /// Documentation of the setting in the field at this path, such as `latency.bin_ms`; `None` for another path.
+    #[must_use]
+    pub fn doc_of_field(path: &str) -> Option<&'static str> {
+        Self::TABLE.doc_of_field(path)
+    }
+
     /// Sides of the bins of pixels that divide both sides of the sensor, px.
     pub const BIN_SIDES_PX: [u16; 5] = [1, 2, 4, 8, 16];
 

@@ -53,7 +53,8 @@ pub use retakes::Retakes;
 pub use rig::{RigFile, RigKind};
 pub use schedule::Schedule;
 pub use schema::{
-    limits_schema_json, rig_schema_json, schedule_schema_json, schema_json, suite_schema_json,
+    limits_schema_json, rig_schema_json, schedule_schema_json, schema_json, setting_doc,
+    suite_schema_json,
 };
 pub use skinrig_settings::{Diagnostic, Diagnostics, Location};
 pub use suite::Suite;

@@ -35,6 +35,17 @@ pub fn suite_schema_json() -> String {
     render(crate::suite::Suite::TABLE, "skinrig suite")
 }
 
+/// Documentation of the setting that a field of [`Protocol`](crate::Protocol) or [`RigFile`](crate::RigFile) holds, by its path below
+/// `protocol` or `bench`, such as `protocol.motion.settle.tolerance_mm`; `None` for another field.
+#[must_use]
+pub fn setting_doc(path: &str) -> Option<&'static str> {
+    match path.split_once('.')? {
+        ("protocol", field) => crate::keys::ProtocolKeys::TABLE.doc_of_field(field),
+        ("bench", field) => crate::rig::RigFile::TABLE.doc_of_field(field),
+        _ => None,
+    }
+}
+
 /// The JSON Schema of the files of a table, for documentation, completion and checks in editors.
 fn render(table: &'static Table, title: &str) -> String {
     let mut definitions = BTreeMap::new();

@@ -24,6 +24,27 @@ impl Table {
         let keys = self.keys.iter();
         keys.filter(|k| k.need == Need::AtLeastOne).map(|k| k.name)
     }
+
+    /// Documentation of the key that the field at this path of structs declares: `settle.tolerance_mm` is the key `tolerance` of `settle`.
+    /// Items of lists are numbers in the path.
+    #[must_use]
+    pub fn doc_of_field(&self, path: &str) -> Option<&'static str> {
+        let (field, rest) = match path.split_once('.') {
+            Some((field, rest)) => (field, Some(rest)),
+            None => (path, None),
+        };
+        let exact = self.keys.iter().find(|k| k.name == field);
+        let with_unit = |k: &&Key| {
+            let rest = field.strip_prefix(k.name);
+            let unit = rest.and_then(|rest| rest.strip_prefix('_'));
+            unit.is_some_and(|unit| k.shape.has_unit(unit))
+        };
+        let key = exact.or_else(|| self.keys.iter().find(with_unit))?;
+        match rest {
+            Some(rest) => key.shape.doc_of_field(rest, key.doc),
+            None => Some(key.doc),
+        }
+    }
 }
 
 /// One key of a mapping.
@@ -135,6 +156,36 @@ pub const fn join_keys<const N: usize>(parts: &[&[Key]]) -> [Key; N] {
 }
 
 impl Shape {
+    /// True if `end` is the end of a field's name for quantities in one of the shape's units: `mm_s` for mm/s.
+    fn has_unit(&self, end: &str) -> bool {
+        let unit = match end {
+            "percent" => "%".to_owned(),
+            "deg_c" => "degc".to_owned(),
+            _ => end.replace('_', "/"),
+        };
+        match self {
+            Self::Quantity(dimensions, _) => {
+                let mut units = dimensions.iter().flat_map(|d| d.units());
+                units.any(|(name, _)| name.eq_ignore_ascii_case(&unit))
+            }
+            Self::Tuple(of, _) | Self::List { of, .. } => of.has_unit(end),
+            _ => false,
+        }
+    }
+
+    /// [`Table::doc_of_field`] for a path below a key with this shape and documentation.
+    fn doc_of_field(&self, path: &str, doc: &'static str) -> Option<&'static str> {
+        match self {
+            Self::Map(table) | Self::WordOr(_, table) => table.doc_of_field(path),
+            Self::List { of, .. } => match path.split_once('.') {
+                Some((_, rest)) => of.doc_of_field(rest, doc),
+                None => Some(doc),
+            },
+            Self::Tuple(..) | Self::Named(_) => Some(doc),
+            _ => None,
+        }
+    }
+
     /// A whole number in a range of whole numbers; above 2^53 the end is open.
     #[must_use]
     pub const fn whole(range: ValueRange) -> Self {

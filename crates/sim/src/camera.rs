@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use skinrig_device::{
     CameraCapabilities, CameraSettings, DeviceError, EventCamera, PatternScan, TestPattern,
+    newest_words,
 };
 use skinrig_formats::{Scanner, evt2};
 use skinrig_model::{
@@ -416,6 +417,10 @@ impl EventCamera for SimCamera {
         self.catch_up();
         self.out.close(self.id, &mut self.scanner);
         self.hand_over(chunks)
+    }
+
+    fn newest(&mut self, most: usize) -> Option<Vec<u8>> {
+        Some(newest_words(&self.out.bytes, most))
     }
 
     fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {

@@ -18,13 +18,16 @@ export const json = async (path, query = {}, more) => (await answer(path, query,
 export const bytes = async (path, query, more) => (await answer(path, query, more)).arrayBuffer();
 export const post = (path, value) =>
   json(path, {}, { method: 'POST', headers: { 'Content-Type': 'application/json' }, body: JSON.stringify(value) });
-export const download = async query => {
-  const found = await answer('download', query);
+export const save = (blob, name) => {
   const link = document.createElement('a');
-  link.href = URL.createObjectURL(await found.blob());
-  link.download = /filename="(.*)"/.exec(found.headers.get('Content-Disposition'))?.[1] ?? 'download';
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+};
+export const download = async query => {
+  const found = await answer('download', query);
+  save(await found.blob(), /filename="(.*)"/.exec(found.headers.get('Content-Disposition'))?.[1] ?? 'download');
 };
 // Calls `on[name](value)` for each server-sent event until the server ends the stream.
 export const listen = async (query, on, signal) => {

@@ -11,6 +11,7 @@ const filled = (e, attributes, children) => {
 export const el = (tag, attributes, ...children) => filled(document.createElement(tag), attributes, children);
 export const shape = (tag, attributes, ...children) => filled(document.createElementNS('http://www.w3.org/2000/svg', tag), attributes, children);
 export const number = (v, digits = 2) => v === null || v === undefined ? '–' : v.toFixed(digits);
+export const fileName = path => path.split(/[\\/]/).pop();
 export const problem = error => el('p', { class: 'notice bad', role: 'alert' }, error.message);
 export const table = (caption, heads, rows) => el('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': caption },
   el('table', { class: 'list-rows' }, el('caption', { class: 'hidden' }, caption),

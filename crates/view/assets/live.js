@@ -12,10 +12,23 @@ const ask = (about, name, said) => !about.control ? [] : [
   } }, el('label', {}, 'Your name ', el('input', { type: 'text', name: 'by', required: true, maxlength: 64 })), ' ',
   el('label', {}, 'Note ', el('input', { type: 'text', name: 'text', required: true, maxlength: 2000 })), ' ', el('button', { type: 'submit' }, 'Add note')),
 ];
+// A mark in the browser's own timeline: the pictures taken then are on the screen now.
+const shown = all => {
+  performance.clearMarks('pictures');
+  performance.mark('pictures', { detail: Math.max(...all.map(p => p?.unix_s ?? 0)) });
+};
 export const live = (name, about, view, signal) => {
   const alarms = el('div', { role: 'alert' }), state = el('p', { role: 'status' }), said = el('p', { role: 'status' });
   const certificate = el('p'), notes = el('ul');
   const card = el('section', { class: 'card', 'aria-label': 'Run' }, alarms, state, certificate, el('div', { class: 'transport' }, ask(about, name, said)), said, notes);
+  // Only the newest pictures are drawn, and none on a page that is not in sight.
+  let newest = null;
+  const draw = () => {
+    const all = newest;
+    newest = null;
+    view.pictures(all);
+    if (all.some(p => p?.unix_s)) requestAnimationFrame(() => shown(all));
+  };
   const on = {
     alarms: all => alarms.replaceChildren(...all.map(a => el('p', { class: `notice ${a.level}` }, a.text))),
     run: ({ run, writer, free_bytes: free }) => {
@@ -25,7 +38,7 @@ export const live = (name, about, view, signal) => {
       if (run?.tip_mm) view.tip(run.tip_mm);
     },
     presses: rows => view.presses(rows),
-    newest: n => view.pictures(n.pictures),
+    pictures: all => { if (!newest) requestAnimationFrame(draw); newest = all; },
     analysis: a => { certificate.textContent = `clock certificate: ${a.certificate.status}; ${a.calibrated ? 'error' : 'residual against the nominal geometry'} of ${a.n} scored presses: RMSE ${number(a.rmse_mm[0])} mm`; },
     journal: j => notes.replaceChildren(...j.notes.map(([t, text]) => el('li', {}, `${number(t, 1)} s: ${text}`))),
     over: ({ error }) => { state.textContent = error ?? 'the run has ended; reload for its playback'; },

@@ -31,7 +31,7 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
 /// Files below `/app/`: name, type and content.
-const FILES: [(&str, &str, &str); 12] = [
+const FILES: [(&str, &str, &str); 20] = [
     ("page.css", STYLE, skinrig_report::style::PAGE),
     ("figure.css", STYLE, skinrig_report::style::FIGURE),
     ("view.css", STYLE, include_str!("../assets/view.css")),
@@ -41,6 +41,18 @@ const FILES: [(&str, &str, &str); 12] = [
     ("dom.js", SCRIPT, include_str!("../assets/dom.js")),
     ("shelf.js", SCRIPT, include_str!("../assets/shelf.js")),
     ("session.js", SCRIPT, include_str!("../assets/session.js")),
+    ("player.js", SCRIPT, include_str!("../assets/player.js")),
+    (
+        "transport.js",
+        SCRIPT,
+        include_str!("../assets/transport.js"),
+    ),
+    ("timeline.js", SCRIPT, include_str!("../assets/timeline.js")),
+    ("beside.js", SCRIPT, include_str!("../assets/beside.js")),
+    ("saving.js", SCRIPT, include_str!("../assets/saving.js")),
+    ("frame.js", SCRIPT, include_str!("../assets/frame.js")),
+    ("zip.js", SCRIPT, include_str!("../assets/zip.js")),
+    ("trend.js", SCRIPT, include_str!("../assets/trend.js")),
     ("map.js", SCRIPT, include_str!("../assets/map.js")),
     ("camera.js", SCRIPT, include_str!("../assets/camera.js")),
     ("live.js", SCRIPT, include_str!("../assets/live.js")),

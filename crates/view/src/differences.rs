@@ -1,23 +1,30 @@
-//! Owns the answer with the settings in which two sessions differ.
+//! Owns the answer with the settings in which two analyses differ.
 
-use std::collections::BTreeSet;
-use std::path::Path;
-
+use serde::Deserialize;
 use serde_json::{Value, json};
 
+use crate::folder::Folder;
 use crate::lab::Lab;
 use crate::problem::Problem;
 
-/// Keys whose values differ, with both values (`null`: the session has no such key), and the number of equal ones.
-pub(crate) fn document(lab: &dyn Lab, sessions: [&Path; 2]) -> Result<Value, Problem> {
-    let [one, two] = [lab.facts(sessions[0])?, lab.facts(sessions[1])?];
-    let keys: BTreeSet<&String> = one.keys().chain(two.keys()).collect();
-    let of = keys.len();
-    let rows: Vec<Value> = keys
-        .into_iter()
-        .map(|key| (key, one.get(key), two.get(key)))
-        .filter(|(_, a, b)| a != b)
-        .map(|(key, a, b)| json!({ "key": key, "a": a, "b": b }))
-        .collect();
-    Ok(json!({ "differences": rows, "keys": of }))
+/// Two sessions of the folder, each with the name of a variant; the official analysis without.
+#[derive(Debug, Deserialize)]
+pub(crate) struct Pair {
+    a: String,
+    b: String,
+    #[serde(default)]
+    a_analysis: Option<String>,
+    #[serde(default)]
+    b_analysis: Option<String>,
+}
+
+/// The differences, and the number of settings.
+pub(crate) fn document(lab: &dyn Lab, folder: &Folder, pair: &Pair) -> Result<Value, Problem> {
+    let (a, b) = (folder.session(&pair.a)?, folder.session(&pair.b)?);
+    let sides = [
+        (&*a, pair.a_analysis.as_deref()),
+        (&*b, pair.b_analysis.as_deref()),
+    ];
+    let (differences, keys) = lab.differences(sides)?;
+    Ok(json!({ "differences": differences, "keys": keys }))
 }

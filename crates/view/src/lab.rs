@@ -1,6 +1,5 @@
 //! Owns the interface to everything about a lab that is not in a session file.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::Serialize;
@@ -25,6 +24,15 @@ pub struct RunState {
     pub report: Value,
 }
 
+/// Newest bytes of a camera of a running session.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NewestBytes {
+    /// Whole words of its stream, the newest last; the first ones may depend on words that are missing.
+    pub bytes: Vec<u8>,
+    /// When the run took them from the camera, s since 1970; 0 for none yet.
+    pub unix_s: f64,
+}
+
 /// An analysis whose results are beside a session.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AnalysisEntry {
@@ -40,10 +48,38 @@ pub struct AnalysisEntry {
     pub trouble: Option<String>,
 }
 
+/// A setting in which two analyses differ.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct SettingDifference {
+    /// Its label.
+    pub label: String,
+    /// Its key; the path of the fact.
+    pub key: String,
+    /// Value of each side.
+    #[serde(flatten)]
+    pub values: SettingValues,
+    /// Consequence for a comparison: `blocking`, `confounding` or `harmless`.
+    pub severity: &'static str,
+    /// Why.
+    pub reason: String,
+}
+
+/// Values of a setting on both sides.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct SettingValues {
+    /// Of the first.
+    pub a: String,
+    /// Of the second.
+    pub b: String,
+}
+
 /// Everything that the server asks of its surroundings. Calls may block; none comes from an async task.
 pub trait Lab: Send + Sync + 'static {
     /// State of the run that writes `session`; `None` if none answers.
     fn run(&self, session: &Path) -> Option<RunState>;
+
+    /// Newest bytes of camera 1 and camera 2 of the run that writes `session`, with those that are not in the file yet; `None` if none answers.
+    fn newest(&self, session: &Path) -> Option<[NewestBytes; 2]>;
 
     /// Hands a request (`pause`, `pause_now`, `resume`, `stop`, `abort` or `halt`) to the run that writes `session`, and returns the run's
     /// state after its acknowledgement.
@@ -64,11 +100,15 @@ pub trait Lab: Send + Sync + 'static {
     /// All analyses beside `session`, the official one first.
     fn analyses(&self, session: &Path, session_id: &str) -> Vec<AnalysisEntry>;
 
-    /// Settings of a session by key, as a comparison of skins looks at them.
+    /// Settings in which two sessions differ, most severe first, and the number of settings. Each session comes with the name of a variant;
+    /// `None` is the official analysis. Settings of the analysis are left out unless both are analysed.
     ///
     /// # Errors
-    /// [`LabError`] if the session cannot be read.
-    fn facts(&self, session: &Path) -> Result<BTreeMap<String, String>, LabError>;
+    /// [`LabError`] if a session cannot be read.
+    fn differences(
+        &self,
+        sides: [(&Path, Option<&str>); 2],
+    ) -> Result<(Vec<SettingDifference>, usize), LabError>;
 
     /// Prototypes of a folder with their series, as `skinrig prototypes --json`.
     ///

@@ -28,5 +28,7 @@ mod routes;
 mod server;
 mod shelf;
 
-pub use lab::{AnalysisEntry, Lab, LabError, RunState};
+pub use lab::{
+    AnalysisEntry, Lab, LabError, NewestBytes, RunState, SettingDifference, SettingValues,
+};
 pub use server::{Options, ServeError, Server};

@@ -88,13 +88,6 @@ struct SessionQuery {
     analysis: Option<String>,
 }
 
-/// Two sessions of the folder.
-#[derive(Debug, Deserialize)]
-struct Pair {
-    a: String,
-    b: String,
-}
-
 /// A press, by its number from 1.
 #[derive(Debug, Deserialize)]
 struct PressQuery {
@@ -246,12 +239,9 @@ async fn download_route(
     Ok(answer)
 }
 
-async fn differences_route(State(app): State<App>, pair: QueryInput<Pair>) -> Answer {
+async fn differences_route(State(app): State<App>, pair: QueryInput<differences::Pair>) -> Answer {
     let pair = query(pair)?;
-    let answer = move |s: &Shared| {
-        let (a, b) = (s.folder.session(&pair.a)?, s.folder.session(&pair.b)?);
-        differences::document(&*s.lab, [&a, &b])
-    };
+    let answer = move |s: &Shared| differences::document(&*s.lab, &s.folder, &pair);
     Ok(Json(app.compute(answer).await?).into_response())
 }
 

@@ -73,12 +73,19 @@ impl<'a> Page<'a> {
     /// # Errors
     /// [`BrowserError`].
     pub fn open(&mut self, file: &Path) -> Result<(), BrowserError> {
+        self.visit(&format!("file://{}", file.display()))
+    }
+
+    /// Opens an address and waits until its document is loaded; drops earlier events.
+    ///
+    /// # Errors
+    /// [`BrowserError`].
+    pub fn visit(&mut self, url: &str) -> Result<(), BrowserError> {
         let _ = self.events();
-        let url = format!("file://{}", file.display());
         let answer = self.call("Page.navigate", json!({ "url": url }))?;
         if let Some(reason) = answer["errorText"].as_str() {
             return Err(BrowserError::Refused {
-                method: url,
+                method: url.to_owned(),
                 reason: reason.to_owned(),
             });
         }
@@ -107,6 +114,18 @@ impl<'a> Page<'a> {
                 reason: thrown["exception"]["description"].to_string(),
             }),
         }
+    }
+
+    /// Waits until an expression is true.
+    ///
+    /// # Errors
+    /// [`BrowserError`]; also when it stays false.
+    pub fn wait_for(&mut self, expression: &str) -> Result<(), BrowserError> {
+        let looks = format!(
+            "new Promise(done => {{ const look = () => {{ let is = false; try {{ is = {expression}; }} catch {{ }} \
+             if (is) done(true); else setTimeout(look, 20); }}; look(); }})"
+        );
+        self.evaluate(&looks).map(|_| ())
     }
 
     /// Value of a text expression.
@@ -168,7 +187,11 @@ impl<'a> Page<'a> {
     /// # Errors
     /// [`BrowserError`].
     pub fn key(&mut self, key: &str) -> Result<(), BrowserError> {
-        let text = if key.chars().count() == 1 { key } else { "" };
+        let text = match key {
+            "Enter" => "\r",
+            _ if key.chars().count() == 1 => key,
+            _ => "",
+        };
         let code = match key {
             "Tab" => 9,
             "Enter" => 13,

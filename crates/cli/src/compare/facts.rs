@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::Value;
 use skinrig_compare::{SessionFacts, flatten};
 use skinrig_model::{CameraId, DeviceRole, RunHeader};
-use skinrig_protocol::Protocol;
+use skinrig_protocol::{Protocol, setting_doc};
 use skinrig_recorder::SessionReader;
 
 use crate::exit::Failure;
@@ -84,6 +84,8 @@ pub(super) fn facts(
     };
     flatten(kind, &rig.map_or(Value::Null, |r| r.rig), &mut flat);
     values.extend(flat);
+    let doc = |path: &String| Some((path.clone(), setting_doc(path)?.to_owned()));
+    let docs = values.keys().filter_map(doc).collect();
     Ok(SessionFacts {
         file: path
             .file_name()
@@ -96,6 +98,7 @@ pub(super) fn facts(
         origin: origin.map(|origin| origin.name().to_owned()),
         rig_name: header.rig_name.clone(),
         values,
+        docs,
     })
 }
 

@@ -4,14 +4,17 @@ mod facts;
 mod inputs;
 mod margins;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use skinrig_analysis::{Analysis, AnalysisError};
-use skinrig_compare::{Comparison, Reanalyses, Session, Subject, compare as compare_skins};
+use skinrig_compare::{
+    Comparison, Difference, Reanalyses, Session, Subject, compare as compare_skins,
+};
 use skinrig_model::AnalysisSettings;
+use skinrig_recorder::SessionReader;
 use skinrig_report::compare as report;
 
+use crate::analyses;
 use crate::analysis_request::AnalysisRequest;
 use crate::args::CompareArgs;
 use crate::exit::{Exit, Failure, Outcome};
@@ -55,16 +58,28 @@ pub(crate) fn compare(args: &CompareArgs, json: bool) -> Outcome {
     Err(Failure::input(blocked.unwrap_or_default()))
 }
 
-/// Settings of a session by key, as used in comparisons.
+/// Settings in which two sessions with their stored analyses differ, and the number of settings.
 ///
 /// # Errors
-/// If the session cannot be read.
-pub(crate) fn values(
-    path: &Path,
-    reader: &skinrig_recorder::SessionReader,
-    header: &skinrig_model::RunHeader,
-) -> Result<BTreeMap<String, String>, Failure> {
-    facts::facts(path, reader, header).map(|facts| facts.values)
+/// If a session cannot be read.
+pub(crate) fn fact_differences(
+    sides: [(&Path, Option<&str>); 2],
+) -> Result<(Vec<Difference>, usize), Failure> {
+    let side = |(path, name): (&Path, Option<&str>)| {
+        let reader = SessionReader::open(path).map_err(Failure::session)?;
+        let header = reader.header().map_err(Failure::session)?;
+        let facts = facts::facts(path, &reader, &header)?;
+        if let Some(name) = name {
+            analyses::parse(name).map_err(|e| Failure::input(format!("analysis `{name}`: {e}")))?;
+        }
+        let analysis = analyses::stored(path, &facts.session_id, name);
+        Ok::<_, Failure>((facts, analysis))
+    };
+    let [(a, one), (b, two)] = [side(sides[0])?, side(sides[1])?];
+    Ok(skinrig_compare::fact_differences([
+        (&a, one.as_ref()),
+        (&b, two.as_ref()),
+    ]))
 }
 
 /// Compares skins and returns the results as JSON. If `out` names a page, also writes the page and the results file.

@@ -5,8 +5,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use skinrig_controller::{ControlHandle, Progress, State};
+use skinrig_model::{CameraId, RawChunk};
 
 use super::error::ServerError;
+use super::newest::NewestBytes;
 use super::server::Server;
 use super::wire::{Reply, Request, RunRequest, RunSnapshot};
 
@@ -19,6 +21,7 @@ pub(crate) struct Board {
     progress: Arc<Mutex<Progress>>,
     control: ControlHandle,
     began: Instant,
+    newest: Arc<NewestBytes>,
 }
 
 impl Board {
@@ -29,6 +32,7 @@ impl Board {
             progress: Arc::default(),
             control,
             began: Instant::now(),
+            newest: Arc::new(NewestBytes::new()),
         }
     }
 
@@ -37,6 +41,7 @@ impl Board {
     pub(crate) fn answer(&self, request: Request) -> Reply {
         match request {
             Request::Status => Reply::Live(Box::new(self.live())),
+            Request::Newest => Reply::Newest(self.newest.ask().map(Into::into)),
             // The acknowledgement of a request to a finished run would never come.
             _ if self.control.state() == State::Finished => {
                 Reply::Refused("expected a run under way, found one that has ended".to_owned())
@@ -79,6 +84,7 @@ impl Board {
 pub(crate) struct Remote {
     progress: Arc<Mutex<Progress>>,
     updated: Option<Instant>,
+    newest: Arc<NewestBytes>,
     _server: Server,
 }
 
@@ -89,11 +95,12 @@ impl Remote {
     /// [`ServerError`] when that is not possible; the run continues without it.
     pub(crate) fn open(session: &Path, control: &ControlHandle) -> Result<Self, ServerError> {
         let board = Board::new(control.clone());
-        let progress = Arc::clone(&board.progress);
+        let (progress, newest) = (Arc::clone(&board.progress), Arc::clone(&board.newest));
         let server = Server::open(session, move |request| board.answer(request))?;
         Ok(Self {
             progress,
             updated: None,
+            newest,
             _server: server,
         })
     }
@@ -107,6 +114,23 @@ impl Remote {
             shown.clone_from(progress);
             self.updated = Some(Instant::now());
         }
+    }
+}
+
+impl Remote {
+    /// Most bytes per camera to copy at the next tick; `None` unless another terminal looks at the newest events.
+    pub(crate) fn wants_newest(&self) -> Option<usize> {
+        self.newest.wants()
+    }
+
+    /// Takes a copy of the newest bytes of a camera that are in no chunk yet.
+    pub(crate) fn show_newest(&self, camera: CameraId, bytes: Vec<u8>) {
+        self.newest.copy(camera, bytes);
+    }
+
+    /// Takes the end of a chunk while another terminal looks.
+    pub(crate) fn show_chunk(&self, chunk: &RawChunk) {
+        self.newest.chunk(chunk);
     }
 }
 

@@ -7,6 +7,7 @@
 mod board;
 mod client;
 mod error;
+mod newest;
 #[cfg(unix)]
 mod place;
 #[cfg(unix)]
@@ -16,7 +17,7 @@ mod wire;
 pub(crate) use board::Remote;
 pub(crate) use client::ask;
 pub(crate) use error::RemoteError;
-pub(crate) use wire::{MOST_NAME_CHARS, Reply, Request, RunRequest, RunSnapshot};
+pub(crate) use wire::{MOST_NAME_CHARS, NewestEvents, Reply, Request, RunRequest, RunSnapshot};
 
 /// This system has no Unix sockets.
 #[cfg(not(unix))]

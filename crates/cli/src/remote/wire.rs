@@ -1,14 +1,18 @@
 //! Requests to a run from another terminal, and its replies: one line of JSON each, of bounded length.
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use skinrig_controller::{Progress, State};
 use skinrig_model::CameraId;
 
+use super::newest::CameraTail;
+
 /// Longest request, bytes.
 pub(crate) const MOST_REQUEST_BYTES: usize = 16 * 1024;
 /// Longest reply, bytes.
-pub(crate) const MOST_REPLY_BYTES: usize = 64 * 1024;
+pub(crate) const MOST_REPLY_BYTES: usize = 512 * 1024;
 /// Longest note, characters.
 pub(crate) const MOST_NOTE_CHARS: usize = 2_000;
 /// Longest name of an operator, characters.
@@ -38,6 +42,8 @@ pub(crate) enum RunRequest {
 pub(crate) enum Request {
     /// Ask for the state of the run.
     Status,
+    /// Ask for the newest bytes of both cameras.
+    Newest,
     /// Control the run.
     Control(RunRequest),
     /// Add a note.
@@ -55,10 +61,37 @@ pub(crate) enum Request {
 pub(crate) enum Reply {
     /// The state of the run.
     Live(Box<RunSnapshot>),
+    /// The newest bytes of camera 1 and camera 2.
+    Newest([NewestEvents; 2]),
     /// Accepted; the number of the request or note.
     Handed(u64),
     /// Refused, with the reason.
     Refused(String),
+}
+
+/// Newest bytes of a camera, with the beginning of older words cut off.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct NewestEvents {
+    /// In base64.
+    pub bytes: String,
+    /// When the run took them, s since 1970; 0 for none yet.
+    pub unix_s: f64,
+}
+
+impl From<CameraTail> for NewestEvents {
+    fn from(tail: CameraTail) -> Self {
+        Self {
+            bytes: STANDARD.encode(&tail.bytes),
+            unix_s: tail.unix_s,
+        }
+    }
+}
+
+impl NewestEvents {
+    /// The bytes; `None` for a reply that is no base64.
+    pub(crate) fn bytes(&self) -> Option<Vec<u8>> {
+        STANDARD.decode(&self.bytes).ok()
+    }
 }
 
 /// A run at one instant, as reported by the run itself.
@@ -242,6 +275,7 @@ mod tests {
         };
         for request in [
             Request::Status,
+            Request::Newest,
             Request::Control(RunRequest::PauseNow),
             note("Ann", "the lamp flickers: \"40 %\""),
         ] {

@@ -231,7 +231,7 @@ fn check_unsealed(subjects: &[Subject]) -> Option<Difference> {
         as_blocking(
             difference(
                 "unsealed",
-                "session.sealed",
+                "session is sealed",
                 Severity::Blocking,
                 values,
                 reason,

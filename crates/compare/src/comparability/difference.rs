@@ -31,8 +31,11 @@ impl Severity {
 pub struct Difference {
     /// Key of the rule; `--despite` takes it to override a blocking difference.
     pub key: &'static str,
-    /// Name or path of the fact.
+    /// Label of the fact.
     pub what: String,
+    /// Path of the fact; `None` for what is not a single fact.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fact: Option<String>,
     /// Value per skin.
     pub values: Vec<String>,
     /// Severity of the difference.
@@ -58,6 +61,7 @@ pub(super) fn difference(
     Difference {
         key,
         what: what.to_owned(),
+        fact: None,
         values,
         severity,
         reason: reason.to_owned(),

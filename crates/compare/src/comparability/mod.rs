@@ -7,12 +7,15 @@
 mod camera_checks;
 mod checks;
 mod difference;
+mod label;
 mod rules;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+
+use skinrig_analysis::Analysis;
 
 use crate::locations::Locations;
-use crate::subject::{Session, Subject, join_values};
+use crate::subject::{SessionFacts, Subject, join_values};
 pub use difference::{Difference, Severity};
 pub use rules::{RULES, Rule};
 
@@ -21,30 +24,17 @@ pub use rules::{RULES, Rule};
 pub fn differences(subjects: &[Subject], overrides: &[String]) -> Vec<Difference> {
     let locations = Locations::of(subjects);
     let mut found = checks::all(subjects, &locations);
-    let mut names: BTreeSet<String> = BTreeSet::new();
-    for session in subjects.iter().flat_map(|s| &s.sessions) {
-        names.extend(session.facts.values.keys().cloned());
-        names.extend(settings_of(session).into_iter().map(|(name, _)| name));
-    }
-    for name in names {
-        let of = |session: &Session| fact(session, &name);
-        let values: Vec<BTreeSet<String>> = subjects.iter().map(|s| s.fact(of)).collect();
-        let Some(rule) = rules::rule_of(&name) else {
-            continue;
-        };
-        if values.iter().all(|v| v.len() == 1 && *v == values[0]) {
-            continue;
-        }
-        found.push(Difference {
-            key: rule.key,
-            what: name.clone(),
-            values: values.iter().map(join_values).collect(),
-            severity: rule.severity,
-            reason: rule.reason.to_owned(),
-            next: rule.next.map(str::to_owned),
-            overridden: false,
-        });
-    }
+    let sides: Vec<Vec<_>> = subjects
+        .iter()
+        .map(|subject| {
+            let sessions = subject.sessions.iter();
+            sessions
+                .map(|s| facts_of(&s.facts, Some(&s.analysis)))
+                .collect()
+        })
+        .collect();
+    let sessions = subjects.iter().flat_map(|s| &s.sessions);
+    found.extend(of_facts(&sides, &docs(sessions.map(|s| &s.facts))));
     for difference in &mut found {
         difference.overridden = difference.severity == Severity::Blocking
             && overrides.iter().any(|k| k == difference.key);
@@ -53,19 +43,65 @@ pub fn differences(subjects: &[Subject], overrides: &[String]) -> Vec<Difference
     found
 }
 
-fn fact(session: &Session, name: &str) -> Option<String> {
-    let of_settings = || settings_of(session).into_iter().find(|(n, _)| n == name);
-    session
-        .facts
-        .values
-        .get(name)
-        .cloned()
-        .or_else(|| of_settings().map(|(_, value)| value))
+/// Settings and other facts in which two sessions differ, most severe first, and the number of facts. Those of the analysis are left out
+/// unless both have one.
+#[must_use]
+pub fn fact_differences(
+    sessions: [(&SessionFacts, Option<&Analysis>); 2],
+) -> (Vec<Difference>, usize) {
+    let both = sessions.iter().all(|(_, analysis)| analysis.is_some());
+    let sides = sessions.map(|(facts, analysis)| vec![facts_of(facts, analysis.filter(|_| both))]);
+    let mut found = of_facts(&sides, &docs(sessions.into_iter().map(|(facts, _)| facts)));
+    found.sort_by(|a, b| (a.severity, a.key, &a.what).cmp(&(b.severity, b.key, &b.what)));
+    let names: BTreeSet<&String> = sides.iter().flatten().flat_map(BTreeMap::keys).collect();
+    (found, names.len())
 }
 
-/// Analysis settings, calibration and locator of a session, as facts.
-fn settings_of(session: &Session) -> Vec<(String, String)> {
-    let analysis = &session.analysis;
+type Facts = BTreeMap<String, String>;
+
+/// Differences between sides with one or more sessions each.
+fn of_facts(sides: &[Vec<Facts>], docs: &BTreeMap<&String, &String>) -> Vec<Difference> {
+    let names: BTreeSet<&String> = sides.iter().flatten().flat_map(BTreeMap::keys).collect();
+    let mut found = Vec::new();
+    for name in names {
+        let of = |facts: &Facts| facts.get(name).map_or("none", String::as_str).to_owned();
+        let values: Vec<BTreeSet<String>> =
+            sides.iter().map(|s| s.iter().map(of).collect()).collect();
+        let Some(rule) = rules::rule_of(name) else {
+            continue;
+        };
+        if values.iter().all(|v| v.len() == 1 && *v == values[0]) {
+            continue;
+        }
+        found.push(Difference {
+            key: rule.key,
+            what: label::label(name, docs.get(name).map(|doc| doc.as_str())),
+            fact: Some(name.clone()),
+            values: values.iter().map(join_values).collect(),
+            severity: rule.severity,
+            reason: rule.reason.to_owned(),
+            next: rule.next.map(str::to_owned),
+            overridden: false,
+        });
+    }
+    found
+}
+
+fn docs<'a>(all: impl Iterator<Item = &'a SessionFacts>) -> BTreeMap<&'a String, &'a String> {
+    all.flat_map(|facts| &facts.docs).collect()
+}
+
+/// Facts of a session with those of its analysis.
+fn facts_of(facts: &SessionFacts, analysis: Option<&Analysis>) -> Facts {
+    let mut all = facts.values.clone();
+    for (name, value) in analysis.into_iter().flat_map(settings_of) {
+        all.entry(name).or_insert(value);
+    }
+    all
+}
+
+/// Settings, calibration and locator of an analysis, as facts.
+fn settings_of(analysis: &Analysis) -> Vec<(String, String)> {
     let mut facts = Vec::new();
     if let Ok(settings) = serde_json::to_value(&analysis.settings) {
         crate::flatten::flatten("analysis", &settings, &mut facts);

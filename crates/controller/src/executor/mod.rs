@@ -146,9 +146,22 @@ impl<'a> Executor<'a> {
             return poses;
         }
         poses.and(cameras).and(line)?;
+        self.show_newest();
         self.journal.check(self.clock.now())?;
         self.queue_marks();
         self.send_marks()
+    }
+
+    /// Hands the newest bytes of both cameras to a sink that looks at them.
+    fn show_newest(&mut self) {
+        let Some(most) = self.journal.wants_newest() else {
+            return;
+        };
+        for camera in CameraId::ALL {
+            if let Some(bytes) = self.cameras.newest(camera, most) {
+                self.journal.newest(camera, bytes);
+            }
+        }
     }
 
     /// Emits the reports of the trigger box, including those before a failure.

@@ -23,6 +23,7 @@ pub struct DetachedCamera {
     poll: Option<Call<Answer<()>>>,
     flush: Option<Call<Answer<()>>>,
     temperature: Option<Call<Answer<Option<f64>>>>,
+    newest: Option<Call<Option<Vec<u8>>>>,
     notes: Vec<String>,
 }
 
@@ -49,6 +50,7 @@ impl DetachedCamera {
             poll: None,
             flush: None,
             temperature: None,
+            newest: None,
             notes: Vec::new(),
         })
     }
@@ -141,6 +143,17 @@ impl EventCamera for DetachedCamera {
         // Earlier calls have finished: their chunks are included.
         (self.poll, self.flush) = (None, None);
         answer
+    }
+
+    /// Result of the previous call, once. A device that does not answer fails at the next poll.
+    fn newest(&mut self, most: usize) -> Option<Vec<u8>> {
+        let answer = self.worker.answer(&mut self.newest).ok()?;
+        if self.newest.is_none() && answer.is_none() {
+            let within = self.worker.timeouts.running;
+            let call = move |d: &mut Device| d.newest(most);
+            self.newest = self.worker.request("newest", within, call).ok();
+        }
+        answer?
     }
 
     /// Notes up to the last stop.

@@ -555,6 +555,10 @@ impl EventCamera for Evk1 {
         self.try_take(true, chunks).map_err(|e| self.fault(e))
     }
 
+    fn newest(&mut self, most: usize) -> Option<Vec<u8>> {
+        Some(self.stream.as_ref()?.inbox.newest(most))
+    }
+
     fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
         self.try_stop(chunks).map_err(|e| self.fault(e))
     }

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use skinrig_device::newest_words;
 use skinrig_model::HostTime;
 
 use crate::error::UsbError;
@@ -138,6 +139,12 @@ impl Inbox {
         let mut state = self.state();
         state.close();
         state.take()
+    }
+
+    /// A copy of the newest whole words of the block being filled, at most `most` bytes.
+    #[must_use]
+    pub fn newest(&self, most: usize) -> Vec<u8> {
+        newest_words(&self.state().open, most)
     }
 
     /// Takes everything at the end of a stream; an incomplete word counts as lost.

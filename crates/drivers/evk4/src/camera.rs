@@ -2,7 +2,9 @@
 
 use std::mem;
 
-use skinrig_device::{CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera};
+use skinrig_device::{
+    CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera, newest_words,
+};
 use skinrig_formats::Scanner;
 use skinrig_model::{
     CameraId, DeviceIdentity, DeviceRole, HostDuration, HostTime, RawChunk, Setting, StreamFormat,
@@ -223,6 +225,10 @@ impl EventCamera for Evt3Camera {
         let caught_up = self.catch_up(chunks);
         self.close(chunks);
         caught_up
+    }
+
+    fn newest(&mut self, most: usize) -> Option<Vec<u8>> {
+        Some(newest_words(&self.filling.bytes, most))
     }
 
     fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {

@@ -40,6 +40,7 @@ fn subject(letter: char, scale: f64, values: &[(&str, &str)]) -> Subject {
         origin: Some("simulated".to_owned()),
         rig_name: "simulated (geometric)".to_owned(),
         values: values.collect::<BTreeMap<_, _>>(),
+        docs: BTreeMap::new(),
     };
     Subject {
         letter,

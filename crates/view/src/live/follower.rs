@@ -10,6 +10,7 @@ use skinrig_recorder::{RecorderError, writer_of};
 
 use super::alarms;
 use super::estimates::Estimates;
+use super::newest::{self, LiveState};
 use super::parts::{Sender, publish};
 use super::snapshot::SessionSnapshot;
 use crate::lab::{Lab, RunState};
@@ -43,6 +44,33 @@ pub(super) fn follow(
     path: &Path,
     to: &Sender,
 ) {
+    let live = LiveState::default();
+    std::thread::scope(|scope| {
+        let pictures = std::thread::Builder::new().name("pictures".to_owned());
+        // Without this thread, pictures come from the file.
+        let _ = pictures.spawn_scoped(scope, || newest::watch(lab, path, to, &live));
+        let _over = OverOnDrop(&live);
+        follow_file(leave, lab, path, to, &live);
+    });
+}
+
+/// Ends the pictures with the follower, however it ends.
+struct OverOnDrop<'a>(&'a LiveState);
+
+impl Drop for OverOnDrop<'_> {
+    fn drop(&mut self) {
+        self.0.over.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Follows the file, and the run's own report.
+fn follow_file(
+    leave: impl Fn(&Path, bool) -> bool,
+    lab: &Arc<dyn Lab>,
+    path: &Path,
+    to: &Sender,
+    live: &LiveState,
+) {
     let stop = Arc::new(AtomicBool::new(false));
     let mut snapshot = SessionSnapshot::new(path);
     let mut estimates = Estimates::new(path, &stop);
@@ -57,7 +85,8 @@ pub(super) fn follow(
         let refreshed = if may_be_sealing {
             Ok(())
         } else {
-            snapshot.refresh(estimates.newest().as_deref(), to)
+            let has_pictures = live.answers.load(Ordering::Relaxed);
+            snapshot.refresh(estimates.newest().as_deref(), has_pictures, to)
         };
         if writer.is_some() && !may_be_sealing {
             estimates.renew(snapshot.outcomes());

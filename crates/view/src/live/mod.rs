@@ -6,6 +6,7 @@
 mod alarms;
 mod estimates;
 mod follower;
+mod newest;
 mod parts;
 mod picture;
 mod snapshot;

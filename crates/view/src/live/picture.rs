@@ -23,8 +23,51 @@ pub(super) struct Picture {
     height: usize,
     accumulation_s: f64,
     events: u64,
-    /// ON counts row by row, then OFF counts, one byte each (255: or more), as base64.
-    counts: String,
+    /// When the run took the events from the camera, s since 1970; `None` for events from the file.
+    unix_s: Option<f64>,
+    /// Bins with events, as base64: index row by row (u16, little endian), ON count and OFF count (one byte each, 255: or more).
+    bins: String,
+}
+
+impl Picture {
+    fn new(counts: &[u8], events: u64, unix_s: Option<f64>) -> Self {
+        let (on, off) = counts.split_at(WIDTH * HEIGHT);
+        let mut bins = Vec::new();
+        for (index, (on, off)) in (0u16..).zip(on.iter().zip(off)) {
+            if (*on, *off) != (0, 0) {
+                bins.extend(index.to_le_bytes());
+                bins.extend([*on, *off]);
+            }
+        }
+        Self {
+            width: WIDTH,
+            height: HEIGHT,
+            accumulation_s: ACCUMULATION_US as f64 * 1e-6,
+            events,
+            unix_s,
+            bins: STANDARD.encode(&bins),
+        }
+    }
+}
+
+/// The picture from bytes that a run has just received; `None` without an event.
+pub(super) fn from_bytes(format: StreamFormat, bytes: &[u8], unix_s: f64) -> Option<Picture> {
+    let mut newest_us = None;
+    Decoder::new(format).for_each_slice(bytes, |slice| {
+        newest_us = slice.last().map(|e| e.t_us).or(newest_us);
+    });
+    let to_us = newest_us?;
+    let from_us = to_us.saturating_sub(ACCUMULATION_US);
+    let mut counts = vec![0u8; 2 * WIDTH * HEIGHT];
+    let mut events = 0;
+    Decoder::new(format).for_each_slice(bytes, |slice| {
+        // The first words may have another time: what it depends on is cut off.
+        let new = slice.iter().filter(|e| (from_us..=to_us).contains(&e.t_us));
+        for event in new {
+            events += u64::from(count(&mut counts, event));
+        }
+    });
+    Some(Picture::new(&counts, events, Some(unix_s)))
 }
 
 /// The picture from the last chunks, which are in stream order; `None` without an event.
@@ -68,13 +111,7 @@ pub(super) fn picture(
             }
         });
     }
-    Ok(Some(Picture {
-        width: WIDTH,
-        height: HEIGHT,
-        accumulation_s: ACCUMULATION_US as f64 * 1e-6,
-        events,
-        counts: STANDARD.encode(&counts),
-    }))
+    Ok(Some(Picture::new(&counts, events, None)))
 }
 
 /// Counts an event; false if it is off the sensor.
@@ -89,4 +126,34 @@ fn count(counts: &mut [u8], event: &CdEvent) -> bool {
     };
     counts[plane + at] = counts[plane + at].saturating_add(1);
     true
+}
+
+#[cfg(test)]
+mod tests {
+    use skinrig_formats::evt2;
+
+    use super::*;
+
+    #[test]
+    fn a_picture_shows_the_newest_events_alone() {
+        let mut encoder = evt2::Encoder::new(0);
+        let mut bytes = Vec::new();
+        for (t_us, x) in [(1_000, 0), (900_000, 4), (1_000_000, 8), (1_000_000, 8)] {
+            let event = CdEvent {
+                t_us,
+                x,
+                y: 4,
+                polarity: Polarity::On,
+            };
+            encoder.cd(event, &mut bytes).unwrap();
+        }
+        let picture = from_bytes(StreamFormat::Evt2, &bytes, 7.0).unwrap();
+        assert_eq!((picture.events, picture.unix_s), (3, Some(7.0)));
+        let bins = STANDARD.decode(&picture.bins).unwrap();
+        let row = WIDTH as u16;
+        let index = |x: u16| (row + x).to_le_bytes();
+        let [a, b] = [index(1), index(2)];
+        assert_eq!(bins, [a[0], a[1], 1, 0, b[0], b[1], 2, 0]);
+        assert!(from_bytes(StreamFormat::Evt2, &[], 7.0).is_none());
+    }
 }

@@ -84,15 +84,17 @@ impl SessionSnapshot {
     }
 
     /// Publishes what is new in the file; does not open one that has not changed.
+    /// Without `has_pictures`, nobody else publishes pictures.
     pub(super) fn refresh(
         &mut self,
         analysis: Option<&Analysis>,
+        has_pictures: bool,
         to: &Sender,
     ) -> Result<(), RecorderError> {
         let stamp = stamp(&self.path);
         if self.stamp != Some(stamp) {
             let reader = SessionReader::open(&self.path)?;
-            self.read(&reader, to)?;
+            self.read(&reader, has_pictures, to)?;
             // A file that grew since has another stamp next time.
             self.stamp = Some(stamp);
         }
@@ -114,7 +116,12 @@ impl SessionSnapshot {
         Ok(())
     }
 
-    fn read(&mut self, reader: &SessionReader, to: &Sender) -> Result<(), RecorderError> {
+    fn read(
+        &mut self,
+        reader: &SessionReader,
+        has_pictures: bool,
+        to: &Sender,
+    ) -> Result<(), RecorderError> {
         let head = match &self.head {
             Some(head) => head,
             None => {
@@ -162,7 +169,12 @@ impl SessionSnapshot {
                 }
                 newest = newest.max(chunk.host_time);
             }
-            pictures.push(picture::picture(reader, head.formats[k], &chunks)?);
+            if !has_pictures {
+                pictures.push(picture::picture(reader, head.formats[k], &chunks)?);
+            }
+        }
+        if !has_pictures {
+            publish(to, "pictures", &pictures);
         }
         let poses = reader.poses(HostTime(newest.0 - POSES_NS), HostTime(i64::MAX))?;
         let tip = poses.last().map(|p| {
@@ -172,7 +184,7 @@ impl SessionSnapshot {
         publish(
             to,
             "newest",
-            &json!({ "t_s": newest.as_secs_f64(), "pictures": pictures, "tip": tip, "lost_bytes": self.lost_bytes }),
+            &json!({ "t_s": newest.as_secs_f64(), "tip": tip, "lost_bytes": self.lost_bytes }),
         );
         Ok(())
     }

@@ -11,7 +11,7 @@ use crate::reading::{LIGHTNESS, complaints, identifiers};
 use crate::{check_phone, picture_folder, save_picture, skinrig, with_page};
 
 /// Page that compares two simulated skins.
-fn comparison() -> &'static PathBuf {
+pub(crate) fn comparison() -> &'static PathBuf {
     static PAGE: OnceLock<PathBuf> = OnceLock::new();
     PAGE.get_or_init(|| {
         let folder = picture_folder().join("comparison");
@@ -48,7 +48,7 @@ fn with_comparison(test: impl FnOnce(&mut Page<'_>)) {
 #[test]
 fn it_loads_without_console_output_and_states_comparability() {
     with_comparison(|page| {
-        let found = complaints(page, ".html");
+        let found = complaints(page, ".html", "file:");
         assert!(found.is_empty(), "{found:#?}");
         for card in ["heading", "verdict-B", "comparability"] {
             let bottom = format!(

@@ -9,7 +9,9 @@
 mod acting;
 mod comparison;
 mod downloads;
+mod latency;
 mod reading;
+mod view;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
