@@ -164,7 +164,7 @@ fn what_may_not_be_compared_is_refused_and_can_be_lifted_by_name() {
     let other_level = record(&lab, "c", "3", &["--level", "kinematic"]);
     skinrig(&["compare", &a, &other_level])
         .code(2)
-        .expect_stderr(&["rig.level", "sim-level", "scored presses that count"]);
+        .expect_stderr(&["simulation level", "sim-level", "scored presses that count"]);
 }
 
 #[test]

@@ -11,7 +11,15 @@ use crate::replay::assert_replays;
 use crate::support::{Lab, ROOT, SMALL, files, only, program, run_to_end, show, skinrig, text};
 
 /// A run in real time that goes on for seven minutes, so that it never ends by itself while a test is looking at it.
-pub(crate) const LIVE: [&str; 5] = ["run", SMALL, "--real-time", "--set", "repetitions.count=60"];
+const LIVE: [&str; 7] = [
+    "run",
+    SMALL,
+    "--real-time",
+    "--set",
+    "repetitions.count=60",
+    "--set",
+    "evaluation.score=[1-60]",
+];
 /// Its presses: two sync presses and four locations.
 pub(crate) const LIVE_PRESSES: u64 = 2 + 60 * 4;
 

@@ -2,8 +2,9 @@
 #![cfg(unix)]
 
 use std::process::Stdio;
+use std::time::{Duration, Instant};
 
-use crate::interrupt::{LIVE, LIVE_PRESSES, LiveRun};
+use crate::interrupt::{LIVE_PRESSES, LiveRun};
 use crate::support::{Lab, SMALL, only, program, read_json, skinrig, text};
 
 const WATCHERS: usize = 8;
@@ -11,10 +12,14 @@ const WATCHERS: usize = 8;
 #[test]
 fn a_run_in_real_time_is_shown_with_its_path_its_rates_and_its_signals() {
     let lab = Lab::new();
-    let mut run = LiveRun::new(&lab.path("s"));
-    // The first press has nothing to be compared with.
-    run.wait_for(&format!("press 3/{LIVE_PRESSES}"));
+    let run = LiveRun::new(&lab.path("s"));
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
+    // The first press has nothing to be compared with.
+    let patience = Instant::now() + Duration::from_secs(60);
+    let done = || skinrig(&["status", "--json", &session]).code(0).json()["live"]["done"].as_u64();
+    while done() < Some(3) {
+        assert!(Instant::now() < patience, "three presses were not made");
+    }
     let frame = skinrig(&["watch", &lab.text("s"), "--once", "--json"]);
     let frame = frame.code(0).json();
     assert_eq!(frame["live"]["state"], "running", "{frame}");
@@ -59,8 +64,15 @@ fn failing_presses_are_shown_with_their_cause_while_the_run_goes_on() {
     let lab = Lab::new();
     let folder = lab.text("s");
     let fault = "camera1-stalled@hold:3";
-    let arguments = [&LIVE[..], &["--sessions", &folder, "--fault", fault]].concat();
-    let mut run = LiveRun::of(program(&arguments));
+    let mut run = LiveRun::of(program(&[
+        "run",
+        SMALL,
+        "--real-time",
+        "--sessions",
+        &folder,
+        "--fault",
+        fault,
+    ]));
     run.wait_for("1 invalid");
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
     let frame = skinrig(&["watch", &session, "--once", "--json"])
