@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use super::slot::Slot;
 
 /// Attempts of a test.
-const ATTEMPTS: u32 = 4;
+const ATTEMPTS: u32 = 6;
 /// The drivers allow their devices a tenth of a second (`docs/reference/runs.md`); several threads take part in each step.
 const LATE: Duration = Duration::from_millis(25);
 /// Rest of the gauge between readings, and work of a reading.
