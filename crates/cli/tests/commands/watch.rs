@@ -25,9 +25,9 @@ fn a_run_in_real_time_is_shown_with_its_path_its_rates_and_its_signals() {
     assert_eq!(frame["live"]["state"], "running", "{frame}");
     assert_eq!(frame["sealed"], false);
     assert_eq!(frame["presses"]["planned"], LIVE_PRESSES - 2);
-    // Four locations, sixty times each; the two sync presses do not count.
+    // Four locations, ten times each; the two sync presses do not count.
     assert_eq!(frame["places"].as_array().unwrap().len(), 4, "{frame}");
-    assert_eq!(frame["places"][0]["planned"], 60);
+    assert_eq!(frame["places"][0]["planned"], 10);
     let latest = frame["latest"].as_array().unwrap().last().unwrap();
     assert_eq!(latest["verdict"], "valid", "{frame}");
     for camera in 0..2 {
