@@ -1,5 +1,6 @@
 //! Two touches at once on optically simulated skins: how often they are separated, located, paired wrongly or left
 //! ambiguous.
+#![expect(clippy::print_stdout, reason = "shows the rates that docs state")]
 
 use skinrig_analysis::locator::{Features, FittedLocator};
 use skinrig_analysis::multi_touch::{
