@@ -19,11 +19,11 @@ mod several;
 mod several_tests;
 #[cfg(test)]
 mod tests;
+mod untouched;
 
 pub use config::{InvalidOpticalSetting, OpticalConfig};
 pub use several::SeveralTips;
 
-use crate::random::{Purpose, Stream};
 use crate::scene::{GRID_NS, PixelEvent, PixelModel, SceneConfig, TipSample};
 
 use contact::Contact;
@@ -31,6 +31,7 @@ use dent::Dent;
 use light::{Column, Illumination};
 use noise::Noise;
 use pixels::{Pixels, Ramp};
+use untouched::Untouched;
 
 /// Pixels of one camera over the optically modelled skin.
 #[derive(Debug, Clone)]
@@ -81,16 +82,14 @@ impl OpticalModel {
 
     /// The model with constants already checked.
     pub(crate) fn build(scene: &SceneConfig, config: OpticalConfig) -> Self {
-        let light = Illumination::new(&scene.outline, &config);
-        let columns = light::columns(&scene.camera, &scene.outline, &light, &config);
-        let noise = Noise::new(scene, &config, &columns);
-        let contact = Contact::none(scene);
-        let dent = Dent::new(scene, &config, &light, &columns, contact.place, None);
-        let mut pixels = Pixels::new(
-            scene,
-            &config,
-            &mut Stream::new(scene.seed, Purpose::Pixels, 1),
-        );
+        let Untouched {
+            light,
+            columns,
+            noise,
+            mut pixels,
+            contact,
+            dent,
+        } = Untouched::new(scene, &config);
         pixels.start_dent(&dent);
         Self {
             scene: scene.clone(),

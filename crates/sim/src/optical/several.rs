@@ -11,10 +11,10 @@ use skinrig_model::{Point3, SENSOR_WIDTH, Skin};
 use super::config::OpticalConfig;
 use super::contact::Contact;
 use super::dent::Dent;
-use super::light::{self, Column, Illumination};
+use super::light::{Column, Illumination};
 use super::noise::Noise;
 use super::pixels::{Change, Pixels, Ramp};
-use crate::random::{Purpose, Stream};
+use super::untouched::Untouched;
 use crate::scene::{FurtherTip, GRID_NS, PixelEvent, PixelModel, SceneConfig, TipSample};
 
 const WIDTH: usize = SENSOR_WIDTH as usize;
@@ -101,24 +101,23 @@ impl SeveralTips {
     /// The model for a first tip and `further` ones that move with it.
     #[must_use]
     pub fn new(scene: &SceneConfig, config: OpticalConfig, further: &[FurtherTip]) -> Self {
-        let light = Illumination::new(&scene.outline, &config);
-        let columns = light::columns(&scene.camera, &scene.outline, &light, &config);
-        let noise = Noise::new(scene, &config, &columns);
-        let contact = Contact::none(scene);
+        let Untouched {
+            light,
+            columns,
+            noise,
+            mut pixels,
+            contact,
+            dent,
+        } = Untouched::new(scene, &config);
         let touch = Touch {
             contact,
-            dent: Dent::new(scene, &config, &light, &columns, contact.place, None),
+            dent,
             ramp: Ramp {
                 t_ns: 0,
                 from_mm: 0.0,
                 to_mm: 0.0,
             },
         };
-        let mut pixels = Pixels::new(
-            scene,
-            &config,
-            &mut Stream::new(scene.seed, Purpose::Pixels, 1),
-        );
         pixels.start_by_light();
         let tips = 1 + further.len();
         Self {
