@@ -405,7 +405,7 @@ fn pairs_of_a_small_session_are_separated_and_none_is_guessed() {
 }
 
 #[test]
-#[ignore = "an hour: cargo test --release -p skinrig-tests --test multi_touch -- --ignored --nocapture (figures of ADR 47)"]
+#[ignore = "an hour: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig-tests --test multi_touch -- --ignored --nocapture (figures of ADR 47)"]
 fn two_thousand_pairs() {
     let number = |name: &str, default: usize| {
         std::env::var(name).map_or(default, |v| v.parse().expect("a number"))

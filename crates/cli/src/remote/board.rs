@@ -115,9 +115,7 @@ impl Remote {
             self.updated = Some(Instant::now());
         }
     }
-}
 
-impl Remote {
     /// Most bytes per camera to copy at the next tick; `None` unless another terminal looks at the newest events.
     pub(crate) fn wants_newest(&self) -> Option<usize> {
         self.newest.wants()

@@ -63,7 +63,7 @@ fn open_tabs(page: &mut Page<'_>, link: &str, count: usize) {
 }
 
 #[test]
-#[ignore = "a run in real time"]
+#[ignore = "a run in real time: SKINRIG_CI_LONG=1 .ci/run, or cargo test --workspace --locked --test report -- --ignored --nocapture"]
 fn events_reach_the_page_soon_and_none_is_lost() {
     let (Some(mut first), Some(mut second)) = (browser(), browser()) else {
         return;
