@@ -39,7 +39,7 @@ impl Factor {
         diagonal.map(libm::log).sum()
     }
 
-    /// `vᵀ C⁻¹ v` for the covariance C and a vector v in whole groups: what stands beyond the last row does not count.
+    /// `vᵀ C⁻¹ v` for the covariance C and a vector v in whole groups. Values beyond the last row are ignored.
     pub(crate) fn explained(&self, mut vector: Vec<Group>) -> f64 {
         if let (Some(last), filled @ 1..) = (vector.last_mut(), self.lower.n() % LANES) {
             last[filled..].fill(0.0);

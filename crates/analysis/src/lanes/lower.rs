@@ -97,7 +97,7 @@ impl Lower {
     }
 
     /// Sums over all elements: `of` the groups of the inputs, of those of `by_row`, and of the element of `by_row` that belongs to the
-    /// column. It must be zero where one of the inputs is.
+    /// column. `of` must be zero wherever one of the inputs is zero.
     #[inline(always)]
     pub(crate) fn sums<const N: usize, const M: usize>(
         inputs: [&Self; N],

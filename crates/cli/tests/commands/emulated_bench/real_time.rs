@@ -12,7 +12,7 @@ use super::slot::Slot;
 const ATTEMPTS: u32 = 6;
 /// The drivers allow their devices a tenth of a second (`docs/reference/runs.md`); several threads take part in each step.
 const LATE: Duration = Duration::from_millis(25);
-/// Rest of the gauge between readings, and work of a reading.
+/// Pause of the gauge between two readings, and its work in each.
 const REST: Duration = Duration::from_millis(10);
 const WORK: Duration = Duration::from_micros(500);
 
