@@ -6,7 +6,7 @@ _list:
 demo:
     cargo run --release --locked -- run protocols/demo.yaml
 
-# Tests of one crate: `just test analysis`, `just test analysis --test audit`.
+# Tests of one crate: `just test analysis`, `just test analysis-tests audit`.
 test crate *args:
     cargo test -p skinrig{{ if crate == "cli" { "" } else { "-" + crate } }} {{ args }}
 
@@ -34,7 +34,7 @@ night out="/tmp/skinrig-nights":
 generate:
     cargo run -q -p skinrig-protocol --example write_schema
     INSTA_UPDATE=always cargo test -p skinrig --test commands json
-    SKINRIG_WRITE_DOCS=1 cargo test -p skinrig-tests --test faults
+    SKINRIG_WRITE_DOCS=1 cargo test -p skinrig-tests faults
 
 # The documentation as a site, with search (needs mdbook).
 site:

@@ -6,7 +6,7 @@
     reason = "an example may panic if it cannot write"
 )]
 
-#[path = "../nightly/tests/trend/nights.rs"]
+#[path = "../nightly/tests/nightly/trend/nights.rs"]
 #[expect(dead_code, reason = "written for tests, which use more of it")]
 mod nights;
 

@@ -1,5 +1,7 @@
 //! Sessions created in memory, press by press: inputs of the analysis and events.
 
+pub mod grid;
+
 use skinrig_analysis::result::PressView;
 use skinrig_analysis::{EventSource, EventSourceError, SessionInput};
 use skinrig_model::{

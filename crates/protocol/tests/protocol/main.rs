@@ -1,0 +1,16 @@
+//! Tests of the protocol crate through its public API, in one binary.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod common;
+mod errors;
+mod laws;
+mod limits;
+mod missing;
+mod notify;
+mod remaining;
+mod rig;
+mod schedules;
+mod shipped;
+mod suite;
+mod surface_check;
+mod validate;

@@ -1,0 +1,7 @@
+//! Tests of the pages and texts that people read.
+
+mod night;
+mod page;
+mod support;
+mod texts;
+mod trend;

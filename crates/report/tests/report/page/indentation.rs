@@ -1,0 +1,93 @@
+//! The section on depth and force, and its line in the terminal.
+
+use skinrig_analysis::result::{
+    Analysis, Indentation, NoQuantity, PressIndentation, Quantity, QuantityAtDepth, QuantityErrors,
+    Ranged, ZeroReturn,
+};
+use skinrig_model::PressRole;
+use skinrig_report::{html, terminal_summary};
+
+use super::input;
+use crate::support;
+
+fn with_depths(drifts: bool) -> Analysis {
+    let mut analysis = support::analysis(4, 3);
+    let estimate = |value: f64| support::studies::estimate(value, 0.01, 32);
+    let errors = QuantityErrors {
+        rmse: estimate(0.123),
+        bias: estimate(0.02),
+        relative_percent: estimate(7.1),
+        covered: estimate(0.95),
+    };
+    let rows = analysis
+        .presses
+        .iter()
+        .filter(|p| p.role != PressRole::Sync);
+    let presses = rows.map(|p| {
+        let ranged = Ranged {
+            value: 2.1,
+            interval: Some([1.9, 2.4]),
+        };
+        PressIndentation {
+            press: p.press,
+            depth_mm: Some(ranged),
+            force_n: None,
+            left_out_mm: (p.role == PressRole::Calibrate).then_some(ranged),
+            measured_mm: Some(2.0),
+            measured_n: None,
+            rest_mm: Some(0.01),
+        }
+    });
+    let depth = Quantity {
+        scored: errors,
+        left_out: errors,
+        depths: vec![QuantityAtDepth {
+            depth_mm: 2.0,
+            scored: errors,
+            left_out: errors,
+        }],
+        taught_by: 16,
+    };
+    analysis.indentation = Some(Indentation {
+        depth: Some(depth),
+        no_depth: None,
+        force: None,
+        no_force: Some(NoQuantity::NotReported),
+        zero: Some(ZeroReturn {
+            after_s: 2.5,
+            mean_mm: estimate(0.08),
+            rms_mm: estimate(0.09),
+            trend_mm: Some(0.01),
+            drifts,
+        }),
+        presses: presses.collect(),
+    });
+    analysis
+}
+
+#[test]
+fn depths_have_a_section_a_figure_and_a_line() {
+    let analysis = with_depths(true);
+    let page = html(&input(&analysis));
+    for part in [
+        "id=\"indentation\"",
+        "Estimated depth",
+        "Depth error by planned depth",
+        "0.123",
+        "drift",
+        "no measured force",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    let text = terminal_summary(&input(&analysis), false);
+    assert!(text.contains("0.12 mm") && text.contains("drift"), "{text}");
+    let still = html(&input(&with_depths(false)));
+    assert!(still.contains("The skin returns to zero."));
+}
+
+#[test]
+fn a_session_of_one_depth_has_none_of_it() {
+    let analysis = support::analysis(4, 3);
+    assert!(!html(&input(&analysis)).contains("Estimated depth"));
+    assert!(!terminal_summary(&input(&analysis), false).contains("left-out locations"));
+}

@@ -1,0 +1,4 @@
+//! Tests of the server over HTTP.
+
+mod access;
+mod live;

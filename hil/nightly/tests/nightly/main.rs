@@ -1,0 +1,4 @@
+//! Tests of verdicts and trends of nights.
+
+mod judging;
+mod trend;

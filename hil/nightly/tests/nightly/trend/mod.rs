@@ -1,0 +1,233 @@
+//! Trends of simulated benches: rate of false alarms over all series, losses detected within three
+//! nights, and attribution of a change.
+//!
+//!     cargo test --release -p skinrig-nightly trend -- --ignored --nocapture
+//!
+//! prints the tables of `docs/reference/nightly.md`.
+#![expect(clippy::unwrap_used, reason = "a failing test may panic")]
+
+mod nights;
+
+use nights::{Bench, PlantedChange};
+use skinrig_nightly::Cause;
+use skinrig_nightly::trend::report::NIGHTS_PER_FALSE_ALARM;
+use skinrig_nightly::trend::run_length::rules;
+use skinrig_nightly::trend::{Acceptance, Chart, History, Report, judge};
+
+const EVENTS: &str = "golden/skin/press_events";
+const LOCATED: &str = "golden/skin/located";
+
+/// Number of alarms in 500 nights of an unchanged bench.
+fn false_alarms(seed: u64) -> usize {
+    let report = judge(&Bench::new(seed).history(500));
+    report.alarms.len() + report.past.len()
+}
+
+fn chart<'a>(report: &'a Report, series: &str) -> &'a Chart {
+    let named = |c: &&Chart| c.series.name == series;
+    report.charts.iter().find(named).unwrap()
+}
+
+/// Number of nights with a value from the loss to the alarm of the chart of `series`; `None` after
+/// twenty nights.
+fn delay(seed: u64, series: &'static str, spread: f64, from: usize, factor: f64) -> Option<usize> {
+    let mut bench = Bench::new(seed).spread(series, spread);
+    bench.planted.push(PlantedChange {
+        series,
+        from,
+        factor,
+    });
+    let history = bench.history(from + 20);
+    let first = first_from(&history, from);
+    let report = judge(&history);
+    let chart = chart(&report, series);
+    let raised = chart.excursions.iter().map(|e| e.raised);
+    let raised = raised.filter(|night| *night >= first).min()?;
+    let created = chart.nights.iter();
+    Some(
+        created
+            .filter(|n| (first..=raised).contains(&n.night))
+            .count(),
+    )
+}
+
+/// Index of the first night of the history on or after the calendar's `day`.
+fn first_from(history: &History, day: usize) -> usize {
+    let id = nights::head(day).id;
+    history.nights.iter().position(|n| n.id >= id).unwrap()
+}
+
+/// Share of benches, %, whose loss was detected within `within` nights.
+fn share_detected(seeds: u64, within: usize, one: impl Fn(u64) -> Option<usize>) -> f64 {
+    let hits = (0..seeds).filter(|seed| one(*seed).is_some_and(|d| d <= within));
+    100.0 * hits.count() as f64 / seeds as f64
+}
+
+#[test]
+fn unchanged_benches_raise_at_most_one_alarm_in_100_nights() {
+    let counts: Vec<usize> = (0..6).map(false_alarms).collect();
+    assert!(
+        counts.iter().all(|c| *c <= 5),
+        "in 500 nights each: {counts:?}"
+    );
+}
+
+#[test]
+fn a_loss_of_15_percent_is_found_within_three_nights() {
+    // The spread between nights is 3 %. One of 12 benches may take longer.
+    let events = share_detected(12, 3, |seed| delay(seed, EVENTS, 0.03, 110, 0.85));
+    assert!(events > 90.0, "{events} %");
+    let located = share_detected(12, 3, |seed| delay(seed, LOCATED, 0.0, 40, 0.85));
+    assert!(located > 90.0, "{located} %");
+}
+
+/// A history of 80 nights without gaps; from night 60 on, the series in `planted` are 25 % lower.
+fn with_quarter_lower(planted: &[&'static str]) -> History {
+    let mut bench = Bench::new(3);
+    bench.gaps = [0, 0];
+    for series in planted {
+        bench.planted.push(PlantedChange {
+            series,
+            from: 60,
+            factor: 0.75,
+        });
+    }
+    bench.history(80)
+}
+
+#[test]
+fn change_is_dated_and_attributed_by_simultaneous_changes() {
+    let skin = with_quarter_lower(&[EVENTS, LOCATED]);
+    let report = judge(&skin);
+    assert_eq!(report.alarms.len(), 1, "{}", report.headline);
+    let alarm = &report.alarms[0];
+    assert!(
+        alarm.since[0] <= 60 && alarm.since[1] >= 60,
+        "{:?}",
+        alarm.since
+    );
+    assert!(alarm.since[1] - alarm.since[0] <= 2, "{:?}", alarm.since);
+    assert_eq!(alarm.attribution.cause, Some(Cause::Skin));
+    assert!(report.headline.contains("the skin"), "{}", report.headline);
+
+    let mut software = skin.clone();
+    for night in &mut software.nights[60..] {
+        night.versions.software = "0.1.0 (bbbbbbb)".to_owned();
+    }
+    let report = judge(&software);
+    assert_eq!(report.alarms[0].attribution.cause, Some(Cause::Software));
+    let changed = &report.alarms[0].attribution.changed;
+    assert_eq!(changed, &["software 0.1.0 (aaaaaaa) -> 0.1.0 (bbbbbbb)"]);
+    // A version that changed at another time is not a cause.
+    let mut earlier = skin;
+    for night in &mut earlier.nights[40..] {
+        night.versions.software = "0.1.0 (bbbbbbb)".to_owned();
+    }
+    let cause = judge(&earlier).alarms[0].attribution.cause;
+    assert_eq!(cause, Some(Cause::Skin));
+
+    let report = judge(&with_quarter_lower(&["noise_lit/camera1/rate", EVENTS]));
+    assert_eq!(report.alarms[0].attribution.cause, Some(Cause::Rig));
+}
+
+#[test]
+fn an_accepted_change_starts_a_new_reference() {
+    let mut history = with_quarter_lower(&[EVENTS]);
+    history.accepted.push(Acceptance {
+        series: None,
+        night: nights::head(60).id,
+        reason: "another skin".to_owned(),
+        by: "ada".to_owned(),
+        at: nights::date(61),
+    });
+    let report = judge(&history);
+    assert!(report.alarms.is_empty(), "{}", report.headline);
+    let chart = chart(&report, EVENTS);
+    assert_eq!(chart.accepted, [60]);
+    let centre = chart.reference.unwrap().centre;
+    assert!((centre / (0.75 * 2.4e5) - 1.0).abs() < 0.05, "{centre}");
+    // Nights before it do not count towards the next reference.
+    history.accepted[0].night = history.nights[history.nights.len() - 5].id.clone();
+    let report = judge(&history);
+    assert!(report.is_learning());
+    assert!(
+        report.headline.contains(" 5 of the 12"),
+        "{}",
+        report.headline
+    );
+}
+
+#[test]
+fn reference_needs_enough_nights_and_skips_invalid_ones() {
+    let mut bench = Bench::new(1);
+    bench.gaps = [0, 0];
+    bench.planted.push(PlantedChange {
+        series: EVENTS,
+        from: 6,
+        factor: 0.5,
+    });
+    let report = judge(&bench.history(11));
+    assert!(report.alarms.is_empty());
+    assert!(
+        report.headline.contains("trends: 11 of the 12"),
+        "{}",
+        report.headline
+    );
+
+    // Every night of the golden skin is INVALID, with a fifth of the usual values.
+    let mut bench = Bench::new(1);
+    bench.gaps = [0, 1];
+    let report = judge(&bench.history(30));
+    assert!(chart(&report, EVENTS).nights.is_empty());
+    assert!(judge(&History::default()).headline.starts_with("no trends"));
+}
+
+#[test]
+#[ignore = "the tables of docs/reference/nightly.md take minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig-nightly trend -- --ignored --nocapture"]
+fn false_alarm_and_delay_table() {
+    let counts: Vec<usize> = (0..200).map(false_alarms).collect();
+    let total: usize = counts.iter().sum();
+    let most = counts.iter().filter(|c| **c > 5).count();
+    println!(
+        "| Benches | Nights | False alarms | Per 100 nights | Benches with more than 5 in 500 nights |"
+    );
+    println!("|---|---|---|---|---|");
+    println!(
+        "| 200 | 100000 | {total} | {:.2} | {most} |\n",
+        total as f64 / 1000.0
+    );
+    let one = judge(&Bench::new(0).history(20));
+    let both = rules(one.charts.len(), NIGHTS_PER_FALSE_ALARM);
+    println!("{} series: {both:?}\n", one.charts.len());
+    println!("| Loss | Spread | after 20 nights: 3 | 10 | after 60: 3 | 10 | after 120: 3 | 10 |");
+    println!("|---|---|---|---|---|---|---|---|");
+    for (loss, spread) in [(15, 2), (15, 3), (15, 4), (15, 5), (10, 3), (5, 3)] {
+        print!("| {loss} % | {spread} % |");
+        for from in [20, 60, 120] {
+            for within in [3, 10] {
+                let factor = 1.0 - f64::from(loss) / 100.0;
+                let spread = f64::from(spread) / 100.0;
+                let share = share_detected(100, within, |s| delay(s, EVENTS, spread, from, factor));
+                print!(" {share:.0} % |");
+            }
+        }
+        println!();
+    }
+    let located = share_detected(100, 3, |seed| delay(seed, LOCATED, 0.0, 40, 0.85));
+    println!(
+        "\nlocated share, 15 % lower after 40 nights: found within 3 nights on {located:.0} %\n"
+    );
+    println!("| Shift, standard deviations | 0 | 1 | 1.5 | 2 | 2.5 | 3 | 4 | 5 |");
+    println!("|---|---|---|---|---|---|---|---|---|");
+    for rule in both {
+        print!("| {} nights beyond {:.2} |", rule.nights, rule.limit);
+        for shift in [0.0, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0] {
+            print!(" {:.3e} |", rule.mean_run_length(shift));
+        }
+        println!();
+    }
+    assert!(total <= 1000, "more than one in 100 nights: {total}");
+    assert!(most <= 10, "{counts:?}");
+    let quick = share_detected(100, 3, |seed| delay(seed, EVENTS, 0.03, 120, 0.85));
+    assert!(quick >= 90.0 && located >= 95.0, "{quick} %, {located} %");
+}

@@ -1,0 +1,16 @@
+//! Tests of the analysis through its public API.
+
+mod audit;
+mod calibration;
+mod clocks;
+mod clustering;
+mod coverage;
+mod geometry;
+mod latency;
+mod locator;
+mod metrics;
+mod models;
+mod reduction;
+mod sample;
+mod session;
+mod timebase;

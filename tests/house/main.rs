@@ -1,0 +1,6 @@
+//! Checks of the workspace itself.
+
+mod architecture;
+mod circles;
+mod docs;
+mod surface;

@@ -1,0 +1,143 @@
+//! A session of 25 locations in two repetitions: its plan, clocks, geometry and events.
+
+use skinrig_analysis::SessionInput;
+use skinrig_model::{
+    AnalysisSettings, CdEvent, HostTime, MarkKind, Point2, Polarity, PressRole, RigGeometry,
+    SkinOutline, StereoGeometry,
+};
+
+use crate::{Memory, PlantedPress, mark, press, timing};
+
+/// Parameters of the true geometry, of model `full`.
+pub const PLANTED: [f64; 8] = [43.0, -33.0, 47.5, 38.0, -1.2, 0.4, -0.11, 0.03];
+/// Camera clocks: offset (µs) and drift (ppm).
+pub const CLOCKS: [(f64, f64); 2] = [(4.2e6, 28.0), (17_592_186_044_416.0, -35.0)];
+
+/// Seeded generator.
+pub struct Random(pub u64);
+
+impl Random {
+    /// Uniform in [0, 1).
+    pub fn unit(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+    /// Roughly normal, unit variance.
+    pub fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
+    }
+}
+
+/// Time of a camera's clock at a host time.
+#[must_use]
+pub fn camera_us(camera: usize, host_s: f64) -> f64 {
+    let (offset, ppm) = CLOCKS[camera];
+    offset + host_s * 1e6 * (1.0 + ppm * 1e-6)
+}
+
+/// Three sync presses, then 25 places in two repetitions: the first calibrates, the second scores.
+#[must_use]
+pub fn plan() -> Vec<(PressRole, u32, u32, Point2, f64)> {
+    let centre = Point2::new(10.0, 2.0);
+    let mut out: Vec<_> = (0..3)
+        .map(|i| (PressRole::Sync, 0, 0, centre, 2.0 + f64::from(i)))
+        .collect();
+    for i in 0..50u32 {
+        let place = i % 25;
+        let at = Point2::new(
+            -14.0 + 11.0 * f64::from(place / 5),
+            -20.0 + 11.0 * f64::from(place % 5),
+        );
+        let role = if i < 25 {
+            PressRole::Calibrate
+        } else {
+            PressRole::Score
+        };
+        out.push((role, i / 25, place, at, 7.0 + 1.75 * f64::from(i)));
+    }
+    out
+}
+
+/// The session and its events: 600 per press and camera, and background.
+#[must_use]
+pub fn session() -> (SessionInput, Memory) {
+    let mut random = Random(7);
+    let planted = StereoGeometry::paper_like(PLANTED);
+    let mut input = crate::session(
+        RigGeometry {
+            outline: SkinOutline::PAPER,
+            nominal: StereoGeometry::PAPER,
+            trigger_channel: Some(0),
+            trigger_delay_us: [0; 2],
+        },
+        AnalysisSettings {
+            bootstrap_resamples: 200,
+            ..AnalysisSettings::default()
+        },
+    );
+    let mut events = [Vec::new(), Vec::new()];
+    for (role, repetition, location, at, contact) in plan() {
+        let touch = PlantedPress {
+            timing: timing(contact, [0.1, 0.1, 0.3, 0.45, 0.6]),
+            ..PlantedPress::new(role, repetition, location, at)
+        };
+        let id = press(&mut input, touch);
+        for (kind, t) in [
+            (MarkKind::Contact, contact),
+            (MarkKind::Release, contact + 0.45),
+        ] {
+            let sent = HostTime::from_secs_f64(t);
+            mark(&mut input, (kind, id), sent, 500, |k| {
+                camera_us(k, t).round() as u64
+            });
+        }
+        for (k, events) in events.iter_mut().enumerate() {
+            let u = planted.cameras[k].column_of_point(at).unwrap();
+            for n in 0..600 {
+                let after = if n < 400 {
+                    0.1 * random.unit()
+                } else {
+                    0.3 + 0.15 * random.unit()
+                };
+                let x = (u + 8.0 * random.normal()).round().clamp(0.0, 639.0);
+                let y = (270.0 + 6.0 * random.normal()).round();
+                events.push(CdEvent {
+                    t_us: camera_us(k, contact + after) as u64,
+                    x: x as u16,
+                    y: y as u16,
+                    polarity: Polarity::from_bit(n % 3 == 0),
+                });
+            }
+        }
+    }
+    for (k, events) in events.iter_mut().enumerate() {
+        for _ in 0..10_000 {
+            let t = camera_us(k, 97.0 * random.unit());
+            let (x, y) = (640.0 * random.unit(), 480.0 * random.unit());
+            let polarity = Polarity::from_bit(random.unit() < 0.5);
+            events.push(CdEvent {
+                t_us: t as u64,
+                x: x as u16,
+                y: y as u16,
+                polarity,
+            });
+        }
+        events.sort_by_key(|e| e.t_us);
+        // Out of order by a few µs, as a row-wise readout is.
+        for i in (0..events.len() - 1).step_by(5) {
+            if events[i + 1].t_us - events[i].t_us < 20 {
+                events.swap(i, i + 1);
+            }
+        }
+    }
+    (
+        input,
+        Memory {
+            events,
+            slice: 1000,
+        },
+    )
+}

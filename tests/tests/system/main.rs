@@ -1,0 +1,12 @@
+//! Tests of several crates together.
+
+mod audit;
+mod bench_files;
+mod contract;
+mod counts;
+mod faults;
+mod indentation;
+mod multi_touch;
+mod numerics;
+mod overflow;
+mod retakes;
