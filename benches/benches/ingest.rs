@@ -9,8 +9,9 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use skinrig_bench::Table;
 use skinrig_bench::session::{header, plain_file};
+use skinrig_formats::codec;
 use skinrig_model::{AttemptId, CameraId, ChunkFacts, HostTime, PressId, RawChunk, Record};
-use skinrig_recorder::{SessionWriter, codec};
+use skinrig_recorder::SessionWriter;
 
 const CHUNK: usize = 1 << 20;
 const CHUNKS: u64 = 256;

@@ -1,9 +1,10 @@
-//! Foreign formats: EVT2, EVT2.1 and EVT3 streams, Prophesee RAW files, bimvee HDF5 containers and
+//! Formats of bytes: EVT2, EVT2.1 and EVT3 streams, Prophesee RAW files, bimvee HDF5 containers and
 //! press-position tables.
 //!
 //! Parsers of foreign bytes are total: any input yields events, or an error with position and
 //! expectation. Words without an event are counted in [`StreamStats`].
 
+pub mod codec;
 pub mod error;
 pub mod hdf5;
 pub mod inspect;

@@ -9,13 +9,13 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
 use crate::cause::verdict_from;
-use crate::codec::Codec;
 use crate::pose;
 use crate::query::{
     Fault, enum_value, int, num, opt_int, opt_num, opt_real, real, real_if_present, sha, text,
     text_if_present,
 };
 use crate::rows::{AttemptRow, ChunkMeta};
+use skinrig_formats::codec::Codec;
 
 pub(crate) fn header_from(row: &SqliteRow) -> Result<RunHeader, Fault> {
     let format = |column: &str| -> Result<StreamFormat, Fault> {

@@ -14,7 +14,6 @@ mod box_row;
 pub mod catalogue;
 mod cause;
 mod chain;
-pub mod codec;
 pub mod error;
 pub mod reader;
 pub mod rows;
@@ -55,7 +54,6 @@ mod worker;
 
 pub use catalogue::{SessionState, SessionSummary, list};
 pub use close_result::SealedSession;
-pub use codec::Codec;
 pub use error::{CopyError, RecorderError, RescueError, WriteFailure};
 pub use lock::writer_of;
 pub use problem::Problem;
@@ -67,6 +65,7 @@ pub use rows::{
 };
 pub use salvage::{LostBytes, SalvageReport, SalvagedTable, salvage};
 pub use sidecar::SESSION_SUFFIX;
+pub use skinrig_formats::codec::Codec;
 pub use tags::{
     Annotation, AnnotationNote, Annotations, annotate, annotations, is_valid_tag, tags_path,
 };

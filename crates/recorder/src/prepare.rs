@@ -5,11 +5,11 @@ use std::sync::Arc;
 use sha2::{Digest, Sha256};
 use skinrig_model::{RawChunk, Record, StreamFormat};
 
-use crate::codec::{self, Codec};
 use crate::error::WriteFailure;
 use crate::prepared::{PreparedChunk, PreparedGap, PreparedRecord, PreparedResult};
 use crate::query::Fault;
 use crate::queue::Shared;
+use skinrig_formats::codec::{self, Codec};
 
 /// Time of a camera's stream.
 #[derive(Debug, Clone, Copy, Default)]

@@ -2,8 +2,8 @@
 
 use skinrig_model::{CameraId, HostTime, Record};
 
-use crate::codec::Codec;
 use crate::query::Fault;
+use skinrig_formats::codec::Codec;
 
 /// A record ready to write, or the reason why it cannot be written. Keeps its place in the order either way.
 pub(crate) type PreparedResult = Result<PreparedRecord, Fault>;

@@ -6,7 +6,7 @@ use skinrig_model::{
     InterruptionReason, LostTime, MotionCommand, PressOutcome, ResumeHeader, RunEnd, Setting,
 };
 
-use crate::codec::Codec;
+use skinrig_formats::codec::Codec;
 
 /// A device with its settings.
 #[derive(Debug, Clone, PartialEq, Eq)]

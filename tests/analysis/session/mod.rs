@@ -1,7 +1,5 @@
 //! Whole analyses of planted sessions: what was planted comes out, and everything that goes wrong has its row.
 
-#![expect(clippy::unwrap_used, reason = "tests")]
-
 mod bad_input;
 mod exclusions;
 mod tradeoff;

@@ -10,10 +10,11 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
+use skinrig_formats::codec;
 use skinrig_formats::evt2::Encoder;
 use skinrig_formats::raw::{RawMetadata, RawWriter};
 use skinrig_model::{CdEvent, Polarity, StreamFormat, TriggerEdge};
-use skinrig_recorder::{SessionWriter, codec};
+use skinrig_recorder::SessionWriter;
 use skinrig_trigger_box::frame;
 use sqlx::Connection;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};

@@ -62,6 +62,9 @@ pub fn plan() -> Vec<(PressRole, u32, u32, Point2, f64)> {
 }
 
 /// The session and its events: 600 per press and camera, and background.
+///
+/// # Panics
+/// Never: all locations are in view of both cameras.
 #[must_use]
 pub fn session() -> (SessionInput, Memory) {
     let mut random = Random(7);
@@ -95,7 +98,9 @@ pub fn session() -> (SessionInput, Memory) {
             });
         }
         for (k, events) in events.iter_mut().enumerate() {
-            let u = planted.cameras[k].column_of_point(at).unwrap();
+            let u = planted.cameras[k]
+                .column_of_point(at)
+                .expect("all locations are in view");
             for n in 0..600 {
                 let after = if n < 400 {
                     0.1 * random.unit()

@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use skinrig_model::{CameraId, LostTime, TriggerEdge};
 
 use super::SessionReader;
-use crate::codec::{self, Codec};
 use crate::error::RecorderError;
 use crate::from_row::chunk_from;
 use crate::query::{blob, each_row, has_table, int, num, opt_num};
 use crate::rows::{ChunkMeta, Loss};
+use skinrig_formats::codec::{self, Codec};
 
 /// Metadata of all chunks, with their stored size.
 const INDEX: &str = "SELECT camera, seq, host_ns, lost_before, codec, raw_bytes, raw_crc32, first_us, last_us, cd_events,

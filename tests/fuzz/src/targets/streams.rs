@@ -1,8 +1,8 @@
 //! Camera bytes: words of every format, and folded chunks.
 
+use skinrig_formats::codec;
 use skinrig_formats::{Decoder, EventSink, Scanner};
 use skinrig_model::{CdEvent, StreamFormat, TriggerEdge};
-use skinrig_recorder::codec;
 
 struct NullSink;
 

@@ -183,7 +183,7 @@ fn a_claimed_length_alone_takes_no_memory() {
     let _turn = lock(&TURN);
     let held = MEMORY.reset_peak();
     // Two words that claim to unfold to a quarter of a gigabyte.
-    let fault = skinrig_recorder::codec::unfold(&[0; 8], 1 << 28).unwrap_err();
+    let fault = skinrig_formats::codec::unfold(&[0; 8], 1 << 28).unwrap_err();
     assert!(fault.to_string().contains("in all"), "{fault}");
     assert!(
         MEMORY.peak() - held < 1 << 16,

@@ -18,7 +18,7 @@
 use std::fmt;
 
 /// Longest raw chunk: 256 MiB. Bounds the memory that a damaged file can request.
-pub(crate) const MAX_CHUNK_BYTES: usize = 1 << 28;
+pub const MAX_CHUNK_BYTES: usize = 1 << 28;
 
 const TIME_HIGH: u32 = 0x8;
 const TOKEN: u32 = 0xB;
@@ -171,7 +171,10 @@ pub fn unfold(stored: &[u8], raw_bytes: usize) -> Result<Vec<u8>, CodecError> {
 }
 
 /// [`unfold`] into a buffer for several chunks, which only grows.
-pub(crate) fn unfold_into<'a>(
+///
+/// # Errors
+/// As [`unfold`].
+pub fn unfold_into<'a>(
     stored: &[u8],
     raw_bytes: usize,
     buffer: &'a mut Vec<u8>,
