@@ -113,6 +113,7 @@ const HARNESSES: &[&str] = &[
     "skinrig-house",
     "skinrig-bench",
     "skinrig-browser",
+    "skinrig-certified",
     "skinrig-fuzz",
     "skinrig-planted",
     "skinrig-wrong-inputs",

@@ -38,7 +38,7 @@ pub(crate) use parameters::{SPREAD, parameters_of, with_parameters};
 pub(crate) use problem::StereoModel;
 use problem::{Measure, Problem};
 pub(crate) use refit::{Refit, covariance};
-use solver::{Descent, minimise};
+use solver::{Descent, minimise, polish};
 pub(crate) use standard::standard_fit;
 
 /// Bound on an error vector while the starts compete, mm: a quarter of the skin's side.
@@ -165,7 +165,10 @@ impl Fit {
             ..
         } = *problem;
         let problem = problem.with_fine_bound(&coarse.parameters);
-        let fine = minimise(&problem, coarse.parameters);
+        let mut fine = minimise(&problem, coarse.parameters);
+        if fine.termination.is_converged() {
+            fine.parameters = polish(&problem, fine.parameters);
+        }
         let end = if is_plausible(start, &fine.parameters) {
             &fine
         } else {

@@ -19,6 +19,10 @@ const FIRST_DAMPING: f64 = 1e-3;
 const DAMPING: (f64, f64) = (1e-14, 1e16);
 /// Converged: the cosine between residuals and each column of the Jacobian is at most this.
 const FLAT: f64 = 1e-10;
+/// Most steps of [`polish`], their damping, and the share of the squared gradient that a step may leave.
+const POLISHING: usize = 10;
+const POLISHING_DAMPING: f64 = 1e-12;
+const SHRINKS: f64 = 0.25;
 /// A step is accepted if it lowers the cost by at least this share of its prediction.
 const MIN_GAIN_RATIO: f64 = 1e-4;
 
@@ -81,6 +85,30 @@ pub(crate) fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
         }
     }
     ended(at, current.cost, Termination::TooManySteps)
+}
+
+/// Steps from a solution beyond the accuracy of its cost, while they shrink the gradient, which keeps its digits there. So little
+/// damping is only felt by directions that the data do not determine: these stay where they are.
+pub(super) fn polish(problem: &Problem<'_>, from: Parameters) -> Parameters {
+    let mut at = from;
+    let mut current = problem.normal(&at);
+    let scale = current.matrix.diagonal();
+    for _ in 0..POLISHING {
+        let Some(step) = step(&current, &scale, POLISHING_DAMPING) else {
+            break;
+        };
+        let there = at + step;
+        let next = problem.normal(&there);
+        let steepness = |n: &NormalEquations| {
+            let each = (0..problem.count).map(|i| n.gradient[i] * n.gradient[i] / scale[i]);
+            each.filter(|s| s.is_finite()).fold(0.0, f64::max)
+        };
+        if !next.cost.is_finite() || steepness(&next) > SHRINKS * steepness(&current) {
+            break;
+        }
+        (at, current) = (there, next);
+    }
+    at
 }
 
 fn is_flat(current: &NormalEquations, count: usize) -> bool {

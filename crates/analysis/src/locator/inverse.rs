@@ -16,7 +16,7 @@ const ROUNDS: usize = 3;
 const STEPS: usize = 30;
 /// Halvings of a step.
 const HALVINGS: usize = 20;
-/// A step shorter than this ends a round, mm.
+/// A step shorter than this is the last of a round, mm.
 const SHORTEST_MM: f64 = 1e-6;
 /// A round that moves the position less than this is the last, mm: variances change over the length scales of the fields.
 const LAST_MM: f64 = 1e-3;
@@ -333,6 +333,8 @@ impl Inverse {
             let [a, b] = normal.side;
             let mut step = [xx * a + xy * b, xy * a + yy * b];
             if libm::hypot(step[0], step[1]) < SHORTEST_MM {
+                // The sum cannot tell whether so short a step leads down; near the minimum it leads there.
+                place = self.place([place.at[0] + step[0], place.at[1] + step[1]]);
                 break;
             }
             let mut lower = None;

@@ -71,8 +71,9 @@ use crate::rule::Rule;
 /// Version of this layout and of the algorithms behind it; part of every result. Results of another version are not read,
 /// except their summary. Version 9: causes of presses are types. Version 10: warnings, violations
 /// and evidence are. Version 11: depth and force are estimated. Version 12: the fields of the locators
-/// end their search where the likelihood gains less than 0.001.
-pub const ANALYSIS_VERSION: u32 = 12;
+/// end their search where the likelihood gains less than 0.001. Version 13: calibrations and located
+/// positions have nine digits and more.
+pub const ANALYSIS_VERSION: u32 = 13;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

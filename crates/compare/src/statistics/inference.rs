@@ -120,20 +120,20 @@ impl Inference {
         }
     }
 
-    /// One-sided p value against `truth <= border`.
+    /// One-sided p value against `truth <= border`: a lower tail, which keeps its digits however small it is.
     pub(crate) fn p_above(&self, border: f64) -> f64 {
         match &self.method {
             IntervalMethod::Student { error, df } => {
-                1.0 - student_cdf((self.value - border) / error, *df)
+                student_cdf((border - self.value) / error, *df)
             }
             IntervalMethod::BootstrapT { error, df, draws } => {
                 let t = (self.value - border) / error;
                 let as_far = draws.len() - draws.partition_point(|d| *d < t);
                 let drawn = (as_far as f64 + 1.0) / (draws.len() as f64 + 1.0);
-                drawn.max(1.0 - student_cdf(t, *df))
+                drawn.max(student_cdf(-t, *df))
             }
             IntervalMethod::Limits { df, .. } => {
-                1.0 - student_cdf(self.standard_errors_above(border), *df)
+                student_cdf(-self.standard_errors_above(border), *df)
             }
         }
     }
