@@ -4,7 +4,7 @@ The answer minimises the sum over presses of e^2 / (1 + (e / c)^2), c = 1 mm, wi
 rays to the true position.
 
 Method A: derivatives by implicit differentiation of the crossing; the gradient is driven to zero by a fixed approximate Hessian.
-Method B: crossing by Cramer's rule, derivatives by central differences with 90 digits, Broyden's method.
+Method B: crossing by Cramer's rule, derivatives by central differences with 70 digits, Broyden's method.
 """
 
 import cmath
@@ -210,8 +210,8 @@ def method_b(presses, count):
         columns = [[0.5 * (columns[i][j] + columns[j][i]) for j in range(count)] for i in range(count)]
         step = solved_floats(columns, slope)
         p = [v - s for v, s in zip(p, step + [0.0] * 10)]
-    with mp.workdps(90):
-        m, h = Precise(), mpf(10) ** -28
+    with mp.workdps(70):
+        m, h = Precise(), mpf(10) ** -21
         inverse = matrix(columns) ** -1
         p = [mpf(v) for v in p]
         g = matrix(differences(m, p, presses, count, h))
