@@ -11,7 +11,6 @@ use crate::table::FAMILIES;
 const MOST_BYTES: u64 = 400_000;
 
 #[test]
-#[expect(clippy::print_stderr, reason = "the reason for skipping is reported")]
 fn the_files_are_those_that_both_methods_write() {
     let python = std::env::var("SKINRIG_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let run = |arguments: &[&str]| {
