@@ -72,6 +72,19 @@ pub enum CalibrationModel {
 }
 
 impl CalibrationModel {
+    /// Name for people, in tables and figures.
+    #[must_use]
+    pub const fn label(self) -> &'static str {
+        match self {
+            Self::None => "nominal geometry",
+            Self::Positions => "positions",
+            Self::PositionsSkews => "with skews",
+            Self::Full => "with distortions (paper)",
+            Self::FullScale => "with scales",
+            Self::Auto => "automatic",
+        }
+    }
+
     /// Name in settings and messages.
     #[must_use]
     pub const fn name(self) -> &'static str {

@@ -203,8 +203,8 @@ pub(crate) fn geometry_note(analysis: &Analysis) -> Option<String> {
         }
         Some(used) if requested != Auto && used != requested => Some(format!(
             "Calibrated with a smaller model ({}) than configured ({}), which could not be fitted",
-            crate::figures::model_name(used),
-            crate::figures::model_name(requested)
+            used.label(),
+            requested.label()
         )),
         Some(_) => None,
     }

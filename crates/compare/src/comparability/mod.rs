@@ -114,10 +114,7 @@ fn settings_of(analysis: &Analysis) -> Vec<(String, String)> {
     };
     facts.push(("calibration.origin".to_owned(), origin.to_owned()));
     if let Some(c) = calibration {
-        facts.push((
-            "calibration.model".to_owned(),
-            crate::flatten::variant_name(&c.model),
-        ));
+        facts.push(("calibration.model".to_owned(), c.model.label().to_owned()));
         facts.push((
             "calibration.lens".to_owned(),
             crate::flatten::variant_name(&c.lens),

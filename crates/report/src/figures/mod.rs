@@ -37,7 +37,6 @@ pub(crate) use latency_onsets::latency_onsets;
 pub(crate) use latency_roc::latency_roc;
 pub(crate) use map::repeat_map;
 pub(crate) use map::skin_map;
-pub(crate) use models::model_name;
 pub use models::models;
 pub use motion::pose_course;
 pub(crate) use motion::pose_presses;

@@ -1,24 +1,10 @@
 //! Owns the figure of the compared calibration models.
 
-use skinrig_model::CalibrationModel;
-
 use super::origin::foot;
 use crate::format::number;
 use crate::input::ReportInput;
 use crate::plot::{Axis, Figure, HALF, Plot, Sample, Sheet};
 use crate::svg::dots;
-
-/// Display name of a model.
-pub(crate) const fn model_name(model: CalibrationModel) -> &'static str {
-    match model {
-        CalibrationModel::None => "nominal geometry",
-        CalibrationModel::Positions => "positions",
-        CalibrationModel::PositionsSkews => "with skews",
-        CalibrationModel::Full => "with distortions (paper)",
-        CalibrationModel::FullScale => "with scales",
-        CalibrationModel::Auto => "automatic",
-    }
-}
 
 /// Cross-validated RMSE of the nested models with interval, the bounded RMSE used to compare them, and the error on the
 /// fitted presses. `None` without a comparison.
@@ -39,7 +25,7 @@ pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
         .filter_map(|r| r.rmse_mm.high.or(r.rmse_mm.value));
     // Alternate heights: five names do not fit side by side.
     let names = rows.iter().enumerate().map(|(i, row)| {
-        let name = model_name(row.model).replace(" (paper)", "");
+        let name = row.model.label().replace(" (paper)", "");
         let (lead, tail) = if i % 2 == 1 { ("\n", "") } else { ("", "\n") };
         format!("{lead}{name} ({}){tail}", row.parameters)
     });

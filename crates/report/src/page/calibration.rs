@@ -3,7 +3,6 @@
 use skinrig_analysis::result::{Analysis, CalibrationResult};
 
 use crate::document::{Column, Group, Row, Table, Text, paragraph, soft};
-use crate::figures::model_name;
 use crate::format::{NONE, interval, number, words};
 use crate::{derive, tables};
 
@@ -78,12 +77,12 @@ pub(super) fn models(a: &Analysis) -> Option<Table> {
     for m in &c.compared {
         grid.marked_row(
             [
-                model_name(m.model).to_owned(),
+                m.model.label().to_owned(),
                 m.parameters.to_string(),
                 number(m.rmse_mm.value, 3),
                 interval(&m.rmse_mm, 1.0, 3),
                 number(m.bounded_rmse_mm, 3),
-                m.test.map_or(NONE, |t| model_name(t.against)).to_owned(),
+                m.test.map_or(NONE, |t| t.against.label()).to_owned(),
                 m.test.map_or_else(
                     || NONE.to_owned(),
                     |t| {
@@ -109,11 +108,11 @@ fn why(a: &Analysis, c: &CalibrationResult) -> String {
     use skinrig_model::CalibrationModel::Auto;
     let used = match a.settings.calibration {
         Auto => "the last accepted model".to_owned(),
-        named if named == c.model => format!("{}, as configured", model_name(named)),
+        named if named == c.model => format!("{}, as configured", named.label()),
         named => format!(
             "{}; the configured {} failed to fit or needs more locations",
-            model_name(c.model),
-            model_name(named)
+            c.model.label(),
+            named.label()
         ),
     };
     format!(
@@ -132,7 +131,7 @@ pub(super) fn fit(a: &Analysis) -> Option<Table> {
     let mut row = |name: &str, value: String| {
         grid.row([name.to_owned(), value]);
     };
-    row("model", model_name(c.model).to_owned());
+    row("model", c.model.label().to_owned());
     row("lens", words(&c.lens));
     row("calibration presses", c.n.to_string());
     row("RMSE before (mm)", number(Some(c.rmse_before_mm), 3));

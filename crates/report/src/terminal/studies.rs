@@ -8,7 +8,6 @@ use skinrig_analysis::result::{
 use skinrig_text::Column as Cells;
 
 use crate::document::{Column, Note, Row, Section, Table};
-use crate::figures::model_name;
 use crate::format::{interval, number};
 use crate::page::indentation::line;
 
@@ -23,7 +22,7 @@ pub(super) fn calibration(a: &Analysis) -> Option<Note> {
         number(Some(c.rmse_before_mm), 2),
         number(Some(c.rmse_after_mm), 2),
         c.n,
-        model_name(c.model),
+        c.model.label(),
         c.rank,
         c.names.len(),
         c.starts_agreeing,

@@ -136,7 +136,7 @@ fn stream(events: u64) -> Vec<u8> {
     bytes
 }
 
-/// The first pictures that a page gets.
+/// The first pictures that a page gets from the run. Until the run answers they come from the file, which has none yet.
 fn first_pictures(mut page: TcpStream) -> Value {
     let mut text = String::new();
     let mut buffer = [0; 4096];
@@ -144,9 +144,11 @@ fn first_pictures(mut page: TcpStream) -> Value {
         let found = page.read(&mut buffer).unwrap();
         assert!(found > 0, "the stream ends: {text}");
         text.push_str(&String::from_utf8_lossy(&buffer[..found]));
-        let after = text.split_once("event: pictures\ndata: ");
-        if let Some((data, _)) = after.and_then(|(_, rest)| rest.split_once("\n\n")) {
-            return serde_json::from_str(data).unwrap();
+        let messages = text.split("event: pictures\ndata: ").skip(1);
+        let whole = messages.filter_map(|m| Some(m.split_once("\n\n")?.0));
+        let mut pictures = whole.map(|data| serde_json::from_str::<Value>(data).unwrap());
+        if let Some(found) = pictures.find(|p| !p[0].is_null()) {
+            return found;
         }
     }
 }
