@@ -7,7 +7,7 @@ use std::net::{SocketAddr, TcpStream};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::thread::ThreadId;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use skinrig::library::{ControlHandle, Program, ProtocolSource, Simulation, simulate};
@@ -28,6 +28,8 @@ const PAGES: usize = 10;
 const CHUNKS: u64 = 256;
 /// Measured sessions without pages, and as many with them.
 const ROUNDS: usize = 7;
+/// Time after which a test without an answer fails.
+const PATIENCE: Duration = Duration::from_secs(60);
 /// When the run took its newest bytes, s.
 const TAKEN_S: f64 = 1234.5;
 /// Protocol of the session whose header the recorded one has.
@@ -140,7 +142,10 @@ fn stream(events: u64) -> Vec<u8> {
 fn first_pictures(mut page: TcpStream) -> Value {
     let mut text = String::new();
     let mut buffer = [0; 4096];
+    let began = Instant::now();
+    page.set_read_timeout(Some(PATIENCE)).unwrap();
     loop {
+        assert!(began.elapsed() < PATIENCE, "none from the run: {text}");
         let found = page.read(&mut buffer).unwrap();
         assert!(found > 0, "the stream ends: {text}");
         text.push_str(&String::from_utf8_lossy(&buffer[..found]));
