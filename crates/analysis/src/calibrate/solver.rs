@@ -19,10 +19,12 @@ const FIRST_DAMPING: f64 = 1e-3;
 const DAMPING: (f64, f64) = (1e-14, 1e16);
 /// Converged: the cosine between residuals and each column of the Jacobian is at most this.
 const FLAT: f64 = 1e-10;
-/// Most steps of [`polish`], their damping, and the share of the squared gradient that a step may leave.
+/// At most this many steps of [`polish`], their damping, the share of the squared gradient that a step may leave, and the share of
+/// the cost that is rounding.
 const POLISHING: usize = 10;
 const POLISHING_DAMPING: f64 = 1e-12;
 const SHRINKS: f64 = 0.25;
+const ROUNDING: f64 = 1e-10;
 /// A step is accepted if it lowers the cost by at least this share of its prediction.
 const MIN_GAIN_RATIO: f64 = 1e-4;
 
@@ -87,8 +89,9 @@ pub(crate) fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
     ended(at, current.cost, Termination::TooManySteps)
 }
 
-/// Steps from a solution beyond the accuracy of its cost, while they shrink the gradient, which keeps its digits there. So little
-/// damping is only felt by directions that the data do not determine: these stay where they are.
+/// Takes steps that the cost is too coarse to judge, as long as they shrink the gradient, which still has digits there, and do not
+/// raise the cost by more than its rounding. The small damping matters only in directions that the data do not determine; there it
+/// keeps the steps short.
 pub(super) fn polish(problem: &Problem<'_>, from: Parameters) -> Parameters {
     let mut at = from;
     let mut current = problem.normal(&at);
@@ -103,7 +106,8 @@ pub(super) fn polish(problem: &Problem<'_>, from: Parameters) -> Parameters {
             let each = (0..problem.count).map(|i| n.gradient[i] * n.gradient[i] / scale[i]);
             each.filter(|s| s.is_finite()).fold(0.0, f64::max)
         };
-        if !next.cost.is_finite() || steepness(&next) > SHRINKS * steepness(&current) {
+        let is_no_higher = next.cost <= current.cost * (1.0 + ROUNDING);
+        if !is_no_higher || steepness(&next) > SHRINKS * steepness(&current) {
             break;
         }
         (at, current) = (there, next);

@@ -333,7 +333,7 @@ impl Inverse {
             let [a, b] = normal.side;
             let mut step = [xx * a + xy * b, xy * a + yy * b];
             if libm::hypot(step[0], step[1]) < SHORTEST_MM {
-                // The sum cannot tell whether so short a step leads down; near the minimum it leads there.
+                // The sum is too coarse to judge so short a step, which ends nearer to the minimum.
                 place = self.place([place.at[0] + step[0], place.at[1] + step[1]]);
                 break;
             }
