@@ -1,4 +1,4 @@
-//! The data: what the generator writes, at least forty problems, and the same in both formats.
+//! Checks the data: they are what the generator writes, enough problems of every level, and equal in both formats.
 
 use std::process::Command;
 

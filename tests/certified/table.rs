@@ -137,7 +137,7 @@ fn every_well_posed_problem_has_its_digits_and_the_rest_is_refused() {
 }
 
 #[test]
-#[ignore = "minutes: cargo test -p skinrig-certified -- --ignored"]
+#[ignore = "a minute or two: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig-certified -- --ignored"]
 fn so_have_sums_of_a_thousand_million_terms() {
     check(true);
 }

@@ -1,4 +1,4 @@
-//! Formats of bytes: EVT2, EVT2.1 and EVT3 streams, Prophesee RAW files, bimvee HDF5 containers and
+//! Byte formats: EVT2, EVT2.1 and EVT3 streams, folded chunks, Prophesee RAW files, bimvee HDF5 containers and
 //! press-position tables.
 //!
 //! Parsers of foreign bytes are total: any input yields events, or an error with position and
