@@ -11,10 +11,12 @@
 //!
 //! Distances are compared squared (`dx² + dy² <= eps * eps`), as scikit-learn's trees do.
 
+mod growing;
 mod tiles;
 
 use skinrig_simd::InstructionSet;
 
+pub(crate) use self::growing::GrowingDbscan;
 use self::tiles::{Part, SIDE, Tiles, WIDTH, ones};
 use crate::grid::PixelGrid;
 
@@ -107,12 +109,47 @@ struct Tile {
     occupied: u64,
     /// Pixels with more than one event.
     repeated: u64,
-    /// Core pixels.
+    /// Core pixels, or those known so far.
     core: u64,
     /// Events.
     events: u32,
     /// Range of its groups.
     groups: (u32, u32),
+}
+
+/// Sums over events of one tile, from its first pixel.
+#[derive(Debug, Clone, Copy, Default)]
+struct TileSums {
+    events: u64,
+    right: u64,
+    right_squares: u64,
+    down: u64,
+    down_squares: u64,
+}
+
+impl TileSums {
+    /// Adds this many events at a position.
+    #[inline(always)]
+    fn add(&mut self, at: usize, events: u32) {
+        let events = u64::from(events);
+        let (right, down) = ((at % SIDE) as u64, (at / SIDE) as u64);
+        self.events += events;
+        self.right += events * right;
+        self.right_squares += events * right * right;
+        self.down += events * down;
+        self.down_squares += events * down * down;
+    }
+
+    /// Adds these events to a cluster; the tile's first pixel is at `column`, `row` of the sensor.
+    #[inline(always)]
+    fn add_to(&self, cluster: &mut Cluster, column: u64, row: u64) {
+        let n = self.events;
+        cluster.events += n;
+        cluster.sum_u += n * column + self.right;
+        cluster.sum_uu += (n * column + 2 * self.right) * column + self.right_squares;
+        cluster.sum_v += n * row + self.down;
+        cluster.sum_vv += (n * row + 2 * self.down) * row + self.down_squares;
+    }
 }
 
 /// Core pixels of one tile that form one cluster without the help of others.
@@ -159,13 +196,19 @@ impl Dbscan {
             #[inline(always)]
             || {
                 self.load(grid);
-                self.find_core(grid);
-                self.join();
-                self.number();
-                self.sum(grid);
+                self.cluster(grid, |_| None);
             },
         );
         &self.clusters
+    }
+
+    /// Clusters the loaded events. `sums`: those of all events of a tile, where they are known.
+    #[inline(always)]
+    fn cluster(&mut self, grid: &PixelGrid, sums: impl Fn(usize) -> Option<TileSums>) {
+        self.find_core(grid);
+        self.join();
+        self.number();
+        self.sum(grid, sums);
     }
 
     /// The clusters of the last run.
@@ -255,12 +298,12 @@ impl Dbscan {
         for &index in &self.occupied {
             let tile = self.all[index];
             let corner = self.corner(index);
-            let mut core = 0;
+            let mut core = tile.core;
             if self.tile_is_near && tile.events >= self.min_samples {
                 core = tile.occupied;
             } else {
                 // No `fold`: it would be a function of its own, compiled for the baseline.
-                for at in ones(tile.occupied) {
+                for at in ones(tile.occupied & !tile.core) {
                     core |= u64::from(self.is_core(grid, index, corner, at)) << at;
                 }
             }
@@ -388,7 +431,7 @@ impl Dbscan {
 
     /// Computes the sums of the clusters.
     #[inline(always)]
-    fn sum(&mut self, grid: &PixelGrid) {
+    fn sum(&mut self, grid: &PixelGrid, known: impl Fn(usize) -> Option<TileSums>) {
         let mut clusters = std::mem::take(&mut self.clusters);
         let top = u64::from(grid.rows().0);
         for &index in &self.occupied {
@@ -396,25 +439,19 @@ impl Dbscan {
             let (row, column) = self.tiles.corner(index);
             let corner = row * WIDTH + column;
             let mut add = |label: u32, pixels: u64| {
-                let (mut n, mut right, mut right_squares) = (0, 0, 0);
-                let (mut down, mut down_squares) = (0, 0);
-                for at in ones(pixels) {
-                    let count = u64::from(grid.count((corner + offset(at)) as u32));
-                    let (aside, below) = ((at % SIDE) as u64, (at / SIDE) as u64);
-                    n += count;
-                    right += count * aside;
-                    right_squares += count * aside * aside;
-                    down += count * below;
-                    down_squares += count * below * below;
-                }
-                let cluster = &mut clusters[label as usize];
-                cluster.events += n;
-                let first = column as u64;
-                cluster.sum_u += n * first + right;
-                cluster.sum_uu += (n * first + 2 * right) * first + right_squares;
-                let first = row as u64 + top;
-                cluster.sum_v += n * first + down;
-                cluster.sum_vv += (n * first + 2 * down) * first + down_squares;
+                let whole = (pixels == tile.occupied).then(|| known(index)).flatten();
+                let sums = whole.unwrap_or_else(|| {
+                    let mut sums = TileSums::default();
+                    for at in ones(pixels) {
+                        sums.add(at, grid.count((corner + offset(at)) as u32));
+                    }
+                    sums
+                });
+                sums.add_to(
+                    &mut clusters[label as usize],
+                    column as u64,
+                    row as u64 + top,
+                );
             };
             for group in self.groups_of(index) {
                 add(group.label, group.core);

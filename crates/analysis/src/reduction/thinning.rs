@@ -15,9 +15,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::Rng;
 use skinrig_model::CentroidRule;
 
-use crate::dbscan::Dbscan;
+use crate::dbscan::GrowingDbscan;
 use crate::estimators::ColumnEstimate;
-use crate::grid::PixelGrid;
 use crate::locator::CameraFeatures;
 use crate::press_events::PackedEvent;
 use crate::result::Thinning;
@@ -34,8 +33,7 @@ pub(super) struct ThinnedView {
 
 /// Thins the views of one camera, one after another.
 pub(super) struct Thinner {
-    grid: PixelGrid,
-    dbscan: Dbscan,
+    remaining: GrowingDbscan,
     min_samples: u32,
     centroid: CentroidRule,
     /// (column, row) of each event of the view, in an order that each seed reshuffles.
@@ -52,8 +50,7 @@ impl Thinner {
         centroid: CentroidRule,
     ) -> Self {
         Self {
-            grid: PixelGrid::new(crop),
-            dbscan: Dbscan::new(eps_px, min_samples),
+            remaining: GrowingDbscan::new(crop, eps_px, min_samples),
             min_samples,
             centroid,
             pixels: Vec::new(),
@@ -68,7 +65,7 @@ impl Thinner {
         let n = self.count();
         self.grow(n);
         let full = self.left();
-        self.grid.clear();
+        self.remaining.clear();
         full
     }
 
@@ -106,7 +103,7 @@ impl Thinner {
             }
             out[at] = last;
         }
-        self.grid.clear();
+        self.remaining.clear();
     }
 
     /// Number of events in the view.
@@ -122,21 +119,21 @@ impl Thinner {
         }
     }
 
-    /// Fills the grid up to the first `count` events.
+    /// Adds the first `count` events, except those that were added before.
     fn grow(&mut self, count: u32) {
-        for &(u, v) in &self.pixels[self.grid.events() as usize..count as usize] {
-            self.grid.add(u, v);
+        for &(u, v) in &self.pixels[self.remaining.events() as usize..count as usize] {
+            self.remaining.add(u, v);
         }
     }
 
-    /// Centroid of the events on the grid.
+    /// Centroid of the remaining events.
     fn left(&mut self) -> ThinnedView {
-        let events = self.grid.events();
+        let events = self.remaining.events();
         let features = if events < self.min_samples {
             CameraFeatures::default() // no event has that many neighbours
         } else {
-            self.dbscan.run(&self.grid);
-            let estimate = ColumnEstimate::of_clusters(&self.dbscan, self.centroid, 1);
+            let clusters = self.remaining.run();
+            let estimate = ColumnEstimate::of_clusters(clusters, self.centroid, 1);
             CameraFeatures::from(&estimate)
         };
         ThinnedView { events, features }
@@ -155,6 +152,8 @@ fn heads(rng: &mut Xoshiro256PlusPlus, tosses: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dbscan::Dbscan;
+    use crate::grid::PixelGrid;
     use proptest::prelude::*;
     use skinrig_model::{CdEvent, Polarity};
 

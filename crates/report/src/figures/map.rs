@@ -10,14 +10,16 @@ use crate::derive::{self, LocationSummary};
 use crate::input::ReportInput;
 use crate::markup::Markup;
 use crate::plot::{
-    Canvas, Figure, LeftTexts, Place, Sample, column, draw_axes, press_path, scale_end, squares,
+    Canvas, Figure, LeftTexts, Place, Sample, column, draw_axes, press_path, rectangle, scale_end,
+    squares,
 };
 use crate::svg::{Px, dots, polyline};
 
 const SIZE: (f64, f64) = (900.0, 700.0);
-/// On a phone, scale and legend stand below the map.
-const NARROW: ((f64, f64), f64) = ((740.0, 1280.0), 1.4);
-const SIDE_TO: (f64, f64) = (-680.0, 700.0);
+/// On a phone, scale and legend stand below the map, side by side.
+const NARROW: ((f64, f64), f64) = ((740.0, 1120.0), 1.4);
+const SCALE_TO: (f64, f64) = (-680.0, 700.0);
+const LEGEND_TO: (f64, f64) = (-440.0, 365.0);
 /// Regions drawn; more would hide the map.
 const REGIONS: usize = 400;
 
@@ -184,7 +186,16 @@ pub(crate) fn skin_map(input: &ReportInput<'_>) -> Figure {
         .iter()
         .map(|(press, at, region)| (ellipse(&layout, place, *at, region), *press))
         .unzip();
-    svg.open("g", &[("class", &"layer-regions")]);
+    svg.open("clipPath", &[("id", &"skin-map-frame")]);
+    rectangle(svg, "clip", place.frame());
+    svg.close();
+    svg.open(
+        "g",
+        &[
+            ("class", &"layer-regions"),
+            ("clip-path", &"url(#skin-map-frame)"),
+        ],
+    );
     press_path(svg, "region", &ellipses, &drawn);
     svg.close();
     svg.open("g", &[("class", &format_args!("layer-vectors{dense}"))]);
@@ -202,9 +213,11 @@ pub(crate) fn skin_map(input: &ReportInput<'_>) -> Figure {
     layout.cameras(svg, place, input);
     svg.leaf("g", &[("class", &"selection")]);
     svg.close();
-    canvas.moving(SIDE_TO);
+    canvas.moving(SCALE_TO);
     let beyond = locations.iter().filter(|l| l.mean_error_mm > end).count();
     error_scale(&mut canvas.svg, "mean error\n(mm)", end, beyond);
+    canvas.svg.close();
+    canvas.moving(LEGEND_TO);
     column(&mut canvas.svg, (756.0, 400.0), &LEGEND);
     canvas.svg.close();
     if counted.is_empty() {
@@ -305,7 +318,7 @@ pub(crate) fn repeat_map(input: &ReportInput<'_>) -> Figure {
     layout.cameras(svg, &place, input);
     svg.close();
     let beyond = locations.iter().filter(|l| l.std_mm > Some(end)).count();
-    canvas.moving(SIDE_TO);
+    canvas.moving(SCALE_TO);
     error_scale(
         &mut canvas.svg,
         "std between\nrepetitions (mm)",

@@ -153,7 +153,7 @@ pub(super) fn error_scale(svg: &mut Markup, title: &str, top_mm: f64, beyond: us
     let (x, top, height) = (786.0, 70.0, 260.0);
     svg.open("g", &[("class", &"colour-bar")]);
     for (i, line) in title.split('\n').enumerate() {
-        let y = top - 32.0 + 15.0 * i as f64;
+        let y = top - 36.0 + 19.0 * i as f64;
         svg.text((x - 30.0, y), "label", "start", line);
     }
     let scale = Scale::new((0.0, top_mm), (top + height, top));
