@@ -3,7 +3,7 @@
 //! An event that is core stays core when events are added, and the sums of a tile whose pixels are all core are those of its
 //! events. So a run examines only pixels that were not core, and adds up only tiles that are partly in a cluster.
 
-use super::{Cluster, Dbscan, SIDE, Tile, TileSums};
+use super::{Dbscan, SIDE, Tile, TileSums};
 use crate::grid::PixelGrid;
 
 /// A grid and its clusters: the same as from [`Dbscan::run`] on a grid with the same events.
